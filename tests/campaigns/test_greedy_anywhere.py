@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import mesh_patches
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -61,17 +62,12 @@ def cells_of(kind: str, rng: np.random.Generator) -> Cells:
             plane((0.0, 0.2), (-0.2, 0.2), rpy_deg=(0, rng.uniform(-15, 15), 0)),
         ]
         return piecewise(bands if rng.random() < 0.5 else halves, **pose).cells((2, 3))
-    u, v = np.meshgrid(np.linspace(0, 0.3, 16), np.linspace(-0.15, 0.15, 16), indexing="ij")
+    u, v, faces = mesh_patches.grid(15, 15)
+    u, v = 0.3 * u, 0.3 * v - 0.15
     z = 0.04 * rng.normal() * np.sin(9 * u) * np.cos(8 * v)
     if kind == "creased mesh":
         z = np.tan(np.radians(rng.uniform(-30, 30))) * np.minimum(u, 0.3 - u)
-    corner = (16 * np.arange(15)[:, None] + np.arange(15)).ravel()
-    faces = np.concatenate([
-        np.column_stack([corner, corner + 16, corner + 17]),
-        np.column_stack([corner, corner + 17, corner + 1]),
-    ])  # fmt: skip
-    points = np.stack([u, v, z], axis=-1).reshape(-1, 3)
-    return mesh(TriangleMesh(points, faces), **pose).cells(count=16)
+    return mesh(TriangleMesh(np.stack([u, v, z], axis=1), faces), **pose).cells(count=16)
 
 
 def motions_of(tree: Any) -> NDArray[np.float64]:

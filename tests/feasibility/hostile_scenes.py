@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from mesh_writers import stl_of
 
 from coverable_errors import worded
 from feasibility.cases import CaseError
@@ -84,13 +85,6 @@ def bad_keys(rng: random.Random, folder: Path) -> tuple[Entry, str]:
     return dict(entry), "is missing|must be|is no key|not supported|not known"
 
 
-def stl_bytes(triangles: np.ndarray) -> bytes:
-    """A binary STL."""
-    rows = np.zeros(len(triangles), dtype=[("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")])
-    rows["v"] = triangles
-    return bytes(80) + struct.pack("<I", len(triangles)) + rows.tobytes()
-
-
 def no_mesh(rng: random.Random, folder: Path) -> tuple[Entry, str]:
     """A file that is no mesh, or none that may be opened."""
     name = f"{rng.getrandbits(40):x}.{rng.choice(('stl', 'obj', 'ply', 'off', 'glb', 'zip', ''))}"
@@ -104,7 +98,7 @@ def no_mesh(rng: random.Random, folder: Path) -> tuple[Entry, str]:
         path.touch()
         os.truncate(path, 1 << 40)
     elif what != "missing":
-        content = {"empty": b"", "html": b"<html>", "cut": stl_bytes(np.ones((9, 3, 3)))[:-7]}
+        content = {"empty": b"", "html": b"<html>", "cut": stl_of(np.ones((9, 3, 3)))[:-7]}
         path.write_bytes(content.get(what, rng.randbytes(rng.randrange(1, 4000))))
     return {"kind": "mesh", "file": str(path), "scale": 1.0}, "."
 
@@ -126,7 +120,7 @@ def bad_triangles(rng: random.Random, folder: Path) -> tuple[Entry, str]:
     else:
         triangles[0, 1, 1] = {"nan": np.nan, "infinite": np.inf}.get(what, 0.0)
         triangles *= {"line": [1, 0, 0], "point": 0.0, "wide": 1e30}.get(what, 1.0)
-        path.write_bytes(stl_bytes(triangles))
+        path.write_bytes(stl_of(triangles))
     return {"kind": "mesh", "file": str(path), "scale": 1.0}, "."
 
 
@@ -150,7 +144,7 @@ def odd_mesh(rng: random.Random, folder: Path) -> tuple[Entry, str]:
     else:
         cube = cube * {"thin": [1, 1, 1e-5], "flat": [1, 1, 0], "needle": [1, 1e-4, 1e-4]}[what]
     path = folder / f"{rng.getrandbits(40):x}.stl"
-    path.write_bytes(stl_bytes(cube[faces]))
+    path.write_bytes(stl_of(cube[faces]))
     return {"kind": "mesh", "file": str(path), "scale": rng.choice((1.0, 0.001, 1000.0))}, TAKEN
 
 

@@ -10,7 +10,7 @@ from arm_urdfs import FREE, arm, joint
 from numpy.typing import NDArray
 
 from feasibility import Task
-from robots import Kinematics, Robot, load_robot
+from robots import Robot, load_robot
 from robots.pinocchio_model import robot_from_urdf
 from robots.urdf.checked_urdf import check_urdf_text
 from surfaces import Cells, Surface, cylinder, hyperboloid, plane, sphere
@@ -108,13 +108,6 @@ def random_configuration(robot: Robot, rng: np.random.Generator) -> Floats:
         values = np.stack([np.clip(rng.choice(RIGHT_ANGLES, robot.n), low, high), low, high, q])
         q = values[rng.choice(4, robot.n, p=[0.4, 0.1, 0.1, 0.4]), np.arange(robot.n)]
     return np.ascontiguousarray(q)
-
-
-def tools(robot: Robot, q: Floats) -> tuple[Floats, Floats]:
-    """Tool points and approach axes (k, 3) of configurations (k, n), by Pinocchio."""
-    kinematics = Kinematics(robot)
-    pairs = [kinematics.tool(row) for row in q]
-    return np.array([p for p, _ in pairs]), np.array([a for _, a in pairs])
 
 
 def between(q0: Floats, q1: Floats, samples: int) -> tuple[Floats, Floats]:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import struct
-
 import mesh_patches
 import numpy as np
 import pytest
+from mesh_writers import stl
 
 from feasibility import Task, check
 from feasibility.cases import load_case
@@ -22,19 +21,7 @@ FINE = (90, 100)  # rows and columns of facets
 
 def stl_of(patch, path):
     """A patch as a binary STL file, corners to single precision, faces looking outward."""
-    u, v = np.meshgrid(
-        np.linspace(*patch.u_range, FINE[0] + 1),
-        np.linspace(*patch.v_range, FINE[1] + 1),
-        indexing="ij",
-    )
-    faces = mesh_patches.grid(*FINE)[2]
-    corners = patch.point(u, v).reshape(-1, 3)[faces]
-    looks = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    if (looks * patch.normal(u, v).reshape(-1, 3)[faces[:, 0]]).sum() < 0.0:
-        corners = corners[:, ::-1]
-    records = np.zeros(len(corners), dtype=[("n", "<f4", 3), ("p", "<f4", (3, 3)), ("a", "<u2")])
-    records["p"] = corners
-    path.write_bytes(b"patch".ljust(80) + struct.pack("<I", len(records)) + records.tobytes())
+    path.write_bytes(stl(*mesh_patches.of_patch(patch, *FINE)))
     return path
 
 

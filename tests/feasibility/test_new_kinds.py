@@ -7,7 +7,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from dense_replay import tools
+from dense_replay import dense, tools
+from mesh_patches import of_patch
 from paper_cases import PAPER_CASES
 from spline_nets import hood
 
@@ -44,10 +45,7 @@ def held(verdict: Verdict, points: int = 20) -> None:
     walk, cells, task, robot = verdict.witness, verdict.cells, verdict.task, verdict.robot
     assert walk is not None
     tolerance = 1e-3 if task.tolerance is None else task.tolerance
-    share = np.linspace(0.0, 1.0, points, endpoint=False)[:, None]
-    q = np.concatenate(
-        [*(a + share * (b - a) for a, b in zip(walk.q, walk.q[1:], strict=False)), walk.q[-1:]]
-    )
+    q = dense(walk.q, points)
     assert (q >= robot.lower - 1e-12).all()
     assert (q <= robot.upper + 1e-12).all()
     tips, axes = tools(robot, q)
@@ -122,12 +120,7 @@ def test_a_feasible_patch_of_each_kind_has_a_motion_that_holds(name: str) -> Non
 
 
 def meshed(patch: Patch, pieces: int = 100, **pose: object) -> Surface:
-    u, v = (np.linspace(*ends, pieces + 1) for ends in (patch.u_range, patch.v_range))
-    i, j = (x.ravel() for x in np.meshgrid(*[np.arange(pieces)] * 2, indexing="ij"))
-    a = i * (pieces + 1) + j
-    b, c, d = a + pieces + 1, a + pieces + 2, a + 1
-    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
-    return mesh(TriangleMesh(patch.point(u[:, None], v[None, :]).reshape(-1, 3), faces), **pose)
+    return mesh(TriangleMesh(*of_patch(patch, pieces, pieces)), **pose)
 
 
 @cache

@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from dense_replay import tools
 from planted_rolls import planted_roll
-from random_arms import tools
 
 from coverable import load_case
 from feasibility import Task, check

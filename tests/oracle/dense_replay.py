@@ -117,6 +117,13 @@ def angles(a: Floats, b: Floats) -> Floats:
     return 2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(a - b, axis=-1), 0.0, 1.0))
 
 
+def dense(rows: Floats, per_segment: int = PER_SEGMENT) -> Floats:
+    """Rows (k, n) and others evenly on the straight lines between them."""
+    part = np.arange(per_segment)[:, None] / per_segment
+    between = rows[:-1, None] * (1.0 - part) + rows[1:, None] * part
+    return np.concatenate([between.reshape(-1, rows.shape[1]), rows[-1:]])
+
+
 def assert_over(verdict: Verdict, cell: NDArray[np.int64], q: Floats) -> None:
     """Every q (k, n) holds the tool over the centre of its cell, inside all constraints."""
     robot, cells, task = verdict.robot, verdict.cells, verdict.task
@@ -136,9 +143,7 @@ def assert_motion(verdict: Verdict, q: Floats) -> None:
     assert np.isfinite(q).all()
     assert (q >= robot.lower).all()
     assert (q <= robot.upper).all()
-    part = np.arange(PER_SEGMENT)[:, None] / PER_SEGMENT
-    dense = (q[:-1, None] * (1.0 - part) + q[1:, None] * part).reshape(-1, robot.n)
-    points, axes = tools(robot, np.concatenate([dense, q[-1:]]))
+    points, axes = tools(robot, dense(q))
     u, v = onto_patch(surface, *closest_points(surface, points))
     target, approach = placed(surface, task, u, v)
     assert np.linalg.norm(points - target, axis=1).max() <= tolerance + SAME

@@ -12,7 +12,6 @@ Run this file to draw the cases again.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -22,7 +21,16 @@ import puma_motion
 import puma_oracle
 from oracle_cases import Problem
 from puma_oracle import Resolution
-from random_cases import HERE, _round, draw_surface, puma_first, tightened, write
+from random_cases import (
+    HERE,
+    _round,
+    centred,
+    collect_found,
+    draw_surface,
+    puma_first,
+    read_found,
+    tightened,
+)
 
 FINE = Resolution(rows=12.0, turn_deg=2.0)
 COARSE = Resolution(samples=1500)
@@ -59,10 +67,7 @@ def draw_large_cells(rng: np.random.Generator) -> Problem:
         cone_deg=round(float(np.exp(rng.uniform(np.log(3), np.log(40)))), 2),
         limits_deg=tuple(_round(pair) for pair in zip(low, high, strict=True)),
     )
-    middle = problem.targets(*np.array([r.mean() for r in problem.ranges])[:, None])[0][0]
-    plain = problem.plain()
-    plain["position"] = _round(place - middle)
-    return Problem.read(plain)
+    return centred(problem, place)
 
 
 def moves(problem: Problem) -> tuple[float, float] | None:
@@ -100,25 +105,9 @@ def search(rng: np.random.Generator) -> Between | None:
     return None if on_net.feasible else Between(problem, on_net.covered, *room)
 
 
-def collect(wanted: int, seed: int, path: Path, kept: list[dict[str, Any]]) -> int:
-    """Add cases until so many are new, writing all; returns how many were drawn."""
-    rng, drawn, most = np.random.default_rng(seed), 0, len(kept) + wanted
-    while len(kept) < most:
-        found, drawn = search(rng), drawn + 1
-        if found is not None:
-            rest = found._asdict()
-            kept.append({**rest.pop("problem").plain(), **rest})
-            write(path, kept)
-    return drawn
-
-
 def read_between(path: Path = HERE / "between_curves.json") -> list[Between]:
     """The stored cases."""
-    found = []
-    for case in json.loads(path.read_text(encoding="utf-8")):
-        rest = [case.pop(field) for field in Between._fields[1:]]
-        found.append(Between(Problem.read(case), *rest))
-    return found
+    return read_found(Between, path)
 
 
 def main() -> None:
@@ -127,7 +116,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=HERE / "between_curves.json")
     out, kept = parser.parse_args().out, list[dict[str, Any]]()
     for seed, wanted in JOBS:
-        drawn = collect(wanted, seed, out, kept)
+        drawn = collect_found(search, wanted, seed, out, kept)
         sys.stderr.write(f"{wanted} of {drawn} drawn\n")
 
 

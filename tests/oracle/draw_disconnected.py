@@ -13,9 +13,8 @@ Run this file to draw the cases again.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
-from pathlib import Path
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,10 +29,12 @@ from random_cases import (
     HERE,
     MOST_STEPS,
     _round,
+    centred,
+    collect_found,
     draw_surface,
     kind_of,
+    read_found,
     tightened,
-    write,
 )
 
 from feasibility import CauseKind, check
@@ -135,10 +136,7 @@ def draw_panda(rng: np.random.Generator) -> Apart | None:
         cone_deg=round(float(np.exp(rng.uniform(np.log(3), np.log(40)))), 2),
         limits_deg=tuple(_round(pair) for pair in zip(low, low + inner, strict=True)),
     )
-    middle = problem.targets(*np.array([r.mean() for r in problem.ranges])[:, None])[0][0]
-    plain = problem.plain()
-    plain["position"] = _round(place - middle)
-    problem = Problem.read(plain)
+    problem = centred(problem, place)
     for _ in range(MOST_STEPS):
         if not reached_alone(problem, rng):
             return None
@@ -155,25 +153,9 @@ def draw(rng: np.random.Generator, arm: str) -> Apart | None:
     return draw_panda(rng) if arm == "panda" else draw_by_oracle(rng, arm)
 
 
-def collect(arm: str, wanted: int, seed: int, path: Path, kept: list[dict[str, Any]]) -> int:
-    """Add problems until so many are new, writing all; returns how many were drawn."""
-    rng, drawn, most = np.random.default_rng(seed), 0, len(kept) + wanted
-    while len(kept) < most:
-        found, drawn = draw(rng, arm), drawn + 1
-        if found is not None:
-            rest = found._asdict()
-            kept.append({**rest.pop("problem").plain(), **rest})
-            write(path, kept)
-    return drawn
-
-
 def read_apart(arm: str) -> list[Apart]:
     """The stored problems of an arm."""
-    found = []
-    for case in json.loads((HERE / f"{arm}_apart.json").read_text(encoding="utf-8")):
-        rest = [case.pop(name) for name in Apart._fields[1:]]
-        found.append(Apart(Problem.read(case), *rest))
-    return found
+    return read_found(Apart, HERE / f"{arm}_apart.json")
 
 
 def main() -> None:
@@ -181,9 +163,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("arms", nargs="*", default=list(JOBS))
     for arm in parser.parse_args().arms:
-        kept = list[dict[str, Any]]()
+        path, kept = HERE / f"{arm}_apart.json", list[dict[str, Any]]()
         for seed, wanted in JOBS[arm]:
-            drawn = collect(arm, wanted, seed, HERE / f"{arm}_apart.json", kept)
+            drawn = collect_found(partial(draw, arm=arm), wanted, seed, path, kept)
             sys.stderr.write(f"{arm}: {wanted} of {drawn} drawn\n")
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from dense_replay import Floats, angles, placed, tools
+from dense_replay import Floats, angles, dense, placed, tools
 
 from feasibility import Task
 from robots import Robot
@@ -169,14 +169,8 @@ def measured(
     robot: Robot, cells: Cells, task: Task, way: Raster, q: Floats, per_step: int = PER_STEP
 ) -> Kept:
     """Sample a motion, straight in joints between rows, against the places straight between."""
-    part = np.arange(per_step)[:, None] / per_step
-
-    def dense(rows: Floats) -> Floats:
-        between = rows[:-1, None] * (1.0 - part) + rows[1:, None] * part
-        return np.concatenate([between.reshape(-1, rows.shape[1]), rows[-1:]])
-
-    points, approaches = placed(cells.surface, task, *dense(way.uv).T)
-    tips, axes = tools(robot, dense(q))
+    points, approaches = placed(cells.surface, task, *dense(way.uv, per_step).T)
+    tips, axes = tools(robot, dense(q, per_step))
     return Kept(
         float(np.linalg.norm(tips - points, axis=1).max()),
         float(angles(axes, approaches).max()),

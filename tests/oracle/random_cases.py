@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import puma_oracle
 import ur5_oracle
+from numpy.typing import NDArray
 from oracle_cases import Answer, Problem, patch
 from puma_oracle import Resolution
 
@@ -120,6 +121,12 @@ def draw_limits(rng: np.random.Generator) -> tuple[tuple[float, float], ...]:
     return tuple(_round(pair) for pair in zip(low, high, strict=True))
 
 
+def centred(problem: Problem, place: NDArray[np.float64]) -> Problem:
+    """The problem with the middle of its patch at a place (m)."""
+    middle = problem.targets(*np.array([r.mean() for r in problem.ranges])[:, None])[0][0]
+    return Problem.read({**problem.plain(), "position": _round(place - middle)})
+
+
 def draw(rng: np.random.Generator) -> Problem:
     """A random problem, its patch around a random place at 0.3 to 1.4 m from the shoulder."""
     hard = rng.random() < 0.6  # large patches and narrow cones, which fall apart more often
@@ -135,10 +142,7 @@ def draw(rng: np.random.Generator) -> Problem:
         cone_deg=round(float(np.exp(rng.uniform(np.log(3), np.log(30 if hard else 90)))), 2),
         limits_deg=draw_limits(rng),
     )
-    middle = problem.targets(*np.array([r.mean() for r in problem.ranges])[:, None])[0][0]
-    plain = problem.plain()
-    plain["position"] = _round(place - middle)
-    return Problem.read(plain)
+    return centred(problem, place)
 
 
 def draw_ur5(rng: np.random.Generator) -> Problem:
@@ -160,10 +164,7 @@ def draw_ur5(rng: np.random.Generator) -> Problem:
         cone_deg=round(float(np.exp(rng.uniform(np.log(18), np.log(70)))), 2),
         limits_deg=tuple(_round(pair) for pair in limits),
     )
-    middle = problem.targets(*np.array([r.mean() for r in problem.ranges])[:, None])[0][0]
-    plain = problem.plain()
-    plain["position"] = _round(place - middle)
-    problem = Problem.read(plain)
+    problem = centred(problem, place)
     points, _ = problem.targets(*patch(problem, 9).uv.T)
     near = np.hypot(points[:, 0], points[:, 1]).min() < ur5_oracle.CLEARANCE + 0.03
     return draw_ur5(rng) if near else problem
@@ -251,6 +252,33 @@ def write(path: Path, cases: list[dict[str, Any]]) -> None:
     """One case a line, so that a change shows."""
     lines = ",\n".join(json.dumps(case, separators=(",", ":")) for case in cases)
     path.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
+
+
+def collect_found(
+    search: Callable[[np.random.Generator], Any],
+    wanted: int,
+    seed: int,
+    path: Path,
+    kept: list[dict[str, Any]],
+) -> int:
+    """Add what a search finds until so many are new, writing all; returns how many were drawn."""
+    rng, drawn, most = np.random.default_rng(seed), 0, len(kept) + wanted
+    while len(kept) < most:
+        found, drawn = search(rng), drawn + 1
+        if found is not None:
+            rest = found._asdict()
+            kept.append({**rest.pop("problem").plain(), **rest})
+            write(path, kept)
+    return drawn
+
+
+def read_found(kind: type[Any], path: Path) -> list[Any]:
+    """The stored named tuples of a kind, whose first field is the problem."""
+    found = []
+    for case in json.loads(path.read_text(encoding="utf-8")):
+        rest = [case.pop(field) for field in kind._fields[1:]]
+        found.append(kind(Problem.read(case), *rest))
+    return found
 
 
 def read(arm: str) -> list[tuple[Problem, Answer]]:

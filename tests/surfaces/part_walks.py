@@ -126,3 +126,30 @@ def lost(surface, rng, count=2000):
         used = walk(parts, first, x, patch.point(u, v), sign * patch.normal(u, v))
         worst = max(worst, used.points, used.normals)
     return worst > 1.0
+
+
+def stated_over_least(patch, rounding):
+    """Errors that affine models over small boxes state, in those that no affine model falls below.
+
+    The models keep to what they state at 21 x 21 places of each box.
+    """
+    rng = np.random.default_rng(3)
+    ends = np.array([patch.u_range, patch.v_range])
+    grid = np.linspace(-1.0, 1.0, 21)
+    x = np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)
+    affine = np.column_stack([np.ones(len(x)), x])
+    ratios = []
+    for _ in range(20):
+        half = np.diff(ends)[:, 0] * rng.uniform(1e-3, 0.02, 2)
+        middle = rng.uniform(ends[:, 0] + half, ends[:, 1] - half)
+        models = patch.part_models((middle - half)[None], (middle + half)[None])
+        u, v = (middle + x * half).T
+        for model, places in zip(
+            models, (patch.local_point(u, v), patch.local_normal(u, v)), strict=True
+        ):
+            best, *_ = np.linalg.lstsq(affine, places, rcond=None)
+            left = np.linalg.norm(places - affine @ best, axis=1).max()
+            ratios.append(max(model.error[0] - rounding, 0.0) / max(left, 1e-15))
+            off = places - affine @ np.vstack([model.centre, model.slopes[0]])
+            assert np.linalg.norm(off, axis=1).max() <= model.error[0] * (1.0 + 1e-9) + 1e-12
+    return ratios

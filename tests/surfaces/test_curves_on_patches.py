@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from smooth_probes import assert_curves_lie_on
 from spline_nets import TURN_KNOTS, full_turn, hood, turned
 
 from surfaces import bspline, cone, ellipsoid, revolution, torus
@@ -29,17 +30,8 @@ def test_curves_run_on_the_surface_and_the_short_way(name):
     patch = PATCHES[name]
     cells = patch.cells(6, 9)
     curves = cells.curves
-    pair = np.repeat(np.arange(len(cells.pairs)), 21)
-    t = np.tile(np.linspace(0, 1, 21), len(cells.pairs))
-    closest_point, normal = curves.at(pair, t)
-    on = patch.closest(closest_point)
-    assert on.inside.all()
-    assert (np.abs(on.height) <= curves.deviations[pair, 0] + 1e-12).all()
-    # The normal there may turn across the curve, where the surface bends more than along it.
-    apart = np.linalg.norm(normal - on.normal, axis=1)
-    assert (apart <= curves.deviations[pair, 1] + 1e-12).all()
+    ends = assert_curves_lie_on(patch, curves)
     assert curves.deviations.max() < 2e-5
-    ends = closest_point.reshape(-1, 21, 3)
     assert ends[:, 0] == pytest.approx(cells.centres[cells.pairs[:, 0]], abs=1e-14)
     assert ends[:, -1] == pytest.approx(cells.centres[cells.pairs[:, 1]], abs=1e-14)
     # No curve goes the long way round: it is at most as long as half a circle on its chord.
@@ -53,15 +45,7 @@ def test_curves_run_on_the_surface_and_the_short_way(name):
 @pytest.mark.parametrize("shape", [(1, 14), (14, 1)], ids=str)
 def test_a_single_row_counts_the_bend_to_its_side(name, shape):
     """No other curve shows how sharply the surface bends across these."""
-    patch = PATCHES[name]
-    curves = patch.cells(*shape).curves
-    pair = np.repeat(np.arange(len(curves)), 21)
-    closest_point, normal = curves.at(pair, np.tile(np.linspace(0, 1, 21), len(curves)))
-    on = patch.closest(closest_point)
-    assert on.inside.all()
-    assert (np.abs(on.height) <= curves.deviations[pair, 0] + 1e-12).all()
-    apart = np.linalg.norm(normal - on.normal, axis=1)
-    assert (apart <= curves.deviations[pair, 1] + 1e-12).all()
+    assert_curves_lie_on(PATCHES[name], PATCHES[name].cells(*shape).curves)
 
 
 @pytest.mark.parametrize("name", PATCHES, ids=str)

@@ -10,7 +10,7 @@ import mesh_patches
 import numpy as np
 import pytest
 import trimesh
-from dense_replay import tools
+from dense_replay import dense, tools
 from trimesh.triangles import closest_point
 
 from feasibility import Answer, Task, check
@@ -77,11 +77,7 @@ def assert_held(verdict, part, position, lean):
     """A motion over all cells, at the standoff and in the cone, but for `lean` rad."""
     assert verdict.feasible
     walk, task = verdict.witness, verdict.task
-    share = np.arange(PER_SEGMENT)[:, None] / PER_SEGMENT
-    q = np.concatenate(
-        [(walk.q[:-1, None] * (1 - share) + walk.q[1:, None] * share).reshape(-1, 6), walk.q[-1:]]
-    )
-    tips, axes = tools(verdict.robot, q)
+    tips, axes = tools(verdict.robot, dense(walk.q, PER_SEGMENT))
     closest = nearest(part.vertices[part.faces] + position, tips)
     away = np.linalg.norm(tips - closest, axis=1)
     tolerance = 1e-3 if task.tolerance is None else task.tolerance

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import mesh_patches
 import numpy as np
 import pytest
-from dense_replay import angles, tools
+from dense_replay import angles, dense, tools
 from scipy.spatial import cKDTree
 
 from feasibility import Task, check
@@ -116,19 +116,12 @@ def _on_triangles(points, corners):
     return best, away
 
 
-def dense(walk):
-    """(k, n) the walk's segments at PER_SEGMENT places each."""
-    share = np.arange(PER_SEGMENT)[:, None] / PER_SEGMENT
-    between = walk.q[:-1, None] * (1.0 - share) + walk.q[1:, None] * share
-    return np.concatenate([between.reshape(-1, walk.q.shape[1]), walk.q[-1:]])
-
-
 def assert_held(verdict, vertices, faces):
     """Tolerance, cone, limits and cells, over the triangles (in the own frame) as given."""
     walk, robot, task, cells = verdict.witness, verdict.robot, verdict.task, verdict.cells
     surface = cells.surface
     tolerance = 1e-3 if task.tolerance is None else task.tolerance
-    q = dense(walk)
+    q = dense(walk.q, PER_SEGMENT)
     assert (q >= robot.lower - 1e-12).all()
     assert (q <= robot.upper + 1e-12).all()
     tips, axes = tools(robot, q)
@@ -235,7 +228,7 @@ def test_the_cone_holds_along_a_thin_rod_where_the_tool_point_is(case):
     rod = cylinder(radius, (-10, 10), (0.0, length), side=side, rpy_deg=rpy, position=position)
     verdict = check(load_robot(name), rod.cells(1, 3), Task(standoff=standoff, cone_deg=cone))
     if verdict.feasible:
-        tips, axes = tools(verdict.robot, dense(verdict.witness))
+        tips, axes = tools(verdict.robot, dense(verdict.witness.q, PER_SEGMENT))
         turn = rotation_from_rpy(*np.radians(rpy))
         off = (tips - np.asarray(position)) @ turn
         off[:, 2] = 0.0
@@ -247,22 +240,15 @@ def test_the_cone_holds_along_a_thin_rod_where_the_tool_point_is(case):
 
 def thorny_plate():
     """A plate with one thorn, thinner than its other triangles are long."""
-    from scipy.spatial import Delaunay
-
     x, y = np.meshgrid(np.linspace(0, 0.4, 41), np.linspace(0, 0.3, 31))
     points = np.column_stack([x.ravel(), y.ravel()])
     tip, turns = np.array(THORN), np.arange(6) * np.pi / 3
     points = points[np.linalg.norm(points - tip, axis=1) > 2e-3]
     base = tip + 5e-4 * np.column_stack([np.cos(turns), np.sin(turns)])
     points = np.concatenate([points, base, tip[None]])
-    faces = Delaunay(points).simplices.astype(np.int64)
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    turn = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    faces[turn < 0] = faces[turn < 0][:, ::-1]
-    faces = faces[abs(turn) > 1e-12]
     vertices = np.column_stack([points, np.zeros(len(points))])
     vertices[-1, 2] = 0.015
-    return vertices, faces
+    return vertices, mesh_patches.flat_faces(points, 1e-12)
 
 
 THORN = (0.08069597657662232, 0.21995366749323075)
@@ -275,7 +261,7 @@ def test_no_motion_is_certified_through_a_thorn():
     task = Task(standoff=0.01, cone_deg=40)
     verdict = check(load_robot("ur5"), surface.cells(150), task)
     if verdict.feasible:
-        tips, _ = tools(verdict.robot, dense(verdict.witness))
+        tips, _ = tools(verdict.robot, dense(verdict.witness.q, PER_SEGMENT))
         tips = tips - surface.position
         away = np.linalg.norm(tips - Reader(vertices, faces).nearest(tips).points, axis=1)
         assert away.min() >= 9e-3 - 1e-9

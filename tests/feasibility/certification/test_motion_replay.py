@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from arm_urdfs import joint
-from random_arms import QUESTIONS, between, deviation, planar_arm, question, robot_of, tools
+from dense_replay import tools
+from random_arms import QUESTIONS, between, deviation, planar_arm, question, robot_of
 
 import feasibility
 from feasibility import Task, check

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from dense_replay import tools
+from dense_replay import dense, tools
 from test_creases import PER_SEGMENT, nearest, roof
 
 from feasibility import Task, check
@@ -32,9 +32,7 @@ def test_a_certificate_bounds_how_far_a_motion_is_from_the_triangles(name: str) 
     assert verdict.witness is not None
     assert verdict.certificate is not None
     walk, certificate = verdict.witness, verdict.certificate
-    share = np.arange(PER_SEGMENT)[:, None] / PER_SEGMENT
-    q = walk.q[:-1, None] * (1 - share) + walk.q[1:, None] * share
-    tips, axes = tools(verdict.robot, np.concatenate([q.reshape(-1, 6), walk.q[-1:]]))
+    tips, axes = tools(verdict.robot, dense(walk.q, PER_SEGMENT))
     closest = nearest(part.vertices[part.faces] + surface.position, tips)
     away = np.linalg.norm(tips - closest, axis=1)
     assert np.abs(away - task.standoff).max() <= certificate.max_position_error

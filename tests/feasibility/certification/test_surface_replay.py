@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from dense_replay import dense
 from rasters import SURFACES, followed, raster
 from small_cases import paper_verdict
 
@@ -22,13 +23,6 @@ FEASIBLE_PAPER_CASES = ("4a", "4b", "4c", "4e", "5a", "5b", "5c", "5d", "5e", "5
 def made(request):
     """A motion made by other means."""
     return raster(request.param)
-
-
-def dense(q, per_row):
-    """Rows (k, n) with others between them."""
-    t = np.arange(per_row)[:, None] / per_row
-    between = q[:-1, None] + t * np.diff(q, axis=0)[:, None]
-    return np.vstack([between.reshape(-1, q.shape[1]), q[-1:]])
 
 
 def heights(cells, task, robot, q):

@@ -18,6 +18,7 @@ from pathlib import Path
 import numba
 import pytest
 from bad_cases import BAD_CASES, GOOD, write
+from guards import GUARD_S
 from schema import CHECK, conforms
 from small_cases import TEXTS, small_case, small_verdict
 
@@ -33,7 +34,6 @@ from feasibility.version import version
 from feasibility.viewer.live_server import LiveView
 
 COMMAND = [sys.executable, "-m", "feasibility.cli"]
-GUARD_S = 300  # against hanging alone
 
 
 def run(*args, **options):
@@ -223,40 +223,6 @@ def test_trouble_of_the_machine_is_status_2_and_no_bug(ask, monkeypatch, plate, 
     status, _, err = ask("check", plate)
     assert words in message(err, status)
     assert "bug" not in err
-
-
-def test_an_interrupted_search_is_status_130(ask, monkeypatch, plate):
-    def interrupted(*_, **__):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(feasibility.checking, "check", interrupted)
-    assert ask("check", plate) == (130, "", "coverable: interrupted\n")
-
-
-def test_an_interrupt_that_python_drops_is_not_lost(ask, monkeypatch, plate):
-    def dropped(*_, **__):
-        with contextlib.suppress(KeyboardInterrupt):  # as in a callback of the interpreter
-            signal.raise_signal(signal.SIGINT)
-        return small_verdict("plate")
-
-    before = signal.getsignal(signal.SIGINT)
-    monkeypatch.setattr(feasibility.checking, "check", dropped)
-    assert ask("check", plate) == (130, "", "coverable: interrupted\n")
-    assert signal.getsignal(signal.SIGINT) is before
-
-
-def test_an_interrupt_during_an_import_lets_it_end(ask, monkeypatch, plate, tmp_path):
-    """An import that is broken off leaves a library that says it is broken."""
-    lines = "import signal", "signal.raise_signal(signal.SIGINT)", "whole = True"
-    (tmp_path / "imported_when_interrupted.py").write_text("\n".join(lines))
-    monkeypatch.syspath_prepend(tmp_path)
-
-    def importing(*_, **__):
-        assert __import__("imported_when_interrupted").whole
-        return small_verdict("plate")
-
-    monkeypatch.setattr(feasibility.checking, "check", importing)
-    assert ask("check", plate) == (130, "", "coverable: interrupted\n")
 
 
 def test_what_a_library_says_of_an_interrupt_is_no_error(ask, monkeypatch, plate):

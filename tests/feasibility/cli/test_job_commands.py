@@ -9,26 +9,18 @@ import pytest
 
 from feasibility.cases import Case, load_case
 from feasibility.certification import replay
-from feasibility.cli.main import main
 from feasibility.reports.path import at_least, at_most
 from feasibility.results.trajectory_files import load_trajectory
 
 
-def run(capsys, *argv):
-    """Exit status, stdout and stderr of a command."""
-    status = main(list(argv))
-    captured = capsys.readouterr()
-    return status, captured.out, captured.err
-
-
-def test_a_path_is_written_in_three_formats_that_replay(tmp_path, capsys):
+def test_a_path_is_written_in_three_formats_that_replay(tmp_path, ask):
     """CSV and JSON, read back, are one motion over all cells that the replay accepts."""
     files = [tmp_path / f"run.{ending}" for ending in ("csv", "json", "yaml")]
     view = tmp_path / "run.html"
     outs = [part for file in files for part in ("--out", str(file))]
     few = "surface.cells=[4, 5]"
     asked = "path", "paper/4e", "--set", few, "--json", "--speed", "0.25", *outs
-    status, out, err = run(capsys, *asked, "--html", str(view))
+    status, out, err = ask(*asked, "--html", str(view))
     assert status == 0
     told = json.loads(out)
     assert told["verdict"] == "feasible"
@@ -55,13 +47,11 @@ def test_a_path_is_written_in_three_formats_that_replay(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("settings", "status"), [([], 1), (["--set", "search.time_limit=1e-6"], 3)]
 )
-def test_a_path_of_what_is_not_feasible_is_refused_with_the_reason(
-    settings, status, tmp_path, capsys
-):
+def test_a_path_of_what_is_not_feasible_is_refused_with_the_reason(settings, status, tmp_path, ask):
     """The verdict's own status, nothing on stdout, no files, and where to go from here."""
     files = [str(tmp_path / "run.csv"), str(tmp_path / "run.html")]
     outs = ["--out", files[0], "--html", files[1]]
-    found, out, err = run(capsys, "path", "paper/4d", *settings, *outs)
+    found, out, err = ask("path", "paper/4d", *settings, *outs)
     assert found == status
     assert out == ""
     assert "no path over this surface is known" in err
@@ -73,14 +63,14 @@ def test_a_path_of_what_is_not_feasible_is_refused_with_the_reason(
 
 @pytest.mark.parametrize("command", ["path", "divide", "explain"])
 @pytest.mark.parametrize("case", ["infeasible", "undecided", "hopeless"])
-def test_json_is_one_object_whatever_the_answer(command, case, capsys):
+def test_json_is_one_object_whatever_the_answer(command, case, ask):
     """Infeasible, out of time, and a surface that no cell of can be reached."""
     settings, status = {
         "infeasible": ([], 1),
         "undecided": (["--set", "search.time_limit=1e-6"], 3),
         "hopeless": (["--set", "surface.position=[9, 0, 0]"], 1),
     }[case]
-    found, out, err = run(capsys, command, "paper/4d", "--json", *settings)
+    found, out, err = ask(command, "paper/4d", "--json", *settings)
     told = json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
     assert found == status
     assert "Traceback" not in err
@@ -110,9 +100,9 @@ def test_json_is_one_object_whatever_the_answer(command, case, capsys):
         (["explain", "paper/4a", "--html", "no/such/folder/x.html"], "no/such/folder"),
     ],
 )
-def test_bad_input_is_one_message(argv, words, capsys):
+def test_bad_input_is_one_message(argv, words, ask):
     """Status 2, nothing on stdout, no traceback."""
-    status, out, err = run(capsys, *argv)
+    status, out, err = ask(*argv)
     assert status == 2
     assert out == ""
     assert words in err
@@ -136,7 +126,7 @@ pieces = [{ kind = "plane", u = [0, 1], v = [0, 1], cells = [2, 3] }]
 @pytest.mark.parametrize("order", ["rows", "columns", "spiral"])
 @pytest.mark.parametrize(("kind", "text"), [("mesh", MESH), ("piecewise", PIECES)])
 def test_an_order_that_there_is_not_is_refused_before_any_work(
-    kind, text, order, tmp_path, capsys, monkeypatch
+    kind, text, order, tmp_path, ask, monkeypatch
 ):
     """Nothing is built for it: neither the mesh's file nor the arm is looked at."""
 
@@ -145,17 +135,17 @@ def test_an_order_that_there_is_not_is_refused_before_any_work(
 
     monkeypatch.setattr(Case, "build", build)
     (tmp_path / "case.toml").write_text(text)
-    status, out, err = run(capsys, "path", str(tmp_path / "case.toml"), "--order", order)
+    status, out, err = ask("path", str(tmp_path / "case.toml"), "--order", order)
     assert (status, out) == (2, "")
     assert f"'{order}'" in err
     assert kind in err
     assert "use order 'shortest'" in err
 
 
-def test_a_division_is_drawn(tmp_path, capsys):
+def test_a_division_is_drawn(tmp_path, ask):
     """Status 1 where cells are left out; the page names the patch and what is left."""
     view = tmp_path / "parts.html"
-    status, out, _ = run(capsys, "divide", "paper/4d", "--html", str(view))
+    status, out, _ = ask("divide", "paper/4d", "--html", str(view))
     assert status == 1
     assert "60 of 90 cells" in out
     page = view.read_text(encoding="utf-8")
@@ -163,14 +153,14 @@ def test_a_division_is_drawn(tmp_path, capsys):
     assert "joint limits (30)" in page
 
 
-def test_an_explanation_says_what_helps(tmp_path, capsys):
+def test_an_explanation_says_what_helps(tmp_path, ask):
     """4d: joint 1, in sentences, as JSON, and beside the picture."""
     view = tmp_path / "why.html"
-    status, out, _ = run(capsys, "explain", "paper/4d", "--html", str(view))
+    status, out, _ = ask("explain", "paper/4d", "--html", str(view))
     assert status == 1
     assert "robot.limits_deg.joint1 (upper) 41.7 deg" in out
     assert "robot.limits_deg.joint1 (upper) 41.7 deg" in view.read_text(encoding="utf-8")
-    status, out, _ = run(capsys, "explain", "paper/4d", "--json")
+    status, out, _ = ask("explain", "paper/4d", "--json")
     assert status == 1
     told = json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
     assert any("joint1" in json.dumps(threshold) for threshold in told["thresholds"])

@@ -5,20 +5,7 @@ import json
 import pytest
 
 from feasibility.cases import all_keys
-from feasibility.cli import main as cli
 from robots import GROUPS, list_robots
-
-
-@pytest.fixture
-def ask(capsys):
-    """Run the command in this process: ask(arguments) -> status, stdout, stderr."""
-
-    def asked(*args):
-        status = cli.main(list(args))
-        out, err = capsys.readouterr()
-        return status, out, err
-
-    return asked
 
 
 def test_keys_prints_each_key_with_type_unit_default_and_meaning(ask):

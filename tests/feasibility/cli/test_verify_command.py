@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -12,7 +13,6 @@ from small_cases import TEXTS, paper_verdict, small_case, small_verdict
 
 from feasibility import Answer, Evidence, NothingToVerifyError, verify
 from feasibility.cases import load_case
-from feasibility.cli import main as cli
 from feasibility.cut_tree import CutTree, Leaf
 from feasibility.reports import verdict as report
 from feasibility.results import load_result, save_result
@@ -42,17 +42,9 @@ VERIFY = {
 
 
 @pytest.fixture
-def ask(capsys):
-    """Run the command in this process: ask(arguments) -> status, stdout, stderr."""
-
-    def asked(*args):
-        status = cli.main(["verify", *map(str, args)])
-        out, err = capsys.readouterr()
-        assert "Traceback" not in err
-        assert "bug" not in err
-        return status, out, err
-
-    return asked
+def ask(ask):
+    """Run `coverable verify` in this process: ask(arguments) -> status, stdout, stderr."""
+    return partial(ask, "verify")
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from dense_replay import dense
 from path_cases import assert_keeps_to_limits
 from small_cases import TEXTS
 
@@ -31,12 +32,6 @@ TASK = Task(standoff=0.02, cone_deg=15, home_deg=HOME)
 @pytest.fixture(scope="module")
 def path():
     return coverage_path(check(UR5, CELLS, TASK))
-
-
-def dense(rows, places=20):
-    share = np.linspace(0.0, 1.0, places)[:, None, None]
-    q = rows[None, :-1] + share * np.diff(rows, axis=0)[None]
-    return q.transpose(1, 0, 2).reshape(-1, rows.shape[1])
 
 
 def test_the_tool_comes_and_goes_straight_along_the_approach(path):
@@ -80,7 +75,7 @@ def test_without_a_home_it_begins_above_the_surface(path):
 def test_the_way_home_leads_around_what_is_in_its_way():
     asked = Collision(surface=False, clearance=0.005)
     alone = coverage_path(check(UR5, CELLS, replace(TASK, collision=asked)))
-    straight = dense(np.stack([np.radians(HOME), ends_of(alone, 0.05).entry[-2]]), 3)[1]
+    straight = dense(np.stack([np.radians(HOME), ends_of(alone, 0.05).entry[-2]]), 2)[1]
     place = Kinematics(UR5).tool(straight)[0]
     ball = Obstacle.sphere("ball", 0.03, position=tuple(place))
     task = replace(TASK, collision=replace(asked, scene=(ball,)))

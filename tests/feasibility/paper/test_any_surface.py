@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mesh_patches import grid
 from meshed_patches import in_cells_of
 
 from feasibility import Answer, Search, Task, check, greedy_check
@@ -29,12 +30,10 @@ RING = torus(0.8, 0.3, (20, 60), (-20, 20), side="inside").cells(3, 3)
 
 def folded(angle_deg: float) -> tuple[np.ndarray, np.ndarray]:
     """A roof of 0.4 m x 0.4 m with its ridge along y, as vertices and faces."""
-    x, y = np.meshgrid(np.linspace(0, 0.4, 9), np.linspace(-0.2, 0.2, 9), indexing="ij")
+    u, v, faces = grid(8, 8)
+    x = 0.4 * u
     z = np.tan(np.radians(angle_deg)) * np.minimum(x, 0.4 - x)
-    vertices = np.stack([0.35 + x, y, 0.2 + z], axis=-1).reshape(-1, 3)
-    corner = (9 * np.arange(8)[:, None] + np.arange(8)).ravel()
-    faces = [[corner, corner + 9, corner + 10], [corner, corner + 10, corner + 1]]
-    return vertices, np.concatenate([np.column_stack(part) for part in faces])
+    return np.column_stack([0.35 + x, 0.4 * v - 0.2, 0.2 + z]), faces
 
 
 def test_the_mesh_of_a_dome_is_searched_as_the_dome() -> None:

@@ -9,6 +9,8 @@ from pathlib import Path
 import networkx as nx
 import numpy as np
 import pytest
+from arm_urdfs import joint
+from random_arms import robot_of
 
 from feasibility import Answer, CauseKind, Evidence, Search, Task, greedy_check
 from feasibility.paper.algorithm_2 import tree_search
@@ -18,52 +20,18 @@ from robots import Kinematics, Robot, load_robot
 from surfaces import Cells, cylinder, plane, sphere
 
 
-def urdf(joints: str, links: int) -> str:
-    names = "".join(f'<link name="l{i}"/>' for i in range(links))
-    return f'<robot name="arm">{names}{joints}</robot>'
-
-
-def joint(i: int, kind: str, xyz: str, axis: str, low: float, high: float) -> str:
-    return (
-        f'<joint name="j{i}" type="{kind}"><parent link="l{i - 1}"/><child link="l{i}"/>'
-        f'<origin xyz="{xyz}"/><axis xyz="{axis}"/>'
-        f'<limit lower="{low}" upper="{high}" effort="1" velocity="1"/></joint>'
-    )
-
-
-def fixed(i: int, xyz: str) -> str:
-    return (
-        f'<joint name="j{i}" type="fixed"><parent link="l{i - 1}"/><child link="l{i}"/>'
-        f'<origin xyz="{xyz}"/></joint>'
-    )
-
-
-def load(folder: Path, text: str, **options: object) -> Robot:
-    path = folder / "arm.urdf"
-    path.write_text(text, encoding="utf-8")
-    return load_robot(path, **options)  # type: ignore[arg-type]
-
-
-def planar_arm(folder: Path, low: float = -3.1, high: float = 3.1) -> Robot:
+def planar_arm(low: float = -3.1, high: float = 3.1) -> Robot:
     """Two links of 1 m in the xy plane; the tool axis is +x of the second."""
-    text = urdf(
-        joint(1, "revolute", "0 0 0", "0 0 1", low, high)
-        + joint(2, "revolute", "1 0 0", "0 0 1", -3.1, 3.1)
-        + fixed(3, "1 0 0"),
-        4,
-    )
-    return load(folder, text, approach_axis=[1, 0, 0])
+    turning = joint(1, limits=(low, high)), joint(2, xyz=(1, 0, 0), limits=(-3.1, 3.1))
+    return robot_of([*turning, joint(3, "fixed", (1, 0, 0))], (1.0, 0.0, 0.0))
 
 
-def gantry(folder: Path, x: tuple[float, float] = (-2.0, 2.0)) -> Robot:
+def gantry(x: tuple[float, float] = (-2.0, 2.0)) -> Robot:
     """Three prismatic joints along x, y and z; the tool axis is +z, so tool point = q."""
-    text = urdf(
-        joint(1, "prismatic", "0 0 0", "1 0 0", *x)
-        + joint(2, "prismatic", "0 0 0", "0 1 0", -2, 2)
-        + joint(3, "prismatic", "0 0 0", "0 0 1", -2, 2),
-        4,
+    ranges = x, (-2.0, 2.0), (-2.0, 2.0)
+    return robot_of(
+        [joint(i + 1, "prismatic", axis=np.eye(3)[i], limits=ranges[i]) for i in range(3)]
     )
-    return load(folder, text)
 
 
 def greedy(**settings: object) -> Search:
@@ -80,8 +48,8 @@ ARC = cylinder(1.5, (0, 80), (-0.1, 0.1), side="inside").cells(8, 1)  # 10 degre
 ELBOW = math.acos(1.5**2 / 2.0 - 1.0)  # cosine rule: |p|^2 = 2 + 2 cos(elbow)
 
 
-def test_planar_arm_covers_the_arc_cell_by_cell(tmp_path: Path) -> None:
-    verdict = greedy_check(planar_arm(tmp_path), ARC, Task(0.0, 60), greedy(step_deg=0.1))
+def test_planar_arm_covers_the_arc_cell_by_cell() -> None:
+    verdict = greedy_check(planar_arm(), ARC, Task(0.0, 60), greedy(step_deg=0.1))
     assert verdict.answer is Answer.FEASIBLE
     assert edges(verdict.graph) == {(i, i + 1) for i in range(7)}
     assert verdict.start == 4
@@ -96,12 +64,12 @@ def test_planar_arm_covers_the_arc_cell_by_cell(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("last", [44.0, 53.0, 67.0])
-def test_shoulder_limit_cuts_the_arc_where_it_stands(tmp_path: Path, last: float) -> None:
+def test_shoulder_limit_cuts_the_arc_where_it_stands(last: float) -> None:
     """Elbow down, the tool is at shoulder + elbow / 2; elbow up it is at shoulder - |elbow| / 2."""
     half = math.degrees(ELBOW) / 2
     high = math.radians(last - half)
     # The lower limit leaves the branch with the elbow up without a start in the middle of the arc.
-    arm = planar_arm(tmp_path, -1.0, high)
+    arm = planar_arm(-1.0, high)
     verdict = greedy_check(arm, ARC, Task(0.0, 60), greedy(step_deg=0.1))
     reached = math.floor(last / 10)
     assert verdict.answer is Answer.INFEASIBLE
@@ -116,10 +84,10 @@ def test_shoulder_limit_cuts_the_arc_where_it_stands(tmp_path: Path, last: float
 
 
 @pytest.mark.parametrize("moves", ["single", "all"])
-def test_gantry_over_a_plane(tmp_path: Path, moves: str) -> None:
+def test_gantry_over_a_plane(moves: str) -> None:
     """Every move is a translation, so each of the 8 neighbours can be entered from each cell."""
     cells = plane((0, 0.4), (0, 0.3), side="inside").cells(4, 3)
-    arm = gantry(tmp_path)
+    arm = gantry()
     verdict = greedy_check(arm, cells, Task(0.05, 30), greedy(step_deg=0.2, moves=moves))
     assert verdict.answer is Answer.FEASIBLE
     assert edges(verdict.graph) == {tuple(pair) for pair in cells.pairs.tolist()}
@@ -130,12 +98,10 @@ def test_gantry_over_a_plane(tmp_path: Path, moves: str) -> None:
     np.testing.assert_allclose(step, math.radians(0.2) * arm.reach)
 
 
-def test_rail_limit_cuts_the_plane(tmp_path: Path) -> None:
+def test_rail_limit_cuts_the_plane() -> None:
     """x <= 0.25: cells of the third column of four are touched, those of the fourth are not."""
     cells = plane((0, 0.4), (0, 0.3), side="inside").cells(4, 3)
-    verdict = greedy_check(
-        gantry(tmp_path, (-1.0, 0.25)), cells, Task(0.05, 30), greedy(step_deg=0.2)
-    )
+    verdict = greedy_check(gantry((-1.0, 0.25)), cells, Task(0.05, 30), greedy(step_deg=0.2))
     assert verdict.covered.tolist() == [True] * 9 + [False] * 3
     assert edges(verdict.graph) == {(i, j) for i, j in cells.pairs.tolist() if j < 9}
 

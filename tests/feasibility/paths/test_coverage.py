@@ -9,7 +9,7 @@ from itertools import pairwise, product
 import networkx as nx
 import numpy as np
 import pytest
-from dense_replay import assert_motion, assert_over
+from dense_replay import assert_motion, assert_over, dense
 from path_cases import BEST, FEASIBLE, PATCHES, path_of, verdict_of
 from small_cases import empty_verdict, paper_verdict, small_case, small_verdict
 
@@ -155,9 +155,7 @@ def test_the_figures_of_a_path_measured_again(name):
     verdict, path = verdict_of(name), path_of(name)
     robot, walk, figures = verdict.robot, path.walk, path.figures
     # Lengths: straight from closest point to closest point along a much denser walk.
-    t = np.arange(16)[:, None] / 16.0
-    dense = walk.q[:-1, None] * (1 - t) + walk.q[1:, None] * t
-    points, _ = Kinematics(robot).tools(np.vstack([dense.reshape(-1, robot.n), walk.q[-1:]]))
+    points, _ = Kinematics(robot).tools(dense(walk.q, 16))
     closest_point = verdict.cells.surface.closest(points)
     way = np.linalg.norm(
         np.diff(points - closest_point.height[:, None] * closest_point.normal, axis=0), axis=1

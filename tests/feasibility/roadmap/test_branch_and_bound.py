@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 from arm_urdfs import FREE, joint
+from dense_replay import tools
 from random_arms import (
     planar_arm,
     rail_arm,
@@ -15,7 +16,6 @@ from random_arms import (
     random_turn,
     robot_of,
     tilted,
-    tools,
     turn_onto,
 )
 

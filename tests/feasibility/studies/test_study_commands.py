@@ -18,7 +18,6 @@ from small_cases import TEXTS
 
 from feasibility import check
 from feasibility.cases import load_case
-from feasibility.cli.main import main
 from feasibility.placement import Pose
 from feasibility.reports.placement import settings_of
 from feasibility.reports.study_plot import charts
@@ -37,13 +36,6 @@ REGION = """
 vary."surface.position".y = {{ range = {} }}
 vary.count = 4
 """
-
-
-def run(capsys, *argv):
-    """Exit status, stdout and stderr of a command."""
-    status = main([str(part) for part in argv])
-    captured = capsys.readouterr()
-    return status, captured.out, captured.err
 
 
 def object_in(text):
@@ -70,10 +62,10 @@ def folder(tmp_path, monkeypatch):
 # -- study ------------------------------------------------------------------------------------
 
 
-def test_each_row_of_a_study_is_what_check_says(folder, capsys) -> None:
+def test_each_row_of_a_study_is_what_check_says(folder, ask) -> None:
     """Every row, as JSON and as CSV, against the verdict on a case made by hand."""
-    status, out, err = run(
-        capsys, "study", "study.toml", "--out", "run.study", "--csv", "run.csv", "--json", *HERE
+    status, out, err = ask(
+        "study", "study.toml", "--out", "run.study", "--csv", "run.csv", "--json", *HERE
     )
     assert status == 0
     told = object_in(out)
@@ -96,10 +88,10 @@ def test_each_row_of_a_study_is_what_check_says(folder, capsys) -> None:
     assert "run.csv" in err
 
 
-def test_a_study_goes_on_from_what_is_kept(folder, capsys, monkeypatch) -> None:
+def test_a_study_goes_on_from_what_is_kept(folder, ask, monkeypatch) -> None:
     """A second run decides the new cases alone, and prints the same rows as a fresh one."""
     (folder / "first.toml").write_text(STUDY.replace(", 2.0]", "]"), encoding="utf-8")
-    assert run(capsys, "study", "first.toml", "--out", "run.study", *HERE)[0] == 0
+    assert ask("study", "first.toml", "--out", "run.study", *HERE)[0] == 0
     from feasibility.studies import scheduling
 
     submitted = []
@@ -110,24 +102,24 @@ def test_a_study_goes_on_from_what_is_kept(folder, capsys, monkeypatch) -> None:
         return run_one(work, tables)
 
     monkeypatch.setattr(scheduling, "run_one", counted)
-    status, out, err = run(
-        capsys, "study", "study.toml", "--out", "run.study", "--csv", "a.csv", "--json", *HERE
+    status, out, err = ask(
+        "study", "study.toml", "--out", "run.study", "--csv", "a.csv", "--json", *HERE
     )
     assert status == 0
     assert "4 finished cases" in err
     assert [t["surface"]["position"][0] for t in submitted] == [2.0, 2.0]
     assert object_in(out)["tasks"] == 6
-    fresh = run(capsys, "study", "study.toml", "--out", "new.study", "--csv", "b.csv", *HERE)
+    fresh = ask("study", "study.toml", "--out", "new.study", "--csv", "b.csv", *HERE)
     assert fresh[0] == 0
     assert len(submitted) == 2 + 6
     assert (folder / "a.csv").read_bytes() == (folder / "b.csv").read_bytes()
     assert "6 cases" in fresh[1]
 
 
-def test_a_process_of_its_own_gives_the_same_table(folder, capsys) -> None:
+def test_a_process_of_its_own_gives_the_same_table(folder, ask) -> None:
     for count in ("0", "1"):
         files = ("--out", f"{count}.study", "--csv", f"{count}.csv", "--workers", count)
-        assert run(capsys, "study", "study.toml", *files)[0] == 0
+        assert ask("study", "study.toml", *files)[0] == 0
     assert (folder / "0.csv").read_bytes() == (folder / "1.csv").read_bytes()
     assert len(table_of(folder / "1.csv")) == 6
 
@@ -153,9 +145,9 @@ def test_a_process_of_its_own_gives_the_same_table(folder, capsys) -> None:
          ["other: is not known", "base.case: there is no such file", "vary.robbots"]),
     ],
 )  # fmt: skip
-def test_a_bad_study_is_one_message(text, words, folder, capsys) -> None:
+def test_a_bad_study_is_one_message(text, words, folder, ask) -> None:
     (folder / "study.toml").write_text(text, encoding="utf-8")
-    assert_refused(run(capsys, "study", "study.toml", "--out", "run.study", *HERE), words)
+    assert_refused(ask("study", "study.toml", "--out", "run.study", *HERE), words)
     assert not (folder / "run.study").exists()
 
 
@@ -172,25 +164,25 @@ def assert_refused(outcome, words) -> None:
     assert err.endswith("\n")
 
 
-def test_what_is_kept_is_not_lost_to_a_bad_run(folder, capsys) -> None:
+def test_what_is_kept_is_not_lost_to_a_bad_run(folder, ask) -> None:
     """A study that is refused, and a file that is no store, leave the files as they were."""
-    assert run(capsys, "study", "study.toml", "--out", "run.study", *HERE)[0] == 0
+    assert ask("study", "study.toml", "--out", "run.study", *HERE)[0] == 0
     (folder / "bad.toml").write_text(STUDY + "extra = 1", encoding="utf-8")
-    assert_refused(run(capsys, "study", "bad.toml", "--out", "run.study", *HERE), ["extra"])
-    status, _, err = run(capsys, "study", "study.toml", "--out", "run.study", *HERE)
+    assert_refused(ask("study", "bad.toml", "--out", "run.study", *HERE), ["extra"])
+    status, _, err = ask("study", "study.toml", "--out", "run.study", *HERE)
     assert status == 0
     assert "6 finished cases" in err
     before = (folder / "plate.toml").read_bytes()
-    assert_refused(run(capsys, "study", "study.toml", "--out", "plate.toml", *HERE), ["plate.toml"])
+    assert_refused(ask("study", "study.toml", "--out", "plate.toml", *HERE), ["plate.toml"])
     assert (folder / "plate.toml").read_bytes() == before
 
 
 # -- compare ----------------------------------------------------------------------------------
 
 
-def test_compare_says_of_each_arm_what_check_says(folder, capsys) -> None:
-    status, out, _ = run(
-        capsys, "compare", "plate.toml", "--set", "surface.position=[0.3, 0, 0.3]", *HERE,
+def test_compare_says_of_each_arm_what_check_says(folder, ask) -> None:
+    status, out, _ = ask(
+        "compare", "plate.toml", "--set", "surface.position=[0.3, 0, 0.3]", *HERE,
         "--robots", "ur5, xarm7", "--json", "--csv", "a.csv", "--html", "a.html",
     )  # fmt: skip
     assert status == 0
@@ -210,12 +202,12 @@ def test_compare_says_of_each_arm_what_check_says(folder, capsys) -> None:
 # -- place ------------------------------------------------------------------------------------
 
 
-def test_a_placement_fed_back_is_feasible(folder, capsys) -> None:
+def test_a_placement_fed_back_is_feasible(folder, ask) -> None:
     """Infeasible where it stands; what `place` answers, `check` accepts, from the same shell."""
     far = ("--set", "surface.position=[0.6, 0, 0.3]")
-    assert run(capsys, "check", "plate.toml", *far)[0] == 1
-    status, out, _ = run(
-        capsys, "place", "plate.toml", *far, *SMALL, "--x", -0.2, 0.6, "--yaw", -20, 20,
+    assert ask("check", "plate.toml", *far)[0] == 1
+    status, out, _ = ask(
+        "place", "plate.toml", *far, *SMALL, "--x", -0.2, 0.6, "--yaw", -20, 20,
         "--count", 8, "--json", "--csv", "p.csv", "--out", "p.study", *HERE,
     )  # fmt: skip
     assert status == 0
@@ -226,14 +218,14 @@ def test_a_placement_fed_back_is_feasible(folder, capsys) -> None:
         assert -20 <= found["rpy_deg"][2] <= 20
         pose = Pose.of_values([*found["position"], *found["rpy_deg"]])
         sets = [part for text in settings_of(pose) for part in ("--set", text)]
-        assert run(capsys, "check", "plate.toml", *SMALL, *sets)[0] == 0
+        assert ask("check", "plate.toml", *SMALL, *sets)[0] == 0
     lines = table_of(folder / "p.csv")
     assert sum(line["verdict"] == "feasible" for line in lines) >= len(told["placements"]) > 0
 
 
-def test_none_in_a_region_is_status_1_with_the_cause(capsys) -> None:
-    status, out, _ = run(
-        capsys, "place", "plate.toml", *SMALL, "--x", 2.5, 3, "--json", "--stations", *HERE
+def test_none_in_a_region_is_status_1_with_the_cause(ask) -> None:
+    status, out, _ = ask(
+        "place", "plate.toml", *SMALL, "--x", 2.5, 3, "--json", "--stations", *HERE
     )
     assert status == 1
     told = object_in(out)
@@ -244,13 +236,13 @@ def test_none_in_a_region_is_status_1_with_the_cause(capsys) -> None:
     assert told["stations"]["left_out"] == list(range(9))
 
 
-def test_stations_share_out_what_no_placement_covers_alone(capsys) -> None:
+def test_stations_share_out_what_no_placement_covers_alone(ask) -> None:
     """Every cell to exactly one station, each with a replayed motion, two at the proven least."""
     long = ["surface.u=[-0.1, 0.1]", "surface.v=[-0.9, 0.9]", "surface.cells=[1, 9]",
             "surface.position=[0.5, 0, 0.3]"]  # fmt: skip
     sets = [part for text in long for part in ("--set", text)]
-    status, out, _ = run(
-        capsys, "place", "plate.toml", *sets, "--y", -0.6, 0.6, "--count", 8, "--stations",
+    status, out, _ = ask(
+        "place", "plate.toml", *sets, "--y", -0.6, 0.6, "--count", 8, "--stations",
         "--json", *HERE,
     )  # fmt: skip
     assert status == 1
@@ -291,13 +283,13 @@ def test_stations_share_out_what_no_placement_covers_alone(capsys) -> None:
         (["place", "plate.toml", "--x", "0", "1", "--set", "task.cone=3"], ["task.cone"]),
     ],
 )  # fmt: skip
-def test_bad_input_is_one_message(argv, words, capsys) -> None:
-    assert_refused(run(capsys, *argv, *HERE), words)
+def test_bad_input_is_one_message(argv, words, ask) -> None:
+    assert_refused(ask(*argv, *HERE), words)
 
 
-def test_processes_and_dask_together_are_refused(capsys) -> None:
+def test_processes_and_dask_together_are_refused(ask) -> None:
     both = ("--workers", "1", "--dask", "tcp://127.0.0.1:1")
-    assert_refused(run(capsys, "compare", "plate.toml", "--robots", "ur5", *both), ["--workers"])
+    assert_refused(ask("compare", "plate.toml", "--robots", "ur5", *both), ["--workers"])
 
 
 # -- pages ------------------------------------------------------------------------------------
@@ -333,18 +325,18 @@ class Page(HTMLParser):
             self.text += data + "\n"
 
 
-def page_of(folder, capsys, name="study.toml", more=()):
+def page_of(folder, ask, name="study.toml", more=()):
     """The page of a study, and the study's own account of its rows."""
     files = ("--out", "run.study", "--html", "page.html")
-    status, out, err = run(capsys, "study", name, *files, "--json", *more, *HERE)
+    status, out, err = ask("study", name, *files, "--json", *more, *HERE)
     assert status == 0
     assert "page: page.html" in err
     return (folder / "page.html").read_text(encoding="utf-8"), object_in(out)
 
 
-def test_the_page_of_a_study_counts_as_its_table_does(folder, capsys) -> None:
+def test_the_page_of_a_study_counts_as_its_table_does(folder, ask) -> None:
     """Verdicts, every value of what varies, the best rows and the poses, against the JSON."""
-    text, told = page_of(folder, capsys)
+    text, told = page_of(folder, ask)
     page = Page(text)
     found = {name: number for name, number in told["verdicts"].items() if number}
     for name, number in found.items():
@@ -372,19 +364,19 @@ def test_the_page_of_a_study_counts_as_its_table_does(folder, capsys) -> None:
     assert f"feasible ({good})" in frame
 
 
-def test_the_page_of_a_study_fetches_nothing_and_repeats_no_name(folder, capsys) -> None:
-    text, _ = page_of(folder, capsys)
+def test_the_page_of_a_study_fetches_nothing_and_repeats_no_name(folder, ask) -> None:
+    text, _ = page_of(folder, ask)
     program = re.search(r"id=&quot;program&quot;&gt;([^&]*)&lt;", text)[1]
     assert len(program) > 100_000
     rest = text.replace(program, "")
     assert not re.search(r"https?:|(?:src|href)=[\"']?//|@import|url\((?!#)", rest)
     names = re.findall(r' id="([^"]*)"', text)
     assert len(names) == len(set(names))
-    again, _ = page_of(folder, capsys)
+    again, _ = page_of(folder, ask)
     assert again == text
 
 
-def test_names_out_of_files_are_text_on_the_page(folder, capsys) -> None:
+def test_names_out_of_files_are_text_on_the_page(folder, ask) -> None:
     """A description, a file's name, an arm's file: no tag more than with harmless names."""
     tags, bad = [], "<img src=x onerror=alert(1)>&\"'"
     urdf = (
@@ -403,7 +395,7 @@ def test_names_out_of_files_are_text_on_the_page(folder, capsys) -> None:
         )
         (folder / f"{name}.toml").write_text(study, encoding="utf-8")
         files = ("--out", f"{k}.study", "--html", f"{k}.html")
-        status, _, err = run(capsys, "study", f"{name}.toml", *files, *HERE)
+        status, _, err = ask("study", f"{name}.toml", *files, *HERE)
         assert status == 0, err
         text = (folder / f"{k}.html").read_text(encoding="utf-8")
         page = Page(text)
@@ -414,12 +406,12 @@ def test_names_out_of_files_are_text_on_the_page(folder, capsys) -> None:
     assert bad not in text
 
 
-def test_a_study_whose_surface_stays_has_no_picture_of_poses(folder, capsys) -> None:
+def test_a_study_whose_surface_stays_has_no_picture_of_poses(folder, ask) -> None:
     """Two numbers vary: a chart for each, and the map of both with a field for each pair."""
     text = 'base.case = "plate.toml"\nvary."task.cone_deg" = [10, 20, 30]\n'
     text += 'vary."task.standoff" = [0.01, 0.02]\n'
     (folder / "cones.toml").write_text(text, encoding="utf-8")
-    page = Page(page_of(folder, capsys, "cones.toml")[0])
+    page = Page(page_of(folder, ask, "cones.toml")[0])
     assert page.frames == []
     assert page.tags["figure"] == 3
     assert "Best covered share over task.cone_deg and task.standoff" in page.text
@@ -460,10 +452,10 @@ def test_maps_show_the_best_of_each_field_and_leave_out_what_failed() -> None:
         assert written == [str(math.floor(share)) for share in best]
 
 
-def test_place_draws_what_it_tried(folder, capsys) -> None:
+def test_place_draws_what_it_tried(folder, ask) -> None:
     """As many poses in the legend as in the table, class by class."""
-    status, _, err = run(
-        capsys, "place", "plate.toml", *SMALL, "--x", -0.2, 0.6, "--count", 8,
+    status, _, err = ask(
+        "place", "plate.toml", *SMALL, "--x", -0.2, 0.6, "--count", 8,
         "--csv", "p.csv", "--html", "p.html", *HERE,
     )  # fmt: skip
     assert status == 0
@@ -480,15 +472,15 @@ def test_place_draws_what_it_tried(folder, capsys) -> None:
     assert "pause" in text
 
 
-def test_a_region_ruled_out_by_proof_has_no_share_to_tell(capsys) -> None:
+def test_a_region_ruled_out_by_proof_has_no_share_to_tell(ask) -> None:
     """Nothing was searched there, so 0 % would be a claim that nobody has looked into."""
     where = ("place", "plate.toml", *SMALL, "--x", 2.5, 3)
-    status, out, _ = run(capsys, *where, *HERE)
+    status, out, _ = ask(*where, *HERE)
     assert status == 1
     assert "%" not in out
     assert "the best of them" not in out
     assert "share     not known" in out
-    told = object_in(run(capsys, *where, "--json", *HERE)[1])
+    told = object_in(ask(*where, "--json", *HERE)[1])
     assert told["share"] is None
     assert told["best"]["stage"] == "bound"
 
@@ -516,12 +508,12 @@ def test_a_region_ruled_out_by_proof_has_no_share_to_tell(capsys) -> None:
     ],
 )  # fmt: skip
 def test_outputs_that_clash_are_refused_before_anything_is_tried(
-    argv, words, folder, capsys, monkeypatch
+    argv, words, folder, ask, monkeypatch
 ) -> None:
     def refuse(*_):
         raise AssertionError("something was tried")
 
     monkeypatch.setattr("feasibility.studies.scheduling.run_one", refuse)
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
-    assert_refused(run(capsys, *argv, *HERE), words)
+    assert_refused(ask(*argv, *HERE), words)
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from dense_replay import assert_motion, assert_over
+from dense_replay import assert_motion, assert_over, dense
 from mesh_patches import bent
 from path_cases import (
     PATCHES,
@@ -178,9 +178,7 @@ def test_samples_keep_to_all_limits(name):
     assert run.time[0] == 0.0
     # No faster than the tool's way at full speed, and not much slower: the arm stops nowhere.
     q = path_of(name).walk.q
-    t = np.arange(8)[:, None] / 8.0
-    dense = (q[:-1, None] * (1 - t) + q[1:, None] * t).reshape(-1, robot.n)
-    points = np.array([kinematics.tool(row)[0] for row in [*dense, q[-1]]])
+    points, _ = kinematics.tools(dense(q, 8))
     way = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
     assert run.tool_way == pytest.approx(way, rel=0.02)
     assert 0.98 * way <= run.duration * SPEED <= 1.6 * way + SPEED

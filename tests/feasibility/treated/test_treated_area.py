@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from dense_replay import dense
 
 from coverable_errors import CoverableError
 from feasibility import Answer, Task, check
@@ -31,9 +32,7 @@ def found():
 def dense_share(verdict, radius: float) -> float:
     """By other code: points drawn by area, distance by brute force to twenty places a segment."""
     q = verdict.witness.q
-    share = np.linspace(0.0, 1.0, 20, endpoint=False)[:, None, None]
-    dense = (q[None, :-1] + share * np.diff(q, axis=0)[None]).transpose(1, 0, 2).reshape(-1, 6)
-    feet = Kinematics(UR5).tools(np.concatenate([dense, q[-1:]]))[0][:, :2]
+    feet = Kinematics(UR5).tools(dense(q))[0][:, :2]
     drawn = np.random.default_rng(4).uniform([0.4, -0.1], [0.7, 0.1], (40_000, 2))
     squared = np.full(len(drawn), np.inf)
     for some in np.array_split(feet, 20):
@@ -44,10 +43,10 @@ def dense_share(verdict, radius: float) -> float:
 
 def test_the_share_of_a_witness_agrees_with_points_drawn_by_area(found) -> None:
     treated = found.treated
-    dense = dense_share(found, 0.04)
+    drawn = dense_share(found, 0.04)
     assert treated.area == pytest.approx(0.06)
     assert treated.upper - treated.lower <= 0.006
-    assert treated.lower - 0.007 <= dense <= treated.upper + 0.007  # 4 standard errors: 0.009
+    assert treated.lower - 0.007 <= drawn <= treated.upper + 0.007  # 4 standard errors: 0.009
     assert 0.0 < treated.twice < treated.upper
     assert treated.lower < 0.99
 

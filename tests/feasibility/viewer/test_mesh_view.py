@@ -11,6 +11,7 @@ import trimesh
 from fabricated import DOME, TASK, every_cause, verdict_on
 from matplotlib.collections import LineCollection, PathCollection, PolyCollection
 from matplotlib.colors import to_rgb
+from mesh_patches import grid
 
 from feasibility.viewer import cell_meshes as cell_shapes
 from feasibility.viewer import scene, view
@@ -27,11 +28,8 @@ MISSED = {2, 3, 7, 11, 15, 20}
 
 def triangles(nu, nv, shape):
     """A unit square bent by (u, v) -> points, as a mesh of 2 nu nv triangles."""
-    u, v = np.meshgrid(np.linspace(0, 1, nu + 1), np.linspace(0, 1, nv + 1), indexing="ij")
-    corner = np.arange(u.size).reshape(u.shape)
-    a, b, c, d = corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]
-    faces = np.stack([[a, b, c], [a, c, d]], axis=-1).reshape(3, -1).T
-    return trimesh.Trimesh(shape(u, v).reshape(-1, 3), faces, process=False)
+    u, v, faces = grid(nu, nv)
+    return trimesh.Trimesh(shape(u, v), faces, process=False)
 
 
 def sheet(u, v):

@@ -4,9 +4,11 @@ import sys
 from pathlib import Path
 
 import hostile_visuals as hostile
+import mesh_patches
 import numpy as np
 import pytest
 from hulls_of_arms import assert_held
+from mesh_writers import stl
 
 from robots import RobotError, load_robot
 from robots.shapes import Polytope, checked_triangles, link_pairs, link_shapes
@@ -75,11 +77,9 @@ def test_triangles_that_are_no_body_are_refused(name):
 
 def grid(height):
     """Triangles over 20 x 20 points."""
-    x, y = (side.reshape(-1) for side in np.meshgrid(np.arange(20.0), np.arange(20.0)))
-    first = np.array([20 * i + k for i in range(19) for k in range(19)])
-    faces = [np.column_stack([first, first + 1, first + 20])]
-    faces += [np.column_stack([first + 1, first + 21, first + 20])]
-    return 0.01 * np.column_stack([x, y, height(x, y)]), np.concatenate(faces)
+    x, y, faces = mesh_patches.grid(19, 19)
+    x, y = 19.0 * x, 19.0 * y
+    return 0.01 * np.column_stack([x, y, height(x, y)]), faces
 
 
 ODD = {
@@ -103,13 +103,6 @@ ODD = {
         np.concatenate([FACES, 4 + FACES]),
     ),
 }
-
-
-def stl(vertices, faces):
-    """Binary STL."""
-    record = np.zeros(len(faces), [("n", "<f4", 3), ("v", "<f4", (3, 3)), ("c", "<u2")])
-    record["v"] = vertices[faces]
-    return b"\0" * 80 + np.uint32(len(faces)).tobytes() + record.tobytes()
 
 
 @pytest.mark.parametrize("name", ODD)

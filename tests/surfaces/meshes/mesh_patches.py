@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from surfaces import Patch
+
 Floats = NDArray[np.float64]
 
 
@@ -32,6 +34,18 @@ def bent(shape: Callable[[Floats, Floats], tuple[Floats, ...]], nu: int, nv: int
     """A grid bent by (u, v) -> (x, y, z), u and v in 0..1."""
     u, v, faces = grid(nu, nv)
     return Mesh(np.stack(np.broadcast_arrays(*shape(u, v)), axis=1), faces)
+
+
+def of_patch(patch: Patch, nu: int, nv: int) -> Mesh:
+    """Triangles with vertices on a patch at even parameters, looking where its normals do."""
+    u, v = np.meshgrid(
+        np.linspace(*patch.u_range, nu + 1), np.linspace(*patch.v_range, nv + 1), indexing="ij"
+    )
+    _, _, faces = grid(nu, nv)
+    points, normals = (at(u, v).reshape(-1, 3) for at in (patch.point, patch.normal))
+    a, b, c = points[faces].swapaxes(0, 1)
+    outwards = (np.cross(b - a, c - a) * normals[faces[:, 0]]).sum() > 0.0
+    return Mesh(points, faces if outwards else faces[:, ::-1])
 
 
 def sheet(n: int = 40) -> Mesh:
@@ -129,20 +143,25 @@ def wedge() -> Mesh:
 
 def scattered(count: int = 3000, seed: int = 5) -> Mesh:
     """A wavy patch over random points, dense in one corner: triangles of all shapes and sizes."""
-    from scipy.spatial import Delaunay
-
     rng = np.random.default_rng(seed)
     inner = rng.uniform(0, 1, (count, 2)) ** [1.8, 1.2]
     t = np.linspace(0, 1, 30)
     sides = [np.column_stack(p) for p in ((t, 0 * t), (t, 0 * t + 1), (0 * t, t), (0 * t + 1, t))]
     points = np.unique(np.concatenate([inner, *sides]), axis=0)
-    faces = Delaunay(points).simplices.astype(np.int64)
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    turn = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    faces[turn < 0] = faces[turn < 0][:, ::-1]
-    faces = faces[abs(turn) > 1e-9]
     x, y = points.T
-    return used(Mesh(np.column_stack([x, 0.8 * y, 0.1 * np.sin(5 * x) * np.cos(4 * y)]), faces))
+    wavy = np.column_stack([x, 0.8 * y, 0.1 * np.sin(5 * x) * np.cos(4 * y)])
+    return used(Mesh(wavy, flat_faces(points, 1e-9)))
+
+
+def flat_faces(points: Floats, least: float) -> NDArray[np.int64]:
+    """Triangles of points (k, 2), counter-clockwise, each of more than half the `least` area."""
+    from scipy.spatial import Delaunay
+
+    faces = Delaunay(points).simplices.astype(np.int64)
+    (ax, ay), (bx, by), (cx, cy) = points[faces].transpose(1, 2, 0)
+    turn = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+    faces[turn < 0] = faces[turn < 0][:, ::-1]
+    return faces[abs(turn) > least]
 
 
 def islands() -> Mesh:
@@ -189,3 +208,11 @@ def folded_sheet(radius: float, facets: int) -> Mesh:
     u, v, faces = grid(8, len(profile) - 1)
     place = np.round(v * (len(profile) - 1)).astype(np.int64)
     return Mesh(np.column_stack([0.3 * u, profile[place]]), faces)
+
+
+def joined(faces):
+    """(K, 2) pairs of faces that share an edge."""
+    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    order = np.lexsort(edges.T)
+    same = (edges[order[1:]] == edges[order[:-1]]).all(axis=1)
+    return np.column_stack([order[:-1][same], order[1:][same]]) // 3

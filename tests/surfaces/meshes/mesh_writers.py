@@ -5,6 +5,7 @@ import struct
 from collections import defaultdict
 
 import numpy as np
+from mesh_patches import grid
 
 from surfaces.meshes import TriangleMesh
 from surfaces.meshes.normals import corner_normals
@@ -19,12 +20,8 @@ def cube(size=0.2):
 
 def plate(nu, nv, width=0.3, height=0.2):
     """A flat grid of nu x nv squares, each cut in two, that looks up."""
-    u, v = np.meshgrid(np.linspace(0, width, nu + 1), np.linspace(0, height, nv + 1), indexing="ij")
-    i, j = (grid.ravel() for grid in np.meshgrid(np.arange(nu), np.arange(nv), indexing="ij"))
-    a = i * (nv + 1) + j
-    b, c, d = a + nv + 1, a + nv + 2, a + 1
-    faces = np.stack([np.stack([a, b, c], 1), np.stack([a, c, d], 1)], 1).reshape(-1, 3)
-    return np.stack([u.ravel(), v.ravel(), 0 * u.ravel()], 1), faces
+    u, v, faces = grid(nu, nv)
+    return np.stack([width * u, height * v, 0 * u], 1), faces
 
 
 def strip(twisted, count=24):
@@ -51,6 +48,11 @@ def stl(vertices, faces, count=None, normals=None, head=b"made by a test"):
         rows["n"] = normals
     total = len(faces) if count is None else count
     return head.ljust(80, b" ") + struct.pack("<I", total) + rows.tobytes()
+
+
+def stl_of(triangles):
+    """The same of triangles (F, 3, 3), each with corners of its own."""
+    return stl(np.reshape(triangles, (-1, 3)), np.arange(3 * len(triangles)).reshape(-1, 3))
 
 
 def text_stl(vertices, faces, name="part"):

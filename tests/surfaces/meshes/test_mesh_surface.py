@@ -24,17 +24,8 @@ def surface_of(name, **pose):
 
 def from_patch(patch, nu, nv, **pose):
     """Triangles of a parametric patch, vertices on it."""
-    u, v = np.meshgrid(
-        np.linspace(*patch.u_range, nu + 1), np.linspace(*patch.v_range, nv + 1), indexing="ij"
-    )
-    _, _, faces = mesh_patches.grid(nu, nv)
-    points = patch.point(u, v).reshape(-1, 3)
-    corners = points[faces]
-    looks = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    outward = patch.normal(u, v).reshape(-1, 3)[faces[:, 0]]
-    if (looks * outward).sum() < 0.0:
-        faces = faces[:, ::-1]
-    return mesh(TriangleMesh(points, faces), side=patch.side, **pose)
+    made = mesh_patches.of_patch(patch, nu, nv)
+    return mesh(TriangleMesh(*made), side=patch.side, **pose)
 
 
 def nearest_by_force(surface, points):

@@ -7,6 +7,7 @@ from itertools import pairwise, product
 
 import numpy as np
 import pytest
+from mesh_patches import grid
 from pass_metrics import ARCH, CAP, PLATE, away, by_level, panel_with_hole, unrolled
 
 from coverable_errors import CoverableError
@@ -204,13 +205,7 @@ def test_over_many_triangles_distances_are_taken_on_a_copy() -> None:
         values[1:-1, 1:-1] += rng.uniform(-0.2, 0.2, (178, 148)) * step
     points = 0.3 * np.stack([np.cos(u), np.sin(u), v / 0.3], axis=-1).reshape(-1, 3)
     own = points @ ARCH.rotation.T + ARCH.position
-    corner = np.arange(180 * 150).reshape(180, 150)
-    a, b, c, d = (
-        part.ravel()
-        for part in (corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:])
-    )
-    faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
-    fine = mesh(TriangleMesh(own, faces), side="outside")
+    fine = mesh(TriangleMesh(own, grid(179, 149)[2]), side="outside")
     found = parallel_passes(fine, 0.05, 0.5, step=0.004)
     assert any("a copy of" in note for note in found.notes)
     levels = by_level(found)

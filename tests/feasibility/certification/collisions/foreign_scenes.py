@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from capsule_arms import at, bodies_of, box_mesh
 from foreign_clearances import ForeignScene, samples
+from mesh_patches import grid
 from scipy.spatial.transform import Rotation
 
 from feasibility.certification import collision_replay
@@ -24,12 +25,9 @@ def random_scene(name, seed, rows=6, step=0.3, waves=6):
         turn = Rotation.from_rotvec(rng.normal(size=3)).as_matrix()
         scene.append(Obstacle(f"object{k}", shape, at(*rng.uniform(-1, 1, 3), turn)))
     scene.append(Obstacle("floor", HalfSpace(), at(z=-0.6)))
-    grid = np.linspace(0.0, 0.5, waves + 1)
-    corner = rng.uniform(-1, 1, 3)
-    u, v = np.meshgrid(grid, grid, indexing="ij")
-    points = corner + np.stack([u, v, 0.3 * np.sin(4 * u) * np.cos(5 * v)], axis=-1)
-    p, r, s, t = points[:-1, :-1], points[1:, :-1], points[:-1, 1:], points[1:, 1:]
-    triangles = np.stack([np.stack([p, r, s], 2), np.stack([r, t, s], 2)]).reshape(-1, 3, 3)
+    u, v, faces = grid(waves, waves)
+    wavy = np.stack([0.5 * u, 0.5 * v, 0.3 * np.sin(2.0 * u) * np.cos(2.5 * v)], axis=1)
+    triangles = (rng.uniform(-1, 1, 3) + wavy)[faces]
     joints = {solid.owner: solid.joint for solid in solids}
     links = list(joints)
     pairs = [

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from capsule_arms import at, planar_arm
+from mesh_patches import of_patch
 from scipy.optimize import nnls
 
 from feasibility.certification.collisions.descent import Descent, rough_bounds
@@ -14,16 +15,15 @@ from feasibility.certification.collisions.relative_motion import Motion
 from feasibility.certification.collisions.shape_pieces import piece_of, sheet_piece
 from feasibility.certification.collisions.trees import Tree
 from robots.urdf import Box, Capsule, Cylinder, Sphere
+from surfaces import sphere
 
 BODIES = (Box((0.1, 0.06, 0.3)), Sphere(0.05), Capsule(0.03, 0.2), Cylinder(0.04, 0.1))
 
 
 def dome(count):
     """A quarter of a sphere of radius 1 in 2 count^2 triangles."""
-    u, v = np.meshgrid(np.linspace(0.3, 1.5, count + 1), np.linspace(0, np.pi, count + 1))
-    points = np.stack([np.sin(u) * np.cos(v), np.sin(u) * np.sin(v), np.cos(u)], axis=-1)
-    p, r, s, t = points[:-1, :-1], points[1:, :-1], points[:-1, 1:], points[1:, 1:]
-    return np.stack([np.stack([p, r, s], 2), np.stack([r, t, s], 2)]).reshape(-1, 3, 3)
+    made = of_patch(sphere(1.0, np.degrees((0.3, 1.5)), (0, 180), "outside"), count, count)
+    return made.vertices[made.faces]
 
 
 def test_the_point_of_a_tetrahedron_nearest_to_the_origin():

@@ -6,7 +6,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from random_arms import rail_arm, random_arm, random_configuration, tilted, tools, turn_onto
+from dense_replay import tools
+from random_arms import rail_arm, random_arm, random_configuration, tilted, turn_onto
 
 from feasibility import Task
 from feasibility.roadmap.branch_and_bound.box_bounds import static_levers

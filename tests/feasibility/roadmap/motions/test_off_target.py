@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from random_arms import finite_limits, planar_arm, tools
+from dense_replay import tools
+from random_arms import finite_limits, planar_arm
 
 from feasibility import Search, Task, check
 from feasibility.roadmap import arrays_of, work_for

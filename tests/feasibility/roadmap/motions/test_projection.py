@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from random_arms import QUESTIONS, finite_limits, planar_arm, question, tools
+from dense_replay import tools
+from random_arms import QUESTIONS, finite_limits, planar_arm, question
 
 from feasibility import Task
 from feasibility.roadmap import arrays_of, place, project, stand_still, work_for

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from random_arms import between, random_arm, random_configuration, random_turn, tilted, tools
+from dense_replay import tools
+from random_arms import between, random_arm, random_configuration, random_turn, tilted
 from scipy.spatial.transform import Rotation
 
 from feasibility import Task

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from arm_urdfs import joint
+from dense_replay import tools
 from random_arms import (
     between,
     deviation,
@@ -16,7 +17,6 @@ from random_arms import (
     random_surface,
     robot_of,
     tilted,
-    tools,
     turn_onto,
 )
 

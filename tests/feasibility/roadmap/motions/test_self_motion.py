@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from arm_urdfs import FREE, joint
-from random_arms import QUESTIONS, finite_limits, question, robot_of, tools
+from dense_replay import tools
+from random_arms import QUESTIONS, finite_limits, question, robot_of
 
 from feasibility import Task, check
 from feasibility.certification import replay

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from random_arms import QUESTIONS, finite_limits, question, tools
+from dense_replay import tools
+from random_arms import QUESTIONS, finite_limits, question
 
 from feasibility.certification import replay
 from feasibility.roadmap import (

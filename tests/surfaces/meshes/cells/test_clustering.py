@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mesh_patches import CONNECTED, PATCHES, Mesh, box, grid, hood, islands, sheet, slivers
+from mesh_patches import CONNECTED, PATCHES, Mesh, box, grid, hood, islands, joined, sheet, slivers
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
@@ -12,25 +12,13 @@ from surfaces import SurfaceError
 from surfaces.meshes.cells.clustering import FACES_PER_CELL, cells_for, cluster_faces
 from surfaces.meshes.cells.subdivision import subdivide
 
-COUNTS = (1, 20, 200)
+COUNTS = (20, 200)
 MANY = (77, 500)  # of every patch in the campaign larger_samples
 
 
 def areas_of(vertices, faces):
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
-
-
-def joined(faces):
-    """(K, 2) pairs of faces that share an edge, by a dictionary of edges."""
-    first, pairs = {}, []
-    for face, corners in enumerate(faces.tolist()):
-        for k in range(3):
-            edge = frozenset((corners[k], corners[(k + 1) % 3]))
-            if edge in first:
-                pairs.append((first[edge], face))
-            first[edge] = face
-    return np.array(pairs)
 
 
 def number_of_components(pairs, count):
@@ -42,8 +30,6 @@ def number_of_components(pairs, count):
 @pytest.mark.parametrize("name", PATCHES)
 def test_cells_are_connected_even_and_complete(name, count):
     mesh = PATCHES[name]()
-    if name == "islands" and count < 20:
-        return
     cut = cells_for(*mesh, count=count)
     vertices, faces, labels = cut.mesh.vertices, cut.mesh.faces, cut.labels
     pairs = joined(faces)
@@ -188,14 +174,14 @@ def border_length(vertices, faces):
     return np.linalg.norm(vertices[start[single]] - vertices[end[single]], axis=1).sum()
 
 
-@pytest.mark.parametrize("parts", [0.5, 30, 1000, 20_000])
+@pytest.mark.parametrize("parts", [30, 1000, 20_000])
 @pytest.mark.parametrize("name", CONNECTED)
 def test_subdivision_keeps_the_surface(name, parts):
     mesh = CONNECTED[name]()
     check_subdivision(mesh, areas_of(*mesh).sum() / parts)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     st.lists(st.floats(-1, 1), min_size=4, max_size=4),
     st.floats(1e-4, 1.0),

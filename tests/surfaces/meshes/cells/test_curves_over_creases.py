@@ -171,12 +171,9 @@ def test_the_normal_turns_no_faster_than_is_said(name):
 
 def test_corners_are_parted_by_creases_alone():
     """Against the faces round every vertex, one by one, on a rough sheet full of broken creases."""
-    x, y = np.meshgrid(np.linspace(0, 1, 12), np.linspace(0, 1, 12), indexing="ij")
-    z = 0.05 * np.random.default_rng(5).normal(size=x.shape)
-    k = np.arange(144).reshape(12, 12)
-    a, b, c, d = k[:-1, :-1].ravel(), k[1:, :-1].ravel(), k[1:, 1:].ravel(), k[:-1, 1:].ravel()
-    faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
-    made = TriangleMesh(np.column_stack([x.ravel(), y.ravel(), z.ravel()]), faces)
+    x, y, faces = mesh_patches.grid(11, 11)
+    z = 0.05 * np.random.default_rng(5).normal(size=144)
+    made = TriangleMesh(np.column_stack([x, y, z]), faces)
     parts = sectors(made)
     normals, counts = made.face_normals, set()
     for vertex in range(144):

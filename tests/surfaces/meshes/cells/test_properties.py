@@ -1,10 +1,11 @@
 """Figures of mesh cells against brute force, hand-made cells, and rigid motions."""
 
 import math
+from functools import cached_property
 
 import numpy as np
 import pytest
-from mesh_patches import PATCHES, Mesh, bent, box, dome, grid, hood, sheet, used
+from mesh_patches import PATCHES, Mesh, bent, box, dome, grid, hood, joined, sheet, used
 
 from surfaces import SurfaceError
 from surfaces.meshes.cells.clustering import cells_for
@@ -35,23 +36,23 @@ class Cut:
         self.normals = normals_of(Mesh(self.vertices, self.faces))
         self.figures = figures(self.vertices, self.faces, self.normals, self.labels)
 
+    @cached_property
+    def border(self):
+        """Directed edges (a, b) -> (own cell, other cell or -1) where these differ."""
+        owner = {}
+        for face, corners in enumerate(self.faces.tolist()):
+            for k in range(3):
+                owner[corners[k], corners[(k + 1) % 3]] = int(self.labels[face])
+        return {
+            (a, b): (cell, owner.get((b, a), -1))
+            for (a, b), cell in owner.items()
+            if owner.get((b, a), -1) != cell
+        }
+
 
 @pytest.fixture(scope="module", params=PATCHES)
 def cut(request: pytest.FixtureRequest) -> Cut:
     return Cut(PATCHES[request.param]())
-
-
-def border_edges(faces, labels):
-    """Directed edges (a, b) -> (own cell, other cell or -1) where these differ, by a dictionary."""
-    owner = {}
-    for face, corners in enumerate(faces.tolist()):
-        for k in range(3):
-            owner[corners[k], corners[(k + 1) % 3]] = int(labels[face])
-    return {
-        (a, b): (cell, owner.get((b, a), -1))
-        for (a, b), cell in owner.items()
-        if owner.get((b, a), -1) != cell
-    }
 
 
 def test_areas(cut):
@@ -95,7 +96,7 @@ def to_segments(points, starts, ends):
 
 def test_centres_are_nearest_to_the_centroid_or_deep_inside(cut):
     vectors = vectors_of(cut.vertices, cut.faces)
-    edges = border_edges(cut.faces, cut.labels)
+    edges = cut.border
     usual = 0
     for cell in range(60):
         member = cut.labels == cell
@@ -124,15 +125,9 @@ def test_flatness_and_crease(cut):
     vectors = vectors_of(cut.vertices, cut.faces)
     unit = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
     found = cut.figures
-    crease, first, inner = np.zeros(60), {}, []
-    for face, corners in enumerate(cut.faces.tolist()):
-        for k in range(3):
-            edge = frozenset((corners[k], corners[(k + 1) % 3]))
-            other = first.setdefault(edge, face)
-            if other != face and cut.labels[other] == cut.labels[face]:
-                inner.append((face, other))
-    one, other = np.array(inner).reshape(-1, 2).T
-    np.maximum.at(crease, cut.labels[one], angle(unit[one], unit[other]))
+    one, other = joined(cut.faces).T
+    crease, inner = np.zeros(60), cut.labels[one] == cut.labels[other]
+    np.maximum.at(crease, cut.labels[one[inner]], angle(unit[one], unit[other])[inner])
     np.testing.assert_allclose(found.crease, crease, atol=1e-9)
     for cell in range(60):
         member = cut.labels == cell
@@ -142,7 +137,7 @@ def test_flatness_and_crease(cut):
 
 
 def test_shared_borders(cut):
-    edges = border_edges(cut.faces, cut.labels)
+    edges = cut.border
     length, segments = {}, {}
     for (a, b), (own, other) in edges.items():
         if 0 <= own < other:
@@ -184,7 +179,7 @@ def test_neighbours_go_clockwise(cut):
 
 
 def test_outlines_close_and_lie_on_borders(cut):
-    edges = border_edges(cut.faces, cut.labels)
+    edges = cut.border
     lines = cut.figures.outlines
     walked = {}
     for loop, cell in enumerate(lines.cells.tolist()):
