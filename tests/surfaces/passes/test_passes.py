@@ -7,7 +7,7 @@ from itertools import pairwise, product
 
 import numpy as np
 import pytest
-from mesh_patches import grid
+from mesh_patches import grid, of_patch
 from pass_metrics import ARCH, CAP, PLATE, away, by_level, panel_with_hole, unrolled
 
 from coverable_errors import CoverableError
@@ -164,17 +164,9 @@ def test_a_spline_as_patch_and_as_mesh_gets_the_same_passes() -> None:
     u = np.linspace(0.0, 1.0, 7)
     x, y = np.meshgrid(0.5 * u, 0.4 * u, indexing="ij")
     patch = bspline(np.stack([x, y, 0.05 * np.sin(4 * x) * np.cos(5 * y)], axis=2))
-    s = np.linspace(0.0, 1.0, 41)
-    a, b = np.meshgrid(s, s, indexing="ij")
-    points = patch.point(a, b).reshape(-1, 3)
-    corner = np.arange(41 * 41).reshape(41, 41)
-    quad = [
-        part.ravel()
-        for part in (corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:])
-    ]
-    faces = np.concatenate([np.column_stack(quad[:3]), np.column_stack([quad[0], *quad[2:]])])
+    triangles = TriangleMesh(*of_patch(patch, 40, 40))
     one = parallel_passes(patch, 0.03, (1.0, 0.2, 0.0))
-    other = parallel_passes(mesh(TriangleMesh(points, faces)), 0.03, (1.0, 0.2, 0.0))
+    other = parallel_passes(mesh(triangles), 0.03, (1.0, 0.2, 0.0))
     assert one.count == other.count
     assert one.spacing == pytest.approx(other.spacing, rel=2e-3)
     assert one.length == pytest.approx(other.length, rel=5e-3)
