@@ -24,6 +24,13 @@ FURTHEST = 1e3  # [mm] that a surface can be moved by sliders where the arm has 
 WIDENED = 90.0  # [deg] by which a limit can be widened with its slider
 WIDENED_MM = 500.0
 LONGEST_STANDOFF = 100.0  # [mm]
+KEYS = {
+    "position": ("surface.position", 1e3),
+    "rpy_deg": ("surface.rpy_deg", 1.0),
+    "standoff": ("task.standoff", 1e3),
+    "cone_deg": ("task.cone_deg", 1.0),
+}
+"""Keys of the case, and units of the page in those of the case."""
 
 Values = dict[str, Any]
 """`position` (3 mm), `rpy_deg` (3), `standoff` (mm), `cone_deg`, and `limits`: by joint a pair of
@@ -101,15 +108,9 @@ class Controls:
         if "limits" in values:
             values["limits"] = {**before["limits"], **values["limits"]}
         new = {key: value for key, value in values.items() if value != before[key]}
-        settings = []
-        if "position" in new:
-            settings.append(f"surface.position={_toml([v / 1e3 for v in new['position']])}")
-        if "rpy_deg" in new:
-            settings.append(f"surface.rpy_deg={_toml(new['rpy_deg'])}")
-        if "standoff" in new:
-            settings.append(f"task.standoff={_toml(new['standoff'] / 1e3)}")
-        if "cone_deg" in new:
-            settings.append(f"task.cone_deg={_toml(new['cone_deg'])}")
+        settings = [
+            f"{name}={_toml(new[key], unit)}" for key, (name, unit) in KEYS.items() if key in new
+        ]
         if "limits" in new:
             settings += self._limit_settings(new["limits"])
         return self.case.with_overrides(settings) if settings else self.case
@@ -129,10 +130,8 @@ class Controls:
         tables: dict[str, list[str]] = {"limits_deg": [], "limits_m": []}
         for name, pair in limits.items():
             if pair is not None:
-                slides = joints[name]
-                key, ends = "limits_m" if slides else "limits_deg", pair
-                ends = [end / 1e3 for end in pair] if slides else pair
-                tables[key].append(f"{toml_key(name)} = {_toml(ends)}")
+                key, unit = ("limits_m", 1e3) if joints[name] else ("limits_deg", 1.0)
+                tables[key].append(f"{toml_key(name)} = {_toml(pair, unit)}")
         written = {key: f"{{ {', '.join(rows)} }}" if rows else "" for key, rows in tables.items()}
         return ["robot.limits=", *(f"robot.{key}={text}" for key, text in written.items())]
 
@@ -177,8 +176,8 @@ def _rounded(value: float) -> float:
     return round(float(value), DIGITS) + 0.0
 
 
-def _toml(value: Any) -> str:
-    """Numbers as TOML, without what conversions leave behind."""
+def _toml(value: Any, unit: float) -> str:
+    """Numbers divided by their unit as TOML, without what conversions leave behind."""
     if isinstance(value, list):
-        return f"[{', '.join(map(_toml, value))}]"
-    return json.dumps(float(f"{value:.12g}"))
+        return f"[{', '.join(_toml(one, unit) for one in value)}]"
+    return json.dumps(float(f"{value / unit:.12g}"))

@@ -8,7 +8,8 @@ from dataclasses import asdict
 from typing import Any
 
 from feasibility.collisions import checked, checked_words
-from feasibility.reports.parts import COLOURS, MARGINS, aligned, csv_text, page, percent, table
+from feasibility.reports.pages import COLOURS, page, table
+from feasibility.reports.parts import MARGINS, aligned, csv_text, percent
 from feasibility.sensitivity import LEAST_CONE_DEG
 from feasibility.studies import Arm, Comparison
 from feasibility.version import version

@@ -25,7 +25,8 @@ from feasibility.reports.explanation_words import (
     sentence,
     what_it_opens,
 )
-from feasibility.reports.parts import aligned, filled, framed, page, table, walk_csv
+from feasibility.reports.pages import framed, page, table
+from feasibility.reports.parts import aligned, filled, walk_csv
 from feasibility.results import plain
 from feasibility.sensitivity import (
     Change,

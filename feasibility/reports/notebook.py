@@ -8,7 +8,7 @@ from collections import Counter
 
 from coverable_errors import counted
 from feasibility.collisions import checked_words
-from feasibility.reports.parts import table
+from feasibility.reports.pages import table
 from feasibility.reports.verdict import CAUSES, SENTENCES, rows_of
 from feasibility.verdict import Verdict
 from feasibility.viewer import view

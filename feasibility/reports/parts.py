@@ -1,10 +1,8 @@
-"""Parts that several answers share: wrapped texts, tables, JSON objects, pages."""
+"""Parts that several answers share: wrapped texts, tables, JSON objects, CSV."""
 
 from __future__ import annotations
 
-import base64
 import csv
-import html
 import io
 import math
 import re
@@ -21,21 +19,17 @@ from feasibility.collisions import Asked, LeftOut, checked_words
 from feasibility.results import plain
 from feasibility.task import Task
 from feasibility.verdict import Cause, Certificate, Walk
-from feasibility.version import version
 from robots import Robot
 from surfaces import Cells
 
 if TYPE_CHECKING:
     from feasibility.certification.collisions import CollisionReplay
-    from feasibility.viewer import View
 
 WIDTH = 100  # columns
 MARGINS = ("limit_deg", "limit_m", "cone_deg", "reach_m")
 BUILT = ("adjacent", "rigid")  # reasons that lie in how the arm is built
 _UNIT = re.compile(r"(?<=\d) (?=(?:deg|mm|m2|m/s|m|s)\b|%)")
 _UNBROKEN = "\u00a0"  # textwrap breaks at plain blanks only
-# Colours that most colour-blind people can tell apart.
-COLOURS = {"feasible": "#1b7f5c", "infeasible": "#c05621", "undecided": "#6b7280"}
 
 
 def filled(head: str, text: str) -> str:
@@ -271,96 +265,3 @@ def seconds_text(timing: Mapping[str, float], phases: Mapping[str, str], before_
     times = seconds(timing, phases, before_s)
     parts = ", ".join(f"{name} {times[key]:.3f}" for key, name in phases.items())
     return f"{times['total_s']:.2f} s (loading {times['load_s']:.2f}, {parts})"
-
-
-def page(title: str, body: str, note: str, collision: Asked | str | None) -> str:
-    """One page that fetches nothing.
-
-    Args:
-        title: plain text.
-        body: HTML.
-        note: plain text at the end; the program's version follows.
-        collision: what was checked, or a sentence about it.
-    """
-    checked = collision if isinstance(collision, str) else checked_words(collision)
-    return _PAGE.format(
-        title=html.escape(title),
-        unchecked=html.escape(checked),
-        body=body,
-        note=html.escape(f"{note} coverable {version()}"),
-    )
-
-
-def framed(view: View, title: str) -> str:
-    """A view as HTML: its page in a frame, and its picture on paper, where the frame is empty."""
-    inner, name = html.escape(view.html(), quote=True), html.escape(title, quote=True)
-    picture = base64.b64encode(view.png()).decode("ascii")
-    return (
-        f'<iframe srcdoc="{inner}" title="{name}" loading="lazy"></iframe>\n'
-        f'<img class="printed" src="data:image/png;base64,{picture}" alt="{name}">\n'
-    )
-
-
-def table(heads: Iterable[str], lines: Iterable[Iterable[str]]) -> str:
-    """A table of escaped cells, as HTML."""
-    head = "".join(f"<th>{cell}</th>" for cell in heads)
-    body = "".join(
-        "<tr>" + "".join(f"<td>{cell}</td>" for cell in line) + "</tr>\n" for line in lines
-    )
-    return f"<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody>\n</table>\n"
-
-
-_PAGE = """<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{title}</title>
-<style>
-body {{ font: 15px/1.45 system-ui, sans-serif; margin: 2.5rem auto; max-width: 66rem;
-  padding: 0 1rem; color: #1f2937; background: #fff; }}
-h1 {{ font-size: 1.35rem; margin-bottom: .3rem; overflow-wrap: anywhere; }}
-h2 {{ font-size: 1.05rem; margin: 1.8rem 0 .4rem; overflow-wrap: anywhere; }}
-p {{ overflow-wrap: anywhere; }}
-table {{ border-collapse: collapse; margin-top: .4rem; width: 100%; }}
-th, td {{ text-align: left; padding: .3rem .8rem .3rem 0; border-bottom: 1px solid #e5e7eb;
-  overflow-wrap: anywhere; }}
-td {{ font-variant-numeric: tabular-nums; }}
-.unchecked {{ color: #8a4b08; margin: 0; }}
-svg {{ max-width: 100%; height: auto; }}
-svg.bars text {{ font: 13px system-ui, sans-serif; fill: #1f2937; }}
-svg.bars text.tick {{ font-size: 11px; fill: #6b7280; }}
-.charts {{ display: flex; flex-wrap: wrap; gap: 1rem; }}
-figure {{ margin: 0; flex: 1 1 26rem; }}
-figcaption {{ color: #4b5563; font-size: .85rem; overflow-wrap: anywhere; }}
-.keys span {{ margin-right: 1.2rem; }}
-.keys i {{ display: inline-block; width: .8rem; height: .8rem; border-radius: 2px;
-  margin-right: .35rem; }}
-.bar {{ display: block; width: 9rem; height: .7rem; background: #eef0f3; }}
-.bar b {{ display: block; height: 100%; background: #4b7fb3; }}
-iframe {{ width: 100%; height: 620px; border: 1px solid #e5e7eb; }}
-body:has(.beside) {{ max-width: none; }}
-.beside {{ display: flex; flex-wrap: wrap; gap: 1.5rem; margin-top: .8rem; }}
-.beside iframe {{ flex: 3 1 32rem; width: auto; height: 82vh; }}
-.beside div {{ flex: 2 1 30rem; min-width: 0; }}
-th {{ white-space: nowrap; }}
-.beside td:nth-child(2), .beside td:nth-child(3) {{ white-space: nowrap; }}
-.beside td:first-child {{ white-space: nowrap; }}
-code {{ font-size: .85rem; overflow-wrap: anywhere; }}
-footer {{ margin-top: 1.8rem; color: #6b7280; font-size: .85rem; }}
-.printed {{ display: none; }}
-@media print {{
-  h2, table, figure, img {{ break-inside: avoid; }}
-  iframe {{ display: none; }}
-  .printed, .beside {{ display: block; }}
-  .printed {{ width: 100%; max-width: 36rem; }}
-}}
-</style>
-</head>
-<body>
-<h1>{title}</h1>
-<p class="unchecked">{unchecked}</p>
-{body}<footer>{note}</footer>
-</body>
-</html>
-"""

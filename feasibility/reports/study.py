@@ -11,16 +11,8 @@ from typing import TYPE_CHECKING, Any
 from coverable_errors import counted
 from feasibility.cases import CollisionPart, ObjectPart
 from feasibility.collisions import CHECKABLE, UNCHECKED, checked, checked_words
-from feasibility.reports.parts import (
-    COLOURS,
-    MARGINS,
-    aligned,
-    csv_text,
-    framed,
-    page,
-    percent,
-    table,
-)
+from feasibility.reports.pages import COLOURS, framed, page, table
+from feasibility.reports.parts import MARGINS, aligned, csv_text, percent
 from feasibility.reports.study_plot import are_numbers, charts, short, worded
 from feasibility.studies import Row, Study, StudyTask, merit
 from feasibility.version import version

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from coverable_arrays import Array, Mask
-from feasibility.reports.parts import COLOURS
+from feasibility.reports.pages import COLOURS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
