@@ -7,8 +7,8 @@ from typing import Any
 
 import networkx as nx
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Mask
 from surfaces import Cells
 
 
@@ -43,7 +43,7 @@ class CellGraph(nx.Graph):
     edge_attr_dict_factory = _Attributes
 
 
-def cell_graph(cells: Cells, covered: NDArray[np.bool_]) -> CellGraph:
+def cell_graph(cells: Cells, covered: Mask) -> CellGraph:
     """The cells without any motion between them.
 
     Args:

@@ -20,7 +20,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from coverable_arrays import Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,14 +79,14 @@ class CutTree:
             if isinstance(node, Leaf):
                 yield node
 
-    def folded(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    def folded(self, q: Array) -> Array:
         """Configurations (..., n) with opened joints turned into t .. t + 2 pi."""
         q = np.array(q, dtype=float)
         for joint, value in self.opened:
             q[..., joint] = value + np.mod(q[..., joint] - value, 2.0 * np.pi)
         return q
 
-    def path_to(self, q: NDArray[np.float64]) -> tuple[tuple[Cut, bool], ...]:
+    def path_to(self, q: Array) -> tuple[tuple[Cut, bool], ...]:
         """The cuts from the root to the leaf whose region holds q (n,).
 
         Each with whether q is above it. All of a motion is in the same region.
@@ -97,7 +98,7 @@ class CutTree:
             node = node.above if above else node.below
         return tuple(found)
 
-    def opened_by(self, walk: NDArray[np.float64]) -> Cut | Leaf | tuple[int, float]:
+    def opened_by(self, walk: Array) -> Cut | Leaf | tuple[int, float]:
         """What a motion (m, n) of a changed case shows to be true no more.
 
         Straight lines between its rows.
@@ -118,7 +119,7 @@ class CutTree:
             node = node.above if above.all() else node.below
         return node
 
-    def parting(self, q: NDArray[np.float64], other: NDArray[np.float64]) -> Cut | None:
+    def parting(self, q: Array, other: Array) -> Cut | None:
         """The cut between two configurations (n,) that no motion joins; None in one region."""
         for (cut, above), (_, beyond) in zip(self.path_to(q), self.path_to(other), strict=False):
             if above != beyond:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from robots import Robot
 from surfaces import Cells
@@ -98,7 +99,7 @@ def lines(tree: CutTree, robot: Robot, cells: Cells) -> list[str]:
     return made
 
 
-def what_opens(tree: CutTree, walk: NDArray[np.float64], robot: Robot, cells: Cells) -> str:
+def what_opens(tree: CutTree, walk: Array, robot: Robot, cells: Cells) -> str:
     """What a covering motion (m, n) of a changed case does that the tree rules out in this one."""
     found = tree.opened_by(walk)
     if isinstance(found, Cut):

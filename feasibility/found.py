@@ -6,9 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from coverable_arrays import Array, Ints, Mask
 from feasibility.cut_tree import CutTree
 from feasibility.verdict import Cause, Replay, Walk
 
@@ -20,11 +18,11 @@ if TYPE_CHECKING:
 class Found:
     """The end of a search, of either method."""
 
-    covered: NDArray[np.bool_]
+    covered: Mask
     """(N,) cells that the best single component covers."""
-    components: tuple[NDArray[np.int64], ...]
+    components: tuple[Ints, ...]
     """Cells of each connected component found, the best first."""
-    postures: NDArray[np.float64] | None = None
+    postures: Array | None = None
     """(K, n) a configuration of each of `components`; None where none is kept."""
     start: int | None
     """Flat index of the cell where the best motion starts."""

@@ -16,9 +16,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from coverable_arrays import Array
 
 ALONG = math.sin(math.radians(1.0))  # [1] a reference this near to the approach shows no direction
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import ArgumentError, Checks, Fault
 from feasibility.collisions import Collision
 from feasibility.cone import chord_of
@@ -22,12 +22,12 @@ FIXED_DEG = 0.1  # [deg] to either side: a range that counts as "fixed"
 class Targets(NamedTuple):
     """A task applied to cells: where the tool point has to be, and where its axis points."""
 
-    points: NDArray[np.float64]
+    points: Array
     """(N, 3) m, in the root frame: centre -+ standoff * normal."""
-    approaches: NDArray[np.float64]
+    approaches: Array
     """(N, 3) unit: +normal for the inside of a surface, -normal for the outside, unless the task or
     the cells have others."""
-    references: NDArray[np.float64] | None = None
+    references: Array | None = None
     """(N, 3) unit, square to the approaches: where the reference axis of the TCP points at a roll
     of 0; None where the roll is free."""
 
@@ -216,13 +216,13 @@ class Task:
         """The range of the roll, rad; None where it is free."""
         return None if self.roll_deg is None else roll_of_range(*self.roll_deg)
 
-    def fixed_approach(self, cells: Cells) -> NDArray[np.float64] | None:
+    def fixed_approach(self, cells: Cells) -> Array | None:
         """(3,) unit, in the root frame, where the approach is one direction; None elsewhere."""
         if self.approach is None or isinstance(self.approach, str):
             return None
         return cells.surface.rotation @ unit(self.approach)
 
-    def fixed_reference(self, cells: Cells) -> NDArray[np.float64] | None:
+    def fixed_reference(self, cells: Cells) -> Array | None:
         """(3,) unit, in the root frame, of `roll_reference`; None where there is none."""
         if self.roll_reference is None:
             return None
@@ -233,7 +233,7 @@ class Task:
         own = self.approach is None and cells.approaches is not None
         return self.fixed_approach(cells) is None and not own
 
-    def approaches(self, cells: Cells) -> NDArray[np.float64]:
+    def approaches(self, cells: Cells) -> Array:
         """(N, 3) unit approach directions b of the cell centres, in the root frame."""
         fixed = self.fixed_approach(cells)
         if fixed is not None:
@@ -257,9 +257,7 @@ class Task:
             references=self._references(cells, approaches),
         )
 
-    def _references(
-        self, cells: Cells, approaches: NDArray[np.float64]
-    ) -> NDArray[np.float64] | None:
+    def _references(self, cells: Cells, approaches: Array) -> Array | None:
         if self.roll is None:
             return None
         fixed, directions = self.fixed_reference(cells), cells.tangents
@@ -300,7 +298,7 @@ def _about(roll_deg: float) -> tuple[float, float]:
     return middle - FIXED_DEG, middle + FIXED_DEG
 
 
-def unit(direction: Direction) -> NDArray[np.float64]:
+def unit(direction: Direction) -> Array:
     """The unit direction (3,) along three numbers that are not all zero."""
     numbers = np.array(direction)
     numbers /= np.abs(numbers).max()  # first, so that no square is too large

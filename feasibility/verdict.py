@@ -10,9 +10,7 @@ from functools import cached_property
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from coverable_arrays import Array, Ints, Mask
 from feasibility.collisions import LeftOut, checked_words
 from feasibility.cut_tree import CutTree
 from feasibility.task import Task
@@ -75,9 +73,9 @@ class Cause:
 class Walk:
     """One continuous motion: straight lines in joint space between waypoints."""
 
-    q: NDArray[np.float64]
+    q: Array
     """(m, n) waypoints, rad or m, unwrapped."""
-    cell: NDArray[np.int64]
+    cell: Ints
     """(m,) flat index of the cell whose centre target the tool point is at; -1 between centres."""
 
 
@@ -174,14 +172,14 @@ class Verdict:
     its `index` (row, column), `covered`, and `q` (n,) or None where the best component does not
     reach it. Edges: pairs of cells that a motion joins, with `motion` (k, n) from the smaller index
     to the larger. Made when first read; `networkx.write_graphml` takes it."""
-    covered: NDArray[np.bool_]
+    covered: Mask
     """(N,) cells that the best single component visits."""
     causes: tuple[Cause, ...] = ()
     """One for each cell that is not covered, in order of index; found when first read."""
-    components: tuple[NDArray[np.int64], ...] = ()
+    components: tuple[Ints, ...] = ()
     """Cells of each connected component found, the best first; the greedy search keeps its best
     tree only."""
-    postures: NDArray[np.float64] | None = None
+    postures: Array | None = None
     """(K, n) a configuration of each of `components`, in their order; None where none is kept."""
     tree: nx.DiGraph | None = None
     """Tree T of the paper's search; None for other methods."""

@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array, Mask
 from coverable_errors import ArgumentError, CoverableError
 from feasibility.certification import (
     MotionFault,
@@ -52,9 +53,9 @@ class Verification:
     """Why it does not hold; none where it does."""
     certificate: Certificate | None = None
     """Of a motion: bounds over all of it where it holds, else what was measured."""
-    q: NDArray[np.float64] | None = None
+    q: Array | None = None
     """(m, n) its rows, rad or m."""
-    reached: NDArray[np.bool_] | None = None
+    reached: Mask | None = None
     """(N,) cells that a motion reaches."""
     proof: CutTree | None = None
     boxes: int = 0
@@ -142,7 +143,7 @@ def verify(
     return _of_verdict(verdict, search, tick)
 
 
-def _rows(q: Any) -> NDArray[np.float64]:
+def _rows(q: Any) -> Array:
     """A motion as an array.
 
     Raises:

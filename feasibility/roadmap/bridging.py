@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from feasibility.roadmap.expansion import CONNECT_STEPS
 from feasibility.roadmap.graph import Roadmap, add_motion, roots_of_nodes
 from feasibility.roadmap.motions import (
@@ -30,9 +30,7 @@ Reserve = Callable[[int], Roadmap]
 """Makes space for so many rows of `waypoints` and an edge, and returns the roadmap."""
 
 
-def nearest_pairs(
-    roadmap: Roadmap, pairs: NDArray[np.int64], one: int, other: int
-) -> NDArray[np.int64]:
+def nearest_pairs(roadmap: Roadmap, pairs: Ints, one: int, other: int) -> Ints:
     """(k, 2) nodes of two components over neighbouring cells, the nearest first.
 
     Near means that a motion from one to the other would move the tool little, see
@@ -90,9 +88,7 @@ def bridge(
     return True
 
 
-def _self_motion(
-    arrays: SearchArrays, work: Work, ends: list[NDArray[np.float64]]
-) -> NDArray[np.float64] | None:
+def _self_motion(arrays: SearchArrays, work: Work, ends: list[Array]) -> Array | None:
     """(k, n) waypoints over `work.target` from the first configuration to the second, or None."""
     rows = np.empty((CONNECT_STEPS + 1, len(ends[0])))
     for a, b in ((0, 1), (1, 0)):

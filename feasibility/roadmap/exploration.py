@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from functools import cached_property, partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from feasibility.clock import Clock
 from feasibility.cut_tree import CutTree
 from feasibility.roadmap.branch_and_bound import Boxes, Ruling, rule
@@ -35,9 +35,6 @@ from feasibility.roadmap.motions import SearchArrays, Work, passable, work_for
 from feasibility.roadmap.seeding import seed_cell
 from robots import Robot
 from surfaces import Cells, components
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 BUDGET = 8_000  # evaluations of the arm between two checks of the clock
 GUESSES = 4  # of one `explore_self_motions`
@@ -115,7 +112,7 @@ class Exploration:
         return int(root_of(self.roadmap, self.roadmap.counters[BEST]))
 
     @property
-    def covered(self) -> NDArray[np.bool_]:
+    def covered(self) -> Mask:
         """(N,) cells of the best component."""
         return self.roadmap.cover[self.best].astype(bool)
 
@@ -130,7 +127,7 @@ class Exploration:
         return int(self.roadmap.size[self.best]) == len(self.cells)
 
     @property
-    def reached(self) -> NDArray[np.bool_]:
+    def reached(self) -> Mask:
         """(N,) cells that some component covers."""
         return self.roadmap.first_node >= 0
 
@@ -174,7 +171,7 @@ class Exploration:
         """How many cells the components cover, the largest ones first."""
         return tuple(int(self.roadmap.size[r]) for r in self.roots()[:most])
 
-    def covers(self, component: int) -> NDArray[np.bool_]:
+    def covers(self, component: int) -> Mask:
         """(N,) cells of a component."""
         return self.roadmap.cover[root_of(self.roadmap, component)].astype(bool)
 

@@ -16,11 +16,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from feasibility.compiled import kernel
 from feasibility.roadmap.motions import NEXT, effects, place
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 NODES, EDGES, WAYPOINTS, COMPONENTS, HEAD, TAIL, CURSOR, BEST = range(8)
 """Indices into `Roadmap.counters`."""

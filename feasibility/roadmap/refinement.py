@@ -12,8 +12,8 @@ from __future__ import annotations
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from feasibility.clock import Clock
 from feasibility.compiled import allocating
 from feasibility.roadmap.exploration import Exploration
@@ -121,9 +121,7 @@ def _bridge(fine: Exploration) -> None:
             fine.bridge(one, other, BRIDGES)
 
 
-def _copy_nodes(
-    exploration: Exploration, fine: Exploration, same: NDArray[np.int64]
-) -> dict[int, int]:
+def _copy_nodes(exploration: Exploration, fine: Exploration, same: Ints) -> dict[int, int]:
     """Copy every node to its finer cell, each component to a slot; returns old nodes by new."""
     old = exploration.roadmap
     slots = {root: slot for slot, root in enumerate(exploration.roots())}
@@ -141,10 +139,7 @@ def _copy_nodes(
 
 
 def _take_over(
-    exploration: Exploration,
-    fine: Exploration,
-    same: NDArray[np.int64],
-    origin: dict[int, int],
+    exploration: Exploration, fine: Exploration, same: Ints, origin: dict[int, int]
 ) -> bool:
     """Take motions between components, and to cells that they miss, as edges; True for any."""
     routes = _Routes(fine.roadmap, origin)
@@ -172,7 +167,7 @@ def _take_over(
     return gained
 
 
-def _joining(exploration: Exploration, roadmap: Roadmap, routes: _Routes) -> NDArray[np.int64]:
+def _joining(exploration: Exploration, roadmap: Roadmap, routes: _Routes) -> Ints:
     """Edges over finer cells that join two components; one joined stays so, so none is missed."""
     a, b = roadmap.ends[: roadmap.counters[EDGES]].T
     known = np.flatnonzero((routes.old[a] >= 0) & (routes.old[b] >= 0))
@@ -180,9 +175,7 @@ def _joining(exploration: Exploration, roadmap: Roadmap, routes: _Routes) -> NDA
     return known[root[routes.old[a[known]]] != root[routes.old[b[known]]]]
 
 
-def _covering(
-    exploration: Exploration, roadmap: Roadmap, routes: _Routes, cell_of: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def _covering(exploration: Exploration, roadmap: Roadmap, routes: _Routes, cell_of: Ints) -> Ints:
     """Nodes over the centre of a cell that their component misses."""
     cells = cell_of[roadmap.cell[: len(routes.old)]]
     there = np.flatnonzero((routes.old >= 0) & (cells >= 0))
@@ -208,7 +201,7 @@ class _Routes:
         """Of each node that a motion leads to: the old node that it begins at; else -1."""
         self.old[source >= 0] = known[source[source >= 0]]
 
-    def to(self, node: int) -> NDArray[np.float64]:
+    def to(self, node: int) -> Array:
         """(k, n) waypoints from the source of a node to it, both included."""
         parts = [self._roadmap.q[node][None]]
         while self._before[node] >= 0:

@@ -22,8 +22,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Ints
 from feasibility.roadmap.branch_and_bound import Boxes, Ruling, root_box
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import NODES, root_of
@@ -158,7 +158,7 @@ def _where_the_arm_collides(exploration: Exploration) -> None:
         exploration.prove_collisions(cell)
 
 
-def evenly(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+def evenly(cells: Ints) -> Ints:
     """The same cells in an order of which every first part is spread over all of them."""
     golden = 0.5 * (np.sqrt(5.0) - 1.0)
     return cells[np.argsort(np.modf(golden * np.arange(len(cells)))[0], kind="stable")]

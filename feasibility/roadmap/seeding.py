@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.collisions import clearance_gradient, segment_clear
 from feasibility.compiled import allocating, kernel, put
 from feasibility.roadmap.expansion import join
@@ -30,7 +30,7 @@ PUSHES = 8  # steps that a colliding configuration gets
 PUSH = 0.2  # [rad] or [m] of one step
 
 
-def moved_clear(arrays: SearchArrays, work: Work, cell: int, q: NDArray[np.float64]) -> bool:
+def moved_clear(arrays: SearchArrays, work: Work, cell: int, q: Array) -> bool:
     """Move q (n,), in place, over its cell until it collides no more; False where it still does.
 
     Each step goes down the gradient of the penetration, and is projected back onto the target. This

@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from feasibility.compiled import allocating, put
 from feasibility.roadmap.graph import EDGES, NODES, Roadmap, root_of
 from feasibility.verdict import Walk
@@ -21,11 +21,11 @@ ZERO, NONE = np.int64(0), np.int64(-1)
 class Links(NamedTuple):
     """The motions of one component, in CSR form."""
 
-    inside: NDArray[np.bool_]
+    inside: Mask
     """(nodes,) which nodes are the component's."""
-    indptr: NDArray[np.int64]
+    indptr: Ints
     """(nodes + 1,) the steps from node x are rows indptr[x] to indptr[x + 1]."""
-    steps: NDArray[np.int64]
+    steps: Ints
     """(2 edges, 2) the node that a step leads to, and its edge + 1, negative if run backwards."""
 
 
@@ -220,7 +220,7 @@ def covering_walk(roadmap: Roadmap, component: int, start: int | None = None) ->
     return Walk(*_string(roadmap, start, _route(roadmap, links, wanted, start, True)))
 
 
-def route_walk(roadmap: Roadmap, start: int, route: NDArray[np.int64]) -> Walk:
+def route_walk(roadmap: Roadmap, start: int, route: Ints) -> Walk:
     """The motion from a node along a route.
 
     The route is of edges + 1, negative where one is run backwards, each from the end of the last.
@@ -228,7 +228,7 @@ def route_walk(roadmap: Roadmap, start: int, route: NDArray[np.int64]) -> Walk:
     return Walk(*_string(roadmap, start, route))
 
 
-def patch_walk(roadmap: Roadmap, links: Links, wanted: NDArray[np.bool_], start: int) -> Walk:
+def patch_walk(roadmap: Roadmap, links: Links, wanted: Mask, start: int) -> Walk:
     """One continuous motion through the wanted cells: the motion that covers one patch.
 
     It may lead over any cell of the component; only the wanted ones have to be visited.
@@ -248,7 +248,7 @@ def patch_walk(roadmap: Roadmap, links: Links, wanted: NDArray[np.bool_], start:
     return Walk(*_string(roadmap, start, route))
 
 
-def edge_motion(roadmap: Roadmap, edge: int) -> NDArray[np.float64]:
+def edge_motion(roadmap: Roadmap, edge: int) -> Array:
     """(k, n) waypoints of one edge, from its first node to its second, both included."""
     first, rows = roadmap.edge_rows[edge]
     start = roadmap.q[roadmap.ends[edge, 0]]

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from coverable_arrays import Mask
 from feasibility.targets.curves import RELIABLE, target_curves
 from feasibility.task import Task
 from surfaces import Cells, components
@@ -54,7 +52,7 @@ def blocked_curves(cells: Cells, task: Task) -> str:
     return ""
 
 
-def _parted(cells: Cells, usable: NDArray[np.bool_]) -> str:
+def _parted(cells: Cells, usable: Mask) -> str:
     """Says so where the usable curves (M,) leave the cells in several parts, whatever the arm."""
     before, parts = (
         int(components(pairs, len(cells)).max(initial=-1)) + 1

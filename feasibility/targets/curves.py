@@ -6,16 +6,13 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from feasibility.targets.directions import approach_curves
 from feasibility.targets.frames import FrameCurves, frame_curves
 from feasibility.task import Task
 from surfaces import Cells
 from surfaces.toolpaths import straight
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 RELIABLE = 0.03  # [1] a curve whose normal deviates no further shows the curvature of the surface
 LATERAL = 1.1  # [1] the normal may turn that much faster between the places looked at
@@ -38,13 +35,13 @@ class TargetCurves(NamedTuple):
     """(M, 2) how far target point (m) and direction may be from the surface's own, at most."""
     centre_curvature: float
     """1/m, the largest `curvature` next to the cells' centres."""
-    folded: NDArray[np.bool_]
+    folded: Mask
     """(M,) curves where the offset surface folds, see `folded_curves`."""
     frames: FrameCurves | None = None
     """The reference direction of the roll; None where the roll is free."""
 
 
-def folded_curves(cells: Cells, height: float) -> NDArray[np.bool_]:
+def folded_curves(cells: Cells, height: float) -> Mask:
     """(M,) curves from or to a cell from which some curve runs into a fold of the offset surface.
 
     At a signed height (m) beyond a radius of curvature the offset surface runs backwards, but in

@@ -6,14 +6,11 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from feasibility.task import Task
 from surfaces import Cells, fit_directions
 from surfaces.toolpaths import arc_at
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 BESIDE_CREASES = 4  # times as many samples for each cubic of a mesh, whose curves may come to rest
 ROUNDING = 1.0 + 1e-12  # covers the rounding of the few operations on derivative bounds

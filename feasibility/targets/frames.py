@@ -5,16 +5,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from feasibility.roll import ALONG, projected
 from feasibility.targets.directions import DirectionCurves, fitted
 from feasibility.targets.references import on_patches, reference_directions
 from feasibility.task import Task
 from surfaces import Cells, Patch, Piecewise, max_principal_curvature
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 PLACES = (0.0, 0.5, 1.0)  # along a piece, where the frame's turning to the side is measured
 STEP = 1e-4  # [1] of a range of parameters: of differences

@@ -10,16 +10,13 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from coverable_errors import ArgumentError, Fault
 from feasibility.roll import ALONG, projected
 from feasibility.task import Task
 from surfaces import Cells, Patch, Piecewise, Surface
 from surfaces.toolpaths import arc_at
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 class OnPatch(NamedTuple):

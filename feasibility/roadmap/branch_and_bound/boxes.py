@@ -5,12 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from feasibility.roadmap.motions import SearchArrays
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 STACK = 512  # most boxes on the stack; depth first, so their number grows with the depth only
 

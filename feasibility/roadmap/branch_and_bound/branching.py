@@ -14,8 +14,8 @@ from __future__ import annotations
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.compiled import allocating, kernel, put
 from feasibility.roadmap.branch_and_bound.box_bounds import static_levers
 from feasibility.roadmap.branch_and_bound.box_contraction import THINNEST, shrink
@@ -177,7 +177,7 @@ def branch_and_bound(arrays, work, places, slabs, boxes, most, directions, space
 
 def rule(
     arrays: SearchArrays, work: Work, cell: int, boxes: Boxes, most: int
-) -> tuple[Ruling, NDArray[np.float64]]:
+) -> tuple[Ruling, Array]:
     """Examine up to `most` more boxes for one cell.
 
     Returns:
@@ -190,7 +190,7 @@ def rule(
 
 def examine(
     arrays: SearchArrays, work: Work, places: Places, slabs: Slabs, boxes: Boxes, most: int
-) -> tuple[Ruling, NDArray[np.float64]]:
+) -> tuple[Ruling, Array]:
     """Examine up to `most` more boxes; as `rule`, wherever the tool may be."""
     n = len(arrays.lower)
     found = np.empty(n)

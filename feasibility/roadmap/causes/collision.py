@@ -6,8 +6,8 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.collisions import Pair, configuration_bounds
 from feasibility.roadmap.branch_and_bound import Ruling
 from feasibility.roadmap.exploration import Exploration
@@ -85,9 +85,7 @@ def _proved(cell: int, proof: ArmBlocked, found: Cause | None = None) -> Cause:
     return replace(found, proved=True, detail=detail)
 
 
-def _worded(
-    cell: int, spare: NDArray[np.float64], best: NDArray[np.float64], pairs: tuple[Pair, ...]
-) -> Cause:
+def _worded(cell: int, spare: Array, best: Array, pairs: tuple[Pair, ...]) -> Cause:
     """What the best configuration collides with, and which pairs collide in how many.
 
     Args:

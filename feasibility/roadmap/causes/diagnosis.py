@@ -19,8 +19,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.collisions import Pair
 from feasibility.compiled import allocating, put
 from feasibility.cone import angle_of
@@ -43,8 +43,6 @@ from feasibility.roadmap.motions import (
 from feasibility.roadmap.search import evenly
 from feasibility.verdict import Cause, CauseKind
 from robots import Kinematics, Robot, jacobians
-
-Array = NDArray[np.float64]
 
 MOST_EXAMINED = 400  # cells that are diagnosed one by one
 ENOUGH = 5  # solutions among which the least violation is taken

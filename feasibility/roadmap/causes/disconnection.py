@@ -14,10 +14,7 @@ from feasibility.verdict import Cause, CauseKind
 
 
 def disconnected(
-    exploration: Exploration,
-    cell: int,
-    proof: CutTree | None = None,
-    pairs: tuple[Pair, ...] = (),
+    exploration: Exploration, cell: int, proof: CutTree | None = None, pairs: tuple[Pair, ...] = ()
 ) -> Cause:
     """Why the best component misses a cell that another one covers; proved where a cut parts them.
 

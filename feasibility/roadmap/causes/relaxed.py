@@ -6,8 +6,8 @@ Where the range of the roll alone prevents a cell: at which rolls the arm has it
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.certification.rolls import reference_axes
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions import (
@@ -19,8 +19,6 @@ from feasibility.roadmap.motions import (
 )
 from feasibility.roll import Roll, roll_of
 from robots import Kinematics
-
-Array = NDArray[np.float64]
 
 STARTS = 16  # Newton starts for each relaxed problem
 MANY = 32  # configurations whose rolls are looked at

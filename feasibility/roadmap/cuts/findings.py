@@ -6,16 +6,14 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from feasibility.roadmap.branch_and_bound import Places, place_at_rest
 from feasibility.roadmap.cuts.regions import Region, folded
 from feasibility.roadmap.cuts.samples import projected, random_targets
 from feasibility.roadmap.cuts.statements import Statement
 from feasibility.roadmap.motions import SearchArrays, Work, with_free_roll, work_for
 from robots.chain import tool
-
-Array = NDArray[np.float64]
 
 SAMPLES = 100  # Newton tries onto the motion set, each attempt
 MOST_SAMPLES = 600
@@ -146,7 +144,7 @@ class Findings:
             self.unfinished[key] = Statement(region, places, parameters)
         return self.unfinished[key]
 
-    def known_leaf(self, region: Region, missed: NDArray[np.bool_]) -> int | None:
+    def known_leaf(self, region: Region, missed: Mask) -> int | None:
         """A cell of `missed` (N,) that is proved already for the region."""
         proved = (f.cell for f in self.leaves if missed[f.cell] and f.region.holds(region))
         return next(proved, None)

@@ -16,12 +16,10 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from feasibility.roadmap.cuts.regions import TURN
 from feasibility.roadmap.graph import EDGES, NODES, WAYPOINTS, Roadmap, roots_of_nodes
-
-Array = NDArray[np.float64]
 
 NARROWEST = 1e-3  # [rad], [m]: gaps that are not worth a try
 KEPT = 8  # gaps kept of those between the same two components
@@ -35,7 +33,7 @@ class Component(NamedTuple):
 
     q: Array
     """(k, n) samples of its motions."""
-    cover: NDArray[np.bool_]
+    cover: Mask
     """(N,)"""
 
 

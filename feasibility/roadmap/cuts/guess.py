@@ -12,16 +12,14 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from feasibility.cut_tree import Cut, Leaf
 from feasibility.roadmap.branch_and_bound import Ruling
 from feasibility.roadmap.cuts.findings import Findings, ProvedCut, ProvedLeaf
 from feasibility.roadmap.cuts.gaps import Component, Gap, gaps, slanted_gaps
 from feasibility.roadmap.cuts.regions import Region
 from feasibility.roadmap.cuts.statements import Budget, Statement
-
-Array = NDArray[np.float64]
 
 CANDIDATES = 8  # cuts proved in turns
 REFINED = 3  # times that gaps are cut anew by the points found on them
@@ -167,9 +165,7 @@ class Guessing:
 
 
 def first_proved(
-    findings: Findings,
-    budget: Budget,
-    candidates: Iterable[tuple[Array, float, Region]],
+    findings: Findings, budget: Budget, candidates: Iterable[tuple[Array, float, Region]]
 ) -> Line | None:
     """The first of some cuts on which the tool is proved to be nowhere.
 
@@ -195,7 +191,7 @@ def first_proved(
             findings.keep(settled.found[None])  # or nearly so, where the ruling is UNKNOWN
 
 
-def _guessed_leaf(findings: Findings, region: Region, cover: NDArray[np.bool_]) -> _GuessedLeaf:
+def _guessed_leaf(findings: Findings, region: Region, cover: Mask) -> _GuessedLeaf:
     """The leaf of a region whose components cover `cover` (N,) and no more.
 
     Its cells are those that Newton does not reach either, the furthest from `cover` first.
@@ -236,7 +232,7 @@ def _go_on(findings: Findings, budget: Budget, leaf: _GuessedLeaf, most: int) ->
         findings.keep(settled.found[None], cell)  # or nearly so, where the ruling is UNKNOWN
 
 
-def _furthest(points: Array, cover: NDArray[np.bool_]) -> list[int]:
+def _furthest(points: Array, cover: Mask) -> list[int]:
     """Cells beyond `cover` (N,), the furthest from what it holds first."""
     missed = np.flatnonzero(~cover)
     kept = points[cover] if cover.any() else points.mean(axis=0)[None]

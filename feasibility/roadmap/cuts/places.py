@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.roadmap.branch_and_bound import Places, toward_middle
 from feasibility.targets import target_parts
 from feasibility.task import Task, unit
@@ -40,9 +40,6 @@ def places_on(surface: Surface, task: Task) -> Places:
         children=np.array(parts.children),
         axis=np.array(parts.axis),
     )
-
-
-Array = NDArray[np.float64]
 
 
 def _toward(surface: Surface, task: Task, parts: SurfaceParts) -> tuple[Array, Array, Array]:

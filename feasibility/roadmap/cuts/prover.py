@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from feasibility.roadmap.branch_and_bound import Places
 from feasibility.roadmap.cuts.findings import Findings
@@ -33,7 +33,7 @@ class ProofAttempt:
     """The proof, if there is one."""
     boxes: int
     """Boxes examined."""
-    seeds: tuple[tuple[int, NDArray[np.float64]], ...]
+    seeds: tuple[tuple[int, Array], ...]
     """(cell, (n,) configuration) that no component of the search explains; the cell is the nearest
     one where it is not covered. Joints of more than a turn may be at another winding."""
     open_gaps: tuple[OpenGap, ...]

@@ -14,12 +14,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from feasibility.roadmap.branch_and_bound import Boxes, Places, Slabs, box_of, no_slabs
 from feasibility.roadmap.motions import SearchArrays
-
-Array = NDArray[np.float64]
 
 TURN = 2.0 * np.pi
 WIDE = 1.5 * TURN  # [rad] range from which on windings cost more than they gain
@@ -32,7 +30,7 @@ class Region(NamedTuple):
     """(n,) rad or m"""
     high: Array
     """(n,) rad or m"""
-    revolute: NDArray[np.bool_]
+    revolute: Mask
     """(n,) joints that turn, rather than slide."""
     slabs: Slabs
 
@@ -61,7 +59,7 @@ class Region(NamedTuple):
         )
         return self._replace(slabs=slabs)
 
-    def inside(self, q: Array) -> NDArray[np.bool_]:
+    def inside(self, q: Array) -> Mask:
         """(k,) which configurations (k, n) lie in the region."""
         along = q @ self.slabs.weights.T
         apart = np.maximum(self.slabs.low - along, along - self.slabs.high)

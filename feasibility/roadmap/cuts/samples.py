@@ -7,8 +7,8 @@ that it does not know.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.compiled import kernel
 from feasibility.roadmap.branch_and_bound import Places, unturned
 from feasibility.roadmap.cuts.regions import Region
@@ -21,8 +21,6 @@ from feasibility.roadmap.motions import (
     project,
     stand_still,
 )
-
-Array = NDArray[np.float64]
 
 NEWTON_STEPS = np.int64(16)  # of a try: most that succeed need fewer, and the rest are many
 

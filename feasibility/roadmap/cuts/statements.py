@@ -9,8 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.roadmap.branch_and_bound import Boxes, Places, Ruling, examine
 from feasibility.roadmap.cuts.regions import Region
 from feasibility.roadmap.motions import SearchArrays, Work
@@ -79,7 +79,7 @@ class Statement:
     parameters: int
     """2 on a surface, 0 at a target at rest."""
     ruling: Ruling = Ruling.OPEN
-    found: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    found: Array = field(default_factory=lambda: np.empty(0))
     """(n,) the configuration that refutes it, where REACHED; nearly so where UNKNOWN."""
     boxes: Boxes = field(init=False)
 

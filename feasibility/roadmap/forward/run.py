@@ -12,8 +12,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from feasibility.roadmap.expansion import CONNECT_STEPS
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.forward.layers import Layers, layers_of
@@ -50,7 +50,7 @@ class Run(NamedTuple):
     rounds: int
     """How often more was tried."""
 
-    def covered(self, poses: int) -> NDArray[np.bool_]:
+    def covered(self, poses: int) -> Mask:
         """(poses,) those that the run passes."""
         return np.arange(poses) <= self.furthest
 
@@ -93,7 +93,7 @@ def run_in_order(exploration: Exploration) -> Run:
     return Run(walk, best.furthest, rounds)
 
 
-def changes_in_place(robot: Robot, targets: NDArray[np.float64], walk: Walk, near: float) -> int:
+def changes_in_place(robot: Robot, targets: Array, walk: Walk, near: float) -> int:
     """How often a motion, marked at the poses, changes its posture over a pose.
 
     Args:

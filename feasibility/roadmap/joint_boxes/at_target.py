@@ -18,13 +18,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from feasibility.roadmap.branch_and_bound import DIRECTIONS
 from feasibility.roadmap.joint_boxes.frames import Boxes, Frames, moves
 from robots import Chain
-
-Array = NDArray[np.float64]
 
 ROUNDING = 1e-9  # [m], [1] by which every bound is widened
 FLATTEST = 1e-6  # [m], [1] a joint of less effect is not contracted
@@ -56,13 +54,13 @@ class Target(NamedTuple):
 class Left(NamedTuple):
     """What may still hold the tool at its target."""
 
-    kept: NDArray[np.bool_]
+    kept: Mask
     """(m,) boxes of which something is left."""
     boxes: Boxes
     """m boxes, contracted."""
     effect: Array
     """(m, n) [1] about how much each joint can change these vectors."""
-    held: NDArray[np.bool_]
+    held: Mask
     """(m,) boxes with the tool at its target in their middle."""
 
 

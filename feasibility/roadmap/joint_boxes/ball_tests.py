@@ -15,16 +15,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from feasibility.collisions import Bodies, Pair
 from feasibility.roadmap.joint_boxes.at_target import Target
 from feasibility.roadmap.joint_boxes.frames import Frames, moves, moves_from_tool
 from feasibility.roadmap.tool_alone import Distance, balls_inside, distance_from, is_convex
 from robots import Chain, Robot, joint_alignments
 from robots.shapes import Triangles
-
-Array = NDArray[np.float64]
 
 FINEST = 12  # parts of the widest side of a mesh, between whose corners points are placed
 MOST_BALLS = 40  # of a link
@@ -65,7 +63,7 @@ class Deepest(NamedTuple):
     out, inf where none is deep at all."""
     effect: Array
     """(m, n) m, how far each joint moves that ball."""
-    pair: NDArray[np.int64]
+    pair: Ints
     """(m,) which pair it is; -1 for none."""
 
 
@@ -128,9 +126,7 @@ class _Placed(NamedTuple):
     """(m, k) m, how far else they may be from there."""
 
 
-def _near(
-    test: _BallTest, frames: Frames, rows: NDArray[np.int64], target: Target
-) -> NDArray[np.int64]:
+def _near(test: _BallTest, frames: Frames, rows: Ints, target: Target) -> Ints:
     """Those of some boxes (rows) in which a ball may be deep, as far as their middles show."""
     if isinstance(test.other, Balls):
         return rows

@@ -17,11 +17,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from robots import Chain
-
-Array = NDArray[np.float64]
 
 
 class Boxes(NamedTuple):
@@ -42,7 +40,7 @@ class Boxes(NamedTuple):
         """(m, n) half widths."""
         return 0.5 * (self.high - self.low)
 
-    def some(self, which: NDArray[np.bool_] | NDArray[np.int64] | slice) -> Boxes:
+    def some(self, which: Mask | Ints | slice) -> Boxes:
         """Some of the boxes."""
         return Boxes(self.low[which], self.high[which])
 
@@ -55,7 +53,7 @@ class Frames(NamedTuple):
     points: Array
     """(m, n + 1, 3) m"""
 
-    def some(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Frames:
+    def some(self, which: Mask | Ints) -> Frames:
         """Those at some of the configurations."""
         return Frames(self.rotations[which], self.points[which])
 

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feasibility.collisions import gather
 from feasibility.roadmap.branch_and_bound import root_box
@@ -16,8 +15,6 @@ from feasibility.roadmap.tool_alone import ToolAlone, ToolBlocked
 from feasibility.task import Task
 from robots import Robot
 from surfaces import Surface
-
-Array = NDArray[np.float64]
 
 GUESSES = 30  # guesses at a configuration over the cell, of which none may be seen to be clear
 

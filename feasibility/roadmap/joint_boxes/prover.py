@@ -13,8 +13,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.collisions import Bodies
 from feasibility.roadmap.branch_and_bound import toward_middle
 from feasibility.roadmap.joint_boxes.at_target import Direction, Target, at_target
@@ -22,8 +22,6 @@ from feasibility.roadmap.joint_boxes.ball_tests import BallTests
 from feasibility.roadmap.joint_boxes.frames import Boxes, frames_at
 from feasibility.task import Task
 from robots import Robot
-
-Array = NDArray[np.float64]
 
 BATCH = 1024  # boxes at a time
 MOST_BOXES = 30_000  # of one target

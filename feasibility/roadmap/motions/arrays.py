@@ -7,13 +7,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from feasibility.collisions import collision_buffer, gather
 from feasibility.targets import FrameCurves, target_curves
 from feasibility.task import Task
 from robots import Chain, Robot
 from surfaces import Cells, Surface
-
-Array = NDArray[np.float64]
 
 NEWTON = 0.02  # [1] share of the tolerance that the Newton iteration leaves at a waypoint
 # [1] share of the cone chord, and of the roll's half range, that this may cost, by how the
@@ -46,7 +45,7 @@ class SearchArrays(NamedTuple):
     """(N, 3) approach directions of the cell centres."""
     references: Array
     """(N, 3) the directions that roll is measured from, across these; (0, 3) where it is free."""
-    first_piece: NDArray[np.int64]
+    first_piece: Ints
     """(M + 1,) where the pieces of each curve begin, see `surfaces.cell_curves`."""
     targets: Array
     """(P, 4, 6) cubics of target point and approach direction along each piece."""
@@ -194,7 +193,7 @@ def with_free_roll(arrays: SearchArrays) -> SearchArrays:
     return arrays._replace(roll=np.array([0.0, np.inf]))
 
 
-def within(arrays: SearchArrays) -> NDArray[np.bool_]:
+def within(arrays: SearchArrays) -> Mask:
     """(M,) curves whose deviations leave something of tolerance, cone and roll."""
     most = np.array([arrays.tolerance, arrays.cone_chord])
     usable = (arrays.deviations < most).all(axis=1)
@@ -203,7 +202,7 @@ def within(arrays: SearchArrays) -> NDArray[np.bool_]:
     return np.asarray(usable, dtype=np.bool_)
 
 
-def passable(arrays: SearchArrays) -> NDArray[np.bool_]:
+def passable(arrays: SearchArrays) -> Mask:
     """(M,) curves along which a motion can be certified, as far as the surface goes."""
     bent = np.isinf(arrays.derivative_bounds[:, :2]).any(axis=1)
     curve = np.repeat(np.arange(len(arrays.deviations)), np.diff(arrays.first_piece))

@@ -8,8 +8,8 @@ made, see `feasibility.roadmap.motions.segment_bound`.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.collisions import clearance_gradient
 from feasibility.compiled import kernel, put
 from feasibility.roadmap.motions.aiming import look_at
@@ -216,9 +216,7 @@ def settle(arrays, work, cell, q, most):  # type: ignore[no-untyped-def]
                 return
 
 
-def margin_shares(
-    arrays: SearchArrays, work: Work, cell: int, guesses: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def margin_shares(arrays: SearchArrays, work: Work, cell: int, guesses: Array) -> Array:
     """Project guesses (in place) onto the constraints over a cell, and measure their margins.
 
     Returns:

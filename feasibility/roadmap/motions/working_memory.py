@@ -8,13 +8,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from feasibility.compiled import kernel
 from feasibility.roadmap.motions.roll import roll_off_middle
 from robots import frames
-
-Array = NDArray[np.float64]
 
 HERE, NEXT = np.int64(0), np.int64(1)  # slots of `Work`: where the arm is, where it tries to go
 OF_CONE, OF_ROLL = np.int64(0), np.int64(1)  # rows of `Work.gradients`
@@ -50,7 +48,7 @@ class Work(NamedTuple):
     """(n,) the step of the secondary objective, to be taken in the free directions."""
     step: Array
     """(n,)"""
-    held: NDArray[np.bool_]
+    held: Mask
     """(n,) joints that the step holds at a limit."""
     trial: Array
     """(n,)"""
@@ -70,9 +68,9 @@ class Work(NamedTuple):
     half range (rad); 0 where nothing is left."""
     roll_terms: Array
     """(4,) turn, A, G and W of the last segment, see `segment_bound`."""
-    counts: NDArray[np.int64]
+    counts: Ints
     """(1,) forward kinematics evaluated."""
-    stop_reason: NDArray[np.int64]
+    stop_reason: Ints
     """(2,) why the last motion stopped: a code, and the joint for LIMIT."""
 
 

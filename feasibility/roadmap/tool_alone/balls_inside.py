@@ -11,12 +11,10 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from robots.shapes import Triangles
 from robots.urdf import Box, Capsule, Cylinder, Sphere
-
-Array = NDArray[np.float64]
 
 MOST = 9  # balls along an axis
 AROUND = 12  # balls around a circle

@@ -12,14 +12,13 @@ from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.collisions import HalfSpace
 from feasibility.roadmap.tool_alone.balls_inside import FLUSH, balls_in, face_planes
 from robots.shapes import Triangles
 from robots.urdf import Box, Capsule, Cylinder, Sphere
 
-Array = NDArray[np.float64]
 Distance = Callable[[Array], Array]
 """From points (..., 3) m in the root frame to m (...)."""
 

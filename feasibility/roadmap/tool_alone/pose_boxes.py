@@ -19,8 +19,8 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from feasibility.collisions import Bodies, Pair
 from feasibility.roadmap.tool_alone.balls_inside import balls_inside
 from feasibility.roadmap.tool_alone.distances import (
@@ -30,8 +30,6 @@ from feasibility.roadmap.tool_alone.distances import (
     distance_from_triangles,
 )
 from robots import Robot
-
-Array = NDArray[np.float64]
 
 MOST_BOXES = 4_000  # of one cell
 ALL_BOXES = 20_000  # of all cells of one search
@@ -260,7 +258,7 @@ def _all_over(cone: float) -> Array:
     return poses
 
 
-def _parts(boxes: Array, tilts: NDArray[np.bool_], cone: float) -> Array:
+def _parts(boxes: Array, tilts: Mask, cone: float) -> Array:
     """Boxes cut into four along the tilt where `tilts`, else into halves along the roll.
 
     Parts wholly outside the cone are left out.
