@@ -73,7 +73,6 @@ def _search(
     """`complete_search`, from a cell that the arm's start is over."""
     with clock.enforced():  # loading kernels takes a second or two
         warm_up()
-    with clock.enforced():
         problem.cells.curves  # noqa: B018 - part of the cells, made once
     clock.start()
     with clock.enforced():
@@ -84,7 +83,8 @@ def _search(
     in_time, known, run = True, None, None
     try:
         if seeds is not None:
-            known = _known(problem, seeds)
+            with clock.enforced():
+                known = _known(problem, seeds)
         if begin is not None and known is None:
             _begin(exploration, begin, problem.bodies)
         if seeds is not None:

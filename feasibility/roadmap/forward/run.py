@@ -2,13 +2,18 @@
 
 The complete search joins configurations whichever way the tool goes between poses. Where one
 component covers all poses there may still be no run in order: the motion may have to go back to
-where it can change its posture. So where the layers of the roadmap hold no run, more is tried from
-the furthest pose that a run reaches: other configurations over it and over the poses before it, by
-self-motions of what a run reaches there, each followed ahead as far as it goes.
+where it can change its posture.
+
+Nodes over one pose are a layer. A motion of the roadmap leads from a layer to the next, or stays in
+one; so a run in order is a path through the layers. The one with the fewest changes of posture in
+place is taken, and among those one with the fewest waypoints. Where there is none, more is tried
+from the furthest pose that a run reaches: other configurations over it and over the poses before
+it, by self-motions of what a run reaches there, each followed ahead as far as it goes.
 """
 
 from __future__ import annotations
 
+import heapq
 from typing import NamedTuple
 
 import numpy as np
@@ -16,12 +21,13 @@ import numpy as np
 from coverable_arrays import Array, Mask
 from feasibility.roadmap.expansion import CONNECT_STEPS
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.forward.layers import Layers, layers_of
 from feasibility.roadmap.graph import (
+    EDGES,
     HEAD,
     NODES,
     TAIL,
     WAYPOINTS,
+    Roadmap,
     add_edge,
     add_node,
     nodes_over,
@@ -33,6 +39,7 @@ from feasibility.roadmap.walk import route_walk
 from feasibility.verdict import Cause, CauseKind, Walk
 from robots import Kinematics, Robot
 
+IN_PLACE = 1e6  # [waypoints] a change of posture in place counts as much
 IDLE_ROUNDS = 8  # rounds without gain after which no run is found
 MOST_ROUNDS = 60
 BACK = (0, 1, 2, 4, 8, 16, 32, 64)  # poses before the furthest over which is looked in a round
@@ -71,6 +78,19 @@ class Run(NamedTuple):
         )
         missed = range(self.furthest + 1, poses)
         return tuple(Cause(pose, CauseKind.DISCONNECTED, False, detail) for pose in missed)
+
+
+class Layers(NamedTuple):
+    """How far a run from the first pose gets."""
+
+    ahead: frozenset[int]
+    """Nodes that a run reaches."""
+    furthest: int
+    """The last pose that a run reaches; -1 where there is none over the first."""
+    start: int
+    """The node at which the best run to that pose begins, -1 where there is none."""
+    route: tuple[int, ...]
+    """Its edges, + 1, negative where one is run backwards."""
 
 
 def run_in_order(exploration: Exploration) -> Run:
@@ -116,6 +136,67 @@ def _layers(exploration: Exploration) -> Layers:
     """How far runs get, from the arm's start where it has one."""
     begun = exploration.begun
     return layers_of(exploration.roadmap, None if begun is None else int(begun[0]))
+
+
+def layers_of(roadmap: Roadmap, begin: int | None = None) -> Layers:
+    """The best run from the first pose to the last one that any run reaches.
+
+    Args:
+        roadmap: the roadmap.
+        begin: the node that it has to begin at; any over the first pose by default.
+    """
+    cell = roadmap.cell[: roadmap.counters[NODES]].tolist()
+    steps = _steps(roadmap, cell)
+    starts = [x for x, over in enumerate(cell) if over == 0] if begin is None else [begin]
+    cost, came = _cheapest(starts, steps)
+    if not cost:
+        return Layers(frozenset(), -1, -1, ())
+    end = min(cost, key=lambda x: (-cell[x], cost[x]))
+    route, here = list[int](), end
+    while here in came:
+        edge, here = came[here]
+        route.append(edge)
+    return Layers(
+        ahead=frozenset(cost),
+        furthest=cell[end],
+        start=here,
+        route=tuple(reversed(route)),
+    )
+
+
+def _steps(roadmap: Roadmap, cell: list[int]) -> list[list[tuple[int, int, float]]]:
+    """From each node those it leads to: the signed edge + 1, the node, and what it costs."""
+    found: list[list[tuple[int, int, float]]] = [[] for _ in cell]
+    count = roadmap.counters[EDGES]
+    rows = roadmap.edge_rows[:count, 1].tolist()
+    for edge, (x, y) in enumerate(roadmap.ends[:count].tolist()):
+        cost = rows[edge] + (IN_PLACE if cell[x] == cell[y] else 0.0)
+        if cell[y] - cell[x] in (0, 1):
+            found[x].append((edge + 1, y, cost))
+        if cell[x] - cell[y] in (0, 1):
+            found[y].append((-edge - 1, x, cost))
+    return found
+
+
+def _cheapest(
+    starts: list[int], steps: list[list[tuple[int, int, float]]]
+) -> tuple[dict[int, float], dict[int, tuple[int, int]]]:
+    """Of all nodes that are reached the least cost, and the last step there."""
+    cost = dict.fromkeys(starts, 0.0)
+    came: dict[int, tuple[int, int]] = {}
+    queue = [(0.0, x) for x in starts]
+    done = np.zeros(len(steps), dtype=bool)
+    while queue:
+        spent, x = heapq.heappop(queue)
+        if done[x]:
+            continue
+        done[x] = True
+        for edge, y, more in steps[x]:
+            if spent + more < cost.get(y, np.inf):
+                cost[y] = spent + more
+                came[y] = edge, x
+                heapq.heappush(queue, (spent + more, y))
+    return cost, came
 
 
 def _try_more(exploration: Exploration, best: Layers) -> None:

@@ -11,7 +11,7 @@ from proving import nodes, nothing, prove, root_region, ruling, statement_of
 from feasibility.cut_tree import Cut, Leaf
 from feasibility.roadmap.branch_and_bound.branching import Ruling, branch_and_bound
 from feasibility.roadmap.cuts import components_of
-from feasibility.roadmap.cuts.samples import projected, random_targets
+from feasibility.roadmap.cuts.findings import projected, random_targets
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions import arrays_of
 from robots import load_robot

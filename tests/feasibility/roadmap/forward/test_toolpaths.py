@@ -10,8 +10,7 @@ from feasibility.certification import placements, replay
 from feasibility.collisions import Collision
 from feasibility.paths import PathError, coverage_path
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.forward.layers import layers_of
-from feasibility.roadmap.forward.run import Run, _follow, run_in_order
+from feasibility.roadmap.forward.run import Run, _follow, layers_of, run_in_order
 from feasibility.roadmap.graph import NODES, WAYPOINTS, add_edge, empty_roadmap
 from feasibility.roadmap.motions import arrays_of
 from feasibility.roadmap.seeding import seed_cell
