@@ -39,7 +39,7 @@ from feasibility.roadmap.walk import route_walk
 from feasibility.verdict import Cause, CauseKind, Walk
 from robots import Kinematics, Robot
 
-IN_PLACE = 1e6  # [waypoints] a change of posture in place counts as much
+CHANGE_COST = 1e6  # [waypoints] that a change of posture in place counts as
 IDLE_ROUNDS = 8  # rounds without gain after which no run is found
 MOST_ROUNDS = 60
 BACK = (0, 1, 2, 4, 8, 16, 32, 64)  # poses before the furthest over which is looked in a round
@@ -170,7 +170,7 @@ def _steps(roadmap: Roadmap, cell: list[int]) -> list[list[tuple[int, int, float
     count = roadmap.counters[EDGES]
     rows = roadmap.edge_rows[:count, 1].tolist()
     for edge, (x, y) in enumerate(roadmap.ends[:count].tolist()):
-        cost = rows[edge] + (IN_PLACE if cell[x] == cell[y] else 0.0)
+        cost = rows[edge] + (CHANGE_COST if cell[x] == cell[y] else 0.0)
         if cell[y] - cell[x] in (0, 1):
             found[x].append((edge + 1, y, cost))
         if cell[x] - cell[y] in (0, 1):
