@@ -34,7 +34,7 @@ FREE = np.bool_(False)  # a track without a goal
 
 
 @kernel
-def _nearest_rival(roadmap, cell, q, own, tried, most):  # type: ignore[no-untyped-def]
+def _nearest_rival(roadmap, cell, q, own, tried, most):
     """The node over `cell` nearest to q in a component that is neither `own` nor tried; or -1."""
     best, nearest = -1, np.inf
     node = roadmap.first_node[cell]
@@ -55,7 +55,7 @@ def _nearest_rival(roadmap, cell, q, own, tried, most):  # type: ignore[no-untyp
 
 
 @allocating
-def join(arrays, work, roadmap, cell, q, own, rows, most):  # type: ignore[no-untyped-def]
+def join(arrays, work, roadmap, cell, q, own, rows, most):
     """Try to reach, by self-motion from q over `cell`, a node of another component.
 
     Waypoints go to `roadmap.waypoints` behind the `rows` rows that are pending there.
@@ -89,7 +89,7 @@ def join(arrays, work, roadmap, cell, q, own, rows, most):  # type: ignore[no-un
 
 
 @allocating
-def spread_out(arrays, work, roadmap, indptr, indices, links, budget):  # type: ignore[no-untyped-def]
+def spread_out(arrays, work, roadmap, indptr, indices, links, budget):
     """Spread every queued node into the neighbouring cells that its component does not cover yet.
 
     Args:
@@ -154,7 +154,7 @@ def spread_out(arrays, work, roadmap, indptr, indices, links, budget):  # type: 
 
 
 @allocating
-def explore_self_motions(arrays, work, roadmap, cell, guesses, most):  # type: ignore[no-untyped-def]
+def explore_self_motions(arrays, work, roadmap, cell, guesses, most):
     """Explore the self-motion manifold over one cell, and merge the components that it connects.
 
     A rapidly exploring random tree for each component: the node nearest to a random configuration
@@ -213,7 +213,7 @@ def explore_self_motions(arrays, work, roadmap, cell, guesses, most):  # type: i
 
 
 @kernel
-def _nearest_nodes(roadmap, i, j, component):  # type: ignore[no-untyped-def]
+def _nearest_nodes(roadmap, i, j, component):
     """The two nodes of a component over cells i and j that are nearest to each other; or -1, -1."""
     best_x, best_y, nearest = -1, -1, np.inf
     x = roadmap.first_node[i]
@@ -233,7 +233,7 @@ def _nearest_nodes(roadmap, i, j, component):  # type: ignore[no-untyped-def]
 
 
 @allocating
-def close_pairs(arrays, work, roadmap, pairs, state, component, budget):  # type: ignore[no-untyped-def]
+def close_pairs(arrays, work, roadmap, pairs, state, component, budget):
     """Try to connect every neighbouring pair of cells inside one component by a motion of its own.
 
     Args:

@@ -21,7 +21,7 @@ from feasibility.compiled import allocating, kernel
 
 
 @kernel
-def contract(g, least_sum, most_sum, low, high):  # type: ignore[no-untyped-def]
+def contract(g, least_sum, most_sum, low, high):
     """Cut the box to d with least_sum <= g . d <= most_sum; False when nothing is left.
 
     Args:
@@ -59,7 +59,7 @@ def contract(g, least_sum, most_sum, low, high):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def contract_along(rows, gap, radius, direction, g, low, high):  # type: ignore[no-untyped-def]
+def contract_along(rows, gap, radius, direction, g, low, high):
     """Cut the box to d with |direction . (rows d - gap)| <= radius; False when nothing is left.
 
     Args:
@@ -76,7 +76,7 @@ def contract_along(rows, gap, radius, direction, g, low, high):  # type: ignore[
 
 
 @allocating
-def contract_to_ball(rows, gap, distance, radius, directions, g, low, high):  # type: ignore[no-untyped-def]
+def contract_to_ball(rows, gap, distance, radius, directions, g, low, high):
     """Cut the box to d with |rows d - gap| <= radius, along the gap and along every direction.
 
     Returns False when nothing is left.
@@ -93,7 +93,7 @@ def contract_to_ball(rows, gap, distance, radius, directions, g, low, high):  # 
 
 
 @kernel
-def reach_of_box(arrays, work, half, longest, lever, sine):  # type: ignore[no-untyped-def]
+def reach_of_box(arrays, work, half, longest, lever, sine):
     """Largest levers and sines over a box about slot 1; returns (first, D/2, first, Da/2).
 
     Args:
@@ -136,7 +136,7 @@ def reach_of_box(arrays, work, half, longest, lever, sine):  # type: ignore[no-u
 
 
 @kernel
-def static_levers(arrays, longest):  # type: ignore[no-untyped-def]
+def static_levers(arrays, longest):
     """The longest lever (n,) that each joint can have: the links behind it, stretched out."""
     total = 0.0
     for j in range(longest.shape[0] - 1, -1, -1):

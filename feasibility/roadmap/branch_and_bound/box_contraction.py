@@ -51,7 +51,7 @@ GAIN = 0.3  # [1] of the volume left: contracting again would gain little
 
 
 @kernel
-def _place_centre(arrays, work, places, part, low, high, space):  # type: ignore[no-untyped-def]
+def _place_centre(arrays, work, places, part, low, high, space):
     """Evaluate the arm and the target at a box's centre."""
     n, m = space.q.shape[0], low.shape[0]
     for j in range(m):
@@ -76,7 +76,7 @@ def _place_centre(arrays, work, places, part, low, high, space):  # type: ignore
 
 
 @kernel
-def _first_and_second(arrays, work, places, part, space):  # type: ignore[no-untyped-def]
+def _first_and_second(arrays, work, places, part, space):
     """Bounds of first and second order, for the point and for the axis, over the present box."""
     n, m = space.q.shape[0], space.half.shape[0]
     first, second, first_axis, second_axis = reach_of_box(
@@ -93,7 +93,7 @@ def _first_and_second(arrays, work, places, part, space):  # type: ignore[no-unt
 
 
 @kernel
-def _contract_second(arrays, work, places, part, directions, space, low, high):  # type: ignore[no-untyped-def]
+def _contract_second(arrays, work, places, part, directions, space, low, high):
     """Cut the present box by the lemma of this module; False when nothing is left.
 
     Args:
@@ -142,7 +142,7 @@ def _contract_second(arrays, work, places, part, directions, space, low, high): 
 
 
 @kernel
-def _first_and_second_of_roll(arrays, work, places, part, space):  # type: ignore[no-untyped-def]
+def _first_and_second_of_roll(arrays, work, places, part, space):
     """Bounds of first and second order for the reference axis over a box; sets its gap."""
     n, m = space.q.shape[0], space.half.shape[0]
     for k in range(3):
@@ -154,7 +154,7 @@ def _first_and_second_of_roll(arrays, work, places, part, space):  # type: ignor
 
 
 @kernel
-def _is_solution(arrays, work, places, part):  # type: ignore[no-untyped-def]
+def _is_solution(arrays, work, places, part):
     """Does slot 1 hold the tool at a place of the part, wherever the model may be off by?"""
     off, turned = places.radius[part, 0], places.radius[part, 1]
     inside = work.error[1, 0] + off <= arrays.tolerance
@@ -168,7 +168,7 @@ def _is_solution(arrays, work, places, part):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _inside_slabs(slabs, q):  # type: ignore[no-untyped-def]
+def _inside_slabs(slabs, q):
     """Do the slabs hold a configuration, but for what no box is cut to?"""
     inside = True
     for i in range(slabs.weights.shape[0]):
@@ -180,7 +180,7 @@ def _inside_slabs(slabs, q):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def shrink(arrays, work, places, part, slabs, directions, space, low, high):  # type: ignore[no-untyped-def]
+def shrink(arrays, work, places, part, slabs, directions, space, low, high):
     """Cut one box (in place) to what may still hold a solution.
 
     Returns:

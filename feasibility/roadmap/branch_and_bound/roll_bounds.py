@@ -24,13 +24,13 @@ FLATTEST = 0.1  # [1] 1 + cos of a tilt beyond which roll is not looked at
 
 
 @kernel
-def rolls_over(arrays, places, part):  # type: ignore[no-untyped-def]
+def rolls_over(arrays, places, part):
     """Is roll limited, and known over a part?"""
     return arrays.roll[1] < np.inf and places.radius[part, 2] < np.inf
 
 
 @kernel
-def roll_chord(arrays):  # type: ignore[no-untyped-def]
+def roll_chord(arrays):
     """2 sin(Theta / 2) of the lemma of this module."""
     tilt = 1.0 - 0.25 * min(arrays.cone_chord, 2.0) ** 2
     cosine = np.cos(0.5 * min(arrays.roll[1], np.pi))
@@ -38,7 +38,7 @@ def roll_chord(arrays):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def unturned(target, toward, middle):  # type: ignore[no-untyped-def]
+def unturned(target, toward, middle):
     """Set row 2 of a target (3, 3) to `toward`, turned back about row 1 by `middle`."""
     cosine, sine = np.cos(middle), np.sin(middle)
     b = target[1]
@@ -49,13 +49,13 @@ def unturned(target, toward, middle):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def length_of(vector):  # type: ignore[no-untyped-def]
+def length_of(vector):
     """The length of a vector (3,)."""
     return np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
 
 
 @kernel
-def reach_of_reference(arrays, work, half, sine):  # type: ignore[no-untyped-def]
+def reach_of_reference(arrays, work, half, sine):
     """As `reach_of_box` for the reference axis: (first, Dx/2); fills sines (n,) against it."""
     before = 0.0
     for j in range(sine.shape[0]):
@@ -78,7 +78,7 @@ def reach_of_reference(arrays, work, half, sine):  # type: ignore[no-untyped-def
 
 
 @kernel
-def reference_rows(arrays, work, rows):  # type: ignore[no-untyped-def]
+def reference_rows(arrays, work, rows):
     """Derivatives (3, n) of the tool's reference axis in slot 1: z x x, 0 by a prismatic joint."""
     x, y, z = work.reference[1, 0], work.reference[1, 1], work.reference[1, 2]
     for j in range(work.axes.shape[1]):
@@ -90,7 +90,7 @@ def reference_rows(arrays, work, rows):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def contract_roll(arrays, work, half, sine, g, low, high):  # type: ignore[no-untyped-def]
+def contract_roll(arrays, work, half, sine, g, low, high):
     """Cut the box, about slot 1, to where roll is in its range; False when nothing is left.
 
     Args:

@@ -14,7 +14,7 @@ CENTRE_SHARE = 0.999  # [1] of the tolerance, for self-motions: curves deviate a
 
 
 @kernel
-def stand_still(arrays, work):  # type: ignore[no-untyped-def]
+def stand_still(arrays, work):
     """Let `work.target` be at rest, at a cell's centre or next to it."""
     for part in range(work.derivative_bound.shape[0]):
         work.derivative_bound[part] = 0.0
@@ -26,7 +26,7 @@ def stand_still(arrays, work):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def look_at(arrays, work, cell):  # type: ignore[no-untyped-def]
+def look_at(arrays, work, cell):
     """Set `work.target` to that of a cell's centre, at rest."""
     for k in range(3):
         work.target[0, k] = arrays.points[cell, k]
@@ -37,7 +37,7 @@ def look_at(arrays, work, cell):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def aim(arrays, work, curve, t):  # type: ignore[no-untyped-def]
+def aim(arrays, work, curve, t):
     """Set `work.target` to the target of a curve at t in [0, 1]."""
     first = arrays.first_piece[curve]
     count = arrays.first_piece[curve + 1] - first
@@ -59,7 +59,7 @@ def aim(arrays, work, curve, t):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def speed_at(arrays, curve, t):  # type: ignore[no-untyped-def]
+def speed_at(arrays, curve, t):
     """Speed of the target along a curve by t, at t in [0, 1], m."""
     first = arrays.first_piece[curve]
     count = arrays.first_piece[curve + 1] - first
@@ -76,7 +76,7 @@ def speed_at(arrays, curve, t):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def bounds_between(arrays, work, curve, t0, t1):  # type: ignore[no-untyped-def]
+def bounds_between(arrays, work, curve, t0, t1):
     """Set `work.derivative_bound` and `work.allowance` for a step along a curve.
 
     The step goes from t0 to t1, in either direction.
@@ -106,7 +106,7 @@ def bounds_between(arrays, work, curve, t0, t1):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _frames_between(arrays, work, curve, t0, t1, low, high):  # type: ignore[no-untyped-def]
+def _frames_between(arrays, work, curve, t0, t1, low, high):
     """`bounds_between` for roll; low and high are the first and the last piece."""
     step = abs(t1 - t0)
     slope, curl, rate = 0.0, 0.0, 0.0

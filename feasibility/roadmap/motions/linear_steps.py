@@ -8,7 +8,7 @@ from feasibility.compiled import allocating, kernel
 
 
 @kernel
-def cholesky_solve(a, b, m):  # type: ignore[no-untyped-def]
+def cholesky_solve(a, b, m):
     """Solve the m x m symmetric a y = b in place; False when a is not positive definite."""
     for i in range(m):
         for j in range(i + 1):
@@ -33,7 +33,7 @@ def cholesky_solve(a, b, m):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def least_step(arrays, work, q, m, damping):  # type: ignore[no-untyped-def]
+def least_step(arrays, work, q, m, damping):
     """The step nearest to `work.secondary_step` with rows @ step = rhs, inside the limits.
 
     Only the first m rows count. Joints that would pass a limit are held at it, the furthest first,
@@ -48,9 +48,7 @@ def least_step(arrays, work, q, m, damping):  # type: ignore[no-untyped-def]
 
 
 @allocating
-def step_within(  # type: ignore[no-untyped-def]
-    lower, upper, rows, rhs, secondary_step, step, held, stop_reason, q, m, damping
-):
+def step_within(lower, upper, rows, rhs, secondary_step, step, held, stop_reason, q, m, damping):
     """See `least_step`; its arguments one by one."""
     n = q.shape[0]
     a = np.empty((6, 6))

@@ -40,7 +40,7 @@ CLOSE = 0.98  # [1] of what they may use: from there on they are rows of a step
 
 
 @kernel
-def project_off_target(arrays, work, q, most):  # type: ignore[no-untyped-def]
+def project_off_target(arrays, work, q, most):
     """Bring the tool point as near to `work.target` as limits and cone allow, from q (in place).
 
     For targets that the tool point cannot reach exactly, but within the tolerance. A damped
@@ -89,7 +89,7 @@ def project_off_target(arrays, work, q, most):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _weighted_rows(arrays, work, goal, roll_goal):  # type: ignore[no-untyped-def]
+def _weighted_rows(arrays, work, goal, roll_goal):
     """Rows of a step with cone and roll where they are nearly used; returns how many."""
     m = POINT
     off = off_target(arrays, work, NEXT)
@@ -111,7 +111,7 @@ def _weighted_rows(arrays, work, goal, roll_goal):  # type: ignore[no-untyped-de
 
 
 @kernel
-def project_near_cell(arrays, work, cell, q, most):  # type: ignore[no-untyped-def]
+def project_near_cell(arrays, work, cell, q, most):
     """`project_onto_cell`, or failing that, to within the tolerance of the cell's centre."""
     if project_onto_cell(arrays, work, cell, q, most):
         return True

@@ -28,7 +28,7 @@ PROJECTION_STEPS = np.int64(60)
 
 
 @kernel
-def linearise(arrays, work, slot):  # type: ignore[no-untyped-def]
+def linearise(arrays, work, slot):
     """Linearise at a slot: three position rows, and the gradients of cone and roll.
 
     That of the cone is the derivative of c = |a - b|, which is well scaled for narrow cones too;
@@ -69,7 +69,7 @@ def linearise(arrays, work, slot):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def tilts(work, goal):  # type: ignore[no-untyped-def]
+def tilts(work, goal):
     """Rows 3 and 4: the tilts of the axis along two directions across the target's.
 
     A step across the row of |a - b| leaves a narrow cone; these two rows hold the axis in both
@@ -95,7 +95,7 @@ def tilts(work, goal):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def add_row(work, m, which, change):  # type: ignore[no-untyped-def]
+def add_row(work, m, which, change):
     """Make row m that of a gradient: 0 the cone's, 1 that of roll; returns the number of rows."""
     for j in range(work.step.shape[0]):
         work.rows[m, j] = work.gradients[which, j]
@@ -104,14 +104,14 @@ def add_row(work, m, which, change):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def roll_change(work, goal):  # type: ignore[no-untyped-def]
+def roll_change(work, goal):
     """rad by which roll has to change in slot 1 to be `goal` off the middle of its range."""
     off = work.error[1, 2]
     return goal - off if off > 0.0 else -goal - off
 
 
 @kernel
-def enough_left(work, m):  # type: ignore[no-untyped-def]
+def enough_left(work, m):
     """Are as many joints left as there are rows?"""
     free = 0
     for j in range(work.held.shape[0]):
@@ -121,7 +121,7 @@ def enough_left(work, m):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def bounded_step(arrays, work, q, cone, roll, goal, roll_goal):  # type: ignore[no-untyped-def]
+def bounded_step(arrays, work, q, cone, roll, goal, roll_goal):
     """`least_step` with rows of cone and roll, where they are to be corrected.
 
     The cone by both tilts where it is narrow, as long as joints suffice.
@@ -148,7 +148,7 @@ def bounded_step(arrays, work, q, cone, roll, goal, roll_goal):  # type: ignore[
 
 
 @kernel
-def predicted_chord(work):  # type: ignore[no-untyped-def]
+def predicted_chord(work):
     """|a - b| after `work.step`, to first order."""
     square = 0.0
     for k in range(3):
@@ -160,7 +160,7 @@ def predicted_chord(work):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def predicted_roll(work):  # type: ignore[no-untyped-def]
+def predicted_roll(work):
     """Roll off the middle of its range after `work.step`, to first order."""
     roll = work.error[1, 2]
     for j in range(work.step.shape[0]):
@@ -169,7 +169,7 @@ def predicted_roll(work):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def corrected(arrays, work, q, usable, goal, roll_goal):  # type: ignore[no-untyped-def]
+def corrected(arrays, work, q, usable, goal, roll_goal):
     """The step with cone and roll where they are violated, or would be.
 
     Args:
@@ -202,7 +202,7 @@ def corrected(arrays, work, q, usable, goal, roll_goal):  # type: ignore[no-unty
 
 
 @kernel
-def first_roll_goal(arrays, work, hard, slack, before):  # type: ignore[no-untyped-def]
+def first_roll_goal(arrays, work, hard, slack, before):
     """How far off the middle of its range the first step leads roll, as it does the chord."""
     comfort = COMFORT * arrays.roll[1]
     if before < np.inf:
@@ -213,7 +213,7 @@ def first_roll_goal(arrays, work, hard, slack, before):  # type: ignore[no-untyp
 
 
 @kernel
-def inside(arrays, work):  # type: ignore[no-untyped-def]
+def inside(arrays, work):
     """Is slot 1 at its target, and inside what there is of cone and roll?"""
     return (
         work.error[1, 0] <= arrays.near
@@ -223,7 +223,7 @@ def inside(arrays, work):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def move(arrays, work, q):  # type: ignore[no-untyped-def]
+def move(arrays, work, q):
     """Take `work.step` from q (in place), shortened if it is long, and evaluate the arm there."""
     largest = 0.0
     n = q.shape[0]
@@ -237,7 +237,7 @@ def move(arrays, work, q):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def project(arrays, work, q, slack, before, most):  # type: ignore[no-untyped-def]
+def project(arrays, work, q, slack, before, most):
     """Project q (in place) onto the constraints over `work.target`; slot 1 holds the result.
 
     The first step starts from slot 1's placement of q, heads for `work.secondary_step`, and keeps
@@ -289,7 +289,7 @@ def project(arrays, work, q, slack, before, most):  # type: ignore[no-untyped-de
 
 
 @kernel
-def project_onto_cell(arrays, work, cell, q, most):  # type: ignore[no-untyped-def]
+def project_onto_cell(arrays, work, cell, q, most):
     """Project a guess q (in place) onto the constraints over a cell's centre; True on success."""
     look_at(arrays, work, cell)
     place(arrays, work, NEXT, q)

@@ -24,7 +24,7 @@ TURN = 2.0 * np.pi
 
 
 @kernel
-def roll_off_middle(target, axis, reference, middle):  # type: ignore[no-untyped-def]
+def roll_off_middle(target, axis, reference, middle):
     """psi less the middle of its range, wrapped to -pi .. pi.
 
     Args:
@@ -46,7 +46,7 @@ def roll_off_middle(target, axis, reference, middle):  # type: ignore[no-untyped
 
 
 @kernel
-def roll_gradient(target, axis, axes, prismatic, out):  # type: ignore[no-untyped-def]
+def roll_gradient(target, axis, axes, prismatic, out):
     """The derivative of roll by each joint, into `out` (n,).
 
     `target` and `axis` are those of `roll_off_middle`, `axes` (n, 3) those of the joints.
@@ -61,7 +61,7 @@ def roll_gradient(target, axis, axes, prismatic, out):  # type: ignore[no-untype
 
 
 @kernel
-def level(target):  # type: ignore[no-untyped-def]
+def level(target):
     """Turn row 2 of a target (3, 3) into a unit vector at right angles to row 1."""
     b, t = target[1], target[2]
     along = (b[0] * t[0] + b[1] * t[1] + b[2] * t[2]) / (b[0] ** 2 + b[1] ** 2 + b[2] ** 2)
@@ -75,7 +75,7 @@ def level(target):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def frame_rates(change, second, slope, curl, off, lateral):  # type: ignore[no-untyped-def]
+def frame_rates(change, second, slope, curl, off, lateral):
     """How fast a frame turns, at most, whose b and t are nearly unit vectors at right angles.
 
     With b^ = b / |b|, P = 1 - b^ b^T, and t^ = P t / |P t|: the frame t^, b^ x t^, b^ turns with

@@ -56,7 +56,7 @@ from feasibility.roadmap.motions.working_memory import HERE, NEXT, cone_used, ro
 
 
 @kernel
-def spread(arrays, work, q0, q1):  # type: ignore[no-untyped-def]
+def spread(arrays, work, q0, q1):
     """D and Da of the module's bound for the segment from q0 (slot 0) to q1 (slot 1).
 
     `work.roll_terms` receives turn, A, G and W.
@@ -100,7 +100,7 @@ def spread(arrays, work, q0, q1):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def peak(a, b, most):  # type: ignore[no-untyped-def]
+def peak(a, b, most):
     """Largest value of (1 - s) a + s b + s (1 - s) most / 2 over s in [0, 1]."""
     slope = abs(b - a)
     if 2.0 * slope >= most:
@@ -109,7 +109,7 @@ def peak(a, b, most):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def roll_spread(work, chord, longer):  # type: ignore[no-untyped-def]
+def roll_spread(work, chord, longer):
     """Bounds on |psi'| and |psi''| on a segment, rad; after `spread`.
 
     Args:
@@ -129,7 +129,7 @@ def roll_spread(work, chord, longer):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def roll_bound(arrays, work, chord, longer, lateral):  # type: ignore[no-untyped-def]
+def roll_bound(arrays, work, chord, longer, lateral):
     """How far off the middle of its range roll may be on a segment, at most, rad.
 
     Args:
@@ -147,7 +147,7 @@ def roll_bound(arrays, work, chord, longer, lateral):  # type: ignore[no-untyped
 
 
 @kernel
-def segment_holds(arrays, work, q0, q1):  # type: ignore[no-untyped-def]
+def segment_holds(arrays, work, q0, q1):
     """Do the constraints hold everywhere on the straight segment from q0 (slot 0) to q1 (slot 1)?
 
     Slot 0 holds the errors against the target at the start of the segment, slot 1 at its end.

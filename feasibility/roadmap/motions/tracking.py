@@ -31,7 +31,7 @@ NEWTON_STEPS = np.int64(8)  # of one step
 
 
 @kernel
-def span_of(arrays, work, curve, begin, end):  # type: ignore[no-untyped-def]
+def span_of(arrays, work, curve, begin, end):
     """Distance between the targets of a curve at two parameters, over `arrays.scale`."""
     aim(arrays, work, curve, begin)
     x, y, z = work.target[0, 0], work.target[0, 1], work.target[0, 2]
@@ -41,7 +41,7 @@ def span_of(arrays, work, curve, begin, end):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _step_from(arrays, work, q, dt, off_target):  # type: ignore[no-untyped-def]
+def _step_from(arrays, work, q, dt, off_target):
     """Project q, with its secondary step, onto the target ahead; `work.trial` is the result.
 
     Returns what `segment_holds` does, inf where the projection failed.
@@ -59,21 +59,21 @@ def _step_from(arrays, work, q, dt, off_target):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _something_left(arrays, work):  # type: ignore[no-untyped-def]
+def _something_left(arrays, work):
     """Is anything left of tolerance, cone and roll on the present step?"""
     left = work.allowance[0] > 0.0 and work.allowance[1] > 0.0
     return left and (work.allowance[2] > 0.0 or not arrays.roll[1] < np.inf)
 
 
 @kernel
-def _starts_inside(arrays, work):  # type: ignore[no-untyped-def]
+def _starts_inside(arrays, work):
     """Does slot 0 obey tolerance, cone and roll?"""
     inside = work.error[0, 0] <= work.allowance[0] and work.error[0, 1] <= work.allowance[1]
     return inside and (abs(work.error[0, 2]) <= work.allowance[2] or not arrays.roll[1] < np.inf)
 
 
 @kernel
-def track(arrays, work, curve, begin, end, q, goal, has_goal, waypoints, first):  # type: ignore[no-untyped-def]
+def track(arrays, work, curve, begin, end, q, goal, has_goal, waypoints, first):
     """Follow a curve from `begin` to `end`, from q (in place).
 
     Args:
