@@ -76,14 +76,14 @@ def check(
         >>> verdict.feasible, verdict.n_covered
         (True, 9)
     """
-    from feasibility.speed import check_asked
+    from feasibility.speed import check_requirements
 
     search = Search() if search is None else search
     settings = (search, "search", Search, "a Search, such as Search(seed=1)")
     if collision is not None and isinstance(task, Task):
         task = replace(task, collision=collision)
     problem = Problem.of(robot, cells, task, settings)
-    check_asked(robot, task, search)
+    check_requirements(robot, task, search)
     method: Method
     if search.method == "greedy":
         if seeds is not None:

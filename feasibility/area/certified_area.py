@@ -15,8 +15,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from coverable_errors import ArgumentError
 from feasibility.area.kernels import tile_memory
 from feasibility.area.lines import Lander
@@ -32,12 +32,10 @@ from robots import Robot
 from surfaces import Cells
 from surfaces.cell_tiles import CellTiles, Tiles, cell_tiles
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
 BUDGET = 2000  # evaluations of the arm for each cell,
 LEAST_BUDGET = 300_000  # and at least so many in all
 FACE_BUDGET = 20  # more for each face of a mesh
+NO_SURFACE = "without a surface between the cells"
 NO_GAINS = np.zeros((0, 0, 3))
 
 
@@ -83,7 +81,7 @@ class CertifiedArea:
         return self.evaluations >= self.budget
 
 
-def why_no_area(cells: Cells, task: Task) -> str:
+def _why_no_area(cells: Cells, task: Task) -> str:
     """Why there is no certified area for a question; empty where there is."""
     if task.collision is not None:
         return "where collisions are checked: how near bodies come all over a tile is not known"
@@ -92,7 +90,7 @@ def why_no_area(cells: Cells, task: Task) -> str:
     if task.roll is not None:
         return "where the roll is limited: how it changes all over a tile is not known"
     if cells.approaches is not None or not len(cells) or not cells.areas.sum() > 0.0:
-        return "without a surface between the cells"
+        return NO_SURFACE
     return ""
 
 
@@ -116,9 +114,8 @@ def certified_area(verdict: Verdict, budget: int | None = None) -> CertifiedArea
         >>> certified_area(verdict).share
         1.0
     """
-    _refuse(why_no_area(verdict.cells, verdict.task))
     if verdict.method == "greedy":
-        _refuse("for the greedy search, which keeps no configurations over the cells' centres")
+        raise _none("for the greedy search, which keeps no configurations over the cells' centres")
     cell, q = _over_centres(verdict)
     return area_from(verdict.robot, verdict.cells, verdict.task, cell, q, budget)
 
@@ -130,7 +127,7 @@ def area_from(
     cell: Ints,
     q: Array,
     budget: int | None = None,
-    within: NDArray[np.bool_] | None = None,
+    within: Mask | None = None,
 ) -> CertifiedArea:
     """The certified area of one motion.
 
@@ -145,14 +142,14 @@ def area_from(
     Raises:
         ArgumentError: see `certified_area`.
     """
-    _refuse(why_no_area(cells, task))
+    why = _why_no_area(cells, task)
+    cut = None if why else cell_tiles(cells, cells.surface.side_sign * task.standoff)
+    if cut is None:
+        raise _none(why or NO_SURFACE)
     which = np.arange(len(cells)) if within is None else np.flatnonzero(within)
     some = np.isin(cell, which)
     cell, q = np.asarray(cell)[some], np.asarray(q, dtype=float)[some]
-    asked = less_deviations(task, cells.surface)
-    cut = cell_tiles(cells, cells.surface.side_sign * task.standoff)
-    if cut is None:
-        raise ArgumentError(_words("without a surface between the cells"))
+    tighter = less_deviations(task, cells.surface)
     if not len(cell):
         none = HeldTiles(cut.of_cells(np.zeros(0, np.int64)), np.zeros(0, np.int64), NO_GAINS)
         nodes = Nodes(np.zeros((0, robot.n)), none.tiles.middles, np.zeros(0, np.int64))
@@ -162,13 +159,13 @@ def area_from(
         budget = max(BUDGET * len(which) + FACE_BUDGET * faces, LEAST_BUDGET)
     with compiling_notice(notice=AREAS):
         lander = Lander(
-            arrays_of(robot, cells, asked), work_for(robot.n), tile_memory(robot.n), cut,
+            arrays_of(robot, cells, tighter), work_for(robot.n), tile_memory(robot.n), cut,
             task.fixed_approach(cells), budget,
         )  # fmt: skip
         held = spread_over(lander, which, cell, q)
     nodes, number = lander.nodes.back_from(held.node)
     held = held._replace(node=number[held.node])
-    good = _judged(robot, cells, asked, cut, held, nodes)
+    good = _judged(robot, cells, tighter, cut, held, nodes)
     return _made(cells, cut, held.of(good), nodes, lander.evaluations, budget)
 
 
@@ -190,7 +187,7 @@ def _made(
 
 def _judged(
     robot: Robot, cells: Cells, task: Task, cut: CellTiles, held: HeldTiles, nodes: Nodes
-) -> NDArray[np.bool_]:
+) -> Mask:
     """(k,) which tiles the judge accepts."""
     if not len(held.node):
         return np.zeros(0, dtype=bool)
@@ -216,11 +213,6 @@ def visited(walk: Walk) -> tuple[Ints, Array]:
     return cell[cell >= 0], walk.q[first[cell >= 0]]
 
 
-def _refuse(why: str) -> None:
-    """Raise what says why there is no certified area, if there is a reason."""
-    if why:
-        raise ArgumentError(_words(why))
-
-
-def _words(why: str) -> str:
-    return f"there is no certified area {why}"
+def _none(why: str) -> ArgumentError:
+    """That there is no certified area, to be raised."""
+    return ArgumentError(f"there is no certified area {why}")

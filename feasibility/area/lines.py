@@ -5,17 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from feasibility.area.kernels import HOLDS, UNKNOWN, UNREACHED, Tile, land
 from feasibility.area.nodes import HeldTiles, Nodes
 from feasibility.roadmap.motions import SearchArrays, Work
 from surfaces.cell_tiles import CellTiles, Lines, Tiles
 from surfaces.places import Places
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 TRIES = 3  # of one line, with ever shorter steps
 STEP = 0.02  # m, what is tried first

@@ -5,13 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from surfaces.cell_tiles import Tiles
 from surfaces.places import Places
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 class Nodes(NamedTuple):
@@ -30,7 +27,7 @@ class Nodes(NamedTuple):
         return Nodes(np.concatenate(q), Places.join(*places), np.concatenate(came))
 
     def back_from(self, ends: Ints) -> tuple[Nodes, Ints]:
-        """The nodes on the ways back from some, in their order; and the new numbers (m,) of all."""
+        """The nodes on the paths back from some, in order; and the new numbers (m,) of all."""
         wanted = np.zeros(len(self.came), dtype=bool)
         back = np.unique(ends)
         while len(back):
@@ -58,6 +55,6 @@ class HeldTiles(NamedTuple):
         tiles, node, gains = zip(*parts, strict=True)
         return HeldTiles(Tiles.join(*tiles), np.concatenate(node), np.concatenate(gains))
 
-    def of(self, rows: NDArray[np.bool_]) -> HeldTiles:
+    def of(self, rows: Mask) -> HeldTiles:
         """Some of the tiles."""
         return HeldTiles(self.tiles.of(rows), self.node[rows], self.gains[rows])

@@ -10,15 +10,12 @@ and from the nearest node. On a mesh the faces come first, from each to those th
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from coverable_arrays import Array, Ints, Mask
 from feasibility.area.lines import Landed, Lander
 from feasibility.area.nodes import HeldTiles, Nodes
 from surfaces.cell_tiles import Tiles
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 LEVELS = 12  # halvings of a cell, or of a face
 FACE_TRIES = 3  # of one face, from different sides
@@ -60,7 +57,7 @@ def spread_over(lander: Lander, which: Ints, cell: Ints, q: Array) -> HeldTiles:
     return HeldTiles.join(*held)
 
 
-def _given_nearest(lander: Lander, tiles: Tiles, source: Ints, level: int) -> NDArray[np.bool_]:
+def _given_nearest(lander: Lander, tiles: Tiles, source: Ints, level: int) -> Mask:
     """Give tiles without a node the nearest one on their chart; which (k,) have one that is near.
 
     Nothing gets to a tile far from all nodes but over others, which would have some.
@@ -107,10 +104,10 @@ def _over_faces(lander: Lander, tiles: Tiles, begun: Ints) -> tuple[Ints, Landed
     count = len(tiles.chart)
     source, tries = np.full(count, -1), np.zeros(count, dtype=np.int64)
     landed = Landed.nowhere(count, lander.nodes.q.shape[1])
-    rows, asked = row_of[lander.nodes.places.chart[begun]], begun
+    rows, origin = row_of[lander.nodes.places.chart[begun]], begun
     while len(rows) and lander.left > 0:
         rows, once = np.unique(rows, return_index=True)
-        source[rows] = asked[once]
+        source[rows] = origin[once]
         tries[rows] += 1
         landed.put(rows, lander.land(tiles.of(rows), source[rows]))
         reached = rows[landed.node[rows] >= 0]
@@ -119,7 +116,7 @@ def _over_faces(lander: Lander, tiles: Tiles, begun: Ints) -> tuple[Ints, Landed
         begins = np.repeat(np.cumsum(lengths) - lengths, lengths)
         within = np.arange(lengths.sum()) - begins
         ahead = row_of[touching[np.repeat(indptr[chart], lengths) + within]]
-        asked = np.repeat(landed.node[reached], lengths)
+        origin = np.repeat(landed.node[reached], lengths)
         open_ = (ahead >= 0) & (landed.node[ahead] < 0) & (tries[ahead] < FACE_TRIES)
-        rows, asked = ahead[open_], asked[open_]
+        rows, origin = ahead[open_], origin[open_]
     return source, landed

@@ -1,4 +1,4 @@
-"""Certified area in words and as JSON, for whoever asked for it."""
+"""Certified area in words and as JSON."""
 
 from __future__ import annotations
 

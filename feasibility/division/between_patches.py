@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.certification import CollisionReplay, collision_replay
 from feasibility.collisions import Bodies, collision_buffer, gather
 from feasibility.division.free_motion import FreeSpace, free_motion
@@ -17,25 +17,21 @@ from feasibility.task import Task
 from robots import Robot
 from surfaces import Cells
 
-Floats = NDArray[np.float64]
-
 
 def clear_moves(
     robot: Robot,
     cells: Cells,
     task: Task,
-    buffer: Floats,
+    buffer: Array,
     moves: Iterable[Reconfiguration],
 ) -> tuple[Reconfiguration, ...]:
-    """The same moves led around what is in their way; as they are where nothing is checked.
+    """The same moves led around obstacles; unchanged where collisions are not checked.
 
     A tool that touches the surface is lifted first, and set down at the end: in between it has to
     stay clear of the surface too.
 
     Args:
-        robot: the arm.
-        cells: the cells of the surface.
-        task: the task, with what is asked of collisions.
+        robot, cells, task: the question, with its collisions.
         buffer: of `collision_buffer`, for the same task.
         moves: straight lines.
     """
@@ -50,7 +46,7 @@ def clear_moves(
     return tuple(_clear_of_contact(robot, bodies, lifted, move) for move in moves)
 
 
-def _clear(robot: Robot, bodies: Bodies, buffer: Floats, move: Reconfiguration) -> Reconfiguration:
+def _clear(robot: Robot, bodies: Bodies, buffer: Array, move: Reconfiguration) -> Reconfiguration:
     """A move that the judge accepts; the straight one, judged, where none was found."""
     rows = free_motion(FreeSpace(robot, buffer), move.start, move.end, seed=0)
     if rows is not None:
@@ -71,11 +67,7 @@ def _clear_of_contact(
 ) -> Reconfiguration:
     """The same of a tool that touches at both ends; the straight move where it cannot be lifted.
 
-    Args:
-        robot: the arm.
-        touching: without the pairs of tool and surface.
-        lifted: with them.
-        move: a straight line.
+    `touching` are the bodies without the pairs of tool and surface, `lifted` those with them.
     """
     up, down = lift(robot, move.start), lift(robot, move.end)
     if up is None or down is None:

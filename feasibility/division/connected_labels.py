@@ -23,13 +23,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Ints, Mask
 from feasibility.division.set_covering import lower_bound
 from surfaces import components
 
-Bools = NDArray[np.bool_]
-Ints = NDArray[np.int64]
 Lists = list[list[int]]
 MOST_CUTS = 8  # nodes of one detached piece that get a constraint each
 OPTIMAL, INFEASIBLE = 0, 2  # words of scipy.optimize.milp
@@ -49,15 +47,9 @@ class Labels:
 
 
 def pieces_of(label: Ints, pairs: Ints) -> Ints:
-    """Number the connected patches.
+    """(N,) the connected patch of each cell, from 0: cells of one label that hang together.
 
-    Args:
-        label: (N,) label of each cell, -1 for none.
-        pairs: (M, 2) cells that touch.
-
-    Returns:
-        (N,) patch of each cell, from 0; -1 where the label is. Cells of one label that hang
-        together are in one patch.
+    A label (N,) of -1 is none, and in no patch: -1. Pairs (M, 2) are of cells that touch.
     """
     same = pairs[label[pairs[:, 0]] == label[pairs[:, 1]]]
     piece = components(same, len(label))
@@ -84,7 +76,7 @@ def neighbours_of(n: int, pairs: Ints) -> Lists:
 class _Programme:
     """Variables and constraints over nodes; x[l, c] is column `at[l, c]`, r the one `half` on."""
 
-    def __init__(self, regions: Bools, neighbours: Lists) -> None:
+    def __init__(self, regions: Mask, neighbours: Lists) -> None:
         """Set up everything but the separators."""
         self.regions, self.neighbours = regions, neighbours
         self.half = int(regions.sum())
@@ -124,7 +116,7 @@ class _Programme:
         self.lower.append(lower)
         self.upper.append(upper)
 
-    def separate(self, label: int, inside: set[int], heads: Iterable[int], met: Bools) -> None:
+    def separate(self, label: int, inside: set[int], heads: Iterable[int], met: Mask) -> None:
         """Constraints for the sets around a piece, one after another until the label is met again.
 
         Args:
@@ -146,7 +138,7 @@ class _Programme:
                 return
             around |= border
 
-    def cut(self, label: Ints, roots: Bools) -> int:
+    def cut(self, label: Ints, roots: Mask) -> int:
         """Add what the labels (n,) violate; returns the number of pieces without a root."""
         deviation = 0
         piece = pieces_of(label, self.links)
@@ -162,7 +154,7 @@ class _Programme:
         return deviation
 
 
-def fewest_labels(regions: Bools, pairs: Ints, known: Labels, deadline: float) -> Labels:
+def fewest_labels(regions: Mask, pairs: Ints, known: Labels, deadline: float) -> Labels:
     """Label every cell with a region that holds it, so that the fewest connected patches arise.
 
     Args:
@@ -195,7 +187,7 @@ def fewest_labels(regions: Bools, pairs: Ints, known: Labels, deadline: float) -
     return Labels(best, pieces, bound)
 
 
-def _nodes(regions: Bools, pairs: Ints) -> tuple[Ints, int]:
+def _nodes(regions: Mask, pairs: Ints) -> tuple[Ints, int]:
     """(N,) node of each cell, those without a choice first; and the number of nodes."""
     alone = regions.sum(axis=0) == 1
     node = pieces_of(np.where(alone, np.argmax(regions, axis=0), -1), pairs)
@@ -206,7 +198,7 @@ def _nodes(regions: Bools, pairs: Ints) -> tuple[Ints, int]:
 
 def _solve(
     programme: _Programme, fewest: int, most: int, time_limit: float
-) -> tuple[Ints | None, Bools, int, bool]:
+) -> tuple[Ints | None, Mask, int, bool]:
     """Solve for `fewest` .. `most` patches by HiGHS, with the separators added so far.
 
     Returns:

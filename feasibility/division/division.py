@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Ints
 from feasibility.collisions import checked_words
 from feasibility.cut_tree import CutTree
 from feasibility.division.reconfiguration import Reconfiguration
@@ -23,7 +23,7 @@ from surfaces import Cells
 class SubPatch(ReadOnlyArrays):
     """Cells that one continuous motion covers, and that motion."""
 
-    cells: NDArray[np.int64]
+    cells: Ints
     """(k,) flat indices, sorted."""
     area: float
     """m^2."""
@@ -50,7 +50,7 @@ class Plan:
     patches: tuple[SubPatch, ...]
     moves: tuple[Reconfiguration, ...]
     """From the end of each patch's walk to the start of the next one's; one fewer than patches.
-    Where collisions are checked, they keep clear, or say that no such way was found."""
+    Where collisions are checked, they keep clear, or say that no such move was found."""
     bound: int
     """The components that the search found cannot be shared out in fewer patches."""
 
@@ -64,7 +64,7 @@ class Plan:
         """Are all walks accepted by the replay?"""
         return all(patch.accepted for patch in self.patches)
 
-    def patch_of(self, n: int) -> NDArray[np.int64]:
+    def patch_of(self, n: int) -> Ints:
         """(n,) index of the patch that each of n cells is in; -1 for cells left out."""
         result = np.full(n, -1, dtype=np.int64)
         for k, patch in enumerate(self.patches):
@@ -97,7 +97,7 @@ class Division(ReadOnlyArrays):
     where that costs no patch."""
     left_out: tuple[Cause, ...]
     """Cells that are in no patch, in order of index, and why."""
-    unsettled: NDArray[np.int64]
+    unsettled: Ints
     """Cells that are in no patch because the time limit ran out before they were decided."""
     ended: bool
     """Did the search run to its end, free to move everywhere? Otherwise the patches are the fewest

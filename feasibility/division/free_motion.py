@@ -3,7 +3,7 @@
 Two trees of certified straight lines grow from both ends: one towards a random place, the other
 towards where the first has got (Kuffner and LaValle, "RRT-Connect", ICRA 2000). Every line is
 certified between its ends too, by the compiled clearance of the search. The effort is a count of
-lines that are asked for, so the same question always has the same answer.
+lines that are tried, so the same question always has the same answer.
 """
 
 from __future__ import annotations
@@ -11,15 +11,13 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.collisions import clearance_gradient, segment_clear
 from robots import Robot
 
-Floats = NDArray[np.float64]
-
-MOST_LINES = 40_000  # that may be asked for, for one motion
-FIRST_LINE = 0.5  # [rad], what a way is tried in at first
+MOST_LINES = 40_000  # that are tried for one motion
+FIRST_LINE = 0.5  # [rad], length of the pieces that a line is tried in at first
 SHORTEST = 1e-3  # [rad], no line is halved below this
 LONGEST = 1.0  # [rad] towards a random place at once
 PUSHES, PUSH = 12, 0.1  # from what an end is near, and the length [rad] of one
@@ -28,28 +26,26 @@ SHORTCUTS = 150  # random places between which a straight line is tried
 TURN = 2.0 * np.pi
 
 
+def in_radians(robot: Robot) -> Array:
+    """(n,) rad by which a joint's move counts, by rad or m: a slide as the turn that sweeps it."""
+    reach = robot.reach if np.isfinite(robot.reach) and robot.reach > 0.0 else 1.0
+    return np.where(robot.prismatic, 1.0 / reach, 1.0)
+
+
 class FreeSpace:
-    """Straight lines that are certified clear, of which only so many may be asked for."""
+    """Straight lines that are certified clear, at most so many of them."""
 
-    def __init__(self, robot: Robot, buffer: Floats, most: int = MOST_LINES) -> None:
-        """Ask nothing yet.
-
-        Args:
-            robot: the arm.
-            buffer: of `collision_buffer`.
-            most: lines that may be asked for.
-        """
+    def __init__(self, robot: Robot, buffer: Array, most: int = MOST_LINES) -> None:
+        """Nothing is certified yet; `buffer` is of `collision_buffer`."""
         self.buffer, self.left = buffer, most
-        # A slide counts as the turn that sweeps it.
-        reach = robot.reach if np.isfinite(robot.reach) and robot.reach > 0.0 else 1.0
-        self.scale = np.where(robot.prismatic, 1.0 / reach, 1.0)
+        self.scale = in_radians(robot)
         self.lower, self.upper = robot.lower, robot.upper
 
-    def length(self, start: Floats, end: Floats) -> float:
+    def length(self, start: Array, end: Array) -> float:
         """rad, the largest move of a joint."""
         return float(np.max(np.abs(end - start) * self.scale, initial=0.0))
 
-    def reached(self, start: Floats, end: Floats) -> Floats:
+    def reached(self, start: Array, end: Array) -> Array:
         """(n,) how far the straight line is certified; `end` itself where all of it is."""
         length = self.length(start, end)
         here, done, step = start, 0.0, min(1.0, FIRST_LINE / max(length, SHORTEST))
@@ -67,11 +63,11 @@ class FreeSpace:
                 step *= 0.5
         return end
 
-    def clear(self, start: Floats, end: Floats) -> bool:
+    def clear(self, start: Array, end: Array) -> bool:
         """Is all of a straight line certified?"""
         return self.reached(start, end) is end
 
-    def box(self, start: Floats, end: Floats) -> tuple[Floats, Floats]:
+    def box(self, start: Array, end: Array) -> tuple[Array, Array]:
         """Limits of joint values worth a try; a joint without limits stays within a turn."""
         low, high = np.minimum(start, end), np.maximum(start, end)
         return np.maximum(self.lower, low - TURN), np.minimum(self.upper, high + TURN)
@@ -80,8 +76,8 @@ class FreeSpace:
 class _Tree:
     """Configurations, each reached by a straight line from the one before it."""
 
-    def __init__(self, space: FreeSpace, root: Floats) -> None:
-        """A tree of the way from one configuration to a place with more room.
+    def __init__(self, space: FreeSpace, root: Array) -> None:
+        """A tree of the path from one configuration to a place that is further from all bodies.
 
         Lines from where the arm all but touches something are hardly ever certified.
         """
@@ -89,7 +85,7 @@ class _Tree:
         self.q = np.stack(_away(space, root))
         self.before = list(range(-1, len(self.q) - 1))
 
-    def towards(self, aim: Floats, most: float = np.inf) -> tuple[int, bool]:
+    def towards(self, aim: Array, most: float = np.inf) -> tuple[int, bool]:
         """Grow from the nearest configuration.
 
         Args:
@@ -111,7 +107,7 @@ class _Tree:
         self.before.append(near)
         return len(self.before) - 1, got is aim
 
-    def way(self, node: int) -> list[Floats]:
+    def path(self, node: int) -> list[Array]:
         """The configurations from the root to a node."""
         found = []
         while node >= 0:
@@ -120,7 +116,7 @@ class _Tree:
         return found[::-1]
 
 
-def _away(space: FreeSpace, q: Floats) -> list[Floats]:
+def _away(space: FreeSpace, q: Array) -> list[Array]:
     """Configurations from q on, one after the other away from what is near."""
     rows = [q]
     for _ in range(PUSHES):
@@ -134,7 +130,7 @@ def _away(space: FreeSpace, q: Floats) -> list[Floats]:
     return rows
 
 
-def free_motion(space: FreeSpace, start: Floats, end: Floats, seed: int) -> Floats | None:
+def free_motion(space: FreeSpace, start: Array, end: Array, seed: int) -> Array | None:
     """A motion between two configurations of which every straight line is certified clear.
 
     Args:
@@ -157,15 +153,15 @@ def free_motion(space: FreeSpace, start: Floats, end: Floats, seed: int) -> Floa
         forwards = not forwards
         if node < 0:
             continue
-        meeting, met = other.towards(one.q[node])
-        if met:
-            nodes = (node, meeting) if one is trees[0] else (meeting, node)
-            first, last = trees[0].way(nodes[0]), trees[1].way(nodes[1])
+        joint, joined = other.towards(one.q[node])
+        if joined:
+            nodes = (node, joint) if one is trees[0] else (joint, node)
+            first, last = trees[0].path(nodes[0]), trees[1].path(nodes[1])
             return _shortened(space, np.array(first + last[-2::-1]), rng)
     return None
 
 
-def _shortened(space: FreeSpace, rows: Floats, rng: np.random.Generator) -> Floats:
+def _shortened(space: FreeSpace, rows: Array, rng: np.random.Generator) -> Array:
     """The same motion with straight lines between random places of it where these are clear."""
     space.left = MOST_LINES
     for _ in range(SHORTCUTS):
@@ -183,7 +179,7 @@ def _shortened(space: FreeSpace, rows: Floats, rng: np.random.Generator) -> Floa
     return _without_needless(space, rows)
 
 
-def _without_needless(space: FreeSpace, rows: Floats) -> Floats:
+def _without_needless(space: FreeSpace, rows: Array) -> Array:
     """The same motion without rows that a straight line from the one before can pass over."""
     kept = [0]
     while kept[-1] < len(rows) - 1:

@@ -17,12 +17,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Ints, Mask
 from coverable_errors import ArgumentError
 from feasibility.division.connected_labels import (
-    Bools,
-    Ints,
     Labels,
     Lists,
     count_of,
@@ -41,9 +39,9 @@ OTHER_COVERS = 40  # other choices of regions that patches are grown of
 class Partition(ReadOnlyArrays):
     """Each cell in exactly one patch, each patch inside one component."""
 
-    rows: NDArray[np.int64]
+    rows: Ints
     """(P,) the component of each patch, a row of the table; the largest patch first."""
-    patch: NDArray[np.int64]
+    patch: Ints
     """(N,) the patch of each cell; -1 for cells that are not needed or that nothing covers."""
     pieces: int
     """Connected pieces that the patches have together; P when each is connected."""
@@ -68,12 +66,12 @@ class Cover:
     """Connected where that costs no patch; otherwise in few pieces."""
     connected: Partition
     """Every patch connected; the same object as `fewest` where connectedness costs nothing."""
-    left_out: NDArray[np.bool_]
+    left_out: Mask
     """(N,) needed cells that no component covers; they are in no patch."""
 
 
 def fewest_patches(
-    covers: Bools, needed: Bools, pairs: Ints, time_limit: float = TIME_LIMIT
+    covers: Mask, needed: Mask, pairs: Ints, time_limit: float = TIME_LIMIT
 ) -> Cover:
     """Share cells out among as few components as possible.
 
@@ -139,13 +137,11 @@ def _partition(label: Ints, group: Ints, pieces: int, bound: int) -> Partition:
     return Partition(label[group >= 0][first[order]], patch, pieces, bound)
 
 
-def connected_cover(covers: Bools, pairs: Ints, deadline: float = np.inf) -> Labels:
-    """Label every cell that some row covers, with the fewest connected patches.
+def connected_cover(covers: Mask, pairs: Ints, deadline: float = np.inf) -> Labels:
+    """Label every cell that a row of `covers` (K, N) has, with the fewest connected patches.
 
-    Args:
-        covers: (K, N) True where component k covers cell c.
-        pairs: (M, 2) cells that touch.
-        deadline: `time.monotonic()` at which to stop with the best so far.
+    Pairs (M, 2) are of cells that touch. At the deadline, by `time.monotonic()`, the best so far
+    is taken.
     """
     label = np.full(covers.shape[1], -1, dtype=np.int64)
     inside = np.where(covers.any(axis=0), 0, -1)
@@ -162,7 +158,7 @@ def connected_cover(covers: Bools, pairs: Ints, deadline: float = np.inf) -> Lab
     return Labels(label, pieces, bound)
 
 
-def _one_part(covers: Bools, pairs: Ints, deadline: float) -> Labels:
+def _one_part(covers: Mask, pairs: Ints, deadline: float) -> Labels:
     """Label cells that hang together."""
     regions, rows = _regions(covers, pairs)
     chosen = set_cover(regions, deadline - time.monotonic())
@@ -181,7 +177,7 @@ def _one_part(covers: Bools, pairs: Ints, deadline: float) -> Labels:
     return Labels(rows[best.label], best.pieces, best.bound)
 
 
-def _choices(regions: Bools, least: tuple[int, ...]) -> Iterator[Ints]:
+def _choices(regions: Mask, least: tuple[int, ...]) -> Iterator[Ints]:
     """Regions to grow patches of, in the order of their priority.
 
     First the regions of a least set cover in several orders, then other covers: all regions,
@@ -203,7 +199,7 @@ def _choices(regions: Bools, least: tuple[int, ...]) -> Iterator[Ints]:
         yield np.array(kept, dtype=np.int64)
 
 
-def _regions(covers: Bools, pairs: Ints) -> tuple[Bools, Ints]:
+def _regions(covers: Mask, pairs: Ints) -> tuple[Mask, Ints]:
     """(L, N) the largest connected regions of the rows, and the row (L,) that each is part of.
 
     A patch inside a region that is contained in another one can have the other's label, so only
@@ -219,7 +215,7 @@ def _regions(covers: Bools, pairs: Ints) -> tuple[Bools, Ints]:
     return np.array(regions)[kept], np.array(rows, dtype=np.int64)[kept]
 
 
-def _grow(regions: Bools, neighbours: Lists) -> Ints:
+def _grow(regions: Mask, neighbours: Lists) -> Ints:
     """(N,) labels (rows of `regions`) grown from the cells that have no choice.
 
     Label by label, a patch in several pieces is joined by shortest paths through cells that are
@@ -247,7 +243,7 @@ def _grow(regions: Bools, neighbours: Lists) -> Ints:
         queue.append(first)
 
 
-def _bridge(label: Ints, k: int, region: Bools, neighbours: Lists) -> None:
+def _bridge(label: Ints, k: int, region: Mask, neighbours: Lists) -> None:
     """Join the pieces of label k by shortest paths through free cells of its region."""
     own = np.flatnonzero(label == k).tolist()
     if not own:

@@ -16,19 +16,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from feasibility.certification import replay
-from feasibility.certification.rates import replay_rates
+from coverable_arrays import Array, Ints, Mask
+from feasibility.clock import Clock
 from feasibility.division.between_patches import clear_moves
 from feasibility.division.connected_labels import count_of
 from feasibility.division.division import Plan, SubPatch
 from feasibility.division.partition import TIME_LIMIT, Partition, fewest_patches
 from feasibility.division.reconfiguration import itinerary
 from feasibility.division.set_covering import set_cover
-from feasibility.roadmap import Exploration, Links, improve, links_of, patch_walk
+from feasibility.roadmap import Exploration, Links, arrays_of, improve, links_of, patch_walk
+from feasibility.roadmap.joint_boxes import blockers_of
+from feasibility.speed import replay_at_rates
 from feasibility.task import Task
 from feasibility.verdict import Walk
+from robots import Robot
+from surfaces import Cells
 
 MOST_COMPONENTS = 4  # components that walks of one patch are made of
 MOST_NEAR = 3  # starts of one component's walks that are near other patches
@@ -46,22 +49,19 @@ class _Option:
     """A component that covers one patch, and where walks over the patch may begin."""
 
     patch: int
-    wanted: NDArray[np.bool_]
+    wanted: Mask
     """(N,) cells of the patch."""
     links: Links
-    nodes: NDArray[np.int64]
+    nodes: Ints
     """Nodes of the component over these cells."""
-    q: NDArray[np.float64]
+    q: Array
     """Their configurations."""
 
 
 def plans(exploration: Exploration, task: Task, left: float = np.inf) -> tuple[Plan, Plan]:
     """The plan with the fewest motions, and the one with connected patches (maybe the same).
 
-    Args:
-        exploration: the search.
-        task: the task.
-        left: seconds for the proof that they are the fewest.
+    `left` are seconds for the proof that they are the fewest.
     """
     roots, covers = cover_table(exploration)
     everywhere = np.ones(len(exploration.cells), dtype=bool)
@@ -78,16 +78,11 @@ def plan_of(
     task: Task,
     partition: Partition,
     roots: list[int],
-    covers: NDArray[np.bool_],
+    covers: Mask,
 ) -> Plan:
     """Walks for every patch, in the best order, each replayed, and moves between them.
 
-    Args:
-        exploration: the search.
-        task: the task.
-        partition: the patches.
-        roots: the K components that `partition.rows` counts.
-        covers: (K, N) the cells that each covers.
+    `partition.rows` counts the K `roots`, each of which covers a row of `covers` (K, N).
     """
     robot, cells = exploration.robot, exploration.cells
     if len(partition) == 0:
@@ -97,17 +92,14 @@ def plan_of(
     patches = []
     for p, walk in zip(chosen.order, chosen.walks, strict=True):
         mine = wanted[p]
-        replayed = replay(robot, cells, task, walk, mine)
-        refusal = replayed.refusal
-        if not refusal and task.asks_rates:
-            refusal = "; ".join(replay_rates(robot, cells, task, walk).refusals)
+        certificate, refusal = replay_at_rates(robot, cells, task, walk, mine)
         patches.append(
             SubPatch(
                 cells=np.flatnonzero(mine),
                 area=float(cells.areas[mine].sum()),
                 pieces=count_of(np.where(mine, 0, -1), cells.pairs),
                 walk=walk,
-                certificate=replayed.certificate,
+                certificate=certificate,
                 refusal=refusal,
             )
         )
@@ -117,10 +109,10 @@ def plan_of(
 
 def _choices(
     exploration: Exploration,
-    wanted: Sequence[NDArray[np.bool_]],
+    wanted: Sequence[Mask],
     roots: list[int],
-    covers: NDArray[np.bool_],
-    asked: bool,
+    covers: Mask,
+    at_speed: bool,
 ) -> list[list[Walk]]:
     """For each patch walks of the components that cover it, from several starts."""
     fitting = []
@@ -128,7 +120,7 @@ def _choices(
         rows = np.flatnonzero(covers[:, mine].all(axis=1))
         most = MOST_COMPONENTS if len(wanted) > 1 else 1
         fitting.append([roots[row] for row in rows[:most].tolist()])
-        for component in () if asked else fitting[-1]:  # of those at a speed all is known
+        for component in () if at_speed else fitting[-1]:  # of those at a speed all is known
             connect_pairs(exploration, component, mine)
     roadmap = exploration.roadmap
     links = {root: links_of(roadmap, root) for root in {r for own in fitting for r in own}}
@@ -169,7 +161,19 @@ def _starts(options: Sequence[_Option]) -> list[list[int]]:
     return result
 
 
-def cover_table(exploration: Exploration) -> tuple[list[int], NDArray[np.bool_]]:
+def exploration_of(robot: Robot, cells: Cells, task: Task, seed: int, clock: Clock) -> Exploration:
+    """An exploration that has not begun.
+
+    Raises:
+        OutOfTime: the deadline passed.
+    """
+    with clock.enforced():
+        arrays = arrays_of(robot, cells, task)
+    blockers = blockers_of(robot, cells.surface, task)
+    return Exploration(robot, cells, arrays, seed, clock, blockers)
+
+
+def cover_table(exploration: Exploration) -> tuple[list[int], Mask]:
     """The root components, and (K, N) the cells that each covers."""
     roots = [r for r in exploration.roots() if exploration.roadmap.size[r] > 0]
     return roots, exploration.roadmap.cover[roots].astype(bool)
@@ -201,7 +205,7 @@ def collect_components(exploration: Exploration) -> None:
         exploration.rounds += 1
 
 
-def connect_pairs(exploration: Exploration, component: int, wanted: NDArray[np.bool_]) -> None:
+def connect_pairs(exploration: Exploration, component: int, wanted: Mask) -> None:
     """Look for a motion of a component between every two neighbouring cells that are wanted."""
     pairs = exploration.cells.pairs
     state = np.zeros(len(pairs) + 1, dtype=np.int64)

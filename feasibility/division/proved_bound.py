@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Ints, Mask
 from feasibility.cut_tree import CutTree
 from feasibility.division.division import Apart
 from feasibility.roadmap import Exploration
@@ -41,13 +41,9 @@ class ProvedBound:
 
 
 def prove_apart(exploration: Exploration, task: Task) -> ProvedBound:
-    """Prove how many motions it takes to cover the cells that are reached.
+    """Prove how many motions it takes to cover the cells that a finished search reaches.
 
     Configurations that refute a guess become seeds, so the exploration may know more afterwards.
-
-    Args:
-        exploration: a finished search.
-        task: the task.
 
     Raises:
         OutOfTime: the deadline passed.
@@ -121,9 +117,7 @@ class _Proofs:
 def _never_together(exploration: Exploration, refuted: set[tuple[int, int]]) -> list[int]:
     """As many cells as can be of which no component found covers two, sorted.
 
-    Args:
-        exploration: the search.
-        refuted: pairs (a, b), a < b, that are not to be among them.
+    No pair (a, b), a < b, among them is one of those `refuted`.
     """
     import networkx as nx
 
@@ -146,9 +140,7 @@ def _never_together(exploration: Exploration, refuted: set[tuple[int, int]]) -> 
     return sorted(clique)
 
 
-def _innermost(
-    exploration: Exploration, reached: NDArray[np.int64], mine: NDArray[np.bool_]
-) -> int:
+def _innermost(exploration: Exploration, reached: Ints, mine: Mask) -> int:
     """Of some of the reached cells the one that is furthest from all others."""
     points = exploration.arrays.points[reached]
     if mine.all():

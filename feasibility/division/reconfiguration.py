@@ -3,12 +3,12 @@
 A patch can be painted by several walks, each from either end, and a walk may be done a full turn
 of a joint further on where the limits allow it. The order and the ends are chosen so that the
 largest move of a joint is the least there is (a bottleneck travelling salesman, by trying all
-orders of a few patches). What comes within 2 per cent of that is taken for as good, and of it the
+orders of a few patches). What comes within 2 per cent of that counts as equally good, and of it the
 least sum over all joints.
 
 The moves are straight lines in joint space, away from the surface. They stay inside the limits,
-because limits are convex. Where collisions are checked, `between_patches` leads a move around what
-is in its way.
+because limits are convex. Where collisions are checked, `between_patches` leads a move around
+obstacles.
 """
 
 from __future__ import annotations
@@ -19,16 +19,15 @@ from itertools import pairwise, permutations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from feasibility.certification import CollisionReplay
-from feasibility.paths import improved
+from feasibility.division.free_motion import in_radians
+from feasibility.paths import improved, turns_inside
 from feasibility.read_only import ReadOnlyArrays
 from feasibility.verdict import Walk
 from robots import Robot
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 TURN = 2.0 * np.pi
 MOST_EXACT = 7  # patches up to which all orders are tried; beyond, one is improved by 2-opt
 AS_GOOD = 1.02  # how much larger than the least the largest move may be
@@ -41,19 +40,19 @@ class Reconfiguration(ReadOnlyArrays):
     """The move from the end of one patch's walk to the start of the next one's."""
 
     joint_names: tuple[str, ...]
-    prismatic: NDArray[np.bool_]
+    prismatic: Mask
     """(n,) which joints slide."""
-    start: Floats
+    start: Array
     """(n,) rad or m."""
-    end: Floats
+    end: Array
     """(n,) rad or m."""
-    via: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    via: Array = field(default_factory=lambda: np.zeros((0, 0)))
     """(k, n) rad or m, configurations in between; none where the move is one straight line."""
     replayed: CollisionReplay | None = None
     """What the judge of collisions says of the move; None where collisions are not checked."""
 
     @property
-    def waypoints(self) -> Floats:
+    def waypoints(self) -> Array:
         """(k + 2, n) rad or m, from start to end; straight lines lead from one to the next."""
         return np.vstack([self.start, *self.via, self.end])
 
@@ -64,10 +63,10 @@ class Reconfiguration(ReadOnlyArrays):
             return ""
         worst, *others = self.replayed.faults
         more = f", and {len(others)} more" if others else ""
-        return f"no way around was found, and straight on {worst.text}{more}"
+        return f"no path around was found, and straight on {worst.text}{more}"
 
     @property
-    def moves(self) -> Floats:
+    def moves(self) -> Array:
         """(n,) how far each joint moves, rad or m, with its sign."""
         return self.end - self.start
 
@@ -109,10 +108,7 @@ def itinerary(robot: Robot, choices: Sequence[Sequence[Walk]]) -> Itinerary:
         for direction in (1, -1)
     ]
     group = np.array([p for p, _ in options], dtype=np.int64)
-    # A slide counts as the turn that sweeps it.
-    reach = robot.reach if np.isfinite(robot.reach) and robot.reach > 0.0 else 1.0
-    scale = np.where(robot.prismatic, 1.0 / reach, 1.0)
-    costs = _costs(robot, [walk for _, walk in options], scale)
+    costs = _costs(robot, [walk for _, walk in options])
     own = [np.flatnonzero(group == p) for p in range(len(choices))]
     orders = [[own[p] for p in order] for order in _orders(costs.largest, own)]
     path = _least_path(costs, orders, AS_GOOD)
@@ -124,40 +120,33 @@ def itinerary(robot: Robot, choices: Sequence[Sequence[Walk]]) -> Itinerary:
     return Itinerary(tuple(int(group[k]) for k in path), tuple(walks), moves)
 
 
-def _turns(robot: Robot, walks: Sequence[Walk]) -> tuple[Floats, Floats]:
+def _turns(robot: Robot, walks: Sequence[Walk]) -> tuple[Array, Array]:
     """(S, n) fewest and most full turns that each joint of each walk can be moved on by."""
-    with np.errstate(invalid="ignore"):
-        low = np.ceil((robot.lower - [walk.q.min(axis=0) for walk in walks]) / TURN)
-        high = np.floor((robot.upper - [walk.q.max(axis=0) for walk in walks]) / TURN)
-    fixed = robot.prismatic
-    # Rounding must not rule out the walk as it is.
-    return np.where(fixed, 0.0, np.minimum(low, 0.0)), np.where(fixed, 0.0, np.maximum(high, 0.0))
+    fewest, most = zip(*(turns_inside(robot, walk.q) for walk in walks), strict=True)
+    return np.array(fewest), np.array(most)
 
 
 class _Costs(NamedTuple):
     """(S, S) figures of the move from the end of each walk to the start of each other."""
 
-    largest: Floats
+    largest: Array
     """The largest move of a joint, rad."""
-    total: Floats
+    total: Array
     """The sum over all joints, rad."""
 
 
-def _costs(robot: Robot, walks: Sequence[Walk], scale: Floats) -> _Costs:
-    """Moves between walks, each walk moved on by the full turns that suit the two best.
-
-    Joint moves times `scale` (n,) are radians.
-    """
+def _costs(robot: Robot, walks: Sequence[Walk]) -> _Costs:
+    """Moves between walks, each walk moved on by the full turns that suit the two best."""
     starts = np.array([walk.q[0] for walk in walks])
     ends = np.array([walk.q[-1] for walk in walks])
     low, high = _turns(robot, walks)
     gap = starts[None] - ends[:, None]
     turns = np.clip(np.round(-gap / TURN), low[None] - high[:, None], high[None] - low[:, None])
-    moves = np.abs(gap + TURN * turns) * scale
+    moves = np.abs(gap + TURN * turns) * in_radians(robot)
     return _Costs(np.max(moves, axis=2, initial=0.0), moves.sum(axis=2))
 
 
-def _orders(largest: Floats, own: Sequence[Ints]) -> list[tuple[int, ...]]:
+def _orders(largest: Array, own: Sequence[Ints]) -> list[tuple[int, ...]]:
     """Orders of patches (each has `own` options) to be tried: all, or one that 2-opt improved."""
     if len(own) <= MOST_EXACT:  # of two opposite orders one will do: walks can be reversed
         return [order for order in permutations(range(len(own))) if order[0] >= order[-1]]
@@ -176,7 +165,7 @@ def _least_path(costs: _Costs, orders: Sequence[Sequence[Ints]], as_good: float)
 
 
 def _through(
-    cost: Floats, layers: Sequence[Ints], combine: Callable[[Floats, Floats], Floats]
+    cost: Array, layers: Sequence[Ints], combine: Callable[[Array, Array], Array]
 ) -> tuple[float, list[int]]:
     """The least combined cost of a path with one option of each layer in turn, and that path."""
     best, came = np.zeros(len(layers[0])), []

@@ -15,8 +15,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Ints, Mask
 from coverable_errors import ArgumentError
 
 ROUNDING = 1e-6  # by how much HiGHS's numbers may differ from integers
@@ -32,12 +32,8 @@ class Chosen:
     """No fewer sets cover everything; the number of rows where the optimum is proved."""
 
 
-def undominated(covers: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Indices of the sets that are not contained in another one; of equal sets, the first.
-
-    Args:
-        covers: (K, N) True where set k holds element c.
-    """
+def undominated(covers: Mask) -> Ints:
+    """The sets, rows of `covers` (K, N), that no other one contains; of equal ones the first."""
     sizes = covers.sum(axis=1)
     shared = covers.astype(np.float64) @ covers.T.astype(np.float64)  # exact: counts below 2^53
     index = np.arange(len(covers))
@@ -48,7 +44,7 @@ def undominated(covers: NDArray[np.bool_]) -> NDArray[np.int64]:
     return np.flatnonzero((sizes > 0) & ~(contained & better).any(axis=1))
 
 
-def set_cover(covers: NDArray[np.bool_], time_limit: float) -> Chosen:
+def set_cover(covers: Mask, time_limit: float) -> Chosen:
     """The fewest rows of a table that together have every column.
 
     Args:
@@ -69,7 +65,7 @@ def set_cover(covers: NDArray[np.bool_], time_limit: float) -> Chosen:
     return Chosen(tuple(sorted(int(kept[k]) for k in rows)), bound)
 
 
-def _solved(table: NDArray[np.bool_], time_limit: float) -> tuple[list[int], int]:
+def _solved(table: Mask, time_limit: float) -> tuple[list[int], int]:
     """Rows and bound by HiGHS; the greedy rows where it has nothing better."""
     from scipy.optimize import Bounds, LinearConstraint, milp
 
@@ -97,7 +93,7 @@ def lower_bound(value: float | None) -> int:
     return max(1, math.ceil(value - ROUNDING))
 
 
-def _greedy(table: NDArray[np.bool_]) -> list[int]:
+def _greedy(table: Mask) -> list[int]:
     """The set with most new elements, again and again."""
     left = np.ones(table.shape[1], dtype=bool)
     rows = []

@@ -1,9 +1,9 @@
 """The moves before and after a motion over a surface.
 
 In: from home, where there is one, to a place behind the first one over the surface, then straight
-along its approach direction. Out: straight back along that of the last place, then home. The way to
-and from home is a straight line of the joints, or leads around what is in its way; all of it is
-inside the limits, and judged like any motion where collisions are checked.
+along its approach direction. Out: straight back along that of the last place, then home. The move
+to and from home is a straight line of the joints, or leads around obstacles; all of it is inside
+the limits, and judged like any motion where collisions are checked.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.certification import collision_replay
 from feasibility.collisions import Bodies, collision_buffer, gather
 from feasibility.division import FreeSpace, free_motion
@@ -22,10 +22,8 @@ from feasibility.paths import CoveragePath, PathError
 from feasibility.read_only import ReadOnlyArrays
 from robots import Robot
 
-Floats = NDArray[np.float64]
-
-STEP = 0.2  # [rad], [m] of a joint from row to row of a way home: the judge has a budget for each
-WAYS = 5  # ways home that are looked for, until the judge accepts one
+STEP = 0.2  # [rad], [m] of a joint from row to row of a move home: the judge has a budget for each
+TRIES = 5  # moves home that are looked for, until the judge accepts one
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -34,9 +32,9 @@ class Ends(ReadOnlyArrays):
 
     approach: float
     """m, length of the straight lines of the tool point."""
-    entry: Floats
+    entry: Array
     """(k, n) rad or m; the last row is the first one over the surface."""
-    exit: Floats
+    exit: Array
     """(k, n) rad or m; the first row is the last one over the surface."""
     from_home: bool
 
@@ -49,7 +47,7 @@ def ends_of(path: CoveragePath, approach: float) -> Ends:
         approach: m, how far the tool is drawn back along the approach direction.
 
     Raises:
-        PathError: the tool cannot be drawn back, something is in its way, or no way home is found.
+        PathError: the tool cannot be drawn back, a body is too near, or no move home is found.
     """
     q, cell = path.walk.q, path.walk.cell
     marks = np.flatnonzero(cell >= 0)
@@ -63,7 +61,7 @@ def ends_of(path: CoveragePath, approach: float) -> Ends:
     return Ends(approach=approach, entry=into[::-1], exit=out, from_home=home)
 
 
-def _move(path: CoveragePath, q: Floats, cell: int, approach: float, what: str) -> Floats:
+def _move(path: CoveragePath, q: Array, cell: int, approach: float, what: str) -> Array:
     """(k, n) from a configuration over the surface back, and home where there is one."""
     robot, task = path.robot, path.task
     direction = -task.approaches(path.cells)[cell]
@@ -83,21 +81,21 @@ def _move(path: CoveragePath, q: Floats, cell: int, approach: float, what: str) 
         return np.vstack([back, home])
     _judged(robot, lifted, home[None], f"{what}: home_deg")
     space = FreeSpace(robot, collision_buffer(lifted, robot))
-    refusal = "no way between home and the surface was found that keeps clear"
-    for seed in range(WAYS):
-        way = free_motion(space, back[-1], home, seed=seed)
-        if way is None:
+    refusal = "no move between home and the surface was found that keeps clear"
+    for seed in range(TRIES):
+        move = free_motion(space, back[-1], home, seed=seed)
+        if move is None:
             continue
-        way = _in_short_steps(way)
-        refused = _refusal(robot, lifted, way)
+        move = _in_short_steps(move)
+        refused = _refusal(robot, lifted, move)
         if not refused:
-            return np.vstack([back, way[1:]])
-        refusal = f"the way home: {refused}"
+            return np.vstack([back, move[1:]])
+        refusal = f"the move home: {refused}"
     raise PathError(f"{what}: {refusal}")
 
 
-def _in_short_steps(rows: Floats) -> Floats:
-    """The same way in rows that are closer to each other."""
+def _in_short_steps(rows: Array) -> Array:
+    """The same motion in rows that are closer to each other."""
     counts = np.ceil(np.abs(np.diff(rows, axis=0)).max(axis=1) / STEP).astype(int)
     pieces = [
         np.linspace(a, b, max(count, 1), endpoint=False)
@@ -106,7 +104,7 @@ def _in_short_steps(rows: Floats) -> Floats:
     return np.vstack([*pieces, rows[-1:]])
 
 
-def _judged(robot: Robot, bodies: Bodies | None, rows: Floats, what: str) -> None:
+def _judged(robot: Robot, bodies: Bodies | None, rows: Array, what: str) -> None:
     """Refuse rows (k, n) along which bodies come too near to each other.
 
     Raises:
@@ -117,13 +115,13 @@ def _judged(robot: Robot, bodies: Bodies | None, rows: Floats, what: str) -> Non
         raise PathError(f"{what}: {refusal}")
 
 
-def _refusal(robot: Robot, bodies: Bodies, rows: Floats) -> str:
-    """What the judge of collisions says against rows (k, n) or their way back; empty for nothing.
+def _refusal(robot: Robot, bodies: Bodies, rows: Array) -> str:
+    """Why the judge of collisions refuses rows (k, n) or their reverse; empty for nothing.
 
     Near the clearance it may certify one and not the other.
     """
-    for way in (rows, rows[::-1]):
-        found = collision_replay(robot, bodies, way)
+    for motion in (rows, rows[::-1]):
+        found = collision_replay(robot, bodies, motion)
         if not found.accepted:
             return found.refusal
     return ""

@@ -1,7 +1,7 @@
 """A timed motion with its entry and its exit, from rest to rest each.
 
 The trajectory of the path itself stays as it is, sample by sample. Entry and exit have curves and
-times of their own, and are judged with the very samples at which they meet the path.
+times of their own, and are judged with the samples that they share with the path.
 """
 
 from __future__ import annotations
@@ -10,16 +10,14 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.entry.ends import Ends
 from feasibility.paths import CoveragePath, PathError
 from feasibility.timing import MotionLimits, Trajectory, move_refusal, timed_moves, used
 
-Array = NDArray[np.float64]
-
 SHARES = 0.5 ** np.arange(1, 9)  # [1] of lines that turns may use, one after the other
-SLOWER = (1.0, 1.05, 1.2, 1.5, 2.0)  # [1] times, where the meeting sample asks for too much
+SLOWER = (1.0, 1.05, 1.2, 1.5, 2.0)  # [1] times, where the shared sample needs too much
 
 
 def entered(
@@ -28,9 +26,7 @@ def entered(
     """The trajectory of a path with its entry before it and its exit behind it.
 
     Args:
-        path: the path.
-        run: its trajectory.
-        ends: its entry and exit.
+        path, run, ends: the path, its trajectory, its entry and exit.
         limits: that these keep to, too.
         period: s between samples.
 
@@ -60,7 +56,7 @@ def entered(
 
 
 def _timed(
-    path: CoveragePath, rows: Array, run: Trajectory, meeting: int, limits: MotionLimits,
+    path: CoveragePath, rows: Array, run: Trajectory, shared: int, limits: MotionLimits,
     period: float, what: str,
 ) -> Trajectory:  # fmt: skip
     """One of the moves with times; its end at the path has the path's own sample.
@@ -69,19 +65,19 @@ def _timed(
         PathError: no timing was found.
     """
     fault = "no timing was found"
-    own = -1 if meeting == 0 else 0
+    own = -1 if shared == 0 else 0
     rows = rows.copy()
-    rows[own] = run.q[meeting]
+    rows[own] = run.q[shared]
     for share in SHARES:
         for slower in SLOWER:
             made = timed_moves(path.robot, rows, float(share), limits, period, slower)
             ddq = made.ddq.copy()
-            ddq[own] = run.ddq[meeting]
+            ddq[own] = run.ddq[shared]
             made = replace(made, ddq=ddq)
             if used(path.robot, made, limits).too_fast <= 1.0:
                 break
         else:
-            fault = "no timing was found that keeps to the limits where it meets the path"
+            fault = "no timing was found that keeps to the limits where it joins the path"
             continue
         fault = move_refusal(path, made)
         if not fault:

@@ -1,7 +1,6 @@
 from .coverage import CoveragePath as CoveragePath
 from .coverage import coverage_path as coverage_path
 from .metrics import PathFigures as PathFigures
-from .metrics import figures_of as figures_of
 from .motion_graph import MotionGraph as MotionGraph
 from .motion_graph import join_self_motions as join_self_motions
 from .motion_graph import motion_graph_of as motion_graph_of
@@ -10,4 +9,5 @@ from .order import Order as Order
 from .order import PathError as PathError
 from .order import check_order as check_order
 from .two_opt import improved as improved
+from .winding import turns_inside as turns_inside
 from .winding import unwound as unwound

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 
 import networkx as nx
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from feasibility.certification import replay
 from feasibility.paths.ladder import JointRoute, first_few, joint_route
 from feasibility.paths.metrics import PathFigures, figures_of
@@ -55,7 +55,7 @@ class CoveragePath(ReadOnlyArrays):
     cells: Cells
     task: Task
     order: Order
-    needed: NDArray[np.bool_]
+    needed: Mask
     """(N,) cells that the path visits; it may pass over others."""
     walk: Walk
     """The motion: straight lines in joint space between waypoints."""
@@ -63,8 +63,17 @@ class CoveragePath(ReadOnlyArrays):
     """What the independent replay of the walk measured."""
     figures: PathFigures
 
+    @staticmethod
+    def of(
+        robot: Robot, cells: Cells, task: Task, order: Order, walk: Walk, needed: Mask,
+        certificate: Certificate,
+    ) -> CoveragePath:  # fmt: skip
+        """A motion that the replay has accepted, measured."""
+        figures = figures_of(robot, cells, task, walk, certificate, needed)
+        return CoveragePath(robot, cells, task, order, needed, walk, certificate, figures)
+
     @property
-    def visits(self) -> NDArray[np.int64]:
+    def visits(self) -> Ints:
         """Flat indices of cells in the order in which the path passes their centres."""
         return self.walk.cell[self.walk.cell >= 0]
 
@@ -125,22 +134,20 @@ def coverage_path(
     replayed = replay(robot, cells, task, walk, needed)
     if not replayed.accepted:
         raise PathError(f"the independent replay refuses the path: {replayed.refusal}")
-    certificate = replayed.certificate
-    figures = figures_of(robot, cells, task, walk, certificate, needed)
-    return CoveragePath(robot, cells, task, order, needed, walk, certificate, figures)
+    return CoveragePath.of(robot, cells, task, order, walk, needed, replayed.certificate)
 
 
-def _from_start(found: JointRoute, start: NDArray[np.float64] | None) -> list[int]:
-    """The nodes of a route, with the way to it from the arm's start before them."""
+def _from_start(found: JointRoute, start: Array | None) -> list[int]:
+    """The nodes of a route, with the path to it from the arm's start before them."""
     if start is None:
         return found.nodes
     graph = found.graph
     begin = int(np.argmin([np.abs(q - start).max() for q in graph.q]))
-    way = nx.shortest_path(graph.edges, begin, found.nodes[0], weight="length")
-    return [*way[:-1], *found.nodes]
+    path = nx.shortest_path(graph.edges, begin, found.nodes[0], weight="length")
+    return [*path[:-1], *found.nodes]
 
 
-def _needed(verdict: Verdict, only: Iterable[int] | None) -> NDArray[np.bool_]:
+def _needed(verdict: Verdict, only: Iterable[int] | None) -> Mask:
     """(N,) the cells to visit.
 
     Raises:
@@ -150,7 +157,7 @@ def _needed(verdict: Verdict, only: Iterable[int] | None) -> NDArray[np.bool_]:
     if verdict.method != "complete":
         raise PathError(
             f"a path needs a verdict of the complete search; this one is of the {verdict.method} "
-            "search, whose motions do not pass the centres of cells; ask with method = 'complete'"
+            "search, whose motions do not pass the centres of cells; take method = 'complete'"
         )
     if only is None:
         if verdict.answer is not Answer.FEASIBLE:
@@ -186,7 +193,7 @@ def _needed(verdict: Verdict, only: Iterable[int] | None) -> NDArray[np.bool_]:
     return needed
 
 
-def _run(verdict: Verdict, needed: NDArray[np.bool_]) -> Walk:
+def _run(verdict: Verdict, needed: Mask) -> Walk:
     """The part of a toolpath's witness from the first needed pose to the last.
 
     Raises:
@@ -200,9 +207,7 @@ def _run(verdict: Verdict, needed: NDArray[np.bool_]) -> Walk:
     return Walk(q=walk.q[first : last + 1], cell=walk.cell[first : last + 1])
 
 
-def _least_revisiting(
-    graph: MotionGraph, cells: Cells, order: Order, needed: NDArray[np.bool_]
-) -> JointRoute:
+def _least_revisiting(graph: MotionGraph, cells: Cells, order: Order, needed: Mask) -> JointRoute:
     """The motion over cells in an order that revisits least, of those that are tried.
 
     Raises:
@@ -228,7 +233,7 @@ class _Attempts:
 
     graph: MotionGraph
     cells: Cells
-    needed: NDArray[np.bool_]
+    needed: Mask
     found: JointRoute | None = None
     fault: PathError | None = None
 
@@ -242,7 +247,7 @@ class _Attempts:
         """Is there anything to gain?"""
         return self.found is None or self.found.revisited > 0.0
 
-    def along(self, visits: NDArray[np.int64]) -> list[int]:
+    def along(self, visits: Ints) -> list[int]:
         """Try an order; the cells at which it got stuck."""
         for wind in (True, False):
             most = math.inf if self.found is None else self.found.revisited

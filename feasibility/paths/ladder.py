@@ -15,8 +15,8 @@ from itertools import pairwise
 
 import networkx as nx
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Ints
 from feasibility.paths.motion_graph import (
     MotionGraph,
     join_self_motions,
@@ -73,7 +73,7 @@ class JointRoute:
 def joint_route(
     graph: MotionGraph,
     cells: Cells,
-    route: NDArray[np.int64],
+    route: Ints,
     *,
     wind: bool = True,
     most_revisited: float = math.inf,
@@ -81,7 +81,7 @@ def joint_route(
     """One continuous motion that visits the cells of a route in turn.
 
     Args:
-        graph: the known motions; those that are made on the way are added.
+        graph: the known motions; those that are made meanwhile are added.
         cells: the cells.
         route: flat indices of cells, each once.
         wind: whether the path may be run full turns of a joint earlier or later than known motions

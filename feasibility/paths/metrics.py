@@ -6,14 +6,15 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from feasibility.certification import placements
+from feasibility.certification.rates import smallest_singular_values
 from feasibility.paths.order import least_length
 from feasibility.read_only import ReadOnlyArrays
 from feasibility.task import Task
 from feasibility.verdict import Certificate, Walk
-from robots import Kinematics, Robot
+from robots import Robot
 from surfaces import Cells
 
 BETWEEN = 4  # places along each straight line of joints at which the tool point is computed
@@ -29,7 +30,7 @@ class PathFigures(ReadOnlyArrays):
     """m, the part of it that leads to cells visited before."""
     least_length: float
     """m, no path through all the centres is shorter; see `order.least_length`."""
-    travel: NDArray[np.float64]
+    travel: Array
     """(n,) rad or m, travel of each joint, back and forth."""
     turn_margin: float
     """rad, smallest distance of a revolute joint from its limits; inf without such limits."""
@@ -64,7 +65,7 @@ def figures_of(
     task: Task,
     walk: Walk,
     certificate: Certificate,
-    needed: NDArray[np.bool_],
+    needed: Mask,
 ) -> PathFigures:
     """Measure a path over the cells `needed` (N,) that a replay has accepted with a certificate."""
     along, owner = _denser(walk.q)
@@ -82,11 +83,11 @@ def figures_of(
         turn_margin=float(turns.min(initial=np.inf)),
         slide_margin=float(slides.min(initial=np.inf)),
         cone_margin=task.cone - certificate.max_angle,
-        singular_value=min(_singular_value(robot, walk.q), math.inf),
+        singular_value=float(smallest_singular_values(robot, walk.q).min()),
     )
 
 
-def revisiting(walk: Walk) -> NDArray[np.bool_]:
+def revisiting(walk: Walk) -> Mask:
     """(m - 1,) segments of a walk that lead to a cell visited before.
 
     The segments from one marked waypoint to the next lead to the cell of the latter.
@@ -97,7 +98,7 @@ def revisiting(walk: Walk) -> NDArray[np.bool_]:
     return np.append(again, False)[np.searchsorted(marks, np.arange(1, len(walk.q)))]
 
 
-def _denser(q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _denser(q: Array) -> tuple[Array, Ints]:
     """Places along the segments of a walk, and the segment that each step between them is on."""
     if len(q) < 2:
         return q, np.empty(0, dtype=np.int64)
@@ -105,16 +106,3 @@ def _denser(q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int
     inner = q[:-1, None] + share * np.diff(q, axis=0)[:, None]
     rows = np.vstack([inner.reshape(-1, q.shape[1]), q[-1:]])
     return rows, np.repeat(np.arange(len(q) - 1), BETWEEN)
-
-
-def _singular_value(robot: Robot, q: NDArray[np.float64]) -> float:
-    """Smallest singular value at waypoints; see `PathFigures.singular_value`."""
-    kinematics = Kinematics(robot)
-    reach = robot.reach if np.isfinite(robot.reach) else 1.0
-    rows = np.empty((len(q), 6, robot.n))
-    for k, configuration in enumerate(q):
-        point, axis = kinematics.jacobians(configuration)
-        rows[k, :3], rows[k, 3:] = point / reach, axis
-    values = np.linalg.svd(rows, compute_uv=False)
-    # The axis is of unit length: its three rows have two directions, so five values count.
-    return float(values[:, min(robot.n, 5) - 1].min(initial=np.inf))

@@ -14,8 +14,8 @@ from itertools import pairwise
 
 import networkx as nx
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from feasibility.roadmap import (
     CONNECT_STEPS,
     MOST_STEPS,
@@ -28,9 +28,9 @@ from feasibility.roadmap import (
     work_for,
 )
 from feasibility.verdict import Verdict, Walk
+from surfaces import Cells
 
-Floats = NDArray[np.float64]
-Motion = Floats
+Motion = Array
 """(k, n) waypoints, both ends included."""
 GOALS = 2  # nodes over the next cell that are headed for, besides those that are joined already
 NEAREST = 6  # nodes over one cell that a self-motion is tried to
@@ -50,7 +50,7 @@ class MotionGraph:
     """Which pair of `cells.pairs` two cells i < j are."""
     cell: list[int] = field(default_factory=list)
     """The cell of each node."""
-    q: list[Floats] = field(default_factory=list)
+    q: list[Array] = field(default_factory=list)
     """The configuration of each node, (n,)."""
     over: dict[int, list[int]] = field(default_factory=dict)
     """Nodes over each cell."""
@@ -58,7 +58,13 @@ class MotionGraph:
     """Each with its `motion`, from the node of lower index to the other, and its `length`."""
     _known: dict[tuple[int, bytes], int] = field(default_factory=dict)
 
-    def node(self, cell: int, q: Floats) -> int:
+    @staticmethod
+    def of(arrays: SearchArrays, work: Work, cells: Cells) -> MotionGraph:
+        """A graph over cells, without nodes."""
+        pairs = {(int(i), int(j)): k for k, (i, j) in enumerate(cells.pairs.tolist())}
+        return MotionGraph(arrays, work, pairs)
+
+    def node(self, cell: int, q: Array) -> int:
         """The node with this configuration over this cell, made where there is none."""
         key = (cell, q.tobytes())
         if key not in self._known:
@@ -107,7 +113,7 @@ class MotionGraph:
         """Do two cells touch?"""
         return (min(a, b), max(a, b)) in self.pairs
 
-    def joined_cells(self) -> NDArray[np.int64]:
+    def joined_cells(self) -> Ints:
         """(M, 2) pairs i < j of different cells that a motion joins."""
         ends = [(self.cell[x], self.cell[y]) for x, y in self.edges.edges]
         found = {(min(a, b), max(a, b)) for a, b in ends if a != b}
@@ -121,9 +127,8 @@ def joint_length(motion: Motion) -> float:
 
 def motion_graph_of(verdict: Verdict) -> MotionGraph:
     """The motions that a verdict holds: those of its graph, and those of its witness."""
-    pairs = {(int(i), int(j)): k for k, (i, j) in enumerate(verdict.cells.pairs.tolist())}
     arrays = arrays_of(verdict.robot, verdict.cells, verdict.task)
-    graph = MotionGraph(arrays, work_for(verdict.robot.n), pairs)
+    graph = MotionGraph.of(arrays, work_for(verdict.robot.n), verdict.cells)
     for first, last, motion in _motions(verdict):
         graph.join(graph.node(first, motion[0]), graph.node(last, motion[-1]), motion)
     return graph
@@ -173,7 +178,7 @@ def join_self_motions(graph: MotionGraph, x: int) -> None:
                 break
 
 
-def _nearest(graph: MotionGraph, cell: int, q: Floats) -> list[int]:
+def _nearest(graph: MotionGraph, cell: int, q: Array) -> list[int]:
     """Nodes over a cell, the nearest to q first."""
     nodes = graph.over.get(cell, [])
     away = [float(np.abs(graph.q[y] - q).sum()) for y in nodes]
@@ -196,7 +201,7 @@ def _head_for(graph: MotionGraph, x: int, y: int) -> bool:
     return True
 
 
-def _follow(graph: MotionGraph, x: int, cell: int, goal: Floats | None) -> Floats | None:
+def _follow(graph: MotionGraph, x: int, cell: int, goal: Array | None) -> Array | None:
     """(k, n) waypoints along the surface from x to a neighbouring cell's centre; None if stuck."""
     q = graph.q[x].copy()
     rows = np.empty((MOST_STEPS + 1, len(q)))
@@ -210,7 +215,7 @@ def _follow(graph: MotionGraph, x: int, cell: int, goal: Floats | None) -> Float
     return None if count < 0 else np.vstack([graph.q[x][None], rows[:count]])
 
 
-def _self_motion(graph: MotionGraph, cell: int, start: Floats, goal: Floats) -> Floats | None:
+def _self_motion(graph: MotionGraph, cell: int, start: Array, goal: Array) -> Array | None:
     """(k, n) waypoints over one cell's centre from start to goal; None where none was found."""
     if np.array_equal(start, goal):
         return start[None].copy()
@@ -222,7 +227,7 @@ def _self_motion(graph: MotionGraph, cell: int, start: Floats, goal: Floats) -> 
     return np.vstack([start[None], rows[:count]]) if reached else None
 
 
-def windings(graph: MotionGraph, nodes: list[int]) -> list[Floats]:
+def windings(graph: MotionGraph, nodes: list[int]) -> list[Array]:
     """(n,) each, rad: full turns of one joint that keep a motion inside the limits.
 
     A joint that may run over more than a full turn can do the same work from another turn. A path
@@ -240,7 +245,7 @@ def windings(graph: MotionGraph, nodes: list[int]) -> list[Floats]:
     return found
 
 
-def rewound(graph: MotionGraph, nodes: list[int], winding: Floats) -> list[int]:
+def rewound(graph: MotionGraph, nodes: list[int], winding: Array) -> list[int]:
     """The nodes of the same motion in another winding, which is added to the graph."""
     moved = [graph.node(graph.cell[x], graph.q[x] + winding) for x in nodes]
     for (x, y), (a, b) in zip(pairwise(nodes), pairwise(moved), strict=True):

@@ -11,12 +11,12 @@ from __future__ import annotations
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import pdist, squareform
 
+from coverable_arrays import Array, Ints, Mask
 from coverable_errors import CoverableError
 from feasibility.paths.two_opt import improved, tour_length
 from surfaces import Cells
@@ -42,7 +42,7 @@ def grid_order(
     columns: int,
     begin: tuple[int, int] = (0, 0),
     flipped: tuple[bool, bool] = (False, False),
-) -> NDArray[np.int64]:
+) -> Ints:
     """Flat indices of rows x columns cells in the order of a path.
 
     Args:
@@ -133,7 +133,7 @@ def check_run(cells: Cells, order: Order) -> None:
 
 
 def usual_order(cells: Cells) -> Order:
-    """The order where none is asked for."""
+    """The default order."""
     if cells.in_order:
         return "given"
     return "rows" if len(cells.shape) == 2 else "shortest"
@@ -142,9 +142,9 @@ def usual_order(cells: Cells) -> Order:
 def route(
     cells: Cells,
     order: Order,
-    needed: NDArray[np.bool_] | None = None,
-    pairs: NDArray[np.int64] | None = None,
-) -> NDArray[np.int64]:
+    needed: Mask | None = None,
+    pairs: Ints | None = None,
+) -> Ints:
     """The order in which a path visits cells.
 
     Args:
@@ -173,7 +173,7 @@ def route(
     return _shortest(steps, [*candidates, _greedy(steps, wanted)])
 
 
-def step_lengths(cells: Cells, pairs: NDArray[np.int64]) -> csr_array:
+def step_lengths(cells: Cells, pairs: Ints) -> csr_array:
     """(N, N) symmetric: distance (m) of the centres of each pair, nothing elsewhere."""
     length = np.linalg.norm(cells.centres[pairs[:, 0]] - cells.centres[pairs[:, 1]], axis=1)
     length = np.maximum(length, np.finfo(float).tiny)  # a zero would be no step at all
@@ -181,7 +181,7 @@ def step_lengths(cells: Cells, pairs: NDArray[np.int64]) -> csr_array:
     return csr_array(steps + steps.T)
 
 
-def route_length(steps: csr_array, order: NDArray[np.int64]) -> float:
+def route_length(steps: csr_array, order: Ints) -> float:
     """m, length of the shortest path that visits cells in this order; inf where there is none."""
     if len(order) < 2:
         return 0.0
@@ -192,7 +192,7 @@ def route_length(steps: csr_array, order: NDArray[np.int64]) -> float:
     return total
 
 
-def _shortest(steps: csr_array, candidates: list[NDArray[np.int64]]) -> NDArray[np.int64]:
+def _shortest(steps: csr_array, candidates: list[Ints]) -> Ints:
     """The shortest of some orders, each improved where there are not too many cells."""
     lengths = [route_length(steps, order) for order in candidates]
     best = candidates[int(np.argmin(lengths))]
@@ -210,7 +210,7 @@ def _shortest(steps: csr_array, candidates: list[NDArray[np.int64]]) -> NDArray[
     return cells[tours[first]]
 
 
-def _greedy(steps: csr_array, wanted: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _greedy(steps: csr_array, wanted: Mask) -> Ints:
     """An order that goes on to the unvisited neighbour with the fewest open ends, or the nearest.
 
     Corners are so not left behind (Warnsdorff's rule); from a dead end the nearest unvisited cell
@@ -239,7 +239,7 @@ def _greedy(steps: csr_array, wanted: NDArray[np.bool_]) -> NDArray[np.int64]:
     return np.array(found, dtype=np.int64)
 
 
-def least_length(centres: NDArray[np.float64]) -> float:
+def least_length(centres: Array) -> float:
     """m, no path through all of these points is shorter.
 
     A path through all points is a tree that spans them, so it is at least as long as the smallest

@@ -7,8 +7,8 @@ I. Or, Traveling salesman-type combinatorial problems (1976).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from feasibility.compiled import kernel, put
 
 LONGEST_PART = 3  # places that Or-opt moves at once
@@ -16,12 +16,12 @@ GAIN = 1e-9  # [1], share of the whole length that a change must gain
 MOST_SWEEPS = np.int64(200)
 
 
-def tour_length(distance: NDArray[np.float64], tour: NDArray[np.int64]) -> float:
+def tour_length(distance: Array, tour: Ints) -> float:
     """Length of an open path through places in this order."""
     return float(distance[tour[:-1], tour[1:]].sum())
 
 
-def improved(distance: NDArray[np.float64], tour: NDArray[np.int64]) -> NDArray[np.int64]:
+def improved(distance: Array, tour: Ints) -> Ints:
     """A path that is no longer, and that no turn of a part and no move of a short part shortens.
 
     Args:

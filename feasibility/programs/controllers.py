@@ -1,11 +1,11 @@
 """Which arm speaks which language, and its joints as the axes of a controller.
 
 A program names axes by their number, so the joints of the URDF have to be those of the controller:
-six that turn, from base to flange, in this order. Where signs or zeros differ, the user says so:
+six that turn, from base to flange, in this order. Where signs or zeros differ, the user gives them:
 
     axis = sign * joint + offset
 
-An axis that arm or part stands on (`[[robot.axis]]`), or a joint that slides, becomes an external
+An axis that carries arm or part (`[[robot.axis]]`), or a joint that slides, becomes an external
 axis where the language has them.
 """
 
@@ -19,13 +19,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import Checks, CoverableError, Fault
 from feasibility.safe_files import FileError, shown_path
 from robots import Robot
-
-Array = NDArray[np.float64]
 
 JOINTS = 6  # of the arm itself, in every language
 MOST_EXTERNAL = 6
@@ -41,14 +39,14 @@ class Language:
 
     name: str
     ending: str
-    """Of its files, which says that it is wanted."""
+    """Of its files, by which it is chosen."""
     maker: str
     external: tuple[str, ...]
     """What it calls external axes; none where it has none."""
     axes: str
     """What the axes of the arm are called, `{}` for the number."""
     period: float
-    """s between points, where nobody asks for another."""
+    """s between points, by default."""
 
 
 URSCRIPT = Language("URScript", "script", "Universal Robots", (), "joint {}", 0.02)
@@ -82,7 +80,7 @@ MAKERS = (
 
 
 def language_of(path: str | os.PathLike[str]) -> Language:
-    """The language that a file's ending asks for.
+    """The language of a file's ending.
 
     Raises:
         FileError: it is no ending of a program.
@@ -187,12 +185,12 @@ def check_program(
         fault = f"{language.name} is for arms of {language.maker}; {robot.name!r} is of {maker}"
         raise ProgramError(fault)
     checks = Checks("", ProgramError)
-    standing = {axis.name for axis in robot.axes}
-    if robot.surface_link is not None and robot.surface_link not in standing:
+    carrying = {axis.name for axis in robot.axes}
+    if robot.surface_link is not None and robot.surface_link not in carrying:
         checks.keep(Fault("", "an arm that holds the part, or a part on a link of its URDF, has no "
                           "program: the order of its axes is not known"))  # fmt: skip
     outside = [
-        j for j, name in enumerate(robot.joint_names) if name in standing or robot.prismatic[j]
+        j for j, name in enumerate(robot.joint_names) if name in carrying or robot.prismatic[j]
     ]
     arm = [j for j in range(robot.n) if j not in outside]
     if len(arm) != JOINTS:

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.collisions import listed_words
 from feasibility.programs.controllers import (
     KRL,
@@ -31,8 +31,6 @@ from feasibility.safe_files import write_whole
 from feasibility.timing import Trajectory, at_times
 from feasibility.version import version
 from robots import Robot
-
-Array = NDArray[np.float64]
 
 SERVO = 0.008  # [s], a whole number of cycles of every UR controller (2 ms and 8 ms)
 LOOKAHEAD, GAIN = 0.1, 300  # [s], [1]: of servoj, its defaults
@@ -91,7 +89,7 @@ def save_program(
     signs: Sequence[float] | None = None,
     offsets_deg: Sequence[float] | None = None,
 ) -> Path:
-    """Write a program; the file's ending says its language, see `language_of`.
+    """Write a program in the language of the file's ending, see `language_of`.
 
     Raises:
         FileError: another ending, or the file cannot be written.
@@ -168,7 +166,7 @@ def _rapid(head: list[str], rows: _Rows) -> str:
 
 
 def _krl(head: list[str], rows: _Rows, name: str) -> str:
-    """One joint spline with its times: shares of the whole, in percent."""
+    """One joint spline with its times: shares in percent."""
     points = []
     for arm, external in zip(rows.arm, rows.external, strict=True):
         named = [f"A{k + 1} {value}" for k, value in enumerate(arm)]

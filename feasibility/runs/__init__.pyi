@@ -1,8 +1,8 @@
 from .at_least import Parted as Parted
 from .at_least import piece_of as piece_of
+from .fewest import Run as Run
 from .fewest import Stations as Stations
-from .fewest import Way as Way
-from .fewest import fewest_ways as fewest_ways
+from .fewest import fewest_runs as fewest_runs
 from .gaps import Gap as Gap
 from .pass_runs import Cut as Cut
 from .pass_runs import PassRuns as PassRuns

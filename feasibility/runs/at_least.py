@@ -1,6 +1,6 @@
 """How many runs it takes at least, proved: whatever the search found or did not find.
 
-Poses 0 .. N - 1 stand along a toolpath, and runs 1 .. R work on it in order: run r on poses
+Poses 0 .. N - 1 lie along a toolpath, and runs 1 .. R work on it in order: run r on poses
 a_r .. b_r, each one continuous motion along the curves between them, with b_r <= a_(r + 1). Call
 i < j **parted** if no motion with the tool within tolerance and cone of the curves between poses
 i .. j covers all of these. A cut tree for that piece of the toolpath by itself proves it: the part
@@ -28,8 +28,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Ints, Mask
 from feasibility.certification import verify_proof
 from feasibility.clock import OutOfTime
 from feasibility.cut_tree import Cut, CutTree, Leaf
@@ -40,7 +40,7 @@ from feasibility.task import Task
 from surfaces.toolpaths import PoseCells
 
 MOST_TRIED = 24  # pieces of a toolpath that a proof is looked for of
-FURTHER = (0.0, 0.25, 0.75)  # [1] of the way to where the next run would end
+FURTHER = (0.0, 0.25, 0.75)  # [1] of the poses up to where the next run would end
 MOST_SEEDS = 12  # configurations over one of them
 SEEDED = 5  # poses of a piece over which its own search begins
 
@@ -64,7 +64,7 @@ class _Pieces:
     exploration: Exploration
     cells: PoseCells
     task: Task
-    worked: NDArray[np.int64]
+    worked: Ints
     """The poses that the runs found work on."""
     tried: int = field(default=0)
 
@@ -139,15 +139,14 @@ def parted_pieces(
     cells: PoseCells,
     task: Task,
     stations: Stations,
-    worked: NDArray[np.bool_],
+    worked: Mask,
     proof: CutTree | None,
 ) -> tuple[Parted, ...]:
     """Pieces of a toolpath, one behind the other, none of which a single motion runs.
 
     Args:
         exploration: a finished search; its clock's time counts.
-        cells: the toolpath.
-        task: the task; speeds do not count.
+        cells, task: the toolpath and the task, whose speeds do not count.
         stations: what is known of it.
         worked: (N,) the poses that the runs found work on.
         proof: that no single motion runs the whole toolpath, where there is one: it counts where
@@ -176,13 +175,9 @@ def parted_pieces(
 def _next_parted(
     pieces: _Pieces, here: int, ahead: list[int], reach: Callable[[int], int]
 ) -> Parted | None:
-    """A parted piece that begins at a pose or behind it; None where nothing was proved.
+    """A parted piece that begins at the pose `here` or behind it; None where nothing was proved.
 
-    Args:
-        pieces: proves it.
-        here: the pose.
-        ahead: poses that no known motion gets to from it.
-        reach: how far motions get from a pose.
+    No known motion leads from it to the poses `ahead`; `reach` is how far motions lead from a pose.
     """
     end = max(reach(ahead[0]), ahead[0])
     near = [pose for pose in ahead if pose <= end]

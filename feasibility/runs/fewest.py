@@ -1,10 +1,10 @@
 """The fewest interruptions of a toolpath, over the configurations that are known.
 
-Stations stand along the toolpath in its order. Over each are nodes, configurations that a search
+Stations lie along the toolpath in its order. Over each are nodes, configurations that a search
 found; a certified motion leads from a node to another over the same station or the next one. The
 tool may be lifted at any station and set down at another node over it, which is an interruption,
 and between two stations it may stay lifted, which leaves the piece between them undone. The best
-way is a shortest path by (undone length, runs, cuts inside a pass, waypoints), in that order.
+runs are a shortest path by (undone length, runs, cuts inside a pass, waypoints), in that order.
 """
 
 from __future__ import annotations
@@ -13,24 +13,28 @@ import heapq
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Cost = tuple[float, int, int, int]
-NOTHING: Cost = (0.0, 0, 0, 0)
+from coverable_arrays import Array, Ints, Mask
+
 GRAIN = 1e-12  # [m] lengths are counted in this, so that equal sums are equal
+# What one step costs, as digits of one number; none of them has more than 32 bits in all.
+CUT, RUN, UNDONE = 1 << 32, 1 << 64, 1 << 96
+
+Step = tuple[int, int, int]
+"""Where to, the signed number of the motion or 0 for none, and the cost."""
 
 
 class Stations(NamedTuple):
     """What is known of a toolpath."""
 
-    over: NDArray[np.int64]
+    over: Ints
     """(nodes,) the station of each node."""
-    steps: NDArray[np.int64]
+    steps: Ints
     """(E, 4) from a node to another over the same station or the next, the signed number of the
     motion, and how many waypoints it has."""
-    pieces: NDArray[np.float64]
+    pieces: Array
     """(N - 1,) m, of the passes between stations; 0 where the tool need not work."""
-    inside: NDArray[np.bool_]
+    inside: Mask
     """(N - 1,) whether both stations belong to one stretch of a pass."""
 
     @property
@@ -39,7 +43,7 @@ class Stations(NamedTuple):
         return len(self.pieces) + 1
 
 
-class Way(NamedTuple):
+class Run(NamedTuple):
     """One run: from a node along motions."""
 
     nodes: tuple[int, ...]
@@ -47,87 +51,56 @@ class Way(NamedTuple):
     """The signed numbers of the motions, one fewer than nodes."""
 
 
-def fewest_ways(stations: Stations) -> tuple[Way, ...]:
+def fewest_runs(stations: Stations) -> tuple[Run, ...]:
     """The runs that leave least undone, the fewest of them, cut between passes where they can be.
 
-    Args:
-        stations: what is known; numbers of nodes are rows of `over`.
+    Numbers of nodes are rows of `stations.over`.
     """
-    cost, came = _shortest(stations)
-    last = -stations.number  # lifted over the last station
-    ends = [k for k in cost if k == last or (k >= 0 and stations.over[k] == stations.number - 1)]
+    cost, before = _cheapest(_steps(stations), -1)
+    last = stations.number - 1
+    ends = [k for k in cost if k == -1 - last or (k >= 0 and stations.over[k] == last)]
     here = min(ends, key=lambda k: cost[k])
-    ways, nodes, route = list[Way](), list[int](), list[int]()
-    while True:
-        step = came.get(here)
-        if here >= 0:
-            nodes.append(here)
-        if here >= 0 and (step is None or step[0] < 0):  # it was set down here
-            ways.append(Way(tuple(reversed(nodes)), tuple(reversed(route))))
-            nodes, route = [], []
-        if step is None:
-            break
-        before, number = step
-        if before >= 0 and here >= 0:
-            route.append(number)
-        here = before
-    return tuple(way for way in reversed(ways) if len(way.nodes) > 1)
+    path = list[tuple[int, int]]()
+    while here in before:
+        there, number = before[here]
+        path.append((here, number))
+        here = there
+    runs = list[tuple[list[int], list[int]]]()
+    for state, number in reversed(path):
+        if number:
+            runs[-1][0].append(state)
+            runs[-1][1].append(number)
+        elif state >= 0:  # the tool is set down here
+            runs.append(([state], []))
+    return tuple(Run(tuple(nodes), tuple(route)) for nodes, route in runs if route)
 
 
-def _shortest(stations: Stations) -> tuple[dict[int, Cost], dict[int, tuple[int, int]]]:
-    """Dijkstra's algorithm over nodes, and -1 - i for the lifted tool over station i."""
-    following = _following(stations)
-    over_station: list[list[int]] = [[] for _ in range(stations.number)]
-    for node, station in enumerate(stations.over.tolist()):
-        over_station[station].append(node)
-    pieces = np.round(stations.pieces / GRAIN).tolist()
-    inside = [*stations.inside.tolist(), False]
-    station_of = stations.over.tolist()
-    cost: dict[int, Cost] = {-1: NOTHING}
-    came: dict[int, tuple[int, int]] = {}
-    queue: list[tuple[Cost, int]] = [(NOTHING, -1)]
-    done = set[int]()
+def _steps(stations: Stations) -> dict[int, list[Step]]:
+    """The steps from each state: a node, or -1 - i for the tool lifted over station i."""
+    over, inside = stations.over.tolist(), [*stations.inside.tolist(), False]
+    steps: dict[int, list[Step]] = {k: [] for k in range(-stations.number, len(over))}
+    for x, y, number, rows in stations.steps.tolist():
+        steps[x].append((y, number, rows))
+    for node, station in enumerate(over):
+        steps[node].append((-1 - station, 0, CUT * inside[station]))
+        steps[-1 - station].append((node, 0, RUN))
+    for station, undone in enumerate(np.round(stations.pieces / GRAIN).tolist()):
+        steps[-1 - station].append((-2 - station, 0, UNDONE * int(undone)))
+    return steps
+
+
+def _cheapest(
+    steps: dict[int, list[Step]], start: int
+) -> tuple[dict[int, int], dict[int, tuple[int, int]]]:
+    """The least cost of each state, and the state and the motion before it (Dijkstra)."""
+    cost, before = {start: 0}, dict[int, tuple[int, int]]()
+    queue = [(0, start)]
     while queue:
         spent, here = heapq.heappop(queue)
-        if here in done:
+        if spent > cost[here]:
             continue
-        done.add(here)
-        for there, number, more in _steps(
-            here, following, over_station, station_of, pieces, inside
-        ):
-            total = (
-                spent[0] + more[0], spent[1] + more[1], spent[2] + more[2], spent[3] + more[3],
-            )  # fmt: skip
-            if there not in cost or total < cost[there]:
-                cost[there] = total
-                came[there] = here, number
-                heapq.heappush(queue, (total, there))
-    return cost, came
-
-
-def _steps(
-    here: int,
-    following: list[list[tuple[int, int, int]]],
-    over_station: list[list[int]],
-    station_of: list[int],
-    pieces: list[float],
-    inside: list[bool],
-) -> list[tuple[int, int, Cost]]:
-    """Where one can go from a state: the state, the motion's number or 0, and what it costs."""
-    if here >= 0:
-        station = station_of[here]
-        found = [(y, number, (0.0, 0, 0, rows)) for y, number, rows in following[here]]
-        return [*found, (-1 - station, 0, (0.0, 0, int(inside[station]), 0))]
-    station = -1 - here
-    found = [(node, 0, (0.0, 1, 0, 0)) for node in over_station[station]]
-    if station < len(pieces):
-        found.append((here - 1, 0, (pieces[station], 0, 0, 0)))
-    return found
-
-
-def _following(stations: Stations) -> list[list[tuple[int, int, int]]]:
-    """From each node those it leads to, with the motion's number and its waypoints."""
-    found: list[list[tuple[int, int, int]]] = [[] for _ in range(len(stations.over))]
-    for x, y, number, rows in stations.steps.tolist():
-        found[x].append((y, number, rows))
-    return found
+        for there, number, more in steps[here]:
+            if there not in cost or spent + more < cost[there]:
+                cost[there], before[there] = spent + more, (here, number)
+                heapq.heappush(queue, (spent + more, there))
+    return cost, before

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from feasibility.collisions import Pair
 from feasibility.roadmap import Exploration
 from feasibility.roadmap.causes import cause_of
@@ -26,7 +26,7 @@ class Gap:
     length: float
     """m, of passes."""
     cause: str
-    """Why, at the first of these places where something is in the way."""
+    """Why, at the first of these places that is not reached."""
     proved: bool
     """Is that proved?"""
 
@@ -35,21 +35,19 @@ def gaps_of(
     exploration: Exploration,
     task: Task,
     places: PassPlaces,
-    pieces: NDArray[np.float64],
-    worked: NDArray[np.bool_],
+    pieces: Array,
+    worked: Mask,
     pairs: tuple[Pair, ...],
     slow: Mapping[int, Cause],
 ) -> tuple[Gap, ...]:
     """What is left out, in order.
 
     Args:
-        exploration: a finished search.
-        task: what is asked.
-        places: the poses of the passes.
+        exploration, task, places: a finished search, its task, the poses of the passes.
         pieces: (N - 1,) m, of passes between poses.
         worked: (N - 1,) on which of them a run works.
         pairs: of bodies that had to stay clear of each other.
-        slow: poses to which no motion leads that does what is asked of speed and singular values.
+        slow: poses to which no motion leads at the required speed and singular values.
     """
     left = (pieces > 0.0) & ~worked
     # What lies between two passes belongs to the gap if it is not worked on either.
@@ -75,7 +73,7 @@ def _why(
     pairs: tuple[Pair, ...],
     slow: Mapping[int, Cause],
 ) -> tuple[str, bool]:
-    """What is in the way at the first of some poses, and whether that is proved."""
+    """Why the first of some poses is not reached, and whether that is proved."""
     for pose in poses:
         if not exploration.reached[pose]:
             cause = slow.get(pose) or cause_of(exploration, pose, pairs)

@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
-from feasibility.certification import replay
-from feasibility.certification.rates import replay_rates
 from feasibility.clock import Clock, OutOfTime
 from feasibility.collisions import Pair
 from feasibility.cut_tree import CutTree
@@ -19,24 +16,16 @@ from feasibility.division import (
     clear_moves,
     collect_components,
     connect_pairs,
+    exploration_of,
 )
-from feasibility.paths import CoveragePath, figures_of, unwound
+from feasibility.paths import CoveragePath, unwound
 from feasibility.problem import Problem
-from feasibility.roadmap import (
-    EDGES,
-    NODES,
-    Exploration,
-    arrays_of,
-    explore,
-    route_walk,
-    warm_up,
-)
-from feasibility.roadmap.joint_boxes import blockers_of
+from feasibility.roadmap import EDGES, NODES, Exploration, explore, route_walk, warm_up
 from feasibility.runs.at_least import Parted, parted_pieces
-from feasibility.runs.fewest import Stations, Way, fewest_ways
+from feasibility.runs.fewest import Run, Stations, fewest_runs
 from feasibility.runs.gaps import Gap, along_stretch, gaps_of, place_words
 from feasibility.runs.stopping import Stop, where_it_stops
-from feasibility.speed import keep_fast_motions
+from feasibility.speed import keep_fast_motions, replay_at_rates
 from feasibility.task import Task
 from robots import Robot
 from surfaces.passes import PassPlaces
@@ -52,7 +41,7 @@ class Cut:
     next_pose: int
     """The first pose of the next run: the same one, or one further on."""
     stretch: int
-    """Which stretch of a pass the run ends on; -1 on the way between two."""
+    """Which stretch of a pass the run ends on; -1 between two."""
     along: float
     """m, from the beginning of that stretch."""
     cause: str
@@ -79,7 +68,7 @@ class PassRuns:
     cut trees that the independent verifier accepts. Whatever the search found, as many
     interruptions are needed at least, see `feasibility.runs.at_least`."""
     refusals: tuple[str, ...]
-    """What the independent replay says against runs that were left out for it."""
+    """Why the independent replay refuses runs that were left out for it."""
 
     @property
     def left_out(self) -> float:
@@ -108,12 +97,9 @@ def pass_runs(
     from singularities, only motions count that hold it.
 
     Args:
-        robot: the arm.
-        cells: the poses of all passes, of `surfaces.passes.pass_toolpath`.
-        task: standoff, cone and so on.
+        robot, cells, task: the question; cells are the poses of `surfaces.passes.pass_toolpath`.
         places: the same poses, with their stretches.
-        seed: of the search.
-        clock: its time limit counts.
+        seed, clock: of the search.
         proof: that no single motion runs all of them, where a verdict has one.
 
     Raises:
@@ -122,23 +108,19 @@ def pass_runs(
     clock = Clock() if clock is None else clock
     warm_up()
     clock.start()
-    with clock.enforced():
-        arrays = arrays_of(robot, cells, task)
-    blockers = blockers_of(robot, cells.surface, task)
-    exploration = Exploration(robot, cells, arrays, seed, clock, blockers)
+    exploration = exploration_of(robot, cells, task, seed, clock)
     try:
         explore(exploration)
         collect_components(exploration)
-        everywhere = np.ones(len(cells), dtype=bool)
         for root in exploration.roots():
-            connect_pairs(exploration, root, everywhere & exploration.covers(root))
+            connect_pairs(exploration, root, exploration.covers(root))
     except OutOfTime:
         pass  # what was found until then counts
     slow = keep_fast_motions(exploration, task) if task.asks_rates else {}
     stations = _stations(exploration, places)
-    found = _replayed(exploration, task, fewest_ways(stations))
+    runs, refusals = _replayed(exploration, task, fewest_runs(stations))
     worked, passed = np.zeros(len(stations.pieces), dtype=bool), np.zeros(len(cells), dtype=bool)
-    for path in found.runs:
+    for path in runs:
         own = np.flatnonzero(path.needed)
         worked[own[0] : own[-1]] = True
         passed[own[0] : own[-1] + 1] = True
@@ -149,19 +131,12 @@ def pass_runs(
         robot=robot,
         task=task,
         places=places,
-        runs=tuple(found.runs),
-        cuts=_cuts(exploration, task, places, found.runs, pairs),
+        runs=tuple(runs),
+        cuts=_cuts(exploration, task, places, runs, pairs),
         gaps=gaps_of(exploration, task, places, stations.pieces, worked, pairs, slow),
         parted=parted,
-        refusals=found.refusals,
+        refusals=tuple(refusals),
     )
-
-
-class _Replayed(NamedTuple):
-    """Ways as certified paths."""
-
-    runs: list[CoveragePath]
-    refusals: tuple[str, ...]
 
 
 def _stations(exploration: Exploration, places: PassPlaces) -> Stations:
@@ -181,26 +156,24 @@ def _stations(exploration: Exploration, places: PassPlaces) -> Stations:
     return Stations(over, steps[(ahead == 0) | (ahead == 1)], lengths * inside, inside)
 
 
-def _replayed(exploration: Exploration, task: Task, ways: Sequence[Way]) -> _Replayed:
-    """The ways that the independent replay accepts."""
+def _replayed(
+    exploration: Exploration, task: Task, found: Sequence[Run]
+) -> tuple[list[CoveragePath], list[str]]:
+    """The runs that the independent replay accepts, and why it refuses the others."""
     robot, cells = exploration.robot, exploration.cells
     runs, refusals = list[CoveragePath](), list[str]()
-    for way in ways:
-        walk = route_walk(exploration.roadmap, way.nodes[0], np.array(way.route, dtype=np.int64))
+    for run in found:
+        walk = route_walk(exploration.roadmap, run.nodes[0], np.array(run.route, dtype=np.int64))
         walk = unwound(robot, task, walk)
         needed = np.zeros(len(cells), dtype=bool)
         needed[walk.cell[walk.cell >= 0]] = True
-        judged = replay(robot, cells, task, walk, needed)
-        refused = judged.refusal
-        if not refused and task.asks_rates:
-            refused = "; ".join(replay_rates(robot, cells, task, walk).refusals)
-        if refused:
-            refusals.append(refused)
-            continue
-        certificate = judged.certificate
-        figures = figures_of(robot, cells, task, walk, certificate, needed)
-        runs.append(CoveragePath(robot, cells, task, "given", needed, walk, certificate, figures))
-    return _Replayed(runs, tuple(refusals))
+        certificate, refusal = replay_at_rates(robot, cells, task, walk, needed)
+        if refusal:
+            refusals.append(refusal)
+        else:
+            path = CoveragePath.of(robot, cells, task, "given", walk, needed, certificate)
+            runs.append(path)
+    return runs, refusals
 
 
 def _cuts(

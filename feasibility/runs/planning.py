@@ -7,67 +7,58 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from coverable_arrays import Mask
 from feasibility.checking import check
 from feasibility.clock import Clock
-from feasibility.runs.overruns import with_reached_overrun
 from feasibility.search import Search
 from feasibility.task import Task
 from feasibility.treated import TreatedArea, treated_by_passes
 from feasibility.verdict import Verdict, Walk
 from robots import Robot
 from surfaces import Surface
-from surfaces.passes import (
-    Passes,
-    PassPlaces,
-    pass_places,
-    pass_toolpath,
-    ranked_directions,
-)
+from surfaces.passes import Pass, Passes, PassPlaces, pass_places, pass_toolpath, ranked_directions
 from surfaces.toolpaths import PoseCells
 
-RETRACT = 0.05  # m, unless it is said
-CERTIFIED = 3  # directions of the fewest pieces that are looked at with the arm
-
-Lay = Callable[[float], Passes]
-"""Lays passes in a direction, an angle in rad."""
+RETRACT = 0.05  # m, by default
+CERTIFIED = 3  # directions of the fewest pieces that are tried with the arm
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PlannedPasses:
-    """Passes, and what can be said of one motion along all of them."""
+    """Passes, and the verdict on one motion along all of them."""
 
     passes: Passes
     places: PassPlaces
     cells: PoseCells
     """The same as a toolpath."""
     task: Task
-    """As it was asked, with footprint and coverage."""
+    """With footprint and coverage."""
     verdict: Verdict
-    """Of the toolpath, without a demand on the coverage."""
+    """Of the toolpath, whatever the coverage."""
 
     def treated(self, *walks: Walk) -> TreatedArea | None:
-        """What motions along the passes treat; None where no footprint is asked for."""
+        """What motions along the passes treat; None without a footprint."""
         robot, surface = self.verdict.robot, self.passes.surface
         return treated_by_passes(surface, self.places, robot, self.task, walks)
 
 
 def plan_passes(
     robot: Robot,
-    laid: Passes,
+    passes: Passes,
     task: Task,
     retract: float = RETRACT,
     search: Search | None = None,
     clock: Clock | None = None,
 ) -> PlannedPasses:
-    """Look for one motion along passes that have been laid.
+    """Look for one motion along passes.
 
     Where none is found, and the arm does not reach all of their overrun, that is shortened, which a
     note says.
 
     Args:
         robot: the arm.
-        laid: the passes.
-        task: what is asked; footprint and coverage are those of the whole surface.
+        passes: the passes.
+        task: footprint and coverage are those of the whole surface.
         retract: m > 0, how far the tool is lifted between stretches that are apart.
         search: settings.
         clock: of the command that this is a part of.
@@ -85,18 +76,18 @@ def plan_passes(
         >>> along.verdict.feasible, round(along.treated(along.verdict.witness).lower, 2)
         (True, 1.0)
     """
-    cells = pass_toolpath(laid, retract)
-    asked = replace(task, footprint=None, coverage=None)
-    verdict = check(robot, cells, asked, search, clock=clock)
+    cells = pass_toolpath(passes, retract)
+    alone = replace(task, footprint=None, coverage=None)
+    verdict = check(robot, cells, alone, search, clock=clock)
     if not verdict.feasible and verdict.components:
         reached = np.zeros(len(cells), dtype=bool)
         reached[np.concatenate(verdict.components)] = True
-        shorter = with_reached_overrun(laid, pass_places(laid, retract), reached)
+        shorter = _with_reached_overrun(passes, pass_places(passes, retract), reached)
         if shorter is not None:
-            laid, cells = shorter, pass_toolpath(shorter, retract)
-            verdict = check(robot, cells, asked, search, clock=clock)
-    laid = replace(laid, notes=(*laid.notes, *_stripes(laid, task)))
-    return PlannedPasses(laid, pass_places(laid, retract), cells, task, verdict)
+            passes, cells = shorter, pass_toolpath(shorter, retract)
+            verdict = check(robot, cells, alone, search, clock=clock)
+    passes = replace(passes, notes=(*passes.notes, *_stripes(passes, task)))
+    return PlannedPasses(passes, pass_places(passes, retract), cells, task, verdict)
 
 
 def plan_best_passes(
@@ -104,27 +95,27 @@ def plan_best_passes(
     surface: Surface,
     task: Task,
     pitch: float,
-    lay: Lay,
+    passes_along: Callable[[float], Passes],
     retract: float = RETRACT,
     search: Search | None = None,
     clock: Clock | None = None,
 ) -> PlannedPasses:
     """The direction with the fewest passes that one motion runs.
 
-    Directions are ranked by the number of pieces of passes, and the best three are looked at with
-    the arm. Where none of them can be run in one motion, it is the first of them.
+    Directions are ranked by the number of pieces of passes, and the best three are tried with the
+    arm. Where none of them can be run in one motion, it is the first of them.
 
     Args:
         robot, task, retract, search, clock: see `plan_passes`.
         surface: what is to be covered.
         pitch: m, the largest distance between passes.
-        lay: lays passes in a direction.
+        passes_along: the passes in a direction, an angle in rad.
 
     Raises:
         SurfaceError: see `surfaces.passes.parallel_passes` and `pass_toolpath`.
     """
     found = [
-        plan_passes(robot, lay(angle), task, retract, search, clock)
+        plan_passes(robot, passes_along(angle), task, retract, search, clock)
         for angle in ranked_directions(surface, pitch)[:CERTIFIED]
     ]
     feasible = [each for each in found if each.verdict.feasible]
@@ -133,11 +124,41 @@ def plan_best_passes(
     return min(feasible, key=lambda each: (each.passes.count, len(each.passes.stretches)))
 
 
-def _stripes(laid: Passes, task: Task) -> tuple[str, ...]:
+def _with_reached_overrun(passes: Passes, places: PassPlaces, reached: Mask) -> Passes | None:
+    """Passes with a note, their overrun cut to the `reached` poses (N,) from the border on.
+
+    None where nothing is to be cut.
+    """
+    found, cut, ends = list[Pass](), 0.0, 0
+    for number, each in enumerate(passes.stretches):
+        own = reached[places.stretch == number]
+        inside = np.flatnonzero(each.on_surface)
+        lost = np.flatnonzero(~own)
+        before, behind = lost[lost < inside[0]], lost[lost > inside[-1]]
+        first = int(before[-1]) + 1 if len(before) else 0
+        last = int(behind[0]) if len(behind) else len(own)
+        kept = slice(first, last)
+        shorter = replace(
+            each, points=each.points[kept], normals=each.normals[kept],
+            on_surface=each.on_surface[kept],
+        )  # fmt: skip
+        cut += each.length - shorter.length
+        ends += (first > 0) + (last < len(own))
+        found.append(shorter)
+    if not ends:
+        return None
+    note = (
+        f"the overrun at {ends} of {2 * len(found)} ends is shortened to what can be reached, by "
+        f"{1e3 * cut / ends:.3g} mm on average"
+    )
+    return replace(passes, stretches=tuple(found), notes=(*passes.notes, note))
+
+
+def _stripes(passes: Passes, task: Task) -> tuple[str, ...]:
     """Whether the footprint is too small for the distance between passes."""
-    if task.disc is None or laid.widest <= task.disc[1]:
+    if task.disc is None or passes.widest <= task.disc[1]:
         return ()
-    across, between = 1e3 * task.disc[1], 1e3 * laid.widest
+    across, between = 1e3 * task.disc[1], 1e3 * passes.widest
     return (
         f"the passes are up to {between:.4g} mm apart and the footprint is {across:.4g} mm wide: "
         f"stripes up to {between - across:.3g} mm wide stay untreated",

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.collisions import Pair
 from feasibility.roadmap import MOST_STEPS, Exploration, track
 from feasibility.roadmap.motions import COLLISION, CONE, FOLD, LIMIT, LONG, ROLL, SINGULAR
@@ -35,20 +35,16 @@ def where_it_stops(
     exploration: Exploration,
     task: Task,
     pose: int,
-    q: NDArray[np.float64],
+    q: Array,
     pairs: tuple[Pair, ...],
 ) -> Stop:
-    """Follow the poses from a configuration over one of them, as far as it goes.
+    """Follow the poses from a configuration q (n,) over one of them, as far as it goes.
 
-    Args:
-        exploration: a finished search.
-        task: what is asked of speed and singular values.
-        pose: where the arm is.
-        q: (n,) its configuration.
-        pairs: that had to stay clear of each other.
+    Speed and singular values count where the task limits them; `pairs` are the bodies that had to
+    stay clear of each other.
     """
     first, q, rows = pose, np.array(q), np.empty((MOST_STEPS + 1, len(q)))
-    cause, motions = "", list[NDArray[np.float64]]()
+    cause, motions = "", list[Array]()
     while pose < len(exploration.cells) - 1:
         curve, begin = exploration.curve(pose, pose + 1), q.copy()
         count = track(exploration.arrays, exploration.work, curve, 0.0, 1.0, q, q, False, rows, 0)
@@ -60,7 +56,7 @@ def where_it_stops(
         pose += 1
     if task.asks_rates:
         rates = motion_rates(exploration.robot, exploration.cells, task, motions)
-        slow = np.flatnonzero(~rates.fine(task))
+        slow = np.flatnonzero(~rates.enough(task))
         if len(slow):
             which = int(slow[0])
             return Stop(first + which, rates.words(exploration.robot, task, which))

@@ -22,7 +22,7 @@ from feasibility.sensitivity.probes import Prober
 from feasibility.sensitivity.quantities import Kind, Quantity, Variant, quantities
 from feasibility.sensitivity.threshold_search import BEYOND, ThresholdSearch
 from feasibility.sensitivity.thresholds import Dropped, Explanation, Finding, Threshold
-from feasibility.speed import check_asked, rate_figures
+from feasibility.speed import check_requirements, rate_figures
 from feasibility.task import Task
 from feasibility.verdict import Evidence, Verdict, Walk
 from robots import Robot
@@ -94,7 +94,7 @@ def explain(
     reporting = progress and (lambda *_: progress(0, None, AS_GIVEN))
     first = clock.part(VERDICT_SHARE, reporting)
     robot = replace(robot, start=None)  # with other numbers it is not on the motion set
-    check_asked(robot, task, search)
+    check_requirements(robot, task, search)
     asked, task = task, replace(task, speed=None, min_manipulability=None)  # of no threshold
     verdict = check(robot, cells, task, search, clock=first)
     began = time.monotonic()

@@ -1,9 +1,9 @@
-from .asking import check_asked as check_asked
-from .deciding import TOO_SLOW as TOO_SLOW
-from .deciding import at_rates as at_rates
 from .fast_motions import keep_fast_motions as keep_fast_motions
 from .largest import RateFigures as RateFigures
 from .largest import rate_figures as rate_figures
 from .motion_rates import MotionRates as MotionRates
 from .motion_rates import motion_rates as motion_rates
-from .of_paths import path_rates as path_rates
+from .motion_rates import path_rates as path_rates
+from .motion_rates import replay_at_rates as replay_at_rates
+from .requirements import check_requirements as check_requirements
+from .verdict_at_speed import at_rates as at_rates

@@ -9,25 +9,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feasibility.clock import OutOfTime
 from feasibility.paths import MotionGraph
 from feasibility.roadmap import EDGES, Exploration, Roadmap, edge_motion
-from feasibility.speed.motion_rates import too_slow_words
 from feasibility.speed.rated_graph import Edge, RatedGraph, grow
 from feasibility.task import Task
 from feasibility.verdict import Cause, CauseKind
 from surfaces import components
 
-Ints = NDArray[np.int64]
-
 
 def keep_fast_motions(exploration: Exploration, task: Task) -> dict[int, Cause]:
-    """Leave only motions in a search that do what a task asks, and only cells that these join.
+    """Leave only motions in a search that hold what a task requires, and only cells that they join.
 
-    A cell to which no such motion leads is in no component any more: that the arm can stand still
-    over it is not what is asked. A single cell is kept where there is nothing else.
+    A cell to which no such motion leads is in no component any more: that the arm can hold still
+    over it is not enough. A single cell is kept where there is nothing else.
 
     Args:
         exploration: a search, which is changed; its clock's time counts.
@@ -38,24 +34,18 @@ def keep_fast_motions(exploration: Exploration, task: Task) -> dict[int, Cause]:
     """
     reached = exploration.reached
     rated = _rated(exploration, task)
-    edges = rated.fine(task.speed or -np.inf, task.min_manipulability or -np.inf)
-    exploration.roadmap = _roadmap_of(exploration.roadmap, rated.graph, edges)
+    exploration.roadmap = _roadmap_of(exploration.roadmap, rated.graph, rated.enough)
     lost = np.flatnonzero(reached & ~exploration.reached).tolist()
-    best = dict[int, Edge]()
-    for edge, one in rated.rated.items():
-        pair = {rated.graph.cell[node] for node in edge}
-        for cell in pair if len(pair) > 1 else ():
-            known = best.get(cell)
-            if known is None or one.speed > rated.rated[known].speed:
-                best[cell] = edge
-    return {cell: _cause(rated, cell, best.get(cell)) for cell in lost}
+    cell = rated.graph.cell
+    best = rated.fastest_to_cells((x, y) for x, y in rated.rated if cell[x] != cell[y])
+    kind, none = CauseKind.DISCONNECTED, "no motion leads to it"
+    return {c: Cause(c, kind, False, rated.fault(best[c]) if c in best else none) for c in lost}
 
 
 def _rated(exploration: Exploration, task: Task) -> RatedGraph:
     """The motions of a search, and more of them, rated."""
     roadmap, cells = exploration.roadmap, exploration.cells
-    pairs = {(int(i), int(j)): k for k, (i, j) in enumerate(cells.pairs.tolist())}
-    graph = MotionGraph(exploration.arrays, exploration.work, pairs)
+    graph = MotionGraph.of(exploration.arrays, exploration.work, cells)
     for edge in range(int(roadmap.counters[EDGES])):
         x, y = (int(roadmap.cell[node]) for node in roadmap.ends[edge])
         motion = edge_motion(roadmap, edge)
@@ -101,18 +91,3 @@ def _roadmap_of(roadmap: Roadmap, graph: MotionGraph, edges: Sequence[Edge]) -> 
         waypoints=np.vstack([*motions, np.zeros((0, n))]), parent=np.arange(slots), cover=cover,
         size=size, failures=np.zeros((slots, slots), dtype=np.int64), counters=np.array(counters),
     )  # fmt: skip
-
-
-def _cause(rated: RatedGraph, cell: int, edge: Edge | None) -> Cause:
-    """Why no motion leads to a cell: what the best one to it would need."""
-    task, detail = rated.task, "no motion leads to it"
-    if edge is not None:
-        one = rated.rated[edge]
-        slow = task.speed is not None and one.speed < task.speed
-        detail = (
-            too_slow_words(rated.robot, one.joint, one.share, float(task.speed or 0.0))
-            if slow
-            else f"singular values fall to {one.sigma:.3g} on the way to it; "
-            f"{task.min_manipulability:g} is asked"
-        )
-    return Cause(cell, CauseKind.DISCONNECTED, False, detail)

@@ -9,7 +9,7 @@ import numpy as np
 from feasibility.certification.rates import RateReplay, replay_rates
 from feasibility.clock import Clock, OutOfTime
 from feasibility.speed.rated_graph import RatedGraph, grow, rated_graph
-from feasibility.speed.routes import possible
+from feasibility.speed.routes import covered
 from feasibility.verdict import Verdict
 
 
@@ -38,16 +38,16 @@ def rate_figures(
     if verdict.witness is None or not len(verdict.cells):
         return None
     free = replace(verdict.task, speed=None, min_manipulability=None)
-    judged = replay_rates(verdict.robot, verdict.cells, free, verdict.witness, closely=True)
-    if not np.isfinite(judged.speed):
-        return RateFigures(judged, judged.speed)
+    replayed = replay_rates(verdict.robot, verdict.cells, free, verdict.witness, closely=True)
+    if not np.isfinite(replayed.speed):
+        return RateFigures(replayed, replayed.speed)
     rated = rated_graph(replace(verdict, task=free))
     try:
         if more:
             grow(rated, Clock() if clock is None else clock)
     except OutOfTime:
         rated.rate()
-    return RateFigures(judged, max(judged.speed, largest_speed(rated, begin_of(rated))))
+    return RateFigures(replayed, max(replayed.speed, largest_speed(rated, begin_of(rated))))
 
 
 def begin_of(rated: RatedGraph) -> int | None:
@@ -64,8 +64,8 @@ def largest_speed(rated: RatedGraph, begin: int | None, sigma: float = -np.inf) 
     low, high = -1, len(speeds)  # speeds[low] is possible, speeds[high] is not
     while high - low > 1:
         middle = (low + high) // 2
-        if not possible(rated, rated.fine(float(speeds[middle]), sigma), begin):
-            high = middle
-        else:
+        if covered(rated, rated.holding(float(speeds[middle]), sigma), begin).all():
             low = middle
+        else:
+            high = middle
     return float(speeds[low]) if low >= 0 else 0.0

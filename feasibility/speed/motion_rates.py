@@ -6,15 +6,21 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from feasibility.certification.rates import SegmentRates, in_place, segment_rates
+from coverable_arrays import Array, Ints, Mask
+from feasibility.certification import replay
+from feasibility.certification.rates import (
+    RateReplay,
+    SegmentRates,
+    in_place,
+    replay_rates,
+    segment_rates,
+)
+from feasibility.paths import CoveragePath, PathError
 from feasibility.task import Task
+from feasibility.verdict import Certificate, Walk
 from robots import Robot
 from surfaces import Cells
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 class MotionRates(NamedTuple):
@@ -24,7 +30,7 @@ class MotionRates(NamedTuple):
     """(k,) m/s, lower bound of what the tool may have all along, but where it waits; inf where it
     does not move."""
     sigma: Array
-    """(k,) lower bound of the smallest singular value; inf where it was not asked for."""
+    """(k,) lower bound of the smallest singular value; inf where it was not requested."""
     sampled_sigma: Array
     """(k,) upper bound of it."""
     joint: Ints
@@ -32,8 +38,8 @@ class MotionRates(NamedTuple):
     share: Array
     """(k,) m/s allowed over that joint's limit: v / share is what the joint needs for v."""
 
-    def fine(self, task: Task) -> NDArray[np.bool_]:
-        """(k,) which do what a task asks."""
+    def enough(self, task: Task) -> Mask:
+        """(k,) which hold what a task requires."""
         speed, sigma = task.speed or -np.inf, task.min_manipulability or -np.inf
         return np.asarray((self.speed >= speed) & (self.sigma >= sigma))
 
@@ -47,19 +53,15 @@ class MotionRates(NamedTuple):
             return too_slow_words(robot, int(self.joint[which]), self.share[which], task.speed)
         return (
             f"the smallest singular value falls to {self.sampled_sigma[which]:.3g}; "
-            f"{task.min_manipulability:g} is asked"
+            f"{task.min_manipulability:g} is required"
         )
 
 
 def too_slow_words(robot: Robot, joint: int, share: float, speed: float, where: str = "") -> str:
     """What a joint would need for a speed (m/s), and what it has.
 
-    Args:
-        robot: the arm.
-        joint: its number.
-        share: m/s that the tool has where the joint turns by one rad/s.
-        speed: m/s.
-        where: " at ...", if that is to be said.
+    `share` is the m/s that the tool has where the joint turns by one rad/s; `where` is " at ..." or
+    nothing.
     """
     unit = "m/s" if robot.prismatic[joint] else "rad/s"
     needed = f"{speed / share:.3g} {unit}" if share > 0.0 else "endless speed"
@@ -68,13 +70,10 @@ def too_slow_words(robot: Robot, joint: int, share: float, speed: float, where: 
 
 
 def motion_rates(robot: Robot, cells: Cells, task: Task, motions: Sequence[Array]) -> MotionRates:
-    """Rate motions, all at once.
+    """Rate motions of (m, n) rows, straight in joint space between them, all at once.
 
-    Args:
-        robot: the arm.
-        cells: over the centres of which the tool may wait.
-        task: singular values are looked at where it asks for some.
-        motions: (m, n) rows each, straight in joint space between them.
+    The tool may wait over the centres of cells. Singular values are computed where the task limits
+    them.
     """
     count = len(motions)
     if not count:
@@ -103,3 +102,41 @@ def _least(robot: Robot, count: int, owner: Ints, found: SegmentRates) -> Motion
     speed[moving], joint[moving] = found.speed[rows], found.joint[rows]
     share[moving] = found.sampled_speed[rows] / robot.max_velocity[joint[moving]]
     return MotionRates(speed, sigma, sampled, joint, share)
+
+
+def replay_at_rates(
+    robot: Robot, cells: Cells, task: Task, walk: Walk, needed: Mask
+) -> tuple[Certificate, str]:
+    """Replay a motion over the cells `needed` (N,), at the speed that the task requires too.
+
+    Returns:
+        What was measured, and why the motion is refused; empty if it is accepted.
+    """
+    replayed = replay(robot, cells, task, walk, needed)
+    refusal = replayed.refusal
+    if not refusal and task.asks_rates:
+        refusal = "; ".join(replay_rates(robot, cells, task, walk).refusals)
+    return replayed.certificate, refusal
+
+
+def path_rates(path: CoveragePath, walk: Walk | None = None) -> RateReplay | None:
+    """The judge's answer about a path's motion; None where the task requires nothing.
+
+    A path in an order of its own need not be as fast as the motion of the verdict. That is
+    reported, not refused: timing runs it slower there. `walk` may be another motion over the same
+    cells, such as the samples of its trajectory.
+
+    Raises:
+        PathError: singular values fall below what the task requires.
+    """
+    task = path.task
+    if not task.asks_rates:
+        return None
+    replayed = replay_rates(path.robot, path.cells, task, path.walk if walk is None else walk)
+    least = task.min_manipulability
+    if least is not None and not replayed.sigma >= least:
+        raise PathError(
+            f"the {'path' if walk is None else 'timed path'} in this order comes too near to a "
+            f"singularity: {replayed.refusals[-1]}; try another --order"
+        )
+    return replayed

@@ -1,27 +1,28 @@
 """The motions that a verdict knows, each with the speed and the singular values it allows.
 
-More motions are made from cell to cell, from every configuration that is known, whatever the speed
-that is asked for: so what is found at one speed is found at every lower one, too.
+More motions are made from cell to cell, from every known configuration, whatever the required
+speed: so what is found at one speed is found at every lower one, too.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from feasibility.clock import Clock
 from feasibility.paths import MotionGraph, join_self_motions, motion_graph_of, step_to
-from feasibility.speed.motion_rates import motion_rates
+from feasibility.speed.motion_rates import motion_rates, too_slow_words
 from feasibility.task import Task
-from feasibility.verdict import Verdict, Walk
+from feasibility.verdict import Verdict
 from robots import Robot
 from surfaces import Cells
 
 Edge = tuple[int, int]
 """Two nodes, the lower index first."""
 
-MOST_STEPS = 20_000  # ways from a configuration to a cell beside it that are tried
+MOST_STEPS = 20_000  # attempts from a configuration to a cell beside it
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,13 +63,33 @@ class RatedGraph:
                 float(found.share[k]),
             )  # fmt: skip
 
-    def fine(self, speed: float, sigma: float) -> list[Edge]:
+    def holding(self, speed: float, sigma: float) -> list[Edge]:
         """The motions that allow both."""
         return [e for e, r in self.rated.items() if r.speed >= speed and r.sigma >= sigma]
 
-    def walk(self, nodes: list[int]) -> Walk:
-        """The motion from node to node."""
-        return self.graph.walk(nodes)
+    @property
+    def enough(self) -> list[Edge]:
+        """The motions that hold what the task requires."""
+        return self.holding(self.task.speed or -np.inf, self.task.min_manipulability or -np.inf)
+
+    def fastest_to_cells(self, edges: Iterable[Edge]) -> dict[int, Edge]:
+        """The fastest of some motions to each cell that they lead to."""
+        best = dict[int, Edge]()
+        for edge in edges:
+            for cell in {self.graph.cell[node] for node in edge}:
+                if cell not in best or self.rated[edge].speed > self.rated[best[cell]].speed:
+                    best[cell] = edge
+        return best
+
+    def fault(self, edge: Edge, where: str = "") -> str:
+        """Why a motion does not hold what the task requires; `where` as in `too_slow_words`."""
+        one, speed = self.rated[edge], self.task.speed
+        if speed is not None and one.speed < speed:
+            return too_slow_words(self.robot, one.joint, one.share, speed, where)
+        return (
+            f"singular values fall to {one.sigma:.3g} on the motion to it; "
+            f"{self.task.min_manipulability:g} is required"
+        )
 
 
 def rated_graph(verdict: Verdict) -> RatedGraph:

@@ -2,38 +2,28 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import networkx as nx
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Mask
 from feasibility.speed.rated_graph import Edge, RatedGraph
 
 
 def route(rated: RatedGraph, edges: Iterable[Edge], begin: int | None) -> list[int] | None:
     """Nodes of one motion over all cells, in order where they have one; None if there is none.
 
-    Args:
-        rated: the nodes.
-        edges: the motions that may be used.
-        begin: the node that it has to begin at; None for any.
+    Only some motions (`edges`) may be used; it begins at the node `begin`, or anywhere.
     """
     graph = _graph(rated, edges, begin)
     if rated.cells.in_order:
-        return _in_order(graph, rated.graph.cell, len(rated.cells), begin)
+        count, nodes = _in_order(graph, rated.graph.cell, begin)
+        return nodes if count == len(rated.cells) else None
     best = _largest(graph, rated, begin)
     if len({rated.graph.cell[x] for x in best}) < len(rated.cells):
         return None
     return _visiting(graph, best, rated.graph.cell, min(best) if begin is None else begin)
-
-
-def possible(rated: RatedGraph, edges: Iterable[Edge], begin: int | None) -> bool:
-    """Is there a `route`?"""
-    if rated.cells.in_order:
-        return route(rated, edges, begin) is not None
-    return bool(covered(rated, edges, begin).all())
 
 
 def _graph(rated: RatedGraph, edges: Iterable[Edge], begin: int | None) -> nx.Graph:
@@ -44,17 +34,14 @@ def _graph(rated: RatedGraph, edges: Iterable[Edge], begin: int | None) -> nx.Gr
     return graph
 
 
-def covered(rated: RatedGraph, edges: Iterable[Edge], begin: int | None) -> NDArray[np.bool_]:
+def covered(rated: RatedGraph, edges: Iterable[Edge], begin: int | None) -> Mask:
     """(N,) the most cells that one motion visits."""
-    graph = _graph(rated, edges, begin)
+    graph, cell = _graph(rated, edges, begin), rated.graph.cell
     found = np.zeros(len(rated.cells), dtype=bool)
     if rated.cells.in_order:
-        for last in range(len(rated.cells), 0, -1):
-            if _in_order(graph, rated.graph.cell, last, begin) is not None:
-                found[:last] = True
-                break
-        return found
-    found[[rated.graph.cell[x] for x in _largest(graph, rated, begin)]] = True
+        found[: _in_order(graph, cell, begin)[0]] = True
+    else:
+        found[[cell[x] for x in _largest(graph, rated, begin)]] = True
     return found
 
 
@@ -72,56 +59,50 @@ def _largest(graph: nx.Graph, rated: RatedGraph, begin: int | None) -> set[int]:
 
 def _visiting(graph: nx.Graph, part: set[int], cell: Sequence[int], begin: int) -> list[int]:
     """A motion over all cells of a component: on to the nearest one not yet visited."""
-    beside = {x: sorted(graph.adj[x]) for x in part}
     missing = {cell[x] for x in part} - {cell[begin]}
     nodes = [begin]
     while missing:
-        before: dict[int, int] = {nodes[-1]: -1}
-        queue = deque([nodes[-1]])
-        while queue:
-            x = queue.popleft()
-            if cell[x] in missing:
+        before: dict[int, int] = {}
+        for x, y in nx.bfs_edges(graph, nodes[-1], sort_neighbors=sorted):
+            before[y] = x
+            if cell[y] in missing:
                 break
-            for y in beside[x]:
-                if y not in before:
-                    before[y] = x
-                    queue.append(y)
-        way = [x]
-        while before[way[-1]] != nodes[-1]:
-            way.append(before[way[-1]])
-        nodes += way[::-1]
-        missing -= {cell[y] for y in way}
+        path = _back(before, y)[1:]
+        nodes += path
+        missing -= {cell[y] for y in path}
     return nodes
 
 
-def _in_order(
-    graph: nx.Graph, cell: Sequence[int], count: int, begin: int | None
-) -> list[int] | None:
-    """A motion over the first `count` cells in their order: over each one in place, and onwards."""
-    before: dict[int, int] = {}
+def _in_order(graph: nx.Graph, cell: Sequence[int], begin: int | None) -> tuple[int, list[int]]:
+    """Run over the cells in their order, over each one in place and onwards, as far as that goes.
+
+    Returns:
+        How many cells are reached, and the nodes of a motion over these.
+    """
     layer = [x for x in graph.nodes if cell[x] == 0] if begin is None else [begin]
-    before |= dict.fromkeys(layer, -1)
-    for here in range(count):
-        queue = deque(layer)
-        while queue:
-            x = queue.popleft()
+    before, seen = dict[int, int](), set(layer)
+
+    def reached(nodes: Iterable[int], over: int) -> Iterator[int]:
+        """Nodes over a cell that motions lead to for the first time."""
+        for x in nodes:
             for y in graph.neighbors(x):
-                if cell[y] == here and y not in before:
+                if cell[y] == over and y not in seen:
+                    seen.add(y)
                     before[y] = x
-                    layer.append(y)
-                    queue.append(y)
-        if not layer:
-            return None
-        if here == count - 1:
-            break
-        ahead = []
-        for x in layer:
-            for y in graph.neighbors(x):
-                if cell[y] == here + 1 and y not in before:
-                    before[y] = x
-                    ahead.append(y)
-        layer = ahead
-    way = [layer[0]]
-    while before[way[-1]] >= 0:
-        way.append(before[way[-1]])
-    return way[::-1]
+                    yield y
+
+    count, nodes = 0, list[int]()
+    while layer:
+        for x in layer:  # which grows
+            layer += reached([x], count)
+        nodes, count = layer, count + 1
+        layer = list(reached(nodes, count))
+    return count, _back(before, nodes[0]) if nodes else []
+
+
+def _back(before: dict[int, int], end: int) -> list[int]:
+    """The path to a node, by the node before each."""
+    path = [end]
+    while path[-1] in before:
+        path.append(before[path[-1]])
+    return path[::-1]

@@ -1,9 +1,9 @@
-"""How far a bent motion is from the straight lines between its samples.
+"""How far a curved motion is from the straight lines between its samples.
 
 On a stretch with samples a and b at its ends let q'' be the second derivative by the share t of the
 stretch. Both the motion and the straight line a + t (b - a) go through a and b, so they are at most
 max |q''| / 8 apart, joint by joint. What of q'' points along b - a only changes how fast the line
-is run: as long as that part is at most 2 |b - a|, the motion runs along it without turning back,
+is run: as long as that part is at most 2 |b - a|, the motion runs along it without going back,
 and is off the line by the rest of q'' alone.
 """
 
@@ -12,8 +12,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from feasibility.certification import placements
 from feasibility.timing.sampled_trajectory import (
     Kind,
@@ -25,37 +25,32 @@ from feasibility.timing.sampled_trajectory import (
 from feasibility.verdict import Walk
 from robots import Robot
 
-Array = NDArray[np.float64]
-
 ROUNDING = 1e-12  # [rad] or [m]
 NEAR = 2e-6  # [m] and [rad] that tool point and axis may be off a motion of straight lines
 MOST_LINES = 64  # in place of one polynomial
 
 
-def deviations(q: Array, bends: Array) -> Array:
+def deviations(q: Array, seconds: Array) -> Array:
     """(m - 1, n) how far each joint may be from the straight lines between m samples.
 
     Args:
         q: (m, n) rad or m.
-        bends: (k, m - 1, n) values by the square of a stretch, between which q'' stays.
+        seconds: (k, m - 1, n) values by the square of a stretch, between which q'' stays.
     """
     ahead = np.diff(q, axis=0)
-    way = np.sqrt((ahead**2).sum(axis=1, keepdims=True))
+    length = np.sqrt((ahead**2).sum(axis=1, keepdims=True))
     with np.errstate(invalid="ignore", divide="ignore"):
-        along = np.where(way > 0.0, ahead / way, 0.0)
-    share = (bends * along).sum(axis=2, keepdims=True)
-    onwards = np.abs(share).max(axis=0) <= 2.0 * way
-    beside = np.where(onwards, bends - share * along, bends)
+        along = np.where(length > 0.0, ahead / length, 0.0)
+    share = (seconds * along).sum(axis=2, keepdims=True)
+    onwards = np.abs(share).max(axis=0) <= 2.0 * length
+    beside = np.where(onwards, seconds - share * along, seconds)
     return np.asarray(np.abs(beside).max(axis=0) / 8.0 + ROUNDING)
 
 
 def deviations_between(run: Trajectory, kind: Kind, q: Array) -> Array:
-    """`deviations` of what a controller makes of a trajectory, looked at at some places.
+    """`deviations` of what a controller makes of the k samples of a trajectory.
 
-    Args:
-        run: k samples.
-        kind: what is put through them.
-        q: ((k - 1) * places + 1, n) the motion at so many places of each polynomial.
+    q ((k - 1) * places + 1, n) is the motion at so many places of each polynomial.
     """
     places = (len(q) - 1) // (len(run) - 1)
     stretch = np.diff(run.time)[:, None] / places
@@ -80,18 +75,18 @@ def motion_near(robot: Robot, run: Trajectory, kind: Kind) -> NearMotion:
     most that at the nearer end, and half of what the tool point moves meanwhile.
     """
     off = deviations_between(run, kind, run.q)
-    bent = np.abs(accelerations(run, kind) * np.diff(run.time)[:, None] ** 2).max(axis=0) / 8.0
+    plain = np.abs(accelerations(run, kind) * np.diff(run.time)[:, None] ** 2).max(axis=0) / 8.0
     levers = _longest(robot, run.q, np.abs(np.diff(run.q, axis=0)) + 2.0 * off)
     point, turn = _moves(robot, levers, off)
-    point_bent, turn_bent = _moves(robot, levers, bent + ROUNDING)
+    point_most, turn_most = _moves(robot, levers, plain + ROUNDING)
     far = np.maximum(point, turn) > NEAR
     lines = np.ones(len(off), dtype=np.int64)
-    lines[far] = np.ceil(np.sqrt(np.maximum(point_bent, turn_bent)[far] / NEAR))
+    lines[far] = np.ceil(np.sqrt(np.maximum(point_most, turn_most)[far] / NEAR))
     lines = np.minimum(lines, MOST_LINES)
     # Of more lines than one the plain bound counts: they point elsewhere than the one.
     point, turn = (
         np.where(far, one / lines**2, other)
-        for one, other in ((point_bent, point), (turn_bent, turn))
+        for one, other in ((point_most, point), (turn_most, turn))
     )
     walk = _lines(run, kind, lines)
     return NearMotion(walk, float(point.max(initial=0.0)), float(turn.max(initial=0.0)))
@@ -102,19 +97,19 @@ def _moves(robot: Robot, levers: Array, off: Array) -> tuple[Array, Array]:
     return (levers * off).sum(axis=1), off[:, ~robot.prismatic].sum(axis=1)
 
 
-def _longest(robot: Robot, q: Array, way: Array) -> Array:
-    """(m, n) m, bounds on the lever arms on the way between rows; 1 of joints that slide."""
+def _longest(robot: Robot, q: Array, moves: Array) -> Array:
+    """(m, n) m, bounds on lever arms between rows `moves` (m, n) apart; 1 of joints that slide."""
     levers = placements(robot, q).levers
     ends = np.maximum(levers[:-1], levers[1:])
-    behind = np.zeros(len(way))
+    behind = np.zeros(len(moves))
     for j in range(robot.n - 1, -1, -1):
         if not robot.prismatic[j]:
             ends[:, j] += 0.5 * behind
-        behind += ends[:, j] * way[:, j]
+        behind += ends[:, j] * moves[:, j]
     return ends
 
 
-def _lines(run: Trajectory, kind: Kind, lines: NDArray[np.int64]) -> Walk:
+def _lines(run: Trajectory, kind: Kind, lines: Ints) -> Walk:
     """The polynomials at so many places (m,) each, in equal steps, and the last sample."""
     first = np.concatenate([[0], np.cumsum(lines)])
     q = np.empty((first[-1] + 1, run.q.shape[1]))

@@ -19,11 +19,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.compiled import kernel
-
-Array = NDArray[np.float64]
 
 CROSSINGS = 100  # per place; with what is left over then, the speed is 0 there
 ROUNDING = 1e-12  # [1]
@@ -37,7 +35,7 @@ class Rows(NamedTuple):
     d: Array
     lean: Array
     """(m - 1, r) c / d; 0 where d is nothing."""
-    room: Array
+    margin: Array
     """(m - 1, r) 1 / |d|; inf there."""
     alone: Array | None
     """(m - 1, r) 1 / |c| there and inf elsewhere; None where d is something everywhere."""
@@ -47,10 +45,10 @@ class Rows(NamedTuple):
         """From c and d (m - 1, r)."""
         alone = np.abs(d) <= LEAST_SHARE * np.abs(c)
         with np.errstate(divide="ignore", invalid="ignore"):
-            room = np.where(alone, np.inf, 1.0 / np.abs(d))
+            margin = np.where(alone, np.inf, 1.0 / np.abs(d))
             lean = np.where(alone, 0.0, c / d)
             by_itself = np.where(alone, 1.0 / np.abs(c), np.inf) if alone.any() else None
-        return Rows(c, d, lean, room, by_itself)
+        return Rows(c, d, lean, margin, by_itself)
 
 
 def fastest_speeds(most: Array, rows: Rows, limits: Array | float = 1.0) -> Array:
@@ -66,42 +64,42 @@ def fastest_speeds(most: Array, rows: Rows, limits: Array | float = 1.0) -> Arra
         >>> fastest_speeds(np.full(5, 9.0), rows).round(9).tolist()
         [0.0, 2.0, 4.0, 2.0, 0.0]
     """
-    # y is between -room - lean x and room - lean x.
+    # y is between -margin - lean x and margin - lean x.
     x = np.append(most[:-1], 0.0)
     if rows.alone is not None:
         x[:-1] = np.minimum(x[:-1], (rows.alone * limits).min(axis=1))
-    _run_through(x, rows.room * limits, rows.lean)
+    _run_through(x, rows.margin * limits, rows.lean)
     return x
 
 
 @kernel
-def _run_through(x, room, lean):  # type: ignore[no-untyped-def]
+def _run_through(x, margin, lean):  # type: ignore[no-untyped-def]
     """Set x (m,), upper bounds before, to the largest values; by two passes."""
     for i in range(x.shape[0] - 2, -1, -1):
-        x[i] = _largest_start(x[i], x[i + 1], room[i], lean[i])
+        x[i] = _largest_start(x[i], x[i + 1], margin[i], lean[i])
     x[0] = 0.0
     for i in range(x.shape[0] - 1):
         y = x[i + 1]
-        for j in range(room.shape[1]):
-            y = min(y, room[i, j] - lean[i, j] * x[i])
+        for j in range(margin.shape[1]):
+            y = min(y, margin[i, j] - lean[i, j] * x[i])
         x[i + 1] = max(y, 0.0)
 
 
 @kernel
-def _largest_start(x, end, room, lean):  # type: ignore[no-untyped-def]
+def _largest_start(x, end, margin, lean):  # type: ignore[no-untyped-def]
     """The largest x, at most the one given, that leads to some y in 0 .. end."""
     for _ in range(CROSSINGS):
-        upper, upper_room, upper_lean = end, end, 0.0
-        lower, lower_room, lower_lean = 0.0, 0.0, 0.0
-        for j in range(room.shape[0]):
+        upper, upper_margin, upper_lean = end, end, 0.0
+        lower, lower_margin, lower_lean = 0.0, 0.0, 0.0
+        for j in range(margin.shape[0]):
             at = lean[j] * x
-            if room[j] - at < upper:
-                upper, upper_room, upper_lean = room[j] - at, room[j], lean[j]
-            if -room[j] - at > lower:
-                lower, lower_room, lower_lean = -room[j] - at, room[j], lean[j]
+            if margin[j] - at < upper:
+                upper, upper_margin, upper_lean = margin[j] - at, margin[j], lean[j]
+            if -margin[j] - at > lower:
+                lower, lower_margin, lower_lean = -margin[j] - at, margin[j], lean[j]
         if lower <= upper:
             return x
-        crossing = (upper_room + lower_room) / (upper_lean - lower_lean)
+        crossing = (upper_margin + lower_margin) / (upper_lean - lower_lean)
         if not crossing < x * (1.0 - ROUNDING):
             return x * (1.0 - ROUNDING)
         x = crossing

@@ -17,8 +17,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array
+from coverable_errors import real
 from feasibility.certification import collision_replay, replay
 from feasibility.collisions import Bodies, checked, gather
 from feasibility.paths import CoveragePath, PathError
@@ -35,13 +37,11 @@ from feasibility.timing.sampled_trajectory import (
     used_by_joints,
 )
 from feasibility.timing.smoothing import Curve, blended, control_points
-from feasibility.timing.speed_limits import MotionLimits, motion_limits, number, tool_slopes
+from feasibility.timing.speed_limits import MotionLimits, motion_limits, tool_slopes
 from feasibility.timing.timed_curve import TimedCurve, samples, speed_bounds, timed_curve
 from feasibility.timing.tool_between_samples import fastest_tool
 from feasibility.verdict import Walk
 from robots import Robot
-
-Array = NDArray[np.float64]
 
 DEFAULT_SPEED = 0.1  # [m/s] of the tool point
 DEFAULT_PERIOD = 0.02  # [s] between samples
@@ -96,16 +96,16 @@ def trajectory(
     """
     robot, cells, task = path.robot, path.cells, path.task
     limits = motion_limits(robot, speed, velocity, acceleration)
-    if not SHORTEST <= number(period) <= LONGEST:
+    if not SHORTEST <= real(period) <= LONGEST:
         raise PathError(f"the period must be {SHORTEST} to {LONGEST} seconds, got {period!r}")
     if len(np.unique(path.walk.q, axis=0)) == 1:
         q, still = path.walk.q[:1], np.zeros((1, robot.n))
-        asked = tuple(checked(task.collision))
+        names = tuple(checked(task.collision))
         return Trajectory(
-            robot.joint_names, np.zeros(1), q, still, still, np.zeros(1), path.walk.cell[:1], asked
+            robot.joint_names, np.zeros(1), q, still, still, np.zeros(1), path.walk.cell[:1], names
         )
     if task.collision is not None:
-        # Turns that were not asked to stay clear mostly do, and the motion is judged anyway.
+        # Turns found without collisions mostly stay clear, and the motion is judged anyway.
         curve = blended(robot, cells, replace(task, collision=None), path.walk)
         run, refusal = _judged(path, curve, limits, period)
         if not refusal:
@@ -212,35 +212,32 @@ def timed_moves(
 
 def move_refusal(path: CoveragePath, run: Trajectory) -> str:
     """Why a timed motion that is over no surface is refused: limits, bodies; empty if it is not."""
-    robot = path.robot
-    past = float(past_limits(robot, run).max(initial=0.0))
-    if past > 0.0:
-        return f"between samples a joint may go {past:.2g} (rad or m) past its limits"
-    bodies = gather(robot, path.cells.surface, path.task.collision, path.task.standoff)
-    return "" if bodies is None else _collisions(robot, bodies, run)
+    return _past_limits(path.robot, run) or _collisions(path, run)
 
 
 def _refusal(path: CoveragePath, run: Trajectory) -> str:
     """Why the samples are refused, as straight lines or interpolated; empty if they are not."""
-    robot, cells = path.robot, path.cells
+    return _past_limits(path.robot, run) or _off_surface(path, run) or _collisions(path, run)
+
+
+def _past_limits(robot: Robot, run: Trajectory) -> str:
+    """How far a joint may go past its limits; empty where all keep to them."""
     past = float(past_limits(robot, run).max(initial=0.0))
-    if past > 0.0:
-        return f"between samples a joint may go {past:.2g} (rad or m) past its limits"
+    return f"between samples a joint may go {past:.2g} (rad or m) past its limits" * (past > 0.0)
+
+
+def _off_surface(path: CoveragePath, run: Trajectory) -> str:
+    """Why the replay refuses the tool alone; empty where it accepts the samples."""
     tool_alone = replace(path.task, collision=None)
-    replayed = replay(robot, cells, tool_alone, run.walk, path.needed)
+    replayed = replay(path.robot, path.cells, tool_alone, run.walk, path.needed)
     for kind in KINDS if replayed.accepted else ():
-        if _near_enough(path, tool_alone, motion_near(robot, run, kind)):
+        if _near_enough(path, tool_alone, motion_near(path.robot, run, kind)):
             continue
         walk = motion_between(run, kind, PLACES)
-        replayed = replay(robot, cells, tool_alone, walk, path.needed)
+        replayed = replay(path.robot, path.cells, tool_alone, walk, path.needed)
         if not replayed.accepted:
             break
-    if not replayed.accepted:
-        return replayed.refusal
-    bodies = gather(robot, cells.surface, path.task.collision, path.task.standoff)
-    if bodies is None:
-        return ""
-    return _collisions(robot, bodies, run)
+    return replayed.refusal
 
 
 def _near_enough(path: CoveragePath, task: Task, near: NearMotion) -> bool:
@@ -256,8 +253,12 @@ def _near_enough(path: CoveragePath, task: Task, near: NearMotion) -> bool:
     return replayed.accepted and off <= task.effective_tolerance and tilt <= task.cone
 
 
-def _collisions(robot: Robot, bodies: Bodies, run: Trajectory) -> str:
+def _collisions(path: CoveragePath, run: Trajectory) -> str:
     """Which bodies come too near, as straight lines or interpolated; empty if all stay clear."""
+    robot, task = path.robot, path.task
+    bodies = gather(robot, path.cells.surface, task.collision, task.standoff)
+    if bodies is None:
+        return ""
     # At once, as lines between samples that all of them are near, where that is clear enough.
     away = np.maximum.reduce([deviations_between(run, kind, run.q) for kind in KINDS])
     if not _collision(robot, bodies, run.q, run.time, away):
@@ -277,12 +278,8 @@ def _collision(
 ) -> str:
     """Which pair comes nearest to each other, how near, and when; empty if all stay clear.
 
-    Args:
-        robot: the arm.
-        bodies: what can collide.
-        q: (m, n) rows of the motion.
-        time: (m,) s.
-        deviations: (m - 1, n) how far joints may be from the straight lines between rows.
+    Rows q (m, n) are at times (m,) s; joints may be off the straight lines between them by
+    `deviations` (m - 1, n).
     """
     replayed = collision_replay(robot, bodies, q, deviations)
     if replayed.accepted:

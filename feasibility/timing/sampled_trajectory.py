@@ -8,18 +8,18 @@ polynomial nowhere leaves the range of its coefficients, so these bound it every
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from coverable_errors import ArgumentError
 from feasibility.timing.speed_limits import MotionLimits, tool_slopes
 from feasibility.verdict import Walk
 from robots import Robot
 
-Array = NDArray[np.float64]
 Kind = Literal["quintic", "cubic"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
@@ -49,7 +49,7 @@ class Trajectory:
     """(k, n) rad/s^2 or m/s^2; from the sample on, where it jumps."""
     tool_speed: Array
     """(k,) m/s."""
-    cell: NDArray[np.int64]
+    cell: Ints
     """(k,) flat index of the cell whose centre the tool point passes then; -1 in between."""
     collisions: tuple[str, ...] = ()
     """What the replay of the motion checked: some of self, surface and scene."""
@@ -120,13 +120,13 @@ def coefficients(run: Trajectory, kind: Kind) -> Array:
     q, last, slope, end_slope = run.q[:-1], run.q[1:], h * run.dq[:-1], h * run.dq[1:]
     if kind == "cubic":
         return np.stack([q, q + slope / 3.0, last - end_slope / 3.0, last])
-    bend, end_bend = h**2 * run.ddq[:-1], h**2 * run.ddq[1:]
+    second, end_second = h**2 * run.ddq[:-1], h**2 * run.ddq[1:]
     return np.stack(
         [
             q,
             q + slope / 5.0,
-            q + 2.0 * slope / 5.0 + bend / 20.0,
-            last - 2.0 * end_slope / 5.0 + end_bend / 20.0,
+            q + 2.0 * slope / 5.0 + second / 20.0,
+            last - 2.0 * end_slope / 5.0 + end_second / 20.0,
             last - end_slope / 5.0,
             last,
         ]
@@ -170,13 +170,16 @@ def closely(points: Array) -> Array:
     return points
 
 
-def largest(points: Array) -> Array:
-    """(n,) the largest of `closely`, which looks only at what may exceed the values at all ends."""
-    reached = points[[0, -1]].max(axis=(0, 1))
-    more = (points.max(axis=0) > reached).any(axis=1)
+def largest(points: Array, of: Callable[[Array], Array] = np.asarray) -> Array:
+    """(n,) the largest value `of` polynomials, such as `np.abs` of them; a close bound.
+
+    Only what may exceed the values at all ends is halved.
+    """
+    reached = of(points[[0, -1]]).max(axis=(0, 1))
+    more = (of(points).max(axis=0) > reached).any(axis=1)
     if not more.any():
         return np.asarray(reached)
-    return np.maximum(reached, closely(points[:, more]).max(axis=(0, 1)))
+    return np.maximum(reached, of(closely(points[:, more])).max(axis=(0, 1)))
 
 
 def values(points: Array, places: int) -> Array:
@@ -232,30 +235,20 @@ def used_by_joints(run: Trajectory, limits: MotionLimits) -> Used:
     """`used` without the tool, which takes far less time."""
     velocity, acceleration = np.zeros((2, run.q.shape[1]))
     for kind in KINDS if len(run) > 1 else ():
-        velocity = np.maximum(velocity, _furthest(derivative(run, coefficients(run, kind))))
-        acceleration = np.maximum(acceleration, _furthest(accelerations(run, kind)))
+        velocity = np.maximum(velocity, largest(derivative(run, coefficients(run, kind)), np.abs))
+        acceleration = np.maximum(acceleration, largest(accelerations(run, kind), np.abs))
     return Used(velocity / limits.velocity, acceleration / limits.acceleration, 0.0)
-
-
-def _furthest(points: Array) -> Array:
-    """(n,) the largest absolute value of polynomials; see `largest`."""
-    most = np.abs(points).max(axis=0)
-    reached = np.maximum(np.abs(points[0]), np.abs(points[-1])).max(axis=0)
-    more = (most > reached).any(axis=1)
-    if not more.any():
-        return np.asarray(reached)
-    return np.maximum(reached, np.abs(closely(points[:, more])).max(axis=(0, 1)))
 
 
 def accelerations_each(run: Trajectory, limits: MotionLimits) -> Array:
     """(k - 1, n) the same between any two samples; where it is at most 1 perhaps too large."""
     most = np.zeros((len(run) - 1, run.q.shape[1]))
     for kind in KINDS:
-        bends = accelerations(run, kind) / limits.acceleration
-        share = np.abs(bends).max(axis=0)
+        shares = accelerations(run, kind) / limits.acceleration
+        share = np.abs(shares).max(axis=0)
         over = np.flatnonzero(share.max(axis=1) > 1.0)
         if len(over):
-            halves = np.abs(closely(bends[:, over])).max(axis=0)
+            halves = np.abs(closely(shares[:, over])).max(axis=0)
             share[over] = halves.reshape(-1, len(over), share.shape[1]).max(axis=0)
         most = np.maximum(most, share)
     return most

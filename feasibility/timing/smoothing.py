@@ -17,9 +17,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
+from coverable_arrays import Array, Ints
 from feasibility.certification import replay
 from feasibility.paths import PathError
 from feasibility.task import Task
@@ -27,8 +27,6 @@ from feasibility.timing.between_samples import deviations
 from feasibility.verdict import Walk
 from robots import Kinematics, Robot
 from surfaces import Cells
-
-Array = NDArray[np.float64]
 
 WIDEST = 0.5  # [1] share of the lines next to a waypoint that its turn may use
 SHARPEST = 2.0**-12  # [1] share below which it is given up
@@ -45,9 +43,9 @@ class Curve:
 
     control: Array
     """(K, n) control points; q(k) is near control point k, q(0) and q(K - 1) are at the ends."""
-    marks: NDArray[np.int64]
+    marks: Ints
     """(m,) k where the curve passes centres of cells."""
-    cell: NDArray[np.int64]
+    cell: Ints
     """(m,) those cells."""
 
     @property
@@ -212,8 +210,8 @@ def _refused(
 def _deviations(curve: Curve, walk: Walk, first: int, last: int) -> Array:
     """(m - 1, n) how far the curve may be from the straight lines of `sampled`."""
     k = np.arange(int(curve.marks[first]), int(curve.marks[last]) + 1)
-    bends = curve.spline().derivative(2)(k) / SAMPLES**2  # it runs straight from one to the next
-    return deviations(walk.q, np.repeat(np.stack([bends[:-1], bends[1:]]), SAMPLES, axis=1))
+    seconds = curve.spline().derivative(2)(k) / SAMPLES**2  # it runs straight from one to the next
+    return deviations(walk.q, np.repeat(np.stack([seconds[:-1], seconds[1:]]), SAMPLES, axis=1))
 
 
 def without_slivers(walk: Walk, sliver: float) -> Walk:

@@ -12,15 +12,15 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline
 
+from coverable_arrays import Array
+from coverable_errors import real
 from feasibility.certification import second_derivatives
 from feasibility.paths import PathError
 from feasibility.read_only import ReadOnlyArrays
 from robots import Kinematics, Robot, moved_by_joints
-
-Array = NDArray[np.float64]
 
 ACCELERATION_TIME = 0.5  # [s], in which a joint gets to its largest velocity, by default
 LOOSE = 0.02  # [1] share by which the bound on the tool's speed may be too careful
@@ -65,7 +65,7 @@ def motion_limits(
         ([3.0, 3.0, 3.0, 3.0, 3.0, 3.0], [6.0, 6.0, 6.0, 6.0, 6.0, 6.0])
     """
     faults: list[str] = []
-    speed = number(tool_speed)
+    speed = real(tool_speed)
     if not LEAST <= speed <= MOST:
         faults.append(
             f"the tool speed must be a positive number of metres per second in {LEAST:g} .. "
@@ -89,14 +89,6 @@ def motion_limits(
     if faults:
         raise PathError(faults)
     return MotionLimits(fastest, quickest, speed)
-
-
-def number(value: object) -> float:
-    """A float, nan where it is none."""
-    try:
-        return float(value) if not isinstance(value, bool) else math.nan  # type: ignore[arg-type]
-    except (TypeError, ValueError, OverflowError):
-        return math.nan
 
 
 def _per_joint(robot: Robot, name: str, unit: str, value: ArrayLike, faults: list[str]) -> Array:
@@ -143,13 +135,13 @@ def squared_speeds(robot: Robot, spline: BSpline, grid: Array, limits: MotionLim
 def _slopes(robot: Robot, spline: BSpline, grid: Array) -> tuple[Array, Array, Array]:
     """|p'| (m,) at the places of a grid; on its pieces the most of |q'| (m - 1, n) and |p''|."""
     h = np.diff(grid)[:, None]
-    q, slope, bend = (spline.derivative(k)(grid) for k in range(3))
-    middle = slope[:-1] + 0.5 * h * bend[:-1]
+    q, slope, second = (spline.derivative(k)(grid) for k in range(3))
+    middle = slope[:-1] + 0.5 * h * second[:-1]
     fastest = np.maximum(np.maximum(np.abs(slope[:-1]), np.abs(slope[1:])), np.abs(middle))
-    bent = np.maximum(np.abs(bend[:-1]), np.abs(bend[1:]))
+    most_second = np.maximum(np.abs(second[:-1]), np.abs(second[1:]))
     moved = moved_by_joints(robot.chain, q)
     levers = np.sqrt((moved**2).sum(axis=1)).T
-    swing = second_derivatives(fastest * h, robot.prismatic, levers, np.inf, bent * h**2)
+    swing = second_derivatives(fastest * h, robot.prismatic, levers, np.inf, most_second * h**2)
     return speeds(moved, slope), fastest, swing / h[:, 0] ** 2
 
 
@@ -164,6 +156,6 @@ def speeds(moved: Array, slope: Array) -> Array:
 def tool_slopes(robot: Robot, q: Array, slope: Array) -> Array:
     """(m,) m, how fast the tool point moves when the joints q (m, n) move at `slope` (m, n).
 
-    By Pinocchio: what users are told.
+    By Pinocchio, for what users see.
     """
     return np.linalg.norm(Kinematics(robot).tool_velocities(q, slope), axis=1)

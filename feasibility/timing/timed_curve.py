@@ -11,17 +11,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
+from coverable_arrays import Array
 from feasibility.paths import PathError
 from feasibility.timing.fastest_speeds import Rows, fastest_speeds
 from feasibility.timing.sampled_trajectory import Trajectory
 from feasibility.timing.smoothing import Curve, inside
 from feasibility.timing.speed_limits import MotionLimits, fine_grid, squared_speeds, tool_slopes
 from robots import Robot
-
-Array = NDArray[np.float64]
 
 TICK = 1e-9  # [s]
 CROWDED = 0.2  # [1] share of the period; samples nearer to a passage of a centre are left out
@@ -58,8 +56,8 @@ class TimedCurve:
         k = np.clip(self.grid[i] + past * (rate + 0.5 * u * past), self.grid[i], self.grid[i + 1])
         rate = np.where(time < self.duration - TICK, np.maximum(rate + u * past, 0.0), 0.0)[:, None]
         spline = self.curve.spline()
-        q, slope, bend = (spline.derivative(order)(k) for order in range(3))
-        return q, slope * rate, bend * rate**2 + slope * u[:, None]
+        q, slope, second = (spline.derivative(order)(k) for order in range(3))
+        return q, slope * rate, second * rate**2 + slope * u[:, None]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -138,15 +136,15 @@ def acceleration_rows(spline: BSpline, grid: Array) -> tuple[Array, Array]:
     Those at its two ends, and between them the middle Bernstein coefficient.
     """
     h = np.diff(grid)[:, None]
-    slope, bend = spline.derivative(1), spline.derivative(2)
+    slope, second = spline.derivative(1), spline.derivative(2)
     middle = grid[:-1] + 0.5 * h[:, 0]
-    slopes, bends = slope(grid), bend(grid)
+    slopes, seconds = slope(grid), second(grid)
     per = 0.5 / h  # u is (y - x) of that
-    begin = bends[:-1] - per * slopes[:-1], per * slopes[:-1]
-    end = -per * slopes[1:], bends[1:] + per * slopes[1:]
-    bent, sloped = 0.5 * bend(middle), per * slope(middle)
+    begin = seconds[:-1] - per * slopes[:-1], per * slopes[:-1]
+    end = -per * slopes[1:], seconds[1:] + per * slopes[1:]
+    curved, sloped = 0.5 * second(middle), per * slope(middle)
     inner = [
-        2.0 * (bent + sign * sloped) - 0.5 * (a + b)
+        2.0 * (curved + sign * sloped) - 0.5 * (a + b)
         for sign, a, b in zip((-1.0, 1.0), begin, end, strict=True)
     ]
     first, last = (np.hstack([begin[k], inner[k], end[k]]) for k in (0, 1))

@@ -7,7 +7,7 @@ the other by at most h^2/8 max |p'''|, and with sums over the joints of the larg
     |p'''| <= L (J + 3 A B + B^3),        L <= (1 + h B) times that at the nearer sample,
 
 because each derivative by a joint turns what comes behind it, and at the end there is a lever arm.
-Where the joints run evenly that says it all. Elsewhere the tool is looked at in between.
+Where the joints run evenly that is enough. Elsewhere the tool is computed in between.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.timing.sampled_trajectory import (
     KINDS,
     PLACES,
@@ -29,8 +29,6 @@ from feasibility.timing.sampled_trajectory import (
 )
 from feasibility.timing.speed_limits import MotionLimits, speeds
 from robots import Robot, moved_by_joints
-
-Array = NDArray[np.float64]
 
 
 def used(robot: Robot, run: Trajectory, limits: MotionLimits) -> Used:
@@ -45,10 +43,7 @@ def used(robot: Robot, run: Trajectory, limits: MotionLimits) -> Used:
 def fastest_tool(robot: Robot, run: Trajectory, enough: float) -> float:
     """m/s, the tool's largest speed, however samples are interpolated; at least two of them.
 
-    Args:
-        robot: the arm.
-        run: the samples.
-        enough: m/s; stretches that a bound shows to be slower are not looked at any closer.
+    Stretches that a bound shows to be slower than `enough` (m/s) are not looked at any closer.
     """
     moved = moved_by_joints(robot.chain, run.q)
     at = speeds(moved, run.dq)
@@ -58,8 +53,8 @@ def fastest_tool(robot: Robot, run: Trajectory, enough: float) -> float:
     for kind in KINDS:
         points = coefficients(run, kind)
         slopes = derivative(run, points)
-        bends = derivative(run, slopes)
-        rates = (slopes, bends, derivative(run, bends))
+        seconds = derivative(run, slopes)
+        rates = (slopes, seconds, derivative(run, seconds))
         b, a, j = (np.abs(rate).max(axis=0).sum(axis=1) for rate in rates)
         longest = np.maximum(levers[:-1], levers[1:]) * (1.0 + h * b)
         most = ends + 0.125 * h * h * longest * (j + 3.0 * a * b + b * b * b)
@@ -77,5 +72,5 @@ def _largest(rows: Array) -> float:
     Between two places a parabola is higher by up to 1/8 of its second difference than the larger
     of both; twice that is allowed for.
     """
-    bent = np.abs(np.diff(rows, n=2, axis=1)).max(axis=1)
-    return float((rows.max(axis=1) + 0.25 * bent).max())
+    most_second = np.abs(np.diff(rows, n=2, axis=1)).max(axis=1)
+    return float((rows.max(axis=1) + 0.25 * most_second).max())

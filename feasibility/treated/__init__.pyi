@@ -1,10 +1,9 @@
 from .area import TreatedArea as TreatedArea
+from .area import UntreatedRegion as UntreatedRegion
 from .area import treated_by_passes as treated_by_passes
 from .area import treated_by_walk as treated_by_walk
 from .decision import Decision as Decision
 from .decision import with_coverage as with_coverage
-from .regions import UntreatedRegion as UntreatedRegion
-from .words import region_words as region_words
 from .words import share_words as share_words
 from .words import treated_json as treated_json
 from .words import treated_words as treated_words

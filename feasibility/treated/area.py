@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from feasibility.read_only import ReadOnlyArrays
 from feasibility.task import Task
 from feasibility.treated.contact_path import ContactPath, contacts_along, contacts_on
-from feasibility.treated.regions import UntreatedRegion, untreated_regions
 from feasibility.verdict import Walk
 from robots import Robot
-from surfaces import Cells, Surface
+from surfaces import Cells, Surface, components
 from surfaces.passes import (
     PassPlaces,
     ToolLines,
@@ -25,12 +25,20 @@ from surfaces.passes import (
     working_mesh,
 )
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
 FINE = 0.5  # [1] of the footprint's radius: edges of the triangles that are measured on
-ACROSS = 60  # edges along the surface's extent, at least: where it bends, triangles cut corners
+ACROSS = 60  # edges along the surface's extent, at least: triangles cut the corners of curved parts
 MOST_COUNTED = 20_000  # faces on which visits are counted
+OPEN = 0.5  # [1] a face of which at least this share is untreated for certain belongs to a region
+LEAST = 1e-6  # [1] of the whole area: smaller regions are not listed
+
+
+class UntreatedRegion(NamedTuple):
+    """A connected part of the surface that the tool does not treat."""
+
+    centre: Array
+    """(3,) m, in the root frame: a place of the surface in its middle."""
+    area: float
+    """m^2."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -51,7 +59,7 @@ class TreatedArea(ReadOnlyArrays):
     """What is left out for certain, the largest region first."""
     mesh: WorkingMesh
     """The surface as it was measured, for pictures."""
-    shares: Floats
+    shares: Array
     """(F,) the treated share of each of its faces, at least."""
     lines: ToolLines
     """The path on the surface below the tool point."""
@@ -66,7 +74,7 @@ class TreatedArea(ReadOnlyArrays):
 
 
 def treated_by_walk(robot: Robot, cells: Cells, task: Task, walk: Walk) -> TreatedArea | None:
-    """What a motion over cells treats; None where no footprint is asked for."""
+    """What a motion over cells treats; None without a footprint."""
     if task.disc is None or not len(walk.q) or cells.surface.bare:
         return None
     return _measured(cells.surface, task.disc, contacts_on(cells.surface, robot, walk))
@@ -75,15 +83,7 @@ def treated_by_walk(robot: Robot, cells: Cells, task: Task, walk: Walk) -> Treat
 def treated_by_passes(
     surface: Surface, places: PassPlaces, robot: Robot, task: Task, walks: tuple[Walk, ...]
 ) -> TreatedArea | None:
-    """What motions along passes treat; None where no footprint is asked for.
-
-    Args:
-        surface: under the passes.
-        places: the poses of the passes.
-        robot: the arm.
-        task: with its footprint.
-        walks: one or more motions, marked at the poses.
-    """
+    """What motions, marked at the poses of passes, treat; None without a footprint."""
     if task.disc is None:
         return None
     height = surface.side_sign * task.standoff
@@ -128,13 +128,36 @@ def _measured(
         lower=small.lower,
         upper=large.upper,
         twice=0.0,
-        untreated=untreated_regions(large),
+        untreated=_untreated_regions(large),
         mesh=small.mesh,
         shares=small.shares,
         lines=contacts.lines,
         notes=_notes(surface, small, footprint),
     )
     return _with_twice(found)
+
+
+def _untreated_regions(found: Treated) -> tuple[UntreatedRegion, ...]:
+    """The regions that are untreated for certain, the largest first."""
+    mesh = found.mesh
+    faces = np.flatnonzero(found.most <= 1.0 - OPEN)
+    if not len(faces):
+        return ()
+    corners = mesh.faces[faces]
+    used, of = np.unique(corners, return_inverse=True)
+    of = of.reshape(-1, 3)
+    joined = np.concatenate([of[:, [0, 1]], of[:, [1, 2]]]).astype(np.int64)
+    part = components(joined, len(used))[of[:, 0]]
+    middles = mesh.corners[faces].mean(axis=1)
+    areas = mesh.areas[faces] * (1.0 - found.most[faces])
+    regions = []
+    for number in np.unique(part):
+        own = part == number
+        mean = np.average(middles[own], axis=0, weights=areas[own])
+        nearest = np.linalg.norm(middles[own] - mean, axis=1).argmin()
+        regions.append(UntreatedRegion(middles[own][nearest], float(areas[own].sum())))
+    listed = (each for each in regions if each.area >= LEAST * found.area)
+    return tuple(sorted(listed, key=lambda each: -each.area))
 
 
 def _with_twice(found: TreatedArea) -> TreatedArea:
@@ -147,7 +170,7 @@ def _with_twice(found: TreatedArea) -> TreatedArea:
 
 
 def _mesh_of(surface: Surface, edge: float) -> WorkingMesh:
-    """Triangles fine enough for the footprint, and for a surface that bends."""
+    """Triangles fine enough for the footprint, and for a curved surface."""
     coarse = working_mesh(surface, np.inf)
     extent = float(np.linalg.norm(np.ptp(coarse.vertices, axis=0)))
     return working_mesh(surface, min(edge, extent / ACROSS))

@@ -11,15 +11,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from feasibility.verdict import Walk
 from robots import Kinematics, Robot
 from surfaces import Surface
 from surfaces.passes import PassPlaces, ToolLines
 from surfaces.toolpaths import arc_at
-
-Floats = NDArray[np.float64]
 
 SAG = 1e-5  # [m] how far the path between two contacts may be from straight
 FAR = 10.0  # [m] the reach of an arm whose slides have no ends
@@ -45,13 +43,9 @@ def contacts_on(surface: Surface, robot: Robot, walk: Walk) -> ContactPath:
 
 
 def contacts_along(places: PassPlaces, robot: Robot, walk: Walk, height: float) -> ContactPath:
-    """The contacts of a motion along passes; where the tool is lifted it has none.
+    """The contacts of a motion marked at the poses of passes; where the tool is lifted it has none.
 
-    Args:
-        places: the poses of the passes.
-        robot: the arm.
-        walk: the motion, marked at the poses.
-        height: m, signed, of the tool point over the surface along the outward normal.
+    `height` (m, signed) is that of the tool point over the surface, along the outward normal.
     """
     dense = _dense(robot, walk.q)
     points, _ = Kinematics(robot).tools(dense.q)
@@ -72,27 +66,27 @@ def contacts_along(places: PassPlaces, robot: Robot, walk: Walk, height: float) 
     return ContactPath(ToolLines(contacts, normals[own], number.reshape(-1)), 2.0 * dense.sag)
 
 
-def _share(points: Floats, a: NDArray[np.int64], b: NDArray[np.int64], tool: Floats) -> Floats:
+def _share(points: Array, a: Ints, b: Ints, tool: Array) -> Array:
     """(k,) how far tool points are from the poses a to the poses b, 0 to 1."""
-    way = points[b] - points[a]
-    along = ((tool - points[a]) * way).sum(axis=1)
-    return np.asarray(np.clip(along / np.maximum((way**2).sum(axis=1), 1e-18), 0.0, 1.0))
+    line = points[b] - points[a]
+    along = ((tool - points[a]) * line).sum(axis=1)
+    return np.asarray(np.clip(along / np.maximum((line**2).sum(axis=1), 1e-18), 0.0, 1.0))
 
 
 class _Dense(NamedTuple):
     """A motion with more rows."""
 
-    q: Floats
-    row: Floats
-    """(m,) in the motion that was given, with the share of the way to the next one."""
+    q: Array
+    row: Array
+    """(m,) in the given motion, with the share of the line to the next one."""
     sag: float
     """m, how far the tool point is from its chord between rows at most."""
 
 
-def _dense(robot: Robot, q: Floats) -> _Dense:
+def _dense(robot: Robot, q: Array) -> _Dense:
     """The same motion with so many rows that the tool point's path is straight between them."""
     reach = robot.reach if np.isfinite(robot.reach) else FAR
-    # A slide bends no path; it counts as the turn that sweeps it.
+    # A slide moves the tool straight; it counts as the turn that sweeps it.
     scale = np.where(robot.prismatic, 1.0 / reach, 1.0)
     steps = (np.abs(np.diff(q, axis=0)) * scale).sum(axis=1)
     finest = np.ceil(steps * np.sqrt(reach / (8.0 * SAG))).astype(np.int64)

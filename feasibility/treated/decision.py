@@ -23,7 +23,7 @@ class Decision(NamedTuple):
 
 
 def with_coverage(decision: Decision, task: Task, found: TreatedArea | None) -> Decision:
-    """A feasible answer stands only where enough of the area is treated for certain.
+    """A feasible answer remains only where enough of the area is treated for certain.
 
     Nothing follows from one motion that treats too little: another may treat more. And a cell
     whose centre cannot be reached may be treated from beside it. So a coverage that falls short
@@ -33,12 +33,12 @@ def with_coverage(decision: Decision, task: Task, found: TreatedArea | None) -> 
         return decision
     if found is None:
         return Decision(Answer.UNDECIDED, Evidence.BUDGET, f"{decision.message} {NOT_MEASURED}")
-    asked = f"{100.0 * task.coverage:g} %"
+    required = f"{100.0 * task.coverage:g} %"
     if found.lower >= task.coverage:
-        words = f"{decision.message} It treats {share_words(found)} of the area; {asked} is asked."
-        return decision._replace(message=words)
+        words = f"It treats {share_words(found)} of the area; {required} is required."
+        return decision._replace(message=f"{decision.message} {words}")
     short = (
-        f"It treats {share_words(found)} of the area, and {asked} is asked: "
+        f"It treats {share_words(found)} of the area, and {required} is required: "
         + ("more splitting may show it." if found.upper >= task.coverage else "that is too little.")
         + ' Finer cells, such as surface.cells = "auto", or passes that are closer treat more.'
     )

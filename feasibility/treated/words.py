@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from feasibility.treated.area import TreatedArea
-    from feasibility.treated.regions import UntreatedRegion
+    from feasibility.treated.area import TreatedArea, UntreatedRegion
 
 
 LISTED = 3  # regions that are named
@@ -39,14 +38,6 @@ def treated_json(found: TreatedArea | None) -> dict[str, Any] | None:
     }
 
 
-def region_words(region: UntreatedRegion) -> str:
-    """Where a region is, and how large."""
-    x, y, z = (1e3 * region.centre).tolist()
-    area = 1e6 * region.area
-    size = f"{1e-2 * area:.3g} cm2" if area >= 100.0 else f"{area:.2g} mm2"
-    return f"{size} at ({x:.0f}, {y:.0f}, {z:.0f}) mm"
-
-
 def treated_words(found: TreatedArea) -> str:
     """The share, how much of it twice, what is left out, in one text."""
     along, across = (1e3 * axis for axis in found.footprint)
@@ -57,7 +48,15 @@ def treated_words(found: TreatedArea) -> str:
     )
     regions = found.untreated
     if regions:
-        named = ", ".join(region_words(each) for each in regions[:LISTED])
+        named = ", ".join(_region_words(each) for each in regions[:LISTED])
         more = f" and {len(regions) - LISTED} more" if len(regions) > LISTED else ""
         words += f"; untreated: {named}{more}"
     return "; ".join([words, *found.notes])
+
+
+def _region_words(region: UntreatedRegion) -> str:
+    """Where a region is, and how large."""
+    x, y, z = (1e3 * region.centre).tolist()
+    area = 1e6 * region.area
+    size = f"{1e-2 * area:.3g} cm2" if area >= 100.0 else f"{area:.2g} mm2"
+    return f"{size} at ({x:.0f}, {y:.0f}, {z:.0f}) mm"

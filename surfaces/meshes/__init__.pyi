@@ -4,6 +4,7 @@ from .facets import cut_faces as cut_faces
 from .mesh_surface import MeshSurface as MeshSurface
 from .mesh_surface import mesh as mesh
 from .normals import WIDTH as WIDTH
+from .normals import corner_angles as corner_angles
 from .selection import checked_box as checked_box
 from .selection import checked_cone as checked_cone
 from .selection import checked_plane as checked_plane
@@ -16,5 +17,6 @@ from .sources import read_mesh as read_mesh
 from .sources import refuse_unlikely_unit as refuse_unlikely_unit
 from .sources import with_likely_unit as with_likely_unit
 from .triangle_mesh import TriangleMesh as TriangleMesh
+from .triangle_mesh import doubled_areas as doubled_areas
 from .triangle_mesh import half_edge_ends as half_edge_ends
 from .triangle_mesh import half_edges as half_edges

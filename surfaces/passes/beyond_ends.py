@@ -1,15 +1,15 @@
 """The first pass goes on beyond its ends, straight, off the surface.
 
-Around an end the lines of equal distance are arcs: places whose way to the first pass ends there
-lie beyond it, where the border is oblique. Were the surface longer, their distance would be that
-from the pass carried on. In geodesic polar coordinates about the end e, at the distance r and the
-angle t from the direction in which the pass leaves, that is the height h of a right-angled
+Around an end the lines of equal distance are arcs: places whose shortest path to the first pass
+ends there lie beyond it, where the border is oblique. Were the surface longer, their distance would
+be that from the pass carried on. In geodesic polar coordinates about the end e, at the distance r
+and the angle t from the direction in which the pass leaves, that is the height h of a right-angled
 triangle over r, and the angle follows from the distance d of a place e' on the pass, l before e.
 Where the curvature K is constant (flat: K -> 0),
 
     cos(k d) = cos(k r) cos(k l) - sin(k r) sin(k l) cos t,    sin(k h) = sin(k r) sin t,
 
-k = sqrt(K); hyperbolic functions where K < 0. This is exact on planes and all that unrolls onto
+k = sqrt(K), imaginary where K < 0. This is exact on planes and all that unrolls onto
 them, and on spheres. Elsewhere K is the mean, and what comes of it is taken where it grows by its
 own length across the lines, as a distance has to; else the arcs stay.
 """
@@ -20,13 +20,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surfaces.passes.net import WorkingMesh
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Mask = NDArray[np.bool_]
+from coverable_arrays import Array, Ints, Mask
+from surfaces.meshes import corner_angles
+from surfaces.passes.triangles import WorkingMesh, border_edges
 
 FLAT = 1e-4  # [1] of a turn's square over the surface: less curvature than this is none
 SQUARE = 0.05  # [1] cosine up to which a border is square to the pass
@@ -42,7 +39,7 @@ class FirstPass:
     mesh: WorkingMesh
     edges: Ints
     """(k, 2) of the mesh, that are the first pass."""
-    distance: Floats
+    distance: Array
     """(V,) m, of all vertices from it."""
     nearest: Ints
     """(V,) the vertex of it that is nearest to each."""
@@ -55,12 +52,10 @@ class FirstPass:
         return ends if len(ends) == 2 and (count <= 2).all() else []
 
 
-def carried_on(first: FirstPass, distances: Callable[[int], Floats]) -> Floats:
-    """(V,) m, distances from the first pass carried on beyond its ends.
+def carried_on(first: FirstPass, distances: Callable[[int], Array]) -> Array:
+    """(V,) m, distances from a pass carried on beyond its ends.
 
-    Args:
-        first: the pass.
-        distances: (V,) m of all vertices from one vertex.
+    `distances` gives those (V,) m of all vertices from one vertex.
     """
     values = first.distance.copy()
     faces = first.mesh.faces
@@ -78,15 +73,15 @@ def carried_on(first: FirstPass, distances: Callable[[int], Floats]) -> Floats:
 
 
 def _heights(
-    first: FirstPass, end: int, beyond: Mask, distances: Callable[[int], Floats]
-) -> Floats | None:
+    first: FirstPass, end: int, beyond: Mask, distances: Callable[[int], Array]
+) -> Array | None:
     """(k,) m, of the places beyond one end; None where there are none to speak of.
 
-    Nor where the pass carried on meets the surface.
+    Nor where the pass carried on runs over the surface.
     """
     r = first.distance[beyond]
     from_end = np.linalg.norm(first.mesh.vertices - first.mesh.vertices[end], axis=1)
-    # As far back as the places are beyond: then the angle is well told.
+    # As far back as the places are beyond: then the angle is well conditioned.
     line = np.unique(first.edges)
     other = int(line[np.abs(from_end[line] - r.max()).argmin()])
     out = first.mesh.vertices[end] - first.mesh.vertices[other]
@@ -105,47 +100,34 @@ def _heights(
 
 def _curvature(mesh: WorkingMesh) -> float:
     """1/m^2, the mean Gaussian curvature: what angles round inner vertices lack of a turn."""
-    corners = mesh.corners
-    ways = [np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners]
-    across = np.linalg.norm(np.cross(ways[0], ways[1]), axis=2)
-    angles = np.arctan2(across, (ways[0] * ways[1]).sum(axis=2))
     count = len(mesh.vertices)
+    angles = corner_angles(mesh.vertices, mesh.faces)
     around = np.bincount(mesh.faces.ravel(), angles.ravel(), count)
-    edges = np.sort(
-        np.stack([mesh.faces, np.roll(mesh.faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1
-    )
-    sides, uses = np.unique(edges @ np.array([count, 1]), return_counts=True)
-    border = sides[uses == 1]
     inner = np.ones(count, dtype=bool)
-    inner[border // count] = inner[border % count] = False
+    inner[border_edges(mesh.faces)] = False
     area = float((mesh.areas * inner[mesh.faces].mean(axis=1)).sum())
     total = float((2.0 * np.pi - around[inner]).sum())
     return 0.0 if abs(total) < FLAT or area <= 0.0 else total / area
 
 
-def _cosine(r: Floats, length: float, d: Floats, curvature: float) -> Floats:
+def _cosine(r: Array, length: float, d: Array, curvature: float) -> Array:
     """(k,) cos t from the sides of the triangle at the end."""
-    k = np.sqrt(abs(curvature))
+    k = np.emath.sqrt(curvature)  # imaginary where K < 0: then cos and sin are hyperbolic
     with np.errstate(divide="ignore", invalid="ignore"):
         if curvature == 0.0:
             found = (d * d - r * r - length * length) / (2.0 * r * length)
-        elif curvature > 0.0:
-            a, b, c = k * r, k * length, k * d
-            found = (np.cos(a) * np.cos(b) - np.cos(c)) / (np.sin(a) * np.sin(b))
         else:
             a, b, c = k * r, k * length, k * d
-            found = (np.cosh(c) - np.cosh(a) * np.cosh(b)) / (np.sinh(a) * np.sinh(b))
+            found = ((np.cos(a) * np.cos(b) - np.cos(c)) / (np.sin(a) * np.sin(b))).real
     return np.nan_to_num(found)  # at the end itself there is no angle
 
 
-def _height(r: Floats, sine: Floats, curvature: float) -> Floats:
+def _height(r: Array, sine: Array, curvature: float) -> Array:
     """(k,) m, of a right-angled triangle over r."""
-    k = np.sqrt(abs(curvature))
     if curvature == 0.0:
         return r * sine
-    if curvature > 0.0:
-        return np.asarray(np.arcsin(np.clip(np.sin(k * r) * sine, -1.0, 1.0)) / k)
-    return np.asarray(np.arcsinh(np.sinh(k * r) * sine) / k)
+    k = np.emath.sqrt(curvature)
+    return np.asarray((np.arcsin(np.sin(k * r) * sine) / k).real)
 
 
 def _touching(mesh: WorkingMesh, edges: Ints) -> Mask:
@@ -155,14 +137,14 @@ def _touching(mesh: WorkingMesh, edges: Ints) -> Mask:
     return np.asarray(on[mesh.faces].any(axis=1))
 
 
-def _grows_evenly(mesh: WorkingMesh, values: Floats, faces: Mask) -> bool:
+def _grows_evenly(mesh: WorkingMesh, values: Array, faces: Mask) -> bool:
     """Is the slope of some values 1 over nearly all of some faces?"""
     own = WorkingMesh(mesh.vertices, mesh.faces[faces])
     off = np.abs(slopes(own, values) - 1.0) > OFF
     return bool(own.areas[off].sum() <= MOST_OFF * own.areas.sum())
 
 
-def slopes(mesh: WorkingMesh, values: Floats) -> Floats:
+def slopes(mesh: WorkingMesh, values: Array) -> Array:
     """(F,) length of the gradient of (V,) values in each face: 1 for a distance."""
     a, b, c = np.moveaxis(mesh.corners, 1, 0)
     fa, fb, fc = values[mesh.faces].T

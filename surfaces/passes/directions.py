@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from surfaces.passes.holes import with_lids
-from surfaces.passes.parallel import SHORTEST, Passes, lay_lines
+from surfaces.passes.parallel import SHORTEST, Passes, pass_lines
 from surfaces.passes.triangulation import working_mesh
 from surfaces.surface import Surface
 
@@ -35,21 +35,16 @@ def ranked_directions(surface: Surface, pitch: float) -> list[float]:
     lidded = with_lids(working_mesh(surface, pitch / EDGES_PER_PITCH), pitch / EDGES_PER_PITCH)
     ranks = []
     for angle in np.radians(np.arange(0.0, 180.0, STEP_DEG)).tolist():
-        laid = lay_lines(surface, lidded, angle, "planes", pitch)
-        pieces = sum(each.line.length >= SHORTEST * laid.spacing for each in laid.lines)
-        ranks.append((pieces, laid.levels, angle))
+        found = pass_lines(surface, lidded, angle, "planes", pitch)
+        pieces = sum(each.line.length >= SHORTEST * found.spacing for each in found.lines)
+        ranks.append((pieces, found.levels, angle))
     return [angle for _, _, angle in sorted(ranks)]
 
 
 def crossed(first: Passes, second: Passes) -> Passes:
-    """Passes in one direction, and then those in another one over the same surface.
-
-    Their numbers go on from those of the first ones.
-    """
-    more = tuple(
-        replace(each, level=each.level + 1 + max((a.level for a in first.stretches), default=-1))
-        for each in second.stretches
-    )
+    """Passes in one direction, then those in another over the same surface, numbered on."""
+    begin = 1 + max((each.level for each in first.stretches), default=-1)
+    more = (replace(each, level=begin + each.level) for each in second.stretches)
     return replace(
         first,
         stretches=(*first.stretches, *more),

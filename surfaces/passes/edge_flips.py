@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surfaces.passes.net import WorkingMesh
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from coverable_arrays import Array, Ints, Mask
+from surfaces.passes.triangles import WorkingMesh, twin_sides
 
 IN_ONE_PLANE = 1e-6  # [1] of the edge: corners this far off the other face's plane are in it
 HAIR = 1e-9  # [rad] beyond pi, so that four corners on a circle are left alone
@@ -16,7 +13,7 @@ MOST_ROUNDS = 200
 
 
 def delaunay(mesh: WorkingMesh) -> WorkingMesh:
-    """Flip edges whose two opposite angles are over 180 degrees together, where nothing bends.
+    """Flip edges in a plane whose two opposite angles are over 180 degrees together.
 
     Lawson's flips, many at a time: those of one round share no face. The surface stays what it is.
     """
@@ -31,18 +28,14 @@ def delaunay(mesh: WorkingMesh) -> WorkingMesh:
     return WorkingMesh(mesh.vertices, faces)
 
 
-def _to_flip(vertices: Floats, faces: Ints) -> Ints:
+def _to_flip(vertices: Array, faces: Ints) -> Ints:
     """Rows of two faces that share no face with other rows, and their corners a, b, c, d.
 
     The faces are (a, b, c) and (b, a, d), the edge a b is to become c d.
     """
-    count = len(vertices)
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     opposite = np.roll(faces, -2, axis=1).ravel()
-    keys = np.minimum(start, end) * count + np.maximum(start, end)
-    order = np.argsort(keys, kind="stable")
-    twin = np.flatnonzero(np.diff(keys[order]) == 0)
-    one, other = order[twin], order[twin + 1]
+    one, other = twin_sides(faces).T
     a, b, c, d = start[one], end[one], opposite[one], opposite[other]
     pa, pb, pc, pd = vertices[a], vertices[b], vertices[c], vertices[d]
     angles = _angle(pa - pc, pb - pc) + _angle(pa - pd, pb - pd)
@@ -57,13 +50,13 @@ def _to_flip(vertices: Floats, faces: Ints) -> Ints:
     return rows[_apart(rows[:, :2], len(faces))]
 
 
-def _angle(x: Floats, y: Floats) -> Floats:
+def _angle(x: Array, y: Array) -> Array:
     """(k,) rad between vectors (k, 3)."""
     sine = np.linalg.norm(np.cross(x, y), axis=1)
     return np.asarray(np.arctan2(sine, (x * y).sum(axis=1)))
 
 
-def _apart(pairs: Ints, count: int) -> NDArray[np.bool_]:
+def _apart(pairs: Ints, count: int) -> Mask:
     """(k,) rows whose faces are in no row before them."""
     first = np.full(count, len(pairs))
     np.minimum.at(first, pairs.ravel(), np.repeat(np.arange(len(pairs)), 2))

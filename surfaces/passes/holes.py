@@ -1,6 +1,6 @@
 """Holes closed for measuring distances: fronts that go round a hole would meet behind it in a kink.
 
-Passes are laid over the closed surface, and what runs over a lid is cut out of them.
+Passes run over the closed surface, and what runs over a lid is cut out of them.
 """
 
 from __future__ import annotations
@@ -9,13 +9,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surfaces.passes.net import WorkingMesh
-from surfaces.passes.triangulation import border_edges
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from coverable_arrays import Array, Ints
+from surfaces.passes.triangles import WorkingMesh, border_edges
 
 MOST_RINGS = 40
 HOLE = 0.5  # [1] of the longest border: a border shorter than this goes round a hole
@@ -67,12 +63,12 @@ def _loops(edges: Ints) -> list[Ints]:
     return loops
 
 
-def _length(points: Floats) -> float:
+def _length(points: Array) -> float:
     """m, once round."""
     return float(np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1).sum())
 
 
-def _lid(points: Floats, loop: Ints, count: int, edge: float) -> tuple[Floats, Ints]:
+def _lid(points: Array, loop: Ints, count: int, edge: float) -> tuple[Array, Ints]:
     """Vertices and faces that fill a loop; the first new vertex has the number `count`."""
     middle, n = points.mean(axis=0), len(loop)
     radius = float(np.linalg.norm(points - middle, axis=1).max())

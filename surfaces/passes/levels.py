@@ -5,22 +5,17 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surfaces.passes.net import WorkingMesh
+from coverable_arrays import Array, Ints, Mask
+from surfaces.passes.triangles import WorkingMesh
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
-OFF_VERTICES = (
-    1e-7  # [1] of the field's range: a level this near to a vertex's value is moved off it
-)
+OFF_VERTICES = 1e-7  # [1] of the field's range by which a level is off all vertices' values
 
 
 class Line(NamedTuple):
     """One connected line of equal value."""
 
-    points: Floats
+    points: Array
     """(k, 3) m, where it crosses edges, in order; the larger values lie to its left."""
     faces: Ints
     """(k - 1,) the face that each piece between them runs over; as many as points if closed."""
@@ -28,7 +23,7 @@ class Line(NamedTuple):
     """True where its end is its beginning; the first point is not repeated."""
 
     @property
-    def pieces(self) -> Floats:
+    def pieces(self) -> Array:
         """Lengths (m) of the pieces over each of `faces`."""
         points = np.concatenate([self.points, self.points[:1]]) if self.closed else self.points
         return np.asarray(np.linalg.norm(np.diff(points, axis=0), axis=1))
@@ -44,9 +39,7 @@ class Line(NamedTuple):
         return Line(self.points[::-1], faces, self.closed)
 
 
-def level_lines(
-    mesh: WorkingMesh, field: Floats, level: float, which: NDArray[np.bool_]
-) -> list[Line]:
+def level_lines(mesh: WorkingMesh, field: Array, level: float, which: Mask) -> list[Line]:
     """The lines on which a field is `level`, seen from outside with larger values to the left.
 
     Args:
@@ -73,7 +66,7 @@ def level_lines(
     return _chained(of[: len(faces)], of[len(faces) :], faces, points)
 
 
-def _crossings(faces: Ints, above: NDArray[np.bool_]) -> tuple[Ints, Ints]:
+def _crossings(faces: Ints, above: Mask) -> tuple[Ints, Ints]:
     """The edges (k, 2), lower vertex first, where lines enter and leave faces (k, 3).
 
     Faces run counterclockwise seen from outside. With the larger values to its left a line enters
@@ -89,7 +82,7 @@ def _crossings(faces: Ints, above: NDArray[np.bool_]) -> tuple[Ints, Ints]:
     return found[0], found[1]
 
 
-def _chained(starts: Ints, ends: Ints, faces: Ints, points: Floats) -> list[Line]:
+def _chained(starts: Ints, ends: Ints, faces: Ints, points: Array) -> list[Line]:
     """Pieces from edge to edge as lines, each as long as it goes."""
     after = dict(zip(starts.tolist(), range(len(starts)), strict=True))
     entered = set(ends.tolist())

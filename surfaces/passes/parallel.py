@@ -8,27 +8,25 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array, Mask
 from coverable_errors import ArgumentError, Checks
 from surfaces.passes.first_pass import Field, distance_field, plane_field
 from surfaces.passes.holes import Lidded, with_lids
 from surfaces.passes.levels import Line, level_lines
-from surfaces.passes.net import WorkingMesh
 from surfaces.passes.stretches import LevelLine, Pass, in_order, stretch_of
-from surfaces.passes.triangulation import working_mesh
-from surfaces.passes.working_copy import WorkingCopy, working_copy
+from surfaces.passes.triangles import WorkingMesh
+from surfaces.passes.triangulation import WorkingCopy, working_copy, working_mesh
 from surfaces.patches import Patch
 from surfaces.surface import Surface
-
-Floats = NDArray[np.float64]
 
 By = Literal["distance", "planes", "parameters"]
 BYS: tuple[By, ...] = ("distance", "planes", "parameters")
 EDGES_PER_PITCH = 4.0  # how fine distances are measured
-POINTS_PER_PITCH = 4.0  # how close the points of a pass are, unless it is said
-SHORTEST = 0.5  # [1] of the spacing: shorter pieces are dropped, unless it is said
-TURNED = math.radians(1.0)  # from here on it is said that passes are not in the direction asked for
+POINTS_PER_PITCH = 4.0  # how close the points of a pass are, by default
+SHORTEST = 0.5  # [1] of the spacing: shorter pieces are dropped, by default
+TURNED = math.radians(1.0)  # passes further from the requested direction than this get a note
 KINK = 0.9  # [1] a distance that grows more slowly than this across a face has a ridge there
 
 
@@ -39,7 +37,7 @@ class Passes:
     surface: Surface
     stretches: tuple[Pass, ...]
     pitch: float
-    """m, what was asked for."""
+    """m, as requested."""
     spacing: float
     """m, the distance between passes: the pitch, or less, so that they are evenly spread."""
     by: By
@@ -73,7 +71,7 @@ def parallel_passes(
     shortest: float | None = None,
     one_way: bool = False,
 ) -> Passes:
-    """Lay parallel passes over a surface.
+    """Parallel passes over a surface.
 
     By `distance`, every point of a pass has its neighbour at the spacing, measured on the surface
     (Atkar et al., "Uniform coverage of automotive surface patches", 2005). Section `planes` keep it
@@ -91,12 +89,12 @@ def parallel_passes(
         overrun: m >= 0, by how much passes go on straight beyond the border.
         step: m > 0 between points of a pass; a quarter of the pitch by default.
         shortest: m >= 0, stretches shorter than this are dropped; half of the spacing by default.
-        one_way: run all passes in the same direction, and not to and fro.
+        one_way: run all passes in the same direction, not to and fro.
 
     Raises:
         ArgumentError: a number is out of its range, the direction is along the normal, or
-            `parameters` are asked for where there are none.
-        SurfaceError: no passes can be laid over a surface of this kind.
+            the surface has no `parameters`.
+        SurfaceError: passes over a surface of this kind are not supported.
 
     Example:
         >>> from surfaces import plane
@@ -109,11 +107,11 @@ def parallel_passes(
     edge = pitch / EDGES_PER_PITCH
     copy = working_copy(surface, working_mesh(surface, edge))
     lidded = with_lids(copy.mesh, edge)
-    laid = lay_lines(surface, lidded, direction, by, pitch)
-    field, spacing = laid.field, laid.spacing
+    found = pass_lines(surface, lidded, direction, by, pitch)
+    field, spacing = found.field, found.spacing
     kept = SHORTEST * spacing if shortest is None else shortest
     lines, dropped = list[LevelLine](), 0.0
-    for each in laid.lines:
+    for each in found.lines:
         if each.line.length >= kept:
             lines.append(each)
         else:
@@ -130,12 +128,12 @@ def parallel_passes(
         by=by,
         widest=spacing if by == "distance" else spacing / max(slopes.min(initial=1.0), 1e-9),
         dropped=dropped,
-        notes=(*_notes(lidded.holes, lines, field, by), *_turned(laid), *_copied(copy)),
+        notes=(*_notes(lidded.holes, lines, field, by), *_direction_note(found), *_copy_note(copy)),
     )
 
 
-class Laid(NamedTuple):
-    """Lines over a surface, as they come."""
+class PassLines(NamedTuple):
+    """Lines over a surface, not yet in the order in which they are run."""
 
     field: Field
     lines: list[LevelLine]
@@ -144,12 +142,12 @@ class Laid(NamedTuple):
     spacing: float
     """m, between levels."""
     turned: float
-    """rad, from the direction that was asked for at the middle to that of the lines."""
+    """rad, from the requested direction at the middle to that of the lines."""
 
 
-def lay_lines(
+def pass_lines(
     surface: Surface, lidded: Lidded, direction: float | ArrayLike, by: By, pitch: float
-) -> Laid:
+) -> PassLines:
     """The lines of all levels, cut at holes; for the arguments see `parallel_passes`."""
     mesh = lidded.mesh
     own = WorkingMesh(mesh.vertices, mesh.faces[: lidded.faces])
@@ -165,7 +163,7 @@ def lay_lines(
         field = (distance_field if by == "distance" else plane_field)(mesh, middle, across)
     covers = field.parent < lidded.faces
     levels, spacing = _levels(field, covers, pitch)
-    return Laid(field, list(_lines(field, covers, levels)), len(levels), spacing, turned)
+    return PassLines(field, list(_lines(field, covers, levels)), len(levels), spacing, turned)
 
 
 def _check(
@@ -183,9 +181,7 @@ def _check(
     checks.done()
 
 
-def _along(
-    surface: Surface, middle: Floats, normal: Floats, direction: float | ArrayLike
-) -> Floats:
+def _along(surface: Surface, middle: Array, normal: Array, direction: float | ArrayLike) -> Array:
     """(3,) unit, the direction of the passes at the middle, in the tangent plane."""
     if np.ndim(direction) == 0:
         angle = float(np.asarray(direction, dtype=float))
@@ -207,7 +203,7 @@ def _along(
     return np.asarray(flat / np.linalg.norm(flat))
 
 
-def _u_direction(surface: Surface, middle: Floats, normal: Floats) -> Floats:
+def _u_direction(surface: Surface, middle: Array, normal: Array) -> Array:
     """(3,) unit, what an angle of 0 means at the middle of the surface."""
     if isinstance(surface, Patch):
         at = surface.closest(middle)
@@ -222,7 +218,7 @@ def _u_direction(surface: Surface, middle: Floats, normal: Floats) -> Floats:
 
 
 def _parameter_field(
-    surface: Surface, mesh: WorkingMesh, along: Floats, middle: Floats
+    surface: Surface, mesh: WorkingMesh, along: Array, middle: Array
 ) -> tuple[Field, float]:
     """The parameter that is constant along the passes, as metres across them at the widest.
 
@@ -245,7 +241,7 @@ def _parameter_field(
     return field._replace(values=width * values, extent=(0.0, width)), turned
 
 
-def _levels(field: Field, own: NDArray[np.bool_], pitch: float) -> tuple[Floats, float]:
+def _levels(field: Field, own: Mask, pitch: float) -> tuple[Array, float]:
     """Where the passes are, and the spacing (m): half of it at both ends, never over the pitch."""
     values = field.values[field.mesh.faces[own]]
     low, high = field.extent or (float(values.min()), float(values.max()))
@@ -254,16 +250,16 @@ def _levels(field: Field, own: NDArray[np.bool_], pitch: float) -> tuple[Floats,
     return np.asarray(low + (np.arange(count) + 0.5) * spacing, dtype=float), spacing
 
 
-def _lines(field: Field, own: NDArray[np.bool_], levels: Floats) -> Iterator[LevelLine]:
+def _lines(field: Field, own: Mask, levels: Array) -> Iterator[LevelLine]:
     """Lines of each level, cut where they run over a lid."""
-    whole = ~field.torn
+    untorn = ~field.torn
     for number, level in enumerate(levels.tolist()):
-        for line in level_lines(field.mesh, field.values, level, whole):
+        for line in level_lines(field.mesh, field.values, level, untorn):
             for part in _parts(line, own[line.faces]):
                 yield LevelLine(number, part)
 
 
-def _parts(line: Line, own: NDArray[np.bool_]) -> Iterator[Line]:
+def _parts(line: Line, own: Mask) -> Iterator[Line]:
     """The parts of a line that run over the surface's own faces."""
     if own.all():
         yield line
@@ -279,17 +275,17 @@ def _parts(line: Line, own: NDArray[np.bool_]) -> Iterator[Line]:
         yield Line(points[start : end + 1], faces[start:end], closed=False)
 
 
-def _turned(laid: Laid) -> tuple[str, ...]:
-    """That passes run in another direction than was asked for."""
-    if laid.turned < TURNED:
+def _direction_note(found: PassLines) -> tuple[str, ...]:
+    """That passes do not run in the requested direction."""
+    if found.turned < TURNED:
         return ()
     return (
         "lines of constant parameters run along u or v, "
-        f"{math.degrees(laid.turned):.3g} deg from the direction that was asked for",
+        f"{math.degrees(found.turned):.3g} deg from the requested direction",
     )
 
 
-def _copied(copy: WorkingCopy) -> tuple[str, ...]:
+def _copy_note(copy: WorkingCopy) -> tuple[str, ...]:
     """That distances were measured on a copy."""
     if copy.deviation <= 0.0:
         return ()
@@ -312,7 +308,7 @@ def _notes(holes: int, lines: list[LevelLine], field: Field, by: By) -> tuple[st
     total = sum(line.length for _, line in lines)
     if length > 0.005 * total:
         notes.append(
-            f"passes have kinks over {100.0 * length / total:.1f} % of their length, where ways "
+            f"passes have kinks over {100.0 * length / total:.1f} % of their length, where paths "
             "to the first pass from two sides meet; another direction may have none"
         )
     return tuple(notes)

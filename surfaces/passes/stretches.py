@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.linalg import norm
 
+from coverable_arrays import Array, Mask
 from surfaces.passes.levels import Line
 from surfaces.protected import Protected
 from surfaces.surface import Surface
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -23,11 +23,11 @@ class Pass(Protected):
 
     level: int
     """Which pass it belongs to, counted across the surface from 0."""
-    points: Floats
+    points: Array
     """(k, 3) m, in the root frame; on the surface, but for the overrun."""
-    normals: Floats
+    normals: Array
     """(k, 3) outward unit normals; along the overrun those at the border."""
-    on_surface: NDArray[np.bool_]
+    on_surface: Mask
     """(k,) False along the overrun."""
     closed: bool
     """True where it ends where it begins."""
@@ -46,25 +46,19 @@ class LevelLine(NamedTuple):
 
 
 def in_order(lines: list[LevelLine], one_way: bool) -> Iterator[LevelLine]:
-    """The lines as they are to be run: level after level, every other level turned round.
+    """The lines, sorted by level, in the order of the run: every other level turned round.
 
     Within a level each line begins nearest to where the one before it ended; those that a hole
     parts follow one another as they lie on their line.
     """
-    levels: dict[int, list[Line]] = {}
-    for level, line in lines:
-        levels.setdefault(level, []).append(line)
-    here: Floats | None = None
-    for number, level in enumerate(sorted(levels)):
-        row = levels[level]
+    here: Array | None = None
+    for number, (level, group) in enumerate(groupby(lines, key=lambda each: each.level)):
+        row = [each.line for each in group]
         if number % 2 and not one_way:
             row = [line.reversed() for line in reversed(row)]
         while row:
-            nearest = 0
-            if here is not None:
-                away = [float(np.linalg.norm(line.points[0] - here)) for line in row]
-                nearest = int(np.argmin(away))
-            line = row.pop(nearest)
+            away = [0.0 if here is None else float(norm(line.points[0] - here)) for line in row]
+            line = row.pop(int(np.argmin(away)))
             here = line.points[-1]
             yield LevelLine(level, line)
 
@@ -93,7 +87,7 @@ def stretch_of(surface: Surface, each: LevelLine, step: float, overrun: float) -
     return Pass(each.level, on, normals, inside, line.closed)
 
 
-def _beyond(end: Floats, heading: Floats, normal: Floats, reach: Floats) -> Floats:
+def _beyond(end: Array, heading: Array, normal: Array, reach: Array) -> Array:
     """(k, 3) m, points straight on from an end in its tangent plane, at distances (k,) from it."""
     flat = heading - (heading @ normal) * normal
     return np.asarray(end + reach[:, None] * flat / max(float(np.linalg.norm(flat)), 1e-300))

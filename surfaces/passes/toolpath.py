@@ -1,4 +1,4 @@
-"""Passes as one toolpath: stretch after stretch, with the ways between them."""
+"""Passes as one toolpath: stretch after stretch, with the moves between them."""
 
 from __future__ import annotations
 
@@ -7,60 +7,58 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from surfaces.passes.parallel import Passes
-from surfaces.passes.stretches import Pass
 from surfaces.surface import SurfaceError
 from surfaces.toolpaths import PoseCells, poses
-
-Floats = NDArray[np.float64]
 
 RETRACT = 0.05  # m
 BESIDE = 2.0  # [1] times the spacing: to an end this near the tool goes on along the surface
 LIFTED = -1
-SAMPLES = 16  # places of a lifted way that are looked at
+SAMPLES = 16  # places of a lifted move that are checked
 
 
 class PassPlaces(NamedTuple):
-    """Places along all passes in the order in which they are run, those of lifted ways among them.
+    """Places along all passes in the order in which they are run, those of lifted moves among them.
 
-    Where one stretch follows on another along the surface, the tool works on the way between too.
+    Where one stretch follows on another along the surface, the tool works between them too.
     """
 
-    points: Floats
+    points: Array
     """(N, 3) m."""
-    normals: Floats
+    normals: Array
     """(N, 3) outward unit normals."""
-    stretch: NDArray[np.int64]
+    stretch: Ints
     """(N,) which of the stretches each is a place of; -1 where the tool is lifted."""
 
 
 def pass_places(found: Passes, retract: float = RETRACT) -> PassPlaces:
-    """All stretches in their order, and the lifted ways between those that are apart.
+    """All stretches in their order, and the lifted moves between those that are apart.
 
     Args:
         found: passes with at least one stretch.
         retract: m > 0, how far the tool is lifted.
 
     Raises:
-        SurfaceError: there are no passes, or a lifted way would run through the surface.
+        SurfaceError: there are no passes, or a lifted move would run through the surface.
     """
     if not found.stretches:
         raise SurfaceError("there is no pass on it; take a smaller pitch", found.surface.kind)
     out = found.surface.side_sign * retract
     rows = [(found.stretches[0].points, found.stretches[0].normals, 0)]
     for number, (before, after) in enumerate(pairwise(found.stretches), start=1):
-        ends = _ends(before, after)
-        if np.linalg.norm(ends.points[1] - ends.points[0]) > BESIDE * found.spacing:
-            lifted = ends.points + out * ends.normals
+        ends = np.stack([before.points[-1], after.points[0]])
+        if np.linalg.norm(ends[1] - ends[0]) > BESIDE * found.spacing:
+            normals = np.stack([before.normals[-1], after.normals[0]])
+            lifted = ends + out * normals
             _refuse_if_through(found, lifted)
-            rows.append((lifted, ends.normals, LIFTED))
+            rows.append((lifted, normals, LIFTED))
         rows.append((after.points, after.normals, number))
-    points, normals, numbers = zip(*rows, strict=True)
+    points, outward, numbers = zip(*rows, strict=True)
     return PassPlaces(
         np.concatenate(points),
-        np.concatenate(normals),
+        np.concatenate(outward),
         np.repeat(np.array(numbers, dtype=np.int64), [len(row) for row in points]),
     )
 
@@ -76,8 +74,8 @@ def pass_toolpath(found: Passes, retract: float = RETRACT) -> PoseCells:
         retract: m > 0, how far the tool is lifted.
 
     Raises:
-        SurfaceError: there are no passes, too many points of them, or a lifted way would run
-            through the surface.
+        SurfaceError: there are no passes, too many points of them, or a lifted move would
+            run through the surface.
 
     Example:
         >>> from surfaces import plane
@@ -91,24 +89,13 @@ def pass_toolpath(found: Passes, retract: float = RETRACT) -> PoseCells:
     return PoseCells.of(replace(made.surface, under=found.surface))
 
 
-def _ends(before: Pass, after: Pass) -> Pass:
-    """The last place of one stretch and the first of the next."""
-    return Pass(
-        level=after.level,
-        points=np.stack([before.points[-1], after.points[0]]),
-        normals=np.stack([before.normals[-1], after.normals[0]]),
-        on_surface=np.array([before.on_surface[-1], after.on_surface[0]]),
-        closed=False,
-    )
-
-
-def _refuse_if_through(found: Passes, ends: Floats) -> None:
-    """Refuse a straight way between two places (2, 3) m off the surface that runs through it."""
+def _refuse_if_through(found: Passes, ends: Array) -> None:
+    """Refuse a straight move between two places (2, 3) m off the surface that runs through it."""
     shares = np.linspace(0.0, 1.0, SAMPLES)[:, None]
     heights = found.surface.closest(ends[0] + shares * (ends[1] - ends[0])).height
     if (found.surface.side_sign * heights <= 0.0).any():
         raise SurfaceError(
-            "the way from one stretch of a pass to the next would run through the surface; "
+            "the move from one stretch of a pass to the next would run through the surface; "
             "take a larger retract height, or another direction",
             found.surface.kind,
         )

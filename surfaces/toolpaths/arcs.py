@@ -2,19 +2,25 @@
 
 As cubics: a straight line is one, and of a great arc cubics with its directions and slopes at both
 ends of pieces of at most 15 degrees are within angle^4 / 384 (1.2e-5).
+
+As parts with rigorous bounds, like those of surfaces: the point's straight line is its own affine
+model. Over half an angle h about a direction m, towards w square to it, the normal is
+cos(t) m + sin(t) w, |t| <= h, and so within the arc's errors of C m + S (t / h) w
+(`surfaces.patches.affine_models`). The second parameter of these parts changes nothing.
 """
 
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from surfaces.cell_curves import CellCurves
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from surfaces.part_growth import Boxes, grown
+from surfaces.parts import PartModels, SurfaceParts
+from surfaces.patches import arc
 
 PIECE = math.radians(15.0)
 ROUNDING = 1.0 + 1e-12  # covers the rounding of the few operations on derivative bounds
@@ -47,12 +53,9 @@ def arc_pieces(directions: Array, pairs: Ints) -> Ints:
 
 
 def straight(points: Array, pairs: Ints, first: Ints) -> Array:
-    """(P, 4, 3) m, cubics of the straight lines between pairs (M, 2) of points (N, 3).
+    """(P, 4, 3) m, cubics of the straight lines between pairs (M, 2) of points (N, 3) m.
 
-    Args:
-        points: m.
-        pairs: which points.
-        first: (M + 1,) where the pieces of each line begin.
+    `first` (M + 1,) is where the pieces of each line begin.
     """
     count = np.diff(first)
     owner = np.repeat(np.arange(len(pairs)), count)
@@ -66,16 +69,10 @@ def straight(points: Array, pairs: Ints, first: Ints) -> Array:
 
 
 def curves(points: Array, directions: Array, pairs: Ints, count: Ints) -> CellCurves:
-    """The curve between each pair of poses.
+    """The curves between pairs (M, 2) of poses, each cut into `count` (M,) cubics.
 
-    Args:
-        points: (N, 3) m.
-        directions: (N, 3) unit; those of a pair not opposite.
-        pairs: (M, 2).
-        count: (M,) into how many cubics each curve is cut.
-
-    Returns:
-        Curves whose "normals" are the directions.
+    Points (N, 3) are in m. Directions (N, 3), the "normals" of the curves, are unit vectors, those
+    of a pair not opposite.
     """
     first = np.concatenate([[0], np.cumsum(count)])
     owner = np.repeat(np.arange(len(pairs)), count)
@@ -95,3 +92,39 @@ def curves(points: Array, directions: Array, pairs: Ints, count: Ints) -> CellCu
     deviations[:, 1] = angles**4 / 384.0 + ROUNDING_OF_DIRECTIONS
     cubics = np.concatenate([straight(points, pairs, first), turns], axis=2)
     return CellCurves(first, cubics, bounds, deviations, np.zeros(len(owner), dtype=bool))
+
+
+def curve_parts(
+    points: Array, normals: Array, pairs: Ints, flat: float, straight: float, most: int
+) -> SurfaceParts:
+    """The tree of the parts, at most `most`, of the curves between pairs (M, 2), M >= 1, of poses.
+
+    Points (N, 3) are in m, normals (N, 3) unit; `flat` (m) and `straight` are the largest r_f and
+    r_n wanted.
+    """
+    count = len(pairs)
+    bounds = partial(_models, points[pairs], normals[pairs])
+    whole = Boxes(bounds, np.arange(count), np.zeros((count, 2)), np.ones((count, 2)))
+    return grown(whole, flat, straight, most)
+
+
+def _models(points: Array, normals: Array, which: Ints, low: Array, high: Array) -> PartModels:
+    """Models of pieces of curves between points and normals (M, 2, 3): low to high of each."""
+    middle, half = 0.5 * (low + high)[:, 0], 0.5 * (high - low)[:, 0]
+    start, end = points[which, 0], points[which, 1]
+    along = end - start
+    ends = normals[which, 0], normals[which, 1]
+    angle = arc_angles(*ends)
+    mean, slope = arc_at(*ends, middle)
+    ahead = slope / np.maximum(angle, 1e-300)[:, None]
+    turned = arc(half * angle)
+    count = len(which)
+    slopes = np.zeros((count, 2, 6))
+    slopes[:, 0, :3] = half[:, None] * along
+    slopes[:, 0, 3:] = turned.slope[:, None] * ahead
+    error = turned.bow + turned.sway
+    radius = np.column_stack([np.zeros(count), error])
+    radii = np.zeros((count, 2, 2))
+    radii[:, 0] = radius
+    centre = np.hstack([start + middle[:, None] * along, turned.mean[:, None] * mean])
+    return PartModels(centre, slopes, radius, radii)

@@ -5,17 +5,15 @@ from __future__ import annotations
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array, Ints
 from coverable_errors import Fault, real, shown
 from surfaces.arguments import ORIGIN, Checks, metres, table
 from surfaces.surface import Side, SurfaceError
 from surfaces.toolpaths.arcs import arc_angles
 from surfaces.toolpaths.pose_cells import PoseCells
 from surfaces.toolpaths.pose_surface import PoseSurface
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 MOST_POSES = 20_000
 MOST_PAIRS = 24  # on average, of each pose
@@ -45,7 +43,7 @@ def poses(
         approaches: (N, 3) the tool axis at each pose, whatever the side; None for against the
             normals ('outside') or along them ('inside').
         tangents: (N, 3) from which the roll of the tool is measured, projected onto the planes
-            square to the normals; None where nobody asks for that.
+            square to the normals; None where it is free.
         neighbours: "order" for a toolpath, which is run from its first pose to its last, never
             back; or a radius in m, within which the tool may move from any pose to any other,
             where their normals differ by less than 90 degrees.
@@ -124,7 +122,7 @@ def _directions(name: str, value: Any, count: int | None, check: Checks) -> Arra
 def _square_to(along: Array, outward: Array, check: Checks) -> Array | None:
     """Tangents without their parts along the normals; None after a fault."""
     if len(along) != len(outward):
-        return None  # said already
+        return None  # a fault is kept already
     flat = along - (along * outward).sum(axis=1, keepdims=True) * outward
     length = np.linalg.norm(flat, axis=1)
     wrong = np.flatnonzero(length < PARALLEL)
@@ -173,7 +171,7 @@ def _pairs(
         turned |= opposite
         if opposite.any() and radius is None:
             where = f"{name}{_rows(np.flatnonzero(opposite))}"
-            got = "got one opposite to the next; put a pose between them that says which way round"
+            got = "got one opposite to the next; put a pose between them"
             expected = "must turn by less than 179 degrees from one to the next"
             check.keep(Fault(where, got, expected=expected))
     return pairs if radius is None else pairs[~turned]

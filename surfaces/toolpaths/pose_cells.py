@@ -6,16 +6,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array, Ints
 from surfaces.adjacency import Neighbours
 from surfaces.cell_curves import CellCurves
 from surfaces.cells import Cells, Triangles, Unrolled
 from surfaces.toolpaths.arcs import arc_at, arc_pieces, curves
 from surfaces.toolpaths.pose_surface import PoseSurface
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 TILE = 0.5  # of the distance to the nearest other pose: side of the square that a pose is drawn as
 SMALLEST = 1e-3  # m, where all poses are in one place

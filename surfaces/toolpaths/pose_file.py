@@ -9,15 +9,13 @@ import os
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import CoverableError, Fault
 from coverable_files import read_regular
 from surfaces.arguments import Checks
 from surfaces.surface import SurfaceError
 from surfaces.toolpaths.given import MOST_POSES
-
-Array = NDArray[np.float64]
 
 MOST_BYTES = 16 << 20
 UNITS = {"m": 1.0, "mm": 1e-3}
@@ -113,17 +111,12 @@ def _values(lines: Any, width: int) -> Array:
     for line in lines:
         if not line:
             continue
-        try:
-            numbers = [float(word) for word in line]
-        except ValueError:
-            numbers = [math.nan]
+        numbers, where = [_number(word) for word in line], f"line {lines.line_num}"
+        wrong = [word for word, x in zip(line, numbers, strict=True) if not math.isfinite(x)]
         if len(line) != width:
-            faults.append(
-                Fault(f"line {lines.line_num}", f"must hold {width} numbers, got {len(line)}")
-            )
-        elif not all(map(math.isfinite, numbers)):
-            word = next(word for word in line if not _finite(word))
-            faults.append(Fault(f"line {lines.line_num}", f"{word[:40]!r} is not a finite number"))
+            faults.append(Fault(where, f"must hold {width} numbers, got {len(line)}"))
+        elif wrong:
+            faults.append(Fault(where, f"{wrong[0][:40]!r} is not a finite number"))
         found.append(numbers)
         if len(faults) >= MOST_FAULTS:
             break
@@ -135,8 +128,8 @@ def _values(lines: Any, width: int) -> Array:
     return np.array(found, dtype=float).reshape(len(found), width)
 
 
-def _finite(word: str) -> bool:
+def _number(word: str) -> float:
     try:
-        return math.isfinite(float(word))
+        return float(word)
     except ValueError:
-        return False
+        return math.nan

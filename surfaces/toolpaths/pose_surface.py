@@ -7,17 +7,15 @@ from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array, Ints
 from surfaces.parts import MOST_PARTS, SurfaceParts
 from surfaces.surface import ClosestPoint, Surface, SurfaceError, points_of
-from surfaces.toolpaths.curve_parts import curve_parts
+from surfaces.toolpaths.arcs import curve_parts
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -43,7 +41,7 @@ class PoseSurface(Surface):
     in_order: bool
     """Whether they are a toolpath, to be run from the first to the last."""
     under: Surface | None = None
-    """The surface that they were laid over, if it is known."""
+    """The surface that they lie over, if it is known."""
 
     @property
     def wall(self) -> Surface | None:

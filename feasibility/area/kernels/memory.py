@@ -5,33 +5,34 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from coverable_arrays import Array
 
 
 class Tile(NamedTuple):
     """One tile, and what is found out about it."""
 
-    corners: NDArray[np.float64]
+    corners: Array
     """(4, 2, 3) target points (m) and approach directions that it is mixed from."""
-    radii: NDArray[np.float64]
+    radii: Array
     """(2,) m and 1, by which it may be off these."""
-    gain: NDArray[np.float64]
+    gain: Array
     """(n, 3) G."""
-    rate: NDArray[np.float64]
+    rate: Array
     """(n,) d, the lengths of its rows."""
-    weights: NDArray[np.float64]
+    weights: Array
     """(n,) W."""
-    rows: NDArray[np.float64]
+    rows: Array
     """(6, n) the Jacobians that G inverts,"""
-    wanted: NDArray[np.float64]
+    wanted: Array
     """(6, 3) and what they are to become."""
-    square: NDArray[np.float64]
+    square: Array
     """(6, 6)"""
-    right: NDArray[np.float64]
+    right: Array
     """(6,)"""
-    turn: NDArray[np.float64]
+    turn: Array
     """(3, 3) A G."""
-    here: NDArray[np.float64]
+    here: Array
     """(n,) where the arm is."""
 
 

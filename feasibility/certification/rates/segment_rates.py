@@ -236,6 +236,11 @@ def smallest_singular(at: Jacobians, scale: float) -> Array:
     return np.asarray(values[:, min(both.shape[2], 5) - 1])
 
 
+def smallest_singular_values(robot: Robot, q: Array) -> Array:
+    """(k,) of configurations q (k, n), see the module."""
+    return smallest_singular(jacobians(Kinematics(robot), q), length_unit(robot))
+
+
 def fastest_anywhere(robot: Robot) -> float:
     """m/s, more than the tool point can have anywhere: every joint at its limit, all links in line.
 

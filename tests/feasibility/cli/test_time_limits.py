@@ -18,7 +18,8 @@ import feasibility.cases.robot_table
 import feasibility.cases.surface_table
 import feasibility.checking
 import feasibility.division
-import feasibility.division.fewest_patches
+import feasibility.division.plans
+import feasibility.division.surface_division
 import feasibility.paths
 import feasibility.placement
 import feasibility.roadmap.causes
@@ -168,7 +169,7 @@ def test_paths(owner, name, ask, clock, monkeypatch, tmp_path):
     [("plans", "Patches were not planned and replayed"), ("_causes", "")],
 )
 def test_divisions(name, words, ask, clock, monkeypatch):
-    monkeypatch.setattr(feasibility.division.fewest_patches, name, clock.endless)
+    monkeypatch.setattr(feasibility.division.surface_division, name, clock.endless)
     status, out, _ = ask("long plate", "divide", "--json")
     found = json.loads(out)
     assert (status, found["answer"]) == (3, "undecided")
@@ -178,7 +179,7 @@ def test_divisions(name, words, ask, clock, monkeypatch):
 
 
 def test_a_division_that_is_not_prepared(ask, clock, monkeypatch):
-    monkeypatch.setattr(feasibility.division.fewest_patches, "arrays_of", clock.endless)
+    monkeypatch.setattr(feasibility.division.plans, "arrays_of", clock.endless)
     status, out, _ = ask("plate", "divide", "--json")
     assert (status, json.loads(out)["verdict"]) == (3, "undecided")
     assert "while the search was prepared" in json.loads(out)["message"]

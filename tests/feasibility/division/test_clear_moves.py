@@ -107,7 +107,7 @@ def test_no_way_is_found_where_the_first_link_cannot_pass() -> None:
     assert move.refusal == ""
     judged = replace(move, replayed=collision_replay(arm, bodies, move.waypoints))
     assert judged.refusal.startswith(
-        "no way around was found, and straight on link1 and block over"
+        "no path around was found, and straight on link1 and block over"
     )
 
 
@@ -200,7 +200,7 @@ def test_a_move_that_is_not_found_is_said() -> None:
     refused = replace(division, task=task, fewest=plan, connected=plan)
     found = json.loads(json.dumps(as_json(refused), allow_nan=False))
     assert found["moves"][0]["refusal"] == move.refusal
-    assert "refused: no way around was found" in " ".join(as_text(refused, "x").split())
+    assert "refused: no path around was found" in " ".join(as_text(refused, "x").split())
     view = view_division(replace(refused, fewest=replace(plan, moves=(both,))))
     assert "(not clear)" in view.legend.text
     assert view.motion is not None

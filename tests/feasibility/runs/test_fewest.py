@@ -1,4 +1,4 @@
-"""The fewest interruptions against every way there is, and against reaching as far as one can."""
+"""The fewest interruptions against all choices, and against reaching as far as one can."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from feasibility.runs import Stations, fewest_ways
+from feasibility.runs import Stations, fewest_runs
 
 
 def drawn(rng, stations: int, classes: int, share: float) -> Stations:
@@ -29,18 +29,18 @@ def drawn(rng, stations: int, classes: int, share: float) -> Stations:
     return Stations(over, np.array(steps, dtype=np.int64).reshape(-1, 4), pieces, inside)
 
 
-def measured(stations: Stations, ways) -> tuple[float, int]:
-    """Undone length and runs, with everything about the ways checked."""
+def measured(stations: Stations, found) -> tuple[float, int]:
+    """Undone length and runs, with everything about the runs checked."""
     edges = {int(number): (int(x), int(y)) for x, y, number, _ in stations.steps}
     done = np.zeros(len(stations.pieces), dtype=bool)
     last = -1
-    for way in ways:
-        assert [edges[number] for number in way.route] == list(itertools.pairwise(way.nodes))
-        first, end = (int(stations.over[way.nodes[k]]) for k in (0, -1))
+    for run in found:
+        assert [edges[number] for number in run.route] == list(itertools.pairwise(run.nodes))
+        first, end = (int(stations.over[run.nodes[k]]) for k in (0, -1))
         assert last <= first < end
         assert not done[first:end].any()
         done[first:end], last = True, end
-    return float(stations.pieces[~done].sum()), len(ways)
+    return float(stations.pieces[~done].sum()), len(found)
 
 
 def by_force(stations: Stations) -> tuple[float, int]:
@@ -68,12 +68,12 @@ def by_force(stations: Stations) -> tuple[float, int]:
 
 
 @pytest.mark.parametrize("share", [0.4, 0.7, 0.95])
-def test_no_way_leaves_less_or_has_fewer_runs(share: float) -> None:
+def test_no_choice_leaves_less_or_has_fewer_runs(share: float) -> None:
     rng = np.random.default_rng(int(100 * share))
     several = 0
     for _ in range(60):
         stations = drawn(rng, int(rng.integers(2, 9)), int(rng.integers(1, 4)), share)
-        found = measured(stations, fewest_ways(stations))
+        found = measured(stations, fewest_runs(stations))
         assert found == by_force(stations)
         several += found[1] > 1
     assert several > 5
@@ -100,7 +100,7 @@ def test_classes_that_last_are_run_as_far_as_any_reaches() -> None:
                 here, undone = here + 1, undone + 1.0
             else:
                 here, runs = int(reach), runs + 1
-        assert measured(asked, fewest_ways(asked)) == (undone, runs)
+        assert measured(asked, fewest_runs(asked)) == (undone, runs)
 
 
 def test_cuts_are_made_between_passes_where_they_can_be() -> None:
@@ -110,6 +110,6 @@ def test_cuts_are_made_between_passes_where_they_can_be() -> None:
     steps += [(8 + k, 9 + k, 20 + k, 1) for k in range(7)]
     inside = np.ones(9, dtype=bool)
     inside[4] = False
-    found = fewest_ways(Stations(over, np.array(steps), np.where(inside, 0.01, 0.0), inside))
-    assert [int(over[way.nodes[-1]]) for way in found] == [4, 9]
+    found = fewest_runs(Stations(over, np.array(steps), np.where(inside, 0.01, 0.0), inside))
+    assert [int(over[run.nodes[-1]]) for run in found] == [4, 9]
     assert int(over[found[1].nodes[0]]) in (4, 5)

@@ -222,7 +222,7 @@ def test_one_pass_is_enough_for_a_narrow_plate() -> None:
 def test_parameters_say_that_they_run_along_u_or_v_alone() -> None:
     plate = plane((0.0, 0.3), (0.0, 0.4))
     (note,) = parallel_passes(plate, 0.05, HALF / 2, by="parameters").notes
-    assert "45 deg from the direction that was asked for" in note
+    assert "45 deg from the requested direction" in note
     assert not parallel_passes(plate, 0.05, HALF, by="parameters").notes
 
 

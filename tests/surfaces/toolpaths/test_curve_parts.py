@@ -1,4 +1,4 @@
-"""The parts of courses between poses hold all of these curves."""
+"""The parts of curves between poses hold all of these curves."""
 
 from __future__ import annotations
 

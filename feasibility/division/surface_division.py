@@ -6,29 +6,20 @@ import time
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Ints
 from coverable_errors import ArgumentError
 from feasibility.clock import Clock, OutOfTime
 from feasibility.collisions import Pair
 from feasibility.division.division import Division, Plan
-from feasibility.division.plans import collect_components, plans
+from feasibility.division.plans import collect_components, exploration_of, plans
 from feasibility.division.proved_bound import ProvedBound, prove_apart
 from feasibility.notices import compiling_notice
 from feasibility.problem import Problem
-from feasibility.roadmap import (
-    Exploration,
-    Ruling,
-    SearchArrays,
-    arrays_of,
-    explore,
-    warm_up,
-    within,
-)
+from feasibility.roadmap import Exploration, Ruling, SearchArrays, explore, warm_up, within
 from feasibility.roadmap.causes import cause_of, causes_of, diagnose, disconnected
-from feasibility.roadmap.joint_boxes import blockers_of
 from feasibility.search import Progress, Search
-from feasibility.speed import check_asked, keep_fast_motions
+from feasibility.speed import check_requirements, keep_fast_motions
 from feasibility.targets import blocked_curves
 from feasibility.task import Task
 from feasibility.verdict import Cause
@@ -63,9 +54,7 @@ def divide(
     singularities, only motions of the search count that hold it.
 
     Args:
-        robot: the arm, with its limits.
-        cells: the surface, cut into E-cells.
-        task: standoff, cone and tolerance.
+        robot, cells, task: the question, as for `check`.
         search: settings of the complete search; where its time limit strikes, the patches are the
             fewest known.
         progress: called as progress(done, total, text) some times a second.
@@ -75,7 +64,7 @@ def divide(
     Raises:
         OutOfTime: a command's time ran out before the search began.
         ArgumentError: the search is the greedy one, which keeps a single tree of motions; or the
-            cells are a toolpath; or the task has a speed that this arm cannot have or be judged by.
+            cells are a toolpath; or the task has a speed that this arm cannot have.
         RobotError: the arm is no serial chain of one-dof joints.
 
     Example:
@@ -124,7 +113,7 @@ class _Shared(NamedTuple):
 
     fewest: Plan
     connected: Plan
-    missing: NDArray[np.int64]
+    missing: Ints
     """Cells in no patch."""
     causes: tuple[Cause, ...]
     late: bool
@@ -132,7 +121,7 @@ class _Shared(NamedTuple):
 
 
 def _refuse_others(robot: Robot, cells: Cells, task: Task, search: Search) -> None:
-    """Refuse the greedy search, toolpaths, and what cannot be asked of speed.
+    """Refuse the greedy search, toolpaths, and speeds that this arm cannot have.
 
     Raises:
         ArgumentError: it is one of them.
@@ -141,7 +130,7 @@ def _refuse_others(robot: Robot, cells: Cells, task: Task, search: Search) -> No
         raise ArgumentError(NOT_GREEDY.format(search.method))
     if cells.in_order:
         raise ArgumentError(NOT_IN_ORDER)
-    check_asked(robot, task, search)
+    check_requirements(robot, task, search)
 
 
 def _shared(
@@ -197,20 +186,17 @@ class _Searched(NamedTuple):
     ended: bool
     """Did it run to its end?"""
     slow: dict[int, Cause]
-    """Cells that no motion leads to at the speed, or the distance from singularities, asked for."""
+    """Cells that no motion leads to at the required speed or distance from singularities."""
 
 
 def _searched(robot: Robot, cells: Cells, task: Task, seed: int, clock: Clock) -> _Searched:
     """The search with all components that it found, and a bound."""
-    with clock.enforced():
-        arrays = arrays_of(robot, cells, task)
-    blockers = blockers_of(robot, cells.surface, task)
-    exploration = Exploration(robot, cells, arrays, seed, clock, blockers)
+    exploration = exploration_of(robot, cells, task, seed, clock)
     ended, apart = True, ProvedBound(min(1, len(cells)))
     try:
         explore(exploration)
         collect_components(exploration)
-        if not _no_motion(arrays):
+        if not _no_motion(exploration.arrays):
             apart = prove_apart(exploration, task)
     except OutOfTime:
         ended = False
@@ -222,7 +208,7 @@ def _searched(robot: Robot, cells: Cells, task: Task, seed: int, clock: Clock) -
 def _causes(
     exploration: Exploration,
     task: Task,
-    missing: NDArray[np.int64],
+    missing: Ints,
     ended: bool,
     slow: dict[int, Cause],
 ) -> tuple[Cause, ...]:

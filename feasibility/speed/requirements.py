@@ -1,4 +1,4 @@
-"""What may be asked of speed, singularities and home: looked at before anything is searched."""
+"""Speed, singularities and home in a task: checked before anything is searched."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from feasibility.task import Task
 from robots import Robot
 
 
-def check_asked(robot: Robot, task: Task, search: Search) -> None:
-    """Refuse what cannot be asked of speed and singularities.
+def check_requirements(robot: Robot, task: Task, search: Search) -> None:
+    """Refuse a speed, a distance from singularities or a home that this arm cannot have.
 
     Raises:
-        ArgumentError: joints without velocity limits, a speed beyond all of them, or the greedy
-            search.
+        ArgumentError: joints without velocity limits, a speed beyond all of them, the greedy
+            search, or a home that is no configuration of the arm.
     """
     _check_home(robot, task)
     if not task.asks_rates:
