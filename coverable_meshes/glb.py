@@ -61,14 +61,6 @@ class _Placed(NamedTuple):
     where: str
 
 
-class GlbPart(NamedTuple):
-    """One mesh of a scene, where the scene shows it."""
-
-    mesh: RawMesh
-    rgba: tuple[float, ...] | None
-    """Red, green, blue, opacity in 0 .. 1; None where it has no colour of its own."""
-
-
 def read_glb(stream: BinaryIO, size: int) -> RawMesh:
     """Read a GLB of `size` bytes: the triangles of its scene, placed as its nodes say.
 
@@ -77,7 +69,7 @@ def read_glb(stream: BinaryIO, size: int) -> RawMesh:
     """
     scene, data = _scene(stream, size)
     parts, others = _parts(scene, data)
-    mesh = joined([part.mesh for part in parts])
+    mesh = joined(parts)
     notes = ["a GLB's y axis points up; the part is taken as the file has it"]
     if len(parts) > 1:
         notes.append(f"{len(parts)} meshes of the file's scene were joined")
@@ -86,7 +78,7 @@ def read_glb(stream: BinaryIO, size: int) -> RawMesh:
     return RawMesh(mesh.vertices, mesh.faces, (*notes, *mesh.notes))
 
 
-def read_glb_parts(stream: BinaryIO, size: int) -> list[GlbPart]:
+def read_glb_parts(stream: BinaryIO, size: int) -> list[RawMesh]:
     """Read a GLB as `read_glb` does, mesh by mesh with their colours."""
     return _parts(*_scene(stream, size))[0]
 
@@ -104,9 +96,9 @@ def _scene(stream: BinaryIO, size: int) -> tuple[Json, bytes]:
     return scene, data
 
 
-def _parts(scene: Json, data: bytes) -> tuple[list[GlbPart], int]:
+def _parts(scene: Json, data: bytes) -> tuple[list[RawMesh], int]:
     """The meshes of triangles that a scene shows, and how many others it has."""
-    parts: list[GlbPart] = []
+    parts: list[RawMesh] = []
     others = faces = vertices = 0
     for placed in _placed_primitives(scene):
         # A small file can show one mesh many times, so all is counted before it is made.
@@ -125,16 +117,16 @@ def _parts(scene: Json, data: bytes) -> tuple[list[GlbPart], int]:
         faces += corners // 3 if mode == _TRIANGLES else max(corners - 2, 0)
         vertices += position.get("count", 0)
         refuse_large(faces, vertices)
-        parts.append(GlbPart(_primitive(scene, data, placed, mode), _rgba(scene, placed)))
+        parts.append(_primitive(scene, data, placed, mode))
     if not faces:
         raise no_triangles()
     return parts, others
 
 
-def _rgba(scene: Json, placed: _Placed) -> tuple[float, ...] | None:
+def _rgba(scene: Json, primitive: Json) -> tuple[float, ...] | None:
     """The plain colour of a primitive's material; None where there is none that can be read."""
     try:
-        material = scene["materials"][placed.primitive["material"]]
+        material = scene["materials"][primitive["material"]]
         factors = material.get("pbrMetallicRoughness", {}).get("baseColorFactor", [1.0] * 4)
         rgba = tuple(_checked(factors, [float] * 4))
     except (KeyError, IndexError, TypeError, AttributeError, MeshError):
@@ -298,7 +290,7 @@ def _primitive(scene: Json, data: bytes, placed: _Placed, mode: int) -> RawMesh:
         points = points.astype(float) @ matrix[:, :3].T + matrix[:, 3]
     if np.linalg.det(matrix[:, :3]) < 0.0:
         faces = faces[:, ::-1]  # a mirror image keeps its outer side
-    return RawMesh(points, faces, notes * ("targets" in primitive))
+    return RawMesh(points, faces, notes * ("targets" in primitive), _rgba(scene, primitive))
 
 
 def _numbers(scene: Json, data: bytes, k: int, kind: str) -> NDArray[Any]:

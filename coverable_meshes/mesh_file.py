@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO, TypeVar
+from typing import BinaryIO, NamedTuple
 
 from coverable_files import FileFault, open_regular, reason
 from coverable_meshes.errors import MeshError
-from coverable_meshes.glb import GlbPart, read_glb, read_glb_parts
+from coverable_meshes.glb import read_glb, read_glb_parts
 from coverable_meshes.obj_and_off import read_obj, read_off
 from coverable_meshes.ply import read_ply
 from coverable_meshes.raw_mesh import RawMesh
@@ -17,17 +18,13 @@ from coverable_meshes.stl import read_stl
 
 LARGEST_FILE = 512 << 20  # bytes
 
-Found = TypeVar("Found")
-Reader = Callable[[BinaryIO, int], Found]
-
-_READERS: dict[str, Reader[RawMesh]] = {
+_READERS: dict[str, Callable[[BinaryIO, int], RawMesh]] = {
     ".stl": read_stl,
     ".obj": read_obj,
     ".ply": read_ply,
     ".off": read_off,
     ".glb": read_glb,
 }
-_PART_READERS: dict[str, Reader[RawMesh | list[GlbPart]]] = {**_READERS, ".glb": read_glb_parts}
 FORMATS = "STL, OBJ, PLY, OFF or GLB"
 # How files begin that are something else than their name says.
 _STARTS = {
@@ -62,13 +59,12 @@ def read_raw(path: str | os.PathLike[str]) -> RawMesh:
     Raises:
         MeshError: no such file, not a mesh, damaged, or too large.
     """
-    return _read(path, _READERS, LARGEST_FILE)
+    with _opened(path, LARGEST_FILE) as file:
+        return _READERS[file.suffix](file.stream, file.size)
 
 
-def read_parts(path: str | os.PathLike[str], largest: int = LARGEST_FILE) -> list[GlbPart]:
-    """Read a mesh file part by part and with colours.
-
-    Coordinates may be infinite or NaN; indices are those of vertices.
+def read_parts(path: str | os.PathLike[str], largest: int = LARGEST_FILE) -> list[RawMesh]:
+    """Read a mesh file part by part and with colours; numbers may be infinite or NaN.
 
     Args:
         path: a file of one of the formats.
@@ -77,26 +73,37 @@ def read_parts(path: str | os.PathLike[str], largest: int = LARGEST_FILE) -> lis
     Raises:
         MeshError: no such file, not a mesh, damaged, too large, or without triangles.
     """
-    found = _read(path, _PART_READERS, largest)
-    parts = found if isinstance(found, list) else [GlbPart(found, None)]
-    for part in parts:
-        faces, vertices = part.mesh.faces, part.mesh.vertices
-        if len(faces) and not 0 <= faces.min() <= faces.max() < len(vertices):
+    with _opened(path, largest) as file:
+        if file.suffix == ".glb":
+            parts = read_glb_parts(file.stream, file.size)
+        else:
+            parts = [_READERS[file.suffix](file.stream, file.size)]
+    for mesh in parts:
+        if len(mesh.faces) and not 0 <= mesh.faces.min() <= mesh.faces.max() < len(mesh.vertices):
             raise MeshError("names a vertex that it does not have; it is damaged")
     return parts
 
 
-def _read(
-    path: str | os.PathLike[str], readers: Mapping[str, Reader[Found]], largest: int
-) -> Found:
-    """Open a regular file, look at how it begins, and read it."""
+class _File(NamedTuple):
+    """An open mesh file."""
+
+    stream: BinaryIO
+    size: int
+    """bytes"""
+    suffix: str
+    """One of `_READERS`."""
+
+
+@contextmanager
+def _opened(path: str | os.PathLike[str], largest: int) -> Iterator[_File]:
+    """Open a regular file that begins as its name says."""
     advice = "thin the mesh, or save it as binary STL"
     suffix = Path(os.fsdecode(path)).suffix.lower()
     try:
         with open_regular(path, largest, f"a mesh as {FORMATS}", advice) as stream:
             _check_start(stream.read(80), suffix)
             stream.seek(0)
-            return readers[suffix](stream, os.fstat(stream.fileno()).st_size)
+            yield _File(stream, os.fstat(stream.fileno()).st_size, suffix)
     except FileFault as error:
         raise MeshError(error.faults) from error
     except OSError as error:

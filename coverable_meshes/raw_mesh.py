@@ -35,6 +35,8 @@ class RawMesh:
     faces: Ints
     """(F, 3)"""
     notes: tuple[str, ...] = ()
+    rgba: tuple[float, ...] | None = None
+    """Red, green, blue, opacity in 0 .. 1; None where the file gives it no colour of its own."""
 
 
 def refuse_large(faces: int, vertices: int = 0) -> None:
@@ -153,6 +155,17 @@ def _turned_to_fan(vertices: Floats, polygons: Ints, names: Ints) -> Ints:
         f"{len(open_ones)} faces with {polygons.shape[1]} corners are not convex, the first is "
         f"face {names[open_ones[0]]} (counted from 0); export the mesh as triangles"
     )
+
+
+def distinct(points: Floats) -> tuple[Floats, Ints]:
+    """Each of some points (k, 3) once, and (k,) which of these each is; faster than `np.unique`."""
+    order = np.lexsort(points.T)
+    ordered = points[order]
+    is_new = np.ones(len(points), dtype=bool)
+    is_new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    number = np.empty(len(points), dtype=np.int64)
+    number[order] = np.cumsum(is_new) - 1
+    return ordered[is_new], number
 
 
 def joined(parts: Sequence[RawMesh]) -> RawMesh:

@@ -10,7 +10,7 @@ import logging
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -19,23 +19,12 @@ from coverable_files import read_regular, reason
 from coverable_meshes.collada_limits import check_collada
 from coverable_meshes.errors import MeshError
 from coverable_meshes.mesh_file import read_parts
-from coverable_meshes.raw_mesh import Floats, Ints
+from coverable_meshes.raw_mesh import RawMesh
 
 LARGEST_FILES = {".stl": 64 << 20, ".glb": 64 << 20, ".dae": 64 << 20}  # bytes
 LARGEST_TEXT = 12 << 20  # bytes, of the other formats, which take longer
 MOST_TRIANGLES = 1_500_000  # of a whole robot, each use of a file counted
 MOST_SECONDS = 8.0  # of processor time, for a picture
-
-
-class FilePart(NamedTuple):
-    """One mesh of a file."""
-
-    vertices: Floats
-    """(V, 3) in the file's unit."""
-    faces: Ints
-    """(F, 3) indices of vertices."""
-    rgba: tuple[float, ...] | None
-    """Red, green, blue, opacity in 0 .. 1; None where it brings no colour of its own."""
 
 
 class MeshFiles:
@@ -55,10 +44,10 @@ class MeshFiles:
         self._clock = clock
         self._most_seconds = most_seconds
         self._started = clock()
-        self._read: dict[str, list[FilePart] | MeshError] = {}
+        self._read: dict[str, list[RawMesh] | MeshError] = {}
         self._triangles = 0
 
-    def parts(self, path: str) -> list[FilePart]:
+    def parts(self, path: str) -> list[RawMesh]:
         """The parts of a mesh file.
 
         Args:
@@ -87,7 +76,7 @@ class MeshFiles:
             )
         self._triangles += triangles
 
-    def _first_read(self, file: Path) -> list[FilePart] | MeshError:
+    def _first_read(self, file: Path) -> list[RawMesh] | MeshError:
         """The parts of a file in its own unit, or what is wrong with it."""
         if self._clock() - self._started > self._most_seconds:
             took = f"reading took more than {self._most_seconds:g} s"
@@ -98,7 +87,7 @@ class MeshFiles:
             return error
 
 
-def read_parts_of(file: Path) -> list[FilePart]:
+def read_parts_of(file: Path) -> list[RawMesh]:
     """Read every part of a mesh file.
 
     Args:
@@ -113,10 +102,7 @@ def read_parts_of(file: Path) -> list[FilePart]:
         if suffix == ".dae":
             parts = _collada(read_regular(file, largest, "a mesh of a robot"))
         else:
-            parts = [
-                FilePart(part.mesh.vertices, part.mesh.faces, part.rgba)
-                for part in read_parts(file, largest)
-            ]
+            parts = read_parts(file, largest)
     except CoverableError as fault:
         raise MeshError(f"{file.name}: {fault}") from fault
     parts = [part for part in parts if len(part.faces)]
@@ -127,7 +113,7 @@ def read_parts_of(file: Path) -> list[FilePart]:
     return parts
 
 
-def _collada(data: bytes) -> list[FilePart]:
+def _collada(data: bytes) -> list[RawMesh]:
     """A .dae by trimesh, after a look at what would become of it."""
     import trimesh
 
@@ -143,9 +129,9 @@ def _collada(data: bytes) -> list[FilePart]:
     finally:
         log.setLevel(before)
     return [
-        FilePart(np.asarray(part.vertices, float), np.asarray(part.faces, np.int64), _rgba(part))
-        for part in parts
-        if isinstance(part, trimesh.Trimesh)
+        RawMesh(np.asarray(one.vertices, float), np.asarray(one.faces, np.int64), (), _rgba(one))
+        for one in parts
+        if isinstance(one, trimesh.Trimesh)
     ]
 
 

@@ -13,6 +13,7 @@ from coverable_meshes.raw_mesh import (
     Floats,
     Lines,
     RawMesh,
+    distinct,
     no_triangles,
     refuse_large,
     shown,
@@ -88,14 +89,8 @@ def _soup(corners: Floats, normals: Floats) -> RawMesh:
 
     The order of the corners says which side is outside, whatever the stored normals say.
     """
-    vertices = corners.astype(float) + 0.0  # -0.0 is 0.0
-    order = np.lexsort(vertices.T)
-    fresh = np.ones(len(vertices), bool)
-    fresh[1:] = (vertices[order[1:]] != vertices[order[:-1]]).any(axis=1)
-    number = np.empty(len(vertices), np.int64)
-    number[order] = np.cumsum(fresh) - 1
+    vertices, number = distinct(corners.astype(float) + 0.0)  # -0.0 is 0.0
     faces = number.reshape(-1, 3)
-    vertices = vertices[order[fresh]]
     with np.errstate(all="ignore"):  # numbers that are not finite are refused later
         a, b, c = (vertices[faces[:, k]] for k in range(3))
         along = np.einsum("fi,fi->f", np.cross(b - a, c - a), normals)

@@ -5,8 +5,8 @@ from .chain import jacobians as jacobians
 from .chain import joint_alignments as joint_alignments
 from .chain_rows import moved_by_joints as moved_by_joints
 from .errors import RobotError as RobotError
-from .inverse_kinematics import configuration_near as configuration_near
 from .kinematics import Kinematics as Kinematics
+from .kinematics import configuration_near as configuration_near
 from .library import GROUPS as GROUPS
 from .library import RobotInfo as RobotInfo
 from .library import flange_axis as flange_axis

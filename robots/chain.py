@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from coverable_kernels import njit
 from robots.errors import RobotError
+from robots.mounting import joint_axes
 
 AGREEMENT = 1e-9  # [m], [1]: largest difference from Pinocchio that is accepted
 SAMPLES = 20  # configurations at which the two are compared
@@ -126,17 +127,8 @@ def joint_alignments(model: pin.Model) -> NDArray[np.float64]:
 
 def _turns_onto_z(model: pin.Model) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
     """Which joints slide, and the rotation that brings z onto each joint's axis."""
-    n, data = model.nv, model.createData()
-    pin.computeJointJacobians(model, data, pin.neutral(model))
-    prismatic, alignments = np.empty(n, dtype=bool), np.empty((n, 3, 3))
-    for i in range(n):
-        # The joint's motion subspace, in its own frame: (linear, angular).
-        jacobian = pin.getJointJacobian(model, data, i + 1, pin.ReferenceFrame.LOCAL)
-        subspace = jacobian.reshape(6, n)[:, i]  # Pinocchio flattens a single column
-        linear, angular = subspace[:3], subspace[3:]
-        prismatic[i] = np.linalg.norm(angular) < 0.5
-        alignments[i] = _rotation_onto(linear if prismatic[i] else angular)
-    return prismatic, alignments
+    slides, axes = joint_axes(model)
+    return slides, np.array([_rotation_onto(axis) for axis in axes])
 
 
 def _rotation_onto(axis: NDArray[np.float64]) -> NDArray[np.float64]:

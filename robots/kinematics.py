@@ -215,3 +215,35 @@ def _points_and_rotations(
     values = np.frombuffer(bytearray().join(poses)).reshape(-1, 12)
     rotations = values[:, :9].reshape(-1, 3, 3).transpose(0, 2, 1)
     return values[:, 9:].copy(), np.ascontiguousarray(rotations)
+
+
+def configuration_near(
+    kinematics: Kinematics,
+    q: NDArray[np.float64],
+    point: NDArray[np.float64],
+    axis: NDArray[np.float64],
+    steps: int,
+    close: float,
+) -> NDArray[np.float64] | None:
+    """The configuration near q (n,) with tool point and axis there; None where none is found.
+
+    Newton's method with the shortest steps, clipped to the limits.
+
+    Args:
+        kinematics: of the arm.
+        q: (n,) rad or m, where to begin.
+        point: (3,) m, of the tool.
+        axis: (3,) unit, its approach axis.
+        steps: at most so many.
+        close: m of the tool point, and 1 of the axis, how far it may be off.
+    """
+    robot = kinematics.robot
+    for _ in range(steps):
+        at, along = kinematics.tool(q)
+        missed = np.concatenate([point - at, axis - along])
+        if np.abs(missed).max() < close:
+            return q
+        rows = np.concatenate(kinematics.jacobians(q))
+        step = np.linalg.lstsq(rows, missed, rcond=1e-6)[0]
+        q = np.clip(q + step, robot.lower, robot.upper)
+    return None

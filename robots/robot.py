@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from robots.errors import RobotError
@@ -16,8 +17,6 @@ from robots.joint_checks import joint_faults, moves_both, no_limit_set, numbers
 from robots.mounting import TCP, made_orthogonal, seen_from, unit_axis, world_frame
 
 if TYPE_CHECKING:
-    import pinocchio as pin
-
     from robots.chain import Chain
     from robots.reach import ReachBound
     from robots.urdf import Axis
@@ -158,8 +157,6 @@ class Robot:
     @cached_property
     def tool_frame_id(self) -> int:
         """Index of the frame of the TCP in `model.frames`."""
-        import pinocchio as pin
-
         kind = pin.FrameType.OP_FRAME
         if self.model.existFrame(TCP, kind):
             return int(self.model.getFrameId(TCP, kind))
@@ -171,8 +168,6 @@ class Robot:
 
         A URDF may give a link and a joint the same name, and `getFrameId(name)` alone then refuses.
         """
-        import pinocchio as pin
-
         kind = pin.FrameType.BODY
         if not self.model.existFrame(self.tool_frame, kind):
             raise RobotError(f"robot {self.name!r} has no link {self.tool_frame!r} for its tool")
@@ -189,8 +184,6 @@ class Robot:
     @property
     def base(self) -> NDArray[np.float64]:
         """(4, 4) m, the URDF's root link in the world, with all joints at zero."""
-        import pinocchio as pin
-
         data = self.model.createData()
         pin.framesForwardKinematics(self.model, data, pin.neutral(self.model))
         root = self.model.getFrameId(self.root_link or self.link_names[0], pin.FrameType.BODY)
@@ -204,8 +197,6 @@ class Robot:
     @property
     def link_names(self) -> tuple[str, ...]:
         """All links of the model, those on held joints too, from the root on."""
-        import pinocchio as pin
-
         return tuple(f.name for f in self.model.frames if f.type == pin.FrameType.BODY)
 
     @property

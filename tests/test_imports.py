@@ -31,8 +31,8 @@ robots: errors
 robots.mounting
 robots.urdf: xml mesh_folders
 robots.urdf.expansion
-robots.urdf: axes geometry visuals collisions joints tree srdf checked_urdf
-robots: arguments joint_checks chain chain_rows reach robot kinematics inverse_kinematics joint_selection pinocchio_model library
+robots.urdf: axes geometry link_shapes joints tree srdf checked_urdf
+robots: arguments joint_checks chain chain_rows reach robot kinematics joint_selection pinocchio_model library
 robots.shapes
 surfaces: protected parts surface at_home part_growth cells adjacency cell_curves curve_fitting arguments
 surfaces.patches

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from coverable_arrays import Array, Ints
-from coverable_meshes import FilePart
+from coverable_meshes import RawMesh
 from feasibility.viewer.threejs import Colour
 from robots.urdf import Box, Capsule, Cylinder, Sphere
 
@@ -93,7 +93,7 @@ def split_at_creases(corners: Ints, normals: Array) -> tuple[Ints, Ints]:
     return first, faces.reshape(-1, 3).astype(np.int64)
 
 
-def drawn(part: FilePart, scale: Array, colour: Colour | None) -> Mesh:
+def drawn(part: RawMesh, scale: Array, colour: Colour | None) -> Mesh:
     """A part of a mesh file, scaled by (3,) factors, in its own colour or else in the one given."""
     if part.rgba is None:
         return Mesh(part.vertices * scale, part.faces, colour or GREY)

@@ -28,7 +28,7 @@ from feasibility.viewer.meshes import (
     thinned,
 )
 from robots import Kinematics, Robot, RobotError
-from robots.urdf import MeshFile, Visual
+from robots.urdf import LinkShape, MeshFile
 
 ROOT = "/robot"
 TRIANGLES = 60_000  # of a whole robot; more are thinned
@@ -151,7 +151,7 @@ def _drawing(robot: Robot, parts: dict[tuple[int, str], list[Mesh]], notes: list
     return Drawing(tuple(commands), lowest, tuple(notes))
 
 
-def _visuals(robot: Robot) -> tuple[list[Visual], list[str]]:
+def _visuals(robot: Robot) -> tuple[list[LinkShape], list[str]]:
     """The checked visuals of the robot's URDF, and what is wrong with the others."""
     if robot.urdf is None:
         return [], []
@@ -168,7 +168,7 @@ def _visuals(robot: Robot) -> tuple[list[Visual], list[str]]:
     return [visual for visual in checked.visuals if visual.link in bodies], notes
 
 
-def _meshes(visual: Visual, files: MeshFiles) -> list[Mesh]:
+def _meshes(visual: LinkShape, files: MeshFiles) -> list[Mesh]:
     """The triangles of one visual, in the visual's own frame.
 
     Raises:

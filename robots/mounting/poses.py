@@ -1,4 +1,4 @@
-"""Poses as they are given: a pair (position, rpy_deg), or a matrix; checked, as (4, 4) matrices."""
+"""Poses as they are given, a pair (position, rpy_deg) or a matrix: checked, as (4, 4) matrices."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coverable_errors import Checks, Fault, shown
-from robots.mounting.fixed_axes import about_fixed_axes
 
 FURTHEST_TCP = 10.0  # [m] from tool_frame: no tool is longer, but many are given in millimetres
 FURTHEST_BASE = 1e4  # [m] from the origin of the world
@@ -86,3 +85,40 @@ def rigid_matrix(checks: Checks, key: str, value: Any, furthest: float, other: s
             return matrix
     checks.keep(Fault(key, f"got {shown(matrix.tolist())}", expected=expected))
     return np.eye(4)
+
+
+def about_fixed_axes(roll: float, pitch: float, yaw: float) -> NDArray[np.float64]:
+    """Rz(yaw) Ry(pitch) Rx(roll), (3, 3), from radians: URDF's fixed-axis roll, pitch, yaw.
+
+    Through half angles, as scipy does it, to the last bit; scipy takes long to import.
+
+    Example:
+        >>> about_fixed_axes(0.0, 0.0, 0.5 * math.pi).round(9) @ [1, 0, 0]
+        array([0., 1., 0.])
+    """
+    turned = math.cos(0.5 * roll), math.sin(0.5 * roll), 0.0, 0.0
+    turned = _product((math.cos(0.5 * pitch), 0.0, math.sin(0.5 * pitch), 0.0), turned)
+    w, x, y, z = _product((math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw)), turned)
+    ww, xx, yy, zz = w * w, x * x, y * y, z * z
+    return np.array(
+        [
+            [xx - yy - zz + ww, 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
+            [2.0 * (x * y + z * w), -xx + yy - zz + ww, 2.0 * (y * z - x * w)],
+            [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), -xx - yy + zz + ww],
+        ]
+    )
+
+
+_Quaternion = tuple[float, float, float, float]  # (w, x, y, z)
+
+
+def _product(left: _Quaternion, right: _Quaternion) -> _Quaternion:
+    """The rotation `right`, and then `left`."""
+    a, b, c, d = left
+    w, x, y, z = right
+    return (
+        a * w - b * x - c * y - d * z,
+        a * x + w * b + (c * z - d * y),
+        a * y + w * c + (d * x - b * z),
+        a * z + w * d + (b * y - c * x),
+    )

@@ -2,7 +2,6 @@ from .bodies import Fineness as Fineness
 from .bodies import Polytope as Polytope
 from .bodies import Solid as Solid
 from .bodies import Triangles as Triangles
-from .crude import with_crude_links_cut as with_crude_links_cut
 from .hulls import Hull as Hull
 from .hulls import hull_of as hull_of
 from .hulls import outer_hull as outer_hull
@@ -13,7 +12,8 @@ from .pairs import LinkPairs as LinkPairs
 from .pairs import PairLeftOut as PairLeftOut
 from .pairs import faults_of_srdf as faults_of_srdf
 from .pairs import link_pairs as link_pairs
-from .solids import solid_faces as solid_faces
+from .sampling import with_crude_links_cut as with_crude_links_cut
 from .tool import Reach as Reach
 from .tool import tool_reach as tool_reach
 from .triangles import checked_triangles as checked_triangles
+from .triangles import solid_faces as solid_faces

@@ -49,8 +49,8 @@ def hull_of(shape: Geometry) -> Hull:
         case Capsule(radius, length):
             return Hull(np.array([[0.0, 0.0, -length / 2], [0.0, 0.0, length / 2]]), radius)
         case Box(size):
-            corners = np.stack(np.meshgrid([-0.5, 0.5], [-0.5, 0.5], [-0.5, 0.5]), axis=-1)
-            return Hull(corners.reshape(-1, 3) * size, 0.0)
+            half = 0.5 * np.array(size)
+            return Hull(_box_corners(-half, half), 0.0)
         case Cylinder(radius, length):
             return Hull(_prism(radius, length), 0.0)
         case Triangles():
@@ -62,10 +62,14 @@ def _prism(radius: float, length: float) -> Array:
     # A corner is at radius / cos(pi / k).
     sides = math.ceil(math.pi / math.acos(radius / (radius + PRISM_EXCESS)))
     sides = min(max(sides, 8), MOST_SIDES)
-    angle = 2.0 * np.pi * np.arange(sides) / sides
-    corner = radius / math.cos(math.pi / sides)
-    ring = corner * np.column_stack([np.cos(angle), np.sin(angle)])
-    ends = [np.column_stack([ring, np.full(sides, z)]) for z in (-length / 2, length / 2)]
+    return rims(radius / math.cos(math.pi / sides), length, sides)
+
+
+def rims(radius: float, length: float, count: int) -> Array:
+    """(2 count, 3) points on the two rims of a cylinder along z."""
+    angle = 2.0 * np.pi * np.arange(count) / count
+    ring = radius * np.column_stack([np.cos(angle), np.sin(angle)])
+    ends = [np.column_stack([ring, np.full(count, z)]) for z in (-length / 2, length / 2)]
     return np.concatenate(ends)
 
 

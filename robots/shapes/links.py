@@ -14,7 +14,7 @@ from robots.shapes.bodies import Fineness, Geometry, Polytope, Solid
 from robots.shapes.hulls import hull_of
 from robots.shapes.pieces import pieces_of
 from robots.shapes.triangles import MeshBodies
-from robots.urdf import CheckedUrdf, CollisionShape, MeshFile, Visual, check_urdf
+from robots.urdf import CheckedUrdf, LinkShape, MeshFile, check_urdf
 
 MOST_NAMED = 8  # links in one note
 
@@ -106,12 +106,7 @@ class _Gathered:
         self.root = checked.root
         self.meshes = MeshBodies()
         self.solids: list[Solid] = []
-        self.collisions: dict[str, list[CollisionShape]] = {}
-        self.visuals: dict[str, list[Visual]] = {}
-        for shape in checked.collisions.shapes:
-            self.collisions.setdefault(shape.link, []).append(shape)
-        for visual in checked.visuals:
-            self.visuals.setdefault(visual.link, []).append(visual)
+        self.collisions, self.visuals = map(_by_link, (checked.collisions.shapes, checked.visuals))
         self.collision_faults = {fault.link: fault.why for fault in checked.collisions.faults}
         self.visual_faults = {fault.link: fault.why for fault in checked.visual_faults}
         self.without = [link for link in checked.collisions.without if link in self.visuals]
@@ -148,9 +143,7 @@ class _Gathered:
             placement.flags.writeable = False
             self.solids.append(Solid(link, joint, placement, geometry))
 
-    def _read(
-        self, shapes: Iterable[CollisionShape | Visual]
-    ) -> tuple[list[tuple[np.ndarray, Geometry]], str]:
+    def _read(self, shapes: Iterable[LinkShape]) -> tuple[list[tuple[np.ndarray, Geometry]], str]:
         """The shapes that can be used, and what is wrong with the first of the others."""
         found: list[tuple[np.ndarray, Geometry]] = []
         fault = ""
@@ -196,6 +189,14 @@ class _Gathered:
                 f"left without collision shapes by the URDF, so not checked: {_named(self.without)}"
             )
         return tuple(notes)
+
+
+def _by_link(shapes: Iterable[LinkShape]) -> dict[str, list[LinkShape]]:
+    """The shapes of each link."""
+    found: dict[str, list[LinkShape]] = {}
+    for shape in shapes:
+        found.setdefault(shape.link, []).append(shape)
+    return found
 
 
 def _named(links: list[str]) -> str:

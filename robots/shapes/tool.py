@@ -9,12 +9,11 @@ import numpy as np
 
 from robots.robot import Robot
 from robots.shapes.bodies import Geometry, Polytope, Solid, Triangles
-from robots.shapes.hulls import Hull, hull_of
+from robots.shapes.hulls import Hull, hull_of, rims
 from robots.shapes.links import LinkShapes
 from robots.urdf import Cylinder
 
 NEAR = 1e-3  # [m]
-_CIRCLE = 2.0 * np.pi * np.arange(360) / 360
 
 
 class Reach(NamedTuple):
@@ -75,8 +74,6 @@ def _extreme_points(shape: Geometry) -> Hull:
         case Triangles(vertices):
             return Hull(vertices, 0.0)
         case Cylinder(radius, length):
-            ring = radius * np.column_stack([np.cos(_CIRCLE), np.sin(_CIRCLE)])
-            ends = [np.column_stack([ring, np.full(360, z)]) for z in (-length / 2, length / 2)]
-            return Hull(np.concatenate(ends), 0.0)
+            return Hull(rims(radius, length, 360), 0.0)
         case _:
             return hull_of(shape)

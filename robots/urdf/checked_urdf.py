@@ -18,13 +18,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.urdf.axes import Axis, insert_axes
-from robots.urdf.collisions import CollisionShapes, read_collisions
 from robots.urdf.expansion import expanded, is_xacro
-from robots.urdf.geometry import ShapeFault
 from robots.urdf.joints import JointInfo
+from robots.urdf.link_shapes import (
+    CollisionShapes,
+    LinkShape,
+    ShapeFault,
+    read_collisions,
+    read_visuals,
+)
 from robots.urdf.mesh_folders import MeshFolders
 from robots.urdf.tree import read_links, read_tree, refuse_other_formats
-from robots.urdf.visuals import Visual, read_visuals
 from robots.urdf.xml import MAX_LENGTH, Faults, Node, UrdfError, parse_xml, read_bytes, shown
 
 MAX_WARNINGS = 100
@@ -53,7 +57,7 @@ class CheckedUrdf:
     """From the root outwards, in the order of `links[1:]`: joint i moves link i + 1."""
     leaves: tuple[str, ...]
     """Links without a child, those of composed axes left out."""
-    visuals: tuple[Visual, ...]
+    visuals: tuple[LinkShape, ...]
     visual_faults: tuple[ShapeFault, ...]
     """Visuals that cannot be drawn; `warnings` says so in short."""
     collisions: CollisionShapes

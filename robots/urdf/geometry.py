@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_errors import Fault
 from robots.mounting import about_fixed_axes
 from robots.urdf.mesh_folders import MeshFolders
 from robots.urdf.xml import BadValue, Node, Triple, numbers, shown, triple
-
-MAX_SHAPES = 2000
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,35 +57,22 @@ class Sphere:
 Geometry = MeshFile | Box | Cylinder | Capsule | Sphere
 
 
-@dataclass(frozen=True, slots=True)
-class ShapeFault:
-    """A shape of a link that cannot be used."""
-
-    link: str
-    why: str
-
-
-def plain(bad: BadValue) -> str:
-    """What `read_shape` says, as a sentence."""
-    return str(bad).replace(" :: ", " ").strip()
-
-
 def read_shape(node: Node, folders: MeshFolders) -> tuple[NDArray[np.float64], Geometry]:
     """The frame (4, 4) m of a shape in its link's frame, write-protected, and the shape.
 
     Raises:
-        BadValue: "what :: why", where there is no shape that can be used.
+        BadValue: there is no shape that can be used; one fault, whose key is the shape.
     """
     shapes = [shape for holder in node.all("geometry") for shape in holder.children]
     if len(shapes) != 1:
-        raise BadValue(f"a <{node.tag}> :: must hold one <geometry> with one shape")
+        raise _unusable(node.tag, "must hold one <geometry> with one shape")
     origin_node = node.first("origin")
     try:
         xyz = triple(origin_node, "xyz", (0.0, 0.0, 0.0))
         rpy = triple(origin_node, "rpy", (0.0, 0.0, 0.0))
         geometry = _geometry(shapes[0], folders)
     except KeyError as missing:
-        raise BadValue(f"a <{shapes[0].tag}> :: has no {missing.args[0]}") from None
+        raise _unusable(shapes[0].tag, f"has no {missing.args[0]}") from None
     origin = np.eye(4)
     origin[:3, :3] = about_fixed_axes(*rpy)
     origin[:3, 3] = xyz
@@ -99,11 +85,12 @@ def _geometry(shape: Node, folders: MeshFolders) -> Geometry:
         name = shape.attributes["filename"]
         x, y, z = triple(shape, "scale", (1.0, 1.0, 1.0))
         if 0.0 in (x, y, z):
-            raise BadValue(f"mesh {shown(name)} :: has scale 0; write factors that are not zero")
+            what = "has scale 0; write factors that are not zero"
+            raise BadValue(Fault(f"mesh {shown(name)}", what))
         try:
             return MeshFile(folders.resolve(name), (x, y, z))
         except BadValue as bad:
-            raise BadValue(f"mesh {shown(name, 200)} :: {bad}") from None
+            raise BadValue(Fault(f"mesh {shown(name, 200)}", str(bad))) from None
     if shape.tag == "box":
         a, b, c = (_positive(shape, "size", 3, i) for i in range(3))
         return Box((a, b, c))
@@ -112,11 +99,15 @@ def _geometry(shape: Node, folders: MeshFolders) -> Geometry:
     if shape.tag in ("cylinder", "capsule"):
         radius, length = _positive(shape, "radius"), _positive(shape, "length")
         return (Cylinder if shape.tag == "cylinder" else Capsule)(radius, length)
-    raise BadValue(f"a <{shown(shape.tag)[1:-1]}> :: is no shape of URDF")
+    raise _unusable(shown(shape.tag)[1:-1], "is no shape of URDF")
 
 
 def _positive(node: Node, attribute: str, count: int = 1, index: int = 0) -> float:
     value = numbers(node, attribute, count)[index]
     if value <= 0.0:
-        raise BadValue(f"a <{node.tag}> :: {attribute} must be above zero")
+        raise _unusable(node.tag, f"{attribute} must be above zero")
     return value
+
+
+def _unusable(tag: str, why: str) -> BadValue:
+    return BadValue(Fault(f"a <{tag}>", why))
