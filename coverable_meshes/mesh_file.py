@@ -63,7 +63,7 @@ def read_raw(path: str | os.PathLike[str]) -> RawMesh:
         return _READERS[file.suffix](file.stream, file.size)
 
 
-def read_parts(path: str | os.PathLike[str], largest: int = LARGEST_FILE) -> list[RawMesh]:
+def read_parts(path: str | os.PathLike[str], largest: int) -> list[RawMesh]:
     """Read a mesh file part by part and with colours; numbers may be infinite or NaN.
 
     Args:

@@ -21,8 +21,6 @@ from coverable_meshes.errors import MeshError
 from coverable_meshes.mesh_file import read_parts
 from coverable_meshes.raw_mesh import RawMesh
 
-LARGEST_FILES = {".stl": 64 << 20, ".glb": 64 << 20, ".dae": 64 << 20}  # bytes
-LARGEST_TEXT = 12 << 20  # bytes, of the other formats, which take longer
 MOST_TRIANGLES = 1_500_000  # of a whole robot, each use of a file counted
 MOST_SECONDS = 8.0  # of processor time, for a picture
 
@@ -87,6 +85,11 @@ class MeshFiles:
             return error
 
 
+def largest_file(file: Path) -> int:
+    """bytes that a mesh of a robot may have; those that are text take longer to read."""
+    return 64 << 20 if file.suffix.lower() in (".stl", ".glb", ".dae") else 12 << 20
+
+
 def read_parts_of(file: Path) -> list[RawMesh]:
     """Read every part of a mesh file.
 
@@ -96,13 +99,11 @@ def read_parts_of(file: Path) -> list[RawMesh]:
     Raises:
         MeshError: the file is missing, damaged, too large, or holds no finite triangles.
     """
-    suffix = file.suffix.lower()
-    largest = LARGEST_FILES.get(suffix, LARGEST_TEXT)
     try:
-        if suffix == ".dae":
-            parts = _collada(read_regular(file, largest, "a mesh of a robot"))
+        if file.suffix.lower() == ".dae":
+            parts = _collada(read_regular(file, largest_file(file), "a mesh of a robot"))
         else:
-            parts = read_parts(file, largest)
+            parts = read_parts(file, largest_file(file))
     except CoverableError as fault:
         raise MeshError(f"{file.name}: {fault}") from fault
     parts = [part for part in parts if len(part.faces)]

@@ -24,9 +24,9 @@ from numpy.typing import ArrayLike
 from robots.arguments import Mounting, check_arguments
 from robots.errors import RobotError
 from robots.joint_selection import suggestion
-from robots.robot import Robot
 
 if TYPE_CHECKING:
+    from robots.robot import Robot
     from robots.urdf import Axis
 
 HERE = Path(__file__).parent

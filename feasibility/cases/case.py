@@ -40,10 +40,7 @@ if TYPE_CHECKING:
 BUILT_IN = Path(__file__).with_name("built_in.toml")
 LARGEST_FILE = 256 * 1024  # bytes
 TABLES = ("robot", "surface", "task", "collision", "search")
-TASK = (
-    "standoff", "cone_deg", "tolerance", "approach", "roll_deg", "roll_reference", "footprint",
-    "coverage", "speed", "min_manipulability", "home_deg",
-)  # fmt: skip
+TASK = tuple(name for name in Task.__dataclass_fields__ if name != "collision")
 
 Tables = dict[str, Any]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple, cast
@@ -46,23 +45,18 @@ class ObjectPart:
 
 @dataclass(frozen=True, slots=True)
 class CollisionPart:
-    """The [collision] table of a case; its fields are those of `Collision`."""
+    """The [collision] table of a case; its fields are those of `Collision`, paths absolute."""
 
     self_: bool = True
     surface: bool = True
     clearance: float = 0.0
-    """m"""
     tool_clearance: float = 0.0
-    """m"""
     tool_links: tuple[str, ...] = ()
     allow: tuple[tuple[str, str], ...] = ()
     clearances: tuple[tuple[str, str, float], ...] = ()
-    """Two names, and m."""
     srdf: str | None = None
-    """Absolute path."""
     shapes: str = "hulls"
     thickness: float = 0.0
-    """m"""
     scene: tuple[ObjectPart, ...] = ()
     tool: tuple[ObjectPart, ...] = ()
 
@@ -125,9 +119,7 @@ def read_collision(table: Any, faults: list[Fault]) -> CollisionPart | None:
     )
     if section.has("self"):
         values["self_"] = section.table["self"]
-    srdf = section.text("srdf")
-    if srdf is not None:
-        values["srdf"] = os.path.abspath(os.path.expanduser(srdf))
+    values |= section.path("srdf")
     if section.has("clearances"):
         values["clearances"] = _clearances(section)
     objects = {key: _objects(section, key) for key in MAKERS}
@@ -203,9 +195,7 @@ def _object(section: Section, key: str, k: int, entry: Any) -> _Entry | None:
     own, make = SHAPES[kind], MAKERS[key]
     values = found.take(*own, *COMMON[key])
     if kind == "mesh":
-        file = found.text("file", required=True)
-        if file is not None:
-            values["file"] = os.path.abspath(os.path.expanduser(file))
+        values |= found.path(required=True)
         if "scale" in values:
             found.make(metres_per_unit, {"scale": values["scale"]})
     others = {other for keys in SHAPES.values() for other in keys} - set(own)

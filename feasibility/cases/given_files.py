@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -14,19 +13,24 @@ if TYPE_CHECKING:
 
 KINDS = ("grid", "poses")
 UNITS = ("m", "mm")
+FACES = "where the faces look to", "behind the faces"
 SIDES = {
-    "grid": "of (u direction) x (v direction), rows being u; with rows along x and columns along y "
-    "that is +z",
-    "poses": "the normals point to",
+    "mesh": ("a mesh needs", *FACES),
+    "step": ("STEP faces need", *FACES),
+    "grid": (
+        "a grid needs",
+        "on the side of (u direction) x (v direction), rows being u; with rows along x and columns "
+        "along y that is +z",
+        "on the other",
+    ),
+    "poses": ("poses need", "on the side the normals point to", "on the other"),
 }
+"""Kinds of surface that have no usual side, and what their sides mean."""
 
 
 def read_given(section: Section, kind: str) -> dict[str, Any]:
     """The values of the keys of a grid or of poses, as they are written."""
-    values: dict[str, Any] = {}
-    file = section.text("file", required=True)
-    if file is not None:
-        values["file"] = os.path.abspath(os.path.expanduser(file))
+    values: dict[str, Any] = {**section.path(required=True)}
     units = section.word("units", UNITS, required=True)
     if units is not None:
         values["units"] = units
@@ -42,13 +46,11 @@ def read_given(section: Section, kind: str) -> dict[str, Any]:
 
 
 def check_side(section: Section, kind: str) -> None:
-    """Keep a fault where the side is not given: there is no usual one."""
-    if section.is_table and not section.has("side"):
-        section.fault(
-            "side",
-            f'is missing; {"a grid needs" if kind == "grid" else "poses need"} "outside" (the tool '
-            f'works on the side {SIDES[kind]}) or "inside" (on the other)',
-        )
+    """Keep a fault where the side is not given and there is no usual one."""
+    if kind in SIDES and section.is_table and not section.has("side"):
+        needs, outside, inside = SIDES[kind]
+        words = f'"outside" (the tool works {outside}) or "inside" ({inside})'
+        section.fault("side", f"is missing; {needs} {words}")
 
 
 def build_grid(values: Mapping[str, Any], pose: Mapping[str, Any], place: str) -> Patch:

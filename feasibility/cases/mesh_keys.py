@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Literal
 
 from coverable_errors import MISSING
 from feasibility.cases.keys import own_keys
-from feasibility.cases.table_reader import CaseError, Section, in_file, shown_path
+from feasibility.cases.table_reader import CaseError, Section, in_file, shown_path, surface_faults
 
 if TYPE_CHECKING:
     from surfaces.meshes import MeshSurface, TriangleMesh
@@ -34,9 +32,7 @@ def read_mesh_keys(section: Section, kind: str) -> dict[str, Any]:
     """The values of the own keys of a mesh or of STEP faces, as they are written."""
     values = section.take(*own_keys(kind))
     values.pop("file", None)
-    file = section.text("file", required=True)
-    if file is not None:
-        values["file"] = os.path.abspath(os.path.expanduser(file))
+    values |= section.path(required=True)
     if kind == "step":
         _check_choice(section, values)
     else:
@@ -44,12 +40,6 @@ def read_mesh_keys(section: Section, kind: str) -> dict[str, Any]:
     if "cell_size" in values:
         section.positive("cell_size", values["cell_size"])
     _check_parts(section, values)
-    if section.is_table and not section.has("side"):
-        section.fault(
-            "side",
-            f'is missing; {"STEP faces need" if kind == "step" else "a mesh needs"} "outside" (the '
-            'tool works where the faces look to) or "inside" (behind the faces)',
-        )
     return values
 
 
@@ -87,9 +77,9 @@ def build_mesh(values: Values, pose: Mapping[str, Any]) -> MeshSurface:
     except SurfaceError as error:
         raise CaseError(in_file(error, file, "surface")) from error
     if "faces" in values:
-        with _faults_of("faces"):
+        with surface_faults("faces", NAMES):
             triangles = take_faces(triangles, values["faces"])
-    with _faults_of(""):
+    with surface_faults(names=NAMES):
         return mesh(_part(triangles, values), **pose)
 
 
@@ -112,7 +102,7 @@ def build_step(values: Values, pose: Mapping[str, Any]) -> MeshSurface:
         own = [fault for fault in error.faults if fault.key.partition("[")[0] in CHOICE]
         faults = [fault._replace(place=shown_path(file)).renamed({}, "surface") for fault in own]
         raise CaseError(faults or in_file(error, file, "surface")) from error
-    with _faults_of(""):
+    with surface_faults(names=NAMES):
         return mesh(_part(triangles, values), **pose)
 
 
@@ -122,7 +112,7 @@ def cut_mesh(surface: MeshSurface, count: int | None, size: float | None) -> Mes
     Raises:
         CaseError: it cannot be cut so.
     """
-    with _faults_of("cells" if size is None else "cell_size"):
+    with surface_faults("cells" if size is None else "cell_size"):
         return surface.cells(count=count, size=size)
 
 
@@ -143,25 +133,9 @@ def _part(triangles: TriangleMesh, values: Values) -> TriangleMesh:
     }
     for key, take in parts.items():
         if key in values:
-            with _faults_of(key):
+            with surface_faults(key, NAMES):
                 triangles = take(values[key])
     return triangles
-
-
-@contextmanager
-def _faults_of(key: str) -> Iterator[None]:
-    """Turn faults of a surface into faults of the case; `key` is whose those without one are.
-
-    Raises:
-        CaseError: what happens inside is a fault.
-    """
-    from surfaces import SurfaceError
-
-    try:
-        yield
-    except SurfaceError as error:
-        faults = (fault._replace(key=fault.key or key) for fault in error.faults)
-        raise CaseError([fault.renamed(NAMES, "surface") for fault in faults]) from error
 
 
 def _check_mesh(section: Section, values: Values) -> None:

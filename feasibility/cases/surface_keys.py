@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
@@ -50,12 +49,10 @@ def read_patch(section: Section, kind: str) -> dict[str, Any]:
     if kind == "grid":
         return read_given(section, kind)
     values = section.take(*PATCHES[kind])
-    file = section.text("file") if kind == "bspline" else None
-    if file is not None:
-        values["file"] = os.path.abspath(os.path.expanduser(file))
-        if "points" in values:
-            section.fault("points", f"contradicts {section.name}.file; give one of the two")
-    return values
+    file = section.path() if kind == "bspline" else {}
+    if file and "points" in values:
+        section.fault("points", f"contradicts {section.name}.file; give one of the two")
+    return values | file
 
 
 def read_grid(section: Section) -> tuple[int, int] | Literal["auto"] | None:

@@ -19,7 +19,14 @@ from feasibility.cases.surface_keys import (
     read_patch,
     try_patch,
 )
-from feasibility.cases.table_reader import ORIGIN, CaseError, Section, Triple, frozen
+from feasibility.cases.table_reader import (
+    ORIGIN,
+    CaseError,
+    Section,
+    Triple,
+    frozen,
+    surface_faults,
+)
 
 if TYPE_CHECKING:
     from surfaces.patches import Patch
@@ -90,17 +97,14 @@ def build_pieces(values: Mapping[str, Any], pose: Mapping[str, Any]) -> Piecewis
     Raises:
         CaseError: a piece cannot be built, or they cannot be joined.
     """
-    from surfaces import SurfaceError
     from surfaces.piecewise import piecewise
 
     patches = [
         piece.build(f"surface.pieces[{k}]")
         for k, piece in enumerate(cast("tuple[PiecePart, ...]", values["pieces"]))
     ]
-    try:
+    with surface_faults():
         return piecewise(patches, gap=values.get("gap"), **pose)
-    except SurfaceError as error:
-        raise CaseError([fault.renamed({}, "surface") for fault in error.faults]) from error
 
 
 def cut_pieces(

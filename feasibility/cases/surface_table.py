@@ -84,14 +84,9 @@ class SurfacePart:
     @property
     def counts(self) -> list[int]:
         """The number of cells along u and v, or of all cells of a mesh; empty if not known yet."""
-        cells = self.cells
-        return (
-            []
-            if cells is None or cells == AUTO
-            else [cells]
-            if isinstance(cells, int)
-            else list(cells)
-        )
+        if self.cells is None or self.cells == AUTO:
+            return []
+        return [self.cells] if isinstance(self.cells, int) else list(self.cells)
 
     def table(self) -> dict[str, Any]:
         """The keys of the [surface] table; what is None is not written."""
@@ -105,22 +100,26 @@ class SurfacePart:
             "cells": self.cells,
         }
 
+    @property
+    def pose(self) -> dict[str, Any]:
+        """The arguments of a constructor that every surface has."""
+        return {"side": self.side, "position": self.position, "rpy_deg": self.rpy_deg}
+
     def build(self) -> Surface:
         """Build the surface; its file, if it has one, is read.
 
         Raises:
             CaseError: the numbers or the file describe no surface.
         """
-        pose = {"side": self.side, "position": self.position, "rpy_deg": self.rpy_deg}
         if self.kind == "mesh":
-            return build_mesh(self.values, pose)
+            return build_mesh(self.values, self.pose)
         if self.kind == "step":
-            return build_step(self.values, pose)
+            return build_step(self.values, self.pose)
         if self.kind == "piecewise":
-            return build_pieces(self.values, pose)
+            return build_pieces(self.values, self.pose)
         if self.kind == "poses":
-            return build_poses(self.values, pose).surface
-        return build_patch(self.kind, self.values, pose)
+            return build_poses(self.values, self.pose).surface
+        return build_patch(self.kind, self.values, self.pose)
 
     def cut(self, footprint: Footprint | None = None) -> Cells:
         """Build the surface and cut it into its cells.
@@ -132,8 +131,7 @@ class SurfacePart:
             CaseError: there is no such surface, or it cannot be cut so.
         """
         if self.kind == "poses":
-            pose = {"side": self.side, "position": self.position, "rpy_deg": self.rpy_deg}
-            return build_poses(self.values, pose)
+            return build_poses(self.values, self.pose)
         surface = self.build()
         if self.kind in ("mesh", "step"):
             return self._cut_mesh(cast("MeshSurface", surface), footprint)
@@ -174,8 +172,7 @@ def read_surface(table: Any, faults: list[Fault]) -> SurfacePart | None:
     if kind == "poses":
         hints["cells"] = "is not needed: each pose is a cell; leave it out"
     section.refuse_others(hints)
-    if kind in KINDS:
-        check_side(section, kind)
+    check_side(section, kind)
     if kind in PATCHES:
         try_patch(section, kind, values, pose)
     else:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from coverable_errors import (
@@ -118,6 +120,11 @@ class Section(Checks):
         self.wrong(key, value, f"must be {expected or self.keys[key].type}")
         return None
 
+    def path(self, key: str = "file", *, required: bool = False) -> dict[str, str]:
+        """The file that a key names, as {key: absolute path}; empty where there is none."""
+        text = self.text(key, required=required)
+        return {} if text is None else {key: absolute(text)}
+
     def word(self, key: str, options: Sequence[str], *, required: bool = False) -> str | None:
         """One of some words."""
         if not self.has(key) and not (required and self.is_table):
@@ -183,6 +190,11 @@ def is_text(value: Any) -> bool:
     return True
 
 
+def absolute(path: str) -> str:
+    """A path of a case, independent of the working directory."""
+    return os.path.abspath(os.path.expanduser(path))
+
+
 def frozen(value: Any, whole: bool = False) -> Any:
     """A value of a case as it is kept: arrays as tuples, numbers as floats unless `whole`."""
     if isinstance(value, Mapping):
@@ -190,6 +202,22 @@ def frozen(value: Any, whole: bool = False) -> Any:
     if isinstance(value, (list, tuple)):
         return tuple(frozen(item, whole) for item in value)
     return float(value) if is_number(value) and not whole else value
+
+
+@contextmanager
+def surface_faults(key: str = "", names: Mapping[str, str] = {}) -> Iterator[None]:
+    """Turn faults of a surface into faults of the case; `key` is whose those without one are.
+
+    Raises:
+        CaseError: what happens inside is a fault.
+    """
+    from surfaces import SurfaceError
+
+    try:
+        yield
+    except SurfaceError as error:
+        faults = (fault._replace(key=fault.key or key) for fault in error.faults)
+        raise CaseError([fault.renamed(names, "surface") for fault in faults]) from error
 
 
 def in_file(error: CoverableError, file: str, table: str) -> list[Fault]:

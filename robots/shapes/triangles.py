@@ -1,4 +1,4 @@
-"""Triangles from untrusted files, checked before a native library sees them; which bound a solid."""
+"""Triangles of untrusted files, checked before native libraries see them; which bound a solid."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coverable_files import FileFault, read_regular
-from coverable_meshes import MeshError, MeshFiles, distinct
+from coverable_meshes import MeshError, MeshFiles, distinct, largest_file
 from robots.errors import RobotError
 from robots.shapes.bodies import Triangles
 from robots.urdf import MeshFile
 
 LARGEST = 1e4  # [m] a coordinate beyond it is no link's
-LARGEST_FILE = 256 << 20  # bytes
 MOST_SECONDS = 60.0  # of processor time for all files of a robot
 MOST_KNOWN = 256  # contents that are kept
 
@@ -159,11 +158,12 @@ class MeshBodies:
         Raises:
             RobotError: the file cannot be read, or its triangles cannot be used.
         """
+        file = Path(mesh.path)
         try:
             if mesh.path not in self._digests:
-                data = read_regular(mesh.path, LARGEST_FILE, "a mesh of a robot")
+                data = read_regular(file, largest_file(file), "a mesh of a robot")
                 self._digests[mesh.path] = sha256(data).digest()
-            key = (self._digests[mesh.path], Path(mesh.path).suffix.lower(), mesh.scale)
+            key = (self._digests[mesh.path], file.suffix.lower(), mesh.scale)
             if key not in _known:
                 read = self._first_read(mesh)
                 if len(_known) >= MOST_KNOWN:
@@ -171,7 +171,7 @@ class MeshBodies:
                 _known[key] = read
             return _known[key]
         except FileFault as fault:
-            raise RobotError(fault.faults, Path(mesh.path).name) from fault
+            raise RobotError(fault.faults, file.name) from fault
         except MeshError as fault:
             raise RobotError(fault.faults) from fault
 

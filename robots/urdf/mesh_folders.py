@@ -17,7 +17,6 @@ from robots.urdf.xml import BadValue
 
 # .gltf and the like pull in other files.
 MESH_SUFFIXES = (".stl", ".dae", ".obj", ".ply", ".off", ".glb")
-MAX_MESH_BYTES = 256 * 2**20
 MAX_PATH = 500  # characters; following a path takes time for each of its parts
 PACKAGE_LEVELS = 5  # how far above the URDF a package.xml is looked for
 
@@ -74,8 +73,6 @@ class MeshFolders:
                 continue
             if not stat.S_ISREG(status.st_mode):
                 raise BadValue("is not a regular file")
-            if status.st_size > MAX_MESH_BYTES:
-                raise BadValue(f"has {status.st_size:,} bytes, over {MAX_MESH_BYTES:,}")
             return str(real)
         if outside is not None:
             raise BadValue(

@@ -10,8 +10,15 @@ from bad_cases import GOOD
 
 from feasibility.cases import CaseError, toml_document
 from feasibility.cases.case import Case, builtin_cases
-from feasibility.cases.toml import TomlError, parse_setting, parse_toml
-from feasibility.cases.toml_limits import MOST_BRACKETS, MOST_KEYS, MOST_PARTS, too_much
+from feasibility.cases.toml import (
+    MOST_BRACKETS,
+    MOST_KEYS,
+    MOST_PARTS,
+    TomlError,
+    parse_setting,
+    parse_toml,
+    too_much,
+)
 from feasibility.studies.file import read_study
 
 PARTS = ("a", '"a"', "'a'", '"a\\""', '"#"', '"["', "''", "1", "a-b", '"é"')
