@@ -51,7 +51,7 @@ class Fault(NamedTuple):
 
         Args:
             names: the key of each argument, where it differs.
-            table: what stands before the key.
+            table: put before the key.
         """
         argument, rest = re.fullmatch(r"([^.\[]*)(.*)", self.key, re.DOTALL).groups()  # type: ignore[union-attr]
         key = names.get(argument, argument) + rest
@@ -75,7 +75,7 @@ class CoverableError(ValueError):
     """
 
     after_key = " "
-    """What stands between key and message."""
+    """Between key and message."""
 
     def __init__(
         self, faults: str | Fault | Iterable[str | Fault], source: str | None = None
@@ -138,7 +138,7 @@ class Checks:
         self.faults: list[Fault] = []
 
     def wrong(self, key: str, value: object, expected: str) -> None:
-        """Keep the fault that `value` is not as it must be.
+        """Keep the fault that `value` is not what was expected.
 
         Args:
             key: the argument.
@@ -189,7 +189,7 @@ class Checks:
     def whole(
         self, key: str, value: object, low: int, high: int = LARGEST_WHOLE, or_word: str = ""
     ) -> int:
-        """A whole number, `low` .. `high`; `or_word` is what else would have done."""
+        """A whole number, `low` .. `high`; `or_word` is what else is accepted."""
         if (
             isinstance(value, Integral)
             and not isinstance(value, bool)

@@ -32,7 +32,7 @@ class Ended(NamedTuple):
     """What a process left behind."""
 
     written: bytes
-    """At most as much as was asked for."""
+    """At most as many bytes as `Limits.output`."""
     too_slow: bool = False
     """It used up its processor time."""
     too_late: bool = False

@@ -210,7 +210,7 @@ def _placed_primitives(scene: Json) -> Iterator[_Placed]:
     Without a scene, all nodes are shown; without nodes, all meshes as they are.
 
     Raises:
-        MeshError: nodes that form no tree, are damaged, or bend their mesh with a skeleton.
+        MeshError: nodes that form no tree, are damaged, or deform their mesh with a skeleton.
     """
     nodes = scene.get("nodes") or [{"mesh": k} for k in range(len(scene.get("meshes", [])))]
     if scene.get("nodes") and scene.get("scenes"):
@@ -233,7 +233,7 @@ def _placed_primitives(scene: Json) -> Iterator[_Placed]:
         if "mesh" in node:
             if "skin" in node:
                 raise MeshError(
-                    f"{where} bends its mesh with a skeleton (skin); export the shape itself"
+                    f"{where} deforms its mesh with a skeleton (skin); export the shape itself"
                 )
             mesh = _item(scene, "meshes", node["mesh"], where)
             for number, primitive in enumerate(mesh.get("primitives", [])):

@@ -182,7 +182,7 @@ class Lines:
     """The lines of a text file that say something, split into words."""
 
     def __init__(self, stream: BinaryIO, comment: bytes = b"") -> None:
-        """Read on from where the stream stands; what follows `comment` in a line is left out."""
+        """Read on from where the stream is; what follows `comment` in a line is left out."""
         self.stream = stream
         self.comment = comment
         self.number = 0
@@ -217,7 +217,7 @@ class Lines:
         return MeshError(f"line {self.number} {fault}")
 
     def floats(self, words: list[bytes]) -> list[float]:
-        """Numbers; NaN and infinities are let through, for what uses them to judge.
+        """Numbers; NaN and infinities are let through; what uses them checks.
 
         Raises:
             MeshError: a word is not a number.

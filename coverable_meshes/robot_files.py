@@ -21,7 +21,7 @@ from coverable_meshes.errors import MeshError
 from coverable_meshes.mesh_file import read_parts
 from coverable_meshes.raw_mesh import RawMesh
 
-MOST_TRIANGLES = 1_500_000  # of a whole robot, each use of a file counted
+MOST_TRIANGLES = 1_500_000  # of a robot, each use of a file counted
 MOST_SECONDS = 8.0  # of processor time, for a picture
 
 

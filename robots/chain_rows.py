@@ -1,7 +1,7 @@
 """The compiled chain's kinematics at many configurations at once, without a compiler.
 
 The same steps as `frames` and `jacobians` in `robots.chain`, on arrays over the configurations:
-for tens of thousands of them six times faster than asking Pinocchio one by one.
+for tens of thousands of them six times faster than Pinocchio one by one.
 """
 
 from __future__ import annotations

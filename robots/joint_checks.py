@@ -66,11 +66,12 @@ def no_limit_set(name: str, known: Iterable[str]) -> str:
 def numbers(
     values: ArrayLike, what: str, shape: tuple[int, ...] | None = None
 ) -> NDArray[np.float64]:
-    """A copy of `values` as an array of floats of that shape; RobotError where it is none."""
+    """A write-protected copy as an array of floats of that shape; RobotError where it is none."""
     try:
         array = np.array(values, dtype=float)
     except (TypeError, ValueError) as error:
         raise RobotError(f"{what} must be an array of numbers, got {values!r}") from error
     if shape is not None and array.shape != shape:
         raise RobotError(f"{what} has shape {array.shape}, not {shape}")
+    array.flags.writeable = False
     return array

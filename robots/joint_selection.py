@@ -17,7 +17,6 @@ MOST_NAMES = 40  # that a message lists
 MOST_GUESSES = 20  # unknown names for which a known one is looked up
 MOST_OTHERS = 8  # leaf links that a note lists
 
-
 TOOL_LINKS = ("tcp", "tool0", "flange", "ee_link")
 """Names of the link that carries the tool, as arms have them; the first one present is taken."""
 
@@ -62,50 +61,31 @@ def select_joints(
         what = f"{checked.path} has no link {surface_link!r} that could carry the surface; {hint}"
         return Selection(tool, (), {}, notes, (*faults, Fault("surface_link", what)), False)
     held = {joint: value for joint, value in lock.items() if joint not in wrong}
-    way = _way(checked, tool, surface_link) if tool else _Way((), ())
-    free = _free_joints(way.between, held)
+    outwards = checked.path_to(tool) if tool else ()
+    inwards = checked.path_to(surface_link) if tool and surface_link is not None else ()
+    common = [joint for joint in outwards if joint in inwards]  # move surface and tool together
+    between = [joint for joint in (*reversed(inwards), *outwards) if joint not in common]
+    free = _free_joints(between, held)
     of_chain = _chain_faults(checked, tool, free, limits) if tool else []
     if tool and not free:
-        of_chain = [_nothing_moves(checked, tool, surface_link, way)]
+        of_chain = [_nothing_moves(checked, tool, surface_link, between, common)]
     locked = _locked_values(checked, {joint.name for joint in free}, held)
-    notes += tuple(_held_for_both(way.common, locked, held, surface_link))
+    notes += tuple(
+        moves_both(joint.name, surface_link or "", locked[joint.name], joint.kind == "prismatic")
+        for joint in common
+        if joint.moves and joint.name not in held
+    )
     is_chain = bool(tool) and not of_chain
     return Selection(tool, free, locked, notes, (*faults, *of_chain), is_chain)
 
 
-class _Way(NamedTuple):
-    """Joints, fixed ones too."""
-
-    between: tuple[JointInfo, ...]
-    """From the root link, or the link that carries the surface, to the tool frame."""
-    common: tuple[JointInfo, ...]
-    """That move the surface and the tool together."""
-
-
-def _way(checked: CheckedUrdf, tool: str, surface_link: str | None) -> _Way:
-    """The joints on the way to the tool frame."""
-    outwards = checked.path_to(tool)
-    inwards = checked.path_to(surface_link) if surface_link is not None else ()
-    names = {joint.name for joint in inwards} & {joint.name for joint in outwards}
-    apart = [joint for joint in (*reversed(inwards), *outwards) if joint.name not in names]
-    return _Way(tuple(apart), tuple(joint for joint in outwards if joint.name in names))
-
-
-def _held_for_both(
-    common: Sequence[JointInfo],
-    locked: Mapping[str, float],
-    lock: Mapping[str, float],
+def _nothing_moves(
+    checked: CheckedUrdf,
+    tool: str,
     surface_link: str | None,
-) -> list[str]:
-    """That joints are held because they move surface and tool together."""
-    return [
-        moves_both(joint.name, surface_link or "", locked[joint.name], joint.kind == "prismatic")
-        for joint in common
-        if joint.moves and joint.name not in lock
-    ]
-
-
-def _nothing_moves(checked: CheckedUrdf, tool: str, surface_link: str | None, way: _Way) -> Fault:
+    between: Sequence[JointInfo],
+    common: Sequence[JointInfo],
+) -> Fault:
     """The fault of an arm without a free joint."""
     if surface_link is None:
         return Fault(
@@ -113,10 +93,10 @@ def _nothing_moves(checked: CheckedUrdf, tool: str, surface_link: str | None, wa
             f"no free joint lies between the root link {checked.root!r} and {tool!r} of "
             f"{checked.path}; choose a tool_frame further out, or lock fewer joints",
         )
-    moving = [joint.name for joint in way.between if joint.moves]
+    moving = [joint.name for joint in between if joint.moves]
     if moving:
         what = f"every joint between it and the tool is held: {', '.join(moving)}; lock fewer"
-    elif any(joint.moves for joint in way.common):
+    elif any(joint.moves for joint in common):
         what = f"it moves with the tool, {tool!r}: no joint lies between the two"
     else:
         what = f"neither it nor the tool, {tool!r}, is moved by any joint"
@@ -194,7 +174,7 @@ def _lock_faults(checked: CheckedUrdf, lock: Mapping[str, float]) -> dict[str, F
 
 
 def _free_joints(between: Sequence[JointInfo], lock: Mapping[str, float]) -> tuple[JointInfo, ...]:
-    """The moving joints on the way to the tool that nothing holds.
+    """The moving joints between surface and tool that nothing holds.
 
     A mimic joint is held when the joint that leads it is.
     """

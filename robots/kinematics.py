@@ -47,11 +47,11 @@ class Kinematics:
         placement = self._data.oMf[self._frame]
         self._translation = placement.translation  # live views: looked up once, copied when kept
         self._rotation = placement.rotation
-        self._pose = _whole(placement)
+        self._pose = _pose_view(placement)
         self._twists = self._data.J.T  # (n, 6), one behind another in memory
         first, second = self._data.oMi[0], self._data.oMi[1]
-        self._rotations = _all_of(first.rotation, second.rotation, robot.n + 1)
-        self._translations = _all_of(first.translation, second.translation, robot.n + 1)
+        self._rotations = _joints_view(first.rotation, second.rotation, robot.n + 1)
+        self._translations = _joints_view(first.translation, second.translation, robot.n + 1)
 
     def configuration(self, q: ArrayLike) -> NDArray[np.float64]:
         """Pinocchio's configuration vector (nq,) for n real joint values (rad or m)."""
@@ -185,7 +185,7 @@ class Kinematics:
         return velocities
 
 
-def _all_of(
+def _joints_view(
     first: NDArray[np.float64], second: NDArray[np.float64], count: int
 ) -> NDArray[np.float64]:
     """One live view (count, ...) of the same member of all of Pinocchio's joint placements.
@@ -198,7 +198,7 @@ def _all_of(
     return np.lib.stride_tricks.as_strided(first, shape, strides, writeable=False)
 
 
-def _whole(placement: pin.SE3) -> NDArray[np.float64]:
+def _pose_view(placement: pin.SE3) -> NDArray[np.float64]:
     """A live view (12,) of a placement: the columns of its rotation, then its translation."""
     rotation, translation = placement.rotation, placement.translation
     start, behind = (view.__array_interface__["data"][0] for view in (rotation, translation))
@@ -211,7 +211,7 @@ def _whole(placement: pin.SE3) -> NDArray[np.float64]:
 def _points_and_rotations(
     poses: list[bytes],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Translations (m, 3) and rotations (m, 3, 3) of copies of what `_whole` views."""
+    """Translations (m, 3) and rotations (m, 3, 3) of copies of what `_pose_view` shows."""
     values = np.frombuffer(bytearray().join(poses)).reshape(-1, 12)
     rotations = values[:, :9].reshape(-1, 3, 3).transpose(0, 2, 1)
     return values[:, 9:].copy(), np.ascontiguousarray(rotations)

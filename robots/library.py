@@ -176,16 +176,16 @@ def _read(
     folders: tuple[str, ...],
     mounting: Mounting,
     xacro_args: Mapping[str, Any],
-    **asked: Any,
+    **options: Any,
 ) -> Robot:
     """Read the URDF of an arm.
 
     Args:
-        info: the arm, with the tool frame and the held joints that are asked for.
+        info: the arm, with the tool frame and the held joints.
         folders: where meshes are looked up, besides those of `info`.
         mounting: of tool, arm and surface; the axes may carry the surface.
         xacro_args: of a .xacro file.
-        asked: limits and axes of the tool, as in `load_robot`.
+        options: limits and axes of the tool, as in `load_robot`.
     """
     from robots.pinocchio_model import robot_from_urdf
     from robots.urdf import carrier_of_surface, check_urdf
@@ -199,7 +199,7 @@ def _read(
         mounting=mounting._replace(surface_link=link),
         lock=info.lock,
         limit_sets=_limit_sets(Path(info.limits)) if info.limits is not None else None,
-        **asked,
+        **options,
     )
     return replace(robot, xacro_args=tuple(xacro_args.items())) if xacro_args else robot
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 class Robot:
     """A serial chain of n one-dof joints from the surface to a tool centre point (TCP).
 
-    The root frame is the world, in which the URDF's root link stands at `base`; or, where a link
+    The root frame is the world, in which the URDF's root link is at `base`; or, where a link
     carries the surface, that link's frame (`surface_link`). The TCP is the frame of the link
     `tool_frame`, or at `tcp` in it.
 
@@ -83,60 +83,61 @@ class Robot:
 
     def __post_init__(self) -> None:
         """Copy and write-protect the arrays, and check that they fit together."""
-        n = len(self.joint_names)
-        shapes: dict[str, tuple[int]] = {"approach_axis": (3,), "reference_axis": (3,)}
-        shapes |= {"lower": (n,), "upper": (n,)}
-        for name, shape in shapes.items():
-            array = numbers(getattr(self, name), f"robot {self.name!r}: {name}", shape)
-            if np.isnan(array).any() and not (name == "reference_axis" and np.isnan(array).all()):
-                raise RobotError(f"robot {self.name!r}: {name} holds NaN")
-            object.__setattr__(self, name, array)
+        n, source = len(self.joint_names), f"robot {self.name!r}"
+        kept: dict[str, Any] = {
+            name: numbers(getattr(self, name), f"{source}: {name}", (n,))
+            for name in ("lower", "upper")
+        }
+        for name, limits in kept.items():
+            if np.isnan(limits).any():
+                raise RobotError(f"{name} holds NaN", source)
+        kept |= self._unit_axes(source)
         if self.start is not None:
-            start = numbers(self.start, f"robot {self.name!r}: start", (n,))
+            kept["start"] = start = numbers(self.start, f"{source}: start", (n,))
             if not np.isfinite(start).all():
-                raise RobotError(f"robot {self.name!r}: start must be finite, got {start.tolist()}")
-            start.flags.writeable = False
-            object.__setattr__(self, "start", start)
-        speeds = numbers(self.max_velocity, f"robot {self.name!r}: max_velocity")
+                raise RobotError(f"start must be finite, got {start.tolist()}", source)
+        speeds = numbers(self.max_velocity, f"{source}: max_velocity")
         if speeds.shape not in ((), (n,)) or (speeds <= 0.0).any():
             raise RobotError(
-                f"robot {self.name!r}: max_velocity must be {n} positive numbers (rad/s or m/s), "
-                f"nan where unknown; got {speeds.tolist()}"
+                f"max_velocity must be {n} positive numbers (rad/s or m/s), nan where unknown; "
+                f"got {speeds.tolist()}",
+                source,
             )
-        object.__setattr__(self, "max_velocity", np.broadcast_to(speeds, n))  # read-only
-        self._normalise_axes()
-        for array in (self.approach_axis, self.reference_axis, self.lower, self.upper):
-            array.flags.writeable = False
+        kept["max_velocity"] = np.broadcast_to(speeds, n)  # read-only
+        sets = {
+            name: numbers(table, f"{source}: limit set {name!r}", (n, 2))
+            for name, table in self.limit_sets.items()
+        }
+        kept["limit_sets"] = MappingProxyType(sets)
+        kept["locked"] = MappingProxyType(dict(self.locked))
+        for name, value in kept.items():
+            object.__setattr__(self, name, value)
         names, kinds = self.joint_names, self.joint_kinds
         faults = joint_faults(names, kinds, self.lower, self.upper, self.start)
         if faults:
-            raise RobotError(faults, f"robot {self.name!r}")
-        sets = {
-            name: numbers(table, f"robot {self.name!r}: limit set {name!r}", (n, 2))
-            for name, table in self.limit_sets.items()
-        }
-        for table in sets.values():
-            table.flags.writeable = False
-        object.__setattr__(self, "limit_sets", MappingProxyType(sets))
-        object.__setattr__(self, "locked", MappingProxyType(dict(self.locked)))
+            raise RobotError(faults, source)
 
-    def _normalise_axes(self) -> None:
-        """Bring both axes of the tool to length one, and the reference axis across the other."""
-        approach = unit_axis(self.approach_axis)
+    def _unit_axes(self, source: str) -> dict[str, NDArray[np.float64]]:
+        """Both axes of the tool, of length one, the reference axis across the other."""
+        names = ("approach_axis", "reference_axis")
+        given = [numbers(getattr(self, name), f"{source}: {name}", (3,)) for name in names]
+        approach = unit_axis(given[0])
         if np.isnan(approach).any():
             raise RobotError(
-                f"robot {self.name!r}: approach_axis must be a finite vector that is not zero, "
-                f"such as [0, 0, 1]; got {self.approach_axis.tolist()}"
+                "approach_axis must be a finite vector that is not zero, such as [0, 0, 1]; "
+                f"got {given[0].tolist()}",
+                source,
             )
-        reference = made_orthogonal(self.reference_axis, approach)
+        reference = made_orthogonal(given[1], approach)
         if np.isnan(reference).any():
             raise RobotError(
-                f"robot {self.name!r}: reference_axis must be a finite vector that is not zero and "
-                f"not parallel to the approach axis {approach.tolist()}, for roll is measured by "
-                f"its part across it; got {self.reference_axis.tolist()}"
+                "reference_axis must be a finite vector that is not zero and not parallel to the "
+                f"approach axis {approach.tolist()}, for roll is measured by its part across it; "
+                f"got {given[1].tolist()}",
+                source,
             )
-        object.__setattr__(self, "approach_axis", approach)
-        object.__setattr__(self, "reference_axis", reference)
+        approach.flags.writeable = reference.flags.writeable = False
+        return {"approach_axis": approach, "reference_axis": reference}
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle as a call of the constructor (mapping proxies do not pickle)."""
@@ -226,7 +227,7 @@ class Robot:
 
     @cached_property
     def chain(self) -> Chain:
-        """The compiled forward kinematics, compared with Pinocchio when first asked for.
+        """The compiled forward kinematics, compared with Pinocchio at first use.
 
         Raises:
             RobotError: the free joints form no serial chain, or the two differ by more than 1e-9 m
@@ -248,8 +249,8 @@ class Robot:
     def relative_to(self, link: str) -> Robot:
         """The same arm as it is seen from one of its links, which carries the surface.
 
-        Its joints are those on the way from the link to the tool, the link's own first: those that
-        carry the link are turned round. Their names, values, limits and velocities are the same;
+        Its joints are those between the link and the tool, the link's own first: those that
+        carry the link are reversed. Their names, values, limits and velocities are the same;
         joints that move both are held at zero, or at the limit next to it, and a note says so.
         Joints that the arm holds stay held: `load_robot(..., surface_link=link)` frees them.
 

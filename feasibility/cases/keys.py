@@ -22,7 +22,7 @@ class Key:
     """One key of a case file."""
 
     table: str
-    """Where it stands: "robot", "surface", "surface.cut", ..."""
+    """The table that it is in: "robot", "surface", "surface.cut", ..."""
     name: str
     type: str
     """What the value is: "must be ..." in messages."""
@@ -33,7 +33,7 @@ class Key:
     default: str | None = None
     """What holds without it, as TOML or in words; None where the key is needed."""
     kind: str = ""
-    """The one kind of surface that has it; empty where that does not matter."""
+    """The one kind of surface that has it; empty where every kind has it."""
     argument: str = ""
     """What a patch's constructor calls it."""
 

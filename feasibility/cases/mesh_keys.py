@@ -44,7 +44,7 @@ def read_mesh_keys(section: Section, kind: str) -> dict[str, Any]:
 
 
 def read_count(section: Section) -> int | Literal["auto"] | None:
-    """How many cells, or as many as the footprint asks for; None where `cell_size` is given."""
+    """How many cells, or as many as the footprint needs; None where `cell_size` is given."""
     written = section.take("cells")
     if section.has("cell_size"):
         if written:

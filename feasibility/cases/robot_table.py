@@ -273,8 +273,8 @@ def _axes_poses_and_lock(section: Section) -> dict[str, Any]:
         for key in ("approach_axis", "reference_axis", *POSES):
             if wrong & {key, f"{key}.position", f"{key}.rpy_deg"}:
                 values.pop(key, None)
-    whole = "xacro_args"  # 1 and 1.0 are two texts
-    kept = {key: frozen(value, key == whole) for key, value in values.items() if key not in POSES}
+    exact = "xacro_args"  # 1 and 1.0 are two texts
+    kept = {key: frozen(value, key == exact) for key, value in values.items() if key not in POSES}
     return kept | {key: PosePart(*frozen(values[key])) for key in POSES if key in values}
 
 

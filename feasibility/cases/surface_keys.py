@@ -56,7 +56,7 @@ def read_patch(section: Section, kind: str) -> dict[str, Any]:
 
 
 def read_grid(section: Section) -> tuple[int, int] | Literal["auto"] | None:
-    """Cells along u and v, at least one of each, or as many as the footprint asks for."""
+    """Cells along u and v, at least one of each, or as many as the footprint needs."""
     written = section.take("cells").get("cells", MISSING)
     if written == "auto":
         return "auto"

@@ -110,7 +110,7 @@ def build_pieces(values: Mapping[str, Any], pose: Mapping[str, Any]) -> Piecewis
 def cut_pieces(
     surface: Piecewise, values: Mapping[str, Any], footprint: Footprint | None
 ) -> PieceCells:
-    """Cut each piece into its grid, fine enough for a footprint (m) where that is asked for.
+    """Cut each piece into its grid, fine enough for a footprint (m) where it is "auto".
 
     Raises:
         CaseError: they cannot be cut so.

@@ -56,7 +56,7 @@ class SurfacePart:
     """The kind's own keys, in the units of the case; arrays as tuples, paths absolute."""
     cells: tuple[int, int] | int | Literal["auto"] | None
     """Along u and v of a patch; of a mesh their number, or None where `cell_size` is given; "auto"
-    for as many as the footprint asks for; None for pieces, which have their own, and for poses,
+    for as many as the footprint needs; None for pieces, which have their own, and for poses,
     each of which is one."""
     side: Literal["inside", "outside"] = "inside"
     position: Triple = ORIGIN
@@ -77,7 +77,7 @@ class SurfacePart:
 
     @property
     def automatic(self) -> bool:
-        """Whether it takes a footprint to tell how many cells there are."""
+        """Whether the number of cells depends on the footprint."""
         pieces = cast("tuple[PiecePart, ...]", self.values.get("pieces", ()))
         return self.cells == AUTO or any(piece.cells == AUTO for piece in pieces)
 

@@ -1,4 +1,4 @@
-"""Reading one table of a case by the reference of keys; constructors judge the values."""
+"""Reading one table of a case by the reference of keys; constructors check the values."""
 
 from __future__ import annotations
 
@@ -195,13 +195,13 @@ def absolute(path: str) -> str:
     return os.path.abspath(os.path.expanduser(path))
 
 
-def frozen(value: Any, whole: bool = False) -> Any:
-    """A value of a case as it is kept: arrays as tuples, numbers as floats unless `whole`."""
+def frozen(value: Any, exact: bool = False) -> Any:
+    """A value of a case as it is kept: arrays as tuples, numbers as floats unless `exact`."""
     if isinstance(value, Mapping):
-        return {key: frozen(item, whole) for key, item in value.items()}
+        return {key: frozen(item, exact) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return tuple(frozen(item, whole) for item in value)
-    return float(value) if is_number(value) and not whole else value
+        return tuple(frozen(item, exact) for item in value)
+    return float(value) if is_number(value) and not exact else value
 
 
 @contextmanager

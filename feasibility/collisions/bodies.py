@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.collisions.scene import Obstacle
-from robots.shapes import Polytope, Solid
+from robots.shapes import LeftOut, Polytope, Solid
 
 if TYPE_CHECKING:
     from surfaces import Sheet
@@ -50,18 +50,6 @@ class Pair:
     """A link, 'tool', an object of the scene, or 'surface'."""
     clearance: float
     """m, the least distance between them."""
-
-
-@dataclass(frozen=True, slots=True)
-class LeftOut:
-    """Two owners that are not asked for, and why."""
-
-    first: str
-    second: str
-    why: str
-    """adjacent, rigid, always, allowed, srdf or contact."""
-    rate: float | None = None
-    """Share of random configurations in which they collide; None where it was not measured."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -117,7 +117,7 @@ def _arm(
 
     shapes = hulls
     if with_itself and fineness == "hulls":
-        shapes = with_crude_links_cut(robot, hulls, sorted_pairs(hulls).asked)
+        shapes = with_crude_links_cut(robot, hulls, sorted_pairs(hulls).checked)
 
     @cache
     def pairs() -> LinkPairs:
@@ -199,8 +199,8 @@ class _Pairs:
     def add_links(self, links: LinkPairs) -> None:
         """Links against each other, and against the tool."""
         self.notes = links.notes
-        self.left_out += [LeftOut(p.first, p.second, p.why, p.rate) for p in links.left_out]
-        for first, second in links.asked:
+        self.left_out += links.left_out
+        for first, second in links.checked:
             self._ask(first, second, self.collision.clearance)
 
     def add_objects(self, touching: bool) -> None:

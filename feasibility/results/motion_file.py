@@ -195,7 +195,7 @@ def _checked(q: NDArray[np.float64], robot: Robot, name: str, notes: tuple[str, 
 
 
 def _turns(q: NDArray[np.float64], robot: Robot) -> list[str]:
-    """Says so where a joint seems to be wrapped at half a turn: it goes all the way round."""
+    """A note where a joint seems to be wrapped at half a turn: it jumps by a turn."""
     jumps = (np.abs(np.diff(q, axis=0)) > math.pi) & ~robot.prismatic
     if not jumps.any():
         return []

@@ -159,7 +159,7 @@ def places(cells: Cells) -> NDArray[np.float64]:
 def check_cells(cells: Cells, label: str, archive: Archive) -> None:
     """Refuse cells that are not the ones that the result was found for.
 
-    A mesh file may have changed since, and so may the way in which surfaces are cut.
+    A mesh file may have changed since, and so may how surfaces are cut.
 
     Args:
         cells: as the case makes them now.

@@ -146,7 +146,7 @@ def load_result(path: str | os.PathLike[str]) -> Result:
 
     Raises:
         ResultError: it is no such file, is damaged, is of a newer format, or its robot or
-            surface is not to be had here as it was.
+            surface is not available here as it was.
     """
     try:
         archive = Archive(Path(path), "a result file of `coverable check --save`")

@@ -62,24 +62,22 @@ def read_certificate(fields: Fields) -> Certificate | None:
     if fields.entries.get("certificate") is None:
         return None
     row = fields.table("certificate")
-    margin = row.entries.get("min_limit_margin")
+    margin = _maybe(row, "min_limit_margin")
+    maybe = ("min_clearance", "max_roll", "max_speed", "min_singular_value")
     return Certificate(
         waypoints=row.get("waypoints", int, "a whole number"),
         max_position_error=row.number("max_position_error"),
         max_angle=row.number("max_angle"),
-        min_limit_margin=np.inf if margin is None else row.number("min_limit_margin"),
-        min_clearance=_maybe(row, "min_clearance"),
+        min_limit_margin=np.inf if margin is None else margin,
         nearest_pair=_pair(row, "nearest_pair"),
-        max_roll=_maybe(row, "max_roll"),
-        max_speed=_maybe(row, "max_speed"),
-        min_singular_value=_maybe(row, "min_singular_value"),
+        **{key: _maybe(row, key) for key in maybe},
         stops_in_place=_count(row, "stops_in_place"),
         corners=_count(row, "corners"),
     )
 
 
 def read_left_out(fields: Fields) -> tuple[LeftOut, ...]:
-    """The pairs that were not asked for."""
+    """The pairs that were left out."""
     found = []
     given = fields.entries.get("pairs_left_out")
     for k, entry in enumerate(() if given is None else fields.get("pairs_left_out", list, "rows")):

@@ -1,4 +1,4 @@
-"""Where an arm stands and what it carries: poses as they are given, base, TCP, the tool's axes."""
+"""Where an arm is mounted: poses as they are given, its base, TCP, the tool's axes."""
 
 from lazy_loader import attach_stub
 

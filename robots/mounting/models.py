@@ -96,7 +96,7 @@ def _locked(model: pin.Model, held: Sequence[int], rest: NDArray[np.float64]) ->
 
 
 def _joints_between(model: pin.Model, frame: int, tool: int) -> tuple[list[int], list[int]]:
-    """The joints on the way from one frame to another, as numbers of a model.
+    """The joints between two frames, as numbers of a model.
 
     Args:
         model: a tree of joints.
@@ -134,7 +134,7 @@ def world_frame(model: pin.Model) -> int:
 def rerooted(model: pin.Model, frame: int, tool: int) -> pin.Model:
     """The chain from one frame of a model to another, as a model of its own.
 
-    Joints of one degree of freedom on the way from `frame` to `tool` are kept; all others have to
+    Joints of one degree of freedom between `frame` and `tool` are kept; all others have to
     be locked before. Continuous joints become revolute ones, so that their value is a real number.
 
     Args:

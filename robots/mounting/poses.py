@@ -45,7 +45,7 @@ def matrix_of(
         position: (3,) m.
         rpy_deg: (3,) degrees.
         furthest: m, largest coordinate of the position.
-        before: what stands before the two names.
+        before: put before the two names.
     """
     expected = "must be three finite numbers (metres)"
     place = checks.numbers(f"{before}position", position, 3, expected, furthest)

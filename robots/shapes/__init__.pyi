@@ -8,8 +8,8 @@ from .hulls import outer_hull as outer_hull
 from .links import LinkShapes as LinkShapes
 from .links import link_shapes as link_shapes
 from .links import outer_bodies as outer_bodies
+from .pairs import LeftOut as LeftOut
 from .pairs import LinkPairs as LinkPairs
-from .pairs import PairLeftOut as PairLeftOut
 from .pairs import faults_of_srdf as faults_of_srdf
 from .pairs import link_pairs as link_pairs
 from .sampling import with_crude_links_cut as with_crude_links_cut

@@ -35,7 +35,7 @@ class LinkShapes:
     frame, such as tool0 or flange; nor is the root link, which is often just called world.
     """
     notes: tuple[str, ...]
-    """What stands in for what, and what is not checked, one sentence each."""
+    """Which shapes stand in for which, and what is not checked, one sentence each."""
     embodied: frozenset[str]
     """Links that are more than a frame, whether they are checked or not."""
     root: str

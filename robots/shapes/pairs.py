@@ -1,4 +1,4 @@
-"""Which pairs of an arm's bodies are asked for, and which are not, each with its reason."""
+"""Which pairs of an arm's bodies are checked, and which are left out, each with its reason."""
 
 from __future__ import annotations
 
@@ -25,23 +25,24 @@ MOST_LISTED = 12  # pairs or links in one note
 
 
 @dataclass(frozen=True, slots=True)
-class PairLeftOut:
-    """Two owners of bodies that are not asked for, and why."""
+class LeftOut:
+    """Two owners of bodies that are not checked against each other, and why."""
 
     first: str
     second: str
-    why: Why
-    rate: float | None
-    """Share of random configurations in which they collide; None for a rigid pair."""
+    why: str
+    """adjacent, rigid, always, allowed, srdf or contact."""
+    rate: float | None = None
+    """Share of random configurations in which they collide; None where it was not measured."""
 
 
 @dataclass(frozen=True, slots=True)
 class LinkPairs:
     """The pairs of owners of bodies."""
 
-    asked: tuple[Pair, ...]
+    checked: tuple[Pair, ...]
     """Base to tip."""
-    left_out: tuple[PairLeftOut, ...]
+    left_out: tuple[LeftOut, ...]
     notes: tuple[str, ...]
     """What a user should know, one sentence each."""
 
@@ -55,13 +56,13 @@ def link_pairs(
     others: Iterable[str] = (),
     tool_solids: Sequence[Solid] = (),
 ) -> LinkPairs:
-    """Sort the pairs of links, and of links and tool, into those that are asked for and others.
+    """Sort the pairs of links, and of links and tool, into those that are checked and others.
 
     A pair is left out where no motion changes the distance ("rigid"), where nothing with a shape
     lies between the two along the arm ("adjacent": they meet at their joint, and what keeps them
     apart otherwise are its limits), where the user says so ("allowed"), where an SRDF does
     ("srdf"), and where both the convex bodies and the exact shapes collide in each of 1,000 random
-    configurations and at zero ("always"). A pair that never collided in these is asked for: samples
+    configurations and at zero ("always"). A pair that never collided in these is checked: samples
     prove nothing.
 
     Args:
@@ -141,21 +142,21 @@ def _measured(
             [f"{first} - {second}" for first, second in alike if (first, second) in parted]
         )
         notes.append(
-            f"asked for, though their convex bodies collide in each of {len(q):,} random "
+            f"checked, though their convex bodies collide in each of {len(q):,} random "
             f"configurations, where their exact shapes do not: {named}; the search finds nothing "
             "with one hull for each shape, and may with convex pieces"
         )
     left_out = [
-        PairLeftOut(*pair, why, rates.get(pair)) for pair, why in found.items() if why is not None
+        LeftOut(*pair, why, rates.get(pair)) for pair, why in found.items() if why is not None
     ]
     always = [f"{pair.first} - {pair.second}" for pair in left_out if pair.why == "always"]
     if always:
         notes.append(
-            f"not asked for, because their convex bodies collide in each of {len(q):,} random "
+            f"not checked, because their convex bodies collide in each of {len(q):,} random "
             f"configurations: {_listed(always)}; finer shapes may part them"
         )
-    asked = tuple(pair for pair, why in found.items() if why is None)
-    return LinkPairs(asked, tuple(left_out), tuple(notes))
+    checked = tuple(pair for pair, why in found.items() if why is None)
+    return LinkPairs(checked, tuple(left_out), tuple(notes))
 
 
 def _nothing_between(first: str, second: str, shapes: LinkShapes) -> bool:
@@ -204,7 +205,7 @@ def _strangers(
 
 
 def faults_of_srdf(path: str | os.PathLike[str], links: Collection[str]) -> list[Fault]:
-    """What is wrong with an SRDF, to be told with other faults before any shape is made.
+    """What is wrong with an SRDF, to be reported with other faults before any shape is made.
 
     Args:
         path: of the file.

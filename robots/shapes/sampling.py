@@ -43,7 +43,7 @@ def random_configurations(robot: Robot, count: int = SAMPLES) -> NDArray[np.floa
 
 
 class PairSampling:
-    """Asks coal which pairs of owners collide."""
+    """Which pairs of owners collide, by coal."""
 
     def __init__(self, robot: Robot, bodies: Sequence[Polytope | Solid]) -> None:
         """Build coal's shapes.
@@ -94,7 +94,7 @@ class PairSampling:
 
 
 def _coal_shape(body: Polytope) -> tuple[Any, pin.SE3]:
-    """A body as coal has it, and where it is in the frame of its joint."""
+    """A body as a shape of coal, and where it is in the frame of its joint."""
     import coal
     from scipy.spatial import ConvexHull
 
@@ -118,7 +118,7 @@ def _coal_shape(body: Polytope) -> tuple[Any, pin.SE3]:
 
 
 def _exact_shape(solid: Solid) -> tuple[Any, pin.SE3]:
-    """The same of a shape as the URDF has it."""
+    """The same of an exact shape of the URDF."""
     import coal
 
     place, shape = pin.SE3(np.array(solid.placement)), solid.geometry

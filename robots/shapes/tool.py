@@ -33,7 +33,7 @@ def tool_reach(
     """How far the bodies on the last joint reach beyond the tool point, the furthest first.
 
     What reaches further than the standoff is inside a flat surface that is treated, whatever the
-    arm does. Exact shapes are asked, not the convex bodies around them.
+    arm does. Exact shapes count, not the convex bodies around them.
 
     Args:
         robot: the arm.

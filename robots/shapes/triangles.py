@@ -75,7 +75,7 @@ def solid_faces(vertices: Array, faces: Faces) -> Faces | None:
 
     They bound a solid where each edge has two of them and they enclose a volume. Where they do not
     agree about the outer side, as in careless files, each piece is turned to look outwards; where
-    no turning makes them agree, they are a sheet.
+    no reversal makes them agree, they are a sheet.
 
     Args:
         vertices: (k, 3) m, equal ones joined.

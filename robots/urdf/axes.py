@@ -4,7 +4,7 @@ Few users have a URDF of their arm on its rail, or of the arm and a turntable. S
 by itself, and becomes a joint and a link of the tree like any other:
 
     world -- base axes, in order -- link of the last one -- (base) -- root link of the URDF
-          \\- surface axes, in order -- link of the last one, on which the surface stands
+          \\- surface axes, in order -- link of the last one, which carries the surface
 """
 
 from __future__ import annotations
@@ -199,7 +199,7 @@ def _joint(axis: Axis, parent: str, robot: Node) -> Node:
 
 
 def _fixed(name: str, parent: str, child: str, place: Matrix | None, line: int) -> Node:
-    """The joint that holds the URDF's root link where it stands."""
+    """The joint that fixes the URDF's root link."""
     joint = Node("joint", {"name": name, "type": "fixed"}, line)
     joint.children = [Node("parent", {"link": parent}, line), Node("child", {"link": child}, line)]
     if place is not None:

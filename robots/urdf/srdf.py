@@ -9,7 +9,7 @@ from robots.urdf.expansion import expanded, is_xacro
 from robots.urdf.xml import Faults, UrdfError, name_of, parse_xml, read_bytes
 
 TAKEN = ("Adjacent", "Default", "Always", "User")
-"""Reasons that state a fact or a wish. "Never" is a guess from samples, and so is no reason."""
+"""Reasons that are accepted. "Never" is a guess from samples, so it is not."""
 
 
 @dataclass(frozen=True, slots=True)

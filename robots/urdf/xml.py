@@ -73,7 +73,7 @@ def parse_xml(data: bytes, path: str, encoding: str | None = None) -> Node:
     """Parse XML into nodes.
 
     Args:
-        data: the whole document.
+        data: the document.
         path: what to call it in messages.
         encoding: overrides what the document declares.
 

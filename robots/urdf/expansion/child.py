@@ -26,7 +26,7 @@ MAX_NESTING = 5_000  # frames of Python: some 1,000 macros or elements inside on
 LONGEST = 300  # characters of what the library says
 
 # From a generator to the frame that runs it and from there to everything; from a class upwards.
-_WAYS_OUT = re.compile(r"__.*|(gi|ag|cr)_.*|f_(back|globals|locals|builtins|code)|mro")
+_ESCAPES = re.compile(r"__.*|(gi|ag|cr)_.*|f_(back|globals|locals|builtins|code)|mro")
 _WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 
@@ -43,7 +43,7 @@ def evaluate(expression: str, symbols: dict[str, Any], local: Any = None) -> Any
     tree = ast.parse(expression.strip(), "<expression>", "eval")
     for node in ast.walk(tree):
         name = str(getattr(node, "attr", None) or getattr(node, "id", ""))
-        if _WAYS_OUT.fullmatch(name):
+        if _ESCAPES.fullmatch(name):
             raise Refused(f"uses {name!r} in an expression, which is not allowed; leave it out")
     dict.update(symbols, __builtins__={})
     return eval(compile(tree, "<expression>", "eval"), symbols, local)
@@ -94,33 +94,33 @@ class Gate:
 
 
 class Arguments(dict[str, str]):
-    """The given arguments, and which were asked for."""
+    """The given arguments, and which the file uses."""
 
     def __init__(self, given: Mapping[str, str]) -> None:
-        """Start with nothing asked for."""
+        """Start with none used."""
         super().__init__(given)
         self.given = tuple(given)
-        self.asked: set[str] = set()
+        self.used: set[str] = set()
 
     def __contains__(self, name: object) -> bool:
         """As <xacro:arg> asks."""
-        self.asked.add(str(name))
+        self.used.add(str(name))
         return super().__contains__(name)
 
     def __getitem__(self, name: str) -> str:
         """As $(arg ...) asks."""
-        self.asked.add(name)
+        self.used.add(name)
         return super().__getitem__(name)
 
     def refuse_unused(self) -> None:
-        """Refuse arguments that nothing asked for, which xacro passes over in silence.
+        """Refuse arguments that the file does not use, which xacro passes over in silence.
 
         Raises:
             Refused: there are some.
         """
-        unused = [name for name in self.given if name not in self.asked]
+        unused = [name for name in self.given if name not in self.used]
         if unused:
-            known = ", ".join(sorted(self.asked)) or "none"
+            known = ", ".join(sorted(self.used)) or "none"
             raise Refused(f"has no argument {unused[0]!r} of xacro_args; its arguments: {known}")
 
 

@@ -18,7 +18,7 @@ def bodies_of_each(shapes) -> Counter[str]:
 def test_the_l_shaped_links_of_a_ur5_are_cut_and_then_meet_as_rarely_as_they_do():
     robot = load_robot("ur5")
     hulls = link_shapes(robot)
-    pairs = link_pairs(robot, hulls).asked
+    pairs = link_pairs(robot, hulls).checked
     cut = with_crude_links_cut(robot, hulls, pairs)
     before, after = bodies_of_each(hulls), bodies_of_each(cut)
     more = {owner for owner in after if after[owner] > before[owner]}
@@ -39,7 +39,7 @@ def test_the_l_shaped_links_of_a_ur5_are_cut_and_then_meet_as_rarely_as_they_do(
 def test_arms_whose_hulls_do_are_left_as_they_are(name):
     robot = load_robot(name)
     hulls = link_shapes(robot)
-    assert with_crude_links_cut(robot, hulls, link_pairs(robot, hulls).asked) is hulls
+    assert with_crude_links_cut(robot, hulls, link_pairs(robot, hulls).checked) is hulls
 
 
 def test_without_pairs_nothing_is_cut():

@@ -59,7 +59,7 @@ def test_every_pair_is_asked_for_or_left_out_once(tmp_path):
         shapes = link_shapes(robot)
         pairs = link_pairs(robot, shapes)
         owners = {body.owner for body in shapes.polytopes}
-        listed = [frozenset(pair) for pair in (*pairs.asked, *sorted_out(pairs))]
+        listed = [frozenset(pair) for pair in (*pairs.checked, *sorted_out(pairs))]
         assert len(listed) == len(set(listed))
         assert set(listed) == {frozenset(pair) for pair in combinations(owners, 2)}
         joint = {body.owner: body.joint for body in shapes.polytopes}
@@ -72,7 +72,7 @@ def test_neighbours_are_adjacent_also_through_frames_but_not_through_bodies(tmp_
     robot = arm(tmp_path, ball(), ball(), FRAME, ball(), DRAWN, ball())
     pairs = link_pairs(robot, link_shapes(robot))
     assert sorted_out(pairs) == {("l0", "l1"): "adjacent", ("l1", "l3"): "adjacent"}
-    assert set(pairs.asked) == {("l0", "l3"), ("l0", "l5"), ("l1", "l5"), ("l3", "l5")}
+    assert set(pairs.checked) == {("l0", "l3"), ("l0", "l5"), ("l1", "l5"), ("l3", "l5")}
 
 
 def test_pairs_that_always_collide_are_left_out_and_said(tmp_path):
@@ -84,7 +84,7 @@ def test_pairs_that_always_collide_are_left_out_and_said(tmp_path):
     assert rates["l0", "l2"] == 1.0
     (note,) = pairs.notes
     assert "in each of 1,000 random configurations: l0 - l2;" in note
-    assert ("l0", "l3") in pairs.asked, "folded up it is inside, stretched out it is not"
+    assert ("l0", "l3") in pairs.checked, "folded up it is inside, stretched out it is not"
 
 
 def test_hulls_alone_leave_no_pair_out(tmp_path):
@@ -94,7 +94,7 @@ def test_hulls_alone_leave_no_pair_out(tmp_path):
     robot = arm(tmp_path, ("", ring), ball(), ball(), ball())
     shapes = link_shapes(robot)
     pairs = link_pairs(robot, shapes)
-    assert set(pairs.asked) == {("l0", "l2"), ("l0", "l3"), ("l1", "l3")}
+    assert set(pairs.checked) == {("l0", "l2"), ("l0", "l3"), ("l1", "l3")}
     (note,) = pairs.notes
     assert "exact shapes do not: l0 - l2, l0 - l3; the search finds nothing" in note
 
@@ -128,7 +128,7 @@ def test_users_and_srdfs_leave_pairs_out_with_their_rates(tmp_path):
     reasons = sorted_out(pairs)
     assert (reasons["l1", "l3"], reasons["l0", "l4"]) == ("allowed", "srdf")
     assert reasons["l0", "l1"] == "adjacent"
-    assert {("l0", "l3"), ("l1", "l4"), ("l0", "l2")} <= set(pairs.asked)
+    assert {("l0", "l3"), ("l1", "l4"), ("l0", "l2")} <= set(pairs.checked)
     # Two hinges apart, balls of 0.1 m at the hinges, 0.3 m links: they touch where
     # 0.3 sqrt(2 - 2 cos(pi - q)) < 0.2, so for |q| > pi - 2 asin(1 / 3).
     touching = (3.0 - (np.pi - 2 * np.arcsin(1 / 3))) / 3.0
@@ -161,7 +161,7 @@ def test_shapes_of_a_tool_count_as_bodies_on_the_last_joint(tmp_path):
     rod = Polytope("tool", 2, np.array([[0.0, 0, 0.1], [0, 0, 0.7]]), 0.01)
     pairs = link_pairs(robot, link_shapes(robot), tool=[rod])
     assert sorted_out(pairs)["l2", "tool"] == "rigid"
-    assert {("l0", "tool"), ("l1", "tool")} <= set(pairs.asked)
+    assert {("l0", "tool"), ("l1", "tool")} <= set(pairs.checked)
 
 
 # Reference: exact meshes collide in 4.6 %, 5.2 %, 7 % of other random configurations.
