@@ -16,15 +16,6 @@ if TYPE_CHECKING:
 CHOICE = ("faces", "colour", "deviation")
 """Keys of a STEP file that say what of it is read."""
 MOST_MESH_CELLS = 20_000  # as `surfaces.meshes.cells` has it
-NAMES = {
-    "low": "box[0]",
-    "high": "box[1]",
-    "half_angle_deg": "within_deg",
-    "count": "cells",
-    "size": "cell_size",
-}
-"""Keys of arguments that are called otherwise in Python."""
-
 Values = Mapping[str, Any]
 
 
@@ -77,9 +68,9 @@ def build_mesh(values: Values, pose: Mapping[str, Any]) -> MeshSurface:
     except SurfaceError as error:
         raise CaseError(in_file(error, file, "surface")) from error
     if "faces" in values:
-        with surface_faults("faces", NAMES):
+        with surface_faults("faces"):
             triangles = take_faces(triangles, values["faces"])
-    with surface_faults(names=NAMES):
+    with surface_faults():
         return mesh(_part(triangles, values), **pose)
 
 
@@ -102,7 +93,7 @@ def build_step(values: Values, pose: Mapping[str, Any]) -> MeshSurface:
         own = [fault for fault in error.faults if fault.key.partition("[")[0] in CHOICE]
         faults = [fault._replace(place=shown_path(file)).renamed({}, "surface") for fault in own]
         raise CaseError(faults or in_file(error, file, "surface")) from error
-    with surface_faults(names=NAMES):
+    with surface_faults():
         return mesh(_part(triangles, values), **pose)
 
 
@@ -133,7 +124,7 @@ def _part(triangles: TriangleMesh, values: Values) -> TriangleMesh:
     }
     for key, take in parts.items():
         if key in values:
-            with surface_faults(key, NAMES):
+            with surface_faults(key):
                 triangles = take(values[key])
     return triangles
 
@@ -169,7 +160,7 @@ def _check_parts(section: Section, values: Values) -> None:
     if "box" in values:
         box = values["box"]
         if isinstance(box, list) and len(box) == 2:
-            section.make(checked_box, dict(zip(("low", "high"), box, strict=True)), NAMES)
+            section.make(checked_box, dict(zip(("low", "high"), box, strict=True)), SURFACE_NAMES)
         else:
             section.wrong_type("box", box)
     for key, check, arguments in (
@@ -180,5 +171,5 @@ def _check_parts(section: Section, values: Values) -> None:
             part = Section(f"{section.name}.{key}", values[key], section.faults)
             written = part.take(*arguments)
             given = {name: written.get(k, MISSING) for k, name in arguments.items()}
-            part.make(check, given, NAMES)
+            part.make(check, given, SURFACE_NAMES)
             part.refuse_others()

@@ -30,6 +30,14 @@ Triple = tuple[float, float, float]
 Made = TypeVar("Made")
 
 ORIGIN: Triple = (0.0, 0.0, 0.0)
+SURFACE_NAMES = {
+    "low": "box[0]",
+    "high": "box[1]",
+    "half_angle_deg": "within_deg",
+    "count": "cells",
+    "size": "cell_size",
+}
+"""Keys of a surface that are called otherwise in Python."""
 
 
 class CaseError(CoverableError):
@@ -205,7 +213,7 @@ def frozen(value: Any, exact: bool = False) -> Any:
 
 
 @contextmanager
-def surface_faults(key: str = "", names: Mapping[str, str] = {}) -> Iterator[None]:
+def surface_faults(key: str = "") -> Iterator[None]:
     """Turn faults of a surface into faults of the case; `key` is whose those without one are.
 
     Raises:
@@ -217,7 +225,7 @@ def surface_faults(key: str = "", names: Mapping[str, str] = {}) -> Iterator[Non
         yield
     except SurfaceError as error:
         faults = (fault._replace(key=fault.key or key) for fault in error.faults)
-        raise CaseError([fault.renamed(names, "surface") for fault in faults]) from error
+        raise CaseError([fault.renamed(SURFACE_NAMES, "surface") for fault in faults]) from error
 
 
 def in_file(error: CoverableError, file: str, table: str) -> list[Fault]:
