@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from coverable_errors import MISSING
 from feasibility.cases.keys import own_keys
-from feasibility.cases.table_reader import CaseError, Section, in_file, shown_path, surface_faults
+from feasibility.cases.table_reader import (
+    SURFACE_NAMES,
+    CaseError,
+    Section,
+    in_file,
+    shown_path,
+    surface_faults,
+)
 
 if TYPE_CHECKING:
     from surfaces.meshes import MeshSurface, TriangleMesh
