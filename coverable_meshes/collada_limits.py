@@ -12,7 +12,7 @@ from collections import defaultdict
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
-from coverable_meshes.errors import MeshError
+from coverable_meshes.raw_mesh import MeshError
 
 MOST_CORNERS = 3_000_000  # of triangles, each instance counted
 MOST_PARTS = 10_000  # primitives, each instance counted

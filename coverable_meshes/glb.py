@@ -19,8 +19,7 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coverable_meshes.errors import MeshError
-from coverable_meshes.raw_mesh import Floats, RawMesh, joined, no_triangles, refuse_large
+from coverable_meshes.raw_mesh import Floats, MeshError, RawMesh, joined, no_triangles, refuse_large
 
 LARGEST_JSON = 8 << 20  # bytes; numbers lie in the other chunk
 MOST_PARTS = 10_000

@@ -9,11 +9,10 @@ from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from coverable_files import FileFault, open_regular, reason
-from coverable_meshes.errors import MeshError
 from coverable_meshes.glb import read_glb, read_glb_parts
 from coverable_meshes.obj_and_off import read_obj, read_off
 from coverable_meshes.ply import read_ply
-from coverable_meshes.raw_mesh import RawMesh
+from coverable_meshes.raw_mesh import MeshError, RawMesh
 from coverable_meshes.stl import read_stl
 
 LARGEST_FILE = 512 << 20  # bytes

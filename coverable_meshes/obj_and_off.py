@@ -7,10 +7,10 @@ from typing import BinaryIO
 
 import numpy as np
 
-from coverable_meshes.errors import MeshError
 from coverable_meshes.raw_mesh import (
     MOST_SIDES,
     Lines,
+    MeshError,
     Polygons,
     RawMesh,
     refuse_large,

@@ -15,13 +15,13 @@ from typing import BinaryIO
 
 import numpy as np
 
-from coverable_meshes.errors import MeshError
 from coverable_meshes.raw_mesh import (
     MOST_SIDES,
     MOST_VERTICES,
     Floats,
     Ints,
     Lines,
+    MeshError,
     Polygons,
     RawMesh,
     no_triangles,

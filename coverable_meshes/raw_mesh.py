@@ -14,7 +14,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from coverable_meshes.errors import MeshError
+from coverable_errors import CoverableError
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -24,6 +24,10 @@ MOST_VERTICES = 3 * MOST_FACES
 MOST_SIDES = 64  # of a polygon
 LONGEST_LINE = 65536  # bytes
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # which some editors put at the start of a text
+
+
+class MeshError(CoverableError):
+    """A mesh file that cannot be read, and why."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

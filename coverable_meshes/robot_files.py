@@ -17,9 +17,8 @@ import numpy as np
 from coverable_errors import CoverableError
 from coverable_files import read_regular, reason
 from coverable_meshes.collada_limits import check_collada
-from coverable_meshes.errors import MeshError
 from coverable_meshes.mesh_file import read_parts
-from coverable_meshes.raw_mesh import RawMesh
+from coverable_meshes.raw_mesh import MeshError, RawMesh
 
 MOST_TRIANGLES = 1_500_000  # of a robot, each use of a file counted
 MOST_SECONDS = 8.0  # of processor time, for a picture

@@ -7,11 +7,11 @@ from typing import BinaryIO
 
 import numpy as np
 
-from coverable_meshes.errors import MeshError
 from coverable_meshes.raw_mesh import (
     BYTE_ORDER_MARK,
     Floats,
     Lines,
+    MeshError,
     RawMesh,
     distinct,
     no_triangles,

@@ -79,8 +79,8 @@ def _hull_of_mesh(mesh: Triangles) -> Hull:
     return outer_hull(mesh.vertices)
 
 
-def outer_hull(points: Array, most: int = MOST_VERTICES) -> Hull:
-    """A convex body of at most `most` vertices that holds some points.
+def outer_hull(points: Array) -> Hull:
+    """A convex body of at most `MOST_VERTICES` that holds some points.
 
     Where the hull has more vertices, the one furthest outside is added to those kept until there
     are enough, or none is further outside than `CLOSE_ENOUGH`; the radius is then an upper bound on
@@ -89,14 +89,13 @@ def outer_hull(points: Array, most: int = MOST_VERTICES) -> Hull:
 
     Args:
         points: (k, 3) m, finite, at least one.
-        most: at least 14.
     """
     from scipy.spatial import ConvexHull, QhullError
 
     solid = thickened(points)
     try:
         corners = solid[ConvexHull(solid).vertices]
-        kept = corners if len(corners) <= most else _furthest(corners, most)
+        kept = corners if len(corners) <= MOST_VERTICES else _furthest(corners)
         radius = _reach_outside(ConvexHull(kept), corners)
     except QhullError:  # no file is known that comes here
         low, high = solid.min(axis=0), solid.max(axis=0)
@@ -131,8 +130,8 @@ def thickened(points: Array) -> Array:
     return points
 
 
-def _furthest(corners: Array, most: int) -> Array:
-    """At most `most` of the corners, chosen one by one: the one furthest outside those before."""
+def _furthest(corners: Array) -> Array:
+    """At most `MOST_VERTICES` of the corners, one by one: the one furthest outside those before."""
     from scipy.spatial import ConvexHull
 
     signs = np.array([[x, y, z] for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1)])
@@ -141,7 +140,7 @@ def _furthest(corners: Array, most: int) -> Array:
     chosen = np.unique((corners @ directions.T).argmax(axis=0))
     hull = ConvexHull(corners[chosen])
     left = np.arange(len(corners))
-    while len(chosen) < most:
+    while len(chosen) < MOST_VERTICES:
         outside = (corners[left] @ hull.equations[:, :3].T + hull.equations[:, 3]).max(axis=1)
         if outside.max() < CLOSE_ENOUGH:
             break

@@ -31,15 +31,15 @@ WITHOUT_LIMITS = {"revolute": np.pi, "continuous": np.pi, "prismatic": 1.0}  # t
 Pair = tuple[str, str]
 
 
-def random_configurations(robot: Robot, count: int = SAMPLES) -> NDArray[np.float64]:
-    """(count, n) configurations inside the limits, the same ones each time.
+def random_configurations(robot: Robot) -> NDArray[np.float64]:
+    """(SAMPLES, n) configurations inside the limits, the same ones each time.
 
     A joint without limits turns once around, or slides a metre to both sides.
     """
     wide = np.array([WITHOUT_LIMITS[kind] for kind in robot.joint_kinds])
     lower = np.where(np.isfinite(robot.lower), robot.lower, np.minimum(-wide, robot.upper - wide))
     upper = np.where(np.isfinite(robot.upper), robot.upper, np.maximum(wide, lower + wide))
-    return np.random.default_rng(SEED).uniform(lower, upper, (count, robot.n))
+    return np.random.default_rng(SEED).uniform(lower, upper, (SAMPLES, robot.n))
 
 
 class PairSampling:

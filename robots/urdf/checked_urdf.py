@@ -111,7 +111,7 @@ def check_urdf(
     name = os.fsdecode(path)
     root = _root_of(name, package_dirs, xacro_args)
     mounted = insert_axes(root, axes, base, name) if axes else None
-    checked = _check(root, name, os.path.dirname(os.path.abspath(name)), package_dirs)
+    checked = checked_tree(root, name, os.path.dirname(os.path.abspath(name)), package_dirs)
     if mounted is None:
         return checked
     composed = {axis.name for axis in axes}
@@ -135,40 +135,17 @@ def _root_of(
     return root
 
 
-def check_urdf_text(
-    text: str,
-    name: str = "URDF text",
-    base_dir: str | os.PathLike[str] | None = None,
-    package_dirs: Sequence[str | os.PathLike[str]] = (),
-) -> CheckedUrdf:
-    """Check a URDF that is a string, as `check_urdf` does, and call it `name` in messages.
-
-    Relative mesh names are looked up in `base_dir`; without it they are not looked for.
-
-    Example:
-        >>> two_links = '''<robot name="slider"> <link name="rail"/> <link name="cart"/>
-        ...   <joint name="slide" type="prismatic"> <parent link="rail"/> <child link="cart"/>
-        ...     <limit lower="0" upper="0.5"/> </joint> </robot>'''
-        >>> check_urdf_text(two_links)
-        CheckedUrdf('slider', 2 links, 1 moving joints)
-        >>> check_urdf_text(two_links.replace('"0.5"', '"-0.5"')).joints[0].fault.split("; ")[0]
-        "line 2: joint 'slide' has limits [0, -0.5]: lower lies above upper"
-    """
-    try:
-        data = text.encode()
-    except UnicodeEncodeError as error:
-        raise UrdfError(f"is no text: {error.reason} at {error.start}", name) from None
-    root = parse_xml(data, name, encoding="utf-8")
-    refuse_other_formats(root, name)
-    return _check(root, name, os.fsdecode(base_dir) if base_dir is not None else None, package_dirs)
-
-
-def _check(
+def checked_tree(
     robot: Node,
     path: str,
-    base_dir: str | None,
+    base_dir: str,
     package_dirs: Sequence[str | os.PathLike[str]],
 ) -> CheckedUrdf:
+    """Check the tree of a <robot>; mesh names are relative to `base_dir`.
+
+    Raises:
+        UrdfError: with every fault that was found.
+    """
     faults = Faults()
     folders = tuple(os.path.abspath(os.fsdecode(folder)) for folder in package_dirs)
     faults.errors += [

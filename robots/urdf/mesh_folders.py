@@ -24,11 +24,11 @@ PACKAGE_LEVELS = 5  # how far above the URDF a package.xml is looked for
 class MeshFolders:
     """Where meshes may come from, and how a mesh name in the file becomes a path."""
 
-    def __init__(self, base_dir: str | None, package_dirs: Sequence[str]) -> None:
+    def __init__(self, base_dir: str, package_dirs: Sequence[str]) -> None:
         """Collect the allowed folders; none are opened."""
-        self.base = Path(base_dir) if base_dir is not None else None
+        self.base = Path(base_dir)
         self.packages = [Path(folder) for folder in package_dirs]
-        self.own_package = _package_around(self.base) if self.base else None
+        self.own_package = _package_around(self.base)
         allowed = [self.base, self.own_package, *self.packages]
         self.allowed = [Path(os.path.realpath(folder)) for folder in allowed if folder is not None]
 
@@ -40,14 +40,12 @@ class MeshFolders:
             paths = [folder / inner for folder in self.packages]
             roots = [*self.packages, self.own_package, self.base]
             paths += [root / rest for root in roots if root is not None and root.name == package]
-            if self.base is not None:
-                paths.append(self.base / inner)
-            return paths
+            return [*paths, self.base / inner]
         if name.startswith("file://"):
             name = name.removeprefix("file://")
         if os.path.isabs(name):
             return [Path(name)]
-        return [folder / name for folder in [self.base, *self.packages] if folder is not None]
+        return [folder / name for folder in [self.base, *self.packages]]
 
     def resolve(self, name: str) -> str:
         """The file that a mesh name refers to.

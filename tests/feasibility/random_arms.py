@@ -8,11 +8,11 @@ from functools import cache
 import numpy as np
 from arm_urdfs import FREE, arm, joint
 from numpy.typing import NDArray
+from urdf_texts import check_urdf_text
 
 from feasibility import Task
 from robots import Robot, load_robot
 from robots.pinocchio_model import robot_from_urdf
-from robots.urdf.checked_urdf import check_urdf_text
 from surfaces import Cells, Surface, cylinder, hyperboloid, plane, sphere
 
 Floats = NDArray[np.float64]

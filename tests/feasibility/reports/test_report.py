@@ -93,8 +93,9 @@ def test_the_margin_in_degrees_is_that_of_turning_joints():
 
 def _arm(text: str) -> Robot:
     """The robot of a URDF text."""
+    from urdf_texts import check_urdf_text
+
     from robots.pinocchio_model import robot_from_urdf
-    from robots.urdf.checked_urdf import check_urdf_text
 
     return robot_from_urdf(check_urdf_text(text), name="r")
 

@@ -18,6 +18,7 @@ from guards import GUARD_S
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from urdf_corpus import ACCEPTED, FAULTY, LIMIT, REFUSED, arm, drawn, joint, link, mesh, urdf
+from urdf_texts import check_urdf_text
 
 from robots.urdf import (
     Box,
@@ -29,7 +30,6 @@ from robots.urdf import (
     UrdfError,
     check_urdf,
 )
-from robots.urdf.checked_urdf import check_urdf_text
 
 ROOT = Path(__file__).parents[3]
 SHARE = next(
@@ -389,7 +389,7 @@ resource.setrlimit(resource.RLIMIT_CPU, (60, 60))
 resource.setrlimit(resource.RLIMIT_AS, (2 * 2**30, 2 * 2**30))
 from urdf_corpus import ACCEPTED, FAULTY, REFUSED
 from robots.urdf.xml import UrdfError, parse_xml
-from robots.urdf.checked_urdf import check_urdf, check_urdf_text
+from robots.urdf import check_urdf
 import tempfile, os
 counts = {"refused": 0, "accepted": 0}
 with tempfile.TemporaryDirectory() as folder:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from urdf_texts import check_urdf_text
 
 from feasibility.collisions import Bodies, HalfSpace, Obstacle, Pair
 from robots.pinocchio_model import robot_from_urdf
 from robots.shapes import Solid, Triangles
 from robots.urdf import Capsule
-from robots.urdf.checked_urdf import check_urdf_text
 
 WIDE = 'lower="-10" upper="10" effort="1" velocity="1"'
 
