@@ -322,6 +322,12 @@ def counted(number: int, one: str, several: str = "") -> str:
     return f"{number:,} {one if number == 1 else several or one + 's'}"
 
 
+def listed(names: Sequence[str], most: int) -> str:
+    """'a, b and 3 more': at most so many names."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
+
+
 def alternatives(options: Sequence[str]) -> str:
     """'a, b or c'."""
     *front, last = options

@@ -134,11 +134,18 @@ def load_robot(
         >>> load_robot("ur5", tcp=((0, 0, 0.12), (0, 0, 0)))
         Robot('ur5', 6 joints, tool 'tool0' + (0, 0, 0.12) m)
     """
-    info = _find(name_or_path) or _unknown(Path(name_or_path).expanduser(), tool_frame)
+    info = _find(name_or_path) or _unknown(name_or_path)
     approach_axis = _approach_axis(info, tool_frame) if approach_axis is None else approach_axis
-    given = {"tcp": tcp, "base": base, "axes": axes, "xacro_args": xacro_args}
-    source, given["reference_axis"] = f"robot {os.fspath(name_or_path)!r}", reference_axis
-    mounting = check_arguments(approach_axis, lock, source, **given)
+    mounting = check_arguments(
+        approach_axis,
+        lock,
+        f"robot {os.fspath(name_or_path)!r}",
+        tcp=tcp,
+        base=base,
+        reference_axis=reference_axis,
+        axes=axes,
+        xacro_args=xacro_args,
+    )
     robot = _read(
         replace(info, lock={**info.lock, **(lock or {})}, tool_frame=tool_frame or info.tool_frame),
         _folders(package_dirs),
@@ -204,10 +211,11 @@ def _read(
     return replace(robot, xacro_args=tuple(xacro_args.items())) if xacro_args else robot
 
 
-def _unknown(path: Path, tool_frame: str | None) -> RobotInfo:
+def _unknown(urdf: str | os.PathLike[str]) -> RobotInfo:
     """What is known about the URDF of an arm that is not in the library."""
+    path = Path(urdf).expanduser()
     name = path.stem.removesuffix(".urdf") if path.suffix.lower() == ".xacro" else path.stem
-    return RobotInfo(name, "file", "", str(path), tool_frame or "")
+    return RobotInfo(name, "file", "", str(path), "")
 
 
 def _folders(package_dirs: str | os.PathLike[str] | Sequence[Any]) -> tuple[str, ...]:
@@ -253,10 +261,9 @@ def joint_kinds(
     """
     from robots.urdf import check_urdf
 
-    info = _find(name_or_path)
-    path = Path(name_or_path).expanduser() if info is None else info.urdf
-    folders = (*package_dirs, *(() if info is None else info.package_dirs))
-    checked = check_urdf(path, package_dirs=folders, xacro_args=xacro_args)
+    info = _find(name_or_path) or _unknown(name_or_path)
+    folders = (*package_dirs, *info.package_dirs)
+    checked = check_urdf(info.urdf, package_dirs=folders, xacro_args=xacro_args)
     return {joint.name: joint.kind for joint in checked.joints if joint.moves}
 
 

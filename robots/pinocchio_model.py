@@ -24,7 +24,7 @@ from robots.robot import Robot
 if TYPE_CHECKING:
     from robots.urdf import CheckedUrdf
 
-WORLD = "universe"  # what Pinocchio calls the world's frame
+RESERVED = "universe"  # what Pinocchio calls the world's frame
 
 
 def robot_from_urdf(
@@ -59,8 +59,8 @@ def robot_from_urdf(
         RobotError: the tool frame or a locked joint does not exist, a locked value is outside its
             limits, or a joint on the chain has a fault and is neither locked nor given limits.
     """
-    if WORLD in checked.links:
-        fault = f"link {WORLD!r}: the name {WORLD!r} is Pinocchio's for the world; rename it"
+    if RESERVED in checked.links:
+        fault = f"link {RESERVED!r}: the name {RESERVED!r} is Pinocchio's for the world; rename it"
         raise RobotError(fault, checked.path)
     chosen = select_joints(checked, tool_frame, lock or {}, limits, mounting.surface_link)
     faults = list(chosen.faults)

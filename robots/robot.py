@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from robots.errors import RobotError
 from robots.joint_checks import joint_faults, moves_both, no_limit_set, numbers
-from robots.mounting import TCP, made_orthogonal, seen_from, unit_axis, world_frame
+from robots.mounting import TCP_FRAME, made_orthogonal, seen_from, unit_axis, world_frame
 
 if TYPE_CHECKING:
     from robots.chain import Chain
@@ -159,8 +159,8 @@ class Robot:
     def tool_frame_id(self) -> int:
         """Index of the frame of the TCP in `model.frames`."""
         kind = pin.FrameType.OP_FRAME
-        if self.model.existFrame(TCP, kind):
-            return int(self.model.getFrameId(TCP, kind))
+        if self.model.existFrame(TCP_FRAME, kind):
+            return int(self.model.getFrameId(TCP_FRAME, kind))
         return self.tool_link_id
 
     @cached_property

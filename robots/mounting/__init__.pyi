@@ -1,6 +1,6 @@
 from .directions import made_orthogonal as made_orthogonal
 from .directions import unit_axis as unit_axis
-from .models import TCP as TCP
+from .models import TCP_FRAME as TCP_FRAME
 from .models import joint_axes as joint_axes
 from .models import place_base as place_base
 from .models import place_tcp as place_tcp

@@ -19,8 +19,8 @@ from coverable_errors import Fault, close_matches
 from robots.errors import RobotError
 
 # Names of their frames in a model.
-TCP = "coverable tcp"
-WORLD = "coverable world"
+TCP_FRAME = "coverable tcp"
+WORLD_FRAME = "coverable world"
 
 
 def place_base(model: pin.Model, base: NDArray[np.float64]) -> None:
@@ -39,7 +39,7 @@ def place_tcp(model: pin.Model, tool: str, tcp: NDArray[np.float64]) -> None:
     number = model.getFrameId(tool, pin.FrameType.BODY)
     link = model.frames[number]
     place = link.placement * pin.SE3(tcp)
-    frame = pin.Frame(TCP, link.parentJoint, number, place, pin.FrameType.OP_FRAME)
+    frame = pin.Frame(TCP_FRAME, link.parentJoint, number, place, pin.FrameType.OP_FRAME)
     model.addFrame(frame, False)  # without an inertia of its own
 
 
@@ -128,7 +128,7 @@ def _to_root(model: pin.Model, joint: int) -> list[int]:
 def world_frame(model: pin.Model) -> int:
     """Index of the frame that is the world."""
     kind = pin.FrameType.OP_FRAME
-    return int(model.getFrameId(WORLD, kind)) if model.existFrame(WORLD, kind) else 0
+    return int(model.getFrameId(WORLD_FRAME, kind)) if model.existFrame(WORLD_FRAME, kind) else 0
 
 
 def rerooted(model: pin.Model, frame: int, tool: int) -> pin.Model:
@@ -193,7 +193,7 @@ def _carry_frames(model: pin.Model, made: pin.Model, seats: dict[int, tuple[int,
     kept = (pin.FrameType.BODY, pin.FrameType.OP_FRAME)
     frames = [frame for frame in model.frames if frame.type in kept]
     if world_frame(model) == 0:
-        frames.append(pin.Frame(WORLD, 0, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+        frames.append(pin.Frame(WORLD_FRAME, 0, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
     for frame in frames:
         joint, offset = seats[int(frame.parentJoint)]
         placement = offset * frame.placement

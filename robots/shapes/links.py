@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+from coverable_errors import listed
 from robots.errors import RobotError
 from robots.robot import Robot
 from robots.shapes.bodies import Fineness, Geometry, Polytope, Solid
@@ -201,6 +202,4 @@ def _by_link(shapes: Iterable[LinkShape]) -> dict[str, list[LinkShape]]:
 
 def _named(links: list[str]) -> str:
     """Links by name, in short."""
-    names = ", ".join(links[:MOST_NAMED])
-    more = f" and {len(links) - MOST_NAMED} more" if len(links) > MOST_NAMED else ""
-    return f"link{'s' if len(links) > 1 else ''} {names}{more}"
+    return f"link{'s' if len(links) > 1 else ''} {listed(links, MOST_NAMED)}"

@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from coverable_errors import Fault
+from coverable_errors import Fault, listed
 from robots.errors import RobotError
 from robots.joint_selection import suggestion
 from robots.robot import Robot
@@ -138,13 +138,12 @@ def _measured(
     for pair in suspects:
         found[pair] = "always" if rates[pair] == 1.0 and pair not in parted else None
     if parted:
-        named = _listed(
-            [f"{first} - {second}" for first, second in alike if (first, second) in parted]
-        )
+        named = [f"{first} - {second}" for first, second in alike if (first, second) in parted]
         notes.append(
             f"checked, though their convex bodies collide in each of {len(q):,} random "
-            f"configurations, where their exact shapes do not: {named}; the search finds nothing "
-            "with one hull for each shape, and may with convex pieces"
+            "configurations, where their exact shapes do not: "
+            f"{listed(named, MOST_LISTED)}; the search finds nothing with one hull for each shape, "
+            "and may with convex pieces"
         )
     left_out = [
         LeftOut(*pair, why, rates.get(pair)) for pair, why in found.items() if why is not None
@@ -153,7 +152,7 @@ def _measured(
     if always:
         notes.append(
             f"not checked, because their convex bodies collide in each of {len(q):,} random "
-            f"configurations: {_listed(always)}; finer shapes may part them"
+            f"configurations: {listed(always, MOST_LISTED)}; finer shapes may part them"
         )
     checked = tuple(pair for pair, why in found.items() if why is None)
     return LinkPairs(checked, tuple(left_out), tuple(notes))
@@ -199,7 +198,7 @@ def _strangers(
     """A fault where an SRDF names links that an arm does not have."""
     unknown = sorted(pairs.named.difference(known))
     links = ", ".join(sorted(known)[:MOST_LISTED])
-    what = f"names links that this robot does not have: {_listed(unknown)}"
+    what = f"names links that this robot does not have: {listed(unknown, MOST_LISTED)}"
     fault = Fault("", what, os.fspath(path), f"is it of another robot? It has {links}")
     return [fault] if unknown else []
 
@@ -215,9 +214,3 @@ def faults_of_srdf(path: str | os.PathLike[str], links: Collection[str]) -> list
         return _strangers(path, read_srdf(path), links)
     except UrdfError as error:
         return [fault._replace(place=error.source) for fault in error.faults]
-
-
-def _listed(names: Sequence[str]) -> str:
-    """Some names, the first ones if there are many."""
-    more = f" and {len(names) - MOST_LISTED} more" if len(names) > MOST_LISTED else ""
-    return ", ".join(names[:MOST_LISTED]) + more
