@@ -23,19 +23,6 @@ UNEVEN = 0.5  # [1] of the footprint, of cells of a mesh, which are no squares
 Footprint = tuple[float, float]
 
 
-def automatic_grid(patch: Patch, footprint: Footprint) -> tuple[int, int]:
-    """Cells along u and v that are small enough for a footprint (m).
-
-    Raises:
-        CaseError: there would be too many of them.
-    """
-    from surfaces.passes import grid_shape
-
-    nu, nv = grid_shape(patch, WIDTH * min(footprint))
-    _check(nu * nv, footprint, MOST_CELLS)
-    return nu, nv
-
-
 def automatic_count(surface: MeshSurface, footprint: Footprint) -> int:
     """How many cells of a mesh are small enough for a footprint (m).
 
@@ -49,11 +36,7 @@ def automatic_count(surface: MeshSurface, footprint: Footprint) -> int:
 
 
 def _check(count: int, footprint: Footprint, most: int) -> None:
-    """Refuse more cells than a surface may have.
-
-    Raises:
-        CaseError: there are.
-    """
+    """Refuse more cells than a surface may have."""
     if count > most:
         what = (
             f"is {AUTO!r}, which makes {count:,} cells for a footprint of "
@@ -69,10 +52,14 @@ def grid_of(
     """Cells along u and v of a patch, as given or fine enough for a footprint (m).
 
     Raises:
-        CaseError: they are to be fine enough for a footprint, and there is none.
+        CaseError: they are to be fine enough for a footprint, and there is none; or too many.
     """
+    from surfaces.passes import grid_shape
+
     if cells != AUTO:
         return cells
     if footprint is None:
         raise CaseError([Fault("surface.cells", f"is {AUTO!r}, without a footprint")])
-    return automatic_grid(patch, footprint)
+    nu, nv = grid_shape(patch, WIDTH * min(footprint))
+    _check(nu * nv, footprint, MOST_CELLS)
+    return nu, nv

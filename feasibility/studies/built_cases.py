@@ -127,9 +127,9 @@ def cut_of(case: Case) -> Cells:
     from surfaces.meshes.cells import MeshCells
 
     if case.surface.kind not in ("mesh", "step"):
-        return case.surface.cut()
+        return case.surface.cut(case.task.disc)
     file = os.stat(case.surface.table()["file"])
-    home = _cut(surface_at_home(case), file.st_mtime_ns, file.st_size)
+    home = _cut(surface_at_home(case), case.task.disc, file.st_mtime_ns, file.st_size)
     placed = replace(
         home.surface,
         rotation=rotation_from_rpy(*np.radians(case.surface.rpy_deg)),
@@ -145,9 +145,11 @@ def surface_at_home(case: Case) -> str:
 
 
 @lru_cache(maxsize=MESHES_KEPT)
-def _cut(table: str, changed: int, size: int) -> MeshCells:
+def _cut(
+    table: str, footprint: tuple[float, float] | None, changed: int, size: int
+) -> MeshCells:
     """The cells of the mesh of a [surface] table, written as a document."""
     part = read_surface(parse_toml(table)["surface"], [])
     if part is None:
         raise ValueError("the table of a surface that was read before cannot be read again")
-    return cast("MeshCells", part.cut())
+    return cast("MeshCells", part.cut(footprint))

@@ -120,18 +120,18 @@ def test_a_mesh_cut_once_and_placed_is_the_mesh_cut_in_place(tmp_path) -> None:
     rows += [f"3 {a} {b} {c}" for a, b, c in faces]
     (tmp_path / "a.off").write_text("\n".join(rows))
     rng = np.random.default_rng(2)
-    for k in range(4):
+    for k, cells in enumerate((5, 5, 5, '"auto"')):
         position, rpy = rng.normal(size=3).tolist(), rng.uniform(-180, 180, size=3).tolist()
         case = Case.from_toml(
             f"""
             robot.name = "ur5"
-            surface = {{ kind = "mesh", file = "a.off", scale = 1.0, cells = 5, side = "outside",
+            surface = {{ kind = "mesh", file = "a.off", scale = 1.0, cells = {cells}, side = "outside",
                 position = {position}, rpy_deg = {rpy} }}
-            task = {{ standoff = 0.01, cone_deg = 30 }}
+            task = {{ standoff = 0.01, cone_deg = 30, footprint = [0.2, 0.15] }}
             """.replace("\n                position", " position"),
             tmp_path,
         )
-        placed, fresh = cut_of(case), case.surface.cut()
+        placed, fresh = cut_of(case), case.surface.cut(case.task.disc)
         for name in ("centres", "normals", "areas", "pairs"):
             assert np.array_equal(getattr(placed, name), getattr(fresh, name)), (k, name)
         for name in ("rotation", "position", "side"):
@@ -140,6 +140,14 @@ def test_a_mesh_cut_once_and_placed_is_the_mesh_cut_in_place(tmp_path) -> None:
         for name in ("first", "cubics", "derivative_bounds", "deviations"):
             ours, theirs = getattr(placed.curves, name), getattr(fresh.curves, name)
             assert np.array_equal(ours, theirs), name
+
+
+def test_cells_of_a_patch_are_as_fine_as_the_footprint_needs() -> None:
+    """As `check` cuts it: with "auto", a study and `compare` said that there was no footprint."""
+    case = small_case("plate").with_overrides(["surface.cells=auto", "task.footprint=0.1"])
+    cells = cut_of(case)
+    assert cells.shape == (4, 4)
+    assert np.array_equal(cells.centres, case.build().cells.centres)
 
 
 def test_an_arm_is_loaded_once() -> None:
