@@ -125,10 +125,10 @@ def test_a_mesh_cut_once_and_placed_is_the_mesh_cut_in_place(tmp_path) -> None:
         case = Case.from_toml(
             f"""
             robot.name = "ur5"
-            surface = {{ kind = "mesh", file = "a.off", scale = 1.0, cells = {cells}, side = "outside",
-                position = {position}, rpy_deg = {rpy} }}
+            surface = {{ kind = "mesh", file = "a.off", scale = 1.0, side = "outside",
+                cells = {cells}, position = {position}, rpy_deg = {rpy} }}
             task = {{ standoff = 0.01, cone_deg = 30, footprint = [0.2, 0.15] }}
-            """.replace("\n                position", " position"),
+            """.replace("\n                cells", " cells"),
             tmp_path,
         )
         placed, fresh = cut_of(case), case.surface.cut(case.task.disc)
