@@ -145,9 +145,7 @@ def surface_at_home(case: Case) -> str:
 
 
 @lru_cache(maxsize=MESHES_KEPT)
-def _cut(
-    table: str, footprint: tuple[float, float] | None, changed: int, size: int
-) -> MeshCells:
+def _cut(table: str, footprint: tuple[float, float] | None, changed: int, size: int) -> MeshCells:
     """The cells of the mesh of a [surface] table, written as a document."""
     part = read_surface(parse_toml(table)["surface"], [])
     if part is None:
