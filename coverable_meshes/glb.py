@@ -19,7 +19,8 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coverable_meshes.raw_mesh import Floats, MeshError, RawMesh, joined, no_triangles, refuse_large
+from coverable_arrays import Array
+from coverable_meshes.raw_mesh import MeshError, RawMesh, joined, no_triangles, refuse_large
 
 LARGEST_JSON = 8 << 20  # bytes; numbers lie in the other chunk
 MOST_PARTS = 10_000
@@ -56,7 +57,7 @@ class _Placed(NamedTuple):
     """A primitive of the scene, and the affine map (3, 4) that puts it there."""
 
     primitive: Json
-    matrix: Floats
+    matrix: Array
     where: str
 
 
@@ -241,7 +242,7 @@ def _placed_primitives(scene: Json) -> Iterator[_Placed]:
         waiting += [(c, matrix, f"{where}.children") for c in reversed(node.get("children", []))]
 
 
-def _matrix(node: Json, where: str) -> Floats:
+def _matrix(node: Json, where: str) -> Array:
     """(4, 4) from the frame of a node to that of its parent."""
     if "matrix" in node:
         matrix = np.array(node["matrix"], float).reshape(4, 4).T  # written column by column

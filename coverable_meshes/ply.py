@@ -15,11 +15,10 @@ from typing import BinaryIO
 
 import numpy as np
 
+from coverable_arrays import Array, Ints
 from coverable_meshes.raw_mesh import (
     MOST_SIDES,
     MOST_VERTICES,
-    Floats,
-    Ints,
     Lines,
     MeshError,
     Polygons,
@@ -213,7 +212,7 @@ def _words(lines: Lines, element: Element, k: int) -> list[list[bytes]]:
 def _binary(data: bytes, order: str, elements: Sequence[Element]) -> RawMesh:
     """Read rows of numbers of one byte order."""
     place, polygons = 0, Polygons()
-    vertices: Floats = np.empty((0, 3))
+    vertices: Array = np.empty((0, 3))
     faces: Ints | None = None
     for element in elements:
         wanted = element.wanted

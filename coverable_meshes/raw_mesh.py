@@ -12,12 +12,9 @@ from dataclasses import dataclass
 from typing import BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from coverable_errors import CoverableError
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 MOST_FACES = 2_000_000
 MOST_VERTICES = 3 * MOST_FACES
@@ -34,7 +31,7 @@ class MeshError(CoverableError):
 class RawMesh:
     """Triangles as a file has them; indices may be out of range and numbers not finite."""
 
-    vertices: Floats
+    vertices: Array
     """(V, 3) in the file's unit."""
     faces: Ints
     """(F, 3)"""
@@ -87,7 +84,7 @@ class Polygons:
         self.corners.extend(corners)
         self.sides.append(len(corners))
 
-    def mesh(self, vertices: Floats) -> RawMesh:
+    def mesh(self, vertices: Array) -> RawMesh:
         """The faces cut into triangles, see `triangulated`."""
         corners, sides = np.array(self.corners, np.int64), np.array(self.sides, np.int64)
         return triangulated(vertices, corners, sides)
@@ -106,7 +103,7 @@ def refuse_sides(face: int, count: int) -> None:
         )
 
 
-def triangulated(vertices: Floats, corners: Ints, sides: Ints) -> RawMesh:
+def triangulated(vertices: Array, corners: Ints, sides: Ints) -> RawMesh:
     """Cut polygons into triangles.
 
     Each becomes a fan about one of its corners, the first from which all triangles face the same
@@ -138,7 +135,7 @@ def triangulated(vertices: Floats, corners: Ints, sides: Ints) -> RawMesh:
     return RawMesh(vertices, faces, (f"{several} cut into triangles",) * bool(cut))
 
 
-def _turned_to_fan(vertices: Floats, polygons: Ints, names: Ints) -> Ints:
+def _turned_to_fan(vertices: Array, polygons: Ints, names: Ints) -> Ints:
     """Turn each polygon (n, k) so that the fan about its first corner covers it."""
     inside = ((polygons >= 0) & (polygons < len(vertices))).all(axis=1)  # others fail later
     result = polygons.copy()
@@ -161,7 +158,7 @@ def _turned_to_fan(vertices: Floats, polygons: Ints, names: Ints) -> Ints:
     )
 
 
-def distinct(points: Floats) -> tuple[Floats, Ints]:
+def distinct(points: Array) -> tuple[Array, Ints]:
     """Each of some points (k, 3) once, and (k,) which of these each is; faster than `np.unique`."""
     order = np.lexsort(points.T)
     ordered = points[order]

@@ -7,9 +7,9 @@ from typing import BinaryIO
 
 import numpy as np
 
+from coverable_arrays import Array
 from coverable_meshes.raw_mesh import (
     BYTE_ORDER_MARK,
-    Floats,
     Lines,
     MeshError,
     RawMesh,
@@ -84,7 +84,7 @@ def _read_text(stream: BinaryIO) -> RawMesh:
     return RawMesh(mesh.vertices, mesh.faces, notes)
 
 
-def _soup(corners: Floats, normals: Floats) -> RawMesh:
+def _soup(corners: Array, normals: Array) -> RawMesh:
     """Single triangles; equal corners become one vertex, for an STL has no other way to say so.
 
     The order of the corners says which side is outside, whatever the stored normals say.

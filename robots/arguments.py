@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import Checks, Fault, printable, shown
 from robots.errors import RobotError
 from robots.mounting import FURTHEST_BASE, FURTHEST_TCP, checked_pose, made_orthogonal, unit_axis
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 class Mounting(NamedTuple):
     """Where tool, arm and surface are mounted; None where a URDF alone says so."""
 
-    tcp: NDArray[np.float64] | None
+    tcp: Array | None
     """(4, 4) m, the tool centre point in the frame of the link `tool_frame`."""
-    base: NDArray[np.float64] | None
+    base: Array | None
     """(4, 4) m, the URDF's root link in the world, or on the last axis that carries it."""
     axes: tuple[Axis, ...] = ()
     """Axes that are no part of the URDF, from the world outwards."""

@@ -19,8 +19,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from coverable_kernels import njit
 from robots.errors import RobotError
 from robots.mounting import joint_axes
@@ -32,15 +32,15 @@ SAMPLES = 20  # configurations at which the two are compared
 class Chain(NamedTuple):
     """Constants of a serial chain of n one-dof joints; a plain tuple of arrays for numba."""
 
-    rotations: NDArray[np.float64]
+    rotations: Array
     """(n, 3, 3) joint frame in the previous joint's frame, before the joint moves."""
-    translations: NDArray[np.float64]
+    translations: Array
     """(n + 1, 3) origins of the same, m; last the tool point in the last joint's frame."""
-    prismatic: NDArray[np.bool_]
+    prismatic: Mask
     """(n,) True where a joint slides along z, False where it turns about it."""
-    approach: NDArray[np.float64]
+    approach: Array
     """(3,) the approach axis in the last joint's frame."""
-    reference: NDArray[np.float64]
+    reference: Array
     """(3,) the reference axis of roll in the last joint's frame."""
 
 
@@ -48,10 +48,10 @@ def checked_chain(
     name: str,
     model: pin.Model,
     tool_frame: int,
-    approach_axis: NDArray[np.float64],
-    reference_axis: NDArray[np.float64],
-    lower: NDArray[np.float64],
-    upper: NDArray[np.float64],
+    approach_axis: Array,
+    reference_axis: Array,
+    lower: Array,
+    upper: Array,
 ) -> Chain:
     """Read the constants of a chain, and compare it with Pinocchio at random configurations.
 
@@ -97,8 +97,8 @@ def checked_chain(
 def _constants(
     model: pin.Model,
     tool_frame: int,
-    approach_axis: NDArray[np.float64],
-    reference_axis: NDArray[np.float64],
+    approach_axis: Array,
+    reference_axis: Array,
 ) -> Chain:
     """Every joint's frame in that of the joint before it, turned so that its axis is z."""
     n, frame = model.nv, model.frames[tool_frame]
@@ -116,7 +116,7 @@ def _constants(
     return Chain(rotations, translations, prismatic, approach, reference)
 
 
-def joint_alignments(model: pin.Model) -> NDArray[np.float64]:
+def joint_alignments(model: pin.Model) -> Array:
     """(n, 3, 3) the frames of `Chain` in those of Pinocchio's joints: the same origins, z the axis.
 
     A point p in Pinocchio's frame of joint i, counted from 1, is alignments[i - 1].T @ p in that
@@ -125,13 +125,13 @@ def joint_alignments(model: pin.Model) -> NDArray[np.float64]:
     return _turns_onto_z(model)[1]
 
 
-def _turns_onto_z(model: pin.Model) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+def _turns_onto_z(model: pin.Model) -> tuple[Mask, Array]:
     """Which joints slide, and the rotation that brings z onto each joint's axis."""
     slides, axes = joint_axes(model)
     return slides, np.array([_rotation_onto(axis) for axis in axes])
 
 
-def _rotation_onto(axis: NDArray[np.float64]) -> NDArray[np.float64]:
+def _rotation_onto(axis: Array) -> Array:
     """A rotation whose z column is `axis`; the identity when the axis is z already."""
     z = axis / np.linalg.norm(axis)
     if z[2] == 1.0 and z[0] == z[1] == 0.0:
@@ -230,7 +230,7 @@ def jacobians(chain, origins, axes, point, axis, point_rows, axis_rows):  # type
             axis_rows[2, i] = zx * axis[1] - zy * axis[0]
 
 
-def tool(chain: Chain, q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def tool(chain: Chain, q: Array) -> tuple[Array, Array]:
     """Tool point (3,) m and approach axis (3,) at one configuration, by `frames`."""
     n = len(q)
     point, axis, at = np.empty(3), np.empty(3), np.ascontiguousarray(q, float)

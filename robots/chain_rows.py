@@ -7,11 +7,9 @@ for tens of thousands of them six times faster than Pinocchio one by one.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from robots.chain import Chain
-
-Array = NDArray[np.float64]
 
 ROWS = 8192  # configurations at once: what the processor's caches hold
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array
 from robots.errors import RobotError
 
 KINDS = ("revolute", "continuous", "prismatic")
@@ -15,9 +16,9 @@ KINDS = ("revolute", "continuous", "prismatic")
 def joint_faults(
     names: Sequence[str],
     kinds: Sequence[str],
-    lower: NDArray[np.float64],
-    upper: NDArray[np.float64],
-    start: NDArray[np.float64] | None,
+    lower: Array,
+    upper: Array,
+    start: Array | None,
 ) -> list[str]:
     """Joints of unknown kind, empty limit ranges, and a start outside of the limits.
 
@@ -63,9 +64,7 @@ def no_limit_set(name: str, known: Iterable[str]) -> str:
     return f"there is no limit set {name!r}; it has: {', '.join(sorted(known)) or 'none'}"
 
 
-def numbers(
-    values: ArrayLike, what: str, shape: tuple[int, ...] | None = None
-) -> NDArray[np.float64]:
+def numbers(values: ArrayLike, what: str, shape: tuple[int, ...] | None = None) -> Array:
     """A write-protected copy as an array of floats of that shape; RobotError where it is none."""
     try:
         array = np.array(values, dtype=float)

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array
 from coverable_errors import ArgumentError
 from robots.robot import Robot
 
@@ -16,9 +17,9 @@ from robots.robot import Robot
 class JointFrames:
     """Where the frames of all joints are, m times; index 0 is the root frame itself."""
 
-    rotations: NDArray[np.float64]
+    rotations: Array
     """(m, n + 1, 3, 3)"""
-    points: NDArray[np.float64]
+    points: Array
     """(m, n + 1, 3) m."""
 
 
@@ -53,20 +54,20 @@ class Kinematics:
         self._rotations = _joints_view(first.rotation, second.rotation, robot.n + 1)
         self._translations = _joints_view(first.translation, second.translation, robot.n + 1)
 
-    def configuration(self, q: ArrayLike) -> NDArray[np.float64]:
+    def configuration(self, q: ArrayLike) -> Array:
         """Pinocchio's configuration vector (nq,) for n real joint values (rad or m)."""
         values = np.ascontiguousarray(q, dtype=float)
         if values.shape != (self.robot.n,):
             raise ArgumentError(f"q must have shape ({self.robot.n},), got {values.shape}")
         return values if self._plain else pin.integrate(self._model, self._neutral, values)
 
-    def tool(self, q: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def tool(self, q: ArrayLike) -> tuple[Array, Array]:
         """Tool point (3,) m and unit approach axis (3,) in the root frame, see `Robot`."""
         pin.forwardKinematics(self._model, self._data, self.configuration(q))
         pin.updateFramePlacement(self._model, self._data, self._frame)
         return self._translation.copy(), self._rotation @ self._approach
 
-    def tools(self, q: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def tools(self, q: ArrayLike) -> tuple[Array, Array]:
         """Tool points (m, 3) m and unit approach axes (m, 3) at configurations q (m, n).
 
         Example:
@@ -83,7 +84,7 @@ class Kinematics:
         points, rotations = _points_and_rotations(poses)
         return points, rotations @ self._approach
 
-    def rotation(self, q: ArrayLike) -> NDArray[np.float64]:
+    def rotation(self, q: ArrayLike) -> Array:
         """(3, 3) axes of the TCP's frame, as columns, in the root frame, at q (n,).
 
         Example:
@@ -113,7 +114,7 @@ class Kinematics:
             frames.points[k] = self._translations
         return frames
 
-    def twists(self, q: ArrayLike) -> NDArray[np.float64]:
+    def twists(self, q: ArrayLike) -> Array:
         """Unit twists (m, 6, n) of the joints at configurations q (m, n), in the root frame.
 
         Column j is what joint j alone does to the root frame's origin: its velocity, 1/s times m,
@@ -126,9 +127,7 @@ class Kinematics:
             columns[k] = pin.computeJointJacobians(self._model, self._data, row).reshape(6, -1)
         return columns
 
-    def tools_and_twists(
-        self, q: ArrayLike
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def tools_and_twists(self, q: ArrayLike) -> tuple[Array, Array, Array]:
         """`tools` and `twists` at once, which takes less time."""
         poses, columns = list[bytes](), list[bytes]()
         for row in self._configurations(q):
@@ -141,7 +140,7 @@ class Kinematics:
         twists = np.frombuffer(bytearray().join(columns)).reshape(-1, self.robot.n, 6)
         return points, rotations @ self._approach, twists.transpose(0, 2, 1)
 
-    def _configurations(self, q: ArrayLike) -> NDArray[np.float64]:
+    def _configurations(self, q: ArrayLike) -> Array:
         """Pinocchio's configuration vectors (m, nq) for joint values q (m, n)."""
         rows = np.ascontiguousarray(q, dtype=float)
         if rows.ndim != 2 or rows.shape[1] != self.robot.n:
@@ -151,7 +150,7 @@ class Kinematics:
         placed = [pin.integrate(self._model, self._neutral, row) for row in rows]
         return np.array(placed).reshape(len(rows), self._model.nq)
 
-    def jacobians(self, q: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def jacobians(self, q: ArrayLike) -> tuple[Array, Array]:
         """Derivatives (3, n) of tool point and of approach axis by q."""
         jacobian = pin.computeFrameJacobian(
             self._model,
@@ -165,7 +164,7 @@ class Kinematics:
         # w x a = [a]x^T w for each column w; `np.cross` takes longer than all the rest.
         return jacobian[:3].copy(), pin.skew(axis).T @ jacobian[3:]
 
-    def tool_velocities(self, q: ArrayLike, dq: ArrayLike) -> NDArray[np.float64]:
+    def tool_velocities(self, q: ArrayLike, dq: ArrayLike) -> Array:
         """Velocities (m, 3) of the tool point at configurations q (m, n) with dq (m, n).
 
         In m/s in the root frame, see `Robot`, when dq is in rad/s or m/s.
@@ -185,9 +184,7 @@ class Kinematics:
         return velocities
 
 
-def _joints_view(
-    first: NDArray[np.float64], second: NDArray[np.float64], count: int
-) -> NDArray[np.float64]:
+def _joints_view(first: Array, second: Array, count: int) -> Array:
     """One live view (count, ...) of the same member of all of Pinocchio's joint placements.
 
     They lie one behind another in a `std::vector`; copied one by one they take longer than the
@@ -198,7 +195,7 @@ def _joints_view(
     return np.lib.stride_tricks.as_strided(first, shape, strides, writeable=False)
 
 
-def _pose_view(placement: pin.SE3) -> NDArray[np.float64]:
+def _pose_view(placement: pin.SE3) -> Array:
     """A live view (12,) of a placement: the columns of its rotation, then its translation."""
     rotation, translation = placement.rotation, placement.translation
     start, behind = (view.__array_interface__["data"][0] for view in (rotation, translation))
@@ -210,7 +207,7 @@ def _pose_view(placement: pin.SE3) -> NDArray[np.float64]:
 
 def _points_and_rotations(
     poses: list[bytes],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Array, Array]:
     """Translations (m, 3) and rotations (m, 3, 3) of copies of what `_pose_view` shows."""
     values = np.frombuffer(bytearray().join(poses)).reshape(-1, 12)
     rotations = values[:, :9].reshape(-1, 3, 3).transpose(0, 2, 1)
@@ -219,12 +216,12 @@ def _points_and_rotations(
 
 def configuration_near(
     kinematics: Kinematics,
-    q: NDArray[np.float64],
-    point: NDArray[np.float64],
-    axis: NDArray[np.float64],
+    q: Array,
+    point: Array,
+    axis: Array,
     steps: int,
     close: float,
-) -> NDArray[np.float64] | None:
+) -> Array | None:
     """The configuration near q (n,) with tool point and axis there; None where none is found.
 
     Newton's method with the shortest steps, clipped to the limits.

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
+
+from coverable_arrays import Array, Mask
 
 SWEEPS = 60  # of the descent below; any number gives a bound, more a tighter one
 MOST_SLIDES = 10  # prismatic joints in a row whose 2^k end positions are looked at one by one
@@ -16,7 +17,7 @@ MOST_SLIDES = 10  # prismatic joints in a row whose 2^k end positions are looked
 class ReachBound(NamedTuple):
     """A ball that the tool point cannot leave."""
 
-    origin: NDArray[np.float64]
+    origin: Array
     """(3,) m, on the first joint that moves, in the root frame."""
     radius: float
     """m; inf where a prismatic joint has no limits."""
@@ -25,9 +26,9 @@ class ReachBound(NamedTuple):
 def reach_bound(
     model: pin.Model,
     tool_frame: int,
-    prismatic: NDArray[np.bool_],
-    lower: NDArray[np.float64],
-    upper: NDArray[np.float64],
+    prismatic: Mask,
+    lower: Array,
+    upper: Array,
 ) -> ReachBound:
     """Upper bound on the distance of the tool point from the origin of the first joint.
 
@@ -57,7 +58,7 @@ def reach_bound(
     first = int(free[0]) if len(free) else n - 1
     origin = data.oMi[first + 1].translation.copy()
     anchors = [origin.copy()]
-    axes: list[NDArray[np.float64] | None] = [None]  # None: this anchor does not slide
+    axes: list[Array | None] = [None]  # None: this anchor does not slide
     slides: list[list[int]] = [[]]  # prismatic joints between an anchor and the next one
     for i in map(int, free):
         if prismatic[i]:
@@ -79,8 +80,8 @@ def reach_bound(
 
 
 def _shorten(
-    anchors: list[NDArray[np.float64]],
-    axes: list[NDArray[np.float64] | None],
+    anchors: list[Array],
+    axes: list[Array | None],
     slides: list[list[int]],
 ) -> None:
     """Slide the anchors, one at a time, to where the path past each is shortest; in place.
@@ -102,9 +103,7 @@ def _shorten(
                 anchors[k] = anchors[k] + shift * axis
 
 
-def _longest(
-    apart: NDArray[np.float64], directions: NDArray[np.float64], strokes: NDArray[np.float64]
-) -> float:
+def _longest(apart: Array, directions: Array, strokes: Array) -> float:
     """Largest |apart + sum_i s_i directions_i| with lower_i <= s_i <= upper_i, m."""
     if not np.isfinite(strokes).all():
         return float("inf")

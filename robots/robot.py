@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array, Mask
 from robots.errors import RobotError
 from robots.joint_checks import joint_faults, moves_both, no_limit_set, numbers
 from robots.mounting import TCP_FRAME, made_orthogonal, seen_from, unit_axis, world_frame
@@ -43,18 +44,18 @@ class Robot:
     """The reduced model: the n free joints, all others locked; base and TCP are in it."""
     tool_frame: str
     """Name of the link that carries the tool."""
-    approach_axis: NDArray[np.float64]
+    approach_axis: Array
     """(3,) unit vector in the TCP's frame; it points from the tool towards the surface."""
     joint_names: tuple[str, ...]
     joint_kinds: tuple[str, ...]
     """'revolute', 'continuous' or 'prismatic', one per joint."""
-    lower: NDArray[np.float64]
+    lower: Array
     """(n,) rad or m; -inf where the joint turns freely."""
-    upper: NDArray[np.float64]
+    upper: Array
     """(n,) rad or m; +inf where the joint turns freely."""
-    max_velocity: NDArray[np.float64] = field(default_factory=lambda: np.array(np.nan))
+    max_velocity: Array = field(default_factory=lambda: np.array(np.nan))
     """(n,) rad/s or m/s, or one for all; nan where no velocity limit is known."""
-    limit_sets: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    limit_sets: Mapping[str, Array] = field(default_factory=dict)
     """Named limits, each (n, 2) rad or m, that `with_limits` knows."""
     urdf: str | None = None
     """Path of the URDF file, for the viewer; None for a robot that was built in memory."""
@@ -64,13 +65,13 @@ class Robot:
     """Every moving joint of the URDF that is not free here, with the value it is held at."""
     notes: tuple[str, ...] = ()
     """What was assumed or left out when the URDF was read."""
-    reference_axis: NDArray[np.float64] = field(default_factory=lambda: np.full(3, np.nan))
+    reference_axis: Array = field(default_factory=lambda: np.full(3, np.nan))
     """(3,) unit vector in the TCP's frame, by which roll is measured; across `approach_axis`.
 
     By default +x, or +z where the approach axis is +-x; of another vector the part that is
     orthogonal to the approach axis is kept.
     """
-    start: NDArray[np.float64] | None = None
+    start: Array | None = None
     """(n,) rad or m, where the covering motion has to begin; None for anywhere."""
     surface_link: str | None = None
     """The link that carries the surface, and whose frame is the root frame; None for the world."""
@@ -117,7 +118,7 @@ class Robot:
         if faults:
             raise RobotError(faults, source)
 
-    def _unit_axes(self, source: str) -> dict[str, NDArray[np.float64]]:
+    def _unit_axes(self, source: str) -> dict[str, Array]:
         """Both axes of the tool, of length one, the reference axis across the other."""
         names = ("approach_axis", "reference_axis")
         given = [numbers(getattr(self, name), f"{source}: {name}", (3,)) for name in names]
@@ -151,7 +152,7 @@ class Robot:
         return len(self.joint_names)
 
     @property
-    def prismatic(self) -> NDArray[np.bool_]:
+    def prismatic(self) -> Mask:
         """(n,) True where a joint slides."""
         return np.array([kind == "prismatic" for kind in self.joint_kinds], dtype=bool)
 
@@ -175,7 +176,7 @@ class Robot:
         return int(self.model.getFrameId(self.tool_frame, kind))
 
     @property
-    def tcp(self) -> NDArray[np.float64]:
+    def tcp(self) -> Array:
         """(4, 4) m, the tool centre point in the frame of the link `tool_frame`."""
         link, tcp = (
             self.model.frames[i].placement for i in (self.tool_link_id, self.tool_frame_id)
@@ -183,7 +184,7 @@ class Robot:
         return np.array(link.actInv(tcp).homogeneous)
 
     @property
-    def base(self) -> NDArray[np.float64]:
+    def base(self) -> Array:
         """(4, 4) m, the URDF's root link in the world, with all joints at zero."""
         data = self.model.createData()
         pin.framesForwardKinematics(self.model, data, pin.neutral(self.model))
@@ -201,11 +202,11 @@ class Robot:
         return tuple(f.name for f in self.model.frames if f.type == pin.FrameType.BODY)
 
     @property
-    def base_point(self) -> NDArray[np.float64]:
+    def base_point(self) -> Array:
         """(3,) m in the root frame, on the first joint that moves: `reach` is measured from it."""
         return self._reach.origin
 
-    def distance_from_base(self, points: ArrayLike) -> NDArray[np.float64]:
+    def distance_from_base(self, points: ArrayLike) -> Array:
         """Distances (...) m of points (..., 3) m in the root frame from `base_point`."""
         return np.asarray(np.linalg.norm(np.asarray(points) - self.base_point, axis=-1))
 
@@ -315,7 +316,7 @@ class Robot:
             )
         return replace(self, lower=table[:, 0], upper=table[:, 1])
 
-    def _limits_by_name(self, limits: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
+    def _limits_by_name(self, limits: Mapping[str, ArrayLike]) -> Array:
         """The present limits (n, 2) with those of some joints replaced."""
         table = np.column_stack([self.lower, self.upper])
         faults = []

@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import Fault, close, printable, shown
 from feasibility.results.trajectory_files import COMMENT, load_trajectory
 from feasibility.safe_files import FileError, read_regular, shown_path
@@ -44,7 +44,7 @@ DELIMITERS = (",", ";", "\t")
 class Motion(NamedTuple):
     """A motion as it was read."""
 
-    q: NDArray[np.float64]
+    q: Array
     """(m, n) rows, rad or m, in the order of the robot's joints."""
     notes: tuple[str, ...]
     """What was not used."""
@@ -170,7 +170,7 @@ def _is_aside(word: str, robot: Robot) -> bool:
     return word in LEFT_ASIDE or word in derived
 
 
-def _checked(q: NDArray[np.float64], robot: Robot, name: str, notes: tuple[str, ...]) -> Motion:
+def _checked(q: Array, robot: Robot, name: str, notes: tuple[str, ...]) -> Motion:
     """The motion, unless its values are in other units.
 
     They are where one is far beyond its limits, and all of the same kind of joint would be inside
@@ -194,7 +194,7 @@ def _checked(q: NDArray[np.float64], robot: Robot, name: str, notes: tuple[str, 
     return Motion(q, (*notes, *_turns(q, robot)))
 
 
-def _turns(q: NDArray[np.float64], robot: Robot) -> list[str]:
+def _turns(q: Array, robot: Robot) -> list[str]:
     """A note where a joint seems to be wrapped at half a turn: it jumps by a turn."""
     jumps = (np.abs(np.diff(q, axis=0)) > math.pi) & ~robot.prismatic
     if not jumps.any():

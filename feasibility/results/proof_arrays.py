@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from feasibility.results.archive import Archive
 
@@ -78,10 +79,10 @@ def unpack_proof(archive: Archive, count: int, n: int) -> CutTree:
 
 
 def _fault(
-    cell: NDArray[np.int64],
-    weights: NDArray[np.float64],
-    sides: NDArray[np.int64],
-    joints: NDArray[np.int64],
+    cell: Ints,
+    weights: Array,
+    sides: Ints,
+    joints: Ints,
     count: int,
     n: int,
 ) -> str:

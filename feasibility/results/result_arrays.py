@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from feasibility.results.archive import Archive, Fields
 from robots import Robot
 from surfaces import Cells
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     import networkx as nx
 
 
-def ragged(name: str, rows: Sequence[NDArray[np.int64]]) -> dict[str, NDArray]:
+def ragged(name: str, rows: Sequence[Ints]) -> dict[str, NDArray]:
     """Arrays of cells as `name_lengths` and `name_values`."""
     return {
         f"{name}_lengths": np.array([len(row) for row in rows], dtype=np.int64),
@@ -24,7 +25,7 @@ def ragged(name: str, rows: Sequence[NDArray[np.int64]]) -> dict[str, NDArray]:
     }
 
 
-def unpack_ragged(archive: Archive, name: str, count: int) -> tuple[NDArray[np.int64], ...]:
+def unpack_ragged(archive: Archive, name: str, count: int) -> tuple[Ints, ...]:
     """The arrays of cells that `ragged` wrote.
 
     Raises:
@@ -96,7 +97,7 @@ def unpack_graph(archive: Archive, name: str, count: int, n: int, tree: bool = F
 
 def read_cells(
     archive: Archive, name: str, count: int, shape: tuple[int | None, ...] = (None,), low: int = 0
-) -> NDArray[np.int64]:
+) -> Ints:
     """An array of cells, each from `low` to `count` - 1.
 
     Raises:
@@ -108,7 +109,7 @@ def read_cells(
     return cells
 
 
-def _cut(archive: Archive, name: str, lengths: NDArray[np.int64], values: NDArray) -> list[NDArray]:
+def _cut(archive: Archive, name: str, lengths: Ints, values: NDArray) -> list[NDArray]:
     """Cut values into pieces of the given lengths, which must use them up."""
     limit = len(values)
     if ((lengths < 0) | (lengths > limit)).any() or sum(lengths.tolist()) != limit:
@@ -119,7 +120,7 @@ def _cut(archive: Archive, name: str, lengths: NDArray[np.int64], values: NDArra
 CLOSE = 1e-9  # [m], [1]: tool points, axes, centres and normals that count as the same
 
 
-def probes(robot: Robot) -> NDArray[np.float64]:
+def probes(robot: Robot) -> Array:
     """(n + 4, 6) numbers that tell one arm from another: limits, tool points and axes.
 
     The limits fill the first n rows (2 of 6 columns, infinite ones as 0 with a flag beside them);
@@ -151,7 +152,7 @@ def check_robot(robot: Robot, fields: Fields, archive: Archive) -> None:
         )
 
 
-def places(cells: Cells) -> NDArray[np.float64]:
+def places(cells: Cells) -> Array:
     """(N, 6) centre (m) and outward normal of each cell."""
     return np.hstack([cells.centres, cells.normals])
 

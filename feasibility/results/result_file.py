@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import ArgumentError, CoverableError, shown, worded
 from feasibility.cases import CLOSED_FORM_KINDS, Case, CaseError, Setup
 from feasibility.results.archive import Archive, ArchiveError, Fields, write_archive
@@ -235,7 +235,7 @@ def _verdict(fields: Fields, archive: Archive, setup: Setup) -> Verdict:
     )
 
 
-def _postures(fields: Fields, archive: Archive, count: int, n: int) -> NDArray[np.float64] | None:
+def _postures(fields: Fields, archive: Archive, count: int, n: int) -> Array | None:
     """A configuration of each component; files of earlier versions hold none."""
     if not ("has_postures" in fields.entries and fields.flag("has_postures")):
         return None

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import ArgumentError, Checks, CoverableError, Fault
 from feasibility.collisions import CHECKABLE, listed_words
 from feasibility.safe_files import FileError, read_regular, shown_path, write_whole
@@ -209,7 +209,7 @@ def from_json_text(text: str) -> Trajectory:
     return Trajectory(joint_names=tuple(joints), **arrays, cell=at, collisions=tuple(collisions))
 
 
-def _array(checks: Checks, key: str, value: object, shape: tuple[int, ...]) -> NDArray[np.float64]:
+def _array(checks: Checks, key: str, value: object, shape: tuple[int, ...]) -> Array:
     """Numbers out of nested lists; whether they are finite, `Trajectory` says."""
     try:
         found = np.array(value if isinstance(value, list) else [])

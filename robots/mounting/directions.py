@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from coverable_arrays import Array
 
 PARALLEL = 1e-6  # [1], sine of the angle below which two directions count as parallel
 
-Vector = NDArray[np.float64]
 
-
-def unit_axis(axis: Vector) -> Vector:
+def unit_axis(axis: Array) -> Array:
     """(3,) the axis brought to length one; NaN where it is zero or not finite."""
     largest = float(np.abs(axis).max())
     if not 1e-9 < largest < np.inf:
@@ -19,7 +18,7 @@ def unit_axis(axis: Vector) -> Vector:
     return np.asarray(scaled / np.linalg.norm(scaled))
 
 
-def made_orthogonal(reference: Vector, approach: Vector) -> Vector:
+def made_orthogonal(reference: Array, approach: Array) -> Array:
     """(3,) unit vector: the part of `reference` that is orthogonal to `approach`.
 
     Args:

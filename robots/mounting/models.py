@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from coverable_errors import Fault, close_matches
 from robots.errors import RobotError
 
@@ -23,7 +23,7 @@ TCP_FRAME = "coverable tcp"
 WORLD_FRAME = "coverable world"
 
 
-def place_base(model: pin.Model, base: NDArray[np.float64]) -> None:
+def place_base(model: pin.Model, base: Array) -> None:
     """Put the root link of a model at the pose `base` (4, 4) in the world; changes the model."""
     place = pin.SE3(base)
     for joint in range(1, model.njoints):
@@ -34,7 +34,7 @@ def place_base(model: pin.Model, base: NDArray[np.float64]) -> None:
             model.frames[number].placement = place * model.frames[number].placement
 
 
-def place_tcp(model: pin.Model, tool: str, tcp: NDArray[np.float64]) -> None:
+def place_tcp(model: pin.Model, tool: str, tcp: Array) -> None:
     """Add the tool centre point to a model, at the pose `tcp` (4, 4) in the link `tool`."""
     number = model.getFrameId(tool, pin.FrameType.BODY)
     link = model.frames[number]
@@ -53,7 +53,7 @@ class SeenFrom(NamedTuple):
     """The others."""
 
 
-def seen_from(model: pin.Model, link: str, tool: int, rest: NDArray[np.float64]) -> SeenFrom:
+def seen_from(model: pin.Model, link: str, tool: int, rest: Array) -> SeenFrom:
     """The chain from a link to the tool frame; the other joints are held.
 
     Args:
@@ -86,7 +86,7 @@ def seen_from(model: pin.Model, link: str, tool: int, rest: NDArray[np.float64])
     return SeenFrom(rerooted(chain, *ends), order, held)
 
 
-def _locked(model: pin.Model, held: Sequence[int], rest: NDArray[np.float64]) -> pin.Model:
+def _locked(model: pin.Model, held: Sequence[int], rest: Array) -> pin.Model:
     """The model with some of its joints, counted from 0, held."""
     if not held:
         return model
@@ -151,7 +151,7 @@ def rerooted(model: pin.Model, frame: int, tool: int) -> pin.Model:
     made = pin.Model()
     made.name = model.name
 
-    def add(joint: int, axis: NDArray[np.float64], placement: pin.SE3) -> int:
+    def add(joint: int, axis: Array, placement: pin.SE3) -> int:
         slide, turn = pin.JointModelPrismaticUnaligned, pin.JointModelRevoluteUnaligned
         kind = slide if slides[joint - 1] else turn
         number = int(made.addJoint(made.njoints - 1, kind(axis), placement, model.names[joint]))
@@ -174,7 +174,7 @@ def rerooted(model: pin.Model, frame: int, tool: int) -> pin.Model:
     return made
 
 
-def joint_axes(model: pin.Model) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+def joint_axes(model: pin.Model) -> tuple[Mask, Array]:
     """Which of the n joints slide, and (n, 3) their unit axes, each in the joint's own frame."""
     n, data = model.nv, model.createData()
     pin.computeJointJacobians(model, data, pin.neutral(model))

@@ -7,18 +7,16 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import Checks, Fault, shown
 
 FURTHEST_TCP = 10.0  # [m] from tool_frame: no tool is longer, but many are given in millimetres
 FURTHEST_BASE = 1e4  # [m] from the origin of the world
 _RIGID = 1e-6  # [1], how far a rotation may be from one
 
-Matrix = NDArray[np.float64]
 
-
-def checked_pose(checks: Checks, key: str, value: Any, furthest: float) -> Matrix:
+def checked_pose(checks: Checks, key: str, value: Any, furthest: float) -> Array:
     """A pose as a (4, 4) matrix; the identity after a fault.
 
     Args:
@@ -37,7 +35,7 @@ def checked_pose(checks: Checks, key: str, value: Any, furthest: float) -> Matri
 
 def matrix_of(
     checks: Checks, position: Any, rpy_deg: Any, furthest: float, before: str = ""
-) -> Matrix:
+) -> Array:
     """The (4, 4) matrix of a frame, turned by roll, pitch and yaw about fixed axes.
 
     Args:
@@ -57,7 +55,7 @@ def matrix_of(
     return matrix
 
 
-def rigid_matrix(checks: Checks, key: str, value: Any, furthest: float, other: str = "") -> Matrix:
+def rigid_matrix(checks: Checks, key: str, value: Any, furthest: float, other: str = "") -> Array:
     """A (4, 4) rigid motion; the identity after a fault.
 
     Args:
@@ -87,7 +85,7 @@ def rigid_matrix(checks: Checks, key: str, value: Any, furthest: float, other: s
     return np.eye(4)
 
 
-def about_fixed_axes(roll: float, pitch: float, yaw: float) -> NDArray[np.float64]:
+def about_fixed_axes(roll: float, pitch: float, yaw: float) -> Array:
     """Rz(yaw) Ry(pitch) Rx(roll), (3, 3), from radians: URDF's fixed-axis roll, pitch, yaw.
 
     Through half angles, as scipy does it, to the last bit; scipy takes long to import.

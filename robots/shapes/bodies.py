@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from robots.errors import RobotError
 from robots.urdf import Box, Capsule, Cylinder, Sphere
 
@@ -16,9 +16,9 @@ from robots.urdf import Box, Capsule, Cylinder, Sphere
 class Triangles:
     """A body, or a sheet, bounded by triangles; checked: finite, and every index is a vertex."""
 
-    vertices: NDArray[np.float64]
+    vertices: Array
     """(k, 3) m."""
-    faces: NDArray[np.int64]
+    faces: Ints
     """(m, 3) indices of vertices."""
     closed: bool
     """True where they bound a solid, see `solid_faces`; they look outwards then. Else a sheet."""
@@ -38,7 +38,7 @@ class Solid:
     """The link's name."""
     joint: int
     """Which joint of the robot's model carries it, 1 .. n; 0 where none does."""
-    placement: NDArray[np.float64]
+    placement: Array
     """(4, 4) the shape's frame in that joint's frame (Pinocchio's), m; in the root frame for 0."""
     geometry: Geometry
 
@@ -54,7 +54,7 @@ class Polytope:
     """The link's name, or that of the object in the scene."""
     joint: int
     """See `Solid.joint`."""
-    vertices: NDArray[np.float64]
+    vertices: Array
     """(k, 3) m, k >= 1, in the frame of the joint (Pinocchio's), or in the root frame."""
     radius: float
     """m, >= 0."""

@@ -12,12 +12,10 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from robots.shapes.bodies import Geometry, Triangles
 from robots.urdf import Box, Capsule, Cylinder, Sphere
-
-Array = NDArray[np.float64]
 
 MOST_VERTICES = 64
 CLOSE_ENOUGH = 1e-4  # [m]: no vertex is added for less
@@ -164,7 +162,7 @@ def _reach_outside(hull: Any, points: Array) -> float:
     corners = hull.points[hull.simplices]  # (f, 3, 3)
     inverse = np.linalg.pinv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))  # (f, 2, 3)
 
-    def gaps(some: Array, facets: NDArray[np.int64]) -> Array:
+    def gaps(some: Array, facets: Ints) -> Array:
         offsets = some[:, None] - corners[facets, 0]
         shares = np.einsum("nfij,nfj->nfi", inverse[facets], offsets)
         first = 1.0 - shares.sum(axis=2, keepdims=True)

@@ -11,12 +11,10 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from robots.shapes.bodies import Geometry, Triangles
 from robots.shapes.hulls import Hull, hull_of, hull_volume, outer_hull
-
-Array = NDArray[np.float64]
 
 MOST_PIECES = 8
 BINS = 16  # planes may lie between any two of them

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from robots.kinematics import Kinematics
 from robots.robot import Robot
 from robots.shapes.bodies import Polytope, Solid, Triangles
@@ -31,7 +31,7 @@ WITHOUT_LIMITS = {"revolute": np.pi, "continuous": np.pi, "prismatic": 1.0}  # t
 Pair = tuple[str, str]
 
 
-def random_configurations(robot: Robot) -> NDArray[np.float64]:
+def random_configurations(robot: Robot) -> Array:
     """(SAMPLES, n) configurations inside the limits, the same ones each time.
 
     A joint without limits turns once around, or slides a metre to both sides.
@@ -67,9 +67,7 @@ class PairSampling:
             index = int(self._geometry.addGeometryObject(entry))
             self._of_owner.setdefault(body.owner, []).append(index)
 
-    def collisions(
-        self, pairs: Sequence[Pair], configurations: NDArray[np.float64]
-    ) -> NDArray[np.bool_]:
+    def collisions(self, pairs: Sequence[Pair], configurations: Array) -> Mask:
         """(k, p) which of p pairs collide in which of k configurations (k, n)."""
         self._geometry.removeAllCollisionPairs()
         pair_of: list[int] = []

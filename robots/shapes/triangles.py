@@ -6,8 +6,8 @@ from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from coverable_files import FileFault, read_regular
 from coverable_meshes import MeshError, MeshFiles, distinct, largest_file
 from robots.errors import RobotError
@@ -20,13 +20,11 @@ MOST_KNOWN = 256  # contents that are kept
 
 VOLUME = 1e-9  # [1], of the widest side cubed: triangles around less bound no solid
 
-Array = NDArray[np.float64]
-Faces = NDArray[np.int64]
 
 _known: dict[tuple[bytes, str, tuple[float, float, float]], Triangles] = {}
 
 
-def checked_triangles(vertices: Array, faces: Faces, what: str = "the mesh") -> Triangles:
+def checked_triangles(vertices: Array, faces: Ints, what: str = "the mesh") -> Triangles:
     """Triangles that a native library may see.
 
     Vertices that are equal are joined, and triangles that name a vertex twice are dropped. Those
@@ -70,7 +68,7 @@ def checked_triangles(vertices: Array, faces: Faces, what: str = "the mesh") -> 
     return Triangles(joined, kept, closed=solid is not None)
 
 
-def solid_faces(vertices: Array, faces: Faces) -> Faces | None:
+def solid_faces(vertices: Array, faces: Ints) -> Ints | None:
     """The triangles of a solid, looking outwards; None where they are a sheet.
 
     They bound a solid where each edge has two of them and they enclose a volume. Where they do not
@@ -107,14 +105,14 @@ def solid_faces(vertices: Array, faces: Faces) -> Faces | None:
     return faces[:, ::-1] if volume < 0.0 else faces
 
 
-def _volumes(vertices: Array, faces: Faces) -> Array:
+def _volumes(vertices: Array, faces: Ints) -> Array:
     """(m,) m^3, signed, between each triangle and one of the corners."""
     corners = vertices[faces]
     a, b, c = (corners[:, k] - corners[0, 0] for k in range(3))
     return np.asarray(np.einsum("ki,ki->k", a, np.cross(b, c)) / 6.0)
 
 
-def _turned(sides: Faces, agree: NDArray[np.bool_], volumes: Array) -> Array | None:
+def _turned(sides: Ints, agree: Mask, volumes: Array) -> Array | None:
     """(m,) 1 for a triangle to be kept, -1 for one to be turned over; None where nothing helps.
 
     Args:

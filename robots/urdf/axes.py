@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import MISSING, Checks, Fault, shown
 from robots.errors import RobotError
 from robots.mounting import FURTHEST_BASE, matrix_of
@@ -28,7 +28,6 @@ MOST_AXES = 20
 WORLD = "world"
 
 Triple = tuple[float, float, float]
-Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +109,7 @@ def _ordered(checks: Checks, key: str, value: Any, unit: str) -> tuple[float, fl
     return low, high
 
 
-def insert_axes(robot: Node, axes: Sequence[Axis], base: Matrix | None, path: str) -> str:
+def insert_axes(robot: Node, axes: Sequence[Axis], base: Array | None, path: str) -> str:
     """Add the axes to a URDF's tree, as links and joints; changes the tree.
 
     Args:
@@ -198,7 +197,7 @@ def _joint(axis: Axis, parent: str, robot: Node) -> Node:
     return joint
 
 
-def _fixed(name: str, parent: str, child: str, place: Matrix | None, line: int) -> Node:
+def _fixed(name: str, parent: str, child: str, place: Array | None, line: int) -> Node:
     """The joint that fixes the URDF's root link."""
     joint = Node("joint", {"name": name, "type": "fixed"}, line)
     joint.children = [Node("parent", {"link": parent}, line), Node("child", {"link": child}, line)]
@@ -212,7 +211,7 @@ def _text(values: Any) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
-def rpy_of(rotation: Matrix) -> tuple[float, float, float]:
+def rpy_of(rotation: Array) -> tuple[float, float, float]:
     """Fixed-axis roll, pitch and yaw, rad, of a rotation (3, 3).
 
     Standing upright (pitch +-90 degrees) only one of roll and yaw is determined; roll is read off

@@ -14,9 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from coverable_arrays import Array
 from robots.urdf.axes import Axis, insert_axes
 from robots.urdf.expansion import expanded, is_xacro
 from robots.urdf.joints import JointInfo
@@ -93,7 +91,7 @@ def check_urdf(
     path: str | os.PathLike[str],
     package_dirs: Sequence[str | os.PathLike[str]] = (),
     axes: Sequence[Axis] = (),
-    base: NDArray[np.float64] | None = None,
+    base: Array | None = None,
     xacro_args: Mapping[str, Any] = {},
 ) -> CheckedUrdf:
     """Read and check a URDF file, or a .xacro file, which is expanded first.

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import Fault
 from robots.mounting import about_fixed_axes
 from robots.urdf.mesh_folders import MeshFolders
@@ -57,7 +57,7 @@ class Sphere:
 Geometry = MeshFile | Box | Cylinder | Capsule | Sphere
 
 
-def read_shape(node: Node, folders: MeshFolders) -> tuple[NDArray[np.float64], Geometry]:
+def read_shape(node: Node, folders: MeshFolders) -> tuple[Array, Geometry]:
     """The frame (4, 4) m of a shape in its link's frame, write-protected, and the shape.
 
     Raises:

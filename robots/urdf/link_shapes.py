@@ -10,9 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from coverable_arrays import Array
 from coverable_errors import Fault, worded
 from robots.urdf.geometry import Geometry, read_shape
 from robots.urdf.mesh_folders import MeshFolders
@@ -28,7 +26,7 @@ class LinkShape:
     """One <visual> or <collision> of one link."""
 
     link: str
-    origin: NDArray[np.float64]
+    origin: Array
     """(4, 4) the shape's frame in the link's frame, m."""
     geometry: Geometry
     rgba: Rgba | None = None
