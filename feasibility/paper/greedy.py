@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_errors import ArgumentError
+from coverable_errors import ArgumentError, counted
 from feasibility.clock import Clock
 from feasibility.found import Found
 from feasibility.notices import GREEDY, compiling_notice
@@ -114,8 +114,8 @@ def _found(problem: Problem, search: Search, steps: Steps, run: _Run) -> Found:
     cells, best, count = problem.cells, run.best, len(problem.cells)
     settings = (
         f"{search.moves} moves of {search.step_deg:g} degrees, tolerance "
-        f"{1e3 * steps.tolerance:.3g} mm; {run.calls} calls of Algorithm 1 from {run.trees} start"
-        f"{'' if run.trees == 1 else 's'}"
+        f"{1e3 * steps.tolerance:.3g} mm; {run.calls} calls of Algorithm 1 from "
+        f"{counted(run.trees, 'start')}"
     )
 
     def replay() -> Replay:

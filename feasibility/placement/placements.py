@@ -22,7 +22,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
-from coverable_errors import Checks, Fault
+from coverable_errors import Checks, Fault, counted
 from feasibility.clock import Clock
 from feasibility.collisions import checked_words
 from feasibility.notices import compiling_notice
@@ -199,8 +199,8 @@ def _ruled_out(
     message = (
         f"No placement in the region: wherever the surface stands in it, some target is at least "
         f"{beyond.distance:.3f} m from the first joint, and the arm reaches at most "
-        f"{beyond.reach:.3f} m (proved for the whole region, {beyond.boxes} "
-        f"box{'es' if beyond.boxes > 1 else ''})."
+        f"{beyond.reach:.3f} m (proved for the whole region, "
+        f"{counted(beyond.boxes, 'box', 'boxes')})."
     )
     return answered(
         answer=Answer.INFEASIBLE,
@@ -230,8 +230,8 @@ def _searched(
     if found:
         answer, evidence = Answer.FEASIBLE, Evidence.WITNESS
         message = (
-            f"{len(found)} feasible placement{'s' if len(found) > 1 else ''}, each with a replayed "
-            f"motion; the best leaves a margin of {found[0].margin:.3f}. {tried}"
+            f"{counted(len(found), 'feasible placement')}, each with a replayed motion; "
+            f"the best leaves a margin of {found[0].margin:.3f}. {tried}"
             + ("; the time limit ran out before more were." if refinement.late else ".")
         )
     else:

@@ -96,7 +96,7 @@ def compare(
     store: Store | None = None,
     progress: Progress | None = None,
 ) -> Comparison:
-    """Ask the same of several arms, each mounted where the case's arm is: on its base and axes.
+    """The same case for several arms, each mounted where the case's arm is: on its base and axes.
 
     Args:
         case: surface, task and search; its own arm keeps its limits and tool if it is among the
@@ -166,7 +166,7 @@ def _tables_of(case: Case, robots: Sequence[str]) -> list[Tables]:
         except ValueError as error:  # RobotError
             faults.append(Fault(place, str(error)))
         else:
-            made.append({**tables, "robot": {**tables["robot"], "name": name}})
+            made.append(tables)
     if faults:
         raise CaseError(faults, case.name)
     return made

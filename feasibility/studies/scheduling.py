@@ -10,7 +10,7 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, 
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from coverable_errors import CoverableError
+from coverable_errors import CoverableError, counted
 from feasibility.clock import OutOfTime
 
 AHEAD = 2  # tasks in flight for each worker: one at work, one waiting
@@ -200,8 +200,7 @@ class _Schedule:
                 self.deaths[index] += 1
             times = self.deaths[index]
             if times == self.workers.patience:
-                often = f"{times} time{'s' if times > 1 else ''}"
-                failure = f"its worker died, {often} with this task alone"
+                failure = f"its worker died, {counted(times, 'time')} with this task alone"
                 replies.append(Reply(index, None, failure, 0.0))
             else:
                 self.suspects.appendleft(index)
