@@ -462,7 +462,7 @@ def test_place_draws_what_it_tried(folder, ask) -> None:
     assert "view: p.html" in err
     text = (folder / "p.html").read_text(encoding="utf-8")
     lines = table_of(folder / "p.csv")
-    drawn = dict(re.findall(r"<label>.*?</i>([a-z][^<]*?) \((\d+)\)</label>", text))
+    drawn = dict(re.findall(r"<label[^>]*>.*?</i>([a-z][^<]*?) \((\d+)\)</label>", text))
     assert drawn.pop("feasible") == str(sum(line["verdict"] == "feasible" for line in lines))
     known = [line for line in lines if line["verdict"] != "feasible"]
     unsearched = sum(line["stage"] in ("bound", "probe") for line in known)
