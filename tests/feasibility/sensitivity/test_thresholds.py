@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from arm_builds import bare, built, on_a_base
-from dense_replay import tools
+from dense_replay import assert_over, tools
 from paper_cases import PAPER_CASES
 
 from feasibility import Task
@@ -214,14 +214,7 @@ def test_followed_configurations_lie_on_the_fibres(name: str) -> None:
     for k in (1, 10, 40):
         cell, found = prober.follow(prober.arrays_at(q, k), start.q)
         assert cell == NO_CELL
-        robot, cells, task = q.applied(variant, k)
-        points, axes = tools(robot, found)
-        aims = task.targets(cells)
-        assert np.linalg.norm(points - aims.points, axis=1).max() <= 1e-3
-        cosine = np.clip((axes * aims.approaches).sum(axis=1), -1.0, 1.0)
-        assert np.degrees(np.arccos(cosine)).max() <= task.cone_deg + 1e-6
-        assert (found >= robot.lower).all()
-        assert (found <= robot.upper).all()
+        assert_over(q.applied(variant, k), np.arange(len(variant.cells)), found)
     cell, _ = prober.follow(prober.arrays, nowhere)
     assert cell != NO_CELL  # NaN is never taken for a configuration
 
@@ -254,13 +247,7 @@ def test_warm_starts_reach_as_far_as_they_go_and_no_further(name: str) -> None:
         if len(variant.cells) <= 40:  # on more cells the search that follows looks at the rest
             cell, found = prober.follow(arrays, reached.q)
             assert cell == NO_CELL
-            points, axes = tools(variant.robot, found)
-            robot, cells, task = q.applied(variant, reached.k)
-            aims = task.targets(cells)
-            assert np.linalg.norm(points - aims.points, axis=1).max() <= 1e-3
-            cosine = np.clip((axes * aims.approaches).sum(axis=1), -1.0, 1.0)
-            assert np.degrees(np.arccos(cosine)).max() <= task.cone_deg + 1e-6
-            assert ((found >= robot.lower) & (found <= robot.upper)).all()
+            assert_over(q.applied(variant, reached.k), np.arange(len(variant.cells)), found)
         if reached.cell != NO_CELL:
             named += 1
             beyond = prober.centres_at(q, reached.k + 1)
