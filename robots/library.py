@@ -125,8 +125,7 @@ def load_robot(
         xacro_args: arguments of a .xacro file, name -> text, number or truth value.
 
     Raises:
-        RobotError: the name is unknown, or the URDF, frame, limits, a pose, an axis or a locked
-            joint is wrong.
+        RobotError: the name is unknown, or the URDF or an argument has faults: all are named.
 
     Example:
         >>> load_robot("puma560", limits="set-1")
@@ -136,24 +135,17 @@ def load_robot(
     """
     info = _find(name_or_path) or _unknown(name_or_path)
     approach_axis = _approach_axis(info, tool_frame) if approach_axis is None else approach_axis
-    mounting = check_arguments(
-        approach_axis,
-        lock,
-        f"robot {os.fspath(name_or_path)!r}",
-        tcp=tcp,
-        base=base,
-        reference_axis=reference_axis,
-        axes=axes,
-        xacro_args=xacro_args,
-    )
+    source = f"robot {os.fspath(name_or_path)!r}"
+    given = {"tcp": tcp, "base": base, "axes": axes, "xacro_args": xacro_args}
+    directions = {"approach_axis": approach_axis, "reference_axis": reference_axis}
+    mounting = check_arguments(lock=lock, source=source, **given, **directions)
     robot = _read(
         replace(info, lock={**info.lock, **(lock or {})}, tool_frame=tool_frame or info.tool_frame),
         _folders(package_dirs),
         mounting._replace(surface_link=surface_link),
         xacro_args or {},
         limits=limits,
-        approach_axis=approach_axis,
-        reference_axis=reference_axis,
+        **directions,
     )
     return robot if start is None else replace(robot, start=np.asarray(start))
 
