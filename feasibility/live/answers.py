@@ -119,7 +119,7 @@ def quick_look(setup: Setup, job: Job) -> Answer:
         "rows": [],
         "groups": [],
         "note": checked_words(task.collision),
-        "paint": {"classes": paint.classes, "entries": paint.entries},
+        "paint": paint._asdict(),
         "commands": picture.packed(picture.posed(robot, q, task.collision is not None)),
         "parts": {"paths": [], "entries": [], "seconds": 0.0},
     }
@@ -130,10 +130,6 @@ def certified(case: Case, setup: Setup, job: Job) -> Answer:
     watch = Watch(job, limit=setup.search.time_limit)
     verdict = check(*setup, clock=watch)
     paint, parts = picture.certified_paint(verdict), picture.certified_parts(verdict)
-    q = None if verdict.postures is None or not len(verdict.postures) else verdict.postures[0]
-    if verdict.witness is not None and len(verdict.witness.q):
-        q = verdict.witness.q[0]
-    posed = picture.posed(setup.robot, q, setup.task.collision is not None)
     return {
         "kind": str(verdict.answer),
         "head": report.as_text(verdict, case).splitlines()[0],
@@ -146,7 +142,7 @@ def certified(case: Case, setup: Setup, job: Job) -> Answer:
             for line in report.causes_listed(verdict.causes, verdict.cells)
         ],
         "note": checked_words(verdict.task.collision),
-        "paint": {"classes": paint.classes, "entries": paint.entries},
-        "commands": picture.packed([*parts.commands, *posed]),
+        "paint": paint._asdict(),
+        "commands": picture.packed(parts.commands),
         "parts": {"paths": parts.paths, "entries": parts.entries, "seconds": parts.seconds},
     }

@@ -155,21 +155,21 @@ class Parts(NamedTuple):
 
 
 def certified_parts(verdict: Verdict) -> Parts:
-    """Graph G, start, sides of a cut, and the motion."""
+    """Graph G, start, sides of a cut, the motion, and the arm where it starts."""
     parts = [
         part
         for part in layers(verdict)
         if part.entry.path is None or not part.entry.path.startswith((SURFACE, CELLS))
     ]
     robot, moving, seconds = verdict.robot, list[Command](), 0.0
-    motion = motion_of(verdict)
-    q = None if verdict.postures is None or not len(verdict.postures) else verdict.postures[0]
+    motion, collides = motion_of(verdict), verdict.task.collision is not None
+    known = verdict.postures if verdict.witness is None else verdict.witness.q
+    q = None if known is None or not len(known) else known[0]
     if motion is not None:
         parts.append(trail(verdict.cells, motion))
         q, seconds = motion.walk[0], float(motion.seconds[-1])
         times = np.linspace(0.0, seconds, 2 if robot.surface_link is None else 400)
         tracks = world_tracks(robot, times, motion.at(times))
-        collides = verdict.task.collision is not None
         roots = [ROOT, HULLS] if collides else [ROOT]
         moving = [animate(robot, motion, play=False, tracks=tracks, roots=roots)]
     drawn = [command for part in parts for command in part.commands]
@@ -180,7 +180,8 @@ def certified_parts(verdict: Verdict) -> Parts:
         np.zeros(robot.n) if q is None else q,
     )
     paths = [entry.path for entry in entries if entry.path is not None]
-    return Parts(shown, paths, [*map(_line, entries)], seconds)
+    commands = [*shown, *posed(robot, q, collides)]
+    return Parts(commands, paths, [*map(_line, entries)], seconds)
 
 
 def packed(commands: Iterable[Command]) -> str:
