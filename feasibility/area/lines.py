@@ -150,7 +150,8 @@ class Lander:
         gains, results = np.zeros((count, n, 3)), np.zeros((count, 2))
         land(
             self.arrays, self.work, self.memory,
-            np.stack([points, self.approaches(normals)], axis=1), self._bends(lines), lines.first,
+            np.stack([points, self.approaches(normals)], axis=1), self._derivative_bounds(lines),
+            lines.first,
             path, corners, radii, gains, results, self.left,
         )  # fmt: skip
         code = results[:, 0].astype(np.int64)
@@ -159,17 +160,17 @@ class Lander:
         node[got] = self._kept(lines, path, source, got)
         return Landed(code, node, gains), results[:, 1]
 
-    def _bends(self, lines: Lines) -> Array:
+    def _derivative_bounds(self, lines: Lines) -> Array:
         """(m, 2) of the piece that ends at each place, see `PlacePaths.derivative_bounds`."""
         total = len(lines.places.chart)
-        bends = np.zeros((total, 2))
+        bounds = np.zeros((total, 2))
         begin = np.delete(np.arange(total), lines.first[1:] - 1)
         path = self.cut.offset.paths(lines.places.of(begin), lines.places.of(begin + 1))
         single = path.share[:, 2] <= LONGER
-        bends[begin + 1] = np.where(single[:, None], path.derivative_bounds[:, 2], np.inf)
+        bounds[begin + 1] = np.where(single[:, None], path.derivative_bounds[:, 2], np.inf)
         if self.approach is not None:
-            bends[:, 1] = 0.0
-        return bends
+            bounds[:, 1] = 0.0
+        return bounds
 
     def _kept(self, lines: Lines, path: Array, source: Ints, got: Ints) -> Ints:
         """Keep the configurations along some lines as nodes; the last one's number of each."""

@@ -44,8 +44,8 @@ def aim_at(work, target):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def allow(arrays, work, bend):  # type: ignore[no-untyped-def]
-    """Bounds and allowances of a step; `bend` (2,) bounds the second derivatives of its target.
+def allow(arrays, work, bound):  # type: ignore[no-untyped-def]
+    """Bounds and allowances of a step; `bound` (2,) bounds the second derivatives of its target.
 
     See `PlacePaths.derivative_bounds`.
 
@@ -53,22 +53,22 @@ def allow(arrays, work, bend):  # type: ignore[no-untyped-def]
     for at the target.
     """
     stand_still(arrays, work)
-    work.derivative_bound[0] = bend[0]
-    work.derivative_bound[1] = bend[1]
+    work.derivative_bound[0] = bound[0]
+    work.derivative_bound[1] = bound[1]
     work.derivative_bound[2] = 0.0
     work.derivative_bound[3] = np.inf
     work.derivative_bound[4] = np.inf
 
 
 @kernel
-def step_to(arrays, work, q, target, bend, size, inner):  # type: ignore[no-untyped-def]
+def step_to(arrays, work, q, target, bound, size, inner):  # type: ignore[no-untyped-def]
     """One certified step from q (slot 0) to a target; the result is in `work.trial`, slot 1.
 
     Args:
         arrays, work: the `SearchArrays` and the `Work`.
         q: (n,) rad or m.
         target: (2, 3) see `aim_at`.
-        bend: (2,) see `allow`.
+        bound: (2,) see `allow`.
         size: rad, how far the arm may move away from limits and boundaries.
         inner: 1, what the projection may use of the cone's chord.
 
@@ -76,7 +76,7 @@ def step_to(arrays, work, q, target, bend, size, inner):  # type: ignore[no-unty
         The shares of tolerance and cone that the step uses, as `segment_holds` does; inf where the
         projection failed.
     """
-    allow(arrays, work, bend)
+    allow(arrays, work, bound)
     aim_at(work, target)
     copy_slot(arrays, work)
     linearise(arrays, work, NEXT)
@@ -93,27 +93,27 @@ def step_to(arrays, work, q, target, bend, size, inner):  # type: ignore[no-unty
 
 
 @kernel
-def certified_step(arrays, work, q, target, bend, size):  # type: ignore[no-untyped-def]
+def certified_step(arrays, work, q, target, bound, size):  # type: ignore[no-untyped-def]
     """`step_to` with the axis led inwards, or else without: a tile's turn needs most of the cone.
 
     Inwards by as much as the step moves the arm anyway, for it has to be short.
     """
     inner = max(INNER * arrays.cone_chord, work.error[HERE, 1] - size)
-    position, cone = step_to(arrays, work, q, target, bend, size, inner)
+    position, cone = step_to(arrays, work, q, target, bound, size, inner)
     if not (position <= 1.0 and cone <= 1.0):
-        position, cone = step_to(arrays, work, q, target, bend, NO_PUSH, np.inf)
+        position, cone = step_to(arrays, work, q, target, bound, NO_PUSH, np.inf)
     return position, cone
 
 
 @kernel
-def follow(arrays, work, q, targets, bends, first, last, path):  # type: ignore[no-untyped-def]
+def follow(arrays, work, q, targets, bounds, first, last, path):  # type: ignore[no-untyped-def]
     """Follow the places first..last of a line from q (in place) over the first one.
 
     Args:
         arrays, work: the `SearchArrays` and the `Work`.
         q: (n,) rad or m.
         targets: (m, 2, 3) target points (m) and approach directions of places.
-        bends: (m, 2) of the piece that ends at each, see `PlacePaths.derivative_bounds`.
+        bounds: (m, 2) of the piece that ends at each, see `PlacePaths.derivative_bounds`.
         first, last: rows.
         path: (m, n) receives the configurations over the places.
 
@@ -131,7 +131,7 @@ def follow(arrays, work, q, targets, bends, first, last, path):  # type: ignore[
             span += (targets[row, 0, k] - targets[row - 1, 0, k]) ** 2
         span = 2.0 * np.sqrt(span) / arrays.scale
         size = max(span, LEAST_PUSH) if span > 0.0 else at_rest
-        position, cone = certified_step(arrays, work, q, targets[row], bends[row], size)
+        position, cone = certified_step(arrays, work, q, targets[row], bounds[row], size)
         if position <= 1.0 and cone <= 1.0:
             put(q, work.trial)
             accept(work)
@@ -147,13 +147,13 @@ def follow(arrays, work, q, targets, bends, first, last, path):  # type: ignore[
 
 @kernel
 def land(  # type: ignore[no-untyped-def]
-    arrays, work, tile, targets, bends, first, path, corners, radii, gains, results, budget
+    arrays, work, tile, targets, bounds, first, path, corners, radii, gains, results, budget
 ):
     """Follow lines to the middles of tiles, and test these.
 
     Args:
         arrays, work, tile: the `SearchArrays`, the `Work`, and the `Tile` as working memory.
-        targets, bends: see `follow`, line by line.
+        targets, bounds: see `follow`, line by line.
         first: (k + 1,) where each line begins.
         path: (m, n) holds at each line's beginning where it starts; receives the rest.
         corners, radii: (k, 4, 2, 3) and (k, 2) of each tile, see `Tile`.
@@ -168,7 +168,7 @@ def land(  # type: ignore[no-untyped-def]
         if work.counts[0] > stop:
             continue
         put(q, path[first[k]])
-        results[k, 1] = follow(arrays, work, q, targets, bends, first[k], first[k + 1] - 1, path)
+        results[k, 1] = follow(arrays, work, q, targets, bounds, first[k], first[k + 1] - 1, path)
         if results[k, 1] > 0.0:
             continue
         for part in range(2):
