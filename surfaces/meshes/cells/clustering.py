@@ -9,8 +9,8 @@ mesh gets the same cells.
 from __future__ import annotations
 
 import math
-import operator
-from typing import Any, NamedTuple
+from numbers import Integral
+from typing import NamedTuple
 
 import numpy as np
 
@@ -235,21 +235,12 @@ def _number_of_cells(total: float, count: int | None, size: float | None) -> int
             raise SurfaceError(Fault("size", got, expected="must be a finite number > 0 (metres)"))
         ideal = total / size**2
         count = max(round(ideal), 1) if ideal < 1e9 else 10**9
-    number = _integer(count)
+    if not isinstance(count, Integral) or isinstance(count, bool):
+        got = f"got {shown(count)}"
+        raise SurfaceError(Fault("count", got, expected="must be a whole number >= 1"))
+    number = int(count)
     if not 1 <= number <= MOST_CELLS:
         key, got = ("count", "got") if size is None else ("size", f"got {size:g} m, which makes")
         expected = f"must make 1 to {MOST_CELLS:,} cells"
         raise SurfaceError(Fault(key, f"{got} {number:,}; {hint}", expected=expected))
-    return number
-
-
-def _integer(value: Any) -> int:
-    """A whole number, or a clear error."""
-    try:
-        number = operator.index(value)
-    except TypeError:
-        number = None
-    if number is None or isinstance(value, bool):
-        got = f"got {shown(value)}"
-        raise SurfaceError(Fault("count", got, expected="must be a whole number >= 1"))
     return number

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from coverable_arrays import Array, Ints
+from coverable_errors import counted
 from surfaces.adjacency import components
 
 if TYPE_CHECKING:
@@ -116,8 +117,3 @@ def _about_sides(mesh: TriangleMesh) -> list[str]:
         f"{counted(int(inverted.sum()), 'closed piece')} of the mesh "
         f"face{'' if inverted.sum() > 1 else 's'} inwards: there, side 'outside' is the inner side"
     ]
-
-
-def counted(count: int, one: str, several: str | None = None) -> str:
-    """A number with its noun."""
-    return f"{count} {one if count == 1 else several or one + 's'}"

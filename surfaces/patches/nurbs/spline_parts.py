@@ -16,6 +16,8 @@ the coefficients nearer to the values.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -68,14 +70,10 @@ def span_nets(
     net = points - origin
     if weights is not None:
         net = np.concatenate([weights[..., None] * net, weights[..., None]], axis=-1)
-    by_u = [
-        span_matrix(knots[0], degree[0], *ends)
-        for ends in zip(breaks[0][:-1], breaks[0][1:], strict=True)
-    ]
-    by_v = [
-        span_matrix(knots[1], degree[1], *ends)
-        for ends in zip(breaks[1][:-1], breaks[1][1:], strict=True)
-    ]
+    by_u, by_v = (
+        [span_matrix(knots[axis], degree[axis], *ends) for ends in pairwise(breaks[axis])]
+        for axis in (0, 1)
+    )
     p, q = degree
     nets = np.array(
         [
@@ -124,16 +122,15 @@ def spline_models(nets: SpanNets, low: Array, high: Array) -> tuple[SpaceModel, 
         _models(nets, low[first : first + step], high[first : first + step])
         for first in range(0, len(low), step)
     ]
-    points, normals = (
-        SpaceModel(
-            np.concatenate([model.centre for model in models]),
-            np.concatenate([model.slopes for model in models]),
-            np.concatenate([model.error for model in models]),
-            np.concatenate([model.along for model in models]),
-        )
-        for models in zip(*blocks, strict=True)
-    )
+    points, normals = (_joined(models) for models in zip(*blocks, strict=True))
     return points._replace(centre=points.centre + nets.origin), normals
+
+
+def _joined(models: Sequence[SpaceModel]) -> SpaceModel:
+    """Models one after the other."""
+    columns = zip(*(model[:4] for model in models), strict=True)
+    centre, slopes, error, along = map(np.concatenate, columns)
+    return SpaceModel(centre, slopes, error, along)
 
 
 def _models(nets: SpanNets, low: Array, high: Array) -> tuple[SpaceModel, SpaceModel]:

@@ -193,7 +193,7 @@ def test_what_is_drawn_is_the_surface():
     assert np.abs(cells.surface.closest(lines).height).max() < 1e-12
     edges = cells.surface.mesh.edges
     length = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1).sum()
-    expected = cells.border_lengths.sum() + edges.border_lengths.sum()
+    expected = cells.figures.borders.lengths.sum() + edges.border_lengths.sum()
     assert length == pytest.approx(expected, rel=1e-12)
     flat = cells.unrolled()
     assert flat.centres.shape == (40, 2)
