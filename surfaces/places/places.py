@@ -82,16 +82,9 @@ class PlacePaths(NamedTuple):
             bounds: (k, 2) derivative bounds of that piece.
             start, end: the places.
         """
-        (point, normal), (last, last_normal) = ends
-        count = len(point)
-        share = np.broadcast_to([0.0, 0.0, 0.0, 1.0], (count, 4)).copy()
-        points = np.stack([point, point, point, last], axis=1)
-        normals = np.stack([normal, normal, normal, last_normal], axis=1)
-        every = np.zeros((count, 3, 2))
-        every[:, 2] = bounds
-        chart = np.stack([start.chart, start.chart, start.chart, end.chart], axis=1)
-        x = np.stack([start.x, start.x, start.x, end.x], axis=1)
-        return PlacePaths(share, points, normals, every, chart, x)
+        four, placed = (start, start, start, end), (ends[0], ends[0], ends[0], ends[1])
+        at_once = np.zeros(len(bounds))
+        return PlacePaths.over(four, placed, at_once, (np.zeros_like(bounds), bounds))
 
     @staticmethod
     def over(
