@@ -49,7 +49,7 @@ class Memory(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _mixed(key):  # type: ignore[no-untyped-def]
+def _mixed(key):
     """Spread the bits of a linear key over the word."""
     key ^= key >> 29
     key *= -7046029254386353131
@@ -58,7 +58,7 @@ def _mixed(key):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _key(offsets):  # type: ignore[no-untyped-def]
+def _key(offsets):
     """A linear key of a J-cell: a neighbour's follows by adding one term per moved joint."""
     key = 0
     for i in range(offsets.shape[0]):
@@ -67,13 +67,13 @@ def _key(offsets):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _weight(i):  # type: ignore[no-untyped-def]
+def _weight(i):
     """An odd 64-bit factor for joint i (wraps around on purpose)."""
     return (2 * i + 1) * -7070675565921424023 + 2 * i
 
 
 @njit(cache=True, error_model="numpy")
-def rehash(memory):  # type: ignore[no-untyped-def]
+def rehash(memory):
     """Enter all nodes of the running call into a new, empty table."""
     counters, table, nodes = memory.counters, memory.table, memory.nodes
     mask = table.shape[0] - 1
@@ -85,7 +85,7 @@ def rehash(memory):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def begin_search(chain, grid, offsets, target, memory):  # type: ignore[no-untyped-def]
+def begin_search(chain, grid, offsets, target, memory):
     """Start a call of Algorithm 1 at the J-cell `offsets` (n,) towards the point `target` (3,)."""
     counters = memory.counters
     counters[STATE], counters[DEPTH], counters[NODES] = RUNNING, 0, 1
@@ -100,7 +100,7 @@ def begin_search(chain, grid, offsets, target, memory):  # type: ignore[no-untyp
 
 
 @njit(cache=True, error_model="numpy")
-def _first_visit(table, nodes, call, count, offsets, delta, key):  # type: ignore[no-untyped-def]
+def _first_visit(table, nodes, call, count, offsets, delta, key):
     """Enter the J-cell offsets + delta as nodes[count]; False when it was checked already."""
     n = offsets.shape[0]
     mask = table.shape[0] - 1
@@ -122,7 +122,7 @@ def _first_visit(table, nodes, call, count, offsets, delta, key):  # type: ignor
 
 
 @njit(cache=True, error_model="numpy")
-def _inside(lowest, highest, offsets, delta):  # type: ignore[no-untyped-def]
+def _inside(lowest, highest, offsets, delta):
     """True when the J-cell offsets + delta obeys the joint limits."""
     inside = True
     for i in range(offsets.shape[0]):
@@ -131,9 +131,7 @@ def _inside(lowest, highest, offsets, delta):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _placed_for(  # type: ignore[no-untyped-def]
-    delta, rotations, translations, prismatic, origin, step, offsets, placed, base
-):
+def _placed_for(delta, rotations, translations, prismatic, origin, step, offsets, placed, base):
     """Bring the joint frames in `base` up to date up to the last that moves; how many are."""
     top = delta.shape[0] - 1
     while delta[top] == 0:
@@ -145,7 +143,7 @@ def _placed_for(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def extend_search(chain, patch_kernel, triangles, grid, target, target_cell, budget, cap, memory):  # type: ignore[no-untyped-def]
+def extend_search(chain, patch_kernel, triangles, grid, target, target_cell, budget, cap, memory):
     """Go on with a call of Algorithm 1 for at most `budget` more neighbours.
 
     Leaves counters[STATE] at FOUND (the stack and the last node are the path), EXHAUSTED (no
@@ -218,7 +216,7 @@ def extend_search(chain, patch_kernel, triangles, grid, target, target_cell, bud
 
 
 @njit(cache=True, error_model="numpy")
-def _expand(nodes, node, tool, offsets, held, partial):  # type: ignore[no-untyped-def]
+def _expand(nodes, node, tool, offsets, held, partial):
     """Make `node`, with its tool (7,), the present J-cell.
 
     Returns:

@@ -64,9 +64,7 @@ class Grid(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def place_joints(  # type: ignore[no-untyped-def]
-    rotations, translations, prismatic, origin, step, offsets, placed, wanted, base
-):
+def place_joints(rotations, translations, prismatic, origin, step, offsets, placed, wanted, base):
     """Bring the frames of joints `placed` .. `wanted` up to date, each before its own motion.
 
     Args:
@@ -99,7 +97,7 @@ def place_joints(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _turn(x, y, z, vx, vy, vz, sine, cosine):  # type: ignore[no-untyped-def]
+def _turn(x, y, z, vx, vy, vz, sine, cosine):
     """Rotate the vector v about the unit axis (x, y, z)."""
     along = (x * vx + y * vy + z * vz) * (1.0 - cosine)
     return (
@@ -110,7 +108,7 @@ def _turn(x, y, z, vx, vy, vz, sine, cosine):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _facing(side, approach, nx, ny, nz, tool):  # type: ignore[no-untyped-def]
+def _facing(side, approach, nx, ny, nz, tool):
     """a.b over a place with the normal (nx, ny, nz)."""
     if approach.shape[0] == 3:
         return tool[3] * approach[0] + tool[4] * approach[1] + tool[5] * approach[2]
@@ -118,7 +116,7 @@ def _facing(side, approach, nx, ny, nz, tool):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def cell_of(patch_kernel, triangles, side, height, tolerance, cosine, approach, tool):  # type: ignore[no-untyped-def]
+def cell_of(patch_kernel, triangles, side, height, tolerance, cosine, approach, tool):
     """E-cell of a tool point and axis (6,) that satisfy the task constraints; -1 where they do not.
 
     The paper's eqs. (5) and (7), with a tolerance, and with the angle of its prose: a.b >= cos. N
@@ -152,7 +150,7 @@ def cell_of(patch_kernel, triangles, side, height, tolerance, cosine, approach, 
 
 
 @njit(cache=True, error_model="numpy")
-def place_tool(chain, grid, offsets, tool, reference):  # type: ignore[no-untyped-def]
+def place_tool(chain, grid, offsets, tool, reference):
     """Tool point and axis (6,) and reference axis (3,) of one J-cell, by forward kinematics."""
     n = offsets.shape[0]
     q = np.empty(n)
@@ -162,7 +160,7 @@ def place_tool(chain, grid, offsets, tool, reference):  # type: ignore[no-untype
 
 
 @njit(cache=True, error_model="numpy")
-def rolls_within(chain, patch_kernel, triangles, grid, offsets, tool):  # type: ignore[no-untyped-def]
+def rolls_within(chain, patch_kernel, triangles, grid, offsets, tool):
     """True where a J-cell with its tool (6,) has a roll in the task's range: eq. (6).
 
     See `feasibility.roll`. The arguments are those of `cell_of`, and a `Chain` and the `Grid`. It
@@ -197,14 +195,14 @@ def rolls_within(chain, patch_kernel, triangles, grid, offsets, tool):  # type: 
 
 
 @njit(cache=True, error_model="numpy")
-def distance(tool, target):  # type: ignore[no-untyped-def]
+def distance(tool, target):
     """|p - p_T|, m."""
     dx, dy, dz = tool[0] - target[0], tool[1] - target[1], tool[2] - target[2]
     return np.sqrt(dx * dx + dy * dy + dz * dz)
 
 
 @njit(cache=True, error_model="numpy")
-def neighbour(number, moves_all, delta):  # type: ignore[no-untyped-def]
+def neighbour(number, moves_all, delta):
     """Write neighbour `number` (0, 1, ...) as moves -1, 0, +1 of the joints; False past the last.
 
     Single moves: +joint 0, -joint 0, +joint 1, ... All moves count in base 3 with digits 0, +1, -1,
@@ -227,7 +225,7 @@ def neighbour(number, moves_all, delta):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def move_tool(prismatic, step, sine, cosine, base, delta, held, partial):  # type: ignore[no-untyped-def]
+def move_tool(prismatic, step, sine, cosine, base, delta, held, partial):
     """Tool of a neighbour, left in partial[0], given the tool of the J-cell in partial[n].
 
     Args:
