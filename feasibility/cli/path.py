@@ -176,11 +176,11 @@ def path(args: argparse.Namespace, began: float) -> int:
             late = f"The time limit of {opened.clock.limit:g} s ran out before the path was timed."
             verdict = replace(verdict, answer=Answer.UNDECIDED, message=f"{verdict.message} {late}")
             return _no_path(args, opened.case.name, verdict, loaded)
-    more = report.Details(None if along is None else along.passes, treated, rates, ends)
+    known = None if along is None else along.passes, treated, rates, ends
     if args.json:
-        print_out(json_text(report.as_json(found, run, limits, more)))
+        print_out(json_text(report.as_json(found, run, limits, *known)))
     else:
-        print_out(report.as_text(found, run, limits, more))
+        print_out(report.as_text(found, run, limits, *known))
     short = report.short_words(treated, opened.setup.task.coverage)
     _write(args, robot, run, opened.case.name)
     if args.html is not None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from typing import Any
 
@@ -35,28 +34,14 @@ FEW = 5  # cells that are named
 HARDLY_LESS = 0.9  # [1] of the required speed
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Details:
-    """What else may be known of a path."""
-
-    passes: Passes | None = None
-    """Those that it runs."""
-    treated: TreatedArea | None = None
-    """Where the task has a footprint."""
-    rates: RateReplay | None = None
-    """Where the task has a speed or a least singular value."""
-    ends: Ends | None = None
-    """How it is entered and left."""
-
-
-PLAIN = Details()
-
-
 def as_json(
     path: CoveragePath,
     trajectory: Trajectory | None = None,
     limits: MotionLimits | None = None,
-    more: Details = PLAIN,
+    passes: Passes | None = None,
+    treated: TreatedArea | None = None,
+    rates: RateReplay | None = None,
+    ends: Ends | None = None,
 ) -> dict[str, Any]:
     """The object that `coverable path --json` prints, without NaN.
 
@@ -66,7 +51,10 @@ def as_json(
         path: the path.
         trajectory: its timing, if it is timed.
         limits: of the timing.
-        more: what else is known of it.
+        passes: those that it runs, if it runs passes.
+        treated: what it treats, where the task has a footprint.
+        rates: where the task has a speed or a least singular value.
+        ends: how it is entered and left.
     """
     figures = path.figures
     sliding = path.robot.prismatic
@@ -94,11 +82,11 @@ def as_json(
             "singular_value": plain(figures.singular_value),
         },
         "certificate": certificate_json(path.certificate) | clearance_json(path.certificate),
-        "treated": treated_json(more.treated),
-        "passes": None if more.passes is None else passes_json(more.passes),
+        "treated": treated_json(treated),
+        "passes": None if passes is None else passes_json(passes),
         "trajectory": None if trajectory is None else _timing(path, trajectory, limits),
-        **rates_json(path, more.rates, trajectory),
-        **ends_json(more.ends),
+        **rates_json(path, rates, trajectory),
+        **ends_json(ends),
         "collisions": checked(path.task.collision),
         "robot": path.robot.name,
         "version": version(),
@@ -183,13 +171,16 @@ def as_text(
     path: CoveragePath,
     trajectory: Trajectory | None = None,
     limits: MotionLimits | None = None,
-    more: Details = PLAIN,
+    passes: Passes | None = None,
+    treated: TreatedArea | None = None,
+    rates: RateReplay | None = None,
+    ends: Ends | None = None,
 ) -> str:
     """The path for people: its length compared with the least possible, margins, and times.
 
     The arguments are those of `as_json`.
     """
-    count, figures, passes = int(path.needed.sum()), path.figures, more.passes
+    count, figures = int(path.needed.sum()), path.figures
     over = counted(count, "cell" if passes is None else "place")
     rows = [
         ("order", f"{path.order}, {over}, {len(path.visits):,} centres passed"),
@@ -204,7 +195,7 @@ def as_text(
         ),
         ("roll", roll_text(path.certificate, path.task)),
         ("clearance", clearance_text(path.certificate)),
-        ("treated", "" if more.treated is None else treated_words(more.treated)),
+        ("treated", "" if treated is None else treated_words(treated)),
     ]
     if trajectory is not None:
         speed = at_most(float(trajectory.tool_speed.max()), 4)
@@ -213,7 +204,7 @@ def as_text(
             ("time", f"{trajectory.duration:.4g} s in {samples}, tool at up to {speed} m/s"),
             ("limits", _limits_text(path.robot, trajectory, limits)),
         ]
-    rows += [("speed", rates_words(path, more.rates, trajectory)), ("ends", ends_words(more.ends))]
+    rows += [("speed", rates_words(path, rates, trajectory)), ("ends", ends_words(ends))]
     head = f"path: one continuous motion over {over}."
     if passes is not None:
         rows[:2] = [("passes", passes_text(passes)), ("length", f"{figures.length:.4g} m in all")]
