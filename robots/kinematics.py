@@ -205,9 +205,7 @@ def _pose_view(placement: pin.SE3) -> Array:
     return np.lib.stride_tricks.as_strided(rotation, (12,), (column,), writeable=False)
 
 
-def _points_and_rotations(
-    poses: list[bytes],
-) -> tuple[Array, Array]:
+def _points_and_rotations(poses: list[bytes]) -> tuple[Array, Array]:
     """Translations (m, 3) and rotations (m, 3, 3) of copies of what `_pose_view` shows."""
     values = np.frombuffer(bytearray().join(poses)).reshape(-1, 12)
     rotations = values[:, :9].reshape(-1, 3, 3).transpose(0, 2, 1)
