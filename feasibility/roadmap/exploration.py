@@ -203,15 +203,8 @@ class Exploration:
     def spread(self) -> bool:
         """Spread all queued nodes; True when one component (of the start) covers every cell."""
         while True:
-            status = spread_out(
-                self.arrays,
-                self.work,
-                self.roadmap,
-                self.indptr,
-                self.indices,
-                self.links,
-                self.budget(),
-            )
+            case = self.arrays, self.work, self.roadmap
+            status = spread_out(*case, self.indptr, self.indices, self.links, self.budget())
             if status == COVERED and (self.begun is None or self.complete):
                 return True
             if status == DONE:
@@ -286,15 +279,8 @@ class Exploration:
         pairs = self.cells.pairs
         joined_pairs(self.roadmap, pairs, component, state)
         while True:
-            status = close_pairs(
-                self.arrays,
-                self.work,
-                self.roadmap,
-                pairs,
-                state,
-                component,
-                self.budget(),
-            )
+            case = self.arrays, self.work, self.roadmap
+            status = close_pairs(*case, pairs, state, component, self.budget())
             if status == DONE:
                 return
             if status == FULL:
