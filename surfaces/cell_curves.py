@@ -14,8 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
-from surfaces.protected import Protected
+from coverable_arrays import Array, Ints, Mask, Protected
 
 STOPPED = 1e-3  # [1] a parallel curve this much slower than the curve counts as stopped
 PLACES = 3  # along a piece, where its slopes are computed

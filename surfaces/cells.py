@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array, Ints, Mask
+from coverable_arrays import Array, Ints, Mask, Protected
 from surfaces.adjacency import Neighbours
 from surfaces.cell_curves import CellCurves
-from surfaces.protected import Protected
 from surfaces.surface import Surface
 
 if TYPE_CHECKING:

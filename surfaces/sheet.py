@@ -8,13 +8,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable_arrays import Array, Protected
 from coverable_errors import LARGEST, Checks
 from surfaces.at_home import AtHome
 from surfaces.meshes import MeshSurface
 from surfaces.patches import Patch
 from surfaces.piecewise import Piecewise
-from surfaces.protected import Protected
 from surfaces.surface import Surface, SurfaceError
 from surfaces.tiles import FlatTiles, flat_tiles
 

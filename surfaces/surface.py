@@ -10,10 +10,9 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array, Mask
+from coverable_arrays import Array, Mask, Protected
 from coverable_errors import ArgumentError, CoverableError
 from surfaces.parts import MOST_PARTS, SurfaceParts
-from surfaces.protected import Protected
 
 Side = Literal["inside", "outside"]
 TURN_TOLERANCE = 1e-9  # [rad]: a range this close to a full turn is one

@@ -34,7 +34,7 @@ robots.urdf.expansion
 robots.urdf: axes geometry link_shapes joints tree srdf checked_urdf
 robots: arguments joint_checks chain chain_rows reach robot kinematics joint_selection pinocchio_model library
 robots.shapes
-surfaces: protected parts surface at_home part_growth cells adjacency cell_curves curve_fitting arguments
+surfaces: parts surface at_home part_growth cells adjacency cell_curves curve_fitting arguments
 surfaces.patches
 surfaces.patches.nurbs
 surfaces.fitted
@@ -49,7 +49,7 @@ surfaces: sheet tiles triangle_kernel cell_triangles
 surfaces.passes
 surfaces.places
 surfaces.cell_tiles
-feasibility: cell_graph clock compiled cone cut_tree cut_words interrupts notices read_only roll safe_files search version
+feasibility: cell_graph clock compiled cone cut_tree cut_words interrupts notices roll safe_files search version
 feasibility.collisions
 feasibility.collisions.kernels
 feasibility: task

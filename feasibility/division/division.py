@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from coverable_arrays import Ints
+from coverable_arrays import Ints, Protected
 from feasibility.collisions import checked_words
 from feasibility.cut_tree import CutTree
 from feasibility.division.reconfiguration import Reconfiguration
-from feasibility.read_only import ReadOnlyArrays
 from feasibility.task import Task
 from feasibility.verdict import Cause, Certificate, Walk
 from robots import Robot
@@ -20,7 +19,7 @@ from surfaces import Cells
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class SubPatch(ReadOnlyArrays):
+class SubPatch(Protected):
     """Cells that one continuous motion covers, and that motion."""
 
     cells: Ints
@@ -83,7 +82,7 @@ class Apart:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Division(ReadOnlyArrays):
+class Division(Protected):
     """A surface divided into the fewest patches; see `feasibility.division.divide`."""
 
     robot: Robot

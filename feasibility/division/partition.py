@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable_arrays import Ints, Mask
+from coverable_arrays import Ints, Mask, Protected
 from coverable_errors import ArgumentError
 from feasibility.division.connected_labels import (
     Labels,
@@ -29,14 +29,13 @@ from feasibility.division.connected_labels import (
     pieces_of,
 )
 from feasibility.division.set_covering import set_cover, undominated
-from feasibility.read_only import ReadOnlyArrays
 
 TIME_LIMIT = 10.0  # [s]
 OTHER_COVERS = 40  # other choices of regions that patches are grown of
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Partition(ReadOnlyArrays):
+class Partition(Protected):
     """Each cell in exactly one patch, each patch inside one component."""
 
     rows: Ints

@@ -20,11 +20,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable_arrays import Array, Ints, Mask, Protected
 from feasibility.certification import CollisionReplay
 from feasibility.division.free_motion import in_radians
 from feasibility.paths import improved, turns_inside
-from feasibility.read_only import ReadOnlyArrays
 from feasibility.verdict import Walk
 from robots import Robot
 
@@ -36,7 +35,7 @@ LEAST_NAMED = 0.05  # [deg], [0.1 mm]: smaller moves are not named
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Reconfiguration(ReadOnlyArrays):
+class Reconfiguration(Protected):
     """The move from the end of one patch's walk to the start of the next one's."""
 
     joint_names: tuple[str, ...]

@@ -13,13 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable_arrays import Array, Protected
 from feasibility.certification import collision_replay
 from feasibility.collisions import Bodies, collision_buffer, gather
 from feasibility.division import FreeSpace, free_motion
 from feasibility.entry.drawing_back import drawn_back
 from feasibility.paths import CoveragePath, PathError
-from feasibility.read_only import ReadOnlyArrays
 from robots import Robot
 
 STEP = 0.2  # [rad], [m] of a joint from row to row of a move home: the judge has a budget for each
@@ -27,7 +26,7 @@ TRIES = 5  # moves home that are looked for, until the judge accepts one
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Ends(ReadOnlyArrays):
+class Ends(Protected):
     """The two moves, straight in joint space between their rows."""
 
     approach: float

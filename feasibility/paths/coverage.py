@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import networkx as nx
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable_arrays import Array, Ints, Mask, Protected
 from feasibility.certification import replay
 from feasibility.paths.ladder import JointRoute, first_few, joint_route
 from feasibility.paths.metrics import PathFigures, figures_of
@@ -36,7 +36,6 @@ from feasibility.paths.order import (
     usual_order,
 )
 from feasibility.paths.winding import unwound
-from feasibility.read_only import ReadOnlyArrays
 from feasibility.task import Task
 from feasibility.verdict import Answer, Certificate, Verdict, Walk
 from robots import Robot
@@ -48,7 +47,7 @@ FLIPS = ((False, False), (True, True), (True, False), (False, True))  # corners 
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class CoveragePath(ReadOnlyArrays):
+class CoveragePath(Protected):
     """One continuous motion that visits cells in a chosen order."""
 
     robot: Robot

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable_arrays import Array, Ints, Mask, Protected
 from feasibility.certification import placements
 from feasibility.certification.rates import smallest_singular_values
 from feasibility.paths.order import least_length
-from feasibility.read_only import ReadOnlyArrays
 from feasibility.task import Task
 from feasibility.verdict import Certificate, Walk
 from robots import Robot
@@ -21,7 +20,7 @@ BETWEEN = 4  # places along each straight line of joints at which the tool point
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class PathFigures(ReadOnlyArrays):
+class PathFigures(Protected):
     """What a path does, measured along it."""
 
     length: float

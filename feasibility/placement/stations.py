@@ -13,21 +13,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable_arrays import Ints, Mask
+from coverable_arrays import Ints, Mask, Protected
 from feasibility.clock import Clock
 from feasibility.division import set_cover
 from feasibility.placement.evaluator import LocalEvaluator, Trial
 from feasibility.placement.placements import COUNT, Placements
 from feasibility.placement.reach_bound import Reach
 from feasibility.placement.refinement import Evaluator, search_all
-from feasibility.read_only import ReadOnlyArrays
 from feasibility.search import Progress, Search
 
 TIME_LIMIT = 60.0  # [s] for the optimum; tables of thousands of rows take far less
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Station(ReadOnlyArrays):
+class Station(Protected):
     """One arm at one placement, doing one continuous motion."""
 
     placement: int
@@ -41,7 +40,7 @@ class Station(ReadOnlyArrays):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Stations(ReadOnlyArrays):
+class Stations(Protected):
     """The fewest stations found."""
 
     stations: tuple[Station, ...]

@@ -9,8 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from coverable_arrays import Ints
-from feasibility.read_only import ReadOnlyArrays
+from coverable_arrays import Ints, Protected
 from feasibility.sensitivity.quantities import Quantity
 from feasibility.speed import RateFigures
 from feasibility.task import Task
@@ -124,7 +123,7 @@ class Pair:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Dropped(ReadOnlyArrays):
+class Dropped(Protected):
     """The cells without which one motion covers the rest."""
 
     cells: Ints

@@ -15,11 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline
 
-from coverable_arrays import Array
+from coverable_arrays import Array, Protected
 from coverable_errors import real
 from feasibility.certification import second_derivatives
 from feasibility.paths import PathError
-from feasibility.read_only import ReadOnlyArrays
 from robots import Kinematics, Robot, moved_by_joints
 
 ACCELERATION_TIME = 0.5  # [s], in which a joint gets to its largest velocity, by default
@@ -30,7 +29,7 @@ LEAST, MOST = 1e-6, 1e6
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class MotionLimits(ReadOnlyArrays):
+class MotionLimits(Protected):
     """What a timed motion keeps to."""
 
     velocity: Array

@@ -8,8 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
-from feasibility.read_only import ReadOnlyArrays
+from coverable_arrays import Array, Ints, Protected
 from feasibility.task import Task
 from feasibility.treated.contact_path import ContactPath, contacts_along, contacts_on
 from feasibility.verdict import Walk
@@ -42,7 +41,7 @@ class UntreatedRegion(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class TreatedArea(ReadOnlyArrays):
+class TreatedArea(Protected):
     """What a tool treats along a motion: everything within half a footprint of its contacts."""
 
     footprint: tuple[float, float]

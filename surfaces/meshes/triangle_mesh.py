@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
+from coverable_arrays import Array, Ints, Protected
 from surfaces.adjacency import components
-from surfaces.protected import Protected
 from surfaces.surface import SurfaceError
 
 

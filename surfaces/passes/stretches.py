@@ -11,9 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.linalg import norm
 
-from coverable_arrays import Array, Mask
+from coverable_arrays import Array, Mask, Protected
 from surfaces.passes.levels import Line
-from surfaces.protected import Protected
 from surfaces.surface import Surface
 
 

@@ -18,11 +18,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable_arrays import Array, Ints, Mask, Protected
 from surfaces.adjacency import components
 from surfaces.passes.tool_lines import ToolLines
 from surfaces.passes.triangles import WorkingMesh, cut_at_middles, edges_of, twin_sides
-from surfaces.protected import Protected
 
 ROUNDS = 3  # how often faces between treated and untreated are cut in four
 JUNG = 3.0**-0.5  # [1] of its longest edge: no place of a triangle is further from its middle

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable_arrays import Array, Ints, Mask, Protected
 from coverable_errors import Fault
 from surfaces.patches.closest_point import ClosestPointSearch, Jet
-from surfaces.protected import Protected
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline

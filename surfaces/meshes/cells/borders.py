@@ -8,12 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable_arrays import Array, Ints, Mask, Protected
 from coverable_kernels import njit
 from surfaces.adjacency import Neighbours
 from surfaces.meshes.closest_point import on_triangle
 from surfaces.meshes.triangle_mesh import edge_partners, sum_by
-from surfaces.protected import Protected
 
 kernel = njit(cache=True, error_model="numpy")
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable_arrays import Array, Ints, Mask, Protected
 from surfaces.adjacency import Neighbours
 from surfaces.meshes.cells.borders import (
     LabelledFaces,
@@ -19,7 +19,6 @@ from surfaces.meshes.cells.borders import (
     shared_borders,
 )
 from surfaces.meshes.triangle_mesh import doubled_areas, sum_by
-from surfaces.protected import Protected
 from surfaces.surface import SurfaceError
 
 MOST_TURN_DEG = 30.0

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable_arrays import Array, Protected
 from surfaces.patches.closest_point import ClosestPointSearch, Jet
 from surfaces.patches.nurbs.spline_parts import SpanNets, span_nets
-from surfaces.protected import Protected
 
 if TYPE_CHECKING:
     from scipy.interpolate import NdBSpline
