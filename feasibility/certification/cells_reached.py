@@ -9,15 +9,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from feasibility.certification.rolls import CLOSE_TO_ZERO as ROLL_CLOSE
 from feasibility.certification.rolls import off_middle, reference_axes, roll_vectors
 from feasibility.certification.stretches import CLOSE_TO_ZERO, Samples
 from feasibility.task import Targets, Task
 from robots import Kinematics, Robot
 from surfaces import Cells
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 TRIES = np.linspace(0.0, 1.0, 9)  # of the part of a stretch that passes within the tolerance
 NAMED = 5  # cells that are listed
@@ -76,16 +74,14 @@ def cells_reached(robot: Robot, cells: Cells, task: Task, rows: Array, samples: 
     return reached
 
 
-def _flat(lists: NDArray[np.object_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _flat(lists: NDArray[np.object_]) -> tuple[Ints, Ints]:
     """Which list, and what in it, of all entries of all lists."""
     counts = [len(found) for found in lists]
     owner = np.repeat(np.arange(len(lists)), counts)
     return owner, np.array([k for found in lists for k in found], dtype=np.int64)
 
 
-def _at(
-    task: Task, aims: Targets, cell: NDArray[np.int64], points: Array, axes: Array, x: Array
-) -> Mask:
+def _at(task: Task, aims: Targets, cell: Ints, points: Array, axes: Array, x: Array) -> Mask:
     """(k,) within the tolerance of the cell's target, and the cone and the roll there."""
     off = np.linalg.norm(points - aims.points[cell], axis=1)
     approaches = aims.approaches[cell]
@@ -111,7 +107,7 @@ def _passing(aims: Array, starts: Array, ends: Array, within: float) -> tuple[Ar
     return np.where(never, 1.0, low), np.where(never, 0.0, high)
 
 
-def missed_text(cells: Cells, task: Task, missed: NDArray[np.int64], samples: Samples) -> str:
+def missed_text(cells: Cells, task: Task, missed: Ints, samples: Samples) -> str:
     """Which cells are missed, and by how much the nearest sample misses the first."""
     names = [str(list(cells.unravel(int(k)))) for k in missed[:NAMED]]
     more = f" and {len(missed) - NAMED:,} more" if len(missed) > NAMED else ""

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from feasibility.certification.piecewise_cubics import SAMPLES, samples
 from feasibility.targets import TargetCurves, beside_facets
 from feasibility.task import Task
 from surfaces import Cells
-
-Array = NDArray[np.float64]
 
 BLOCK = 4096  # curves at once
 MOST_PARTS = 400  # of a curve over a mesh, each with these samples
 
 
 def curve_deviations(
-    cells: Cells, task: Task, targets: TargetCurves, used: NDArray[np.int64]
+    cells: Cells, task: Task, targets: TargetCurves, used: Ints
 ) -> tuple[Array, str]:
     """See `_of_some`; some curves at a time, to bound the memory."""
     starts = range(0, max(len(used), 1), BLOCK)
@@ -26,9 +24,7 @@ def curve_deviations(
     return np.concatenate([deviations for deviations, _ in found]), "".join(faults[:1])
 
 
-def _of_some(
-    cells: Cells, task: Task, targets: TargetCurves, used: NDArray[np.int64]
-) -> tuple[Array, str]:
+def _of_some(cells: Cells, task: Task, targets: TargetCurves, used: Ints) -> tuple[Array, str]:
     """Bounds on how far the targets of curves deviate from the surface's, and a fault.
 
     The curves are compared with their closest points on the surface, at samples that their fit did
@@ -74,9 +70,7 @@ def _of_some(
     return deviations, ""
 
 
-def _samples(
-    cells: Cells, used: NDArray[np.int64], apart: float
-) -> tuple[NDArray[np.int64], Array]:
+def _samples(cells: Cells, used: Ints, apart: float) -> tuple[Ints, Array]:
     """Samples (k,) to compare: which of the used curves, and t on it."""
     curves = cells.curves
     count = curves.first[used + 1] - curves.first[used]

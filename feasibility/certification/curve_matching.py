@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from feasibility.certification.curve_deviations import curve_deviations
 from feasibility.certification.piecewise_cubics import PiecewiseCubics
 from feasibility.certification.rolls import FrameMatch, MatchedPlaces, match_frames
@@ -20,8 +20,6 @@ from feasibility.targets import TargetCurves, target_curves
 from feasibility.task import Task
 from feasibility.verdict import Walk
 from surfaces import Cells
-
-Array = NDArray[np.float64]
 
 ARRIVED = 0.02  # [1] share of the tolerance: a tool point this near to a centre is at it
 STAYS = -1  # in place of a curve: the walk stays over one cell
@@ -116,8 +114,8 @@ def _way(
     curves: TargetCurves,
     walk: Walk,
     points: Array,
-    marks: NDArray[np.int64],
-    curve: NDArray[np.int64],
+    marks: Ints,
+    curve: Ints,
 ) -> _Way:
     """Match the waypoints between marks to the curve (k - 1,) between each two of the k marks.
 
@@ -155,7 +153,7 @@ def _way(
     return _Way(places, (t0, t1))
 
 
-def _curves(cells: Cells, start: NDArray[np.int64], end: NDArray[np.int64]) -> NDArray[np.int64]:
+def _curves(cells: Cells, start: Ints, end: Ints) -> Ints:
     """(k,) the curve between two cells; STAYS where they are one, less where there is none."""
     pairs, count = cells.pairs, len(cells)
     keys = pairs[:, 0] * count + pairs[:, 1]
@@ -167,8 +165,8 @@ def _curves(cells: Cells, start: NDArray[np.int64], end: NDArray[np.int64]) -> N
 
 
 def _matched_parameters(
-    curves: TargetCurves, curve: NDArray[np.int64], points: Array, near: float
-) -> tuple[Array, NDArray[np.bool_]]:
+    curves: TargetCurves, curve: Ints, points: Array, near: float
+) -> tuple[Array, Mask]:
     """(k,) t on each curve for a tool point, and whether that is at one of its centres.
 
     A tool point within `near` (m) of a centre may be taken to be there, which costs up to that
@@ -187,8 +185,8 @@ def _matched_parameters(
 
 
 def _matched_between_poses(
-    curves: TargetCurves, curve: NDArray[np.int64], tools: Array, lean: float
-) -> tuple[Array, NDArray[np.bool_]]:
+    curves: TargetCurves, curve: Ints, tools: Array, lean: float
+) -> tuple[Array, Mask]:
     """(k,) t on each curve for a tool point and its axis (k, 6); none is taken to be at a pose.
 
     The axis tells places apart where the tool turns on the spot; elsewhere it hardly counts: an
@@ -199,9 +197,7 @@ def _matched_between_poses(
     return t, np.zeros(len(t), dtype=bool)
 
 
-def _derivative_bounds(
-    curves: TargetCurves, curve: NDArray[np.int64], t0: Array, t1: Array
-) -> Array:
+def _derivative_bounds(curves: TargetCurves, curve: Ints, t0: Array, t1: Array) -> Array:
     """(k, 3) see `CurveMatch.derivative_bounds`, of segments from t0 to t1 on curves."""
     cubics = PiecewiseCubics(curves.first, curves.cubics)
     low, high = (cubics.pieces(curve, end(t0, t1)).piece for end in (np.minimum, np.maximum))

@@ -10,12 +10,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.certification.rows import Rows
 from robots import Kinematics, Robot
-
-Array = NDArray[np.float64]
 
 BLOCK = 4096  # configurations at once, to bound the memory
 

@@ -24,12 +24,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from robots import Robot
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 def largest_levers(levers: Array, half: Array, prismatic: Mask, cap: Array | float) -> Array:

@@ -13,8 +13,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from feasibility.certification.collisions import collision_replay
 from feasibility.certification.curve_matching import CurveMatch, match_to_curves
 from feasibility.certification.jacobians import placements
@@ -59,8 +59,8 @@ def replay(
     cells: Cells,
     task: Task,
     walk: Walk,
-    needed: NDArray[np.bool_],
-    deviations: NDArray[np.float64] | None = None,
+    needed: Mask,
+    deviations: Array | None = None,
 ) -> Replay:
     """Check a walk: limits, tool point, cone and roll at and between waypoints, and its cells.
 
@@ -92,9 +92,7 @@ def replay(
     return Replay(certificate, clear.refusal, collides=not clear.accepted)
 
 
-def _replay_of_tool(
-    robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[np.bool_]
-) -> Replay:
+def _replay_of_tool(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: Mask) -> Replay:
     """`replay` of limits, tool and cells alone."""
     disorder = order_of_marks(cells, walk)
     if disorder:
@@ -112,9 +110,7 @@ def _replay_of_tool(
     return Replay(over_surface.certificate, f"{along_curves.refusal}; {over_surface.refusal}")
 
 
-def _marks_are_right(
-    robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[np.bool_]
-) -> bool:
+def _marks_are_right(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: Mask) -> bool:
     """Are the marked waypoints at the targets of their cells, and every needed cell marked?"""
     at = np.flatnonzero(walk.cell >= 0)
     visited = np.zeros(len(cells), dtype=bool)
@@ -133,8 +129,8 @@ def _marks_are_right(
 
 def _largest_tilt(
     matched: CurveMatch,
-    derivative_bound: NDArray[np.float64],
-    axis_bound: NDArray[np.float64],
+    derivative_bound: Array,
+    axis_bound: Array,
     beside: bool,
 ) -> float:
     """The largest |a - b| along a walk.
@@ -155,9 +151,7 @@ def _largest_tilt(
     return float(np.max(tilted, initial=np.max(alone, initial=0.0)))
 
 
-def replay_along_curves(
-    robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[np.bool_]
-) -> Replay:
+def replay_along_curves(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: Mask) -> Replay:
     """`replay` by the curves alone, of a walk that goes from centre to centre along them.
 
     Where the roll alone is not shown to stay in its range, segments are halved, a few times.
@@ -193,9 +187,7 @@ def _with_middles(walk: Walk) -> Walk:
     return Walk(q, cell)
 
 
-def _along_curves(
-    robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[np.bool_]
-) -> _Along:
+def _along_curves(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: Mask) -> _Along:
     """`replay_along_curves` of these segments as they are."""
     poses = placements(robot, walk.q)
     matched = match_to_curves(cells, task, walk, poses.points, poses.axes)
@@ -239,7 +231,7 @@ def _refusals(
     cells: Cells,
     task: Task,
     walk: Walk,
-    needed: NDArray[np.bool_],
+    needed: Mask,
     matched: CurveMatch,
     certificate: Certificate,
     worst: float,

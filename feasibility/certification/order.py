@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.certification.faults import MotionFault
 from feasibility.certification.stretches import Samples
 from feasibility.verdict import Walk
@@ -38,7 +38,7 @@ def order_of_places(offset: OffsetSurface, samples: Samples, tolerance: float) -
     if along is None or not len(along):
         return []
     known = np.nan_to_num(along, nan=-np.inf)
-    back: NDArray[np.float64] = np.maximum.accumulate(known) - along
+    back: Array = np.maximum.accumulate(known) - along
     worst = int(np.argmax(np.nan_to_num(back)))
     if not back[worst] > tolerance:
         return []

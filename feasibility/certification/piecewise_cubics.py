@@ -5,10 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from coverable_arrays import Array, Ints
 
 GUESSES = 4  # parameters tried first on each piece of a curve
 NEWTON_STEPS = 16  # from the best of them, at most

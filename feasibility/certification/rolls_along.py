@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.certification.curve_matching import CurveMatch
 from feasibility.certification.rolls import (
     CLOSE_TO_ZERO,
@@ -20,8 +20,6 @@ from feasibility.certification.rolls import (
 from feasibility.roll import Roll
 from feasibility.task import Task
 from robots import Robot
-
-Array = NDArray[np.float64]
 
 LENGTH = 1.01  # [1] cubics of unit directions are no longer than this
 

@@ -7,7 +7,9 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-Chosen = NDArray[np.bool_] | NDArray[np.intp] | slice
+from coverable_arrays import Mask
+
+Chosen = Mask | NDArray[np.intp] | slice
 
 
 class Rows:
@@ -17,7 +19,7 @@ class Rows:
         >>> from dataclasses import dataclass
         >>> @dataclass(frozen=True, eq=False, slots=True)
         ... class Points(Rows):
-        ...     x: NDArray[np.float64]
+        ...     x: Array
         >>> points = Points(np.array([1.0, 2.0, 3.0]))
         >>> Points.join(points.of(points.x > 2.0), points).x.tolist()
         [3.0, 1.0, 2.0, 3.0]

@@ -27,8 +27,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from feasibility.certification.jacobians import Placements
 from feasibility.certification.lever_bounds import peaks, second_derivatives
 from feasibility.certification.rolls import CLOSE_TO_ZERO as ROLL_CLOSE
@@ -38,10 +38,6 @@ from feasibility.task import Task
 from robots import Kinematics, Robot
 from surfaces import Cells
 from surfaces.places import OffsetSurface, Places
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 CLOSE_TO_ZERO = 1e-12  # [m], [1]: rounding of double arithmetic on unit vectors
 

@@ -20,8 +20,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from feasibility.certification.cells_reached import cells_reached, in_order, missed_text
 from feasibility.certification.collisions import collision_replay
 from feasibility.certification.faults import Judged, MotionFault
@@ -37,9 +37,6 @@ from robots import Robot
 from surfaces import Cells, Surface
 from surfaces.places import offset_surface
 from surfaces.toolpaths import PoseSurface
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 LEVELS = 26  # halvings of a segment between two rows
 MOST_SAMPLES = 1_000_000  # configurations looked at between rows
@@ -62,7 +59,7 @@ def replay_over_surface(
     robot: Robot,
     cells: Cells,
     task: Task,
-    q: NDArray[np.float64],
+    q: Array,
     needed: Mask | None = None,
     bodies: Bodies | None = None,
 ) -> MotionReplay:

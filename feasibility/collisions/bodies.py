@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from coverable_arrays import Array
 from feasibility.collisions.scene import Obstacle
 from robots.shapes import LeftOut, Polytope, Solid
 
@@ -21,7 +19,7 @@ class Soup:
 
     owner: str
     """'surface', or the object's name."""
-    triangles: NDArray[np.float64]
+    triangles: Array
     """(k, 3, 3) m, in the root frame."""
     deviation: float
     """m, how far the body may stand out from its triangles; every clearance is larger by it."""

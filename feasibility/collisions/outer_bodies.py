@@ -11,8 +11,8 @@ import itertools
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.collisions.bodies import Soup
 from feasibility.collisions.scene import Obstacle, ToolShape
 from feasibility.collisions.shapes import HalfSpace
@@ -20,7 +20,7 @@ from feasibility.collisions.words import TOOL
 from robots import Robot
 from robots.shapes import Polytope, Solid, Triangles, hull_of
 
-Points = NDArray[np.float64]
+Points = Array
 
 MOST_VERTICES = 64  # of a convex mesh: its hull would be thinned, so one with more stays triangles
 _CONVEX = 1e-9  # [1], of the widest side: a vertex may stand out of a face's plane as far

@@ -9,8 +9,8 @@ from types import MappingProxyType
 from typing import Any, TypeVar, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import ArgumentError, Checks, Fault
 from feasibility.collisions.pairs import checked_distance
 from feasibility.collisions.shapes import (
@@ -53,7 +53,7 @@ class Obstacle:
 
     name: str
     geometry: Shape | HalfSpace
-    placement: NDArray[np.float64]
+    placement: Array
     """(4, 4) the object's frame in the world or in the link's frame, m."""
     clearance: float | None = None
     """m, in place of `Collision.clearance` for every pair with it."""
@@ -194,7 +194,7 @@ class ToolShape:
     """
 
     geometry: Shape
-    placement: NDArray[np.float64]
+    placement: Array
     """(4, 4) the shape's frame in the tool frame, m."""
 
     def __post_init__(self) -> None:

@@ -8,9 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from coverable_arrays import Array
 from coverable_errors import Checks, Fault, shown
 from feasibility.collisions.triangles import object_triangles
 from robots.mounting import matrix_of, rigid_matrix
@@ -21,7 +19,7 @@ SMALLEST_SIDE, LARGEST_SIDE = 1e-6, 1e4  # [m]
 FARTHEST = 1e4  # [m], from the origin of the world
 ORIGIN = (0.0, 0.0, 0.0)
 
-Matrix = NDArray[np.float64]
+Matrix = Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from robots.shapes import Polytope
 
-Array = NDArray[np.float64]
 Pair = tuple[str, str]
 
 TOLD = 5e-3  # [m] of overlap: the base of a ur5, as drawn, ends 4 mm below its frame

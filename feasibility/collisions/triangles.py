@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from coverable_errors import Checks, CoverableError, Fault
 from robots.shapes import Triangles, solid_faces
 
@@ -16,8 +16,8 @@ MOST_FACES = 500_000
 SMALLEST_EXTENT, LARGEST_EXTENT = 1e-6, 1e4  # [m], of the widest side
 _AREA = 1e-14  # [1], of the widest side squared: a face below is none
 
-Points = NDArray[np.float64]
-Faces = NDArray[np.int64]
+Points = Array
+Faces = Ints
 PLACEHOLDER = Triangles(
     np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), np.array([[0, 1, 2]]), False
 )

@@ -7,18 +7,14 @@ any motion over the surface is (`stretches`), along a path between the places th
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from feasibility.certification.jacobians import placements
 from feasibility.certification.stretches import Judge, Stretches
 from feasibility.task import Task
 from robots import Robot
 from surfaces import Cells
 from surfaces.places import OffsetSurface, Places
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 CLOSE_TO_LIMIT = 1e-12  # rad or m: rounding
 HALVINGS = 6  # of a segment

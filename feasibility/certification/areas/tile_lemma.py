@@ -8,17 +8,14 @@ tile, and neither is trusted: G is brought to J G = I, and every number computed
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from feasibility.certification.jacobians import Jacobians, jacobians
 from feasibility.certification.lever_bounds import largest_levers, second_derivative_bound
 from feasibility.certification.rolls import Held
 from feasibility.task import Task
 from robots import Kinematics, Robot
 from surfaces.cell_tiles import CellTiles, TileBounds, Tiles
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 ROUNDING = 1.0 + 1e-9
 CLOSE_TO_ZERO = 1e-12  # [1]: rounding of double arithmetic on unit vectors

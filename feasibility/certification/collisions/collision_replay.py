@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import ArgumentError
 from feasibility.certification.collisions.first_look import Body, CoupledBodies, FirstLook
 from feasibility.certification.collisions.pairing import ROUNDING, Pairing, Place
@@ -24,8 +24,6 @@ from feasibility.certification.collisions.shape_pieces import piece_of, sheet_pi
 from feasibility.certification.faults import Judged, MotionFault
 from feasibility.collisions import Bodies, Pair
 from robots import Robot
-
-Array = NDArray[np.float64]
 
 TOUCHING = 5e-7  # [m] overlap that is called touching
 KEPT = 8  # bodies of so many problems are kept ready, for motions replayed one after another

@@ -9,14 +9,12 @@ again of the smaller boxes inside.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from feasibility.certification.collisions.pieces import Piece
 from feasibility.certification.collisions.plane_search import NEAR, Couples, ball_bounds, searched
 from feasibility.certification.collisions.relative_motion import Stretches
 from feasibility.certification.collisions.trees import BRANCHES, Level, Tree
-
-Array = NDArray[np.float64]
 
 AT_ONCE = 1 << 13  # couples, which keeps the arrays small
 
@@ -51,7 +49,7 @@ class Descent:
         couples, most = self._searched(self.tree.levels[-1], s, couples, between)
         return self.keep(couples, couples.low >= np.clip(NEAR * most, self.needed, self.aim))
 
-    def keep(self, couples: Couples, good: NDArray[np.bool_]) -> Couples:
+    def keep(self, couples: Couples, good: Mask) -> Couples:
         """Note the bounds of the good ones; the others."""
         self.bound = min(self.bound, float(np.min(couples.low[good], initial=np.inf)))
         return couples.of(~good)

@@ -6,12 +6,10 @@ from functools import lru_cache
 from typing import TypeGuard
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.certification.collisions.mesh_pieces import MeshPart
 from feasibility.certification.collisions.pieces import Piece
-
-Array = NDArray[np.float64]
 
 KEPT = 64  # meshes of which what is asked here is remembered
 

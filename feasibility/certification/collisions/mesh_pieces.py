@@ -12,11 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from coverable_errors import ArgumentError
 from feasibility.certification.collisions.pieces import NO_CIRCLE, Outline, Piece
 from feasibility.certification.collisions.trees import Tree
-
-Array = NDArray[np.float64]
 
 # [1] least thickness of a hull relative to its length; qhull and coal fail on flat ones
 FLAT = 1e-6
@@ -27,7 +26,7 @@ MANY = 64  # corners of a part of a mesh, above which only those on its hull are
 class MeshPart(Piece):
     """Some triangles of a mesh, the surface of a body or a sheet."""
 
-    def __init__(self, vertices: Array, faces: NDArray[np.int64], closed: bool) -> None:
+    def __init__(self, vertices: Array, faces: Ints, closed: bool) -> None:
         """Faces (m, 3) of vertices (k, 3) m in the joint's frame, m >= 1."""
         used, renumbered = np.unique(faces, return_inverse=True)
         self.vertices, self.faces = vertices[used], renumbered.reshape(-1, 3)
@@ -122,7 +121,7 @@ class MeshHull(Piece):
         return self.mesh
 
 
-def mesh_piece(vertices: Array, faces: NDArray[np.int64], closed: bool, at_rest: bool) -> Piece:
+def mesh_piece(vertices: Array, faces: Ints, closed: bool, at_rest: bool) -> Piece:
     """A mesh behind its hull, or the mesh alone where it is flat.
 
     Args:
@@ -165,7 +164,7 @@ def _outermost(points: Array) -> Array:
         return points
 
 
-def _coal_triangles(vertices: Array, faces: NDArray[np.int64]) -> tuple[Any, Any]:
+def _coal_triangles(vertices: Array, faces: Ints) -> tuple[Any, Any]:
     """Coal's lists of points and triangles."""
     import coal
 

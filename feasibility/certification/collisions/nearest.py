@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from feasibility.certification.collisions.collision_replay import ready_bodies
 from feasibility.certification.collisions.first_look import Body, CoupledBodies, FirstLook
 from feasibility.certification.collisions.pieces import Below, coal_distance
@@ -20,7 +21,6 @@ from feasibility.certification.collisions.relative_motion import Motion, Stretch
 from feasibility.collisions import Bodies
 from robots import Kinematics, Robot
 
-Array = NDArray[np.float64]
 Names = tuple[str, str]
 
 
@@ -155,7 +155,7 @@ def _lines(
     names: Names,
     couples: list[_Couple],
     found: NDArray[np.intp],
-    here: NDArray[np.bool_],
+    here: Mask,
     rotations: Array,
     points: Array,
 ) -> NearPair:

@@ -16,8 +16,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from feasibility.certification.collisions.budgets import Budget, TooNear
 from feasibility.certification.collisions.descent import Descent, rough_bounds
 from feasibility.certification.collisions.inside import one_inside_other
@@ -35,8 +35,6 @@ from feasibility.certification.collisions.pieces import (
 )
 from feasibility.certification.collisions.plane_search import NEAR, Couples
 from feasibility.certification.collisions.relative_motion import Motion, Stretches
-
-Array = NDArray[np.float64]
 
 ROUNDING = 1e-9  # [m] of placements, and what keeps distances from vanishing
 FAILURES = 3  # of coal's directions in a row, after which another way is taken
@@ -162,9 +160,7 @@ class Pairing:
             s = s.of(curved)
         return [(a, b, self.motion.halves(s, *self.joints))] if len(s.row) else []
 
-    def _accepted(
-        self, s: Stretches, wanted: float, also: NDArray[np.bool_] | None = None
-    ) -> Stretches:
+    def _accepted(self, s: Stretches, wanted: float, also: Mask | None = None) -> Stretches:
         """Keep the lowest of the bounds that will do; the stretches that are left."""
         good = s.bound >= wanted if also is None else also
         self.bound = min(self.bound, float(np.min(s.bound[good], initial=np.inf)))

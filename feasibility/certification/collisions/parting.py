@@ -12,13 +12,11 @@ is checked by this formula alone; it does not matter where n is from.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.certification.collisions.pieces import Below, Piece
 from feasibility.certification.collisions.plane_kernels import part
 from feasibility.certification.collisions.relative_motion import Poses, Stretches
-
-Array = NDArray[np.float64]
 
 TINY = 1e-300  # what keeps quotients of zeros finite
 

@@ -12,11 +12,9 @@ from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from robots.urdf import Cylinder
-
-Array = NDArray[np.float64]
 
 TINY = 1e-300  # what keeps quotients of zeros finite
 FEW = 8  # triangles, into no less of which a sheet is cut for a hull, which is larger than its mesh

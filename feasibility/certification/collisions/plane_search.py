@@ -14,13 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from feasibility.certification.collisions.parting import TINY, nearest_points, unit
 from feasibility.certification.collisions.pieces import Piece
 from feasibility.certification.collisions.relative_motion import Stretches
 from feasibility.certification.collisions.trees import Level
 from feasibility.certification.rows import Rows
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 NEAR = 0.9  # [1] share of the distances met, that is aimed at where it costs little
@@ -141,7 +141,7 @@ def nearest_of(corners: Array) -> tuple[Array, Array]:
     return found, corners[rows[:, None], kept]
 
 
-def _on_faces(corners: Array) -> tuple[Array, NDArray[np.bool_]]:
+def _on_faces(corners: Array) -> tuple[Array, Mask]:
     """(k, 4, 3) the origin projected onto the faces, inf if beside them; (k,) is it inside?"""
     a, b, c = (corners[:, FACES[:, i]] for i in range(3))
     normals = _cross(b - a, c - a)

@@ -24,12 +24,12 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import ArgumentError
 from feasibility.certification.collisions.outer_kernels import chord_bounds, outer_bounds
 from feasibility.certification.rows import Rows
 from robots import Kinematics, Robot
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 KEPT = 16  # arms whose twists are remembered

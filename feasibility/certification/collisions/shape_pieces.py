@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import ArgumentError
 from feasibility.certification.collisions.mesh_pieces import MeshPart, mesh_piece
 from feasibility.certification.collisions.pieces import Below, Piece, Round, moved
 from feasibility.collisions import HalfSpace
 from robots.shapes import Triangles
 from robots.urdf import Box, Capsule, Cylinder, Sphere
-
-Array = NDArray[np.float64]
 
 
 def piece_of(geometry: object, placement: Array, at_rest: bool = False) -> Piece:

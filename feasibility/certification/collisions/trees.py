@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from coverable_arrays import Array
+
 Indices = NDArray[np.intp]
 
 BRANCHES = 3  # a box holds 2^3 smaller ones, or triangles

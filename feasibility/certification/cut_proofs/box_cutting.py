@@ -7,9 +7,9 @@ or the part of the surface gives way to its children. The finest parts are halve
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from feasibility.certification.cut_proofs.linear_models import Array, Boxes, Models, Parts
+from coverable_arrays import Array, Ints
+from feasibility.certification.cut_proofs.linear_models import Boxes, Models, Parts
 
 KEPT = 0.7  # share of a box's width, in its shortest joint, over which contraction is no progress
 FEW = 100  # boxes: so few are cut several times at once, as none of them will be proved empty yet
@@ -64,7 +64,7 @@ def cut(boxes: Boxes, reach: Array, parts: Parts, length: float) -> tuple[Boxes,
     return Boxes.join(*(some for some, _ in made)), np.concatenate([r for _, r in made])
 
 
-def _halves(boxes: Boxes, reach: Array, along: NDArray[np.int64]) -> list[tuple[Boxes, Array]]:
+def _halves(boxes: Boxes, reach: Array, along: Ints) -> list[tuple[Boxes, Array]]:
     """Boxes (m) cut at the middle of one variable each (m,)."""
     rows = np.arange(len(boxes))
     low, high, reach = boxes.low.copy(), boxes.high.copy(), reach.copy()

@@ -17,9 +17,9 @@ makes it shortest; coordinate descent finds that roughly, and any w is right. Na
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from feasibility.certification.cut_proofs.linear_models import Array, Models
+from coverable_arrays import Array, Mask
+from feasibility.certification.cut_proofs.linear_models import Models
 
 SWEEPS = 2  # of the coordinate descent
 STEEPEST = 3  # columns of which the pairwise cross products are tried as directions
@@ -69,7 +69,7 @@ def excess(values: Array, radius: Array) -> Array:
     return left
 
 
-def separated(models: Models, w: Array) -> NDArray[np.bool_]:
+def separated(models: Models, w: Array) -> Mask:
     """(m,) boxes that directions w (m, 6 + k) prove empty."""
     slopes = np.einsum("mjk,mk->mj", models.columns, w)
     least = (models.residual * w).sum(axis=1)

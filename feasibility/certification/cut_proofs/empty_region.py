@@ -17,8 +17,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from feasibility.certification.cut_proofs.box_cutting import smaller
 from feasibility.certification.cut_proofs.box_exclusion import (
     contract,
@@ -29,7 +29,6 @@ from feasibility.certification.cut_proofs.box_exclusion import (
 from feasibility.certification.cut_proofs.linear_models import (
     Allowed,
     Arm,
-    Array,
     Boxes,
     Models,
     Parts,
@@ -169,7 +168,7 @@ class Emptiness:
         kept = ~self._overlap(self.overlapping, boxes, models)
         return boxes.of(kept), models.of(kept), place[kept]
 
-    def _overlap(self, overlapping: Overlapping, boxes: Boxes, models: Models) -> NDArray[np.bool_]:
+    def _overlap(self, overlapping: Overlapping, boxes: Boxes, models: Models) -> Mask:
         """(m,) boxes, as far as their models leave them, in which bodies overlap everywhere."""
         n, parts, part = self.arm.n, self.parts, boxes.part
         low, high = boxes.centre + models.low, boxes.centre + models.high
@@ -199,7 +198,7 @@ def _next(waiting: list[Boxes]) -> Boxes:
     return Boxes.join(*taken)
 
 
-def _spread(boxes: Boxes) -> NDArray[np.int64]:
+def _spread(boxes: Boxes) -> Ints:
     """Indices of a few boxes of every claim."""
     claims = np.unique(boxes.claim)
     share = -(-STARTS // len(claims))

@@ -21,10 +21,10 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from feasibility.certification.jacobians import Jacobians, cross, jacobians, lengths
-from feasibility.certification.lever_bounds import Array, lever_bounds, longest_levers
+from feasibility.certification.lever_bounds import lever_bounds, longest_levers
 from feasibility.certification.rolls import (
     ReferenceParts,
     TargetModel,
@@ -51,9 +51,9 @@ class Parts(NamedTuple):
     """(K, 2, 6) what x_1 and x_2 change T and b by."""
     radius: Array
     """(K, 2) r_T (m) and r_b."""
-    children: NDArray[np.int64]
+    children: Ints
     """(K, 2) the parts that each is cut into; -1, -1 for the finest."""
-    axis: NDArray[np.int64]
+    axis: Ints
     """(K,) the parameter that the cut halves; -1 where the children are any two parts."""
     references: ReferenceParts
     """Reference directions over the same parts; those of no use where the roll is free."""
@@ -122,9 +122,9 @@ class Boxes(Rows):
     """(m, n + 2) rad or m, and x in -1 .. 1 of the part."""
     high: Array
     """(m, n + 2)"""
-    part: NDArray[np.int64]
+    part: Ints
     """(m,) index of the part."""
-    claim: NDArray[np.int64]
+    claim: Ints
     """(m,) number of what is to be proved about it."""
 
     def __len__(self) -> int:
@@ -236,7 +236,7 @@ class Arm:
         )
 
 
-def _over_parts(parts: Parts, part: NDArray[np.int64], x: Array) -> tuple[Array, Array]:
+def _over_parts(parts: Parts, part: Ints, x: Array) -> tuple[Array, Array]:
     """b and t (m, 2, 3) at places x (m, 2) of parts (m,), and their slopes (m, 2, 2, 3)."""
     centre = np.stack([parts.centre[part, 3:], parts.references.centre[part]], axis=1)
     slopes = np.stack([parts.slopes[part][..., 3:], parts.references.slopes[part]], axis=2)

@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from surfaces import Cells, Surface, SurfaceParts
 from surfaces.toolpaths import PoseSurface, arc_at
 
@@ -20,8 +20,6 @@ AT_ONCE = 60  # curves between poses that are looked at
 ROUNDING = 1e-9  # [m], [1] that a radius is taken larger by
 ON_SURFACE = 1e-8  # [m], [1] by which a place and its own closest place may differ
 WITHIN = 2.0  # of (|df| / r_f)^2 + (|dn| / r_n)^2; a common x makes each at most 1
-
-Array = NDArray[np.float64]
 
 
 def disagreement(cells: Cells, parts: SurfaceParts) -> str:
@@ -63,7 +61,7 @@ class ClosestPlaces(NamedTuple):
     """(m, 3) m"""
     normals: Array
     """(m, 3) outward unit normals."""
-    on_patch: NDArray[np.bool_]
+    on_patch: Mask
     """(m,) False where there is no such place."""
 
 
@@ -100,7 +98,7 @@ def _on_curves(surface: PoseSurface, points: Array) -> ClosestPlaces:
     return ClosestPlaces(closest, normals, np.asarray(np.isfinite(points).all(axis=1)))
 
 
-def on_a_finest_part(places: Array, parts: SurfaceParts) -> NDArray[np.bool_]:
+def on_a_finest_part(places: Array, parts: SurfaceParts) -> Mask:
     """(m,) which places (m, 6), points and normals, lie on some finest part. NaN lies on none."""
     held = np.zeros(len(places), dtype=bool)
     row = np.arange(len(places))
@@ -117,7 +115,7 @@ def on_a_finest_part(places: Array, parts: SurfaceParts) -> NDArray[np.bool_]:
     return held
 
 
-def _may_lie_on(places: Array, parts: SurfaceParts, part: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _may_lie_on(places: Array, parts: SurfaceParts, part: Ints) -> Mask:
     """(m,) whether places (m, 6) can lie on parts (m,): least squares over x in [-1, 1]^2."""
     radius = parts.radius[part] + ROUNDING
     scale = 1.0 / np.repeat(radius, 3, axis=1)

@@ -9,10 +9,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from feasibility.certification.cut_proofs.box_exclusion import excess
-from feasibility.certification.cut_proofs.linear_models import Arm, Array, Models, derivatives
+from feasibility.certification.cut_proofs.linear_models import Arm, Models, derivatives
 from feasibility.certification.cut_proofs.parts_agreement import closest_places
 from feasibility.certification.cut_proofs.region import Region
 from feasibility.certification.rolls import off_middle, reference_axes, roll_vectors
@@ -78,9 +78,7 @@ class Refuter:
             q = self._stepped(q, residual, slides, low - q, high - q, sums)
         return None
 
-    def _targets(
-        self, points: Array, cell: NDArray[np.int64]
-    ) -> tuple[Array, Array, NDArray[np.bool_], Array]:
+    def _targets(self, points: Array, cell: Ints) -> tuple[Array, Array, Mask, Array]:
         """Target points and approaches (m, 3) for tool points, and where they are on the patch.
 
         And the surface's points under them.
@@ -100,9 +98,7 @@ class Refuter:
             found.points,
         )
 
-    def _rolled(
-        self, q: Array, axes: Array, approaches: Array, closest: Array, cell: NDArray[np.int64]
-    ) -> NDArray[np.bool_]:
+    def _rolled(self, q: Array, axes: Array, approaches: Array, closest: Array, cell: Ints) -> Mask:
         """(m,) whose roll is in its range, over the surface or at cells' targets."""
         roll, at_cells = self.task.roll, self.targets.references
         if roll is None or at_cells is None:

@@ -11,9 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from feasibility.certification.cut_proofs.linear_models import GUARD, Array, Models
+from coverable_arrays import Array, Mask
+from feasibility.certification.cut_proofs.linear_models import GUARD, Models
 
 TURN = 2.0 * np.pi
 ON_CUT = 1e-9  # [rad], [m] by which w . q may pass the value that it should have
@@ -61,14 +61,14 @@ class Region:
         """Does it hold no configuration, plainly?"""
         return bool((self.low > self.high).any() or (self.least > self.most).any())
 
-    def folded(self, prismatic: NDArray[np.bool_]) -> Region:
+    def folded(self, prismatic: Mask) -> Region:
         """One turn of each joint whose interval holds one and that no sum weighs."""
         turns = ~prismatic & ~(self.weights != 0.0).any(axis=0) & (self.high - self.low > TURN)
         low = np.where(turns, np.where(np.isfinite(self.low), self.low, -np.pi), self.low)
         high = np.where(turns, low + TURN, self.high)
         return Region(low, high, self.weights, self.least, self.most)
 
-    def sums_hold(self, q: Array) -> NDArray[np.bool_]:
+    def sums_hold(self, q: Array) -> Mask:
         """(m,) whose weighted sums of configurations (m, n) are in it, within `ON_CUT`."""
         sums = q @ self.weights.T
         inside = (sums >= self.least - ON_CUT) & (sums <= self.most + ON_CUT)

@@ -7,14 +7,12 @@ apart by no motion of less than r + s. A mesh that is not a convex solid has cor
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.certification.tool_alone import planes_around
 from feasibility.collisions import HalfSpace
 from robots.shapes import Triangles
 from robots.urdf import Box, Capsule, Cylinder, Sphere
-
-Array = NDArray[np.float64]
 
 ALONG, ACROSS = 9, 5  # points along the longest side of a body, and along the others
 FINEST = 10  # parts of the widest side of a mesh that no edge is longer than

@@ -19,15 +19,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from feasibility.certification.collisions import collision_replay
 from feasibility.certification.joint_boxes.depths import depths, points_inside
 from feasibility.certification.rows import Rows
 from feasibility.collisions import Bodies
 from robots import Kinematics, Robot
-
-Array = NDArray[np.float64]
 
 GUARD = 1e-7  # [m] that an overlap has to be larger by
 
@@ -90,7 +88,7 @@ class Overlapping:
         self._robot, self._bodies, self._kinematics = robot, bodies, Kinematics(robot)
         self._couples = _couples(bodies)
 
-    def everywhere(self, low: Array, high: Array, target: Array, off: Array) -> NDArray[np.bool_]:
+    def everywhere(self, low: Array, high: Array, target: Array, off: Array) -> Mask:
         """(m,) boxes in which some pair is too near all over, wherever the tool is at its target.
 
         Args:
@@ -124,7 +122,7 @@ class Overlapping:
         """Does the judge of collisions find all pairs apart at a configuration (n,)?"""
         return collision_replay(self._robot, self._bodies, np.array([q, q])).accepted
 
-    def _overlap(self, couples: _Couples, boxes: _Middles) -> NDArray[np.bool_]:
+    def _overlap(self, couples: _Couples, boxes: _Middles) -> Mask:
         """(m,) boxes in which some points are inside a body everywhere."""
         points = couples.points
         turned = points.places @ boxes.rotations[:, points.joint].transpose(0, 2, 1)

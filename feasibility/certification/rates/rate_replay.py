@@ -20,9 +20,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from coverable_arrays import Array, Ints, Mask
 from coverable_errors import ArgumentError, Fault
 from feasibility.certification.jacobians import Jacobians, jacobians, placements
 from feasibility.certification.lever_bounds import second_derivatives
@@ -37,9 +37,6 @@ from feasibility.task import Task
 from feasibility.verdict import Walk
 from robots import Kinematics, Robot
 from surfaces import Cells
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 IN_PLACE = 0.1  # [1] share of the tolerance within which the tool point begins and ends in place
 CORNER_DEG = 30.0  # [deg] by which the tool's path turns at a corner
@@ -166,7 +163,7 @@ def too_slow(
     targets: Array,
     points: Array,
     found: SegmentRates,
-    slow: NDArray[np.int64],
+    slow: Ints,
     speed: float,
 ) -> str:
     """Which joint allows the speed least, how fast it would have to be there, and where that is."""

@@ -25,8 +25,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from feasibility.certification.jacobians import Jacobians, jacobians
 from feasibility.certification.lever_bounds import (
     levers_along,
@@ -35,9 +35,6 @@ from feasibility.certification.lever_bounds import (
 )
 from feasibility.certification.rows import Rows
 from robots import Kinematics, Robot
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 LOOSE = 0.005  # [1] share by which a bound may be below an exact value, before it is good enough
 LEVELS = 14  # halvings of a segment
@@ -83,7 +80,7 @@ def segment_rates(
     speed: float | None = None,
     sigma: float | None = None,
     group: Ints | None = None,
-    resting: NDArray[np.bool_] | None = None,
+    resting: Mask | None = None,
 ) -> SegmentRates:
     """Rates along straight segments of joints.
 
@@ -155,7 +152,7 @@ class _Least:
         self.groups, self.asked = groups, asked
         self.low, self.exact, self.share = np.full(m, np.inf), np.full(m, np.inf), np.zeros(m)
 
-    def seen(self, p: _Pieces, low: Array, first: Array, last: Array) -> NDArray[np.bool_]:
+    def seen(self, p: _Pieces, low: Array, first: Array, last: Array) -> Mask:
         """Take note of exact values at the ends of pieces (k,); which pieces are still open."""
         for values, where in ((first, p.low), (last, p.high)):
             better = values < self.exact[p.owner]

@@ -22,14 +22,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from feasibility.certification.jacobians import cross, lengths
 from feasibility.certification.lever_bounds import peaks, second_derivatives
 from feasibility.roll import Roll
 from robots import Kinematics, Robot
-
-Array = NDArray[np.float64]
 
 ROUNDS = 24  # halvings of the angle that is looked for
 CLOSE_TO_ZERO = 1e-9  # [1], [rad]: u directions are known by differences to about this
@@ -105,7 +103,7 @@ def largest_off(z0: Array, z1: Array, second: Array, unknown: Array, half: float
         Bounds; inf where the roll may leave the range, NaN where something is.
     """
 
-    def holds(angle: Array, sign: float) -> NDArray[np.bool_]:
+    def holds(angle: Array, sign: float) -> Mask:
         ends = [np.sin(angle) * z[:, 0] - sign * np.cos(angle) * z[:, 1] for z in (z0, z1)]
         low = peaks(unknown[:, 0] - ends[0], unknown[:, 1] - ends[1], second)
         return np.asarray(low <= CLOSE_TO_ZERO)

@@ -27,12 +27,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.roll import Roll, projected
 from surfaces.places import second_derivative_of_unit
-
-Array = NDArray[np.float64]
 
 ROUNDING = 1e-9  # [1], and of u directions, which are differences
 NEVER = 4.0  # [1] of |F - 1|, which says nothing

@@ -5,16 +5,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from feasibility.certification.piecewise_cubics import PiecewiseCubics, samples
 from feasibility.roll import projected
 from feasibility.targets import FrameCurves, TargetCurves, reference_directions
 from feasibility.task import Task
 from surfaces import Cells
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 class MatchedPlaces(NamedTuple):

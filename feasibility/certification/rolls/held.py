@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.certification.rolls.bounds import (
     ROOT,
     largest_off,
@@ -32,8 +32,6 @@ from feasibility.roll import Roll, projected
 from feasibility.task import Task
 from surfaces import Cells
 from surfaces.places import OffsetSurface, PlacePaths, Places, second_derivative_of_unit
-
-Array = NDArray[np.float64]
 
 FIRST, LAST = 0, 2  # pieces of a path; in the middle one the place changes sides, on the spot
 

@@ -7,16 +7,14 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.certification.collisions import Piece, piece_of, sheet_piece
 from feasibility.certification.tool_alone.erosion import eroded
 from feasibility.collisions import Bodies, HalfSpace, Obstacle
 from robots import Robot
 from robots.shapes import Solid, Triangles
 from robots.urdf import Box, Capsule, Cylinder
-
-Array = NDArray[np.float64]
 
 SLACK = 1e-5  # [m] more than coal is off
 SLABS = 4  # that long shapes of the tool are cut into

@@ -11,12 +11,10 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from robots.shapes import Triangles
 from robots.urdf import Box, Capsule, Cylinder, Sphere
-
-Array = NDArray[np.float64]
 
 FLUSH = 1e-9  # [1] of the widest side, that a convex mesh may be off its hull
 FULL = 1e-6  # [1] of the hull's volume, that it may be off

@@ -19,13 +19,11 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.certification.tool_alone.couples import Couple, couples_of
 from feasibility.collisions import Bodies
 from robots import Robot
-
-Array = NDArray[np.float64]
 
 MOST_BOXES = 100_000
 TICK = 500  # boxes between two calls of `tick`

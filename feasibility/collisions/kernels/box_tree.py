@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from feasibility.collisions.kernels.tables import (
     FIRST,
     LAST,
@@ -18,10 +18,9 @@ from feasibility.collisions.kernels.tables import (
     MIDDLE,
     NODE_COLUMNS,
     RIGHT,
-    Array,
 )
 
-Whole = NDArray[np.int64]
+Whole = Ints
 CORNERS = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 OUTWARD = 1e-12  # relative: boxes hold their corners in spite of rounding
 

@@ -19,11 +19,12 @@ from numba import types
 from numba.core import event
 from numba.extending import intrinsic
 
+from coverable_arrays import Array
 from coverable_kernels import cfunc
 from feasibility.collisions.kernels.measuring import measure
 from feasibility.collisions.kernels.push import push
 from feasibility.collisions.kernels.segments import segment_holds_clear
-from feasibility.collisions.kernels.tables import ADDRESS, Array
+from feasibility.collisions.kernels.tables import ADDRESS
 from feasibility.compiled import kernel
 from feasibility.notices import COLLISIONS, compiling_notice
 

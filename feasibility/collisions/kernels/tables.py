@@ -16,11 +16,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.compiled import kernel
-
-Array = NDArray[np.float64]
 
 ADDRESS = 0  # the number that holds the function's address
 HEADER = 64  # numbers ahead of the first table: three for each table, from number 1 on
