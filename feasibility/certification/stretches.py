@@ -132,7 +132,7 @@ class Judge:
     def over(
         self, places: Places, row: Ints, share: Array, points: Array, axes: Array, x: Array
     ) -> Samples:
-        """`compared`, with the places that they are said to be over."""
+        """`compared`, over given places."""
         target, normal = self.offset.at(places)
         error = np.linalg.norm(points - target, axis=1)
         approaches = self._held.approaches(normal)

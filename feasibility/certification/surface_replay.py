@@ -4,8 +4,8 @@ A motion is straight in joint space between its rows. It is accepted where, at e
 joints are inside their limits, and some place x of the surface that moves continuously has the tool
 point within the tolerance of its target T(x), the tool axis within the cone of its approach
 direction b(x), and the roll about it, where that is limited, in its range; and where every needed
-cell is reached at some instant. No curve between cells is asked for, nor where the motion says that
-it is.
+cell is reached at some instant. Curves between cells play no part, nor does what the motion says of
+where it is.
 
 Between rows, bounds are used (`stretches`). A stretch that they do not accept is halved: they fall
 to a quarter, and one exact configuration is added. What is wrong at an exact configuration is

@@ -22,7 +22,7 @@ def gather(
     Args:
         robot: the arm.
         surface: what it works on.
-        collision: what is asked for.
+        collision: what has to stay clear of what.
         standoff: m; where it is 0 the tool touches the surface, and that pair is left out.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Everything that can collide in one problem, and the pairs that are asked for."""
+"""Everything that can collide in one problem, and the pairs that are checked."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Bodies:
     unchecked: tuple[str, ...] = ()
     """Links without any shape."""
     checked: tuple[str, ...] = ()
-    """Which of self, surface, scene are asked for."""
+    """Which of self, surface, scene are checked."""
     notes: tuple[str, ...] = ()
     """What a user should know, one sentence each."""
     carried: tuple[Seat, ...] = ()

@@ -1,4 +1,4 @@
-"""Everything that can collide in one problem: arm, tool, surface and scene, and who meets whom."""
+"""Everything that can collide in one problem, and which pairs have to stay clear of each other."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import numpy as np
 from coverable_errors import ArgumentError
 from feasibility.collisions.bodies import Bodies, LeftOut, Pair, Soup
 from feasibility.collisions.outer_bodies import polytopes_of, soup_of, tool_polytopes, tool_solids
+from feasibility.collisions.overlaps_at_rest import overlapping
 from feasibility.collisions.scene import ToolShape
 from feasibility.collisions.seats import Seat, carried_bodies, furthest, seats_of
 from feasibility.collisions.settings import Collision
-from feasibility.collisions.standing import overlapping
 from feasibility.collisions.words import SURFACE, TOOL
 from robots import Robot
 from robots.shapes import (
@@ -127,7 +127,7 @@ def _arm(
 
 
 def _beyond(reaches: Iterable[Reach], pairs: Iterable[Pair], standoff: float) -> list[str]:
-    """That bodies reach further beyond the tool point than the standoff leaves them room."""
+    """That bodies reach further beyond the tool point than the standoff leaves them."""
     needed = {pair.first: pair.clearance for pair in pairs if pair.second == SURFACE}
     return [
         f"shapes of {reach.owner} reach {1e3 * reach.beyond:.1f} mm beyond the tool point, and "
@@ -165,7 +165,7 @@ def _tool_owners(collision: Collision, joints: Mapping[str, int], robot: Robot) 
     last joint: the tool is then what is mounted on the tool frame, or else the link of that name.
 
     Args:
-        collision: what is asked for.
+        collision: what has to stay clear of what.
         joints: which joint carries each owner.
         robot: the arm.
     """

@@ -1,7 +1,7 @@
-"""Which joint each object of the scene stands on: one that does not move is at rest, or is carried.
+"""Which joint carries each object of the scene: one that does not move is at rest, or is carried.
 
-Objects stand in the world or on a link. Where a link carries the surface, it is the surface that is
-at rest for the search and the judge, and the world may move.
+Objects are placed in the world or on a link. Where a link carries the surface, it is the surface
+that is at rest for the search and the judge, and the world may move.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from robots.urdf import Box
 
 
 def seats_of(robot: Robot, scene: Iterable[Obstacle]) -> tuple[Seat, ...]:
-    """Where each object stands; links that it names have to exist."""
+    """Where each object is; links that it names have to exist."""
     import pinocchio as pin
 
     model, found = robot.model, []

@@ -1,4 +1,4 @@
-"""The table [collision]: what is asked to stay clear of what, and by how much."""
+"""The table [collision]: what has to stay clear of what, and by how much."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Collision:
     tool_links: tuple[str, ...] = ()
     """Links that are the tool; where none are named, the shapes that move with the last joint."""
     allow: tuple[tuple[str, str], ...] = ()
-    """Pairs that are not asked for: links, objects of the scene, 'surface' or 'tool'."""
+    """Pairs that are not checked: links, objects of the scene, 'surface' or 'tool'."""
     clearances: tuple[tuple[str, str, float], ...] = field(default=())
     """Pairs with a clearance of their own, m."""
     srdf: str | None = None
@@ -96,12 +96,12 @@ class Collision:
 
     @property
     def checked(self) -> tuple[str, ...]:
-        """What is asked for: some of 'self', 'surface' and 'scene'."""
+        """What is checked: some of 'self', 'surface' and 'scene'."""
         return asked_for(self.self_, self.surface, bool(self.scene))
 
     @property
     def without_surface(self) -> Collision:
-        """The same where there is no surface, only poses, and nothing that is said of it."""
+        """The same where there is no surface, only poses, nor any pair with it."""
         return replace(
             self,
             surface=False,
@@ -139,7 +139,7 @@ class Collision:
         for key, pair in pairs:
             for name in pair:
                 if name == SURFACE and not self.surface:
-                    text = "names the surface, which is not asked for; write surface = true"
+                    text = "names the surface, which is not checked; write surface = true"
                     faults.append(Fault(key, text))
                 else:
                     faults += stranger(key, name, known, what)

@@ -63,7 +63,7 @@ def checked_words(asked: Asked | None) -> str:
     """
     if asked is None or not asked.checked:
         return UNCHECKED
-    said = f"{listed_words(asked.checked)}, {1e3 * asked.clearance:g} mm apart"
+    sentence = f"{listed_words(asked.checked)}, {1e3 * asked.clearance:g} mm apart"
     if "surface" in asked.checked and asked.tool_clearance != asked.clearance:
-        said += f" (the tool and the surface {1e3 * asked.tool_clearance:g} mm)"
-    return said
+        sentence += f" (the tool and the surface {1e3 * asked.tool_clearance:g} mm)"
+    return sentence

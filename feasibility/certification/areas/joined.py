@@ -44,7 +44,7 @@ def joined(
     judge = Judge(robot, task, offset, cells)
     alone = np.flatnonzero(came < 0)
     step = np.flatnonzero(came >= 0)
-    # Pairs of rows, of which every second stretch is asked for.
+    # Pairs of rows, of which every second stretch counts.
     row = np.stack([came[step], step], axis=1).ravel()
     row = np.concatenate([row, alone])
     poses, x = placements(robot, q[row]), judge.reference_axes(q[row])

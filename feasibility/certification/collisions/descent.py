@@ -2,8 +2,8 @@
 
 Where no plane parts the body from all triangles, one may part it from each small part of them. So
 couples of a stretch and a box of triangles (`trees`) are looked at together, as arrays: most are
-far apart as balls; of the others, planes are tried (`plane_search`), and what is left is asked
-again of the smaller boxes inside.
+far apart as balls; of the others, planes are tried (`plane_search`), and what is left is
+tried again with the smaller boxes inside.
 """
 
 from __future__ import annotations

@@ -11,13 +11,13 @@ from coverable_arrays import Array
 from feasibility.certification.collisions.mesh_pieces import MeshPart
 from feasibility.certification.collisions.pieces import Piece
 
-KEPT = 64  # meshes of which what is asked here is remembered
+KEPT = 64  # meshes whose answers are remembered
 
 
 def one_inside_other(a: Piece, b: Piece, rotation: Array, point: Array) -> bool:
     """Is a shell of one body inside the other, b at a pose (3, 3), (3,) m in the frame of a?
 
-    Their boundaries must not touch. Only closed meshes are asked; coal knows of the inside of
+    Their boundaries must not touch. Only closed meshes are tested; coal knows of the inside of
     primitives.
     """
     if _is_closed(a) and _any_inside(a, _points(b) @ rotation.T + point):

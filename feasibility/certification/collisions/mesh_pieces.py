@@ -32,7 +32,7 @@ class MeshPart(Piece):
         self.vertices, self.faces = vertices[used], renumbered.reshape(-1, 3)
         self.closed = closed
         super().__init__(None, np.eye(4), self.vertices, 0.0)
-        del self.geometry  # made when coal is asked
+        del self.geometry  # made when coal is called
         self.triangles = len(faces)
 
     @cached_property

@@ -37,10 +37,10 @@ from feasibility.certification.collisions.plane_search import NEAR, Couples
 from feasibility.certification.collisions.relative_motion import Motion, Stretches
 
 ROUNDING = 1e-9  # [m] of placements, and what keeps distances from vanishing
-FAILURES = 3  # of coal's directions in a row, after which another way is taken
-PATIENCE, TIRED = 4, 0.92  # stretches asked about, after which that share is aimed at
+FAILURES = 3  # of coal's directions in a row, after which something else is tried
+PATIENCE, TIRED = 4, 0.92  # stretches measured, after which that share is aimed at
 ENOUGH = 0.75  # [1] share of what is aimed at, which will do of the hulls of meshes
-HALVINGS = 3  # of stretches that no plane parts from a triangle, before coal is asked
+HALVINGS = 3  # of stretches that no plane parts from a triangle, before coal is called
 LOOKS = 3  # at stretches that no plane parts from triangles: are they too near?
 SHORTEST = 2.0**-24  # [1] share of a segment, below which a stretch is not halved again
 CALLS = (500, 20)  # most coal calls for two bodies: so many, and so many for each segment

@@ -2,7 +2,7 @@
 
 A piece is a convex body, or some triangles of a mesh. What a plane certificate needs of it is its
 support h(n) = max n . x over its points x, which is computed here from corners and radii. Coal is
-only asked for distances and nearest points, from which directions n are taken.
+only called for distances and nearest points, from which directions n are taken.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Piece:
         """A convex body.
 
         Args:
-            geometry: coal's; None where coal is never asked.
+            geometry: coal's; None where coal is never called.
             placement: (4, 4) the geometry's frame in the joint's frame, m.
             corners: (k, 3) m, in the joint's frame.
             radius: m; the body lies within this distance of the hull of the corners.

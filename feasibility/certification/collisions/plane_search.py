@@ -24,7 +24,7 @@ from feasibility.certification.rows import Rows
 Indices = NDArray[np.intp]
 
 NEAR = 0.9  # [1] share of the distances met, that is aimed at where it costs little
-STEPS = 3  # after which smaller boxes are asked
+STEPS = 3  # after which smaller boxes are tried
 LAST_STEPS = 16  # the same for triangles
 
 # Of tetrahedra.

@@ -69,7 +69,7 @@ def closest_places(surface: Surface, points: Array) -> ClosestPlaces:
     """The places whose normals lead to points (m, 3).
 
     Beyond the border of a mesh or a seam the normal that `closest` gives leads elsewhere; so each
-    place is asked for its own closest place. Of poses it is the place of a curve that is nearest.
+    place is compared with its own closest place. Of poses it is the nearest place of a curve.
     """
     if isinstance(surface, PoseSurface):
         return _on_curves(surface, points)
@@ -84,14 +84,14 @@ def closest_places(surface: Surface, points: Array) -> ClosestPlaces:
 def _on_curves(surface: PoseSurface, points: Array) -> ClosestPlaces:
     """The places of the straight lines between poses that are nearest to points (m, 3)."""
     start, end = (surface.placed_points[of] for of in surface.pairs.T)
-    way = end - start
+    line = end - start
     off = points[:, None] - start
-    share = (off * way).sum(axis=2) / np.maximum((way**2).sum(axis=1), 1e-300)
+    share = (off * line).sum(axis=2) / np.maximum((line**2).sum(axis=1), 1e-300)
     share = np.clip(share, 0.0, 1.0)
-    away = np.linalg.norm(off - share[..., None] * way, axis=2)
+    away = np.linalg.norm(off - share[..., None] * line, axis=2)
     nearest = np.argmin(np.nan_to_num(away, nan=np.inf), axis=1)
     t = share[np.arange(len(points)), nearest]
-    closest = start[nearest] + t[:, None] * way[nearest]
+    closest = start[nearest] + t[:, None] * line[nearest]
     i, j = surface.pairs[nearest].T
     outward = surface.turned(surface.outward)
     normals, _ = arc_at(outward[i], outward[j], t)

@@ -84,7 +84,7 @@ class Overlapping:
     """Finds boxes in which bodies of one problem overlap everywhere."""
 
     def __init__(self, robot: Robot, bodies: Bodies) -> None:
-        """Lay points into the bodies of all pairs that are asked for."""
+        """Place points in the bodies of all pairs that are checked."""
         self._robot, self._bodies, self._kinematics = robot, bodies, Kinematics(robot)
         self._couples = _couples(bodies)
 
@@ -132,10 +132,10 @@ class Overlapping:
         shifted = x + (boxes.target - boxes.tool)[:, None]
         found = np.zeros(len(x), dtype=bool)
         for body, clearance in couples.bodies:
-            room = points.deep + clearance - GUARD
-            over = room + _depths(body, boxes, x) > moved[body.joint]
+            kept = points.deep + clearance - GUARD
+            over = kept + _depths(body, boxes, x) > moved[body.joint]
             if body.joint == 0:
-                over |= room + _depths(body, boxes, shifted) > from_tool
+                over |= kept + _depths(body, boxes, shifted) > from_tool
             found |= over.any(axis=1)
         return found
 
@@ -196,15 +196,15 @@ def _couples(bodies: Bodies) -> list[_Couples]:
             inside.setdefault(owner, []).append(_Inside(joint, shape, np.asarray(placement)))
     found = []
     for solid in bodies.solids:
-        met = [
+        inside_of = [
             (body, pair.clearance)
             for pair in bodies.pairs
             for one, other in ((pair.first, pair.second), (pair.second, pair.first))
             for body in (inside.get(other, ()) if one == solid.owner else ())
             if solid.joint > body.joint
         ]
-        if met:
+        if inside_of:
             places, deep = points_inside(solid.geometry)
             places = places @ solid.placement[:3, :3].T + solid.placement[:3, 3]
-            found.append(_Couples(_Points(solid.joint, places, deep), met))
+            found.append(_Couples(_Points(solid.joint, places, deep), inside_of))
     return found

@@ -18,7 +18,7 @@ from robots.urdf import Box, Capsule, Cylinder
 
 SLACK = 1e-5  # [m] more than coal is off
 SLABS = 4  # that long shapes of the tool are cut into
-LEAST = 1e-6  # [m] left of a shape, that coal is asked about
+LEAST = 1e-6  # [m] left of a shape, that coal is called for
 KEPT = 64  # bodies that are remembered, with what is left of them
 
 
@@ -92,7 +92,7 @@ def couples_of(robot: Robot, bodies: Bodies, axis: Array) -> list[Couple]:
 
     Args:
         robot: the arm.
-        bodies: its bodies, and the pairs that are asked for.
+        bodies: its bodies, and the pairs that are checked.
         axis: (3,) the tool axis in the frame of the last joint.
     """
     frame = robot.model.frames[robot.tool_frame_id]

@@ -18,7 +18,7 @@ from robots.urdf import Box, Capsule, Cylinder, Sphere
 
 FLUSH = 1e-9  # [1] of the widest side, that a convex mesh may be off its hull
 FULL = 1e-6  # [1] of the hull's volume, that it may be off
-MOST_FACES = 4_000  # of a mesh that is asked whether it is convex
+MOST_FACES = 4_000  # of a mesh that is tested for convexity
 LEFT = 1e-6  # [m] that has to be left of a mesh
 
 

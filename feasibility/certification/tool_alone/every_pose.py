@@ -1,6 +1,6 @@
 """Does the tool collide in every pose that covers a cell? What must confirm such a proof.
 
-No code is shared with the search, which lays balls into the tool and measures how deep they are.
+No code is shared with the search, which places balls in the tool and measures how deep they are.
 Here shapes as they are meet shapes that are eroded, and whether they do is coal's word, yes or no:
 its depths are not asked, as they are not the least ones. A box of tilts (a rotation vector w across
 the approach direction, inside the cone) and rolls moves no point of a body by more than
@@ -61,7 +61,7 @@ def never_clear(
 
     Args:
         robot: the arm, of which only what moves with the tool counts.
-        bodies: its bodies, and the pairs that are asked for.
+        bodies: its bodies, and the pairs that are checked.
         cone: rad, largest angle between tool axis and approach direction.
         tolerance: m, of the tool point.
         point: (3,) m, the target of the tool point.

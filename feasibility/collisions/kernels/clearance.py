@@ -44,7 +44,7 @@ def collision_buffer(bodies: Bodies, robot: Robot) -> Array:
     It holds an address of this process: never send it to another one; make it there anew.
 
     Args:
-        bodies: what can collide, and the pairs that are asked for.
+        bodies: what can collide, and the pairs that are checked.
         robot: the arm whose joints carry them.
 
     Raises:

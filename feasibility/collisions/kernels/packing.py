@@ -47,7 +47,7 @@ def packed(bodies: Bodies, robot: Robot) -> Array:
     """All tables in one array, without the function's address; remembered: copy it, then write.
 
     Args:
-        bodies: what can collide, and the pairs that are asked for.
+        bodies: what can collide, and the pairs that are checked.
         robot: the arm whose joints carry them.
     """
     n = robot.n
@@ -233,7 +233,7 @@ def _items(
     roots: list[int],
     n: int,
 ) -> tuple[list[list[float]], int]:
-    """What is asked for, by pairs of groups and of a soup and a group; how many directions."""
+    """What is checked, by pairs of groups and of a soup and a group; how many directions."""
     items: list[list[float]] = []
     directions, unknown = 0, (-np.inf, -np.inf)
     for index, pair in enumerate(bodies.pairs):

@@ -1,4 +1,4 @@
-"""A base that stands in something is said to: no motion changes it."""
+"""A base inside something is noted: no motion changes it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from feasibility.collisions import Collision, Obstacle, gather
 from feasibility.collisions.outer_bodies import polytopes_of
-from feasibility.collisions.standing import overlap
+from feasibility.collisions.overlaps_at_rest import overlap
 from robots import load_robot
 from surfaces import plane
 
@@ -22,7 +22,7 @@ def notes(name: str, *scene: Obstacle, **asked: object) -> list[str]:
 
 
 @pytest.mark.parametrize(("name", "base"), [("ur5", "base_link"), ("panda", "panda_link0")])
-def test_a_base_in_a_block_is_said_to_stand_there(name: str, base: str) -> None:
+def test_a_base_in_a_block_is_noted(name: str, base: str) -> None:
     block = Obstacle.box("block", (1.0, 1.0, 0.1), (0.0, 0.0, 0.0))  # its top is 50 mm high
     (note,) = notes(name, block, self_=False)  # one hull for each link
     assert note.startswith(f"{base} and block are rigid to each other")

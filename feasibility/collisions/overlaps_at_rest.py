@@ -1,4 +1,4 @@
-"""What stands inside what from the start: bodies at rest that no motion parts."""
+"""Bodies at rest that overlap from the start, which no motion changes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from robots.shapes import Polytope
 
 Pair = tuple[str, str]
 
-TOLD = 5e-3  # [m] of overlap: the base of a ur5, as drawn, ends 4 mm below its frame
+NOTED = 5e-3  # [m] of overlap: the base of a ur5, as drawn, ends 4 mm below its frame
 DIRECTIONS = 400  # all around, besides the normals of faces
 
 
@@ -25,16 +25,16 @@ def overlapping(bodies: Sequence[Polytope], pairs: Iterable[Pair]) -> list[str]:
     of_owner: dict[str, list[Polytope]] = {}
     for body in bodies:
         of_owner.setdefault(body.owner, []).append(body)
-    said = []
+    notes = []
     for first, second in pairs:
         both = of_owner.get(first, ()), of_owner.get(second, ())
         deepest = max((overlap(a, b) for a in both[0] for b in both[1]), default=0.0)
-        if deepest > TOLD:
-            said.append(
-                f"{first} and {second} are rigid to each other, so the pair is not asked for, but "
+        if deepest > NOTED:
+            notes.append(
+                f"{first} and {second} are rigid to each other, so the pair is not checked, but "
                 f"they overlap by {1e3 * deepest:.1f} mm"
             )
-    return said
+    return notes
 
 
 def overlap(a: Polytope, b: Polytope) -> float:
