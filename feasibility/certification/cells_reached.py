@@ -45,7 +45,9 @@ def cells_reached(robot: Robot, cells: Cells, task: Task, rows: Array, samples: 
     tree = cKDTree(samples.points)
     near = tree.query_ball_point(aims.points, tolerance)
     cell, sample = _flat(near)
-    good = _at(task, aims, cell, samples.points[sample], samples.axes[sample], samples.x[sample])
+    good = at_targets(
+        task, aims, cell, samples.points[sample], samples.axes[sample], samples.x[sample]
+    )
     reached[cell[good]] = True
     left = np.flatnonzero(~reached)
     starts, ends = samples.points[:-1], samples.points[1:]
@@ -69,7 +71,7 @@ def cells_reached(robot: Robot, cells: Cells, task: Task, rows: Array, samples: 
     points, axes = Kinematics(robot).tools(flat)
     x = axes if task.roll is None else reference_axes(robot, flat)
     cell = np.repeat(some, len(TRIES))
-    good = _at(task, aims, cell, points, axes, x)
+    good = at_targets(task, aims, cell, points, axes, x)
     reached[cell[good]] = True
     return reached
 
@@ -81,8 +83,15 @@ def _flat(lists: NDArray[np.object_]) -> tuple[Ints, Ints]:
     return owner, np.array([k for found in lists for k in found], dtype=np.int64)
 
 
-def _at(task: Task, aims: Targets, cell: Ints, points: Array, axes: Array, x: Array) -> Mask:
-    """(k,) within the tolerance of the cell's target, and the cone and the roll there."""
+def at_targets(task: Task, aims: Targets, cell: Ints, points: Array, axes: Array, x: Array) -> Mask:
+    """(k,) which tools are within the tolerance of a cell's target, and the cone and roll there.
+
+    Args:
+        task: its tolerance, cone and roll are used exactly.
+        aims: the targets of all cells.
+        cell: (k,) which cell.
+        points, axes, x: (k, 3) tool points (m), approach axes and reference axes.
+    """
     off = np.linalg.norm(points - aims.points[cell], axis=1)
     approaches = aims.approaches[cell]
     chord = np.linalg.norm(axes - approaches, axis=1)

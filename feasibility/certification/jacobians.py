@@ -45,7 +45,8 @@ class Jacobians(Rows):
 def jacobians(kinematics: Kinematics, q: Array) -> Jacobians:
     """Of configurations q (m, n), rad or m."""
     points, axes, twists = kinematics.tools_and_twists(q)
-    linear, angular = twists[:, :3], twists[:, 3:]
+    moving = np.ascontiguousarray(twists.transpose(1, 0, 2)).transpose(1, 0, 2)  # by coordinate
+    linear, angular = moving[:, :3], moving[:, 3:]
     return Jacobians(points, axes, linear + cross(angular, points), cross(angular, axes))
 
 
@@ -53,7 +54,7 @@ def cross(a: Array, b: Array) -> Array:
     """(m, 3, n) products of n vectors (m, 3, n) with one (m, 3); `np.cross` is slower."""
     x, y, z = b.T[:, :, None]
     u, v, w = a[:, 0], a[:, 1], a[:, 2]
-    return np.stack([v * z - w * y, w * x - u * z, u * y - v * x], axis=1)
+    return np.stack([v * z - w * y, w * x - u * z, u * y - v * x]).transpose(1, 0, 2)
 
 
 def lengths(a: Array) -> Array:

@@ -15,16 +15,14 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable_arrays import Array, Mask
+from feasibility.certification.cells_reached import at_targets
 from feasibility.certification.collisions import collision_replay
 from feasibility.certification.curve_matching import CurveMatch, match_to_curves
 from feasibility.certification.jacobians import placements
 from feasibility.certification.lever_bounds import peaks, second_derivatives
 from feasibility.certification.order import order_of_marks
-from feasibility.certification.rolls import CLOSE_TO_ZERO as ROLL_CLOSE
 from feasibility.certification.rolls import (
-    off_middle,
     reference_axes,
-    roll_vectors,
     tool_frames,
 )
 from feasibility.certification.rolls_along import rolls_along
@@ -115,15 +113,10 @@ def _marks_are_right(robot: Robot, cells: Cells, task: Task, walk: Walk, needed:
     at = np.flatnonzero(walk.cell >= 0)
     visited = np.zeros(len(cells), dtype=bool)
     visited[walk.cell[at]] = True
-    aims, poses = task.targets(cells), placements(robot, walk.q[at])
-    off = np.linalg.norm(poses.points - aims.points[walk.cell[at]], axis=1)
-    approaches = aims.approaches[walk.cell[at]]
-    chord = np.linalg.norm(poses.axes - approaches, axis=1)
-    right = (off <= task.effective_tolerance) & (chord <= task.cone_chord + CLOSE_TO_ZERO)
-    if task.roll is not None and aims.references is not None:
-        x, references = reference_axes(robot, walk.q[at]), aims.references[walk.cell[at]]
-        z = roll_vectors(x, poses.axes, references, approaches, task.roll)
-        right &= off_middle(z) <= task.roll.half + ROLL_CLOSE
+    q, cell = walk.q[at], walk.cell[at]
+    poses = placements(robot, q)
+    x = poses.axes if task.roll is None else reference_axes(robot, q)
+    right = at_targets(task, task.targets(cells), cell, poses.points, poses.axes, x)
     return bool(visited[needed].all() and right.all())
 
 

@@ -111,12 +111,6 @@ JOINTS, GROUPS, ITEMS, ASKED, CONFIGURATIONS, POSES, LEVERS, LARGEST, REACH = (
 
 
 @kernel
-def start_of(m, table):  # type: ignore[no-untyped-def]
-    """Where a table begins."""
-    return np.int64(m[1 + 3 * table])
-
-
-@kernel
 def rows_of(m, table):  # type: ignore[no-untyped-def]
     """How many rows a table has."""
     return np.int64(m[2 + 3 * table])
