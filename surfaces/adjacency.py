@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Ints, Mask
+from coverable_arrays import Array, Ints, Mask
 
 # Clockwise from the upper left; row = u grows downwards, column = v grows to the right.
 _CLOCKWISE = (
@@ -24,6 +24,15 @@ class Neighbours(NamedTuple):
     """(N + 1,) where each cell's list begins, and the end of the last."""
     indices: Ints
     """Flat cell indices, each cell's list clockwise from its upper left neighbour."""
+
+    @staticmethod
+    def listed(owner: Ints, other: Ints, key: Array | Ints, count: int) -> Neighbours:
+        """From directed pairs (M,) of `count` cells, those of each owner in the order of a key."""
+        indptr = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=count))])
+        indices = other[np.lexsort((key, owner))]
+        for array in (indptr, indices):
+            array.flags.writeable = False
+        return Neighbours(indptr, indices)
 
     def of(self, k: int) -> Ints:
         """The neighbours of cell k, clockwise."""

@@ -95,12 +95,7 @@ class PieceCells(Cells):
         ahead = self.centres[other] - self.centres[owner]
         x, y = ((ahead * axes[owner]).sum(axis=1) for axes in (right, up))
         clockwise = np.mod(np.arctan2(y, -x) - LEFT, 2.0 * np.pi)
-        order = np.lexsort((clockwise, owner))
-        indptr = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=len(self)))])
-        indices = other[order]
-        for array in (indptr, indices):
-            array.flags.writeable = False
-        return Neighbours(indptr, indices)
+        return Neighbours.listed(owner, other, clockwise, len(self))
 
     @cached_property
     def curves(self) -> CellCurves:

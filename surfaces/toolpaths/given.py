@@ -110,13 +110,7 @@ def _directions(name: str, value: Any, count: int | None, check: Checks) -> Arra
     found = table(name, _listed(value), (count, 3), expected, 3 * MOST_POSES, check.faults)
     if found is None:
         return None
-    length = np.linalg.norm(found, axis=1)
-    zero = np.flatnonzero(length < LEAST)
-    if len(zero):
-        where = f"{name}{_rows(zero)}"
-        check.keep(Fault(where, "got zero", expected="must have a direction"))
-        return None
-    return np.asarray(found / length[:, None])
+    return _unit(name, found, LEAST, Fault("", "got zero", expected="must have a direction"), check)
 
 
 def _square_to(along: Array, outward: Array, check: Checks) -> Array | None:
@@ -124,13 +118,18 @@ def _square_to(along: Array, outward: Array, check: Checks) -> Array | None:
     if len(along) != len(outward):
         return None  # a fault is kept already
     flat = along - (along * outward).sum(axis=1, keepdims=True) * outward
-    length = np.linalg.norm(flat, axis=1)
-    wrong = np.flatnonzero(length < PARALLEL)
-    if len(wrong):
-        where = f"tangents{_rows(wrong)}"
-        check.keep(Fault(where, "got one along the normal", expected="must not be along normals"))
+    fault = Fault("", "got one along the normal", expected="must not be along normals")
+    return _unit("tangents", flat, PARALLEL, fault, check)
+
+
+def _unit(name: str, rows: Array, least: float, fault: Fault, check: Checks) -> Array | None:
+    """Rows (N, 3) as unit vectors; None after a fault, of those that are shorter than `least`."""
+    length = np.linalg.norm(rows, axis=1)
+    short = np.flatnonzero(length < least)
+    if len(short):
+        check.keep(fault._replace(key=f"{name}{_rows(short)}"))
         return None
-    return np.asarray(flat / length[:, None])
+    return np.asarray(rows / length[:, None])
 
 
 def _radius(neighbours: Any, check: Checks) -> float | None:

@@ -77,11 +77,7 @@ class PoseCells(Cells):
     def neighbours(self) -> Neighbours:
         """(indptr, indices): the poses that each may move to, by their numbers."""
         ends = np.concatenate([self.surface.pairs, self.surface.pairs[:, ::-1]])
-        owner, other = ends[np.lexsort((ends[:, 1], ends[:, 0]))].T.copy()
-        indptr = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=len(self)))])
-        for array in (indptr, other):
-            array.flags.writeable = False
-        return Neighbours(indptr, other)
+        return Neighbours.listed(ends[:, 0], ends[:, 1], ends[:, 1], len(self))
 
     @cached_property
     def curves(self) -> CellCurves:
