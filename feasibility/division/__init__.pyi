@@ -1,11 +1,11 @@
 from .between_patches import clear_moves as clear_moves
+from .between_patches import tool_moved as tool_moved
 from .division import Apart as Apart
 from .division import Division as Division
 from .division import Plan as Plan
 from .division import SubPatch as SubPatch
 from .free_motion import FreeSpace as FreeSpace
 from .free_motion import free_motion as free_motion
-from .lifting import tool_moved as tool_moved
 from .patch_areas import PatchAreas as PatchAreas
 from .patch_areas import patch_areas as patch_areas
 from .plans import collect_components as collect_components

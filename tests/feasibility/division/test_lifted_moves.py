@@ -12,8 +12,7 @@ from feasibility import Task, check
 from feasibility.certification import collision_replay
 from feasibility.collisions import Collision, ToolShape, gather
 from feasibility.division import Reconfiguration
-from feasibility.division.between_patches import clear_moves
-from feasibility.division.lifting import LIFT, STEPS, lift
+from feasibility.division.between_patches import LIFT, STEPS, clear_moves, lift
 from feasibility.verdict import Walk
 from robots import Kinematics, load_robot
 from surfaces import plane
