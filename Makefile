@@ -1,8 +1,10 @@
 # make demo   set up .venv and decide paper/4a        make bench  the table of speeds
 # make test   set up .venv and run every check        make clean  remove what was made
+# make lint   style and types alone                   make distclean   the same, and .venv
 # make campaign NAME=oracle   what takes too long for make test (tests/campaigns)
 # make bench BENCH=old.json   the same, with figures in that file and not in out/bench.json
 # make bench-compare OLD=old.json NEW=new.json   what became slower, and counts that changed
+# make test-browser   the live page, by mouse and keyboard, in a Chromium
 # make wheel  a wheel in dist/ that brings compiled kernels, for this platform, Python and numba
 # PYTHON=/path/to/python chooses the interpreter (CPython 3.11 or later).
 
@@ -17,7 +19,7 @@ unexport PYTHONDONTWRITEBYTECODE
 .PHONY: help demo test test-browser lint kernels greedy collected wheel bench bench-compare campaign clean distclean
 
 help:
-	@sed -n '1,7s/^# //p' Makefile
+	@sed -n '/^#/!q; s/^# //p' Makefile
 
 # The stamp is younger than pyproject.toml once everything it names is installed. Python compiles what it
 # imports, which is a third of what pip would compile.

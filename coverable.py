@@ -17,6 +17,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from coverable_errors import ArgumentError, CoverableError
     from feasibility import (
         Answer,
         Cause,
@@ -137,8 +138,9 @@ if TYPE_CHECKING:
 
 # fmt: off
 __all__ = [
-    "Answer", "Axis", "Case", "CaseError", "Cause", "CauseKind", "Cells", "CertifiedArea",
-    "Collision", "Comparison", "CoveragePath", "Division", "Evidence", "Explanation",
+    "Answer", "ArgumentError", "Axis", "Case", "CaseError", "Cause", "CauseKind", "Cells",
+    "CertifiedArea", "Collision", "Comparison", "CoverableError", "CoveragePath", "Division",
+    "Evidence", "Explanation",
     "LiteralSearch", "Live", "Local", "LocalEvaluator", "MeshSurface", "Obstacle", "PassRuns",
     "Patch", "PathError", "Piecewise", "Placements", "PlannedPasses", "Plot", "Pose",
     "Region", "Robot", "RobotError", "Search", "Store", "Study", "Surface", "SurfaceError",
@@ -184,7 +186,9 @@ _ROOMS = (
     "feasibility.viewer.passes",
     "feasibility.live",
 )
-_RENAMED = {  # name -> module, name there
+_ELSEWHERE = {  # name -> module, name there: of no room, or by another name
+    "ArgumentError": ("coverable_errors", "ArgumentError"),
+    "CoverableError": ("coverable_errors", "CoverableError"),
     "Local": ("feasibility.placement", "LocalEvaluator"),
     "comparison_chart": ("feasibility.reports.comparison", "chart"),
     "comparison_text": ("feasibility.reports.comparison", "as_text"),
@@ -204,8 +208,8 @@ def __getattr__(name: str) -> Any:
         return import_module("feasibility.version").version()
     if name not in __all__:
         raise AttributeError(f"module 'coverable' has no attribute {name!r}")
-    if name in _RENAMED:
-        module, there = _RENAMED[name]
+    if name in _ELSEWHERE:
+        module, there = _ELSEWHERE[name]
         value = getattr(import_module(module), there)
     else:
         room = next(r for r in map(import_module, _ROOMS) if name in r.__all__)

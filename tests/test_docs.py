@@ -14,6 +14,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -200,7 +201,7 @@ def test_the_front_door_is_true() -> None:
     seen = {
         name.asname or name.name
         for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)
-        for name in node.names if str(node.module).split(".")[0] in PACKAGES
+        for name in node.names if str(node.module).split(".")[0] in (*PACKAGES, "coverable_errors")
     }  # fmt: skip
     assert sorted(seen | {"__version__"}) == coverable.__all__ == dir(coverable)
     for name in coverable.__all__:
@@ -214,9 +215,42 @@ def test_the_front_door_is_true() -> None:
 def test_a_public_name_means_one_thing() -> None:
     """Where two rooms hand on the same name, it is the same object."""
     rooms = [import_module(room) for room in coverable._ROOMS]
-    for name in sorted(set(coverable.__all__) - set(coverable._RENAMED) - {"__version__"}):
+    for name in sorted(set(coverable.__all__) - set(coverable._ELSEWHERE) - {"__version__"}):
         found = [getattr(room, name) for room in rooms if name in room.__all__]
         assert all(one is found[0] for one in found), name
+
+
+def test_one_except_is_enough(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever is wrong with an input, `coverable.CoverableError` catches it and says what."""
+    monkeypatch.chdir(tmp_path)
+    Path("other.txt").write_text("of another kind")
+    calls = [
+        lambda: coverable.Task(-1.0, 45.0),
+        lambda: coverable.Search(method="lucky"),  # type: ignore[arg-type]
+        lambda: coverable.Collision(clearance=-1.0),
+        lambda: coverable.cylinder(-1.0, (0, 90), (0, 1)),
+        lambda: coverable.load_robot("no such arm"),
+    ]
+    readers = ("load_case", "load_result", "load_robot", "load_study", "load_trajectory", "mesh",
+               "read_grid", "read_net", "read_poses", "step")  # fmt: skip
+    for name in readers:
+        for file in ("missing.toml", "other.txt"):
+            calls.append(partial(getattr(coverable, name), file))
+    for call in calls:
+        with pytest.raises(coverable.CoverableError) as caught:
+            call()
+        assert caught.value.faults
+    for room in map(import_module, coverable._ROOMS):
+        for error in (getattr(room, name) for name in room.__all__ if name.endswith("Error")):
+            assert issubclass(error, coverable.CoverableError)
+
+
+def test_make_help_names_every_target() -> None:
+    text = (ROOT / "Makefile").read_text("utf-8")
+    targets = set(re.findall(r"^([a-z-]+):", text, re.MULTILINE))
+    parts = {"help", "kernels", "greedy", "collected"}  # of others
+    said = "\n".join(line for line in text.splitlines()[:12] if line.startswith("#"))
+    assert set(re.findall(r"make ([a-z-]+)", said)) == targets - parts
 
 
 def test_a_wheel_works_outside_the_checkout(tmp_path: Path) -> None:

@@ -189,12 +189,12 @@ class LiteralSearch:
         """Continuity check on manifold E, from the J-cell at the start.
 
         Raises:
-            ValueError: the start is not feasible, or over no E-cell.
+            ArgumentError: the start is not feasible, or over no E-cell.
         """
         jc_1 = (0,) * self.robot.n
         ec_1, _ = self.ecell(jc_1)
         if ec_1 < 0:
-            raise ValueError("the start is no feasible J-cell: limits, eq. (5) or eq. (7)")
+            raise ArgumentError("the start is no feasible J-cell: limits, eq. (5) or eq. (7)")
         self.found.T[ec_1] = None
         self.TREESEARCH(jc_1)
         return self.found

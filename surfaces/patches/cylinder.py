@@ -1,4 +1,4 @@
-"""Patches of cylinders about the z axis of their own frame."""
+"""Patches of cylinders about z of their frame: Table III, eqs. (12) and (13) of the paper."""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""A patch of a hyperboloid of one sheet about the z axis of its own frame."""
+"""A patch of a hyperboloid of one sheet about z of its own frame: Table III of the paper.
+
+Its eqs. (14) to (16), but for the standoff d: as on every surface here it is a distance, along the
+normal, where eq. (14) takes it off the radius.
+"""
 
 from __future__ import annotations
 

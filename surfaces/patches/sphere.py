@@ -1,4 +1,4 @@
-"""Patches of spheres about the origin of their own frame."""
+"""Patches of spheres about the origin of their frame: Table III, eqs. (9) to (11) of the paper."""
 
 from __future__ import annotations
 

@@ -90,7 +90,7 @@ def dh_urdf(
             )
     lines = [
         '<?xml version="1.0"?>',
-        "<!-- Written by `python -m robots.dh`; change that file, not this one. -->",
+        "<!-- Written by `python tests/robots/dh.py`; change that file, not this one. -->",
         *([f"<!-- {comment} -->"] if comment else []),
         f"<robot name={quoteattr(name)}>",
     ]
