@@ -284,6 +284,23 @@ def test_imports_follow_the_order_of_rooms() -> None:
     assert upward == []
 
 
+def test_table_of_rooms_is_in_order() -> None:
+    """CONTRIBUTING names every room and module of the top level, each below what it imports.
+
+    A room and those within it import each other's modules both ways, which `ORDER` has in detail.
+    """
+    table = (ROOT / "CONTRIBUTING.md").read_text("utf-8").split("## The rooms")[1].split("\n## ")[0]
+    first = [row.split("|")[1] for row in table.splitlines() if row.startswith("| `")]
+    named = [name.removesuffix(".py") for row in first for name in re.findall(r"`([\w/.]+)`", row)]
+    place = {name.rstrip("/").replace("/", "."): number for number, name in enumerate(named)}
+    rooms = {name: room_of(name) or name for name in FILES}
+    assert set(place) == set(rooms.values())
+    for name in set(FILES) - {"feasibility.cli.__main__"}:
+        for room, used in ((rooms[name], rooms[other]) for other in homes(name)):
+            nested = f"{room}.".startswith(f"{used}.") or f"{used}.".startswith(f"{room}.")
+            assert nested or place[used] < place[room], f"{name} imports from {used}"
+
+
 def test_rooms_are_entered_by_their_door() -> None:
     """A module may be named only inside its room, and in the rooms within it."""
     past = [

@@ -88,7 +88,7 @@ def _search(
         if begin is not None and known is None:
             _begin(exploration, begin, problem.bodies)
         if seeds is not None:
-            _plant(exploration, seeds)
+            _seed_cells(exploration, seeds)
         if known is None:
             explore(exploration, partial(between_rounds, exploration, proving, problem.searched))
         close(exploration)
@@ -183,7 +183,7 @@ def _collides(exploration: Exploration, bodies: Bodies, start: NDArray[np.float6
     )
 
 
-def _plant(exploration: Exploration, seeds: Walk) -> None:
+def _seed_cells(exploration: Exploration, seeds: Walk) -> None:
     """Seed the cells that a known motion passes, as long as the best component misses some.
 
     Where it has no marks, the rows with the tool point nearest to each cell are taken.
