@@ -22,12 +22,24 @@ distributed = pytest.importorskip("distributed")
 pytestmark = pytest.mark.filterwarnings("ignore")  # what Dask says of its own threads and ports
 
 
+def two_workers():
+    """A cluster of two workers of one thread each, heard on this machine alone."""
+    return distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
+    )
+
+
 @pytest.fixture(scope="module")
 def cluster():
-    """Two workers of one thread each, heard on this machine alone."""
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
-    ) as made:
+    """Two workers that nobody kills."""
+    with two_workers() as made:
+        yield made
+
+
+@pytest.fixture
+def mortal():
+    """Two workers for one test, which may kill one; another may come late, or never."""
+    with two_workers() as made:
         yield made
 
 
@@ -39,7 +51,6 @@ def test_what_fails_on_dask_is_told(cluster) -> None:
 
 
 def test_one_worker_of_a_machine_loads_first(cluster, monkeypatch, capsys) -> None:
-    """Both are there: no test above kills one, for which another might come, or might not."""
     monkeypatch.setattr("feasibility.studies.dask_workers.warm_up", study_works.mark_loaded)
     with open_workers(address=cluster.scheduler_address) as there:
         assert there.submit(study_works.marks).result() in ([], [1])
@@ -47,22 +58,22 @@ def test_one_worker_of_a_machine_loads_first(cluster, monkeypatch, capsys) -> No
     assert sorted(marks.values()) == [[], [1]]
 
 
-def test_a_dask_worker_killed_in_the_middle(cluster) -> None:
+def test_a_dask_worker_killed_in_the_middle(mortal) -> None:
     tasks = [StudyTask({"number": k}, {"k": k}, study_works.double) for k in range(40)]
     killed = []
 
     def kill(done, total, text) -> None:
         if done > 10 and not killed:
-            killed.append(next(iter(cluster.workers.values())).pid)
+            killed.append(next(iter(mortal.workers.values())).pid)
             os.kill(killed[0], signal.SIGKILL)
 
-    with open_workers(address=cluster.scheduler_address) as there:
+    with open_workers(address=mortal.scheduler_address) as there:
         rows = run_tasks(tasks, there, progress=kill)
     assert killed
     assert [row.result["double"] for row in rows] == [2 * k for k in range(40)]
 
 
-def test_a_dask_worker_killed_under_the_command(cluster, tmp_path, capsys, monkeypatch) -> None:
+def test_a_dask_worker_killed_under_the_command(mortal, tmp_path, capsys, monkeypatch) -> None:
     """Real verdicts, and the table that is written is that of this process alone, byte by byte."""
     study = tmp_path / "plates.toml"
     study.write_text(study_works.STUDY, encoding="utf-8")
@@ -72,10 +83,10 @@ def test_a_dask_worker_killed_under_the_command(cluster, tmp_path, capsys, monke
         keep(self, records)
         if not held:
             held.append(len(self))
-            os.kill(next(iter(cluster.workers.values())).pid, signal.SIGKILL)
+            os.kill(next(iter(mortal.workers.values())).pid, signal.SIGKILL)
 
     monkeypatch.setattr(Store, "keep", keep_and_kill)
-    for stem, how in (("dask", ("--dask", cluster.scheduler_address)), ("0", ("--workers", "0"))):
+    for stem, how in (("dask", ("--dask", mortal.scheduler_address)), ("0", ("--workers", "0"))):
         files = "--out", str(tmp_path / f"{stem}.study"), "--csv", str(tmp_path / f"{stem}.csv")
         assert main(["study", str(study), *files, *how]) == 0
     assert 0 < held[0] < 24
