@@ -280,6 +280,14 @@ def is_number(value: object) -> bool:
     return math.isfinite(real(value))
 
 
+def number_in(word: str) -> float:
+    """The number that a word of a text file stands for, or NaN if it is none."""
+    try:
+        return float(word)
+    except ValueError:
+        return math.nan
+
+
 def shown(value: object) -> str:
     """A value for a message: on one line, and short."""
     try:
@@ -322,10 +330,15 @@ def counted(number: int, one: str, several: str = "") -> str:
     return f"{number:,} {one if number == 1 else several or one + 's'}"
 
 
-def listed(names: Sequence[str], most: int) -> str:
-    """'a, b and 3 more': at most so many names."""
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more
+def listed(names: Sequence[object], most: int) -> str:
+    """At most so many names or numbers, and how many more there are.
+
+    Example:
+        >>> listed(["a", "b", "c", "d"], 2), listed([7, 8], 2)
+        ('a, b and 2 more', '7, 8')
+    """
+    more = f" and {len(names) - most:,} more" if len(names) > most else ""
+    return ", ".join(map(str, names[:most])) + more
 
 
 def alternatives(options: Sequence[str]) -> str:

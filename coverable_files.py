@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import os
 import stat
+from pathlib import Path
 from typing import BinaryIO
 
 from coverable_errors import CoverableError
+
+LONGEST_NAME = 100  # characters of a file's name in a message
 
 
 class FileFault(CoverableError):
@@ -73,6 +76,12 @@ def read_regular(path: str | os.PathLike[str], cap: int, what: str, if_larger: s
 def too_large(cap: int, what: str, advice: str = "") -> str:
     """The sentence about a file of more than `cap` bytes."""
     return f"is larger than {size(cap)}, too large for {what}" + (f"; {advice}" if advice else "")
+
+
+def shown_name(path: str | os.PathLike[str]) -> str:
+    """The name of a file for a message, quoted; a long one is cut short."""
+    name = Path(os.fsdecode(path)).name
+    return repr(name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}...")
 
 
 def reason(error: Exception) -> str:

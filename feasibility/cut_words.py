@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from coverable_arrays import Array
+from coverable_errors import listed
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from robots import Robot
 from surfaces import Cells
@@ -119,15 +120,12 @@ def what_opens(tree: CutTree, walk: Array, robot: Robot, cells: Cells) -> str:
 def _of_many(tree: CutTree, robot: Robot, cells: Cells) -> str:
     """A tree of several cuts in one sentence: the cuts, and the cells that are lost."""
     cuts = [place_of(node, robot) for node in tree.nodes() if isinstance(node, Cut)]
-    named = list(dict.fromkeys(cuts))
-    more = f" and {len(named) - MOST_NAMED} more" if len(named) > MOST_NAMED else ""
+    named = listed(list(dict.fromkeys(cuts)), MOST_NAMED)
     leaves = list(tree.leaves())
-    lost = list(dict.fromkeys(str(_cell(leaf, cells)) for leaf in leaves))
-    others = f" and {len(lost) - MOST_NAMED} more" if len(lost) > MOST_NAMED else ""
+    lost = cells.named(list(dict.fromkeys(leaf.cell for leaf in leaves)), MOST_NAMED)
     return (
-        f"{len(cuts)} cuts that no motion crosses ({', '.join(named[:MOST_NAMED])}{more}) leave "
-        f"{len(leaves)} regions of the joint space, and in each a cell cannot be covered "
-        f"({', '.join(lost[:MOST_NAMED])}{others})"
+        f"{len(cuts)} cuts that no motion crosses ({named}) leave {len(leaves)} regions of the "
+        f"joint space, and in each a cell cannot be covered ({lost})"
     )
 
 

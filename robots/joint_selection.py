@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from numpy.typing import ArrayLike
 
-from coverable_errors import Fault, close_matches
+from coverable_errors import Fault, close_matches, listed
 from robots.joint_checks import moves_both
 
 if TYPE_CHECKING:
@@ -121,15 +121,14 @@ def _tool_frame(checked: CheckedUrdf, link: str | None) -> tuple[str, str]:
     known = next((name for name in TOOL_LINKS if name in moved), None)
     if known is not None:
         others = [repr(leaf) for leaf in leaves if leaf != known]
-        more = ", ..." if len(others) > MOST_OTHERS else ""
-        beside = f"; joints also move {', '.join(others[:MOST_OTHERS])}{more}" if others else ""
+        beside = f"; joints also move {listed(others, MOST_OTHERS)}" if others else ""
         return known, f"tool_frame is {known!r}, chosen by its name{beside}"
     if len(leaves) == 1:
         return leaves[0], f"tool_frame is {leaves[0]!r}, the only leaf link that a joint moves"
-    listed = leaves or checked.leaves
+    known_leaves = leaves or checked.leaves
     return "", (
-        f"{checked.path} has {len(listed)} leaf links, so tool_frame must name one: "
-        f"{', '.join(listed)} (or any other link)"
+        f"{checked.path} has {len(known_leaves)} leaf links, so tool_frame must name one: "
+        f"{listed(known_leaves, MOST_NAMES)} (or any other link)"
     )
 
 
@@ -147,8 +146,7 @@ def suggestion(name: str, known: Sequence[str]) -> str:
     close = close_matches(name, known, most=5, cutoff=0.5)
     if close:
         return f"did you mean {' or '.join(repr(match) for match in close)}?"
-    shown = ", ".join(list(known)[:MOST_NAMES])
-    return f"it has: {shown}" + (", ..." if len(known) > MOST_NAMES else "")
+    return f"it has: {listed(list(known), MOST_NAMES)}"
 
 
 def _lock_faults(checked: CheckedUrdf, lock: Mapping[str, float]) -> dict[str, Fault]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from coverable_arrays import Array, Ints, Mask, Protected
+from coverable_errors import listed
 from surfaces.adjacency import Neighbours
 from surfaces.cell_curves import CellCurves
 from surfaces.surface import Surface
@@ -261,3 +262,7 @@ class Cells(Protected, ABC):
         Raises:
             IndexError: there is no such cell.
         """
+
+    def named(self, cells: Sequence[int] | Ints, most: int) -> str:
+        """At most so many cells as people count them: "[0, 1], [2, 0] and 3 more"."""
+        return listed([list(self.unravel(int(k))) for k in cells], most)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from coverable_errors import ArgumentError
+from coverable_errors import ArgumentError, counted
 from feasibility.clock import Clock, OutOfTime
 from feasibility.verdict import Verdict
 
@@ -53,13 +53,12 @@ def area_words(area: CertifiedArea | str) -> str:
         f"{percent_down(area.share)} of the area ({area.area:.3g} m2, {len(area.areas):,} tiles)"
     )
     if partly:
-        noun = "cell" if partly == 1 else "cells"
-        words += f"; {partly:,} {noun} in part"
+        words += f"; {counted(partly, 'cell')} in part"
         least = int(np.argmin(np.where(shares > 0.0, shares, np.inf)))
         words += f", the least {list(area.cells.unravel(least))}: {percent_down(shares[least])}"
     none = int((shares == 0.0).sum())
     if none:
-        words += f"; {none:,} {'cell' if none == 1 else 'cells'} not at all"
+        words += f"; {counted(none, 'cell')} not at all"
     if area.exhausted:
         words += f"; not all was looked at within {area.budget:,} evaluations of the arm"
     return words

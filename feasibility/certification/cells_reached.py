@@ -118,17 +118,16 @@ def _passing(aims: Array, starts: Array, ends: Array, within: float) -> tuple[Ar
 
 def missed_text(cells: Cells, task: Task, missed: Ints, samples: Samples) -> str:
     """Which cells are missed, and by how much the nearest sample misses the first."""
-    names = [str(list(cells.unravel(int(k)))) for k in missed[:NAMED]]
-    more = f" and {len(missed) - NAMED:,} more" if len(missed) > NAMED else ""
-    what = f"cell {names[0]} is" if len(missed) == 1 else f"cells {', '.join(names)}{more} are"
+    names, name = cells.named(missed, NAMED), cells.named(missed[:1], 1)
+    what = f"cell {name} is" if len(missed) == 1 else f"cells {names} are"
     if not len(samples.row):
         return f"{what} never reached"
     aims, first = task.targets(cells), missed[0]
     off = np.linalg.norm(samples.points - aims.points[first], axis=1)
     nearest = int(np.argmin(off))
-    where = f"comes no nearer to the target of {names[0]} than about {1e3 * off[nearest]:.4g} mm"
+    where = f"comes no nearer to the target of {name} than about {1e3 * off[nearest]:.4g} mm"
     if off[nearest] <= task.effective_tolerance:
         held = "cone" if task.roll is None else "cone, or its range of the roll,"
-        where = f"is at the target of {names[0]}, but not inside the {held} there"
+        where = f"is at the target of {name}, but not inside the {held} there"
     row = f"near row {samples.row[nearest] + 1}"
     return f"{what} never reached: {row} the tool {where}"

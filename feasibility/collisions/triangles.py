@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from coverable_arrays import Array, Ints
 from coverable_errors import Checks, CoverableError, Fault
+from coverable_files import shown_name
 from robots.shapes import Triangles, solid_faces
 
 MOST_FACES = 500_000
@@ -42,7 +42,7 @@ def read_triangles(path: str | os.PathLike[str], scale: float | None = None) -> 
     from surfaces.meshes import metres_per_unit, refuse_unlikely_unit
 
     checks = Checks()
-    name = repr(Path(os.fsdecode(path)).name[:100])
+    name = shown_name(path)
     made = PLACEHOLDER
     try:
         unit = metres_per_unit(scale)

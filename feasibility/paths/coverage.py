@@ -20,8 +20,9 @@ import networkx as nx
 import numpy as np
 
 from coverable_arrays import Array, Ints, Mask, Protected
+from coverable_errors import listed
 from feasibility.certification import replay
-from feasibility.paths.ladder import JointRoute, first_few, joint_route
+from feasibility.paths.ladder import FEW, JointRoute, joint_route
 from feasibility.paths.metrics import PathFigures, figures_of
 from feasibility.paths.motion_graph import MotionGraph, motion_graph_of
 from feasibility.paths.order import (
@@ -179,9 +180,11 @@ def _needed(verdict: Verdict, only: Iterable[int] | None) -> Mask:
     if len(named) == 0:
         faults.append("no cells are named; name at least one")
     if len(beyond):
-        faults.append(f"there is no cell {first_few(beyond.tolist())}; cells are 0 to {total - 1}")
+        faults.append(
+            f"there is no cell {listed(beyond.tolist(), FEW)}; cells are 0 to {total - 1}"
+        )
     if len(missed):
-        names = first_few(missed.tolist())
+        names = listed(missed.tolist(), FEW)
         faults.append(
             f"cell {names} cannot be reached by the motion that covers most; leave it out"
         )

@@ -31,6 +31,7 @@ KEPT = 4  # nodes that are kept over each cell of the route
 APART = 0.1  # [rad] or [m], a node nearer to a cheaper one than this is a copy of it
 FEWEST = 2  # nodes that are kept even where they are copies
 REVISIT = 20.0  # [rad], what a detour as long as the arm costs; revisits are expensive
+FEW = 5  # cells that a message names
 START, GOAL = -1, -2  # nodes before those that a detour begins at, and behind those it ends at
 
 
@@ -96,8 +97,8 @@ def joint_route(
     """
     missing = [int(c) for c in route if not graph.over.get(int(c))]
     if missing:
-        names = first_few([list(cells.unravel(cell)) for cell in missing])
-        raise PathError(f"no motion leads to cell{'s' if len(missing) > 1 else ''} {names}")
+        plural, names = "s" if len(missing) > 1 else "", cells.named(missing, FEW)
+        raise PathError(f"no motion leads to cell{plural} {names}")
     states = [_State(x, 0.0, (x,), None) for x in graph.over[int(route[0])]]
     seen = {int(route[0])}
     stuck, again = [], 0.0
@@ -203,9 +204,3 @@ def _unrolled(state: _State | None) -> list[int]:
         parts.append(state.nodes)
         state = state.before
     return [x for part in reversed(parts) for x in part]
-
-
-def first_few(names: Sequence[object]) -> str:
-    """The first few of some names or numbers, and how many more there are."""
-    more = f" and {len(names) - 5} more" if len(names) > 5 else ""
-    return ", ".join(str(name) for name in names[:5]) + more

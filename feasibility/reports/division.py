@@ -206,7 +206,7 @@ def _indented(line: str) -> str:
 def _never_together(division: Division) -> str:
     """Cells of which a motion covers one at most."""
     cells = sorted({cell for apart in division.apart for cell in (apart.cell, apart.other)})
-    named = ", ".join(str(list(division.cells.unravel(cell))) for cell in cells)
+    named = division.cells.named(cells, len(cells))
     return (
         f"Of the cells {named} no two can be covered by one motion, proved pair by pair "
         "(--json has the proofs)."

@@ -303,8 +303,7 @@ def rates_words(
     parts = list(rates.refusals)
     if path.task.speed is not None:
         where = [stop.cell for stop in rates.stops if stop.why == "in place"]
-        names = ", ".join(str(list(path.cells.unravel(c))) for c in dict.fromkeys(where[:FEW]))
-        at = f" at {names}{', ...' if len(where) > FEW else ''}" if where else ""
+        at = f" at {path.cells.named(list(dict.fromkeys(where)), FEW)}" if where else ""
         corners = len(rates.stops) - len(where)
         able = "inside the joints' velocities all along" if rates.accepted else "not all along"
         parts.insert(

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable_arrays import Array
-from coverable_errors import Fault, close, printable, shown
+from coverable_errors import Fault, close, number_in, printable, shown
 from feasibility.results.trajectory_files import COMMENT, load_trajectory
 from feasibility.safe_files import FileError, read_regular, shown_path
 from robots import Robot
@@ -87,7 +87,7 @@ def _from_csv(text: str, robot: Robot, name: str) -> Motion:
     if not rows:
         raise FileError("is empty; expected a line of joint names, then a row a waypoint", name)
     place, head = f"line {rows[0][0]}", [word.strip() for word in rows[0][1]]
-    if all(map(_is_number, head)):
+    if not any(math.isnan(number_in(word)) for word in head):
         expected = f"expected a first line of joint names: {', '.join(robot.joint_names)}"
         raise FileError(f"begins with numbers; {expected}", name)
     if len(head) > MOST_COLUMNS or len(rows) - 1 > MOST_ROWS:
@@ -105,7 +105,7 @@ def _from_csv(text: str, robot: Robot, name: str) -> Motion:
             faults.append(Fault("", what, f"line {line}"))
             continue
         for joint, (column, in_degrees) in enumerate(columns):
-            value = _number(row[column])
+            value = number_in(row[column])
             if not math.isfinite(value):
                 what = f"{head[column]} is {shown(row[column].strip())}, no finite number"
                 faults.append(Fault("", what, f"line {line}"))
@@ -116,20 +116,6 @@ def _from_csv(text: str, robot: Robot, name: str) -> Motion:
     unused = [word for column, word in enumerate(head) if column not in used]
     notes = [f"not used: {', '.join(map(printable, unused))}"] if unused else []
     return _checked(q, robot, name, tuple(notes))
-
-
-def _is_number(word: str) -> bool:
-    """Can it be read as a number?"""
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
-
-
-def _number(word: str) -> float:
-    """The number; NaN for what is none."""
-    return float(word) if _is_number(word) else math.nan
 
 
 def _columns(

@@ -63,11 +63,10 @@ def unfinished_words(problem: Problem, proving: Proving, in_time: bool) -> str:
         return blocked
     missed = np.flatnonzero(~exploration.reached)
     if len(missed):
-        named = ", ".join(str(list(problem.cells.unravel(int(cell)))) for cell in missed[:3])
-        more = ", ..." if len(missed) > 3 else ""
+        named = problem.cells.named(missed, 3)
         return (
             f"{len(missed)} cell{'s were' if len(missed) > 1 else ' was'} neither reached nor "
-            f"proved uncoverable {problem.within} ({named}{more}); the best motion covers "
+            f"proved uncoverable {problem.within} ({named}); the best motion covers "
             f"{exploration.n_covered} of {total}."
         )
     if exploration.stopped:

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from coverable_arrays import Mask
+from coverable_errors import counted
 from feasibility.certification.rates import RateReplay, replay_rates
 from feasibility.clock import Clock, OutOfTime
 from feasibility.speed.largest import begin_of, largest_speed
@@ -71,9 +72,12 @@ def _accepted(verdict: Verdict, walk: Walk, certificate: Certificate | None, not
     corners = len(replayed.stops) - len(places)
     words = ""
     if task.speed is not None:
-        waits = _counted(len(places), "wait", "waits") + f" in place{_named(verdict, places)}"
-        time = f", {replayed.waiting:.2g} s together," if places else ""
-        stops = f", but for {waits}{time} and {_counted(corners, 'corner', 'corners')}"
+        waits = f"{counted(len(places), 'wait')} in place"
+        if places:
+            unique = list(dict.fromkeys(places))
+            waits += f" at cell{'s' if len(unique) > 1 else ''} {verdict.cells.named(unique, FEW)}"
+            waits += f", {replayed.waiting:.2g} s together,"
+        stops = f", but for {waits} and {counted(corners, 'corner')}"
         words = (
             f" The tool can have {task.speed:g} m/s all along it inside the joints' velocities"
             f"{stops if replayed.stops else ''}."
@@ -97,20 +101,6 @@ def _accepted(verdict: Verdict, walk: Walk, certificate: Certificate | None, not
         verdict, witness=walk, certificate=kept, message=message + words + note,
         start=start if start >= 0 else verdict.start,
     )  # fmt: skip
-
-
-def _counted(count: int, one: str, many: str) -> str:
-    return f"{count} {one if count == 1 else many}"
-
-
-def _named(verdict: Verdict, cells: list[int]) -> str:
-    """' at cells [0, 1], [2, 3], ...', or nothing."""
-    if not cells:
-        return ""
-    unique = list(dict.fromkeys(cells))
-    names = ", ".join(str(list(verdict.cells.unravel(c))) for c in unique[:FEW])
-    more = ", ..." if len(unique) > FEW else ""
-    return f" at cell{'s' if len(unique) > 1 else ''} {names}{more}"
 
 
 def _not_found(

@@ -27,7 +27,7 @@ from functools import reduce
 from operator import getitem
 from typing import Any
 
-from coverable_errors import Fault, shown
+from coverable_errors import Fault, listed, shown
 from feasibility.cases import (
     TABLES,
     CaseError,
@@ -243,10 +243,9 @@ def _check(base: Tables, varied: Variation, faults: list[Fault]) -> None:
 
 def _more(key: str, indices: Sequence[int]) -> str:
     """Values that are wrong for the same cause as others that were reported."""
-    shown_ones = ", ".join(f"[{k}]" for k in indices[:MOST_INDICES])
-    rest = ", ..." if len(indices) > MOST_INDICES else ""
+    which = listed([f"[{k}]" for k in indices], MOST_INDICES)
     what = "value is" if len(indices) == 1 else "values are"
-    return f"{len(indices)} more {what} no better for {key}: {shown_ones}{rest}"
+    return f"{len(indices)} more {what} no better for {key}: {which}"
 
 
 def _covers(path: Sequence[str | int], key: str) -> bool:

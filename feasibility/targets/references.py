@@ -86,15 +86,12 @@ def check_references(cells: Cells, task: Task) -> None:
     wrong = np.flatnonzero(~(sine >= ALONG))
     if not len(wrong):
         return
-    names = ", ".join(str(list(cells.unravel(int(cell)))) for cell in wrong[:3])
-    more = f" and {len(wrong) - 3:,} more" if len(wrong) > 3 else ""
-    plural = "s" if len(wrong) > 1 else ""
+    where = f"cell{'s' if len(wrong) > 1 else ''} {cells.named(wrong, 3)}"
     what = "the u direction" if fixed is None else "the direction"
     raise ArgumentError(
         Fault(
             "roll_reference",
-            f"{what} is along the approach direction at cell{plural} {names}{more}, where it shows "
-            "no roll",
+            f"{what} is along the approach direction at {where}, where it shows no roll",
             expected="give one that is along the surface there, or cut these cells off",
         ),
         "task",

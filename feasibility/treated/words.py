@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from coverable_errors import listed
+
 if TYPE_CHECKING:
     from feasibility.treated.area import TreatedArea, UntreatedRegion
-
 
 LISTED = 3  # regions that are named
 
@@ -48,9 +49,7 @@ def treated_words(found: TreatedArea) -> str:
     )
     regions = found.untreated
     if regions:
-        named = ", ".join(_region_words(each) for each in regions[:LISTED])
-        more = f" and {len(regions) - LISTED} more" if len(regions) > LISTED else ""
-        words += f"; untreated: {named}{more}"
+        words += f"; untreated: {listed([_region_words(each) for each in regions], LISTED)}"
     return "; ".join([words, *found.notes])
 
 

@@ -15,6 +15,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from coverable_arrays import Array
+from coverable_errors import listed
 from coverable_meshes import MeshError, MeshFiles
 from feasibility.viewer import threejs
 from feasibility.viewer.meshes import (
@@ -122,8 +123,7 @@ def _draw(robot: Robot) -> Drawing:
         key = (int(frame.parentJoint), visual.link)
         parts.setdefault(key, []).extend(moved(mesh, place) for mesh in meshes)
     for fault, links in missing.items():
-        more = f" and {len(links) - 1:,} more" if len(links) > 1 else ""
-        notes.append(f"not drawn: a shape of link {links[0]}{more}: {fault}")
+        notes.append(f"not drawn: a shape of link {listed(links, 1)}: {fault}")
     if notes or not parts:
         for joint in set(range(robot.n + 1)) - {joint for joint, _ in parts}:
             parts[joint, "capsule"] = [_capsule(robot, joint)]

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from coverable_arrays import Array
-from coverable_errors import Fault, worded
+from coverable_errors import Fault, listed, worded
 from robots.urdf.geometry import Geometry, read_shape
 from robots.urdf.mesh_folders import MeshFolders
 from robots.urdf.xml import BadValue, Faults, Node, numbers, shown
@@ -88,8 +88,7 @@ def read_visuals(
             first = f"{what} of link {shown(bad.link)} (line {bad.line})".strip()
             problems.setdefault(bad.fault.fault, {}).setdefault(what, first)
     for why, cases in problems.items():
-        more = f" and {len(cases) - 1} more" if len(cases) > 1 else ""
-        faults.warnings.append(f"not drawn: {next(iter(cases.values()))}{more}: {why}")
+        faults.warnings.append(f"not drawn: {listed([*cases.values()], 1)}: {why}")
     return visuals, unusable
 
 

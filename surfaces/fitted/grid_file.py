@@ -11,7 +11,7 @@ import numpy as np
 
 from coverable_arrays import Array
 from coverable_errors import CoverableError
-from coverable_files import read_regular
+from coverable_files import read_regular, shown_name
 from surfaces.arguments import Checks
 from surfaces.patches.nurbs import read_net
 from surfaces.surface import SurfaceError
@@ -40,9 +40,7 @@ def read_grid(path: str | os.PathLike[str], units: str = "m") -> Array:
     checks = Checks("grid")
     scale = UNITS[checks.choice("units", units, tuple(UNITS))]
     checks.done()
-    file = Path(path)
-    name = repr(file.name if len(file.name) <= 100 else file.name[:100] + "...")
-    suffix = file.suffix.lower()
+    name, suffix = shown_name(path), Path(path).suffix.lower()
     if suffix not in (".npy", ".csv"):
         raise SurfaceError("a grid of points must be a .npy or a .csv file", name)
     if suffix == ".npy":

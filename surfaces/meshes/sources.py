@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from coverable_errors import shown
+from coverable_files import shown_name
 from coverable_meshes import MeshError, read_raw
 from surfaces.arguments import Checks
 from surfaces.meshes.repair import clean
@@ -34,7 +34,7 @@ def read_mesh(path: str | os.PathLike[str], scale: float | None = None) -> Trian
         SurfaceError: no such file, not a mesh, damaged, too large, or not a surface; with the
             file's name, the place and what would do.
     """
-    name = repr(Path(os.fsdecode(path)).name[:100])
+    name = shown_name(path)
     try:
         unit = metres_per_unit(scale)
         raw = read_raw(path)

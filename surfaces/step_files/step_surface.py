@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from numpy.typing import ArrayLike
 
-from coverable_errors import Fault, shown
+from coverable_errors import Fault, listed, shown
+from coverable_files import shown_name
 from surfaces.arguments import ORIGIN, Checks
 from surfaces.meshes import MeshSurface, TriangleMesh, mesh, with_likely_unit
 from surfaces.meshes.repair import clean
@@ -76,7 +76,7 @@ def step_faces(file: str | os.PathLike[str]) -> tuple[StepFace, ...]:
     Raises:
         SurfaceError: the extra is missing, or the file cannot be read.
     """
-    name = repr(Path(os.fsdecode(file)).name[:100])
+    name = shown_name(file)
     try:
         return _faces(read_step(file, {"numbers": [], "colour": ""}))
     except SurfaceError as error:
@@ -96,7 +96,7 @@ def step_triangles(
         SurfaceError: as `step`.
     """
     numbers, wanted = checked_choice(faces, colour, deviation)
-    name = repr(Path(os.fsdecode(file)).name[:100])
+    name = shown_name(file)
     job = {"numbers": numbers, "colour": wanted, "deviation": deviation, "angle": ANGLE}
     try:
         read = read_step(file, job, caps)
@@ -150,7 +150,7 @@ def _refuse_missing(read: Read, numbers: list[int], colour: str, chosen: bool) -
         raise SurfaceError(Fault(f"faces[{beyond[0]}]", what))
     if colour and not read.taken:
         there = sorted({face["colour"] for face in read.faces} - {""})
-        remedy = "there are " + ", ".join(there[:LISTED]) + ", ..." * (len(there) > LISTED)
+        remedy = f"there are {listed(there, LISTED)}"
         if not there:
             remedy = f"none of its {count} faces has one; choose by faces = [3, 7]"
         raise SurfaceError(Fault("colour", f"is {shown(colour)}, which no face has; {remedy}"))
@@ -171,7 +171,7 @@ def _listed(read: Read) -> str:
 def _note(read: Read) -> str:
     """What stands for the faces, and how far off."""
     faces = read.taken
-    shown_faces = ", ".join(map(str, faces[:LISTED])) + (", ..." if len(faces) > LISTED else "")
+    shown_faces = listed(faces, LISTED)
     which = f"face {shown_faces}" if len(faces) == 1 else f"{len(faces)} faces ({shown_faces})"
     count = len(read.triangles)
     return f"{count:,} triangles stand for {which}, at most {read.deviation * 1e3:.2g} mm off"

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from coverable_arrays import Array, Ints
-from coverable_errors import Fault, real, shown
+from coverable_errors import Fault, listed, real, shown
 from surfaces.arguments import ORIGIN, Checks, metres, table
 from surfaces.surface import Side, SurfaceError
 from surfaces.toolpaths.arcs import arc_angles
@@ -178,5 +178,4 @@ def _pairs(
 
 def _rows(rows: Ints) -> str:
     """Some rows as indices, "[3], [5] and 2 more"."""
-    named = ", ".join(f"[{row}]" for row in rows[:NAMED].tolist())
-    return named + (f" and {len(rows) - NAMED} more" if len(rows) > NAMED else "")
+    return listed([f"[{row}]" for row in rows.tolist()], NAMED)

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from coverable_arrays import Array
-from coverable_errors import CoverableError, Fault
-from coverable_files import read_regular
+from coverable_errors import CoverableError, Fault, number_in
+from coverable_files import read_regular, shown_name
 from surfaces.arguments import Checks
 from surfaces.surface import SurfaceError
 from surfaces.toolpaths.given import MOST_POSES
@@ -49,7 +49,7 @@ def read_poses(path: str | os.PathLike[str], units: str = "m") -> PoseFile:
     Raises:
         SurfaceError: the file cannot be read, or is not such a file; several faults are named.
     """
-    name = repr(os.path.basename(os.fspath(path))[:100])
+    name = shown_name(path)
     checks = Checks("poses")
     scale = UNITS[checks.choice("units", units, tuple(UNITS))]
     checks.done()
@@ -111,7 +111,7 @@ def _values(lines: Any, width: int) -> Array:
     for line in lines:
         if not line:
             continue
-        numbers, where = [_number(word) for word in line], f"line {lines.line_num}"
+        numbers, where = [number_in(word) for word in line], f"line {lines.line_num}"
         wrong = [word for word, x in zip(line, numbers, strict=True) if not math.isfinite(x)]
         if len(line) != width:
             faults.append(Fault(where, f"must hold {width} numbers, got {len(line)}"))
@@ -126,10 +126,3 @@ def _values(lines: Any, width: int) -> Array:
     if faults:
         raise SurfaceError(faults)
     return np.array(found, dtype=float).reshape(len(found), width)
-
-
-def _number(word: str) -> float:
-    try:
-        return float(word)
-    except ValueError:
-        return math.nan

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
+from coverable_errors import is_number, shown
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from robots import Robot
 
@@ -29,10 +28,10 @@ def _fault_of_opened(robot: Robot, opened: object) -> str:
     seen = set()
     for joint, value in opened:
         if not _is_index(joint, robot.n):
-            return f"opened joint {joint!r} is none of the {robot.n} joints"
+            return f"opened joint {shown(joint)} is none of the {robot.n} joints"
         name = robot.joint_names[joint]
-        if not _is_number(value):
-            return f"joint {name} is opened at {value!r}, which is no number"
+        if not is_number(value):
+            return f"joint {name} is opened at {shown(value)}, which is no number"
         if robot.prismatic[joint]:
             return f"joint {name} slides and cannot be opened: there are no turns of it"
         if joint in seen:
@@ -55,7 +54,7 @@ def _fault_of_nodes(robot: Robot, n_cells: int, tree: CutTree) -> str:
             return f"the tree is more than {MOST_CUTS_DEEP:,} cuts deep"
         if isinstance(node, Leaf):
             if not _is_index(node.cell, n_cells):
-                return f"a leaf names cell {node.cell!r}; there are {n_cells}, counted from 0"
+                return f"a leaf names cell {shown(node.cell)}; there are {n_cells}, counted from 0"
         elif isinstance(node, Cut):
             fault = _fault_of_cut(robot, node, opened)
             if fault:
@@ -72,8 +71,9 @@ def _fault_of_cut(robot: Robot, cut: Cut, opened: set[int]) -> str:
     if not isinstance(weights, tuple) or len(weights) != robot.n:
         length = len(weights) if isinstance(weights, tuple) else "no"
         return f"a cut has {length} weights for {robot.n} joints"
-    if not all(_is_number(weight) for weight in weights) or not _is_number(cut.value):
-        return f"a cut has weights {weights} and value {cut.value!r}, not all of them numbers"
+    if not all(map(is_number, weights)) or not is_number(cut.value):
+        value = shown(cut.value)
+        return f"a cut has weights {shown(weights)} and value {value}, not all of them numbers"
     weighed = [j for j in range(robot.n) if weights[j] != 0.0]
     if not weighed:
         return "a cut weighs no joint"
@@ -88,8 +88,3 @@ def _is_index(value: object, count: int) -> bool:
     """Is it a whole number from 0 to count - 1?"""
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     return whole and 0 <= int(value) < count  # type: ignore[call-overload]
-
-
-def _is_number(value: object) -> bool:
-    """Is it a finite number?"""
-    return isinstance(value, float | int | np.floating | np.integer) and math.isfinite(value)

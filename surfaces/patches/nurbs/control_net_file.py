@@ -10,7 +10,8 @@ import os
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from coverable_files import read_regular
+from coverable_errors import number_in
+from coverable_files import read_regular, shown_name
 from surfaces.patches.nurbs.nurbs_checks import MOST_POINTS
 from surfaces.surface import SurfaceError
 
@@ -46,9 +47,7 @@ def read_net(path: str | os.PathLike[str], what: str = "a control net (.json or 
     Raises:
         SurfaceError: the file cannot be read, or is not such a file.
     """
-    file = Path(path)
-    name = repr(file.name if len(file.name) <= 100 else file.name[:100] + "...")
-    suffix = file.suffix.lower()
+    name, suffix = shown_name(path), Path(path).suffix.lower()
     if suffix not in (".json", ".csv"):
         raise SurfaceError("a control net must be a .json or a .csv file", name)
     try:
@@ -132,10 +131,7 @@ def _index(word: str, where: str) -> int:
 
 def _number(word: str, where: str) -> float:
     """A finite number."""
-    try:
-        number = float(word)
-    except ValueError:
-        number = math.nan
+    number = number_in(word)
     if not math.isfinite(number):
         raise ValueError(f"{where}: {word[:40]!r} is not a finite number")
     return number
