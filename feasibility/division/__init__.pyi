@@ -10,7 +10,6 @@ from .patch_areas import PatchAreas as PatchAreas
 from .patch_areas import patch_areas as patch_areas
 from .plans import collect_components as collect_components
 from .plans import connect_pairs as connect_pairs
-from .plans import exploration_of as exploration_of
 from .proved_bound import ProvedBound as ProvedBound
 from .proved_bound import prove_apart as prove_apart
 from .reconfiguration import Reconfiguration as Reconfiguration

@@ -18,20 +18,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
-from feasibility.clock import Clock
 from feasibility.division.between_patches import clear_moves
 from feasibility.division.connected_labels import count_of
 from feasibility.division.division import Plan, SubPatch
 from feasibility.division.partition import TIME_LIMIT, Partition, fewest_patches
 from feasibility.division.reconfiguration import itinerary
 from feasibility.division.set_covering import set_cover
-from feasibility.roadmap import Exploration, Links, arrays_of, improve, links_of, patch_walk
-from feasibility.roadmap.joint_boxes import blockers_of
+from feasibility.roadmap import Exploration, Links, improve, links_of, patch_walk
 from feasibility.speed import replay_at_rates
 from feasibility.task import Task
 from feasibility.verdict import Walk
-from robots import Robot
-from surfaces import Cells
 
 MOST_COMPONENTS = 4  # components that walks of one patch are made of
 MOST_NEAR = 3  # starts of one component's walks that are near other patches
@@ -159,18 +155,6 @@ def _starts(options: Sequence[_Option]) -> list[list[int]]:
         starts += [x for _, x in sorted(near)[:MOST_NEAR]]
         result.append(list(dict.fromkeys(starts)))
     return result
-
-
-def exploration_of(robot: Robot, cells: Cells, task: Task, seed: int, clock: Clock) -> Exploration:
-    """An exploration that has not begun.
-
-    Raises:
-        OutOfTime: the deadline passed.
-    """
-    with clock.enforced():
-        arrays = arrays_of(robot, cells, task)
-    blockers = blockers_of(robot, cells.surface, task)
-    return Exploration(robot, cells, arrays, seed, clock, blockers)
 
 
 def cover_table(exploration: Exploration) -> tuple[list[int], Mask]:

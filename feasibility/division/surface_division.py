@@ -12,11 +12,19 @@ from coverable_errors import ArgumentError
 from feasibility.clock import Clock, OutOfTime
 from feasibility.collisions import Pair
 from feasibility.division.division import Division, Plan
-from feasibility.division.plans import collect_components, exploration_of, plans
+from feasibility.division.plans import collect_components, plans
 from feasibility.division.proved_bound import ProvedBound, prove_apart
 from feasibility.notices import compiling_notice
 from feasibility.problem import Problem
-from feasibility.roadmap import Exploration, Ruling, SearchArrays, explore, warm_up, within
+from feasibility.roadmap import (
+    Exploration,
+    Ruling,
+    SearchArrays,
+    exploration_of,
+    explore,
+    warm_up,
+    within,
+)
 from feasibility.roadmap.causes import cause_of, causes_of, diagnose, disconnected
 from feasibility.search import Progress, Search
 from feasibility.speed import check_requirements, keep_fast_motions

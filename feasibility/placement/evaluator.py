@@ -32,9 +32,9 @@ from feasibility.roadmap import (
     arrays_of,
     collisions_of,
     covering_walk,
+    exploration_of,
     explore,
 )
-from feasibility.roadmap.joint_boxes import blockers_of
 from feasibility.search import Search
 from feasibility.studies import cause_counts, component_covers
 from feasibility.task import Task
@@ -242,9 +242,7 @@ class LocalEvaluator:
 
     def _explored(self, cells: Cells) -> Exploration:
         """The search of `check` for cells at their place."""
-        problem = arrays_of(self.robot, cells, self.task)
-        blockers = blockers_of(self.robot, cells.surface, self.task)
-        exploration = Exploration(self.robot, cells, problem, self.search.seed, blockers=blockers)
+        exploration = exploration_of(self.robot, cells, self.task, self.search.seed)
         explore(exploration)
         return exploration
 

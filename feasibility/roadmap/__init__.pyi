@@ -37,6 +37,7 @@ from .motions import within as within
 from .motions import work_for as work_for
 from .search import close as close
 from .search import evenly as evenly
+from .search import exploration_of as exploration_of
 from .search import explore as explore
 from .search import improve as improve
 from .search import seed_middle as seed_middle

@@ -19,8 +19,6 @@ from feasibility.roadmap.causes import causes_of
 from feasibility.roadmap.exploration import Exploration, wound
 from feasibility.roadmap.forward import Run, changes_in_place, run_in_order
 from feasibility.roadmap.graph_g import graph_of
-from feasibility.roadmap.joint_boxes import blockers_of
-from feasibility.roadmap.motions import arrays_of
 from feasibility.roadmap.outcome import (
     exhausted_words,
     proof_of,
@@ -29,7 +27,7 @@ from feasibility.roadmap.outcome import (
 )
 from feasibility.roadmap.proving import Proving
 from feasibility.roadmap.refinement import COARSE, FINE, refine
-from feasibility.roadmap.search import close, explore, restart
+from feasibility.roadmap.search import close, exploration_of, explore, restart
 from feasibility.roadmap.walk import covering_walk
 from feasibility.roadmap.warmup import warm_up
 from feasibility.search import Search
@@ -75,10 +73,9 @@ def _search(
         warm_up()
         problem.cells.curves  # noqa: B018 - part of the cells, made once
     clock.start()
-    with clock.enforced():
-        arrays = arrays_of(problem.robot, problem.cells, problem.searched)
-    blockers = blockers_of(problem.robot, problem.cells.surface, problem.task)
-    exploration = Exploration(problem.robot, problem.cells, arrays, search.seed, clock, blockers)
+    exploration = exploration_of(
+        problem.robot, problem.cells, problem.task, search.seed, clock, problem.searched
+    )
     proving = Proving(exploration, problem.task)
     in_time, known, run = True, None, None
     try:

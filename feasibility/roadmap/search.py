@@ -24,10 +24,15 @@ from collections.abc import Callable
 import numpy as np
 
 from coverable_arrays import Ints
+from feasibility.clock import Clock
 from feasibility.roadmap.branch_and_bound import Boxes, Ruling, root_box
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import NODES, root_of
-from feasibility.roadmap.motions import margin_shares
+from feasibility.roadmap.joint_boxes import blockers_of
+from feasibility.roadmap.motions import arrays_of, margin_shares
+from feasibility.task import Task
+from robots import Robot
+from surfaces import Cells
 
 PIVOT_SEEDS = 8
 TOP = 5  # components that a round works on
@@ -48,6 +53,29 @@ NEWTON_STARTS = 25
 
 Between = Callable[[int], None]
 """Called after so many rounds without gain, to try something else."""
+
+
+def exploration_of(
+    robot: Robot,
+    cells: Cells,
+    task: Task,
+    seed: int,
+    clock: Clock | None = None,
+    searched: Task | None = None,
+) -> Exploration:
+    """An exploration that has not begun, with proofs that collisions keep the arm from cells.
+
+    Args:
+        robot, cells, task, seed, clock: of the search.
+        searched: the task that it keeps to, where that is narrower than `task`.
+
+    Raises:
+        OutOfTime: the deadline passed.
+    """
+    clock = Clock() if clock is None else clock
+    with clock.enforced():
+        arrays = arrays_of(robot, cells, task if searched is None else searched)
+    return Exploration(robot, cells, arrays, seed, clock, blockers_of(robot, cells.surface, task))
 
 
 def explore(exploration: Exploration, between: Between | None = None) -> None:

@@ -16,11 +16,18 @@ from feasibility.division import (
     clear_moves,
     collect_components,
     connect_pairs,
-    exploration_of,
 )
 from feasibility.paths import CoveragePath, unwound
 from feasibility.problem import Problem
-from feasibility.roadmap import EDGES, NODES, Exploration, explore, route_walk, warm_up
+from feasibility.roadmap import (
+    EDGES,
+    NODES,
+    Exploration,
+    exploration_of,
+    explore,
+    route_walk,
+    warm_up,
+)
 from feasibility.runs.at_least import Parted, parted_pieces
 from feasibility.runs.fewest import Run, Stations, fewest_runs
 from feasibility.runs.gaps import Gap, along_stretch, gaps_of, place_words

@@ -42,9 +42,8 @@ def cause_counts(verdict: Verdict) -> CauseCounts:
     if verdict.method == "greedy":
         kinds = [str(cause.kind) for cause in verdict.causes]
         return CauseCounts(_counted(kinds), len(kinds))
-    from feasibility.roadmap import Exploration, arrays_of
+    from feasibility.roadmap import exploration_of
     from feasibility.roadmap.causes import cause_of
-    from feasibility.roadmap.joint_boxes import blockers_of
 
     robot, cells, task = verdict.robot, verdict.cells, verdict.task
     reached = np.isin(np.arange(len(cells)), np.concatenate([[], *verdict.components]))
@@ -53,8 +52,7 @@ def cause_counts(verdict: Verdict) -> CauseCounts:
     if len(lost) == 0:
         return CauseCounts(_counted(kinds), 0)
     # A new exploration: its Newton's method, its random starts, and proofs by the tool are used.
-    arrays, blockers = arrays_of(robot, cells, task), blockers_of(robot, cells.surface, task)
-    exploration = Exploration(robot, cells, arrays, verdict.seed, blockers=blockers)
+    exploration = exploration_of(robot, cells, task, verdict.seed)
     bodies = gather(robot, cells.surface, task.collision, task.standoff)
     pairs = () if bodies is None else bodies.pairs
     few = lost[np.unique(np.linspace(0, len(lost) - 1, EXAMINED).round().astype(np.int64))]

@@ -229,6 +229,8 @@ SHAPES = {
     "not all of them numbers": CutTree(Cut((np.nan, 1.0), 0.0, Leaf(0), Leaf(1))),
     "value nan, not all of them": CutTree(Cut((0.0, 1.0), np.nan, Leaf(0), Leaf(1))),
     "value inf, not all of them": CutTree(Cut((0.0, 1.0), np.inf, Leaf(0), Leaf(1))),
+    "value 1000000": CutTree(Cut((0.0, 1.0), 10**400, Leaf(0), Leaf(1))),
+    "a leaf names cell a whole number of thousands of digits": CutTree(Leaf(10**5000)),
     "a leaf names cell 5; there are 5": CutTree(Leaf(5)),
     "a leaf names cell -1": CutTree(Leaf(-1)),
     "a leaf names cell 1.5": CutTree(Leaf(1.5)),
