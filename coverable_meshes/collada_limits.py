@@ -207,7 +207,7 @@ class _Scan:
         if number in self.known:
             found = self.known[number]
             if found is None:
-                raise MeshError("has a node that shows itself, without end")
+                raise MeshError("has a node that contains itself")
             return found
         if depth > DEEPEST:
             raise MeshError(f"has nodes more than {DEEPEST} deep inside each other")

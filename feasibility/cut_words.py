@@ -104,16 +104,16 @@ def what_opens(tree: CutTree, walk: Array, robot: Robot, cells: Cells) -> str:
     """What a covering motion (m, n) of a changed case does that the tree rules out in this one."""
     found = tree.opened_by(walk)
     if isinstance(found, Cut):
-        return f"the motion then crosses {place_of(found, robot)}, as none can now"
+        return f"the motion then crosses {place_of(found, robot)}, which no motion can now"
     if isinstance(found, tuple):
         joint, value = found
         name = robot.joint_names[joint]
-        return f"{name} then passes {joint_value(robot, joint, value)}, as in no motion now"
+        return f"{name} then passes {joint_value(robot, joint, value)}, which it cannot now"
     text = f"cell {_cell(found, cells)} can then be covered"
     path = tree.path_to(walk[0])
     if path:
         cut, above = path[-1]
-        text += f" {'above' if above else 'below'} {place_of(cut, robot)}, as it cannot now"
+        text += f" {'above' if above else 'below'} {place_of(cut, robot)}, where it cannot now"
     return text
 
 

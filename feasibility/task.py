@@ -181,7 +181,9 @@ class Task:
         if low > high:
             checks.wrong("roll_deg", self.roll_deg, f"{expected}; this range is empty")
         elif high - low < 360.0 and cone_deg > 90.0:
-            expected = "must be 90 or less where roll_deg is limited: further back rolls blur"
+            expected = (
+                "must be 90 or less where roll_deg is limited: beyond that a roll means little"
+            )
             checks.wrong("cone_deg", cone_deg, expected)
         return low, high
 

@@ -201,7 +201,9 @@ def _pose_view(placement: pin.SE3) -> Array:
     start, behind = (view.__array_interface__["data"][0] for view in (rotation, translation))
     column = rotation.itemsize
     if behind - start != 9 * column or rotation.strides != (column, 3 * column):
-        raise ImportError("this version of Pinocchio keeps placements otherwise than expected")
+        raise ImportError(
+            "this version of Pinocchio stores placements in another layout than expected"
+        )
     return np.lib.stride_tricks.as_strided(rotation, (12,), (column,), writeable=False)
 
 

@@ -60,7 +60,7 @@ def area_words(area: CertifiedArea | str) -> str:
     if none:
         words += f"; {counted(none, 'cell')} not at all"
     if area.exhausted:
-        words += f"; not all was looked at within {area.budget:,} evaluations of the arm"
+        words += f"; not everything was examined within {area.budget:,} evaluations of the arm"
     return words
 
 

@@ -269,7 +269,7 @@ def _from_tables(tables: Tables, name: str, overrides: Iterable[str]) -> Case:
     task = _read_task(tables["task"], faults) if "task" in tables else None
     collision = read_collision(tables["collision"], faults) if "collision" in tables else None
     if surface is not None and task is not None and surface.automatic and task.disc is None:
-        wanted = "give task.footprint, in metres, which tells how fine is fine enough"
+        wanted = "give task.footprint, in metres, from which their size follows"
         faults.append(Fault("surface.cells", f"is {AUTO!r}, without a footprint", expected=wanted))
     search = _read_search(tables.get("search", {}), faults)
     if faults and "robot" in tables:

@@ -202,19 +202,19 @@ def too_much(text: str) -> str:
         >>> too_much("a = [[1, 2], [3, 4]]")
         ''
         >>> too_much("a = " + 20 * "[")
-        'is nested too deeply: 20 brackets are open at once; at most 16 will do'
+        'is nested too deeply: 20 brackets are open at once, more than 16'
     """
     bare = _STRINGS_AND_COMMENTS.sub(lambda found: "" if found[0][0] == "#" else "s", text)
     steps = (1 if bracket in "[{" else -1 for bracket in re.findall(r"[\[\]{}]", bare))
     deepest = max(accumulate(steps), default=0)
     deep = "is nested too deeply:"
     if deepest > MOST_BRACKETS:
-        return f"{deep} {deepest:,} brackets are open at once; at most {MOST_BRACKETS} will do"
+        return f"{deep} {deepest:,} brackets are open at once, more than {MOST_BRACKETS}"
     longest = max((found[0].count(".") for found in _PATH.finditer(bare)), default=0) + 1
     if longest > MOST_PARTS:
-        return f"{deep} a key has {longest:,} parts; at most {MOST_PARTS} will do"
+        return f"{deep} a key has {longest:,} parts, more than {MOST_PARTS}"
     keys = sum(1 + found[0].count(".") for found in _KEY.finditer(bare))
-    return f"has {keys:,} keys; at most {MOST_KEYS:,} will do" if keys > MOST_KEYS else ""
+    return f"has {keys:,} keys, more than {MOST_KEYS:,}" if keys > MOST_KEYS else ""
 
 
 def too_deep(tables: Any, above: int = 0) -> str:
@@ -227,7 +227,7 @@ def too_deep(tables: Any, above: int = 0) -> str:
         above: tables that it will lie in.
     """
     if above > MOST_PARTS:
-        return f"is nested too deeply: at most {MOST_PARTS} tables inside each other will do"
+        return f"is nested too deeply: at most {MOST_PARTS} tables inside each other are read"
     inner = tables.values() if isinstance(tables, dict) else tables
     if not isinstance(tables, (dict, list)):
         return ""

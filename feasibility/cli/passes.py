@@ -42,7 +42,7 @@ def add_passes(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--overrun", type=positive, default=0.0, metavar="M",
-        help="how far passes go on beyond the border, m; less where the arm does not get there",
+        help="how far passes go on beyond the border, m; less where the arm cannot reach",
     )  # fmt: skip
     parser.add_argument(
         "--retract", type=positive, default=0.05, metavar="M",

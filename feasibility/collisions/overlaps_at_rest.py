@@ -72,7 +72,7 @@ def _normals(body: Polytope) -> Array:
 
 
 def _all_around() -> Array:
-    """Unit vectors, evenly (a Fibonacci lattice)."""
+    """Unit vectors evenly in all directions (a Fibonacci lattice)."""
     k = np.arange(DIRECTIONS) + 0.5
     z, turn = 1.0 - 2.0 * k / DIRECTIONS, np.pi * (1.0 + np.sqrt(5.0)) * k
     flat = np.sqrt(1.0 - z**2)

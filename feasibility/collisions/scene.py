@@ -64,10 +64,10 @@ class Obstacle:
         """Refuse what is no body, and keep plain numbers."""
         checks = Checks(f"obstacle {self.name!r}" if isinstance(self.name, str) else "an obstacle")
         if not (isinstance(self.name, str) and self.name.strip() and self.name.isprintable()):
-            checks.wrong("name", self.name, "must be a word that answers can call it by")
+            checks.wrong("name", self.name, "must be a word, by which answers name it")
         elif self.name in (SURFACE, TOOL):
             checks.wrong(
-                "name", self.name, "must be another: pairs call the surface and the tool so"
+                "name", self.name, "must be another: in pairs it means the surface or the tool"
             )
         if self.frame is not None and not (isinstance(self.frame, str) and self.frame.strip()):
             checks.wrong("frame", self.frame, "must be the name of a link, or None for the world")
@@ -87,8 +87,8 @@ class Obstacle:
         """What a user should know about it, one sentence each."""
         if isinstance(self.geometry, Triangles) and not self.geometry.closed:
             return (
-                f"The mesh of {self.name!r} is not closed, so it is taken as a sheet: its faces "
-                "are kept clear of, but it has no inside.",
+                f"The mesh of {self.name!r} is not closed, so it is taken as a sheet: the "
+                "arm keeps clear of its faces, but it has no inside.",
             )
         return ()
 

@@ -118,7 +118,7 @@ class Collision:
         objects = [obstacle.name for obstacle in self.scene]
         known = [*links, *objects, *([SURFACE] if self.surface else []), TOOL]
         faults = [
-            Fault(f"scene[{k}].name", f"{name!r} is also a link of the arm; call it otherwise")
+            Fault(f"scene[{k}].name", f"{name!r} is also a link of the arm; choose another")
             for k, name in enumerate(objects)
             if name in links
         ]
@@ -167,9 +167,7 @@ def _objects(checks: Checks, scene: Any, tool: Any) -> dict[str, tuple[Any, ...]
         expected = f"must be a list of {kind.__name__}, such as {kind.__name__}.box makes"
         rows = sequence(checks, key, given, expected)
         if len(rows) > MOST_OBJECTS:
-            got = (
-                f"has {len(rows):,} objects; at most {MOST_OBJECTS:,} will do: join them as a mesh"
-            )
+            got = f"has {len(rows):,} objects, more than {MOST_OBJECTS:,}: join them as a mesh"
             checks.keep(Fault(key, got))
         for k, row in enumerate(rows):
             if not isinstance(row, kind):

@@ -39,7 +39,10 @@ SENTENCES = {
     "partial": "divided in part: the patches cover all cells that can be covered.",
     "undecided": "undecided: this division is the best one found, or could not be certified.",
 }
-PARTLY_FAST = "divided in part: no motion to the other cells is as fast or as regular as required."
+PARTLY_FAST = (
+    "divided in part: no motion to the other cells is as fast or as far from singularities as "
+    "required."
+)
 NOTHING = "not divided: no cell can be covered."
 
 

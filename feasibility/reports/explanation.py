@@ -124,7 +124,7 @@ def _remarks(explanation: Explanation) -> list[str]:
     texts.append(rates_sentence(explanation))
     texts += in_the_way(explanation)
     if not helps and not best_changes(explanation) and explanation.thresholds:
-        texts.append("No single change that was tried was found to make it feasible.")
+        texts.append("None of the single changes that were tried makes it feasible.")
     if explanation.pair is not None:
         texts.append(_pair(explanation.pair))
     texts += helpless(explanation)
@@ -150,7 +150,7 @@ def _pair(pair: Pair) -> str:
 def _seeded(alone: Verdict) -> str:
     """Why `check` may say something else."""
     return (
-        f"The motion was found beside the case as given; `check` alone, with seed {alone.seed}, "
+        f"The motion was found from those of changed cases; `check` alone, with seed {alone.seed}, "
         f"says: {alone.answer} ({alone.evidence})."
     )
 

@@ -306,9 +306,9 @@ def _remedy(quantity: Quantity, value: str, now: str) -> str:
 def _helpless(threshold: Threshold) -> str:
     """No value was found to help."""
     quantity, other = threshold.quantity, threshold.other
-    text = f"{label(quantity)} to {shown(quantity, quantity.end)} does not help alone"
+    text = f"{label(quantity)} to {shown(quantity, quantity.end)} alone does not help"
     if quantity.kind is Kind.WITHOUT:
-        text = f"{quantity.name} it is not feasible either"
+        text = f"not feasible {quantity.name} either"
     if threshold.tried:
         text += f" ({threshold.tried})"
     if other is not None:

@@ -144,7 +144,7 @@ def measured_json(
 ) -> dict[str, Any] | None:
     """What the replay of a motion q (m, n) measured, with limits and clearance; null without one.
 
-    The margins of prismatic joints are not among it.
+    The margins of prismatic joints are not among these.
     """
     if certificate is None:
         return None

@@ -47,7 +47,7 @@ EVIDENCE = {
     Evidence.EXHAUSTED: "the search ran to its end at the stated resolution",
     Evidence.BUDGET: "the search was stopped, or what it found could not be certified",
 }
-CUT = "cuts through the joint space, which no motion crosses, part cells from each other"
+CUT = "cuts through the joint space, which no motion crosses, separate cells from each other"
 SHORT = "a motion visits every cell, but it is not shown to treat enough of the area"
 CAUSES = {
     CauseKind.OUT_OF_REACH: "out of reach",

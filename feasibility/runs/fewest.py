@@ -16,7 +16,7 @@ import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
 
-GRAIN = 1e-12  # [m] lengths are counted in this, so that equal sums are equal
+RESOLUTION = 1e-12  # [m] lengths are counted in this, so that equal sums are equal
 # What one step costs, as digits of one number; none of them has more than 32 bits in all.
 CUT, RUN, UNDONE = 1 << 32, 1 << 64, 1 << 96
 
@@ -84,7 +84,7 @@ def _steps(stations: Stations) -> dict[int, list[Step]]:
     for node, station in enumerate(over):
         steps[node].append((-1 - station, 0, CUT * inside[station]))
         steps[-1 - station].append((node, 0, RUN))
-    for station, undone in enumerate(np.round(stations.pieces / GRAIN).tolist()):
+    for station, undone in enumerate(np.round(stations.pieces / RESOLUTION).tolist()):
         steps[-1 - station].append((-2 - station, 0, UNDONE * int(undone)))
     return steps
 

@@ -32,7 +32,7 @@ from feasibility.verdict import (
 )
 
 FEW = 5  # cells that are named
-TOO_SLOW = "covered, but not as fast or as far from singularities as asked"
+TOO_SLOW = "covered, but not as fast or as far from singularities as required"
 """A key of the statistics of a verdict that is undecided for it."""
 
 
@@ -136,7 +136,7 @@ def _causes(rated: RatedGraph, reached: Mask) -> tuple[Cause, ...]:
     best = rated.fastest_to_cells(edge for edge in rated.rated if edge not in enough)
     kind, found = CauseKind.DISCONNECTED, list[Cause]()
     for cell in np.flatnonzero(~reached).tolist():
-        detail = "the motions to it do what is required, but are not joined with the best one"
+        detail = "the motions to it are as required, but not connected to the best one"
         if cell in best:
             detail = rated.fault(best[cell], f" at cell {list(rated.cells.unravel(cell))}")
         found.append(Cause(cell, kind, False, detail))

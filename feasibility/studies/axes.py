@@ -196,9 +196,7 @@ def _read_values(key: Key, value: Any, keys: list[Axis | Range], faults: list[Fa
         if not value:
             faults.append(Fault(key.place, f"is empty; expected {FORMS}"))
         elif len(value) > MOST_VALUES:
-            faults.append(
-                Fault(key.place, f"has {len(value)} values; at most {MOST_VALUES} will do")
-            )
+            faults.append(Fault(key.place, f"has {len(value)} values, more than {MOST_VALUES}"))
         else:
             keys.append(Axis(*own, tuple(value)))
         return

@@ -120,10 +120,10 @@ def read_study(
         raise CaseError(faults, name)
     varied = _absolute(varied, base_dir)
     if varied.size > MOST_TASKS:
-        faults.append(Fault("vary", f"makes {varied.size} tasks; at most {MOST_TASKS} will do"))
+        faults.append(Fault("vary", f"makes {varied.size} tasks, more than {MOST_TASKS}"))
     elif varied.cases > MOST_CASES:
         what = f"makes {varied.cases} cases besides those that differ in the pose"
-        faults.append(Fault("vary", f"{what}; at most {MOST_CASES} will do"))
+        faults.append(Fault("vary", f"{what}, more than {MOST_CASES}"))
     else:
         _check(base, varied, faults)
     if faults:

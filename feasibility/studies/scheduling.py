@@ -51,7 +51,7 @@ class Workers(Protocol):
         """Run something; arguments and result are pickled on their way."""
 
     def renew(self) -> None:
-        """Start anew after a break; the old pool's futures end no more."""
+        """Start a new pool after one broke, whose futures never finish."""
 
     def close(self) -> None:
         """End the workers, whatever they are doing."""

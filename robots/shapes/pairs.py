@@ -87,7 +87,9 @@ def link_pairs(
         for name in pair:
             if name not in known | outside:
                 hint = suggestion(name, [*joint, *sorted(outside)])
-                faults.append(Fault("allow", f"names {name!r}, which is nothing here; {hint}"))
+                faults.append(
+                    Fault("allow", f"names {name!r}, which is no link or object here; {hint}")
+                )
     disabled = set[frozenset[str]]()
     if srdf is not None:
         disabled, said, fault = _of_srdf(srdf, known, robot.name)

@@ -91,7 +91,7 @@ def parametric(
     m, n = found.counts
     off = (MORE * found.off, MORE * _normal_deviation(formula, found.net, ranges, found.counts))
     words = (
-        f"A spline through {m} x {n} points stands for g; it deviates by at most "
+        f"A spline through {m} x {n} points replaces g; it deviates by at most "
         f"{1e3 * off[0]:.2g} mm and {np.degrees(off[1]):.2g} deg, as measured between "
         "them, which is taken off tolerance and cone.",
         outward_words(found.net.normal(middle)),

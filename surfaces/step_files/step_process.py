@@ -75,7 +75,7 @@ def read_step(path: str | os.PathLike[str], job: Mapping[str, Any], caps: Caps =
     ended = run_apart(CHILD, line + data, caps.waiting, limits)
     less = "export fewer faces, or ask for a larger deviation"
     if ended.too_late:
-        raise SurfaceError(f"is not read after {caps.waiting:g} s; {less}")
+        raise SurfaceError(f"could not be read within {caps.waiting:g} s; {less}")
     if ended.too_slow:
         raise SurfaceError(f"takes more than {caps.seconds} s of processor time to read; {less}")
     try:

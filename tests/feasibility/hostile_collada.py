@@ -74,7 +74,9 @@ def dae_circle(rng: random.Random, folder: Path) -> tuple[str, str]:
         f"<node id='n{k}'>{referred(f'n{(k + 1) % count}', rng.choice((1, 3)))}{shown()}</node>"
         for k in range(count)
     )
-    return write(folder, "circle.dae", collada(nodes=nodes, scene=referred("n0"))), "shows itself"
+    return write(
+        folder, "circle.dae", collada(nodes=nodes, scene=referred("n0"))
+    ), "contains itself"
 
 
 def dae_chain(rng: random.Random, folder: Path) -> tuple[str, str]:

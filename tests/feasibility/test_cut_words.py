@@ -122,13 +122,16 @@ def walk_of(*rows_deg: dict[int, float]) -> np.ndarray:
 @pytest.mark.parametrize(
     ("rows", "said"),
     [
-        (({2: -90}, {2: -80}), "the motion then crosses joint3 = -82 deg, as none can now"),
-        (({2: -90, 4: -1}, {2: -90, 4: 1}), "the motion then crosses joint5 = 0 deg, as none"),
-        (({2: -80, 1: 10}, {2: -80, 1: 15}), "the motion then crosses joint2 = 12.5 deg, as none"),
-        (({5: 170}, {5: 190}), "joint6 then passes 178 deg, as in no motion now"),
-        (({5: 530}, {5: 550}), "joint6 then passes 178 deg, as in no motion now"),
+        (({2: -90}, {2: -80}), "the motion then crosses joint3 = -82 deg, which no motion can now"),
+        (({2: -90, 4: -1}, {2: -90, 4: 1}), "the motion then crosses joint5 = 0 deg, which no"),
+        (({2: -80, 1: 10}, {2: -80, 1: 15}), "the motion then crosses joint2 = 12.5 deg, which no"),
+        (({5: 170}, {5: 190}), "joint6 then passes 178 deg, which it cannot now"),
+        (({5: 530}, {5: 550}), "joint6 then passes 178 deg, which it cannot now"),
         (({2: -90, 4: -5}, {2: -85, 4: -5}), "cell [4, 1] can then be covered below joint5 = 0"),
-        (({1: 10},), "cell [0, 0] can then be covered below joint2 = 12.5 deg, as it cannot now"),
+        (
+            ({1: 10},),
+            "cell [0, 0] can then be covered below joint2 = 12.5 deg, where it cannot now",
+        ),
         (({1: 13, 5: 360},), "cell [4, 1] can then be covered above joint2 = 12.5 deg"),
     ],
 )

@@ -89,7 +89,7 @@ def test_a_cell_that_the_roll_alone_prevents_says_which_could_be_had():
     assert verdict.answer is Answer.INFEASIBLE
     assert {cause.kind for cause in verdict.causes} == {CauseKind.ORIENTATION}
     detail = verdict.causes[0].detail
-    assert detail.startswith("roll: could be had from "), detail
+    assert detail.startswith("roll: possible from "), detail
     assert "-15 to 15 deg are allowed" in detail
     words = detail.split()
     low, high = float(words[5]), float(words[7])

@@ -210,7 +210,7 @@ class Arm:
     def _with_roll(
         self, made: Models, q: Array, half: Array, at: TargetModel, allowed: Allowed
     ) -> Models:
-        """The models with a coordinate more for each end of the roll's range, which is limited."""
+        """The models with one more coordinate for each end of the roll's limited range."""
         if allowed.roll is None:
             return made
         n, length = self.n, allowed.length

@@ -80,7 +80,9 @@ def _fault_of_cut(robot: Robot, cut: Cut, opened: set[int]) -> str:
     turning = ~np.isfinite(robot.upper - robot.lower) & ~robot.prismatic
     free = [j for j in weighed if turning[j] and j not in opened]
     if len(weighed) > 1 and free:
-        return f"a cut weighs {robot.joint_names[free[0]]}, which has no limits, beside others"
+        return (
+            f"a cut weighs {robot.joint_names[free[0]]}, which has no limits, together with others"
+        )
     return ""
 
 

@@ -116,8 +116,8 @@ def replay_rates(
         worst = int(near[np.argmin(exact[near])])
         place = _named(cells, targets, points[worst])
         refusals.append(
-            f"the smallest singular value is {exact[worst]:.3g} at cell {place}; {sigma:g} is asked"
-            + _others(len(near) - 1)
+            f"the smallest singular value is {exact[worst]:.3g} at cell {place}; "
+            f"{sigma:g} is required" + _others(len(near) - 1)
         )
     return RateReplay(
         float(found.speed[moving].min(initial=np.inf)), float(least.min(initial=np.inf)),

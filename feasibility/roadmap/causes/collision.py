@@ -67,7 +67,7 @@ def proved_collision(exploration: Exploration, cell: int) -> Cause | None:
     how = f"overlap by {near}" if found.distance < 0.0 else f"are {near} apart"
     detail = (
         f"in every pose of the tool there that cone and tolerance allow, {one}; at best "
-        f"{pairs[0]} {how} or so"
+        f"{pairs[0]} {how}, about"
     )
     return Cause(cell, CauseKind.COLLISION, True, detail, found.pairs[0], found.distance)
 
@@ -100,7 +100,7 @@ def _worded(cell: int, spare: Array, best: Array, pairs: tuple[Pair, ...]) -> Ca
         how = f"overlap by {-1e3 * distance:.1f} mm"
     else:
         short = math.floor(1e4 * distance) / 10.0  # never rounded up to the clearance
-        how = f"come within {short:.1f} mm, {1e3 * pair.clearance:g} mm are asked for"
+        how = f"come within {short:.1f} mm, {1e3 * pair.clearance:g} mm are required"
     often = (spare <= 0.0).sum(axis=0)
     most = np.argsort(-often, kind="stable")[:NAMED]
     shares = ", ".join(

@@ -71,7 +71,7 @@ def other_rolls(exploration: Exploration, cell: int) -> str:
         f"{np.degrees(middle + end):.1f}".removesuffix(".0") for end in (*ends, -half, half)
     )
     where = f"from {first} to {last} deg" if first != last else f"at {first} deg"
-    return f"roll: could be had {where}; {least} to {most} deg are allowed"
+    return f"roll: possible {where}; {least} to {most} deg are allowed"
 
 
 def _off_middle(exploration: Exploration, cell: int, q: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Signed distances of points from bodies at rest, never less than they are.
+"""Signed distances of points from bodies at rest, exact or larger.
 
 They are negative inside. Of primitives they are exact; of a convex mesh exact inside, where the
 depth is the least over the planes of its faces. Of triangles the distance from some of those near

@@ -100,7 +100,7 @@ def _run(job: Mapping[str, Any], path: str, caps: Caps) -> bytes:
     limits = Limits(caps.memory, caps.seconds, caps.bytes + 2**16)
     ended = run_apart(CHILD, json.dumps(job).encode(), caps.waiting, limits)
     if ended.too_late:
-        raise UrdfError(f"is not expanded after {caps.waiting:g} s", path)
+        raise UrdfError(f"could not be expanded within {caps.waiting:g} s", path)
     if ended.too_slow:
         raise UrdfError(
             f"takes more than {caps.seconds} s of processor time to expand; does a macro or an "

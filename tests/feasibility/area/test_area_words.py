@@ -37,7 +37,7 @@ def test_cells_in_part_and_cells_without_are_told_apart():
     assert "2 cells in part, the least [0, " in words
     assert words.endswith("6 cells not at all")
     spent = replace(area, budget=area.evaluations)
-    assert "not all was looked at" in area_words(spent)
+    assert "not everything was examined" in area_words(spent)
 
 
 def test_where_there_is_none_the_reason_is_said():

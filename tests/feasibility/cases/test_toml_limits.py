@@ -66,7 +66,7 @@ def test_too_deep_a_document_never_gets_to_the_parser(
 
     text = too_deep(seed)
     monkeypatch.setattr(tomllib, "loads", loads)
-    with pytest.raises(TomlError, match=r"is nested too deeply: .*; at most \d+ will do"):
+    with pytest.raises(TomlError, match=r"is nested too deeply: .*, more than \d+"):
         parse_toml(text)
     with pytest.raises(CaseError, match="nested too deeply"):
         Case.from_toml(text)
@@ -95,7 +95,7 @@ def test_too_many_keys_are_counted_before_the_parser() -> None:
     many = "\n".join(f"k{k} = {k}" for k in range(MOST_KEYS + 1))
     tables = "\n".join(f"[a.b.k{k}]" for k in range(MOST_KEYS // 3 + 1))
     for text in (many, tables):
-        with pytest.raises(TomlError, match=rf"has 50,00\d keys; at most {MOST_KEYS:,} will do"):
+        with pytest.raises(TomlError, match=rf"has 50,00\d keys, more than {MOST_KEYS:,}"):
             parse_toml(text)
 
 

@@ -30,7 +30,7 @@ def test_a_motion_across_the_cut_opens_it() -> None:
     q = np.add(np.full((2, 6), proof.root.value), [[-0.1], [0.1]])
     found = explanation(Walk(q, np.array([0, 1])))
     place = place_of(proof.root, found.verdict.robot)
-    said = f"the motion then crosses {place}, as none can now"
+    said = f"the motion then crosses {place}, which no motion can now"
     assert f"task.cone_deg: {said}." in " ".join(as_text(found, "x").split())
     (threshold,) = as_json(found, "x")["thresholds"]
     assert threshold["opens"] == said

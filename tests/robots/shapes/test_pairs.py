@@ -151,7 +151,7 @@ def test_names_that_do_not_exist_are_one_error(tmp_path):
         )
     text = str(caught.value)
     assert len(caught.value.faults) == 3
-    for words in ("'l9', which is nothing here; did you mean", "'ground'", "shelf"):
+    for words in ("'l9', which is no link or object here; did you mean", "'ground'", "shelf"):
         assert words in text
     assert "names links that this robot does not have: panda_link0; is it of another robot?" in text
 

@@ -180,7 +180,7 @@ def test_a_file_that_only_looks_like_one_is_refused(tmp_path):
     ("caps", "words"),
     [
         (Caps(memory=2**27), "more than 0.125 GB of memory"),
-        (Caps(waiting=0.01), "is not read after 0.01 s"),
+        (Caps(waiting=0.01), "could not be read within 0.01 s"),
     ],
 )
 def test_caps_hold(folder, caps, words):

@@ -260,7 +260,7 @@ def test_a_slide_is_not_opened_nor_a_free_joint_weighed_beside_others(tmp_path):
     check = verify_proof(
         free, strip(), Task(0.0, 20.0), CutTree(Cut((1.0, 1.0), 0.0, Leaf(0), Leaf(1)))
     )
-    assert check.refusal == "a cut weighs j2, which has no limits, beside others"
+    assert check.refusal == "a cut weighs j2, which has no limits, together with others"
 
 
 def test_trees_of_any_size_end(tmp_path):
