@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import os
 import stat
+from collections.abc import Callable, Iterable
+from io import BufferedReader
 from pathlib import Path
-from typing import BinaryIO
+from typing import Generic, Protocol, TypeVar
 
 from coverable_errors import CoverableError
 
@@ -22,7 +24,7 @@ class FileFault(CoverableError):
 
 def open_regular(
     path: str | os.PathLike[str], cap: int, what: str, if_larger: str = ""
-) -> BinaryIO:
+) -> BufferedReader:
     """Open a regular file of at most `cap` bytes.
 
     Pipes and devices are refused without waiting for them.
@@ -71,6 +73,51 @@ def read_regular(path: str | os.PathLike[str], cap: int, what: str, if_larger: s
     if len(data) > cap:
         raise FileFault(too_large(cap, what, if_larger))
     return data
+
+
+def stamps(paths: Iterable[str]) -> tuple[tuple[int, int] | None, ...]:
+    """Time (ns) and size (bytes) of files or folders, by which a change is noticed.
+
+    None for one that is not there.
+    """
+    found: list[tuple[int, int] | None] = []
+    for path in paths:
+        try:
+            status = os.stat(path)
+        except (OSError, ValueError):  # ValueError: a NUL byte in the name
+            found.append(None)
+        else:
+            found.append((status.st_mtime_ns, status.st_size))
+    return tuple(found)
+
+
+class _OfFiles(Protocol):
+    @property
+    def files(self) -> tuple[str, ...]: ...
+
+
+T = TypeVar("T", bound=_OfFiles)
+
+
+class Remembered(Generic[T]):
+    """Values made from files, each kept until one of its `files` changes."""
+
+    def __init__(self, most: int) -> None:
+        """Start with none; at most `most` are kept."""
+        self._most = most
+        self._kept: dict[object, tuple[T, tuple[tuple[int, int] | None, ...]]] = {}
+
+    def get(self, key: object, make: Callable[[], T]) -> T:
+        """The value of that key, made where there is none that still holds."""
+        if key in self._kept:
+            value, before = self._kept[key]
+            if stamps(value.files) == before:
+                return value
+        value = make()
+        if len(self._kept) >= self._most:
+            self._kept.clear()
+        self._kept[key] = value, stamps(value.files)
+        return value
 
 
 def too_large(cap: int, what: str, advice: str = "") -> str:

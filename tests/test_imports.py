@@ -31,7 +31,7 @@ robots: errors
 robots.mounting
 robots.urdf: xml mesh_folders
 robots.urdf.expansion
-robots.urdf: axes geometry link_shapes joints tree srdf checked_urdf
+robots.urdf: axes geometry link_shapes joints tree srdf checked_urdf files
 robots: arguments joint_checks chain chain_rows reach robot kinematics joint_selection pinocchio_model library
 robots.shapes
 surfaces: parts surface at_home part_growth cells adjacency cell_curves curve_fitting arguments

@@ -9,6 +9,7 @@ from .collision_table import CollisionPart as CollisionPart
 from .collision_table import ObjectPart as ObjectPart
 from .keys import Key as Key
 from .keys import all_keys as all_keys
+from .robot_table import RobotPart as RobotPart
 from .robot_table import in_robot_table as in_robot_table
 from .robot_table import read_robot as read_robot
 from .surface_keys import CLOSED_FORM_KINDS as CLOSED_FORM_KINDS

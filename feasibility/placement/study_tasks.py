@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from coverable_files import stamps
 from feasibility.cases import TABLES, Case, toml_document
 from feasibility.placement.evaluator import LocalEvaluator, Margins, Stage, Trial
 from feasibility.placement.region import Pose
@@ -19,6 +20,7 @@ from feasibility.studies import (
     Workers,
     bits_of,
     cells_of,
+    files_of,
     run_tasks,
     trial_fault,
 )
@@ -90,7 +92,8 @@ def try_placement(tables: Tables) -> Tables:
     Returns:
         See `trial_table`.
     """
-    local = _evaluator(toml_document({title: tables[title] for title in TABLES if title in tables}))
+    text = toml_document({title: tables[title] for title in TABLES if title in tables})
+    local = _evaluator(text, *map(stamps, files_of(tables)))
     request = tables["placement"]
     pose = Pose.of_values(request["pose"])
     if "early" in request:
@@ -99,8 +102,8 @@ def try_placement(tables: Tables) -> Tables:
 
 
 @lru_cache(maxsize=KEPT)
-def _evaluator(text: str) -> LocalEvaluator:
-    """The evaluator of a case, made once."""
+def _evaluator(text: str, *changed: tuple[object, ...]) -> LocalEvaluator:
+    """The evaluator of a case, made once, and again where a file has changed."""
     return LocalEvaluator(*Case.from_toml(text).build())
 
 

@@ -1,6 +1,7 @@
 from .built_cases import arm_of as arm_of
 from .built_cases import case_of as case_of
 from .built_cases import cut_of as cut_of
+from .case_files import files_of as files_of
 from .file import Study as Study
 from .file import load_study as load_study
 from .file import read_study as read_study

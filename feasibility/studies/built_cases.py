@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from coverable_files import stamps
 from feasibility.cases import TABLES, Case, parse_toml, read_robot, read_surface, toml_document
 from feasibility.clock import Clock
+from feasibility.studies.case_files import files_of_arm
 from feasibility.studies.scheduling import Tables
 from robots import Robot, flange_axis
 from surfaces import Cells, SurfaceError, check_pose, rotation_from_rpy
@@ -65,16 +67,18 @@ def clock_of(case: Case) -> Clock:
 
 
 def arm_of(case: Case) -> Robot:
-    """The arm of a case, loaded once.
+    """The arm of a case, loaded once, and again where a file of it has changed.
 
     Raises:
         RobotError: it cannot be loaded so.
     """
-    return _load(toml_document({"robot": case.robot.table()}), case.surface.frame)
+    arm = case.robot
+    files = () if arm.urdf is None else (arm.urdf, *files_of_arm(arm, meshes=True))
+    return _load(toml_document({"robot": arm.table()}), case.surface.frame, stamps(files))
 
 
 @lru_cache(maxsize=ROBOTS_KEPT)
-def _load(table: str, surface_link: str | None) -> Robot:
+def _load(table: str, surface_link: str | None, changed: tuple[object, ...]) -> Robot:
     """The arm of a [robot] table, written as a document; a link of it may carry the surface."""
     part = read_robot(parse_toml(table)["robot"], [])
     if part is None:

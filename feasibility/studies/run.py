@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from typing import Any
 
+from coverable_files import FileFault, open_regular, stamps
 from feasibility.search import Progress
+from feasibility.studies.case_files import files_of
 from feasibility.studies.outcome import evaluate
 from feasibility.studies.scheduling import Reply, Tables, Work, Workers, schedule
 from feasibility.studies.store import Record, Status, Store
 from feasibility.studies.stored import outcome_fault
 from feasibility.version import version
 
+LARGEST = 1 << 30  # bytes; no reader takes a file beyond it
 KEEP_S = 0.5  # [s] for which finished tasks may wait to be written together
 
 
@@ -53,7 +55,7 @@ class StudyTask:
             "work": f"{package}.{self.work.__qualname__}",
             "version": version(),
             "tables": self.tables,
-            "files": [digest(*file) for file in _files_of(self.tables)],
+            "files": _digests(self.tables),
         }
         text = json.dumps(identity, sort_keys=True, allow_nan=False, separators=(",", ":"))
         object.__setattr__(self, "key", hashlib.sha256(text.encode()).hexdigest())
@@ -169,30 +171,20 @@ def _record(task: StudyTask, reply: Reply) -> Record:
     return Record(task.key, task.parameters, "failed", result, reply.seconds)
 
 
-def _files_of(tables: Mapping[str, Any]) -> list[tuple[str, float, int]]:
-    """The files that a case names, with time and size, by which a change is noticed."""
-    parts = [tables.get(title) for title in ("robot", "surface", "collision")]
-    for part, key in zip((*parts[1:], parts[2]), ("pieces", "scene", "tool"), strict=True):
-        if isinstance(part, Mapping) and isinstance(part.get(key), Sequence):
-            parts += part[key]
-    found = []
-    for part in parts:
-        written = part if isinstance(part, Mapping) else {}
-        name = written.get("urdf", written.get("file", written.get("srdf")))
-        if isinstance(name, str):
-            try:
-                status = os.stat(name)
-            except (OSError, ValueError):
-                continue  # the task will say so
-            found.append((name, status.st_mtime, status.st_size))
-    return found
+def _digests(tables: Mapping[str, Any]) -> list[str]:
+    """What the files of a case hold, in short; those that it names and that are gone left out."""
+    files = files_of(tables)
+    named, further = (list(zip(paths, stamps(paths), strict=True)) for paths in files)
+    return [_digest(*file) for file in (*(file for file in named if file[1]), *further)]
 
 
-@lru_cache(maxsize=256)
-def digest(path: str, changed: float, size: int) -> str:
+@lru_cache(maxsize=4096)
+def _digest(path: str, stamp: tuple[int, int] | None) -> str:
     """What a file holds, in short; read again when its time or size has changed."""
+    if stamp is None:
+        return ""
     try:
-        with open(path, "rb") as stream:
+        with open_regular(path, LARGEST, "a file of a case") as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()
-    except OSError:
+    except (OSError, FileFault):
         return ""  # the task will say so

@@ -2,6 +2,7 @@ from .axes import Axis as Axis
 from .axes import carrier_of_surface as carrier_of_surface
 from .checked_urdf import CheckedUrdf as CheckedUrdf
 from .checked_urdf import check_urdf as check_urdf
+from .files import files_named_by as files_named_by
 from .geometry import Box as Box
 from .geometry import Capsule as Capsule
 from .geometry import Cylinder as Cylinder

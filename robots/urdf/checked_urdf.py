@@ -62,6 +62,8 @@ class CheckedUrdf:
     warnings: tuple[str, ...]
     """What is odd in the file and leaves the robot correct."""
     package_dirs: tuple[str, ...]
+    mesh_paths: tuple[str, ...]
+    """Where meshes were looked for, in the allowed folders; not all are there."""
 
     def path_to(self, link: str) -> tuple[JointInfo, ...]:
         """The joints from the root to `link`, base to tip.
@@ -123,8 +125,8 @@ def _root_of(
     """The first element of a file; lines are those of the expanded text."""
     if is_xacro(path):
         called = f"{path} (expanded)"
-        data = expanded(path, tuple(map(os.fsdecode, package_dirs)), xacro_args)
-        root = parse_xml(data, called, encoding="utf-8")
+        found = expanded(path, tuple(map(os.fsdecode, package_dirs)), xacro_args)
+        root = parse_xml(found.text, called, encoding="utf-8")
     elif xacro_args:
         raise UrdfError("is no .xacro file, so it has no xacro_args; leave them out", path)
     else:
@@ -178,6 +180,7 @@ def checked_tree(
         collisions=collisions,
         warnings=(*faults.warnings[:MAX_WARNINGS], *more),
         package_dirs=folders,
+        mesh_paths=tuple(mesh_folders.tried),
     )
 
 

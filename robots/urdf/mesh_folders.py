@@ -26,6 +26,7 @@ class MeshFolders:
 
     def __init__(self, base_dir: str, package_dirs: Sequence[str]) -> None:
         """Collect the allowed folders; none are opened."""
+        self.tried: dict[str, None] = {}  # allowed paths that were looked at
         self.base = Path(base_dir)
         self.packages = [Path(folder) for folder in package_dirs]
         self.own_package = _package_around(self.base)
@@ -65,6 +66,7 @@ class MeshFolders:
             if not any(real.is_relative_to(folder) for folder in self.allowed):
                 outside = outside or real
                 continue
+            self.tried[str(candidate)] = None
             try:
                 status = os.stat(real)
             except (OSError, ValueError):

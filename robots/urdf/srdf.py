@@ -33,7 +33,7 @@ def read_srdf(path: str | os.PathLike[str]) -> DisabledPairs:
         UrdfError: the file cannot be read, is no SRDF, or a pair lacks a link; with every fault.
     """
     name = os.fsdecode(path)
-    root = parse_xml(expanded(name) if is_xacro(name) else read_bytes(name), name)
+    root = parse_xml(expanded(name).text if is_xacro(name) else read_bytes(name), name)
     faults = Faults()
     if root.tag != "robot":
         raise UrdfError(f"line {root.line}: an SRDF starts with <robot name=...>", name)

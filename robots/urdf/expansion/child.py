@@ -6,7 +6,8 @@ expressions may not name what leads out of them (`evaluate`); of all that Python
 hooks only reading from the folders of the file is allowed (`Gate`); and memory, processor time and
 output have their caps.
 
-The job comes as JSON on the standard input; what leaves is one line, "urdf" or "fault", and a text.
+The job comes as JSON on the standard input. What leaves is one line, "urdf" or "fault", and then
+the files that were read, as JSON on one line, and the text; or what is wrong.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from importlib import import_module
 from typing import Any
 from xml.parsers import expat
 
+MOST_FILES = 1_000  # that one file may lead to
 MAX_NESTING = 5_000  # frames of Python: some 1,000 macros or elements inside one another
 LONGEST = 300  # characters of what the library says
 
@@ -56,6 +58,7 @@ class Gate:
         """Allow regular files of at most `most` bytes in folders given by their real paths."""
         self.folders = folders
         self.most = most
+        self.seen: dict[str, None] = {}  # files and folders that were looked at
 
     def __call__(self, event: str, args: tuple[Any, ...]) -> None:
         """Refuse what is not reading.
@@ -90,6 +93,9 @@ class Gate:
                 f"would read {str(path)[:LONGEST]!r}, which lies outside the folders that files "
                 "may come from; add its folder to package_dirs"
             )
+        self.seen[os.path.abspath(path)] = None
+        if len(self.seen) > MOST_FILES:
+            raise Refused(f"would read more than {MOST_FILES:,} files")
         return real
 
 
@@ -150,11 +156,14 @@ def _no_environment(name: str) -> str:
     )
 
 
-def expand(job: Mapping[str, Any]) -> str:
+def expand(job: Mapping[str, Any]) -> tuple[str, list[str]]:
     """Expand a xacro file; the audit hook stays for as long as the process lives.
 
     Args:
         job: see `xacro_files`.
+
+    Returns:
+        The text, and the files and folders that were looked at for it.
 
     Raises:
         Refused: the file does what it may not.
@@ -180,10 +189,11 @@ def expand(job: Mapping[str, Any]) -> str:
     arguments = Arguments(job["args"])
     import_module("xml.dom.expatbuilder")  # minidom would import it behind the gate
     sys.setrecursionlimit(MAX_NESTING)
-    sys.addaudithook(Gate(job["folders"], job["bytes"]))
+    gate = Gate(job["folders"], job["bytes"])
+    sys.addaudithook(gate)
     text: str = xacro.process_file(job["path"], mappings=arguments, verbosity=0).toprettyxml("  ")
     arguments.refuse_unused()
-    return text
+    return text, list(gate.seen)
 
 
 def described(error: BaseException) -> str:
@@ -227,9 +237,10 @@ def main() -> None:
     job = json.load(sys.stdin)
     sys.path[:0] = job["library"]
     try:
-        text = expand(job)
-        kind, answer = "urdf", text.encode()
-        if len(answer) > job["bytes"]:
+        text, files = expand(job)
+        urdf = text.encode()
+        kind, answer = "urdf", json.dumps(files).encode() + b"\n" + urdf
+        if len(urdf) > job["bytes"]:
             raise Refused(f"expands to more than {job['bytes']:,} bytes, too large for a URDF")
     except (Exception, Refused) as error:  # noqa: BLE001 - the library raises of all kinds
         kind = "fault"

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from coverable_errors import Fault
+from coverable_files import Remembered
 from coverable_processes import Limits, folder_of, run_apart
 from robots.urdf.mesh_folders import MeshFolders
 from robots.urdf.xml import MAX_BYTES, UrdfError, read_bytes
@@ -36,6 +37,19 @@ class Caps(NamedTuple):
 
 
 CAPS = Caps()
+LISTED = 2**22  # bytes that the names of the files may take
+
+
+class Expansion(NamedTuple):
+    """What a xacro file stands for."""
+
+    text: bytes
+    """A URDF, as UTF-8."""
+    files: tuple[str, ...]
+    """Absolute paths that were looked at: the file, what it includes, and folders with patterns."""
+
+
+_known = Remembered[Expansion](most=16)
 
 
 def is_xacro(path: str | os.PathLike[str]) -> bool:
@@ -50,8 +64,8 @@ def is_xacro(path: str | os.PathLike[str]) -> bool:
 
 def expanded(
     path: str, package_dirs: Sequence[str] = (), args: Mapping[str, Any] = {}, caps: Caps = CAPS
-) -> bytes:
-    """Expand a xacro file into the text of a URDF, as UTF-8.
+) -> Expansion:
+    """Expand a xacro file into the text of a URDF; again only where a file has changed.
 
     Args:
         path: the file.
@@ -80,25 +94,33 @@ def expanded(
         "args": {name: _text(value) for name, value in args.items()},
         "bytes": caps.bytes,
     }
+    given = json.dumps(job)
+    return _known.get((given, caps), lambda: _expanded(given, path, caps))
+
+
+def _expanded(job: str, path: str, caps: Caps) -> Expansion:
+    """What the process makes of a job."""
     kind, _, answer = _run(job, path, caps).partition(b"\n")
-    if kind == b"urdf":
-        return answer
+    listed, _, text = answer.partition(b"\n")
     try:
-        said = json.loads(answer) if kind == b"fault" else {}
+        said = json.loads(answer if kind == b"fault" else listed)
     except ValueError:
-        said = {}
+        said = None
+    if kind == b"urdf" and isinstance(said, list) and all(isinstance(file, str) for file in said):
+        return Expansion(text, tuple(said))
+    said = said if isinstance(said, dict) else {}
     what = str(said.get("fault", "cannot be expanded: its process broke off"))
     raise UrdfError(Fault("", what, str(said.get("place", ""))), path)
 
 
-def _run(job: Mapping[str, Any], path: str, caps: Caps) -> bytes:
+def _run(job: str, path: str, caps: Caps) -> bytes:
     """What the process writes about a job.
 
     Raises:
         UrdfError: it took too long.
     """
-    limits = Limits(caps.memory, caps.seconds, caps.bytes + 2**16)
-    ended = run_apart(CHILD, json.dumps(job).encode(), caps.waiting, limits)
+    limits = Limits(caps.memory, caps.seconds, caps.bytes + LISTED)
+    ended = run_apart(CHILD, job.encode(), caps.waiting, limits)
     if ended.too_late:
         raise UrdfError(f"could not be expanded within {caps.waiting:g} s", path)
     if ended.too_slow:

@@ -206,14 +206,14 @@ def test_external_entities_are_not_read(tmp_path):
     path.write_text(
         '<!DOCTYPE robot [<!ENTITY x SYSTEM "secret">]><robot name="r"><link name="a"/>&x;</robot>'
     )
-    assert b"secret</" not in expanded(str(path))
+    assert b"secret</" not in expanded(str(path)).text
     with pytest.raises(UrdfError, match="DOCTYPE"):
         check_urdf(path)
 
 
 def test_the_environment_is_empty(tmp_path, monkeypatch):
     monkeypatch.setenv("SECRET", "secret")
-    assert b'"none"' in expanded(one_file(tmp_path, '<link name="$(optenv SECRET none)"/>'))
+    assert b'"none"' in expanded(one_file(tmp_path, '<link name="$(optenv SECRET none)"/>')).text
 
 
 @pytest.mark.parametrize(
@@ -292,3 +292,26 @@ os._exit(0)
     done = subprocess.run([sys.executable, "-S", "-c", program], capture_output=True, check=False)
     assert (done.stdout.decode(), done.stderr.decode()) == ("inside\n", "")
     assert sorted(os.listdir(tmp_path)) == ["inside", "large"]
+
+
+def test_a_file_is_expanded_again_only_where_it_or_what_it_looked_at_has_changed(
+    arm, tmp_path, monkeypatch
+):
+    runs = []
+    run = xacro_files.run_apart
+    monkeypatch.setattr(xacro_files, "run_apart", lambda *job: runs.append(job) or run(*job))
+    optional = arm.parent / "more.xacro"
+    include = '<xacro:include filename="more.xacro" optional="true"/></robot>'
+    arm.write_text(ARM.replace("</robot>", include))
+    first = expanded(str(arm))
+    names = ("urdf/arm.urdf.xacro", "urdf/more.xacro", "config/limits.yaml", "macros/segment.xacro")
+    assert set(first.files) == {str(arm.parents[1] / name) for name in names}
+    assert expanded(str(arm)) is first
+    assert len(runs) == 1
+    optional.write_text(f'{HEAD}<link name="extra"/></robot>')
+    assert b'"extra"' in expanded(str(arm)).text
+    (arm.parents[1] / "config" / "limits.yaml").write_text("turn: 180")
+    assert b"3.14159" in expanded(str(arm)).text
+    assert len(runs) == 3
+    expanded(str(arm), args={"reach": 1})
+    assert len(runs) == 4
