@@ -3,8 +3,8 @@ from .arguments import check_pose as check_pose
 from .cell_triangles import Triangulation as Triangulation
 from .cell_triangles import triangulation as triangulation
 from .cells import Cells as Cells
+from .cells import CellTriangles as CellTriangles
 from .cells import Finer as Finer
-from .cells import Triangles as Triangles
 from .curve_fitting import fit_directions as fit_directions
 from .fitted import grid as grid
 from .fitted import parametric as parametric

@@ -18,7 +18,7 @@ LARGEST_RATIO = 1e6  # of two lengths of one surface
 ORIGIN = (0.0, 0.0, 0.0)
 
 
-class Pose(TypedDict):
+class PoseArguments(TypedDict):
     """What every surface is built from besides its own shape."""
 
     side: Side
@@ -66,7 +66,7 @@ class Checks(coverable_errors.Checks):
         """The rotation of fixed-axis roll, pitch, yaw in degrees."""
         return rotation_from_rpy(*np.radians(self.vector(name, value, "degrees")))
 
-    def pose(self, side: Any, position: Any, rpy_deg: Any) -> Pose:
+    def pose(self, side: Any, position: Any, rpy_deg: Any) -> PoseArguments:
         """Side, position (metres) and fixed-axis roll, pitch, yaw (degrees), under these names."""
         return {
             "side": self.choice("side", side, SIDES),

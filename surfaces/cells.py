@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import networkx as nx
 
 
-class Triangles(NamedTuple):
+class CellTriangles(NamedTuple):
     """Triangles to draw."""
 
     vertices: Array
@@ -221,7 +221,7 @@ class Cells(Protected, ABC):
         """
 
     @abstractmethod
-    def triangles(self, which: Ints, samples: int = 8, inset: float = 0.0) -> Triangles:
+    def triangles(self, which: Ints, samples: int = 8, inset: float = 0.0) -> CellTriangles:
         """Triangles that fill some cells, smooth where the surface bends.
 
         Args:

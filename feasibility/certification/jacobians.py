@@ -63,7 +63,7 @@ def lengths(a: Array) -> Array:
     return np.sqrt(x * x + y * y + z * z)
 
 
-class Placements(NamedTuple):
+class ToolPlacements(NamedTuple):
     """Tool points and axes of m configurations, and the lengths of their derivatives."""
 
     points: Array
@@ -76,10 +76,10 @@ class Placements(NamedTuple):
     """(m, n) sine of the angle between each revolute axis and the approach axis; 0 if prismatic."""
 
 
-def placements(robot: Robot, q: Array) -> Placements:
+def placements(robot: Robot, q: Array) -> ToolPlacements:
     """Tool points, axes and lever arms at q (m, n)."""
     kinematics, parts = Kinematics(robot), []
     for first in range(0, max(len(q), 1), BLOCK):
         at = jacobians(kinematics, q[first : first + BLOCK])
         parts.append((at.points, at.axes, at.levers, at.sines))
-    return Placements(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+    return ToolPlacements(*(np.concatenate(part) for part in zip(*parts, strict=True)))

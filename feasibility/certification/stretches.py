@@ -29,7 +29,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
-from feasibility.certification.jacobians import Placements
+from feasibility.certification.jacobians import ToolPlacements
 from feasibility.certification.lever_bounds import peaks, second_derivatives
 from feasibility.certification.rolls import CLOSE_TO_ZERO as ROLL_CLOSE
 from feasibility.certification.rolls import Held, ToolAxes, reference_axes, tool_frames
@@ -147,7 +147,7 @@ class Judge:
         q = rows[row] + share[:, None] * (rows[row + 1] - rows[row])
         return self.sampled(row, share, q)
 
-    def between_rows(self, rows: Array, poses: Placements, at: Samples) -> Stretches:
+    def between_rows(self, rows: Array, poses: ToolPlacements, at: Samples) -> Stretches:
         """The stretches from row to row, with the samples `at` every row."""
         steps, slides = np.abs(np.diff(rows, axis=0)), self.robot.prismatic
         second = [

@@ -32,7 +32,7 @@ ROUNDS = 3
 LARGEST = 3  # parts that a round tries to join
 
 
-class Reached(NamedTuple):
+class QuickAnswer(NamedTuple):
     """What a quick look found."""
 
     covered: Mask
@@ -41,7 +41,7 @@ class Reached(NamedTuple):
     """(n,) a configuration of that motion; None where it reaches nothing."""
 
 
-def quick_search(problem: Problem, search: Search, clock: Clock) -> Reached:
+def quick_search(problem: Problem, search: Search, clock: Clock) -> QuickAnswer:
     """Search until all is reached, the clock ends it, or the few rounds are over.
 
     Args:
@@ -67,7 +67,7 @@ def quick_search(problem: Problem, search: Search, clock: Clock) -> Reached:
     except OutOfTime:
         pass
     covered = exploration.covered
-    return Reached(covered, exploration.posture(exploration.best) if covered.any() else None)
+    return QuickAnswer(covered, exploration.posture(exploration.best) if covered.any() else None)
 
 
 def _explore(exploration: Exploration) -> None:
@@ -84,11 +84,11 @@ def _explore(exploration: Exploration) -> None:
         improve(exploration, exploration.roots()[:LARGEST])
 
 
-def _greedy(problem: Problem, search: Search, clock: Clock) -> Reached:
+def _greedy(problem: Problem, search: Search, clock: Clock) -> QuickAnswer:
     """What the paper's search reaches until the clock ends it."""
     try:
         found = greedy_search(problem, search, clock, problem.robot.start)
     except OutOfTime:  # before it had found anything
-        return Reached(np.zeros(len(problem.cells), dtype=bool), None)
+        return QuickAnswer(np.zeros(len(problem.cells), dtype=bool), None)
     known = found.postures is not None and len(found.postures)
-    return Reached(found.covered, found.postures[0] if known else None)  # type: ignore[index]
+    return QuickAnswer(found.covered, found.postures[0] if known else None)  # type: ignore[index]

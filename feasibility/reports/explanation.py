@@ -30,10 +30,10 @@ from feasibility.reports.parts import aligned, filled, walk_csv
 from feasibility.results import plain
 from feasibility.sensitivity import (
     Change,
+    ChangePair,
     Dropped,
     Explanation,
     Finding,
-    Pair,
     Quantity,
     Threshold,
 )
@@ -140,7 +140,7 @@ def _remarks(explanation: Explanation) -> list[str]:
     return [text for text in texts if text]
 
 
-def _pair(pair: Pair) -> str:
+def _pair(pair: ChangePair) -> str:
     """The two changes that do it together."""
     both = " and ".join(map(worded, pair.changes))
     waypoints = len(pair.witness.q)

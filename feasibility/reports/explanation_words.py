@@ -20,7 +20,7 @@ SPARE = 1.0 / 3.0  # [1] of a joint's range: a limit that may tighten by more do
 FURTHEST = "the furthest value tried"
 
 
-class Row(NamedTuple):
+class ThresholdRow(NamedTuple):
     """One threshold, as a table shows it."""
 
     change: str
@@ -102,12 +102,14 @@ def _spare(threshold: Threshold) -> str:
     return f"{row.change} {side} to {row.value} ({row.now} now)"
 
 
-def row_of(threshold: Threshold) -> Row:
+def row_of(threshold: Threshold) -> ThresholdRow:
     """One threshold as a row of a table."""
     quantity, found, other = threshold.quantity, threshold.feasible, threshold.other
     now = "-" if quantity.kind is Kind.SHIFT else shown(quantity, quantity.given)
     if found is None:
-        return Row(label(quantity), now, "-", "" if other is None else _against(quantity, other))
+        return ThresholdRow(
+            label(quantity), now, "-", "" if other is None else _against(quantity, other)
+        )
     value = shown(quantity, found.value, True)
     if threshold.span is not None:
         value += f" .. {shown(quantity, threshold.span.feasible.value)}"
@@ -115,7 +117,7 @@ def row_of(threshold: Threshold) -> Row:
     if other is not None:
         beyond = _against(quantity, other)
     mark = f" {SEEDED}" if found.unaided is False else ""
-    return Row(label(quantity), now, value + mark, beyond)
+    return ThresholdRow(label(quantity), now, value + mark, beyond)
 
 
 def idle_limits(explanation: Explanation) -> str:

@@ -10,7 +10,7 @@ from coverable_errors import counted
 from feasibility.collisions import checked
 from feasibility.reports.parts import aligned, certificate_json, clearance_json, summary
 from feasibility.reports.proof import tree_json
-from feasibility.runs import Cut, PassRuns, PlannedPasses
+from feasibility.runs import Interruption, PassRuns, PlannedPasses
 from feasibility.timing import Trajectory
 from feasibility.treated import TreatedArea, treated_json, treated_words
 from feasibility.version import version
@@ -111,7 +111,7 @@ def _bound_json(along: PlannedPasses, found: PassRuns) -> dict[str, Any]:
     }
 
 
-def _cut_json(cut: Cut, found: PassRuns) -> dict[str, Any]:
+def _cut_json(cut: Interruption, found: PassRuns) -> dict[str, Any]:
     """One interruption."""
     return {
         "stretch": None if cut.stretch < 0 else 1 + cut.stretch,

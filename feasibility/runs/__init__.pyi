@@ -4,7 +4,7 @@ from .fewest import Run as Run
 from .fewest import Stations as Stations
 from .fewest import fewest_runs as fewest_runs
 from .gaps import Gap as Gap
-from .pass_runs import Cut as Cut
+from .pass_runs import Interruption as Interruption
 from .pass_runs import PassRuns as PassRuns
 from .pass_runs import pass_runs as pass_runs
 from .planning import PlannedPasses as PlannedPasses

@@ -31,7 +31,7 @@ from feasibility.roadmap import (
 from feasibility.runs.at_least import Parted, parted_pieces
 from feasibility.runs.fewest import Run, Stations, fewest_runs
 from feasibility.runs.gaps import Gap, along_stretch, gaps_of, place_words
-from feasibility.runs.stopping import Stop, where_it_stops
+from feasibility.runs.stopping import RunStop, where_it_stops
 from feasibility.speed import keep_fast_motions, replay_at_rates
 from feasibility.task import Task
 from robots import Robot
@@ -40,7 +40,7 @@ from surfaces.toolpaths import PoseCells
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Cut:
+class Interruption:
     """Where the tool has to be lifted, and the arm to take another configuration."""
 
     pose: int
@@ -66,7 +66,7 @@ class PassRuns:
     places: PassPlaces
     runs: tuple[CoveragePath, ...]
     """One certified motion each, in order."""
-    cuts: tuple[Cut, ...]
+    cuts: tuple[Interruption, ...]
     """Between one run and the next."""
     gaps: tuple[Gap, ...]
     """What no run works on, and why."""
@@ -189,7 +189,7 @@ def _cuts(
     places: PassPlaces,
     runs: Sequence[CoveragePath],
     pairs: tuple[Pair, ...],
-) -> tuple[Cut, ...]:
+) -> tuple[Interruption, ...]:
     """What lies between the runs."""
     robot, cells = exploration.robot, exploration.cells
     moves = [
@@ -202,7 +202,7 @@ def _cuts(
         pose, following = int(before.visits[-1]), int(after.visits[0])
         stop = where_it_stops(exploration, task, pose, move.start, pairs)
         found.append(
-            Cut(
+            Interruption(
                 pose=pose,
                 next_pose=following,
                 stretch=int(places.stretch[pose]),
@@ -214,7 +214,7 @@ def _cuts(
     return tuple(found)
 
 
-def _cause_words(places: PassPlaces, stop: Stop) -> str:
+def _cause_words(places: PassPlaces, stop: RunStop) -> str:
     """What stops an arm that goes on, and where."""
     if not stop.cause:
         return "another configuration gets further"

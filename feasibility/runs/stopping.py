@@ -22,7 +22,7 @@ WORDS = {
 }
 
 
-class Stop(NamedTuple):
+class RunStop(NamedTuple):
     """Where a motion along poses ends."""
 
     pose: int
@@ -37,7 +37,7 @@ def where_it_stops(
     pose: int,
     q: Array,
     pairs: tuple[Pair, ...],
-) -> Stop:
+) -> RunStop:
     """Follow the poses from a configuration q (n,) over one of them, as far as it goes.
 
     Speed and singular values count where the task limits them; `pairs` are the bodies that had to
@@ -59,8 +59,8 @@ def where_it_stops(
         slow = np.flatnonzero(~rates.enough(task))
         if len(slow):
             which = int(slow[0])
-            return Stop(first + which, rates.words(exploration.robot, task, which))
-    return Stop(pose, cause)
+            return RunStop(first + which, rates.words(exploration.robot, task, which))
+    return RunStop(pose, cause)
 
 
 def _words(exploration: Exploration, code: int, joint: int, pairs: tuple[Pair, ...]) -> str:

@@ -6,9 +6,9 @@ from .quantities import Quantity as Quantity
 from .quantities import range_of as range_of
 from .quantities import tilted as tilted
 from .thresholds import Change as Change
+from .thresholds import ChangePair as ChangePair
 from .thresholds import Dropped as Dropped
 from .thresholds import Explanation as Explanation
 from .thresholds import Finding as Finding
-from .thresholds import Pair as Pair
 from .thresholds import Threshold as Threshold
 from .warm_start import last_true as last_true

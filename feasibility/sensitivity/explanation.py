@@ -16,7 +16,7 @@ from feasibility.clock import Clock, OutOfTime
 from feasibility.division import divide
 from feasibility.roadmap import HERE, Exploration, margin_shares, place
 from feasibility.search import Progress, Search
-from feasibility.sensitivity.limited_search import Attempt
+from feasibility.sensitivity.limited_search import LimitedAttempt
 from feasibility.sensitivity.pairs import PairSearch
 from feasibility.sensitivity.probes import Prober
 from feasibility.sensitivity.quantities import Kind, Quantity, Variant, quantities
@@ -208,7 +208,7 @@ def _thresholds(
     prober: Prober,
     verdict: Verdict,
     q: Array,
-    motions: Sequence[Attempt],
+    motions: Sequence[LimitedAttempt],
     varied: Sequence[Quantity],
 ) -> Iterator[tuple[ThresholdSearch, Threshold]]:
     """The thresholds one by one, each with a fair share of what is left; until the deadline."""
@@ -234,16 +234,18 @@ def _thresholds(
         yield made, found
 
 
-def _motions(prober: Prober, verdict: Verdict, q: Array) -> list[Attempt]:
+def _motions(prober: Prober, verdict: Verdict, q: Array) -> list[LimitedAttempt]:
     """The witness of a feasible case, and covering motions in other postures."""
     angle = None if verdict.certificate is None else verdict.certificate.max_angle
-    start = Attempt(verdict.answer, verdict.evidence, verdict.message, q, verdict.witness, angle)
+    start = LimitedAttempt(
+        verdict.answer, verdict.evidence, verdict.message, q, verdict.witness, angle
+    )
     if prober.clock.out_of_time:
         return [start]
     return [start, *other_motions(prober, GUESSES, POSTURES)]
 
 
-def other_motions(prober: Prober, guesses: int, most: int) -> list[Attempt]:
+def other_motions(prober: Prober, guesses: int, most: int) -> list[LimitedAttempt]:
     """Covering motions of the case as given, from up to `most` postures far from each other.
 
     They are chosen among random `guesses` that are projected onto a cell in the middle.

@@ -63,7 +63,7 @@ class LimitedExploration(Exploration):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Attempt:
+class LimitedAttempt:
     """What a search found."""
 
     answer: Answer

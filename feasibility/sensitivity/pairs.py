@@ -17,11 +17,11 @@ import numpy as np
 from coverable_arrays import Array
 from feasibility.clock import Clock
 from feasibility.roadmap import Ruling
-from feasibility.sensitivity.limited_search import Attempt
+from feasibility.sensitivity.limited_search import LimitedAttempt
 from feasibility.sensitivity.probes import Prober
 from feasibility.sensitivity.quantities import Kind, Quantity, Variant
 from feasibility.sensitivity.threshold_search import HINT_BOXES, ThresholdSearch
-from feasibility.sensitivity.thresholds import Change, Finding, Pair
+from feasibility.sensitivity.thresholds import Change, ChangePair, Finding
 from feasibility.verdict import Verdict
 
 Step = tuple[Quantity, int]
@@ -47,7 +47,7 @@ class PairSearch:
     tick: Callable[[], None]
     spent: int = 0
 
-    def find(self, varied: Sequence[Quantity]) -> Pair | None:
+    def find(self, varied: Sequence[Quantity]) -> ChangePair | None:
         """The pair, each change as small as it was found to do; None where none was found."""
         for steps in self._sets(varied):
             if len(steps) == 2 and (pair := self._narrowed(steps)) is not None:
@@ -83,7 +83,7 @@ class PairSearch:
                 needed = rest
         return needed
 
-    def _feasible(self, steps: Sequence[Step]) -> Attempt | None:
+    def _feasible(self, steps: Sequence[Step]) -> LimitedAttempt | None:
         """A covering motion of the case with some changes; None where none is found."""
         if self.spent > self.most or self.clock.out_of_time:
             return None
@@ -92,7 +92,7 @@ class PairSearch:
         self.spent += prober.spent
         return attempt
 
-    def _searched(self, prober: Prober) -> Attempt | None:
+    def _searched(self, prober: Prober) -> LimitedAttempt | None:
         """See `_feasible`: what bounds rule out at once is not searched."""
         if prober.beyond_reach(prober.arrays).any():
             return None
@@ -115,7 +115,7 @@ class PairSearch:
             variant = quantity.applied(variant, k)
         return Prober(variant, self.verdict.seed, self.clock, self.tick)
 
-    def _narrowed(self, steps: list[Step]) -> Pair | None:
+    def _narrowed(self, steps: list[Step]) -> ChangePair | None:
         """Both changes made as small as they were found to do, one after the other."""
         attempt = self._feasible(steps)
         if attempt is None:
@@ -133,4 +133,4 @@ class PairSearch:
                 walk = threshold.feasible.witness
                 steps[index] = quantity, search.good.k
         changes = tuple(Change(quantity, quantity.value(k)) for quantity, k in steps)
-        return None if walk is None else Pair(changes, walk)
+        return None if walk is None else ChangePair(changes, walk)

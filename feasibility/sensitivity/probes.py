@@ -34,8 +34,8 @@ from feasibility.roadmap import (
 from feasibility.roadmap.forward import run_in_order
 from feasibility.sensitivity.limited_search import (
     NO_CELL,
-    Attempt,
     CollisionProofs,
+    LimitedAttempt,
     LimitedExploration,
     Steps,
     certifiable,
@@ -243,7 +243,7 @@ class Prober:
         deep: bool,
         needed: Mask | None = None,
         hard: int = NO_CELL,
-    ) -> Attempt:
+    ) -> LimitedAttempt:
         """Search for a covering motion, from known configurations first.
 
         Args:
@@ -285,24 +285,26 @@ class Prober:
             walk = covering_walk(exploration.roadmap, exploration.best)
         if walk is not None:
             detail = f"one motion of {len(walk.q)} waypoints"
-            return Attempt(Answer.FEASIBLE, Evidence.WITNESS, detail, q, walk)
+            return LimitedAttempt(Answer.FEASIBLE, Evidence.WITNESS, detail, q, walk)
         proved = [k for k, ruling in exploration.rulings.items() if ruling is Ruling.PROVED]
         if proved:
             self.suspect(proved[0])
             detail = f"cell {list(cells.unravel(proved[0]))} is proved uncoverable"
-            return Attempt(Answer.INFEASIBLE, Evidence.PROOF, detail, q, None)
+            return LimitedAttempt(Answer.INFEASIBLE, Evidence.PROOF, detail, q, None)
         best = f"the best motion covers {int(exploration.covered.sum())} of {len(cells)} cells"
         if run is not None:
             best = f"the best run in order ends over pose {run.furthest}"
         if ended and certifiable(arrays):
             detail = f"the search ended without a covering motion; {best}"
-            return Attempt(Answer.INFEASIBLE, Evidence.EXHAUSTED, detail, q, None)
+            return LimitedAttempt(Answer.INFEASIBLE, Evidence.EXHAUSTED, detail, q, None)
         detail = f"not found with {int(exploration.work.counts[0])} evaluations of the arm; {best}"
         if self.clock.out_of_time:
             detail = "unknown, because the time limit ran out"
-        return Attempt(Answer.UNDECIDED, Evidence.BUDGET, detail, q, None)
+        return LimitedAttempt(Answer.UNDECIDED, Evidence.BUDGET, detail, q, None)
 
-    def confirmed(self, variant: Variant, attempt: Attempt, needed: Mask | None = None) -> Attempt:
+    def confirmed(
+        self, variant: Variant, attempt: LimitedAttempt, needed: Mask | None = None
+    ) -> LimitedAttempt:
         """An attempt once its motion is replayed: still feasible, or undecided if refused."""
         if attempt.walk is None or attempt.angle is not None:
             return attempt
@@ -314,7 +316,7 @@ class Prober:
             angle = replayed.certificate.max_angle
             return replace(attempt, detail=f"{attempt.detail}, replayed", angle=angle)
         detail = f"a motion was found, but the replay refuses it: {replayed.refusal}"
-        return Attempt(Answer.UNDECIDED, Evidence.BUDGET, detail, attempt.q, None)
+        return LimitedAttempt(Answer.UNDECIDED, Evidence.BUDGET, detail, attempt.q, None)
 
     def _add_seeds(self, exploration: LimitedExploration, seeds: Array, deep: bool) -> None:
         """Add seeds until one component covers every cell, hard cells first."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from coverable_arrays import Array
 from feasibility.roadmap import Ruling
-from feasibility.sensitivity.limited_search import NO_CELL, Attempt
+from feasibility.sensitivity.limited_search import NO_CELL, LimitedAttempt
 from feasibility.sensitivity.probes import Prober
 from feasibility.sensitivity.quantities import Kind, Quantity
 from feasibility.sensitivity.thresholds import Finding, Span, Threshold
@@ -39,7 +39,7 @@ class Probe(NamedTuple):
     """A number of steps, and what a search found there."""
 
     k: int
-    attempt: Attempt
+    attempt: LimitedAttempt
 
 
 class Bracket(NamedTuple):
@@ -64,7 +64,7 @@ class ThresholdSearch:
     """Evaluations that one verdict of the case takes."""
     stop: int
     """Evaluations (of the prober) at which no further search is begun, except to end with one."""
-    motions: Sequence[Attempt] = ()
+    motions: Sequence[LimitedAttempt] = ()
     """Covering motions of the case as given, the one of its verdict first."""
     rivals: list[Probe] = field(default_factory=list)
     """The same, as far as each goes unchanged, the furthest first; none that was tried."""
@@ -175,7 +175,7 @@ class ThresholdSearch:
         reported = self._reported(good)
         return Span(reported, other) if reported.feasible else Span(self._reported(entry), reported)
 
-    def _look(self, k: int, seeds: Array) -> Attempt | Finding:
+    def _look(self, k: int, seeds: Array) -> LimitedAttempt | Finding:
         """Is it feasible at k steps? An attempt if so, or what speaks against it."""
         arrays = self.prober.arrays_at(self.quantity, k)
         missed = np.flatnonzero(~np.isfinite(seeds).all(axis=1))
@@ -322,7 +322,9 @@ class ThresholdSearch:
             proof = self._proof(k, bracket.failed)
         return proof, q
 
-    def _search(self, k: int, seeds: Array, deep: bool = False, hard: int = NO_CELL) -> Attempt:
+    def _search(
+        self, k: int, seeds: Array, deep: bool = False, hard: int = NO_CELL
+    ) -> LimitedAttempt:
         """Search at k steps: from the seeds alone, or deeper, with half of what is left."""
         left = self.stop - self.prober.spent
         most = max(left, self.verdict_cost) // 2 if deep else SHORT * self.verdict_cost
@@ -334,7 +336,7 @@ class ThresholdSearch:
         variant = self.quantity.applied(self.prober.given, probe.k)
         return self._finding(probe.k, self.prober.confirmed(variant, probe.attempt))
 
-    def _finding(self, k: int, found: Attempt) -> Finding:
+    def _finding(self, k: int, found: LimitedAttempt) -> Finding:
         """What was found at k steps."""
         value = self.quantity.value(k)
         return Finding(value, found.answer, found.evidence, found.detail, witness=found.walk)

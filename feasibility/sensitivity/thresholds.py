@@ -114,7 +114,7 @@ class Change:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Pair:
+class ChangePair:
     """Two changes that make a case feasible together, where none of them does alone."""
 
     changes: tuple[Change, ...]
@@ -153,7 +153,7 @@ class Explanation:
     """Evaluations of the arm that the thresholds took, a box of a proof counting as one."""
     seconds: float
     """Time that they took."""
-    pair: Pair | None = None
+    pair: ChangePair | None = None
     """Two changes together, where no single one helps; None where none was found either."""
     alone: Verdict | None = None
     """What `check` says with the seed given and no motion known, where `verdict` owes its motion to

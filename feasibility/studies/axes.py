@@ -34,7 +34,7 @@ class Key:
 
 
 @dataclass(frozen=True, slots=True)
-class Axis(Key):
+class VariedKey(Key):
     """A key and the values that it takes."""
 
     values: tuple[Any, ...]
@@ -52,7 +52,7 @@ class Range(Key):
 class Variation:
     """All that varies: every combination of the axes' values, with every sample of the ranges."""
 
-    axes: tuple[Axis, ...]
+    axes: tuple[VariedKey, ...]
     ranges: tuple[Range, ...]
     count: int
     """Samples of all ranges together; 0 without ranges."""
@@ -74,7 +74,7 @@ class Variation:
 def read_variation(table: Any, faults: list[Fault]) -> Variation:
     """Read the [vary] table; what is wrong is added to `faults` and left out."""
     section = Section("vary", table, faults)
-    keys: list[Axis | Range] = []
+    keys: list[VariedKey | Range] = []
     if section.has("robots"):
         _read_robots(section, keys)
     sampler = section.word("sampler", SAMPLERS)
@@ -86,7 +86,7 @@ def read_variation(table: Any, faults: list[Fault]) -> Variation:
             _read_pose(place, key, value, keys, faults)
         else:
             _read_values(Key(f"{name}.{key}", place, (name, key)), value, keys, faults)
-    axes = tuple(key for key in keys if isinstance(key, Axis))
+    axes = tuple(key for key in keys if isinstance(key, VariedKey))
     ranges = tuple(key for key in keys if isinstance(key, Range))
     if ranges and count is None and "count" not in section.table:
         section.fault("count", "is missing; expected how many samples of the ranges to take")
@@ -144,7 +144,7 @@ def _merged(section: Section, found: list[tuple[str, str, Any]]) -> list[tuple[s
     return [(*key, value) for key, value in result.items()]
 
 
-def _read_robots(section: Section, keys: list[Axis | Range]) -> None:
+def _read_robots(section: Section, keys: list[VariedKey | Range]) -> None:
     """The arms: names, or tables as under [robot]."""
     expected = 'an array of robots, such as ["ur5", { name = "puma560", limits = "set-1" }]'
     value = section.table["robots"]
@@ -160,11 +160,15 @@ def _read_robots(section: Section, keys: list[Axis | Range]) -> None:
         else:
             section.fault(f"robots[{k}]", f"must be a name or a table, got {shown(robot)}")
     if len(tables) == len(value):
-        keys.append(Axis("robot", "vary.robots", ("robot",), tuple(tables)))
+        keys.append(VariedKey("robot", "vary.robots", ("robot",), tuple(tables)))
 
 
 def _read_pose(
-    place: str, key: str, value: Mapping[str, Any], keys: list[Axis | Range], faults: list[Fault]
+    place: str,
+    key: str,
+    value: Mapping[str, Any],
+    keys: list[VariedKey | Range],
+    faults: list[Fault],
 ) -> None:
     """A position or an orientation, part by part."""
     names = POSES[key]
@@ -178,10 +182,10 @@ def _read_pose(
             continue
         part = Key(f"surface.{key}.{name}", f"{place}.{name}", ("surface", key, index))
         inner = [float(value[name])] if is_number(value[name]) else value[name]
-        found: list[Axis | Range] = []
+        found: list[VariedKey | Range] = []
         _read_values(part, inner, found, faults)
         for entry in found:
-            values = entry.values if isinstance(entry, Axis) else ()
+            values = entry.values if isinstance(entry, VariedKey) else ()
             bad = [value for value in values if not is_number(value)]
             if bad:
                 faults.append(Fault(part.place, f"must hold finite numbers, got {shown(bad[0])}"))
@@ -189,7 +193,7 @@ def _read_pose(
                 keys.append(entry)
 
 
-def _read_values(key: Key, value: Any, keys: list[Axis | Range], faults: list[Fault]) -> None:
+def _read_values(key: Key, value: Any, keys: list[VariedKey | Range], faults: list[Fault]) -> None:
     """The values of one key, in one of the forms that there are."""
     own = (key.label, key.place, key.path)
     if isinstance(value, list):
@@ -198,7 +202,7 @@ def _read_values(key: Key, value: Any, keys: list[Axis | Range], faults: list[Fa
         elif len(value) > MOST_VALUES:
             faults.append(Fault(key.place, f"has {len(value)} values, more than {MOST_VALUES}"))
         else:
-            keys.append(Axis(*own, tuple(value)))
+            keys.append(VariedKey(*own, tuple(value)))
         return
     section = Section(key.place, value if isinstance(value, Mapping) else {}, faults)
     before = len(faults)
@@ -209,7 +213,7 @@ def _read_values(key: Key, value: Any, keys: list[Axis | Range], faults: list[Fa
     elif section.table.keys() == {"from", "to", "steps"}:
         values = _steps(section)
         if len(faults) == before:
-            keys.append(Axis(*own, values))
+            keys.append(VariedKey(*own, values))
     else:
         faults.append(Fault(key.place, f"must be {FORMS}; got {shown(value)}"))
 

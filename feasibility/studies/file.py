@@ -41,7 +41,7 @@ from feasibility.cases import (
     toml_key,
 )
 from feasibility.safe_files import shown_path
-from feasibility.studies.axes import Axis, Range, Variation, read_variation
+from feasibility.studies.axes import Range, Variation, VariedKey, read_variation
 from feasibility.studies.combinations import cause_of, faults_of, put, tasks_of
 from feasibility.studies.run import StudyTask
 from feasibility.studies.scheduling import Tables
@@ -187,7 +187,7 @@ def _join(place: str, key: str) -> str:
 def _absolute(varied: Variation, base_dir: str | os.PathLike[str] | None) -> Variation:
     """Make paths among the values independent of the working directory."""
 
-    def values(axis: Axis) -> tuple[Any, ...]:
+    def values(axis: VariedKey) -> tuple[Any, ...]:
         made = []
         for value in axis.values:
             tables: Any = {}
@@ -208,7 +208,7 @@ def _absolute(varied: Variation, base_dir: str | os.PathLike[str] | None) -> Var
 
 def _check(base: Tables, varied: Variation, faults: list[Fault]) -> None:
     """Keep the faults of every value, each tried with the first value of everything else."""
-    entries: list[tuple[Axis | Range, tuple[Any, ...]]] = [
+    entries: list[tuple[VariedKey | Range, tuple[Any, ...]]] = [
         *((axis, axis.values) for axis in varied.axes),
         *((span, (span.low, span.high)) for span in varied.ranges),
     ]

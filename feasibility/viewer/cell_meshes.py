@@ -14,7 +14,7 @@ import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
 from feasibility.viewer.meshes import merge_vertices, split_at_creases
-from surfaces import Cells, Triangles
+from surfaces import Cells, CellTriangles
 from surfaces.meshes import half_edge_ends, half_edges
 from surfaces.meshes.cells import MeshCells
 
@@ -24,7 +24,7 @@ COARSER = 1.25  # from one spacing to the next
 WIDEST = 0.3  # [1] of a cell's width, beyond which no vertices are merged
 
 
-def patch(cells: Cells, which: Ints, inset: float = 0.0) -> Triangles:
+def patch(cells: Cells, which: Ints, inset: float = 0.0) -> CellTriangles:
     """Triangles that fill some cells, as fine as their number allows; see `Cells.triangles`."""
     if isinstance(cells, MeshCells):
         return display_mesh_of(cells).fill(which, cells.centres, inset)
@@ -78,7 +78,7 @@ class DisplayMesh:
         for field in fields(self):
             getattr(self, field.name).flags.writeable = False
 
-    def fill(self, which: Ints, centres: Array, inset: float = 0.0) -> Triangles:
+    def fill(self, which: Ints, centres: Array, inset: float = 0.0) -> CellTriangles:
         """The triangles of some cells (k,), shrunk towards their centres by a share `inset`."""
         mine = np.isin(self.labels, which)
         labels = np.repeat(self.labels[mine], 3)
@@ -87,7 +87,7 @@ class DisplayMesh:
         key = corner if inset == 0.0 else labels * len(self.vertices) + corner
         _, first, faces = np.unique(key, return_index=True, return_inverse=True)
         vertices = self.vertices[corner[first]]
-        return Triangles(
+        return CellTriangles(
             vertices=vertices + inset * (centres[labels[first]] - vertices),
             faces=faces.reshape(-1, 3).astype(np.int64),
             normals=self.normals[corner[first]],

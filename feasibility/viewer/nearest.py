@@ -14,7 +14,7 @@ from feasibility.viewer import threejs
 from feasibility.viewer.cell_meshes import marks
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.meshes import tubes
-from feasibility.viewer.playback import Motion, key_times
+from feasibility.viewer.playback import Playback, key_times
 from feasibility.viewer.robot import extent
 from feasibility.viewer.scene import Layer
 from feasibility.viewer.threejs import Colour, Command
@@ -38,7 +38,7 @@ class NearestDrawn:
 
 
 def draw_nearest(
-    robot: Robot, bodies: Bodies | None, motion: Motion, start: float
+    robot: Robot, bodies: Bodies | None, motion: Playback, start: float
 ) -> NearestDrawn | None:
     """The nearest pair at the key frames of a motion; None where there is no pair.
 
@@ -71,11 +71,11 @@ def draw_nearest(
 def _drawn(path: str, size: float) -> list[Command]:
     """A line of 1 m along z, and a mark for each of its ends."""
     vertices, faces = tubes([np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]])], THICK * size)
-    commands = [threejs.mesh(f"{path}/line", vertices, faces, LINE, lit=False, on_top=True)]
+    commands = [threejs.mesh_object(f"{path}/line", vertices, faces, LINE, lit=False, on_top=True)]
     vertices, faces = marks(np.zeros((1, 3)), END * size)
     for name in ("first", "second"):
         commands.append(
-            threejs.mesh(f"{path}/{name}", vertices, faces, LINE, lit=False, on_top=True)
+            threejs.mesh_object(f"{path}/{name}", vertices, faces, LINE, lit=False, on_top=True)
         )
     return commands
 
@@ -104,11 +104,11 @@ def _tracks(path: str, pair: NearPair, times: Array) -> list[dict[str, Any]]:
     turns, lengths = _turns(pair.points)
     scales = np.column_stack([np.ones((len(when), 2)), lengths])
     return [
-        threejs.track(f"{path}/line", "position", when, first),
-        threejs.track(f"{path}/line", "quaternion", when, turns),
-        threejs.track(f"{path}/line", "scale", when, scales),
-        threejs.track(f"{path}/first", "position", when, first),
-        threejs.track(f"{path}/second", "position", when, second),
+        threejs.key_frames(f"{path}/line", "position", when, first),
+        threejs.key_frames(f"{path}/line", "quaternion", when, turns),
+        threejs.key_frames(f"{path}/line", "scale", when, scales),
+        threejs.key_frames(f"{path}/first", "position", when, first),
+        threejs.key_frames(f"{path}/second", "position", when, second),
     ]
 
 

@@ -121,7 +121,7 @@ def _hull(body: Polytope) -> Mesh | None:
 def _command(path: str, mesh: Mesh) -> Command:
     """The command that draws a mesh with its creases."""
     split, normals = shaded(mesh)
-    return threejs.mesh(
+    return threejs.mesh_object(
         path, split.vertices, split.faces, mesh.colour, normals=normals, opacity=mesh.opacity
     )
 

@@ -20,7 +20,7 @@ from feasibility.viewer.areas import certified_layer
 from feasibility.viewer.cell_meshes import cell_size
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.meshes import tubes
-from feasibility.viewer.playback import Motion, paced, timed
+from feasibility.viewer.playback import Playback, paced, timed
 from feasibility.viewer.scene import (
     PATCHES,
     TRAIL,
@@ -142,7 +142,7 @@ def view_division(
 
 
 def painting(
-    trajectory: Trajectory | None, motion: Motion, limits: MotionLimits | None
+    trajectory: Trajectory | None, motion: Playback, limits: MotionLimits | None
 ) -> tuple[tuple[float, float], Array | None]:
     """When the tool is over the surface, s, and the share (k,) of their velocities that joints use.
 
@@ -162,7 +162,7 @@ def painting(
 
 
 def trail_pieces(
-    motion: Motion,
+    motion: Playback,
     radius: float,
     when: tuple[float, float],
     use: Array | None = None,
@@ -191,7 +191,7 @@ def trail_pieces(
         most = 0.0 if use is None else float(np.interp(times, motion.seconds, use).max())
         band = next(j for j, one in enumerate(bands) if most <= one[0])
         path = f"{bands[band][3]}/{k:03d}"
-        commands[band].append(threejs.mesh(path, vertices, faces, bands[band][1], lit=False))
+        commands[band].append(threejs.mesh_object(path, vertices, faces, bands[band][1], lit=False))
         tracks.append(threejs.appearing(path, stop, end))
     layers = [
         Layer(tuple(made), Entry(name, colour, path))

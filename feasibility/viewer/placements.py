@@ -18,7 +18,7 @@ from feasibility.cases import Setup
 from feasibility.placement import Pose, Stage, Trial, moved_cells
 from feasibility.search import Progress, Search
 from feasibility.viewer import robot as robot_visuals
-from feasibility.viewer.playback import Motion, motion_of
+from feasibility.viewer.playback import Playback, motion_of
 from feasibility.viewer.poses import (
     Class,
     Tried,
@@ -205,7 +205,7 @@ def _view(
     return replace(drawn, camera=camera)
 
 
-def _joints(robot: Robot, motion: Motion | None) -> Array:
+def _joints(robot: Robot, motion: Playback | None) -> Array:
     """(k, 3) m: the base and the joints of the arm as it moves, or at rest."""
     walk = robot_visuals.home(robot)[None]
     if motion is not None:

@@ -27,7 +27,7 @@ JOINED = 1e-6  # [rad] or [m]: largest gap between the end of one motion and the
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Motion:
+class Playback:
     """Straight lines in joint space, to be played at an even pace."""
 
     walk: Array
@@ -49,7 +49,7 @@ class Motion:
         return np.column_stack([np.interp(times, self.seconds, row) for row in self.points.T])
 
 
-def motion_of(verdict: Verdict) -> Motion | None:
+def motion_of(verdict: Verdict) -> Playback | None:
     """What the verdict's view plays; None where the arm does not move.
 
     The witness where there is one, else the path of the search tree along which the tool travels
@@ -101,7 +101,7 @@ def walk_along(graph: nx.Graph, cells: list[int]) -> Array:
     return np.concatenate(rows)
 
 
-def paced(robot: Robot, walk: Array, there_and_back: bool, label: str) -> Motion:
+def paced(robot: Robot, walk: Array, there_and_back: bool, label: str) -> Playback:
     """Time a walk (m, n) so that the tool travels evenly.
 
     Where the tool point rests and only joints move, their motion counts: 1 rad as a twentieth of
@@ -117,26 +117,26 @@ def paced(robot: Robot, walk: Array, there_and_back: bool, label: str) -> Motion
     travelled = np.concatenate([[0.0], np.cumsum(travel)])
     duration = float(np.clip(travelled[-1] / (0.3 * reach), SHORTEST, LONGEST))
     scale = duration / travelled[-1] if travelled[-1] > 0.0 else 0.0
-    return Motion(np.asarray(walk), travelled * scale, points, there_and_back, label)
+    return Playback(np.asarray(walk), travelled * scale, points, there_and_back, label)
 
 
-def timed(robot: Robot, trajectory: Trajectory, label: str) -> Motion:
+def timed(robot: Robot, trajectory: Trajectory, label: str) -> Playback:
     """A trajectory as it is timed, or in `LONGEST` seconds if it takes longer."""
     kept = np.unique(np.linspace(0, len(trajectory) - 1, min(len(trajectory), SAMPLES)).astype(int))
     q, time = trajectory.q[kept], trajectory.time[kept] - trajectory.time[0]
     if time[-1] > LONGEST:
         time = time * (LONGEST / time[-1])
-    return Motion(q, time, Kinematics(robot).tools(q)[0], False, label)
+    return Playback(q, time, Kinematics(robot).tools(q)[0], False, label)
 
 
-def key_times(motion: Motion) -> Array:
+def key_times(motion: Playback) -> Array:
     """Even times (k,) s of the key frames, at most `KEY_FRAMES` of them."""
     return np.linspace(0.0, float(motion.seconds[-1]), min(KEY_FRAMES, 4 * len(motion.walk)))
 
 
 def animate(
     robot: Robot,
-    motion: Motion,
+    motion: Playback,
     *,
     play: bool,
     tracks: Sequence[dict[str, Any]] = (),
@@ -159,7 +159,7 @@ def animate(
         name, values = "position", placements[:, joint, :3, 3]
         if not robot.prismatic[joint]:
             name, values = "quaternion", quaternions(placements[:, joint, :3, :3])
-        tracks += [threejs.track(path, name, times, values) for path in groups]
+        tracks += [threejs.key_frames(path, name, times, values) for path in groups]
     return threejs.animation(tracks, play=play, there_and_back=motion.there_and_back)
 
 

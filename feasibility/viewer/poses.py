@@ -18,7 +18,7 @@ from feasibility.placement import Pose, Stage, Trial, moved_cells
 from feasibility.viewer import threejs
 from feasibility.viewer.cell_meshes import marks, patch
 from feasibility.viewer.meshes import tubes
-from feasibility.viewer.playback import Motion
+from feasibility.viewer.playback import Playback
 from feasibility.viewer.scene import (
     MISSED,
     PATCHES,
@@ -30,7 +30,7 @@ from feasibility.viewer.scene import (
     trail,
 )
 from feasibility.viewer.threejs import Colour
-from surfaces import Cells, Triangles, components
+from surfaces import Cells, CellTriangles, components
 
 if TYPE_CHECKING:
     from feasibility.placement import StationPlan
@@ -118,7 +118,7 @@ def class_of_row(row: Row) -> Class:
     return class_of_share(float(row.result["share"]))
 
 
-def best_layers(cells: Cells, best: Tried, motion: Motion | None) -> list[Layer]:
+def best_layers(cells: Cells, best: Tried, motion: Playback | None) -> list[Layer]:
     """The cells at the best placement, what is covered there, and the path of a covering motion."""
     if len(cells) == 0:
         return []
@@ -220,7 +220,7 @@ def placed(points: Array, pose: Pose) -> Array:
     return points @ pose.rotation.T + np.array(pose.position)
 
 
-def _triangles(cells: Cells) -> Triangles:
+def _triangles(cells: Cells) -> CellTriangles:
     """A few triangles of all cells, in the surface's frame."""
     every = np.arange(len(cells))
     pieces = int(np.clip(MOST // (2 * sum(cells.shape)), 1, FINEST))
@@ -239,7 +239,7 @@ def _size(points: Array) -> float:
     return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
-def _boundary(triangles: Triangles, near: float) -> Array:
+def _boundary(triangles: CellTriangles, near: float) -> Array:
     """(k, 2, 3) m: edges of one triangle only; corners nearer than `near` (m) are one."""
     from scipy.spatial import cKDTree
 
@@ -254,7 +254,7 @@ def _boundary(triangles: Triangles, near: float) -> Array:
     return np.asarray(vertices[first[found[number == 1]]])
 
 
-def _sections(triangles: Triangles) -> Array:
+def _sections(triangles: CellTriangles) -> Array:
     """(k, 2, 3) m: where the three planes through the middle cut the surface."""
     import trimesh
 

@@ -8,12 +8,12 @@ import numpy as np
 
 from coverable_arrays import Array
 from feasibility.viewer.html_page import Readout
-from feasibility.viewer.playback import Motion, key_times
+from feasibility.viewer.playback import Playback, key_times
 from robots import Kinematics, Robot
 from surfaces import Cells
 
 
-def readout_of(robot: Robot, cells: Cells, motion: Motion) -> Readout:
+def readout_of(robot: Robot, cells: Cells, motion: Playback) -> Readout:
     """The values of a motion at its key frames, between which the page interpolates.
 
     The distance is that of the tool point from the surface on its working side (mm), the angle

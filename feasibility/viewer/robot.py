@@ -147,7 +147,7 @@ def _drawing(robot: Robot, parts: dict[tuple[int, str], list[Mesh]], notes: list
             lowest = min(lowest, float(heights.min()))
         path = f"{paths[joint]}/link {threejs.safe_name(link)}/part {number}"
         looks: dict[str, Any] = {"normals": normals, "opacity": mesh.opacity}
-        commands.append(threejs.mesh(path, mesh.vertices, mesh.faces, mesh.colour, **looks))
+        commands.append(threejs.mesh_object(path, mesh.vertices, mesh.faces, mesh.colour, **looks))
     return Drawing(tuple(commands), lowest, tuple(notes))
 
 

@@ -21,7 +21,7 @@ from feasibility.viewer.cell_meshes import FULL_DETAIL, borders, cell_size, mark
 from feasibility.viewer.cut_sides import COLOURS, LOST, Sides, sides_of
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.meshes import tubes
-from feasibility.viewer.playback import Motion
+from feasibility.viewer.playback import Playback
 from feasibility.viewer.threejs import Colour, Command
 from surfaces import Cells
 
@@ -77,8 +77,8 @@ class Layer:
 def mesh_layer(
     label: str, colour: Colour, path: str, vertices: ArrayLike, faces: ArrayLike, **looks: Any
 ) -> Layer:
-    """Triangles of one colour with a line of the legend; `looks` as in `threejs.mesh`."""
-    command = threejs.mesh(path, vertices, faces, colour, **looks)
+    """Triangles of one colour with a line of the legend; `looks` as in `threejs.mesh_object`."""
+    command = threejs.mesh_object(path, vertices, faces, colour, **looks)
     return Layer((command,), Entry(label, colour, path))
 
 
@@ -309,7 +309,7 @@ def hidden(layer: Layer) -> Layer:
     return replace(layer, commands=(*layer.commands, command), entry=entry)
 
 
-def trail(cells: Cells, motion: Motion) -> Layer:
+def trail(cells: Cells, motion: Playback) -> Layer:
     """The path of the tool point in the motion that is played.
 
     A covering motion runs along most edges of G, so it is hidden at first.

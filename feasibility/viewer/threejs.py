@@ -43,7 +43,7 @@ def hex_colour(colour: Colour) -> int:
     return (red << 16) | (green << 8) | blue
 
 
-def mesh(
+def mesh_object(
     path: str,
     vertices: ArrayLike,
     faces: ArrayLike,
@@ -122,7 +122,7 @@ def set_property(path: str, name: str, value: Any) -> Command:
     return {"type": "set_property", "path": path, "property": name, "value": value}
 
 
-def track(path: str, name: str, times: Array, values: Array) -> dict[str, Any]:
+def key_frames(path: str, name: str, times: Array, values: Array) -> dict[str, Any]:
     """How one property of one path changes with time.
 
     Args:

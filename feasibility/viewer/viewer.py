@@ -33,7 +33,7 @@ from feasibility.viewer.html_page import Camera, Entry, Legend, Readout, page
 from feasibility.viewer.live_server import LiveView
 from feasibility.viewer.nearest import draw_nearest
 from feasibility.viewer.obstacles import HULLS, hull_layers, points_of, scene_layers, tool_layers
-from feasibility.viewer.playback import Motion, animate, key_times, motion_of
+from feasibility.viewer.playback import Playback, animate, key_times, motion_of
 from feasibility.viewer.readout import readout_of, with_nearest
 from feasibility.viewer.scene import Layer, layers, trail
 from feasibility.viewer.stage import camera_on, ground
@@ -53,7 +53,7 @@ class View:
     """Drawing commands of the page, in order."""
     legend: Legend
     camera: Camera
-    motion: Motion | None
+    motion: Playback | None
     """What the arm plays."""
     notes: tuple[str, ...]
     """What could not be drawn as the URDF says."""
@@ -164,7 +164,7 @@ def compose(
     title: str,
     text: str,
     parts: Sequence[Layer],
-    motion: Motion | None,
+    motion: Playback | None,
     *,
     resting: Array,
     tracks: Sequence[dict[str, Any]] = (),
@@ -182,7 +182,7 @@ def compose(
         parts: what is drawn, in the order of the legend.
         motion: what the arm plays, or None.
         resting: (n,) its configuration otherwise.
-        tracks: what else moves with it, see `threejs.track`.
+        tracks: what else moves with it, see `threejs.key_frames`.
         play: start the motion when the page opens.
         at: share of the motion, 0 to 1, at which the arm waits when `play` is False.
         task: with what the arm had to stay clear of.

@@ -46,7 +46,7 @@ class WorkingMesh(NamedTuple):
         return WorkingMesh(self.vertices[used], faces.reshape(-1, 3).astype(np.int64))
 
 
-class Edges(NamedTuple):
+class FaceEdges(NamedTuple):
     """The edges of F faces, each once."""
 
     ends: Ints
@@ -55,7 +55,7 @@ class Edges(NamedTuple):
     """(F, 3) the edge on the side from each corner to the next."""
 
 
-class Cut(NamedTuple):
+class CutFaces(NamedTuple):
     """Faces cut in parts."""
 
     mesh: WorkingMesh
@@ -63,11 +63,11 @@ class Cut(NamedTuple):
     """(F,) the face before that each face is a part of."""
 
 
-def edges_of(faces: Ints) -> Edges:
+def edges_of(faces: Ints) -> FaceEdges:
     """The edges of faces (F, 3), sorted."""
     halves = half_edges(faces)
     ends = np.sort(half_edge_ends(faces, halves.order[halves.starts]), axis=1)
-    return Edges(ends, halves.edges.reshape(-1, 3))
+    return FaceEdges(ends, halves.edges.reshape(-1, 3))
 
 
 def border_edges(faces: Ints) -> Ints:
@@ -82,17 +82,17 @@ def twin_sides(faces: Ints) -> Ints:
     return np.column_stack([halves.order[same], halves.order[same + 1]])
 
 
-def cut_at_middles(mesh: WorkingMesh, edges: Edges, some: Mask) -> Cut:
+def cut_at_middles(mesh: WorkingMesh, edges: FaceEdges, some: Mask) -> CutFaces:
     """Cut faces at the middles of some of the edges (E,)."""
     return cut_edges(mesh, edges, some, mesh.vertices[edges.ends[some]].mean(axis=1))
 
 
-def cut_edges(mesh: WorkingMesh, edges: Edges, some: Mask, points: Array) -> Cut:
+def cut_edges(mesh: WorkingMesh, edges: FaceEdges, some: Mask, points: Array) -> CutFaces:
     """Put a point (k, 3) m on each of some edges (E,), and cut the faces there."""
     number = np.full(len(edges.ends), -1, dtype=np.int64)
     number[some] = len(mesh.vertices) + np.arange(len(points))
     faces, parent = _cut_faces(mesh.faces, number[edges.of])
-    return Cut(WorkingMesh(np.concatenate([mesh.vertices, points]), faces), parent)
+    return CutFaces(WorkingMesh(np.concatenate([mesh.vertices, points]), faces), parent)
 
 
 def _cut_faces(faces: Ints, cut: Ints) -> tuple[Ints, Ints]:

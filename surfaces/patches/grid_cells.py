@@ -15,7 +15,7 @@ from surfaces.adjacency import Neighbours, grid_neighbours
 from surfaces.arguments import Checks
 from surfaces.at_home import AtHome
 from surfaces.cell_curves import CellCurves
-from surfaces.cells import Cells, Finer, Triangles, Unrolled
+from surfaces.cells import Cells, CellTriangles, Finer, Unrolled
 from surfaces.curve_fitting import CurveFit
 from surfaces.patches.patch import ClosedFormPatch, Patch
 from surfaces.surface import max_principal_curvature
@@ -204,7 +204,7 @@ class GridCells(Cells):
         column = _bin(v, self.surface.v_range, self.shape[1])
         return np.where((row >= 0) & (column >= 0), row * self.shape[1] + column, -1)
 
-    def triangles(self, which: Ints, samples: int = 8, inset: float = 0.0) -> Triangles:
+    def triangles(self, which: Ints, samples: int = 8, inset: float = 0.0) -> CellTriangles:
         """See `Cells.triangles`."""
         t = (np.linspace(0.0, 1.0, samples + 1) - 0.5) * (1.0 - inset)
         du, dv = (part.reshape(-1) for part in np.meshgrid(t, t, indexing="ij"))
@@ -225,7 +225,7 @@ class GridCells(Cells):
         looks = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         if (looks * normals[faces[:, 0]]).sum() < 0.0:  # counterclockwise seen from outside
             faces = faces[:, ::-1]
-        return Triangles(vertices, faces, normals)
+        return CellTriangles(vertices, faces, normals)
 
     def unrolled(self) -> Unrolled:
         """See `Cells.unrolled`: v to the right and u down, as cells are numbered."""

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from coverable_arrays import Array, Ints, Mask
 from surfaces.adjacency import Neighbours
 from surfaces.cell_curves import CellCurves
-from surfaces.cells import Cells, Finer, Triangles, Unrolled
+from surfaces.cells import Cells, CellTriangles, Finer, Unrolled
 from surfaces.curve_fitting import CurveFit
 from surfaces.patches import GridCells
 from surfaces.piecewise.across_seams import SMOOTH, SeamPairs, curves_across, seam_pairs_of
@@ -183,7 +183,7 @@ class PieceCells(Cells):
         """See `Cells.borders`."""
         return np.concatenate([grid.borders(samples) for grid in self.grids])
 
-    def triangles(self, which: Ints, samples: int = 8, inset: float = 0.0) -> Triangles:
+    def triangles(self, which: Ints, samples: int = 8, inset: float = 0.0) -> CellTriangles:
         """See `Cells.triangles`; cell by cell in the given order."""
         which = np.asarray(which, dtype=np.int64)
         corners, faces = (samples + 1) ** 2, 2 * samples**2  # of one cell
@@ -196,7 +196,9 @@ class PieceCells(Cells):
             normals[some] = self.surface.signs[k] * part.normals.reshape(-1, corners, 3)
             shift = corners * (some - np.arange(len(some)))
             triangles[some] = part.faces.reshape(-1, faces, 3) + shift[:, None, None]
-        return Triangles(vertices.reshape(-1, 3), triangles.reshape(-1, 3), normals.reshape(-1, 3))
+        return CellTriangles(
+            vertices.reshape(-1, 3), triangles.reshape(-1, 3), normals.reshape(-1, 3)
+        )
 
     def unrolled(self) -> Unrolled:
         """See `Cells.unrolled`: seen along the mean normal, from the outside."""

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from coverable_arrays import Array, Ints
 from surfaces.adjacency import Neighbours
 from surfaces.cell_curves import CellCurves
-from surfaces.cells import Cells, Triangles, Unrolled
+from surfaces.cells import Cells, CellTriangles, Unrolled
 from surfaces.toolpaths.arcs import arc_at, arc_pieces, curves
 from surfaces.toolpaths.pose_surface import PoseSurface
 
@@ -123,13 +123,13 @@ class PoseCells(Cells):
         axes = width[:, None, None] * np.stack([along, np.cross(self.normals, along)], axis=1)
         return np.asarray(self.centres[:, None] + _CORNERS @ axes)
 
-    def triangles(self, which: Ints, samples: int = 8, inset: float = 0.0) -> Triangles:
+    def triangles(self, which: Ints, samples: int = 8, inset: float = 0.0) -> CellTriangles:
         """See `Cells.triangles`: two for each pose."""
         centres = self.centres[which, None]
         corners = centres + (1.0 - inset) * (self._tiles[which] - centres)
         faces = 4 * np.arange(len(corners))[:, None, None] + _HALVES
         normals = np.repeat(self.normals[which], 4, axis=0)
-        return Triangles(corners.reshape(-1, 3), faces.reshape(-1, 3), normals)
+        return CellTriangles(corners.reshape(-1, 3), faces.reshape(-1, 3), normals)
 
     def unrolled(self) -> Unrolled:
         """See `Cells.unrolled`: seen along the mean normal, from the outside."""

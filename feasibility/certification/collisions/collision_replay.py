@@ -19,7 +19,7 @@ from feasibility.certification.collisions.first_look import Body, CoupledBodies,
 from feasibility.certification.collisions.pairing import ROUNDING, Pairing, Place
 from feasibility.certification.collisions.pieces import Below
 from feasibility.certification.collisions.plane_search import NEAR
-from feasibility.certification.collisions.relative_motion import Motion
+from feasibility.certification.collisions.relative_motion import ArmMotion
 from feasibility.certification.collisions.shape_pieces import piece_of, sheet_piece
 from feasibility.certification.faults import Judged, MotionFault
 from feasibility.collisions import Bodies, Pair
@@ -150,7 +150,7 @@ def collision_replay(
         return CollisionReplay(None, None, (), 0)
     if len(rows) == 1:  # an arm at rest: a motion that goes nowhere
         rows, deviations = np.repeat(rows, 2, axis=0), None
-    motion = Motion(robot, rows, None if deviations is None else np.abs(deviations))
+    motion = ArmMotion(robot, rows, None if deviations is None else np.abs(deviations))
     return _judged(ready, motion)
 
 
@@ -177,7 +177,7 @@ class _Checked:
         return (bound - ROUNDING if place is None else place.distance) - self.deviation
 
 
-def _judged(ready: BodiesOfOwners, motion: Motion) -> CollisionReplay:
+def _judged(ready: BodiesOfOwners, motion: ArmMotion) -> CollisionReplay:
     """All pairs, the nearest first: how near they come sets what is aimed at."""
     checked = [_Checked(couple) for couple in ready.ordered]
     look = FirstLook(motion, ready.known)

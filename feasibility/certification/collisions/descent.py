@@ -14,7 +14,7 @@ from coverable_arrays import Array, Mask
 from feasibility.certification.collisions.pieces import Piece
 from feasibility.certification.collisions.plane_search import NEAR, Couples, ball_bounds, searched
 from feasibility.certification.collisions.relative_motion import Stretches
-from feasibility.certification.collisions.trees import BRANCHES, Level, Tree
+from feasibility.certification.collisions.trees import BRANCHES, Level, TriangleTree
 
 AT_ONCE = 1 << 13  # couples, which keeps the arrays small
 
@@ -22,7 +22,7 @@ AT_ONCE = 1 << 13  # couples, which keeps the arrays small
 class Descent:
     """The triangles of a body and another body."""
 
-    def __init__(self, tree: Tree, b: Piece, needed: float, aim: float) -> None:
+    def __init__(self, tree: TriangleTree, b: Piece, needed: float, aim: float) -> None:
         """Look for planes that part them by `aim` (m), or else by `needed`."""
         self.tree, self.b, self.needed, self.aim = tree, b, needed, aim
         self.bound = np.inf
@@ -65,7 +65,7 @@ class Descent:
         return Couples(couples.at, couples.boxes, low), most
 
 
-def rough_bounds(tree: Tree, b: Piece, s: Stretches) -> Array:
+def rough_bounds(tree: TriangleTree, b: Piece, s: Stretches) -> Array:
     """(k,) m, rough bounds of the distances of a body from all triangles along stretches.
 
     They say nothing of the inside, if these bound a solid.

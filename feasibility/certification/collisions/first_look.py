@@ -12,7 +12,7 @@ import numpy as np
 
 from coverable_arrays import Array
 from feasibility.certification.collisions.pieces import Piece
-from feasibility.certification.collisions.relative_motion import Motion, Stretches
+from feasibility.certification.collisions.relative_motion import ArmMotion, Stretches
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -50,7 +50,7 @@ class CoupledBodies:
 class FirstLook:
     """Couples of bodies along one motion."""
 
-    def __init__(self, motion: Motion, known: CoupledBodies) -> None:
+    def __init__(self, motion: ArmMotion, known: CoupledBodies) -> None:
         """Bound the distances of all of them."""
         self._motion, self._known = motion, known
         # A half space, whose ball has no end, is at rest.

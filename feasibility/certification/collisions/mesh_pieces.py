@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from coverable_arrays import Array, Ints
 from coverable_errors import ArgumentError
 from feasibility.certification.collisions.pieces import NO_CIRCLE, Outline, Piece
-from feasibility.certification.collisions.trees import Tree
+from feasibility.certification.collisions.trees import TriangleTree
 
 # [1] least thickness of a hull relative to its length; qhull and coal fail on flat ones
 FLAT = 1e-6
@@ -52,9 +52,9 @@ class MeshPart(Piece):
         return _outermost(self.corners)
 
     @cached_property
-    def tree(self) -> Tree:
+    def tree(self) -> TriangleTree:
         """Its triangles in boxes."""
-        return Tree(self.vertices[self.faces])
+        return TriangleTree(self.vertices[self.faces])
 
     @cached_property
     def outline(self) -> Outline | None:

@@ -17,7 +17,7 @@ from coverable_arrays import Array, Mask
 from feasibility.certification.collisions.collision_replay import ready_bodies
 from feasibility.certification.collisions.first_look import Body, CoupledBodies, FirstLook
 from feasibility.certification.collisions.pieces import Below, coal_distance
-from feasibility.certification.collisions.relative_motion import Motion, Stretches
+from feasibility.certification.collisions.relative_motion import ArmMotion, Stretches
 from feasibility.collisions import Bodies
 from robots import Kinematics, Robot
 
@@ -62,7 +62,7 @@ def nearest_along(robot: Robot, bodies: Bodies, q: Array) -> NearestAlong | None
     """
     if not bodies.pairs:
         return None
-    motion = Motion(robot, np.repeat(q, 2, axis=0) if len(q) == 1 else q)
+    motion = ArmMotion(robot, np.repeat(q, 2, axis=0) if len(q) == 1 else q)
     ready = ready_bodies(bodies)
     named = [
         ((pair.first, pair.second), couple)
@@ -92,7 +92,7 @@ class _Couple:
     """One body of each owner of a pair, along one motion."""
 
     def __init__(
-        self, names: Names, first: Body, second: Body, motion: Motion, s: Stretches
+        self, names: Names, first: Body, second: Body, motion: ArmMotion, s: Stretches
     ) -> None:
         """Bodies a and b, carried by `joints` (i, j), i <= j, and the segments of the motion."""
         self.names, self.motion = names, motion

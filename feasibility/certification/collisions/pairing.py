@@ -34,7 +34,7 @@ from feasibility.certification.collisions.pieces import (
     is_exact,
 )
 from feasibility.certification.collisions.plane_search import NEAR, Couples
-from feasibility.certification.collisions.relative_motion import Motion, Stretches
+from feasibility.certification.collisions.relative_motion import ArmMotion, Stretches
 
 ROUNDING = 1e-9  # [m] of placements, and what keeps distances from vanishing
 FAILURES = 3  # of coal's directions in a row, after which something else is tried
@@ -78,7 +78,7 @@ class Pairing:
     """Two bodies, the stretches of one motion, and what is known of their distance."""
 
     def __init__(
-        self, a: Piece, b: Piece, joints: tuple[int, int], motion: Motion, stretches: Stretches
+        self, a: Piece, b: Piece, joints: tuple[int, int], motion: ArmMotion, stretches: Stretches
     ) -> None:
         """Bodies a and b, carried by `joints` (i, j), i <= j, and the segments of the motion."""
         self.a, self.b, self.joints, self.motion = a, b, joints, motion

@@ -89,7 +89,7 @@ class BodyMotions:
     """m, how far deviating from straight joint motion may move it besides."""
 
 
-class Motion:
+class ArmMotion:
     """A joint motion with Pinocchio's placements of every joint."""
 
     def __init__(self, robot: Robot, q: Array, deviations: Array | None = None) -> None:

@@ -49,7 +49,7 @@ class Level:
         return np.asarray((n @ self.centres.T + np.einsum("pka,ka->pk", along, self.halves)).max(1))
 
 
-class Tree:
+class TriangleTree:
     """Levels of boxes around the triangles of a mesh, each of eight of the next level."""
 
     def __init__(self, triangles: Array) -> None:

@@ -28,13 +28,13 @@ from feasibility.certification.cut_proofs.box_exclusion import (
 )
 from feasibility.certification.cut_proofs.linear_models import (
     Allowed,
-    Arm,
+    ArmModel,
     Boxes,
     Models,
     Parts,
 )
 from feasibility.certification.cut_proofs.refutation import Refuter
-from feasibility.certification.cut_proofs.region import Region
+from feasibility.certification.cut_proofs.region import JointRegion
 from feasibility.certification.joint_boxes import Overlapping
 
 BATCH = 2048  # boxes at a time
@@ -48,7 +48,7 @@ class Claim(NamedTuple):
 
     what: str
     """What claims it, in words."""
-    region: Region
+    region: JointRegion
     cell: int | None
     """The cell whose target it is; None where the tool may be anywhere on the surface."""
 
@@ -70,7 +70,7 @@ class Emptiness:
 
     def __init__(
         self,
-        arm: Arm,
+        arm: ArmModel,
         parts: Parts,
         roots: Callable[[int | None], int],
         allowed: Allowed,
@@ -135,7 +135,7 @@ class Emptiness:
             waiting.append(smaller(left, models, self.parts, self.allowed.length))
         return Outcome(done)
 
-    def _first(self, region: Region, claim: Claim, index: int) -> Boxes:
+    def _first(self, region: JointRegion, claim: Claim, index: int) -> Boxes:
         """The whole region over the whole surface, or at the cell's target."""
         root = self.roots(claim.cell)
         return Boxes(
@@ -145,7 +145,7 @@ class Emptiness:
             np.array([index]),
         )
 
-    def examine(self, boxes: Boxes, region: Region) -> tuple[Boxes, Models, Array]:
+    def examine(self, boxes: Boxes, region: JointRegion) -> tuple[Boxes, Models, Array]:
         """The boxes that are not proved empty, their models, and where these come nearest.
 
         Args:

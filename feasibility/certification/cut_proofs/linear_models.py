@@ -156,7 +156,7 @@ class Models(Rows):
     """(m, n + 2) m, by how much each variable can change the residual, at most."""
 
 
-class Arm:
+class ArmModel:
     """Pinocchio's view of one arm, and the levers that no configuration exceeds."""
 
     def __init__(self, robot: Robot, low: Array, high: Array) -> None:

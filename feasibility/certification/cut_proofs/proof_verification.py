@@ -29,14 +29,14 @@ import numpy as np
 from feasibility.certification.cut_proofs.empty_region import Claim, Emptiness, Outcome
 from feasibility.certification.cut_proofs.linear_models import (
     Allowed,
-    Arm,
+    ArmModel,
     Parts,
     target_parts,
     with_cells,
 )
 from feasibility.certification.cut_proofs.parts_agreement import disagreement
 from feasibility.certification.cut_proofs.refutation import Refuter
-from feasibility.certification.cut_proofs.region import TURN, Region
+from feasibility.certification.cut_proofs.region import TURN, JointRegion
 from feasibility.certification.cut_proofs.tree_shape import malformed
 from feasibility.certification.joint_boxes import Overlapping
 from feasibility.certification.lever_bounds import out_of_line, stretched_length
@@ -135,7 +135,7 @@ def verify_on(
     limits, fault = _finite_slides(robot, surface, task.effective_tolerance)
     if fault:
         return ProofCheck(fault, 0)
-    arm = Arm(robot, limits.low, limits.high)
+    arm = ArmModel(robot, limits.low, limits.high)
     length = max(TYPICAL * float(arm.caps.max()), 1e-3)
     # A wider range leaves out too little for boxes to show it; so does what is proved without.
     roll = task.roll if task.roll is not None and task.roll.half <= 0.5 * np.pi else None
@@ -161,32 +161,32 @@ def verify_on(
     return ProofCheck(_refusal(claims[found.failed], found), found.boxes)
 
 
-def _finite_slides(robot: Robot, surface: Parts, tolerance: float) -> tuple[Region, str]:
+def _finite_slides(robot: Robot, surface: Parts, tolerance: float) -> tuple[JointRegion, str]:
     """The limits, those of one joint that slides freely bounded by reach; or why that fails."""
     low, high = robot.lower.copy(), robot.upper.copy()
     (free,) = np.nonzero(robot.prismatic & ~np.isfinite(high - low))
     if len(free) > 1:
         names = " and ".join(robot.joint_names[j] for j in free)
-        return Region.box(low, high), f"{names} slide without limits, which no bound covers"
+        return JointRegion.box(low, high), f"{names} slide without limits, which no bound covers"
     for j in free:
         # p is the sum of the links' vectors and of the slides', so |q_j| <= |p| + all the others.
         root = np.linalg.norm(surface.slopes[0, :, :3], axis=1).sum() + surface.radius[0, 0]
         furthest = float(np.linalg.norm(surface.centre[0, :3]) + root) + tolerance
         reach = 1.001 * (furthest + stretched_length(robot, without=int(j))) + 1e-6
         low[j], high[j] = max(low[j], -reach), min(high[j], reach)
-    return Region.box(low, high), ""
+    return JointRegion.box(low, high), ""
 
 
-def _claims(robot: Robot, cells: Cells, tree: CutTree, limits: Region) -> Iterator[Claim]:
+def _claims(robot: Robot, cells: Cells, tree: CutTree, limits: JointRegion) -> Iterator[Claim]:
     """Everything that a tree claims to be empty: joints opened, cuts and leaves."""
     low, high = limits.low.copy(), limits.high.copy()
     for joint, value in tree.opened:
         at = limits.low.copy(), limits.high.copy()
         at[0][joint] = at[1][joint] = value
         opened = np.eye(robot.n)[joint]
-        yield Claim(f"the opening {hyperplane(opened, value, robot)}", Region.box(*at), None)
+        yield Claim(f"the opening {hyperplane(opened, value, robot)}", JointRegion.box(*at), None)
         low[joint], high[joint] = value, value + TURN
-    waiting: list[tuple[Cut | Leaf, Region]] = [(tree.root, Region.box(low, high))]
+    waiting: list[tuple[Cut | Leaf, JointRegion]] = [(tree.root, JointRegion.box(low, high))]
     leaves = 0
     while waiting:
         node, region = waiting.pop()

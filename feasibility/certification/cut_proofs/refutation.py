@@ -12,9 +12,9 @@ import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
 from feasibility.certification.cut_proofs.box_exclusion import excess
-from feasibility.certification.cut_proofs.linear_models import Arm, Models, derivatives
+from feasibility.certification.cut_proofs.linear_models import ArmModel, Models, derivatives
 from feasibility.certification.cut_proofs.parts_agreement import closest_places
-from feasibility.certification.cut_proofs.region import Region
+from feasibility.certification.cut_proofs.region import JointRegion
 from feasibility.certification.rolls import off_middle, reference_axes, roll_vectors
 from feasibility.roll import projected
 from feasibility.targets import u_directions
@@ -40,7 +40,7 @@ class Refutation(NamedTuple):
 class Refuter:
     """Looks for configurations with the tool on the surface, or at one cell's target."""
 
-    def __init__(self, arm: Arm, cells: Cells, task: Task, length: float) -> None:
+    def __init__(self, arm: ArmModel, cells: Cells, task: Task, length: float) -> None:
         """Work for one arm; axes weigh `length` (m)."""
         self.arm = arm
         self.cells = cells
@@ -49,7 +49,7 @@ class Refuter:
         self.targets = task.targets(cells)
 
     def find(
-        self, starts: Array, at: list[tuple[Region, int | None]], sums: Region
+        self, starts: Array, at: list[tuple[JointRegion, int | None]], sums: JointRegion
     ) -> Refutation | None:
         """A configuration that keeps to the constraints, near one of the starts (m, n).
 
@@ -114,7 +114,7 @@ class Refuter:
         return np.asarray(off_middle(z) <= roll.half)
 
     def _stepped(
-        self, q: Array, residual: Array, slides: Array, low: Array, high: Array, sums: Region
+        self, q: Array, residual: Array, slides: Array, low: Array, high: Array, sums: JointRegion
     ) -> Array:
         """Configurations one step of low .. high (m, n) nearer to the constraints."""
         n, m = self.arm.n, len(q)

@@ -20,7 +20,7 @@ ON_CUT = 1e-9  # [rad], [m] by which w . q may pass the value that it should hav
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Region:
+class JointRegion:
     """Joints inside a box, and weighted sums of joints inside intervals."""
 
     low: Array
@@ -35,11 +35,11 @@ class Region:
     """(k,) and at most this."""
 
     @staticmethod
-    def box(low: Array, high: Array) -> Region:
+    def box(low: Array, high: Array) -> JointRegion:
         """A region without weighted sums."""
-        return Region(low, high, np.zeros((0, len(low))), np.zeros(0), np.zeros(0))
+        return JointRegion(low, high, np.zeros((0, len(low))), np.zeros(0), np.zeros(0))
 
-    def within(self, weights: Array, least: float, most: float) -> Region:
+    def within(self, weights: Array, least: float, most: float) -> JointRegion:
         """The part of it in which weights . q lies in least .. most."""
         (weighted,) = np.nonzero(weights)
         if len(weighted) == 1:
@@ -47,8 +47,8 @@ class Region:
             low, high = self.low.copy(), self.high.copy()
             first, last = sorted((least / weights[j], most / weights[j]))
             low[j], high[j] = max(low[j], first), min(high[j], last)
-            return Region(low, high, self.weights, self.least, self.most)
-        return Region(
+            return JointRegion(low, high, self.weights, self.least, self.most)
+        return JointRegion(
             self.low,
             self.high,
             np.vstack([self.weights, weights]),
@@ -61,12 +61,12 @@ class Region:
         """Does it hold no configuration, plainly?"""
         return bool((self.low > self.high).any() or (self.least > self.most).any())
 
-    def folded(self, prismatic: Mask) -> Region:
+    def folded(self, prismatic: Mask) -> JointRegion:
         """One turn of each joint whose interval holds one and that no sum weighs."""
         turns = ~prismatic & ~(self.weights != 0.0).any(axis=0) & (self.high - self.low > TURN)
         low = np.where(turns, np.where(np.isfinite(self.low), self.low, -np.pi), self.low)
         high = np.where(turns, low + TURN, self.high)
-        return Region(low, high, self.weights, self.least, self.most)
+        return JointRegion(low, high, self.weights, self.least, self.most)
 
     def sums_hold(self, q: Array) -> Mask:
         """(m,) whose weighted sums of configurations (m, n) are in it, within `ON_CUT`."""

@@ -57,7 +57,7 @@ def components_of(roadmap: Roadmap) -> list[Component]:
     return sorted(found, key=lambda component: -int(component.cover.sum()))
 
 
-class Gap(NamedTuple):
+class JointGap(NamedTuple):
     """An interval of w . q without a known point of the motion set, between two components."""
 
     weights: Array
@@ -75,20 +75,22 @@ class Gap(NamedTuple):
         return 0.5 * (self.low + self.high)
 
 
-def gaps(joints: tuple[int, ...], components: list[Component], samples: Array) -> list[Gap]:
+def gaps(joints: tuple[int, ...], components: list[Component], samples: Array) -> list[JointGap]:
     """The gaps of some joints, the most promising first.
 
     Components are those inside a region, samples (k, n) other points of the motion set inside it.
     """
-    found: list[Gap] = []
+    found: list[JointGap] = []
     for joint in joints:
         found += gaps_along(np.eye(samples.shape[1])[joint], components, samples)
     return sorted(found, key=lambda gap: -gap.promise)
 
 
-def slanted_gaps(joints: tuple[int, ...], components: list[Component], samples: Array) -> list[Gap]:
+def slanted_gaps(
+    joints: tuple[int, ...], components: list[Component], samples: Array
+) -> list[JointGap]:
     """The gaps along several joints together, the most promising first; as `gaps`."""
-    found: list[Gap] = []
+    found: list[JointGap] = []
     for k, one in enumerate(components[:PAIRED]):
         for other in components[:k]:
             weights = np.zeros(samples.shape[1])
@@ -117,14 +119,14 @@ def _between_hulls(one: Array, other: Array) -> Array:
     return near / size if size > NARROWEST else np.zeros_like(near)
 
 
-def gaps_along(weights: Array, components: list[Component], samples: Array) -> list[Gap]:
+def gaps_along(weights: Array, components: list[Component], samples: Array) -> list[JointGap]:
     """The gaps of w . q between components, each cut at the samples, the widest `KEPT` of each."""
     along = [component.q @ weights for component in components]
     low = np.array([values.min() for values in along])
     order = np.argsort(low, kind="stable")
     reached = np.maximum.accumulate(np.array([along[k].max() for k in order]))
     others = np.sort(samples @ weights)
-    found: list[Gap] = []
+    found: list[JointGap] = []
     for k in range(len(order) - 1):
         start, end = float(reached[k]), float(low[order[k + 1]])
         if not end - start > NARROWEST:
@@ -135,7 +137,7 @@ def gaps_along(weights: Array, components: list[Component], samples: Array) -> l
         sides = [[components[i].cover for i in part] for part in (order[: k + 1], order[k + 1 :])]
         settled = sum(not np.any(side, axis=0).all() for side in sides)
         found += [
-            Gap(
+            JointGap(
                 weights=weights,
                 low=float(ends[i]),
                 high=float(ends[i + 1]),

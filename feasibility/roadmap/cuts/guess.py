@@ -17,8 +17,8 @@ from coverable_arrays import Array, Mask
 from feasibility.cut_tree import Cut, Leaf
 from feasibility.roadmap.branch_and_bound import Ruling
 from feasibility.roadmap.cuts.findings import Findings, ProvedCut, ProvedLeaf
-from feasibility.roadmap.cuts.gaps import Component, Gap, gaps, slanted_gaps
-from feasibility.roadmap.cuts.regions import Region
+from feasibility.roadmap.cuts.gaps import Component, JointGap, gaps, slanted_gaps
+from feasibility.roadmap.cuts.regions import SlabRegion
 from feasibility.roadmap.cuts.statements import Budget, Statement
 
 CANDIDATES = 8  # cuts proved in turns
@@ -47,7 +47,7 @@ class OpenGap(NamedTuple):
 class _GuessedLeaf:
     """A region in which all known components miss the same cells."""
 
-    region: Region
+    region: SlabRegion
     statements: dict[int, Statement] = field(default_factory=dict)
     """By cell."""
     cell: int | None = None
@@ -87,7 +87,7 @@ class Guessing:
     boxes_left: float = np.inf
     """An estimate of what the proof still needs, where only boxes are missing."""
 
-    def tree(self, region: Region, components: list[Component]) -> Cut | Leaf | None:
+    def tree(self, region: SlabRegion, components: list[Component]) -> Cut | Leaf | None:
         """The tree of a region, proved; None where none was found."""
         guess = self._node(region, components, DEEPEST)
         if guess is None:
@@ -97,7 +97,7 @@ class Guessing:
         return _proved(guess) if proved else None
 
     def _node(
-        self, region: Region, components: list[Component], depth: int
+        self, region: SlabRegion, components: list[Component], depth: int
     ) -> _Guess | _GuessedLeaf | None:
         """The cuts of a region, proved, above leaves that are not; None where there are none."""
         inside = [c for c in components if region.inside(c.q).any()]
@@ -114,7 +114,7 @@ class Guessing:
         one, other = (self._node(side, inside, depth - 1) for side in region.sides(*line))
         return None if one is None or other is None else _Guess(line, one, other)
 
-    def _cut(self, region: Region, inside: list[Component]) -> Line | None:
+    def _cut(self, region: SlabRegion, inside: list[Component]) -> Line | None:
         """A cut between components inside the region."""
         known = self._known(region, inside)
         if known is not None:
@@ -131,17 +131,17 @@ class Guessing:
         self._note_open_gaps(region, inside)
         return None
 
-    def _through(self, region: Region, found: list[Gap]) -> Line | None:
+    def _through(self, region: SlabRegion, found: list[JointGap]) -> Line | None:
         """The first proved cut through the middles of some gaps."""
         candidates = (
             (gap.weights, gap.middle, region.on(gap.weights, gap.middle)) for gap in found
         )
         return first_proved(self.findings, self.budget, candidates)
 
-    def _samples(self, region: Region) -> Array:
+    def _samples(self, region: SlabRegion) -> Array:
         return self.findings.samples_in(region, self.opened)
 
-    def _known(self, region: Region, inside: list[Component]) -> Line | None:
+    def _known(self, region: SlabRegion, inside: list[Component]) -> Line | None:
         """A cut proved earlier that parts the components here."""
         for known in self.findings.cuts:
             if known.region.holds(region):
@@ -150,7 +150,7 @@ class Guessing:
                     return known.weights, known.value
         return None
 
-    def _note_open_gaps(self, region: Region, inside: list[Component]) -> None:
+    def _note_open_gaps(self, region: SlabRegion, inside: list[Component]) -> None:
         """Keep the gaps of a region through which no cut was proved."""
         samples = self._samples(region)
         seen = set()
@@ -165,7 +165,7 @@ class Guessing:
 
 
 def first_proved(
-    findings: Findings, budget: Budget, candidates: Iterable[tuple[Array, float, Region]]
+    findings: Findings, budget: Budget, candidates: Iterable[tuple[Array, float, SlabRegion]]
 ) -> Line | None:
     """The first of some cuts on which the tool is proved to be nowhere.
 
@@ -191,7 +191,7 @@ def first_proved(
             findings.keep(settled.found[None])  # or nearly so, where the ruling is UNKNOWN
 
 
-def _guessed_leaf(findings: Findings, region: Region, cover: Mask) -> _GuessedLeaf:
+def _guessed_leaf(findings: Findings, region: SlabRegion, cover: Mask) -> _GuessedLeaf:
     """The leaf of a region whose components cover `cover` (N,) and no more.
 
     Its cells are those that Newton does not reach either, the furthest from `cover` first.

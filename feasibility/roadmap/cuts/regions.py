@@ -23,7 +23,7 @@ TURN = 2.0 * np.pi
 WIDE = 1.5 * TURN  # [rad] range from which on windings cost more than they gain
 
 
-class Region(NamedTuple):
+class SlabRegion(NamedTuple):
     """Configurations low <= q <= high inside some slabs."""
 
     low: Array
@@ -34,7 +34,7 @@ class Region(NamedTuple):
     """(n,) joints that turn, rather than slide."""
     slabs: Slabs
 
-    def sides(self, weights: Array, value: float) -> tuple[Region, Region]:
+    def sides(self, weights: Array, value: float) -> tuple[SlabRegion, SlabRegion]:
         """What a cut weights . q = value leaves on either side: w . q <= t, and w . q >= t."""
         weighted = np.flatnonzero(weights)
         if len(weighted) == 1 and weights[weighted[0]] == 1.0:
@@ -44,14 +44,14 @@ class Region(NamedTuple):
             return self._replace(high=high), self._replace(low=low)
         return self._bounded(weights, -np.inf, value), self._bounded(weights, value, np.inf)
 
-    def on(self, weights: Array, value: float) -> Region:
+    def on(self, weights: Array, value: float) -> SlabRegion:
         """The part of the region with weights . q = value."""
         below, above = self.sides(weights, value)
         if below.slabs is self.slabs:
             return above._replace(high=below.high)
         return self._bounded(weights, value, value)
 
-    def _bounded(self, weights: Array, low: float, high: float) -> Region:
+    def _bounded(self, weights: Array, low: float, high: float) -> SlabRegion:
         slabs = Slabs(
             np.vstack([self.slabs.weights, weights]),
             np.append(self.slabs.low, low),
@@ -65,7 +65,7 @@ class Region(NamedTuple):
         apart = np.maximum(self.slabs.low - along, along - self.slabs.high)
         return np.hstack([self.low - q, q - self.high, apart]).max(axis=1) <= 0.0
 
-    def holds(self, other: Region) -> bool:
+    def holds(self, other: SlabRegion) -> bool:
         """Does this region, of no slabs, hold another?"""
         return (
             len(self.slabs.low) == 0
@@ -78,7 +78,7 @@ class Region(NamedTuple):
         """Is nothing left of an interval?"""
         return not bool((self.low <= self.high).all())
 
-    def over_one_turn(self) -> Region:
+    def over_one_turn(self) -> SlabRegion:
         """The region with no more than one turn of any joint: what the tool can do is the same."""
         wide = self.revolute & (self.high - self.low >= TURN) & ~self.slabs.weights.any(axis=0)
         start = np.where(np.isfinite(self.low), self.low, -np.pi)
@@ -96,7 +96,7 @@ class Region(NamedTuple):
         return box_of(box.low, box.high, parameters)
 
 
-def limits_of(arrays: SearchArrays, places: Places) -> Region:
+def limits_of(arrays: SearchArrays, places: Places) -> SlabRegion:
     """The region inside the limits; slides without ends are bounded where that is simple."""
     low, high = arrays.lower.copy(), arrays.upper.copy()
     slides = np.flatnonzero(arrays.chain.prismatic & ~(np.isfinite(low) & np.isfinite(high)))
@@ -111,7 +111,7 @@ def limits_of(arrays: SearchArrays, places: Places) -> Region:
             + ends[np.isfinite(ends)].sum()
         ) * (1.0 + 1e-9)
         low[slides], high[slides] = np.maximum(low[slides], -far), np.minimum(high[slides], far)
-    return Region(low, high, ~arrays.chain.prismatic, no_slabs(len(low)))
+    return SlabRegion(low, high, ~arrays.chain.prismatic, no_slabs(len(low)))
 
 
 def wide_joints(arrays: SearchArrays) -> list[int]:
@@ -120,7 +120,7 @@ def wide_joints(arrays: SearchArrays) -> list[int]:
     return [int(j) for j in np.flatnonzero(wide)]
 
 
-def turn_from(region: Region, joint: int, t: float) -> Region:
+def turn_from(region: SlabRegion, joint: int, t: float) -> SlabRegion:
     """The region with one turn of a joint, from t."""
     low, high = region.low.copy(), region.high.copy()
     low[joint], high[joint] = t, t + TURN

@@ -11,7 +11,7 @@ from coverable_arrays import Array, Ints
 from feasibility.area import percent_down
 from feasibility.viewer.cell_meshes import cell_size
 from feasibility.viewer.html_page import Entry, Readout
-from feasibility.viewer.playback import Motion
+from feasibility.viewer.playback import Playback
 from feasibility.viewer.scene import Layer, mesh_layer
 from feasibility.viewer.threejs import Colour
 from robots import Kinematics, Robot
@@ -70,7 +70,7 @@ def _square() -> tuple[Array, Ints]:
 
 
 def with_certified_share(
-    readout: Readout, robot: Robot, area: CertifiedArea, motion: Motion
+    readout: Readout, robot: Robot, area: CertifiedArea, motion: Playback
 ) -> Readout:
     """The same values, and how much of the cell under the tool is certified, in percent."""
     points, _ = Kinematics(robot).tools(motion.at(np.array(readout.times)))

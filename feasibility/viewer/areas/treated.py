@@ -11,7 +11,7 @@ from coverable_arrays import Ints
 from feasibility.treated import TreatedArea
 from feasibility.viewer import threejs
 from feasibility.viewer.html_page import Entry
-from feasibility.viewer.playback import Motion
+from feasibility.viewer.playback import Playback
 from feasibility.viewer.scene import SURFACE, Layer, mesh_layer
 from feasibility.viewer.threejs import Colour, Command
 from surfaces.passes import WorkingMesh
@@ -49,7 +49,7 @@ def area_layers(found: TreatedArea, side: float) -> list[Layer]:
     return _layers(found, side, [np.arange(len(found.shares))])[0]
 
 
-def painted_layers(found: TreatedArea, side: float, motion: Motion, height: float) -> Painted:
+def painted_layers(found: TreatedArea, side: float, motion: Playback, height: float) -> Painted:
     """The same, each face when the tool comes by first.
 
     Args:
@@ -109,4 +109,4 @@ def _faces(mesh: WorkingMesh, which: Ints, lift: Any, colour: Colour, path: str)
     """Some faces in one colour, a little above the surface."""
     corners = (mesh.corners[which] + lift[which][:, None]).reshape(-1, 3)
     faces = np.arange(len(corners)).reshape(-1, 3)
-    return threejs.mesh(path, corners, faces, colour, opacity=0.9, lit=False)
+    return threejs.mesh_object(path, corners, faces, colour, opacity=0.9, lit=False)

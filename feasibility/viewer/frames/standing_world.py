@@ -50,8 +50,8 @@ def world_tracks(robot: Robot, times: Array, walk: Array) -> list[dict[str, Any]
     places = root_in_world(robot, walk)
     turns = quaternions(places[:, :3, :3])
     return [
-        threejs.track(GROUP, "position", times, places[:, :3, 3]),
-        threejs.track(GROUP, "quaternion", times, turns),
+        threejs.key_frames(GROUP, "position", times, places[:, :3, 3]),
+        threejs.key_frames(GROUP, "quaternion", times, turns),
     ]
 
 

@@ -21,7 +21,7 @@ from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer.areas import painted_layers, surface_layer
 from feasibility.viewer.passes.digits import GAP, WIDTH, digit_lines
 from feasibility.viewer.path_and_division import painting, trail_pieces
-from feasibility.viewer.playback import Motion, paced, timed
+from feasibility.viewer.playback import Playback, paced, timed
 from feasibility.viewer.scene import MISSED, OUTLINES, PATCHES, Layer, drawn_lines
 from feasibility.viewer.viewer import View, compose, titled
 from robots import Robot
@@ -83,7 +83,7 @@ def view_passes(
 
 def _motion(
     robot: Robot, paths: Sequence[CoveragePath], trajectory: Trajectory | None
-) -> Motion | None:
+) -> Playback | None:
     """What is played: the trajectory, or all paths in even time, with the moves between them."""
     if trajectory is None:
         walks = [path.walk.q for path in paths]

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from coverable_arrays import Array, Ints, Mask
 from surfaces.adjacency import Neighbours
 from surfaces.cell_curves import CellCurves
-from surfaces.cells import Cells, Triangles, Unrolled
+from surfaces.cells import Cells, CellTriangles, Unrolled
 from surfaces.curve_fitting import CurveFit
 from surfaces.meshes.mesh_surface import MeshSurface
 from surfaces.surface import SurfaceError, max_principal_curvature, points_of
@@ -213,7 +213,7 @@ class MeshCells(Cells):
         local = self.surface.mesh.vertices[ends]
         return local @ self.surface.rotation.T + self.surface.position
 
-    def triangles(self, which: Ints, samples: int = 8, inset: float = 0.0) -> Triangles:
+    def triangles(self, which: Ints, samples: int = 8, inset: float = 0.0) -> CellTriangles:
         """See `Cells.triangles`."""
         members, indptr = self.members
         parts = [members[indptr[k] : indptr[k + 1]] for k in which]
@@ -223,7 +223,7 @@ class MeshCells(Cells):
         corners = corners + surface.position
         centre = self.centres[self.labels[faces]][:, None]
         corners = corners + inset * (centre - corners)
-        return Triangles(
+        return CellTriangles(
             vertices=corners.reshape(-1, 3),
             faces=np.arange(3 * len(faces)).reshape(-1, 3),
             normals=(surface.corner_normals[faces] @ surface.rotation.T).reshape(-1, 3),

@@ -31,7 +31,7 @@ HALVES = np.array([[0, 1, 2], [0, 2, 3]])
 
 def square(path, colour, size=0.5, x=0.0, **looks):
     """A square across the view, `size` m from middle to side, at a distance of 4 - x m."""
-    return threejs.mesh(path, size * SQUARE + [x, 0, 0], HALVES, colour, lit=False, **looks)
+    return threejs.mesh_object(path, size * SQUARE + [x, 0, 0], HALVES, colour, lit=False, **looks)
 
 
 def mask(image, colour):
@@ -126,7 +126,7 @@ def test_joints_carry_what_comes_after_them() -> None:
     turn = np.eye(4)
     c = math.sqrt(0.5)
     turn[1:3, 1:3] = [[c, -c], [c, c]]
-    part = threejs.mesh("/j/k/p", 0.1 * SQUARE + [0, 0.6, 0], HALVES, RED, lit=False)
+    part = threejs.mesh_object("/j/k/p", 0.1 * SQUARE + [0, 0.6, 0], HALVES, RED, lit=False)
     image = painted(
         [part, threejs.transform("/j", turn), threejs.transform("/j/k", turn)], FRONT, *SIZE
     )

@@ -7,7 +7,7 @@ import pytest
 
 from feasibility.certification.collisions.first_look import Body, CoupledBodies, FirstLook
 from feasibility.certification.collisions.pieces import COAL, coal_distance
-from feasibility.certification.collisions.relative_motion import Motion
+from feasibility.certification.collisions.relative_motion import ArmMotion
 from feasibility.certification.collisions.shape_pieces import piece_of
 from feasibility.collisions import HalfSpace
 from robots import load_robot
@@ -36,7 +36,7 @@ def test_no_bound_is_above_a_distance_and_boxes_tell_more_than_balls(step):
     all_bodies = list(bodies(rng, robot.n))
     couples = [(a, b) for a in all_bodies for b in all_bodies if a.joint < b.joint]
     q = np.cumsum(np.vstack([rng.uniform(-1, 1, 6), step * rng.normal(size=(3, 6))]), axis=0)
-    motion = Motion(robot, q)
+    motion = ArmMotion(robot, q)
     low = FirstLook(motion, CoupledBodies(couples)).low
     spare, by_boxes = [], 0
     for k, (a, b) in enumerate(couples):
@@ -57,6 +57,6 @@ def test_of_what_has_no_end_nothing_is_told():
     robot = load_robot("ur5")
     ground = Body(0, piece_of(HalfSpace(), np.eye(4), at_rest=True), 0.0)
     thing = Body(3, piece_of(Box((0.1, 0.1, 0.1)), np.eye(4)), 0.0)
-    motion = Motion(robot, np.array([np.zeros(6), np.full(6, 0.1)]))
+    motion = ArmMotion(robot, np.array([np.zeros(6), np.full(6, 0.1)]))
     low = FirstLook(motion, CoupledBodies([(ground, thing)])).low
     assert (low == -np.inf).all()

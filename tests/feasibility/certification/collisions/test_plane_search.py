@@ -11,9 +11,9 @@ from scipy.optimize import nnls
 from feasibility.certification.collisions.descent import Descent, rough_bounds
 from feasibility.certification.collisions.pieces import coal_distance
 from feasibility.certification.collisions.plane_search import nearest_of
-from feasibility.certification.collisions.relative_motion import Motion
+from feasibility.certification.collisions.relative_motion import ArmMotion
 from feasibility.certification.collisions.shape_pieces import piece_of, sheet_piece
-from feasibility.certification.collisions.trees import Tree
+from feasibility.certification.collisions.trees import TriangleTree
 from robots.urdf import Box, Capsule, Cylinder, Sphere
 from surfaces import sphere
 
@@ -47,7 +47,7 @@ def test_the_point_of_a_tetrahedron_nearest_to_the_origin():
 @pytest.mark.parametrize("count", [1, 3, 8, 20])
 def test_every_triangle_is_in_its_boxes(count):
     triangles = dome(count)
-    tree = Tree(triangles)
+    tree = TriangleTree(triangles)
     assert set(tree.last) == set(range(len(triangles)))
     of = np.arange(len(tree.last))
     for level in tree.levels[::-1]:
@@ -68,7 +68,7 @@ def test_bounds_are_never_above_the_distance_and_seldom_far_below(body):
     robot = planar_arm([0.3, 0.4, 0.1], ["revolute", "revolute", "prismatic"])
     sheet, piece = sheet_piece(dome(20), False), piece_of(body, at(0.05))
     walk = np.cumsum(rng.normal(size=(100, 3)) * [0.08, 0.08, 0.02], axis=0)
-    motion = Motion(robot, walk + np.array([0.6, 0.3, 0.2]))
+    motion = ArmMotion(robot, walk + np.array([0.6, 0.3, 0.2]))
     s = motion.stretches(0, 3, piece.centre, piece.ball)
     shares = np.linspace(0.0, 1.0, 7)
     true = np.empty(len(s.row))

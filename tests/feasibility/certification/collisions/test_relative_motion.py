@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from capsule_arms import planar_arm
 
-from feasibility.certification.collisions.relative_motion import Motion
+from feasibility.certification.collisions.relative_motion import ArmMotion
 from robots import Kinematics, load_robot
 
 SAMPLES = 40
@@ -38,7 +38,7 @@ def test_no_point_moves_or_leaves_its_chord_further(step):
             rows = np.vstack([q, q + step * rng.normal(size=robot.n)])
             centre, ball = rng.normal(size=3) * 0.3, rng.uniform(0.01, 0.3)
             deviations = step * 0.2 * rng.random((1, robot.n))
-            s = Motion(robot, rows, deviations).stretches(a, b, centre, ball)
+            s = ArmMotion(robot, rows, deviations).stretches(a, b, centre, ball)
             around = rng.normal(size=(60, 3))
             points = centre + ball * around / np.linalg.norm(around, axis=1, keepdims=True)
             t = np.linspace(0, 1, SAMPLES + 1)[:, None]
@@ -66,7 +66,7 @@ def test_halves_are_placed_where_the_motion_is_and_bounded_like_the_whole():
     rng = np.random.default_rng(3)
     robot = load_robot("ur5")
     rows = rng.normal(size=(4, 6))
-    motion = Motion(robot, rows)
+    motion = ArmMotion(robot, rows)
     s = motion.stretches(1, 5, np.array([0.1, 0.0, 0.2]), 0.1)
     for _ in range(3):
         s = motion.halves(s, 1, 5)

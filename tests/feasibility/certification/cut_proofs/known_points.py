@@ -13,8 +13,13 @@ from scipy.spatial.transform import Rotation
 from feasibility import Task
 from feasibility.certification.cut_proofs.box_cutting import smaller
 from feasibility.certification.cut_proofs.empty_region import Claim, Emptiness
-from feasibility.certification.cut_proofs.linear_models import Allowed, Arm, Boxes, target_parts
-from feasibility.certification.cut_proofs.region import Region
+from feasibility.certification.cut_proofs.linear_models import (
+    Allowed,
+    ArmModel,
+    Boxes,
+    target_parts,
+)
+from feasibility.certification.cut_proofs.region import JointRegion
 from feasibility.certification.rolls import reference_axes
 from feasibility.roll import projected, roll_of
 from robots import Kinematics
@@ -37,7 +42,7 @@ class Known(NamedTuple):
     """A configuration, boxes that hold it, and how it lies in them."""
 
     emptiness: Emptiness
-    region: Region
+    region: JointRegion
     boxes: Boxes
     places: np.ndarray
     """(m, n + 2) the configuration and x in the part of each box."""
@@ -80,7 +85,7 @@ def known(rng, boxes=50):
         task = rolled_task(rng, robot, q, patch, (u, v), standoff)
     finest = patch.parts(0.3 * tolerance, 0.3 * chord, 600)
     parts = target_parts(finest, patch.cells(1, 1), task)
-    arm = Arm(robot, robot.lower - FAR, robot.upper + FAR)
+    arm = ArmModel(robot, robot.lower - FAR, robot.upper + FAR)
     allowed = Allowed(tolerance, chord, 0.5, task.roll)
     emptiness = Emptiness(arm, parts, lambda cell: 0, allowed, lambda: None)
     part, x = at_parameters(patch, u, v)
@@ -134,7 +139,7 @@ def child_of(parts, part, x):
 
 def region_around(rng, robot, q):
     """All limits, and up to two weighted sums of q inside intervals, at an end of them or equal."""
-    region = Region.box(robot.lower, robot.upper)
+    region = JointRegion.box(robot.lower, robot.upper)
     for _ in range(rng.integers(3)):
         weights = rng.normal(size=robot.n) * (rng.random(robot.n) < 0.6)
         value = float(weights @ q)
