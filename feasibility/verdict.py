@@ -11,10 +11,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from coverable_arrays import Array, Ints, Mask
-from feasibility.collisions import LeftOut, checked_words
+from feasibility.collisions import checked_words
 from feasibility.cut_tree import CutTree
 from feasibility.task import Task
 from robots import Robot
+from robots.shapes import LeftOut
 from surfaces import Cells
 
 if TYPE_CHECKING:

@@ -314,6 +314,15 @@ def test_rooms_are_entered_by_their_door() -> None:
     assert past == []
 
 
+def test_what_rooms_hand_on_has_one_meaning_a_name() -> None:
+    """No two rooms hand on different things by one name; of the search's kernels two still do."""
+    meanings: dict[str, set[str]] = {}
+    for room in filter(is_room, {room_of(name) for name in FILES}):
+        for name, module in door(room).items():
+            meanings.setdefault(name, set()).add(module)
+    assert {name for name, found in meanings.items() if len(found) > 1} <= {"Places", "place"}
+
+
 def test_what_a_room_hands_on_is_no_module_of_its_own() -> None:
     """Lazy loading would give the module. Kinds of surfaces have their own file, and a guard."""
     for room in {room_of(name) for name in FILES} - {"", "surfaces.patches", "surfaces"}:

@@ -1,6 +1,5 @@
 from .asked_bodies import gather as gather
 from .bodies import Bodies as Bodies
-from .bodies import LeftOut as LeftOut
 from .bodies import Pair as Pair
 from .bodies import Seat as Seat
 from .bodies import Soup as Soup

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable_errors import ArgumentError
-from feasibility.collisions.bodies import Bodies, LeftOut, Pair, Soup
+from feasibility.collisions.bodies import Bodies, Pair, Soup
 from feasibility.collisions.outer_bodies import polytopes_of, soup_of, tool_polytopes, tool_solids
 from feasibility.collisions.overlaps_at_rest import overlapping
 from feasibility.collisions.scene import ToolShape
@@ -19,6 +19,7 @@ from feasibility.collisions.words import SURFACE, TOOL
 from robots import Robot
 from robots.shapes import (
     Fineness,
+    LeftOut,
     LinkPairs,
     LinkShapes,
     Polytope,

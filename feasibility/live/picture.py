@@ -18,7 +18,7 @@ from feasibility.cases import Setup
 from feasibility.verdict import Answer, Evidence, Verdict
 from feasibility.viewer import (
     HULLS,
-    ROOT,
+    ROBOT,
     Colour,
     Command,
     Entry,
@@ -137,7 +137,7 @@ def posed(robot: Robot, q: Array | None, collides: bool) -> list[Command]:
     """Put the arm into a configuration (n,), and the group of a surface that it carries."""
     if q is None:
         return []
-    roots = [ROOT, HULLS] if collides else [ROOT]
+    roots = [ROBOT, HULLS] if collides else [ROBOT]
     commands = [command for root in roots for command in pose(robot, q, root)]
     return carried(robot, commands, [], q)[0]
 
@@ -170,7 +170,7 @@ def certified_parts(verdict: Verdict) -> Parts:
         q, seconds = motion.walk[0], float(motion.seconds[-1])
         times = np.linspace(0.0, seconds, 2 if robot.surface_link is None else 400)
         tracks = world_tracks(robot, times, motion.at(times))
-        roots = [ROOT, HULLS] if collides else [ROOT]
+        roots = [ROBOT, HULLS] if collides else [ROBOT]
         moving = [animate(robot, motion, play=False, tracks=tracks, roots=roots)]
     drawn = [command for part in parts for command in part.commands]
     shown, entries = carried(

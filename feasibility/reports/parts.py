@@ -15,11 +15,12 @@ import numpy as np
 
 from coverable_arrays import Array
 from coverable_errors import counted
-from feasibility.collisions import Asked, LeftOut, checked_words
+from feasibility.collisions import Asked, checked_words
 from feasibility.results import plain
 from feasibility.task import Task
 from feasibility.verdict import Cause, Certificate, Walk
 from robots import Robot
+from robots.shapes import LeftOut
 from surfaces import Cells
 
 if TYPE_CHECKING:

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from coverable_errors import shown
-from feasibility.collisions import LeftOut
 from feasibility.results.archive import Fields
 from feasibility.verdict import Cause, CauseKind, Certificate
+from robots.shapes import LeftOut
 
 
 def cause_row(cause: Cause) -> dict[str, Any]:

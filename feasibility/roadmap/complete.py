@@ -17,7 +17,7 @@ from feasibility.notices import REASONS, compiling_notice
 from feasibility.problem import Problem
 from feasibility.roadmap.causes import causes_of
 from feasibility.roadmap.exploration import Exploration, wound
-from feasibility.roadmap.forward import Run, changes_in_place, run_in_order
+from feasibility.roadmap.forward import OrderedRun, changes_in_place, run_in_order
 from feasibility.roadmap.graph_g import graph_of
 from feasibility.roadmap.outcome import (
     exhausted_words,
@@ -254,7 +254,7 @@ def _causes(problem: Problem, exploration: Exploration) -> tuple[Cause, ...]:
         return causes_of(exploration, proof_of(exploration), problem.pairs)
 
 
-def _in_order(found: Found, run: Run, problem: Problem, exploration: Exploration) -> Found:
+def _in_order(found: Found, run: OrderedRun, problem: Problem, exploration: Exploration) -> Found:
     """The same of a toolpath, all of whose poses one component covers."""
     total, walk = len(problem.cells), run.walk
     counts = {**found.counts, "fk": int(exploration.work.counts[0])}

@@ -97,13 +97,13 @@ class _Pieces:
         first, last = int(before[-1]), int(behind[0])
         root = _renumbered(found.proof.root, found.first - first)
         tree = CutTree(root, found.proof.opened)
-        own = piece_of(self.cells, first, last)
+        own = poses_between(self.cells, first, last)
         judged = verify_proof(self.exploration.robot, own, self.task, tree, self._tick)
         return Parted(first, last, tree) if judged.accepted else None
 
     def _cut(self, first: int, last: int) -> CutTree | None:
         """A cut tree for a piece, guessed from the configurations known over it."""
-        known, task, own = self.exploration, self.task, piece_of(self.cells, first, last)
+        known, task, own = self.exploration, self.task, poses_between(self.cells, first, last)
         arrays = arrays_of(known.robot, own, task)
         exploration = Exploration(known.robot, own, arrays, known.seed, known.clock)
         over = known.roadmap.cell[: known.roadmap.counters[NODES]]
@@ -118,7 +118,7 @@ class _Pieces:
         self.exploration.tick("proving how many runs it takes")
 
 
-def piece_of(cells: PoseCells, first: int, last: int) -> PoseCells:
+def poses_between(cells: PoseCells, first: int, last: int) -> PoseCells:
     """The poses first .. last of a toolpath as one of their own."""
     surface, some = cells.surface, slice(first, last + 1)
     steps = np.arange(last - first)

@@ -21,7 +21,7 @@ from .placements import view_placements as view_placements
 from .placements import view_study as view_study
 from .playback import animate as animate
 from .playback import motion_of as motion_of
-from .robot import ROOT as ROOT
+from .robot import ROBOT as ROBOT
 from .robot import pose as pose
 from .scene import MISSED as MISSED
 from .scene import layers as layers

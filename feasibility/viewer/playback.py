@@ -14,7 +14,7 @@ from coverable_arrays import Array
 from coverable_errors import ArgumentError
 from feasibility.verdict import Verdict
 from feasibility.viewer import threejs
-from feasibility.viewer.robot import ROOT, extent, joint_paths, joint_placements
+from feasibility.viewer.robot import ROBOT, extent, joint_paths, joint_placements
 from robots import Kinematics, Robot
 
 if TYPE_CHECKING:
@@ -140,7 +140,7 @@ def animate(
     *,
     play: bool,
     tracks: Sequence[dict[str, Any]] = (),
-    roots: Sequence[str] = (ROOT,),
+    roots: Sequence[str] = (ROBOT,),
 ) -> threejs.Command:
     """The animation of a motion: one track for each joint's group, and what else moves with it.
 

@@ -31,7 +31,7 @@ from feasibility.viewer.meshes import (
 from robots import Kinematics, Robot, RobotError
 from robots.urdf import LinkShape, MeshFile
 
-ROOT = "/robot"
+ROBOT = "/robot"
 TRIANGLES = 60_000  # of a whole robot; more are thinned
 SKELETON: threejs.Colour = (0.55, 0.58, 0.62)
 
@@ -47,7 +47,7 @@ class Drawing:
     """What could not be drawn as the URDF says, one sentence each."""
 
 
-def joint_paths(robot: Robot, root: str = ROOT) -> tuple[str, ...]:
+def joint_paths(robot: Robot, root: str = ROBOT) -> tuple[str, ...]:
     """The n + 1 groups of the scene tree: what is fixed to the root, then each joint's."""
     paths = [root]
     for name in robot.joint_names:
@@ -85,7 +85,7 @@ def joint_placements(robot: Robot, walk: ArrayLike) -> Array:
     return placements
 
 
-def pose(robot: Robot, q: ArrayLike, root: str = ROOT) -> list[threejs.Command]:
+def pose(robot: Robot, q: ArrayLike, root: str = ROBOT) -> list[threejs.Command]:
     """Commands that put the drawn arm, or another tree of joints, into configuration q (n,)."""
     placements = joint_placements(robot, q)[0]
     paths = joint_paths(robot, root)[1:]

@@ -187,7 +187,7 @@ def compose(
         at: share of the motion, 0 to 1, at which the arm waits when `play` is False.
         task: with what the arm had to stay clear of.
     """
-    drawing, roots = robot_visuals.draw(robot), [robot_visuals.ROOT]
+    drawing, roots = robot_visuals.draw(robot), [robot_visuals.ROBOT]
     q, readout, start, around = resting, None, 0.0, None
     moving = list[Command]()
     parts, tracks = list(parts), list(tracks)
@@ -208,7 +208,7 @@ def compose(
         tracks += world_tracks(robot, times, motion.at(times))
         moving = [animate(robot, motion, play=play, tracks=tracks, roots=roots)]
         q = motion.at(np.array([start]))[0]
-    entries = [Entry(robot.name, ARM, robot_visuals.ROOT), *(part.entry for part in parts)]
+    entries = [Entry(robot.name, ARM, robot_visuals.ROBOT), *(part.entry for part in parts)]
     drawn = [command for part in parts for command in part.commands]
     poses = [command for root in roots for command in robot_visuals.pose(robot, q, root)]
     every = (*drawing.commands, *triads(robot), *drawn, *moving, *poses)

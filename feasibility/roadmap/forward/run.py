@@ -47,7 +47,7 @@ SEEDS = 8  # guesses over the first pose, each round
 JOINED = 2  # nodes over each pose that a motion ahead tries to join
 
 
-class Run(NamedTuple):
+class OrderedRun(NamedTuple):
     """What was found of a run in order."""
 
     walk: Walk | None
@@ -93,7 +93,7 @@ class Layers(NamedTuple):
     """Its edges, + 1, negative where one is run backwards."""
 
 
-def run_in_order(exploration: Exploration) -> Run:
+def run_in_order(exploration: Exploration) -> OrderedRun:
     """The run that gets furthest; more is tried where it does not reach the last pose.
 
     Raises:
@@ -110,7 +110,7 @@ def run_in_order(exploration: Exploration) -> Run:
     walk = None
     if best.furthest == last:
         walk = route_walk(exploration.roadmap, best.start, np.array(best.route, dtype=np.int64))
-    return Run(walk, best.furthest, rounds)
+    return OrderedRun(walk, best.furthest, rounds)
 
 
 def changes_in_place(robot: Robot, targets: Array, walk: Walk, near: float) -> int:

@@ -14,7 +14,7 @@ from feasibility.certification import replay, verify_proof
 from feasibility.certification.rates import replay_rates
 from feasibility.clock import Clock
 from feasibility.reports import pass_runs as report
-from feasibility.runs import pass_runs, piece_of, plan_passes
+from feasibility.runs import pass_runs, plan_passes, poses_between
 from feasibility.viewer.passes import view_passes
 from robots import load_robot
 from surfaces import plane, poses
@@ -70,7 +70,7 @@ def test_no_fewer_runs_are_proved_and_the_proofs_hold(found) -> None:
     for one in runs.parted:
         assert last <= one.first < one.last < len(cells)
         last = one.last
-        own = piece_of(cells, one.first, one.last)
+        own = poses_between(cells, one.first, one.last)
         assert np.allclose(own.centres, cells.centres[one.first : one.last + 1])
         assert verify_proof(SHORT, own, TASK, one.proof).accepted
         # Every run ends, or begins, strictly inside.

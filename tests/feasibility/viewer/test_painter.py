@@ -16,7 +16,7 @@ from feasibility.viewer import plot_views, threejs, view
 from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer.html_page import Camera
 from feasibility.viewer.painter import LENS, _parts, _seen, painted
-from feasibility.viewer.robot import ROOT
+from feasibility.viewer.robot import ROBOT
 from feasibility.viewer.stage import camera_on
 from robots import load_robot
 from surfaces import plane
@@ -82,7 +82,7 @@ def test_what_is_half_transparent_shows_what_is_behind() -> None:
 @pytest.mark.parametrize("at", [0.0, 0.6])
 def test_no_link_is_cut_off_at_the_edge_of_a_small_picture(name, at) -> None:
     shown = view(paper_verdict(name), play=False, at=at)
-    arm = [c for c in shown.commands if c.get("path", "").startswith(ROOT)]
+    arm = [c for c in shown.commands if c.get("path", "").startswith(ROBOT)]
     image = painted(arm, shown.camera, 360, 300)
     assert (image < 0.9).all(axis=2).sum() > 2000
     for edge in (image[0], image[-1], image[:, 0], image[:, -1]):
@@ -98,7 +98,7 @@ def test_the_foot_is_in_the_picture_wherever_the_surface_stands() -> None:
         cells = plane((x, x + 0.3), (y, y + 0.4), position=(0, 0, z), side="outside").cells(2, 2)
         q = rng.uniform(puma.lower, puma.upper)
         camera = camera_on(puma, cells, q, drawing.lowest)
-        parts = _parts([*drawing.commands, *robot_visuals.pose(puma, q, ROOT)])
+        parts = _parts([*drawing.commands, *robot_visuals.pose(puma, q, ROBOT)])
         seen = _seen(np.concatenate([part.points for part in parts]), camera, 900, 560)
         assert (seen[:, :2] > 0).all()
         assert (seen[:, :2] < [900, 560]).all()

@@ -10,7 +10,7 @@ from feasibility.certification import placements, replay
 from feasibility.collisions import Collision
 from feasibility.paths import PathError, coverage_path
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.forward.run import Run, _follow, layers_of, run_in_order
+from feasibility.roadmap.forward.run import OrderedRun, _follow, layers_of, run_in_order
 from feasibility.roadmap.graph import NODES, WAYPOINTS, add_edge, empty_roadmap
 from feasibility.roadmap.motions import arrays_of
 from feasibility.roadmap.seeding import seed_cell
@@ -133,7 +133,7 @@ def test_a_configuration_is_followed_ahead_along_certified_motions(ur5):
 
 
 def test_what_a_failed_run_says():
-    run = Run(walk=None, furthest=3, rounds=8)
+    run = OrderedRun(walk=None, furthest=3, rounds=8)
     assert run.covered(6).tolist() == [True] * 4 + [False] * 2
     assert "ends over pose 3" in run.failed_words(6)
     assert [(cause.cell, cause.kind) for cause in run.causes(6)] == [
