@@ -102,7 +102,7 @@ def check(
 
 def _at_rates(verdict: Verdict, clock: Clock) -> Verdict:
     """The verdict at the speed, and as far from singularities, as the task asks."""
-    if not verdict.task.asks_rates:
+    if not verdict.task.requires_rates:
         return verdict
     from feasibility.speed import at_rates
 

@@ -199,8 +199,8 @@ class Task:
         return given if given is None or isinstance(given, tuple) else (given, given)
 
     @property
-    def asks_rates(self) -> bool:
-        """Is a speed, or a distance from singularities, asked for?"""
+    def requires_rates(self) -> bool:
+        """Is a speed, or a distance from singularities, required?"""
         return self.speed is not None or self.min_manipulability is not None
 
     @property

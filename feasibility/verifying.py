@@ -168,7 +168,7 @@ def _of_motion(claim: Literal["motion", "witness"], problem: Problem, q: Any) ->
 def _too_fast(problem: Problem, walk: Walk) -> tuple[MotionFault, ...]:
     """What is wrong with speeds and singular values, where the task limits them."""
     task = problem.task
-    if not task.asks_rates:
+    if not task.requires_rates:
         return ()
     check_rates(problem.robot, task)
     judged = replay_rates(problem.robot, problem.cells, task, walk)

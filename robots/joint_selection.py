@@ -106,8 +106,8 @@ def _nothing_moves(
 def _tool_frame(checked: CheckedUrdf, link: str | None) -> tuple[str, str]:
     """The tool link, and what is to be said about it.
 
-    It is the one that is named, or the only leaf; of several leaves the first link of `TOOL_LINKS`,
-    or the only leaf that moves. Where none of this helps it is empty, and the words are a fault.
+    The named link, or the only leaf; among several leaves the first of `TOOL_LINKS`, or the only
+    leaf that moves. Where none of this helps it is empty, and the words are a fault.
     """
     if link is not None and link in checked.links:
         return link, ""

@@ -84,7 +84,7 @@ def plan_of(
     if len(partition) == 0:
         return Plan((), (), partition.bound)
     wanted = [partition.patch == p for p in range(len(partition))]
-    chosen = itinerary(robot, _choices(exploration, wanted, roots, covers, task.asks_rates))
+    chosen = itinerary(robot, _choices(exploration, wanted, roots, covers, task.requires_rates))
     patches = []
     for p, walk in zip(chosen.order, chosen.walks, strict=True):
         mine = wanted[p]

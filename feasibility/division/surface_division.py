@@ -208,7 +208,7 @@ def _searched(robot: Robot, cells: Cells, task: Task, seed: int, clock: Clock) -
             apart = prove_apart(exploration, task)
     except OutOfTime:
         ended = False
-    slow = keep_fast_motions(exploration, task) if task.asks_rates else {}
+    slow = keep_fast_motions(exploration, task) if task.requires_rates else {}
     exploration.clock = Clock()
     return _Searched(exploration, apart, ended, slow)
 

@@ -123,7 +123,7 @@ def pass_runs(
             connect_pairs(exploration, root, exploration.covers(root))
     except OutOfTime:
         pass  # what was found until then counts
-    slow = keep_fast_motions(exploration, task) if task.asks_rates else {}
+    slow = keep_fast_motions(exploration, task) if task.requires_rates else {}
     stations = _stations(exploration, places)
     runs, refusals = _replayed(exploration, task, fewest_runs(stations))
     worked, passed = np.zeros(len(stations.pieces), dtype=bool), np.zeros(len(cells), dtype=bool)

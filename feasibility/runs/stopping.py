@@ -54,7 +54,7 @@ def where_it_stops(
             break
         motions.append(np.vstack([begin, rows[:count]]))
         pose += 1
-    if task.asks_rates:
+    if task.requires_rates:
         rates = motion_rates(exploration.robot, exploration.cells, task, motions)
         slow = np.flatnonzero(~rates.enough(task))
         if len(slow):

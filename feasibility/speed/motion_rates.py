@@ -114,7 +114,7 @@ def replay_at_rates(
     """
     replayed = replay(robot, cells, task, walk, needed)
     refusal = replayed.refusal
-    if not refusal and task.asks_rates:
+    if not refusal and task.requires_rates:
         refusal = "; ".join(replay_rates(robot, cells, task, walk).refusals)
     return replayed.certificate, refusal
 
@@ -130,7 +130,7 @@ def path_rates(path: CoveragePath, walk: Walk | None = None) -> RateReplay | Non
         PathError: singular values fall below what the task requires.
     """
     task = path.task
-    if not task.asks_rates:
+    if not task.requires_rates:
         return None
     replayed = replay_rates(path.robot, path.cells, task, path.walk if walk is None else walk)
     least = task.min_manipulability

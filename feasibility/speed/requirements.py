@@ -18,7 +18,7 @@ def check_requirements(robot: Robot, task: Task, search: Search) -> None:
             search, or a home that is no configuration of the arm.
     """
     _check_home(robot, task)
-    if not task.asks_rates:
+    if not task.requires_rates:
         return
     if search.method != "complete":
         what = "needs the complete search: the greedy one has no motion over the cells' centres"

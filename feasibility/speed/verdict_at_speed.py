@@ -39,7 +39,7 @@ TOO_SLOW = "covered, but not as fast or as far from singularities as required"
 def at_rates(verdict: Verdict, clock: Clock) -> Verdict:
     """The verdict at the speed, or the same where it is not feasible or no speed is required."""
     task, walk = verdict.task, verdict.witness
-    if not task.asks_rates or not verdict.feasible or walk is None or not len(verdict.cells):
+    if not task.requires_rates or not verdict.feasible or walk is None or not len(verdict.cells):
         return verdict
     replayed = replay_rates(verdict.robot, verdict.cells, task, walk)
     if replayed.accepted:
