@@ -8,11 +8,18 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+
+
+def unit_along(direction: ArrayLike) -> Array:
+    """The unit vector (3,) along three finite numbers that are not all zero, of any size."""
+    vector = np.array(direction, dtype=float)
+    vector /= np.abs(vector).max()  # first, so that squares neither vanish nor overflow
+    return np.asarray(vector / np.linalg.norm(vector))
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)

@@ -75,6 +75,18 @@ def read_regular(path: str | os.PathLike[str], cap: int, what: str, if_larger: s
     return data
 
 
+def read_text(path: str | os.PathLike[str], cap: int, what: str) -> str:
+    """Read a text file in UTF-8, without its byte order mark; arguments as for `open_regular`.
+
+    Raises:
+        FileFault: as `read_regular`, or it is not such text.
+    """
+    try:
+        return read_regular(path, cap, what).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise FileFault(f"is not text in UTF-8, at byte {error.start}; expected {what}") from error
+
+
 def stamps(paths: Iterable[str]) -> tuple[tuple[int, int] | None, ...]:
     """Time (ns) and size (bytes) of files or folders, by which a change is noticed.
 

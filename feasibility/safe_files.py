@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import secrets
 import stat
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
@@ -27,8 +28,25 @@ def read_regular(path: str | os.PathLike[str], cap: int, what: str) -> bytes:
     Raises:
         FileError: there is no such file, it is not a regular one, or it is too large.
     """
-    try:
+    with _named(path):
         return coverable_files.read_regular(path, cap, what)
+
+
+def read_text(path: str | os.PathLike[str], cap: int, what: str) -> str:
+    """Read a text file in UTF-8, as `coverable_files.read_text` does.
+
+    Raises:
+        FileError: as `read_regular`, or it is not such text.
+    """
+    with _named(path):
+        return coverable_files.read_text(path, cap, what)
+
+
+@contextmanager
+def _named(path: str | os.PathLike[str]) -> Iterator[None]:
+    """A fault of a file becomes a `FileError` with its name."""
+    try:
+        yield
     except coverable_files.FileFault as error:
         raise FileError(error.faults, shown_path(path)) from error
 

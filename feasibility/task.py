@@ -8,7 +8,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable_arrays import Array, unit_along
 from coverable_errors import ArgumentError, Checks, Fault
 from feasibility.collisions import Collision
 from feasibility.cone import chord_of
@@ -222,13 +222,13 @@ class Task:
         """(3,) unit, in the root frame, where the approach is one direction; None elsewhere."""
         if self.approach is None or isinstance(self.approach, str):
             return None
-        return cells.surface.rotation @ unit(self.approach)
+        return cells.surface.rotation @ unit_along(self.approach)
 
     def fixed_reference(self, cells: Cells) -> Array | None:
         """(3,) unit, in the root frame, of `roll_reference`; None where there is none."""
         if self.roll_reference is None:
             return None
-        return cells.surface.rotation @ unit(self.roll_reference)
+        return cells.surface.rotation @ unit_along(self.roll_reference)
 
     def along_normals(self, cells: Cells) -> bool:
         """Whether the approach directions are the normals of the surface, towards it."""
@@ -298,10 +298,3 @@ def _about(roll_deg: float) -> tuple[float, float]:
     """
     middle = math.fmod(roll_deg, 360.0)
     return middle - FIXED_DEG, middle + FIXED_DEG
-
-
-def unit(direction: Direction) -> Array:
-    """The unit direction (3,) along three numbers that are not all zero."""
-    numbers = np.array(direction)
-    numbers /= np.abs(numbers).max()  # first, so that no square is too large
-    return np.asarray(numbers / np.linalg.norm(numbers))

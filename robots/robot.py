@@ -219,6 +219,11 @@ class Robot:
         """
         return self._reach.radius
 
+    @property
+    def length_unit(self) -> float:
+        """m, by which lengths of this arm are measured: its reach, or 1 m where it has none."""
+        return self.reach if 0.0 < self.reach < np.inf else 1.0
+
     @cached_property
     def _reach(self) -> ReachBound:
         """The ball that the tool point cannot leave."""

@@ -28,7 +28,7 @@ from feasibility.cases.toml import (
     parse_toml,
     toml_document,
 )
-from feasibility.safe_files import FileError, read_regular, shown_path
+from feasibility.safe_files import FileError, read_text, shown_path
 from feasibility.search import Search
 from feasibility.targets import check_references
 from feasibility.task import Task, check_footprint
@@ -225,12 +225,9 @@ def load_case(name_or_path: str | os.PathLike[str], overrides: Iterable[str] = (
 def read_document(path: str | os.PathLike[str], what: str) -> str:
     """The text of a TOML file, or a `CaseError` that says what is wrong with it."""
     try:
-        return read_regular(path, LARGEST_FILE, what).decode("utf-8-sig")
+        return read_text(path, LARGEST_FILE, what)
     except FileError as error:
         raise CaseError(error.faults, error.source) from error
-    except UnicodeDecodeError as error:
-        message = f"is not UTF-8 text (byte {error.start}); expected {what}"
-        raise CaseError(message, shown_path(path)) from error
 
 
 @cache

@@ -28,8 +28,7 @@ TURN = 2.0 * np.pi
 
 def in_radians(robot: Robot) -> Array:
     """(n,) rad by which a joint's move counts, by rad or m: a slide as the turn that sweeps it."""
-    reach = robot.reach if np.isfinite(robot.reach) and robot.reach > 0.0 else 1.0
-    return np.where(robot.prismatic, 1.0 / reach, 1.0)
+    return np.where(robot.prismatic, 1.0 / robot.length_unit, 1.0)
 
 
 class FreeSpace:

@@ -22,7 +22,7 @@ import numpy as np
 from coverable_arrays import Array
 from coverable_errors import Fault, close, number_in, printable, shown
 from feasibility.results.trajectory_files import COMMENT, load_trajectory
-from feasibility.safe_files import FileError, read_regular, shown_path
+from feasibility.safe_files import FileError, read_text, shown_path
 from robots import Robot
 
 CAP = 64 << 20  # bytes
@@ -64,11 +64,7 @@ def load_motion(path: str | os.PathLike[str], robot: Robot) -> Motion:
             raise FileError(faults, name)
         note = "its times and velocities are not used: rows are joined by straight lines"
         return _checked(found.q[:, [column for column, _ in columns]], robot, name, (note,))
-    data = read_regular(path, CAP, "a joint motion (.csv)")
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise FileError(f"is not text: {error.reason} at byte {error.start}", name) from error
+    text = read_text(path, CAP, "a joint motion (.csv)")
     try:
         return _from_csv(text, robot, name)
     except csv.Error as error:

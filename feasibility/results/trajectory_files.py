@@ -19,7 +19,7 @@ import numpy as np
 from coverable_arrays import Array
 from coverable_errors import ArgumentError, Checks, CoverableError, Fault
 from feasibility.collisions import CHECKABLE, listed_words
-from feasibility.safe_files import FileError, read_regular, shown_path, write_whole
+from feasibility.safe_files import FileError, read_text, shown_path, write_whole
 from feasibility.timing import Trajectory
 
 MOST_SAMPLES = 1_000_000
@@ -64,11 +64,9 @@ def load_trajectory(path: str | os.PathLike[str]) -> Trajectory:
     read = _of_ending(path, {"csv": from_csv, "json": from_json_text, "yaml": None})
     if read is None:
         raise FileError("YAML is written only; load the trajectory from CSV or JSON", name)
-    data = read_regular(path, CAP, "a trajectory (.csv or .json)")
+    text = read_text(path, CAP, "a trajectory (.csv or .json)")
     try:
-        return read(data.decode("utf-8"))
-    except UnicodeDecodeError as error:
-        raise FileError(f"is not text: {error.reason}", name) from error
+        return read(text)
     except CoverableError as error:
         raise FileError(error.faults, name) from error
 

@@ -9,8 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from coverable_arrays import unit_along
 from feasibility.collisions import Collision
-from feasibility.task import Task, unit
+from feasibility.task import Task
 from robots import Robot
 from surfaces import Cells
 
@@ -144,7 +145,7 @@ def tilted(
     """A task's approach direction, a given one, tilted by an angle (rad) towards a unit vector."""
     if task.approach is None or isinstance(task.approach, str):
         raise ValueError("the approach direction is the surface's")
-    x, y, z = math.cos(angle) * unit(task.approach) + math.sin(angle) * np.array(towards)
+    x, y, z = math.cos(angle) * unit_along(task.approach) + math.sin(angle) * np.array(towards)
     return float(x), float(y), float(z)
 
 
@@ -218,7 +219,7 @@ def _of_directions(task: Task, widen: bool) -> list[Quantity]:
         found.append(Quantity(Kind.ROLL, "roll", "rad", task.roll.half, end, ANGLE_STEP_DEG, True))
     if task.approach is None or isinstance(task.approach, str):
         return found
-    b = unit(task.approach)
+    b = unit_along(task.approach)
     across = np.eye(3)[np.argsort(np.abs(b))[:2]]
     for axis in across:
         for sign in (1.0, -1.0):

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from feasibility.task import Direction, unit
+from coverable_arrays import unit_along
+from feasibility.task import Direction
 from surfaces import Surface, SurfaceParts
 
 MOST = 8192
@@ -54,6 +55,6 @@ def target_parts(
         array[..., 3:] *= -sign
     radius[:, 0] += standoff * radius[:, 1]
     if approach is not None:
-        centre[..., 3:] = surface.rotation @ unit(approach)
+        centre[..., 3:] = surface.rotation @ unit_along(approach)
         slopes[..., 3:] = radius[:, 1] = 0.0
     return SurfaceParts(centre, slopes, radius, parts.children, parts.axis)

@@ -13,6 +13,7 @@ from coverable_arrays import Array, Ints
 from coverable_meshes import RawMesh
 from feasibility.viewer.threejs import Colour
 from robots.urdf import Box, Capsule, Cylinder, Sphere
+from surfaces.meshes import doubled_areas
 
 CREASE = 0.7  # [rad]: edges sharper than this keep a visible edge (40 degrees)
 DEGREE = 57.0  # [1/rad] normals that agree to about a degree are one
@@ -172,7 +173,7 @@ def shaded(mesh: Mesh) -> tuple[Mesh, Array]:
     Returns:
         The mesh with its vertices split, and (V, 3) unit normals.
     """
-    areas = _doubled_areas(mesh.vertices, mesh.faces)
+    areas = doubled_areas(mesh.vertices, mesh.faces)
     units = _unit(areas)
     flat = mesh.faces.reshape(-1)  # vertex of each corner
     face = np.repeat(np.arange(len(mesh.faces)), 3)
@@ -240,7 +241,7 @@ def _without_repeats(lines: Sequence[Array]) -> list[Array]:
 def _merged(mesh: Mesh, spacing: float) -> Mesh:
     """Merge the vertices within each box of a grid, and drop triangles that collapse."""
     faces = merge_vertices(mesh.vertices, mesh.faces, spacing).faces
-    faces = faces[_doubled_areas(mesh.vertices, faces).any(axis=1)]  # no normal, nothing to see
+    faces = faces[doubled_areas(mesh.vertices, faces).any(axis=1)]  # no normal, nothing to see
     used = np.zeros(len(mesh.vertices), dtype=bool)
     used[faces] = True
     return replace(mesh, vertices=mesh.vertices[used], faces=(np.cumsum(used) - 1)[faces])
@@ -249,12 +250,6 @@ def _merged(mesh: Mesh, spacing: float) -> Mesh:
 def _unit(vectors: Array, least: float = 1e-300) -> Array:
     """Vectors (..., 3) at length 1; those shorter than `least` stay short."""
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), least))
-
-
-def _doubled_areas(vertices: Array, faces: Ints) -> Array:
-    """(F, 3) normals as long as twice the areas."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    return np.cross(b - a, c - a)
 
 
 def _numbered(keys: Ints) -> Ints:

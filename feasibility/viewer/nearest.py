@@ -15,7 +15,6 @@ from feasibility.viewer.cell_meshes import marks
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.meshes import tubes
 from feasibility.viewer.playback import Playback, key_times
-from feasibility.viewer.robot import extent
 from feasibility.viewer.scene import Layer
 from feasibility.viewer.threejs import Colour, Command
 from robots import Robot
@@ -54,7 +53,7 @@ def draw_nearest(
         return None
     shown = found.which[max(int(np.searchsorted(times, start, side="right")) - 1, 0)]
     commands, tracks = list[Command](), list[dict[str, Any]]()
-    size = extent(robot)
+    size = robot.length_unit
     for number, pair in enumerate(found.pairs):
         path = f"{ROOT}/{number} {threejs.safe_name(' and '.join(pair.names))}"
         commands += _drawn(path, size)

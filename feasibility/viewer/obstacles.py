@@ -12,7 +12,7 @@ from feasibility.collisions import TOOL, Bodies, HalfSpace, Obstacle, Seat
 from feasibility.viewer import threejs
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.meshes import CREASE, Mesh, as_mesh, moved, shaded, solid_mesh, thinned
-from feasibility.viewer.robot import extent, joint_paths
+from feasibility.viewer.robot import joint_paths
 from feasibility.viewer.scene import Layer, hidden
 from feasibility.viewer.threejs import Colour, Command
 from robots import Robot
@@ -83,7 +83,7 @@ def points_of(scene: Sequence[Obstacle], robot: Robot) -> Array:
     solid = [one for one in scene if not isinstance(one.geometry, HalfSpace)]
     points = [_mesh_of(one, robot).vertices for one in solid]
     every = np.concatenate([np.empty((0, 3)), *points])
-    return every[np.linalg.norm(every, axis=1) <= extent(robot)]
+    return every[np.linalg.norm(every, axis=1) <= robot.length_unit]
 
 
 def _mesh_of(one: Obstacle, robot: Robot) -> Mesh:
@@ -91,7 +91,7 @@ def _mesh_of(one: Obstacle, robot: Robot) -> Mesh:
     if not isinstance(one.geometry, HalfSpace):
         return moved(_shape(one.geometry, SCENE, SEEN_THROUGH), one.placement)
     x, y, _ = np.linalg.inv(one.placement)[:3, 3]
-    wide = WIDE * extent(robot)
+    wide = WIDE * robot.length_unit
     corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * wide + [x, y, 0.0]
     square = Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]]), SCENE, SHEER)
     return moved(square, one.placement)

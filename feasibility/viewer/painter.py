@@ -16,6 +16,7 @@ from coverable_arrays import Array, Ints
 from feasibility.compiled import kernel
 from feasibility.viewer.html_page import Camera
 from feasibility.viewer.threejs import Command, numbers_of
+from surfaces.meshes import doubled_areas
 
 LENS = np.tan(np.radians(37.5))  # half the height of meshcat's picture at a distance of 1
 NEAR = 0.02  # [m]: what is nearer to the camera is left out
@@ -138,8 +139,7 @@ def _part(scene: dict[str, Any], places: Sequence[Array]) -> _Part:
 
 def _normals(points: Array, faces: Ints) -> Array:
     """(V, 3) the mean normal of the faces at each point."""
-    a, b, c = points[faces].transpose(1, 0, 2)
-    across = np.cross(b - a, c - a)
+    across = doubled_areas(points, faces)
     normals = np.zeros_like(points)
     for k in range(3):
         np.add.at(normals, faces[:, k], across)

@@ -14,7 +14,7 @@ from coverable_arrays import Array
 from coverable_errors import ArgumentError
 from feasibility.verdict import Verdict
 from feasibility.viewer import threejs
-from feasibility.viewer.robot import ROBOT, extent, joint_paths, joint_placements
+from feasibility.viewer.robot import ROBOT, joint_paths, joint_placements
 from robots import Kinematics, Robot
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ def paced(robot: Robot, walk: Array, there_and_back: bool, label: str) -> Playba
     the arm's reach, so that nothing jumps.
     """
     points, _ = Kinematics(robot).tools(walk)
-    reach = extent(robot)
+    reach = robot.length_unit
     lever = np.where(robot.prismatic, 1.0, reach / 20.0)  # [m] or [m/rad]
     travel = np.hypot(
         np.linalg.norm(np.diff(points, axis=0), axis=1),

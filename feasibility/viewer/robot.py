@@ -60,11 +60,6 @@ def home(robot: Robot) -> Array:
     return np.clip(np.zeros(robot.n), robot.lower, robot.upper)
 
 
-def extent(robot: Robot) -> float:
-    """m, the reach of the arm; 1 for an arm on a rail without end."""
-    return robot.reach if np.isfinite(robot.reach) else 1.0
-
-
 def joint_placements(robot: Robot, walk: ArrayLike) -> Array:
     """Each joint's frame in the frame of the joint before it, by Pinocchio.
 

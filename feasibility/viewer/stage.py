@@ -29,7 +29,7 @@ def ground(robot: Robot, cells: Cells, floor: float, place: Array = STILL) -> li
         place: (4, 4) m, the root frame in the world.
     """
     box = in_world(_extent(cells), place)
-    size = max(robot_visuals.extent(robot), 0.2)
+    size = max(robot.length_unit, 0.2)
     spacing = _round_below(size / 5.0)
     extent = np.abs(box[:, :2]).max(initial=size)
     half = spacing * np.ceil(extent / spacing)

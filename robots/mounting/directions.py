@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable_arrays import Array, unit_along
 
 PARALLEL = 1e-6  # [1], sine of the angle below which two directions count as parallel
 
@@ -14,8 +14,7 @@ def unit_axis(axis: Array) -> Array:
     largest = float(np.abs(axis).max())
     if not 1e-9 < largest < np.inf:
         return np.full(3, np.nan)
-    scaled = axis / largest  # first, so that no square is too large
-    return np.asarray(scaled / np.linalg.norm(scaled))
+    return unit_along(axis)
 
 
 def made_orthogonal(reference: Array, approach: Array) -> Array:

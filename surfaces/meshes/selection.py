@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array, Ints, Mask
+from coverable_arrays import Array, Ints, Mask, unit_along
 from coverable_errors import Fault, shown
 from surfaces.arguments import Checks
 from surfaces.meshes.repair import one_fan_each, weld_distance
@@ -198,7 +198,7 @@ def checked_plane(point: Any, normal: Any) -> tuple[Array, Array]:
     """
     checks = Checks("cut by a plane")
     through = checks.vector("point", point, "metres")
-    direction = _unit(checks.direction("normal", normal))
+    direction = unit_along(checks.direction("normal", normal))
     checks.done()
     return through, direction
 
@@ -226,17 +226,11 @@ def checked_cone(direction: Any, half_angle_deg: Any) -> tuple[Array, float]:
         SurfaceError: with everything that is wrong.
     """
     checks = Checks("faces within a cone")
-    axis = _unit(checks.direction("direction", direction))
+    axis = unit_along(checks.direction("direction", direction))
     expected = "must be a number > 0 and <= 180 (degrees)"
     angle = checks.number("half_angle_deg", half_angle_deg, expected, math.ulp(0.0), 180.0)
     checks.done()
     return axis, angle
-
-
-def _unit(direction: list[float]) -> Array:
-    """A direction at length 1; scaled first, so that squares neither vanish nor overflow."""
-    vector = np.array(direction) / max(map(abs, direction))
-    return vector / float(np.linalg.norm(vector))
 
 
 def _listed(point: Array) -> str:

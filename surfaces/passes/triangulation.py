@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from surfaces.adjacency import components
-from surfaces.meshes import MeshSurface
+from surfaces.meshes import MeshSurface, doubled_areas
 from surfaces.passes.edge_flips import delaunay
 from surfaces.passes.triangles import WorkingMesh, border_edges, cut_at_middles, edges_of
 from surfaces.patches import Patch
@@ -111,9 +111,8 @@ def _grid(patch: Patch, edge: float, sign: float) -> WorkingMesh:
         for part in (corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:])
     )
     faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
-    first = vertices[faces[: len(a)]]
-    middle = first.mean(axis=1)
-    normal = np.cross(first[:, 1] - first[:, 0], first[:, 2] - first[:, 0])
+    first = faces[: len(a)]
+    middle, normal = vertices[first].mean(axis=1), doubled_areas(vertices, first)
     outward = (normal * patch.closest(middle).normal).sum() * sign
     return WorkingMesh(vertices, faces if outward >= 0.0 else faces[:, ::-1].copy())
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from coverable_arrays import Array
 from coverable_errors import CoverableError, Fault, number_in
-from coverable_files import read_regular, shown_name
+from coverable_files import read_text, shown_name
 from surfaces.arguments import Checks
 from surfaces.surface import SurfaceError
 from surfaces.toolpaths.given import MOST_POSES
@@ -54,12 +54,10 @@ def read_poses(path: str | os.PathLike[str], units: str = "m") -> PoseFile:
     scale = UNITS[checks.choice("units", units, tuple(UNITS))]
     checks.done()
     try:
-        data = read_regular(path, MOST_BYTES, "a list of poses (.csv)")
-        rows = csv.reader(io.StringIO(data.decode("utf-8-sig"), newline=""), strict=True)
+        text = read_text(path, MOST_BYTES, "a list of poses (.csv)")
+        rows = csv.reader(io.StringIO(text, newline=""), strict=True)
         columns = _columns([word.strip().lower() for word in next(rows, [])])
         values = _values(rows, sum(len(group) for group in columns.values()))
-    except UnicodeDecodeError as error:
-        raise SurfaceError(f"is not text in UTF-8, at byte {error.start}", name) from error
     except csv.Error as error:
         raise SurfaceError(f"is no CSV: {error}", name) from error
     except CoverableError as error:

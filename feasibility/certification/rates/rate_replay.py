@@ -29,7 +29,6 @@ from feasibility.certification.lever_bounds import second_derivatives
 from feasibility.certification.rates.segment_rates import (
     SegmentRates,
     fastest_anywhere,
-    length_unit,
     segment_rates,
     smallest_singular,
 )
@@ -109,7 +108,7 @@ def replay_rates(
         if len(slow):
             refusals.append(too_slow(robot, cells, targets, points, found, slow, speed))
     # Segments know their ends; a motion of one row has none.
-    alone = smallest_singular(at, length_unit(robot)) if len(walk.q) == 1 else np.empty(0)
+    alone = smallest_singular(at, robot.length_unit) if len(walk.q) == 1 else np.empty(0)
     least, exact = np.append(found.sigma, alone), np.append(found.sampled_sigma, alone)
     near = np.flatnonzero(~(least >= (-np.inf if sigma is None else sigma)))
     if len(near):

@@ -141,7 +141,7 @@ def _sigma(robot: Robot, at: Jacobians, asked: bool) -> Array:
     """(k,) the smallest singular values, where they are asked for; NaN elsewhere."""
     if not asked:
         return np.full(len(at.points), np.nan)
-    return smallest_singular(at, length_unit(robot))
+    return smallest_singular(at, robot.length_unit)
 
 
 class _Least:
@@ -203,7 +203,7 @@ def _way_bounds(robot: Robot, ways: Array, width: Array, p: _Pieces) -> tuple[Ar
 
 def _sigma_bounds(robot: Robot, steps: Array, p: _Pieces) -> tuple[Array, Array, Array]:
     """Lower bound of the singular value, and its values at both ends, (k,)."""
-    scale = length_unit(robot)
+    scale = robot.length_unit
     turns = np.where(robot.prismatic, 0.0, steps)
     square = np.zeros(len(steps))
     for first, last, cap, unit in (
@@ -221,11 +221,6 @@ def _sigma_bounds(robot: Robot, steps: Array, p: _Pieces) -> tuple[Array, Array,
     return 0.5 * (first + last - np.sqrt(square)), first, last
 
 
-def length_unit(robot: Robot) -> float:
-    """m, what lengths are measured in for singular values: the arm's reach, 1 m without one."""
-    return robot.reach if np.isfinite(robot.reach) else 1.0
-
-
 def smallest_singular(at: Jacobians, scale: float) -> Array:
     """(k,) the smallest singular value that counts: of two directions of the axis, not three."""
     both = np.concatenate([at.point / scale, at.axis], axis=1)
@@ -235,7 +230,7 @@ def smallest_singular(at: Jacobians, scale: float) -> Array:
 
 def smallest_singular_values(robot: Robot, q: Array) -> Array:
     """(k,) of configurations q (k, n), see the module."""
-    return smallest_singular(jacobians(Kinematics(robot), q), length_unit(robot))
+    return smallest_singular(jacobians(Kinematics(robot), q), robot.length_unit)
 
 
 def fastest_anywhere(robot: Robot) -> float:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable_arrays import Array, unit_along
 from feasibility.roadmap.branch_and_bound import Places, toward_middle
 from feasibility.targets import target_parts
-from feasibility.task import Task, unit
+from feasibility.task import Task
 from surfaces import Surface, SurfaceParts
 
 FLAT = 0.5  # [1] of the tolerance: largest radius of target points on the finest parts
@@ -59,7 +59,7 @@ def _toward(surface: Surface, task: Task, parts: SurfaceParts) -> tuple[Array, A
     nothing = np.zeros((count, 3)), np.zeros((count, 2, 3)), np.full(count, np.inf)
     if task.roll is None or task.roll_reference is None:
         return nothing
-    r = surface.rotation @ unit(task.roll_reference)
+    r = surface.rotation @ unit_along(task.roll_reference)
     length = np.linalg.norm(parts.centre[:, 3:], axis=1)
     turns = np.linalg.norm(parts.slopes[..., 3:], axis=2).sum(axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -6,7 +6,7 @@ import numpy as np
 
 from coverable_arrays import Array
 from feasibility.viewer import threejs
-from feasibility.viewer.robot import extent, joint_paths
+from feasibility.viewer.robot import joint_paths
 from robots import Robot
 
 AXES = ((0.85, 0.1, 0.1), (0.1, 0.65, 0.1), (0.1, 0.2, 0.9))
@@ -40,5 +40,5 @@ def triads(robot: Robot) -> list[threejs.Command]:
     for name, number in shown.items():
         frame = model.frames[number]
         path = f"{paths[int(frame.parentJoint)]}/frame of the {name}"
-        drawn.append(triad(path, frame.placement.homogeneous, SMALL * max(extent(robot), 0.2)))
+        drawn.append(triad(path, frame.placement.homogeneous, SMALL * max(robot.length_unit, 0.2)))
     return drawn

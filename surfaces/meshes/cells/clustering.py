@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable_arrays import Array, Ints
-from coverable_errors import Fault, shown
+from coverable_errors import SMALLEST, Fault, real, shown
 from surfaces.adjacency import components
 from surfaces.meshes.cells.subdivision import Subdivision, subdivide
 from surfaces.meshes.cells.voronoi import far_seeds, flood, recentre, smooth, units, whole_steps
@@ -230,7 +230,7 @@ def _number_of_cells(total: float, count: int | None, size: float | None) -> int
     if (count is None) == (size is None):
         raise SurfaceError(Fault("count", "is needed, or size, and not both", expected=hint))
     if size is not None:
-        if isinstance(size, bool) or not (math.isfinite(size) and size > 0.0):
+        if not SMALLEST <= real(size) < math.inf:
             got = f"got {shown(size)}; {hint}"
             raise SurfaceError(Fault("size", got, expected="must be a finite number > 0 (metres)"))
         ideal = total / size**2

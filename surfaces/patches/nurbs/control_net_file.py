@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from coverable_errors import number_in
-from coverable_files import read_regular, shown_name
+from coverable_files import read_text, shown_name
 from surfaces.patches.nurbs.nurbs_checks import MOST_POINTS
 from surfaces.surface import SurfaceError
 
@@ -51,11 +51,8 @@ def read_net(path: str | os.PathLike[str], what: str = "a control net (.json or 
     if suffix not in (".json", ".csv"):
         raise SurfaceError("a control net must be a .json or a .csv file", name)
     try:
-        data = read_regular(path, MOST_BYTES, what)
-        text = data.decode("utf-8-sig")
+        text = read_text(path, MOST_BYTES, what)
         return _from_json(text) if suffix == ".json" else _from_csv(text)
-    except UnicodeDecodeError as error:
-        raise SurfaceError(f"is not text in UTF-8, at byte {error.start}", name) from error
     except RecursionError as error:
         raise SurfaceError("is nested too deep for a control net", name) from error
     except (ValueError, csv.Error) as error:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from coverable_arrays import unit_along
 from coverable_errors import ArgumentError
 from feasibility import Task
 from feasibility.roll import cosine_and_sine, projected, roll_of
 from feasibility.targets import check_references, target_curves
-from feasibility.task import unit
 from surfaces import cylinder, plane, sphere
 
 DOME = sphere(1.0, (10, 90), (10, 180), rpy_deg=(30, 0, 20), position=(1, 2, 3)).cells(4, 5)
@@ -47,11 +47,11 @@ def test_curves_follow_the_frames_of_the_surface_within_their_bounds(name, cells
     closest = surface.closest(point)
     approach = -surface.side_sign * closest.normal
     if task.approach is not None:
-        approach = np.tile(surface.rotation @ unit(task.approach), (len(t), 1))
+        approach = np.tile(surface.rotation @ unit_along(task.approach), (len(t), 1))
     assert np.linalg.norm(b - approach, axis=1).max() <= found.deviations[:, 1].max() + 1e-12
     along_u = surface.tangent(closest.u, closest.v)
     if task.roll_reference is not None:
-        along_u = np.tile(surface.rotation @ unit(task.roll_reference), (len(t), 1))
+        along_u = np.tile(surface.rotation @ unit_along(task.roll_reference), (len(t), 1))
     right, _ = projected(along_u, approach)
     off = np.linalg.norm(value - right, axis=1)
     assert (off <= frames.deviations[curves] + 2.0 * found.deviations[curves, 1] + 1e-8).all()
@@ -74,11 +74,11 @@ def test_frames_turn_no_faster_than_their_curvature(name, cells):
         b = (
             -surface.side_sign * normal
             if task.approach is None
-            else surface.rotation @ unit(task.approach)
+            else surface.rotation @ unit_along(task.approach)
         )
         e = surface.tangent(u, v)
         if task.roll_reference is not None:
-            e = np.tile(surface.rotation @ unit(task.roll_reference), (len(u), 1))
+            e = np.tile(surface.rotation @ unit_along(task.roll_reference), (len(u), 1))
         points.append(surface.point(u, v) + height * normal)
         references.append(projected(e, b)[0])
     step, turn = (np.linalg.norm(two[1] - two[0], axis=1) for two in (points, references))

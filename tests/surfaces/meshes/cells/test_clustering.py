@@ -117,6 +117,9 @@ def test_a_face_each():
         ({"size": 1e-9}, "1 to 20,000 cells"),
         ({"size": float("nan")}, "finite number > 0"),
         ({"size": -1.0}, "finite number > 0"),
+        ({"size": 1e-200}, "finite number > 0"),
+        ({"size": 10**400}, "finite number > 0"),
+        ({"size": "0.1"}, "finite number > 0"),
     ],
 )
 def test_bad_numbers_of_cells(arguments, message):
