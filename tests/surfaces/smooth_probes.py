@@ -99,6 +99,32 @@ def same_surface(one, other, tolerance=0.0):
     return agree and (a.inside == b.inside).all() and one.side == other.side
 
 
+def assert_normals_fit(shape, u, v, step=1e-5, least=1e-9):
+    """Normals (returned) are unit, square to differences of points, and to the right-hand side."""
+    normals = shape.normal(u, v)
+    assert np.abs(np.linalg.norm(normals, axis=1) - 1).max() < 1e-14
+    du, dv = tangents(shape, u, v, step)
+    assert np.einsum("ij,ij->i", np.cross(du, dv), normals).min() > 0  # neighbours go clockwise outside
+    for tangent in (du, dv):
+        assert np.abs(np.einsum("ij,ij->i", tangent, normals)).max() < least
+    return normals
+
+
+def assert_closest_recovers(
+    shape, reach, height=1e-14, normal=1e-11, parameter=1e-11, lever=np.ones_like, count=2000
+):
+    """Points at most `reach` off the patch lead back to where they were put, that exactly."""
+    u, v = random_parameters(shape, count)
+    h = np.random.default_rng(1).uniform(-reach, reach, count)
+    n = shape.normal(u, v)
+    found = shape.closest(shape.point(u, v) + h[:, None] * n)
+    assert found.inside.all()
+    assert np.abs(found.height - h).max() < height
+    assert np.abs(found.normal - n).max() < normal
+    assert np.abs(found.u - u).max() < parameter
+    assert np.abs((found.v - v) * lever(u)).max() < parameter
+
+
 def assert_pickles_and_moves(shape, motion):
     """A pickled copy is the same, and a moved one (returned) has everything moved."""
     assert same_surface(shape, pickle.loads(pickle.dumps(shape)))
@@ -107,9 +133,13 @@ def assert_pickles_and_moves(shape, motion):
     u, v = random_parameters(shape, 100)
     points = shape.point(u, v)
     assert moved.point(u, v) == pytest.approx(points @ rotation.T + translation)
+    assert moved.normal(u, v) == pytest.approx(shape.normal(u, v) @ rotation.T)
     closest_point = moved.closest((points + 0.01 * shape.normal(u, v)) @ rotation.T + translation)
     assert closest_point.height == pytest.approx(np.full(100, 0.01), abs=1e-14)
     assert closest_point.inside.all()
+    assert (type(moved), moved.side) == (type(shape), shape.side)
+    with pytest.raises(ValueError, match="read-only"):
+        moved.rotation[0, 0] = 2.0
     return moved
 
 

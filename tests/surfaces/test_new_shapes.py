@@ -1,17 +1,18 @@
 """Cone, torus and ellipsoid: each predicate comes from geometry or from brute force."""
 
 import math
-import pickle
 
 import numpy as np
 import pytest
 from smooth_probes import (
     POSE,
+    assert_closest_recovers,
+    assert_normals_fit,
+    assert_pickles_and_moves,
     extrapolated_area,
     least_distances,
     random_parameters,
     same_surface,
-    tangents,
 )
 
 from surfaces import Cells, SurfaceError, cone, ellipsoid, torus
@@ -76,12 +77,7 @@ def test_points_satisfy_the_implicit_equation(shape):
 
 def test_normals_are_unit_outward_and_normal_to_finite_differences(shape):
     u, v = random_parameters(shape, 2000)
-    n = shape.normal(u, v)
-    assert np.abs(np.linalg.norm(n, axis=1) - 1).max() < 1e-14
-    du, dv = tangents(shape, u, v)
-    assert np.einsum("ij,ij->i", np.cross(du, dv), n).min() > 0  # neighbours go clockwise outside
-    for tangent in (du, dv):
-        assert np.abs(np.einsum("ij,ij->i", tangent, n)).max() < 1e-9
+    n = assert_normals_fit(shape, u, v)
     away = (shape.point(u, v) - shape.position) @ shape.rotation
     if shape.kind == "cone":
         away[:, 2] = 0
@@ -91,17 +87,8 @@ def test_normals_are_unit_outward_and_normal_to_finite_differences(shape):
 
 
 def test_closest_recovers_parameters_height_and_normal(shape):
-    u, v = random_parameters(shape, 2000)
-    reach = 0.45 * least_curvature_radius(shape)
-    h = np.random.default_rng(1).uniform(-reach, reach, 2000)
-    n = shape.normal(u, v)
-    closest_point = shape.closest(shape.point(u, v) + h[:, None] * n)
-    assert np.abs(closest_point.height - h).max() < 1e-14
-    assert np.abs(closest_point.normal - n).max() < 1e-11
-    assert np.abs(closest_point.u - u).max() < 1e-11
-    lever = np.sin(u) if shape.kind == "ellipsoid" else 1.0
-    assert np.abs((closest_point.v - v) * lever).max() < 1e-11
-    assert closest_point.inside.all()
+    lever = np.sin if shape.kind == "ellipsoid" else np.ones_like
+    assert_closest_recovers(shape, 0.45 * least_curvature_radius(shape), lever=lever)
 
 
 def test_no_point_of_the_whole_surface_is_nearer_than_the_foot(shape):
@@ -231,19 +218,7 @@ def test_points_that_are_not_finite_have_no_foot(shape):
 
 
 def test_surfaces_pickle_and_move(shape, motion):
-    assert same_surface(shape, pickle.loads(pickle.dumps(shape)))
-    rotation, translation = motion
-    moved = shape.moved(rotation, translation)
-    u, v = random_parameters(shape, 100)
-    assert moved.point(u, v) == pytest.approx(shape.point(u, v) @ rotation.T + translation)
-    assert moved.normal(u, v) == pytest.approx(shape.normal(u, v) @ rotation.T)
-    points = shape.point(u, v) - 0.003 * shape.normal(u, v)
-    closest_point = moved.closest(points @ rotation.T + translation)
-    assert closest_point.height == pytest.approx(np.full(100, -0.003), abs=1e-14)
-    assert closest_point.inside.all()
-    assert (type(moved), moved.side) == (type(shape), shape.side)
-    with pytest.raises(ValueError, match="read-only"):
-        moved.rotation[0, 0] = 2.0
+    assert_pickles_and_moves(shape, motion)
 
 
 def test_seams_and_poles_are_joined():

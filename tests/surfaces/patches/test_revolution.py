@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from smooth_probes import (
     POSE,
+    assert_closest_recovers,
+    assert_normals_fit,
     assert_pickles_and_moves,
     extrapolated_area,
     least_distances,
     random_parameters,
-    tangents,
 )
 
 from surfaces import SurfaceError, cone, revolution
@@ -81,27 +82,15 @@ def test_normals_are_unit_and_normal_to_finite_differences(shape):
     knots = shape.profile.knots
     u = u[np.abs(u[:, None] - knots).min(1) > 3 * step]
     v = v[: len(u)]
-    n = shape.normal(u, v)
-    assert np.abs(np.linalg.norm(n, axis=1) - 1).max() < 1e-14
-    du, dv = tangents(shape, u, v, step)
-    assert np.einsum("ij,ij->i", np.cross(du, dv), n).min() > 0
-    for tangent in (du, dv):
-        assert np.abs(np.einsum("ij,ij->i", tangent, n)).max() < 1e-9
+    n = assert_normals_fit(shape, u, v, step)
     away = (shape.point(u, v) - shape.position) @ shape.rotation * [1, 1, 0]
     assert (np.einsum("ij,ij->i", away, n @ shape.rotation) * outward(shape, u) >= 0).all()
 
 
 def test_closest_recovers_parameters_height_and_normal(shape):
-    u, v = random_parameters(shape, 2000)
-    h = np.random.default_rng(1).uniform(-0.03, 0.03, 2000)
-    n = shape.normal(u, v)
-    closest_point = shape.closest(shape.point(u, v) + h[:, None] * n)
-    assert closest_point.inside.all()
-    assert np.abs(closest_point.height - h).max() < 1e-14
-    assert np.abs(closest_point.u - u).max() < 1e-12
-    assert np.abs(closest_point.normal - n).max() < 1e-10
-    lever = shape.profile.at(u)[:, 0]
-    assert np.abs((closest_point.v - v) * lever).max() < 1e-12
+    assert_closest_recovers(
+        shape, 0.03, normal=1e-10, parameter=1e-12, lever=lambda u: shape.profile.at(u)[:, 0]
+    )
 
 
 def test_no_point_of_the_whole_turn_is_nearer_than_the_foot(shape):

@@ -7,12 +7,13 @@ import pytest
 from scipy.interpolate import BSpline
 from smooth_probes import (
     POSE,
+    assert_closest_recovers,
+    assert_normals_fit,
     assert_pickles_and_moves,
     extrapolated_area,
     least_distances,
     random_parameters,
     same_surface,
-    tangents,
 )
 from spline_nets import TURN_KNOTS, full_turn, hood, meridian, quarter_turn, turned
 
@@ -80,13 +81,7 @@ def test_points_are_the_sum_of_basis_functions(shape):
 
 
 def test_normals_are_unit_and_normal_to_finite_differences(shape):
-    u, v = inner(shape)
-    n = shape.normal(u, v)
-    assert np.abs(np.linalg.norm(n, axis=1) - 1).max() < 1e-14
-    du, dv = tangents(shape, u, v, 1e-4)
-    for tangent in (du, dv):
-        assert np.abs(np.einsum("ij,ij->i", tangent, n)).max() < 1e-8
-    assert np.einsum("ij,ij->i", np.cross(du, dv), n).min() > 0
+    assert_normals_fit(shape, *inner(shape), step=1e-4, least=1e-8)
 
 
 def test_derivatives_are_exact(shape):
@@ -111,15 +106,7 @@ def test_derivatives_are_exact(shape):
 
 
 def test_closest_recovers_parameters_height_and_normal(shape):
-    u, v = random_parameters(shape, 1500)
-    h = np.random.default_rng(1).uniform(-0.03, 0.03, 1500)
-    n = shape.normal(u, v)
-    closest_point = shape.closest(shape.point(u, v) + h[:, None] * n)
-    assert closest_point.inside.all()
-    assert np.abs(closest_point.height - h).max() < 2e-15 * 10
-    assert np.abs(closest_point.normal - n).max() < 1e-10
-    assert np.abs(closest_point.u - u).max() < 1e-11
-    assert np.abs(closest_point.v - v).max() < 1e-11
+    assert_closest_recovers(shape, 0.03, height=2e-14, normal=1e-10, count=1500)
 
 
 def test_no_point_of_the_patch_is_nearer_than_the_foot(shape):
