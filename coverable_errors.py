@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from functools import partial
 from numbers import Integral, Real
-from typing import Any, Final, NamedTuple, TypeVar
+from typing import Any, Final, NamedTuple, TypeGuard, TypeVar
 
 MOST_SHOWN = 20  # faults in one message; `faults` has them all
 LONGEST_SHOWN = 80  # characters of a value in a message
@@ -190,11 +190,7 @@ class Checks:
         self, key: str, value: object, low: int, high: int = LARGEST_WHOLE, or_word: str = ""
     ) -> int:
         """A whole number, `low` .. `high`; `or_word` is what else is accepted."""
-        if (
-            isinstance(value, Integral)
-            and not isinstance(value, bool)
-            and low <= int(value) <= high
-        ):
+        if is_whole(value, low, high):
             return int(value)
         some = f">= {low} (64 bits)" if high == LARGEST_WHOLE else f"in {low} .. {high:,}"
         either = f"{or_word} or " if or_word else ""
@@ -278,6 +274,13 @@ def real(value: object) -> float:
 def is_number(value: object) -> bool:
     """True for a finite real number; truth values are none."""
     return math.isfinite(real(value))
+
+
+def is_whole(value: object, low: int, high: int = LARGEST_WHOLE) -> TypeGuard[int]:
+    """True for a whole number, `low` .. `high`; truth values are none."""
+    if not isinstance(value, Integral) or isinstance(value, bool):
+        return False
+    return low <= int(value) <= high
 
 
 def number_in(word: str) -> float:

@@ -22,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable_arrays import Array, Mask
+from coverable_errors import counted
 from feasibility.certification.cells_reached import cells_reached, in_order, missed_text
 from feasibility.certification.collisions import collision_replay
 from feasibility.certification.faults import Judged, MotionFault
@@ -241,8 +242,8 @@ def _roll_faults(task: Task, wrong: Samples, noun: str) -> list[MotionFault]:
 
 def _others(number: int, noun: str) -> str:
     """' (the worst; wrong at 3 other rows, too)', or nothing."""
-    plural = "s" if number != 1 else ""
-    return f" (the worst; wrong at {number:,} other {noun}{plural}, too)" if number > 0 else ""
+    others = counted(number, f"other {noun}")
+    return f" (the worst; wrong at {others}, too)" if number > 0 else ""
 
 
 def _open_fault(judge: Judge, left: Stretches, bounds: Bounds) -> MotionFault:

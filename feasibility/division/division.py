@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from coverable_arrays import Ints, Protected
+from coverable_errors import counted
 from feasibility.collisions import checked_words
 from feasibility.cut_tree import CutTree
 from feasibility.division.reconfiguration import Reconfiguration
@@ -153,8 +154,8 @@ class Division(Protected):
 
     def __repr__(self) -> str:
         """The division in one line."""
-        number = len(self.patches)
+        patches = counted(len(self.patches), "patch", "patches")
         return (
-            f"{number} patch{'' if number == 1 else 'es'}, {self.n_covered} of {len(self.cells)} "
-            f"cells. {self.message} {checked_words(self.task.collision).capitalize()}."
+            f"{patches}, {self.n_covered} of {len(self.cells)} cells. {self.message} "
+            f"{checked_words(self.task.collision).capitalize()}."
         )

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable_arrays import Ints
-from coverable_errors import ArgumentError
+from coverable_errors import ArgumentError, counted
 from feasibility.clock import Clock, OutOfTime
 from feasibility.collisions import Pair
 from feasibility.division.division import Division, Plan
@@ -266,7 +266,7 @@ def _message(shared: _Shared, at_least: int, cells: int, ended: bool, folded: bo
             if ended
             else "The time limit ran out before any patch was found." + LATE * shared.late
         )
-    what = f"{number} continuous motion{'s' if number > 1 else ''}"
+    what = counted(number, "continuous motion")
     proof = f"; at least {at_least}, proved" if min(number, at_least) > 1 else ""
     if fewest.bound > max(at_least, 1):
         proof += f"; at least {fewest.bound} among the motions found"

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from coverable_arrays import Array
-from coverable_errors import ArgumentError, Checks, CoverableError, Fault
+from coverable_errors import ArgumentError, Checks, CoverableError, Fault, is_whole
 from feasibility.collisions import CHECKABLE, listed_words
 from feasibility.safe_files import FileError, read_text, shown_path, write_whole
 from feasibility.timing import Trajectory
@@ -196,7 +196,8 @@ def from_json_text(text: str) -> Trajectory:
         name: _array(checks, key, record[key], (k, n) if name in ("q", "dq", "ddq") else (k,))
         for key, name in ARRAYS.items()
     }
-    if not isinstance(cells, list) or len(cells) != k or not all(map(_is_cell, cells)):
+    fits = isinstance(cells, list) and len(cells) == k
+    if not fits or not all(cell is None or is_whole(cell, 0, 2**62 - 1) for cell in cells):
         expected = f"must be a list of {k} whole numbers >= 0, or null between centres"
         checks.wrong("cell", cells, expected)
     collisions = record.get("collisions", [])
@@ -217,12 +218,6 @@ def _array(checks: Checks, key: str, value: object, shape: tuple[int, ...]) -> A
         return found.astype(float)
     checks.wrong(key, value, f"must hold {' x '.join(map(str, shape))} numbers")
     return np.zeros(shape)
-
-
-def _is_cell(value: object) -> bool:
-    """Is it a flat index, or null?"""
-    whole = isinstance(value, int) and not isinstance(value, bool)
-    return value is None or (whole and 0 <= value < 2**62)  # type: ignore[operator]
 
 
 # -- YAML --------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from coverable_errors import alternatives, is_number, printable, shown
+from coverable_errors import alternatives, is_number, is_whole, printable, shown
 from feasibility.studies.outcome import cells_of
 from feasibility.verdict import Answer, CauseKind, Evidence
 
@@ -51,12 +51,8 @@ def table(shape: Shape) -> Part:
     )
 
 
-def _is_count(value: Any) -> bool:
-    return type(value) is int and 0 <= value <= MOST
-
-
-COUNT = Part(_is_count, f"a whole number in 0 .. {MOST:,}")
-WHOLE = Part(lambda value: type(value) is int and 0 <= value < 2**63, "a whole number >= 0")
+COUNT = Part(lambda value: is_whole(value, 0, MOST), f"a whole number in 0 .. {MOST:,}")
+WHOLE = Part(lambda value: is_whole(value, 0), "a whole number >= 0")
 SHARE = Part(number(0.0, 1.0 + 1e-9).holds, "a number in 0 .. 1")  # sums of areas are rounded
 TRUTH = Part(lambda value: isinstance(value, bool), "true or false")
 TEXT = Part(
@@ -70,7 +66,7 @@ CAUSES = Part(
     lambda value: (
         isinstance(value, dict)
         and all(map(CAUSE.holds, value))
-        and all(map(_is_count, value.values()))
+        and all(map(COUNT.holds, value.values()))
     ),
     "numbers of cells by cause",
 )

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from coverable_arrays import Array, Mask
-from coverable_errors import ArgumentError, Checks
+from coverable_errors import ArgumentError, Checks, counted
 from surfaces.passes.first_pass import Field, distance_field, plane_field
 from surfaces.passes.holes import Lidded, with_lids
 from surfaces.passes.levels import Line, level_lines
@@ -299,7 +299,7 @@ def _notes(holes: int, lines: list[LevelLine], field: Field, by: By) -> tuple[st
     """What to know about the passes."""
     notes = []
     if holes:
-        notes.append(f"{holes} hole{'s' * (holes > 1)} parted passes; the tool must lift there")
+        notes.append(f"{counted(holes, 'hole')} parted passes; the tool must lift there")
     if by != "distance" or not lines:
         return tuple(notes)
     # Beside the first pass the distance from its vertices is coarse.

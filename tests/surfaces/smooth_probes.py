@@ -104,7 +104,7 @@ def assert_normals_fit(shape, u, v, step=1e-5, least=1e-9):
     normals = shape.normal(u, v)
     assert np.abs(np.linalg.norm(normals, axis=1) - 1).max() < 1e-14
     du, dv = tangents(shape, u, v, step)
-    assert np.einsum("ij,ij->i", np.cross(du, dv), normals).min() > 0  # neighbours go clockwise outside
+    assert np.einsum("ij,ij->i", np.cross(du, dv), normals).min() > 0  # neighbours clockwise
     for tangent in (du, dv):
         assert np.abs(np.einsum("ij,ij->i", tangent, normals)).max() < least
     return normals

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_errors import is_number, shown
+from coverable_errors import is_number, is_whole, shown
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from robots import Robot
 
@@ -27,7 +27,7 @@ def _fault_of_opened(robot: Robot, opened: object) -> str:
         return "opened joints are no pairs of a joint and a value"
     seen = set()
     for joint, value in opened:
-        if not _is_index(joint, robot.n):
+        if not is_whole(joint, 0, robot.n - 1):
             return f"opened joint {shown(joint)} is none of the {robot.n} joints"
         name = robot.joint_names[joint]
         if not is_number(value):
@@ -53,7 +53,7 @@ def _fault_of_nodes(robot: Robot, n_cells: int, tree: CutTree) -> str:
         if depth > MOST_CUTS_DEEP:
             return f"the tree is more than {MOST_CUTS_DEEP:,} cuts deep"
         if isinstance(node, Leaf):
-            if not _is_index(node.cell, n_cells):
+            if not is_whole(node.cell, 0, n_cells - 1):
                 return f"a leaf names cell {shown(node.cell)}; there are {n_cells}, counted from 0"
         elif isinstance(node, Cut):
             fault = _fault_of_cut(robot, node, opened)
@@ -84,9 +84,3 @@ def _fault_of_cut(robot: Robot, cut: Cut, opened: set[int]) -> str:
             f"a cut weighs {robot.joint_names[free[0]]}, which has no limits, together with others"
         )
     return ""
-
-
-def _is_index(value: object, count: int) -> bool:
-    """Is it a whole number from 0 to count - 1?"""
-    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    return whole and 0 <= int(value) < count  # type: ignore[call-overload]

@@ -9,13 +9,12 @@ mesh gets the same cells.
 from __future__ import annotations
 
 import math
-from numbers import Integral
 from typing import NamedTuple
 
 import numpy as np
 
 from coverable_arrays import Array, Ints
-from coverable_errors import SMALLEST, Fault, real, shown
+from coverable_errors import LARGEST, LARGEST_WHOLE, SMALLEST, Fault, is_whole, real, shown
 from surfaces.adjacency import components
 from surfaces.meshes.cells.subdivision import Subdivision, subdivide
 from surfaces.meshes.cells.voronoi import far_seeds, flood, recentre, smooth, units, whole_steps
@@ -230,12 +229,12 @@ def _number_of_cells(total: float, count: int | None, size: float | None) -> int
     if (count is None) == (size is None):
         raise SurfaceError(Fault("count", "is needed, or size, and not both", expected=hint))
     if size is not None:
-        if not SMALLEST <= real(size) < math.inf:
+        if not SMALLEST <= real(size) <= LARGEST:
             got = f"got {shown(size)}; {hint}"
             raise SurfaceError(Fault("size", got, expected="must be a finite number > 0 (metres)"))
         ideal = total / size**2
         count = max(round(ideal), 1) if ideal < 1e9 else 10**9
-    if not isinstance(count, Integral) or isinstance(count, bool):
+    if not is_whole(count, -LARGEST_WHOLE):
         got = f"got {shown(count)}"
         raise SurfaceError(Fault("count", got, expected="must be a whole number >= 1"))
     number = int(count)
