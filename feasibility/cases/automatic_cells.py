@@ -54,12 +54,12 @@ def grid_of(
     Raises:
         CaseError: they are to be fine enough for a footprint, and there is none; or too many.
     """
-    from surfaces.passes import grid_shape
-
     if cells != AUTO:
         return cells
     if footprint is None:
         raise CaseError([Fault("surface.cells", f"is {AUTO!r}, without a footprint")])
+    from surfaces.passes import grid_shape
+
     nu, nv = grid_shape(patch, WIDTH * min(footprint))
     _check(nu * nv, footprint, MOST_CELLS)
     return nu, nv
