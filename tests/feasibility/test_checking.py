@@ -381,9 +381,9 @@ def test_ctrl_c_ends_a_hard_search(tmp_path) -> None:
 def test_a_motion_refused_by_a_hair_is_looked_for_again(monkeypatch):
     """The search is made to use more than the tolerance; the second time it keeps to less."""
     from feasibility import checking, problem
-    from feasibility.roadmap import complete
+    from feasibility.roadmap import complete, search
 
-    made = complete.arrays_of
+    made = search.arrays_of
     asked = []
     warm_up()
 
@@ -393,7 +393,7 @@ def test_a_motion_refused_by_a_hair_is_looked_for_again(monkeypatch):
         return given._replace(tolerance=1.08 * given.tolerance)
 
     robot, cells, task, _ = load_case("paper/4a").build()
-    monkeypatch.setattr(complete, "arrays_of", generous)
+    monkeypatch.setattr(search, "arrays_of", generous)
     # Judged along the curves alone: over the surface itself, such a motion is still right.
     monkeypatch.setattr(complete, "replay", replay_along_curves)
     verdict = checking.check(robot, cells, task)

@@ -116,11 +116,11 @@ def test_files_that_are_not_written_are_named(ask, clock, monkeypatch, tmp_path)
     assert not (tmp_path / "a.html").exists()
 
 
-@pytest.mark.parametrize("name", ["arrays_of", "warm_up"])
+@pytest.mark.parametrize("step", ["search.arrays_of", "complete.warm_up"])
 @pytest.mark.parametrize("command", ["check", "path"])
-def test_preparing_the_search(command, name, ask, clock, monkeypatch):
+def test_preparing_the_search(command, step, ask, clock, monkeypatch):
     """Curves between 90,001 cells, say, or kernels that are loaded from a slow disk."""
-    monkeypatch.setattr(feasibility.roadmap.complete, name, clock.endless)
+    monkeypatch.setattr(f"feasibility.roadmap.{step}", clock.endless)
     status, out, _ = ask("plate", command, "--json")
     found = json.loads(out)
     assert (status, found["verdict"], found["covered"]) == (3, "undecided", 0)
@@ -179,7 +179,7 @@ def test_divisions(name, words, ask, clock, monkeypatch):
 
 
 def test_a_division_that_is_not_prepared(ask, clock, monkeypatch):
-    monkeypatch.setattr(feasibility.division.plans, "arrays_of", clock.endless)
+    monkeypatch.setattr("feasibility.roadmap.search.arrays_of", clock.endless)
     status, out, _ = ask("plate", "divide", "--json")
     assert (status, json.loads(out)["verdict"]) == (3, "undecided")
     assert "while the search was prepared" in json.loads(out)["message"]
