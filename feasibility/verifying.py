@@ -13,11 +13,10 @@ from typing import Any, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array, Mask
+from coverable_arrays import Array, Ints, Mask
 from coverable_errors import ArgumentError, CoverableError
 from feasibility.certification import (
     MotionFault,
-    replay,
     replay_over_surface,
     verify_proof,
 )
@@ -155,10 +154,12 @@ def _rows(q: Any) -> Array:
         raise ArgumentError(f"q must be an array (m, n) of numbers, got {q!r:.60}") from error
 
 
-def _of_motion(claim: Literal["motion", "witness"], problem: Problem, q: Any) -> Verification:
+def _of_motion(
+    claim: Literal["motion", "witness"], problem: Problem, q: Any, marks: Ints | None = None
+) -> Verification:
     """The replay of a motion over the surface."""
     robot, cells, task = problem.robot, problem.cells, problem.task
-    found = replay_over_surface(robot, cells, task, q, bodies=problem.bodies)
+    found = replay_over_surface(robot, cells, task, q, bodies=problem.bodies, marks=marks)
     faults = (*found.faults, *_begun_elsewhere(robot, q))
     if found.accepted and len(cells):
         faults = (*faults, *_too_fast(problem, Walk(q, np.full(len(q), -1, dtype=np.int64))))
@@ -185,19 +186,6 @@ def _begun_elsewhere(robot: Robot, q: Any) -> tuple[MotionFault, ...]:
     return (MotionFault(0, 0.0, f"it begins {off:.3g} rad or m off the start"),)
 
 
-def _of_witness(problem: Problem, walk: Walk) -> Verification:
-    """A stored motion over the surface, or failing that along the curves that it was found on."""
-    found = _of_motion("witness", problem, walk.q)
-    if found.holds:
-        return found
-    robot, cells, task = problem.robot, problem.cells, problem.task
-    every = np.ones(len(cells), dtype=bool)
-    along = replay(robot, cells, task, walk, every)
-    if not along.accepted or _begun_elsewhere(robot, walk.q) or _too_fast(problem, walk):
-        return found
-    return replace(found, faults=(), certificate=along.certificate, reached=every)
-
-
 def _of_verdict(
     verdict: Verdict, search: Search | None, tick: Callable[[], object] | None
 ) -> Verification:
@@ -207,7 +195,7 @@ def _of_verdict(
     if verdict.answer is Answer.FEASIBLE and len(cells) == 0:
         return _of_motion("witness", problem, np.empty((0, robot.n)))
     if verdict.answer is Answer.FEASIBLE and verdict.witness is not None:
-        return _of_witness(problem, verdict.witness)
+        return _of_motion("witness", problem, verdict.witness.q, verdict.witness.cell)
     if verdict.answer is Answer.FEASIBLE and verdict.tree is not None and search is not None:
         from feasibility.paper import replay_stored
 

@@ -56,13 +56,13 @@ feasibility: task
 feasibility.targets
 feasibility: found problem verdict
 feasibility.treated
-feasibility.certification: faults rows jacobians lever_bounds piecewise_cubics
+feasibility.certification: faults rows jacobians lever_bounds
 feasibility.certification.collisions
 feasibility.certification.tool_alone
 feasibility.certification.joint_boxes
 feasibility.certification.rolls
 feasibility.certification.cut_proofs
-feasibility.certification: cells_reached curve_deviations curve_matching motion_replay order rolls_along stretches surface_replay
+feasibility.certification: cells_reached motion_replay order stretches surface_replay
 feasibility.certification.areas
 feasibility.paper
 feasibility.cases

@@ -9,7 +9,6 @@ from .jacobians import placements as placements
 from .lever_bounds import second_derivatives as second_derivatives
 from .motion_replay import Replay as Replay
 from .motion_replay import replay as replay
-from .motion_replay import replay_along_curves as replay_along_curves
 from .surface_replay import MotionReplay as MotionReplay
 from .surface_replay import less_deviations as less_deviations
 from .surface_replay import replay_over_surface as replay_over_surface

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable_arrays import Array, Ints
 from feasibility.certification.faults import MotionFault
 from feasibility.certification.stretches import Samples
 from feasibility.verdict import Walk
@@ -24,6 +24,30 @@ def order_of_marks(cells: Cells, walk: Walk) -> str:
     before, after = marks[wrong[0] : wrong[0] + 2].tolist()
     how = "back" if after < before else "on"
     return f"the motion goes {how} from pose {before} to pose {after}, out of their order"
+
+
+def curves_of_marks(cells: Cells, marks: Ints) -> Ints | None:
+    """(m,) between poses, the curve that a motion is on behind each row, by its marks.
+
+    None where there is a surface, or two marks in a row are those of poses without a curve.
+    """
+    at = np.flatnonzero(marks >= 0)
+    if not cells.surface.bare or len(at) < 2 or at[0] != 0 or at[-1] != len(marks) - 1:
+        return None
+    start, end = marks[at[:-1]], marks[at[1:]]
+    count = len(cells)
+    keys = cells.pairs[:, 0] * count + cells.pairs[:, 1]
+    row = np.searchsorted(keys, np.minimum(start, end) * count + np.maximum(start, end))
+    row = np.minimum(row, len(keys) - 1)
+    any_curve = np.full(count, -1)  # to stay over a pose, at the end of any of its curves
+    any_curve[cells.pairs.ravel()] = np.repeat(np.arange(len(keys)), 2)
+    known = (
+        cells.pairs[row] == np.column_stack([np.minimum(start, end), np.maximum(start, end)])
+    ).all(axis=1)
+    curve = np.where(start == end, any_curve[start], np.where(known, row, -1))
+    if (curve < 0).any():
+        return None
+    return np.append(np.repeat(curve, np.diff(at)), curve[-1])
 
 
 def order_of_places(offset: OffsetSurface, samples: Samples, tolerance: float) -> list[MotionFault]:

@@ -104,11 +104,25 @@ class Bounds(Rows):
 class Judge:
     """Compares configurations of one motion, and stretches between them, with a surface."""
 
-    def __init__(self, robot: Robot, task: Task, offset: OffsetSurface, cells: Cells) -> None:
-        """Judge `robot` by `task`, over the surface of `cells`, whose parallel is `offset`."""
-        self.robot, self.task, self.offset = robot, task, offset
+    def __init__(
+        self,
+        robot: Robot,
+        task: Task,
+        offset: OffsetSurface,
+        cells: Cells,
+        curves: Ints | None = None,
+    ) -> None:
+        """Judge `robot` by `task`, over the surface of `cells`, whose parallel is `offset`.
+
+        Between poses `curves` (m,) may say which curve the motion is on behind each row.
+        """
+        self.robot, self.task, self.offset, self._curves = robot, task, offset, curves
         self._kinematics = Kinematics(robot)
         self._held = Held.of(task, cells, offset)
+
+    def approaches(self, normals: Array) -> Array:
+        """Approach directions (k, 3) where the surface has these normals."""
+        return self._held.approaches(normals)
 
     def sampled(self, row: Ints, share: Array, q: Array) -> Samples:
         """Samples at configurations q (k, n)."""
@@ -126,7 +140,8 @@ class Judge:
         """
         tolerance = self.task.effective_tolerance
         look = max(self.task.standoff, self.offset.least_look)
-        places = self.offset.nearest(points, points + look * axes, tolerance)
+        only = None if self._curves is None else self._curves[row]
+        places = self.offset.nearest(points, points + look * axes, tolerance, only)
         return self.over(places, row, share, points, axes, x)
 
     def over(

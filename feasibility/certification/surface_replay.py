@@ -21,13 +21,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Mask
+from coverable_arrays import Array, Ints, Mask
 from coverable_errors import counted
 from feasibility.certification.cells_reached import cells_reached, in_order, missed_text
 from feasibility.certification.collisions import collision_replay
 from feasibility.certification.faults import Judged, MotionFault
 from feasibility.certification.jacobians import placements
-from feasibility.certification.order import order_of_places
+from feasibility.certification.order import curves_of_marks, order_of_places
 from feasibility.certification.rolls import CLOSE_TO_ZERO as ROLL_CLOSE
 from feasibility.certification.stretches import CLOSE_TO_ZERO, Bounds, Judge, Samples, Stretches
 from feasibility.collisions import Bodies
@@ -63,6 +63,7 @@ def replay_over_surface(
     q: Array,
     needed: Mask | None = None,
     bodies: Bodies | None = None,
+    marks: Ints | None = None,
 ) -> MotionReplay:
     """Judge a motion by the module's rules.
 
@@ -73,6 +74,8 @@ def replay_over_surface(
         q: (m, n) rows, rad or m, unwrapped.
         needed: (N,) cells that have to be reached; all by default.
         bodies: what has to stay clear of what; None where collisions are not checked.
+        marks: (m,) the cell whose target a row is said to be at, -1 at none: over which places the
+            motion may be, to be tried first.
     """
     rows = np.asarray(q, dtype=float)
     nowhere = np.zeros(len(cells), dtype=bool)
@@ -84,12 +87,16 @@ def replay_over_surface(
     surface = cells.surface
     if isinstance(surface, PoseSurface) and task.approach == "normal":
         surface = replace(surface, axes=None)  # those of the poses' own do not count
-    judge = Judge(robot, less_deviations(task, surface), offset_surface(surface, height), cells)
+    curves = None if marks is None else curves_of_marks(cells, marks)
+    offset = offset_surface(surface, height)
+    judge = Judge(robot, less_deviations(task, surface), offset, cells, curves)
     margin, faults = _limits(robot, rows)
     poses = placements(robot, rows)
     count = np.arange(len(rows))
     x = judge.reference_axes(rows)
     at_rows = judge.compared(count, np.zeros(len(rows)), poses.points, poses.axes, x)
+    if marks is not None:
+        at_rows = _at_marks(judge, cells, marks, at_rows)
     good = judge.within(at_rows)
     faults += _exact_faults(judge, at_rows.of(~good), "row")
     stretches = judge.between_rows(rows, poses, at_rows).of(good[:-1] & good[1:])
@@ -114,6 +121,21 @@ def replay_over_surface(
             certificate, min_clearance=clear.min_clearance, nearest_pair=clear.nearest_pair
         )
     return MotionReplay(certificate, tuple(faults), reached)
+
+
+def _at_marks(judge: Judge, cells: Cells, marks: Ints, at: Samples) -> Samples:
+    """The samples at all rows, over the places of the marked cells where those found will not do."""
+    bad = np.flatnonzero(~judge.within(at) & (marks >= 0))
+    if not len(bad):
+        return at
+    aims = judge.task.targets(cells).points[marks[bad]]
+    places = judge.offset.nearest(aims, aims, 0.0)
+    some = at.of(bad)
+    tried = judge.over(places, some.row, some.share, some.points, some.axes, some.x)
+    row = np.arange(len(marks))
+    better = judge.within(tried)
+    row[bad[better]] = len(marks) + np.flatnonzero(better)
+    return Samples.join(at, tried).of(row)
 
 
 def less_deviations(task: Task, surface: Surface) -> Task:

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 GRID = np.linspace(0.0, 1.0, 9)  # places on an edge that are tried, in so many rounds
 ROUNDS = 8
-SLICES = 4  # of the strip along a crease, in flat triangles
+SLICES = 8  # of the strip along a crease, in flat triangles
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +63,9 @@ class MeshPlaces(OffsetSurface):
         corners = Places(np.repeat(face, 3), weights.reshape(-1, 3)[:, 1:])
         return FaceTree.of(self.at(corners)[0].reshape(-1, 3, 3)), corners
 
-    def nearest(self, points: Array, ahead: Array, within: float) -> Places:
+    def nearest(
+        self, points: Array, ahead: Array, within: float, only: Ints | None = None
+    ) -> Places:
         """See `OffsetSurface.nearest`: on the flat triangles between offset points."""
         tree, corners = self._triangles
         found, weights = tree.nearest(points)

@@ -25,16 +25,32 @@ from coverable_arrays import Array
 from surfaces.places.places import second_derivatives_of_unit
 from surfaces.places.spline_bounds import spline_bounds
 
+LEAST = 1e-4  # [1] of a range, a step of differences
+
 BoxBounds = Callable[[Any, Array, Array], Array]
 
 
 def box_bounds(patch: Any) -> BoxBounds:
-    """The function for a kind of patch; for one that is not known here all bounds are inf."""
-    return _KINDS.get(patch.kind, _unknown)
+    """The function for a kind of patch."""
+    return _KINDS.get(patch.kind, _measured)
 
 
-def _unknown(patch: Any, low: Array, high: Array) -> Array:
-    return np.full((len(low), 3, 2), np.inf)
+def _measured(patch: Any, low: Array, high: Array) -> Array:
+    """Of a kind that is not known here: twice the second differences over the box, no proof."""
+    half = np.maximum(0.5 * (high - low), LEAST * np.ptp([patch.u_range, patch.v_range], axis=1))
+    middle = 0.5 * (low + high)
+    at = {
+        (i, k): np.stack(patch.point_and_normal(*(middle + half * [i, k]).T), axis=1)
+        for i in (-1, 0, 1)
+        for k in (-1, 0, 1)
+    }
+    hu, hv = half.T[:, :, None, None]
+    along = [
+        [(at[1, k] - 2.0 * at[0, k] + at[-1, k]) / hu**2 for k in (-1, 0, 1)],
+        [(at[1, 1] - at[1, -1] - at[-1, 1] + at[-1, -1]) / (4.0 * hu * hv)],
+        [(at[i, 1] - 2.0 * at[i, 0] + at[i, -1]) / hv**2 for i in (-1, 0, 1)],
+    ]
+    return 2.0 * np.stack([np.linalg.norm(d, axis=-1).max(axis=0) for d in along], axis=1)
 
 
 def _table(point: tuple[Any, Any, Any], normal: tuple[Any, Any, Any], count: int) -> Array:

@@ -53,7 +53,9 @@ class PatchPlaces(OffsetSurface):
         normals = self.sign * self.patch.normal(x[..., 0], x[..., 1])
         return self.patch.point(x[..., 0], x[..., 1]) + self.height * normals, normals
 
-    def nearest(self, points: Array, ahead: Array, within: float) -> Places:
+    def nearest(
+        self, points: Array, ahead: Array, within: float, only: Ints | None = None
+    ) -> Places:
         """See `OffsetSurface.nearest`."""
         return by_closest_points(self, self.closest, points, ahead, within)
 

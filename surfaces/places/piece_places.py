@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable_arrays import Array, Ints
 from surfaces.piecewise import Piecewise
 from surfaces.places.patch_places import PatchPlaces
 from surfaces.places.places import OffsetSurface, PlacePaths, Places, by_closest_points, share_of
@@ -39,7 +39,9 @@ class PiecePlaces(OffsetSurface):
             points[some], normals[some] = self.pieces[k].at(places.of(some))
         return points, normals
 
-    def nearest(self, points: Array, ahead: Array, within: float) -> Places:
+    def nearest(
+        self, points: Array, ahead: Array, within: float, only: Ints | None = None
+    ) -> Places:
         """See `OffsetSurface.nearest`."""
         return by_closest_points(self, self._closest, points, ahead, within)
 

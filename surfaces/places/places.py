@@ -138,13 +138,16 @@ class OffsetSurface(ABC):
         """Points T (k, 3) m of the offset surface, and the surface's normals (k, 3)."""
 
     @abstractmethod
-    def nearest(self, points: Array, ahead: Array, within: float) -> Places:
+    def nearest(
+        self, points: Array, ahead: Array, within: float, only: Ints | None = None
+    ) -> Places:
         """Places whose offset points are near to given points; the nearest, if all goes well.
 
         Args:
             points: (k, 3) m.
             ahead: (k, 3) m, points of space near which the surface may be: a second guess.
             within: m, the distance from which on a second guess is worth its while.
+            only: (k,) between poses, the curve that each is on, where that is known.
         """
 
     def facets(self, points: Array) -> Array:

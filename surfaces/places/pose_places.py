@@ -15,7 +15,7 @@ from surfaces.toolpaths import PoseSurface, arc_angles, arc_at
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
-NEAREST = 4  # poses around a point whose curves are looked at
+NEAREST = 4  # places on curves around a point, whose curves and their neighbours are looked at
 TURN = 1e-3  # m: what a turn of the tool by 1 rad counts, where places have to be distinguished
 
 
@@ -48,10 +48,19 @@ class PosePlaces(OffsetSurface):
         return -poses.side_sign * poses.turned(poses.axes)
 
     @cached_property
-    def _tree(self) -> cKDTree:
+    def _tree(self) -> tuple[cKDTree, Ints]:
+        """Places all along the curves, and the curve of each."""
         from scipy.spatial import cKDTree
 
-        return cKDTree(self._points)
+        i, j = self.poses.pairs.T
+        ahead = self._points[j] - self._points[i]
+        length = np.linalg.norm(ahead, axis=1)
+        wide = max(float(np.median(length)), 1e-2 * float(length.max()), 1e-12)
+        parts = np.ceil(length / wide).astype(np.int64) + 1
+        curve = np.repeat(np.arange(len(parts)), parts)
+        number = np.arange(len(curve)) - np.repeat(np.cumsum(parts) - parts, parts)
+        share = number / np.maximum(parts[curve] - 1, 1)
+        return cKDTree(self._points[i[curve]] + share[:, None] * ahead[curve]), curve
 
     @cached_property
     def _around(self) -> tuple[Ints, Ints]:
@@ -86,7 +95,9 @@ class PosePlaces(OffsetSurface):
         directions[known], _ = arc_at(self._directions[i], self._directions[j], share)
         return points, directions
 
-    def nearest(self, points: Array, ahead: Array, within: float) -> Places:
+    def nearest(
+        self, points: Array, ahead: Array, within: float, only: Ints | None = None
+    ) -> Places:
         """See `OffsetSurface.nearest`: on the curves of the poses around, by point and direction.
 
         The tool looks towards `ahead`, which distinguishes places where it turns on the spot.
@@ -96,9 +107,16 @@ class PosePlaces(OffsetSurface):
         axes = -self.poses.side_sign * (ahead[known] - points[known])
         length = np.linalg.norm(axes, axis=1, keepdims=True)
         axes = np.divide(axes, length, out=np.zeros_like(axes), where=length > 0.0)
-        count = min(NEAREST, len(self._points))
-        around = self._tree.query(points[known], k=count)[1].reshape(len(known), count)
-        row, curve = self._curves_of(around)
+        if not len(self.poses.pairs):
+            return _placed(chart, t)
+        if only is not None:
+            share, _ = self._closest(only[known], points[known], axes)
+            chart[known], t[known] = only[known], share
+            return _placed(chart, t)
+        tree, curves = self._tree
+        count = min(NEAREST, len(curves))
+        near = curves[tree.query(points[known], k=count)[1].reshape(len(known), count)]
+        row, curve = self._curves_of(self.poses.pairs[near].reshape(len(known), -1))
         if not len(row):
             return _placed(chart, t)
         share, cost = self._closest(curve, points[known[row]], axes[row])

@@ -12,8 +12,5 @@ from .box_models import TargetModel as TargetModel
 from .box_models import ToolModel as ToolModel
 from .box_models import reference_parts as reference_parts
 from .box_models import roll_models as roll_models
-from .frame_matching import FrameMatch as FrameMatch
-from .frame_matching import MatchedPlaces as MatchedPlaces
-from .frame_matching import match_frames as match_frames
 from .held import Held as Held
 from .held import ToolAxes as ToolAxes
