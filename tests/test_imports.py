@@ -46,8 +46,8 @@ surfaces.meshes: mesh_surface selection sources
 surfaces.meshes.cells
 surfaces.step_files
 surfaces: sheet tiles triangle_kernel cell_triangles
-surfaces.passes
 surfaces.places
+surfaces.passes
 surfaces.cell_tiles
 feasibility: cell_graph clock compiled cone cut_tree cut_words interrupts notices roll safe_files search version
 feasibility.collisions
@@ -62,7 +62,7 @@ feasibility.certification.tool_alone
 feasibility.certification.joint_boxes
 feasibility.certification.rolls
 feasibility.certification.cut_proofs
-feasibility.certification: cells_reached motion_replay order stretches surface_replay
+feasibility.certification: cells_reached followed motion_replay order stretches surface_replay
 feasibility.certification.areas
 feasibility.paper
 feasibility.cases

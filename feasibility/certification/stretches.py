@@ -112,17 +112,14 @@ class Judge:
         cells: Cells,
         curves: Ints | None = None,
     ) -> None:
-        """Judge `robot` by `task`, over the surface of `cells`, whose parallel is `offset`.
+        """Judge `robot` by `task`, over what `offset` is the parallel of.
 
-        Between poses `curves` (m,) may say which curve the motion is on behind each row.
+        That is the surface of `cells`, or the one under them. Between poses `curves` (m,) may say
+        which curve the motion is on behind each row.
         """
         self.robot, self.task, self.offset, self._curves = robot, task, offset, curves
         self._kinematics = Kinematics(robot)
         self._held = Held.of(task, cells, offset)
-
-    def approaches(self, normals: Array) -> Array:
-        """Approach directions (k, 3) where the surface has these normals."""
-        return self._held.approaches(normals)
 
     def sampled(self, row: Ints, share: Array, q: Array) -> Samples:
         """Samples at configurations q (k, n)."""

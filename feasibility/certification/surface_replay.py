@@ -11,6 +11,8 @@ Between rows, bounds are used (`stretches`). A stretch that they do not accept i
 to a quarter, and one exact configuration is added. What is wrong at an exact configuration is
 refused, and so is what is still open after many halvings.
 
+Along poses that follow a surface the same has to hold over that surface (`followed`).
+
 Where bodies are given, they have to stay clear of each other too (`collisions`).
 """
 
@@ -26,6 +28,7 @@ from coverable_errors import counted
 from feasibility.certification.cells_reached import cells_reached, in_order, missed_text
 from feasibility.certification.collisions import collision_replay
 from feasibility.certification.faults import Judged, MotionFault
+from feasibility.certification.followed import followed_parts, lifted_faults
 from feasibility.certification.jacobians import placements
 from feasibility.certification.order import curves_of_marks, order_of_places
 from feasibility.certification.rolls import CLOSE_TO_ZERO as ROLL_CLOSE
@@ -83,37 +86,28 @@ def replay_over_surface(
     if fault is not None:
         unknown = Certificate(len(rows) if rows.ndim else 0, np.nan, np.nan, np.nan)
         return MotionReplay(unknown, (fault,), nowhere)
-    height = cells.surface.side_sign * task.standoff
     surface = cells.surface
     if isinstance(surface, PoseSurface) and task.approach == "normal":
         surface = replace(surface, axes=None)  # those of the poses' own do not count
     curves = None if marks is None else curves_of_marks(cells, marks)
-    offset = offset_surface(surface, height)
+    offset = offset_surface(surface, surface.side_sign * task.standoff)
     judge = Judge(robot, less_deviations(task, surface), offset, cells, curves)
     margin, faults = _limits(robot, rows)
-    poses = placements(robot, rows)
-    count = np.arange(len(rows))
-    x = judge.reference_axes(rows)
-    at_rows = judge.compared(count, np.zeros(len(rows)), poses.points, poses.axes, x)
-    if marks is not None:
-        at_rows = _at_marks(judge, cells, marks, at_rows)
-    good = judge.within(at_rows)
-    faults += _exact_faults(judge, at_rows.of(~good), "row")
-    stretches = judge.between_rows(rows, poses, at_rows).of(good[:-1] & good[1:])
-    looked = _between(judge, rows, stretches)
-    faults += looked.faults
-    samples = in_order(Samples.join(at_rows, *looked.samples))
+    found = _tool_along(judge, rows, cells, marks)
+    samples = found.samples
     reached = cells_reached(robot, cells, task, rows, samples)
     missed = np.flatnonzero(~reached if needed is None else needed & ~reached)
+    faults += found.faults
     if len(missed):
         faults.append(MotionFault(-1, 0.0, missed_text(cells, task, missed, samples)))
-    faults += order_of_places(judge.offset, samples, task.effective_tolerance)
-    error = max(looked.error, float(np.max(samples.error, initial=0.0)))
-    chord = max(looked.chord, float(np.max(samples.chord, initial=0.0)))
-    roll = max(looked.roll, float(np.max(samples.roll, initial=0.0)))
+    faults += order_of_places(offset, samples, task.effective_tolerance)
+    if isinstance(surface, PoseSurface) and not faults:
+        found = _with_what_follows(found, judge, rows, cells, surface)
+        faults += found.faults
     certificate = Certificate(
-        len(rows), error, angle_of(chord), margin, max_roll=None if task.roll is None else roll
-    )
+        len(rows), found.error, angle_of(found.chord), margin,
+        max_roll=None if task.roll is None else found.roll,
+    )  # fmt: skip
     if bodies is not None:
         clear = collision_replay(robot, bodies, rows)
         faults += clear.faults
@@ -123,8 +117,59 @@ def replay_over_surface(
     return MotionReplay(certificate, tuple(faults), reached)
 
 
+class _Along(NamedTuple):
+    """What is found of limits, tool point, axis and roll along a motion."""
+
+    error: float
+    """m, bound of |p - T|; and of |a - b|, and rad of the roll, where stretches are right."""
+    chord: float
+    roll: float
+    faults: list[MotionFault]
+    samples: Samples
+    """In the order of the motion, all rows among them."""
+
+
+def _tool_along(
+    judge: Judge, rows: Array, cells: Cells | None = None, marks: Ints | None = None
+) -> _Along:
+    """Judge tool point, axis and roll at all rows and between them."""
+    poses, x = placements(judge.robot, rows), judge.reference_axes(rows)
+    count = np.arange(len(rows))
+    at_rows = judge.compared(count, np.zeros(len(rows)), poses.points, poses.axes, x)
+    if marks is not None and cells is not None:
+        at_rows = _at_marks(judge, cells, marks, at_rows)
+    good = judge.within(at_rows)
+    faults = _exact_faults(judge, at_rows.of(~good), "row")
+    stretches = judge.between_rows(rows, poses, at_rows).of(good[:-1] & good[1:])
+    looked = _between(judge, rows, stretches)
+    samples = in_order(Samples.join(at_rows, *looked.samples))
+    most = [float(np.max(one, initial=0.0)) for one in (samples.error, samples.chord, samples.roll)]
+    bounds = (looked.error, looked.chord, looked.roll)
+    return _Along(*map(max, bounds, most), faults + looked.faults, samples)
+
+
+def _with_what_follows(
+    found: _Along, judge: Judge, rows: Array, cells: Cells, surface: PoseSurface
+) -> _Along:
+    """What is found along poses, and of what follows the surface under them over that, too.
+
+    What is lifted, or beyond the border, must not go through the surface.
+    """
+    if surface.under is None or surface.followed is None:
+        return found
+    task = less_deviations(judge.task, surface.under)
+    over = Judge(judge.robot, task, offset_surface(surface.under, judge.offset.height), cells)
+    faults = lifted_faults(judge, surface, rows, found.samples)
+    most = np.array([found.error, found.chord, found.roll])
+    for part in followed_parts(judge, surface.followed, rows, found.samples):
+        one = _tool_along(over, part.q)
+        most = np.maximum(most, [one.error, one.chord, one.roll])
+        faults += [part.placed(fault) for fault in one.faults]
+    return _Along(*most.tolist(), faults, found.samples)
+
+
 def _at_marks(judge: Judge, cells: Cells, marks: Ints, at: Samples) -> Samples:
-    """The samples at all rows, over the places of the marked cells where those found will not do."""
+    """The samples at all rows, over their marked cells where the places found will not do."""
     bad = np.flatnonzero(~judge.within(at) & (marks >= 0))
     if not len(bad):
         return at

@@ -80,6 +80,7 @@ def passes_json(passes: Passes) -> dict[str, Any]:
         "widest_m": passes.widest,
         "length_m": passes.length,
         "dropped_m": passes.dropped,
+        "beyond_border_m": passes.beyond_border,
         "notes": list(passes.notes),
     }
 

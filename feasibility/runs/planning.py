@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from coverable_arrays import Mask
+from coverable_errors import counted
 from feasibility.checking import check
 from feasibility.clock import Clock
 from feasibility.search import Search
@@ -16,10 +17,19 @@ from feasibility.treated import TreatedArea, treated_by_passes
 from feasibility.verdict import Verdict, Walk
 from robots import Robot
 from surfaces import Surface
-from surfaces.passes import Pass, Passes, PassPlaces, pass_places, pass_toolpath, ranked_directions
+from surfaces.passes import (
+    Pass,
+    Passes,
+    PassPlaces,
+    PassRoute,
+    ToolWay,
+    pass_route,
+    ranked_directions,
+)
 from surfaces.toolpaths import PoseCells
 
 RETRACT = 0.05  # m, by default
+WITHIN = 0.25  # [1] of the tolerance: how far straight lines between places may be from the surface
 CERTIFIED = 3  # directions of the fewest pieces that are tried with the arm
 
 
@@ -64,7 +74,7 @@ def plan_passes(
         clock: of the command that this is a part of.
 
     Raises:
-        SurfaceError: see `surfaces.passes.pass_toolpath`.
+        SurfaceError: see `surfaces.passes.pass_route`.
 
     Example:
         >>> from feasibility import Task
@@ -76,18 +86,21 @@ def plan_passes(
         >>> along.verdict.feasible, round(along.treated(along.verdict.witness).lower, 2)
         (True, 1.0)
     """
-    cells = pass_toolpath(passes, retract)
+    height = passes.surface.side_sign * task.standoff
+    way = ToolWay(height, WITHIN * task.effective_tolerance)
+    route = pass_route(passes, retract, way)
     alone = replace(task, footprint=None, coverage=None)
-    verdict = check(robot, cells, alone, search, clock=clock)
+    verdict = check(robot, route.cells, alone, search, clock=clock)
     if not verdict.feasible and verdict.components:
-        reached = np.zeros(len(cells), dtype=bool)
+        reached = np.zeros(len(route.cells), dtype=bool)
         reached[np.concatenate(verdict.components)] = True
-        shorter = _with_reached_overrun(passes, pass_places(passes, retract), reached)
+        shorter = _with_reached_overrun(route.passes, route.places, reached)
         if shorter is not None:
-            passes, cells = shorter, pass_toolpath(shorter, retract)
-            verdict = check(robot, cells, alone, search, clock=clock)
-    passes = replace(passes, notes=(*passes.notes, *_stripes(passes, task)))
-    return PlannedPasses(passes, pass_places(passes, retract), cells, task, verdict)
+            route = pass_route(shorter, retract, way)
+            verdict = check(robot, route.cells, alone, search, clock=clock)
+    notes = *route.passes.notes, *_off_surface(route, retract), *_stripes(passes, task)
+    passes = replace(route.passes, notes=notes)
+    return PlannedPasses(passes, route.places, route.cells, task, verdict)
 
 
 def plan_best_passes(
@@ -112,7 +125,7 @@ def plan_best_passes(
         passes_along: the passes in a direction, an angle in rad.
 
     Raises:
-        SurfaceError: see `surfaces.passes.parallel_passes` and `pass_toolpath`.
+        SurfaceError: see `surfaces.passes.parallel_passes` and `pass_route`.
     """
     found = [
         plan_passes(robot, passes_along(angle), task, retract, search, clock)
@@ -152,6 +165,20 @@ def _with_reached_overrun(passes: Passes, places: PassPlaces, reached: Mask) -> 
         f"{1e3 * cut / ends:.3g} mm on average"
     )
     return replace(passes, stretches=tuple(found), notes=(*passes.notes, note))
+
+
+def _off_surface(route: PassRoute, retract: float) -> list[str]:
+    """Where the tool is not over the surface: lifted, or beyond the border."""
+    notes = []
+    if route.places.lifts:
+        times = counted(route.places.lifts, "time")
+        notes.append(f"the tool is lifted {times} between stretches, by {1e3 * retract:.4g} mm")
+    if route.passes.beyond_border > 0.0:
+        notes.append(
+            f"passes go on beyond the border by up to {1e3 * route.passes.beyond_border:.4g} mm, "
+            "straight in the plane that is tangent there"
+        )
+    return notes
 
 
 def _stripes(passes: Passes, task: Task) -> tuple[str, ...]:

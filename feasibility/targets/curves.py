@@ -12,12 +12,14 @@ from feasibility.targets.directions import approach_curves
 from feasibility.targets.frames import FrameCurves, frame_curves
 from feasibility.task import Task
 from surfaces import Cells
-from surfaces.toolpaths import straight
+from surfaces.places import offset_surface
+from surfaces.toolpaths import PoseSurface, straight
 
 RELIABLE = 0.03  # [1] a curve whose normal deviates no further shows the curvature of the surface
 LATERAL = 1.1  # [1] the normal may turn that much faster between the places looked at
 FEW, MANY = 3, 32  # places on a curve over a mesh; and on one over a crease, or off its facets by
 OFF = 0.05  # [1] of the tolerance
+UNSEEN = 1.25  # [1] a curve may be that much further from the surface between the places looked at
 
 
 class TargetCurves(NamedTuple):
@@ -119,6 +121,27 @@ def _see_facets(cells: Cells, standoff: float, tolerance: float, deviations: Arr
         some = some[(off > OFF * tolerance) | (leans > 0.0) | cells.curves.creased[some]]
 
 
+def _see_surface(cells: Cells, height: float, deviations: Array) -> None:
+    """Raise the deviations (M, 2) of curves that follow a surface to those from it, as sampled.
+
+    Whether a motion is right over the surface is for the judge to say.
+    """
+    surface = cells.surface
+    if not isinstance(surface, PoseSurface) or surface.under is None or surface.followed is None:
+        return
+    some = np.flatnonzero(surface.followed)
+    base, offset = offset_surface(surface.under, 0.0), offset_surface(surface.under, height)
+    i, j = cells.pairs[some].T
+    ends = cells.centres + height * cells.normals
+    for t in (np.arange(FEW) + 0.5) / FEW:
+        over, normals = cells.curves.at(some, np.full(len(some), t))
+        target, normal = offset.at(base.nearest(over, over, np.inf))
+        tool = (1.0 - t) * ends[i] + t * ends[j]
+        off = np.linalg.norm(tool - target, axis=1)
+        leans = np.linalg.norm(normals - normal, axis=1)
+        deviations[some] = np.maximum(deviations[some], UNSEEN * np.column_stack([off, leans]))
+
+
 def target_curves(cells: Cells, task: Task) -> TargetCurves:
     """Offset the curves of `cells` to the tool's side by the standoff, and direct the tool there.
 
@@ -156,6 +179,7 @@ def _target_curves(cells: Cells, task: Task) -> TargetCurves:
     if cells.surface.bare:
         cubics[..., :3] = straight(task.targets(cells).points, cells.pairs, curves.first)
         derivative_bounds[:, 0] = deviations[:, 0] = 0.0
+        _see_surface(cells, height, deviations)
     if cells.surface.mean_edge_length > 0.0:
         _see_facets(cells, standoff, tolerance, deviations)
     curvature, at_centre = _normal_curvature(cells, standoff, tolerance)

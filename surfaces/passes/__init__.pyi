@@ -6,10 +6,12 @@ from .stretches import Pass as Pass
 from .tool_lines import ToolLines as ToolLines
 from .tool_lines import visits as visits
 from .toolpath import PassPlaces as PassPlaces
-from .toolpath import pass_places as pass_places
+from .toolpath import PassRoute as PassRoute
+from .toolpath import pass_route as pass_route
 from .toolpath import pass_toolpath as pass_toolpath
 from .treated import Treated as Treated
 from .treated import treated_share as treated_share
 from .triangles import WorkingMesh as WorkingMesh
 from .triangulation import grid_shape as grid_shape
 from .triangulation import working_mesh as working_mesh
+from .ways import ToolWay as ToolWay

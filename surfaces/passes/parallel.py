@@ -59,6 +59,11 @@ class Passes:
         """m, of all passes together, overrun included."""
         return sum(each.length for each in self.stretches)
 
+    @property
+    def beyond_border(self) -> float:
+        """m, how far passes go on beyond the border, at most."""
+        return max((each.beyond_border for each in self.stretches), default=0.0)
+
 
 def parallel_passes(
     surface: Surface,

@@ -36,6 +36,15 @@ class Pass(Protected):
         """m."""
         return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
 
+    @property
+    def beyond_border(self) -> float:
+        """m, how far it goes on beyond the border."""
+        on = np.flatnonzero(self.on_surface)
+        if not len(on):
+            return 0.0
+        ends = self.points[[0, -1]] - self.points[[on[0], on[-1]]]
+        return float(np.linalg.norm(ends, axis=1).max())
+
 
 class LevelLine(NamedTuple):
     """A line with the number of its level."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array, Ints
+from coverable_arrays import Array, Ints, Mask
 from surfaces.parts import MOST_PARTS, SurfaceParts
 from surfaces.surface import ClosestPoint, Surface, SurfaceError, points_of
 from surfaces.toolpaths.arcs import curve_parts
@@ -42,6 +42,9 @@ class PoseSurface(Surface):
     """Whether they are a toolpath, to be run from the first to the last."""
     under: Surface | None = None
     """The surface that they lie over, if it is known."""
+    followed: Mask | None = None
+    """(M,) between which pairs the tool works on that surface: there a motion has to be right over
+    the surface, too. None where nothing is known of one."""
 
     @property
     def wall(self) -> Surface | None:

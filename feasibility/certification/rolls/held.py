@@ -63,14 +63,15 @@ class Held:
 
     @staticmethod
     def of(task: Task, cells: Cells, offset: OffsetSurface) -> Held:
-        """What `task` wants over the surface of `cells`, whose parallel is `offset`."""
+        """What `task` wants over the surface of `cells`, or that under them, by its `offset`."""
+        wall = cells.surface.wall
         return Held(
             offset,
             -cells.surface.side_sign,
             task.fixed_approach(cells),
             task.fixed_reference(cells),
             task.roll,
-            cells.surface.mean_edge_length == 0.0,
+            wall is None or wall.mean_edge_length == 0.0,
         )
 
     def approaches(self, normals: Array) -> Array:

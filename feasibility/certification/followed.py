@@ -1,0 +1,153 @@
+"""Poses over a surface: which parts of a motion along them have to be right over it as well.
+
+The curves of a toolpath say where it leads. Where they follow a surface, the tool has to be right
+over the surface itself; where it is lifted, or beyond the border, its target must not go through
+that. The height of a point over a surface changes by no more than the point moves; so on a straight
+line between two targets, d apart, with the heights a and b, it is at least (a + b - d) / 2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from coverable_arrays import Array, Ints, Mask
+from feasibility.certification.faults import MotionFault
+from feasibility.certification.stretches import Judge, Samples
+from surfaces import Surface
+from surfaces.meshes import MeshSurface
+from surfaces.toolpaths import PoseSurface
+
+HALVINGS = 30  # to where a motion leaves what it follows
+LEVELS = 20  # halvings of what is lifted, until it is clear of the surface
+BEYOND = 2e-3  # [m] so close targets beyond the border are looked at
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class FollowedPart:
+    """A part of a motion that follows a surface."""
+
+    q: Array
+    """(k, n) rows, rad or m."""
+    row: Ints
+    """(k,) the row of the whole motion, or the row before."""
+    share: Array
+    """(k,) how far on the way to the next one, 0..1."""
+
+    def placed(self, fault: MotionFault) -> MotionFault:
+        """A fault of this part as one of the whole motion."""
+        last = len(self.row) - 1
+        k = min(max(fault.row, 0), last)
+        here = self.row[k] + self.share[k]
+        there = self.row[min(k + 1, last)] + self.share[min(k + 1, last)]
+        at = float(here + fault.share * (there - here))
+        row = int(np.floor(at))
+        return MotionFault(row, at - row, fault.text)
+
+
+def followed_parts(
+    judge: Judge, followed: Mask, rows: Array, samples: Samples
+) -> list[FollowedPart]:
+    """The parts of a motion over curves that follow a surface.
+
+    Args:
+        judge: of the motion over the poses.
+        followed: (M,) which of their curves do.
+        rows: (m, n) the motion, rad or m.
+        samples: of it, as it passes them, over their places on the curves.
+    """
+    on = _on(samples.places.chart, followed)
+    at = samples.row + samples.share
+    turns = np.flatnonzero(on[1:] != on[:-1])
+    cuts = _turns(judge, followed, rows, at[turns], at[turns + 1], on[turns])
+    parts = []
+    for run in np.split(np.arange(len(at)), turns + 1):
+        if len(run) and on[run[0]]:
+            own = at[run]
+            before, after = np.searchsorted(turns, run[0]) - 1, np.searchsorted(turns, run[-1])
+            ends = [cuts[k : k + 1] if 0 <= k < len(cuts) else own[:0] for k in (before, after)]
+            parts.append(_part(rows, np.unique(np.concatenate([ends[0], own, ends[1]]))))
+    return parts
+
+
+def _on(chart: Ints, followed: Mask) -> Mask:
+    """(k,) which places are on curves that follow the surface."""
+    return np.asarray((chart >= 0) & followed[np.maximum(chart, 0)])
+
+
+def _part(rows: Array, at: Array) -> FollowedPart:
+    """The configurations of a motion at row numbers with their shares (k,)."""
+    row = np.minimum(np.floor(at).astype(np.int64), max(len(rows) - 2, 0))
+    share = at - row
+    ahead = rows[np.minimum(row + 1, len(rows) - 1)] - rows[row]
+    return FollowedPart(rows[row] + share[:, None] * ahead, row, share)
+
+
+def _turns(
+    judge: Judge, followed: Mask, rows: Array, low: Array, high: Array, begins: Mask
+) -> Array:
+    """(k,) where between `low` and `high` a motion changes what it follows; `begins`: at low."""
+    low, high = low.copy(), high.copy()
+    for _ in range(HALVINGS if len(low) else 0):
+        middle = 0.5 * (low + high)
+        part = _part(rows, middle)
+        found = judge.sampled(part.row, part.share, part.q)
+        same = _on(found.places.chart, followed) == begins
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    return 0.5 * (low + high)
+
+
+def lifted_faults(
+    judge: Judge, surface: PoseSurface, rows: Array, samples: Samples
+) -> list[MotionFault]:
+    """Where a tool that is lifted, or beyond the border, may be through the surface under poses.
+
+    Args:
+        judge: of the motion over the poses.
+        surface: the poses, with a surface under them.
+        rows, samples: see `followed_parts`.
+    """
+    under, followed, tolerance = surface.under, surface.followed, judge.task.effective_tolerance
+    if under is None or followed is None or not len(rows):
+        return []
+    off = ~_on(samples.places.chart, followed)
+    at = samples.row + samples.share
+    some = np.flatnonzero(off[:-1] | off[1:])
+    left, right = at[some], at[some + 1]
+    for _ in range(LEVELS):
+        parts = [_part(rows, end) for end in (left, right)]
+        places = [judge.sampled(part.row, part.share, part.q).places for part in parts]
+        targets = [judge.offset.at(each)[0] for each in places]
+        ends = np.stack([_heights(under, each) for each in targets])
+        least = np.nan_to_num(ends, nan=np.inf).min(axis=0)
+        way = np.linalg.norm(targets[1] - targets[0], axis=1)
+        if (least < -tolerance).any():
+            return [_through(parts[0], least)]
+        both, none = np.isfinite(ends).all(axis=0), np.isnan(ends).all(axis=0)
+        bound = np.where(both, 0.5 * (ends.sum(axis=0) - way), least - way)
+        open_ = np.where(none, way > BEYOND, ~(bound >= -tolerance))
+        if not open_.any():
+            return []
+        middle = 0.5 * (left[open_] + right[open_])
+        left, right = np.append(left[open_], middle), np.append(middle, right[open_])
+    text = "not certified: the tool may go through the surface where it is lifted"
+    return [MotionFault(int(left[0]), float(left[0] % 1.0), text)]
+
+
+def _through(part: FollowedPart, heights: Array) -> MotionFault:
+    """The fault of a tool that goes deepest where it is."""
+    worst = int(np.argmin(heights))
+    text = (
+        f"the tool goes through the surface where it is lifted, by {-1e3 * heights[worst]:.4g} mm"
+    )
+    return MotionFault(int(part.row[worst]), float(part.share[worst]), text)
+
+
+def _heights(surface: Surface, points: Array) -> Array:
+    """(k,) m, on the tool's side of a surface; NaN beyond its border."""
+    at = surface.closest(points)
+    over = at.inside
+    if isinstance(surface, MeshSurface):
+        over = ~surface.beyond_border(*surface.nearest(points))
+    return np.where(over, surface.side_sign * at.height, np.nan)

@@ -1,0 +1,143 @@
+"""Lines on a surface with so many points that the straight pieces between them stay near it.
+
+A tool runs straight from one point to the next, and its normal along the great arc; so a pass, or
+the way from one pass to the next, is as near to the surface as its points are close.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from coverable_arrays import Array, Ints
+from surfaces.passes.parallel import Passes
+from surfaces.passes.stretches import Pass
+from surfaces.places import offset_surface
+from surfaces.surface import Surface
+from surfaces.toolpaths import arc_at
+
+WITHIN = 1e-4  # [m], by default
+LEANS = 0.05  # [rad] of a normal from the great arc; over triangles it may be more
+LEVELS = 10  # halvings of a piece
+TURNING = 4  # of them those for the sake of normals alone
+SHARES = np.array([0.25, 0.5, 0.75])  # where a piece is compared with the surface
+LONGER = 2.0  # [1] times the straight line: a way on the surface that is longer goes round a gap
+CLEAR = 64  # places of a straight way beside the surface that are looked at
+OVER = (
+    0.9  # [1] cosine of the angle at the nearest place from which on a point is not beyond a border
+)
+
+
+class Line(NamedTuple):
+    """Points on a surface, joined by straight lines."""
+
+    points: Array
+    """(k, 3) m."""
+    normals: Array
+    """(k, 3) outward unit normals."""
+    own: Ints
+    """(k,) the index among the points that were given; -1 of those put in."""
+
+
+class ToolWay(NamedTuple):
+    """Where a tool is to be beside the surface, and how near to that it has to stay."""
+
+    height: float
+    """m, along the outward normal."""
+    within: float = WITHIN
+    """m, how far straight lines between its places may be from where it is to be."""
+
+
+def fitted(found: Passes, way: ToolWay) -> Passes:
+    """The same passes with points put in where straight lines between them would leave them."""
+    return replace(found, stretches=tuple(_fitted(found.surface, p, way) for p in found.stretches))
+
+
+def _fitted(surface: Surface, each: Pass, way: ToolWay) -> Pass:
+    """One stretch; its overrun is straight already."""
+    on = np.flatnonzero(each.on_surface)
+    if len(on) < 2:
+        return each
+    inner = slice(int(on[0]), int(on[-1]) + 1)
+    line = followed(surface, each.points[inner], each.normals[inner], way)
+    parts = [(each.points[: on[0]], each.normals[: on[0]])]
+    parts += [(line.points, line.normals), (each.points[on[-1] + 1 :], each.normals[on[-1] + 1 :])]
+    points, normals = (np.concatenate(part) for part in zip(*parts, strict=True))
+    inside = np.repeat([False, True, False], [len(part[0]) for part in parts])
+    return replace(each, points=points, normals=normals, on_surface=inside)
+
+
+def followed(surface: Surface, points: Array, normals: Array, way: ToolWay) -> Line:
+    """A line through points (k, 3) m on a surface, with those put in that keep it there."""
+    base, offset = offset_surface(surface, 0.0), offset_surface(surface, way.height)
+    line = Line(points, normals, np.arange(len(points)))
+    for level in range(LEVELS):
+        middle, off, leans = _beside(surface, line.points, line.normals, way.height)
+        cut = (off > way.within) | (level < TURNING) & (leans > LEANS)
+        if not cut.any():
+            break
+        places = base.nearest(middle[cut], middle[cut], np.inf)
+        at = np.flatnonzero(cut) + 1
+        new, (_, turned) = base.at(places)[0], offset.at(places)
+        line = Line(
+            np.insert(line.points, at, new, axis=0),
+            np.insert(line.normals, at, turned, axis=0),
+            np.insert(line.own, at, -1),
+        )
+    return line
+
+
+def _beside(
+    surface: Surface, points: Array, normals: Array, height: float
+) -> tuple[Array, Array, Array]:
+    """The middles (k, 3) of the pieces of a line, and how far a tool is off along them: m, rad."""
+    base, offset = offset_surface(surface, 0.0), offset_surface(surface, height)
+    start, ahead = points[:-1], np.diff(points, axis=0)
+    ends = points + height * normals
+    off, leans = np.zeros((2, len(ahead)))
+    for share in SHARES.tolist():
+        over = start + share * ahead
+        target, normal = offset.at(base.nearest(over, over, np.inf))
+        tool = ends[:-1] + share * np.diff(ends, axis=0)
+        arc, _ = arc_at(normals[:-1], normals[1:], np.full(len(ahead), share))
+        off = np.maximum(off, np.linalg.norm(tool - target, axis=1))
+        leans = np.maximum(leans, np.linalg.norm(arc - normal, axis=1))
+    return start + 0.5 * ahead, off, leans
+
+
+def along_surface(surface: Surface, ends: Array, normals: Array, way: ToolWay) -> Line | None:
+    """The way on a surface between two places (2, 3) m of it; None where there is no short one."""
+    line = followed(surface, ends, normals, way)
+    pieces = np.linalg.norm(np.diff(line.points, axis=0), axis=1)
+    _, off, _ = _beside(surface, line.points, line.normals, way.height)
+    straight = float(np.linalg.norm(ends[1] - ends[0]))
+    if (off > way.within).any() or pieces.sum() > LONGER * straight:
+        return None
+    return line
+
+
+class Beside(NamedTuple):
+    """How a straight way of the tool lies to the surface."""
+
+    through: bool
+    """It runs through it."""
+    near: bool
+    """It comes nearer than the tool is to be."""
+
+
+def beside(surface: Surface, ends: Array, normals: Array, way: ToolWay) -> Beside:
+    """How the straight way of a tool between two places (2, 3) m lies to a surface."""
+    share = np.linspace(0.0, 1.0, CLEAR)[:, None]
+    tool = ends + way.height * normals
+    tool = tool[0] + share * (tool[1] - tool[0])
+    base = offset_surface(surface, 0.0)
+    foot, normal = base.at(base.nearest(tool, tool, np.inf))
+    apart = np.linalg.norm(tool - foot, axis=1)
+    above = surface.side_sign * ((tool - foot) * normal).sum(axis=1)
+    over = np.abs(above) > OVER * apart
+    return Beside(
+        bool((over & (above < -way.within)).any()),
+        bool((over & (apart < abs(way.height) - way.within)).any()),
+    )
