@@ -175,21 +175,20 @@ class Cells(Protected, ABC):
         """(N,) cells with a strip along a crease where the normal turns; only meshes have them."""
         return np.zeros(len(self), dtype=bool)
 
-    def distances(self, pairs: Ints, points: Array, everywhere: bool) -> tuple[Array, Array]:
+    def distances(self, pairs: Ints, points: Array) -> tuple[Array, Array]:
         """Distances (k,) m of points from the surface, and outward unit vectors along them (k, 3).
 
-        On a mesh these are measured from the triangles, without interpolated normals.
+        On a mesh these are measured from the triangles of the two cells and of those that touch
+        both, without interpolated normals.
 
         Args:
             pairs: (k, 2) rows of `pairs`, near whose curve each point lies.
             points: (k, 3) m.
-            everywhere: measure from all of the surface, which takes long on a mesh at large
-                distances; otherwise from the two cells and those that touch both.
         """
         found = self.surface.closest(points)
         return np.abs(found.height), found.normal
 
-    def crease_distances(self, pairs: Ints, points: Array, everywhere: bool) -> Array:
+    def crease_distances(self, pairs: Ints, points: Array) -> Array:
         """(k,) m, how far points of the surface are from the crease on whose strip they lie.
 
         An upper bound; inf off the strips. See `distances` for the arguments.

@@ -109,7 +109,7 @@ def lifted_faults(
         rows, samples: see `followed_parts`.
     """
     under, followed, tolerance = surface.under, surface.followed, judge.task.effective_tolerance
-    if under is None or followed is None or not len(rows):
+    if under is None or surface.working is None:
         return []
     off = ~_on(samples.places.chart, followed)
     at = samples.row + samples.share

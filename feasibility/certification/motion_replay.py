@@ -11,8 +11,11 @@ from dataclasses import replace
 import numpy as np
 
 from coverable_arrays import Array, Mask
+from feasibility.certification.cells_reached import at_targets
 from feasibility.certification.collisions import collision_replay
+from feasibility.certification.jacobians import placements
 from feasibility.certification.order import order_of_marks
+from feasibility.certification.rolls import reference_axes
 from feasibility.certification.surface_replay import replay_over_surface
 from feasibility.collisions import gather
 from feasibility.task import Task
@@ -48,9 +51,10 @@ def replay(
     if disorder:
         return Replay(Certificate(len(walk.q), np.nan, np.nan, np.nan), disorder)
     found = replay_over_surface(robot, cells, task, walk.q, needed, marks=walk.cell)
+    refusal = found.refusal or _misplaced(robot, cells, task, walk)
     bodies = gather(robot, cells.surface, task.collision, task.standoff)
-    if bodies is None or not found.accepted:
-        return Replay(found.certificate, found.refusal)
+    if bodies is None or refusal:
+        return Replay(found.certificate, refusal)
     clear = collision_replay(robot, bodies, walk.q, deviations)
     certificate = replace(
         found.certificate, min_clearance=clear.min_clearance, nearest_pair=clear.nearest_pair
@@ -65,3 +69,16 @@ def _malformed(cells: Cells, walk: Walk) -> str:
     if ((walk.cell < -1) | (walk.cell >= len(cells))).any():
         return f"a waypoint is marked with a cell that is not one of the {len(cells)}"
     return ""
+
+
+def _misplaced(robot: Robot, cells: Cells, task: Task, walk: Walk) -> str:
+    """Why a marked waypoint is not where it says it is; empty where all are."""
+    at = np.flatnonzero(walk.cell >= 0)
+    q, cell = walk.q[at], walk.cell[at]
+    poses = placements(robot, q)
+    x = poses.axes if task.roll is None else reference_axes(robot, q)
+    right = at_targets(task, task.targets(cells), cell, poses.points, poses.axes, x)
+    if right.all():
+        return ""
+    row = int(at[np.argmin(right)])
+    return f"row {row + 1} is marked with cell {walk.cell[row]}, but is not at its centre's target"

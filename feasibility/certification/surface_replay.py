@@ -104,10 +104,10 @@ def replay_over_surface(
     if isinstance(surface, PoseSurface) and not faults:
         found = _with_what_follows(found, judge, rows, cells, surface)
         faults += found.faults
+    error, chord, roll = found.most.tolist()
     certificate = Certificate(
-        len(rows), found.error, angle_of(found.chord), margin,
-        max_roll=None if task.roll is None else found.roll,
-    )  # fmt: skip
+        len(rows), error, angle_of(chord), margin, max_roll=None if task.roll is None else roll
+    )
     if bodies is not None:
         clear = collision_replay(robot, bodies, rows)
         faults += clear.faults
@@ -118,12 +118,10 @@ def replay_over_surface(
 
 
 class _Along(NamedTuple):
-    """What is found of limits, tool point, axis and roll along a motion."""
+    """What is found of tool point, axis and roll along a motion."""
 
-    error: float
-    """m, bound of |p - T|; and of |a - b|, and rad of the roll, where stretches are right."""
-    chord: float
-    roll: float
+    most: Array
+    """(3,) bounds: m, how far the tool point is off; of |a - b|; rad of the roll."""
     faults: list[MotionFault]
     samples: Samples
     """In the order of the motion, all rows among them."""
@@ -143,9 +141,9 @@ def _tool_along(
     stretches = judge.between_rows(rows, poses, at_rows).of(good[:-1] & good[1:])
     looked = _between(judge, rows, stretches)
     samples = in_order(Samples.join(at_rows, *looked.samples))
-    most = [float(np.max(one, initial=0.0)) for one in (samples.error, samples.chord, samples.roll)]
-    bounds = (looked.error, looked.chord, looked.roll)
-    return _Along(*map(max, bounds, most), faults + looked.faults, samples)
+    each = (_off(judge, samples), samples.chord, samples.roll)
+    most = np.maximum(looked.most, [np.max(one, initial=0.0) for one in each])
+    return _Along(most, faults + looked.faults, samples)
 
 
 def _with_what_follows(
@@ -155,17 +153,17 @@ def _with_what_follows(
 
     What is lifted, or beyond the border, must not go through the surface.
     """
-    if surface.under is None or surface.followed is None:
+    if surface.under is None or surface.working is None:
         return found
     task = less_deviations(judge.task, surface.under)
     over = Judge(judge.robot, task, offset_surface(surface.under, judge.offset.height), cells)
     faults = lifted_faults(judge, surface, rows, found.samples)
-    most = np.array([found.error, found.chord, found.roll])
+    most = found.most
     for part in followed_parts(judge, surface.followed, rows, found.samples):
         one = _tool_along(over, part.q)
-        most = np.maximum(most, [one.error, one.chord, one.roll])
+        most = np.maximum(most, one.most)
         faults += [part.placed(fault) for fault in one.faults]
-    return _Along(*most.tolist(), faults, found.samples)
+    return _Along(most, faults, found.samples)
 
 
 def _at_marks(judge: Judge, cells: Cells, marks: Ints, at: Samples) -> Samples:
@@ -196,12 +194,18 @@ def less_deviations(task: Task, surface: Surface) -> Task:
 class _Between(NamedTuple):
     """What is found between rows."""
 
-    error: float
-    """m, bound of |p - T|; and of |a - b|, and rad of the roll, where stretches are right."""
-    chord: float
-    roll: float
+    most: Array
+    """(3,) see `_Along`, where stretches are right."""
     faults: list[MotionFault]
     samples: list[Samples]
+
+
+def _off(judge: Judge, one: Samples | Bounds) -> Array:
+    """(k,) m, how far tool points are off; nearer to a mesh's triangles than the standoff is, too.
+
+    Further from them than that they are by no more than from their targets.
+    """
+    return np.maximum(one.error, judge.task.standoff - one.facets)
 
 
 def _between(judge: Judge, rows: Array, stretches: Stretches) -> _Between:
@@ -211,7 +215,7 @@ def _between(judge: Judge, rows: Array, stretches: Stretches) -> _Between:
     for level in range(LEVELS + 1):
         bounds = judge.bounds(left)
         good = judge.within(bounds)
-        each = (bounds.error, bounds.chord, bounds.roll)
+        each = (_off(judge, bounds), bounds.chord, bounds.roll)
         most = np.maximum(most, [np.max(one[good], initial=0.0) for one in each])
         left, bounds = left.of(~good), bounds.of(~good)
         seen += len(left.length)
@@ -229,8 +233,7 @@ def _between(judge: Judge, rows: Array, stretches: Stretches) -> _Between:
         faults = _exact_faults(judge, Samples.join(*wrong), "place")
     elif len(left.length):
         faults = [_open_fault(judge, left, bounds)]
-    error, chord, roll = most.tolist()
-    return _Between(error, chord, roll, faults, samples)
+    return _Between(most, faults, samples)
 
 
 def _malformed(robot: Robot, rows: Array) -> MotionFault | None:

@@ -130,6 +130,7 @@ def poses_between(cells: PoseCells, first: int, last: int) -> PoseCells:
             axes=None if surface.axes is None else surface.axes[some],
             along=None if surface.along is None else surface.along[some],
             pairs=np.column_stack([steps, steps + 1]),
+            working=None if surface.working is None else surface.working[some],
         )
     )
 

@@ -1,6 +1,5 @@
 from .blocked import blocked_curves as blocked_curves
 from .curves import TargetCurves as TargetCurves
-from .curves import beside_facets as beside_facets
 from .curves import target_curves as target_curves
 from .frames import FrameCurves as FrameCurves
 from .parts import target_parts as target_parts

@@ -59,64 +59,27 @@ def folded_curves(cells: Cells, height: float) -> Mask:
     return np.asarray(folded | cell[cells.pairs].any(axis=1))
 
 
-class BesideFacets(NamedTuple):
-    """How targets at k places on curves lie to the triangles of a mesh themselves."""
-
-    off: Array
-    """(k,) m, by how much the target's distance from them is not the standoff."""
-    leans: Array
-    """(k,) |n - m| of the curve's normal n and the direction m from the mesh to the target; on
-    the strips along creases only, elsewhere normals are interpolated."""
-    away: Array
-    """(k,) m, the target's distance from them."""
-
-
-def beside_facets(
-    cells: Cells,
-    standoff: float,
-    tolerance: float,
-    curves: Ints,
-    point: Array,
-    normal: Array,
-    everywhere: bool,
-) -> BesideFacets:
-    """Compare targets with the triangles of a mesh, without any interpolation.
-
-    On the strip along a crease, and where normals are interpolated, the targets are nearer to the
-    mesh than the standoff. So they are where something protrudes from it. Nearer to a crease than
-    the tolerance leaves over the standoff, the normal is any of those that meet there.
-
-    Args:
-        cells: of a mesh.
-        standoff: m.
-        tolerance: m, of the tool point.
-        curves: (k,) which curves.
-        point: (k, 3) m, a place on each of them.
-        normal: (k, 3) their normals there.
-        everywhere: compare with all of the mesh, which takes long at large standoffs; otherwise
-            with the cells of the curve and those that touch both.
-    """
-    pairs = cells.pairs[curves]
-    target = point + cells.surface.side_sign * standoff * normal
-    away, direction = cells.distances(pairs, target, everywhere)
-    leans = np.zeros(len(point))
-    off = np.abs(standoff - away) if standoff > 0.0 else leans
-    strip = cells.crease_distances(pairs, point, everywhere)
-    some = np.isfinite(strip) & (strip >= tolerance - standoff)
-    leans[some] = np.linalg.norm(normal[some] - direction[some], axis=1)
-    return BesideFacets(off, leans, away)
-
-
 def _see_facets(cells: Cells, standoff: float, tolerance: float, deviations: Array) -> None:
-    """Raise the deviations (M, 2) of curves over a mesh to those from its triangles."""
+    """Raise the deviations (M, 2) of curves over a mesh to those from its triangles.
+
+    On the strip along a crease, and where normals are interpolated, targets are nearer to the
+    triangles than the standoff. So they are where something protrudes. On such a strip the
+    direction of the tool is compared with the one from the nearest place to the target, too;
+    nearer to a crease than the tolerance leaves over the standoff, with none.
+    """
     some = np.arange(len(deviations))
     for count in (FEW, MANY):
         t = (np.arange(count) + 0.5) / count
-        curves = np.repeat(some, count)
-        places = curves, *cells.curves.at(curves, np.tile(t, len(some)))
-        found = beside_facets(cells, standoff, tolerance, *places, everywhere=False)
-        off = found.off.reshape(-1, count).max(axis=1)
-        leans = found.leans.reshape(-1, count).max(axis=1)
+        pairs = np.repeat(cells.pairs[some], count, axis=0)
+        point, normal = cells.curves.at(np.repeat(some, count), np.tile(t, len(some)))
+        target = point + cells.surface.side_sign * standoff * normal
+        away, direction = cells.distances(pairs, target)
+        leans = np.zeros(len(point))
+        off = np.abs(standoff - away) if standoff > 0.0 else leans
+        strip = cells.crease_distances(pairs, point)
+        on = np.isfinite(strip) & (strip >= tolerance - standoff)
+        leans[on] = np.linalg.norm(normal[on] - direction[on], axis=1)
+        off, leans = (each.reshape(-1, count).max(axis=1) for each in (off, leans))
         deviations[some] = np.maximum(deviations[some], np.column_stack([off, leans]))
         some = some[(off > OFF * tolerance) | (leans > 0.0) | cells.curves.creased[some]]
 
@@ -127,9 +90,11 @@ def _see_surface(cells: Cells, height: float, deviations: Array) -> None:
     Whether a motion is right over the surface is for the judge to say.
     """
     surface = cells.surface
-    if not isinstance(surface, PoseSurface) or surface.under is None or surface.followed is None:
+    if not isinstance(surface, PoseSurface) or surface.under is None:
         return
     some = np.flatnonzero(surface.followed)
+    if not len(some):
+        return
     base, offset = offset_surface(surface.under, 0.0), offset_surface(surface.under, height)
     i, j = cells.pairs[some].T
     ends = cells.centres + height * cells.normals

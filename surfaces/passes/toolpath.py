@@ -123,9 +123,8 @@ def pass_route(found: Passes, retract: float = RETRACT, way: ToolWay = ON_SURFAC
     places = pass_places(passes, retract, way)
     turn, origin = surface.rotation, surface.position
     made = poses((places.points - origin) @ turn, places.normals @ turn, side=surface.side)
-    on = places.on_surface
     placed = replace(
-        made.surface, rotation=turn, position=origin, under=surface, followed=on[:-1] & on[1:]
+        made.surface, rotation=turn, position=origin, under=surface, working=places.on_surface
     )
     return PassRoute(passes, places, PoseCells.of(placed))
 

@@ -107,7 +107,7 @@ class PosePlaces(OffsetSurface):
         axes = -self.poses.side_sign * (ahead[known] - points[known])
         length = np.linalg.norm(axes, axis=1, keepdims=True)
         axes = np.divide(axes, length, out=np.zeros_like(axes), where=length > 0.0)
-        if not len(self.poses.pairs):
+        if not len(self.poses.pairs) or not len(known):
             return _placed(chart, t)
         if only is not None:
             share, _ = self._closest(only[known], points[known], axes)

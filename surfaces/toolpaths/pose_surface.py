@@ -42,9 +42,16 @@ class PoseSurface(Surface):
     """Whether they are a toolpath, to be run from the first to the last."""
     under: Surface | None = None
     """The surface that they lie over, if it is known."""
-    followed: Mask | None = None
-    """(M,) between which pairs the tool works on that surface: there a motion has to be right over
-    the surface, too. None where nothing is known of one."""
+    working: Mask | None = None
+    """(N,) at which poses the tool works on that surface, neither lifted nor beyond its border.
+    None where that is not known."""
+
+    @property
+    def followed(self) -> Mask:
+        """(M,) between which pairs a motion has to be right over the surface under them, too."""
+        if self.under is None or self.working is None:
+            return np.zeros(len(self.pairs), dtype=bool)
+        return np.asarray(self.working[self.pairs].all(axis=1))
 
     @property
     def wall(self) -> Surface | None:

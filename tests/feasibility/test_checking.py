@@ -18,11 +18,11 @@ from dense_replay import assert_motion, assert_over, assert_witness
 from guards import GUARD_S
 from oracle_build import built
 from oracle_cases import Problem
+from random_arms import question
 from random_cases import draw, draw_ur5
 
 from feasibility import Answer, CauseKind, Evidence, Search, Task, Verdict, check
 from feasibility.cases import load_case
-from feasibility.certification import replay, replay_along_curves
 from feasibility.roadmap import warm_up
 from feasibility.roadmap.exploration import BUDGET
 from robots import load_robot
@@ -380,32 +380,27 @@ def test_ctrl_c_ends_a_hard_search(tmp_path) -> None:
 
 def test_a_motion_refused_by_a_hair_is_looked_for_again(monkeypatch):
     """The search is made to use more than the tolerance; the second time it keeps to less."""
-    from feasibility import checking, problem
-    from feasibility.roadmap import complete, search
+    from feasibility import checking
+    from feasibility.roadmap import search
 
-    made = search.arrays_of
-    asked = []
+    made, asked, most = search.arrays_of, [], 1
     warm_up()
 
     def generous(robot, cells, task):
         given = made(robot, cells, task)
         asked.append(given.tolerance)
-        return given._replace(tolerance=1.08 * given.tolerance)
+        return given._replace(tolerance=2.0 * given.tolerance) if len(asked) <= most else given
 
-    robot, cells, task, _ = load_case("paper/4a").build()
+    robot, cells, task = question("puma, tube")
     monkeypatch.setattr(search, "arrays_of", generous)
-    # Judged along the curves alone: over the surface itself, such a motion is still right.
-    monkeypatch.setattr(complete, "replay", replay_along_curves)
     verdict = checking.check(robot, cells, task)
     assert asked == pytest.approx([1e-3, 0.9e-3])
     assert verdict.feasible
-    assert verdict.certificate.max_position_error <= 1e-3
-    every = np.ones(len(cells), dtype=bool)
-    assert replay(robot, cells, task, verdict.witness, every).accepted
-    monkeypatch.setattr(problem, "NARROWER", 1.0)
+    assert_witness(verdict)
+    asked, most = [], 2
     again = checking.check(robot, cells, task)
     assert again.answer == "undecided"
-    assert "refuses it: the tool point deviates" in again.message
+    assert "off its surface" in again.message
     assert again.witness is None
 
 

@@ -145,24 +145,22 @@ class MeshCells(Cells):
         creased[self.labels[self.surface.on_crease.any(axis=1)]] = True
         return creased
 
-    def distances(self, pairs: Ints, points: Array, everywhere: bool) -> tuple[Array, Array]:
+    def distances(self, pairs: Ints, points: Array) -> tuple[Array, Array]:
         """See `Cells.distances`."""
-        return self.surface.beside(points, *self._closest_places(pairs, points, everywhere))
+        return self.surface.beside(points, *self._closest_places(pairs, points))
 
-    def crease_distances(self, pairs: Ints, points: Array, everywhere: bool) -> Array:
+    def crease_distances(self, pairs: Ints, points: Array) -> Array:
         """See `Cells.crease_distances`."""
         if not self.surface.on_crease.any():
-            return super().crease_distances(pairs, points, everywhere)
-        return self.surface.from_crease(*self._closest_places(pairs, points, everywhere))
+            return super().crease_distances(pairs, points)
+        return self.surface.from_crease(*self._closest_places(pairs, points))
 
     def _crease_shares(self, pairs: Ints, points: Array) -> Array:
         """(m, k) see `MeshSurface.crease_share`, closest to points (m, k, 3) m."""
         return self.surface.crease_share(*self._closest_faces(pairs, points))
 
-    def _closest_places(self, pairs: Ints, points: Array, everywhere: bool) -> tuple[Ints, Array]:
+    def _closest_places(self, pairs: Ints, points: Array) -> tuple[Ints, Array]:
         """Faces (k,) and weights (k, 3) on them closest to points (k, 3) m; see `distances`."""
-        if everywhere:
-            return self.surface.nearest(points)
         faces, weights = self._closest_faces(pairs, points[:, None])
         return faces[:, 0], weights[:, 0]
 

@@ -17,12 +17,11 @@ from random_arms import QUESTIONS, between, deviation, planar_arm, question, rob
 
 import feasibility
 from feasibility import Task, check
-from feasibility.certification import replay_along_curves as replay
+from feasibility.certification import replay
 from feasibility.verdict import Walk
 from surfaces import cylinder, plane, sphere
 
-SIMPLE = ("puma, tube", "ur5, plate")
-SEARCH = ("compiled", "roadmap", "paper", "checking")
+SEARCH = ("compiled", "roadmap", "paper", "checking", "targets")
 
 
 def part_of(module, package):
@@ -47,6 +46,16 @@ def ask(name, q=None, cell=None, **changes):
     return replay(robot, cells, replace(task, **changes), walk, needed)
 
 
+def largest(name):
+    """m and rad, the largest deviation of the witness of a question and its largest tilt."""
+    robot, cells, task = question(name)
+    walk = witness(name)
+    q = np.vstack([between(a, b, 20)[1] for a, b in zip(walk.q, walk.q[1:], strict=False)])
+    found = deviation(cells.surface, task.standoff, *tools(robot, q))
+    assert found.on_patch.all()
+    return found.distance.max(), 2.0 * np.arcsin(0.5 * found.chord.max())
+
+
 @pytest.fixture(params=QUESTIONS)
 def name(request):
     """The name of a question."""
@@ -56,30 +65,22 @@ def name(request):
 def test_figures_bound_what_dense_sampling_finds(name):
     """20 points a segment: tool point, angle and limits are as good as the certificate says.
 
-    The angle is within a hundredth of what is found. The tool point's figure is within 2.5 times
-    of it where single joints do the work. Where joints make up for each other, or the arm's own
-    arcs follow the surface (the dome is centred on the shoulder), a bound by the sum of their
-    shares comes out 10 to 100 times too large. That costs waypoints, not soundness.
+    The angle is within a hundredth of what is found.
     """
-    robot, cells, task = question(name)
+    robot, _, task = question(name)
     walk = witness(name)
     outcome = ask(name)
     assert outcome.accepted
     assert outcome.refusal == ""
     figures = outcome.certificate
     assert figures.waypoints == len(walk.q)
-    q = np.vstack([between(a, b, 20)[1] for a, b in zip(walk.q, walk.q[1:], strict=False)])
-    found = deviation(cells.surface, task.standoff, *tools(robot, q))
-    assert found.on_patch.all()
-    distance = found.distance.max()
-    angle = 2.0 * np.arcsin(0.5 * found.chord.max())
+    distance, angle = largest(name)
     assert distance <= figures.max_position_error
-    assert figures.max_position_error <= 2.5 * distance or name not in SIMPLE
     assert angle <= figures.max_angle + 1e-12
     assert figures.max_angle <= 1.01 * angle
     assert figures.max_position_error <= (task.tolerance or 1e-3)
     assert figures.max_angle <= task.cone + 1e-9
-    margin = min((q - robot.lower).min(), (robot.upper - q).min())
+    margin = min((walk.q - robot.lower).min(), (robot.upper - walk.q).min())
     assert figures.min_limit_margin == pytest.approx(margin, abs=1e-12)
     assert margin >= 0.0
 
@@ -110,39 +111,15 @@ def test_a_waypoint_that_is_off_by_one_and_a_half_tolerances(name, share):
         q[row] += np.linalg.lstsq(jacobian, point + away - now, rcond=1e-6)[0]
     (now,), _ = tools(robot, q[row : row + 1])
     assert np.linalg.norm(now - point - away) < 1e-6
-    assert "deviates" in ask(name, q).refusal
+    assert "off its surface" in ask(name, q).refusal
 
 
-def test_removed_waypoints(name):
-    """Waypoints between centres that are left out make segments too long for the bound."""
-    if name in ("ur5, plate", "ur5 on a rail"):
-        kept = np.arange(len(witness(name).q)) % 8 == 0  # a plate forgives more
-    else:
-        kept = witness(name).cell >= 0
+def test_a_cut_off_the_surface(name):
+    """Out to a configuration off the surface, and back to the last cell."""
     walk = witness(name)
-    outcome = ask(name, walk.q[kept], walk.cell[kept])
-    assert not outcome.accepted
-
-
-def test_a_cut_across_the_walk(name):
-    """From the first waypoint straight to the last, marks and all: no motion along the surface."""
-    walk = witness(name)
-    last, first = walk.q[-1:], walk.q[:1]
-    q, cell = np.vstack([walk.q, first]), np.append(walk.cell, walk.cell[0])
-    neighbours = question(name)[1].neighbours.of(int(walk.cell[-1]))
-    refusal = ask(name, q, cell).refusal
-    assert ("deviates" if walk.cell[0] in neighbours else "do not touch") in refusal
-    # Out to a configuration off the surface, and back to the last cell.
+    last = walk.q[-1:]
     q, cell = np.vstack([walk.q, last + 0.3, last]), np.append(walk.cell, [-1, walk.cell[-1]])
-    assert "deviates" in ask(name, q, cell).refusal
-
-
-def test_a_motion_that_ends_between_centres(name):
-    """What lies before the first mark or behind the last belongs to no curve."""
-    walk = witness(name)
-    q, cell = np.vstack([walk.q, walk.q[-1:]]), np.append(walk.cell, -1)
-    assert "away from every cell's centre" in ask(name, q, cell).refusal
-    assert "away from every cell's centre" in ask(name, q[::-1], cell[::-1]).refusal
+    assert "off its surface" in ask(name, q, cell).refusal
 
 
 def test_limits_are_exact(name):
@@ -163,22 +140,18 @@ def test_limits_are_exact(name):
                 continue
             narrow = robot.with_limits(np.column_stack([tight[0], tight[1]]))
             refusal = replay(narrow, cells, task, walk, needed).refusal
-            assert "a joint passes its limit by 1e-06" in refusal
+            assert f"{robot.joint_names[j]} passes its limit by" in refusal
 
 
 def test_tolerance_and_cone_are_those_of_the_task(name):
-    """The figures just suffice; a little less is refused."""
+    """The figures just suffice; a little less than what is really there is refused."""
     figures = ask(name).certificate
-    cone = np.degrees(figures.max_angle)
-    exact = {"tolerance": figures.max_position_error, "cone_deg": cone + 1e-9}
+    exact = {"tolerance": figures.max_position_error,
+             "cone_deg": np.degrees(figures.max_angle) + 1e-9}  # fmt: skip
     assert ask(name, **exact).accepted
-    tilted = ask(name, cone_deg=cone - 0.01)
-    if tilted.accepted:  # the cone holds at the targets, if not at the closest points beside them
-        tilted = ask(name, cone_deg=np.degrees(tilted.certificate.max_angle) - 0.01)
-    assert "tilts" in tilted.refusal
-    # The tolerance also sets the band over which the surface's curvature is bounded.
-    loose = ask(name, tolerance=0.99 * figures.max_position_error)
-    assert "deviates" in loose.refusal
+    distance, angle = largest(name)
+    assert "tilts" in ask(name, cone_deg=np.degrees(angle) - 0.01).refusal
+    assert not ask(name, tolerance=0.99 * distance).accepted
 
 
 def test_marks_are_checked(name):
@@ -189,19 +162,18 @@ def test_marks_are_checked(name):
     first, other = rows[0], rows[walk.cell[rows] != walk.cell[rows[0]]][0]
     wrong = walk.cell.copy()
     wrong[first] = walk.cell[other]
-    misplaced = ("not at its cell's centre", "do not touch")
-    assert any(words in ask(name, cell=wrong).refusal for words in misplaced)
+    misplaced = "is not at its centre's target"
+    assert misplaced in ask(name, cell=wrong).refusal
     swapped = walk.cell.copy()
     swapped[[first, other]] = walk.cell[[other, first]]
-    assert any(words in ask(name, cell=swapped).refusal for words in misplaced)
-    missing = np.where(walk.cell == walk.cell[other], -1, walk.cell)
-    unmarked = ask(name, cell=missing).refusal
-    assert any(words in unmarked for words in ("never visited", "deviates", *misplaced))
+    assert misplaced in ask(name, cell=swapped).refusal
+    unmarked = ask(name, cell=np.where(walk.cell == walk.cell[other], -1, walk.cell))
+    assert unmarked.accepted  # it is reached, whether it is marked or not
     still = Walk(walk.q[:1], walk.cell[:1])
     needed = np.zeros(len(cells), dtype=bool)
     needed[[walk.cell[0], walk.cell[other]]] = True
     robot, _, task = question(name)
-    assert replay(robot, cells, task, still, needed).refusal == "1 cells are never visited"
+    assert "never reached" in replay(robot, cells, task, still, needed).refusal
     for impossible in (len(cells), -2, 10**9):
         bad = walk.cell.copy()
         bad[first] = impossible
@@ -210,7 +182,7 @@ def test_marks_are_checked(name):
     if len(between_centres):
         early = walk.cell.copy()
         early[between_centres[len(between_centres) // 2]] = walk.cell[other]
-        assert any(words in ask(name, cell=early).refusal for words in misplaced)
+        assert misplaced in ask(name, cell=early).refusal
 
 
 def test_a_turn_more_in_one_joint(name):
@@ -246,11 +218,11 @@ def test_walks_that_are_malformed(name):
             for column in (0, walk.q.shape[1] - 1):
                 q = walk.q.copy()
                 q[row, column] = bad
-                assert "not finite" in ask(name, q).refusal
+                assert "not a finite number" in ask(name, q).refusal
     assert "no motion of" in ask(name, walk.q[:, 1:]).refusal
-    assert "no motion of" in ask(name, walk.q[1:]).refusal
-    assert "never visited" in ask(name, walk.q[:0], walk.cell[:0]).refusal
-    assert "never visited" in ask(name, walk.q[:1], walk.cell[:1]).refusal
+    assert "have cells of shape" in ask(name, walk.q[1:]).refusal
+    assert "never reached" in ask(name, walk.q[:0], walk.cell[:0]).refusal
+    assert "never reached" in ask(name, walk.q[:1], walk.cell[:1]).refusal
 
 
 def test_one_waypoint_for_one_cell():
@@ -297,7 +269,6 @@ def test_a_motion_beside_its_target_is_refused():
         cells = patch.cells(1, 1)
         outcome = replay(arm, cells, task, Walk(q, np.array([0])), np.zeros(1, dtype=bool))
         assert outcome.accepted is accepted
-        assert outcome.certificate.max_position_error == pytest.approx(beside, abs=1e-12)
 
 
 def test_over_a_fold_only_a_single_waypoint_is_certified():

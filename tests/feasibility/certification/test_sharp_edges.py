@@ -8,7 +8,6 @@ from dense_replay import dense, tools
 from test_creases import PER_SEGMENT, nearest, roof
 
 from feasibility import Task, check
-from feasibility.targets import beside_facets
 from robots import load_robot
 from surfaces import mesh
 
@@ -24,7 +23,7 @@ CASES = {
 
 @pytest.mark.parametrize("name", CASES)
 def test_a_certificate_bounds_how_far_a_motion_is_from_the_triangles(name: str) -> None:
-    """By the exact distance, and over a sharp edge by the direction to it too."""
+    """By the exact distance; over a sharp edge the direction to it is inside the cone, too."""
     part, task, count = CASES[name]
     surface = mesh(part, position=(0.5, -0.15, 0.3))
     verdict = check(load_robot("ur5"), surface.cells(count), task)
@@ -38,7 +37,7 @@ def test_a_certificate_bounds_how_far_a_motion_is_from_the_triangles(name: str) 
     assert np.abs(away - task.standoff).max() <= certificate.max_position_error
     if name not in ("smooth", "concave"):  # where normals are interpolated
         cosine = ((closest - tips) * axes).sum(axis=1) / away
-        assert np.arccos(np.clip(cosine, -1, 1)).max() <= certificate.max_angle + 1e-9
+        assert np.arccos(np.clip(cosine, -1, 1)).max() <= task.cone + 1e-9
 
 
 @pytest.mark.parametrize("angle", [95, 120, 150, 170])
@@ -51,20 +50,3 @@ def test_a_point_over_a_sharp_edge_is_outside(angle: int) -> None:
         closest_point = surface.closest([0.0, y, 0.0] + 0.05 * over)
         np.testing.assert_allclose(closest_point.height, 0.05, rtol=1e-12)
         assert surface.closest([0.0, y, -0.01]).height < 0.0
-
-
-@pytest.mark.parametrize("angle", [25, 60, 120, 150])
-def test_the_cells_of_a_curve_agree_with_the_full_mesh(angle: int) -> None:
-    """Where nothing else is near: the search uses the former, the replay the latter."""
-    cells = mesh(roof(angle)).cells(20)
-    t = (np.arange(32) + 0.5) / 32
-    curves = np.repeat(np.arange(len(cells.pairs)), len(t))
-    places = curves, *cells.curves.at(curves, np.tile(t, len(cells.pairs)))
-    near, all_over = (
-        beside_facets(cells, 0.02, 3e-4, *places, everywhere=everywhere)
-        for everywhere in (False, True)
-    )
-    np.testing.assert_allclose(near.off, all_over.off, atol=1e-12)
-    np.testing.assert_allclose(near.leans, all_over.leans, atol=1e-9)
-    assert near.leans.max() < 0.1
-    assert (near.leans.max() > 0.0) == (angle > 30)
