@@ -62,7 +62,7 @@ feasibility.certification.tool_alone
 feasibility.certification.joint_boxes
 feasibility.certification.rolls
 feasibility.certification.cut_proofs
-feasibility.certification: cells_reached followed motion_replay order stretches surface_replay
+feasibility.certification: cells_reached followed motion_replay order refusals stretches surface_replay
 feasibility.certification.areas
 feasibility.paper
 feasibility.cases

@@ -1,9 +1,10 @@
 """Poses over a surface: which parts of a motion along them have to be right over it as well.
 
 The curves of a toolpath say where it leads. Where they follow a surface, the tool has to be right
-over the surface itself; where it is lifted, or beyond the border, its target must not go through
-that. The height of a point over a surface changes by no more than the point moves; so on a straight
-line between two targets, d apart, with the heights a and b, it is at least (a + b - d) / 2.
+over the surface itself; where it is lifted, or beyond the border, it must not go through that. The
+height of a point over a surface changes by no more than the point moves; so on a straight line
+between two points d apart, with the heights a and b, it is at least (a + b - d) / 2. Between two
+configurations the tool point bends off such a line by less, the more they are halved.
 """
 
 from __future__ import annotations
@@ -15,13 +16,14 @@ import numpy as np
 from coverable_arrays import Array, Ints, Mask
 from feasibility.certification.faults import MotionFault
 from feasibility.certification.stretches import Judge, Samples
+from robots import Kinematics
 from surfaces import Surface
 from surfaces.meshes import MeshSurface
-from surfaces.toolpaths import PoseSurface
 
 HALVINGS = 30  # to where a motion leaves what it follows
 LEVELS = 20  # halvings of what is lifted, until it is clear of the surface
-BEYOND = 2e-3  # [m] so close targets beyond the border are looked at
+BEYOND, LONG = 2e-3, 0.02  # [m] so close points are looked at, beyond the border and elsewhere
+BENT = 1.01  # [1] the way between two points that are so close, compared with the straight line
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -98,39 +100,48 @@ def _turns(
     return 0.5 * (low + high)
 
 
-def lifted_faults(
-    judge: Judge, surface: PoseSurface, rows: Array, samples: Samples
-) -> list[MotionFault]:
-    """Where a tool that is lifted, or beyond the border, may be through the surface under poses.
-
-    Args:
-        judge: of the motion over the poses.
-        surface: the poses, with a surface under them.
-        rows, samples: see `followed_parts`.
-    """
-    under, followed, tolerance = surface.under, surface.followed, judge.task.effective_tolerance
-    if under is None or surface.working is None:
-        return []
+def off_surface(followed: Mask, samples: Samples) -> tuple[Array, Array]:
+    """(k,) from where to where, in rows with their shares, a motion does not follow the surface."""
     off = ~_on(samples.places.chart, followed)
     at = samples.row + samples.share
     some = np.flatnonzero(off[:-1] | off[1:])
-    left, right = at[some], at[some + 1]
+    return at[some], at[some + 1]
+
+
+def lifted_faults(
+    surface: Surface,
+    rows: Array,
+    lifted: tuple[Array, Array],
+    kinematics: Kinematics,
+    tolerance: float,
+) -> list[MotionFault]:
+    """Where a tool that is lifted, or beyond the border, may be through a surface.
+
+    Args:
+        surface: the surface.
+        rows: (m, n) the motion, rad or m.
+        lifted: (k,) from where to where it is, in rows with their shares.
+        kinematics: of the arm.
+        tolerance: m, how deep the tool may be.
+    """
+    left, right = lifted
     for _ in range(LEVELS):
+        if not len(left):
+            return []
         parts = [_part(rows, end) for end in (left, right)]
-        places = [judge.sampled(part.row, part.share, part.q).places for part in parts]
-        targets = [judge.offset.at(each)[0] for each in places]
-        ends = np.stack([_heights(under, each) for each in targets])
+        points = [kinematics.tools(part.q)[0] for part in parts]
+        ends = np.stack([_heights(surface, each) for each in points])
         least = np.nan_to_num(ends, nan=np.inf).min(axis=0)
-        way = np.linalg.norm(targets[1] - targets[0], axis=1)
         if (least < -tolerance).any():
             return [_through(parts[0], least)]
+        way = BENT * np.linalg.norm(points[1] - points[0], axis=1)
         both, none = np.isfinite(ends).all(axis=0), np.isnan(ends).all(axis=0)
         bound = np.where(both, 0.5 * (ends.sum(axis=0) - way), least - way)
-        open_ = np.where(none, way > BEYOND, ~(bound >= -tolerance))
-        if not open_.any():
-            return []
+        open_ = ~(bound >= -tolerance) | (way > np.where(none, BEYOND, LONG))
         middle = 0.5 * (left[open_] + right[open_])
         left, right = np.append(left[open_], middle), np.append(middle, right[open_])
+    if not len(left):
+        return []
     text = "not certified: the tool may go through the surface where it is lifted"
     return [MotionFault(int(left[0]), float(left[0] % 1.0), text)]
 

@@ -24,20 +24,19 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
-from coverable_errors import counted
 from feasibility.certification.cells_reached import cells_reached, in_order, missed_text
 from feasibility.certification.collisions import collision_replay
 from feasibility.certification.faults import Judged, MotionFault
-from feasibility.certification.followed import followed_parts, lifted_faults
+from feasibility.certification.followed import followed_parts, lifted_faults, off_surface
 from feasibility.certification.jacobians import placements
 from feasibility.certification.order import curves_of_marks, order_of_places
-from feasibility.certification.rolls import CLOSE_TO_ZERO as ROLL_CLOSE
-from feasibility.certification.stretches import CLOSE_TO_ZERO, Bounds, Judge, Samples, Stretches
+from feasibility.certification.refusals import exact_faults, limits, open_fault
+from feasibility.certification.stretches import Bounds, Judge, Samples, Stretches
 from feasibility.collisions import Bodies
 from feasibility.cone import angle_of
 from feasibility.task import Task
 from feasibility.verdict import Certificate
-from robots import Robot
+from robots import Kinematics, Robot
 from surfaces import Cells, Surface
 from surfaces.places import offset_surface
 from surfaces.toolpaths import PoseSurface
@@ -67,6 +66,7 @@ def replay_over_surface(
     needed: Mask | None = None,
     bodies: Bodies | None = None,
     marks: Ints | None = None,
+    working: Mask | None = None,
 ) -> MotionReplay:
     """Judge a motion by the module's rules.
 
@@ -79,6 +79,9 @@ def replay_over_surface(
         bodies: what has to stay clear of what; None where collisions are not checked.
         marks: (m,) the cell whose target a row is said to be at, -1 at none: over which places the
             motion may be, to be tried first.
+        working: (m,) at which rows the tool works: between two of them it has to be right over the
+            surface, or over that under poses, whose curves then do not count; elsewhere it may be
+            anywhere but through that. Everywhere by default.
     """
     rows = np.asarray(q, dtype=float)
     nowhere = np.zeros(len(cells), dtype=bool)
@@ -86,21 +89,23 @@ def replay_over_surface(
     if fault is not None:
         unknown = Certificate(len(rows) if rows.ndim else 0, np.nan, np.nan, np.nan)
         return MotionReplay(unknown, (fault,), nowhere)
-    surface = cells.surface
-    if isinstance(surface, PoseSurface) and task.approach == "normal":
-        surface = replace(surface, axes=None)  # those of the poses' own do not count
-    curves = None if marks is None else curves_of_marks(cells, marks)
+    surface, curves = _surface_of(cells, task, working), None
+    if working is None and marks is not None:
+        curves = curves_of_marks(cells, marks)
     offset = offset_surface(surface, surface.side_sign * task.standoff)
     judge = Judge(robot, less_deviations(task, surface), offset, cells, curves)
-    margin, faults = _limits(robot, rows)
-    found = _tool_along(judge, rows, cells, marks)
-    samples = found.samples
-    reached = cells_reached(robot, cells, task, rows, samples)
-    missed = np.flatnonzero(~reached if needed is None else needed & ~reached)
+    margin, faults = limits(robot, rows)
+    if working is None:
+        found = _tool_along(judge, rows, cells, marks)
+        reached = cells_reached(robot, cells, task, rows, found.samples)
+    else:
+        found, reached = _tool_at_work(judge, rows, cells, surface, working)
+        needed = _at_work(cells) if needed is None else needed
     faults += found.faults
+    missed = np.flatnonzero(~reached if needed is None else needed & ~reached)
     if len(missed):
-        faults.append(MotionFault(-1, 0.0, missed_text(cells, task, missed, samples)))
-    faults += order_of_places(offset, samples, task.effective_tolerance)
+        faults.append(MotionFault(-1, 0.0, missed_text(cells, task, missed, found.samples)))
+    faults += order_of_places(offset, found.samples, task.effective_tolerance)
     if isinstance(surface, PoseSurface) and not faults:
         found = _with_what_follows(found, judge, rows, cells, surface)
         faults += found.faults
@@ -115,6 +120,46 @@ def replay_over_surface(
             certificate, min_clearance=clear.min_clearance, nearest_pair=clear.nearest_pair
         )
     return MotionReplay(certificate, tuple(faults), reached)
+
+
+def _surface_of(cells: Cells, task: Task, working: Mask | None) -> Surface:
+    """What a motion is judged over."""
+    surface = cells.surface
+    if not isinstance(surface, PoseSurface):
+        return surface
+    if working is not None and surface.under is not None:
+        return surface.under
+    # Those of the poses' own do not count along normals.
+    return replace(surface, axes=None) if task.approach == "normal" else surface
+
+
+def _at_work(cells: Cells) -> Mask | None:
+    """(N,) the poses at which the tool works, where cells are poses; None for all cells."""
+    return cells.surface.working if isinstance(cells.surface, PoseSurface) else None
+
+
+def _tool_at_work(
+    judge: Judge, rows: Array, cells: Cells, surface: Surface, working: Mask
+) -> tuple[_Along, Mask]:
+    """What is found where the tool works, and (N,) the cells that are reached there.
+
+    Where it does not, it must not go through the surface.
+    """
+    most, faults, samples = np.zeros(3), list[MotionFault](), list[Samples]()
+    reached = np.zeros(len(cells), dtype=bool)
+    turns = np.flatnonzero(np.diff(working)) + 1
+    for part in np.split(np.arange(len(rows)), turns):
+        if len(part) and working[part[0]]:
+            found = _tool_along(judge, rows[part])
+            most = np.maximum(most, found.most)
+            faults += [replace(each, row=each.row + part[0]) for each in found.faults]
+            samples.append(replace(found.samples, row=found.samples.row + part[0]))
+            reached |= cells_reached(judge.robot, cells, judge.task, rows[part], found.samples)
+    lifted = np.flatnonzero(~(working[:-1] & working[1:])).astype(float)
+    kinematics, tolerance = Kinematics(judge.robot), judge.task.effective_tolerance
+    faults += lifted_faults(surface, rows, (lifted, lifted + 1.0), kinematics, tolerance)
+    none = judge.sampled(np.zeros(0, dtype=np.int64), np.zeros(0), rows[:0])
+    return _Along(most, faults, Samples.join(none, *samples)), reached
 
 
 class _Along(NamedTuple):
@@ -137,7 +182,7 @@ def _tool_along(
     if marks is not None and cells is not None:
         at_rows = _at_marks(judge, cells, marks, at_rows)
     good = judge.within(at_rows)
-    faults = _exact_faults(judge, at_rows.of(~good), "row")
+    faults = exact_faults(judge, at_rows.of(~good), "row")
     stretches = judge.between_rows(rows, poses, at_rows).of(good[:-1] & good[1:])
     looked = _between(judge, rows, stretches)
     samples = in_order(Samples.join(at_rows, *looked.samples))
@@ -157,9 +202,11 @@ def _with_what_follows(
         return found
     task = less_deviations(judge.task, surface.under)
     over = Judge(judge.robot, task, offset_surface(surface.under, judge.offset.height), cells)
-    faults = lifted_faults(judge, surface, rows, found.samples)
-    most = found.most
-    for part in followed_parts(judge, surface.followed, rows, found.samples):
+    followed, most = surface.followed, found.most
+    at = off_surface(followed, found.samples)
+    kinematics, tolerance = Kinematics(judge.robot), judge.task.effective_tolerance
+    faults = lifted_faults(surface.under, rows, at, kinematics, tolerance)
+    for part in followed_parts(judge, followed, rows, found.samples):
         one = _tool_along(over, part.q)
         most = np.maximum(most, one.most)
         faults += [part.placed(fault) for fault in one.faults]
@@ -230,9 +277,9 @@ def _between(judge: Judge, rows: Array, stretches: Stretches) -> _Between:
         left = left.of(good).halves(middle.of(good))
     faults = list[MotionFault]()
     if wrong:
-        faults = _exact_faults(judge, Samples.join(*wrong), "place")
+        faults = exact_faults(judge, Samples.join(*wrong), "place")
     elif len(left.length):
-        faults = [_open_fault(judge, left, bounds)]
+        faults = [open_fault(judge, left, bounds)]
     return _Between(most, faults, samples)
 
 
@@ -245,102 +292,3 @@ def _malformed(robot: Robot, rows: Array) -> MotionFault | None:
         row, joint = np.argwhere(~finite)[0]
         return MotionFault(int(row), 0.0, f"{robot.joint_names[joint]} is not a finite number")
     return None
-
-
-def _limits(robot: Robot, rows: Array) -> tuple[float, list[MotionFault]]:
-    """The smallest distance from a limit, and the worst row that passes one; limits are convex."""
-    margins = np.minimum(rows - robot.lower, robot.upper - rows)
-    least = float(margins.min(initial=np.inf))
-    if least >= 0.0:
-        return least, []
-    row, joint = np.unravel_index(np.argmin(margins), margins.shape)
-    slides = robot.prismatic[joint]
-    by = f"{-1e3 * least:.4g} mm" if slides else f"{-np.degrees(least):.4g} deg"
-    text = f"{robot.joint_names[joint]} passes its limit by {by}"
-    others = int((margins < 0.0).any(axis=1).sum()) - 1
-    return least, [MotionFault(int(row), 0.0, text + _others(others, "row"))]
-
-
-def _exact_faults(judge: Judge, wrong: Samples, noun: str) -> list[MotionFault]:
-    """The worst of configurations that are wrong: the furthest off, and the most tilted."""
-    task, faults = judge.task, []
-    tolerance = task.effective_tolerance
-    off = np.flatnonzero(~(wrong.error <= tolerance))
-    if len(off):
-        worst = off[np.argmax(np.nan_to_num(wrong.error[off], nan=np.inf))]
-        text = (
-            f"the tool point is {1e3 * wrong.error[worst]:.4g} mm off its surface, "
-            f"{1e3 * tolerance:g} mm are allowed" + _others(len(off) - 1, noun)
-        )
-        faults.append(MotionFault(int(wrong.row[worst]), float(wrong.share[worst]), text))
-    tilted = np.flatnonzero(~(wrong.chord <= task.cone_chord + CLOSE_TO_ZERO))
-    if len(tilted):
-        worst = tilted[np.argmax(np.nan_to_num(wrong.chord[tilted], nan=np.inf))]
-        text = (
-            f"the tool axis tilts {np.degrees(angle_of(float(wrong.chord[worst]))):.6g} deg, "
-            f"{task.cone_deg:g} deg are allowed" + _others(len(tilted) - 1, noun)
-        )
-        faults.append(MotionFault(int(wrong.row[worst]), float(wrong.share[worst]), text))
-    faults += _roll_faults(task, wrong, noun)
-    near = np.flatnonzero(~(wrong.facets >= judge.least_distance - CLOSE_TO_ZERO))
-    if len(near) and not len(off):
-        worst = near[np.argmin(wrong.facets[near])]
-        text = (
-            f"the tool point comes within {1e3 * wrong.facets[worst]:.4g} mm of the mesh's "
-            f"triangles, nearer than the standoff of {1e3 * task.standoff:g} mm: something "
-            "protrudes there, or its facets are too coarse for this standoff"
-        )
-        faults.append(MotionFault(int(wrong.row[worst]), float(wrong.share[worst]), text))
-    return faults
-
-
-def _roll_faults(task: Task, wrong: Samples, noun: str) -> list[MotionFault]:
-    """The one whose roll is furthest outside its range."""
-    if task.roll is None or task.roll_deg is None:
-        return []
-    rolled = np.flatnonzero(~(wrong.roll <= task.roll.half + ROLL_CLOSE))
-    if not len(rolled):
-        return []
-    worst = rolled[np.argmax(np.nan_to_num(wrong.roll[rolled], nan=np.inf))]
-    beyond = np.degrees(wrong.roll[worst] - task.roll.half)
-    low, high = task.roll_deg
-    text = f"the roll is {beyond:.6g} deg outside its range, {low:g} to {high:g} deg" + _others(
-        len(rolled) - 1, noun
-    )
-    return [MotionFault(int(wrong.row[worst]), float(wrong.share[worst]), text)]
-
-
-def _others(number: int, noun: str) -> str:
-    """' (the worst; wrong at 3 other rows, too)', or nothing."""
-    others = counted(number, f"other {noun}")
-    return f" (the worst; wrong at {others}, too)" if number > 0 else ""
-
-
-def _open_fault(judge: Judge, left: Stretches, bounds: Bounds) -> MotionFault:
-    """What to say of a stretch that neither bounds nor exact configurations decide."""
-    # One with a jump first, then the shortest: what is wrong there is nearest to a place.
-    one = int(np.lexsort((left.length, bounds.joined))[0])
-    row, share = int(left.start.row[one]), float(left.start.share[one] + 0.5 * left.length[one])
-    if not bounds.joined[one]:
-        target = [
-            judge.offset.at(s.places.of(np.array([one])))[0][0] for s in (left.start, left.end)
-        ]
-        jump = 1e3 * float(np.linalg.norm(target[1] - target[0]))
-        text = f"the place on the surface that the tool is over jumps, by {jump:.3g} mm"
-    elif not bounds.error[one] <= judge.task.effective_tolerance:
-        text = (
-            "not certified: the tool point is at the edge of the tolerance, or its place on the "
-            f"surface jumps (within {1e3 * bounds.error[one]:.6g} mm, "
-            f"{1e3 * judge.task.effective_tolerance:g} mm are allowed)"
-        )
-    elif not bounds.chord[one] <= judge.task.cone_chord + CLOSE_TO_ZERO:
-        text = (
-            "not certified: the tool axis is at the edge of the cone (within "
-            f"{np.degrees(angle_of(float(bounds.chord[one]))):.6f} deg, {judge.task.cone_deg:g} "
-            "deg are allowed)"
-        )
-    elif not bounds.facets[one] >= judge.least_distance - CLOSE_TO_ZERO:
-        text = "not certified: the tool point may come too near to the mesh's triangles"
-    else:
-        text = "not certified: the roll is at the edge of its range, or the reference turns there"
-    return MotionFault(row, share, text)
