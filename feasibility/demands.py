@@ -107,6 +107,7 @@ DEMANDS = (
 )  # fmt: skip
 BY_REPLAY = tuple(demand.name for demand in DEMANDS if demand.judge is None)
 TOGETHER = tuple(demand.name for demand in DEMANDS if demand.together)
+OF_EACH = tuple(demand.name for demand in DEMANDS if not demand.together)
 RATES = ("speed", "distance from singularities")
 OF_TREE = ("standoff", "tolerance", "cone", "roll", "limits", "start")
 """What the replay of the paper's tree judges, which knows nothing of the others."""
