@@ -14,6 +14,7 @@ from coverable_errors import ArgumentError
 from feasibility.attempts import Method, attempts_at
 from feasibility.clock import Clock, OutOfTime
 from feasibility.collisions import Collision
+from feasibility.demands import OF_TREE, RATES, further, unjudged
 from feasibility.found import Found
 from feasibility.problem import Problem
 from feasibility.search import Progress, Search
@@ -97,7 +98,25 @@ def check(
         method = partial(complete_search, seeds=seeds)
     clock = Clock(search.time_limit, progress) if clock is None else clock
     verdict = _decided(problem, search, clock, method)
-    return _measured(_at_rates(verdict, clock), clock)
+    return _all_judged(_measured(_at_rates(verdict, clock), clock))
+
+
+def _all_judged(verdict: Verdict) -> Verdict:
+    """The verdict; undecided where its motion does not hold, or nobody judged, what is demanded."""
+    if not verdict.feasible or not len(verdict.cells):
+        return verdict
+    robot, cells, task = verdict.robot, verdict.cells, verdict.task
+    if verdict.witness is None:
+        left = unjudged(robot, task, OF_TREE)
+        refusal = f"not judged of it: {', '.join(left)}" if left else ""
+    else:
+        refusal = further(robot, cells, task, [verdict.witness], (*RATES, "coverage")).refusal
+    if not refusal:
+        return verdict
+    return replace(
+        verdict, answer=Answer.UNDECIDED, evidence=Evidence.BUDGET, witness=None, certificate=None,
+        message=f"{verdict.message} But {refusal}.",
+    )  # fmt: skip
 
 
 def _at_rates(verdict: Verdict, clock: Clock) -> Verdict:
@@ -132,14 +151,18 @@ def greedy_check(
         start: (n,) the start configuration over one of the cells, rad or m; without it, `check`.
 
     Raises:
-        ArgumentError: `start` is not a feasible configuration over one of the cells.
+        ArgumentError: `start` is not a feasible configuration over one of the cells; or the task
+            demands what only the complete search knows.
     """
     from feasibility.paper import greedy_search
+    from feasibility.speed import check_requirements
 
     search = Search(method="greedy") if search is None else search
+    problem = Problem.of(robot, cells, task)
+    check_requirements(robot, task, search)
     clock = Clock(search.time_limit, progress)
-    method = partial(greedy_search, start=start)
-    return _measured(_decided(Problem.of(robot, cells, task), search, clock, method), clock)
+    method = partial(greedy_search, start=robot.start if start is None else start)
+    return _all_judged(_measured(_decided(problem, search, clock, method), clock))
 
 
 def _decided(problem: Problem, search: Search, clock: Clock, method: Method) -> Verdict:

@@ -1,14 +1,17 @@
 """`verify`: what somebody claims, judged without any search.
 
-A motion that anybody made is replayed over the surface; a verdict's witness likewise; its proof is
-checked cut by cut, and leaf by leaf. Nothing is believed of where they come from.
+A motion that anybody made is replayed over the surface, and all else that the case demands is
+judged (`demands`); a verdict's witness likewise; its proof is checked cut by cut, and leaf by leaf.
+Nothing is believed of where they come from.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal, overload
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,9 +23,10 @@ from feasibility.certification import (
     replay_over_surface,
     verify_proof,
 )
-from feasibility.certification.rates import check_rates, replay_rates
-from feasibility.collisions import checked_words
+from feasibility.clock import Clock, OutOfTime
+from feasibility.collisions import Collision, checked_words
 from feasibility.cut_tree import CutTree
+from feasibility.demands import BY_REPLAY, OF_TREE, further, unjudged
 from feasibility.problem import Problem
 from feasibility.results import Result
 from feasibility.search import Search
@@ -31,7 +35,15 @@ from feasibility.verdict import Answer, Certificate, Evidence, Verdict, Walk
 from robots import Robot
 from surfaces import Cells
 
-AT_START = 1e-9  # [rad] or [m]: a first row this near to the start is at it
+if TYPE_CHECKING:
+    from feasibility.treated import TreatedArea
+
+NOT_IN_TIME = (
+    "not verified in time: the limit of {:g} s ran out; --set search.time_limit=... gives more time"
+)
+
+
+Claim = Literal["motion", "witness", "tree", "proof"]
 
 
 class NothingToVerifyError(CoverableError):
@@ -42,7 +54,7 @@ class NothingToVerifyError(CoverableError):
 class Verification:
     """What became of a claim."""
 
-    claim: Literal["motion", "witness", "tree", "proof"]
+    claim: Claim
     """A motion that anybody made; a verdict's own; the tree of the paper's search, which holds by
     the paper's definitions; or a cut tree."""
     robot: Robot
@@ -59,11 +71,25 @@ class Verification:
     proof: CutTree | None = None
     boxes: int = 0
     """Of a proof: how many boxes of joints and surface, or of tilt and roll, were looked at."""
+    treated: TreatedArea | None = None
+    """Of a motion that holds otherwise: what it treats, where the case requires a coverage."""
+    not_judged: tuple[str, ...] = ()
+    """What the case demands that was not looked at: of a motion that is refused for something else,
+    of a tree what the paper's search knows nothing of, and of a proof what it does not need, for
+    what no motion does with less demanded, none does with more. A motion, witness or tree that
+    holds was judged in everything."""
+    late: bool = False
+    """Did the time run out before there was an answer? Then it does not hold."""
 
     @property
     def holds(self) -> bool:
         """True where the claim is confirmed."""
         return not self.faults
+
+    @property
+    def collision(self) -> Collision | None:
+        """What bodies were judged to stay clear of; None where that was not looked at."""
+        return None if "collisions" in self.not_judged else self.task.collision
 
     @property
     def refusal(self) -> str:
@@ -74,18 +100,18 @@ class Verification:
         """One line."""
         what = f"{len(self.cells)} cells by {self.robot.name}"
         said = f"{self.claim} {'holds' if self.holds else 'does not hold'}: {what}."
-        checked = f"{checked_words(self.task.collision).capitalize()}."
+        checked = f"{checked_words(self.collision).capitalize()}."
         return " ".join(filter(None, [said, self.refusal, checked]))
 
 
 @overload
-def verify(claim: Robot, cells: Cells, task: Task, q: ArrayLike) -> Verification: ...
+def verify(
+    claim: Robot, cells: Cells, task: Task, q: ArrayLike, *, clock: Clock | None = None
+) -> Verification: ...
 
 
 @overload
-def verify(
-    claim: Verdict | Result, *, tick: Callable[[], object] | None = None
-) -> Verification: ...
+def verify(claim: Verdict | Result, *, clock: Clock | None = None) -> Verification: ...
 
 
 def verify(
@@ -94,23 +120,25 @@ def verify(
     task: Task | None = None,
     q: ArrayLike | None = None,
     *,
-    tick: Callable[[], object] | None = None,
+    clock: Clock | None = None,
 ) -> Verification:
     """Does this motion cover the cells; does what this verdict says of them hold?
 
     `verify(robot, cells, task, q)` judges a motion q (m, n) that anybody made, straight in joint
     space between its rows (rad or m, unwrapped): at every instant the tool point is within the
     tolerance of the target over a place of the surface, the axis within the cone there, that place
-    moves continuously, the joints are inside their limits; bodies stay clear where the task asks
-    for it; and every cell is reached. `verify` of a verdict, or of a result that was loaded, judges
-    its witness or its proof.
+    moves continuously, the joints are inside their limits; every cell is reached; and all else that
+    is demanded holds: bodies stay clear, it begins at the arm's start, it keeps the speed and its
+    distance from singularities, it treats enough of the area. `verify` of a verdict, or of a result
+    that was loaded, judges its witness or its proof.
 
     Args:
         claim: the arm; or a verdict or result.
         cells: the surface, cut into E-cells.
         task: standoff, cone and tolerance.
         q: the motion.
-        tick: of a proof, which may take long: called now and then; what it raises ends the check.
+        clock: its limit counts, and it reports progress; running out is no "holds". Of a motion,
+            and of the first steps of a proof, the limit is kept in commands alone.
 
     Raises:
         TypeError: an argument is something else.
@@ -132,14 +160,14 @@ def verify(
     """
     if isinstance(claim, Robot):
         problem = Problem.of(claim, cells, task)  # type: ignore[arg-type]  # refuses None
-        return _of_motion("motion", problem, _rows(q))
+        return _in_time("motion", problem, partial(_of_motion, "motion", problem, _rows(q)), clock)
     if cells is not None or task is not None or q is not None:
         raise TypeError("a verdict knows its robot, cells and task: give it alone")
     search = claim.case.search if isinstance(claim, Result) else None
     verdict = claim.verdict if isinstance(claim, Result) else claim
     if not isinstance(verdict, Verdict):
         raise TypeError(f"expected a Robot, a Verdict or a Result, got {verdict!r:.60}")
-    return _of_verdict(verdict, search, tick)
+    return _of_verdict(verdict, search, Clock() if clock is None else clock)
 
 
 def _rows(q: Any) -> Array:
@@ -154,61 +182,85 @@ def _rows(q: Any) -> Array:
         raise ArgumentError(f"q must be an array (m, n) of numbers, got {q!r:.60}") from error
 
 
-def _of_motion(
-    claim: Literal["motion", "witness"], problem: Problem, q: Any, marks: Ints | None = None
+def _in_time(
+    claim: Claim, problem: Problem, judged: Callable[[], Verification], clock: Clock | None
 ) -> Verification:
-    """The replay of a motion over the surface."""
+    """What became of a claim within the limit; a claim that could not be judged does not hold."""
+    clock = Clock() if clock is None else clock
+    try:
+        with clock.start().enforced():
+            return judged()
+    except OutOfTime:
+        robot, cells, task = problem.robot, problem.cells, problem.task
+        late = MotionFault(-1, 0.0, NOT_IN_TIME.format(clock.limit))
+        left = unjudged(robot, task, ())
+        return Verification(claim, robot, cells, task, (late,), not_judged=left, late=True)
+
+
+def _of_motion(claim: Claim, problem: Problem, q: Any, marks: Ints | None = None) -> Verification:
+    """The replay of a motion over the surface, and the other demands' judges."""
     robot, cells, task = problem.robot, problem.cells, problem.task
     found = replay_over_surface(robot, cells, task, q, bodies=problem.bodies, marks=marks)
-    faults = (*found.faults, *_begun_elsewhere(robot, q))
-    if found.accepted and len(cells):
-        faults = (*faults, *_too_fast(problem, Walk(q, np.full(len(q), -1, dtype=np.int64))))
-    return Verification(claim, robot, cells, task, faults, found.certificate, q, found.reached)
+    made = partial(
+        Verification, claim, robot, cells, task,
+        certificate=found.certificate, q=q, reached=found.reached,
+    )  # fmt: skip
+    if not found.accepted:
+        malformed = math.isnan(found.certificate.min_limit_margin)
+        judged = () if malformed else BY_REPLAY
+        return made(found.faults, not_judged=unjudged(robot, task, judged))
+    if not len(cells):
+        return made(())
+    more = further(robot, cells, task, [Walk(q, np.full(len(q), -1, dtype=np.int64))])
+    return made(more.faults, treated=more.treated)
 
 
-def _too_fast(problem: Problem, walk: Walk) -> tuple[MotionFault, ...]:
-    """What is wrong with speeds and singular values, where the task limits them."""
-    task = problem.task
-    if not task.requires_rates:
-        return ()
-    check_rates(problem.robot, task)
-    judged = replay_rates(problem.robot, problem.cells, task, walk)
-    return tuple(MotionFault(-1, 0.0, text) for text in judged.refusals)
-
-
-def _begun_elsewhere(robot: Robot, q: Any) -> tuple[MotionFault, ...]:
-    """The fault of a motion that does not begin at the arm's start."""
-    if robot.start is None or len(q) == 0 or np.shape(q[0]) != robot.start.shape:
-        return ()
-    off = float(np.abs(q[0] - robot.start).max())
-    if off <= AT_START:
-        return ()
-    return (MotionFault(0, 0.0, f"it begins {off:.3g} rad or m off the start"),)
-
-
-def _of_verdict(
-    verdict: Verdict, search: Search | None, tick: Callable[[], object] | None
-) -> Verification:
+def _of_verdict(verdict: Verdict, search: Search | None, clock: Clock) -> Verification:
     """A verdict's witness, tree or proof."""
-    robot, cells, task = verdict.robot, verdict.cells, verdict.task
-    problem = Problem.of(robot, cells, task)
-    if verdict.answer is Answer.FEASIBLE and len(cells) == 0:
-        return _of_motion("witness", problem, np.empty((0, robot.n)))
-    if verdict.answer is Answer.FEASIBLE and verdict.witness is not None:
-        return _of_motion("witness", problem, verdict.witness.q, verdict.witness.cell)
-    if verdict.answer is Answer.FEASIBLE and verdict.tree is not None and search is not None:
-        from feasibility.paper import replay_stored
+    problem = Problem.of(verdict.robot, verdict.cells, verdict.task)
+    claim: Claim = "witness"
+    if verdict.answer is Answer.FEASIBLE and len(verdict.cells) == 0:
+        judged = partial(_of_motion, claim, problem, np.empty((0, verdict.robot.n)))
+    elif verdict.answer is Answer.FEASIBLE and verdict.witness is not None:
+        walk = verdict.witness
+        judged = partial(_of_motion, claim, problem, walk.q, walk.cell)
+    elif (
+        verdict.answer is Answer.FEASIBLE
+        and verdict.tree is not None
+        and search is not None
+        and search.method == "greedy"
+    ):
+        claim, judged = "tree", partial(_of_tree, verdict, search)
+    elif verdict.answer is Answer.INFEASIBLE and verdict.proof is not None:
+        claim, judged = "proof", partial(_of_proof, verdict, verdict.proof, clock)
+    else:
+        raise NothingToVerifyError(_nothing(verdict))
+    return _in_time(claim, problem, judged, clock)
 
-        found = replay_stored(verdict, search)
-        faults = () if found.accepted else (MotionFault(-1, 0.0, found.refusal),)
-        return Verification("tree", robot, cells, task, faults, found.certificate)
-    if verdict.evidence is Evidence.PROOF and verdict.proof is not None:
-        checked = verify_proof(robot, cells, task, verdict.proof, tick)
-        faults = () if checked.accepted else (MotionFault(-1, 0.0, checked.refusal),)
-        return Verification(
-            "proof", robot, cells, task, faults, proof=verdict.proof, boxes=checked.boxes
-        )
-    raise NothingToVerifyError(_nothing(verdict))
+
+def _of_tree(verdict: Verdict, search: Search) -> Verification:
+    """The tree of the paper's search, by the paper's definitions, which know not every demand."""
+    from feasibility.paper import replay_stored
+
+    robot, cells, task = verdict.robot, verdict.cells, verdict.task
+    found = replay_stored(verdict, search)
+    left = unjudged(robot, task, OF_TREE)
+    faults = [found.refusal] if found.refusal else []
+    if left:
+        faults.append(f"{', '.join(left)}: not judged, since the greedy search knows nothing of it")
+    told = tuple(MotionFault(-1, 0.0, text) for text in faults)
+    return Verification("tree", robot, cells, task, told, found.certificate, not_judged=left)
+
+
+def _of_proof(verdict: Verdict, proof: CutTree, clock: Clock) -> Verification:
+    """The proof that no motion covers every cell."""
+    robot, cells, task = verdict.robot, verdict.cells, verdict.task
+    checked = verify_proof(robot, cells, task, proof, lambda: clock.tick(0, None, "verifying"))
+    faults = () if checked.accepted else (MotionFault(-1, 0.0, checked.refusal),)
+    left = unjudged(robot, task, BY_REPLAY)
+    return Verification(
+        "proof", robot, cells, task, faults, proof=proof, boxes=checked.boxes, not_judged=left
+    )
 
 
 def _nothing(verdict: Verdict) -> str:

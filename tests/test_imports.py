@@ -78,6 +78,7 @@ feasibility.roadmap: walk
 feasibility.roadmap.forward
 feasibility.roadmap: complete graph_g outcome refinement warmup
 feasibility.certification.rates
+feasibility: demands
 feasibility.area.kernels
 feasibility.area
 feasibility.paths

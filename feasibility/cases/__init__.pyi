@@ -12,7 +12,6 @@ from .keys import all_keys as all_keys
 from .robot_table import RobotPart as RobotPart
 from .robot_table import in_robot_table as in_robot_table
 from .robot_table import read_robot as read_robot
-from .surface_keys import CLOSED_FORM_KINDS as CLOSED_FORM_KINDS
 from .surface_keys import OWN_KEYS as OWN_KEYS
 from .surface_table import faults_of_building as faults_of_building
 from .surface_table import read_surface as read_surface

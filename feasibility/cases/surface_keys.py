@@ -40,8 +40,6 @@ PATCHES: Mapping[str, Mapping[str, str]] = MappingProxyType(
 """The keys of each kind of patch, and the arguments of its constructor that they stand for."""
 WHOLE = ("degree", "faces", "pieces")
 """Keys whose values hold no real numbers."""
-CLOSED_FORM_KINDS = ("sphere", "cylinder", "hyperboloid", "plane")
-"""The kinds that compiled loops know by formulas; of those were the first result files."""
 
 
 def read_patch(section: Section, kind: str) -> dict[str, Any]:

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import argparse
+import time
 from typing import TYPE_CHECKING
 
-from feasibility.cli.command import add_case, add_command, json_text, open_case
+from feasibility.cli.command import TooLate, add_case, add_command, json_text, open_case
 from feasibility.cli.console import print_out, progress_bar
 from feasibility.safe_files import shown_path
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from feasibility.cases import Case
     from feasibility.verifying import Verification
+
+LIMIT = "search.time_limit"
 
 
 def add(subcommands: argparse._SubParsersAction) -> None:
@@ -21,13 +25,15 @@ def add(subcommands: argparse._SubParsersAction) -> None:
         subcommands, "verify", verify, add_case,
         help="check a motion from anywhere, or a saved result, without searching",
         usage="coverable verify [--json] [--set KEY=VALUE] CASE MOTION\n"
-        "       coverable verify [--json] RESULT",
+        "       coverable verify [--json] [--set search.time_limit=SECONDS] RESULT",
         description="Check a joint motion against a case by the independent replay alone: limits, "
-        "tool point and tool axis at every instant, between rows too, and every cell reached. Or "
-        "check the witness or the proof of a result that `check --save` wrote.",
+        "tool point and tool axis at every instant, between rows too, every cell reached, and all "
+        "else that the case demands. Or check the witness or the proof of a result that "
+        "`check --save` wrote.",
         epilog="MOTION is CSV: a first line of joint names in any order, then a row a waypoint, in "
         "rad (NAME_deg: degrees) or m, unwrapped; rows are joined by straight lines in joint "
-        "space, and counted from 1. exit status: 0 holds, 1 does not, 2 bad input, 130 interrupted",
+        "space, and counted from 1. exit status: 0 holds, 1 does not, or is not "
+        "verified within search.time_limit, 2 bad input, 130 interrupted",
     )  # fmt: skip
     parser.add_argument(
         "motion", metavar="MOTION", nargs="?", help="a file of joint values; none for a RESULT"
@@ -36,39 +42,60 @@ def add(subcommands: argparse._SubParsersAction) -> None:
 
 def verify(args: argparse.Namespace, began: float) -> int:
     """`coverable verify CASE MOTION`, and `coverable verify RESULT`."""
-    return _result(args) if args.motion is None else _motion(args, began)
+    return _result(args, began) if args.motion is None else _motion(args, began)
 
 
 def _motion(args: argparse.Namespace, began: float) -> int:
     """Check a motion file against a case."""
-    with open_case(args, began, {}) as opened:
-        from feasibility.results import load_motion
-        from feasibility.verifying import verify as run
+    try:
+        with open_case(args, began, {}) as opened:
+            from feasibility.results import load_motion
+            from feasibility.verifying import verify as run
 
-        robot, cells, task, _ = opened.setup
-        motion = load_motion(args.motion, robot)
-        opened.progress(0, None, "replaying the motion")
-        found = run(robot, cells, task, motion.q)
+            robot, cells, task, _ = opened.setup
+            motion = load_motion(args.motion, robot)
+            opened.progress(0, None, "replaying the motion")
+            found = run(robot, cells, task, motion.q, clock=opened.clock)
+    except TooLate as late:
+        return _too_late(args, late.case)
     return _said(args, found, opened.case.name, args.motion, motion.notes)
 
 
-def _result(args: argparse.Namespace) -> int:
+def _result(args: argparse.Namespace, began: float) -> int:
     """Check a saved result."""
     with progress_bar() as progress:
         from coverable_errors import CoverableError
-        from feasibility.results import ResultError, load_result
+        from feasibility.clock import Clock, OutOfTime
+        from feasibility.results import ResultError, case_of_result, load_result
         from feasibility.verifying import verify as run
 
-        if args.settings:
-            raise CoverableError("--set changes a case; a result holds the case it was found for")
+        if any(setting.partition("=")[0].strip() != LIMIT for setting in args.settings):
+            raise CoverableError(
+                "--set changes a case; a result holds the case it was found for, of which only "
+                f"{LIMIT} may be another"
+            )
         try:
-            result = load_result(args.case)
+            case = case_of_result(args.case).with_overrides(args.settings)
+            clock = Clock(case.search.time_limit, progress)
+            clock.begin(time.monotonic() - (time.perf_counter() - began))
+            progress(0, None, "verifying")
+            with clock.enforced():
+                result = load_result(args.case)
+        except OutOfTime:
+            return _too_late(args, case)
         except ResultError as error:
             hint = "a motion is checked by `coverable verify CASE MOTION`"
             raise ResultError(f"{error}; {hint}") from error
-        progress(0, None, "verifying")
-        found = run(result, tick=lambda: progress(0, None, "verifying"))
-    return _said(args, found, result.case.name, args.case, ())
+        found = run(result, clock=clock)
+    return _said(args, found, case.name, args.case, ())
+
+
+def _too_late(args: argparse.Namespace, case: Case) -> int:
+    """Say that the time ran out while arm and surface were loaded; the exit status."""
+    from feasibility.reports import verification as report
+
+    print_out(json_text(report.late_json(case)) if args.json else report.late_text(case))
+    return 1
 
 
 def _said(

@@ -112,6 +112,9 @@ class Division(Protected):
     apart: tuple[Apart, ...] = ()
     """Where more than two motions are proved to be needed: the pairs among `at_least` cells, of
     which a motion covers one at most."""
+    lacking: str = ""
+    """What the case demands that the motions do not hold together, such as a coverage, or that was
+    not judged; empty where they hold all."""
     timing: Mapping[str, float] = field(default_factory=dict)
     """Seconds: load_s, search_s, divide_s, total_s."""
     statistics: Mapping[str, Any] = field(default_factory=dict)

@@ -11,6 +11,7 @@ from coverable_arrays import Ints
 from coverable_errors import ArgumentError, counted
 from feasibility.clock import Clock, OutOfTime
 from feasibility.collisions import Pair
+from feasibility.demands import OF_EACH, further, unjudged
 from feasibility.division.division import Division, Plan
 from feasibility.division.plans import collect_components, plans
 from feasibility.division.proved_bound import ProvedBound, prove_apart
@@ -27,7 +28,7 @@ from feasibility.roadmap import (
 )
 from feasibility.roadmap.causes import cause_of, causes_of, diagnose, disconnected
 from feasibility.search import Progress, Search
-from feasibility.speed import check_requirements, keep_fast_motions
+from feasibility.speed import check_requirements, keep_fast_motions, required_words
 from feasibility.targets import blocked_curves
 from feasibility.task import Task
 from feasibility.verdict import Cause
@@ -96,7 +97,7 @@ def divide(
     blocked = blocked_curves(cells, task) if len(cells) and _no_motion(exploration.arrays) else ""
     shared = _shared(exploration, task, clock, blocked, ended, slow)
     fewest, ended = shared.fewest, ended and not shared.late
-    found = _message(shared, apart.number, len(cells), ended, folded)
+    found = _message(shared, task, apart.number, len(cells), ended, folded)
     return Division(
         robot=robot,
         cells=cells,
@@ -111,6 +112,7 @@ def divide(
         at_least=min(apart.number, len(fewest.patches)),
         proof=apart.proof if fewest.patches else None,
         apart=apart.apart if fewest.patches else (),
+        lacking=shared.lacking,
         timing=_timing(called, began, searched),
         statistics=_statistics(exploration),
     )
@@ -126,6 +128,8 @@ class _Shared(NamedTuple):
     causes: tuple[Cause, ...]
     late: bool
     """Did a command's time run out meanwhile?"""
+    lacking: str = ""
+    """See `Division.lacking`."""
 
 
 def _refuse_others(robot: Robot, cells: Cells, task: Task, search: Search) -> None:
@@ -159,9 +163,22 @@ def _shared(
                 missing = np.flatnonzero(fewest.patch_of(total) < 0)
                 shared = shared._replace(fewest=fewest, connected=connected, missing=missing)
             causes = _causes(exploration, task, shared.missing, ended, slow)
-            return shared._replace(causes=causes)
+            return shared._replace(causes=causes, lacking=_lacking(exploration, task, shared))
     except OutOfTime:
         return shared._replace(late=True)
+
+
+def _lacking(exploration: Exploration, task: Task, shared: _Shared) -> str:
+    """What the case demands that the motions of a plan do not hold together; see `Division`."""
+    robot, cells = exploration.robot, exploration.cells
+    left = unjudged(robot, task, OF_EACH)
+    if not left or not len(cells):
+        return ""
+    if len(shared.missing) or not (shared.fewest.accepted and shared.connected.accepted):
+        return f"not judged, since not every cell is in a patch: {', '.join(left)}"
+    walks = [[patch.walk for patch in plan.patches] for plan in (shared.fewest, shared.connected)]
+    found = [further(robot, cells, task, some, OF_EACH).refusal for some in walks]
+    return found[0] or found[1]
 
 
 def _timing(called: float, began: float, searched: float) -> dict[str, float]:
@@ -247,7 +264,9 @@ def _no_motion(arrays: SearchArrays) -> bool:
     return nowhere or not arrays.cone_chord > 0.0
 
 
-def _message(shared: _Shared, at_least: int, cells: int, ended: bool, folded: bool) -> str:
+def _message(
+    shared: _Shared, task: Task, at_least: int, cells: int, ended: bool, folded: bool
+) -> str:
     """One or two sentences: what was found, and on what it rests."""
     fewest, connected = shared.fewest, shared.connected
     total = cells - len(shared.missing), cells
@@ -257,12 +276,16 @@ def _message(shared: _Shared, at_least: int, cells: int, ended: bool, folded: bo
             f"{len(refused)} patch{'es have' if len(refused) > 1 else ' has'} a walk that the "
             f"independent replay refuses: {refused[0]}."
         )
-    number = len(fewest.patches)
+    number, how = len(fewest.patches), f" {required_words(task)}" * task.requires_rates
     if total[1] == 0:
         return "There are no cells to cover."
     if number == 0:
         return (
-            "No motion covers any cell."
+            (
+                f"No motion was found that covers any cell{how}."
+                if how
+                else "No motion covers any cell."
+            )
             if ended
             else "The time limit ran out before any patch was found." + LATE * shared.late
         )
@@ -270,7 +293,9 @@ def _message(shared: _Shared, at_least: int, cells: int, ended: bool, folded: bo
     proof = f"; at least {at_least}, proved" if min(number, at_least) > 1 else ""
     if fewest.bound > max(at_least, 1):
         proof += f"; at least {fewest.bound} among the motions found"
-    sentence = f"{what} cover{'' if number > 1 else 's'} {total[0]} of {total[1]} cells{proof}."
+    sentence = (
+        f"{what} cover{'' if number > 1 else 's'} {total[0]} of {total[1]} cells{how}{proof}."
+    )
     if connected is not fewest:
         most = len(connected.patches)
         least = "" if connected.optimal else f" (at least {connected.bound})"
@@ -284,6 +309,8 @@ def _message(shared: _Shared, at_least: int, cells: int, ended: bool, folded: bo
             " Where the standoff reaches the surface's radius of curvature its offset folds and no "
             "motion can be certified: these are the fewest known."
         )
+    if shared.lacking:
+        sentence += f" But {shared.lacking}"
     if not ended:
         sentence += " The time limit ran out: these are the fewest known."
     return sentence

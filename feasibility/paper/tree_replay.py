@@ -29,7 +29,10 @@ SAME = 1e-9  # [rad], [m], [1]: rounding allowed where two computations of one n
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Path:
-    """One edge of the search: J-cells from one E-cell into a neighbouring one."""
+    """One edge of the search: J-cells from one E-cell into a neighbouring one.
+
+    The first of a tree, with which it begins, is one J-cell in one E-cell.
+    """
 
     cell: int
     neighbour: int
@@ -46,12 +49,14 @@ def replay_tree(
     - every J-cell is inside the joint limits, the tolerance, the cone and the surface, and so is
       the motion between them;
     - a path begins in its cell, where and how that cell was first entered, and ends in the
-      neighbour.
+      neighbour;
+    - the first begins at the arm's start, where it has one.
 
     Between J-cells, closed forms have a margin that makes this true; any other surface is left to
     the replay of motions over a surface.
 
-    The `paths` are the edges of a tree, each after the edge that enters its cell.
+    The `paths` are the J-cell that the tree begins with, and its edges, each after the edge that
+    enters its cell.
     """
     faults: list[str] = []
     q = np.concatenate([path.q for path in paths]) if paths else np.empty((0, robot.n))
@@ -78,6 +83,8 @@ def replay_tree(
         faults.append("a path does not begin or end in the cell it claims")
     if not _continuous(paths):
         faults.append("a path does not begin where its cell was entered")
+    if robot.start is not None and not np.abs(q[:1] - robot.start).max(initial=0.0) <= SAME:
+        faults.append("it does not begin at the arm's start")
     roll = None
     if task.roll is not None:
         off = task.roll.off(rolls_at(kinematics, cells, task, q))
@@ -88,7 +95,7 @@ def replay_tree(
         error, angle, more = _by_margins(cells, task, steps, points, axes)
     else:
         error, angle, more = _by_surface(robot, cells, task, steps, [] if faults else paths)
-    certificate = Certificate(len(q), error, angle, float(margin))
+    certificate = Certificate(len(q) - len(first[:1]), error, angle, float(margin))
     if roll is not None and task.roll is not None:
         between = task.roll.half - float(steps.roll[1])
         certificate = replace(certificate, max_roll=roll + between)
@@ -127,7 +134,7 @@ def _by_surface(
         return 0.0, 0.0, []
     tree: nx.DiGraph = nx.DiGraph()
     tree.add_node(paths[0].cell, q=paths[0].q[0])
-    tree.add_edges_from((path.cell, path.neighbour, {"motion": path.q}) for path in paths)
+    tree.add_edges_from((path.cell, path.neighbour, {"motion": path.q}) for path in paths[1:])
     rows = corners(there_and_back(tree, paths[0].cell))
     used = replace(task, tolerance=steps.tolerance)
     found = replay_over_surface(robot, cells, used, rows, np.zeros(len(cells), dtype=bool))
@@ -160,7 +167,7 @@ def _continuous(paths: Sequence[Path]) -> bool:
     if not paths:
         return True
     entered = {paths[0].cell: paths[0].q[0]}
-    for path in paths:
+    for path in paths[1:]:
         if path.cell not in entered or path.neighbour in entered:
             return False
         if not np.abs(path.q[0] - entered[path.cell]).max() <= SAME:
@@ -172,16 +179,32 @@ def _continuous(paths: Sequence[Path]) -> bool:
 def replay_stored(verdict: Verdict, search: Search) -> Replay:
     """`replay_tree` of a verdict of the greedy search, with the settings of that search.
 
-    Besides, every cell has to be in its tree.
+    Besides, its configurations have to be those that its motions lead to, and every cell has to be
+    in its tree.
     """
-    cells = verdict.cells
-    steps = Steps.of(verdict.robot, cells, verdict.task, search)
-    edges = [] if verdict.tree is None else verdict.tree.edges(data="motion")
-    paths = [Path(a, b, motion) for a, b, motion in edges]
-    found = replay_tree(verdict.robot, cells, verdict.task, steps, paths)
-    entered = set() if verdict.tree is None else set(verdict.tree.nodes)
-    missed = len(cells) - len(entered)
-    if missed:
-        text = f"{missed} cells are not in the tree"
-        return Replay(found.certificate, "; ".join(filter(None, (found.refusal, text))))
+    robot, cells, task = verdict.robot, verdict.cells, verdict.task
+    paths = _paths_of(verdict)
+    if isinstance(paths, str):
+        return Replay(Certificate(0, np.nan, np.nan, np.nan), paths)
+    found = replay_tree(robot, cells, task, Steps.of(robot, cells, task, search), paths)
+    missed = len(cells) - len(paths)
+    if missed and found.accepted:
+        return Replay(found.certificate, f"{missed} cells are not in the tree")
     return found
+
+
+def _paths_of(verdict: Verdict) -> list[Path] | str:
+    """The paths of a verdict's tree for `replay_tree`; or why it is none."""
+    tree, start = verdict.tree, verdict.start
+    if tree is None or start is None or start not in tree:
+        return "it has no tree that begins in a cell"
+    q = dict(tree.nodes(data="q"))
+    motions = [Path(a, b, motion) for a, b, motion in tree.edges(data="motion")]
+    if any(known is None for known in (*q.values(), *(path.q for path in motions))):
+        return "a cell or an edge of its tree has no configurations"
+    paths = [Path(start, start, np.atleast_2d(q[start])), *motions]
+    if sorted(path.neighbour for path in paths) != sorted(tree):
+        return "its tree does not enter each of its cells once"
+    if any(not np.abs(q[path.neighbour] - path.q[-1]).max() <= SAME for path in paths):
+        return "a cell's configuration is not the one that its motion leads to"
+    return paths

@@ -8,13 +8,12 @@ again. Only `feasibility.check`, which decides in the end, gets cells that have 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
 
 from coverable_arrays import Mask
-from feasibility.certification import replay
 from feasibility.checking import check
 from feasibility.placement.quick_search import (
     MOST_COVERS,
@@ -36,6 +35,7 @@ from feasibility.roadmap import (
     explore,
 )
 from feasibility.search import Search
+from feasibility.speed import TOO_SLOW, replay_at_rates
 from feasibility.studies import cause_counts, component_covers
 from feasibility.task import Task
 from feasibility.verdict import Answer, Evidence
@@ -126,7 +126,6 @@ class LocalEvaluator:
 
     def __init__(self, robot: Robot, cells: Cells, task: Task, search: Search) -> None:
         """Compute what all placements share."""
-        robot = replace(robot, start=None)  # elsewhere it is not over the surface
         self.robot, self.cells, self.task, self.search = robot, cells, task, search
         self.problem = arrays_of(robot, cells, task)
         self.reach = Reach.of(robot, cells, task)
@@ -207,9 +206,8 @@ class LocalEvaluator:
         cover = trial.covers[component]
         for root in exploration.roots():
             if (exploration.covers(root) >= cover).all():
-                walk = covering_walk(exploration.roadmap, root)
-                replayed = replay(self.robot, cells, self.task, walk, exploration.covers(root))
-                return "" if replayed.accepted else replayed.refusal
+                walk, needed = covering_walk(exploration.roadmap, root), exploration.covers(root)
+                return replay_at_rates(self.robot, cells, self.task, walk, needed)[1]
         return "the search did not find this motion again"
 
     def check_at(self, pose: Pose, causes: bool = False) -> Trial:
@@ -225,6 +223,7 @@ class LocalEvaluator:
         if tried is not None and not tried.complete:
             # The search of `check` again, for the margins that its motion leaves.
             tried = self._trial_of(self._explored(cells), pose, early=False)
+        slow = TOO_SLOW in verdict.statistics  # all of it is covered: the message says the cause
         return Trial(
             pose=pose,
             stage=Stage.CHECK,
@@ -236,7 +235,7 @@ class LocalEvaluator:
             answer=verdict.answer,
             evidence=verdict.evidence,
             message=verdict.message,
-            causes=cause_counts(verdict).cells if causes else {},
+            causes=cause_counts(verdict).cells if causes and not slow else {},
             fk=int(verdict.statistics["fk"]) + (0 if tried is None else tried.fk),
         )
 

@@ -25,6 +25,7 @@ from typing import Any
 from coverable_errors import Checks, Fault, counted
 from feasibility.clock import Clock
 from feasibility.collisions import checked_words
+from feasibility.demands import refuse_start
 from feasibility.notices import compiling_notice
 from feasibility.placement.evaluator import LocalEvaluator, Stage, Trial
 from feasibility.placement.reach_bound import Beyond, Reach
@@ -136,6 +137,7 @@ def place(
 
     Raises:
         PlacementError: there is nothing to place, or the settings make no sense.
+        ArgumentError: the arm has a start.
 
     Example:
         >>> from robots import load_robot
@@ -149,6 +151,7 @@ def place(
     """
     search = Search() if search is None else search
     _check_settings(cells, search, count, around, keep, time_limit)
+    refuse_start(robot, "but where the surface stands elsewhere it is not over it")
     began = time.monotonic()
     clock = clock or Clock(time_limit).start()
     reach = Reach.of(robot, cells, task)
@@ -247,6 +250,8 @@ def _searched(
             + (f", and most of the rest is {MISSED[cause]}" if cause else "")
             + ("; the time limit ran out." if refinement.late else ". This is no proof.")
         )
+        checked = [trial for trial in trials if trial.answer is Answer.UNDECIDED][:1]
+        message += "".join(f" Of the best, `check` says: {trial.message}" for trial in checked)
     return answered(
         answer=answer,
         evidence=evidence,

@@ -15,6 +15,7 @@ import numpy as np
 
 from coverable_arrays import Ints, Mask, Protected
 from feasibility.clock import Clock
+from feasibility.demands import OF_EACH, unjudged
 from feasibility.division import set_cover
 from feasibility.placement.evaluator import LocalEvaluator, Trial
 from feasibility.placement.placements import COUNT, Placements
@@ -68,7 +69,9 @@ class StationPlan:
     trials: tuple[Trial, ...]
     """The placement of each station."""
     refusals: tuple[str, ...]
-    """For each station why the replay refuses its motion; empty where it accepts it."""
+    """For each station why its motion is refused; empty where it holds what the case demands."""
+    not_judged: tuple[str, ...] = ()
+    """What the case demands of all motions together, such as a coverage."""
 
     @property
     def certified(self) -> bool:
@@ -111,7 +114,8 @@ def station_plan(
     local = LocalEvaluator(placements.robot, placements.cells, placements.task, search)
     chosen = [(trials[station.placement], station.component) for station in stations.stations]
     refusals = tuple(local.replayed(*motion) for motion in chosen)
-    return StationPlan(stations, tuple(trial for trial, _ in chosen), refusals)
+    left = unjudged(placements.robot, placements.task, OF_EACH)
+    return StationPlan(stations, tuple(trial for trial, _ in chosen), refusals, left)
 
 
 def fewest_stations(covers: Sequence[Mask], n: int, time_limit: float = TIME_LIMIT) -> Stations:

@@ -44,13 +44,19 @@ PARTLY_FAST = (
     "required."
 )
 NOTHING = "not divided: no cell can be covered."
+NOT_FAST = (
+    "not divided: no motion was found that is as fast or as far from singularities as required."
+)
+LACKING = "undecided: every cell is in a patch, but not all that the case demands is shown to hold."
 
 
 def answer_of(division: Division) -> str:
     """One word: 'complete', 'partial' (cells are left out) or 'undecided'."""
     if not division.decided:
         return "undecided"
-    return "complete" if division.whole else "partial"
+    if not division.whole:
+        return "partial"
+    return "undecided" if division.lacking else "complete"
 
 
 def as_json(
@@ -77,6 +83,7 @@ def as_json(
         "left_out": causes_json(division.left_out, cells),
         "unsettled": [list(cells.unravel(k)) for k in division.unsettled.tolist()],
         "collisions": checked(division.task.collision),
+        "lacking": division.lacking,
         "message": division.message,
         **_areas_json(areas),
         "timing": seconds(division.timing, PHASES, before_s),
@@ -157,10 +164,12 @@ def as_text(
     """The division for people: the answer, the patches and moves in order, what is left out."""
     answer = answer_of(division)
     head = SENTENCES[answer]
-    if answer == "partial" and (division.task.speed or division.task.min_manipulability):
-        head = PARTLY_FAST
-    if division.decided and not division.patches and len(division.cells):
-        head = NOTHING
+    if division.decided and answer == "undecided":
+        head = LACKING
+    if answer == "partial":
+        fast = division.task.requires_rates
+        none, some = (NOT_FAST, PARTLY_FAST) if fast else (NOTHING, head)
+        head = some if division.patches else none
     covered = f"{division.n_covered:,} of {len(division.cells):,} cells"
     rows = [
         ("case", title),

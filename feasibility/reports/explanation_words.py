@@ -90,6 +90,8 @@ def headline(explanation: Explanation) -> str:
         without = f"without {counted(len(dropped.cells), 'cell')} one motion covers the other"
         return f"{verdict.answer}. No change was found to help; {without} {rest:,}."
     why = "No change was found to help" if explanation.thresholds else "Nothing was looked at"
+    if verdict.covered.all() and verdict.treated is not None:
+        why = "No change was looked for: a motion covers every cell, but treats too little"
     return f"{verdict.answer}. {why}."
 
 
@@ -133,7 +135,7 @@ def idle_limits(explanation: Explanation) -> str:
 
 def rates_sentence(explanation: Explanation) -> str:
     """How fast the tool may be, and how near singularities the motion comes; empty if not known."""
-    rates, asked = explanation.rates, explanation.asked
+    rates, asked = explanation.rates, explanation.verdict.task
     if rates is None:
         return ""
     text = ""
@@ -142,9 +144,8 @@ def rates_sentence(explanation: Explanation) -> str:
             f"Inside the joints' velocities a motion over all cells may have up to "
             f"{rates.largest:.3g} m/s all along, but for stops in place and at corners"
         )
-        if asked is not None and asked.speed is not None:
-            enough = "enough" if rates.largest >= asked.speed else "too little"
-            text += f" ({asked.speed:g} m/s is required: {enough}; no threshold above requires it)"
+        if asked.speed is not None:
+            text += f" ({asked.speed:g} m/s is required)"
         if rates.witness.speed < rates.largest:
             text += f"; the covering motion above {rates.witness.speed:.3g} m/s"
         text += ". "

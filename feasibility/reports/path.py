@@ -100,10 +100,11 @@ def no_path_json(verdict: Verdict, reason: str, before_s: float = 0.0) -> dict[s
 
 def short_words(treated: TreatedArea | None, coverage: float | None) -> str:
     """That a path treats less of the area than is required; empty where it treats enough."""
-    if treated is None or coverage is None or treated.lower >= coverage:
+    if coverage is None or (treated is not None and treated.lower >= coverage):
         return ""
+    share = "a share that was not measured" if treated is None else share_words(treated)
     return (
-        f"undecided: the path treats {share_words(treated)} of the area, and "
+        f"undecided: the path treats {share} of the area, and "
         f"{100.0 * coverage:g} % is required; passes or cells that are closer treat more."
     )
 

@@ -26,7 +26,7 @@ from feasibility.version import version
 SENTENCES = {
     Answer.FEASIBLE: "feasible: the surface can be covered in one motion at the placements below.",
     Answer.INFEASIBLE: "none in the region: no placement there was found to be feasible.",
-    Answer.UNDECIDED: "undecided: the search for a placement was stopped.",
+    Answer.UNDECIDED: "undecided: no placement was shown to be feasible, nor that there is none.",
 }
 PROVED = "none in the region: no placement there is feasible."
 MARGINS = ("margin", "limits", "cone", "reach")
@@ -80,6 +80,7 @@ def _stations_json(plan: StationPlan) -> dict[str, Any]:
         "optimal": stations.optimal,
         "at_least": stations.bound,
         "left_out": stations.left_out.tolist(),
+        "not_judged": list(plan.not_judged),
         "stations": [
             {
                 "position": list(trial.pose.position),
@@ -131,7 +132,8 @@ def as_text(placements: Placements, case: str = "", plan: StationPlan | None = N
     if placements.evidence is Evidence.PROOF:
         why = "placements that the reach bound rules out are not searched"
     missed = [(CauseKind(kind), number) for kind, number in placements.causes.items()]
-    checked = placements.trials[0].message if placements.trials else ""
+    tried = placements.trials[:1] if not placements.found else ()
+    checked = "".join(trial.message for trial in tried)
     rows = [
         ("case", case),
         ("region", ", ".join(ranges)),
@@ -140,7 +142,7 @@ def as_text(placements: Placements, case: str = "", plan: StationPlan | None = N
         ("cause", "" if placements.cause is None else CAUSES[placements.cause]),
         ("missed", "; ".join(f"{counted(n, 'cell')}: {CAUSES[k]}" for k, n in missed)),
         ("share", "" if _searched(placements.best) else f"not known: {why}"),
-        ("check", "" if placements.found or not checked else f"of the best: {checked}"),
+        ("check", "" if checked in placements.message else f"of the best: {checked}"),
         ("time", _time_text(placements)),
     ]
     lines = summary(
@@ -213,6 +215,9 @@ def _stations_text(plan: StationPlan) -> list[str]:
         angles = ", ".join(f"{v:.2f}" for v in trial.pose.rpy_deg)
         refused = f" (not certified: {refusal})" if refusal else ""
         lines.append(f"  {cells} at {position} m, {angles} deg{refused}")
+    lines += [f"  not judged of them together: {', '.join(plan.not_judged)}"] * bool(
+        plan.not_judged
+    )
     missed = len(stations.left_out)
     nowhere = f"  {missed:5d} cells are covered at no placement that was tried"
     return [*lines, nowhere] if missed else lines

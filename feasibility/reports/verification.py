@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,8 +15,12 @@ from feasibility.reports.parts import (
     summary,
 )
 from feasibility.reports.proof import proof_json
-from feasibility.verifying import Verification
+from feasibility.treated import treated_json, treated_words
+from feasibility.verifying import NOT_IN_TIME, Verification
 from feasibility.version import version
+
+if TYPE_CHECKING:
+    from feasibility.cases import Case
 
 WORDS = {
     "motion": (
@@ -33,6 +37,7 @@ WORDS = {
         "the stored proof is refused",
     ),
 }
+LATE = "does not hold: not verified in time."
 
 
 def as_json(found: Verification, notes: Sequence[str] = ()) -> dict[str, Any]:
@@ -60,7 +65,10 @@ def as_json(found: Verification, notes: Sequence[str] = ()) -> dict[str, Any]:
         "certificate": measured_json(found.robot, found.certificate, found.q),
         "proof": proof_json(found.proof, found.robot, found.cells),
         "boxes": found.boxes if found.proof is not None else None,
-        "collisions": checked(found.task.collision),
+        "treated": treated_json(found.treated),
+        "not_judged": list(found.not_judged),
+        "in_time": not found.late,
+        "collisions": checked(found.collision),
         "notes": list(notes),
         "robot": found.robot.name,
         "version": version(),
@@ -85,9 +93,48 @@ def as_text(found: Verification, case: str, source: str, notes: Sequence[str] = 
     rows += [("certificate" if found.holds else "measured", _measured(found))]
     if found.proof is not None and found.holds:
         rows.append(("checked", counted(found.boxes, "box", "boxes")))
+    rows.append(("treated", "" if found.treated is None else treated_words(found.treated)))
+    rows.append(("not judged", _not_judged(found)))
     rows += [("note", note) for note in notes]
     answer = f"{head}: {WORDS[found.claim][not found.holds]}."
-    return "\n".join(summary(answer, rows, found.task.collision))
+    return "\n".join(summary(LATE if found.late else answer, rows, found.collision))
+
+
+def _not_judged(found: Verification) -> str:
+    """What the case demands that was not looked at, and why."""
+    if not found.not_judged or found.claim == "tree" or found.late:  # the refusal says it
+        return ""
+    because = "it is refused already"
+    if found.claim == "proof":
+        because = "what no motion does without it, none does with it"
+    return f"{', '.join(found.not_judged)}: {because}"
+
+
+def late_json(case: Case) -> dict[str, Any]:
+    """What `coverable verify --json` prints where the time ran out before there was a problem."""
+    refusal = {"row": None, "share": None, "text": _late(case)}
+    return {
+        "verdict": "does not hold",
+        "claim": None,
+        "cells": 0,
+        "refusals": [refusal],
+        **{key: [] for key in ("missed", "not_judged", "collisions", "notes")},
+        **dict.fromkeys(("reached", "certificate", "proof", "boxes", "treated")),
+        "in_time": False,
+        "robot": case.robot.name or str(case.robot.urdf),
+        "version": version(),
+    }
+
+
+def late_text(case: Case) -> str:
+    """The same for people."""
+    return "\n".join(summary(LATE, [("case", case.name), ("but", _late(case))], None))
+
+
+def _late(case: Case) -> str:
+    """That loading took all of the time."""
+    limit = case.search.time_limit
+    return NOT_IN_TIME.format(limit) + "; the arm was being loaded and the surface cut into cells"
 
 
 def _measured(found: Verification) -> str:

@@ -2,6 +2,7 @@ from .motion_file import Motion as Motion
 from .motion_file import load_motion as load_motion
 from .result_file import Result as Result
 from .result_file import ResultError as ResultError
+from .result_file import case_of_result as case_of_result
 from .result_file import load_result as load_result
 from .result_file import save_result as save_result
 from .result_rows import plain as plain

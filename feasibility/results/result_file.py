@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from coverable_arrays import Array
-from coverable_errors import ArgumentError, CoverableError, shown, worded
-from feasibility.cases import CLOSED_FORM_KINDS, Case, CaseError, Setup
+from coverable_errors import CoverableError, shown
+from feasibility.cases import Case, CaseError, Setup
 from feasibility.results.archive import Archive, ArchiveError, Fields, write_archive
 from feasibility.results.proof_arrays import pack_proof, unpack_proof
 from feasibility.results.result_arrays import (
@@ -39,7 +39,6 @@ from feasibility.results.result_rows import (
     read_names,
 )
 from feasibility.safe_files import FileError
-from feasibility.task import Task
 from feasibility.verdict import (
     Answer,
     Evidence,
@@ -50,13 +49,20 @@ from feasibility.verdict import (
 from feasibility.version import version
 
 if TYPE_CHECKING:
+    from feasibility.task import Task
     from feasibility.treated import TreatedArea
     from robots import Robot
     from surfaces import Cells
 
 FORMAT = "coverable-result"
-TASK = ("standoff", "cone_deg", "tolerance")  # what is stored of it; the rest is the case's
-FORMAT_VERSION = 3  # 2 had no proofs; 1 no `places`, and the kinds `CLOSED_FORM_KINDS` alone
+FORMAT_VERSION = 4
+OLDEST = 3  # states task, method and seed a second time, which is not read
+SAID = {
+    Answer.FEASIBLE: (Evidence.WITNESS,),
+    Answer.INFEASIBLE: (Evidence.PROOF, Evidence.EXHAUSTED),
+    Answer.UNDECIDED: (Evidence.BUDGET,),
+}
+"""What each answer may rest on."""
 
 
 class ResultError(CoverableError):
@@ -82,11 +88,13 @@ def save_result(verdict: Verdict, case: Case, path: str | os.PathLike[str]) -> P
         path: the file; what it held before is replaced once the new content is complete.
 
     Raises:
-        ResultError: the file cannot be written.
+        ResultError: the file cannot be written, or the verdict is about another task or search:
+            a file states its case once, and all that is read of it comes from there.
 
     Returns:
         The path.
     """
+    _check_about(verdict, case)
     n = verdict.robot.n
     meta = {
         "format": FORMAT,
@@ -98,12 +106,9 @@ def save_result(verdict: Verdict, case: Case, path: str | os.PathLike[str]) -> P
             "tool_frame": verdict.robot.tool_frame,
             "joints": list(verdict.robot.joint_names),
         },
-        "task": {key: getattr(verdict.task, key) for key in TASK},
         "answer": str(verdict.answer),
         "evidence": str(verdict.evidence),
         "message": verdict.message,
-        "method": verdict.method,
-        "seed": int(verdict.seed),
         "start": None if verdict.start is None else int(verdict.start),
         "causes": [cause_row(cause) for cause in verdict.causes],
         "certificate": None if verdict.certificate is None else plain(asdict(verdict.certificate)),
@@ -138,6 +143,22 @@ def save_result(verdict: Verdict, case: Case, path: str | os.PathLike[str]) -> P
     return Path(path)
 
 
+def _check_about(verdict: Verdict, case: Case) -> None:
+    """Refuse a verdict that is about something else than a case.
+
+    Raises:
+        ResultError: its task, method or seed is another.
+    """
+    search = case.search
+    about = replace(verdict.task, collision=None), verdict.method, verdict.seed
+    if about != (case.task, search.method, search.seed):
+        asked = f"{case.task}, {search.method}, seed {search.seed}"
+        raise ResultError(
+            f"the verdict is not about case {case.name!r}: it is about {', '.join(map(str, about))}"
+            f", and the case asks for {asked}; save it with the case that was checked"
+        )
+
+
 def load_result(path: str | os.PathLike[str]) -> Result:
     """Read a result file; nothing in it is trusted.
 
@@ -148,38 +169,64 @@ def load_result(path: str | os.PathLike[str]) -> Result:
         ResultError: it is no such file, is damaged, is of a newer format, or its robot or
             surface is not available here as it was.
     """
+    archive, fields, case = _opened(path)
     try:
-        archive = Archive(Path(path), "a result file of `coverable check --save`")
-        fields = Fields(archive, archive.meta(), "")
-        found = _format(fields)
         written = fields.text("version")
-        text = fields.table("case")
-        name = text.text("name")
-        case = Case.from_toml(text.text("toml"), name=f"{archive.name}: case {shown(name)}")
-        case = replace(case, name=name, description=text.text("description"))
         setup = case.build()
         check_robot(setup.robot, fields.table("robot"), archive)
-        if found > 1 or case.surface.kind not in CLOSED_FORM_KINDS:
-            check_cells(setup.cells, case.surface.label, archive)
+        check_cells(setup.cells, case.surface.label, archive)
         verdict = _verdict(fields, archive, setup)
     except CaseError as error:
-        raise ResultError(f"{os.fspath(path)!r}: its case cannot be used: {error}") from error
+        raise _unusable(path, error) from error
     except ArchiveError as error:
         raise ResultError(str(error)) from error
     return Result(case, verdict, written)
 
 
-def _format(fields: Fields) -> int:
-    """The version of the format; files of something else, or of a later coverable, are refused."""
+def case_of_result(path: str | os.PathLike[str]) -> Case:
+    """The case that a result file is about; neither arm nor surface is loaded.
+
+    Raises:
+        ResultError: it is no such file, or its case is none.
+    """
+    return _opened(path)[2]
+
+
+def _opened(path: str | os.PathLike[str]) -> tuple[Archive, Fields, Case]:
+    """A result file, its JSON, and its case.
+
+    Raises:
+        ResultError: it is no such file, or its case is none.
+    """
+    try:
+        archive = Archive(Path(path), "a result file of `coverable check --save`")
+        fields = Fields(archive, archive.meta(), "")
+        _check_format(fields)
+        text = fields.table("case")
+        name = text.text("name")
+        case = Case.from_toml(text.text("toml"), name=f"{archive.name}: case {shown(name)}")
+        return archive, fields, replace(case, name=name, description=text.text("description"))
+    except CaseError as error:
+        raise _unusable(path, error) from error
+    except ArchiveError as error:
+        raise ResultError(str(error)) from error
+
+
+def _unusable(path: str | os.PathLike[str], error: CaseError) -> ResultError:
+    """That a file's case cannot be used, and why."""
+    return ResultError(f"{os.fspath(path)!r}: its case cannot be used: {error}")
+
+
+def _check_format(fields: Fields) -> None:
+    """Refuse files of something else, or of another version of the format."""
     if fields.entries.get("format") != FORMAT:
         raise fields.archive.error("is not a result file of `coverable check --save`")
     found = fields.get("format_version", int, "a whole number")
-    if not 1 <= found <= FORMAT_VERSION:
+    if not OLDEST <= found <= FORMAT_VERSION:
         raise fields.archive.error(
             f"is of format {found}, written by coverable {shown(fields.entries.get('version'))}; "
-            f"coverable {version()} reads formats 1 to {FORMAT_VERSION}"
+            f"coverable {version()} reads formats {OLDEST} and {FORMAT_VERSION}"
         )
-    return int(found)
 
 
 def _verdict(fields: Fields, archive: Archive, setup: Setup) -> Verdict:
@@ -196,22 +243,23 @@ def _verdict(fields: Fields, archive: Archive, setup: Setup) -> Verdict:
     if fields.flag("has_witness"):
         q = archive.array("witness_q", np.float64, (None, n))
         witness = Walk(q=q, cell=read_cells(archive, "witness_cell", count, (len(q),), low=-1))
-    proof = None  # a file of format 2 says nothing of it
-    if "has_proof" in fields.entries and fields.flag("has_proof"):
-        proof = unpack_proof(archive, count, n)
+    proof = unpack_proof(archive, count, n) if fields.flag("has_proof") else None
     components = unpack_ragged(archive, "components", count)
     start = None if fields.entries.get("start") is None else fields.cell("start", count)
     timing = fields.table("timing")
-    task = _task(fields.table("task"), setup.task)
+    answer, evidence = fields.member("answer", Answer), fields.member("evidence", Evidence)
+    if evidence not in SAID[answer]:
+        raise archive.error(f"meta.json: it answers {answer} with the evidence {evidence}")
+    task, search = setup.task, setup.search
     return Verdict(
-        answer=fields.member("answer", Answer),
-        evidence=fields.member("evidence", Evidence),
+        answer=answer,
+        evidence=evidence,
         message=fields.text("message"),
         robot=robot,
         cells=cells,
         task=task,
-        method=fields.text("method"),
-        seed=int(fields.get("seed", int, "a whole number")),
+        method=search.method,
+        seed=search.seed,
         graph=graph,
         n_edges=graph.number_of_edges(),
         covered=covered,
@@ -240,17 +288,6 @@ def _postures(fields: Fields, archive: Archive, count: int, n: int) -> Array | N
     if not ("has_postures" in fields.entries and fields.flag("has_postures")):
         return None
     return archive.array("postures", np.float64, (count, n))
-
-
-def _task(fields: Fields, task: Task) -> Task:
-    """The case's task with the numbers that were used: a method may choose the tolerance."""
-    standoff, cone_deg = fields.number("standoff"), fields.number("cone_deg")
-    tolerance = None if fields.entries.get("tolerance") is None else fields.number("tolerance")
-    try:
-        return replace(task, standoff=standoff, cone_deg=cone_deg, tolerance=tolerance)
-    except ArgumentError as error:
-        text = "; ".join(worded(fault.renamed({}, "task")) for fault in error.faults)
-        raise fields.archive.error(f"meta.json: {text}") from error
 
 
 def _treated(robot: Robot, cells: Cells, task: Task, witness: Walk) -> TreatedArea | None:

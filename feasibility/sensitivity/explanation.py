@@ -13,10 +13,11 @@ from coverable_arrays import Array
 from coverable_errors import ArgumentError
 from feasibility.checking import check
 from feasibility.clock import Clock, OutOfTime
+from feasibility.demands import refuse_start
 from feasibility.division import divide
 from feasibility.roadmap import HERE, Exploration, margin_shares, place
 from feasibility.search import Progress, Search
-from feasibility.sensitivity.limited_search import LimitedAttempt
+from feasibility.sensitivity.limited_search import LimitedAttempt, held
 from feasibility.sensitivity.pairs import PairSearch
 from feasibility.sensitivity.probes import Prober
 from feasibility.sensitivity.quantities import Kind, Quantity, Variant, quantities
@@ -24,6 +25,7 @@ from feasibility.sensitivity.threshold_search import BEYOND, ThresholdSearch
 from feasibility.sensitivity.thresholds import Dropped, Explanation, Finding, Threshold
 from feasibility.speed import check_requirements, rate_figures
 from feasibility.task import Task
+from feasibility.treated import shortfall
 from feasibility.verdict import Evidence, Verdict, Walk
 from robots import Robot
 from surfaces import Cells
@@ -58,7 +60,7 @@ def explain(
     One quantity is varied at a time: the cone, each limit of each joint, the standoff, the
     surface's place along six directions; where collisions are checked, also the clearances, and one
     object of the scene is left out at a time. On both sides of a threshold the verdict is given;
-    "feasible" is said only of a motion that the replay accepts.
+    "feasible" is said only of a motion that holds all that the case demands.
 
     Args:
         robot: the arm, with its limits.
@@ -70,10 +72,12 @@ def explain(
         clock: of the command that this is a part of; its limit counts instead of the search's.
 
     Returns:
-        The verdict of the case as given, and the thresholds.
+        The verdict of the case as given, and the thresholds; none where a covering motion is known
+        that treats too little, which depends on the cells and hardly on these quantities.
 
     Raises:
-        ArgumentError: the method is the greedy one, whose "no" does not depend on the case alone.
+        ArgumentError: the method is the greedy one, whose "no" does not depend on the case alone;
+            or the arm has a start.
         RobotError: the arm is no serial chain of one-dof joints.
 
     Example:
@@ -93,12 +97,11 @@ def explain(
     clock = (Clock(search.time_limit) if clock is None else clock).start()
     reporting = progress and (lambda *_: progress(0, None, AS_GIVEN))
     first = clock.part(VERDICT_SHARE, reporting)
-    robot = replace(robot, start=None)  # with other numbers it is not on the motion set
+    refuse_start(robot, "but with other numbers it is not over the surface")
     check_requirements(robot, task, search)
-    asked, task = task, replace(task, speed=None, min_manipulability=None)  # of no threshold
     verdict = check(robot, cells, task, search, clock=first)
     began = time.monotonic()
-    if len(cells) == 0:
+    if len(cells) == 0 or (verdict.treated is not None and shortfall(task, verdict.treated)):
         return Explanation(verdict, (), (), None, 0, 0.0)
     found, motion = _explained(verdict, began, clock, progress)
     if motion is not None:
@@ -109,8 +112,8 @@ def explain(
             found = replace(again, alone=verdict, evaluations=evaluations)
     rates = None
     with suppress(OutOfTime), clock.enforced():
-        rates = rate_figures(found.verdict, clock, more=asked.speed is not None)
-    return replace(found, rates=rates, asked=asked)
+        rates = rate_figures(found.verdict, clock, more=task.speed is not None)
+    return replace(found, rates=rates)
 
 
 def _explained(
@@ -132,7 +135,7 @@ def _explained(
     except OutOfTime:
         names = tuple(quantity.name for quantity in varied)
         return Explanation(verdict, (), names, None, 0, time.monotonic() - began), None
-    dropped = None if verdict.feasible else drop(prober, verdict, q)
+    dropped = None if verdict.covered.all() else drop(prober, verdict, q)
     motions = _motions(prober, verdict, q) if verdict.feasible else []
     searches: list[ThresholdSearch] = []
     for made, threshold in _thresholds(prober, verdict, q, motions, varied):
@@ -260,7 +263,8 @@ def other_motions(prober: Prober, guesses: int, most: int) -> list[LimitedAttemp
     for k in apart(np.array([_posture(prober, q) for q in tried]), most):
         seeds = np.full((len(cells), robot.n), np.nan)
         seeds[cells.middle] = tried[k]
-        found.append(prober.attempt(prober.arrays, seeds, np.inf, deep=False))
+        attempt = prober.attempt(prober.arrays, seeds, np.inf, deep=False)
+        found.append(held(prober.given, attempt))
     return [attempt for attempt in found if attempt.found]
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from coverable_arrays import Array, Ints
 from feasibility.clock import OutOfTime
 from feasibility.compiled import kernel
+from feasibility.demands import BY_REPLAY, TOGETHER, further, unjudged
 from feasibility.roadmap import (
     Exploration,
     SearchArrays,
@@ -81,6 +82,28 @@ class LimitedAttempt:
     def found(self) -> bool:
         """True with a covering motion."""
         return self.walk is not None
+
+
+def held(
+    given: Variant, attempt: LimitedAttempt, steps: Steps | None = None, whole: bool = True
+) -> LimitedAttempt:
+    """An attempt whose motion holds what no replay judges, such as a speed; else undecided.
+
+    Args:
+        given: the case.
+        attempt: of it, or of one nearby.
+        steps: the quantity and its steps, of a case nearby.
+        whole: whether what several motions hold together is judged too, such as the coverage,
+            which takes long to measure.
+    """
+    if attempt.walk is None or not unjudged(given.robot, given.task, BY_REPLAY):
+        return attempt
+    variant = given if steps is None else steps[0].applied(given, steps[1])
+    found = further(*variant, [attempt.walk], judged=() if whole else TOGETHER)
+    if found.accepted:
+        return attempt
+    detail = f"{attempt.detail}, but {found.refusal}"
+    return LimitedAttempt(Answer.UNDECIDED, Evidence.BUDGET, detail, attempt.q, None)
 
 
 class CollisionProofs:

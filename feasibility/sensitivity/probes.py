@@ -40,6 +40,7 @@ from feasibility.sensitivity.limited_search import (
     Steps,
     certifiable,
     configurations,
+    held,
     project_all,
 )
 from feasibility.sensitivity.quantities import OF_COLLISIONS, Kind, Quantity, Variant
@@ -305,18 +306,18 @@ class Prober:
     def confirmed(
         self, variant: Variant, attempt: LimitedAttempt, needed: Mask | None = None
     ) -> LimitedAttempt:
-        """An attempt once its motion is replayed: still feasible, or undecided if refused."""
+        """An attempt once its motion is judged: still feasible, or undecided if refused."""
         if attempt.walk is None or attempt.angle is not None:
             return attempt
         self.tick()
-        robot, cells, task = variant
-        needed = np.ones(len(cells), dtype=bool) if needed is None else needed
-        replayed = replay(robot, cells, task, attempt.walk, needed)
-        if replayed.accepted:
-            angle = replayed.certificate.max_angle
-            return replace(attempt, detail=f"{attempt.detail}, replayed", angle=angle)
-        detail = f"a motion was found, but the replay refuses it: {replayed.refusal}"
-        return LimitedAttempt(Answer.UNDECIDED, Evidence.BUDGET, detail, attempt.q, None)
+        whole = needed is None
+        needed = np.ones(len(variant.cells), dtype=bool) if needed is None else needed
+        replayed = replay(*variant, attempt.walk, needed)
+        if not replayed.accepted:
+            detail = f"a motion was found, but the replay refuses it: {replayed.refusal}"
+            return LimitedAttempt(Answer.UNDECIDED, Evidence.BUDGET, detail, attempt.q, None)
+        detail, angle = f"{attempt.detail}, replayed", replayed.certificate.max_angle
+        return held(variant, replace(attempt, detail=detail, angle=angle), whole=whole)
 
     def _add_seeds(self, exploration: LimitedExploration, seeds: Array, deep: bool) -> None:
         """Add seeds until one component covers every cell, hard cells first."""

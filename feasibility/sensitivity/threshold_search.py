@@ -16,7 +16,7 @@ import numpy as np
 
 from coverable_arrays import Array
 from feasibility.roadmap import Ruling
-from feasibility.sensitivity.limited_search import NO_CELL, LimitedAttempt
+from feasibility.sensitivity.limited_search import NO_CELL, LimitedAttempt, held
 from feasibility.sensitivity.probes import Prober
 from feasibility.sensitivity.quantities import Kind, Quantity
 from feasibility.sensitivity.thresholds import Finding, Span, Threshold
@@ -116,6 +116,7 @@ class ThresholdSearch:
         arrays = self.prober.arrays_at(self.quantity, self.good.k)
         nothing = np.full_like(self.good.attempt.q, np.nan)
         attempt = self.prober.attempt(arrays, nothing, most, deep=True)
+        attempt = held(self.prober.given, attempt, (self.quantity, self.good.k), False)
         late = self.prober.clock.out_of_time
         cut_short = late or most < ALONE * self.verdict_cost
         unaided = None if cut_short and not attempt.found else attempt.found
@@ -329,7 +330,8 @@ class ThresholdSearch:
         left = self.stop - self.prober.spent
         most = max(left, self.verdict_cost) // 2 if deep else SHORT * self.verdict_cost
         arrays = self.prober.arrays_at(self.quantity, k)
-        return self.prober.attempt(arrays, seeds, most, deep, hard=hard)
+        attempt = self.prober.attempt(arrays, seeds, most, deep, hard=hard)
+        return held(self.prober.given, attempt, (self.quantity, k), False)
 
     def _reported(self, probe: Probe) -> Finding:
         """A feasible probe as a finding, once its motion is replayed."""

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from coverable_arrays import Ints, Protected
 from feasibility.sensitivity.quantities import Quantity
 from feasibility.speed import RateFigures
-from feasibility.task import Task
 from feasibility.verdict import Answer, Evidence, Verdict, Walk
 
 
@@ -160,5 +159,3 @@ class Explanation:
     the witness of a threshold; None where `verdict` is that."""
     rates: RateFigures | None = None
     """Largest speed and smallest singular value of a feasible case; None of another."""
-    asked: Task | None = None
-    """The task as given: thresholds, and `verdict`, leave out its speed and singular values."""

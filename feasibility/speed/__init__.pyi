@@ -6,4 +6,6 @@ from .motion_rates import motion_rates as motion_rates
 from .motion_rates import path_rates as path_rates
 from .motion_rates import replay_at_rates as replay_at_rates
 from .requirements import check_requirements as check_requirements
+from .requirements import required_words as required_words
+from .verdict_at_speed import TOO_SLOW as TOO_SLOW
 from .verdict_at_speed import at_rates as at_rates

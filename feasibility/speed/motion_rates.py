@@ -16,6 +16,7 @@ from feasibility.certification.rates import (
     replay_rates,
     segment_rates,
 )
+from feasibility.demands import TOGETHER, further
 from feasibility.paths import CoveragePath, PathError
 from feasibility.task import Task
 from feasibility.verdict import Certificate, Walk
@@ -107,15 +108,13 @@ def _least(robot: Robot, count: int, owner: Ints, found: SegmentRates) -> Motion
 def replay_at_rates(
     robot: Robot, cells: Cells, task: Task, walk: Walk, needed: Mask
 ) -> tuple[Certificate, str]:
-    """Replay a motion over the cells `needed` (N,), at the speed that the task requires too.
+    """Replay a motion over the cells `needed` (N,), and judge all else that it has to hold alone.
 
     Returns:
         What was measured, and why the motion is refused; empty if it is accepted.
     """
     replayed = replay(robot, cells, task, walk, needed)
-    refusal = replayed.refusal
-    if not refusal and task.requires_rates:
-        refusal = "; ".join(replay_rates(robot, cells, task, walk).refusals)
+    refusal = replayed.refusal or further(robot, cells, task, [walk], TOGETHER).refusal
     return replayed.certificate, refusal
 
 

@@ -28,6 +28,14 @@ def check_requirements(robot: Robot, task: Task, search: Search) -> None:
     check_rates(robot, task)
 
 
+def required_words(task: Task) -> str:
+    """What a task requires of speed and singular values, as a sentence goes on; maybe nothing."""
+    words = [] if task.speed is None else [f"at {task.speed:g} m/s"]
+    if task.min_manipulability is not None:
+        words.append(f"with singular values of {task.min_manipulability:g} at least")
+    return " and ".join(words)
+
+
 def _check_home(robot: Robot, task: Task) -> None:
     """Refuse a home that is no configuration of the arm.
 

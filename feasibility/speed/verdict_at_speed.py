@@ -19,6 +19,7 @@ from feasibility.clock import Clock, OutOfTime
 from feasibility.speed.largest import begin_of, largest_speed
 from feasibility.speed.motion_rates import replay_at_rates
 from feasibility.speed.rated_graph import RatedGraph, grow, rated_graph
+from feasibility.speed.requirements import required_words
 from feasibility.speed.routes import covered, route
 from feasibility.verdict import (
     Answer,
@@ -109,15 +110,10 @@ def _not_found(
     """Undecided: what is wrong with the motion that is known, and how much is possible."""
     task, total = verdict.task, len(verdict.cells)
     reached = covered(rated, rated.enough, begin)
-    required = []
-    if task.speed is not None:
-        required.append(f"at {task.speed:g} m/s")
-    if task.min_manipulability is not None:
-        required.append(f"with singular values of {task.min_manipulability:g} at least")
     best = largest_speed(rated, begin, task.min_manipulability or -np.inf)
     message = (
         f"One continuous motion covers every cell, but none was found that does so "
-        f"{' and '.join(required)}: on the one that is known {'; '.join(replayed.refusals)}. "
+        f"{required_words(task)}: on the one that is known {'; '.join(replayed.refusals)}. "
         f"The best of those known covers {int(reached.sum())} of {total} cells."
     )
     if task.speed is not None and best > 0.0:

@@ -3,6 +3,7 @@ from .area import UntreatedRegion as UntreatedRegion
 from .area import treated_by_passes as treated_by_passes
 from .area import treated_by_walk as treated_by_walk
 from .decision import Decision as Decision
+from .decision import shortfall as shortfall
 from .decision import with_coverage as with_coverage
 from .words import share_words as share_words
 from .words import treated_json as treated_json

@@ -72,11 +72,12 @@ class TreatedArea(Protected):
         return visits(middles, normals, self.lines, 0.5 * min(self.footprint))
 
 
-def treated_by_walk(robot: Robot, cells: Cells, task: Task, walk: Walk) -> TreatedArea | None:
-    """What a motion over cells treats; None without a footprint."""
-    if task.disc is None or not len(walk.q) or cells.surface.bare:
+def treated_by_walk(robot: Robot, cells: Cells, task: Task, *walks: Walk) -> TreatedArea | None:
+    """What motions over cells treat together; None without a footprint."""
+    if task.disc is None or not sum(len(walk.q) for walk in walks) or cells.surface.bare:
         return None
-    return _measured(cells.surface, task.disc, contacts_on(cells.surface, robot, walk))
+    found = [contacts_on(cells.surface, robot, walk) for walk in walks]
+    return _measured(cells.surface, task.disc, _joined(found))
 
 
 def treated_by_passes(

@@ -31,15 +31,22 @@ def with_coverage(decision: Decision, task: Task, found: TreatedArea | None) -> 
     """
     if task.coverage is None or decision.answer is not Answer.FEASIBLE:
         return decision
+    short = shortfall(task, found)
+    if short or found is None:
+        message = f"{decision.message} {short[0].upper()}{short[1:]}"
+        return Decision(Answer.UNDECIDED, Evidence.BUDGET, message)
+    words = f"It treats {share_words(found)} of the area; {100.0 * task.coverage:g} % is required."
+    return decision._replace(message=f"{decision.message} {words}")
+
+
+def shortfall(task: Task, found: TreatedArea | None) -> str:
+    """What is missing of the coverage that a task requires; empty where nothing is."""
+    if task.coverage is None or (found is not None and found.lower >= task.coverage):
+        return ""
     if found is None:
-        return Decision(Answer.UNDECIDED, Evidence.BUDGET, f"{decision.message} {NOT_MEASURED}")
-    required = f"{100.0 * task.coverage:g} %"
-    if found.lower >= task.coverage:
-        words = f"It treats {share_words(found)} of the area; {required} is required."
-        return decision._replace(message=f"{decision.message} {words}")
-    short = (
-        f"It treats {share_words(found)} of the area, and {required} is required: "
+        return NOT_MEASURED
+    return (
+        f"it treats {share_words(found)} of the area, and {100.0 * task.coverage:g} % is required: "
         + ("more splitting may show it." if found.upper >= task.coverage else "that is too little.")
         + ' Finer cells, such as surface.cells = "auto", or passes that are closer treat more.'
     )
-    return Decision(Answer.UNDECIDED, Evidence.BUDGET, f"{decision.message} {short}")

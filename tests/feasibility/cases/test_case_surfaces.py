@@ -10,14 +10,12 @@ import surface_parts
 from bad_cases import GOOD, SURFACES, surface, write
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from small_cases import small_case, small_verdict
 from surface_files import MESH, NET, POINTS, cube, mesh_case, net_case, sheet, write_stl
 
 import surfaces
 from coverable_errors import Fault
 from feasibility import check
 from feasibility.cases import (
-    CLOSED_FORM_KINDS,
     OWN_KEYS,
     Case,
     as_read,
@@ -95,7 +93,6 @@ def test_the_kinds_are_those_that_are_tested():
     assert set(OWN_KEYS) == {*PATCHES, "piecewise", "mesh", "step", "poses"}
     assert set(PATCHES) - {"grid"} == set(surface_parts.PATCHES)  # a grid is a file
     assert all(callable(getattr(surfaces, kind)) for kind in OWN_KEYS)
-    assert set(CLOSED_FORM_KINDS) < set(PATCHES)
 
 
 def test_caps_are_those_of_the_surfaces():
@@ -459,7 +456,7 @@ def test_a_result_is_not_shown_on_another_surface(solved, tmp_path):
 
 
 def repacked(saved, path, **changes):
-    """The file with other entries in its JSON, and perhaps without `places`."""
+    """The file with other entries in its JSON."""
     with zipfile.ZipFile(saved) as file:
         members = {name: file.read(name) for name in file.namelist()}
     meta = json.loads(members["meta.json"])
@@ -467,10 +464,7 @@ def repacked(saved, path, **changes):
     members["meta.json"] = json.dumps({**meta, **changes, "case": case}).encode()
     with zipfile.ZipFile(path, "w") as file:
         for name, data in members.items():
-            if not (
-                meta["format_version"] != changes.get("format_version", 3) and "places" in name
-            ):
-                file.writestr(name, data)
+            file.writestr(name, data)
     return path
 
 
@@ -485,16 +479,6 @@ def test_a_result_that_names_another_file_is_hostile(solved, tmp_path):
             load_result(bad)
         assert "tulip" not in str(caught.value)
         assert "root:" not in str(caught.value)
-
-
-def test_results_of_the_first_format_are_still_read(solved, tmp_path):
-    old = tmp_path / "old.a.result"
-    save_result(small_verdict("plate"), small_case("plate"), tmp_path / "new")
-    loaded = load_result(repacked(tmp_path / "new", old, format_version=1))
-    assert repr(loaded.verdict) == repr(small_verdict("plate"))
-    # No coverable has written one of a file.
-    _, _, saved = solved
-    refused(repacked(saved, old, format_version=1), "lacks 'places.npy'")
 
 
 def test_labels_and_counts():

@@ -101,7 +101,9 @@ def test_the_replay_of_a_tree_judges_between_jcells(cells) -> None:
     assert verdict.certificate is not None
     assert replay_stored(verdict, COARSE).accepted
     steps = Steps.of(PUMA, cells, TASK, COARSE)
-    paths = [Path(a, b, motion) for a, b, motion in verdict.tree.edges(data="motion")]
+    start = verdict.start
+    paths = [Path(start, start, verdict.tree.nodes[start]["q"][None])]
+    paths += [Path(a, b, motion) for a, b, motion in verdict.tree.edges(data="motion")]
     assert replay_tree(PUMA, cells, TASK, steps, paths).accepted
     points, axes = Kinematics(PUMA).tools(np.concatenate([path.q for path in paths]))
     found = cells.surface.closest(points)
@@ -112,7 +114,7 @@ def test_the_replay_of_a_tree_judges_between_jcells(cells) -> None:
     tilt = np.degrees(np.arccos(np.einsum("ki,ki->k", axes, found.normal))).max()
     narrow = replace(TASK, cone_deg=0.95 * tilt)
     assert "the tool axis tilts" in replay_tree(PUMA, cells, narrow, steps, paths).refusal
-    swapped = [replace(path, neighbour=path.cell) for path in paths]
+    swapped = paths[:1] + [replace(path, neighbour=path.cell) for path in paths[1:]]
     assert "in the cell it claims" in replay_tree(PUMA, cells, TASK, steps, swapped).refusal
 
 
