@@ -50,7 +50,7 @@ if TYPE_CHECKING:
         station_plan,
     )
     from feasibility.placement import LocalEvaluator as Local
-    from feasibility.programs import save_program
+    from feasibility.programs import ProgramSettings, save_program
     from feasibility.reports.comparison import as_text as comparison_text
     from feasibility.reports.comparison import chart as comparison_chart
     from feasibility.reports.division import as_text as division_text
