@@ -143,6 +143,7 @@ __all__ = [
     "Evidence", "Explanation",
     "LiteralSearch", "Live", "Local", "LocalEvaluator", "MeshSurface", "Obstacle", "PassRuns",
     "Patch", "PathError", "Piecewise", "Placements", "PlannedPasses", "Plot", "Pose",
+    "ProgramSettings",
     "Region", "Robot", "RobotError", "Search", "Store", "Study", "Surface", "SurfaceError",
     "Task", "ToolShape", "Trajectory", "TreatedArea", "Verdict", "Verification", "View",
     "__version__", "bspline", "builtin_cases", "certified_area", "check", "compare",
