@@ -50,7 +50,7 @@ if TYPE_CHECKING:
         station_plan,
     )
     from feasibility.placement import LocalEvaluator as Local
-    from feasibility.programs import save_program
+    from feasibility.programs import ProgramSettings, save_program
     from feasibility.reports.comparison import as_text as comparison_text
     from feasibility.reports.comparison import chart as comparison_chart
     from feasibility.reports.division import as_text as division_text
@@ -143,6 +143,7 @@ __all__ = [
     "Evidence", "Explanation",
     "LiteralSearch", "Live", "Local", "LocalEvaluator", "MeshSurface", "Obstacle", "PassRuns",
     "Patch", "PathError", "Piecewise", "Placements", "PlannedPasses", "Plot", "Pose",
+    "ProgramSettings",
     "Region", "Robot", "RobotError", "Search", "Store", "Study", "Surface", "SurfaceError",
     "Task", "ToolShape", "Trajectory", "TreatedArea", "Verdict", "Verification", "View",
     "__version__", "bspline", "builtin_cases", "certified_area", "check", "compare",

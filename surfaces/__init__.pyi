@@ -38,9 +38,12 @@ from .piecewise import piecewise as piecewise
 from .sheet import Sheet as Sheet
 from .sheet import sheet_of as sheet_of
 from .step_files import StepFace as StepFace
+from .step_files import StepParts as StepParts
 from .step_files import checked_choice as checked_choice
+from .step_files import face_words as face_words
 from .step_files import step as step
 from .step_files import step_faces as step_faces
+from .step_files import step_parts as step_parts
 from .step_files import step_triangles as step_triangles
 from .surface import Surface as Surface
 from .surface import SurfaceError as SurfaceError

@@ -100,6 +100,7 @@ feasibility.viewer: cell_meshes cut_sides scene
 feasibility.viewer.areas
 feasibility.viewer: figures live_server nearest obstacles painter path_and_division placements poses readout stage view_figures viewer
 feasibility.viewer.passes
+feasibility.viewer.faces
 feasibility.reports
 feasibility.live
 feasibility.cli: case_commands command console listing main passes path place study_compare verify

@@ -93,9 +93,11 @@ def build_step(values: Values, pose: Mapping[str, Any]) -> MeshSurface:
     """
     from surfaces import SurfaceError, mesh, step_triangles
 
-    file = values["file"]
+    file, choice = values["file"], {key: values[key] for key in CHOICE if key in values}
+    if "facing" in values and not {"faces", "colour"} & set(choice):
+        choice["faces"] = "all"
     try:
-        triangles = step_triangles(file, **{key: values[key] for key in CHOICE if key in values})
+        triangles = step_triangles(file, **choice)
     except SurfaceError as error:
         own = [fault for fault in error.faults if fault.key.partition("[")[0] in CHOICE]
         faults = [fault._replace(place=shown_path(file)).renamed({}, "surface") for fault in own]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from coverable_errors import CoverableError
@@ -63,12 +64,15 @@ def add(subcommands: argparse._SubParsersAction) -> None:
     )  # fmt: skip
     parser = subcommands.add_parser(
         "show",
-        help="look at a result that `check --save` wrote",
-        description="Open the view of a result in a browser window; Ctrl-C ends it.",
+        help="look at a result that `check --save` wrote, or at the faces of a STEP file",
+        description="Open the view of a result, or of the faces of a STEP file with their numbers, "
+        "in a browser window; Ctrl-C ends it.",
         allow_abbrev=False,
     )
     parser.set_defaults(run=show)
-    parser.add_argument("result", metavar="RESULT", help="a file that `check --save` wrote")
+    parser.add_argument(
+        "result", metavar="RESULT", help="a file that `check --save` wrote, or a .step or .stp file"
+    )
     add_html(parser, "the view to a file instead")
     _add_browser(parser)
     parser = subcommands.add_parser(
@@ -175,10 +179,12 @@ def _seeds(args: argparse.Namespace, opened: OpenCase) -> Walk | None:
 
 def show(args: argparse.Namespace, began: float) -> int:
     """`coverable show RESULT`: the view in a browser window until Ctrl-C, or in a file."""
-    from feasibility.results import load_result
-
     if args.html is not None:
         check_writable(args.html)
+    if args.result.lower().endswith((".step", ".stp")):
+        return _show_faces(args)
+    from feasibility.results import load_result
+
     result = load_result(args.result)
     print_out(f"{result.case.name}: {result.verdict!r}")
     from feasibility.viewer import view
@@ -188,6 +194,22 @@ def show(args: argparse.Namespace, began: float) -> int:
         write_text(args.html, drawn.html(), "view")
         return 0
     return _serve("view", drawn.show(open_browser=False), args.browser)
+
+
+def _show_faces(args: argparse.Namespace) -> int:
+    """The faces of a STEP file with their numbers."""
+    from feasibility.viewer import LiveView
+    from feasibility.viewer.faces import faces_page
+    from surfaces import face_words, step_parts
+
+    parts = step_parts(args.result)
+    for face in parts.faces:
+        print_out(face_words(face))
+    drawn = faces_page(parts, Path(args.result).name)
+    if args.html is not None:
+        write_text(args.html, drawn, "view")
+        return 0
+    return _serve("view", LiveView(drawn), args.browser)
 
 
 def live(args: argparse.Namespace, began: float) -> int:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from coverable_errors import CoverableError, Fault
 from feasibility.cli.command import STATUS, json_text, numbers, positive, write_text
 from feasibility.cli.console import print_err, print_out
+from feasibility.cli.programs import period_of, write_programs
 from feasibility.safe_files import shown_path
 
 if TYPE_CHECKING:
@@ -141,7 +142,7 @@ def in_runs(args: argparse.Namespace, opened: OpenCase, along: PlannedPasses) ->
     timed = [
         trajectory(
             run, args.speed, velocity=args.velocity, acceleration=args.acceleration,
-            **({} if args.period is None else {"period": args.period}),
+            period=period_of(args),
         )
         for run in found.runs
     ]  # fmt: skip
@@ -151,8 +152,7 @@ def in_runs(args: argparse.Namespace, opened: OpenCase, along: PlannedPasses) ->
     else:
         print_out(report.as_text(along, found, timed, treated))
     _write(args, found, timed)
-    for file in args.program:
-        print_err(f"--program: nothing written to {shown_path(file)}: there are several motions")
+    write_programs(args, opened, along, *timed)
     if args.html is not None:
         from feasibility.viewer.passes import view_passes
 

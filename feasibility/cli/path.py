@@ -12,13 +12,13 @@ from feasibility.cli.command import (
     add_command,
     add_html,
     json_text,
-    numbers,
     open_case,
     positive,
     write_text,
 )
 from feasibility.cli.console import print_err, print_out
 from feasibility.cli.passes import add_passes, check_passes, in_runs, passes_asked
+from feasibility.cli.programs import add_programs, check_programs, period_of, write_programs
 from feasibility.safe_files import shown_path
 
 if TYPE_CHECKING:
@@ -31,13 +31,11 @@ if TYPE_CHECKING:
     from feasibility.treated import TreatedArea
     from feasibility.verdict import Verdict
     from feasibility.viewer import View
-    from robots import Robot
 
 ORDERS = ("rows", "columns", "spiral", "shortest", "given")
 STATUSES = "exit status: as of `coverable check`"
 WHY_COMPLETE = "a path needs 'complete': the greedy search does not visit the cells' centres"
 SPEED = 0.1  # [m/s] of the tool point
-PERIOD = 0.02  # [s] between samples
 APPROACH = 0.05  # [m] of entry and exit, where there is a home
 
 
@@ -45,7 +43,7 @@ def add(subcommands: argparse._SubParsersAction) -> None:
     """Add the command."""
     add_command(
         subcommands, "path", path, add_case, add_html, add_passes, _add_timing,
-        _add_programs, _add_ends,
+        add_programs, _add_ends,
         help="a coverage motion that an arm can run",
         description="Plan a path over every cell in a chosen order, time it within the limits of "
         "joints and tool, and write it as a trajectory.",
@@ -75,7 +73,7 @@ def _add_timing(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--period", type=positive, metavar="S",
-        help="time between samples, seconds (default 0.02; 0.1 for programs in RAPID or KRL alone)",
+        help="time between samples, seconds (default 0.02; 0.1 for programs alone, but URScript)",
     )  # fmt: skip
     parser.add_argument(
         "--out", metavar="FILE", action="append", default=[],
@@ -93,36 +91,6 @@ def _add_ends(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
 
 
-def _add_programs(parser: argparse.ArgumentParser) -> None:
-    """Programs of robot controllers."""
-    parser.add_argument(
-        "--program", metavar="FILE", action="append", default=[],
-        help="write the trajectory as a program: .script (URScript), .mod (ABB RAPID) or .src "
-        "(KUKA KRL); can be repeated",
-    )  # fmt: skip
-    parser.add_argument(
-        "--axis-signs", metavar="S1,..,S6", type=_six,
-        help="of a program: 1 or -1 for each axis of the controller, where its sense is not that "
-        "of the URDF's joint; write --axis-signs=-1,1,1,1,1,1",
-    )  # fmt: skip
-    parser.add_argument(
-        "--axis-offsets-deg", metavar="D1,..,D6", type=_six,
-        help="of a program: degrees that are added to each axis, where its zero is another",
-    )  # fmt: skip
-
-
-def _six(text: str) -> list[float]:
-    """Six finite numbers with commas between them.
-
-    Raises:
-        ArgumentTypeError: the text is something else.
-    """
-    found = numbers(text)
-    if len(found) != 6:
-        raise argparse.ArgumentTypeError(f"must be six numbers with commas, got {text!r:.60}")
-    return found
-
-
 def path(args: argparse.Namespace, began: float) -> int:
     """`coverable path CASE`: a coverage motion in a chosen order, timed and written to files."""
     outputs = {"--html": args.html} | {f"--out[{k}]": out for k, out in enumerate(args.out)}
@@ -130,8 +98,12 @@ def path(args: argparse.Namespace, began: float) -> int:
 
     def check_case(case: Case) -> None:
         from feasibility.paths import check_order
+        from feasibility.results import check_ending
 
         check_passes(args)
+        for out in args.out:
+            check_ending(out)
+        check_programs(args, case)
         if args.order is not None:
             check_order(args.order, case.surface.kind, case.surface.is_grid)
 
@@ -141,15 +113,12 @@ def path(args: argparse.Namespace, began: float) -> int:
         from feasibility.entry import ends_of, entered
         from feasibility.paths import coverage_path
         from feasibility.reports import path as report
-        from feasibility.results import check_ending
         from feasibility.speed import path_rates
         from feasibility.timing import motion_limits, trajectory
         from feasibility.verdict import Answer
 
-        for out in args.out:
-            check_ending(out)
         robot, loaded = opened.setup.robot, opened.so_far()
-        period = _check_programs(args, robot)
+        period = period_of(args)
         speed = args.speed = args.speed or opened.setup.task.speed or SPEED
         limits = motion_limits(robot, speed, args.velocity, args.acceleration)
         along = None if args.passes is None else passes_asked(args, opened)
@@ -182,7 +151,8 @@ def path(args: argparse.Namespace, began: float) -> int:
     else:
         print_out(report.as_text(found, run, limits, *known))
     short = report.short_words(treated, opened.setup.task.coverage)
-    _write(args, robot, run, opened.case.name)
+    _write(args, run)
+    write_programs(args, opened, along, run)
     if args.html is not None:
         write_text(args.html, _view(opened, along, found, treated, run, limits).html(), "view")
     if short:
@@ -244,25 +214,8 @@ def _approach(args: argparse.Namespace, task: Task) -> float | None:
     return APPROACH
 
 
-def _check_programs(args: argparse.Namespace, robot: Robot) -> float:
-    """Refuse programs that this arm has not, before the search; s between samples.
-
-    Raises:
-        CoverableError: a file's ending is that of no program, or the arm has none of that kind.
-    """
-    from feasibility.programs import check_program, language_of
-
-    languages = [language_of(file) for file in args.program]
-    for language in languages:
-        check_program(language, robot, args.axis_signs, args.axis_offsets_deg)
-    if args.period is not None:
-        return float(args.period)
-    slow = [language.period for language in languages]
-    return PERIOD if args.out or not slow else min(slow)
-
-
-def _write(args: argparse.Namespace, robot: Robot, run: Trajectory, name: str) -> None:
-    """Write the wanted trajectories and programs, and report them on stderr.
+def _write(args: argparse.Namespace, run: Trajectory) -> None:
+    """Write the wanted trajectories, and report them on stderr.
 
     Raises:
         FileError: a file cannot be written.
@@ -272,8 +225,3 @@ def _write(args: argparse.Namespace, robot: Robot, run: Trajectory, name: str) -
 
         save_trajectory(out, run)
         print_err(f"trajectory: {shown_path(out)}")
-    for file in args.program:
-        from feasibility.programs import save_program
-
-        save_program(file, robot, run, name, args.axis_signs, args.axis_offsets_deg)
-        print_err(f"program: {shown_path(file)}")

@@ -1,4 +1,4 @@
-"""Timed motions as programs of robot controllers: URScript, RAPID and KRL."""
+"""Timed motions as programs of robot controllers: URScript, RAPID, KRL, FANUC's TP, INFORM."""
 
 from lazy_loader import attach_stub
 

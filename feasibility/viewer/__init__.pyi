@@ -12,6 +12,7 @@ from .html_page import meshcat_program as meshcat_program
 from .live_server import HTML as HTML
 from .live_server import File as File
 from .live_server import Handler as Handler
+from .live_server import LiveView as LiveView
 from .live_server import LocalServer as LocalServer
 from .live_server import Served as Served
 from .obstacles import HULLS as HULLS

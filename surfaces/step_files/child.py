@@ -12,7 +12,9 @@ from __future__ import annotations
 
 import importlib
 import io
+import itertools
 import json
+import math
 import os
 import resource
 import sys
@@ -22,12 +24,14 @@ from typing import Any
 MILLIMETRE = 1e-3  # m; Open CASCADE turns all units into millimetres
 # Of edges and inner points of a triangle, as weights of its corners: where it may lie off the face.
 WITHIN = ((0.5, 0.5, 0.0), (0.0, 0.5, 0.5), (0.5, 0.0, 0.5), (1 / 3, 1 / 3, 1 / 3))
-# Of Open CASCADE.
-MODULES = (
-    "BRep", "BRepAdaptor", "BRepGProp", "BRepMesh", "collections", "GeomAdaptor", "GProp",
-    "IFSelect", "Quantity", "STEPCAFControl", "TCollection", "TDocStd", "TopAbs", "TopExp",
-    "TopLoc", "TopoDS", "XCAFDoc",
+MODULES = (  # of Open CASCADE
+    "BRep", "BRepAdaptor", "BRepGProp", "BRepMesh", "BRepTools", "collections", "GeomAdaptor",
+    "GeomAPI", "gp", "GProp", "IFSelect", "IntTools", "Quantity", "Standard", "STEPCAFControl",
+    "TCollection", "TDocStd", "TopAbs", "TopExp", "TopLoc", "TopoDS", "XCAFDoc",
 )  # fmt: skip
+LATTICE = (4, 16)  # places of a face along u and along v among which its middle one is found
+VIEWED = (0.55, -0.70, 0.45)  # from a part to a viewer, about
+MOST_PROJECTED = 20_000  # points of a file that are projected onto its faces; some take 1 ms
 
 
 class Refused(Exception):
@@ -75,6 +79,7 @@ class Part:
         from OCP.Quantity import Quantity_Color
         from OCP.XCAFDoc import XCAFDoc_ColorTool, XCAFDoc_ColorType, XCAFDoc_ShapeTool
 
+        kinds = XCAFDoc_ColorType.XCAFDoc_ColorGen, XCAFDoc_ColorType.XCAFDoc_ColorSurf
         coloured = []
         parts = Sequence_TDF_Label()
         self.shapes.GetShapes(parts)
@@ -82,10 +87,7 @@ class Part:
             inner = Sequence_TDF_Label()
             XCAFDoc_ShapeTool.GetSubShapes_s(part, inner)
             for label in (part, *inner):
-                for kind in (
-                    XCAFDoc_ColorType.XCAFDoc_ColorGen,
-                    XCAFDoc_ColorType.XCAFDoc_ColorSurf,
-                ):
+                for kind in kinds:
                     colour = Quantity_Color()
                     if XCAFDoc_ColorTool.GetColor_s(label, kind, colour):
                         shape = XCAFDoc_ShapeTool.GetShape_s(label)
@@ -100,18 +102,23 @@ class Part:
         return [names.get(known.FindIndex(unplaced(face)), "") for face in self.faces]
 
     def described(self) -> list[dict[str, Any]]:
-        """Each face's kind, area (m^2) and colour."""
+        """Each face's kind, area (m^2), colour, and a place on it (m) with its outward normal."""
         from OCP.BRepAdaptor import BRepAdaptor_Surface
         from OCP.BRepGProp import BRepGProp
         from OCP.GProp import GProp_GProps
+        from OCP.Standard import Standard_Failure
 
         found = []
         for face, colour in zip(self.faces, self.colour_of_each(), strict=True):
             properties = GProp_GProps()
             BRepGProp.SurfaceProperties_s(face, properties)
             kind = BRepAdaptor_Surface(face, False).GetType().name.removeprefix("GeomAbs_")
-            area = properties.Mass() * MILLIMETRE**2
-            found.append({"kind": kind.lower(), "area": area, "colour": colour})
+            try:
+                centre, normal = middle_of(face, properties.CentreOfMass().Coord())
+            except Standard_Failure:
+                centre = normal = [0.0] * 3
+            own = {"area": properties.Mass() * MILLIMETRE**2, "centre": centre, "normal": normal}
+            found.append({"kind": kind.lower(), "colour": colour, **own})
         return found
 
     def triangulated(self, numbers: list[int], deviation: float, angle: float) -> Triangles:
@@ -148,8 +155,11 @@ class Triangles:
         """Start with none."""
         self.vertices: list[tuple[float, float, float]] = []
         self.corners: list[tuple[int, int, int]] = []
+        self.counts: list[int] = []
+        """How many triangles each face has."""
         self.deviation = 0.0
-        """m, the largest at the middles of triangles and edges."""
+        """m, the largest at the middles of triangles and edges, or a little more."""
+        self.left = MOST_PROJECTED
 
     def add(self, face: Any, number: int) -> None:
         """Add those of a face, their outer side that of the body.
@@ -172,6 +182,7 @@ class Triangles:
         nodes = [cut.Node(k + 1) for k in range(cut.NbNodes())]
         triangles = [cut.Triangle(k + 1) for k in range(cut.NbTriangles())]
         corners = [tuple(one.Value(k) - 1 for k in (1, 2, 3)) for one in triangles]
+        self.counts.append(len(corners))
         self._measure(face, cut, nodes, corners)
         turned = face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED
         turned ^= move.IsNegative()
@@ -183,24 +194,43 @@ class Triangles:
             self.vertices.append((x, y, z))
 
     def _measure(self, face: Any, cut: Any, nodes: list[Any], corners: list[Any]) -> None:
-        """Compare triangles with the face at the same parameters."""
+        """Compare triangles with the face at the same parameters.
+
+        At a pole that may be far off a triangle that is close to the face. So the points furthest
+        off are projected onto the face, until no other can be further off.
+        """
         from OCP.BRep import BRep_Tool
+        from OCP.BRepTools import BRepTools
         from OCP.GeomAdaptor import GeomAdaptor_Surface
+        from OCP.GeomAPI import GeomAPI_ProjectPointOnSurf
+        from OCP.gp import gp_Pnt
         from OCP.TopLoc import TopLoc_Location
 
         if not cut.HasUVNodes():
             raise Refused("has a face without parameters, which cannot be measured; leave it out")
-        surface = GeomAdaptor_Surface(BRep_Tool.Surface_s(face, TopLoc_Location()))
+        whole = BRep_Tool.Surface_s(face, TopLoc_Location())
+        surface = GeomAdaptor_Surface(whole)
         places = [node.Coord() for node in nodes]
         values = [cut.UVNode(k + 1).Coord() for k in range(len(nodes))]
-        most = 0.0
+        most, further = self.deviation / MILLIMETRE, list[tuple[float, list[float]]]()
         for ends in corners:
             for weights in WITHIN:
                 u, v = mean([values[k] for k in ends], weights)
                 flat = mean([places[k] for k in ends], weights)
-                curved = surface.Value(u, v).Coord()
-                most = max(most, sum((a - b) ** 2 for a, b in zip(flat, curved, strict=True)))
-        self.deviation = max(self.deviation, MILLIMETRE * most**0.5)
+                off = math.dist(flat, surface.Value(u, v).Coord())
+                if off > most:
+                    further.append((off, flat))
+        foot = GeomAPI_ProjectPointOnSurf()
+        foot.Init(whole, *BRepTools.UVBounds_s(face))
+        for off, flat in sorted(further, reverse=True):
+            if off <= most:
+                break
+            if self.left > 0:
+                self.left -= 1
+                foot.Perform(gp_Pnt(*flat))
+                off = min(off, foot.LowerDistance()) if foot.NbPoints() else off
+            most = max(most, off)
+        self.deviation = MILLIMETRE * most
 
 
 def mean(values: list[tuple[float, ...]], weights: tuple[float, ...]) -> list[float]:
@@ -222,6 +252,43 @@ def faces_of(shape: Any) -> Iterator[Any]:
         yield TopoDS.Face(found.FindKey(k + 1))
 
 
+def middle_of(face: Any, centre: tuple[float, ...]) -> tuple[list[float], list[float]]:
+    """The place (m) of a face, off its border, that is nearest to its centre, and its normal.
+
+    The centre itself may lie in a hole, or off the face, as that of a sphere: of places that are
+    equally near, one is taken that a viewer sees. The normal is zero where none is found.
+    """
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+    from OCP.BRepTools import BRepTools
+    from OCP.gp import gp_Pnt, gp_Pnt2d, gp_Vec
+    from OCP.IntTools import IntTools_FClass2d
+    from OCP.TopAbs import TopAbs_Orientation, TopAbs_State
+
+    surface, inside = BRepAdaptor_Surface(face, False), IntTools_FClass2d(face, 1e-7)
+    turned = face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED
+    turned ^= face.Location().Transformation().IsNegative()
+    u0, u1, v0, v1 = BRepTools.UVBounds_s(face)
+    found = []
+    for count in LATTICE:
+        shares = [k / count for k in range(1, count)]
+        for a, b in itertools.product(shares, shares):
+            u, v = u0 + a * (u1 - u0), v0 + b * (v1 - v0)
+            if inside.Perform(gp_Pnt2d(u, v)) != TopAbs_State.TopAbs_IN:
+                continue
+            place, along_u, along_v = gp_Pnt(), gp_Vec(), gp_Vec()
+            surface.D1(u, v, place, along_u, along_v)
+            across = along_u.Crossed(along_v)
+            size = (-1.0 if turned else 1.0) * across.Magnitude()
+            normal = [part / size if size else 0.0 for part in across.Coord()]
+            seen = sum(a * b for a, b in zip(normal, VIEWED, strict=True))
+            away = float(f"{math.dist(place.Coord(), centre):.6g}")
+            found.append((away, -seen, place.Coord(), normal))
+        if found:
+            break
+    _, _, middle, normal = min(found, default=(0.0, 0.0, centre, [0.0] * 3))
+    return [MILLIMETRE * part for part in middle], normal
+
+
 def unplaced(face: Any) -> Any:
     """The same for a face at any place of a part with it."""
     from OCP.TopLoc import TopLoc_Location
@@ -241,8 +308,9 @@ def answer(job: dict[str, Any], data: bytes) -> bytes:
     reply: dict[str, Any] = {"faces": part.described()}
     colours = [face["colour"] for face in reply["faces"]]
     numbers = job["numbers"]
-    if job["colour"]:
-        numbers = [k + 1 for k, colour in enumerate(colours) if colour == job["colour"]]
+    if job["colour"] or numbers == "all":
+        wanted = {job["colour"]} if job["colour"] else set(colours)
+        numbers = [k + 1 for k, colour in enumerate(colours) if colour in wanted]
     numbers = [number for number in dict.fromkeys(numbers) if number <= len(colours)]
     if not numbers:
         return json.dumps(reply).encode() + b"\n"
@@ -250,7 +318,7 @@ def answer(job: dict[str, Any], data: bytes) -> bytes:
     vertices = np.array(made.vertices, dtype="<f8").reshape(-1, 3)
     corners = np.array(made.corners, dtype="<i4").reshape(-1, 3)
     reply |= {"taken": numbers, "deviation": made.deviation}
-    reply |= {"vertices": len(vertices), "triangles": len(corners)}
+    reply |= {"vertices": len(vertices), "triangles": len(corners), "counts": made.counts}
     return json.dumps(reply).encode() + b"\n" + vertices.tobytes() + corners.tobytes()
 
 
@@ -271,10 +339,8 @@ def main() -> None:
     resource.setrlimit(resource.RLIMIT_NOFILE, (0, 0))
     try:
         reply = answer(job, data)
-    except Refused as error:
-        reply = json.dumps({"fault": str(error)}).encode() + b"\n"
-    except MemoryError:
-        reply = json.dumps({"fault": "needs too much memory"}).encode() + b"\n"
+    except (Refused, MemoryError) as error:
+        reply = json.dumps({"fault": str(error) or "needs too much memory"}).encode() + b"\n"
     written.write(reply)
     written.flush()
     os._exit(0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,8 +19,8 @@ from surfaces.surface import SurfaceError
 EXTRA = "needs the extra: pip install 'coverable[step]'"
 CHILD = Path(__file__).with_name("child.py")
 HEADER, END = b"ISO-10303-21;", b"END-ISO-10303-21;"
-MOST_FACES = 1_000_000  # of a file; a line of its description takes some 60 bytes
-LINE = 100  # bytes, of such a line at most
+MOST_FACES = 1_000_000  # of a file; a line of its description takes some 200 bytes
+LINE = 300  # bytes, of such a line at most
 
 
 class Caps(NamedTuple):
@@ -44,7 +45,8 @@ class Read(NamedTuple):
     """What a STEP file holds."""
 
     faces: list[dict[str, Any]]
-    """`kind`, `area` (m^2) and `colour` ("#rrggbb" or "") of each; the first is number 1."""
+    """Of each, the first being number 1: `kind`, `area` (m^2), `colour` ("#rrggbb" or ""), a place
+    near its middle, `centre` (m), and the outward `normal` there."""
     taken: list[int]
     """Numbers of the faces with triangles here."""
     vertices: Array
@@ -53,6 +55,8 @@ class Read(NamedTuple):
     """(F, 3) corners, counterclockwise seen from outside."""
     deviation: float
     """m, the largest measured between the faces and their triangles."""
+    counts: list[int]
+    """How many triangles each of the faces taken has, in order."""
 
 
 def read_step(path: str | os.PathLike[str], job: Mapping[str, Any], caps: Caps = CAPS) -> Read:
@@ -60,7 +64,8 @@ def read_step(path: str | os.PathLike[str], job: Mapping[str, Any], caps: Caps =
 
     Args:
         path: the file.
-        job: `numbers` of faces, or a `colour`; the `deviation` (m) and `angle` (rad) of triangles.
+        job: `numbers` of faces or "all", or a `colour`; the `deviation` (m) and `angle` (rad) of
+            triangles.
         caps: of the process.
 
     Raises:
@@ -124,21 +129,35 @@ def _taken(written: bytes, caps: Caps) -> Read:
     if "fault" in said:
         raise SurfaceError(str(said["fault"])[:300])
     faces = [
-        {"kind": str(one["kind"]), "area": float(one["area"]), "colour": str(one["colour"])}
+        {
+            "kind": str(one["kind"]), "area": float(one["area"]), "colour": str(one["colour"]),
+            **{key: _vector(one[key]) for key in ("centre", "normal")},
+        }
         for one in said["faces"]
-    ]
+    ]  # fmt: skip
     vertices, triangles = int(said.get("vertices", 0)), int(said.get("triangles", 0))
     if triangles > caps.triangles:
         raise SurfaceError(
             f"makes {triangles:,} triangles, more than {caps.triangles:,}; take fewer faces, or "
             "ask for a larger deviation"
         )
+    counts = [int(count) for count in said.get("counts", [])]
+    taken = [int(number) for number in said.get("taken", [])]
+    if len(counts) != len(taken) or sum(counts) != triangles or min(counts, default=0) < 0:
+        raise ValueError("triangles of other faces")
     if min(vertices, triangles) < 0 or len(arrays) != 24 * vertices + 12 * triangles:
         raise ValueError("arrays of another size")
     return Read(
         faces,
-        [int(number) for number in said.get("taken", [])],
+        taken,
         np.frombuffer(arrays[: 24 * vertices], "<f8").reshape(-1, 3).copy(),
         np.frombuffer(arrays[24 * vertices :], "<i4").reshape(-1, 3).astype(np.int64),
         float(said.get("deviation", 0.0)),
+        counts,
     )
+
+
+def _vector(given: Any) -> tuple[float, float, float]:
+    """Three finite numbers; 0 where one is not."""
+    x, y, z = (float(part) if math.isfinite(float(part)) else 0.0 for part in given)
+    return x, y, z

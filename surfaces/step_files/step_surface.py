@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
+import numpy as np
 from numpy.typing import ArrayLike
 
+from coverable_arrays import Array, Ints
 from coverable_errors import Fault, listed, shown
 from coverable_files import shown_name
 from surfaces.arguments import ORIGIN, Checks
@@ -18,9 +20,12 @@ from surfaces.step_files.step_process import CAPS, Caps, Read, read_step
 from surfaces.surface import Side, SurfaceError
 
 DEVIATION = 1e-4  # [m]
+COARSE = 5e-4  # [m] in a picture
 ANGLE = 0.2  # [rad] between neighbouring triangles: their normals are blended, as of any mesh
 LISTED = 20  # faces, or colours, in a message
-CHOOSE = 'choose by faces = [3, 7] or by colour = "#ff0000"'
+CHOOSE = 'choose by faces = [3, 7], by faces = "all" or by colour = "#ff0000"'
+ALL = "all"
+Faces = Sequence[int] | Literal["all"]
 
 
 class StepFace(NamedTuple):
@@ -34,11 +39,27 @@ class StepFace(NamedTuple):
     """m^2."""
     colour: str
     """As "#rrggbb"; empty where the file gives it none."""
+    centre: tuple[float, float, float]
+    """m, a place on the face near its middle, in the file's frame."""
+    normal: tuple[float, float, float]
+    """Outward unit normal there; zero where there is none."""
+
+
+class StepParts(NamedTuple):
+    """All faces of a STEP file as triangles."""
+
+    faces: tuple[StepFace, ...]
+    vertices: Array
+    """(V, 3) m."""
+    triangles: Ints
+    """(F, 3) corners, counterclockwise seen from outside."""
+    owner: Ints
+    """(F,) the number of the face that each triangle belongs to."""
 
 
 def step(
     file: str | os.PathLike[str],
-    faces: Sequence[int] | None = None,
+    faces: Faces | None = None,
     colour: str | None = None,
     deviation: float = DEVIATION,
     side: Side = "outside",
@@ -53,7 +74,7 @@ def step(
 
     Args:
         file: its path.
-        faces: numbers as `step_faces` gives them, from 1; or
+        faces: numbers as `step_faces` gives them, from 1, or "all"; or
         colour: "#rrggbb", of all faces to be taken.
         deviation: m, how far triangles may lie off the faces, about.
         side: 'outside' for a tool on the side that the faces look to, which is outside the solid.
@@ -85,7 +106,7 @@ def step_faces(file: str | os.PathLike[str]) -> tuple[StepFace, ...]:
 
 def step_triangles(
     file: str | os.PathLike[str],
-    faces: Sequence[int] | None = None,
+    faces: Faces | None = None,
     colour: str | None = None,
     deviation: float = DEVIATION,
     caps: Caps = CAPS,
@@ -106,23 +127,40 @@ def step_triangles(
         raise SurfaceError(error.faults, name) from error
 
 
+def step_parts(file: str | os.PathLike[str], caps: Caps = CAPS) -> StepParts:
+    """All faces of a STEP file, each with its triangles, for a picture.
+
+    Raises:
+        SurfaceError: as `step`.
+    """
+    job = {"numbers": ALL, "colour": "", "deviation": COARSE, "angle": ANGLE}
+    try:
+        read = read_step(file, job, caps)
+    except SurfaceError as error:
+        raise SurfaceError(error.faults, shown_name(file)) from error
+    owner = np.repeat(np.array(read.taken, dtype=np.int64), read.counts)
+    return StepParts(_faces(read), read.vertices, read.triangles, owner)
+
+
 def checked_choice(
-    faces: Sequence[int] | None = None, colour: str | None = None, deviation: float = DEVIATION
-) -> tuple[list[int], str]:
-    """Which faces are meant: their numbers, and the colour in small letters.
+    faces: Faces | None = None, colour: str | None = None, deviation: float = DEVIATION
+) -> tuple[list[int] | Literal["all"], str]:
+    """Which faces are meant: their numbers or all, and the colour in small letters.
 
     Raises:
         SurfaceError: the arguments make no sense, or contradict each other.
     """
     check = Checks("step")
     check.number("deviation", deviation, "must be a number in 1e-06 .. 0.1 (metres)", 1e-6, 0.1)
-    numbers: list[int] = []
-    if faces is not None:
-        given: Any = faces.tolist() if hasattr(faces, "tolist") else faces
+    numbers: list[int] | Literal["all"] = []
+    if isinstance(faces, str) and faces == ALL:
+        numbers = "all"
+    elif faces is not None:
+        given: Any = faces.tolist() if isinstance(faces, np.ndarray) else faces
         if isinstance(given, Sequence) and not isinstance(given, str) and given:
             numbers = [check.whole(f"faces[{k}]", one, 1, 10**9) for k, one in enumerate(given)]
         else:
-            check.wrong("faces", faces, "must be an array of numbers of faces, from 1")
+            check.wrong("faces", faces, 'must be an array of numbers of faces, from 1, or "all"')
     wanted = ""
     if colour is not None:
         if isinstance(colour, str) and re.fullmatch("#[0-9a-fA-F]{6}", colour):
@@ -135,7 +173,9 @@ def checked_choice(
     return numbers, wanted
 
 
-def _refuse_missing(read: Read, numbers: list[int], colour: str, chosen: bool) -> None:
+def _refuse_missing(
+    read: Read, numbers: list[int] | Literal["all"], colour: str, chosen: bool
+) -> None:
     """Refuse faces that are not there.
 
     Raises:
@@ -143,10 +183,11 @@ def _refuse_missing(read: Read, numbers: list[int], colour: str, chosen: bool) -
     """
     count = len(read.faces)
     if not chosen:
-        raise SurfaceError(f"{CHOOSE}; the file has {_listed(read)}")
-    beyond = [k for k, number in enumerate(numbers) if number > count]
+        raise SurfaceError(f"{CHOOSE}; `coverable show` shows them: {_listed(read)}")
+    own = [] if numbers == "all" else numbers
+    beyond = [k for k, number in enumerate(own) if number > count]
     if beyond:
-        what = f"names face {numbers[beyond[0]]}; the file has {_listed(read)}"
+        what = f"names face {own[beyond[0]]}; the file has {_listed(read)}"
         raise SurfaceError(Fault(f"faces[{beyond[0]}]", what))
     if colour and not read.taken:
         there = sorted({face["colour"] for face in read.faces} - {""})
@@ -159,13 +200,26 @@ def _refuse_missing(read: Read, numbers: list[int], colour: str, chosen: bool) -
 def _listed(read: Read) -> str:
     """How many faces there are, and what the largest of them are."""
     faces = sorted(_faces(read), key=lambda face: -face.area)[:LISTED]
-    words = [
-        f"{face.number}: {face.kind}, {face.area:.3g} m^2" + f", {face.colour}" * bool(face.colour)
-        for face in sorted(faces)
-    ]
+    words = [face_words(face) for face in sorted(faces)]
     largest = f", the {LISTED} largest" if len(read.faces) > LISTED else ""
     plural = "face" if len(read.faces) == 1 else f"faces, 1 .. {len(read.faces)}"
     return f"{len(read.faces)} {plural}{largest} ({'; '.join(words)})"
+
+
+def face_words(face: StepFace) -> str:
+    """A face with what tells it apart.
+
+    Example:
+        >>> face_words(StepFace(3, "plane", 0.02, "#ff0000", (0.1, 0.05, 0.0), (0.0, -0.0, -1.0)))
+        '3: plane, 0.02 m^2, #ff0000, at 0.1, 0.05, 0 m, looks to 0, 0, -1'
+    """
+    centre, normal = (
+        ", ".join(f"{round(value, digits) + 0.0:g}" for value in vector)
+        for vector, digits in ((face.centre, 4), (face.normal, 2))
+    )
+    colour = f", {face.colour}" if face.colour else ""
+    words = f"{face.number}: {face.kind}, {face.area:.3g} m^2{colour}, at {centre} m"
+    return f"{words}, looks to {normal}" if any(face.normal) else words
 
 
 def _note(read: Read) -> str:

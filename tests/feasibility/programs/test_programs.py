@@ -8,32 +8,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from small_cases import TEXTS
+from timed_motions import TURN, UR5, at, motion
 
 from feasibility.cli.main import main
-from feasibility.programs import ProgramError, check_program, language_of, save_program
+from feasibility.programs import (
+    ProgramError,
+    ProgramSettings,
+    check_program,
+    language_of,
+    save_program,
+)
 from feasibility.safe_files import FileError
-from feasibility.timing import Trajectory
 from robots import Axis, load_robot
 
-UR5 = load_robot("ur5")
 RAIL = Axis("rail", "prismatic", (1, 0, 0), limits=(-2.0, 4.0))
 IRB = replace(load_robot("ur5", axes=[RAIL]), name="irb1200_on_a_rail")
-TURN = 180.0 / np.pi
-
-
-def at(time, n):
-    """q, dq and ddq (k, n) of a smooth motion from rest to rest in two seconds."""
-    s = np.clip(np.asarray(time)[:, None] / 2.0, 0.0, 1.0)
-    way = np.linspace(2.0, 0.5, n)
-    q = np.linspace(-1.0, 1.0, n) + s**3 * (10 - 15 * s + 6 * s**2) * way
-    return q, 15 * (s * (1 - s)) ** 2 * way, 15 * s * (1 - s) * (1 - 2 * s) * way
-
-
-def motion(robot, period=0.02):
-    """Its samples, one of them between the regular ones."""
-    time = np.sort(np.append(np.arange(0.0, 2.0 + 1e-9, period), 0.1234567))
-    still = np.zeros(len(time))
-    return Trajectory(robot.joint_names, time, *at(time, robot.n), still, still.astype(int) - 1)
 
 
 def numbers(text):
@@ -73,7 +62,8 @@ def read_source(text):
 
 
 def saved(tmp_path, name, robot, **given):
-    save_program(tmp_path / name, robot, motion(robot), "a case\nof two lines", **given)
+    settings = ProgramSettings(**given)
+    save_program(tmp_path / name, robot, motion(robot), "a case\nof two lines", settings)
     return (tmp_path / name).read_text(encoding="ascii")
 
 
@@ -115,7 +105,7 @@ def test_rounding_leaves_no_joint_outside_its_limits():
     for name, unit, digits in (("a.script", 1.0, 7), ("a.mod", TURN, 4), ("a.src", TURN, 4)):
         axes = check_program(language_of(name), replace(robot, name="arm"))
         for end in (-third, third):
-            arm, _ = axes.values(robot, np.full((1, 6), end), digits)
+            arm, _ = axes.values(robot, np.full((1, 6), end))
             assert (np.abs(arm) <= third * unit).all()
             assert np.abs(arm - end * unit).max() <= 10.0**-digits
 
@@ -131,6 +121,9 @@ def test_rounding_leaves_no_joint_outside_its_limits():
         ("a.script", replace(IRB, name="ur5"), "URScript has no external axes; there are rail"),
         ("a.mod", replace(load_robot("panda"), name="arm"), "7 of them move here"),
         ("a.mod", replace(UR5, name="a", surface_link="upper_arm_link"), "order of its axes"),
+        ("a.ls", UR5, "TP is for arms of FANUC; 'ur5' is of Universal Robots"),
+        ("a.ls", replace(IRB, name="arm"), "external axes are not written in TP yet; there are"),
+        ("a.jbi", replace(UR5, name="gp7"), "pulses_per_deg is missing"),
     ],
 )
 def test_other_arms_are_refused_with_a_sentence(file, robot, said):
@@ -141,7 +134,7 @@ def test_other_arms_are_refused_with_a_sentence(file, robot, said):
 def test_signs_and_endings_are_checked(tmp_path):
     for signs in ([1, 1, 1, 1, 1, 2], [1] * 5):
         with pytest.raises(ProgramError, match="signs"):
-            check_program(language_of("a.mod"), replace(UR5, name="arm"), signs)
+            check_program(language_of("a.mod"), replace(UR5, name="arm"), ProgramSettings(signs))
     with pytest.raises(FileError, match=r"\.script"):
         save_program(tmp_path / "a.prg", UR5, motion(UR5))
     assert list(tmp_path.iterdir()) == []
@@ -155,7 +148,7 @@ def test_the_command_writes_them(tmp_path, capsys):
     time, q = read_script(out.read_text())
     assert time[-1] > 1.0
     assert ((q >= UR5.lower) & (q <= UR5.upper)).all()
-    for file, status in (("run.mod", "is of Universal Robots"), ("run.txt", ".src (KRL)")):
+    for file, status in (("run.mod", "is of Universal Robots"), ("run.txt", ".src (KUKA KRL)")):
         assert main(["path", str(case), "--program", str(tmp_path / file)]) == 2
         assert status in " ".join(capsys.readouterr().err.split())
     assert main(["path", str(case), "--program", str(out), "--axis-signs", "1,2"]) == 2

@@ -10,12 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from OCP.BRepFilletAPI import BRepFilletAPI_MakeFillet
-from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeSphere
 from OCP.gp import gp_Ax1, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
 from OCP.IFSelect import IFSelect_ReturnStatus
 from OCP.Interface import Interface_Static
 from OCP.Quantity import Quantity_Color, Quantity_TypeOfColor
 from OCP.STEPCAFControl import STEPCAFControl_Writer
+from OCP.STEPControl import STEPControl_StepModelType, STEPControl_Writer
 from OCP.TCollection import TCollection_ExtendedString
 from OCP.TDocStd import TDocStd_Document
 from OCP.TopAbs import TopAbs_ShapeEnum
@@ -79,7 +80,16 @@ def _paint(colours: Any, label: Any, rgb: tuple[float, float, float]) -> None:
     colours.SetColor(label, colour, XCAFDoc_ColorType.XCAFDoc_ColorSurf)
 
 
+def write_ball(path: Path, radius: float) -> None:
+    """A sphere (m) round the origin, its poles on the z axis."""
+    writer = STEPControl_Writer()
+    shape = BRepPrimAPI_MakeSphere(1e3 * radius).Shape()
+    writer.Transfer(shape, STEPControl_StepModelType.STEPControl_AsIs)
+    assert writer.Write(str(path)) == IFSelect_ReturnStatus.IFSelect_RetDone
+
+
 if __name__ == "__main__":
     folder, (*size, radius) = Path(sys.argv[1]), map(float, sys.argv[2:])
     write_part(folder / "part.step", size, radius)
     write_part(folder / "pair.step", size, radius, "INCH", placed=True)
+    write_ball(folder / "ball.step", 0.3)

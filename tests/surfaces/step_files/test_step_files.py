@@ -1,6 +1,9 @@
 """Faces of STEP files become surfaces in metres, and files that are none become sentences."""
 
+import base64
+import gzip
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +13,7 @@ import pytest
 
 from coverable_processes import Ended, Limits, folder_of, run_apart
 from feasibility.cases import Case, CaseError
+from feasibility.cli.main import main
 from surfaces import SurfaceError, step, step_faces
 from surfaces.step_files import step_process, step_surface
 from surfaces.step_files.step_process import CAPS, CHILD, Caps, read_step
@@ -78,6 +82,33 @@ def test_faces_have_numbers_kinds_areas_and_colours(folder, monkeypatch, pair):
     round_ones = [face.number for face in faces if face.kind == "cylinder"]
     assert round_ones == [face.number for face in faces if face.colour == "#ff0000"] == [3, 10]
     assert {face.colour for face in faces if face.kind == "plane"} == {"#808080"}
+    # The part, its round edge along z at the origin; and the same, turned about z and 1 m up.
+    size = np.array(SIZE)
+    turn, up = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.array([0, 0, 1])
+    for own, other in zip(faces[:7], faces[7:], strict=True):
+        centre, normal = np.array(own.centre), np.array(own.normal)
+        if own.kind == "cylinder":
+            outwards = [*(centre[:2] - ROUND) / ROUND, 0.0]
+            assert centre[2] == pytest.approx(SIZE[2] / 2)
+        else:
+            axis = int(np.abs(normal).argmax())
+            outwards = np.eye(3)[axis] * (1.0 if centre[axis] > size[axis] / 2 else -1.0)
+            assert centre[axis] == pytest.approx(size[axis] if outwards[axis] > 0 else 0.0)
+            assert (np.abs(centre - size / 2)[np.arange(3) != axis] <= ROUND).all()
+        np.testing.assert_allclose(normal, outwards, atol=1e-9)
+        np.testing.assert_allclose(other.centre, turn @ centre + up, atol=1e-9)
+        np.testing.assert_allclose(other.normal, turn @ normal, atol=1e-9)
+
+
+def test_the_deviation_is_right_at_the_poles_of_a_sphere(folder):
+    surface = step(folder / "ball.step", faces="all")
+    said = float(re.search(r"at most (\S+) mm off", surface.notes[0])[1]) * 1e-3
+    corners = surface.mesh.vertices[surface.mesh.faces]
+    np.testing.assert_allclose(np.linalg.norm(corners, axis=2), 0.3, atol=1e-9)
+    shares = np.random.default_rng(1).dirichlet((1, 1, 1), 20)
+    off = 0.3 - np.linalg.norm(np.einsum("sk,fki->fsi", shares, corners), axis=2)
+    assert 0.9 * said <= off.max() <= 1.01 * said
+    assert said < 1e-4
 
 
 def test_triangles_are_in_metres_and_as_near_as_is_said(known, folder, read):
@@ -121,7 +152,8 @@ def test_parts_of_an_assembly_stand_where_it_has_them(folder, monkeypatch, pair)
 @pytest.mark.parametrize(
     ("choice", "words"),
     [
-        ({}, ["faces = [3, 7]", "7 faces", "3: cylinder, 0.000785 m^2, #ff0000"]),
+        ({}, ["faces = [3, 7]", "7 faces", "3: cylinder, 0.000785 m^2, #ff0000, at 0.0029, 0.00"]),
+        ({"faces": "al"}, ['array of numbers of faces, from 1, or "all"']),
         ({"faces": [3, 8]}, ["faces[1]", "face 8", "1 .. 7", "7: plane"]),
         ({"faces": [0]}, ["faces[0]", "1 .. "]),
         ({"faces": []}, ["array of numbers"]),
@@ -210,12 +242,42 @@ def _answered(said, arrays=b""):
         _answered({"faces": [], "vertices": 1, "triangles": 1}, b"0" * 35),
         _answered({"faces": [], "vertices": -1, "triangles": 2}),
         _answered({"faces": 3}),
+        _answered(
+            {"faces": [], "taken": [1], "counts": [2], "vertices": 0, "triangles": 1}, b"0" * 12
+        ),
     ],
 )
 def test_what_the_process_writes_is_not_believed(folder, monkeypatch, written):
     monkeypatch.setattr(step_process, "run_apart", lambda *given: Ended(written))
     with pytest.raises(SurfaceError, match="Open CASCADE broke off over it"):
         step(folder / "part.step", faces=[1])
+
+
+def test_facing_takes_a_part_of_all_faces(folder):
+    keys = "facing = { direction = [0, 0, 1], within_deg = 30 }\ncells = 12"
+    for more in ("", '\nfaces = "all"'):
+        case = Case.from_toml(CASE.format(keys + more), folder)
+        assert Case.from_toml(case.to_toml()) == case
+        surface = case.build().cells.surface
+        assert surface.mesh.face_areas.sum() == pytest.approx(AREAS[1], abs=1e-6)
+        np.testing.assert_allclose(surface.mesh.vertices[:, 2], SIZE[2], atol=1e-12)
+
+
+def test_show_lists_the_faces_and_draws_them_with_their_numbers(folder, tmp_path, capsys):
+    page = tmp_path / "faces.html"
+    assert main(["show", str(folder / "part.step"), "--html", str(page)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.partition(":")[0] for line in lines] == [str(k) for k in range(1, 8)]
+    assert lines[2].startswith("3: cylinder, 0.000785 m^2, #ff0000, at 0.0029, 0.0029, 0.025 m")
+    text = page.read_text()
+    packed = re.search(r'<script[^>]*id="commands"[^>]*>(.*?)</script>', text, re.DOTALL)[1]
+    drawn = gzip.decompress(base64.b64decode(packed))
+    for k in range(1, 8):
+        assert f'data-path="/faces/{k}"' in text
+        assert f"/faces/{k}".encode() in drawn
+        assert f"/numbers/{k}".encode() in drawn
+    assert main(["show", str(tmp_path / "none.STP")]) == 2
+    assert "none.STP" in capsys.readouterr().err
 
 
 def test_there_is_a_most_of_triangles(folder, monkeypatch):
@@ -230,8 +292,10 @@ def test_there_is_a_most_of_triangles(folder, monkeypatch):
 )
 def test_triangles_of_no_vertices_are_refused(folder, monkeypatch, corners, words):
     arrays = np.eye(3).tobytes() + np.array(corners, dtype="<i4").tobytes()
-    face = {"kind": "plane", "area": 1.0, "colour": ""}
+    place = {"centre": [0, 0, 0], "normal": [0, 0, 1]}
+    face = {"kind": "plane", "area": 1.0, "colour": "", **place}
     said = {"faces": [face], "taken": [1], "vertices": 3, "triangles": 1, "deviation": 0.0}
+    said["counts"] = [1]
     monkeypatch.setattr(step_process, "run_apart", lambda *given: Ended(_answered(said, arrays)))
     with pytest.raises(SurfaceError, match=words):
         step(folder / "part.step", faces=[1])

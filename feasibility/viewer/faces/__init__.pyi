@@ -1,0 +1,1 @@
+from .faces_view import faces_page as faces_page

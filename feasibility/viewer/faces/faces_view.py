@@ -1,0 +1,104 @@
+"""Faces of a STEP file in their colours, each with its number, border, and line of the legend."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.linalg import norm
+
+from coverable_arrays import Array, Ints
+from coverable_errors import counted
+from feasibility.viewer import threejs
+from feasibility.viewer.frames import triad
+from feasibility.viewer.html_page import Entry, Legend, page
+from feasibility.viewer.meshes import GREY, tubes
+from feasibility.viewer.passes import digit_lines
+from feasibility.viewer.scene import OUTLINES
+from feasibility.viewer.stage import framing
+from surfaces import StepFace, StepParts
+
+MOST_LINES = 40  # of the legend, the largest faces
+TALL, SMALLEST, LARGEST = 0.5, 0.03, 0.1  # [1] a digit, of a face's width; of the whole part
+OFF = 0.006  # [1] of the part: numbers stand off their faces
+THICK = 0.06  # [1] of a digit's height
+INK: threejs.Colour = (0.0, 0.0, 0.0)
+VIEWED = np.array([0.55, -0.70, 0.45]) / norm([0.55, -0.70, 0.45])  # from the part to the eye
+
+
+def faces_page(parts: StepParts, name: str) -> str:
+    """A page that shows the faces of a file.
+
+    Args:
+        parts: the faces with their triangles.
+        name: of the file.
+    """
+    points = parts.vertices
+    size = float(norm(np.ptp(points, axis=0)))
+    largest = {
+        face.number for face in sorted(parts.faces, key=lambda face: -face.area)[:MOST_LINES]
+    }
+    commands = [
+        threejs.set_property("/Background", "top_color", [1.0, 1.0, 1.0]),
+        threejs.set_property("/Background", "bottom_color", [0.93, 0.95, 0.97]),
+        threejs.set_property("/Grid", "visible", False),
+        threejs.set_property("/Axes", "visible", False),
+        triad("/frame", np.eye(4), 0.2 * size),
+    ]
+    entries = []
+    for face in parts.faces:
+        own = parts.triangles[parts.owner == face.number]
+        used, corners = np.unique(own, return_inverse=True)
+        path, colour = f"/faces/{face.number}", _colour(face)
+        triangles = corners.reshape(-1, 3)
+        commands.append(threejs.mesh_object(path, points[used], triangles, colour))
+        if face.number in largest:
+            label = f"{face.number}: {face.kind}, {face.area:.3g} m^2"
+            entries.append(Entry(label, colour, path))
+        width = face.area / max(float(norm(np.ptp(points[used], axis=0))), 1e-300)
+        tall = float(np.clip(TALL * width, SMALLEST * size, LARGEST * size))
+        digits = tubes(_number(face, tall, OFF * size), THICK * tall)
+        commands.append(threejs.mesh_object(f"/numbers/{face.number}", *digits, INK, lit=False))
+    borders = points[_borders(parts)].reshape(-1, 3)
+    commands.append(threejs.segments("/borders", borders, OUTLINES))
+    entries += [Entry("borders", OUTLINES, "/borders"), Entry("numbers", INK, "/numbers")]
+    text = 'in a case: faces = [3, 7], faces = "all" or colour = "#ff0000"'
+    if len(parts.faces) > MOST_LINES:
+        text += f"; below the {MOST_LINES} largest"
+    title = f"{name}: {counted(len(parts.faces), 'face')}"
+    legend = Legend(title, text, tuple(entries), checked="")
+    return page(commands, legend, framing(points, VIEWED))
+
+
+def _colour(face: StepFace) -> threejs.Colour:
+    """That of the file, else grey."""
+    if not face.colour:
+        return GREY
+    red, green, blue = (int(face.colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
+    return red, green, blue
+
+
+def _borders(parts: StepParts) -> Ints:
+    """(k, 2) edges that belong to one triangle of a face alone."""
+    edges = np.sort(
+        np.concatenate([parts.triangles[:, [i, (i + 1) % 3]] for i in range(3)]), axis=1
+    )
+    every, counts = np.unique(edges, axis=0, return_counts=True)
+    return np.asarray(every[counts == 1])
+
+
+def _number(face: StepFace, tall: float, off: float) -> list[Array]:
+    """The number of a face as lines before its middle, upright where it can be.
+
+    Args:
+        face: the face.
+        tall: m, a digit.
+        off: m, from the face.
+    """
+    normal = np.array(face.normal) if any(face.normal) else VIEWED
+    digits = len(str(face.number))
+    up = np.array([0.0, 0.0, 1.0]) if abs(normal[2]) < 0.9 else -VIEWED * [1.0, 1.0, 0.0]
+    up = up - (up @ normal) * normal
+    up = up / norm(up)
+    along = np.cross(up, normal)
+    wide = (0.75 * digits - 0.25) * tall
+    middle = np.array(face.centre) + off * normal
+    return digit_lines(face.number, middle - 0.5 * (wide * along + tall * up), along, tall * up)
