@@ -105,6 +105,7 @@ DEMANDS = (
         _treating, together=True,
     ),
 )  # fmt: skip
+NAMES = tuple(demand.name for demand in DEMANDS)
 BY_REPLAY = tuple(demand.name for demand in DEMANDS if demand.judge is None)
 TOGETHER = tuple(demand.name for demand in DEMANDS if demand.together)
 OF_EACH = tuple(demand.name for demand in DEMANDS if not demand.together)

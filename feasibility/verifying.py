@@ -26,7 +26,7 @@ from feasibility.certification import (
 from feasibility.clock import Clock, OutOfTime
 from feasibility.collisions import Collision, checked_words
 from feasibility.cut_tree import CutTree
-from feasibility.demands import BY_REPLAY, OF_TREE, further, unjudged
+from feasibility.demands import BY_REPLAY, NAMES, OF_TREE, further, unjudged
 from feasibility.problem import Problem
 from feasibility.results import Result
 from feasibility.search import Search
@@ -106,7 +106,13 @@ class Verification:
 
 @overload
 def verify(
-    claim: Robot, cells: Cells, task: Task, q: ArrayLike, *, clock: Clock | None = None
+    claim: Robot,
+    cells: Cells,
+    task: Task,
+    q: ArrayLike,
+    *,
+    working: ArrayLike | None = None,
+    clock: Clock | None = None,
 ) -> Verification: ...
 
 
@@ -120,6 +126,7 @@ def verify(
     task: Task | None = None,
     q: ArrayLike | None = None,
     *,
+    working: ArrayLike | None = None,
     clock: Clock | None = None,
 ) -> Verification:
     """Does this motion cover the cells; does what this verdict says of them hold?
@@ -137,12 +144,16 @@ def verify(
         cells: the surface, cut into E-cells.
         task: standoff, cone and tolerance.
         q: the motion.
+        working: (m,) true in rows at which the tool works. Between two of them it has to be right
+            over the surface; elsewhere, lifted or beyond the border, it may be anywhere but through
+            the surface, and reaches no cell. Of passes (`pass_route`) those places have to be
+            reached at which it works. True everywhere by default.
         clock: its limit counts, and it reports progress; running out is no "holds". Of a motion,
             and of the first steps of a proof, the limit is kept in commands alone.
 
     Raises:
         TypeError: an argument is something else.
-        ArgumentError: q holds no numbers.
+        ArgumentError: q holds no numbers, or `working` does not fit to it.
         NothingToVerifyError: the verdict has neither a motion nor a proof.
 
     Example:
@@ -160,8 +171,11 @@ def verify(
     """
     if isinstance(claim, Robot):
         problem = Problem.of(claim, cells, task)  # type: ignore[arg-type]  # refuses None
-        return _in_time("motion", problem, partial(_of_motion, "motion", problem, _rows(q)), clock)
-    if cells is not None or task is not None or q is not None:
+        rows = _rows(q)
+        at_work = None if working is None else _at_work(working, rows)
+        judged = partial(_of_motion, "motion", problem, rows, working=at_work)
+        return _in_time("motion", problem, judged, clock)
+    if cells is not None or task is not None or q is not None or working is not None:
         raise TypeError("a verdict knows its robot, cells and task: give it alone")
     search = claim.case.search if isinstance(claim, Result) else None
     verdict = claim.verdict if isinstance(claim, Result) else claim
@@ -182,6 +196,19 @@ def _rows(q: Any) -> Array:
         raise ArgumentError(f"q must be an array (m, n) of numbers, got {q!r:.60}") from error
 
 
+def _at_work(working: ArrayLike, rows: Array) -> Mask:
+    """Where the tool works, as an array.
+
+    Raises:
+        ArgumentError: it does not say so of every row.
+    """
+    found = np.asarray(working)
+    if found.dtype != bool or found.shape != rows.shape[:1]:
+        given = f"got {found.dtype} of shape {found.shape}"
+        raise ArgumentError(f"working must be an array ({len(rows)},) of true and false, {given}")
+    return found
+
+
 def _in_time(
     claim: Claim, problem: Problem, judged: Callable[[], Verification], clock: Clock | None
 ) -> Verification:
@@ -197,10 +224,18 @@ def _in_time(
         return Verification(claim, robot, cells, task, (late,), not_judged=left, late=True)
 
 
-def _of_motion(claim: Claim, problem: Problem, q: Any, marks: Ints | None = None) -> Verification:
+def _of_motion(
+    claim: Claim,
+    problem: Problem,
+    q: Any,
+    marks: Ints | None = None,
+    working: Mask | None = None,
+) -> Verification:
     """The replay of a motion over the surface, and the other demands' judges."""
     robot, cells, task = problem.robot, problem.cells, problem.task
-    found = replay_over_surface(robot, cells, task, q, bodies=problem.bodies, marks=marks)
+    found = replay_over_surface(
+        robot, cells, task, q, bodies=problem.bodies, marks=marks, working=working
+    )
     made = partial(
         Verification, claim, robot, cells, task,
         certificate=found.certificate, q=q, reached=found.reached,
@@ -211,8 +246,20 @@ def _of_motion(claim: Claim, problem: Problem, q: Any, marks: Ints | None = None
         return made(found.faults, not_judged=unjudged(robot, task, judged))
     if not len(cells):
         return made(())
-    more = further(robot, cells, task, [Walk(q, np.full(len(q), -1, dtype=np.int64))])
-    return made(more.faults, treated=more.treated)
+    if working is None:
+        more = further(robot, cells, task, [_unmarked(q)])
+        return made(more.faults, treated=more.treated)
+    # How fast the tool is, and what it treats, counts where it works.
+    whole = further(robot, cells, task, [_unmarked(q)], judged=set(NAMES) - {"start"})
+    turns = np.flatnonzero(np.diff(working)) + 1
+    parts = [part for part in np.split(np.arange(len(q)), turns) if working[part[0]]]
+    at_work = further(robot, cells, task, [_unmarked(q[part]) for part in parts], judged=("start",))
+    return made((*whole.faults, *at_work.faults), treated=at_work.treated)
+
+
+def _unmarked(q: Array) -> Walk:
+    """A motion that does not say where it is."""
+    return Walk(q, np.full(len(q), -1, dtype=np.int64))
 
 
 def _of_verdict(verdict: Verdict, search: Search | None, clock: Clock) -> Verification:

@@ -16,17 +16,19 @@ from feasibility.safe_files import shown_path
 if TYPE_CHECKING:
     from feasibility.cli.command import OpenCase
     from feasibility.runs import PassRuns, PlannedPasses
+    from feasibility.task import Task
     from feasibility.timing import Trajectory
     from surfaces import Surface
     from surfaces.passes import Passes
+    from surfaces.toolpaths import PoseCells
 
 BEST = "best"
 BY = ("distance", "planes", "parameters")
 SQUARE = math.pi / 2
 
 
-def add_passes(parser: argparse.ArgumentParser) -> None:
-    """Parallel passes in place of the cells."""
+def add_layout(parser: argparse.ArgumentParser) -> None:
+    """Which parallel passes stand in place of the cells."""
     parser.add_argument(
         "--passes", metavar="DIRECTION",
         help="run parallel passes over the surface, whatever its cells: an angle in degrees at its "
@@ -42,6 +44,16 @@ def add_passes(parser: argparse.ArgumentParser) -> None:
         "parameters",
     )  # fmt: skip
     parser.add_argument(
+        "--cross",
+        action="store_true",
+        help="then run passes square to them too (an angle, or best)",
+    )
+
+
+def add_passes(parser: argparse.ArgumentParser) -> None:
+    """Parallel passes in place of the cells, and how they are run."""
+    add_layout(parser)
+    parser.add_argument(
         "--overrun", type=positive, default=0.0, metavar="M",
         help="how far passes go on beyond the border, m; less where the arm cannot reach",
     )  # fmt: skip
@@ -52,11 +64,6 @@ def add_passes(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--one-way", action="store_true", help="run all passes in the same direction"
-    )
-    parser.add_argument(
-        "--cross",
-        action="store_true",
-        help="then run passes square to them too (an angle, or best)",
     )
 
 
@@ -70,7 +77,7 @@ def check_passes(args: argparse.Namespace) -> None:
     if (args.passes is None) != (args.pitch is None):
         missing = "--pitch" if args.pitch is None else "--passes"
         faults.append(Fault(missing, "is missing", expected="--passes and --pitch go together"))
-    if args.passes is not None and args.order is not None:
+    if args.passes is not None and getattr(args, "order", None) is not None:
         given = f"got {args.order!r}, but passes have an order of their own"
         faults.append(Fault("--order", given, expected="leave it out"))
     if args.cross and (args.passes is None or "," in args.passes):
@@ -102,11 +109,26 @@ def _passes(args: argparse.Namespace, surface: Surface, direction: Any) -> Passe
     found = [
         parallel_passes(
             surface, args.pitch, direction + turn if turn else direction,
-            by=args.by, overrun=args.overrun, one_way=args.one_way,
+            by=args.by, overrun=getattr(args, "overrun", 0.0),
+            one_way=getattr(args, "one_way", False),
         )
         for turn in (0.0, SQUARE)[: 1 + args.cross]
     ]  # fmt: skip
     return crossed(*found) if args.cross else found[0]
+
+
+def places_asked(args: argparse.Namespace, surface: Surface, task: Task) -> PoseCells:
+    """The places of the passes that the arguments describe, for a motion to be judged.
+
+    Raises:
+        CoverableError: the direction is none.
+    """
+    from feasibility.runs import route_of
+
+    if args.passes.strip() == BEST:
+        fault = "is the best for an arm, which only `coverable path` looks for"
+        raise CoverableError(Fault("--passes", fault, expected="give the direction itself"))
+    return route_of(_passes(args, surface, direction_of(args.passes)), task).cells
 
 
 def passes_asked(args: argparse.Namespace, opened: OpenCase) -> PlannedPasses:

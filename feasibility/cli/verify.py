@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from feasibility.cli.command import TooLate, add_case, add_command, json_text, open_case
 from feasibility.cli.console import print_out, progress_bar
+from feasibility.cli.passes import add_layout, check_passes, places_asked
 from feasibility.safe_files import shown_path
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ LIMIT = "search.time_limit"
 def add(subcommands: argparse._SubParsersAction) -> None:
     """Add the command."""
     parser = add_command(
-        subcommands, "verify", verify, add_case,
+        subcommands, "verify", verify, add_case, add_layout,
         help="check a motion from anywhere, or a saved result, without searching",
         usage="coverable verify [--json] [--set KEY=VALUE] CASE MOTION\n"
         "       coverable verify [--json] [--set search.time_limit=SECONDS] RESULT",
@@ -32,8 +33,10 @@ def add(subcommands: argparse._SubParsersAction) -> None:
         "`check --save` wrote.",
         epilog="MOTION is CSV: a first line of joint names in any order, then a row a waypoint, in "
         "rad (NAME_deg: degrees) or m, unwrapped; rows are joined by straight lines in joint "
-        "space, and counted from 1. exit status: 0 holds, 1 does not, or is not "
-        "verified within search.time_limit, 2 bad input, 130 interrupted",
+        "space, and counted from 1. A column `working`, as `coverable path` writes it, is 1 in "
+        "rows at which the tool works and else 0: there it may be lifted. A motion along passes "
+        "is judged with the --passes and --pitch that it was planned with. exit status: 0 holds, "
+        "1 does not, or is not verified within search.time_limit, 2 bad input, 130 interrupted",
     )  # fmt: skip
     parser.add_argument(
         "motion", metavar="MOTION", nargs="?", help="a file of joint values; none for a RESULT"
@@ -47,15 +50,27 @@ def verify(args: argparse.Namespace, began: float) -> int:
 
 def _motion(args: argparse.Namespace, began: float) -> int:
     """Check a motion file against a case."""
+
+    def check_case(case: Case) -> None:
+        check_passes(args)
+
     try:
-        with open_case(args, began, {}) as opened:
+        with open_case(args, began, {}, check_case=check_case) as opened:
+            import numpy as np
+
             from feasibility.results import load_motion
             from feasibility.verifying import verify as run
 
             robot, cells, task, _ = opened.setup
             motion = load_motion(args.motion, robot)
+            if args.passes is not None:
+                opened.progress(0, None, "planning passes")
+                cells = places_asked(args, cells.surface, task)
             opened.progress(0, None, "replaying the motion")
-            found = run(robot, cells, task, motion.q, clock=opened.clock)
+            working = motion.working
+            if working is None and args.passes is not None:
+                working = np.ones(len(motion.q), dtype=bool)
+            found = run(robot, cells, task, motion.q, working=working, clock=opened.clock)
     except TooLate as late:
         return _too_late(args, late.case)
     return _said(args, found, opened.case.name, args.motion, motion.notes)
@@ -69,6 +84,8 @@ def _result(args: argparse.Namespace, began: float) -> int:
         from feasibility.results import ResultError, case_of_result, load_result
         from feasibility.verifying import verify as run
 
+        if args.passes is not None or args.pitch is not None:
+            raise CoverableError("--passes is of a motion; a result knows what was asked")
         if any(setting.partition("=")[0].strip() != LIMIT for setting in args.settings):
             raise CoverableError(
                 "--set changes a case; a result holds the case it was found for, of which only "

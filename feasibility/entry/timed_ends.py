@@ -43,6 +43,8 @@ def entered(
         replace(after, time=after.time + last),
     ]
     kept = [slice(0, -1), slice(None), slice(1, None)]
+    own = np.ones(len(run), dtype=bool) if run.working is None else run.working
+    working = np.pad(own, (len(before) - 1, len(after) - 1))
 
     def joined(name: str) -> Any:
         return np.concatenate(
@@ -51,7 +53,7 @@ def entered(
 
     return replace(
         run, time=np.round(joined("time"), 9), q=joined("q"), dq=joined("dq"), ddq=joined("ddq"),
-        tool_speed=joined("tool_speed"), cell=joined("cell"),
+        tool_speed=joined("tool_speed"), cell=joined("cell"), working=working,
     )  # fmt: skip
 
 

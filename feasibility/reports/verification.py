@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from coverable_arrays import Mask
 from coverable_errors import counted
 from feasibility.collisions import checked
 from feasibility.reports.parts import (
@@ -18,6 +19,8 @@ from feasibility.reports.proof import proof_json
 from feasibility.treated import treated_json, treated_words
 from feasibility.verifying import NOT_IN_TIME, Verification
 from feasibility.version import version
+from surfaces import Cells
+from surfaces.toolpaths import PoseSurface
 
 if TYPE_CHECKING:
     from feasibility.cases import Case
@@ -88,8 +91,7 @@ def as_text(found: Verification, case: str, source: str, notes: Sequence[str] = 
     rows = [("case", case), (found.claim if found.claim != "tree" else "motion", source)]
     rows += [("but" if not k else "and", str(fault)) for k, fault in enumerate(found.faults)]
     if found.reached is not None:
-        reached = f"{int(found.reached.sum()):,} of {counted(len(found.cells), 'cell')} reached"
-        rows.append(("cells", reached))
+        rows.append(_reached(found.cells, found.reached))
     rows += [("certificate" if found.holds else "measured", _measured(found))]
     if found.proof is not None and found.holds:
         rows.append(("checked", counted(found.boxes, "box", "boxes")))
@@ -97,7 +99,18 @@ def as_text(found: Verification, case: str, source: str, notes: Sequence[str] = 
     rows.append(("not judged", _not_judged(found)))
     rows += [("note", note) for note in notes]
     answer = f"{head}: {WORDS[found.claim][not found.holds]}."
+    if found.holds and isinstance(found.cells.surface, PoseSurface):
+        answer = "holds: the tool is right at every pose, and on its way between them."
     return "\n".join(summary(LATE if found.late else answer, rows, found.collision))
+
+
+def _reached(cells: Cells, reached: Mask) -> tuple[str, str]:
+    """How many cells a motion reaches, or of passes the places at which the tool works."""
+    working = cells.surface.working if isinstance(cells.surface, PoseSurface) else None
+    if working is None:
+        return "cells", f"{int(reached.sum()):,} of {counted(len(cells), 'cell')} reached"
+    total = counted(int(working.sum()), "place")
+    return "passes", f"{int((reached & working).sum()):,} of {total} along them reached"
 
 
 def _not_judged(found: Verification) -> str:

@@ -2,9 +2,9 @@
 
 Columns go by name and stand in any order. A joint's values are radians (metres where it slides), or
 degrees in a column `NAME_deg`. What else our own files and those of other programs have beside the
-joints (cell, time, velocities) is not used, and said to be; any other column is a fault. So are a
-joint without a column, one with two, ragged rows, what is no finite number, and values that can
-only be degrees.
+joints (cell, time, velocities) is not used, and said to be; but a column `working` is, with 1 in
+rows at which the tool works and 0 elsewhere. Any other column is a fault. So are a joint without a
+column, one with two, ragged rows, what is no finite number, and values that can only be degrees.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable_arrays import Array, Mask
 from coverable_errors import Fault, close, number_in, printable, shown
-from feasibility.results.trajectory_files import COMMENT, load_trajectory
+from feasibility.results.trajectory_files import COMMENT, WORKING, load_trajectory
 from feasibility.safe_files import FileError, read_text, shown_path
 from robots import Robot
 
@@ -48,6 +48,8 @@ class Motion(NamedTuple):
     """(m, n) rows, rad or m, in the order of the robot's joints."""
     notes: tuple[str, ...]
     """What was not used."""
+    working: Mask | None = None
+    """(m,) at which rows the tool works, by a column `working` of 0 and 1; None for all."""
 
 
 def load_motion(path: str | os.PathLike[str], robot: Robot) -> Motion:
@@ -63,7 +65,8 @@ def load_motion(path: str | os.PathLike[str], robot: Robot) -> Motion:
         if faults:
             raise FileError(faults, name)
         note = "its times and velocities are not used: rows are joined by straight lines"
-        return _checked(found.q[:, [column for column, _ in columns]], robot, name, (note,))
+        q = found.q[:, [column for column, _ in columns]]
+        return _checked(q, robot, name, (note,))._replace(working=found.working)
     text = read_text(path, CAP, "a joint motion (.csv)")
     try:
         return _from_csv(text, robot, name)
@@ -95,6 +98,8 @@ def _from_csv(text: str, robot: Robot, name: str) -> Motion:
     if len(rows) == 1:
         raise FileError("has no rows", name)
     q = np.full((len(rows) - 1, robot.n), np.nan)
+    at_work = head.index(WORKING) if head.count(WORKING) == 1 else None
+    working = np.ones(len(q), dtype=bool)
     for k, (line, row) in enumerate(rows[1:]):
         if len(row) != len(head):
             what = f"has {len(row)} fields, not the {len(head)} of the first line"
@@ -106,12 +111,17 @@ def _from_csv(text: str, robot: Robot, name: str) -> Motion:
                 what = f"{head[column]} is {shown(row[column].strip())}, no finite number"
                 faults.append(Fault("", what, f"line {line}"))
             q[k, joint] = math.radians(value) if in_degrees else value
+        if at_work is not None:
+            working[k] = row[at_work].strip() == "1"
+            if row[at_work].strip() not in ("0", "1"):
+                faults.append(Fault("", f"expected 0 or 1 as {WORKING}", f"line {line}"))
     if faults:
         raise FileError(faults, name)
-    used = {column for column, _ in columns}
+    used = {column for column, _ in columns} | {at_work}
     unused = [word for column, word in enumerate(head) if column not in used]
     notes = [f"not used: {', '.join(map(printable, unused))}"] if unused else []
-    return _checked(q, robot, name, tuple(notes))
+    found = _checked(q, robot, name, tuple(notes))
+    return found if at_work is None else found._replace(working=working)
 
 
 def _columns(
@@ -149,7 +159,7 @@ def _columns(
 def _is_aside(word: str, robot: Robot) -> bool:
     """Is it a column that motions often have beside the joints?"""
     derived = {joint + end for joint in robot.joint_names for end in DERIVED}
-    return word in LEFT_ASIDE or word in derived
+    return word in (*LEFT_ASIDE, WORKING) or word in derived
 
 
 def _checked(q: Array, robot: Robot, name: str, notes: tuple[str, ...]) -> Motion:

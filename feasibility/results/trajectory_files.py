@@ -26,6 +26,7 @@ MOST_SAMPLES = 1_000_000
 MOST_JOINTS = 64
 CAP = 64 << 20  # [bytes] largest file that is read
 FORMAT = "coverable trajectory 1"
+WORKING = "working"  # the column, or the list, that says where the tool works
 COMMENT = "#"  # begins the lines of a CSV that hold no numbers
 ARRAYS = {
     "time": "time", "positions": "q", "velocities": "dq", "accelerations": "ddq",
@@ -86,16 +87,21 @@ def _of_ending(path: str | os.PathLike[str], known: dict[str, Any]) -> Any:
 
 
 def as_csv(trajectory: Trajectory) -> str:
-    """One row a sample: time (s), joints, their velocities and accelerations, tool speed, cell."""
+    """One row a sample: time (s), joints, their velocities and accelerations, tool speed, cell.
+
+    Where the tool does not work all along, a last column `working` says 1 where it does.
+    """
     text = io.StringIO()
     text.write(f"{COMMENT} {listed_words(trajectory.collisions)}\n")
     rows = csv.writer(text, lineterminator="\n")
-    rows.writerow(_columns(trajectory.joint_names))
+    working = trajectory.working
+    rows.writerow([*_columns(trajectory.joint_names), *([] if working is None else [WORKING])])
     table = np.column_stack(
         [trajectory.time, trajectory.q, trajectory.dq, trajectory.ddq, trajectory.tool_speed]
     )
-    for values, cell in zip(table.tolist(), trajectory.cell.tolist(), strict=True):
-        rows.writerow([*map(repr, values), "" if cell < 0 else cell])
+    works = [[]] * len(table) if working is None else [[int(one)] for one in working]
+    for values, cell, work in zip(table.tolist(), trajectory.cell.tolist(), works, strict=True):
+        rows.writerow([*map(repr, values), "" if cell < 0 else cell, *work])
     return text.getvalue()
 
 
@@ -119,6 +125,8 @@ def from_csv(text: str) -> Trajectory:
     except csv.Error as error:
         raise ArgumentError(f"is not CSV: {error}") from error
     head = rows[0][1] if rows else []
+    with_work = head[-1:] == [WORKING]
+    head = head[: len(head) - with_work]
     n = (len(head) - 3) // 3
     joints = tuple(head[1 : 1 + max(n, 0)])
     if n < 1 or n > MOST_JOINTS or head != _columns(joints):
@@ -132,12 +140,15 @@ def from_csv(text: str) -> Trajectory:
     checks = Checks("")
     table = np.full((len(rows) - 1, len(head) - 1), math.nan)
     cells = np.full(len(rows) - 1, -1, dtype=np.int64)
+    working = np.ones(len(rows) - 1, dtype=bool)
+    width = len(head) + with_work
     for k, (line, row) in enumerate(rows[1:]):
-        if len(row) != len(head):
-            checks.keep(
-                Fault("", f"expected {len(head)} columns, found {len(row)}", f"line {line}")
-            )
+        if len(row) != width:
+            checks.keep(Fault("", f"expected {width} columns, found {len(row)}", f"line {line}"))
             continue
+        if with_work and row[-1] not in ("0", "1"):
+            checks.keep(Fault("", f"expected 0 or 1 as {WORKING}", f"line {line}"))
+        working[k] = not with_work or row.pop() == "1"
         try:
             table[k] = [float(word) for word in row[:-1]]
             cells[k] = int(row[-1]) if row[-1] else -1
@@ -147,8 +158,9 @@ def from_csv(text: str) -> Trajectory:
     checks.done()
     columns = np.split(table, np.cumsum([1, n, n, n]), axis=1)
     return Trajectory(
-        joints, columns[0][:, 0], columns[1], columns[2], columns[3], columns[4][:, 0], cells
-    )
+        joints, columns[0][:, 0], columns[1], columns[2], columns[3], columns[4][:, 0], cells,
+        working=working if with_work else None,
+    )  # fmt: skip
 
 
 # -- JSON --------------------------------------------------------------------------------------
@@ -160,6 +172,8 @@ def as_json_text(trajectory: Trajectory) -> str:
     record: dict[str, Any] = {"format": FORMAT, "collisions": list(trajectory.collisions)}
     record["joint_names"] = list(trajectory.joint_names)
     record |= {key: getattr(trajectory, name).tolist() for key, name in ARRAYS.items()}
+    if trajectory.working is not None:
+        record[WORKING] = trajectory.working.tolist()
     return json.dumps({**record, "cell": cells}, allow_nan=False) + "\n"
 
 
@@ -176,7 +190,7 @@ def from_json_text(text: str) -> Trajectory:
     except ValueError as error:
         raise ArgumentError(f"is not JSON: {error}") from error
     keys = {"format", "joint_names", *ARRAYS, "cell"}
-    known = keys | {"collisions"}  # older files have none
+    known = keys | {"collisions", WORKING}  # not all files have them
     if not isinstance(record, dict) or record.get("format") != FORMAT:
         raise ArgumentError(f'expected an object with "format": "{FORMAT}"')
     faults = [Fault(key, "is missing") for key in sorted(keys - set(record))]
@@ -203,9 +217,16 @@ def from_json_text(text: str) -> Trajectory:
     collisions = record.get("collisions", [])
     if not isinstance(collisions, list) or not all(name in CHECKABLE for name in collisions):
         checks.wrong("collisions", collisions, f"must be a list of some of {', '.join(CHECKABLE)}")
+    working = record.get(WORKING)
+    if working is not None and not (
+        isinstance(working, list) and len(working) == k and {type(one) for one in working} <= {bool}
+    ):
+        checks.wrong(WORKING, working, f"must be a list of {k} times true or false")
     checks.done()
     at = np.array([-1 if cell is None else cell for cell in cells], dtype=np.int64)
-    return Trajectory(joint_names=tuple(joints), **arrays, cell=at, collisions=tuple(collisions))
+    return Trajectory(
+        joint_names=tuple(joints), **arrays, cell=at, collisions=tuple(collisions), working=working
+    )
 
 
 def _array(checks: Checks, key: str, value: object, shape: tuple[int, ...]) -> Array:

@@ -86,9 +86,7 @@ def plan_passes(
         >>> along.verdict.feasible, round(along.treated(along.verdict.witness).lower, 2)
         (True, 1.0)
     """
-    height = passes.surface.side_sign * task.standoff
-    way = ToolWay(height, WITHIN * task.effective_tolerance)
-    route = pass_route(passes, retract, way)
+    route = route_of(passes, task, retract)
     alone = replace(task, footprint=None, coverage=None)
     verdict = check(robot, route.cells, alone, search, clock=clock)
     if not verdict.feasible and verdict.components:
@@ -96,11 +94,21 @@ def plan_passes(
         reached[np.concatenate(verdict.components)] = True
         shorter = _with_reached_overrun(route.passes, route.places, reached)
         if shorter is not None:
-            route = pass_route(shorter, retract, way)
+            route = route_of(shorter, task, retract)
             verdict = check(robot, route.cells, alone, search, clock=clock)
     notes = *route.passes.notes, *_off_surface(route, retract), *_stripes(passes, task)
     passes = replace(route.passes, notes=notes)
     return PlannedPasses(passes, route.places, route.cells, task, verdict)
+
+
+def route_of(passes: Passes, task: Task, retract: float = RETRACT) -> PassRoute:
+    """Passes as one toolpath, as near to the surface as the task needs it.
+
+    Raises:
+        SurfaceError: see `surfaces.passes.pass_route`.
+    """
+    height = passes.surface.side_sign * task.standoff
+    return pass_route(passes, retract, ToolWay(height, WITHIN * task.effective_tolerance))
 
 
 def plan_best_passes(

@@ -42,6 +42,7 @@ from feasibility.timing.timed_curve import TimedCurve, samples, speed_bounds, ti
 from feasibility.timing.tool_between_samples import fastest_tool
 from feasibility.verdict import Walk
 from robots import Robot
+from surfaces.toolpaths import PoseSurface
 
 DEFAULT_SPEED = 0.1  # [m/s] of the tool point
 DEFAULT_PERIOD = 0.02  # [s] between samples
@@ -109,14 +110,23 @@ def trajectory(
         curve = blended(robot, cells, replace(task, collision=None), path.walk)
         run, refusal = _judged(path, curve, limits, period)
         if not refusal:
-            return run
+            return _with_work(path, run)
     curve = blended(robot, cells, task, path.walk)
     for _ in range(FINER + 1):
         run, refusal = _judged(path, curve, limits, period)
         if not refusal:
-            return run
+            return _with_work(path, run)
         period *= 0.5
     raise PathError(f"the independent replay refuses the timed motion: {refusal}")
+
+
+def _with_work(path: CoveragePath, run: Trajectory) -> Trajectory:
+    """The same with where the tool works, if that is not all along."""
+    surface = path.cells.surface
+    if not isinstance(surface, PoseSurface) or surface.working is None:
+        return run
+    working = surface.works(run.cell)
+    return run if working.all() else replace(run, working=working)
 
 
 def _judged(

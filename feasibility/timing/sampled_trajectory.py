@@ -14,7 +14,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
+from coverable_arrays import Array, Ints, Mask
 from coverable_errors import ArgumentError
 from feasibility.timing.speed_limits import MotionLimits, tool_slopes
 from feasibility.verdict import Walk
@@ -53,6 +53,9 @@ class Trajectory:
     """(k,) flat index of the cell whose centre the tool point passes then; -1 in between."""
     collisions: tuple[str, ...] = ()
     """What the replay of the motion checked: some of self, surface and scene."""
+    working: Mask | None = None
+    """(k,) at which samples the tool works, neither lifted nor beyond the border, nor on its way to
+    the surface; None for all."""
 
     def __post_init__(self) -> None:
         """Copy, check and write-protect the arrays."""
@@ -61,6 +64,10 @@ class Trajectory:
             array = np.array(getattr(self, name), dtype=np.int64 if name == "cell" else float)
             array.flags.writeable = False
             object.__setattr__(self, name, array)
+        if self.working is not None:
+            working = np.array(self.working, dtype=bool)
+            working.flags.writeable = False
+            object.__setattr__(self, "working", working)
         faults = self._faults()
         if faults:
             raise ArgumentError(faults, "trajectory")
@@ -81,6 +88,8 @@ class Trajectory:
                 faults.append(f"{name} must have shape {shape}, got {array.shape}")
             elif not np.isfinite(array).all():
                 faults.append(f"{name} must hold finite numbers")
+        if self.working is not None and self.working.shape != (k,):
+            faults.append(f"working must have shape {(k,)}, got {self.working.shape}")
         if not np.isfinite(self.time).all() or not (self.time >= 0.0).all():
             faults.append("times must be finite and not negative (seconds)")
         elif not (np.diff(self.time) > 0.0).all():

@@ -23,6 +23,7 @@ from surfaces.passes import (
     visits,
     working_mesh,
 )
+from surfaces.toolpaths import PoseSurface
 
 FINE = 0.5  # [1] of the footprint's radius: edges of the triangles that are measured on
 ACROSS = 60  # edges along the surface's extent, at least: triangles cut the corners of curved parts
@@ -73,11 +74,24 @@ class TreatedArea(Protected):
 
 
 def treated_by_walk(robot: Robot, cells: Cells, task: Task, *walks: Walk) -> TreatedArea | None:
-    """What motions over cells treat together; None without a footprint."""
-    if task.disc is None or not sum(len(walk.q) for walk in walks) or cells.surface.bare:
+    """What motions over cells treat together; None without a footprint.
+
+    Over poses it is the surface under them, where that is known, and where the tool works on it.
+    """
+    surface = cells.surface.wall
+    if task.disc is None or surface is None or not sum(len(walk.q) for walk in walks):
         return None
-    found = [contacts_on(cells.surface, robot, walk) for walk in walks]
-    return _measured(cells.surface, task.disc, _joined(found))
+    if isinstance(cells.surface, PoseSurface):
+        walks = tuple(part for walk in walks for part in _at_work(cells.surface, walk))
+    found = [contacts_on(surface, robot, walk) for walk in walks]
+    return _measured(surface, task.disc, _joined(found))
+
+
+def _at_work(surface: PoseSurface, walk: Walk) -> list[Walk]:
+    """The parts of a motion along poses in which the tool works."""
+    works = surface.works(walk.cell)
+    parts = np.split(np.arange(len(works)), np.flatnonzero(np.diff(works)) + 1)
+    return [Walk(walk.q[part], walk.cell[part]) for part in parts if works[part[0]]]
 
 
 def treated_by_passes(

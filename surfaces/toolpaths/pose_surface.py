@@ -53,6 +53,20 @@ class PoseSurface(Surface):
             return np.zeros(len(self.pairs), dtype=bool)
         return np.asarray(self.working[self.pairs].all(axis=1))
 
+    def works(self, marks: Ints) -> Mask:
+        """(m,) at which rows of a motion the tool works, by the poses that rows are marked with.
+
+        Args:
+            marks: (m,) indices of poses, -1 in between; all of it works where nothing is known.
+        """
+        at = np.flatnonzero(marks >= 0)
+        if self.working is None or not len(at):
+            return np.ones(len(marks), dtype=bool)
+        row, last, on = np.arange(len(marks)), len(at) - 1, self.working[marks[at]]
+        before = np.clip(np.searchsorted(at, row, side="right") - 1, 0, last)
+        after = np.clip(np.searchsorted(at, row), 0, last)
+        return np.asarray(on[before] & on[after])
+
     @property
     def wall(self) -> Surface | None:
         """See `Surface.wall`."""

@@ -200,7 +200,7 @@ def _surface(kind: str, rng: np.random.Generator, far: float) -> tuple[Any, Smoo
     u, v = (math.pi / 2 - half, math.pi / 2 + half), (-deep / 2, deep / 2)
     span = tuple(np.degrees(u))
     if kind == "torus":
-        tube = float(rng.uniform(0.1, 0.2))
+        tube = 0.8 * radius
         v = (-deep / tube / 2, deep / tube / 2)
         below = turn.apply([0, 0, -radius - tube]) + at
         made = torus(radius, tube, span, tuple(np.degrees(v)), "outside", below, _rpy(lying))
