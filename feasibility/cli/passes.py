@@ -123,12 +123,13 @@ def places_asked(args: argparse.Namespace, surface: Surface, task: Task) -> Pose
     Raises:
         CoverableError: the direction is none.
     """
-    from feasibility.runs import route_of
+    from feasibility.runs import tool_way
+    from surfaces.passes import places_along
 
     if args.passes.strip() == BEST:
         fault = "is the best for an arm, which only `coverable path` looks for"
         raise CoverableError(Fault("--passes", fault, expected="give the direction itself"))
-    return route_of(_passes(args, surface, direction_of(args.passes)), task).cells
+    return places_along(_passes(args, surface, direction_of(args.passes)), tool_way(surface, task))
 
 
 def passes_asked(args: argparse.Namespace, opened: OpenCase) -> PlannedPasses:

@@ -99,7 +99,7 @@ def as_text(found: Verification, case: str, source: str, notes: Sequence[str] = 
     rows.append(("not judged", _not_judged(found)))
     rows += [("note", note) for note in notes]
     answer = f"{head}: {WORDS[found.claim][not found.holds]}."
-    if found.holds and isinstance(found.cells.surface, PoseSurface):
+    if found.holds and found.reached is not None and isinstance(found.cells.surface, PoseSurface):
         answer = "holds: the tool is right at every pose, and on its way between them."
     return "\n".join(summary(LATE if found.late else answer, rows, found.collision))
 

@@ -10,4 +10,4 @@ from .pass_runs import pass_runs as pass_runs
 from .planning import PlannedPasses as PlannedPasses
 from .planning import plan_best_passes as plan_best_passes
 from .planning import plan_passes as plan_passes
-from .planning import route_of as route_of
+from .planning import tool_way as tool_way

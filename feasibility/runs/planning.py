@@ -86,7 +86,8 @@ def plan_passes(
         >>> along.verdict.feasible, round(along.treated(along.verdict.witness).lower, 2)
         (True, 1.0)
     """
-    route = route_of(passes, task, retract)
+    way = tool_way(passes.surface, task)
+    route = pass_route(passes, retract, way)
     alone = replace(task, footprint=None, coverage=None)
     verdict = check(robot, route.cells, alone, search, clock=clock)
     if not verdict.feasible and verdict.components:
@@ -94,21 +95,16 @@ def plan_passes(
         reached[np.concatenate(verdict.components)] = True
         shorter = _with_reached_overrun(route.passes, route.places, reached)
         if shorter is not None:
-            route = route_of(shorter, task, retract)
+            route = pass_route(shorter, retract, way)
             verdict = check(robot, route.cells, alone, search, clock=clock)
     notes = *route.passes.notes, *_off_surface(route, retract), *_stripes(passes, task)
     passes = replace(route.passes, notes=notes)
     return PlannedPasses(passes, route.places, route.cells, task, verdict)
 
 
-def route_of(passes: Passes, task: Task, retract: float = RETRACT) -> PassRoute:
-    """Passes as one toolpath, as near to the surface as the task needs it.
-
-    Raises:
-        SurfaceError: see `surfaces.passes.pass_route`.
-    """
-    height = passes.surface.side_sign * task.standoff
-    return pass_route(passes, retract, ToolWay(height, WITHIN * task.effective_tolerance))
+def tool_way(surface: Surface, task: Task) -> ToolWay:
+    """Where the tool is to be beside a surface, and how near to that straight lines must stay."""
+    return ToolWay(surface.side_sign * task.standoff, WITHIN * task.effective_tolerance)
 
 
 def plan_best_passes(

@@ -9,6 +9,7 @@ from .toolpath import PassPlaces as PassPlaces
 from .toolpath import PassRoute as PassRoute
 from .toolpath import pass_route as pass_route
 from .toolpath import pass_toolpath as pass_toolpath
+from .toolpath import places_along as places_along
 from .treated import Treated as Treated
 from .treated import treated_share as treated_share
 from .triangles import WorkingMesh as WorkingMesh

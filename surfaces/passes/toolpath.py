@@ -119,14 +119,32 @@ def pass_route(found: Passes, retract: float = RETRACT, way: ToolWay = ON_SURFAC
         SurfaceError: there are no passes, too many points of them, or a lifted move would
             run through the surface.
     """
-    passes, surface = fitted(found, way), found.surface
+    passes = fitted(found, way)
     places = pass_places(passes, retract, way)
+    return PassRoute(passes, places, _posed(found, places))
+
+
+def places_along(found: Passes, way: ToolWay = ON_SURFACE) -> PoseCells:
+    """The places of passes as poses, without the ways between: what a motion has to reach.
+
+    Raises:
+        SurfaceError: there are no passes, or too many points of them.
+    """
+    if not found.stretches:
+        raise SurfaceError("there is no pass on it; take a smaller pitch", found.surface.kind)
+    parts = [_places(each, number) for number, each in enumerate(fitted(found, way).stretches)]
+    return _posed(found, PassPlaces(*map(np.concatenate, zip(*parts, strict=True))))
+
+
+def _posed(found: Passes, places: PassPlaces) -> PoseCells:
+    """Places as poses, in the frame of the surface."""
+    surface = found.surface
     turn, origin = surface.rotation, surface.position
     made = poses((places.points - origin) @ turn, places.normals @ turn, side=surface.side)
     placed = replace(
         made.surface, rotation=turn, position=origin, under=surface, working=places.on_surface
     )
-    return PassRoute(passes, places, PoseCells.of(placed))
+    return PoseCells.of(placed)
 
 
 def pass_toolpath(found: Passes, retract: float = RETRACT) -> PoseCells:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,8 +14,9 @@ from feasibility import Task, check, verify
 from feasibility.cli.main import main
 from feasibility.collisions import Collision
 from robots import Kinematics, load_robot
-from surfaces import cylinder, plane
-from surfaces.passes import parallel_passes, pass_toolpath
+from surfaces import cylinder, plane, poses
+from surfaces.passes import parallel_passes, pass_route, pass_toolpath
+from surfaces.toolpaths import PoseCells
 
 UR5 = load_robot("ur5")
 TASK = Task(standoff=0.02, cone_deg=20)
@@ -115,3 +117,70 @@ def test_passes_too_fast_for_the_joints_are_left_out_with_the_joint(case, capsys
     assert "no part of them can be run" in out
     assert "along stretch 1: " in out
     assert "rad/s; it allows 3.15" in out
+
+
+DUG_IN = """
+[robot]
+name = "ur5"
+[surface]
+kind = "cylinder"
+radius = 0.15
+u_deg = [50, 130]
+v = [0.0, 0.3]
+position = [0.5, 0.15, 0.0]
+rpy_deg = [90, 0, 0]
+side = "outside"
+cells = [4, 4]
+[task]
+standoff = 0.0
+cone_deg = 30
+tolerance = 0.0005
+"""
+
+
+@pytest.fixture
+def pipe(tmp_path):
+    path = tmp_path / "pipe.toml"
+    path.write_text(DUG_IN)
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    "more", [[], ["--overrun", "0.02"], ["--one-way"], ["--approach", "0.03"]], ids=str
+)
+def test_verify_accepts_what_path_has_certified(pipe, tmp_path, capsys, more):
+    """Between the passes it once went 2.3 mm into the part."""
+    out, laid = tmp_path / "run.csv", ["--passes", "90", "--pitch", "0.06"]
+    assert main(["path", pipe, *laid, *more, "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert ("the tool is lifted 3 times" in said) == ("--one-way" in more)
+    assert ("beyond the border by up to 20 mm" in " ".join(said.split())) == ("--overrun" in more)
+    assert main(["verify", pipe, str(out), *laid]) == 0
+    assert "places along them reached" in capsys.readouterr().out
+    assert main(["verify", pipe, str(out), "--passes", "0", "--pitch", "0.06"]) == 1
+    if more:
+        text = out.read_text().splitlines()
+        assert text[1].endswith(",working")
+        out.write_text("\n".join([text[1], *(f"{row[:-1]}1" for row in text[2:])]))
+        assert main(["verify", pipe, str(out), *laid]) == 1
+        assert "off its surface" in capsys.readouterr().out
+
+
+def test_a_way_through_the_part_is_refused():
+    """Straight from pass to pass, as poses alone would have it, and lifted through the part."""
+    part = cylinder(0.15, (50, 130), (0.0, 0.3), "outside", (0.5, 0.15, 0.0), (90, 0, 0))
+    task = Task(0.0, 30, 5e-4)
+    route = pass_route(parallel_passes(part, 0.06, np.pi / 2))
+    kept = route.places.stretch >= 0
+    cut = poses(route.places.points[kept], route.places.normals[kept])
+    verdict = check(UR5, cut, task)
+    assert verdict.feasible  # there is no surface that anybody knows of
+    q, on = verdict.witness.q, np.ones(kept.sum(), dtype=bool)
+    over = PoseCells.of(replace(cut.surface, under=part, working=on))
+    assert "off its surface" in verify(UR5, over, task, q).refusal
+    lifted = on.copy()
+    ends = np.flatnonzero(np.diff(route.places.stretch[kept]))
+    lifted[[*ends, *(ends + 1)]] = False
+    through = PoseCells.of(replace(cut.surface, under=part, working=lifted))
+    assert "goes through the surface where it is lifted" in verify(UR5, through, task, q).refusal
+    assert not check(UR5, over, task).feasible
