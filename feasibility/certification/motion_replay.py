@@ -13,14 +13,13 @@ import numpy as np
 from coverable_arrays import Array, Mask
 from feasibility.certification.cells_reached import at_targets
 from feasibility.certification.collisions import collision_replay
-from feasibility.certification.jacobians import placements
 from feasibility.certification.order import order_of_marks
 from feasibility.certification.rolls import reference_axes
 from feasibility.certification.surface_replay import replay_over_surface
 from feasibility.collisions import gather
 from feasibility.task import Task
 from feasibility.verdict import Certificate, Replay, Walk
-from robots import Robot
+from robots import Kinematics, Robot
 from surfaces import Cells
 
 
@@ -75,9 +74,9 @@ def _misplaced(robot: Robot, cells: Cells, task: Task, walk: Walk) -> str:
     """Why a marked waypoint is not where it says it is; empty where all are."""
     at = np.flatnonzero(walk.cell >= 0)
     q, cell = walk.q[at], walk.cell[at]
-    poses = placements(robot, q)
-    x = poses.axes if task.roll is None else reference_axes(robot, q)
-    right = at_targets(task, task.targets(cells), cell, poses.points, poses.axes, x)
+    points, axes = Kinematics(robot).tools(q)
+    x = axes if task.roll is None else reference_axes(robot, q)
+    right = at_targets(task, task.targets(cells), cell, points, axes, x)
     if right.all():
         return ""
     row = int(at[np.argmin(right)])

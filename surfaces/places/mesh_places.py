@@ -116,7 +116,9 @@ class MeshPlaces(OffsetSurface):
         t = np.where(count >= 2, _crossing(*ends, *along), 0.0)
         creased = np.asarray(self.surface.on_crease.any(axis=1))
         some = np.flatnonzero((count >= 2) & (creased[start.chart] | creased[end.chart]))
-        t[some] = self._shortest(start.of(some), end.of(some), corner[some], last[some], t[some])
+        if len(some):
+            few = start.of(some), end.of(some)
+            t[some] = self._shortest(*few, corner[some], last[some], t[some])
         t = t[:, None]
         before = Places(start.chart, ((1.0 - t) * eye[corner] + t * eye[last])[:, 1:])
         after = Places(end.chart, ((1.0 - t) * eye[mates[0]] + t * eye[mates[1]])[:, 1:])

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from surfaces.patches import Patch
 from surfaces.places.patch_places import PatchPlaces
 from surfaces.places.places import OffsetSurface
 from surfaces.surface import Surface, SurfaceError
 
 
+@lru_cache(maxsize=4)  # surfaces are values; one motion after the other is judged over them
 def offset_surface(surface: Surface, height: float) -> OffsetSurface:
     """The surface's parallel at a signed height (m) along its outward normal.
 

@@ -48,12 +48,28 @@ class PosePlaces(OffsetSurface):
         return -poses.side_sign * poses.turned(poses.axes)
 
     @cached_property
+    def _ahead(self) -> Array:
+        """(M, 3) m, from the first to the second target of each pair."""
+        i, j = self.poses.pairs.T
+        return self._points[j] - self._points[i]
+
+    @cached_property
+    def _turn(self) -> Array:
+        """(M,) rad, by how much the direction turns from the first to the second pose of each."""
+        i, j = self.poses.pairs.T
+        return arc_angles(self._directions[i], self._directions[j])
+
+    @cached_property
+    def _lengths(self) -> Array:
+        """(M,) m, of the curves; turns count a little."""
+        return np.hypot(np.linalg.norm(self._ahead, axis=1), TURN * self._turn)
+
+    @cached_property
     def _tree(self) -> tuple[cKDTree, Ints]:
         """Places all along the curves, and the curve of each."""
         from scipy.spatial import cKDTree
 
-        i, j = self.poses.pairs.T
-        ahead = self._points[j] - self._points[i]
+        i, ahead = self.poses.pairs[:, 0], self._ahead
         length = np.linalg.norm(ahead, axis=1)
         wide = max(float(np.median(length)), 1e-2 * float(length.max()), 1e-12)
         parts = np.ceil(length / wide).astype(np.int64) + 1
@@ -90,8 +106,7 @@ class PosePlaces(OffsetSurface):
         points, directions = np.full((2, len(chart), 3), np.nan)
         i, j = self._ends(chart[known])
         share = t[known]
-        begin, ahead = self._points[i], self._points[j] - self._points[i]
-        points[known] = begin + share[:, None] * ahead
+        points[known] = self._points[i] + share[:, None] * self._ahead[chart[known]]
         directions[known], _ = arc_at(self._directions[i], self._directions[j], share)
         return points, directions
 
@@ -139,8 +154,7 @@ class PosePlaces(OffsetSurface):
     def _closest(self, chart: Ints, points: Array, axes: Array) -> tuple[Array, Array]:
         """(k,) t on each curve, and its cost: the squared distance, with a little of the turn."""
         i, j = self._ends(chart)
-        begin, ahead = self._points[i], self._points[j] - self._points[i]
-        angle = arc_angles(self._directions[i], self._directions[j])
+        begin, ahead, angle = self._points[i], self._ahead[chart], self._turn[chart]
         square = (ahead**2).sum(axis=1)
         known = np.linalg.norm(axes, axis=1) > 0.0
         weight = np.where(known, (TURN * angle) ** 2, 0.0)
@@ -162,8 +176,7 @@ class PosePlaces(OffsetSurface):
         """See `OffsetSurface.along`."""
         if not self.poses.in_order:
             return None
-        curves = np.arange(len(self.poses.pairs))
-        starts = np.concatenate([[0.0], np.cumsum(self._length(curves, np.ones(len(curves))))])
+        starts = np.concatenate([[0.0], np.cumsum(self._lengths)])
         here = self._length(places.chart, places.x[:, 0])
         return np.where(places.chart >= 0, starts[places.chart] + here, np.nan)
 
@@ -182,8 +195,7 @@ class PosePlaces(OffsetSurface):
 
     def _derivative_bounds(self, chart: Ints, t0: Array, t1: Array) -> Array:
         """(k, 2) see `PlacePaths.derivative_bounds`; a direction that turns at an even speed."""
-        i, j = self._ends(chart)
-        turn = (t1 - t0) * arc_angles(self._directions[i], self._directions[j])
+        turn = (t1 - t0) * self._turn[chart]
         return np.stack([np.zeros(len(chart)), ROUNDING * turn**2], axis=1)
 
     def _over_poses(self, made: PlacePaths, rows: Ints, start: Places, end: Places) -> None:
@@ -227,12 +239,8 @@ class PosePlaces(OffsetSurface):
         return np.where((start.chart >= 0) & (start.chart == end.chart), turn, np.inf)
 
     def _length(self, chart: Ints, share: Array) -> Array:
-        """(k,) m, of parts of curves; turns count a little."""
-        i, j = self._ends(chart)
-        turn = TURN * arc_angles(self._directions[i], self._directions[j])
-        return np.asarray(
-            share * np.hypot(np.linalg.norm(self._points[j] - self._points[i], axis=1), turn)
-        )
+        """(k,) m, of parts of curves."""
+        return np.asarray(share * self._lengths[chart])
 
 
 def _placed(chart: Ints, t: Array) -> Places:
