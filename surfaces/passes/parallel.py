@@ -117,7 +117,10 @@ def parallel_passes(
         else:
             dropped += each.line.length
     apart = step or pitch / POINTS_PER_PITCH
-    slopes = field.slopes[np.concatenate([np.zeros(0, int), *(each.line.faces for each in lines)])]
+    run = np.concatenate([np.zeros(0, int), *(each.line.faces for each in lines)])
+    if by == "distance":  # exact, but where a value is that of its neighbours
+        run = run[field.touched[run]]
+    slopes = np.minimum(field.slopes[run], 1.0)
     return Passes(
         surface=surface,
         stretches=tuple(
@@ -126,7 +129,7 @@ def parallel_passes(
         pitch=float(pitch),
         spacing=spacing,
         by=by,
-        widest=spacing if by == "distance" else spacing / max(slopes.min(initial=1.0), 1e-9),
+        widest=spacing / max(slopes.min(initial=1.0), 1e-9),
         dropped=dropped,
         notes=(*_notes(lidded.holes, lines, field, by), *_direction_note(found), *_copy_note(copy)),
     )
@@ -302,6 +305,12 @@ def _notes(holes: int, lines: list[LevelLine], field: Field, by: By) -> tuple[st
         notes.append(f"{counted(holes, 'hole')} parted passes; the tool must lift there")
     if by != "distance" or not lines:
         return tuple(notes)
+    if field.mended is not None:
+        notes.append(
+            f"the exact distance did not reach {len(field.mended):,} of "
+            f"{len(field.values):,} vertices, which took theirs from their neighbours; the largest "
+            "distance between passes was checked there"
+        )
     # Beside the first pass the distance from its vertices is coarse.
     kinked = (field.slopes < KINK) & (field.values[field.mesh.faces] != 0.0).all(axis=1)
     length = sum(float(line.pieces[kinked[line.faces]].sum()) for _, line in lines)
