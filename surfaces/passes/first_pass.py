@@ -32,7 +32,8 @@ class Field(NamedTuple):
     @property
     def touched(self) -> Mask:
         """(F,) faces with a corner whose value comes from its neighbours."""
-        return np.isin(self.mesh.faces, [] if self.mended is None else self.mended).any(axis=1)
+        mended = np.isin(self.mesh.faces, [] if self.mended is None else self.mended)
+        return np.asarray(mended.any(axis=1))
 
     @property
     def torn(self) -> Mask:

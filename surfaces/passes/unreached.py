@@ -43,7 +43,7 @@ def reached(mesh: WorkingMesh, distances: Array) -> Reached:
     values = np.where(lost, np.inf, distances)
     if not len(missing):
         return Reached(values, missing)
-    _refuse_parts(mesh, lost[mesh.faces].all(axis=1))
+    _refuse_parts(mesh, np.asarray(lost[mesh.faces].all(axis=1)))
     faces = mesh.faces[lost[mesh.faces].any(axis=1)]
     around = np.concatenate([np.roll(faces, turn, axis=1) for turn in range(3)])
     around = around[lost[around[:, 0]]]
