@@ -12,6 +12,8 @@ from feasibility.collisions import checked
 from feasibility.reports.parts import (
     certificate_text,
     measured_json,
+    smooth_json,
+    smooth_text,
     summary,
 )
 from feasibility.reports.proof import proof_json
@@ -60,6 +62,7 @@ def as_json(found: Verification, notes: Sequence[str] = ()) -> dict[str, Any]:
         "certificate": measured_json(found.robot, found.certificate, found.q),
         "proof": proof_json(found.proof, found.robot, found.cells),
         "boxes": found.boxes if found.proof is not None else None,
+        **smooth_json(found.cells.surface),
         "collisions": checked(found.task.collision),
         "notes": list(notes),
         "robot": found.robot.name,
@@ -83,6 +86,7 @@ def as_text(found: Verification, case: str, source: str, notes: Sequence[str] = 
         reached = f"{int(found.reached.sum()):,} of {counted(len(found.cells), 'cell')} reached"
         rows.append(("cells", reached))
     rows += [("certificate" if found.holds else "measured", _measured(found))]
+    rows.append(("smoothed", smooth_text(found.cells.surface)))
     if found.proof is not None and found.holds:
         rows.append(("checked", counted(found.boxes, "box", "boxes")))
     rows += [("note", note) for note in notes]

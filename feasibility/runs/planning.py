@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from coverable_arrays import Mask
+from feasibility.certification import less_deviations
 from feasibility.checking import check
 from feasibility.clock import Clock
 from feasibility.search import Search
@@ -77,7 +78,9 @@ def plan_passes(
         (True, 1.0)
     """
     cells = pass_toolpath(passes, retract)
-    alone = replace(task, footprint=None, coverage=None)
+    # Poses do not know how far the surface may be from the one meant.
+    alone = less_deviations(task, passes.surface)
+    alone = replace(alone, footprint=None, coverage=None, smooth=None)
     verdict = check(robot, cells, alone, search, clock=clock)
     if not verdict.feasible and verdict.components:
         reached = np.zeros(len(cells), dtype=bool)
