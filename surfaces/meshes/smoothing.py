@@ -28,6 +28,7 @@ from surfaces.meshes.triangle_mesh import TriangleMesh
 from surfaces.surface import Smoothing, SurfaceError
 
 EDGES = 8.0  # edges along the length, at least
+NEEDLE = 1e-4  # [1] of the length: lower triangles bend as if they were as high
 MOST_FACES = 400_000  # that are solved for; about a minute
 
 
@@ -66,32 +67,33 @@ def displacements(mesh: TriangleMesh, length: float) -> Array:
     from scipy import sparse
     from scipy.sparse.linalg import splu
 
-    # Displacements and not places: over needles the second sum is stiff, and rounding in it would
-    # draw the whole part towards the origin.
     count, edges, x = len(mesh.vertices), mesh.edges, mesh.vertices
     (a, b), (c, d) = edges.vertices.T, _opposite(mesh).T
+    # Over needles the second sum is stiff, and rounding in it would outweigh the first.
+    short = NEEDLE * length
     heights = 2.0 * mesh.face_areas[edges.faces] / edges.lengths[:, None]
-    squared = edges.lengths**2
-    shares = [((x[top] - x[a]) * (x[b] - x[a])).sum(axis=1) / squared for top in (c, d)]
-    above, below = 1.0 / heights.T
-    values = (above, below, (shares[0] - 1.0) * above + (shares[1] - 1.0) * below,
-              -shares[0] * above - shares[1] * below)  # fmt: skip
+    above, below = 1.0 / np.maximum(heights, short).T
+    squared = np.maximum(edges.lengths, short) ** 2
+    one, other = (((x[top] - x[a]) * (x[b] - x[a])).sum(axis=1) / squared for top in (c, d))
+    values = above, below, (one - 1.0) * above + (other - 1.0) * below, -one * above - other * below
     rows = np.tile(np.arange(len(a)), 4)
     jump = sparse.csr_array(
         (np.concatenate(values), (rows, np.concatenate([c, d, a, b]))), shape=(len(a), count)
     )
-    weights = 3.0 * edges.lengths / heights.sum(axis=1)
-    stiff = (length / math.tau) ** 4 * (jump.T @ sparse.diags_array(weights) @ jump)
+    weights = (length / math.tau) ** 4 * edges.lengths * 2.0 / (1.0 / above + 1.0 / below)
+    weighted = jump.T @ sparse.diags_array(weights)
     masses = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas / 3.0, 3), count)
     solver = splu(
-        (sparse.diags_array(masses) + stiff).tocsc(), permc_spec="MMD_AT_PLUS_A",
+        (sparse.diags_array(masses) + weighted @ jump).tocsc(), permc_spec="MMD_AT_PLUS_A",
         diag_pivot_thresh=0.0, options={"SymmetricMode": True},
     )  # fmt: skip
-    return np.asarray(solver.solve(-(stiff @ x)))
+    # In a face the gradient of the place across an edge is the unit vector away from it.
+    sides = (x[b] - x[a]) / edges.lengths[:, None]
+    away = np.cross(mesh.face_normals[edges.faces], sides[:, None])
+    return np.asarray(solver.solve(-(weighted @ (away[:, 0] - away[:, 1]))))
 
 
 def _opposite(mesh: TriangleMesh) -> Ints:
     """(E, 2) the corners of both faces of each edge that do not lie on it."""
-    return np.asarray(
-        mesh.faces[mesh.edges.faces].sum(axis=2) - mesh.edges.vertices.sum(axis=1)[:, None]
-    )
+    on = mesh.edges.vertices.sum(axis=1)[:, None]
+    return np.asarray(mesh.faces[mesh.edges.faces].sum(axis=2) - on)
