@@ -163,7 +163,7 @@ def place(
     refinement.run(count, around)
     placements = _searched(answered, refinement, refinement.verified(keep))
     if placements.answer is Answer.UNDECIDED and (closed := blocked_curves(cells, task)):
-        offer = smoothing_offer(cells, task)
+        offer = smoothing_offer(cells, task, clock)
         message = f"{placements.message} Wherever it stands: {closed} {offer}".rstrip()
         placements = replace(placements, message=message)
     return _timed(placements, began)

@@ -60,7 +60,9 @@ def unfinished_words(problem: Problem, proving: Proving, in_time: bool) -> str:
         )
     blocked = blocked_curves(problem.cells, problem.task)
     if blocked:
-        return f"{blocked} {smoothing_offer(problem.cells, problem.task)}".rstrip()
+        return (
+            f"{blocked} {smoothing_offer(problem.cells, problem.task, exploration.clock)}".rstrip()
+        )
     missed = np.flatnonzero(~exploration.reached)
     if len(missed):
         named = problem.cells.named(missed, 3)
