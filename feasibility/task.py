@@ -89,9 +89,9 @@ class Task:
     point (over the arm's reach) and approach axis, a pure number. None for any."""
     smooth: float | None = None
     """m, for meshes: targets and approach directions are those of a copy of the surface smoothed
-    over this length (`MeshSurface.smoothed`). How far the copy is off the surface is stated, and
-    taken off the tolerance; where it is more than that, the tolerance holds from the copy. None for
-    the surface itself."""
+    over this length (`surfaces.meshes.smoothed`). How far the copy is off the surface is stated,
+    and taken off the tolerance; where it is more than that, the tolerance holds from the copy. None
+    for the surface itself."""
     home_deg: tuple[float, ...] | None = None
     """(n,) degrees, where a path comes from and goes back to; None where it begins and ends over
     the surface. For arms whose joints all turn."""
@@ -210,7 +210,7 @@ class Task:
 
     @property
     def smoothing(self) -> tuple[float, float] | None:
-        """m, the arguments of `MeshSurface.smoothed`; None where there is nothing to smooth."""
+        """m, length and tolerance for `surfaces.meshes.smoothed`; None for the surface itself."""
         return None if self.smooth is None else (self.smooth, self.effective_tolerance)
 
     @property
@@ -321,7 +321,7 @@ def check_smooth(cells: Cells, task: Task) -> None:
         what = (
             f"is {wanted}, but the cells are of a surface that is {how}, or for another tolerance"
         )
-        expected = "cut mesh(...).smoothed(task.smooth, task.effective_tolerance) into cells"
+        expected = "cut smoothed(mesh, task.smooth, task.effective_tolerance) into cells"
         raise ArgumentError(Fault("smooth", what, expected=expected), "task")
 
 

@@ -111,9 +111,10 @@ def smooth_mesh(surface: MeshSurface, smoothing: tuple[float, float] | None) -> 
         CaseError: it cannot be smoothed so.
     """
     from surfaces import SurfaceError
+    from surfaces.meshes import smoothed
 
     try:
-        return surface if smoothing is None else surface.smoothed(*smoothing)
+        return surface if smoothing is None else smoothed(surface, *smoothing)
     except SurfaceError as error:
         raise CaseError(Fault("task.smooth", str(error))) from error
 

@@ -65,7 +65,7 @@ def smoothing_offer(cells: Cells, task: Task, clock: Clock) -> str:
 
     Lengths are tried one after the other, which takes seconds, for as long as there is time.
     """
-    from surfaces.meshes import MeshSurface
+    from surfaces.meshes import MeshSurface, smoothed
 
     surface = cells.surface
     if not isinstance(surface, MeshSurface):
@@ -79,7 +79,7 @@ def smoothing_offer(cells: Cells, task: Task, clock: Clock) -> str:
             break
         clock.report(0, None, f"smoothing the mesh over {length:g} m")
         try:
-            copy = surface.wall.smoothed(length, tolerance)
+            copy = smoothed(surface, length, tolerance)
             made = copy.smoothing
             if made is None or made.off > max(tolerance, MOST_OFF * task.standoff):
                 break

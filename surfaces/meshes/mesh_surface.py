@@ -51,7 +51,7 @@ class MeshSurface(Surface):
     """(F, 3, 3) the same on creases, where both sides have one: the normal turns to it over a strip
     along the crease, `WIDTH` of a face wide."""
     smoothing: Smoothing | None = None
-    """Of a smoothed copy, see `smoothed`."""
+    """Of a smoothed copy, see `surfaces.meshes.smoothed`."""
 
     @property
     def deviations(self) -> tuple[float, float]:
@@ -206,22 +206,6 @@ class MeshSurface(Surface):
         from surfaces.meshes.cells import MeshCells
 
         return MeshCells.cut(self, count, size)
-
-    def smoothed(self, length: float, tolerance: float) -> MeshSurface:
-        """A copy without bends that are tighter than a length: for targets and approaches.
-
-        Collisions and areas stay those of this surface, the copy's `wall`.
-
-        Args:
-            length: m > 0; a wave of this length keeps half its height.
-            tolerance: m > 0, of the task; what the copy is off is taken off it, if it is less.
-
-        Raises:
-            SurfaceError: the length makes no sense, or is too short for a surface of this size.
-        """
-        from surfaces.meshes.smoothing import smoothed
-
-        return smoothed(self, length, tolerance)
 
     def finer(self, vertices: Array, faces: Ints, parent: Ints) -> MeshSurface:
         """The same surface in smaller triangles, with a continuous normal.

@@ -22,6 +22,7 @@ import numpy as np
 
 from coverable_arrays import Array, Ints
 from surfaces.arguments import Checks
+from surfaces.meshes.cells import subdivide
 from surfaces.meshes.mesh_surface import MeshSurface
 from surfaces.meshes.normals import corner_normals
 from surfaces.meshes.triangle_mesh import TriangleMesh
@@ -33,9 +34,26 @@ MOST_FACES = 400_000  # that are solved for; about a minute
 
 
 def smoothed(surface: MeshSurface, length: float, tolerance: float) -> MeshSurface:
-    """See `MeshSurface.smoothed`."""
-    from surfaces.meshes.cells.subdivision import subdivide
+    """A copy of a mesh without bends that are tighter than a length: for targets and approaches.
 
+    Collisions and areas stay those of the mesh itself, which is the copy's `wall`.
+
+    Args:
+        surface: the mesh, or a smoothed copy of it.
+        length: m > 0; a wave of this length keeps half its height.
+        tolerance: m > 0, of the task; what the copy is off is taken off it, if it is less.
+
+    Raises:
+        SurfaceError: the length makes no sense, or is too short for a surface of this size.
+
+    Example:
+        >>> from surfaces.meshes import TriangleMesh, mesh
+        >>> ridge = [[0, 0, 0], [1, 0, 0.1], [1, 1, 0.1], [0, 1, 0], [2, 0, 0], [2, 1, 0]]
+        >>> roof = TriangleMesh(ridge, [[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2]])
+        >>> copy = smoothed(mesh(roof), 0.5, tolerance=0.02)
+        >>> copy.smoothing.counted, round(copy.smoothing.off, 3)
+        (True, 0.011)
+    """
     checks = Checks("smooth")
     checks.positive("length", length, "metres")
     checks.positive("tolerance", tolerance, "metres")

@@ -10,7 +10,7 @@ from coverable_arrays import Array, Ints, Mask
 from surfaces.adjacency import components
 from surfaces.passes.beyond_ends import FirstPass, carried_on, slopes
 from surfaces.passes.triangles import WorkingMesh, cut_at_middles, cut_edges, edges_of, twin_sides
-from surfaces.passes.unreached import Reached, reached
+from surfaces.passes.unreached import Reached, exact_distances, reached, refuse_parts
 
 SNAP = 0.02  # [1] of an edge: a crossing nearer to its end is put there, or slivers would arise
 HALVINGS = 2  # of the edges along the first pass: distances are taken from their vertices
@@ -106,16 +106,15 @@ def _from_carried_on(mesh: WorkingMesh, first: Ints, edges: Ints) -> Reached:
     """(V,) m, length of the shortest path on the triangles to the first pass, carried on."""
     from pygeodesic.geodesic import PyGeodesicAlgorithmExact
 
+    refuse_parts(mesh, first)
     algorithm = PyGeodesicAlgorithmExact(mesh.vertices, mesh.faces.astype(np.int32))
-    found, nearest = algorithm.geodesicDistances(first.astype(np.int32), None)
-    distances, mended = reached(mesh, np.asarray(found, dtype=float))
-    nearest = first[nearest]
-    nearest[mended] = -1
+    found, nearest = exact_distances(algorithm, first, len(mesh.vertices))
+    distances, mended = reached(mesh, found)
     known = FirstPass(mesh, edges, distances, nearest)
 
     def from_vertex(vertex: int) -> Array:
-        found, _ = algorithm.geodesicDistances(np.array([vertex], np.int32), None)
-        return reached(mesh, np.asarray(found, dtype=float))[0]
+        found, _ = exact_distances(algorithm, np.array([vertex]), len(mesh.vertices))
+        return reached(mesh, found).distances
 
     carried = carried_on(known, from_vertex)
     carried[mended] = np.inf  # their neighbours' values may be others now

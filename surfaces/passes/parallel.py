@@ -117,10 +117,6 @@ def parallel_passes(
         else:
             dropped += each.line.length
     apart = step or pitch / POINTS_PER_PITCH
-    run = np.concatenate([np.zeros(0, int), *(each.line.faces for each in lines)])
-    if by == "distance":  # exact, but where a value is that of its neighbours
-        run = run[field.touched[run]]
-    slopes = np.minimum(field.slopes[run], 1.0)
     return Passes(
         surface=surface,
         stretches=tuple(
@@ -129,7 +125,7 @@ def parallel_passes(
         pitch=float(pitch),
         spacing=spacing,
         by=by,
-        widest=spacing / max(slopes.min(initial=1.0), 1e-9),
+        widest=spacing / _least_slope(field, lines, by),
         dropped=dropped,
         notes=(*_notes(lidded.holes, lines, field, by), *_direction_note(found), *_copy_note(copy)),
     )
@@ -276,6 +272,14 @@ def _parts(line: Line, own: Mask) -> Iterator[Line]:
     ends = np.flatnonzero(np.diff(np.concatenate([[0], own.astype(np.int8), [0]])))
     for start, end in ends.reshape(-1, 2):
         yield Line(points[start : end + 1], faces[start:end], closed=False)
+
+
+def _least_slope(field: Field, lines: list[LevelLine], by: By) -> float:
+    """(0, 1] how slowly the field grows across a pass, at the least."""
+    faces = np.concatenate([np.zeros(0, int), *(line.faces for _, line in lines)])
+    if by == "distance":  # exact, but where a value is that of its neighbours
+        faces = faces[field.touched[faces]]
+    return max(float(field.slopes[faces].min(initial=1.0)), 1e-9)
 
 
 def _direction_note(found: PassLines) -> tuple[str, ...]:

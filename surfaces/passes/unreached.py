@@ -1,4 +1,4 @@
-"""Vertices that exact distances do not reach, although their mesh is one piece.
+"""Exact distances on a mesh, and vertices that they do not reach although it is one piece.
 
 The windows by which exact distances spread are lost to rounding at a vertex now and then. Such a
 vertex takes its value from its neighbours: the least that makes the distance grow by its own length
@@ -8,15 +8,18 @@ over one of its faces, or along one of its edges (one step of fast marching; Kim
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable_arrays import Array, Ints
 from coverable_errors import counted
 from surfaces.adjacency import components
 from surfaces.passes.triangles import WorkingMesh
 from surfaces.surface import SurfaceError
+
+REMEDY = "measure between section planes (--by planes), which needs no way over the surface"
+MOST_CALLS = 200  # of pygeodesic where it fails
 
 
 class Reached(NamedTuple):
@@ -28,22 +31,51 @@ class Reached(NamedTuple):
     """(k,) vertices that took theirs from their neighbours."""
 
 
+def exact_distances(algorithm: Any, sources: Ints, count: int) -> tuple[Array, Ints]:
+    """Of all vertices from the nearest of some: (V,) m, inf where lost, and which (V,), -1 there.
+
+    What pygeodesic says is the nearest source of a vertex that it has not reached is left to
+    chance, and may be too large a number for its own array. Then ever fewer vertices are asked for.
+
+    Args:
+        algorithm: pygeodesic's, of the mesh.
+        sources: (k,) vertices.
+        count: V.
+
+    Raises:
+        SurfaceError: that happens at too many places.
+    """
+    distances, nearest = np.full(count, np.inf), np.full(count, -1, dtype=np.int64)
+    waiting: list[Ints | None] = [None]
+    for _ in range(MOST_CALLS):
+        targets = waiting.pop()
+        own = np.arange(count) if targets is None else targets
+        asked = None if targets is None else targets.astype(np.int32)
+        try:
+            found, index = algorithm.geodesicDistances(sources.astype(np.int32), asked)
+        except OverflowError:
+            if len(own) > 1:
+                waiting += np.array_split(own, 2)
+        else:
+            known = np.isfinite(found)
+            distances[own[known]], nearest[own[known]] = found[known], sources[index[known]]
+        if not waiting:
+            return distances, nearest
+    raise SurfaceError(f"exact distances have too many gaps; {REMEDY}", "passes")
+
+
 def reached(mesh: WorkingMesh, distances: Array) -> Reached:
-    """Fill the gaps of exact distances.
+    """Fill the gaps of exact distances on a mesh that is one piece.
 
     Args:
         mesh: the mesh.
         distances: (V,) m; what is not finite was not reached.
-
-    Raises:
-        SurfaceError: whole parts of the mesh were not reached.
     """
     lost = ~np.isfinite(distances)
     missing = np.flatnonzero(lost)
     values = np.where(lost, np.inf, distances)
     if not len(missing):
         return Reached(values, missing)
-    _refuse_parts(mesh, np.asarray(lost[mesh.faces].all(axis=1)))
     faces = mesh.faces[lost[mesh.faces].any(axis=1)]
     around = np.concatenate([np.roll(faces, turn, axis=1) for turn in range(3)])
     around = around[lost[around[:, 0]]]
@@ -72,23 +104,24 @@ def _over_faces(corners: Array, values: Array) -> Array:
     return np.asarray(along)
 
 
-def _refuse_parts(mesh: WorkingMesh, lost: Mask) -> None:
-    """Refuse a mesh with connected parts none of whose faces (F,) have a corner that was reached.
+def refuse_parts(mesh: WorkingMesh, first: Ints) -> None:
+    """Refuse a mesh with parts that nothing joins to some vertices.
 
     Raises:
         SurfaceError: there are some.
     """
     joined = np.concatenate([mesh.faces[:, :2], mesh.faces[:, 1:]])
-    part = components(joined, len(mesh.vertices))[mesh.faces[:, 0]]
-    whole = np.setdiff1d(part[lost], part[~lost])
-    if not len(whole):
+    part = components(joined, len(mesh.vertices))
+    of_face = part[mesh.faces[:, 0]]
+    apart = np.setdiff1d(of_face, part[first])
+    if not len(apart):
         return
-    own = part == whole[0]
+    own = of_face == apart[0]
     middle = np.average(mesh.corners[own].mean(axis=1), axis=0, weights=mesh.areas[own])
     at = ", ".join(f"{value:.3g}" for value in middle)
     raise SurfaceError(
-        f"the distance from the first pass does not reach {counted(len(whole), 'part')} of the "
-        f"surface, such as the one about ({at}) m: nothing joins it to the rest; measure between "
-        "section planes (--by planes), which needs no way over the surface, or mend the mesh",
+        f"the distance from the first pass does not reach {counted(len(apart), 'part')} of the "
+        f"surface, such as the one about ({at}) m: nothing joins it to the rest; {REMEDY}, or "
+        "mend the mesh",
         "passes",
     )

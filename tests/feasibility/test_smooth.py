@@ -22,7 +22,7 @@ from feasibility.cases import Case, load_case
 from feasibility.cli.main import main
 from feasibility.results import load_result
 from surfaces import mesh
-from surfaces.meshes import TriangleMesh
+from surfaces.meshes import TriangleMesh, smoothed
 
 STANDOFF = 0.2
 TOML = """
@@ -98,8 +98,10 @@ def test_what_a_copy_is_off_is_taken_off_the_tolerance(panel) -> None:
     assert verdict.certificate.max_position_error <= 0.008 - off
     assert abs(distances(setup, verdict.witness.q) - STANDOFF).max() <= 0.008
     # Away from the copy by more than what is left the same motion is refused.
-    lower = mesh(panel.with_suffix(".stl"), position=[0.5, -0.2, -0.1075]).smoothed(0.3, 0.008)
-    assert not verify(setup.robot, lower.cells(20), setup.task, verdict.witness.q).holds
+    lower = mesh(panel.with_suffix(".stl"), position=[0.5, -0.2, -0.1075])
+    assert not verify(
+        setup.robot, smoothed(lower, 0.3, 0.008).cells(20), setup.task, verdict.witness.q
+    ).holds
 
 
 def test_passes_and_areas(panel, capsys) -> None:
@@ -119,7 +121,7 @@ def test_cells_and_task_have_to_agree(panel) -> None:
     setup = Case.from_toml(TOML, panel.parent).build()
     with pytest.raises(CoverableError, match="not smoothed"):
         check(setup.robot, setup.cells, replace(setup.task, smooth=0.3))
-    surface = setup.cells.surface.smoothed(0.3, 1e-3)
+    surface = smoothed(setup.cells.surface, 0.3, 1e-3)
     task = Task(standoff=STANDOFF, cone_deg=40, smooth=0.3)
     with pytest.raises(CoverableError, match="another tolerance"):
         check(setup.robot, surface.cells(20), replace(task, tolerance=0.1))

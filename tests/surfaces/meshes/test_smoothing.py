@@ -9,7 +9,7 @@ from triangle_probes import least_distances
 
 from coverable_errors import CoverableError
 from surfaces import mesh
-from surfaces.meshes import TriangleMesh
+from surfaces.meshes import TriangleMesh, smoothed
 
 LENGTH = 0.1
 
@@ -29,7 +29,7 @@ def test_a_wave_of_the_length_keeps_half_its_height(share: float, kept: float) -
     wave = bent(
         lambda u, v: (u, 0.5 * v, 1e-3 * np.sin(2.0 * np.pi * u / (share * LENGTH))), 200, 100
     )
-    smooth = mesh(TriangleMesh(*wave)).smoothed(LENGTH, 1.0)
+    smooth = smoothed(mesh(TriangleMesh(*wave)), LENGTH, 1.0)
     corners = smooth.mesh.vertices
     inner = (abs(corners[:, :2] - [0.5, 0.25]) < [0.3, 0.1]).all(axis=1)
     assert abs(corners[inner, 2]).max() == pytest.approx(1e-3 * kept, rel=0.1)
@@ -40,7 +40,7 @@ def test_planes_stay_up_to_their_borders_needles_or_not() -> None:
         return 5.0 + 0.6 * u, 7.0 + 0.4 * v**9, 0.3 * u + 0.2
 
     flat = mesh(TriangleMesh(*bent(shape, 12, 6)))
-    assert flat.smoothed(LENGTH, 1.0).smoothing.off < 1e-9
+    assert smoothed(flat, LENGTH, 1.0).smoothing.off < 1e-9
 
 
 @pytest.mark.parametrize("flank", [0.008, 0.035])
@@ -50,7 +50,7 @@ def test_neither_is_further_from_the_other_than_is_said(flank: float, cut: bool)
     rng = np.random.default_rng(1)
     vertices, faces = bead(flank)
     given = mesh(TriangleMesh(vertices, faces))
-    smooth = given.smoothed(LENGTH, 0.01)
+    smooth = smoothed(given, LENGTH, 0.01)
     if cut:
         smooth = smooth.cells(20).surface
     assert 1e-3 < smooth.smoothing.off < 0.008
@@ -67,15 +67,15 @@ def test_neither_is_further_from_the_other_than_is_said(flank: float, cut: bool)
     some = rng.choice(smooth.wall.mesh.vertices, 40, replace=False)
     assert least_distances(corners, some).max() < 1e-12
     assert smooth.wall.mesh.area == pytest.approx(given.mesh.area, rel=1e-9)
-    assert given.smoothed(LENGTH, 1e-3).deviations == (0.0, 0.0)  # more than the tolerance
+    assert smoothed(given, LENGTH, 1e-3).deviations == (0.0, 0.0)  # more than the tolerance
 
 
 def test_it_moves_with_its_wall_and_lengths_that_make_no_sense_are_refused() -> None:
     given = mesh(TriangleMesh(*bead(0.01)))
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    moved = given.smoothed(LENGTH, 0.01).moved(turn, [1.0, 2.0, 3.0])
+    moved = smoothed(given, LENGTH, 0.01).moved(turn, [1.0, 2.0, 3.0])
     place = given.mesh.vertices[:9] @ turn.T + [1.0, 2.0, 3.0]
     assert np.abs(moved.wall.closest(place).height).max() < 1e-12
     for length, said in ((0.0, "length"), (np.nan, "length"), (1e-4, "take .* m or more")):
         with pytest.raises(CoverableError, match=said):
-            given.smoothed(length, 0.01)
+            smoothed(given, length, 0.01)
