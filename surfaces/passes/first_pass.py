@@ -104,16 +104,13 @@ def _through(cut: CutMesh, middle: Array) -> tuple[Ints, Ints]:
 
 def _from_carried_on(mesh: WorkingMesh, first: Ints, edges: Ints) -> Reached:
     """(V,) m, length of the shortest path on the triangles to the first pass, carried on."""
-    from pygeodesic.geodesic import PyGeodesicAlgorithmExact
-
     refuse_parts(mesh, first)
-    algorithm = PyGeodesicAlgorithmExact(mesh.vertices, mesh.faces.astype(np.int32))
-    found, nearest = exact_distances(algorithm, first, len(mesh.vertices))
+    found, nearest = exact_distances(mesh, first)
     distances, mended = reached(mesh, found)
     known = FirstPass(mesh, edges, distances, nearest)
 
     def from_vertex(vertex: int) -> Array:
-        found, _ = exact_distances(algorithm, np.array([vertex]), len(mesh.vertices))
+        found, _ = exact_distances(mesh, np.array([vertex]))
         return reached(mesh, found).distances
 
     carried = carried_on(known, from_vertex)

@@ -8,7 +8,7 @@ over one of its faces, or along one of its edges (one step of fast marching; Kim
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,8 @@ from surfaces.passes.triangles import WorkingMesh
 from surfaces.surface import SurfaceError
 
 REMEDY = "measure between section planes (--by planes), which needs no way over the surface"
-MOST_CALLS = 200  # of pygeodesic where it fails
+TRIES = 4  # of pygeodesic where it fails
+HAIR = 1e-9  # [1] of the extent
 
 
 class Reached(NamedTuple):
@@ -31,37 +32,36 @@ class Reached(NamedTuple):
     """(k,) vertices that took theirs from their neighbours."""
 
 
-def exact_distances(algorithm: Any, sources: Ints, count: int) -> tuple[Array, Ints]:
+def exact_distances(mesh: WorkingMesh, sources: Ints) -> tuple[Array, Ints]:
     """Of all vertices from the nearest of some: (V,) m, inf where lost, and which (V,), -1 there.
 
     What pygeodesic says is the nearest source of a vertex that it has not reached is left to
-    chance, and may be too large a number for its own array. Then ever fewer vertices are asked for.
+    chance, and may be too large a number for its own array. Then it is asked again, with vertices
+    that are a hair elsewhere, so that other roundings occur.
 
     Args:
-        algorithm: pygeodesic's, of the mesh.
+        mesh: the mesh.
         sources: (k,) vertices.
-        count: V.
 
     Raises:
-        SurfaceError: that happens at too many places.
+        SurfaceError: that happens every time.
     """
-    distances, nearest = np.full(count, np.inf), np.full(count, -1, dtype=np.int64)
-    waiting: list[Ints | None] = [None]
-    for _ in range(MOST_CALLS):
-        targets = waiting.pop()
-        own = np.arange(count) if targets is None else targets
-        asked = None if targets is None else targets.astype(np.int32)
+    from pygeodesic.geodesic import PyGeodesicAlgorithmExact
+
+    rng = np.random.default_rng(0)
+    hair = HAIR * float(np.ptp(mesh.vertices, axis=0).max())
+    for k in range(TRIES):
+        off = min(k, 1) * hair * rng.uniform(-1.0, 1.0, mesh.vertices.shape)
+        algorithm = PyGeodesicAlgorithmExact(mesh.vertices + off, mesh.faces.astype(np.int32))
         try:
-            found, index = algorithm.geodesicDistances(sources.astype(np.int32), asked)
+            found, index = algorithm.geodesicDistances(sources.astype(np.int32), None)
         except OverflowError:
-            if len(own) > 1:
-                waiting += np.array_split(own, 2)
-        else:
-            known = np.isfinite(found)
-            distances[own[known]], nearest[own[known]] = found[known], sources[index[known]]
-        if not waiting:
-            return distances, nearest
-    raise SurfaceError(f"exact distances have too many gaps; {REMEDY}", "passes")
+            continue
+        known = np.isfinite(found)
+        nearest = np.full(len(known), -1, dtype=np.int64)
+        nearest[known] = sources[index[known]]
+        return np.where(known, found, np.inf), nearest
+    raise SurfaceError(f"exact distances cannot be measured on this mesh; {REMEDY}", "passes")
 
 
 def reached(mesh: WorkingMesh, distances: Array) -> Reached:
