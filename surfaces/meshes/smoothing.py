@@ -52,7 +52,7 @@ def smoothed(surface: MeshSurface, length: float, tolerance: float) -> MeshSurfa
         >>> roof = TriangleMesh(ridge, [[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2]])
         >>> copy = smoothed(mesh(roof), 0.5, tolerance=0.02)
         >>> copy.smoothing.counted, round(copy.smoothing.off, 3)
-        (True, 0.011)
+        (True, 0.007)
     """
     checks = Checks("smooth")
     checks.positive("length", length, "metres")
