@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from feasibility.collisions import gather
 from feasibility.targets import check_references
-from feasibility.task import Task, check_footprint
+from feasibility.task import Task, check_footprint, check_smooth
 from robots import Robot
 from surfaces import Cells, Surface
 
@@ -42,8 +42,8 @@ class Problem:
             TypeError: an argument is something else, such as a surface that is not cut into cells;
                 all of them are named.
             ArgumentError: the roll is limited, but the surface has no reference direction for it,
-                or one that is along the approach direction at some cell; or there is a footprint,
-                but no surface.
+                or one that is along the approach direction at some cell; there is a footprint, but
+                no surface; or the surface is not smoothed as the task says.
         """
         _refuse_other_types(
             (robot, "robot", Robot, 'a Robot, such as robots.load_robot("ur5")'),
@@ -53,6 +53,7 @@ class Problem:
         )
         check_references(cells, task)
         check_footprint(cells, task)
+        check_smooth(cells, task)
         task = task_over(cells, task)
         return cls(robot, cells, task, task)
 
@@ -102,6 +103,8 @@ class Problem:
     def within(self) -> str:
         """Tolerance, cone and range of the roll in words."""
         words = f"within {1e3 * self.task.effective_tolerance:g} mm and {self.task.cone_deg:g} deg"
+        if self.task.smooth is not None:
+            words += f" of a copy smoothed over {1e3 * self.task.smooth:g} mm"
         if self.task.roll is None or self.task.roll_deg is None:
             return words
         low, high = self.task.roll_deg

@@ -87,6 +87,11 @@ class Task:
     min_manipulability: float | None = None
     """What the smallest singular value along the motion has to be at least: of the Jacobian of tool
     point (over the arm's reach) and approach axis, a pure number. None for any."""
+    smooth: float | None = None
+    """m, for meshes: targets and approach directions are those of a copy of the surface smoothed
+    over this length (`surfaces.meshes.smoothed`). How far the copy is off the surface is stated,
+    and taken off the tolerance; where it is more than that, the tolerance holds from the copy. None
+    for the surface itself."""
     home_deg: tuple[float, ...] | None = None
     """(n,) degrees, where a path comes from and goes back to; None where it begins and ends over
     the surface. For arms whose joints all turn."""
@@ -102,7 +107,12 @@ class Task:
                 "cone_deg", self.cone_deg, "must lie in 0 .. 180 (degrees)", 0.0, 180.0
             ),
         }
-        units = {"tolerance": "metres", "speed": "m/s", "min_manipulability": "a pure number"}
+        units = {
+            "tolerance": "metres",
+            "speed": "m/s",
+            "min_manipulability": "a pure number",
+            "smooth": "metres",
+        }
         for name, unit in units.items():
             if getattr(self, name) is not None:
                 kept[name] = checks.positive(name, getattr(self, name), unit)
@@ -199,6 +209,11 @@ class Task:
         return given if given is None or isinstance(given, tuple) else (given, given)
 
     @property
+    def smoothing(self) -> tuple[float, float] | None:
+        """m, length and tolerance for `surfaces.meshes.smoothed`; None for the surface itself."""
+        return None if self.smooth is None else (self.smooth, self.effective_tolerance)
+
+    @property
     def requires_rates(self) -> bool:
         """Is a speed, or a distance from singularities, required?"""
         return self.speed is not None or self.min_manipulability is not None
@@ -287,6 +302,27 @@ def check_footprint(cells: Cells, task: Task) -> None:
         expected = "leave it out, or plan passes over the surface itself"
         what = "is given, but between poses there is no surface to treat"
         raise ArgumentError(Fault("footprint", what, expected=expected), "task")
+
+
+def check_smooth(cells: Cells, task: Task) -> None:
+    """Refuse cells of a surface that is not smoothed as the task says.
+
+    Raises:
+        ArgumentError: it is not, or was for another tolerance.
+    """
+    made, wanted = cells.surface.smoothing, task.smooth
+    if made is None or wanted is None:
+        fits = made is None and wanted is None
+    else:
+        counted = made.off < task.effective_tolerance
+        fits = made.length == wanted and made.counted == counted
+    if not fits:
+        how = f"smoothed over {made.length:g} m" if made else "not smoothed"
+        what = (
+            f"is {wanted}, but the cells are of a surface that is {how}, or for another tolerance"
+        )
+        expected = "cut smoothed(mesh, task.smooth, task.effective_tolerance) into cells"
+        raise ArgumentError(Fault("smooth", what, expected=expected), "task")
 
 
 def _about(roll_deg: float) -> tuple[float, float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal, Self
+from typing import ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -49,6 +49,33 @@ class ClosestPoint:
         return ClosestPoint(u, v, height, values[:, 3:].reshape(*shape, 3), inside.reshape(shape))
 
 
+class Smoothing(NamedTuple):
+    """How a surface was smoothed, triangle by triangle."""
+
+    length: float
+    """m; a wave of this length keeps half its height, one of half the length a seventeenth."""
+    off: float
+    """m, how far the two are apart at most, either from the other: no vertex moved further."""
+    counted: bool
+    """Whether that is taken off the tolerance; it is not where it is more than that."""
+    vertices: Array
+    """(V, 3) m, those of the surface before, in its own frame."""
+
+    def words(self) -> str:
+        """What a user should know about it, without a full stop."""
+        off = f"{1e3 * self.off:.3g} mm"
+        what = (
+            "which is taken off the tolerance"
+            if self.counted
+            else "which is more than the tolerance: that holds from the copy, and the distance "
+            f"from the surface itself may differ from the standoff by {off} more"
+        )
+        return (
+            "targets and approach directions are those of a copy smoothed over "
+            f"{1e3 * self.length:g} mm, up to {off} off the surface, {what}"
+        )
+
+
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Surface(Protected, ABC):
     """A surface placed in the root frame: the world, or the frame of the link that carries it.
@@ -80,6 +107,11 @@ class Surface(Protected, ABC):
     def deviations(self) -> tuple[float, float]:
         """How far points (m) and normals (1) may be from those of the surface meant, at most."""
         return (0.0, 0.0)
+
+    @property
+    def smoothing(self) -> Smoothing | None:
+        """Of a smoothed copy of a mesh, how it was made; None for any other surface."""
+        return None
 
     @property
     def bare(self) -> bool:

@@ -44,6 +44,7 @@ surfaces.meshes: triangle_mesh normals closest_point face_tree places_on_faces f
 surfaces.meshes.repair
 surfaces.meshes: mesh_surface selection sources
 surfaces.meshes.cells
+surfaces.meshes: smoothing
 surfaces.step_files
 surfaces: sheet tiles triangle_kernel cell_triangles
 surfaces.places

@@ -14,6 +14,7 @@ from feasibility.cases.collision_table import CollisionPart, faults_of_meshes, r
 from feasibility.cases.robot_table import RobotPart, faults_of_loading, in_robot_table, read_robot
 from feasibility.cases.surface_table import (
     AUTO,
+    MESHES,
     SurfacePart,
     faults_of_building,
     named_file,
@@ -105,7 +106,7 @@ class Case:
         except RobotError as error:
             faults += in_robot_table(error)
         try:
-            cells = self.surface.cut(self.task.disc)
+            cells = self.surface.cut(self.task.disc, self.task.smoothing)
         except CaseError as error:
             faults += error.faults
         try:
@@ -268,6 +269,9 @@ def _from_tables(tables: Tables, name: str, overrides: Iterable[str]) -> Case:
     if surface is not None and task is not None and surface.automatic and task.disc is None:
         wanted = "give task.footprint, in metres, from which their size follows"
         faults.append(Fault("surface.cells", f"is {AUTO!r}, without a footprint", expected=wanted))
+    if surface is not None and task is not None and task.smooth and surface.kind not in MESHES:
+        what = f"is for meshes and STEP faces, and the surface is of kind {surface.kind!r}"
+        faults.append(Fault("task.smooth", what, expected="leave it out"))
     search = _read_search(tables.get("search", {}), faults)
     if faults and "robot" in tables:
         faults += faults_of_loading(tables["robot"])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Literal
 
-from coverable_errors import MISSING
+from coverable_errors import MISSING, Fault
 from feasibility.cases.keys import own_keys
 from feasibility.cases.table_reader import (
     SURFACE_NAMES,
@@ -104,6 +104,21 @@ def build_step(values: Values, pose: Mapping[str, Any]) -> MeshSurface:
         raise CaseError(faults or in_file(error, file, "surface")) from error
     with surface_faults():
         return mesh(_part(triangles, values), **pose)
+
+
+def smooth_mesh(surface: MeshSurface, smoothing: tuple[float, float] | None) -> MeshSurface:
+    """A copy smoothed over a length for a tolerance (m), or the mesh itself.
+
+    Raises:
+        CaseError: it cannot be smoothed so.
+    """
+    from surfaces import SurfaceError
+    from surfaces.meshes import smoothed
+
+    try:
+        return surface if smoothing is None else smoothed(surface, *smoothing)
+    except SurfaceError as error:
+        raise CaseError(Fault("task.smooth", str(error))) from error
 
 
 def cut_mesh(surface: MeshSurface, count: int | None, size: float | None) -> MeshCells:

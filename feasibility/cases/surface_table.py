@@ -21,6 +21,7 @@ from feasibility.cases.mesh_keys import (
     cut_mesh,
     read_count,
     read_mesh_keys,
+    smooth_mesh,
 )
 from feasibility.cases.surface_keys import (
     OWN_KEYS,
@@ -45,6 +46,7 @@ OWN_FORMULA = (
     "a surface of your own formula g(u, v) is given by points of it, as a grid, by triangles, as a "
     "mesh, or in Python by surfaces.parametric(g, u, v)"
 )
+MESHES = ("mesh", "step")  # kinds whose surface is triangles
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,11 +123,16 @@ class SurfacePart:
             return build_poses(self.values, self.pose).surface
         return build_patch(self.kind, self.values, self.pose)
 
-    def cut(self, footprint: Footprint | None = None) -> Cells:
+    def cut(
+        self,
+        footprint: Footprint | None = None,
+        smoothing: tuple[float, float] | None = None,
+    ) -> Cells:
         """Build the surface and cut it into its cells.
 
         Args:
             footprint: m, of the tool, where the cells are to be fine enough for it.
+            smoothing: length and tolerance, m, where a mesh is to be smoothed before.
 
         Raises:
             CaseError: there is no such surface, or it cannot be cut so.
@@ -133,8 +140,8 @@ class SurfacePart:
         if self.kind == "poses":
             return build_poses(self.values, self.pose)
         surface = self.build()
-        if self.kind in ("mesh", "step"):
-            return self._cut_mesh(cast("MeshSurface", surface), footprint)
+        if self.kind in MESHES:
+            return self._cut_mesh(smooth_mesh(cast("MeshSurface", surface), smoothing), footprint)
         if self.kind == "piecewise":
             return cut_pieces(cast("Piecewise", surface), self.values, footprint)
         patch, cells = cast("Patch", surface), cast("tuple[int, int]", self.cells)
@@ -222,7 +229,7 @@ def _values(
     section: Section, kind: str
 ) -> tuple[dict[str, Any], tuple[int, int] | int | Literal["auto"] | None]:
     """What the kind's own keys say, and how many cells there are."""
-    if kind in ("mesh", "step"):
+    if kind in MESHES:
         return read_mesh_keys(section, kind), read_count(section)
     if kind == "piecewise":
         return read_pieces(section), None

@@ -26,7 +26,14 @@ def in_order(samples: Samples) -> Samples:
     return samples.of(np.lexsort((samples.share, samples.row)))
 
 
-def cells_reached(robot: Robot, cells: Cells, task: Task, rows: Array, samples: Samples) -> Mask:
+def cells_reached(
+    robot: Robot,
+    cells: Cells,
+    task: Task,
+    rows: Array,
+    samples: Samples,
+    marks: Ints | None = None,
+) -> Mask:
     """(N,) cells that a motion reaches.
 
     Args:
@@ -35,13 +42,20 @@ def cells_reached(robot: Robot, cells: Cells, task: Task, rows: Array, samples: 
         task: its tolerance and cone.
         rows: (m, n) the motion.
         samples: of it, in the order of `in_order`, all rows among them.
+        marks: (m,) the cell that each row is said to be at, -1 for none: looked at first.
     """
-    from scipy.spatial import cKDTree
-
     reached = np.zeros(len(cells), dtype=bool)
     if not len(cells) or not len(samples.row):
         return reached
     aims, tolerance = task.targets(cells), task.effective_tolerance
+    if marks is not None:
+        at = samples.of((samples.share == 0.0) & (marks[samples.row] >= 0))
+        cell = marks[at.row]
+        reached[cell[at_targets(task, aims, cell, at.points, at.axes, at.x)]] = True
+        if reached.all():
+            return reached
+    from scipy.spatial import cKDTree  # takes a while to load
+
     tree = cKDTree(samples.points)
     near = tree.query_ball_point(aims.points, tolerance)
     cell, sample = _flat(near)

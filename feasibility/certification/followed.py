@@ -109,7 +109,7 @@ def off_surface(followed: Mask, samples: Samples) -> tuple[Array, Array]:
 
 
 def lifted_faults(
-    surface: Surface,
+    surface: Surface | None,
     rows: Array,
     lifted: tuple[Array, Array],
     kinematics: Kinematics,
@@ -118,7 +118,7 @@ def lifted_faults(
     """Where a tool that is lifted, or beyond the border, may be through a surface.
 
     Args:
-        surface: the surface.
+        surface: the surface, if there is one.
         rows: (m, n) the motion, rad or m.
         lifted: (k,) from where to where it is, in rows with their shares.
         kinematics: of the arm.
@@ -126,7 +126,7 @@ def lifted_faults(
     """
     left, right = lifted
     for _ in range(LEVELS):
-        if not len(left):
+        if not len(left) or surface is None:
             return []
         parts = [_part(rows, end) for end in (left, right)]
         points = [kinematics.tools(part.q)[0] for part in parts]

@@ -97,7 +97,7 @@ def replay_over_surface(
     margin, faults = limits(robot, rows)
     if working is None:
         found = _tool_along(judge, rows, cells, marks)
-        reached = cells_reached(robot, cells, task, rows, found.samples)
+        reached = cells_reached(robot, cells, task, rows, found.samples, marks)
     else:
         found, reached = _tool_at_work(judge, rows, cells, surface, working)
         needed = _at_work(cells) if needed is None else needed
@@ -157,7 +157,7 @@ def _tool_at_work(
             reached |= cells_reached(judge.robot, cells, judge.task, rows[part], found.samples)
     lifted = np.flatnonzero(~(working[:-1] & working[1:])).astype(float)
     kinematics, tolerance = Kinematics(judge.robot), judge.task.effective_tolerance
-    faults += lifted_faults(surface, rows, (lifted, lifted + 1.0), kinematics, tolerance)
+    faults += lifted_faults(surface.wall, rows, (lifted, lifted + 1.0), kinematics, tolerance)
     none = judge.sampled(np.zeros(0, dtype=np.int64), np.zeros(0), rows[:0])
     return _Along(most, faults, Samples.join(none, *samples)), reached
 
@@ -205,7 +205,7 @@ def _with_what_follows(
     followed, most = surface.followed, found.most
     at = off_surface(followed, found.samples)
     kinematics, tolerance = Kinematics(judge.robot), judge.task.effective_tolerance
-    faults = lifted_faults(surface.under, rows, at, kinematics, tolerance)
+    faults = lifted_faults(surface.under.wall, rows, at, kinematics, tolerance)
     for part in followed_parts(judge, followed, rows, found.samples):
         one = _tool_along(over, part.q)
         most = np.maximum(most, one.most)

@@ -33,7 +33,7 @@ from feasibility.placement.refinement import Evaluator, Refinement
 from feasibility.placement.region import PlacementError, Pose, Region
 from feasibility.roadmap import warm_up
 from feasibility.search import Progress, Search
-from feasibility.targets import blocked_curves
+from feasibility.targets import blocked_curves, smoothing_offer
 from feasibility.task import Task
 from feasibility.verdict import Answer, CauseKind, Evidence
 from robots import Robot
@@ -166,7 +166,8 @@ def place(
     refinement.run(count, around)
     placements = _searched(answered, refinement, refinement.verified(keep))
     if placements.answer is Answer.UNDECIDED and (closed := blocked_curves(cells, task)):
-        message = f"{placements.message} Wherever it stands: {closed}"
+        offer = smoothing_offer(cells, task, clock)
+        message = f"{placements.message} Wherever it stands: {closed} {offer}".rstrip()
         placements = replace(placements, message=message)
     return _timed(placements, began)
 

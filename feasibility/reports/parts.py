@@ -21,7 +21,7 @@ from feasibility.task import Task
 from feasibility.verdict import Cause, Certificate, Walk
 from robots import Robot
 from robots.shapes import LeftOut
-from surfaces import Cells
+from surfaces import Cells, Surface
 
 if TYPE_CHECKING:
     from feasibility.certification.collisions import CollisionReplay
@@ -50,6 +50,20 @@ def filled(head: str, text: str) -> str:
         break_on_hyphens=False,
     )
     return wrapped.replace(_UNBROKEN, " ")
+
+
+def smooth_json(surface: Surface) -> dict[str, Any]:
+    """Of a smoothed copy, over which length, how far off, and what became of that."""
+    made = surface.smoothing
+    if made is None:
+        return {}
+    counted = made.counted
+    return {"smooth": {"length_m": made.length, "off_m": made.off, "taken_off_tolerance": counted}}
+
+
+def smooth_text(surface: Surface) -> str:
+    """The same in words; empty for any other surface."""
+    return "" if surface.smoothing is None else surface.smoothing.words()
 
 
 def summary(

@@ -8,7 +8,14 @@ from typing import Any
 
 from coverable_errors import counted
 from feasibility.collisions import checked
-from feasibility.reports.parts import aligned, certificate_json, clearance_json, summary
+from feasibility.reports.parts import (
+    aligned,
+    certificate_json,
+    clearance_json,
+    smooth_json,
+    smooth_text,
+    summary,
+)
 from feasibility.reports.proof import tree_json
 from feasibility.runs import Interruption, PassRuns, PlannedPasses
 from feasibility.timing import Trajectory
@@ -63,6 +70,7 @@ def as_json(
         ],
         "refused": list(found.refusals),
         "treated": treated_json(treated),
+        **smooth_json(along.passes.surface),
         "collisions": checked(along.task.collision),
         "robot": found.robot.name,
         "version": version(),
@@ -149,6 +157,7 @@ def as_text(
         ("runs", _fewest_words(found)),
         ("left out", _left_words(along, found)),
         ("refused", "; ".join(found.refusals)),
+        ("smoothed", smooth_text(along.passes.surface)),
         ("treated", "" if treated is None else treated_words(treated)),
     ]
     lines = summary(head, rows, along.task.collision, 14)

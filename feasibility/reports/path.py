@@ -18,6 +18,8 @@ from feasibility.reports.parts import (
     clearance_json,
     clearance_text,
     roll_text,
+    smooth_json,
+    smooth_text,
     summary,
 )
 from feasibility.reports.pass_runs import passes_json, passes_text
@@ -87,6 +89,7 @@ def as_json(
         "trajectory": None if trajectory is None else _timing(path, trajectory, limits),
         **rates_json(path, rates, trajectory),
         **ends_json(ends),
+        **smooth_json(path.cells.surface if passes is None else passes.surface),
         "collisions": checked(path.task.collision),
         "robot": path.robot.name,
         "version": version(),
@@ -196,6 +199,7 @@ def as_text(
         ),
         ("roll", roll_text(path.certificate, path.task)),
         ("clearance", clearance_text(path.certificate)),
+        ("smoothed", smooth_text(path.cells.surface if passes is None else passes.surface)),
         ("treated", "" if treated is None else treated_words(treated)),
     ]
     if trajectory is not None:

@@ -19,6 +19,8 @@ from feasibility.reports.parts import (
     measured_json,
     seconds,
     seconds_text,
+    smooth_json,
+    smooth_text,
     summary,
     walk_csv,
 )
@@ -82,6 +84,7 @@ def as_json(
         "pairs_left_out": [left_out_json(one) for one in verdict.pairs_left_out],
         "proof": proof_json(verdict.proof, verdict.robot, verdict.cells),
         "treated": treated_json(verdict.treated),
+        **smooth_json(verdict.cells.surface),
         **({} if area is None else area_json(area)),
         "timing": seconds(verdict.timing, PHASES, before_s),
         "robot": verdict.robot.name,
@@ -148,6 +151,7 @@ def rows_of(verdict: Verdict) -> list[tuple[str, str]]:
         ("evidence", f"{verdict.evidence}: {_evidence(verdict)}"),
         ("found", _message(verdict)),
         ("certificate", _certificate_text(verdict)),
+        ("smoothed", smooth_text(verdict.cells.surface)),
         ("treated", _treated_text(verdict)),
     ]
 

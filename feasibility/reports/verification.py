@@ -13,6 +13,8 @@ from feasibility.collisions import checked
 from feasibility.reports.parts import (
     certificate_text,
     measured_json,
+    smooth_json,
+    smooth_text,
     summary,
 )
 from feasibility.reports.proof import proof_json
@@ -68,6 +70,7 @@ def as_json(found: Verification, notes: Sequence[str] = ()) -> dict[str, Any]:
         "certificate": measured_json(found.robot, found.certificate, found.q),
         "proof": proof_json(found.proof, found.robot, found.cells),
         "boxes": found.boxes if found.proof is not None else None,
+        **smooth_json(found.cells.surface),
         "treated": treated_json(found.treated),
         "not_judged": list(found.not_judged),
         "in_time": not found.late,
@@ -93,6 +96,7 @@ def as_text(found: Verification, case: str, source: str, notes: Sequence[str] = 
     if found.reached is not None:
         rows.append(_reached(found.cells, found.reached))
     rows += [("certificate" if found.holds else "measured", _measured(found))]
+    rows.append(("smoothed", smooth_text(found.cells.surface)))
     if found.proof is not None and found.holds:
         rows.append(("checked", counted(found.boxes, "box", "boxes")))
     rows.append(("treated", "" if found.treated is None else treated_words(found.treated)))

@@ -10,7 +10,7 @@ from feasibility.problem import Problem
 from feasibility.roadmap.branch_and_bound import Ruling
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.proving import Proving
-from feasibility.targets import blocked_curves
+from feasibility.targets import blocked_curves, smoothing_offer
 
 
 def proof_of(exploration: Exploration) -> CutTree | None:
@@ -60,7 +60,9 @@ def unfinished_words(problem: Problem, proving: Proving, in_time: bool) -> str:
         )
     blocked = blocked_curves(problem.cells, problem.task)
     if blocked:
-        return blocked
+        return (
+            f"{blocked} {smoothing_offer(problem.cells, problem.task, exploration.clock)}".rstrip()
+        )
     missed = np.flatnonzero(~exploration.reached)
     if len(missed):
         named = problem.cells.named(missed, 3)

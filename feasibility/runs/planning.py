@@ -9,6 +9,7 @@ import numpy as np
 
 from coverable_arrays import Mask
 from coverable_errors import counted
+from feasibility.certification import less_deviations
 from feasibility.checking import check
 from feasibility.clock import Clock
 from feasibility.search import Search
@@ -88,7 +89,7 @@ def plan_passes(
     """
     way = tool_way(passes.surface, task)
     route = pass_route(passes, retract, way)
-    alone = replace(task, footprint=None, coverage=None)
+    alone = replace(task, footprint=None, coverage=None, smooth=None)
     verdict = check(robot, route.cells, alone, search, clock=clock)
     if not verdict.feasible and verdict.components:
         reached = np.zeros(len(route.cells), dtype=bool)
@@ -104,7 +105,8 @@ def plan_passes(
 
 def tool_way(surface: Surface, task: Task) -> ToolWay:
     """Where the tool is to be beside a surface, and how near to that straight lines must stay."""
-    return ToolWay(surface.side_sign * task.standoff, WITHIN * task.effective_tolerance)
+    within = WITHIN * less_deviations(task, surface).effective_tolerance
+    return ToolWay(surface.side_sign * task.standoff, within)
 
 
 def plan_best_passes(

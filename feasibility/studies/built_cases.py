@@ -132,8 +132,9 @@ def cut_of(case: Case) -> Cells:
 
     if case.surface.kind not in ("mesh", "step"):
         return case.surface.cut(case.task.disc)
+    disc, smoothing = case.task.disc, case.task.smoothing
     file = os.stat(case.surface.table()["file"])
-    home = _cut(surface_at_home(case), case.task.disc, file.st_mtime_ns, file.st_size)
+    home = _cut(surface_at_home(case), disc, smoothing, file.st_mtime_ns, file.st_size)
     placed = replace(
         home.surface,
         rotation=rotation_from_rpy(*np.radians(case.surface.rpy_deg)),
@@ -149,9 +150,15 @@ def surface_at_home(case: Case) -> str:
 
 
 @lru_cache(maxsize=MESHES_KEPT)
-def _cut(table: str, footprint: tuple[float, float] | None, changed: int, size: int) -> MeshCells:
+def _cut(
+    table: str,
+    footprint: tuple[float, float] | None,
+    smoothing: tuple[float, float] | None,
+    changed: int,
+    size: int,
+) -> MeshCells:
     """The cells of the mesh of a [surface] table, written as a document."""
     part = read_surface(parse_toml(table)["surface"], [])
     if part is None:
         raise ValueError("the table of a surface that was read before cannot be read again")
-    return cast("MeshCells", part.cut(footprint))
+    return cast("MeshCells", part.cut(footprint, smoothing))

@@ -1,4 +1,5 @@
 from .blocked import blocked_curves as blocked_curves
+from .blocked import smoothing_offer as smoothing_offer
 from .curves import TargetCurves as TargetCurves
 from .curves import target_curves as target_curves
 from .frames import FrameCurves as FrameCurves

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from coverable_arrays import Mask
+from feasibility.clock import Clock
 from feasibility.targets.curves import RELIABLE, target_curves
 from feasibility.task import Task
-from surfaces import Cells, components
+from surfaces import Cells, SurfaceError, components
+
+GROWTH = 2.0**0.5  # from one length of smoothing that is tried to the next
+MOST_LENGTHS = 10
+MOST_OFF = 0.25  # [1] of the standoff: a copy further off the surface is not offered
+OPEN = 0.25  # [1] of its area that no face of the offset surface may fall below
 
 
 def blocked_curves(cells: Cells, task: Task) -> str:
@@ -49,6 +57,39 @@ def blocked_curves(cells: Cells, task: Task) -> str:
             "cells, a finer or smoother mesh, cut it along its creases, or allow a wider cone or a "
             "larger tolerance."
         )
+    return ""
+
+
+def smoothing_offer(cells: Cells, task: Task, clock: Clock) -> str:
+    """Over which length a mesh has to be smoothed so that nothing is blocked; empty for none.
+
+    Lengths are tried one after the other, which takes seconds, for as long as there is time.
+    """
+    from surfaces.meshes import MeshSurface, smoothed
+
+    surface = cells.surface
+    if not isinstance(surface, MeshSurface):
+        return ""
+    height, tolerance = surface.side_sign * task.standoff, task.effective_tolerance
+    shortest = max(task.standoff, surface.mean_edge_length, 1.5 * (task.smooth or 0.0))
+    longest = float(surface.mesh.extent.max())
+    for length in (shortest * GROWTH**k for k in range(MOST_LENGTHS)):
+        length = float(f"{length:.2g}")
+        if length > longest or clock.out_of_time:
+            break
+        clock.report(0, None, f"smoothing the mesh over {length:g} m")
+        try:
+            copy = smoothed(surface, length, tolerance)
+            made = copy.smoothing
+            if made is None or made.off > max(tolerance, MOST_OFF * task.standoff):
+                break
+            if copy.least_area(height) < OPEN:
+                continue
+            smoother = copy.cells(count=len(cells))
+        except SurfaceError:
+            continue
+        if not blocked_curves(smoother, replace(task, smooth=length)):
+            return f"With task.smooth = {length:g} it can be tried: {made.words()}."
     return ""
 
 

@@ -105,6 +105,8 @@ def _see_surface(cells: Cells, height: float, deviations: Array) -> None:
         off = np.linalg.norm(tool - target, axis=1)
         leans = np.linalg.norm(normals - normal, axis=1)
         deviations[some] = np.maximum(deviations[some], UNSEEN * np.column_stack([off, leans]))
+    off, lean = surface.under.deviations
+    deviations[some] += (off + abs(height) * lean, lean)
 
 
 def target_curves(cells: Cells, task: Task) -> TargetCurves:

@@ -130,7 +130,7 @@ def _measured(
     The disc is a ball about each contact, see `surfaces.passes.treated`.
     """
     inner, outer = 0.5 * min(footprint), 0.5 * max(footprint)
-    mesh = _mesh_of(surface, FINE * inner)
+    mesh = _mesh_of(surface.wall or surface, FINE * inner)  # not a smoothed copy
     doubled = mesh.doubled_areas
     normals = doubled / np.maximum(np.linalg.norm(doubled, axis=1), 1e-300)[:, None]
     off = min(contacts.off, 0.5 * inner)
@@ -200,7 +200,7 @@ def _notes(surface: Surface, found: Treated, footprint: tuple[float, float]) -> 
             "of an ellipse the share is at least that of the disc inside it, and at most that of "
             "the disc around it"
         )
-    error, _ = surface.deviations
+    error, _ = (surface.wall or surface).deviations
     if error > 0.0:
         notes.append(f"the surface is known to {1e3 * error:.2g} mm")
     return tuple(notes)

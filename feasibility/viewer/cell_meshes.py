@@ -120,7 +120,8 @@ def make_display_mesh(cells: MeshCells, budget: int = BUDGET) -> DisplayMesh:
 
     More are left where cells are so many that each would be drawn by too few.
     """
-    mesh, surface = cells.surface.mesh, cells.surface
+    surface = cells.surface.wall  # not a smoothed copy of it
+    mesh = surface.mesh
     on_border = np.zeros(len(mesh.vertices), dtype=bool)
     on_border[mesh.edges.border_vertices] = True
     faces, labels = mesh.faces, cells.labels
@@ -151,7 +152,7 @@ def _thinned(cells: MeshCells, on_border: Mask, budget: int) -> tuple[Ints, Ints
     Returns:
         The faces, and the cell (F,) of each.
     """
-    mesh = cells.surface.mesh
+    mesh = cells.surface.wall.mesh
     kinds = _kinds(mesh.faces, cells.labels, on_border)
     widest = WIDEST * np.sqrt(cells.areas.mean())
     spacing = min(cells.surface.mean_edge_length * np.sqrt(len(mesh.faces) / budget), widest)

@@ -12,6 +12,7 @@ from .selection import cut_box as cut_box
 from .selection import cut_plane as cut_plane
 from .selection import faces_within_cone as faces_within_cone
 from .selection import take_faces as take_faces
+from .smoothing import smoothed as smoothed
 from .sources import metres_per_unit as metres_per_unit
 from .sources import read_mesh as read_mesh
 from .sources import refuse_unlikely_unit as refuse_unlikely_unit

@@ -17,16 +17,17 @@ from surfaces.meshes.mesh_parts import Clusters
 from surfaces.meshes.normals import (
     WIDTH,
     blended,
-    carried,
     corner_normals,
     crease_share,
+    parts_of_faces,
     sectors,
+    unit,
 )
 from surfaces.meshes.sources import triangles_of
 from surfaces.meshes.triangle_mesh import TriangleMesh
 from surfaces.part_growth import grown
 from surfaces.parts import MOST_PARTS, SurfaceParts
-from surfaces.surface import ClosestPoint, Side, Surface, points_of
+from surfaces.surface import ClosestPoint, Side, Smoothing, Surface, points_of
 
 if TYPE_CHECKING:
     from surfaces.meshes.cells import MeshCells
@@ -49,13 +50,31 @@ class MeshSurface(Surface):
     crease_normals: Array
     """(F, 3, 3) the same on creases, where both sides have one: the normal turns to it over a strip
     along the crease, `WIDTH` of a face wide."""
+    smoothing: Smoothing | None = None
+    """Of a smoothed copy, see `surfaces.meshes.smoothed`."""
+
+    @property
+    def deviations(self) -> tuple[float, float]:
+        """See `Surface.deviations`; approach directions are those of a smoothed copy itself."""
+        made = self.smoothing
+        return (0.0 if made is None or not made.counted else made.off, 0.0)
+
+    @cached_property
+    def wall(self) -> MeshSurface:
+        """See `Surface.wall`: of a smoothed copy the surface before, with the same faces."""
+        if self.smoothing is None:
+            return self
+        before = TriangleMesh(self.smoothing.vertices, self.mesh.faces, self.mesh.history)
+        normals = corner_normals(before)
+        return MeshSurface(self.rotation, self.position, self.side, before, normals, normals)
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What was repaired in the mesh, and what to know about it."""
         from surfaces.meshes.repair import notes_of
 
-        return notes_of(self.mesh)
+        made = self.smoothing
+        return (*notes_of(self.mesh), *([] if made is None else [made.words()]))
 
     @cached_property
     def mean_edge_length(self) -> float:
@@ -196,11 +215,16 @@ class MeshSurface(Surface):
             faces: (G, 3).
             parent: (G,) the present face that each is part of.
         """
-        normals = carried(self.mesh, self.corner_normals, vertices, faces, parent)
+        weights, smoothing = parts_of_faces(self.mesh, vertices, faces, parent), self.smoothing
+        normals = unit(np.einsum("gkc,gci->gki", weights, self.corner_normals[parent]))
+        if smoothing is not None:
+            before = np.empty_like(vertices)
+            before[faces] = weights @ smoothing.vertices[self.mesh.faces[parent]]
+            smoothing = smoothing._replace(vertices=before)
         mesh = TriangleMesh(vertices, faces, self.mesh.history)
         own = blended(vertices, faces, normals, sectors(mesh))
         crease = blended(vertices, faces, normals, faces)
-        return MeshSurface(self.rotation, self.position, self.side, mesh, own, crease)
+        return MeshSurface(self.rotation, self.position, self.side, mesh, own, crease, smoothing)
 
     @cached_property
     def on_border(self) -> tuple[Mask, Mask]:
@@ -236,6 +260,15 @@ class MeshSurface(Surface):
         size = np.where(self.on_crease.any(axis=1), strip, 1.0)[:, None, None]
         turns = self.crease_normals[:, 1:] - self.crease_normals[:, :1]
         return size * (corners[:, 1:] - corners[:, :1]), turns
+
+    def least_area(self, height: float) -> float:
+        """[1] how much of its area a face keeps on the offset surface at a signed height (m).
+
+        The least of all faces; negative where that folds.
+        """
+        steps, turns = self.turns
+        before, after = (np.cross(x[:, 0], x[:, 1]) for x in (steps, steps + height * turns))
+        return float(((before * after).sum(axis=1) / (before**2).sum(axis=1)).min())
 
     @cached_property
     def face_balls(self) -> tuple[Array, Array, Array]:

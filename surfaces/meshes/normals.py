@@ -53,12 +53,11 @@ def corner_normals(mesh: TriangleMesh) -> Array:
     return flat.reshape(-1, 3, 3)
 
 
-def carried(mesh: TriangleMesh, normals: Array, fine: Array, faces: Ints, parent: Ints) -> Array:
-    """Corner normals (G, 3, 3) of a finer mesh of the same surface, linear over each old face.
+def parts_of_faces(mesh: TriangleMesh, fine: Array, faces: Ints, parent: Ints) -> Array:
+    """(G, 3, 3) where the corners of a finer mesh lie on its faces: weights of their corners.
 
     Args:
         mesh: the coarser mesh.
-        normals: (F, 3, 3) its corner normals.
         fine: (W, 3) m, vertices of the finer one.
         faces: (G, 3) its faces.
         parent: (G,) the face of `mesh` that each is part of.
@@ -70,8 +69,7 @@ def carried(mesh: TriangleMesh, normals: Array, fine: Array, faces: Ints, parent
     off = fine[faces] - old[:, None, 0]
     second = np.einsum("gki,gi->gk", np.cross(off, other[:, None]), across) / square
     third = np.einsum("gki,gi->gk", np.cross(side[:, None], off), across) / square
-    weights = np.stack([1.0 - second - third, second, third], axis=-1)
-    return unit(np.einsum("gkc,gci->gki", weights, normals[parent]))
+    return np.stack([1.0 - second - third, second, third], axis=-1)
 
 
 def blended(vertices: Array, faces: Ints, normals: Array, groups: Ints) -> Array:

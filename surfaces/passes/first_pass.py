@@ -10,6 +10,7 @@ from coverable_arrays import Array, Ints, Mask
 from surfaces.adjacency import components
 from surfaces.passes.beyond_ends import FirstPass, carried_on, slopes
 from surfaces.passes.triangles import WorkingMesh, cut_at_middles, cut_edges, edges_of, twin_sides
+from surfaces.passes.unreached import Reached, exact_distances, reached, refuse_parts
 
 SNAP = 0.02  # [1] of an edge: a crossing nearer to its end is put there, or slivers would arise
 HALVINGS = 2  # of the edges along the first pass: distances are taken from their vertices
@@ -25,6 +26,14 @@ class Field(NamedTuple):
     """(F,) the face, before the first pass was cut into them, that each face is a part of."""
     extent: tuple[float, float] | None = None
     """m, the least and the greatest value, where the vertices alone do not show them."""
+    mended: Ints | None = None
+    """Vertices whose values come from their neighbours, see `unreached`; None for none."""
+
+    @property
+    def touched(self) -> Mask:
+        """(F,) faces with a corner whose value comes from its neighbours."""
+        mended = np.isin(self.mesh.faces, [] if self.mended is None else self.mended)
+        return np.asarray(mended.any(axis=1))
 
     @property
     def torn(self) -> Mask:
@@ -65,13 +74,17 @@ def distance_field(mesh: WorkingMesh, middle: Array, across: Array) -> Field:
 
     Where the first pass does not part the surface in two (along a closed tube), the plane does, and
     values jump where the two sides meet.
+
+    Raises:
+        SurfaceError: there are parts of the surface that the distance does not reach.
     """
     cut = _cut_in(mesh, (mesh.vertices - middle) @ across)
     for _ in range(HALVINGS):
         cut = _with_denser_line(cut)
     first, edges = _through(cut, middle)
-    values = _from_carried_on(cut.mesh, first, edges) * _sides(cut, edges)
-    field = Field(cut.mesh, values, cut.parent)
+    distances, mended = _from_carried_on(cut.mesh, first, edges)
+    values = distances * _sides(cut, edges)
+    field = Field(cut.mesh, values, cut.parent, mended=mended if len(mended) else None)
     if not field.torn.any():
         return field
     # The plane is cut into the far side too, so there are vertices about where the two sides meet.
@@ -89,18 +102,20 @@ def _through(cut: CutMesh, middle: Array) -> tuple[Ints, Ints]:
     return used[own], edges[own[of.reshape(-1, 2)[:, 0]]]
 
 
-def _from_carried_on(mesh: WorkingMesh, first: Ints, edges: Ints) -> Array:
+def _from_carried_on(mesh: WorkingMesh, first: Ints, edges: Ints) -> Reached:
     """(V,) m, length of the shortest path on the triangles to the first pass, carried on."""
-    from pygeodesic.geodesic import PyGeodesicAlgorithmExact
-
-    algorithm = PyGeodesicAlgorithmExact(mesh.vertices, mesh.faces.astype(np.int32))
-    distances, nearest = algorithm.geodesicDistances(first.astype(np.int32), None)
-    known = FirstPass(mesh, edges, np.asarray(distances, dtype=float), first[nearest])
+    refuse_parts(mesh, first)
+    found, nearest = exact_distances(mesh, first)
+    distances, mended = reached(mesh, found)
+    known = FirstPass(mesh, edges, distances, nearest)
 
     def from_vertex(vertex: int) -> Array:
-        return np.asarray(algorithm.geodesicDistances(np.array([vertex], np.int32), None)[0], float)
+        found, _ = exact_distances(mesh, np.array([vertex]))
+        return reached(mesh, found).distances
 
-    return carried_on(known, from_vertex)
+    carried = carried_on(known, from_vertex)
+    carried[mended] = np.inf  # their neighbours' values may be others now
+    return reached(mesh, carried)
 
 
 def _sides(cut: CutMesh, edges: Ints) -> Array:

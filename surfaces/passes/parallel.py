@@ -122,7 +122,6 @@ def parallel_passes(
         else:
             dropped += each.line.length
     apart = step or pitch / POINTS_PER_PITCH
-    slopes = field.slopes[np.concatenate([np.zeros(0, int), *(each.line.faces for each in lines)])]
     return Passes(
         surface=surface,
         stretches=tuple(
@@ -131,7 +130,7 @@ def parallel_passes(
         pitch=float(pitch),
         spacing=spacing,
         by=by,
-        widest=spacing if by == "distance" else spacing / max(slopes.min(initial=1.0), 1e-9),
+        widest=spacing / _least_slope(field, lines, by),
         dropped=dropped,
         notes=(*_notes(lidded.holes, lines, field, by), *_direction_note(found), *_copy_note(copy)),
     )
@@ -280,6 +279,14 @@ def _parts(line: Line, own: Mask) -> Iterator[Line]:
         yield Line(points[start : end + 1], faces[start:end], closed=False)
 
 
+def _least_slope(field: Field, lines: list[LevelLine], by: By) -> float:
+    """(0, 1] how slowly the field grows across a pass, at the least."""
+    faces = np.concatenate([np.zeros(0, int), *(line.faces for _, line in lines)])
+    if by == "distance":  # exact, but where a value is that of its neighbours
+        faces = faces[field.touched[faces]]
+    return max(float(field.slopes[faces].min(initial=1.0)), 1e-9)
+
+
 def _direction_note(found: PassLines) -> tuple[str, ...]:
     """That passes do not run in the requested direction."""
     if found.turned < TURNED:
@@ -307,6 +314,12 @@ def _notes(holes: int, lines: list[LevelLine], field: Field, by: By) -> tuple[st
         notes.append(f"{counted(holes, 'hole')} parted passes; the tool must lift there")
     if by != "distance" or not lines:
         return tuple(notes)
+    if field.mended is not None:
+        notes.append(
+            f"the exact distance did not reach {len(field.mended):,} of "
+            f"{len(field.values):,} vertices, which took theirs from their neighbours; the largest "
+            "distance between passes was checked there"
+        )
     # Beside the first pass the distance from its vertices is coarse.
     kinked = (field.slopes < KINK) & (field.values[field.mesh.faces] != 0.0).all(axis=1)
     length = sum(float(line.pieces[kinked[line.faces]].sum()) for _, line in lines)

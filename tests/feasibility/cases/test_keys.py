@@ -65,7 +65,7 @@ def tables_of(kind):
 def place_of(key):
     """A good case in which the key may stand, its table there, and what messages call the table."""
     kind, path, inner = copy.deepcopy(OTHERS.get(key.table, (key.kind or "sphere", (), {})))
-    tables = tables_of(kind or "sphere")
+    tables = tables_of("mesh" if key.name == "smooth" else kind or "sphere")
     outer = key.table.split(".")[0]
     if outer != "robot":
         del tables["robot"]  # no arm is loaded for it

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from mesh_patches import grid, of_patch
 from pass_metrics import ARCH, CAP, PLATE, away, by_level, panel_with_hole, unrolled
+from pygeodesic import geodesic
 
 from coverable_errors import CoverableError
 from surfaces import bspline, cylinder, mesh, piecewise, plane, sphere, torus
@@ -249,3 +250,47 @@ def test_oblique_passes_stay_parallel_beyond_the_ends_of_the_first(name: str, de
         assert np.ptp(height) <= 0.02 * found.spacing
     gaps = np.abs(np.diff([height.mean() for height in heights]))
     assert np.abs(gaps / found.spacing - 1.0).max() <= 0.02
+
+
+@pytest.mark.parametrize("source", [7, 10**9, 2**32 - 1])
+def test_vertices_that_distances_do_not_reach_take_theirs_from_their_neighbours(
+    source: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Rounding may lose vertices, two beside each other too; passes stay where they were.
+
+    pygeodesic names any source of such vertices, and fails where its array cannot hold that.
+    """
+    rng, surface = np.random.default_rng(5), panel_with_hole(0.02)
+    exact = parallel_passes(surface, 0.05, 0.3, step=0.002)
+
+    class Forgetful(geodesic.PyGeodesicAlgorithmExact):
+        failed = source < 2**31
+
+        def geodesicDistances(self, sources, targets):
+            found, nearest = super().geodesicDistances(sources, targets)
+            if not Forgetful.failed:
+                Forgetful.failed = True
+                raise OverflowError
+            some = np.flatnonzero(found > 0.02)
+            lost = rng.choice(some, len(some) // 20, replace=False)
+            found[lost], nearest[lost] = np.inf, min(source, 10**9)
+            return found, nearest
+
+    monkeypatch.setattr(geodesic, "PyGeodesicAlgorithmExact", Forgetful)
+    found = parallel_passes(surface, 0.05, 0.3, step=0.002)
+    assert any("the exact distance did not reach" in note for note in found.notes)
+    assert found.spacing <= found.widest <= 1.02 * found.spacing
+    for each in found.stretches:
+        lines = [other.points for other in by_level(exact)[each.level]]
+        least = min(away("plate", each.points, line).max() for line in lines)
+        assert least <= 0.02 * found.spacing
+
+
+def test_parts_that_nothing_joins_are_named_with_the_remedy() -> None:
+    u, v, faces = grid(4, 4)
+    points = np.column_stack([u, v, np.zeros_like(u)])
+    both = np.concatenate([points, points + np.array([2.0, 0.0, 0.0])])
+    apart = mesh(TriangleMesh(both, np.concatenate([faces, faces + len(points)])))
+    with pytest.raises(CoverableError, match=r"1 part of the surface.*--by planes"):
+        parallel_passes(apart, 0.2)
+    assert parallel_passes(apart, 0.2, by="planes").length > 8.0
