@@ -175,7 +175,7 @@ def in_runs(args: argparse.Namespace, opened: OpenCase, along: PlannedPasses) ->
     else:
         print_out(report.as_text(along, found, timed, treated))
     _write(args, found, timed)
-    write_programs(args, opened, along, *timed)
+    write_programs(args, opened, along, *timed, numbered=True)
     if args.html is not None:
         from feasibility.viewer.passes import view_passes
 

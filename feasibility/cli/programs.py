@@ -128,9 +128,15 @@ def _settings(args: argparse.Namespace) -> ProgramSettings:
 
 
 def write_programs(
-    args: argparse.Namespace, opened: OpenCase, along: PlannedPasses | None, *runs: Trajectory
-) -> None:
-    """Write the wanted programs, and report them on stderr; numbered where there are several runs.
+    args: argparse.Namespace, opened: OpenCase, along: PlannedPasses | None, *runs: Trajectory,
+    numbered: bool = False,
+) -> None:  # fmt: skip
+    """Write the wanted programs, and report them on stderr.
+
+    Args:
+        args, opened, along: what was asked for.
+        runs: a program each.
+        numbered: put their numbers into the names, as of trajectories.
 
     Raises:
         FileError: a file cannot be written.
@@ -144,8 +150,8 @@ def write_programs(
             print_err(f"--program: nothing written to {shown_path(file)}: there is no motion")
         for number, run in enumerate(runs, start=1):
             path, what = Path(file), "program"
-            if len(runs) > 1:
-                path = path.with_name(f"{path.stem}_run{number}{path.suffix}")
+            if numbered:
+                path = path.with_name(f"{path.stem}_{number}{path.suffix}")
                 what = f"program {number} of {len(runs)}"
             name, settings = opened.case.name, _settings(args)
             save_program(path, robot, run, name, settings, cells.surface, work)

@@ -90,6 +90,11 @@ class AxisMap:
             if self.language is INFORM:
                 unit = f"{self.per_deg[k]:.10g} pulses per deg"
             lines.append(f"{self.language.axes[k]} = {text}, {unit}")
+        if self.language is INFORM:
+            largest = np.degrees(robot.max_velocity[list(self.arm)]).tolist()
+            speeds = ", ".join(f"{speed:.4g}" for speed in largest)
+            lines.append(f"VJ is a share of {speeds} deg/s (S to T), which are the URDF's: times "
+                         "hold where the controller's are the same.")  # fmt: skip
         if self.j3_by_j2:
             lines.append("J3 is counted from the horizontal, as FANUC's controllers show it.")
         for k, joint in enumerate(self.external):

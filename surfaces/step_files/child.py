@@ -31,7 +31,7 @@ MODULES = (  # of Open CASCADE
 )  # fmt: skip
 LATTICE = (4, 16)  # places of a face along u and along v among which its middle one is found
 VIEWED = (0.55, -0.70, 0.45)  # from a part to a viewer, about
-MOST_PROJECTED = 20_000  # points of a file that are projected onto its faces; some take 1 ms
+MOST_PROJECTED, LAST_QUICK = 20_000, 4  # points put onto faces at 1 ms; up to tori it is quick
 
 
 class Refused(Exception):
@@ -226,7 +226,7 @@ class Triangles:
             if off <= most:
                 break
             if self.left > 0:
-                self.left -= 1
+                self.left -= surface.GetType().value > LAST_QUICK
                 foot.Perform(gp_Pnt(*flat))
                 off = min(off, foot.LowerDistance()) if foot.NbPoints() else off
             most = max(most, off)

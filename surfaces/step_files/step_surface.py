@@ -20,7 +20,7 @@ from surfaces.step_files.step_process import CAPS, Caps, Read, read_step
 from surfaces.surface import Side, SurfaceError
 
 DEVIATION = 1e-4  # [m]
-COARSE = 5e-4  # [m] in a picture
+COARSE, BLUNT = 5e-4, 0.5  # [m], [rad] in a picture
 ANGLE = 0.2  # [rad] between neighbouring triangles: their normals are blended, as of any mesh
 LISTED = 20  # faces, or colours, in a message
 CHOOSE = 'choose by faces = [3, 7], by faces = "all" or by colour = "#ff0000"'
@@ -133,7 +133,7 @@ def step_parts(file: str | os.PathLike[str], caps: Caps = CAPS) -> StepParts:
     Raises:
         SurfaceError: as `step`.
     """
-    job = {"numbers": ALL, "colour": "", "deviation": COARSE, "angle": ANGLE}
+    job = {"numbers": ALL, "colour": "", "deviation": COARSE, "angle": BLUNT}
     try:
         read = read_step(file, job, caps)
     except SurfaceError as error:

@@ -18,6 +18,7 @@ from surfaces import StepFace, StepParts
 
 MOST_LINES = 40  # of the legend, the largest faces
 TALL, SMALLEST, LARGEST = 0.5, 0.03, 0.1  # [1] a digit, of a face's width; of the whole part
+MANY = 20  # faces, with more of which the smallest digits are smaller still
 OFF = 0.006  # [1] of the part: numbers stand off their faces
 THICK = 0.06  # [1] of a digit's height
 INK: threejs.Colour = (0.0, 0.0, 0.0)
@@ -33,6 +34,7 @@ def faces_page(parts: StepParts, name: str) -> str:
     """
     points = parts.vertices
     size = float(norm(np.ptp(points, axis=0)))
+    smallest = SMALLEST * size / max(1.0, len(parts.faces) / MANY) ** 0.5
     largest = {
         face.number for face in sorted(parts.faces, key=lambda face: -face.area)[:MOST_LINES]
     }
@@ -54,7 +56,7 @@ def faces_page(parts: StepParts, name: str) -> str:
             label = f"{face.number}: {face.kind}, {face.area:.3g} m^2"
             entries.append(Entry(label, colour, path))
         width = face.area / max(float(norm(np.ptp(points[used], axis=0))), 1e-300)
-        tall = float(np.clip(TALL * width, SMALLEST * size, LARGEST * size))
+        tall = float(np.clip(TALL * width, smallest, LARGEST * size))
         digits = tubes(_number(face, tall, OFF * size), THICK * tall)
         commands.append(threejs.mesh_object(f"/numbers/{face.number}", *digits, INK, lit=False))
     borders = points[_borders(parts)].reshape(-1, 3)

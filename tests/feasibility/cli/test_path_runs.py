@@ -48,7 +48,8 @@ def case(tmp_path):
 def test_passes_are_cut_where_they_cannot_be_run(case, tmp_path, capsys) -> None:
     out = tmp_path / "run.csv"
     asked = ["path", case(ROUND), "--passes", "0", "--pitch", "0.1", "--out", str(out)]
-    assert main([*asked, "--json"]) == 1
+    switch = ["--program", str(tmp_path / "run.script"), "--on", "ON", "--off", "OFF"]
+    assert main([*asked, *switch, "--json"]) == 1
     found = json.loads(capsys.readouterr().out)
     runs, cuts = found["runs"], found["cuts"]
     assert found["verdict"] == "infeasible"
@@ -63,6 +64,9 @@ def test_passes_are_cut_where_they_cannot_be_run(case, tmp_path, capsys) -> None
     assert sorted(tmp_path.glob("run_*.csv")) == [
         tmp_path / f"run_{k + 1}.csv" for k in range(len(runs))
     ]
+    for k in range(len(runs)):
+        lines = (tmp_path / f"run_{k + 1}.script").read_text().split()
+        assert lines.count("ON") == lines.count("OFF") == 1
     assert found["treated"]["lower"] > 0.97
     assert main(asked[:-2]) == 1
     said = " ".join(capsys.readouterr().out.split())

@@ -146,7 +146,10 @@ def test_yaskawa_has_pulses_and_shares_of_the_largest_speeds(tmp_path):
     steps = np.diff(run.time)
     coarse = 0.0051 / shares[1:]  # VJ has steps of 0.01
     assert (np.abs(took - steps) <= 1.01e-4 + steps * coarse)[shares[1:] > 0.01].all()
-    assert "S = shoulder_pan_joint, 1341.4" in " ".join(lines).replace(" '", " ")
+    said = " ".join(lines).replace(" '", " ")
+    speeds = ", ".join(f"{speed:.4g}" for speed in robot.max_velocity * TURN)
+    assert f"VJ is a share of {speeds} deg/s" in said
+    assert "S = shoulder_pan_joint, 1341.4" in said
 
 
 @pytest.mark.parametrize("language", ["ls", "jbi"])
