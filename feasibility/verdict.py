@@ -92,11 +92,13 @@ class Certificate:
     min_limit_margin: float
     """rad or m, smallest distance of a joint from a limit."""
     min_clearance: float | None = None
-    """m, lower bound on the distance of any pair of bodies along the walk, of the exact shapes: it
-    is certified, and may be up to a third below the truth. None where collisions are not checked,
-    or there is no pair."""
+    """m, certified lower bound on the distance of any pair of bodies along the walk, of the exact
+    shapes. None where collisions are not checked, or there is no pair."""
+    measured_clearance: float | None = None
+    """m, the least distance of exact bodies that coal measured along the walk: the truth lies
+    between `min_clearance` and this."""
     nearest_pair: tuple[str, str] | None = None
-    """Links, objects of the scene, 'tool' or 'surface': the two that this bound is of."""
+    """Links, objects of the scene, 'tool' or 'surface': the two that `min_clearance` is of."""
     max_roll: float | None = None
     """rad, bound on how far the roll is from the middle of its range along the walk; None where it
     is free."""

@@ -227,13 +227,15 @@ def roll_text(certificate: Certificate, task: Task) -> str:
 def clearance_json(certificate: Certificate | CollisionReplay) -> dict[str, Any]:
     """How near which pair came along a motion; no keys where collisions were not checked.
 
-    `min_clearance_m` is a lower bound: certified, and up to a third below the truth.
+    `min_clearance_m` is certified, `measured_clearance_m` the least that coal measured: the truth
+    lies between the two.
     """
     if certificate.min_clearance is None:
         return {}
     pair = certificate.nearest_pair
     return {
         "min_clearance_m": plain(float(certificate.min_clearance)),
+        "measured_clearance_m": plain(certificate.measured_clearance),
         "nearest_pair": None if pair is None else list(pair),
     }
 
@@ -242,8 +244,11 @@ def clearance_text(certificate: Certificate | CollisionReplay) -> str:
     """How near which pair came along a motion; empty where that was not looked at."""
     if certificate.min_clearance is None or certificate.nearest_pair is None:
         return ""
-    nearest = f"{1e3 * certificate.min_clearance:.3g} mm"
-    return f"bodies at least {nearest} apart ({' and '.join(certificate.nearest_pair)})"
+    nearest = f"at least {1e3 * certificate.min_clearance:.3g} mm apart"
+    if certificate.measured_clearance is not None:
+        measured = f"{1e3 * certificate.measured_clearance:.3g} mm"
+        nearest += f", certified, and {measured} where they were measured nearest"
+    return f"bodies {nearest} ({' and '.join(certificate.nearest_pair)})"
 
 
 def seconds(
