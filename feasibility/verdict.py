@@ -11,7 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from coverable_arrays import Array, Ints, Mask
-from feasibility.collisions import checked_words
+from feasibility.collisions import said_of
 from feasibility.cut_tree import CutTree
 from feasibility.task import Task
 from robots import Robot
@@ -200,7 +200,8 @@ class Verdict:
     n_edges: int = 0
     """Number of edges of graph G."""
     unchecked_links: tuple[str, ...] = ()
-    """Links without any shape, where collisions are checked."""
+    """Links without any shape, where collisions are checked, and "FLANGE to TCP" where no body is
+    between the two."""
     pairs_left_out: tuple[LeftOut, ...] = ()
     """Pairs that are not checked, and why."""
     treated: Any = None
@@ -248,7 +249,7 @@ class Verdict:
     def __repr__(self) -> str:
         """The verdict in one line."""
         pairs = len(self.cells.pairs)
-        said = checked_words(self.task.collision).capitalize()
+        said = said_of(self.robot, self.task.collision).capitalize()
         return (
             f"{self.answer} ({self.evidence}): {self.n_covered} of {len(self.cells)} cells, "
             f"{self.n_edges} of {pairs} edges. {self.message} {said}."

@@ -21,7 +21,7 @@ from feasibility.certification import (
     verify_proof,
 )
 from feasibility.certification.rates import check_rates, replay_rates
-from feasibility.collisions import checked_words
+from feasibility.collisions import said_of
 from feasibility.cut_tree import CutTree
 from feasibility.problem import Problem
 from feasibility.results import Result
@@ -74,7 +74,7 @@ class Verification:
         """One line."""
         what = f"{len(self.cells)} cells by {self.robot.name}"
         said = f"{self.claim} {'holds' if self.holds else 'does not hold'}: {what}."
-        checked = f"{checked_words(self.task.collision).capitalize()}."
+        checked = f"{said_of(self.robot, self.task.collision).capitalize()}."
         return " ".join(filter(None, [said, self.refusal, checked]))
 
 

@@ -15,7 +15,6 @@ import numpy as np
 
 from coverable_arrays import Array
 from coverable_errors import counted
-from feasibility.collisions import Asked, checked_words
 from feasibility.results import plain
 from feasibility.task import Task
 from feasibility.verdict import Cause, Certificate, Walk
@@ -52,14 +51,12 @@ def filled(head: str, text: str) -> str:
     return wrapped.replace(_UNBROKEN, " ")
 
 
-def summary(
-    head: str, rows: Iterable[tuple[str, str]], collision: Asked | None, width: int = 12
-) -> list[str]:
+def summary(head: str, rows: Iterable[tuple[str, str]], said: str, width: int = 12) -> list[str]:
     """The answer in one line, an empty line, and named rows; rows without text are left out.
 
-    The last row says whether collisions are checked.
+    The last row is what is `said` of collisions.
     """
-    rows = [*rows, ("note", checked_words(collision))]
+    rows = [*rows, ("note", said)]
     return [head, "", *(filled(f"  {name:<{width}}", text) for name, text in rows if text)]
 
 

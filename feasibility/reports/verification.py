@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from coverable_errors import counted
-from feasibility.collisions import checked
+from feasibility.collisions import checked, said_of
 from feasibility.reports.parts import (
     certificate_text,
     measured_json,
@@ -87,7 +87,7 @@ def as_text(found: Verification, case: str, source: str, notes: Sequence[str] = 
         rows.append(("checked", counted(found.boxes, "box", "boxes")))
     rows += [("note", note) for note in notes]
     answer = f"{head}: {WORDS[found.claim][not found.holds]}."
-    return "\n".join(summary(answer, rows, found.task.collision))
+    return "\n".join(summary(answer, rows, said_of(found.robot, found.task.collision)))
 
 
 def _measured(found: Verification) -> str:
