@@ -12,6 +12,7 @@ from .pairs import LeftOut as LeftOut
 from .pairs import LinkPairs as LinkPairs
 from .pairs import faults_of_srdf as faults_of_srdf
 from .pairs import link_pairs as link_pairs
+from .sampling import with_contacts as with_contacts
 from .sampling import with_crude_links_cut as with_crude_links_cut
 from .tool import BARE as BARE
 from .tool import Reach as Reach
