@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from coverable_arrays import Array
-from coverable_errors import counted
+from coverable_errors import counted, listed
 from feasibility.results import plain
 from feasibility.task import Task
 from feasibility.verdict import Cause, Certificate, Walk
@@ -246,6 +246,18 @@ def clearance_text(certificate: Certificate | CollisionReplay) -> str:
         measured = f"{1e3 * certificate.measured_clearance:.3g} mm"
         nearest += f", certified, and {measured} where they were measured nearest"
     return f"bodies {nearest} ({' and '.join(certificate.nearest_pair)})"
+
+
+def bodiless(results: Iterable[Sequence[str]]) -> str:
+    """What has no body in some of many answers, to be added to what is said of collisions.
+
+    Example:
+        >>> bodiless([[], ["tool0 to TCP"], ["tool0 to TCP"]])
+        '; without a body, so not checked: tool0 to TCP ([[collision.tool]] gives a tool its body)'
+    """
+    names = list(dict.fromkeys(name for unchecked in results for name in unchecked))
+    remedy = "([[collision.tool]] gives a tool its body)"
+    return f"; without a body, so not checked: {listed(names, 8)} {remedy}" if names else ""
 
 
 def seconds(

@@ -89,6 +89,23 @@ def test_a_tool_without_a_body_is_named_with_what_would_do(name, capsys) -> None
         assert WOULD_DO in html.unescape(Path("page.html").read_text("utf-8"))
 
 
+@pytest.mark.parametrize("name", ["compare", "study"])
+def test_answers_on_many_cases_name_a_tool_without_a_body(name, capsys, tmp_path) -> None:
+    Path("far.toml").write_text(
+        TEXTS["plate"].replace("[3, 4]", "[2, 2]")
+        + "robot.tcp.position = [0, 0, 0.15]\n[collision]\nsurface = false\n"
+    )
+    Path("far study.toml").write_text('base.case = "far.toml"\nvary."task.cone_deg" = [30]\n')
+    outputs = ("--html", "page.html", "--workers", "0")
+    asked = ("far.toml", "--robots", "ur5")
+    if name == "study":
+        asked = ("far study.toml", "--out", str(tmp_path / "kept"))
+    main([name, *asked, *outputs])
+    words = "without a body, so not checked: tool0 to TCP ([[collision.tool]] gives a tool its"
+    assert words in " ".join(capsys.readouterr().out.split())
+    assert words in html.unescape(Path("page.html").read_text("utf-8"))
+
+
 def test_the_body_that_would_do_does(capsys) -> None:
     shape = '[{kind="capsule",radius=0.01,length=0.13,position=[0.0,0.0,0.075]}]'
     assert main([*COMMANDS["check, feasible"], *FAR, "--json"]) == 0
