@@ -61,8 +61,10 @@ def allowed(key: str, odd: Any) -> bool:
         return odd in ("", SCRIPT, "maybe")
     if key in ("margins", "certificate"):
         return odd is None
-    if key in ("components", "causes", "unchecked_links"):
-        return bool(odd == ({} if key == "causes" else []))
+    if key in ("components", "causes"):
+        return bool(odd == ([] if key == "components" else {}))
+    if key == "unchecked_links":  # names, which pages escape
+        return odd in ([], [SCRIPT])
     counts = "seed", "edges", "pairs", "examined", "fk", "covered"
     return key in counts and odd == 5 and odd is not True
 
