@@ -7,7 +7,7 @@ checked cut by cut, and leaf by leaf. Nothing is believed of where they come fro
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal, overload
 
 import numpy as np

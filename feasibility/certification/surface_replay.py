@@ -122,7 +122,7 @@ def replay_over_surface(
 
 
 def _at_marks(judge: Judge, cells: Cells, marks: Ints, at: Samples) -> Samples:
-    """The samples at all rows, over the places of the marked cells where those found will not do."""
+    """The samples at all rows, over their marked cells where the places found will not do."""
     bad = np.flatnonzero(~judge.within(at) & (marks >= 0))
     if not len(bad):
         return at
