@@ -196,7 +196,8 @@ def assess(tables: Tables) -> dict[str, Any]:
     cone = None
     if request["critical"] and not clock.out_of_time:
         cone = critical_cone(robot, cells, case, verdict.feasible, clock)
-    kept = "verdict evidence message share covered cells margins unchecked_links".split()
+    kept = ["verdict", "evidence", "message", "share", "covered", "cells", "margins"]
+    kept.append("unchecked_links")
     return {
         "robot": robot.name,
         "joints": robot.n,
