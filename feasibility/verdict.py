@@ -11,7 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from coverable_arrays import Array, Ints, Mask
-from feasibility.collisions import checked_words
+from feasibility.collisions import said_of
 from feasibility.cut_tree import CutTree
 from feasibility.task import Task
 from robots import Robot
@@ -92,11 +92,13 @@ class Certificate:
     min_limit_margin: float
     """rad or m, smallest distance of a joint from a limit."""
     min_clearance: float | None = None
-    """m, lower bound on the distance of any pair of bodies along the walk, of the exact shapes: it
-    is certified, and may be up to a third below the truth. None where collisions are not checked,
-    or there is no pair."""
+    """m, certified lower bound on the distance of any pair of bodies along the walk, of the exact
+    shapes. None where collisions are not checked, or there is no pair."""
+    measured_clearance: float | None = None
+    """m, the least distance of exact bodies that coal measured along the walk: the truth lies
+    between `min_clearance` and this."""
     nearest_pair: tuple[str, str] | None = None
-    """Links, objects of the scene, 'tool' or 'surface': the two that this bound is of."""
+    """Links, objects of the scene, 'tool' or 'surface': the two that `min_clearance` is of."""
     max_roll: float | None = None
     """rad, bound on how far the roll is from the middle of its range along the walk; None where it
     is free."""
@@ -198,7 +200,8 @@ class Verdict:
     n_edges: int = 0
     """Number of edges of graph G."""
     unchecked_links: tuple[str, ...] = ()
-    """Links without any shape, where collisions are checked."""
+    """Links without any shape, where collisions are checked, and "FLANGE to TCP" where no body is
+    between the two."""
     pairs_left_out: tuple[LeftOut, ...] = ()
     """Pairs that are not checked, and why."""
     treated: Any = None
@@ -246,7 +249,7 @@ class Verdict:
     def __repr__(self) -> str:
         """The verdict in one line."""
         pairs = len(self.cells.pairs)
-        said = checked_words(self.task.collision).capitalize()
+        said = said_of(self.robot, self.task.collision).capitalize()
         return (
             f"{self.answer} ({self.evidence}): {self.n_covered} of {len(self.cells)} cells, "
             f"{self.n_edges} of {pairs} edges. {self.message} {said}."

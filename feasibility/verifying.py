@@ -24,7 +24,7 @@ from feasibility.certification import (
     verify_proof,
 )
 from feasibility.clock import Clock, OutOfTime
-from feasibility.collisions import Collision, checked_words
+from feasibility.collisions import Collision, said_of
 from feasibility.cut_tree import CutTree
 from feasibility.demands import BY_REPLAY, NAMES, OF_TREE, further, unjudged
 from feasibility.problem import Problem
@@ -100,7 +100,7 @@ class Verification:
         """One line."""
         what = f"{len(self.cells)} cells by {self.robot.name}"
         said = f"{self.claim} {'holds' if self.holds else 'does not hold'}: {what}."
-        checked = f"{checked_words(self.collision).capitalize()}."
+        checked = f"{said_of(self.robot, self.collision).capitalize()}."
         return " ".join(filter(None, [said, self.refusal, checked]))
 
 

@@ -29,7 +29,7 @@ coverable_processes
 coverable_meshes
 robots: errors
 robots.mounting
-robots.urdf: xml mesh_folders
+robots.urdf: xml packages mesh_folders
 robots.urdf.expansion
 robots.urdf: axes geometry link_shapes joints tree srdf checked_urdf files
 robots: arguments joint_checks chain chain_rows reach robot kinematics joint_selection pinocchio_model library

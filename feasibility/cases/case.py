@@ -106,10 +106,6 @@ class Case:
         except RobotError as error:
             faults += in_robot_table(error)
         try:
-            cells = self.surface.cut(self.task.disc, self.task.smoothing)
-        except CaseError as error:
-            faults += error.faults
-        try:
             task = self.built_task()
         except CaseError as error:
             faults += error.faults
@@ -117,6 +113,13 @@ class Case:
             unknown = task.collision.unknown_names(robot.link_names)
             faults += [fault.renamed({}, "collision") for fault in unknown]
         faults += [] if robot is None else self._faults_of_srdf(robot.link_names)
+        try:
+            if faults:  # nothing is compiled for a case that is not decided
+                self.surface.build()
+            else:
+                cells = self.surface.cut(self.task.disc, self.task.smoothing)
+        except CaseError as error:
+            faults += error.faults
         if robot is None or cells is None or task is None or faults:
             raise CaseError(faults, self.name)
         try:

@@ -6,8 +6,6 @@ judges it over the surface itself, `collisions` whether bodies stay clear.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from coverable_arrays import Array, Mask
@@ -55,9 +53,7 @@ def replay(
     if bodies is None or refusal:
         return Replay(found.certificate, refusal)
     clear = collision_replay(robot, bodies, walk.q, deviations)
-    certificate = replace(
-        found.certificate, min_clearance=clear.min_clearance, nearest_pair=clear.nearest_pair
-    )
+    certificate = clear.added_to(found.certificate)
     return Replay(certificate, clear.refusal, collides=not clear.accepted)
 
 

@@ -116,9 +116,7 @@ def replay_over_surface(
     if bodies is not None:
         clear = collision_replay(robot, bodies, rows)
         faults += clear.faults
-        certificate = replace(
-            certificate, min_clearance=clear.min_clearance, nearest_pair=clear.nearest_pair
-        )
+        certificate = clear.added_to(certificate)
     return MotionReplay(certificate, tuple(faults), reached)
 
 

@@ -1,4 +1,5 @@
 from .asked_bodies import gather as gather
+from .asked_bodies import said_of as said_of
 from .bodies import Bodies as Bodies
 from .bodies import Pair as Pair
 from .bodies import Seat as Seat

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from feasibility.collisions.words import checked_words
+
 if TYPE_CHECKING:
     from feasibility.collisions.bodies import Bodies
     from feasibility.collisions.settings import Collision
@@ -37,3 +39,17 @@ def gather(
     from feasibility.collisions.gathering import gathered
 
     return gathered(robot, surface, collision, float(standoff))
+
+
+def said_of(robot: Robot, collision: Collision | None) -> str:
+    """The sentence that says what is checked, and what of the tool has no body.
+
+    Raises:
+        RobotError: no link has a shape, or the SRDF is not of this arm.
+    """
+    said = checked_words(collision)
+    if collision is None or not collision.checked:
+        return said
+    from feasibility.collisions.gathering import bare_stretch
+
+    return "; ".join([said, *bare_stretch(robot, collision).values()])

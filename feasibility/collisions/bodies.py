@@ -65,7 +65,7 @@ class Bodies:
     pairs: tuple[Pair, ...]
     left_out: tuple[LeftOut, ...] = ()
     unchecked: tuple[str, ...] = ()
-    """Links without any shape."""
+    """Links without any shape, and the way from flange to tool point where no body is on it."""
     checked: tuple[str, ...] = ()
     """Which of self, surface, scene are checked."""
     notes: tuple[str, ...] = ()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache, lru_cache
 from typing import NamedTuple
@@ -18,14 +19,17 @@ from feasibility.collisions.settings import Collision
 from feasibility.collisions.words import SURFACE, TOOL
 from robots import Robot
 from robots.shapes import (
+    BARE,
     Fineness,
     LeftOut,
     LinkPairs,
     LinkShapes,
     Polytope,
     Reach,
+    bare_length,
     link_pairs,
     link_shapes,
+    tool_line,
     tool_reach,
     with_crude_links_cut,
 )
@@ -41,9 +45,7 @@ def gathered(robot: Robot, surface: Surface, collision: Collision, standoff: flo
     faults = collision.unknown_names(robot.link_names)
     if faults:
         raise ArgumentError([fault.renamed({}, "collision") for fault in faults])
-    names = tuple(one.name for one in collision.scene)
-    of_arm = collision.tool, collision.allow, collision.srdf, names, collision.self_
-    arm = _arm(robot, collision.shapes, *of_arm)
+    arm = _arm_of(robot, collision)
     shapes, tool = arm.shapes, arm.tool
     solids = [*shapes.solids, *tool_solids(collision.tool, robot)]
     polytopes, soups = [*shapes.polytopes, *tool], list[Soup]()
@@ -70,7 +72,7 @@ def gathered(robot: Robot, surface: Surface, collision: Collision, standoff: flo
         carried=tuple(seat for seat in seats if seat.joint),
         pairs=tuple(found.asked),
         left_out=tuple(found.left_out),
-        unchecked=shapes.unchecked,
+        unchecked=(*shapes.unchecked, *bare_stretch(robot, collision)),
         checked=collision.checked,
         notes=(
             *shapes.notes,
@@ -125,6 +127,38 @@ def _arm(
         return sorted_pairs(shapes)
 
     return _Arm(shapes, tuple(bodies), tuple(tool_reach(robot, shapes, bodies)), pairs)
+
+
+def _arm_of(robot: Robot, collision: Collision) -> _Arm:
+    """Bodies of links and tool."""
+    names = tuple(one.name for one in collision.scene)
+    of_arm = collision.tool, collision.allow, collision.srdf, names, collision.self_
+    return _arm(robot, collision.shapes, *of_arm)
+
+
+def bare_stretch(robot: Robot, collision: Collision) -> dict[str, str]:
+    """The way from flange to tool point where no body is on it, by its name: what is to be said.
+
+    Raises:
+        RobotError: no link has a shape, or the SRDF is not of this arm.
+    """
+    arm, line = _arm_of(robot, collision), tool_line(robot)
+    bare = bare_length(robot, [*arm.shapes.polytopes, *arm.tool])
+    if not bare:
+        return {}
+    frame = robot.model.frames[robot.tool_link_id].placement.homogeneous
+    start, end = (line.ends - frame[:3, 3]) @ frame[:3, :3]
+    length = float(np.linalg.norm(end - start))
+    x, y, z = ((end - start) / length).round(6).tolist()
+    rpy_deg = [0.0, math.degrees(math.acos(z)), math.degrees(math.atan2(y, x))]
+    rows = {"position": 0.5 * (start + end), "rpy_deg": np.array(rpy_deg)}
+    placed = (f"{key} = {(row.round(4) + 0.0).tolist()}" for key, row in rows.items() if row.any())
+    radius, straight = 0.5 * BARE, round(length - BARE, 4)
+    what = ", ".join([f'kind = "capsule", radius = {radius:g}, length = {straight:g}', *placed])
+    return {
+        f"{line.flange} to TCP": f"the last {1e3 * bare:.0f} mm from {line.flange} to the TCP have "
+        f"no body, so nothing is checked there; [[collision.tool]] with {what} would do"
+    }
 
 
 def _beyond(reaches: Iterable[Reach], pairs: Iterable[Pair], standoff: float) -> list[str]:

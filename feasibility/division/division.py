@@ -10,7 +10,7 @@ import numpy as np
 
 from coverable_arrays import Ints, Protected
 from coverable_errors import counted
-from feasibility.collisions import checked_words
+from feasibility.collisions import said_of
 from feasibility.cut_tree import CutTree
 from feasibility.division.reconfiguration import Reconfiguration
 from feasibility.task import Task
@@ -160,5 +160,5 @@ class Division(Protected):
         patches = counted(len(self.patches), "patch", "patches")
         return (
             f"{patches}, {self.n_covered} of {len(self.cells)} cells. {self.message} "
-            f"{checked_words(self.task.collision).capitalize()}."
+            f"{said_of(self.robot, self.task.collision).capitalize()}."
         )

@@ -16,7 +16,7 @@ from coverable_errors import CoverableError
 from feasibility.cases import Case, Setup
 from feasibility.checking import check
 from feasibility.clock import Clock, OutOfTime
-from feasibility.collisions import checked_words
+from feasibility.collisions import said_of
 from feasibility.live import picture
 from feasibility.live.controls import Controls
 from feasibility.live.jobs import Answer, Job, Superseded
@@ -118,7 +118,7 @@ def quick_look(setup: Setup, job: Job) -> Answer:
         "cells": total,
         "rows": [],
         "groups": [],
-        "note": checked_words(task.collision),
+        "note": said_of(robot, task.collision),
         "paint": paint._asdict(),
         "commands": picture.packed(picture.posed(robot, q, task.collision is not None)),
         "parts": {"paths": [], "entries": [], "seconds": 0.0},
@@ -141,7 +141,7 @@ def certified(case: Case, setup: Setup, job: Job) -> Answer:
             line.removesuffix(JSON_HINT)
             for line in report.causes_listed(verdict.causes, verdict.cells)
         ],
-        "note": checked_words(verdict.task.collision),
+        "note": said_of(verdict.robot, verdict.task.collision),
         "paint": paint._asdict(),
         "commands": picture.packed(parts.commands),
         "parts": {"paths": parts.paths, "entries": parts.entries, "seconds": parts.seconds},

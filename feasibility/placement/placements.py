@@ -24,7 +24,7 @@ from typing import Any
 
 from coverable_errors import Checks, Fault, counted
 from feasibility.clock import Clock
-from feasibility.collisions import checked_words
+from feasibility.collisions import said_of
 from feasibility.demands import refuse_start
 from feasibility.notices import compiling_notice
 from feasibility.placement.evaluator import LocalEvaluator, Stage, Trial
@@ -96,7 +96,7 @@ class Placements:
     def __repr__(self) -> str:
         """One line."""
         line = f"{self.answer} ({self.evidence}): {len(self.found)} placements. {self.message}"
-        return f"{line} {checked_words(self.task.collision).capitalize()}."
+        return f"{line} {said_of(self.robot, self.task.collision).capitalize()}."
 
 
 def place(

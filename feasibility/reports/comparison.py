@@ -9,7 +9,7 @@ from typing import Any
 
 from feasibility.collisions import checked, checked_words
 from feasibility.reports.pages import COLOURS, page, table
-from feasibility.reports.parts import MARGINS, aligned, csv_text, percent
+from feasibility.reports.parts import MARGINS, aligned, bodiless, csv_text, percent
 from feasibility.sensitivity import LEAST_CONE_DEG
 from feasibility.studies import Arm, Comparison
 from feasibility.version import version
@@ -92,7 +92,13 @@ def as_text(comparison: Comparison) -> str:
     rows += [[text(arm) for _, text in heads] for arm in comparison.ranked]
     rules = ["-" * max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [line.rstrip() for line in aligned([rows[0], rules, *rows[1:]])]
-    return "\n".join([headline(comparison), f"  {checked_words(comparison.collision)}", "", *lines])
+    return "\n".join([headline(comparison), f"  {_said(comparison)}", "", *lines])
+
+
+def _said(comparison: Comparison) -> str:
+    """What is said of collisions."""
+    unchecked = bodiless(arm.unchecked_links for arm in comparison.arms)
+    return checked_words(comparison.collision) + unchecked
 
 
 def headline(comparison: Comparison) -> str:
@@ -114,7 +120,7 @@ def as_html(comparison: Comparison) -> str:
     lines = [[html.escape(text(arm)) for _, text in heads] for arm in comparison.ranked]
     body = f"<p>{html.escape(headline(comparison))}.</p>\n{chart(comparison)}\n"
     body += table((html.escape(name) for name, _ in heads), lines)
-    return page(f"Robots compared: {comparison.case}", body, NOTE, comparison.collision)
+    return page(f"Robots compared: {comparison.case}", body, NOTE, _said(comparison))
 
 
 def chart(comparison: Comparison) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from coverable_errors import counted
 from feasibility.area import percent_down
-from feasibility.collisions import checked
+from feasibility.collisions import checked, said_of
 from feasibility.cut_words import lines as proof_lines
 from feasibility.division import Apart, Division, Plan, Reconfiguration, SubPatch
 from feasibility.reports.parts import (
@@ -178,7 +178,7 @@ def as_text(
         ("certified", _areas_text(areas, division)),
         ("time", seconds_text(division.timing, PHASES, before_s)),
     ]
-    lines = summary(head, rows, division.task.collision)
+    lines = summary(head, rows, said_of(division.robot, division.task.collision))
     if division.patches:
         lines += ["", "In this order:", *_steps(division.fewest, division)]
     if division.connected is not division.fewest:

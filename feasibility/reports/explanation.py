@@ -9,7 +9,7 @@ import shlex
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from feasibility.collisions import checked, checked_words
+from feasibility.collisions import checked, said_of
 from feasibility.reports.changes import key, settings, worded
 from feasibility.reports.explanation_words import (
     SEEDED,
@@ -60,7 +60,7 @@ def as_text(explanation: Explanation, case_name: str, case: Case | None = None) 
     verdict = explanation.verdict
     lines = [filled("", f"{case_name}: {headline(explanation)}")]
     if len(verdict.cells) == 0:
-        return "\n".join([*lines, f"  {checked_words(verdict.task.collision)}"])
+        return "\n".join([*lines, f"  {_said(explanation)}"])
     command = to_try(explanation, case_name, case)
     lines += [f"  try  {command}"] if command else []
     lines += ["", *(filled("  ", text) for text in _findings(explanation))]
@@ -68,7 +68,7 @@ def as_text(explanation: Explanation, case_name: str, case: Case | None = None) 
         lines += ["", *_aligned([heads, *rows])]
     for text in _remarks(explanation):
         lines += ["", filled("  ", text)]
-    return "\n".join([*lines, "", f"  {checked_words(verdict.task.collision)}"])
+    return "\n".join([*lines, "", f"  {_said(explanation)}"])
 
 
 def as_html(explanation: Explanation, case_name: str, view: View, case: Case | None = None) -> str:
@@ -82,7 +82,12 @@ def as_html(explanation: Explanation, case_name: str, view: View, case: Case | N
     frame = framed(view, "the case as given")
     body = f'<div class="beside">{frame}<div>{"".join(parts)}</div></div>\n'
     title = f"{case_name}: {headline(explanation)}"
-    return page(title, body, "", explanation.verdict.task.collision)
+    return page(title, body, "", _said(explanation))
+
+
+def _said(explanation: Explanation) -> str:
+    """What is said of collisions."""
+    return said_of(explanation.verdict.robot, explanation.verdict.task.collision)
 
 
 def to_try(explanation: Explanation, case_name: str, case: Case | None = None) -> str:

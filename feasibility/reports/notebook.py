@@ -7,7 +7,7 @@ import html
 from collections import Counter
 
 from coverable_errors import counted
-from feasibility.collisions import checked_words
+from feasibility.collisions import said_of
 from feasibility.reports.pages import table
 from feasibility.reports.verdict import CAUSES, SENTENCES, rows_of
 from feasibility.verdict import Verdict
@@ -35,7 +35,7 @@ def _page(verdict: Verdict, picture: str) -> str:
     for (kind, proved), number in causes.most_common():
         text = f"{counted(number, 'cell')}: {CAUSES[kind]}{', proved' if proved else ''}"
         rows.append(("not covered", html.escape(text)))
-    rows.append(("note", html.escape(checked_words(verdict.task.collision))))
+    rows.append(("note", html.escape(said_of(verdict.robot, verdict.task.collision))))
     body = table(("", html.escape(SENTENCES[verdict.answer])), rows)
     for cell in ("<th>", "<td>"):  # Jupyter's own style is for numbers
         body = body.replace(cell, f'{cell[:-1]} style="text-align: left">')

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from coverable_arrays import Array
-from coverable_errors import counted
-from feasibility.collisions import Asked, checked_words
+from coverable_errors import counted, listed
 from feasibility.results import plain
 from feasibility.task import Task
 from feasibility.verdict import Cause, Certificate, Walk
@@ -66,14 +65,12 @@ def smooth_text(surface: Surface) -> str:
     return "" if surface.smoothing is None else surface.smoothing.words()
 
 
-def summary(
-    head: str, rows: Iterable[tuple[str, str]], collision: Asked | None, width: int = 12
-) -> list[str]:
+def summary(head: str, rows: Iterable[tuple[str, str]], said: str, width: int = 12) -> list[str]:
     """The answer in one line, an empty line, and named rows; rows without text are left out.
 
-    The last row says whether collisions are checked.
+    The last row is what is `said` of collisions.
     """
-    rows = [*rows, ("note", checked_words(collision))]
+    rows = [*rows, ("note", said)]
     return [head, "", *(filled(f"  {name:<{width}}", text) for name, text in rows if text)]
 
 
@@ -241,13 +238,15 @@ def roll_text(certificate: Certificate, task: Task) -> str:
 def clearance_json(certificate: Certificate | CollisionReplay) -> dict[str, Any]:
     """How near which pair came along a motion; no keys where collisions were not checked.
 
-    `min_clearance_m` is a lower bound: certified, and up to a third below the truth.
+    `min_clearance_m` is certified, `measured_clearance_m` the least that coal measured: the truth
+    lies between the two.
     """
     if certificate.min_clearance is None:
         return {}
     pair = certificate.nearest_pair
     return {
         "min_clearance_m": plain(float(certificate.min_clearance)),
+        "measured_clearance_m": plain(certificate.measured_clearance),
         "nearest_pair": None if pair is None else list(pair),
     }
 
@@ -256,8 +255,23 @@ def clearance_text(certificate: Certificate | CollisionReplay) -> str:
     """How near which pair came along a motion; empty where that was not looked at."""
     if certificate.min_clearance is None or certificate.nearest_pair is None:
         return ""
-    nearest = f"{1e3 * certificate.min_clearance:.3g} mm"
-    return f"bodies at least {nearest} apart ({' and '.join(certificate.nearest_pair)})"
+    nearest = f"at least {1e3 * certificate.min_clearance:.3g} mm apart"
+    if certificate.measured_clearance is not None:
+        measured = f"{1e3 * certificate.measured_clearance:.3g} mm"
+        nearest += f", certified, and {measured} where they were measured nearest"
+    return f"bodies {nearest} ({' and '.join(certificate.nearest_pair)})"
+
+
+def bodiless(results: Iterable[Sequence[str]]) -> str:
+    """What has no body in some of many answers, to be added to what is said of collisions.
+
+    Example:
+        >>> bodiless([[], ["tool0 to TCP"], ["tool0 to TCP"]])
+        '; without a body, so not checked: tool0 to TCP ([[collision.tool]] gives a tool its body)'
+    """
+    names = list(dict.fromkeys(name for unchecked in results for name in unchecked))
+    remedy = "([[collision.tool]] gives a tool its body)"
+    return f"; without a body, so not checked: {listed(names, 8)} {remedy}" if names else ""
 
 
 def seconds(

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from coverable_errors import counted
-from feasibility.collisions import checked
+from feasibility.collisions import checked, said_of
 from feasibility.reports.parts import (
     aligned,
     certificate_json,
@@ -160,7 +160,7 @@ def as_text(
         ("smoothed", smooth_text(along.passes.surface)),
         ("treated", "" if treated is None else treated_words(treated)),
     ]
-    lines = summary(head, rows, along.task.collision, 14)
+    lines = summary(head, rows, said_of(found.robot, along.task.collision), 14)
     if count:
         lines += ["", *(f"  {line.rstrip()}" for line in aligned(_table(found, timed)))]
     for number, cut in enumerate(found.cuts, start=1):

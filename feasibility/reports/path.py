@@ -10,7 +10,7 @@ import numpy as np
 
 from coverable_errors import counted
 from feasibility.certification.rates import RateReplay
-from feasibility.collisions import checked
+from feasibility.collisions import checked, said_of
 from feasibility.entry import Ends
 from feasibility.paths import CoveragePath, PathFigures
 from feasibility.reports.parts import (
@@ -214,7 +214,7 @@ def as_text(
     if passes is not None:
         rows[:2] = [("passes", passes_text(passes)), ("length", f"{figures.length:.4g} m in all")]
         head = f"path: one continuous motion along {counted(passes.count, 'pass', 'passes')}."
-    return "\n".join(summary(head, rows, path.task.collision, 14))
+    return "\n".join(summary(head, rows, said_of(path.robot, path.task.collision), 14))
 
 
 def _length_text(figures: PathFigures) -> str:

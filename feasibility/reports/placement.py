@@ -7,7 +7,7 @@ from typing import Any
 
 from coverable_arrays import Array, Mask
 from coverable_errors import counted
-from feasibility.collisions import checked
+from feasibility.collisions import checked, said_of
 from feasibility.placement import (
     AXES,
     PlacementMap,
@@ -145,9 +145,8 @@ def as_text(placements: Placements, case: str = "", plan: StationPlan | None = N
         ("check", "" if checked in placements.message else f"of the best: {checked}"),
         ("time", _time_text(placements)),
     ]
-    lines = summary(
-        PROVED if proved else SENTENCES[placements.answer], rows, placements.task.collision, 10
-    )
+    said = said_of(placements.robot, placements.task.collision)
+    lines = summary(PROVED if proved else SENTENCES[placements.answer], rows, said, 10)
     if placements.found:
         lines += ["", *_table(placements.found)]
         put = " ".join(f"--set '{setting}'" for setting in settings_of(placements.found[0].pose))

@@ -12,7 +12,7 @@ from coverable_errors import counted
 from feasibility.cases import CollisionPart, ObjectPart
 from feasibility.collisions import CHECKABLE, UNCHECKED, checked, checked_words
 from feasibility.reports.pages import COLOURS, framed, page, table
-from feasibility.reports.parts import MARGINS, aligned, csv_text, percent
+from feasibility.reports.parts import MARGINS, aligned, bodiless, csv_text, percent
 from feasibility.reports.study_plot import are_numbers, charts, short, worded
 from feasibility.studies import Row, Study, StudyTask, merit
 from feasibility.version import version
@@ -70,7 +70,7 @@ def as_csv(study: Study, rows: Sequence[Row]) -> str:
 def as_text(study: Study, rows: Sequence[Row]) -> str:
     """The outcome of the study: verdicts, by value where there are few, and the best rows."""
     lines = [study.description] if study.description else []
-    lines += [headline(study, rows), f"  {collision_words(study)}"]
+    lines += [headline(study, rows), f"  {_said(study, rows)}"]
     if found := causes(rows):
         listed = ", ".join(f"{cause} in {number}" for cause, number in found)
         lines.append(f"  most frequent cause of missed cells: {listed}.")
@@ -119,7 +119,7 @@ def as_html(study: Study, rows: Sequence[Row], poses: View | None = None) -> str
         parts.append(f"<p>Pairs of numbers without a map: {pictures.left_out}.</p>\n")
     if poses is not None:
         parts.append(f"<h2>Poses</h2>\n{framed(poses, 'poses of the surface')}")
-    return page(f"Study: {study.name}", "".join(parts), NOTE, collision_words(study))
+    return page(f"Study: {study.name}", "".join(parts), NOTE, _said(study, rows))
 
 
 def checked_in_all(study: Study) -> list[str]:
@@ -135,6 +135,11 @@ def collision_words(study: Study) -> str:
     if len(found) <= 1:
         return next(iter(found), UNCHECKED)
     return "; ".join(f"in {number} of {total} cases {text}" for text, number in found.items())
+
+
+def _said(study: Study, rows: Sequence[Row]) -> str:
+    """What is said of collisions."""
+    return collision_words(study) + bodiless(row.result.get("unchecked_links", ()) for row in rows)
 
 
 def _settings(task: StudyTask) -> CollisionPart | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from feasibility.cases import Case
-from feasibility.collisions import checked
+from feasibility.collisions import checked, checked_words
 from feasibility.reports.parts import summary
 from feasibility.version import version
 
@@ -50,4 +50,4 @@ def as_json(case: Case, text: str, seconds: float) -> dict[str, Any]:
 def as_text(case: Case, text: str) -> str:
     """For people."""
     rows = [("case", f"{case.name}  {case.description}".rstrip()), ("found", text), ("hint", MORE)]
-    return "\n".join(summary(HEAD, rows, case.collision))
+    return "\n".join(summary(HEAD, rows, checked_words(case.collision)))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from coverable_errors import counted
 from feasibility.area import area_json, area_words
 from feasibility.cases import OWN_KEYS, Case
-from feasibility.collisions import checked
+from feasibility.collisions import checked, said_of
 from feasibility.cut_words import lines as proof_lines
 from feasibility.paper import tree_walk
 from feasibility.reports.parts import (
@@ -115,8 +115,9 @@ def as_text(
     The arguments are those of `as_json`, and the case for its name.
     """
     title = ("case", f"{case.name}  {case.description}".rstrip())
+    said = said_of(verdict.robot, verdict.task.collision)
     if not len(verdict.cells):
-        return "\n".join(summary(EMPTY, [title], verdict.task.collision))
+        return "\n".join(summary(EMPTY, [title], said))
     head = SENTENCES[verdict.answer]
     if _falls_short(verdict):
         head = f"undecided: {SHORT}."
@@ -130,7 +131,7 @@ def as_text(
         ("left out", left_out_text(verdict.pairs_left_out)),
         ("time", seconds_text(verdict.timing, PHASES, before_s)),
     ]
-    lines = summary(head, rows, verdict.task.collision)
+    lines = summary(head, rows, said)
     if verdict.proof is not None and verdict.proof.n_cuts > 1:
         lines += ["", "Why no single motion covers every cell:"]
         lines += [f"  {line}" for line in proof_lines(verdict.proof, verdict.robot, verdict.cells)]

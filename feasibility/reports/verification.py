@@ -9,7 +9,7 @@ import numpy as np
 
 from coverable_arrays import Mask
 from coverable_errors import counted
-from feasibility.collisions import checked
+from feasibility.collisions import checked, checked_words, said_of
 from feasibility.reports.parts import (
     certificate_text,
     measured_json,
@@ -105,7 +105,8 @@ def as_text(found: Verification, case: str, source: str, notes: Sequence[str] = 
     answer = f"{head}: {WORDS[found.claim][not found.holds]}."
     if found.holds and found.reached is not None and isinstance(found.cells.surface, PoseSurface):
         answer = "holds: the tool is right at every pose, and on its way between them."
-    return "\n".join(summary(LATE if found.late else answer, rows, found.collision))
+    head = LATE if found.late else answer
+    return "\n".join(summary(head, rows, said_of(found.robot, found.collision)))
 
 
 def _reached(cells: Cells, reached: Mask) -> tuple[str, str]:
@@ -145,7 +146,9 @@ def late_json(case: Case) -> dict[str, Any]:
 
 def late_text(case: Case) -> str:
     """The same for people."""
-    return "\n".join(summary(LATE, [("case", case.name), ("but", _late(case))], None))
+    return "\n".join(
+        summary(LATE, [("case", case.name), ("but", _late(case))], checked_words(None))
+    )
 
 
 def _late(case: Case) -> str:

@@ -63,7 +63,8 @@ def read_certificate(fields: Fields) -> Certificate | None:
         return None
     row = fields.table("certificate")
     margin = _maybe(row, "min_limit_margin")
-    maybe = ("min_clearance", "max_roll", "max_speed", "min_singular_value")
+    clear = ("min_clearance", "measured_clearance")
+    maybe = (*clear, "max_roll", "max_speed", "min_singular_value")
     return Certificate(
         waypoints=row.get("waypoints", int, "a whole number"),
         max_position_error=row.number("max_position_error"),

@@ -106,6 +106,7 @@ def outcome_of(verdict: Verdict) -> Outcome:
         components: see `component_covers`, as hexadecimal bits (see `cells_of`).
         margins: what the covering motion leaves (see `margins_of`), None unless feasible.
         certificate: what the replay measured, None unless feasible.
+        unchecked_links: what has no body, as in `Verdict`.
         fk: evaluations of the arm.
     """
     areas = np.asarray(verdict.cells.areas)
@@ -134,6 +135,7 @@ def outcome_of(verdict: Verdict) -> Outcome:
             "max_position_error_m": finite(measured.max_position_error),
             "max_angle_deg": finite(math.degrees(measured.max_angle)),
         },
+        "unchecked_links": list(verdict.unchecked_links),
         "fk": int(verdict.statistics.get("fk", 0)),
     }
 

@@ -63,6 +63,8 @@ class Arm:
     `LEAST_CONE_DEG` are not tested. None where there is none, or it was not requested."""
     margins: dict[str, float | None] | None = None
     """What the covering motion leaves: limit_deg, limit_m, cone_deg, reach_m."""
+    unchecked_links: Sequence[str] = ()
+    """What has no body, where collisions are checked; see `Verdict`."""
     seconds: float = 0.0
     """Time that the work took."""
 
@@ -194,7 +196,8 @@ def assess(tables: Tables) -> dict[str, Any]:
     cone = None
     if request["critical"] and not clock.out_of_time:
         cone = critical_cone(robot, cells, case, verdict.feasible, clock)
-    kept = ("verdict", "evidence", "message", "share", "covered", "cells", "margins")
+    kept = ["verdict", "evidence", "message", "share", "covered", "cells", "margins"]
+    kept.append("unchecked_links")
     return {
         "robot": robot.name,
         "joints": robot.n,

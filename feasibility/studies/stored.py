@@ -59,6 +59,9 @@ TEXT = Part(
     lambda v: isinstance(v, str) and len(v) <= LONGEST_TEXT and not _CONTROL.search(v),
     "a text that can be printed",
 )
+NAMES = Part(
+    lambda value: isinstance(value, list) and all(map(TEXT.holds, value)), "a list of names"
+)
 VERDICT = word(Answer)
 EVIDENCE = word(Evidence)
 CAUSE = Part(lambda value: value in [str(kind) for kind in CauseKind], "a cause")
@@ -107,6 +110,7 @@ OUTCOME: Shape = {
             }
         )
     ),
+    "unchecked_links": NAMES,
     "fk": WHOLE,
 }
 """Of one case: see `outcome_of`."""
@@ -116,7 +120,7 @@ ARM: Shape = {
     "joints": COUNT,
     "reach_m": optional(number(0.0)),
     **{key: OUTCOME[key] for key in ("verdict", "evidence", "message", "share")},
-    **{key: OUTCOME[key] for key in ("covered", "cells", "margins")},
+    **{key: OUTCOME[key] for key in ("covered", "cells", "margins", "unchecked_links")},
     "cause": optional(CAUSE),
     "patches": optional(COUNT),
     "patches_share": optional(SHARE),

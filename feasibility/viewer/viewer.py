@@ -21,7 +21,7 @@ import numpy as np
 
 from coverable_arrays import Array
 from coverable_errors import counted
-from feasibility.collisions import checked_words, gather
+from feasibility.collisions import gather, said_of
 from feasibility.cut_words import sentence
 from feasibility.task import Task
 from feasibility.verdict import Verdict
@@ -218,7 +218,7 @@ def compose(
         robot=robot,
         commands=(*ground(robot, cells, drawing.lowest, place), *seen),
         legend=Legend(
-            title, " · ".join([text, *drawing.notes]), tuple(entries), checked_words(collision)
+            title, " · ".join([text, *drawing.notes]), tuple(entries), said_of(robot, collision)
         ),
         camera=camera_on(robot, cells, q, drawing.lowest, around, place),
         motion=motion,

@@ -12,8 +12,13 @@ from .pairs import LeftOut as LeftOut
 from .pairs import LinkPairs as LinkPairs
 from .pairs import faults_of_srdf as faults_of_srdf
 from .pairs import link_pairs as link_pairs
+from .sampling import with_contacts as with_contacts
 from .sampling import with_crude_links_cut as with_crude_links_cut
+from .tool import BARE as BARE
 from .tool import Reach as Reach
+from .tool import ToolLine as ToolLine
+from .tool import bare_length as bare_length
+from .tool import tool_line as tool_line
 from .tool import tool_reach as tool_reach
 from .triangles import checked_triangles as checked_triangles
 from .triangles import solid_faces as solid_faces

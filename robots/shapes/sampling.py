@@ -79,9 +79,7 @@ class PairSampling:
         model, data = self._robot.model, self._robot.model.createData()
         scratch = self._geometry.createData()
         for request in scratch.collisionRequests:
-            # Without contacts coal 3.0 takes many deep penetrations of hulls for a distance of
-            # 1e-7 m, so for none at all.
-            request.enable_contact = True
+            with_contacts(request)
         found = np.zeros((len(configurations), len(pairs)), dtype=bool)
         for row, q in enumerate(configurations):
             configuration = self._kinematics.configuration(q)
@@ -89,6 +87,15 @@ class PairSampling:
             hits = [k for k, result in enumerate(scratch.collisionResults) if result.isCollision()]
             found[row, [pair_of[k] for k in hits]] = True
         return found
+
+
+def with_contacts(request: Any) -> Any:
+    """A request of coal's that also finds deep penetrations.
+
+    Without contacts coal 3.0 takes many of those of hulls for a distance of 1e-7 m, so for none.
+    """
+    request.enable_contact = True
+    return request
 
 
 def _coal_shape(body: Polytope) -> tuple[Any, pin.SE3]:

@@ -1,11 +1,13 @@
-"""How far an arm's shapes reach beyond its tool point."""
+"""An arm's tool point and its shapes: how far they reach beyond it, and where none is near it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
+from scipy.optimize import nnls
 
 from robots.robot import Robot
 from robots.shapes.bodies import Geometry, Polytope, Solid, Triangles
@@ -14,6 +16,8 @@ from robots.shapes.links import LinkShapes
 from robots.urdf import Cylinder
 
 NEAR = 1e-3  # [m]
+HEAVY = 1e3  # [1] of a sum of weights beside lengths
+BARE = 0.02  # [m] from the tool point to the nearest body, from which on that is to be said
 
 
 class Reach(NamedTuple):
@@ -25,6 +29,55 @@ class Reach(NamedTuple):
     """m beyond the tool point; negative where all ends behind it."""
     radius: float
     """m, largest distance from the axis of what ends there, or within 1 mm of it."""
+
+
+class ToolLine(NamedTuple):
+    """From the flange to the tool point."""
+
+    flange: str
+    """The link that the tool is mounted on."""
+    joint: int
+    """Pinocchio's, that carries both."""
+    ends: np.ndarray
+    """(2, 3) m in the joint's frame: the flange and the tool point, which may be one."""
+
+
+def tool_line(robot: Robot) -> ToolLine:
+    """The flange is the link of the tool frame, or the last before it that is elsewhere.
+
+    Example:
+        >>> from robots import load_robot
+        >>> line = tool_line(load_robot("ur5", tcp=((0, 0, 0.15), (0, 0, 0))))
+        >>> line.flange, (line.ends[1] - line.ends[0]).round(9).tolist()
+        ('tool0', [0.0, 0.15, 0.0])
+    """
+    frames, tcp = robot.model.frames, robot.model.frames[robot.tool_frame_id]
+    end, number = tcp.placement.translation, robot.tool_link_id
+    while number and frames[number].parentJoint == tcp.parentJoint:
+        frame = frames[number]
+        start = frame.placement.translation
+        if frame.type == pin.FrameType.BODY and np.linalg.norm(end - start) > NEAR:
+            return ToolLine(frame.name, int(tcp.parentJoint), np.stack([start, end]))
+        number = frame.parentFrame
+    return ToolLine(robot.tool_frame, int(tcp.parentJoint), np.stack([end, end]))
+
+
+def bare_length(robot: Robot, bodies: Iterable[Polytope]) -> float:
+    """How far (m) the tool point is from the nearest body on its joint; 0 where one is near.
+
+    At most the way from the flange, as nothing has to be between the two where they are one.
+    """
+    _, joint, (start, end) = tool_line(robot)
+    length = least = float(np.linalg.norm(end - start))
+    for body in bodies:
+        if body.joint == joint and least > BARE:
+            # The nearest point of the hull: weights of its corners, at least 0, that sum up to 1.
+            apart = body.vertices - end
+            rows = np.vstack([apart.T, np.full(len(apart), HEAVY * max(length, 1.0))])
+            weights, _ = nnls(rows, np.append(np.zeros(3), rows[3, 0]))
+            nearest = np.linalg.norm(weights @ apart / weights.sum())
+            least = min(least, float(nearest) - body.radius)
+    return least if least > BARE else 0.0
 
 
 def tool_reach(

@@ -247,8 +247,9 @@ def _limits(node: Node, limit: Node | None, kind: str, owner: str, faults: Fault
             )
         return Limits(kind, -math.inf, math.inf)
     nothing = (kind, None, None)
-    if limit is None or not given:
-        what = "no <limit>" if limit is None else "a <limit> without lower and upper"
+    missing = [end for end in ("lower", "upper") if end not in given]
+    if limit is None or missing:
+        what = "no <limit>" if limit is None else f"a <limit> without {' and '.join(missing)}"
         return Limits(*nothing, f"is {kind} and has {what}; {remedy}")
     try:
         lower, upper = (number(limit, end, 0.0, bound=math.inf) for end in ("lower", "upper"))
@@ -263,12 +264,7 @@ def _limits(node: Node, limit: Node | None, kind: str, owner: str, faults: Fault
         )
     if lower >= upper:
         what = "it is locked" if lower == upper else "lower lies above upper"
-        if len(given) == 1:
-            what += f" (a missing limit counts as 0; only {given[0]} is written)"
         return Limits(*nothing, f"has limits [{lower:g}, {upper:g}]: {what}; {remedy}")
-    if len(given) == 1:
-        missing = "upper" if given == ["lower"] else "lower"
-        faults.warn(limit, f"{owner} has no {missing} limit; URDF's default of 0 is used")
     if kind == "revolute" and max(abs(lower), abs(upper)) > LIKELY_DEGREES:
         faults.warn(
             limit,

@@ -2,23 +2,25 @@
 
 A mesh is taken only when it is a regular file of a known mesh format whose real path, symbolic
 links followed, lies inside one of the allowed folders: the URDF's own, the ROS package around it,
-and `package_dirs`.
+`package_dirs`, and the packages that it asks for by the name in their package.xml (`packages`).
 """
 
 from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import cached_property
 from itertools import accumulate
 from pathlib import Path
 
+from robots.urdf.packages import package_around, packages_seen, seen_words
 from robots.urdf.xml import BadValue
 
 # .gltf and the like pull in other files.
 MESH_SUFFIXES = (".stl", ".dae", ".obj", ".ply", ".off", ".glb")
+_IN_PACKAGE = ("package://", "model://")
 MAX_PATH = 500  # characters; following a path takes time for each of its parts
-PACKAGE_LEVELS = 5  # how far above the URDF a package.xml is looked for
 
 
 class MeshFolders:
@@ -29,24 +31,34 @@ class MeshFolders:
         self.tried: dict[str, None] = {}  # allowed paths that were looked at
         self.base = Path(base_dir)
         self.packages = [Path(folder) for folder in package_dirs]
-        self.own_package = _package_around(self.base)
+        self.own_package = package_around(self.base)
         allowed = [self.base, self.own_package, *self.packages]
         self.allowed = [Path(os.path.realpath(folder)) for folder in allowed if folder is not None]
 
-    def candidates(self, name: str) -> list[Path]:
+    @cached_property
+    def seen(self) -> dict[str, Path]:
+        """Folders of packages by the name in their package.xml."""
+        return packages_seen(self.base, self.packages)
+
+    def candidates(self, name: str) -> Iterator[Path]:
         """Paths that a mesh name may refer to, best first; they need not exist."""
-        if name.startswith(("package://", "model://")):
+        if name.startswith(_IN_PACKAGE):
             inner = name.split("://", 1)[1].lstrip("/")
             package, _, rest = inner.partition("/")
-            paths = [folder / inner for folder in self.packages]
+            yield from (folder / inner for folder in self.packages)
             roots = [*self.packages, self.own_package, self.base]
-            paths += [root / rest for root in roots if root is not None and root.name == package]
-            return [*paths, self.base / inner]
+            yield from (root / rest for root in roots if root is not None and root.name == package)
+            yield self.base / inner
+            if package in self.seen:
+                self.allowed.append(Path(os.path.realpath(self.seen[package])))
+                yield self.seen[package] / rest
+            return
         if name.startswith("file://"):
             name = name.removeprefix("file://")
         if os.path.isabs(name):
-            return [Path(name)]
-        return [folder / name for folder in [self.base, *self.packages]]
+            yield Path(name)
+        else:
+            yield from (folder / name for folder in [self.base, *self.packages])
 
     def resolve(self, name: str) -> str:
         """The file that a mesh name refers to.
@@ -78,19 +90,13 @@ class MeshFolders:
             raise BadValue(
                 "lies outside the folders that meshes may come from; add its folder to package_dirs"
             )
-        raise BadValue("is not found; add the folder above its package to package_dirs")
-
-
-def _package_around(folder: Path) -> Path | None:
-    """The nearest folder at or above `folder` that is a ROS package, so ../meshes works in one."""
-    folder = Path(os.path.abspath(folder))
-    around = [folder, *folder.parents][:PACKAGE_LEVELS]
-    return next((here for here in around if os.path.isfile(here / "package.xml")), None)
+        seen = f" ({seen_words(list(self.seen))})" if name.startswith(_IN_PACKAGE) else ""
+        raise BadValue(f"is not found; add the folder above its package to package_dirs{seen}")
 
 
 def leaves_package(name: str) -> bool:
     """True for a package:// name that climbs out of its package with '..'."""
-    if not name.startswith(("package://", "model://")):
+    if not name.startswith(_IN_PACKAGE):
         return False
     parts = name.split("://", 1)[1].replace("\\", "/").split("/")
     return min(accumulate({"": 0, ".": 0, "..": -1}.get(part, 1) for part in parts)) < 0

@@ -42,6 +42,8 @@ class Node:
     attributes: dict[str, str]
     line: int
     children: list[Node] = field(default_factory=list)
+    text: str = ""
+    """What is written in it, as much as a name may have."""
 
     def all(self, tag: str) -> list[Node]:
         """The direct children of that tag."""
@@ -130,6 +132,7 @@ class _Builder:
         self.count = 0
         parser.StartElementHandler = self.start
         parser.EndElementHandler = self.end
+        parser.CharacterDataHandler = self.write
         parser.StartDoctypeDeclHandler = self.doctype
         parser.EntityDeclHandler = self.doctype
 
@@ -163,6 +166,11 @@ class _Builder:
         else:
             self.root = node
         self.open.append(node)
+
+    def write(self, text: str) -> None:
+        node = self.open[-1]
+        if len(node.text) < MAX_NAME:
+            node.text += text[:MAX_NAME]
 
     def end(self, _: str) -> None:
         self.open.pop()

@@ -221,12 +221,16 @@ class ClosedFormPatch(Patch):
         """The points of the surface closest to `points` (..., 3) m; see `ClosestPoint`.
 
         Where several points are equally close (centre of a sphere, axis of a cylinder), one of
-        them is taken, on the patch if there is one.
+        them is taken, on the patch if there is one. For a point that is not finite it is NaN and
+        not inside.
         """
         from surfaces.patches.closed_form_kernels import closest_points
 
         points = points_of(points)
-        values, inside = closest_points(self.patch_kernel(), np.array(points.reshape(-1, 3)))
+        flat = np.array(points.reshape(-1, 3))
+        values, inside = closest_points(self.patch_kernel(), flat)
+        finite = np.isfinite(flat).all(axis=1)
+        values[~finite], inside[~finite] = np.nan, False
         return ClosestPoint.of_rows(points.shape[:-1], values, inside)
 
     def patch_kernel(self, nu: int = 1, nv: int = 1) -> PatchKernel:

@@ -61,7 +61,7 @@ class Piecewise(Surface):
         words += [
             f"pieces[{a}] and pieces[{b}] meet at a crease of up to {math.degrees(angle):.3g} "
             "degrees; motions across it cannot be certified where it is sharper than tolerance "
-            "and cone allow."
+            "and cone allow. Over outer edges they are of triangles: export the part as a mesh."
             for (a, b), angle in creases.items()
             if angle > CREASE
         ]

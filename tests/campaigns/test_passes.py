@@ -7,16 +7,16 @@ from foreign_passes import KINDS, drawn
 from test_passes_hold import assert_holds
 
 CASES = 200
-FOUND = 0.6  # [1] of them that have a motion
+FOUND = 0.9  # [1] of them that have a motion
+HELD: dict[int, bool] = {}
 
 
 @pytest.mark.parametrize("number", range(CASES))
 def test_what_is_called_feasible_is_right_over_the_surface(number: int) -> None:
-    case = drawn(number)
     found = assert_holds(number)
-    print(number, KINDS[number % len(KINDS)], case.arm, case.planned.verdict.answer, found)
+    print(number, KINDS[number % len(KINDS)], drawn(number).arm, found)
+    HELD[number] = found
 
 
 def test_most_have_a_motion() -> None:
-    found = sum(drawn(number).planned.verdict.feasible for number in range(0, CASES, 5))
-    assert found >= FOUND * len(range(0, CASES, 5))
+    assert sum(HELD.values()) >= FOUND * len(HELD)

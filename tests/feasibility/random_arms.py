@@ -155,15 +155,6 @@ def random_surface(rng: np.random.Generator, kind: str) -> Surface:
     return plane((-5, 5), (-5, 5), side=side)
 
 
-def target_near(surface: Surface, standoff: float, point: Floats) -> tuple[Floats, Floats]:
-    """Target point and approach direction of the target surface that are nearest to a point."""
-    closest_point = surface.closest(point)
-    sign = surface.side_sign
-    return point + (
-        sign * standoff - closest_point.height
-    ) * closest_point.normal, -sign * closest_point.normal
-
-
 @dataclass(frozen=True, eq=False, slots=True)
 class Deviation:
     """How far a motion deviates from the target surface and from the approach direction."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import heapq
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy as np
 from coverable_arrays import Array
 from coverable_errors import ArgumentError
 from feasibility.certification.collisions.first_look import Body, CoupledBodies, FirstLook
+from feasibility.certification.collisions.measured import least_measured
 from feasibility.certification.collisions.pairing import ROUNDING, Pairing, Place
 from feasibility.certification.collisions.pieces import Below
 from feasibility.certification.collisions.plane_search import NEAR
@@ -23,9 +24,11 @@ from feasibility.certification.collisions.relative_motion import ArmMotion
 from feasibility.certification.collisions.shape_pieces import piece_of, sheet_piece
 from feasibility.certification.faults import Judged, MotionFault
 from feasibility.collisions import Bodies, Pair
+from feasibility.verdict import Certificate
 from robots import Robot
 
 TOUCHING = 5e-7  # [m] overlap that is called touching
+MEASURED = 8  # couples, with the lowest certified distances, of which coal measures the least
 KEPT = 8  # bodies of so many problems are kept ready, for motions replayed one after another
 
 
@@ -47,10 +50,22 @@ class CollisionReplay(Judged):
     a refused one, the least distance that was measured."""
     nearest_pair: tuple[str, str] | None
     """The pair that it is of."""
+    measured_clearance: float | None
+    """m, the least distance that coal measured along an accepted motion: the truth lies between
+    `min_clearance` and this. None where there is no pair, and of a refused motion."""
     faults: tuple[CollisionFault, ...]
     """One for each pair that comes too near, the nearest first; none when it is accepted."""
     calls: int
-    """How often coal was called."""
+    """How often coal was called for what is certified."""
+
+    def added_to(self, certificate: Certificate) -> Certificate:
+        """The certificate of the same motion, with what was found."""
+        return replace(
+            certificate,
+            min_clearance=self.min_clearance,
+            measured_clearance=self.measured_clearance,
+            nearest_pair=self.nearest_pair,
+        )
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -144,10 +159,10 @@ def collision_replay(
     if not finite.all():
         row = int(np.argmin(finite))
         fault = CollisionFault(row, 0.0, "a joint value is not finite", ("", ""), np.nan)
-        return CollisionReplay(None, None, (fault,), 0)
+        return CollisionReplay(None, None, None, (fault,), 0)
     ready = ready_bodies(bodies)
     if not len(rows) or not bodies.pairs:
-        return CollisionReplay(None, None, (), 0)
+        return CollisionReplay(None, None, None, (), 0)
     if len(rows) == 1:  # an arm at rest: a motion that goes nowhere
         rows, deviations = np.repeat(rows, 2, axis=0), None
     motion = ArmMotion(robot, rows, None if deviations is None else np.abs(deviations))
@@ -218,10 +233,16 @@ def _outcome(checked: list[_Checked]) -> CollisionReplay:
             if known is None or not fault.distance >= known.distance:
                 faults[fault.pair] = fault
     least = min(checked, key=_decided)
+    measured = math.inf
+    if not faults:
+        for one in sorted(checked, key=_decided)[:MEASURED]:
+            if one.pairing is not None and one.distance < measured:
+                measured = min(measured, least_measured(one.pairing) + one.deviation)
     ordered = sorted(faults.values(), key=_decided)
     return CollisionReplay(
         min_clearance=float(least.distance),
         nearest_pair=(least.pair.first, least.pair.second),
+        measured_clearance=None if faults else max(measured, float(least.distance)),
         faults=tuple(ordered),
         calls=sum(pairing.calls for pairing in pairings),
     )

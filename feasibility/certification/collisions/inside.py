@@ -31,8 +31,8 @@ def _is_closed(body: Piece) -> TypeGuard[MeshPart]:
 
 
 def _any_inside(body: MeshPart, points: Array) -> bool:
-    """Is one of the points (k, 3) inside the mesh?"""
-    triangles = _outward(body)
+    """Is one of the points (k, 3) inside the mesh, whose shells are oriented as it is closed?"""
+    triangles = body.vertices[body.faces]
     return any(abs(winding(triangles, point)) > 0.5 for point in points)
 
 
@@ -47,23 +47,6 @@ def winding(triangles: Array, point: Array) -> float:
     below = la * lb * lc
     below += (a * b).sum(1) * lc + (b * c).sum(1) * la + (c * a).sum(1) * lb
     return float(2.0 * np.arctan2(above, below).sum() / (4.0 * np.pi))
-
-
-@lru_cache(maxsize=KEPT)
-def _outward(mesh: MeshPart) -> Array:
-    """Its triangles (k, 3, 3), each shell with one orientation."""
-    faces = mesh.faces
-    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-    ways = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    along = np.where(ways[:, 0] < ways[:, 1], 1, -1)
-    _, which = np.unique(edges, axis=0, return_inverse=True)
-    if np.bincount(which.ravel(), weights=along).any():  # an edge run through twice the same way
-        import trimesh
-
-        whole = trimesh.Trimesh(mesh.vertices, faces, process=False)
-        trimesh.repair.fix_normals(whole, multibody=True)
-        faces = np.asarray(whole.faces)
-    return mesh.vertices[faces]
 
 
 @lru_cache(maxsize=KEPT)

@@ -88,20 +88,22 @@ class Pairing:
         self.place: Place | None = None
         """Why it is refused."""
         self._most = CALLS[0] + CALLS[1] * len(motion.q)
-        self.stretches, self._hints = stretches, stretches.bound
+        self.stretches = stretches
+        self.hints = stretches.bound
+        """(m - 1,) m, about how near they come along each segment, or nearer."""
 
     def guess(self) -> float:
         """Improve the bounds without coal; how near (m) the bodies seem to come, at least."""
         s = self.stretches
         if isinstance(self.a, MeshPart) and self.a.triangles > FEW:
-            self._hints = rough_bounds(self.a.tree, self.b, s)
+            self.hints = rough_bounds(self.a.tree, self.b, s)
             if not self.a.closed:
-                self.stretches = replace(s, bound=np.maximum(s.bound, self._hints))
+                self.stretches = replace(s, bound=np.maximum(s.bound, self.hints))
         else:
             for n in guesses(self.a, self.b, s):
                 s = _raised(self.a, self.b, s, n)
-            self.stretches, self._hints = s, s.bound
-        return float(self._hints.min())
+            self.stretches, self.hints = s, s.bound
+        return float(self.hints.min())
 
     def meet(self) -> float:
         """The distance (m) at the row that seemed worst when it was guessed, by coal.
@@ -109,7 +111,7 @@ class Pairing:
         That of the bodies themselves: their hulls may be much nearer.
         """
         s = self.stretches
-        measured = self._measured(self.a, self.b, s, int(np.argmin(self._hints)))
+        measured = self._measured(self.a, self.b, s, int(np.argmin(self.hints)))
         if not (isinstance(self.a, MeshPart) and self.a.triangles > FEW):
             self.stretches = _raised_along(self.a, self.b, s, measured, np.inf)
         if is_exact(self.a, self.b):

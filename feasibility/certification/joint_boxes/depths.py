@@ -22,6 +22,9 @@ MOST_CORNERS = 64  # of a mesh
 def depths(shape: object, points: Array) -> Array | None:
     """(...) m, how deep points (..., 3) are, at most 0 outside; None of what has no known inside.
 
+    How far outside a point is, is not told. So a point of one body counts only where it is inside
+    the other one too: what overlaps by less than the points are apart may be missed.
+
     Args:
         shape: a primitive, `Triangles` or a `HalfSpace`.
         points: m, in its own frame.

@@ -13,7 +13,7 @@ from feasibility.certification.collisions import Piece, piece_of, sheet_piece
 from feasibility.certification.tool_alone.erosion import eroded
 from feasibility.collisions import Bodies, HalfSpace, Obstacle
 from robots import Robot
-from robots.shapes import Solid, Triangles
+from robots.shapes import Solid, Triangles, with_contacts
 from robots.urdf import Box, Capsule, Cylinder
 
 SLACK = 1e-5  # [m] more than coal is off
@@ -170,9 +170,8 @@ def _meet(moving: Piece, pose: pin.SE3, still: Piece, margin: float = 0.0) -> bo
     """Do two pieces come nearer than a margin (m), the first one carried by a pose?"""
     import coal
 
-    request = coal.CollisionRequest()
-    # Without contacts coal 3.0 takes many deep penetrations of hulls for no collision.
-    request.enable_contact, request.security_margin = True, margin
+    request = with_contacts(coal.CollisionRequest())
+    request.security_margin = margin
     place = pose.homogeneous @ moving.placement
     first = coal.Transform3s(place[:3, :3], place[:3, 3])
     second = coal.Transform3s(still.placement[:3, :3], still.placement[:3, 3])

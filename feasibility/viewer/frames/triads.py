@@ -1,4 +1,4 @@
-"""Three short lines for a frame: x red, y green, z blue."""
+"""Three short lines for a frame, x red, y green, z blue; and a line from flange to tool point."""
 
 from __future__ import annotations
 
@@ -6,10 +6,13 @@ import numpy as np
 
 from coverable_arrays import Array
 from feasibility.viewer import threejs
-from feasibility.viewer.robot import joint_paths
+from feasibility.viewer.meshes import tubes
+from feasibility.viewer.robot import SKELETON, joint_paths
 from robots import Robot
+from robots.shapes import tool_line
 
 AXES = ((0.85, 0.1, 0.1), (0.1, 0.65, 0.1), (0.1, 0.2, 0.9))
+THIN = 0.003  # [1] of the reach: radius of the line from flange to TCP
 SMALL = 0.1  # [1] of the reach: length of an axis
 
 
@@ -27,7 +30,10 @@ def triad(path: str, place: Array, length: float) -> threejs.Command:
 
 
 def triads(robot: Robot) -> list[threejs.Command]:
-    """The frames of the TCP, of the arm's base, and of the link that carries the surface."""
+    """The frames of the TCP, of the arm's base, and of the link that carries the surface.
+
+    And a line from the flange to the TCP, where a tool may have no shape of its own.
+    """
     import pinocchio as pin
 
     model, body = robot.model, pin.FrameType.BODY
@@ -41,4 +47,9 @@ def triads(robot: Robot) -> list[threejs.Command]:
         frame = model.frames[number]
         path = f"{paths[int(frame.parentJoint)]}/frame of the {name}"
         drawn.append(triad(path, frame.placement.homogeneous, SMALL * max(robot.length_unit, 0.2)))
-    return drawn
+    line = tool_line(robot)
+    if (line.ends[0] == line.ends[1]).all():
+        return drawn
+    rod = tubes([line.ends], THIN * max(robot.length_unit, 0.2))
+    path = f"{paths[line.joint]}/flange to TCP"
+    return [*drawn, threejs.mesh_object(path, *rod, SKELETON)]

@@ -143,9 +143,11 @@ def find_package(name: str, job: Mapping[str, Any]) -> str:
         for folder in folders:
             if os.path.isdir(folder):
                 return folder
+        if name in job["seen"]:
+            return str(job["seen"][name])
     raise Refused(
         f"asks for the package {name!r}, which is not found; add the folder above it to "
-        "package_dirs"
+        f"package_dirs ({job['unseen']})"
     )
 
 
@@ -173,7 +175,10 @@ def expand(job: Mapping[str, Any]) -> tuple[str, list[str]]:
     from xacro import substitution_args as given
 
     def find(name: str) -> str:
-        return find_package(name, job)
+        folder = find_package(name, job)
+        if folder == job["seen"].get(name):  # it may be read once it is asked for
+            gate.folders.append(os.path.join(os.path.realpath(folder), ""))
+        return folder
 
     def eval_in_brackets(expression: str, context: dict[str, Any]) -> str:
         values = context["arg"]

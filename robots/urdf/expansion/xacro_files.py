@@ -17,6 +17,7 @@ from coverable_errors import Fault
 from coverable_files import Remembered
 from coverable_processes import Limits, folder_of, run_apart
 from robots.urdf.mesh_folders import MeshFolders
+from robots.urdf.packages import seen_words
 from robots.urdf.xml import MAX_BYTES, UrdfError, read_bytes
 
 EXTRA = "needs the extra: pip install 'coverable[xacro]'"
@@ -70,7 +71,8 @@ def expanded(
     Args:
         path: the file.
         package_dirs: folders that hold the packages of $(find ...); with them, the file's own
-            folder and the ROS package around it, all that the file may read.
+            folder, the ROS package around it and the packages it asks for by the name in their
+            package.xml (`robots.urdf.packages`), all that the file may read.
         args: its arguments: texts, numbers and truth values.
         caps: of the process.
 
@@ -91,6 +93,8 @@ def expanded(
         "folders": [os.path.join(str(folder), "") for folder in mesh_folders.allowed],
         "packages": [str(folder) for folder in (*mesh_folders.packages, base)],
         "roots": [str(folder) for folder in roots],
+        "seen": {name: str(folder) for name, folder in mesh_folders.seen.items()},
+        "unseen": seen_words(list(mesh_folders.seen)),
         "args": {name: _text(value) for name, value in args.items()},
         "bytes": caps.bytes,
     }

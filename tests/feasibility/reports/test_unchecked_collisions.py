@@ -66,6 +66,57 @@ def test_every_text_says_it_in_one_line(name, capsys) -> None:
         assert UNCHECKED in html.unescape(Path("page.html").read_text("utf-8")).lower()
 
 
+FAR = (
+    *("--set", "robot.tcp.position=[0,0,0.15]", "--set", "collision.clearance=0.0"),
+    *("--set", "collision.surface=false"),
+)
+WOULD_DO = (
+    '[[collision.tool]] with kind = "capsule", radius = 0.01, length = 0.13, '
+    "position = [0.0, 0.0, 0.075] would do"
+)
+
+
+@pytest.mark.parametrize(
+    "name", ["check, feasible", "path", "divide", "explain", "place", "verify", "check, infeasible"]
+)
+def test_a_tool_without_a_body_is_named_with_what_would_do(name, capsys) -> None:
+    page = ("--html", "page.html") if name in PAGES else ()
+    main([*COMMANDS[name], *FAR, *page])
+    said = " ".join(capsys.readouterr().out.split())
+    bare = "the last 150 mm from tool0 to the TCP have no body, so nothing is checked there; "
+    assert bare + WOULD_DO in said
+    if page:
+        assert WOULD_DO in html.unescape(Path("page.html").read_text("utf-8"))
+
+
+@pytest.mark.parametrize("name", ["compare", "study"])
+def test_answers_on_many_cases_name_a_tool_without_a_body(name, capsys, tmp_path) -> None:
+    Path("far.toml").write_text(
+        TEXTS["plate"].replace("[3, 4]", "[2, 2]")
+        + "robot.tcp.position = [0, 0, 0.15]\n[collision]\nsurface = false\n"
+    )
+    Path("far study.toml").write_text('base.case = "far.toml"\nvary."task.cone_deg" = [30]\n')
+    outputs = ("--html", "page.html", "--workers", "0")
+    asked = ("far.toml", "--robots", "ur5")
+    if name == "study":
+        asked = ("far study.toml", "--out", str(tmp_path / "kept"))
+    main([name, *asked, *outputs])
+    words = "without a body, so not checked: tool0 to TCP ([[collision.tool]] gives a tool its"
+    assert words in " ".join(capsys.readouterr().out.split())
+    assert words in html.unescape(Path("page.html").read_text("utf-8"))
+
+
+def test_the_body_that_would_do_does(capsys) -> None:
+    shape = '[{kind="capsule",radius=0.01,length=0.13,position=[0.0,0.0,0.075]}]'
+    assert main([*COMMANDS["check, feasible"], *FAR, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["unchecked_links"] == ["tool0 to TCP"]
+    assert (
+        main([*COMMANDS["check, feasible"], *FAR, "--set", f"collision.tool={shape}", "--json"])
+        == 0
+    )
+    assert json.loads(capsys.readouterr().out)["unchecked_links"] == []
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_object_lists_no_collisions_as_checked(name, capsys) -> None:
     main([*COMMANDS[name], "--json"])

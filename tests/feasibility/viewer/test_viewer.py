@@ -195,6 +195,16 @@ def test_key_frames_place_every_joint_where_pinocchio_does(feasible, drawn):
             assert np.allclose(place, data.oMi[joint + 1].homogeneous, atol=1e-5)
 
 
+def test_a_line_leads_from_the_flange_to_the_tool_point():
+    robot = load_robot("ur5", tcp=((0.03, 0, 0.15), (0, 0, 0)))
+    nothing = verdict_on(robot, DOME.cells(2, 2), missed=range(4))
+    path = f"{joint_paths(robot)[robot.n]}/flange to TCP"
+    rod = vertices(objects(view(nothing).commands)[path])
+    frames = [robot.model.frames[k] for k in (robot.tool_link_id, robot.tool_frame_id)]
+    ends = np.array([frame.placement.translation for frame in frames])
+    assert np.allclose(rod.reshape(2, -1, 3).mean(axis=1), ends, atol=1e-5)
+
+
 def test_a_sliding_joint_slides(tmp_path):
     rail = tmp_path / "rail.urdf"
     rail.write_text(

@@ -265,11 +265,6 @@ ACCEPTED: dict[str, tuple[str | bytes, tuple[str, ...]]] = {
         ("'elbow'", "read as continuous"),
     ),
     "limit without effort": (limit('lower="-1" upper="1"'), ()),
-    "lower limit only": (
-        limit('lower="-1" effort="1" velocity="1"'),
-        ("'elbow'", "no upper limit", "default of 0"),
-    ),
-    "upper limit only": (limit('upper="1" effort="1" velocity="1"'), ("no lower limit",)),
     "limits in degrees": (
         limit('lower="-180" upper="180" effort="1" velocity="1"'),
         ("'elbow'", "were degrees meant?"),
@@ -374,8 +369,8 @@ FAULTY: dict[str, tuple[str, tuple[str, ...]]] = {
     "limit in other words": (limit('min="-1" max="1" ' + BOTH), ("without lower and upper",)),
     "lower above upper": (limit('lower="1" upper="-1" ' + BOTH), ("[1, -1]", "above upper")),
     "lower equals upper": (limit('lower="0" upper="0" ' + BOTH), ("[0, 0]", "locked")),
-    "lower only, positive": (limit('lower="0.5" ' + BOTH), ("[0.5, 0]", "only lower is written")),
-    "upper only, zero": (limit('upper="0" ' + BOTH), ("[0, 0]", "only upper is written")),
+    "lower limit only": (limit('lower="-1" ' + BOTH), ("'elbow'", "a <limit> without upper")),
+    "upper limit only": (limit('upper="1" ' + BOTH), ("'elbow'", "a <limit> without lower")),
     "limit NaN": (limit('lower="nan" upper="1" ' + BOTH), ("'nan'", "must be 1 finite number")),
     "limit infinite": (limit('lower="-inf" upper="inf" ' + BOTH), ("'-inf'", "1 finite number")),
     "limit of words": (limit('lower="low" upper="high" ' + BOTH), ("'low'", "1 finite number")),

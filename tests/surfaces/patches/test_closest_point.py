@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from smooth_probes import least_distances
 
-from surfaces import cylinder, sphere
+from surfaces import cylinder, hyperboloid, plane, sphere
 from surfaces.patches.closest_point import ClosestPointSearch, Jet
 from surfaces.patches.patch import EDGE, LocalClosestPoints, SmoothPatch
 
@@ -195,3 +195,20 @@ def test_the_nearest_of_many_valleys_is_found_on_a_curve_in_the_plane():
         assert sampled - reached < (3.2 * step) ** 2 * (1 + 10 / max(sampled, 1e-9)) + 1e-12
     ends = found[(found[:, 0] == -6) | (found[:, 0] == 6)]
     assert 0 < len(ends) < 60
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        sphere(0.5, (0, 180), (0, 360)),
+        cylinder(0.5, (0, 360), (-1, 1)),
+        hyperboloid(0.5, 0.4, (0, 360), (-1, 1)),
+        plane((-1, 1), (-1, 1)),
+    ],
+    ids=lambda shape: shape.kind,
+)
+def test_points_that_are_not_finite_have_no_foot_on_closed_forms(shape):
+    found = shape.closest([[0, np.inf, 0], [np.nan, 0, 0], [-np.inf, 0, np.inf], [0.4, 0.1, 0.2]])
+    assert found.inside.tolist() == [False, False, False, True]
+    assert np.isfinite(found.height).tolist() == [False, False, False, True]
+    assert np.isnan(found.normal[:3]).all()

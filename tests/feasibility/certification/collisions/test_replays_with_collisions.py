@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from foreign_clearances import ForeignScene, samples
 
 from feasibility import Task, check, verify
+from feasibility.cases import load_case
 from feasibility.certification import collision_replay, replay, replay_over_surface
 from feasibility.collisions import Collision, Obstacle, gather
+from feasibility.reports import verdict as report
 from robots import load_robot
 from surfaces import plane
 
@@ -39,15 +42,34 @@ def test_a_covering_motion_with_its_clearance(walk):
     assert (alone.certificate.min_clearance, alone.certificate.nearest_pair) == (None, None)
     found = replay(UR5, CELLS, task, walk, EVERY)
     assert found.accepted
-    assert replace(found.certificate, min_clearance=None, nearest_pair=None) == alone.certificate
+    nothing = {"min_clearance": None, "measured_clearance": None, "nearest_pair": None}
+    assert replace(found.certificate, **nothing) == alone.certificate
     foreign = ForeignScene(UR5, bodies)
     least = np.min([foreign.distances(row) for row in samples(walk.q, np.radians(3.0))], axis=0)
     assert 0.5 * least.min() <= found.certificate.min_clearance <= least.min()
+    assert 0.99 * least.min() <= found.certificate.measured_clearance <= 1.05 * least.min()
     over = replay_over_surface(UR5, CELLS, TASK, walk.q, EVERY, bodies)
     assert over.accepted
     assert over.certificate.min_clearance == found.certificate.min_clearance
     assert over.certificate.nearest_pair == found.certificate.nearest_pair
     assert verify(UR5, CELLS, task, walk.q).holds
+
+
+def test_what_is_certified_and_what_was_measured_have_the_truth_between_them():
+    """A motion of which little more than half of the clearance is certified."""
+    case = load_case(Path(__file__).with_name("clearance_bound.toml"))
+    verdict = check(*case.build())
+    task = verdict.task
+    bodies = gather(verdict.robot, verdict.cells.surface, task.collision, task.standoff)
+    foreign, certificate = ForeignScene(verdict.robot, bodies), verdict.certificate
+    rows = samples(verdict.witness.q, np.radians(1.0))
+    truth = np.min([foreign.distances(row) for row in rows])
+    assert certificate.min_clearance <= truth <= certificate.measured_clearance + 1e-4
+    assert certificate.measured_clearance <= 1.1 * truth
+    said = report.as_json(verdict)["certificate"]
+    assert said["measured_clearance_m"] == certificate.measured_clearance
+    text = " ".join(report.as_text(verdict, case).split())
+    assert f"certified, and {1e3 * certificate.measured_clearance:.3g} mm where they were" in text
 
 
 def test_more_clearance_than_there_is_is_refused(walk):
