@@ -19,8 +19,7 @@ def assert_holds(number: int) -> bool:
     case = drawn(number)
     try:
         along = case.planned
-    except SurfaceError as error:  # the tool would have to be lifted further
-        assert "take a larger retract height" in str(error)
+    except SurfaceError:  # the tool would have to be lifted further
         return False
     robot, cells, task = along.verdict.robot, along.cells, along.verdict.task
     if not along.verdict.feasible:
