@@ -7,7 +7,8 @@ import zipfile
 
 import pytest
 
-from feasibility import Search
+from coverable_errors import ArgumentError
+from feasibility import Search, greedy_check
 from feasibility.cases import all_keys, load_case
 from feasibility.cli.main import _parser
 from feasibility.demands import DEMANDS
@@ -147,3 +148,27 @@ def test_every_command_says_yes_where_everything_holds(ask, known):
 @pytest.mark.parametrize("demand", [demand.name for demand in DEMANDS])
 def test_no_command_says_yes_where_a_demand_is_not_held(ask, known, demand):
     assert says_yes(ask, known, IMPOSSIBLE[demand]) == set()
+
+
+def test_what_is_not_held_is_named_as_the_cause(ask, known):
+    """`explain` advised 21 changes of limits where the coverage is what is missing."""
+    coverage, speed = (
+        [part for setting in IMPOSSIBLE[name] for part in ("--set", setting)]
+        for name in ("coverage", "speed")
+    )
+    said = {name: ask(name, known[0], *coverage)[1] for name in ("explain", "divide")}
+    assert all("99 % is required" in " ".join(text.split()) for text in said.values())
+    assert "makes it feasible" not in said["explain"]
+    for name in ("explain", "divide"):
+        assert "at 3 m/s" in " ".join(ask(name, known[0], *speed)[1].split())
+    setup = load_case(known[0], IMPOSSIBLE["speed"]).build()
+    region = Region.around(Pose.of_surface(setup.cells.surface), {"x": (0.0, 0.01)})
+    found = place(*setup[:3], region, count=1, around=0, keep=1)
+    assert "none was found that does so at 3 m/s" in found.message
+    assert found.cause is None
+
+
+def test_the_greedy_search_refuses_what_it_does_not_judge():
+    setup = load_case("paper/4a", ["task.speed=0.1"]).build()
+    with pytest.raises(ArgumentError, match="needs the complete search"):
+        greedy_check(*setup[:3])
