@@ -16,7 +16,6 @@ import numpy as np
 
 from coverable_errors import ArgumentError, Fault
 from feasibility.certification import Judged, MotionFault
-from feasibility.certification.rates import check_rates, replay_rates
 from feasibility.task import Task
 from feasibility.verdict import Walk
 from robots import Robot
@@ -68,6 +67,8 @@ def _at_start(robot: Robot, cells: Cells, task: Task, walks: Sequence[Walk]) -> 
 
 def _at_rates(robot: Robot, cells: Cells, task: Task, walks: Sequence[Walk]) -> Findings:
     """Does each motion keep the speed, and its distance from singularities?"""
+    from feasibility.certification.rates import check_rates, replay_rates
+
     check_rates(robot, task)
     found = [replay_rates(robot, cells, task, walk).refusals for walk in walks]
     return Findings(tuple(MotionFault(-1, 0.0, text) for texts in found for text in texts))

@@ -120,9 +120,9 @@ def _found(problem: Problem, search: Search, steps: Steps, run: _Run) -> Found:
 
     def replay() -> Replay:
         """Every path of the tree, by Pinocchio."""
-        (first, *_), edges = best.jcell, best.parent.items()
-        paths = [Path(first, first, best.space.q(best.jcell[first])[None])]
-        paths += [Path(a, b, best.motion(a, b)) for b, a in edges]
+        begun = list(best.jcell.items())[:1]
+        paths = [Path(cell, cell, best.space.q(jcell)[None]) for cell, jcell in begun]
+        paths += [Path(a, b, best.motion(a, b)) for b, a in best.parent.items()]
         return replay_tree(problem.robot, cells, problem.task, steps, paths)
 
     capped = f"; {run.capped} calls stopped at the cap, which is unknown rather than no"

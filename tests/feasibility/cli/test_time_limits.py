@@ -26,12 +26,15 @@ import feasibility.roadmap.causes
 import feasibility.roadmap.complete
 import feasibility.sensitivity.explanation
 import feasibility.timing
+import feasibility.verifying
 from feasibility import clock as clocks
-from feasibility import interrupts
+from feasibility import interrupts, verify
 from feasibility.cli.main import main
 from feasibility.clock import Clock, OutOfTime, compiling
 from feasibility.interrupts import interruptible
 from feasibility.placement import StudyEvaluator
+from feasibility.reports.verdict import as_csv
+from feasibility.results import save_result
 from feasibility.roadmap import warm_up
 from feasibility.studies.outcome import evaluate
 from feasibility.studies.robot_comparison import assess
@@ -207,6 +210,36 @@ def test_stations_and_map(ask, clock, monkeypatch, tmp_path):
     status, _, err = ask("plate", "place", *args)
     assert (status, err) == (0, "no map: the time limit of 3600 s ran out\n")
     assert not picture.exists()
+
+
+JUDGES = [*BUILDING, (feasibility.verifying, "replay_over_surface")]
+
+
+@pytest.mark.parametrize(("owner", "name"), JUDGES)
+def test_what_is_not_verified_in_time_does_not_hold(
+    owner, name, clock, monkeypatch, tmp_path, capsys
+):
+    case, motion, saved = (tmp_path / name for name in ("case.toml", "walk.csv", "a.result"))
+    case.write_text(TEXTS["plate"])
+    motion.write_text(as_csv(small_verdict("plate")))
+    save_result(small_verdict("plate"), small_case("plate"), saved)
+    monkeypatch.setattr(owner, name, clock.endless)
+    for what in ([case, motion], [saved]):
+        asked = ["verify", *map(str, what), "--set", f"search.time_limit={LIMIT}"]
+        capsys.readouterr()
+        assert main([*asked, "--json"]) == 1
+        found = json.loads(capsys.readouterr().out)
+        assert (found["verdict"], found["in_time"]) == ("does not hold", False)
+        assert "limit of 3600 s ran out" in found["refusals"][0]["text"]
+        assert main(asked) == 1
+        assert capsys.readouterr().out.startswith("does not hold: not verified in time.")
+
+
+def test_a_proof_is_verified_within_a_limit_in_python_too():
+    verdict = small_verdict("long plate")
+    assert verify(verdict).holds
+    found = verify(verdict, clock=Clock(1e-9))
+    assert (found.holds, found.late, found.claim) == (False, True, "proof")
 
 
 @pytest.mark.parametrize("work", [evaluate, assess])

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import json
+import zipfile
 from dataclasses import replace
 from functools import partial
 
@@ -11,11 +13,11 @@ import pytest
 from schema import Maybe, OneOf, ProofTree, conforms
 from small_cases import TEXTS, paper_verdict, small_case, small_verdict
 
-from feasibility import Answer, Evidence, NothingToVerifyError, verify
+from feasibility import Answer, Evidence, NothingToVerifyError, check, verify
 from feasibility.cases import load_case
 from feasibility.cut_tree import CutTree, Leaf
 from feasibility.reports import verdict as report
-from feasibility.results import load_result, save_result
+from feasibility.results import ResultError, load_result, save_result
 
 VERIFY = {
     "verdict": OneOf("holds", "does not hold"),
@@ -193,6 +195,90 @@ def test_a_stored_tree_is_not_believed(ask, tmp_path):
     tree.remove_node(leaf)
     save_result(replace(verdict, tree=tree), small_case("greedy dome"), path)
     assert "1 cells are not in the tree" in ask(path)[1]
+
+
+def forged(path, text=str, task=None, **arrays):
+    """The same result file with another text of its case, a second statement of it, or arrays."""
+    with zipfile.ZipFile(path) as file:
+        members = {name: file.read(name) for name in file.namelist()}
+    meta = json.loads(members["meta.json"])
+    meta["case"]["toml"] = text(meta["case"]["toml"])
+    members["meta.json"] = json.dumps(meta | ({} if task is None else {"task": task})).encode()
+    for name, change in arrays.items():
+        buffer = io.BytesIO()
+        np.save(buffer, change(np.load(io.BytesIO(members[f"{name}.npy"]))))
+        members[f"{name}.npy"] = buffer.getvalue()
+    with zipfile.ZipFile(f"{path}.forged", "w") as file:
+        for name, data in members.items():
+            file.writestr(name, data)
+    return f"{path}.forged"
+
+
+def test_a_result_is_judged_by_the_one_statement_of_its_case(ask, tmp_path):
+    """Before, standoff, cone and tolerance came from a second one, in meta.json."""
+    limits = "[[-60, 40], [-100, -20], [20, 120], [40, 130], [60, 140], [-200, -120]]"
+    away = ["task.approach=[0, 0, 1]", "task.cone_deg=1", f"robot.limits_deg={limits}"]
+    case = small_case("plate").with_overrides(away)
+    verdict = check(*case.build())
+    assert verdict.evidence is Evidence.PROOF
+    path = save_result(verdict, case, tmp_path / "a.result")
+    assert ask(path)[0] == 0
+    second = {"standoff": 0.02, "cone_deg": 1.0, "tolerance": None}
+    wide = forged(path, lambda text: text.replace("cone_deg = 1.0", "cone_deg = 180.0"), second)
+    assert load_result(wide).verdict.task.cone_deg == 180.0
+    assert ask(wide)[0] == 1
+    path = save_result(small_verdict("plate"), small_case("plate"), path)
+    high = forged(path, lambda text: text.replace("standoff = 0.02", "standoff = 0.03"), second)
+    assert "mm off its surface" in ask(high)[1]
+    with pytest.raises(ResultError, match="not about case"):
+        save_result(small_verdict("plate"), case, path)
+
+
+DEMANDED = {
+    "coverage": ("[task]", "[task]\nfootprint = 0.01\ncoverage = 0.99", "is required"),
+    "collisions": ("[task]", "[collision]\nself = true\n[task]", "collisions: not judged"),
+    "speed": ("[task]", "[task]\nspeed = 0.01", "speed: not judged"),
+    "start": ("[robot]", "[robot]\nstart_deg = [0, 0, 0, 0, 0, 0]", "start"),
+}
+
+
+@pytest.mark.parametrize("demanded", DEMANDED)
+def test_what_a_tree_was_not_judged_in_is_named_and_does_not_hold(ask, demanded, tmp_path):
+    path = save_result(
+        small_verdict("greedy dome"), small_case("greedy dome"), tmp_path / "a.result"
+    )
+    old, new, word = DEMANDED[demanded]
+    status, out, _ = ask(forged(path, lambda text: text.replace(old, new)))
+    assert status == 1
+    assert word in out or demanded == "coverage"
+    assert "collisions are not checked" in out
+
+
+def test_every_configuration_of_a_stored_tree_is_judged(ask, tmp_path):
+    def bent(values):
+        values[-1] += 1e-3
+        return values
+
+    verdict, case = small_verdict("greedy dome"), small_case("greedy dome")
+    path = save_result(verdict, case, tmp_path / "a.result")
+    assert "is not the one that its motion leads to" in ask(forged(path, tree_q=bent))[1]
+    assert ask(forged(path, tree_motions=bent))[0] == 1
+    alone = case.with_overrides(["surface.cells=[1, 1]"])
+    path = save_result(check(*alone.build()), alone, path)
+    assert ask(path)[0] == 0
+    assert ask(forged(path, tree_q=lambda q: q + 0.5))[0] == 1
+
+
+def test_verify_judges_all_that_a_case_demands_and_names_the_rest(ask, plate):
+    treats = ("--set", "task.footprint=0.01", "--set", "task.coverage=0.99")
+    status, out, _ = ask(*plate, *treats, "--json")
+    answer = as_json(out)
+    assert status == 1
+    assert "99 % is required" in answer["refusals"][0]["text"]
+    assert answer["not_judged"] == []
+    status, out, _ = ask(*plate, *treats, "--set", "task.standoff=0.05", "--json")
+    assert as_json(out)["not_judged"] == ["coverage"]
+    assert ask(*plate, *treats, "--set", "task.coverage=0.05")[0] == 0
 
 
 def test_verify_in_python():

@@ -92,7 +92,6 @@ def test_a_motion_found_beside_a_case_is_tried_on_the_case_itself(seed: int) -> 
     found = explained(seed)
     assert found.verdict.feasible
     assert found.alone is None or found.alone.answer is not Answer.FEASIBLE
-    assert found.asked is not None
     assert found.rates is not None
     told = f"`check` alone, with seed {seed}, says" in " ".join(as_text(found, "x").split())
     assert told == (found.alone is not None)
