@@ -28,7 +28,7 @@ from feasibility.collisions import checked_words
 from feasibility.notices import compiling_notice
 from feasibility.placement.evaluator import LocalEvaluator, Stage, Trial
 from feasibility.placement.reach_bound import Beyond, Reach
-from feasibility.placement.refinement import Evaluator, Refinement
+from feasibility.placement.refinement import INTERRUPTED, Evaluator, Refinement
 from feasibility.placement.region import PlacementError, Pose, Region
 from feasibility.roadmap import warm_up
 from feasibility.search import Progress, Search
@@ -81,6 +81,13 @@ class Placements:
     statistics: dict[str, Any] = field(default_factory=dict)
     """fk: evaluations of the arm; drawn, bound, probe, search, check: placements by the stage that
     they came to; boxes: of the region's bound."""
+    stopped: str = ""
+    """Why the search did not go on to its end, in words; empty where it did."""
+
+    @property
+    def interrupted(self) -> bool:
+        """Did a Ctrl-C end the search?"""
+        return self.stopped == INTERRUPTED
 
     @property
     def best(self) -> Trial | None:
@@ -113,6 +120,7 @@ def place(
     evaluator: Evaluator | None = None,
     progress: Progress | None = None,
     clock: Clock | None = None,
+    interruptible: bool = False,
 ) -> Placements:
     """Where in a region may the surface stand, so that one continuous motion covers it?
 
@@ -130,6 +138,8 @@ def place(
         evaluator: tries placements; default in this process.
         progress: called as progress(done, total, text); what it raises ends the search.
         clock: of the command that this is a part of; its limit counts instead of `time_limit`.
+        interruptible: whether a KeyboardInterrupt ends the search with what is known by then, as
+            the time limit does, in place of being raised; see `Placements.interrupted`.
 
     Returns:
         The placements. That there are none is a result, not an error.
@@ -160,8 +170,14 @@ def place(
             warm_up()
         evaluator = LocalEvaluator(robot, cells, task, search)
     refinement = Refinement(evaluator, reach, region, search.seed, early, clock, progress)
-    refinement.run(count, around)
-    placements = _searched(answered, refinement, refinement.verified(keep))
+    try:
+        refinement.run(count, around)
+        refinement.verify(keep)
+    except KeyboardInterrupt:
+        if not interruptible:
+            raise
+        refinement.stopped = INTERRUPTED
+    placements = _searched(answered, refinement, refinement.found(keep))
     if placements.answer is Answer.UNDECIDED and (closed := blocked_curves(cells, task)):
         message = f"{placements.message} Wherever it stands: {closed}"
         placements = replace(placements, message=message)
@@ -232,10 +248,10 @@ def _searched(
         message = (
             f"{counted(len(found), 'feasible placement')}, each with a replayed motion; "
             f"the best leaves a margin of {found[0].margin:.3f}. {tried}"
-            + ("; the time limit ran out before more were." if refinement.late else ".")
+            + (f"; this is the best so far: {refinement.stopped}." if refinement.stopped else ".")
         )
     else:
-        undecided = refinement.late or bool(failed)
+        undecided = bool(refinement.stopped or failed)
         undecided |= any(trial.answer is Answer.UNDECIDED for trial in trials)
         answer = Answer.UNDECIDED if undecided else Answer.INFEASIBLE
         evidence = Evidence.BUDGET if undecided else Evidence.EXHAUSTED
@@ -245,7 +261,7 @@ def _searched(
         message = (
             f"None found in the region: {tried}; the best covers {100.0 * best:.1f} % of the area"
             + (f", and most of the rest is {MISSED[cause]}" if cause else "")
-            + ("; the time limit ran out." if refinement.late else ". This is no proof.")
+            + (f"; {refinement.stopped}." if refinement.stopped else ". This is no proof.")
         )
     return answered(
         answer=answer,
@@ -255,6 +271,7 @@ def _searched(
         trials=tuple(trials),
         cause=cause,
         causes=causes,
+        stopped=refinement.stopped,
         statistics={
             "fk": sum(trial.fk for trial in trials),
             "drawn": refinement.drawn,

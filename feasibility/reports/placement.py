@@ -177,7 +177,7 @@ def _found_text(placements: Placements) -> str:
     return (
         f"None found in the region: of {number['drawn']} placements {number['bound']} have a "
         f"target out of reach, {number['probe']} failed a few Newton starts, and none was searched"
-        + ("; the time limit ran out first." if placements.answer is Answer.UNDECIDED else ".")
+        + (f"; {placements.stopped} first." if placements.stopped else ".")
     )
 
 

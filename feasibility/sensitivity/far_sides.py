@@ -21,7 +21,8 @@ from feasibility.sensitivity.thresholds import Finding, Span, Threshold
 from feasibility.verdict import Answer, Evidence, Verdict
 
 ASKED, LEAST_ASKED = 6, 150_000  # verdicts' worth, and evaluations, for `check` at a far side ...
-ROUNDS = ((1, 60), (4, 20))  # ... as many times that, one after the other, up to so many in all
+ROUNDS = ((1, 30), (4, 20))  # ... as many times that, one after the other, up to so many in all
+SLOW = 3  # answers in a row that find motions, after which larger and larger steps are taken
 GIVEN = 0  # steps from the value given
 
 
@@ -57,14 +58,15 @@ def settle(
     """
     effort, before = max(ASKED * cost, LEAST_ASKED), prober.spent
     for times, in_all in ROUNDS:
-        sides = FarSides(verdict, times * effort, before + in_all * effort)
-        found[:] = [sides.settled(*side) for side in zip(searches, found, strict=True)]
+        for k, made in enumerate(searches):  # what one leaves over is for the next
+            stop = before + in_all * effort * (k + 1) / len(searches)
+            found[k] = FarSides(verdict, times * effort, stop).settled(made, found[k])
     return prober.spent - before
 
 
 @dataclass(frozen=True, slots=True)
 class FarSides:
-    """Asks `check` about the far sides of thresholds."""
+    """Asks `check` about the far sides of a threshold."""
 
     verdict: Verdict
     """Of the case as given."""
@@ -89,15 +91,21 @@ class FarSides:
 
     def _beyond(self, made: ThresholdSearch, other: Finding | None, far: int) -> Beyond:
         """What is past a far side on the way to `far` steps, as long as `check` finds motions."""
-        good, feasible = None, None
+        good, feasible, gains = None, None, 0
         while other is not None and other.answer is Answer.UNDECIDED:
-            k = made.quantity.steps_to(other.value)
+            near = made.quantity.steps_to(other.value)
             late = made.prober.spent > self.stop or made.prober.clock.out_of_time
-            if late or k == GIVEN:
+            if late or near == GIVEN:
                 break
+            ahead = int(2.0 ** (gains - SLOW)) * (1 if far > near else -1)
+            k = near + ahead if GIVEN < near + ahead <= made.quantity.last else near
             verdict = self._asked(made, k)
-            if not verdict.feasible:
+            if not verdict.feasible and k == near:
                 return Beyond(good, feasible, finding_of(other.value, verdict))
+            if not verdict.feasible:
+                gains = 0
+                continue
+            gains += 1
             probe = Probe(k, attempt_of(verdict))
             good, other = made.narrow(probe, far)
             feasible = made.reported(good)
