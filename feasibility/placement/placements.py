@@ -101,7 +101,8 @@ class Placements:
 
     def __repr__(self) -> str:
         """One line."""
-        line = f"{self.answer} ({self.evidence}): {len(self.found)} placements. {self.message}"
+        found = counted(len(self.found), "placement")
+        line = f"{self.answer} ({self.evidence}): {found}. {self.message}"
         return f"{line} {checked_words(self.task.collision).capitalize()}."
 
 

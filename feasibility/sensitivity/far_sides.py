@@ -22,7 +22,6 @@ from feasibility.verdict import Answer, Evidence, Verdict
 
 ASKED, LEAST_ASKED = 6, 150_000  # verdicts' worth, and evaluations, for `check` at a far side ...
 ROUNDS = ((1, 30), (4, 20))  # ... as many times that, one after the other, up to so many in all
-SLOW = 3  # answers in a row that find motions, after which larger and larger steps are taken
 GIVEN = 0  # steps from the value given
 
 
@@ -91,21 +90,15 @@ class FarSides:
 
     def _beyond(self, made: ThresholdSearch, other: Finding | None, far: int) -> Beyond:
         """What is past a far side on the way to `far` steps, as long as `check` finds motions."""
-        good, feasible, gains = None, None, 0
+        good, feasible = None, None
         while other is not None and other.answer is Answer.UNDECIDED:
-            near = made.quantity.steps_to(other.value)
+            k = made.quantity.steps_to(other.value)
             late = made.prober.spent > self.stop or made.prober.clock.out_of_time
-            if late or near == GIVEN:
+            if late or k == GIVEN:
                 break
-            ahead = int(2.0 ** (gains - SLOW)) * (1 if far > near else -1)
-            k = near + ahead if GIVEN < near + ahead <= made.quantity.last else near
             verdict = self._asked(made, k)
-            if not verdict.feasible and k == near:
-                return Beyond(good, feasible, finding_of(other.value, verdict))
             if not verdict.feasible:
-                gains = 0
-                continue
-            gains += 1
+                return Beyond(good, feasible, finding_of(other.value, verdict))
             probe = Probe(k, attempt_of(verdict))
             good, other = made.narrow(probe, far)
             feasible = made.reported(good)
