@@ -194,9 +194,7 @@ class Refinement:
             self.best = max(known, key=lambda trial: trial.rank, default=None)
             if self.stopped:
                 return
-            if not any(trial.feasible for trial in self.sure.values()):
-                self._make_sure()
-        self._make_sure()
+            self._make_sure()
 
     def _make_sure(self) -> None:
         """Check the best so far, where one motion covers it all: its answer, if stopped here."""
