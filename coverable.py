@@ -49,7 +49,6 @@ if TYPE_CHECKING:
         placement_map,
         station_plan,
     )
-    from feasibility.placement import LocalEvaluator as Local
     from feasibility.programs import ProgramSettings, save_program
     from feasibility.reports.comparison import as_text as comparison_text
     from feasibility.reports.comparison import chart as comparison_chart
@@ -141,7 +140,7 @@ __all__ = [
     "Answer", "ArgumentError", "Axis", "Case", "CaseError", "Cause", "CauseKind", "Cells",
     "CertifiedArea", "Collision", "Comparison", "CoverableError", "CoveragePath", "Division",
     "Evidence", "Explanation",
-    "LiteralSearch", "Live", "Local", "LocalEvaluator", "MeshSurface", "Obstacle", "PassRuns",
+    "LiteralSearch", "Live", "LocalEvaluator", "MeshSurface", "Obstacle", "PassRuns",
     "Patch", "PathError", "Piecewise", "Placements", "PlannedPasses", "Plot", "Pose",
     "ProgramSettings",
     "Region", "Robot", "RobotError", "Search", "Store", "Study", "Surface", "SurfaceError",
@@ -190,7 +189,6 @@ _ROOMS = (
 _ELSEWHERE = {  # name -> module, name there: of no room, or by another name
     "ArgumentError": ("coverable_errors", "ArgumentError"),
     "CoverableError": ("coverable_errors", "CoverableError"),
-    "Local": ("feasibility.placement", "LocalEvaluator"),
     "comparison_chart": ("feasibility.reports.comparison", "chart"),
     "comparison_text": ("feasibility.reports.comparison", "as_text"),
     "division_text": ("feasibility.reports.division", "as_text"),

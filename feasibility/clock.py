@@ -78,6 +78,7 @@ class Clock:
         began: `time.monotonic()` at which the work began; NaN before that.
         loaded: the same, at which the search itself did, its kernels loaded.
         limit: seconds; inf for no limit.
+        evaluations: of the arm, after which a search stops as at the deadline; inf for no limit.
     """
 
     def __init__(self, limit: float | None = None, progress: Progress | None = None) -> None:
@@ -88,6 +89,7 @@ class Clock:
             progress: called as progress(done, total, text). What it raises ends the search.
         """
         self.limit = math.inf if limit is None else limit
+        self.evaluations = math.inf
         self._progress = progress
         self.began, self.loaded = math.nan, math.nan
         self._compiled = 0.0

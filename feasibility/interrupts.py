@@ -92,7 +92,8 @@ def forgive() -> None:
 def limited(left: Callable[[], float], error: type[Exception]) -> Iterator[None]:
     """Raise an error in the block, wherever it is, when its time is up; not during an import.
 
-    Does nothing outside of `interruptible`.
+    Does nothing outside of `interruptible`, nor inside another such block: the outer limit counts,
+    be it longer.
 
     Args:
         left: seconds until then; it may grow meanwhile.

@@ -98,12 +98,14 @@ def write_whole(path: str | os.PathLike[str], write: Callable[[IO[bytes]], objec
     file = Path(os.path.realpath(path))
     temporary = os.fspath(file.with_name(f".{file.name[:40]}.{secrets.token_hex(8)}"))
     try:
+        mode = _mode(file)
         with unfinished(temporary):
-            with open(temporary, "xb", opener=_private) as stream:
+            with open(temporary, "xb", opener=None if mode is None else _private) as stream:
                 write(stream)
                 stream.flush()
                 os.fsync(stream.fileno())
-            os.chmod(temporary, _mode(file))
+            if mode is not None:
+                os.chmod(temporary, mode)
             settle()
             os.replace(temporary, file)
     except OSError as error:
@@ -112,7 +114,7 @@ def write_whole(path: str | os.PathLike[str], write: Callable[[IO[bytes]], objec
 
 
 def _private(path: str, flags: int) -> int:
-    """Open a new file that nobody else reads while it is written."""
+    """Open a new file that nobody else reads until it has its permissions."""
     return os.open(path, flags, 0o600)
 
 
@@ -131,13 +133,9 @@ def _write_through(file: Path, write: Callable[[IO[bytes]], object]) -> Path:
     return file
 
 
-def _mode(file: Path) -> int:
-    """Permissions for a file: those it has, or those that a new file gets."""
-    if file.exists():
-        return stat.S_IMODE(file.stat().st_mode)
-    mask = os.umask(0)
-    os.umask(mask)
-    return 0o666 & ~mask
+def _mode(file: Path) -> int | None:
+    """The permissions of a file; None where there is none, and the system gives them."""
+    return stat.S_IMODE(file.stat().st_mode) if file.exists() else None
 
 
 def shown_path(path: str | os.PathLike[str]) -> str:

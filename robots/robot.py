@@ -341,7 +341,7 @@ class Robot:
 
     def __repr__(self) -> str:
         """One line: name, joints and tool."""
-        x, y, z = self.tcp[:3, 3].tolist()
+        x, y, z = (self.tcp[:3, 3].round(9) + 0.0).tolist()  # no noise of rounding, no -0
         off = f" + ({x:g}, {y:g}, {z:g}) m" if self.tool_frame_id != self.tool_link_id else ""
         seen = f", seen from {self.surface_link!r}" if self.surface_link else ""
         return f"Robot({self.name!r}, {self.n} joints, tool {self.tool_frame!r}{off}{seen})"

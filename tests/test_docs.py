@@ -95,12 +95,10 @@ def test_commands_of_the_readme_run(
         if arguments[0] in ("path", "compare", "explain"):
             arguments += ["--set", "surface.cells=[3, 4]"]
         if arguments[:2] == ["place", "case.toml"]:
-            arguments += ["--set", "surface.cells=[2, 2]"]
-        if arguments[0] == "place":
-            arguments += ["--count", "4"]
+            arguments += ["--set", "surface.cells=[2, 2]", "--count", "4"]
         if arguments[0] in ("place", "compare", "study"):
             arguments += ["--workers", "0"]
-        expected = 1 if arguments[1:2] == ["paper/4d"] else 0
+        expected = 1 if arguments[1:2] == ["paper/4d"] and arguments[0] != "place" else 0
         assert main(arguments) == expected, arguments
         assert "usage" not in capsys.readouterr().err
     assert (tmp_path / "walk.csv").read_text().startswith("cell,joint1,")

@@ -101,8 +101,8 @@ def peaks(a: Array, b: Array, most: Array) -> Array:
     `most` (m,) bounds the second derivative, so the norm is at most
     (1 - s) a + s b + s (1 - s) most / 2, whose largest value this is. NaN comes out as NaN.
     """
-    slope = np.abs(b - a)
     with np.errstate(divide="ignore", invalid="ignore"):
+        slope = np.abs(b - a)
         inner = 0.5 * (a + b) + most / 8.0 + slope**2 / (2.0 * most)
     return np.where(2.0 * slope >= most, np.maximum(a, b), inner)
 

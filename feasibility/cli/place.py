@@ -22,13 +22,13 @@ from feasibility.cli.command import (
     write_text,
 )
 from feasibility.cli.console import print_err, print_out, with_rate
-from feasibility.interrupts import settle
+from feasibility.interrupts import INTERRUPTED, MESSAGE, forgive, settle
 from feasibility.safe_files import shown_path, write_whole
 
 if TYPE_CHECKING:
     from feasibility.cli.command import OpenCase
-    from feasibility.cli.console import Bar
     from feasibility.placement import Evaluator, PlacementMap, Placements, StationPlan
+    from feasibility.viewer import View
 
 AXES = {
     "x": "m", "y": "m", "z": "m", "roll": "degrees", "pitch": "degrees", "yaw": "degrees"
@@ -44,7 +44,8 @@ def add(subcommands: argparse._SubParsersAction) -> None:
         help="where the surface can stand",
         description="Search a region of positions and orientations of the surface (in the "
         "world, or in surface.frame) for placements at which one continuous motion covers it.",
-        epilog="exit status: 0 a placement is feasible, 1 none was found, 3 undecided",
+        epilog="exit status: 0 a placement is feasible, 1 none was found, 3 undecided, 130 "
+        "interrupted, after what was known by then",
     )  # fmt: skip
     for name, unit in AXES.items():
         parser.add_argument(
@@ -78,7 +79,8 @@ def run_place(args: argparse.Namespace, began: float) -> int:
         began: `time.perf_counter()` when the command began.
 
     Returns:
-        0 when a placement is feasible, 1 when none was found, 3 when undecided.
+        0 when a placement is feasible, 1 when none was found, 3 when undecided, 130 after a Ctrl-C,
+        when what is known by then is reported.
 
     Raises:
         PlacementError, CaseError, FileError, WorkersError: the input cannot be used.
@@ -96,26 +98,46 @@ def run_place(args: argparse.Namespace, began: float) -> int:
         count = COUNT if args.count is None else args.count
         store = None if args.out is None else stack.enter_context(Store(args.out))
         workers = stack.enter_context(open_workers(args.workers, args.dask))
-        progress = _Progress(opened.progress)
-        evaluator: Evaluator = StudyEvaluator(case, workers, store, progress.within)
+        evaluator: Evaluator = StudyEvaluator(case, workers, store, lambda *_: settle())
         placements = place(
-            *setup[:3], region, setup.search, evaluator=evaluator, progress=progress,
-            count=count, clock=clock,
+            *setup[:3], region, setup.search, evaluator=evaluator, count=count, clock=clock,
+            progress=with_rate(opened.progress), interruptible=True,
         )  # fmt: skip
-        plan, chart = _further(args, opened, placements, evaluator, count)
-        if args.html is not None:
-            from feasibility.viewer import view_placements
-
-            limit = None if math.isinf(clock.left) else max(clock.left, _LEAST)
-            search = replace(setup.search, time_limit=limit)
-            drawn = view_placements(
-                placements, search, case.name, plan, progress=opened.progress
-            )  # fmt: skip
+        interrupted = placements.interrupted
+        try:
+            if not interrupted:
+                plan, chart = _further(args, opened, placements, evaluator, count)
+                drawn = _view(args, opened, placements, plan)
+        except KeyboardInterrupt:
+            interrupted = True
+        if interrupted:
+            forgive()  # what is known is still reported
     placements.timing["command_s"] = time.perf_counter() - began
     _report(args, placements, case.name, plan, chart)
     if drawn is not None:
         write_text(args.html, drawn.html(), "view")
-    return STATUS[str(placements.answer)]
+    if interrupted:
+        left_out = [name for name, made in (("map", chart), ("html", drawn)) if made is None]
+        for name in (name for name in left_out if getattr(args, name) is not None):
+            print_err(f"nothing written to --{name}: {shown_path(getattr(args, name))}")
+        print_err(MESSAGE)
+    return INTERRUPTED if interrupted else STATUS[str(placements.answer)]
+
+
+def _view(
+    args: argparse.Namespace, opened: OpenCase, placements: Placements, plan: StationPlan | None
+) -> View | None:
+    """The view, where it is wanted; its motion is searched for in the time that is left."""
+    if args.html is None:
+        return None
+    from feasibility.viewer import view_placements
+
+    left = opened.clock.left
+    limit = None if math.isinf(left) else max(left, _LEAST)
+    search = replace(opened.setup.search, time_limit=limit)
+    return view_placements(
+        placements, search, opened.case.name, plan, progress=opened.progress
+    )  # fmt: skip
 
 
 def _further(
@@ -130,7 +152,7 @@ def _further(
     from feasibility.placement import map_around_best, station_plan
 
     plan = chart = None
-    clock, progress = opened.clock, _Progress(opened.progress)
+    clock, progress = opened.clock, with_rate(opened.progress)
     wanted = "stations" if args.stations and not placements.found else ""
     try:
         with clock.enforced():
@@ -144,26 +166,6 @@ def _further(
         missing = [wanted] + ["map"] * (wanted != "map" and args.map is not None)
         print_err(f"no {' and no '.join(missing)}: the time limit of {clock.limit:g} s ran out")
     return plan, chart
-
-
-class _Progress:
-    """Progress in placements, with an estimate of the time left; also within a batch of them."""
-
-    def __init__(self, bar: Bar) -> None:
-        """Nothing is reported yet."""
-        self._report, self._latest = with_rate(bar), (0, 0, "")
-
-    def __call__(self, done: int, total: int | None, text: str) -> None:
-        """Between batches."""
-        self._latest = done, total or 0, text
-        self._report(done, total, text)
-
-    def within(self, done: int, total: int | None, text: str) -> None:
-        """So many placements of the present batch."""
-        settle()
-        before, whole, text = self._latest
-        if text:
-            self._report(before + done, whole or None, text)
 
 
 def _ranges(args: argparse.Namespace) -> dict[str, Any]:

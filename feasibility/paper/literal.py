@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -87,10 +88,10 @@ class LiteralSearch:
         self.kinematics = Kinematics(robot)
         self.found = TreeAndGraph()
 
-    @staticmethod
+    @classmethod
     def of(
-        robot: Robot, cells: Cells, task: Task, search: Search, start: ArrayLike | None = None
-    ) -> LiteralSearch:
+        cls, robot: Robot, cells: Cells, task: Task, search: Search, start: ArrayLike | None = None
+    ) -> Self:
         """The search that `check` makes compiled: its delta q, margins, and first start.
 
         Args:
@@ -105,7 +106,7 @@ class LiteralSearch:
         steps = Steps.of(robot, cells, task, search)
         found = candidates(robot, cells, task, search, steps.usable) if start is None else [start]
         for q in found:
-            literal = LiteralSearch(robot, cells, task, q, steps)
+            literal = cls(robot, cells, task, q, steps)
             if start is not None or literal.ecell((0,) * robot.n)[0] >= 0:
                 literal.found = TreeAndGraph()
                 return literal

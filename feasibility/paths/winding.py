@@ -30,10 +30,10 @@ def unwound(robot: Robot, task: Task, walk: Walk) -> Walk:
     if robot.start is not None or not len(walk.q):
         return walk
     bounded = np.isfinite(robot.lower) & np.isfinite(robot.upper)
-    wanted = np.where(bounded, 0.5 * (robot.lower + robot.upper), 0.0)
-    if task.home_deg is not None:
-        wanted = np.radians(task.home_deg)
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore"):  # a joint without limits has no middle
+        wanted = np.where(bounded, 0.5 * (robot.lower + robot.upper), 0.0)
+        if task.home_deg is not None:
+            wanted = np.radians(task.home_deg)
         turns = np.round((wanted - 0.5 * (walk.q.min(axis=0) + walk.q.max(axis=0))) / TURN)
     turns = np.clip(turns, *turns_inside(robot, walk.q))
     if not turns.any():

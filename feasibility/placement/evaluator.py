@@ -124,6 +124,8 @@ class Trial:
 class LocalEvaluator:
     """Tries placements of one surface for one arm and task."""
 
+    batch = 1
+
     def __init__(self, robot: Robot, cells: Cells, task: Task, search: Search) -> None:
         """Compute what all placements share."""
         self.robot, self.cells, self.task, self.search = robot, cells, task, search

@@ -29,7 +29,7 @@ from feasibility.demands import refuse_start
 from feasibility.notices import compiling_notice
 from feasibility.placement.evaluator import LocalEvaluator, Stage, Trial
 from feasibility.placement.reach_bound import Beyond, Reach
-from feasibility.placement.refinement import Evaluator, Refinement
+from feasibility.placement.refinement import INTERRUPTED, Evaluator, Refinement
 from feasibility.placement.region import PlacementError, Pose, Region
 from feasibility.roadmap import warm_up
 from feasibility.search import Progress, Search
@@ -82,6 +82,13 @@ class Placements:
     statistics: dict[str, Any] = field(default_factory=dict)
     """fk: evaluations of the arm; drawn, bound, probe, search, check: placements by the stage that
     they came to; boxes: of the region's bound."""
+    stopped: str = ""
+    """Why the search did not go on to its end, in words; empty where it did."""
+
+    @property
+    def interrupted(self) -> bool:
+        """Did a Ctrl-C end the search?"""
+        return self.stopped == INTERRUPTED
 
     @property
     def best(self) -> Trial | None:
@@ -95,7 +102,8 @@ class Placements:
 
     def __repr__(self) -> str:
         """One line."""
-        line = f"{self.answer} ({self.evidence}): {len(self.found)} placements. {self.message}"
+        found = counted(len(self.found), "placement")
+        line = f"{self.answer} ({self.evidence}): {found}. {self.message}"
         return f"{line} {said_of(self.robot, self.task.collision).capitalize()}."
 
 
@@ -114,6 +122,7 @@ def place(
     evaluator: Evaluator | None = None,
     progress: Progress | None = None,
     clock: Clock | None = None,
+    interruptible: bool = False,
 ) -> Placements:
     """Where in a region may the surface stand, so that one continuous motion covers it?
 
@@ -131,6 +140,8 @@ def place(
         evaluator: tries placements; default in this process.
         progress: called as progress(done, total, text); what it raises ends the search.
         clock: of the command that this is a part of; its limit counts instead of `time_limit`.
+        interruptible: whether a KeyboardInterrupt ends the search with what is known by then, as
+            the time limit does, in place of being raised; see `Placements.interrupted`.
 
     Returns:
         The placements. That there are none is a result, not an error.
@@ -163,13 +174,28 @@ def place(
             warm_up()
         evaluator = LocalEvaluator(robot, cells, task, search)
     refinement = Refinement(evaluator, reach, region, search.seed, early, clock, progress)
-    refinement.run(count, around)
-    placements = _searched(answered, refinement, refinement.verified(keep))
-    if placements.answer is Answer.UNDECIDED and (closed := blocked_curves(cells, task)):
-        offer = smoothing_offer(cells, task, clock)
-        message = f"{placements.message} Wherever it stands: {closed} {offer}".rstrip()
-        placements = replace(placements, message=message)
+    try:
+        refinement.run(count, around)
+        refinement.verify(keep)
+    except KeyboardInterrupt:
+        if not interruptible:
+            raise
+        refinement.stopped = INTERRUPTED
+    placements = _searched(answered, refinement, refinement.found(keep))
+    if placements.answer is Answer.UNDECIDED:
+        placements = _with_blocked(placements, clock)
     return _timed(placements, began)
+
+
+def _with_blocked(placements: Placements, clock: Clock) -> Placements:
+    """The same, saying where no placement helps, and what may."""
+    cells, task = placements.cells, placements.task
+    closed = blocked_curves(cells, task)
+    if not closed:
+        return placements
+    offer = smoothing_offer(cells, task, clock)
+    message = f"{placements.message} Wherever it stands: {closed} {offer}".rstrip()
+    return replace(placements, message=message)
 
 
 def _timed(placements: Placements, began: float) -> Placements:
@@ -236,10 +262,10 @@ def _searched(
         message = (
             f"{counted(len(found), 'feasible placement')}, each with a replayed motion; "
             f"the best leaves a margin of {found[0].margin:.3f}. {tried}"
-            + ("; the time limit ran out before more were." if refinement.late else ".")
+            + (f"; this is the best so far: {refinement.stopped}." if refinement.stopped else ".")
         )
     else:
-        undecided = refinement.late or bool(failed)
+        undecided = bool(refinement.stopped or failed)
         undecided |= any(trial.answer is Answer.UNDECIDED for trial in trials)
         answer = Answer.UNDECIDED if undecided else Answer.INFEASIBLE
         evidence = Evidence.BUDGET if undecided else Evidence.EXHAUSTED
@@ -249,7 +275,7 @@ def _searched(
         message = (
             f"None found in the region: {tried}; the best covers {100.0 * best:.1f} % of the area"
             + (f", and most of the rest is {MISSED[cause]}" if cause else "")
-            + ("; the time limit ran out." if refinement.late else ". This is no proof.")
+            + (f"; {refinement.stopped}." if refinement.stopped else ". This is no proof.")
         )
         checked = [trial for trial in trials if trial.answer is Answer.UNDECIDED][:1]
         message += "".join(f" Of the best, `check` says: {trial.message}" for trial in checked)
@@ -261,6 +287,7 @@ def _searched(
         trials=tuple(trials),
         cause=cause,
         causes=causes,
+        stopped=refinement.stopped,
         statistics={
             "fk": sum(trial.fk for trial in trials),
             "drawn": refinement.drawn,

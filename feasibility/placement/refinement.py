@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Protocol
@@ -10,6 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from coverable_arrays import Array
+from coverable_errors import counted
 from feasibility.clock import Clock, OutOfTime
 from feasibility.placement.evaluator import Stage, Trial
 from feasibility.placement.reach_bound import Reach
@@ -21,13 +23,17 @@ FEW = 32  # poses within reach that refinement should start from
 FALLBACK = 4  # placements that are searched although bound or probe speak against them
 ELITES = 4  # placements that are refined
 WIDTHS = (0.5, 0.35, 0.25, 0.17, 0.12, 0.08)  # [1] of the region, around the best
+TIME_OUT = "the time limit ran out"
+INTERRUPTED = "it was interrupted"
 CYCLES = 3  # times through the widths, as long as nothing is feasible
 APART = 0.05  # [1] of the region's widths: placements nearer to each other are alike
-BATCH = 64  # poses between two looks at the clock
 
 
 class Evaluator(Protocol):
     """Tries placements, here or elsewhere; results come in the order of the poses."""
+
+    batch: int
+    """Poses that it should be given at once, so that it is busy, and the answer not late."""
 
     def try_all(self, poses: Sequence[Pose], early: bool) -> list[Trial]:
         """See `LocalEvaluator.try_at`."""
@@ -41,10 +47,10 @@ def search_all(
 ) -> list[Trial]:
     """Search the placements (k, 6), a batch at a time; none is discarded early."""
     trials: list[Trial] = []
-    for start in range(0, len(values), BATCH):
+    for start in range(0, len(values), evaluator.batch):
         if progress is not None:
             progress(start, len(values), text)
-        poses = [Pose.of_values(row) for row in values[start : start + BATCH]]
+        poses = [Pose.of_values(row) for row in values[start : start + evaluator.batch]]
         trials += evaluator.try_all(poses, early=False)
     return trials
 
@@ -64,9 +70,13 @@ class Refinement:
     drawn: int = 0
     bound: int = 0
     """Placements that the reach bound discarded."""
+    best: Trial | None = None
+    """The first in rank of those tried."""
     checks: dict[Pose, Trial] = field(default_factory=dict)
-    late: bool = False
-    """Has the time run out?"""
+    sure: dict[Pose, Trial] = field(default_factory=dict)
+    """What `check` says of those that were the best for a while, in case the search is stopped."""
+    stopped: str = ""
+    """Why the search did not go on to its end, if so."""
     expected: int = 0
     """Placements that are tried in all, if a search goes on to its end; an estimate."""
     streams: int = 0
@@ -114,7 +124,7 @@ class Refinement:
                     self.region.near(trial.pose.values, width, around, self._stream())[:around]
                     for trial in self._elites(ELITES)
                 ]
-                if self.late or not rows:
+                if self.stopped or not rows:
                     return
                 values = np.vstack(rows)
                 self.drawn += len(values)
@@ -132,20 +142,25 @@ class Refinement:
             if any(trial.feasible for trial in self.checks.values()):
                 return
 
-    def verified(self, keep: int) -> list[Trial]:
-        """The best placements that `check` calls feasible."""
+    def verify(self, keep: int) -> None:
+        """Check the best placements, until so many are feasible."""
         likely = self._elites(3 * keep, lambda trial: trial.complete)
         while (
             likely
-            and not self.late
+            and not self.stopped
             and sum(trial.feasible for trial in self.checks.values()) < keep
         ):
             some, likely = likely[:keep], likely[keep:]
             self._check([trial.pose for trial in some])
-        found = [trial for trial in self.checks.values() if trial.feasible]
-        if not found and not self.late:
+        known = [*self.checks.values(), *self.sure.values()]
+        if not self.stopped and not any(trial.feasible for trial in known):
             self._check([trial.pose for trial in self._elites(1)], causes=True)
-            found = [trial for trial in self.checks.values() if trial.feasible]
+
+    def found(self, keep: int) -> list[Trial]:
+        """The best placements that `check` calls feasible, of those it was asked about."""
+        if self.stopped or not any(trial.feasible for trial in self.checks.values()):
+            self._keep(list(self.sure.values()))
+        found = [trial for trial in self.checks.values() if trial.feasible]
         return sorted(found, key=lambda trial: -trial.margin)[:keep]
 
     def _elites(
@@ -169,36 +184,58 @@ class Refinement:
         """Look into poses (k, 6), a batch at a time."""
         if not self.trials:
             self.expected += len(values)
-        for start in range(0, len(values), BATCH):
-            rows = values[start : start + BATCH]
+        for start in range(0, len(values), self.evaluator.batch):
+            self._report("trying placements")
+            rows = values[start : start + self.evaluator.batch]
             poses = [Pose.of_values(row) for row in rows]
-            self.trials += self._in_time(partial(self.evaluator.try_all, poses, early))
-            if self.late:
+            tried = self._in_time(partial(self.evaluator.try_all, poses, early))
+            self.trials += tried
+            known = tried if self.best is None else [self.best, *tried]
+            self.best = max(known, key=lambda trial: trial.rank, default=None)
+            if self.stopped:
                 return
-            if self.progress is not None:
-                done = sum(trial.complete for trial in self.trials)
-                text = f"trying placements, {done} covered"
-                self.progress(len(self.trials), max(self.expected, len(self.trials)), text)
+            self._make_sure()
+
+    def _make_sure(self) -> None:
+        """Check the best so far, where one motion covers it all: its answer, if stopped here."""
+        best = self.best
+        if best is None or not best.complete or best.pose in self.sure or best.pose in self.checks:
+            return
+        for trial in self._in_time(partial(self.evaluator.check_all, [best.pose], False)):
+            self.sure[trial.pose] = trial
 
     def _check(self, poses: list[Pose], causes: bool = False) -> None:
         """Run `check` on poses; its trials replace the earlier ones."""
         poses = [pose for pose in poses if causes or pose not in self.checks]
-        if self.progress is not None:
-            self.progress(len(self.trials), None, f"checking the best {len(poses)} placements")
-        checked = self._in_time(partial(self.evaluator.check_all, poses, causes))
+        if not causes:
+            self._keep([self.sure[pose] for pose in poses if pose in self.sure])
+            poses = [pose for pose in poses if pose not in self.sure]
+        self._report(f"checking the best {counted(len(poses), 'placement')}")
+        self._keep(self._in_time(partial(self.evaluator.check_all, poses, causes)))
+
+    def _keep(self, checked: Sequence[Trial]) -> None:
+        """Let what was checked replace what was tried."""
         for trial in checked:
             self.checks[trial.pose] = trial
             self.trials = [t for t in self.trials if t.pose != trial.pose] + [trial]
 
+    def _report(self, doing: str) -> None:
+        """Say how far it is, and what the best so far is."""
+        if self.progress is None:
+            return
+        text, best = doing, self.best
+        if best is not None:
+            margin = f"all, margin {best.margin:.2f}"
+            text += f"; best covers {margin if best.complete else f'{100.0 * best.share:.1f} %'}"
+        self.progress(len(self.trials), max(self.expected, len(self.trials)), text)
+
     def _in_time(self, tried: Callable[[], list[Trial]]) -> list[Trial]:
         """Some trials; none where the time has run out, before them or meanwhile."""
-        self.late |= self.clock.out_of_time
-        try:
-            if not self.late:
+        with suppress(OutOfTime):
+            if not (self.stopped or self.clock.out_of_time):
                 with self.clock.enforced():
                     return tried()
-        except OutOfTime:
-            self.late = True
+        self.stopped = TIME_OUT
         return []
 
     def _stream(self) -> int:

@@ -27,6 +27,7 @@ from feasibility.studies import (
 from feasibility.verdict import Answer, Evidence
 
 KEPT = 4  # surfaces that one worker keeps
+AHEAD = 4  # placements for each worker in one batch
 
 Tables = dict[str, Any]
 
@@ -52,6 +53,7 @@ class StudyEvaluator:
         """
         self.tables, self.workers, self.store = case.to_tables(), workers, store
         self.progress = progress
+        self.batch = AHEAD * workers.width
 
     def try_all(self, poses: Sequence[Pose], early: bool) -> list[Trial]:
         """See `Evaluator`."""

@@ -98,7 +98,7 @@ def csv_text(rows: Iterable[Iterable[Any]]) -> str:
 def walk_csv(robot: Robot, walk: Walk) -> str:
     """A motion as CSV: `cell`, empty between centres, then one column per joint, rad or m.
 
-    Array are written so that they read back as the same numbers.
+    Numbers are written so that they read back as the same numbers.
     """
     rows = zip(walk.cell.tolist(), walk.q.tolist(), strict=True)
     lines = (["" if cell < 0 else cell, *map(repr, q)] for cell, q in rows)

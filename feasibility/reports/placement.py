@@ -18,7 +18,7 @@ from feasibility.placement import (
     Trial,
     trial_table,
 )
-from feasibility.reports.parts import aligned, csv_text, percent, summary
+from feasibility.reports.parts import aligned, csv_text, summary
 from feasibility.reports.verdict import CAUSES, EVIDENCE
 from feasibility.verdict import Answer, CauseKind, Evidence
 from feasibility.version import version
@@ -178,7 +178,7 @@ def _found_text(placements: Placements) -> str:
     return (
         f"None found in the region: of {number['drawn']} placements {number['bound']} have a "
         f"target out of reach, {number['probe']} failed a few Newton starts, and none was searched"
-        + ("; the time limit ran out first." if placements.answer is Answer.UNDECIDED else ".")
+        + (f"; {placements.stopped} first." if placements.stopped else ".")
     )
 
 
@@ -190,7 +190,7 @@ def _table(trials: Sequence[Trial]) -> list[str]:
     rows = [heads + ([f"{name} (0..1)" for name in MARGINS] if with_margins else [])]
     for trial in trials:
         row = [f"{v:.3f}" for v in trial.pose.position] + [f"{v:.2f}" for v in trial.pose.rpy_deg]
-        row.append(percent(trial.share).removesuffix("%").strip())
+        row.append(f"{100.0 * trial.share:.1f}")
         if (m := trial.margins) is not None:
             row += [f"{v:.3f}" for v in (m.least, m.limits, m.cone, m.reach)]
         rows.append(row + ["-"] * (len(rows[0]) - len(row)))

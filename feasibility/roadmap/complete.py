@@ -37,7 +37,7 @@ from feasibility.verdict import Cause, Replay, Walk
 from robots import Kinematics
 
 FIRST, SECOND, THIRD, LAST = 1, 4, 8, 16  # rounds without gain
-FEW_BOXES, MORE_BOXES = 20_000, 200_000
+FEW_CUT_BOXES, MORE_CUT_BOXES = 20_000, 200_000
 IN_PLACE = 0.1  # [1] share of the tolerance within which a tool point stays over a pose
 
 
@@ -115,16 +115,16 @@ def between_rounds(exploration: Exploration, proving: Proving, task: Task, idle:
     if not exploration.apart:
         return
     if idle == FIRST:
-        proved(FEW_BOXES)
-    elif idle == SECOND and not proved(MORE_BOXES):
+        proved(FEW_CUT_BOXES)
+    elif idle == SECOND and not proved(MORE_CUT_BOXES):
         refine(exploration, task, COARSE)
     elif idle == THIRD:
         before = exploration.sizes()
         restart(exploration)
         if exploration.sizes() == before:
-            proved(MORE_BOXES)
+            proved(MORE_CUT_BOXES)
     elif idle == LAST and not refine(exploration, task, FINE):
-        proved(MORE_BOXES)
+        proved(MORE_CUT_BOXES)
 
 
 def _check_seeds(problem: Problem, seeds: Walk) -> None:

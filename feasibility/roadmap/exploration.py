@@ -8,7 +8,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
-from feasibility.clock import Clock
+from feasibility.clock import Clock, OutOfTime
 from feasibility.cut_tree import CutTree
 from feasibility.roadmap.branch_and_bound import Boxes, Ruling, rule
 from feasibility.roadmap.bridging import NARROWEST, WIDEST, bridge, nearest_pairs
@@ -188,9 +188,11 @@ class Exploration:
         """Report progress, and stop when the time is up.
 
         Raises:
-            OutOfTime: the deadline has passed.
+            OutOfTime: the deadline has passed, or the clock allows no more evaluations.
         """
         self.clock.tick(int(self.roadmap.size[self.best]), len(self.cells), text)
+        if self.work.counts[0] > self.clock.evaluations:
+            raise OutOfTime
 
     def budget(self) -> int:
         """Evaluations of the arm that compiled loops may use before they return to `tick`."""

@@ -1,7 +1,7 @@
 """Covering walks: edges of one component in a row, one continuous motion over its cells.
 
 The walk goes to the nearest cell that it has not visited, and among equally near ones by
-Warnsdorff's rule. (Step 8 of the complete search: the witness repeats stored edges.)
+Warnsdorff's rule. The witness repeats stored edges.
 """
 
 from __future__ import annotations

@@ -17,7 +17,13 @@ from feasibility.demands import refuse_start
 from feasibility.division import divide
 from feasibility.roadmap import HERE, Exploration, margin_shares, place
 from feasibility.search import Progress, Search
-from feasibility.sensitivity.limited_search import LimitedAttempt, held
+from feasibility.sensitivity.far_sides import settle
+from feasibility.sensitivity.limited_search import (
+    LimitedAttempt,
+    attempt_of,
+    held,
+    known_configurations,
+)
 from feasibility.sensitivity.pairs import PairSearch
 from feasibility.sensitivity.probes import Prober
 from feasibility.sensitivity.quantities import Kind, Quantity, Variant, quantities
@@ -142,10 +148,12 @@ def _explained(
         searches.append(made)
         done.append(threshold)  # one by one: `tick` counts them
     _refine(prober, verdict, searches, done)
+    asked = settle(prober, verdict, cost_of(verdict), searches, done)
     motion = None if verdict.feasible else _over_given(prober, verdict, searches)
     if motion is None:
         most = max(ALL_IN_ALL * float(verdict.statistics["fk"]), 2.0 * LEAST)
-        done = [_alone(made, found, most) for made, found in zip(searches, done, strict=True)]
+        stops = asked + CHECKED * most, asked + most
+        done = [_alone(made, found, *stops) for made, found in zip(searches, done, strict=True)]
     left_out = tuple(quantity.name for quantity in varied[len(done) :])
     pair, spent = None, prober.spent
     helped = any(t.feasible for t in done if t.quantity.kind is not Kind.WITHOUT)
@@ -159,16 +167,17 @@ def _explained(
     return found, motion
 
 
-def _alone(made: ThresholdSearch, found: Threshold, most: float) -> Threshold:
+def _alone(made: ThresholdSearch, found: Threshold, checks: float, searches: float) -> Threshold:
     """The same threshold; its feasible side says whether `check` alone finds it, if known.
 
-    What a short search misses, `check` itself looks for, up to `most` evaluations in all.
+    What a short search misses, `check` itself looks for; neither is begun once the prober has spent
+    so many evaluations.
     """
-    found, prober = made.alone(found, most), made.prober
+    found, prober = made.alone(found, searches), made.prober
     if found.feasible is None or found.feasible.unaided is not False or made.good is None:
         return found
     left, unaided = prober.clock.left, None
-    if prober.spent < CHECKED * most and left > 0.0:
+    if prober.spent < checks and left > 0.0:
         limit = left if np.isfinite(left) else None
         variant = made.quantity.applied(prober.given, made.good.k)
         verdict = check(*variant, Search(seed=prober.seed, time_limit=limit))
@@ -239,10 +248,7 @@ def _thresholds(
 
 def _motions(prober: Prober, verdict: Verdict, q: Array) -> list[LimitedAttempt]:
     """The witness of a feasible case, and covering motions in other postures."""
-    angle = None if verdict.certificate is None else verdict.certificate.max_angle
-    start = LimitedAttempt(
-        verdict.answer, verdict.evidence, verdict.message, q, verdict.witness, angle
-    )
+    start = attempt_of(verdict)
     if prober.clock.out_of_time:
         return [start]
     return [start, *other_motions(prober, GUESSES, POSTURES)]
@@ -305,19 +311,6 @@ def _refine(
             return
         searches[k].stop = prober.spent + left // (len(wide) - done)
         found[k] = searches[k].tighter(found[k])
-
-
-def known_configurations(verdict: Verdict) -> Array:
-    """(N, n) a configuration over each cell that the best motion covers; NaN over the others."""
-    q = np.full((len(verdict.cells), verdict.robot.n), np.nan)
-    if verdict.witness is not None:
-        at = np.flatnonzero(verdict.witness.cell >= 0)[::-1]
-        q[verdict.witness.cell[at]] = verdict.witness.q[at]
-        return q
-    for cell, found in verdict.graph.nodes(data="q"):
-        if found is not None:
-            q[cell] = found
-    return q
 
 
 def drop(prober: Prober, verdict: Verdict, q: Array) -> Dropped:

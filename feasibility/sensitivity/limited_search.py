@@ -25,7 +25,7 @@ from feasibility.roadmap import (
 )
 from feasibility.roadmap.joint_boxes import Blockers, blockers_of
 from feasibility.sensitivity.quantities import Quantity, Variant
-from feasibility.verdict import Answer, Evidence, Walk
+from feasibility.verdict import Answer, Evidence, Verdict, Walk
 
 LEAST = 100  # evaluations between two checks of the limit
 MOST_BOXES = 10_000  # of joint values, for all proofs with collisions of one explanation
@@ -104,6 +104,26 @@ def held(
         return attempt
     detail = f"{attempt.detail}, but {found.refusal}"
     return LimitedAttempt(Answer.UNDECIDED, Evidence.BUDGET, detail, attempt.q, None)
+
+
+def attempt_of(verdict: Verdict) -> LimitedAttempt:
+    """What `check` found, as an attempt."""
+    angle = None if verdict.certificate is None else verdict.certificate.max_angle
+    q, said = known_configurations(verdict), (verdict.answer, verdict.evidence, verdict.message)
+    return LimitedAttempt(*said, q, verdict.witness, angle)
+
+
+def known_configurations(verdict: Verdict) -> Array:
+    """(N, n) a configuration over each cell that the best motion covers; NaN over the others."""
+    q = np.full((len(verdict.cells), verdict.robot.n), np.nan)
+    if verdict.witness is not None:
+        at = np.flatnonzero(verdict.witness.cell >= 0)[::-1]
+        q[verdict.witness.cell[at]] = verdict.witness.q[at]
+        return q
+    for cell, found in verdict.graph.nodes(data="q"):
+        if found is not None:
+            q[cell] = found
+    return q
 
 
 class CollisionProofs:

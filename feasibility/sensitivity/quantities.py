@@ -97,6 +97,12 @@ class Quantity:
             return round(self.given + sign * k * self.step, 9)
         return math.radians(round(math.degrees(self.given) + sign * k * self.step, 9))
 
+    def steps_to(self, value: float) -> int:
+        """The number of steps k after which the value is this one."""
+        length = abs(value - self.given)
+        length = math.degrees(length) if self.unit == "rad" else length
+        return self.last if value == self.end else round(length / self.step)
+
     def applied(self, variant: Variant, k: int) -> Variant:
         """The case with this quantity k steps from the value given."""
         if k == 0:

@@ -81,23 +81,19 @@ class ThresholdSearch:
         probes = [self._extended(Probe(0, attempt), end) for attempt in motions]
         self.rivals = sorted(probes, key=lambda probe: -probe.k)
         good, other = self._outwards(self.rivals.pop(0))
-        reported = self._reported(good)
+        reported = self.reported(good)
         if not reported.feasible:  # the replay refuses what the search found
-            return Threshold(self.quantity, self._reported(Probe(0, self.motions[0])), reported)
+            return Threshold(self.quantity, self.reported(Probe(0, self.motions[0])), reported)
         self.good = good
         return Threshold(self.quantity, reported, other)
 
     def tighter(self, found: Threshold) -> Threshold:
         """The same threshold, its sides brought nearer to each other if that succeeds."""
-        good, other, apart = self.good, found.other, found.steps_apart
+        good, other = self.good, found.other
         if good is None or other is None:
             return found
-        near = (good.k + apart + k for k in (0, 1, -1))
-        bad = next((k for k in near if self.quantity.value(k) == other.value), None)
-        if bad is None:
-            return found
-        good, beyond = self._narrow(good, bad, other)
-        reported = self._reported(good)
+        good, beyond = self.narrow(good, self.quantity.steps_to(other.value), other)
+        reported = self.reported(good)
         if not reported.feasible:
             return found
         self.good = good
@@ -131,8 +127,8 @@ class ThresholdSearch:
                 attempt = self._search(end, q)
                 if attempt.found:
                     return Probe(end, attempt), None
-                return self._narrow(here, end, self._finding(end, attempt))
-        return self._narrow(here, end + 1)
+                return self.narrow(here, end, self._finding(end, attempt))
+        return self.narrow(here, end + 1)
 
     # -- a case that is not ----------------------------------------------------------------------
 
@@ -157,8 +153,8 @@ class ThresholdSearch:
                 proved += found.evidence is Evidence.PROOF
                 continue
             entry = Probe(k, found)
-            good, other = self._narrow(entry, before)
-            reported = self._reported(good)
+            good, other = self.narrow(entry, before)
+            reported = self.reported(good)
             if not reported.feasible:
                 return Threshold(self.quantity, None, reported)
             self.good = good
@@ -173,8 +169,8 @@ class ThresholdSearch:
         if self.quantity.kind is not Kind.STANDOFF:
             return None
         good, other = self._outwards(entry)
-        reported = self._reported(good)
-        return Span(reported, other) if reported.feasible else Span(self._reported(entry), reported)
+        reported = self.reported(good)
+        return Span(reported, other) if reported.feasible else Span(self.reported(entry), reported)
 
     def _look(self, k: int, seeds: Array) -> LimitedAttempt | Finding:
         """Is it feasible at k steps? An attempt if so, or what speaks against it."""
@@ -199,7 +195,7 @@ class ThresholdSearch:
 
     # -- between the two -------------------------------------------------------------------------
 
-    def _narrow(
+    def narrow(
         self, good: Probe, far: int, there: Finding | None = None
     ) -> tuple[Probe, Finding | None]:
         """From a feasible value towards one that is not, until they are neighbours or nearly so.
@@ -333,7 +329,7 @@ class ThresholdSearch:
         attempt = self.prober.attempt(arrays, seeds, most, deep, hard=hard)
         return held(self.prober.given, attempt, (self.quantity, k), False)
 
-    def _reported(self, probe: Probe) -> Finding:
+    def reported(self, probe: Probe) -> Finding:
         """A feasible probe as a finding, once its motion is replayed."""
         variant = self.quantity.applied(self.prober.given, probe.k)
         return self._finding(probe.k, self.prober.confirmed(variant, probe.attempt))

@@ -142,6 +142,8 @@ def _tables_of(case: Case, robots: Sequence[str]) -> list[Tables]:
     Raises:
         CaseError: see `compare`.
     """
+    from robots import RobotError
+
     base = {title: as_read(table) for title, table in case.to_tables().items()}
     if case.search.method != "complete":
         kept = ("seed", "time_limit")
@@ -165,7 +167,7 @@ def _tables_of(case: Case, robots: Sequence[str]) -> list[Tables]:
             arm_of(case_of(tables))
         except CaseError as error:
             faults += [fault._replace(key=f"{place}: {fault.key}") for fault in error.faults]
-        except ValueError as error:  # RobotError
+        except RobotError as error:
             faults.append(Fault(place, str(error)))
         else:
             made.append(tables)

@@ -26,12 +26,11 @@ from feasibility.viewer.poses import (
     class_layers,
     class_of_row,
     class_of_trial,
-    hidden,
     outline,
     placed,
     station_layers,
 )
-from feasibility.viewer.scene import Layer, cells_layers
+from feasibility.viewer.scene import Layer, cells_layers, hidden
 from feasibility.viewer.stage import framing, joint_points
 from feasibility.viewer.viewer import View, compose, titled
 from robots import Robot

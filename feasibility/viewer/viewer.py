@@ -3,7 +3,7 @@
     from feasibility.viewer import show
     show(verdict)
 
-Nothing but other views, reports and commands imports the viewer.
+Nothing but other views, reports, commands and the live page imports the viewer.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from coverable_arrays import Array
 from coverable_errors import counted
 from feasibility.collisions import gather, said_of
 from feasibility.cut_words import sentence
+from feasibility.safe_files import write_whole
 from feasibility.task import Task
 from feasibility.verdict import Verdict
 from feasibility.viewer import robot as robot_visuals
@@ -68,9 +69,8 @@ class View:
 
     def save_html(self, path: str | os.PathLike[str]) -> Path:
         """Write the page to a file and return its path."""
-        file = Path(path)
-        file.write_text(self.html(), encoding="utf-8")
-        return file
+        text = self.html()
+        return write_whole(path, lambda stream: stream.write(text.encode()))
 
     def show(self, open_browser: bool = True) -> LiveView:
         """Serve the page on 127.0.0.1 until the result is closed or this program ends."""

@@ -202,3 +202,8 @@ def test_notes_come_from_the_urdf_and_survive_pickling():
     assert all("continuous" in note for note in kinova.notes)
     assert pickle.loads(pickle.dumps(kinova)).notes == kinova.notes
     assert load_robot("puma560").notes == ()
+
+
+def test_a_tool_is_shown_without_the_noise_of_rounding():
+    off = ([0.1, -1e-28, 0.2], [0, 0, 0])
+    assert "tool 'tool0' + (0.1, 0, 0.2) m" in repr(load_robot("ur5", tcp=off))

@@ -31,7 +31,7 @@ def rolls_over(arrays, places, part):
 
 @kernel
 def roll_chord(arrays):
-    """2 sin(Theta / 2) of the lemma of this module."""
+    """2 sin(Theta / 2) of the lemma of `box_contraction`."""
     tilt = 1.0 - 0.25 * min(arrays.cone_chord, 2.0) ** 2
     cosine = np.cos(0.5 * min(arrays.roll[1], np.pi))
     return 2.0 * np.sqrt(max(1.0 - tilt * cosine * cosine, 0.0))

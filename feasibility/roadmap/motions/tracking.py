@@ -8,7 +8,6 @@ away from limits and from the boundaries of cone and roll, or to head for a goal
 step is kept only when `feasibility.roadmap.motions.segment_bound` shows that the straight joint
 segment obeys every constraint between its ends too; otherwise it is shortened. Where no step is
 short enough, the tool point may leave its target, within the tolerance.
-(Step 6 of the complete search.)
 """
 
 from __future__ import annotations

@@ -12,11 +12,13 @@ from bad_cases import GOOD, SURFACES
 
 from coverable_errors import MISSING
 from feasibility import Search
-from feasibility.cases import Case, CaseError, CollisionPart, all_keys
+from feasibility.cases import Case, CaseError, CollisionPart, all_keys, mesh_keys, surface_pieces
 from feasibility.cases.keys import keys_of, kinds
 from feasibility.cases.robot_table import RobotPart
 from feasibility.cases.surface_table import SurfacePart
 from feasibility.collisions import Collision
+from surfaces.meshes.cells import clustering
+from surfaces.piecewise import piecewise_surface
 
 WRONG = datetime.date(2026, 1, 1)  # no key takes a date
 ALTERNATIVES = {"name": "urdf", "urdf": "name", "points": "file", "file": "points",
@@ -301,3 +303,8 @@ def test_the_page_of_the_reference_is_in_step():
 
     page = Path(__file__).parents[3] / "docs" / "keys.md"
     assert page.read_text("utf-8") == as_page(), "run: python docs/keys.py"
+
+
+def test_a_case_may_have_as_many_pieces_and_cells_as_the_surfaces():
+    assert surface_pieces.MOST_PIECES == piecewise_surface.MOST_PIECES
+    assert mesh_keys.MOST_MESH_CELLS == clustering.MOST_CELLS

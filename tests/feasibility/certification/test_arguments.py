@@ -10,6 +10,7 @@ import pytest
 
 from coverable_errors import CoverableError, worded
 from feasibility import Search, Task, check
+from feasibility.certification.lever_bounds import peaks
 from robots import load_robot
 from surfaces import plane
 
@@ -80,3 +81,8 @@ def test_arguments_in_another_order_or_of_another_kind() -> None:
         assert [fault.split(":")[0] for fault in faults] == wrong
     with pytest.raises(TypeError, match=r"robot: .*cells: .*task: "):
         check(good[2], good[0], good[1])
+
+
+def test_ends_without_bounds_are_unknown_and_no_warning() -> None:
+    ends = np.array([np.inf, 1.0])
+    assert np.array_equal(peaks(ends, ends, np.array([np.inf, 0.0])), [np.nan, 1.0], equal_nan=True)

@@ -80,7 +80,6 @@ POINTS = [
     (feasibility.safe_files, "check_writable"),
     (feasibility.safe_files, "_mode"),
     (os, "fsync"),
-    (os, "chmod"),
     (os, "replace"),
     (command, "print_err"),
     (console, "_write"),

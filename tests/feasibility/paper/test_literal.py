@@ -133,3 +133,13 @@ def test_a_start_off_the_manifold_is_refused() -> None:
     far = sphere(1.0, (50, 75), (40, 85), position=(9, 0, 0)).cells(2, 2)
     with pytest.raises(ValueError, match="no start was found"):
         LiteralSearch.of(PUMA, far, task, search)
+
+
+def test_a_subclass_makes_searches_of_its_own() -> None:
+    """Whoever overrides a step of the algorithms is to measure that, and not the base class."""
+
+    class Turned(LiteralSearch):
+        """Looks at the J-cells in another order."""
+
+    search = Search(method="greedy", step_deg=1.0)
+    assert type(Turned.of(PUMA, DOME, Task(0.005, 45), search)) is Turned

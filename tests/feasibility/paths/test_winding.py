@@ -49,3 +49,10 @@ def test_home_says_which_turn_and_a_start_is_kept(verdict) -> None:
     assert replay(UR5, CELLS, TASK, found, EVERY).accepted
     begun = load_robot("ur5", start=walk.q[0].tolist())
     assert unwound(begun, replace(TASK, home_deg=tuple(home.tolist())), walk) is walk
+
+
+def test_joints_without_limits_are_turned_towards_zero(verdict) -> None:
+    free = replace(UR5, lower=np.full(6, -np.inf), upper=np.full(6, np.inf))
+    far = Walk(verdict.witness.q + 2.0 * np.pi, verdict.witness.cell)
+    found = unwound(free, TASK, far)  # a warning of numpy is an error here
+    assert np.abs(0.5 * (found.q.min(axis=0) + found.q.max(axis=0))).max() <= np.pi + 1e-9

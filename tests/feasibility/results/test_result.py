@@ -16,6 +16,8 @@ from feasibility.cases import Case
 from feasibility.results import archive, load_result, save_result
 from feasibility.results import result_file as result
 from feasibility.results.result_file import ResultError
+from feasibility.safe_files import FileError
+from feasibility.viewer import view
 
 
 def same_graph(a, b):
@@ -395,3 +397,19 @@ def test_a_new_file_has_the_usual_permissions_and_links_are_followed(tmp_path):
     save_result(small_verdict("plate"), case, tmp_path / "link")
     assert (tmp_path / "link").is_symlink()
     assert load_result(tmp_path / "plain").verdict.feasible
+
+
+def test_no_other_thread_sees_another_umask(tmp_path, monkeypatch):
+    """Nor is a page that cannot be written left half written."""
+    monkeypatch.setattr(os, "umask", None)
+    page = tmp_path / "page.html"
+    drawn = view(small_verdict("plate"))
+    assert drawn.save_html(page) == page
+    monkeypatch.setattr(os, "replace", lambda *_: no_space())
+    with pytest.raises(FileError, match="cannot be written"):
+        drawn.save_html(page)
+    assert [file.name for file in tmp_path.iterdir()] == ["page.html"]
+
+
+def no_space():
+    raise OSError(28, "No space left on device")

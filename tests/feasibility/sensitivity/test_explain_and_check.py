@@ -10,6 +10,7 @@ import pytest
 from feasibility import Answer, Search, Task, check
 from feasibility.cases import Case, load_case
 from feasibility.certification import replay
+from feasibility.clock import Clock
 from feasibility.reports.explanation import as_text
 from feasibility.sensitivity import Explanation, Kind, explain
 from feasibility.sensitivity.quantities import Variant, quantities
@@ -164,3 +165,27 @@ def test_limits_narrower_than_a_step_are_not_varied() -> None:
     names = {q.name for q in quantities(Variant(robot, PLATE.cells(3, 3), Task(0.02, 30)), False)}
     assert not any("wrist_3_joint" in name for name in names)
     assert "wrist_2_joint upper limit" in names
+
+
+def test_the_far_side_of_a_margin_is_one_where_check_finds_no_motion_either() -> None:
+    """What the short searches leave undecided, `check` decides, or does not decide either."""
+    given = Variant(load_robot("ur5"), PLATE.cells(2, 2), Task(0.02, 30))
+    found = explain(*given)
+    sides = [(t.quantity, t.other) for t in found.thresholds if t.other is not None]
+    assert len(sides) > 10
+    for quantity, other in sides:
+        verdict = check(*quantity.applied(given, quantity.steps_to(other.value)))
+        assert verdict.answer is other.answer, quantity.name
+        assert not verdict.feasible
+    assert sum(other.answer is Answer.INFEASIBLE for _, other in sides) > len(sides) // 2
+
+
+def test_a_search_ends_after_so_many_evaluations_on_any_machine() -> None:
+    """As at the deadline: undecided, and why cells are missed can still be read."""
+    robot, cells, task, _ = load_case("paper/5f").with_overrides(["task.standoff=0.505"]).build()
+    clock = Clock()
+    clock.evaluations = 30_000
+    verdict = check(robot, cells, task, clock=clock)
+    assert verdict.answer is Answer.UNDECIDED
+    assert 30_000 < verdict.statistics["fk"] < 100_000
+    assert len(verdict.causes) == len(cells) - verdict.n_covered
