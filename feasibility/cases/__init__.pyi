@@ -11,6 +11,7 @@ from .keys import Key as Key
 from .keys import all_keys as all_keys
 from .robot_table import RobotPart as RobotPart
 from .robot_table import in_robot_table as in_robot_table
+from .robot_table import is_urdf as is_urdf
 from .robot_table import read_robot as read_robot
 from .surface_keys import CLOSED_FORM_KINDS as CLOSED_FORM_KINDS
 from .surface_keys import OWN_KEYS as OWN_KEYS
@@ -18,6 +19,7 @@ from .surface_table import faults_of_building as faults_of_building
 from .surface_table import read_surface as read_surface
 from .table_reader import CaseError as CaseError
 from .table_reader import Section as Section
+from .table_reader import absolute as absolute
 from .table_reader import is_text as is_text
 from .toml import TomlError as TomlError
 from .toml import as_read as as_read
