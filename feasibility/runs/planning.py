@@ -86,7 +86,6 @@ def plan_passes(
         if shorter is not None:
             passes, cells = shorter, pass_toolpath(shorter, retract)
             verdict = check(robot, cells, alone, search, clock=clock)
-    passes = replace(passes, notes=(*passes.notes, *_stripes(passes, task)))
     return PlannedPasses(passes, pass_places(passes, retract), cells, task, verdict)
 
 
@@ -152,14 +151,3 @@ def _with_reached_overrun(passes: Passes, places: PassPlaces, reached: Mask) -> 
         f"{1e3 * cut / ends:.3g} mm on average"
     )
     return replace(passes, stretches=tuple(found), notes=(*passes.notes, note))
-
-
-def _stripes(passes: Passes, task: Task) -> tuple[str, ...]:
-    """Whether the footprint is too small for the distance between passes."""
-    if task.disc is None or passes.widest <= task.disc[1]:
-        return ()
-    across, between = 1e3 * task.disc[1], 1e3 * passes.widest
-    return (
-        f"the passes are up to {between:.4g} mm apart and the footprint is {across:.4g} mm wide: "
-        f"stripes up to {between - across:.3g} mm wide stay untreated",
-    )
