@@ -74,6 +74,7 @@ class Case:
     name: str = field(default="case", compare=False)
     """What it is called in reports: the built-in name, or the file's."""
     description: str = field(default="", compare=False)
+    """A sentence, and the settings that have replaced what it was about."""
     collision: CollisionPart | None = None
     """None where collisions are not checked."""
 
@@ -180,7 +181,7 @@ class Case:
         except TomlError as error:
             raise CaseError(str(error), name) from error
         make_absolute(tables, base_dir)
-        return _from_tables(tables, name, overrides)
+        return _from_tables(tables, name, tuple(overrides))
 
     def with_overrides(self, overrides: Iterable[str]) -> Case:
         """The case with some keys replaced, as `--set` does; see `from_toml`.
@@ -192,8 +193,7 @@ class Case:
             title: {key: as_read(value) for key, value in table.items()}
             for title, table in self.to_tables().items()
         }
-        made = _from_tables(tables, self.name, overrides)
-        return replace(made, description=self.description)
+        return _from_tables(tables, self.name, tuple(overrides), self.description)
 
 
 def load_case(name_or_path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Case:
@@ -243,13 +243,14 @@ def builtin_cases() -> Mapping[str, Case]:
             for title in TABLES
             if title in base or title in entry
         }
-        case = _from_tables(tables[name], name, ())
-        cases[name] = replace(case, description=entry["description"])
+        cases[name] = _from_tables(tables[name], name, (), entry["description"])
     return cases
 
 
-def _from_tables(tables: Tables, name: str, overrides: Iterable[str]) -> Case:
-    """Apply overrides, then check everything."""
+def _from_tables(
+    tables: Tables, name: str, overrides: Sequence[str], description: str = ""
+) -> Case:
+    """Apply overrides, which the description then names, and check everything."""
     faults: list[Fault] = []
     for setting in overrides:
         override(tables, setting, faults)
@@ -278,7 +279,9 @@ def _from_tables(tables: Tables, name: str, overrides: Iterable[str]) -> Case:
         faults += faults_of_meshes(tables.get("collision"))
     if faults or robot is None or surface is None or task is None or search is None:
         raise CaseError(faults, name)
-    return Case(robot, surface, task, search, name, collision=collision)
+    changed = f"changed: {', '.join(overrides)}" if overrides else ""
+    description = "; ".join(filter(None, (description, changed)))
+    return Case(robot, surface, task, search, name, description, collision)
 
 
 def _read_task(table: Any, faults: list[Fault]) -> Task | None:

@@ -132,7 +132,7 @@ def _path(table: dict[str, Any]) -> tuple[str, ...]:
 
 
 def override(tables: dict[str, Any], setting: str, faults: list[Fault]) -> None:
-    """Replace, add or remove one key."""
+    """Replace, add or remove one key; without a value a whole table too."""
     label = f"--set {setting if setting.isprintable() and len(setting) <= 80 else shown(setting)}"
     try:
         path, value = parse_setting(setting)
@@ -140,11 +140,13 @@ def override(tables: dict[str, Any], setting: str, faults: list[Fault]) -> None:
         faults.append(Fault(label, str(error)))
         return
     *folders, key = path
-    if not folders:
+    if not folders and value is not None:
         faults.append(Fault(label, "needs a table and a key, such as task.cone_deg=10"))
         return
     table: Any = tables
     for folder in folders:
+        if value is None and folder not in table:
+            return  # a table that is not there has nothing to remove, and is not made
         table = table.setdefault(folder, {})
         if not isinstance(table, dict):
             faults.append(Fault(label, f"{folder} is not a table"))
