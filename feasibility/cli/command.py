@@ -49,7 +49,7 @@ def add_command(
     """
     parser: argparse.ArgumentParser = subcommands.add_parser(name, allow_abbrev=False, **texts)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, command=name)
     for add in arguments:
         add(parser)
     return parser
@@ -182,7 +182,7 @@ def open_case(
             for note in bodies.notes if bodies is not None else ():
                 print_err(f"note: collisions: {note}")
             doing = "the search was prepared"
-            with compiling_notice(notice=MORE):
+            with compiling_notice(notice=MORE.format(args.command)):
                 yield OpenCase(case, setup, progress, clock, began)
         except OutOfTime as late:
             text = f"The time limit of {clock.limit:g} s ran out while {doing}"
