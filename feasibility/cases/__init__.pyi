@@ -27,3 +27,4 @@ from .toml import make_absolute as make_absolute
 from .toml import parse_toml as parse_toml
 from .toml import toml_document as toml_document
 from .toml import toml_key as toml_key
+from .units import unit_notes as unit_notes

@@ -156,7 +156,7 @@ def open_case(
     """
     with progress_bar() as progress:
         from coverable_errors import Fault
-        from feasibility.cases import CaseError, load_case
+        from feasibility.cases import CaseError, load_case, unit_notes
         from feasibility.clock import Clock, OutOfTime
         from feasibility.collisions import gather
         from feasibility.notices import CUTTING, MORE, compiling_notice
@@ -175,6 +175,8 @@ def open_case(
                 task, surface = setup.task, setup.cells.surface
                 bodies = gather(setup.robot, surface, task.collision, task.standoff)
             settle()
+            for note in unit_notes(case.to_tables(), setup.robot.length_unit):
+                print_err(f"note: {note}")
             for note in setup.robot.notes:
                 print_err(f"note: {setup.robot.name}: {note}")
             for note in setup.cells.notes:
