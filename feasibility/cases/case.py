@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -24,10 +25,12 @@ from feasibility.cases.toml import (
     TomlError,
     as_read,
     make_absolute,
+    make_relative,
     override,
     parse_toml,
     toml_document,
 )
+from feasibility.cases.toml_edits import differences, edited
 from feasibility.safe_files import FileError, read_text, shown_path
 from feasibility.search import Search
 from feasibility.targets import check_references
@@ -77,6 +80,8 @@ class Case:
     """A sentence, and the settings that have replaced what it was about."""
     collision: CollisionPart | None = None
     """None where collisions are not checked."""
+    source: tuple[str, str] | None = field(default=None, compare=False, repr=False)
+    """The text that it was read from, and the folder that its paths are relative to."""
 
     def built_task(self) -> Task:
         """The task with what the arm must stay clear of; meshes of the scene are read.
@@ -157,6 +162,26 @@ class Case:
         """The case as text that `from_toml` reads back as an equal case; paths are absolute."""
         return toml_document(self.to_tables())
 
+    def as_written(self) -> str:
+        """The case in the words of its file, for the folder that this is in; see `to_toml`.
+
+        What has changed since is changed there, so that comments and paths stay as they were; where
+        that is not possible, it is written anew, with paths relative to that folder.
+        """
+        if self.source is None:
+            return self.to_toml()
+        text, folder = self.source
+        with suppress(CaseError):  # the file alone may be no case
+            tables = [as_read(case.to_tables()) for case in (Case.from_toml(text, folder), self)]
+            for each in tables:
+                make_relative(each, folder)
+            made = edited(text, differences(*tables), tables[1])
+            if Case.from_toml(made, folder) == self:
+                return made
+        written = as_read(self.to_tables())
+        make_relative(written, folder)
+        return toml_document(written)
+
     @staticmethod
     def from_toml(
         text: str,
@@ -181,7 +206,8 @@ class Case:
         except TomlError as error:
             raise CaseError(str(error), name) from error
         make_absolute(tables, base_dir)
-        return _from_tables(tables, name, tuple(overrides))
+        made = _from_tables(tables, name, tuple(overrides))
+        return replace(made, source=(text, os.path.abspath(base_dir or "")))
 
     def with_overrides(self, overrides: Iterable[str]) -> Case:
         """The case with some keys replaced, as `--set` does; see `from_toml`.
@@ -193,7 +219,8 @@ class Case:
             title: {key: as_read(value) for key, value in table.items()}
             for title, table in self.to_tables().items()
         }
-        return _from_tables(tables, self.name, tuple(overrides), self.description)
+        made = _from_tables(tables, self.name, tuple(overrides), self.description)
+        return replace(made, source=self.source)
 
 
 def load_case(name_or_path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Case:

@@ -161,7 +161,7 @@ def test_no_limits_without_width_are_offered(name: str) -> None:
 
 
 def test_no_limit_is_offered_a_full_turn_beyond_what_the_joint_has() -> None:
-    """Whatever limits the case gives; those of the URDF are 180 deg for the elbow, 360 elsewhere."""
+    """Whatever limits the case gives; those of the URDF are 180 deg for the elbow, else 360."""
     given = {"elbow_joint": np.radians([-400.0, 900.0]), "wrist_1_joint": np.radians([-9.0, 9.0])}
     robot = load_robot("ur5").with_limits(given)
     found = quantities(Variant(robot, PLATE.cells(3, 3), Task(0.02, 30)), True)
