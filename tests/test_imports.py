@@ -101,7 +101,7 @@ feasibility.viewer: figures live_server nearest obstacles painter path_and_divis
 feasibility.viewer.passes
 feasibility.reports
 feasibility.live
-feasibility.cli: case_commands command console listing main passes path place study_compare verify
+feasibility.cli: case_commands command console listing main passes path place study_compare verify warm_up
 coverable_command
 feasibility.cli: __main__
 coverable

@@ -226,8 +226,8 @@ def _hints(verdict: Verdict, case: Case) -> list[str]:
             "coverable explain finds how far the cone, the limits and the rest can be tightened",
         ]
         replayed = verdict.witness is not None and len(verdict.cells)
-        shows = [*walk, "--html view.html shows it", *(more if replayed else [])]
-        return [*_treating_more(verdict, case), *shows]
+        treating = _treating_more(verdict, case)
+        return [*treating, *walk, "--html view.html shows it", *(more if replayed else [])]
     hints = []
     if not verdict.task.cone_deg > 0.0:
         hints.append("--set task.cone_deg=1 gives the tool axis a tolerance")
