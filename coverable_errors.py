@@ -211,16 +211,22 @@ class Checks:
         return options[0]
 
     def numbers(
-        self, key: str, value: Any, count: int, expected: str, largest: float = LARGEST
+        self,
+        key: str,
+        value: Any,
+        count: int,
+        expected: str,
+        largest: float = LARGEST,
+        remedy: str = "",
     ) -> list[float] | None:
-        """Some finite numbers, none beyond `largest`; None after a fault."""
+        """Some finite numbers, none beyond `largest`, or else a remedy; None after a fault."""
         items = value.tolist() if hasattr(value, "tolist") else value
         if isinstance(items, Sequence) and not isinstance(items, (str, bytes)):
             found = [real(item) for item in items]
             if len(found) == count and all(map(math.isfinite, found)):
                 if max(map(abs, found), default=0.0) <= largest:
                     return found
-                what = f"got {shown(value)}, with a number beyond {largest:g}"
+                what = f"got {shown(value)}, with a number beyond {largest:g}{remedy}"
                 self.keep(Fault(key, what, expected=expected))
                 return None
         self.wrong(key, value, expected)

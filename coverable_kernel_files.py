@@ -79,8 +79,8 @@ def load(kernel: Kernel, source: Path) -> Any:
     return None
 
 
-def keep(kernel: Kernel, source: Path, content: bytes) -> None:
-    """Write a kernel where it is found again; nowhere, if nothing can be written.
+def keep(kernel: Kernel, source: Path, content: bytes) -> Path | None:
+    """Write a kernel where it is found again; the folder, or None if nothing can be written.
 
     Args:
         kernel: which.
@@ -90,7 +90,8 @@ def keep(kernel: Kernel, source: Path, content: bytes) -> None:
     for folder in _own_folders(source):
         with contextlib.suppress(OSError):
             _write(folder, kernel, content, source.parent)
-            return
+            return folder
+    return None
 
 
 def is_safe(found: os.stat_result, code: os.stat_result, user: int) -> bool:

@@ -38,6 +38,8 @@ LIBRARY = (ModuleType, FunctionType, BuiltinFunctionType, np.ufunc, types.Type)
 COMPILED = ("py_func", "_defn", "_pyfunc")  # what compiled functions and intrinsics are made of
 # How kernels are compiled is in these files.
 HOW = b"".join(Path(str(f)).read_bytes() for f in (__file__, coverable_inner_kernels.__file__))
+KEPT_IN: set[Path | None] = set()
+"""Folders in which kernels of this process were kept; None for those that were kept nowhere."""
 Function = Any
 """A Python function."""
 
@@ -104,7 +106,7 @@ class KeptKernels:
         if not compiled.library.has_dynamic_globals:  # such as addresses
             without_bitcode(compiled.library)
             content = dumps(compiled._reduce())
-            keep(self.kernel(signature, compiled.codegen), self._source, content)
+            KEPT_IN.add(keep(self.kernel(signature, compiled.codegen), self._source, content))
 
     def flush(self) -> None:
         """numba would compile anew what has been compiled; names of files see to that here."""

@@ -10,11 +10,14 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
-COMPILING = "compiling {} (first run only, up to a minute) ..."
+COMPILING = (
+    "compiling {} (first run only, up to a minute; `coverable warm-up` compiles all there is at "
+    "once) ..."
+)
 NOTICE = COMPILING.format("the search kernels")
 CUTTING = COMPILING.format("the kernels that cut a surface into cells")
 COLLISIONS = COMPILING.format("the kernels that keep clear of collisions")
-MORE = COMPILING.format("what else this command needs")
+MORE = COMPILING.format("what else `coverable {}` needs")
 AREAS = COMPILING.format("the kernels that certify areas")
 REASONS = COMPILING.format("the kernels that say why cells are missed")
 GREEDY = COMPILING.format("the kernels of the greedy search")

@@ -116,11 +116,11 @@ def _tool_frame(checked: CheckedUrdf, link: str | None) -> tuple[str, str]:
         return "", f"{checked.path} has no link {link!r} for tool_frame; {hint}"
     if len(checked.leaves) == 1:
         return checked.leaves[0], ""
-    moved = _moved_links(checked)
-    leaves = [leaf for leaf in checked.leaves if leaf in moved]
-    known = next((name for name in TOOL_LINKS if name in moved), None)
+    bodies = _bodies(checked)
+    leaves = [leaf for leaf in checked.leaves if leaf in bodies]
+    known = next((name for name in TOOL_LINKS if name in bodies), None)
     if known is not None:
-        others = [repr(leaf) for leaf in leaves if leaf != known]
+        others = [repr(leaf) for leaf in leaves if bodies[leaf] != bodies[known]]
         beside = f"; joints also move {listed(others, MOST_OTHERS)}" if others else ""
         return known, f"tool_frame is {known!r}, chosen by its name{beside}"
     if len(leaves) == 1:
@@ -132,13 +132,13 @@ def _tool_frame(checked: CheckedUrdf, link: str | None) -> tuple[str, str]:
     )
 
 
-def _moved_links(checked: CheckedUrdf) -> set[str]:
-    """The links that a moving joint lies before, seen from the root."""
-    moved: set[str] = set()
+def _bodies(checked: CheckedUrdf) -> dict[str, str]:
+    """The links that a moving joint lies before, each with the first link that it is fixed to."""
+    first: dict[str, str] = {}
     for joint in checked.joints:  # from the root outwards
-        if joint.moves or joint.parent in moved:
-            moved.add(joint.child)
-    return moved
+        if joint.moves or joint.parent in first:
+            first[joint.child] = joint.child if joint.moves else first[joint.parent]
+    return first
 
 
 def suggestion(name: str, known: Sequence[str]) -> str:

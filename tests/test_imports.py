@@ -104,7 +104,7 @@ feasibility.viewer.passes
 feasibility.viewer.faces
 feasibility.reports
 feasibility.live
-feasibility.cli: case_commands command console listing main passes path place programs study_compare verify
+feasibility.cli: case_commands command console listing main passes path place programs study_compare verify warm_up
 coverable_command
 feasibility.cli: __main__
 coverable

@@ -1,7 +1,7 @@
 """A wheel that brings compiled kernels: `make wheel` writes it to dist/.
 
-The sources are copied, and commands of the copy are run that use all common kernels, compiled for
-any processor of this kind. What they kept goes into the copy as `coverable_shipped_kernels`, and
+The sources are copied, and the copy is warmed up, with kernels compiled for any processor of this
+kind. What they kept goes into the copy as `coverable_shipped_kernels`, and
 setuptools makes the wheel, for this Python and platform. Which installation may use which kernel is
 in the names of the files (`coverable_kernel_files.py`): elsewhere they are compiled as from source.
 """
@@ -22,32 +22,6 @@ ROOT = Path(__file__).resolve().parents[1]
 SOURCES = ("pyproject.toml", "README.md", "LICENSE", "coverable*.py")
 PACKAGES = ("coverable_meshes", "robots", "surfaces", "feasibility")
 FIRST = (("check", "paper/4a"), ("check", "paper/4d"))
-COMMANDS = (
-    *FIRST,
-    ("check", "paper/4a", "--set", "surface.position=[4, 0, 0]", "--area"),
-    ("check", "paper/5e", "--set", "collision.clearance=0.005"),
-    ("check", "paper/4f", "--set", "search.method=greedy"),
-    ("check", "{greedy}"),
-    ("check", "{mesh}", "--area"),
-    ("explain", "paper/4c"),
-    ("path", "paper/4a"),
-    ("path", "paper/4a", "--passes", "0", "--pitch", "0.1"),
-    ("divide", "paper/4d"),
-    ("place", "paper/4d", "--yaw", "-40", "40", "--count", "2", "--workers", "1"),
-)
-MESH = """
-[robot]
-name = "ur5"
-[surface]
-kind = "mesh"
-file = "sheet.off"
-position = [0.4, -0.1, 0.2]
-side = "outside"
-cells = 6
-[task]
-standoff = 0.02
-cone_deg = 30
-"""
 # Machine code is for one architecture, where Python itself may be for two.
 PLATFORM = sysconfig.get_platform().replace("universal2", platform.machine())
 SETUP = """
@@ -68,7 +42,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         source, kept = Path(folder) / "source", Path(folder) / "kept"
         copy_sources(source)
-        for command in FIRST if given.first else COMMANDS:
+        for command in FIRST if given.first else [("warm-up",)]:
             print("compiling for: coverable", *command, flush=True)
             compile_kernels(source, kept, command)
         kernels = collect(kept, source / "coverable_shipped_kernels")
@@ -92,15 +66,6 @@ def compile_kernels(source: Path, kept: Path, command: tuple[str, ...]) -> None:
     Raises:
         subprocess.CalledProcessError: if it neither decides nor says why not.
     """
-    inputs = kept.parent / "cases"
-    inputs.mkdir(exist_ok=True)
-    (inputs / "mesh.toml").write_text(MESH)
-    (inputs / "sheet.off").write_text(sheet())
-    files = {
-        "{mesh}": str(inputs / "mesh.toml"),
-        "{greedy}": str(ROOT / "tests/feasibility/paper/greedy_on_a_torus.toml"),
-    }
-    words = [files.get(word, word) for word in command]
     environment = {
         **os.environ,
         "PYTHONPATH": str(source),
@@ -111,25 +76,11 @@ def compile_kernels(source: Path, kept: Path, command: tuple[str, ...]) -> None:
         "NUMBA_DISABLE_INTEL_SVML": "1",  # its functions need not be there elsewhere
     }
     done = subprocess.run(
-        [sys.executable, "-m", "feasibility.cli", *words],
-        cwd=inputs, env=environment, stdout=subprocess.DEVNULL, check=False,
+        [sys.executable, "-m", "feasibility.cli", *command],
+        cwd=kept.parent, env=environment, stdout=subprocess.DEVNULL, check=False,
     )  # fmt: skip
     if done.returncode not in (0, 1, 3):  # feasible, infeasible, undecided
         raise subprocess.CalledProcessError(done.returncode, ["coverable", *command])
-
-
-def sheet() -> str:
-    """A bent sheet of triangles, as OFF."""
-    count = 13
-    grid = [(i / 60, j / 60) for i in range(count) for j in range(count)]
-    points = [f"{x:.6f} {y:.6f} {0.5 * (x - 0.1) ** 2:.6f}" for x, y in grid]
-    corners = [i * count + j for i in range(count - 1) for j in range(count - 1)]
-    triangles = [
-        f"3 {k} {k + one} {k + other}"
-        for k in corners
-        for one, other in ((count, count + 1), (count + 1, 1))
-    ]
-    return "\n".join(["OFF", f"{len(points)} {len(triangles)} 0", *points, *triangles, ""])
 
 
 def collect(kept: Path, to: Path) -> int:

@@ -11,12 +11,14 @@ from .keys import Key as Key
 from .keys import all_keys as all_keys
 from .robot_table import RobotPart as RobotPart
 from .robot_table import in_robot_table as in_robot_table
+from .robot_table import is_urdf as is_urdf
 from .robot_table import read_robot as read_robot
 from .surface_keys import OWN_KEYS as OWN_KEYS
 from .surface_table import faults_of_building as faults_of_building
 from .surface_table import read_surface as read_surface
 from .table_reader import CaseError as CaseError
 from .table_reader import Section as Section
+from .table_reader import absolute as absolute
 from .table_reader import is_text as is_text
 from .toml import TomlError as TomlError
 from .toml import as_read as as_read
@@ -24,3 +26,4 @@ from .toml import make_absolute as make_absolute
 from .toml import parse_toml as parse_toml
 from .toml import toml_document as toml_document
 from .toml import toml_key as toml_key
+from .units import unit_notes as unit_notes

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -25,10 +26,12 @@ from feasibility.cases.toml import (
     TomlError,
     as_read,
     make_absolute,
+    make_relative,
     override,
     parse_toml,
     toml_document,
 )
+from feasibility.cases.toml_edits import differences, edited
 from feasibility.safe_files import FileError, read_text, shown_path
 from feasibility.search import Search
 from feasibility.targets import check_references
@@ -75,8 +78,11 @@ class Case:
     name: str = field(default="case", compare=False)
     """What it is called in reports: the built-in name, or the file's."""
     description: str = field(default="", compare=False)
+    """A sentence, and the settings that have replaced what it was about."""
     collision: CollisionPart | None = None
     """None where collisions are not checked."""
+    source: tuple[str, str] | None = field(default=None, compare=False, repr=False)
+    """The text that it was read from, and the folder that its paths are relative to."""
 
     def built_task(self) -> Task:
         """The task with what the arm must stay clear of; meshes of the scene are read.
@@ -160,6 +166,26 @@ class Case:
         """The case as text that `from_toml` reads back as an equal case; paths are absolute."""
         return toml_document(self.to_tables())
 
+    def as_written(self) -> str:
+        """The case in the words of its file, for the folder that this is in; see `to_toml`.
+
+        What has changed since is changed there, so that comments and paths stay as they were; where
+        that is not possible, it is written anew, with paths relative to that folder.
+        """
+        if self.source is None:
+            return self.to_toml()
+        text, folder = self.source
+        with suppress(CaseError):  # the file alone may be no case
+            tables = [as_read(case.to_tables()) for case in (Case.from_toml(text, folder), self)]
+            for each in tables:
+                make_relative(each, folder)
+            made = edited(text, differences(*tables), tables[1])
+            if Case.from_toml(made, folder) == self:
+                return made
+        written = as_read(self.to_tables())
+        make_relative(written, folder)
+        return toml_document(written)
+
     @staticmethod
     def from_toml(
         text: str,
@@ -184,7 +210,8 @@ class Case:
         except TomlError as error:
             raise CaseError(str(error), name) from error
         make_absolute(tables, base_dir)
-        return _from_tables(tables, name, overrides)
+        made = _from_tables(tables, name, tuple(overrides))
+        return replace(made, source=(text, os.path.abspath(base_dir or "")))
 
     def with_overrides(self, overrides: Iterable[str]) -> Case:
         """The case with some keys replaced, as `--set` does; see `from_toml`.
@@ -196,8 +223,8 @@ class Case:
             title: {key: as_read(value) for key, value in table.items()}
             for title, table in self.to_tables().items()
         }
-        made = _from_tables(tables, self.name, overrides)
-        return replace(made, description=self.description)
+        made = _from_tables(tables, self.name, tuple(overrides), self.description)
+        return replace(made, source=self.source)
 
 
 def load_case(name_or_path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Case:
@@ -247,13 +274,14 @@ def builtin_cases() -> Mapping[str, Case]:
             for title in TABLES
             if title in base or title in entry
         }
-        case = _from_tables(tables[name], name, ())
-        cases[name] = replace(case, description=entry["description"])
+        cases[name] = _from_tables(tables[name], name, (), entry["description"])
     return cases
 
 
-def _from_tables(tables: Tables, name: str, overrides: Iterable[str]) -> Case:
-    """Apply overrides, then check everything."""
+def _from_tables(
+    tables: Tables, name: str, overrides: Sequence[str], description: str = ""
+) -> Case:
+    """Apply overrides, which the description then names, and check everything."""
     faults: list[Fault] = []
     for setting in overrides:
         override(tables, setting, faults)
@@ -285,7 +313,9 @@ def _from_tables(tables: Tables, name: str, overrides: Iterable[str]) -> Case:
         faults += faults_of_meshes(tables.get("collision"))
     if faults or robot is None or surface is None or task is None or search is None:
         raise CaseError(faults, name)
-    return Case(robot, surface, task, search, name, collision=collision)
+    changed = f"changed: {', '.join(overrides)}" if overrides else ""
+    description = "; ".join(filter(None, (description, changed)))
+    return Case(robot, surface, task, search, name, description, collision)
 
 
 def _read_task(table: Any, faults: list[Fault]) -> Task | None:

@@ -19,6 +19,7 @@ from feasibility.cases.table_reader import (
     Pair,
     Section,
     Triple,
+    absolute,
     frozen,
     is_text,
 )
@@ -198,6 +199,11 @@ def _starting_at(robot: Robot, start: tuple[float, ...], in_degrees: bool) -> Ro
         raise RobotError(faults, source) from error
 
 
+def is_urdf(name: str) -> bool:
+    """Is this the path of a URDF or xacro file, not the name of an arm?"""
+    return os.sep in name or name.lower().endswith(URDF_ENDINGS)
+
+
 def _radians(pair: Pair) -> Pair:
     """Both ends in radians."""
     return math.radians(pair[0]), math.radians(pair[1])
@@ -231,12 +237,12 @@ def _part(section: Section) -> RobotPart:
         section.fault("name", "contradicts robot.urdf; give one of the two")
     elif not section.table.keys() & {"name", "urdf"} and section.is_table:
         section.fault("name", "is missing; expected the name of a robot, or urdf = a URDF file")
-    if name is not None and (os.sep in name or name.lower().endswith(URDF_ENDINGS)):
+    if name is not None and is_urdf(name):
         section.fault("name", f"must be a name, got the path {shown(name)}; write urdf = it")
         name = None
     part = RobotPart(
         name=name,
-        urdf=None if urdf is None else os.path.abspath(os.path.expanduser(urdf)),
+        urdf=None if urdf is None else absolute(urdf),
         package_dirs=_package_dirs(section),
         tool_frame=section.text("tool_frame"),
         limits=section.text("limits"),
@@ -329,4 +335,4 @@ def _package_dirs(section: Section) -> tuple[str, ...]:
     if not isinstance(value, list) or not all(map(is_text, value)):
         section.wrong_type("package_dirs", value)
         return ()
-    return tuple(os.path.abspath(os.path.expanduser(folder)) for folder in value)
+    return tuple(map(absolute, value))

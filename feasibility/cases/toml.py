@@ -6,7 +6,7 @@ import json
 import os
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from itertools import accumulate
 from typing import Any
 
@@ -20,7 +20,7 @@ MOST_KEYS = 50_000  # parts of all keys together
 
 # What may hold brackets, dots and equals signs that mean nothing. A string that never ends goes to
 # the end of its line or of the text; the parser refuses it there.
-_STRINGS_AND_COMMENTS = re.compile(
+STRINGS_AND_COMMENTS = re.compile(
     r'"""(?:[^\\"]|\\.|"{1,2}(?!"))*+"{0,5}'
     r"|'''(?:[^']|'{1,2}(?!'))*+'{0,5}"
     r'|"(?:[^\\"\n]|\\.)*+"?'
@@ -32,6 +32,9 @@ _PATH = re.compile(r"(?<![\w-])[\w-]++(?:[ \t]*+\.[ \t]*+[\w-]++)*+")
 _KEY = re.compile(
     rf"{_PATH.pattern}(?=[ \t]*+=)|^[ \t]*+\[\[?+[ \t]*+{_PATH.pattern}[ \t]*+\]", re.MULTILINE
 )
+# An array as it is written over several lines, without one inside that is written so.
+_OPENED = re.compile(r"^(.*)\[\n((?: +.*[^\[\n]\n)+?) *\]", re.MULTILINE)
+WIDTH = 100  # of a line
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+", re.ASCII)
 
 
@@ -54,7 +57,17 @@ def toml_document(tables: Mapping[str, Any]) -> str:
     """
     import tomli_w
 
-    return tomli_w.dumps({name: table for name, table in tables.items() if table != {}})
+    text = tomli_w.dumps({name: table for name, table in tables.items() if table != {}})
+    before = ""
+    while text != before:  # from the inside outwards
+        before, text = text, _OPENED.sub(_on_one_line, text)
+    return text
+
+
+def _on_one_line(found: re.Match[str]) -> str:
+    """An array that is written over several lines, on one if it fits."""
+    short = f"{found[1]}[{', '.join(line.strip(' ,') for line in found[2].splitlines())}]"
+    return short if len(short) <= WIDTH else found[0]
 
 
 def parse_toml(text: str) -> dict[str, Any]:
@@ -132,7 +145,7 @@ def _path(table: dict[str, Any]) -> tuple[str, ...]:
 
 
 def override(tables: dict[str, Any], setting: str, faults: list[Fault]) -> None:
-    """Replace, add or remove one key."""
+    """Replace, add or remove one key; without a value a whole table too."""
     label = f"--set {setting if setting.isprintable() and len(setting) <= 80 else shown(setting)}"
     try:
         path, value = parse_setting(setting)
@@ -140,11 +153,13 @@ def override(tables: dict[str, Any], setting: str, faults: list[Fault]) -> None:
         faults.append(Fault(label, str(error)))
         return
     *folders, key = path
-    if not folders:
+    if not folders and value is not None:
         faults.append(Fault(label, "needs a table and a key, such as task.cone_deg=10"))
         return
     table: Any = tables
     for folder in folders:
+        if value is None and folder not in table:
+            return  # a table that is not there has nothing to remove, and is not made
         table = table.setdefault(folder, {})
         if not isinstance(table, dict):
             faults.append(Fault(label, f"{folder} is not a table"))
@@ -157,33 +172,40 @@ def override(tables: dict[str, Any], setting: str, faults: list[Fault]) -> None:
 
 def make_absolute(tables: dict[str, Any], base_dir: str | os.PathLike[str] | None) -> None:
     """Make the paths of a case file independent of the working directory, where they are paths."""
-    if base_dir is None:
-        return
+    if base_dir is not None:
+        _change_paths(tables, lambda path: os.path.join(base_dir, os.path.expanduser(path)))
 
-    def absolute(value: Any) -> Any:
-        if not isinstance(value, str) or not value.strip():
-            return value
-        return os.path.join(base_dir, os.path.expanduser(value))
+
+def make_relative(tables: dict[str, Any], base_dir: str | os.PathLike[str]) -> None:
+    """Make the paths of a case relative to the folder of its file."""
+    _change_paths(tables, lambda path: os.path.relpath(path, base_dir))
+
+
+def _change_paths(tables: dict[str, Any], change: Callable[[str], str]) -> None:
+    """Change the paths of a case file, where they are paths."""
+
+    def changed(value: Any) -> Any:
+        return change(value) if isinstance(value, str) and value.strip() else value
 
     robot, surface = tables.get("robot"), tables.get("surface")
     if isinstance(robot, dict):
         if "urdf" in robot:
-            robot["urdf"] = absolute(robot["urdf"])
+            robot["urdf"] = changed(robot["urdf"])
         if isinstance(robot.get("package_dirs"), list):
-            robot["package_dirs"] = [absolute(folder) for folder in robot["package_dirs"]]
+            robot["package_dirs"] = [changed(folder) for folder in robot["package_dirs"]]
     if isinstance(surface, dict):
         pieces = surface.get("pieces")
         for piece in (surface, *(pieces if isinstance(pieces, list) else ())):
             if isinstance(piece, dict) and "file" in piece:
-                piece["file"] = absolute(piece["file"])
+                piece["file"] = changed(piece["file"])
     collision = tables.get("collision")
     if isinstance(collision, dict):
         if "srdf" in collision:
-            collision["srdf"] = absolute(collision["srdf"])
+            collision["srdf"] = changed(collision["srdf"])
         for objects in (collision.get("scene"), collision.get("tool")):
             for entry in objects if isinstance(objects, list) else ():
                 if isinstance(entry, dict) and "file" in entry:
-                    entry["file"] = absolute(entry["file"])
+                    entry["file"] = changed(entry["file"])
 
 
 def as_read(value: Any) -> Any:
@@ -204,7 +226,7 @@ def too_much(text: str) -> str:
         >>> too_much("a = " + 20 * "[")
         'is nested too deeply: 20 brackets are open at once, more than 16'
     """
-    bare = _STRINGS_AND_COMMENTS.sub(lambda found: "" if found[0][0] == "#" else "s", text)
+    bare = STRINGS_AND_COMMENTS.sub(lambda found: "" if found[0][0] == "#" else "s", text)
     steps = (1 if bracket in "[{" else -1 for bracket in re.findall(r"[\[\]{}]", bare))
     deepest = max(accumulate(steps), default=0)
     deep = "is nested too deeply:"

@@ -49,7 +49,7 @@ def add_command(
     """
     parser: argparse.ArgumentParser = subcommands.add_parser(name, allow_abbrev=False, **texts)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, command=name)
     for add in arguments:
         add(parser)
     return parser
@@ -156,7 +156,7 @@ def open_case(
     """
     with progress_bar() as progress:
         from coverable_errors import Fault
-        from feasibility.cases import CaseError, load_case
+        from feasibility.cases import CaseError, load_case, unit_notes
         from feasibility.clock import Clock, OutOfTime
         from feasibility.collisions import gather
         from feasibility.notices import CUTTING, MORE, compiling_notice
@@ -175,6 +175,8 @@ def open_case(
                 task, surface = setup.task, setup.cells.surface
                 bodies = gather(setup.robot, surface, task.collision, task.standoff)
             settle()
+            for note in unit_notes(case.to_tables(), setup.robot.length_unit):
+                print_err(f"note: {note}")
             for note in setup.robot.notes:
                 print_err(f"note: {setup.robot.name}: {note}")
             for note in setup.cells.notes:
@@ -182,7 +184,7 @@ def open_case(
             for note in bodies.notes if bodies is not None else ():
                 print_err(f"note: collisions: {note}")
             doing = "the search was prepared"
-            with compiling_notice(notice=MORE):
+            with compiling_notice(notice=MORE.format(args.command)):
                 yield OpenCase(case, setup, progress, clock, began)
         except OutOfTime as late:
             text = f"The time limit of {clock.limit:g} s ran out while {doing}"

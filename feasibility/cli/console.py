@@ -114,7 +114,8 @@ class Bar:
 
         text = TextColumn("{task.description}", markup=False)
         columns = (text, BarColumn(), MofNCompleteColumn(), Elapsed())
-        self._bar = Progress(*columns, console=Console(stderr=True), transient=True)
+        # On this very stream: what a command says inside of another one may go elsewhere.
+        self._bar = Progress(*columns, console=Console(file=sys.stderr), transient=True)
         self._task = self._bar.add_task("", total=None)
         self._bar.start()
 

@@ -20,8 +20,9 @@ def add(subcommands: argparse._SubParsersAction) -> None:
     add_command(subcommands, "robots", robots, help="list the robots by name")
     parser = add_command(subcommands, "keys", keys, help="print the reference of the case file")
     parser.add_argument(
-        "table", metavar="TABLE", nargs="?",
-        help="robot, surface, task, collision or search; or a kind of surface, such as mesh",
+        "table", metavar="TABLE", nargs="*",
+        help="robot, surface, task, collision or search; or a kind of surface, such as mesh or "
+        "surface mesh",
     )  # fmt: skip
 
 
@@ -43,7 +44,7 @@ def keys(args: argparse.Namespace, began: float) -> int:
     """`coverable keys [TABLE]`: what a case file can say."""
     from feasibility.reports import keys as report
 
-    found = report.keys_under(args.table)
+    found = report.keys_under(".".join(args.table) if args.table else None)
     print_out(json_text(report.as_json(found)) if args.json else report.as_text(found))
     return 0
 

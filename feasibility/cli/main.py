@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from coverable_errors import CoverableError
-from feasibility.cli import case_commands, listing, path, place, study_compare, verify
+from feasibility.cli import case_commands, listing, path, place, study_compare, verify, warm_up
 from feasibility.cli.command import BAD_INPUT, STATUS, TooLate, json_text
 from feasibility.cli.console import prepare, print_err, print_out
 from feasibility.interrupts import INTERRUPTED, MESSAGE, interruptible, leave_at_once
@@ -53,7 +53,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     subcommands = parser.add_subparsers(metavar="COMMAND", required=True)
-    for commands in (case_commands, path, verify, study_compare, place, listing):
+    for commands in (case_commands, path, verify, study_compare, place, listing, warm_up):
         commands.add(subcommands)
     return parser
 

@@ -173,7 +173,7 @@ def _view(
     from feasibility.viewer.passes import view_passes
 
     if along is None:
-        return view_path(found, run, opened.case.name, limits)
+        return view_path(found, run, opened.case.name, limits, treated)
     return view_passes(along, [found], treated, run, opened.case.name, limits)
 
 

@@ -42,8 +42,9 @@ def add(subcommands: argparse._SubParsersAction) -> None:
         description="Decide the same case for several arms.",
     )  # fmt: skip
     parser.add_argument(
-        "--robots", metavar="NAMES", required=True, help="names of arms, such as ur5,panda,kinova"
-    )
+        "--robots", metavar="NAMES", required=True,
+        help="names of arms, and paths of URDFs: ur5,panda,my_arm.urdf",
+    )  # fmt: skip
     parser.add_argument(
         "--critical", action="store_true", help="also find the smallest cone of each arm (slow)"
     )

@@ -106,7 +106,11 @@ class PageServer(LocalServer):
     def _save(self, asked: Mapping[str, Any]) -> dict[str, Any]:
         """The case with the values of a page as text, for the browser to keep."""
         try:
-            return {"toml": self.controls.changed(asked.get("values")).to_toml()}
+            case = self.controls.changed(asked.get("values"))
+            text, of = case.as_written(), f"# As `coverable live` showed {case.name}"
+            if case.source is not None and not text.startswith(of):
+                text = f"{of}; its paths are relative to the folder of that file.\n{text}"
+            return {"toml": text}
         except CoverableError as error:
             return {"error": str(error)}
 

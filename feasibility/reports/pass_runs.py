@@ -45,7 +45,7 @@ def as_json(
         "verdict": str(along.verdict.answer),
         "evidence": str(along.verdict.evidence),
         "message": along.verdict.message,
-        "passes": passes_json(along.passes),
+        "passes": passes_json(along.passes, treated),
         "runs": [
             {
                 "stretches": [1 + stretch for stretch in found.stretches_of(run)],
@@ -77,8 +77,8 @@ def as_json(
     }
 
 
-def passes_json(passes: Passes) -> dict[str, Any]:
-    """How passes are laid out."""
+def passes_json(passes: Passes, treated: TreatedArea | None) -> dict[str, Any]:
+    """How passes are laid out; `treated` is what their motion treats."""
     return {
         "count": passes.count,
         "stretches": len(passes.stretches),
@@ -89,12 +89,12 @@ def passes_json(passes: Passes) -> dict[str, Any]:
         "length_m": passes.length,
         "dropped_m": passes.dropped,
         "beyond_border_m": passes.beyond_border,
-        "notes": list(passes.notes),
+        "notes": [*passes.notes, *_stripes(passes, treated)],
     }
 
 
-def passes_text(passes: Passes) -> str:
-    """Passes in words."""
+def passes_text(passes: Passes, treated: TreatedArea | None) -> str:
+    """Passes in words; `treated` is what their motion treats."""
     words = f"{passes.count}, {1e3 * passes.spacing:.4g} mm apart"
     if passes.widest > 1.001 * passes.spacing:
         words += f" ({1e3 * passes.widest:.4g} mm where the surface slopes)"
@@ -103,7 +103,21 @@ def passes_text(passes: Passes) -> str:
     words += f", {passes.length:.4g} m together"
     if passes.dropped > 0.0:
         words += f"; {passes.dropped:.3g} m left out in pieces too short to run"
-    return "; ".join([words, *passes.notes])
+    return "; ".join([words, *passes.notes, *_stripes(passes, treated)])
+
+
+def _stripes(passes: Passes, treated: TreatedArea | None) -> tuple[str, ...]:
+    """That passes are too far apart for the footprint, where something is measured to be untreated.
+
+    Passes that cross may treat what lies between, and stripes may be too narrow to measure.
+    """
+    if treated is None or not treated.untreated or passes.widest <= treated.footprint[1]:
+        return ()
+    across, between = 1e3 * treated.footprint[1], 1e3 * passes.widest
+    return (
+        f"the passes are up to {between:.4g} mm apart and the footprint is {across:.4g} mm wide: "
+        f"stripes up to {between - across:.3g} mm wide are left between them",
+    )
 
 
 def _bound_json(along: PlannedPasses, found: PassRuns) -> dict[str, Any]:
@@ -152,7 +166,7 @@ def as_text(
         else "no part of them can be run."
     )
     rows = [
-        ("passes", passes_text(along.passes)),
+        ("passes", passes_text(along.passes, treated)),
         ("one motion", along.verdict.message),
         ("runs", _fewest_words(found)),
         ("left out", _left_words(along, found)),

@@ -85,7 +85,7 @@ def as_json(
         },
         "certificate": certificate_json(path.certificate) | clearance_json(path.certificate),
         "treated": treated_json(treated),
-        "passes": None if passes is None else passes_json(passes),
+        "passes": None if passes is None else passes_json(passes, treated),
         "trajectory": None if trajectory is None else _timing(path, trajectory, limits),
         **rates_json(path, rates, trajectory),
         **ends_json(ends),
@@ -212,7 +212,8 @@ def as_text(
     rows += [("speed", rates_words(path, rates, trajectory)), ("ends", ends_words(ends))]
     head = f"path: one continuous motion over {over}."
     if passes is not None:
-        rows[:2] = [("passes", passes_text(passes)), ("length", f"{figures.length:.4g} m in all")]
+        laid = passes_text(passes, treated)
+        rows[:2] = [("passes", laid), ("length", f"{figures.length:.4g} m in all")]
         head = f"path: one continuous motion along {counted(passes.count, 'pass', 'passes')}."
     return "\n".join(summary(head, rows, said_of(path.robot, path.task.collision), 14))
 

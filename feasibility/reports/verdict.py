@@ -25,7 +25,7 @@ from feasibility.reports.parts import (
     walk_csv,
 )
 from feasibility.reports.proof import proof_json
-from feasibility.treated import treated_json, treated_words
+from feasibility.treated import share_words, treated_json, treated_words
 from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict, Walk
 from feasibility.version import version
 from surfaces import Cells
@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from feasibility.area import CertifiedArea
 
 DETAILS = 3  # cells of one group whose details are listed
+ENOUGH = 0.99  # [1] share of the area, below which it is said how to treat more
+OVERLAPPING = 0.9  # [1] of the footprint: passes that far apart leave nothing between them
 PHASES = {"search_s": "search", "certify_s": "certificate"}
 
 SENTENCES = {
@@ -41,6 +43,7 @@ SENTENCES = {
     Answer.INFEASIBLE: "infeasible: no single continuous motion covers the whole surface.",
     Answer.UNDECIDED: "undecided: neither a covering motion nor a proof against one was found.",
 }
+FEASIBLE_CELLS = "feasible: one continuous motion visits every cell"
 EMPTY = "feasible: there are no cells, so there is nothing to cover; the arm was not looked at."
 GREEDY_NO = "infeasible: not found by the greedy search, which cannot rule a motion out."
 EVIDENCE = {
@@ -118,9 +121,7 @@ def as_text(
     said = said_of(verdict.robot, verdict.task.collision)
     if not len(verdict.cells):
         return "\n".join(summary(EMPTY, [title], said))
-    head = SENTENCES[verdict.answer]
-    if _falls_short(verdict):
-        head = f"undecided: {SHORT}."
+    head = _with_share(SENTENCES[verdict.answer], verdict)
     if verdict.answer is Answer.INFEASIBLE and verdict.method == "greedy":
         head = GREEDY_NO
     rows = [
@@ -138,10 +139,23 @@ def as_text(
     groups = list(causes_listed(verdict.causes, verdict.cells))
     if groups:
         lines += ["", "Not covered:", *groups]
-    hints = _hints(verdict)
+    hints = _hints(verdict, case)
     if hints:
         lines += ["", "To try next:", *(f"  {hint}" for hint in hints)]
     return "\n".join(lines)
+
+
+def _with_share(sentence: str, verdict: Verdict) -> str:
+    """The sentence; with a footprint how much of the area the motion treats, in its place."""
+    task, treated = verdict.task, verdict.treated
+    if treated is None:
+        unknown = task.footprint is not None and verdict.feasible
+        return f"{FEASIBLE_CELLS}; what it treats is not measured." if unknown else sentence
+    treats = f"treats {share_words(treated)} of the area"
+    if not _falls_short(verdict):
+        return f"{FEASIBLE_CELLS} and {treats}."
+    required = "" if task.coverage is None else f", where {100.0 * task.coverage:g} % is required"
+    return f"undecided: one continuous motion visits every cell and {treats}{required}."
 
 
 def rows_of(verdict: Verdict) -> list[tuple[str, str]]:
@@ -205,8 +219,10 @@ def causes_listed(missed: Iterable[Cause], cells: Cells) -> Iterator[str]:
             yield f"    ... and {len(causes) - DETAILS:,} more (--json lists all)"
 
 
-def _hints(verdict: Verdict) -> list[str]:
+def _hints(verdict: Verdict, case: Case) -> list[str]:
     """What to try next."""
+    if _falls_short(verdict):
+        return _treating_more(verdict, case)
     if verdict.answer is Answer.FEASIBLE:
         stored = verdict.witness is not None or verdict.tree is not None
         walk = ["--witness walk.csv writes the motion"] if stored else []
@@ -215,10 +231,9 @@ def _hints(verdict: Verdict) -> list[str]:
             "coverable explain finds how far the cone, the limits and the rest can be tightened",
         ]
         replayed = verdict.witness is not None and len(verdict.cells)
-        return [*walk, "--html view.html shows it", *(more if replayed else [])]
+        treating = _treating_more(verdict, case)
+        return [*treating, *walk, "--html view.html shows it", *(more if replayed else [])]
     hints = []
-    if _falls_short(verdict):
-        return ["--set surface.cells=auto cuts cells that are fine enough for the footprint"]
     if not verdict.task.cone_deg > 0.0:
         hints.append("--set task.cone_deg=1 gives the tool axis a tolerance")
     elif verdict.answer is Answer.UNDECIDED and "time limit" in verdict.message:
@@ -244,6 +259,28 @@ def _hints(verdict: Verdict) -> list[str]:
         hints.append(f"{_narrower(verdict)} leaves out cells that need a second motion")
     shows = "it" if verdict.covered.all() else "which cells are missed"
     hints.append(f"--html view.html shows {shows}")
+    return hints
+
+
+def _treating_more(verdict: Verdict, case: Case) -> list[str]:
+    """What would treat more of the area; nothing where enough is treated."""
+    task, treated = verdict.task, verdict.treated
+    if treated is None or task.disc is None:
+        return []
+    if treated.lower >= (ENOUGH if task.coverage is None else task.coverage):
+        return []
+    surface, hints = case.surface, []
+    if surface.kind == "piecewise":
+        hints.append('cells = "auto" in each of surface.pieces cuts cells as fine as the footprint')
+    elif not surface.automatic:
+        sized = "" if surface.values.get("cell_size") is None else "--set surface.cell_size= "
+        hints.append(f"{sized}--set surface.cells=auto cuts cells as fine as the footprint")
+    pitch = f"{OVERLAPPING * task.disc[1]:.2g}"
+    hints.append(
+        f"coverable path --passes best --pitch {pitch}, with the same case, runs passes that close"
+    )
+    if task.coverage is None:
+        hints.append(f"--set task.coverage={ENOUGH:g} calls nothing feasible that treats less")
     return hints
 
 

@@ -98,7 +98,7 @@ def plan_passes(
         if shorter is not None:
             route = pass_route(shorter, retract, way)
             verdict = check(robot, route.cells, alone, search, clock=clock)
-    notes = *route.passes.notes, *_off_surface(route, retract), *_stripes(passes, task)
+    notes = *route.passes.notes, *_off_surface(route, retract)
     passes = replace(route.passes, notes=notes)
     return PlannedPasses(passes, route.places, route.cells, task, verdict)
 
@@ -185,14 +185,3 @@ def _off_surface(route: PassRoute, retract: float) -> list[str]:
             "straight in the plane that is tangent there"
         )
     return notes
-
-
-def _stripes(passes: Passes, task: Task) -> tuple[str, ...]:
-    """Whether the footprint is too small for the distance between passes."""
-    if task.disc is None or passes.widest <= task.disc[1]:
-        return ()
-    across, between = 1e3 * task.disc[1], 1e3 * passes.widest
-    return (
-        f"the passes are up to {between:.4g} mm apart and the footprint is {across:.4g} mm wide: "
-        f"stripes up to {between - across:.3g} mm wide stay untreated",
-    )

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from coverable_errors import Fault
-from feasibility.cases import Case, CaseError, CollisionPart, as_read
+from feasibility.cases import Case, CaseError, CollisionPart, absolute, as_read, is_urdf
 from feasibility.clock import Clock, OutOfTime
 from feasibility.search import Progress
 from feasibility.sensitivity import LEAST_CONE_DEG
@@ -40,6 +40,7 @@ class Arm:
     """What one arm can do about the surface; the defaults are those of an arm whose task failed."""
 
     robot: str
+    """As it was named: two files may hold arms of the same name."""
     joints: int
     reach_m: float | None
     """Upper bound on the distance of the tool from the first joint; None where there is none."""
@@ -103,7 +104,7 @@ def compare(
     Args:
         case: surface, task and search; its own arm keeps its limits and tool if it is among the
             robots.
-        robots: names of the library.
+        robots: names of the library, and paths of URDF or xacro files.
         workers: where they run, see `open_workers`.
         divide: count the patches that an arm needs where one motion will not do, on surfaces of
             up to `MOST_DIVIDED` cells.
@@ -123,16 +124,15 @@ def compare(
         [('puma560', 'feasible'), ('ur5', 'infeasible')]
     """
     tasks = []
-    for tables in _tables_of(case, robots):
+    for name, tables in zip(robots, _tables_of(case, robots), strict=True):
         tables["compare"] = {"divide": divide, "critical": critical}
-        parameters = {"robot": tables["robot"]["name"]}
-        tasks.append(StudyTask(tables, parameters, assess, arm_fault))
+        tasks.append(StudyTask(tables, {"robot": name}, assess, arm_fault))
     rows = run_tasks(tasks, workers, store, progress)
     arms = []
     for task, row in zip(tasks, rows, strict=True):
         robot = arm_of(case_of(task.tables))
-        known = {"robot": robot.name, "joints": robot.n, "reach_m": finite(robot.reach)}
-        arms.append(Arm(**{**known, **row.result}, seconds=row.seconds))
+        known = {"joints": robot.n, "reach_m": finite(robot.reach)}
+        arms.append(Arm(**{**known, **row.result, **task.parameters}, seconds=row.seconds))
     return Comparison(case.name, tuple(arms), divide, critical, case.collision)
 
 
@@ -150,16 +150,17 @@ def _tables_of(case: Case, robots: Sequence[str]) -> list[Tables]:
         base["search"] = {key: base["search"][key] for key in kept if key in base["search"]}
     faults, made = [], []
     if not robots:
-        faults.append(Fault("--robots", "is empty; expected names such as ur5,panda,puma560"))
+        faults.append(Fault("--robots", "is empty; expected such as ur5,panda,my_arm.urdf"))
     for k, name in enumerate(robots):
         place = f"--robots[{k}]"
         if name in robots[:k]:
             faults.append(Fault(place, f"{name!r} is named twice"))
             continue
-        own = base["robot"].get("name") == name
-        arm = base["robot"] if own else mounted_as({"name": name}, base["robot"])
+        given = {"urdf": absolute(name)} if is_urdf(name) else {"name": name}
+        own = given.items() <= base["robot"].items()
+        arm = base["robot"] if own else mounted_as(given, base["robot"])
         tables = {**base, "robot": arm}
-        other = None if own else mounting_fault({"name": name}, base["robot"])
+        other = None if own else mounting_fault(given, base["robot"])
         if other is not None:
             faults.append(Fault(place, f"{name} {other}"))
             continue

@@ -14,9 +14,10 @@ import numpy as np
 
 from coverable_arrays import Array
 from coverable_errors import counted
+from feasibility.treated import TreatedArea, share_words
 from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer import threejs
-from feasibility.viewer.areas import certified_layer
+from feasibility.viewer.areas import certified_layer, painted_layers
 from feasibility.viewer.cell_meshes import cell_size
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.meshes import tubes
@@ -57,6 +58,7 @@ def view_path(
     trajectory: Trajectory | None = None,
     case: str | None = None,
     limits: MotionLimits | None = None,
+    treated: TreatedArea | None = None,
 ) -> View:
     """The arm along a path, and the trail of the tool growing behind it.
 
@@ -67,6 +69,7 @@ def view_path(
         case: name of the case, for the title.
         limits: of the timing: where the task has a speed, the trail is coloured by how much of
             them the joints use.
+        treated: what it treats, where there is a footprint; painted behind the tool too.
     """
     robot, cells, figures = path.robot, path.cells, path.figures
     count = int(path.needed.sum())
@@ -78,11 +81,17 @@ def view_path(
         speed = f"{trajectory.duration:.1f} s"
     times, use = painting(trajectory, motion, limits if path.task.speed is not None else None)
     strokes, tracks = trail_pieces(motion, 0.06 * cell_size(cells), times, use)
+    if treated is not None:
+        side = cells.surface.side_sign
+        painted = painted_layers(treated, side, motion, path.task.standoff)
+        strokes, tracks = [*painted.layers, *strokes], [*painted.tracks, *tracks]
     again = f", {figures.revisited:.2g} m of it revisited" if figures.revisited > 0.0 else ""
     text = (
         f"{robot.name}: {counted(count, 'cell')} in order {path.order}, "
         f"{figures.length:.2f} m{again}, {speed}"
     )
+    if treated is not None:
+        text += f"; treated {share_words(treated)} of the area"
     title = titled(f"feasible, one path over {counted(count, 'cell')}", case)
     drawn = compose(
         robot, cells, title, text, [*cells_layers(cells), *strokes], motion,

@@ -46,7 +46,7 @@ def matrix_of(
         before: put before the two names.
     """
     expected = "must be three finite numbers (metres)"
-    place = checks.numbers(f"{before}position", position, 3, expected, furthest)
+    place = checks.numbers(f"{before}position", position, 3, expected, furthest, "; millimetres?")
     expected = "must be three finite numbers (degrees)"
     angles = checks.numbers(f"{before}rpy_deg", rpy_deg, 3, expected)
     matrix = np.eye(4)

@@ -64,7 +64,9 @@ def test_a_urdf_as_it_comes(tmp_path, name):
     robot = load_text(tmp_path, tree(edges))
     assert robot.tool_frame == expected
     (note,) = (note for note in robot.notes if note.startswith(f"tool_frame is {expected!r}"))
-    assert "'base'" not in note  # no joint moves it, so it is no choice
+    beside = {"fingers": ("left", "right")}.get(name, ())
+    named = {child for _, child, _ in edges if f"'{child}'" in note.partition(";")[2]}
+    assert named == set(beside)  # what no joint moves, or only together with the tool, is no choice
     assert load_text(tmp_path, tree(edges), tool_frame="upper").tool_frame == "upper"
 
 

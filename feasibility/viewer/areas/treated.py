@@ -22,7 +22,10 @@ TIMES: tuple[tuple[str, Colour], ...] = (  # a sequence that colour-blind reader
     ("treated twice", (0.10, 0.48, 0.62)),
     ("three times or more", (0.20, 0.10, 0.42)),
 )
-STROKES = 40  # groups of faces that appear one after the other
+STROKES = 160  # groups of faces that appear one after the other
+CLOSE = (
+    0.25  # [1] of the footprint's radius: how far places of the tool are apart that are looked at
+)
 ABOVE = 1e-3  # [1] of the surface's extent, so that colours lie over the surface
 HALF = 0.5  # [1] of a face: with more of it treated it counts as treated
 
@@ -58,23 +61,37 @@ def painted_layers(found: TreatedArea, side: float, motion: Playback, height: fl
         motion: what the picture plays.
         height: m, of the tool point over the surface.
     """
-    from scipy.spatial import KDTree
-
-    middles = found.mesh.corners.mean(axis=1)
-    reach = float(np.hypot(0.5 * max(found.footprint), height))
-    end = float(motion.seconds[-1])
-    even = np.linspace(0.0, end, STROKES * 12 + 1)
-    points = motion.tool_at(even)
-    first = np.full(len(middles), STROKES - 1)
-    for number in reversed(range(STROKES)):  # the earliest one is written last
-        near, _ = KDTree(points[12 * number : 12 * number + 13]).query(
-            middles, distance_upper_bound=reach
-        )
-        first[np.isfinite(near)] = number
+    first = _first_strokes(found, motion, height)
     groups = [np.flatnonzero(first == number) for number in range(STROKES)]
     layers, paths = _layers(found, side, groups)
+    end = float(motion.seconds[-1])
     times = np.linspace(0.0, end, STROKES + 1)[1:]
     return Painted(layers, [threejs.appearing(path, times[k], end) for path, k in paths])
+
+
+def _first_strokes(found: TreatedArea, motion: Playback, height: float) -> Ints:
+    """(F,) in which stroke the tool comes by each face first, however long the path is.
+
+    A face that it does not come by counts to the stroke that comes nearest.
+    """
+    from scipy.spatial import KDTree
+
+    middles, radius = found.mesh.corners.mean(axis=1), 0.5 * max(found.footprint)
+    edges = np.linspace(0.0, float(motion.seconds[-1]), STROKES + 1)
+    times = np.union1d(motion.seconds, edges)
+    steps = np.linalg.norm(np.diff(motion.tool_at(times), axis=0), axis=1)
+    count = np.maximum(np.ceil(steps / (CLOSE * radius)), 1).astype(np.int64)
+    within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    times = np.repeat(times[:-1], count) + within * np.repeat(np.diff(times) / count, count)
+    points, stroke = motion.tool_at(times), np.searchsorted(edges, times, side="right") - 1
+    first = stroke[KDTree(points).query(middles)[1]]
+    rest = np.arange(len(middles))
+    for number in np.unique(stroke):
+        tree = KDTree(points[stroke == number])
+        near, _ = tree.query(middles[rest], distance_upper_bound=float(np.hypot(radius, height)))
+        first[rest[np.isfinite(near)]] = number
+        rest = rest[~np.isfinite(near)]
+    return np.asarray(first)
 
 
 def _layers(

@@ -227,6 +227,19 @@ def test_overrides_replace_add_and_remove_keys():
     assert case == load_case("paper/4a")  # unchanged
 
 
+def test_an_override_removes_a_whole_table_and_makes_none_to_remove_from():
+    case = Case.from_toml(GOOD, overrides=["collision.clearance=0.01", "search.seed=3"])
+    assert case.with_overrides(["collision=", "search="]) == Case.from_toml(GOOD)
+    assert Case.from_toml(GOOD, overrides=["collision.clearance="]).collision is None
+
+
+def test_a_description_names_what_was_changed():
+    """The built-in one speaks of the cone before: 45 deg beside an answer for 10 was misleading."""
+    case = load_case("paper/4a", ["task.cone_deg=10", "search.seed=7"])
+    assert case.description.endswith("cone 45 deg; changed: task.cone_deg=10, search.seed=7")
+    assert load_case("paper/4a").description.endswith("cone 45 deg")
+
+
 @pytest.mark.parametrize(
     ("setting", "words"),
     [

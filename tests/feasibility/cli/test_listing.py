@@ -24,10 +24,11 @@ def test_keys_prints_each_key_with_type_unit_default_and_meaning(ask):
         ("surface.cut", lambda key: key.table == "surface.cut"),
         ("mesh", lambda key: key.kind == "mesh"),
         ("surface.mesh", lambda key: key.kind == "mesh"),
+        ("surface step", lambda key: key.kind == "step"),
     ],
 )
 def test_keys_of_one_table_or_kind(ask, asked, wanted):
-    status, out, _ = ask("keys", asked, "--json")
+    status, out, _ = ask("keys", *asked.split(), "--json")
     rows = json.loads(out)["keys"]
     assert status == 0
     expected = [

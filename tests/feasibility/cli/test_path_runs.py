@@ -91,11 +91,19 @@ def test_a_pitch_wider_than_the_footprint_leaves_stripes(case, capsys) -> None:
     wide = [case(PLATE), "--passes", "0", "--pitch", "0.1"]
     assert main(["path", *wide]) == 3
     said = capsys.readouterr()
-    assert "stripes up to 50 mm wide stay untreated" in " ".join(said.out.split())
+    assert "stripes up to 50 mm wide are left between" in " ".join(said.out.split())
     assert "undecided: the path treats" in said.err
     assert main(["path", *wide, "--set", "task.coverage="]) == 0
     treated = capsys.readouterr().out
     assert "untreated: " in " ".join(treated.split())
+
+
+def test_no_stripes_are_said_to_be_left_beside_all_that_is_treated(case, capsys) -> None:
+    crossed = ["--passes", "0", "--pitch", "0.05", "--cross", "--set", "task.footprint=0.0499"]
+    assert main(["path", case(PLATE), *crossed]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "to 100.00 % of" in said
+    assert "stripes" not in said
 
 
 def test_crossing_needs_an_angle(case, capsys) -> None:

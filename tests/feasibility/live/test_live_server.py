@@ -15,7 +15,7 @@ import psutil
 import pytest
 import umsgpack
 from guards import GUARD_S
-from small_cases import small_case
+from small_cases import TEXTS, small_case
 
 from feasibility import check
 from feasibility.cases import Case, load_case
@@ -176,6 +176,17 @@ def test_a_certified_answer_brings_graph_motion_and_posture(client):
     assert any(path.startswith("/graph/edges of G") for path in paths)
     assert not any(path.startswith(("/surface", "/cells")) for path in paths)
     assert answer["parts"]["seconds"] > 0
+
+
+def test_what_is_saved_has_the_words_of_the_file(tmp_path):
+    path = tmp_path / "plate.toml"
+    path.write_text(f"# Mine.\n{TEXTS['plate']}# The end.\n")
+    with Live(load_case(path)) as page:
+        saved = Client(page).post("save", values={"cone_deg": 22})["toml"]
+    first, rest = saved.split("\n", 1)
+    assert first.startswith("# ")
+    assert "relative to the folder" in first
+    assert rest == path.read_text().replace("cone_deg = 30", "cone_deg = 22.0")
 
 
 def test_what_is_saved_is_what_is_shown_and_nothing_is_written(client, tmp_path, monkeypatch):

@@ -160,6 +160,18 @@ def test_no_limits_without_width_are_offered(name: str) -> None:
             assert np.radians(0.1) * (1 - 1e-9) <= width < np.radians(0.2)
 
 
+def test_no_limit_is_offered_a_full_turn_beyond_what_the_joint_has() -> None:
+    """Whatever limits the case gives; those of the URDF are 180 deg for the elbow, else 360."""
+    given = {"elbow_joint": np.radians([-400.0, 900.0]), "wrist_1_joint": np.radians([-9.0, 9.0])}
+    robot = load_robot("ur5").with_limits(given)
+    found = quantities(Variant(robot, PLATE.cells(3, 3), Task(0.02, 30)), True)
+    ends = {q.name: round(np.degrees(q.end)) for q in found if q.kind in (Kind.LOWER, Kind.UPPER)}
+    assert ends["elbow_joint lower limit"] == -540
+    assert "elbow_joint upper limit" not in ends  # further than that is what the case has
+    assert ends["wrist_1_joint upper limit"] == 369
+    assert ends["wrist_2_joint upper limit"] == 720
+
+
 def test_limits_narrower_than_a_step_are_not_varied() -> None:
     robot = load_robot("ur5").with_limits({"wrist_3_joint": np.radians([0.0, 0.05])})
     names = {q.name for q in quantities(Variant(robot, PLATE.cells(3, 3), Task(0.02, 30)), False)}

@@ -10,6 +10,7 @@ import xml.etree.ElementTree as ET
 from argparse import Namespace
 from dataclasses import replace
 from html.parser import HTMLParser
+from shutil import copyfile
 
 import pytest
 import study_works
@@ -28,6 +29,7 @@ from feasibility.reports.study import as_text as study_text
 from feasibility.studies import Arm, Comparison, Row, compare, open_workers
 from feasibility.studies.file import read_study
 from feasibility.studies.robot_comparison import CONE_STEP_DEG, _tables_of, critical_cone
+from robots import list_robots
 
 ROBOTS = ("ur3", "ur5", "puma560", "xarm7")
 
@@ -174,6 +176,19 @@ def test_a_cone_that_no_width_helps() -> None:
     case = small_case("long plate").with_overrides(["surface.cells=[2, 1]"])
     robot, cells, _, _ = case.build()
     assert critical_cone(robot, cells, case, False) is None
+
+
+def test_a_file_is_compared_with_an_arm_of_the_library(strip, tmp_path, monkeypatch) -> None:
+    """Its path is taken from where the command runs, and names it in the answer."""
+    monkeypatch.chdir(tmp_path)
+    (urdf,) = (info.urdf for info in list_robots() if info.name == "ur5")
+    copyfile(urdf, "my.urdf")
+    with open_workers(0) as workers:
+        ours, theirs = compare(strip, ["my.urdf", "ur5"], workers, divide=False).arms
+        with pytest.raises(CaseError, match=r"robots\[0\].*no\.urdf"):
+            compare(strip, ["no.urdf"], workers)
+    assert ours.robot == "my.urdf"
+    assert replace(ours, robot="ur5", seconds=0.0) == replace(theirs, seconds=0.0)
 
 
 def test_arms_that_cannot_be_compared(strip) -> None:

@@ -145,6 +145,23 @@ def test_the_command_says_what_is_treated(capsys) -> None:
     assert "larger than the whole surface" in " ".join(capsys.readouterr().out.split())
 
 
+def test_with_a_footprint_the_answer_begins_with_what_is_treated(capsys) -> None:
+    """And says how to treat more of it, where that is not nearly all."""
+    asked = ["check", "paper/4a", "--set", "surface.cells=[4, 5]", "--set", "task.footprint=0.3"]
+    assert main(asked) == 0
+    head, *rest = capsys.readouterr().out.splitlines()
+    treats = "feasible: one continuous motion visits every cell and treats {} of the area.".format
+    (share,) = (line.split(" of ")[0] for line in rest if line.startswith("  treated"))
+    assert head == treats(share.removeprefix("  treated").strip())
+    offered = " ".join(rest)
+    for remedy in ("surface.cells=auto", "task.coverage=0.99", "path --passes best --pitch 0.27"):
+        assert remedy in offered
+    assert main([*asked, "--set", "surface.cells=auto"]) == 0
+    fine = capsys.readouterr().out
+    assert fine.startswith(treats("100.00 %"))
+    assert not any(word in fine for word in ("cells=auto cuts", "coverage=0", "--pitch"))
+
+
 def test_visits_are_counted_by_coming_and_going() -> None:
     rows = [np.linspace((-0.05, y, 0.0), (0.65, y, 0.0), 200) for y in (0.1, 0.14)]
     normals = np.tile([0.0, 0.0, 1.0], (400, 1))

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 from path_cases import path_of
+from scipy.spatial import KDTree
 
 from feasibility import check
 from feasibility.cases import load_case
 from feasibility.division import divide
 from feasibility.paths import coverage_path
 from feasibility.timing import trajectory
+from feasibility.treated import treated_by_walk
 from feasibility.viewer import view_division, view_path
 from feasibility.viewer.path_and_division import STROKES
 from feasibility.viewer.playback import LONGEST
@@ -63,6 +66,28 @@ def test_the_trail_appears_piece_by_piece_behind_the_tool():
     assert view.legend.title == "paper/4a: feasible, one path over 90 cells"
 
 
+def test_the_swept_stripe_is_painted_without_gaps():
+    """At any time what is shown is what the tool has come by until then, however long its path."""
+    one, radius = path(), 0.02
+    task = replace(one.task, footprint=2.0 * radius)
+    view = view_path(one, treated=treated_by_walk(one.robot, one.cells, task, one.walk))
+    when = tracks(view, ".visible")
+    drawn = [c for c in view.commands if c.get("path", "").startswith("/treated/")]
+    drawn = [c for c in drawn if c["path"] in when]
+    corners = [c["object"]["geometries"][0]["data"]["attributes"]["position"] for c in drawn]
+    middles = [numbers(part["array"]).reshape(-1, 3, 3).mean(axis=1) for part in corners]
+    shown = [numbers(when[c["path"]]["times"])[1] for c in drawn]
+    shown = np.repeat(shown, [len(part) for part in middles])
+    end = view.motion.seconds[-1]
+    for now in (0.2 * end, 0.5 * end, 0.8 * end):
+        behind = view.motion.tool_at(np.linspace(0.0, now, 20_000))
+        away, _ = KDTree(behind).query(np.concatenate(middles))
+        height = task.standoff
+        assert (shown[away < np.hypot(0.8 * radius, height)] <= now + 0.01 * end).all()
+        assert (shown[away > np.hypot(2.0 * radius, height)] >= now - 0.01 * end).all()
+    assert "treated " in view.legend.text
+
+
 def test_the_arm_plays_the_walk():
     """Every waypoint, in even time."""
     view = view_path(path())
@@ -93,8 +118,6 @@ def test_patches_and_what_is_left_out_are_coloured():
 
 def test_moves_between_patches_are_drawn_where_the_tool_goes():
     """Made of two walks by hand: the arm goes straight from one to the other."""
-    from dataclasses import replace
-
     from feasibility.division import Reconfiguration
 
     one = division()

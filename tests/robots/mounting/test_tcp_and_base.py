@@ -107,7 +107,10 @@ def test_the_reference_axis_is_across_the_approach_axis(approach, reference, exp
 @pytest.mark.parametrize(
     ("asked", "message"),
     [
-        ({"tcp": ((0, 0, 1e4), (0, 0, 0))}, r"tcp.position must be .* with a number beyond 10$"),
+        (
+            {"tcp": ((0, 0, 1e4), (0, 0, 0))},
+            r"tcp.position .* with a number beyond 10; millimetres\?$",
+        ),
         ({"tcp": ((0, 0, np.nan), (0, 0, 0))}, "tcp.position must be three finite numbers"),
         ({"tcp": ((0, 0, 0), "z")}, r"tcp.rpy_deg must be three finite numbers \(degrees\)"),
         ({"tcp": np.diag([1, 1, -1, 1])}, "tcp must be a pair .* without scale or mirror"),
