@@ -112,6 +112,7 @@ def verify(
     q: ArrayLike,
     *,
     working: ArrayLike | None = None,
+    marks: ArrayLike | None = None,
     clock: Clock | None = None,
 ) -> Verification: ...
 
@@ -127,6 +128,7 @@ def verify(
     q: ArrayLike | None = None,
     *,
     working: ArrayLike | None = None,
+    marks: ArrayLike | None = None,
     clock: Clock | None = None,
 ) -> Verification:
     """Does this motion cover the cells; does what this verdict says of them hold?
@@ -148,12 +150,15 @@ def verify(
             over the surface; elsewhere, lifted or beyond the border, it may be anywhere but through
             the surface, and reaches no cell. Of passes (`pass_route`) those places have to be
             reached at which it works. True everywhere by default.
+        marks: (m,) the cell whose target each row is at, -1 for none, as a `Walk` and a trajectory
+            have it: where to look first, of a toolpath that crosses itself or turns sharply. They
+            are not believed, and what does not hold by them may hold without.
         clock: its limit counts, and it reports progress; running out is no "holds". Of a motion,
             and of the first steps of a proof, the limit is kept in commands alone.
 
     Raises:
         TypeError: an argument is something else.
-        ArgumentError: q holds no numbers, or `working` does not fit to it.
+        ArgumentError: q holds no numbers, or `working` or `marks` do not fit to it.
         NothingToVerifyError: the verdict has neither a motion nor a proof.
 
     Example:
@@ -172,10 +177,11 @@ def verify(
     if isinstance(claim, Robot):
         problem = Problem.of(claim, cells, task)  # type: ignore[arg-type]  # refuses None
         rows = _rows(q)
-        at_work = None if working is None else _at_work(working, rows)
-        judged = partial(_of_motion, "motion", problem, rows, working=at_work)
+        at_work = None if working is None else _one_a_row("working", working, rows, "b")
+        said = None if marks is None else _one_a_row("marks", marks, rows, "i")
+        judged = partial(_of_motion, "motion", problem, rows, said, at_work)
         return _in_time("motion", problem, judged, clock)
-    if cells is not None or task is not None or q is not None or working is not None:
+    if any(given is not None for given in (cells, task, q, working, marks)):
         raise TypeError("a verdict knows its robot, cells and task: give it alone")
     search = claim.case.search if isinstance(claim, Result) else None
     verdict = claim.verdict if isinstance(claim, Result) else claim
@@ -196,16 +202,17 @@ def _rows(q: Any) -> Array:
         raise ArgumentError(f"q must be an array (m, n) of numbers, got {q!r:.60}") from error
 
 
-def _at_work(working: ArrayLike, rows: Array) -> Mask:
-    """Where the tool works, as an array.
+def _one_a_row(name: str, values: ArrayLike, rows: Array, kind: Literal["b", "i"]) -> Any:
+    """True and false, or whole numbers, for each row of a motion.
 
     Raises:
-        ArgumentError: it does not say so of every row.
+        ArgumentError: they are something else.
     """
-    found = np.asarray(working)
-    if found.dtype != bool or found.shape != rows.shape[:1]:
+    found = np.asarray(values)
+    if found.dtype.kind != kind or found.shape != rows.shape[:1]:
+        what = {"b": "true and false", "i": "whole numbers"}[kind]
         given = f"got {found.dtype} of shape {found.shape}"
-        raise ArgumentError(f"working must be an array ({len(rows)},) of true and false, {given}")
+        raise ArgumentError(f"{name} must be an array ({len(rows)},) of {what}, {given}")
     return found
 
 
@@ -233,9 +240,14 @@ def _of_motion(
 ) -> Verification:
     """The replay of a motion over the surface, and the other demands' judges."""
     robot, cells, task = problem.robot, problem.cells, problem.task
-    found = replay_over_surface(
-        robot, cells, task, q, bodies=problem.bodies, marks=marks, working=working
+    if marks is not None:
+        marks = np.where((marks >= 0) & (marks < len(cells)), marks, -1)
+    judge = partial(
+        replay_over_surface, robot, cells, task, q, bodies=problem.bodies, working=working
     )
+    found = judge(marks=marks)
+    if marks is not None and not found.accepted:
+        found = next((other for other in (judge(),) if other.accepted), found)
     made = partial(
         Verification, claim, robot, cells, task,
         certificate=found.certificate, q=q, reached=found.reached,

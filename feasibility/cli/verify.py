@@ -70,7 +70,10 @@ def _motion(args: argparse.Namespace, began: float) -> int:
             working = motion.working
             if working is None and args.passes is not None:
                 working = np.ones(len(motion.q), dtype=bool)
-            found = run(robot, cells, task, motion.q, working=working, clock=opened.clock)
+            marks = motion.marks if args.passes is None else None
+            found = run(
+                robot, cells, task, motion.q, working=working, marks=marks, clock=opened.clock
+            )
     except TooLate as late:
         return _too_late(args, late.case)
     return _said(args, found, opened.case.name, args.motion, motion.notes)

@@ -1,10 +1,11 @@
 """A joint motion that anybody may have made, as a CSV file with a column for each joint.
 
 Columns go by name and stand in any order. A joint's values are radians (metres where it slides), or
-degrees in a column `NAME_deg`. What else our own files and those of other programs have beside the
-joints (cell, time, velocities) is not used, and said to be; but a column `working` is, with 1 in
-rows at which the tool works and 0 elsewhere. Any other column is a fault. So are a joint without a
-column, one with two, ragged rows, what is no finite number, and values that can only be degrees.
+degrees in a column `NAME_deg`. Two columns more are used: `cell`, the number of the cell that a row
+is at, and `working`, with 1 in rows at which the tool works and 0 elsewhere. What else our files
+and those of other programs have beside the joints (time, velocities) is not used, and said to be;
+any other column is a fault. So are a joint without a column, one with two, ragged rows, what is no
+finite number, and values that can only be degrees.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Mask
+from coverable_arrays import Array, Ints, Mask
 from coverable_errors import Fault, close, number_in, printable, shown
 from feasibility.results.trajectory_files import COMMENT, WORKING, load_trajectory
 from feasibility.safe_files import FileError, read_text, shown_path
@@ -28,7 +29,8 @@ from robots import Robot
 CAP = 64 << 20  # bytes
 MOST_ROWS = 1_000_000
 MOST_COLUMNS = 1000
-LEFT_ASIDE = ("cell", "time", "t", "tool_speed", "time_from_start", "index", "row", "waypoint")
+CELL, DIGITS = "cell", 10
+LEFT_ASIDE = (CELL, "time", "t", "tool_speed", "time_from_start", "index", "row", "waypoint")
 DERIVED = ("_velocity", "_acceleration", "_effort")
 SLACK = 1e-6  # rad or m, beyond limits, of values that are taken for another unit
 UNITS = (
@@ -50,6 +52,9 @@ class Motion(NamedTuple):
     """What was not used."""
     working: Mask | None = None
     """(m,) at which rows the tool works, by a column `working` of 0 and 1; None for all."""
+    marks: Ints | None = None
+    """(m,) the cell that each row is said to be at, by a column `cell`, -1 where that is empty;
+    None without such a column of whole numbers."""
 
 
 def load_motion(path: str | os.PathLike[str], robot: Robot) -> Motion:
@@ -66,7 +71,7 @@ def load_motion(path: str | os.PathLike[str], robot: Robot) -> Motion:
             raise FileError(faults, name)
         note = "its times and velocities are not used: rows are joined by straight lines"
         q = found.q[:, [column for column, _ in columns]]
-        return _checked(q, robot, name, (note,))._replace(working=found.working)
+        return _checked(q, robot, name, (note,))._replace(working=found.working, marks=found.cell)
     text = read_text(path, CAP, "a joint motion (.csv)")
     try:
         return _from_csv(text, robot, name)
@@ -117,11 +122,23 @@ def _from_csv(text: str, robot: Robot, name: str) -> Motion:
                 faults.append(Fault("", f"expected 0 or 1 as {WORKING}", f"line {line}"))
     if faults:
         raise FileError(faults, name)
+    marks = _marks(head, [row for _, row in rows[1:]])
     used = {column for column, _ in columns} | {at_work}
+    used |= set() if marks is None else {head.index(CELL)}
     unused = [word for column, word in enumerate(head) if column not in used]
     notes = [f"not used: {', '.join(map(printable, unused))}"] if unused else []
     found = _checked(q, robot, name, tuple(notes))
-    return found if at_work is None else found._replace(working=working)
+    return found._replace(working=None if at_work is None else working, marks=marks)
+
+
+def _marks(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Ints | None:
+    """The cells that rows are said to be at; None where that is not said in whole numbers."""
+    if head.count(CELL) != 1:
+        return None
+    words = [row[head.index(CELL)].strip() for row in rows]
+    if not all(word == "" or (word.isdecimal() and len(word) < DIGITS) for word in words):
+        return None
+    return np.array([-1 if word == "" else int(word) for word in words], dtype=np.int64)
 
 
 def _columns(

@@ -7,7 +7,7 @@ import pytest
 from dense_replay import dense, tools
 from test_creases import PER_SEGMENT, nearest, roof
 
-from feasibility import Task, check
+from feasibility import Task, check, verify
 from robots import load_robot
 from surfaces import mesh
 
@@ -35,6 +35,7 @@ def test_a_certificate_bounds_how_far_a_motion_is_from_the_triangles(name: str) 
     closest = nearest(part.vertices[part.faces] + surface.position, tips)
     away = np.linalg.norm(tips - closest, axis=1)
     assert np.abs(away - task.standoff).max() <= certificate.max_position_error
+    assert verify(verdict.robot, verdict.cells, task, walk.q).holds
     if name not in ("smooth", "concave"):  # where normals are interpolated
         cosine = ((closest - tips) * axes).sum(axis=1) / away
         assert np.arccos(np.clip(cosine, -1, 1)).max() <= task.cone + 1e-9

@@ -10,10 +10,10 @@ from dense_replay import dense
 from rasters import SURFACES, followed, raster
 from small_cases import paper_verdict
 
-from feasibility import Task
+from feasibility import Task, check, verify
 from feasibility.certification import replay_over_surface
 from robots import Kinematics, load_robot
-from surfaces import mesh, piecewise, plane
+from surfaces import mesh, piecewise, plane, poses
 from surfaces.meshes import TriangleMesh
 
 FEASIBLE_PAPER_CASES = ("4a", "4b", "4c", "4e", "5a", "5b", "5c", "5d", "5e", "5f")
@@ -378,3 +378,24 @@ def test_no_cells_and_single_rows():
     none = plane((0.35, 0.55), (-0.1, 0.1), side="outside", position=(0, 0, 0.3)).cells(0, 3)
     assert replay_over_surface(made.robot, none, made.task, first).accepted
     assert replay_over_surface(made.robot, none, made.task, made.q[:0]).accepted
+
+
+def test_long_ways_of_a_toolpath_are_followed_where_they_are():
+    """Poses of other passes, and of those that are crossed, are nearer than both ends."""
+    x, y = np.linspace(0.4, 0.6, 9), np.linspace(-0.1, 0.1, 9)
+    square = [(0.4, -0.1), (0.6, -0.1), (0.6, 0.1), (0.4, 0.1)]
+    down = [(0.5, each) for each in y[::-1]]
+    across = [(each, 0.0) for each in x]
+    flat = np.array([*square, *down, (0.4, -0.1), *across])
+    line = poses(
+        np.column_stack([flat, np.full(len(flat), 0.2)]), np.tile([0.0, 0.0, 1.0], (len(flat), 1))
+    )
+    robot, task = load_robot("ur5"), Task(0.02, 20, 5e-4)
+    verdict = check(robot, line, task)
+    assert verdict.feasible
+    q, marks = verdict.witness.q, verdict.witness.cell
+    assert verify(robot, line, task, q, marks=marks).holds
+    assert not verify(robot, line, task, q[len(q) // 2 :]).holds
+    ahead = np.flatnonzero(marks == 3)[0] + 1  # three sides of the square, which cross nothing
+    few = poses(line.surface.points[:4], line.surface.outward[:4])
+    assert verify(robot, few, task, q[:ahead]).holds
