@@ -139,8 +139,7 @@ def place(
         evaluator: tries placements; default in this process.
         progress: called as progress(done, total, text); what it raises ends the search.
         clock: of the command that this is a part of; its limit counts instead of `time_limit`.
-        interruptible: whether a KeyboardInterrupt ends the search with what is known by then, as
-            the time limit does, in place of being raised; see `Placements.interrupted`.
+        interruptible: whether a Ctrl-C ends the search as the time limit does, and is not raised.
 
     Returns:
         The placements. That there are none is a result, not an error.
@@ -171,18 +170,17 @@ def place(
             warm_up()
         evaluator = LocalEvaluator(robot, cells, task, search)
     refinement = Refinement(evaluator, reach, region, search.seed, early, clock, progress)
-    try:
-        refinement.run(count, around)
-        refinement.verify(keep)
-    except KeyboardInterrupt:
-        if not interruptible:
-            raise
-        refinement.stopped = INTERRUPTED
-    placements = _searched(answered, refinement, refinement.found(keep))
-    if placements.answer is Answer.UNDECIDED and (closed := blocked_curves(cells, task)):
-        message = f"{placements.message} Wherever it stands: {closed}"
-        placements = replace(placements, message=message)
-    return _timed(placements, began)
+    found = refinement.searched(count, around, keep, interruptible)
+    return _timed(_with_closed(_searched(answered, refinement, found)), began)
+
+
+def _with_closed(placements: Placements) -> Placements:
+    """The same; where it is undecided, with the curves that nothing can be certified along."""
+    if placements.answer is not Answer.UNDECIDED:
+        return placements
+    closed = blocked_curves(placements.cells, placements.task)
+    more = f" Wherever it stands: {closed}" if closed else ""
+    return replace(placements, message=placements.message + more)
 
 
 def _timed(placements: Placements, began: float) -> Placements:
