@@ -140,8 +140,7 @@ def place(
         evaluator: tries placements; default in this process.
         progress: called as progress(done, total, text); what it raises ends the search.
         clock: of the command that this is a part of; its limit counts instead of `time_limit`.
-        interruptible: whether a KeyboardInterrupt ends the search with what is known by then, as
-            the time limit does, in place of being raised; see `Placements.interrupted`.
+        interruptible: whether a Ctrl-C ends the search as the time limit does, and is not raised.
 
     Returns:
         The placements. That there are none is a result, not an error.
@@ -174,14 +173,8 @@ def place(
             warm_up()
         evaluator = LocalEvaluator(robot, cells, task, search)
     refinement = Refinement(evaluator, reach, region, search.seed, early, clock, progress)
-    try:
-        refinement.run(count, around)
-        refinement.verify(keep)
-    except KeyboardInterrupt:
-        if not interruptible:
-            raise
-        refinement.stopped = INTERRUPTED
-    placements = _searched(answered, refinement, refinement.found(keep))
+    found = refinement.searched(count, around, keep, interruptible)
+    placements = _searched(answered, refinement, found)
     if placements.answer is Answer.UNDECIDED:
         placements = _with_blocked(placements, clock)
     return _timed(placements, began)

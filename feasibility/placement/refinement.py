@@ -82,6 +82,17 @@ class Refinement:
     streams: int = 0
     """Random sequences used so far, so that each is another one."""
 
+    def searched(self, count: int, around: int, keep: int, interruptible: bool) -> list[Trial]:
+        """Search and check; the best that are feasible, see `place`."""
+        try:
+            self.run(count, around)
+            self.verify(keep)
+        except KeyboardInterrupt:
+            if not interruptible:
+                raise
+            self.stopped = INTERRUPTED
+        return self.found(keep)
+
     def run(self, count: int, around: int) -> None:
         """Spread `count` poses over the region, then try `around` around each of the best."""
         self.expected = len(WIDTHS) * ELITES * around
