@@ -148,8 +148,8 @@ def verify(
         q: the motion.
         working: (m,) true in rows at which the tool works. Between two of them it has to be right
             over the surface; elsewhere, lifted or beyond the border, it may be anywhere but through
-            the surface, and reaches no cell. Of passes (`pass_route`) those places have to be
-            reached at which it works. True everywhere by default.
+            the surface, and reaches no cell. Of passes those places have to be reached at
+            which it works. True everywhere by default.
         marks: (m,) the cell whose target each row is at, -1 for none, as a `Walk` and a trajectory
             have it: where to look first, of a toolpath that crosses itself or turns sharply. They
             are not believed, and what does not hold by them may hold without.

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
+from coverable_arrays import Array
 from surfaces.passes.parallel import Passes
 from surfaces.passes.stretches import Pass
 from surfaces.places import offset_surface
@@ -37,8 +37,6 @@ class Line(NamedTuple):
     """(k, 3) m."""
     normals: Array
     """(k, 3) outward unit normals."""
-    own: Ints
-    """(k,) the index among the points that were given; -1 of those put in."""
 
 
 class ToolWay(NamedTuple):
@@ -71,21 +69,15 @@ def _fitted(surface: Surface, each: Pass, way: ToolWay) -> Pass:
 
 def followed(surface: Surface, points: Array, normals: Array, way: ToolWay) -> Line:
     """A line through points (k, 3) m on a surface, with those put in that keep it there."""
-    base, offset = offset_surface(surface, 0.0), offset_surface(surface, way.height)
-    line = Line(points, normals, np.arange(len(points)))
+    base, line = offset_surface(surface, 0.0), Line(points, normals)
     for level in range(LEVELS):
         middle, off, leans = _beside(surface, line.points, line.normals, way.height)
         cut = (off > way.within) | (level < TURNING) & (leans > LEANS)
         if not cut.any():
             break
-        places = base.nearest(middle[cut], middle[cut], np.inf)
+        new = base.at(base.nearest(middle[cut], middle[cut], np.inf))
         at = np.flatnonzero(cut) + 1
-        new, (_, turned) = base.at(places)[0], offset.at(places)
-        line = Line(
-            np.insert(line.points, at, new, axis=0),
-            np.insert(line.normals, at, turned, axis=0),
-            np.insert(line.own, at, -1),
-        )
+        line = Line(*(np.insert(old, at, put, axis=0) for old, put in zip(line, new, strict=True)))
     return line
 
 
