@@ -174,16 +174,13 @@ def place(
         evaluator = LocalEvaluator(robot, cells, task, search)
     refinement = Refinement(evaluator, reach, region, search.seed, early, clock, progress)
     found = refinement.searched(count, around, keep, interruptible)
-    placements = _searched(answered, refinement, found)
-    if placements.answer is Answer.UNDECIDED:
-        placements = _with_blocked(placements, clock)
-    return _timed(placements, began)
+    return _timed(_with_blocked(_searched(answered, refinement, found), clock), began)
 
 
 def _with_blocked(placements: Placements, clock: Clock) -> Placements:
-    """The same, saying where no placement helps, and what may."""
+    """The same; where it is undecided, with what no placement helps, and what may."""
     cells, task = placements.cells, placements.task
-    closed = blocked_curves(cells, task)
+    closed = blocked_curves(cells, task) if placements.answer is Answer.UNDECIDED else ""
     if not closed:
         return placements
     offer = smoothing_offer(cells, task, clock)

@@ -9,7 +9,7 @@ import numpy as np
 
 from coverable_arrays import Ints
 from feasibility.timing import Trajectory
-from surfaces.passes import Pass, PassPlaces
+from surfaces.passes import LIFTED, Pass, PassPlaces
 
 OFF = -1
 
@@ -25,8 +25,10 @@ def working_places(places: PassPlaces, stretches: Sequence[Pass]) -> Ints:
         stretches: of the same passes.
     """
     levels = np.array([each.level for each in stretches])
-    lifted = places.stretch < 0
-    stretch = np.where(lifted, 0, places.stretch)
+    lifted = places.stretch == LIFTED
+    # On the way to the next stretch it goes on as on the one before.
+    known = np.where(places.stretch >= 0, np.arange(len(lifted)), 0)
+    stretch = np.where(lifted, 0, places.stretch[np.maximum.accumulate(known)])
     onto = (np.diff(stretch, prepend=stretch[:1]) != 0) & ~lifted
     hole = onto & (levels[stretch] == np.roll(levels[stretch], 1))
     begins = hole | (np.diff(lifted.astype(np.int64), prepend=1) < 0)

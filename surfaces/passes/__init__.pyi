@@ -5,6 +5,7 @@ from .parallel import parallel_passes as parallel_passes
 from .stretches import Pass as Pass
 from .tool_lines import ToolLines as ToolLines
 from .tool_lines import visits as visits
+from .toolpath import LIFTED as LIFTED
 from .toolpath import PassPlaces as PassPlaces
 from .toolpath import PassRoute as PassRoute
 from .toolpath import pass_route as pass_route

@@ -64,11 +64,13 @@ NO_DEMANDS = {
          "task.footprint"),
         MEASURE,
     ),
+    "task.smooth": "says which surface is meant: all judges take the smoothed copy",
     "task.home_deg": "says where path comes from: the entry is checked as it is made",
 }  # fmt: skip
 JUDGING = {"check", "verify", "divide", "explain", "path", "place"}
 OTHERS = {
     **dict.fromkeys(("live", "study", "compare"), "what they say is what check says"),
+    "warm-up": "compiles, and is about no case",
     "show": "shows what a file says, and judges nothing",
     **dict.fromkeys(("cases", "robots", "keys"), "are about no motion"),
 }

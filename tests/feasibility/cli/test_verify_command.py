@@ -81,7 +81,7 @@ def test_a_motion_that_holds(ask, plate):
     answer = as_json(out)
     assert answer["verdict"] == "holds"
     assert answer["refusals"] == answer["missed"] == []
-    assert answer["notes"] == ["not used: cell"]
+    assert answer["notes"] == []
 
 
 def test_a_motion_that_does_not(ask, plate):

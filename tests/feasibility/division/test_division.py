@@ -451,7 +451,7 @@ def test_the_command(
     """One JSON object on stdout, and the status of what it says."""
     for as_object in (True, False):
         args = argparse.Namespace(
-            case=case, settings=settings, json=as_object, html=None, area=False
+            command="divide", case=case, settings=settings, json=as_object, html=None, area=False
         )
         assert run(args, time.perf_counter()) == status
         out = capsys.readouterr().out
@@ -463,7 +463,12 @@ def test_the_command(
 
 def test_the_command_refuses_the_greedy_search() -> None:
     args = argparse.Namespace(
-        case="paper/4d", settings=["search.method=greedy"], json=False, html=None, area=False
+        command="divide",
+        case="paper/4d",
+        settings=["search.method=greedy"],
+        json=False,
+        html=None,
+        area=False,
     )
     with pytest.raises(CaseError, match=r"search\.method: a division needs 'complete'"):
         run(args, time.perf_counter())

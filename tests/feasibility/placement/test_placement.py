@@ -617,7 +617,7 @@ def arguments(**given: object) -> argparse.Namespace:
     settings = ["surface.cells=[3,3]"]
     return argparse.Namespace(
         **{**plain, "case": "paper/4a", "settings": settings, "count": 4, "workers": 0,
-           "json": False, "stations": False, "time_limit": None, **given}
+           "command": "place", "json": False, "stations": False, "time_limit": None, **given}
     )  # fmt: skip
 
 

@@ -84,7 +84,9 @@ def test_a_tool_is_off_over_holes_and_on_from_pass_to_pass():
     lift = levels.index(2)  # before the first stretch of the third pass; else along the surface
     assert levels == [0, 1, 1, 2, 2, 3]
     stretch = [k for number in range(6) for k in ([-1] * 2) * (number == lift) + [number] * 3]
-    places = PassPlaces(np.zeros((20, 3)), np.zeros((20, 3)), np.array(stretch))
+    stretch[3] = -2  # on the way from the first to the second, along the surface
+    on = np.array(stretch) != -1
+    places = PassPlaces(np.zeros((20, 3)), np.zeros((20, 3)), np.array(stretch), on)
     work = working_places(places, passes)
     assert work.tolist() == [*[0] * 6, *[1] * 3, -1, -1, *[2] * 3, *[3] * 6]
     run = motion(UR5)
