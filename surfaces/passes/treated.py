@@ -65,8 +65,8 @@ def treated_share(
         path: of the tool, on the surface.
         radius: m > 0, half of the footprint.
         rounds: how often faces at the border are cut in four, where the bracket is wide.
-        off: m >= 0, how far the tool may be from the path at most; where that is the radius or more,
-            nothing is known.
+        off: m >= 0, how far the tool may be from the path at most; beyond the radius nothing
+            is known.
     """
     area = float(mesh.areas.sum())
     if not len(path.points):
