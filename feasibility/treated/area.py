@@ -133,7 +133,7 @@ def _measured(
     mesh = _mesh_of(surface.wall or surface, FINE * inner)  # not a smoothed copy
     doubled = mesh.doubled_areas
     normals = doubled / np.maximum(np.linalg.norm(doubled, axis=1), 1e-300)[:, None]
-    off = min(contacts.off, 0.5 * inner)
+    off = contacts.off
     small = treated_share(mesh, normals, contacts.lines, inner, off=off)
     large = treated_share(mesh, normals, contacts.lines, outer, off=off) if outer > inner else small
     found = TreatedArea(
