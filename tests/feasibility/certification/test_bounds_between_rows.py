@@ -1,0 +1,141 @@
+"""What is said between rows holds at densely sampled places there, and less would be wrong."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from arm_urdfs import joint
+from random_arms import between, finite_limits, random_arm, robot_of
+
+from feasibility import Task
+from feasibility.certification.jacobians import jacobians, placements
+from feasibility.certification.lever_bounds import (
+    largest_levers,
+    levers_along,
+    longest_levers,
+    peaks,
+    second_derivatives,
+)
+from feasibility.certification.stretches import Judge
+from robots import Kinematics
+from surfaces import cylinder, mesh, plane
+from surfaces.meshes import TriangleMesh
+from surfaces.places import offset_surface
+
+S = np.linspace(0.0, 1.0, 401)
+
+
+def test_peaks_are_the_largest_values_of_parabolas():
+    rng = np.random.default_rng(0)
+    a, b, most = rng.random((3, 2000, 1)) * [[[1.0]], [[1.0]], [[20.0]]]
+    truth = ((1.0 - S) * a + S * b + S * (1.0 - S) * most / 2.0).max(axis=1)
+    found = peaks(a[:, 0], b[:, 0], most[:, 0])
+    assert (found >= truth - 1e-15).all()
+    assert found == pytest.approx(truth, abs=1e-4)
+    assert np.isnan(peaks(*np.array([[np.nan, 1.0], [1.0, np.nan], [1.0, 1.0]]))).all()
+
+
+@pytest.mark.parametrize("turn", [0.01, 0.3, 1.5, 3.0])
+def test_levers_grow_as_joints_behind_turn(turn):
+    """An elbow of two links of 1 m: its lever is |1 + exp(i q)|, least where it is folded."""
+    elbow = robot_of([joint(1), joint(2, xyz=(1, 0, 0)), joint(3, "fixed", (1, 0, 0))])
+    slides, kinematics = elbow.prismatic, Kinematics(elbow)
+    half = np.array([[0.0, turn]])
+    for middle in (0.0, 1.0, np.pi):
+        at = jacobians(kinematics, np.array([[0.0, middle]]))
+        truth = np.abs(1.0 + np.exp(1j * (middle + turn * (2.0 * S - 1.0)))).max()
+        in_box = largest_levers(at.levers, half, slides, np.inf)[0, 0]
+        ends = [np.array([[0.0, middle + way * turn]]) for way in (-1.0, 1.0)]
+        levers = [jacobians(kinematics, q).levers for q in ends]
+        along = levers_along(2.0 * half, slides, *levers, np.inf)[0, 0]
+        assert min(in_box, along) >= truth - 1e-9
+        assert truth > 1.9 or max(in_box, along) < 1.2 * truth + turn
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_levers_and_bends_hold_along_random_segments(seed):
+    rng = np.random.default_rng(seed)
+    robot = random_arm(rng)
+    low, high = finite_limits(robot)
+    start = rng.uniform(low, high)
+    end = np.clip(start + rng.normal(size=robot.n) * 10.0 ** rng.uniform(-3, 0), low, high)
+    _, q = between(start, end, 400)
+    at = jacobians(Kinematics(robot), q)
+    steps = np.abs(end - start)[None]
+    for truth, path, cap in ((at.levers, at.points, np.inf), (at.sines, at.axes, 1.0)):
+        along = levers_along(steps, robot.prismatic, truth[:1], truth[-1:], cap)
+        turns = ~robot.prismatic
+        assert (truth[:, turns] <= along[0, turns] * (1.0 + 1e-9) + 1e-12).all()
+        bent = second_derivatives(steps, robot.prismatic, truth[[0, -1]], cap)[0]
+        seen = np.linalg.norm(np.diff(path, n=2, axis=0), axis=1).max() * 400.0**2
+        assert seen <= bent * (1.0 + 1e-3) + 1e-8
+
+
+def test_joints_that_do_not_run_evenly_bend_the_way_by_that_as_well():
+    """On a circle |p''|^2 = r^2 (q'^4 + q''^2)."""
+    rate, own, levers = np.array([[0.7]]), np.array([[2.0]]), np.full((2, 1), 0.4)
+    found = second_derivatives(rate, np.array([False]), levers, np.inf, own)[0]
+    assert 0.4 * np.hypot(0.7**2, 2.0) <= found <= 0.4 * (0.7**2 + 2.0) + 1e-12
+
+
+def test_slides_behind_a_joint_lengthen_its_lever_by_their_further_end():
+    robot = robot_of(
+        [joint(1), joint(2, "prismatic", (1, 0, 0), axis=(1, 0, 0), limits=(-3.0, 0.5)),
+         joint(3, "prismatic", axis=(1, 0, 0), limits=(-0.25, 0.5))]
+    )  # fmt: skip
+    assert longest_levers(robot, robot.lower, robot.upper)[0] == pytest.approx(1.0 + 3.0 + 0.5)
+
+
+def flat(kind):
+    """The plane x = 0.5, as one patch, as two triangles, or a wall that is bent about z."""
+    if kind == "patch":
+        return plane((-0.5, 0.5), (-0.5, 0.5), position=(0.5, 0, 0), rpy_deg=(0, 90, 0))
+    if kind == "bent":
+        return cylinder(0.75, (-60, 60), (-0.5, 0.5))
+    corners = np.array([[0.5, y, z] for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+    return mesh(TriangleMesh(corners, [[0, 2, 1], [1, 2, 3]]))
+
+
+def along(robot, surface, task, first, last, rounds=4):
+    """Stretches of a motion of one joint, halved: of each its bounds, and 401 samples there."""
+    cells = surface.cells(2, 2) if surface.kind != "mesh" else surface.cells(4)
+    judge = Judge(robot, task, offset_surface(surface, 0.0), cells)
+    rows = np.array([[first], [last]])
+    at = judge.sampled(np.arange(2), np.zeros(2), rows)
+    stretch, found = judge.between_rows(rows, placements(robot, rows), at), []
+    for _ in range(rounds):
+        bounds = judge.bounds(stretch)
+        for k in range(len(stretch.length)):
+            share = stretch.start.share[k] + S * stretch.length[k]
+            q = first + share[:, None] * (last - first)
+            found.append((bounds.of([k]), judge.sampled(np.zeros(len(S), int), share, q)))
+        stretch = stretch.halves(judge.middles(rows, stretch))
+    return found
+
+
+def turning():
+    """An arm of one joint, whose tool runs round a circle of 0.5 m and looks outwards."""
+    return robot_of([joint(1), joint(2, "fixed", (0.5, 0, 0))], (1, 0, 0))
+
+
+@pytest.mark.parametrize("kind", ["patch", "triangles", "bent"])
+def test_on_a_circle_errors_and_tilts_are_bounded_and_hardly_more(kind):
+    task = Task(0.0, 60, 0.4, approach=(1.0, 0.0, 0.0) if kind == "bent" else "normal")
+    used = []
+    for bounds, there in along(turning(), flat(kind), task, -0.15, 0.4):
+        assert there.error.max() <= bounds.error + 1e-12
+        assert there.chord.max() <= bounds.chord + 1e-12
+        used.append(there.error.max() / bounds.error[0])
+    assert max(used) > 0.97
+
+
+def test_distances_from_triangles_are_no_less_than_is_said_and_hardly_more():
+    """A tool that bends towards a wall, and one that slides past the tip of a thorn, at 0.1 m."""
+    wall = mesh(TriangleMesh([[1.5, -1, -1], [1.5, 1, -1], [1.5, 0, 1]], [[0, 1, 2]]))
+    thorn = mesh(TriangleMesh([[0.1, 0, 0], [1.1, 0.1, 0.1], [1.1, -0.1, 0.1]], [[0, 1, 2]]))
+    slide = robot_of([joint(1, "prismatic", axis=(0, 1, 0))])
+    for robot, surface, far in ((turning(), wall, 0.5), (slide, thorn, 0.3)):
+        for bounds, there in along(robot, surface, Task(0.0, 180, 1.0), -far, far, 2):
+            assert bounds.facets <= there.facets.min() + 1e-12
+            assert bounds.facets > 0.9 * there.facets.min()
+    assert bounds.facets == pytest.approx(there.facets.min())
