@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from arm_urdfs import joint
@@ -15,8 +17,10 @@ from feasibility.certification.lever_bounds import (
     longest_levers,
     peaks,
     second_derivatives,
+    stretched_length,
 )
 from feasibility.certification.stretches import Judge
+from feasibility.certification.surface_replay import less_deviations
 from robots import Kinematics
 from surfaces import cylinder, mesh, plane
 from surfaces.meshes import TriangleMesh
@@ -84,6 +88,7 @@ def test_slides_behind_a_joint_lengthen_its_lever_by_their_further_end():
          joint(3, "prismatic", axis=(1, 0, 0), limits=(-0.25, 0.5))]
     )  # fmt: skip
     assert longest_levers(robot, robot.lower, robot.upper)[0] == pytest.approx(1.0 + 3.0 + 0.5)
+    assert [stretched_length(robot, without=j) for j in (1, 2)] == pytest.approx([1.5, 4.0])
 
 
 def flat(kind):
@@ -139,3 +144,28 @@ def test_distances_from_triangles_are_no_less_than_is_said_and_hardly_more():
             assert bounds.facets <= there.facets.min() + 1e-12
             assert bounds.facets > 0.9 * there.facets.min()
     assert bounds.facets == pytest.approx(there.facets.min())
+
+
+@pytest.mark.parametrize("share", [1.0 - 1e-4, 1.0 + 1e-4])
+def test_tolerance_and_cone_are_exact(share):
+    """Turned by 0.3 rad the tool is 0.5 (1 - cos 0.3) m before the plane."""
+    off, turn = 0.5 - 0.5 * np.cos(0.3), np.degrees(0.3)
+    for tolerance, cone in ((share * off, 60.0), (1.0, share * turn)):
+        task = Task(0.0, cone, tolerance)
+        judge = Judge(
+            turning(), task, offset_surface(flat("patch"), 0.0), flat("patch").cells(2, 2)
+        )
+        at = judge.sampled(np.zeros(1, int), np.zeros(1), np.array([[0.3]]))
+        assert judge.within(at).all() == (share > 1.0)
+
+
+@pytest.mark.parametrize(("off", "leans"), [(1e-3, 0.0), (0.0, 0.05), (2e-3, 0.1)])
+def test_what_a_surface_may_deviate_by_is_taken_off(off, leans):
+    """A target is f + d n, and the angle between unit vectors is 2 asin of half their chord."""
+    task = Task(0.02, 30.0, 0.01)
+    left = less_deviations(task, SimpleNamespace(deviations=(off, leans)))
+    assert left.effective_tolerance == pytest.approx(0.01 - off - 0.02 * leans)
+    assert left.cone == pytest.approx(task.cone - 2.0 * np.arcsin(0.5 * leans))
+    far = less_deviations(task, SimpleNamespace(deviations=(0.5, 2.0)))
+    assert far.effective_tolerance < 1e-11
+    assert far.cone == 0.0

@@ -5,7 +5,7 @@ what takes its place, and not by a line; it has to match exactly once. The tree 
 temporary folder, and the tests of a room have to pass there first. Then each fault is put into a
 copy of that, and the tests run until one fails. A fault that no test finds survives.
 
-    python tests/mutants/run.py [REGEX]      those whose room, file, edit or words match
+    python tests/mutants/mutants.py [REGEX]      those whose room, file, edit or words match
 """
 
 from __future__ import annotations
