@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -157,6 +158,10 @@ def test_tolerance_and_cone_are_exact(share):
         )
         at = judge.sampled(np.zeros(1, int), np.zeros(1), np.array([[0.3]]))
         assert judge.within(at).all() == (share > 1.0)
+        right = replace(at, error=np.zeros(1), chord=np.zeros(1))
+        for facets in (-share * task.effective_tolerance, np.nan):
+            near = replace(right, facets=np.array([task.standoff + facets]))
+            assert judge.within(near).all() == (facets == facets and share < 1.0)
 
 
 @pytest.mark.parametrize(("off", "leans"), [(1e-3, 0.0), (0.0, 0.05), (2e-3, 0.1)])
@@ -169,3 +174,17 @@ def test_what_a_surface_may_deviate_by_is_taken_off(off, leans):
     far = less_deviations(task, SimpleNamespace(deviations=(0.5, 2.0)))
     assert far.effective_tolerance < 1e-11
     assert far.cone == 0.0
+
+
+def test_what_is_not_known_at_an_end_is_not_known_between():
+    """No NaN in, no acceptance out: of error, tilt or distance from triangles, at either end."""
+    surface, rows = flat("triangles"), np.array([[0.0], [0.1]])
+    judge = Judge(turning(), Task(0.0, 180, 0.4), offset_surface(surface, 0.0), surface.cells(4))
+    at = judge.sampled(np.arange(2), np.zeros(2), rows)
+    whole = judge.between_rows(rows, placements(judge.robot, rows), at)
+    assert judge.within(judge.bounds(whole)).all()
+    for end in ("start", "end"):
+        for name in ("points", "axes", "facets"):
+            known = getattr(whole, end)
+            lost = replace(known, **{name: np.full_like(getattr(known, name), np.nan)})
+            assert not judge.within(judge.bounds(replace(whole, **{end: lost}))).any()
