@@ -1,4 +1,4 @@
-"""What is said between rows holds at densely sampled places there, and less would be wrong."""
+"""Bounds between rows hold where they are sampled, and less would be wrong; margins are exact."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from arm_urdfs import joint
 from random_arms import between, finite_limits, random_arm, robot_of
 
 from feasibility import Task
+from feasibility.certification.cells_reached import at_targets
 from feasibility.certification.jacobians import jacobians, placements
 from feasibility.certification.lever_bounds import (
     largest_levers,
@@ -22,6 +23,7 @@ from feasibility.certification.lever_bounds import (
 )
 from feasibility.certification.stretches import Judge
 from feasibility.certification.surface_replay import less_deviations
+from feasibility.task import Targets
 from robots import Kinematics
 from surfaces import cylinder, mesh, plane
 from surfaces.meshes import TriangleMesh
@@ -162,6 +164,21 @@ def test_tolerance_and_cone_are_exact(share):
         for facets in (-share * task.effective_tolerance, np.nan):
             near = replace(right, facets=np.array([task.standoff + facets]))
             assert judge.within(near).all() == (facets == facets and share < 1.0)
+
+
+@pytest.mark.parametrize("what", range(4))
+@pytest.mark.parametrize("share", [1.0 - 1e-4, 1.0 + 1e-4])
+def test_a_cell_is_reached_within_tolerance_cone_and_roll_and_no_further(what, share):
+    """The tool is off by 1 mm, tilted by 10 deg about x, or rolled by 20 deg either way."""
+    x, y, z = np.eye(3)
+    aims = Targets(np.zeros((1, 3)), z[None], x[None])
+    task = Task(0.0, 10.0, 1e-3, roll_deg=(-20.0, 20.0), roll_reference=(1.0, 0.0, 0.0))
+    off = np.where(np.arange(4) == what, share, 0.0) * [1e-3, *np.radians([10.0, 20.0, -20.0])]
+    axis = np.cos(off[1]) * z - np.sin(off[1]) * y
+    roll = off[2] + off[3]
+    reference = np.cos(roll) * x + np.sin(roll) * y
+    found = at_targets(task, aims, np.zeros(1, int), off[:1, None] * y, axis[None], reference[None])
+    assert found.all() == (share < 1.0)
 
 
 @pytest.mark.parametrize(("off", "leans"), [(1e-3, 0.0), (0.0, 0.05), (2e-3, 0.1)])
