@@ -21,9 +21,12 @@ from feasibility.certification.lever_bounds import (
     second_derivatives,
     stretched_length,
 )
+from feasibility.certification.order import order_of_marks, order_of_places
+from feasibility.certification.refusals import exact_faults
 from feasibility.certification.stretches import Judge
 from feasibility.certification.surface_replay import less_deviations
 from feasibility.task import Targets
+from feasibility.verdict import Walk
 from robots import Kinematics
 from surfaces import cylinder, mesh, plane
 from surfaces.meshes import TriangleMesh
@@ -205,3 +208,35 @@ def test_what_is_not_known_at_an_end_is_not_known_between():
             known = getattr(whole, end)
             lost = replace(known, **{name: np.full_like(getattr(known, name), np.nan)})
             assert not judge.within(judge.bounds(replace(whole, **{end: lost}))).any()
+
+
+@pytest.mark.parametrize("value", [1.0 - 1e-4, 1.0 + 1e-4, np.nan])
+@pytest.mark.parametrize("name", ["error", "chord", "roll", "facets"])
+def test_a_row_is_at_fault_where_it_is_not_within_one_of_its_margins(name, value):
+    task = Task(0.02, 30.0, 0.01, roll_deg=(-20.0, 20.0), roll_reference=(0.0, 0.0, 1.0))
+    judge = Judge(turning(), task, offset_surface(flat("patch"), 0.0), flat("patch").cells(2, 2))
+    at = judge.sampled(np.zeros(1, int), np.zeros(1), np.zeros((1, 1)))
+    none = np.zeros(1)
+    right = replace(at, error=none, chord=none, roll=none, facets=np.full(1, np.inf))
+    margins = {"error": 0.01, "chord": task.cone_chord, "roll": np.radians(20.0), "facets": 0.01}
+    given = replace(right, **{name: np.full(1, value * margins[name])})
+    wrong = not (value > 1.0 if name == "facets" else value < 1.0)
+    assert judge.within(right).all()
+    assert not exact_faults(judge, right, "row")
+    assert judge.within(given).all() == (not wrong)
+    assert bool(exact_faults(judge, given, "row")) == wrong
+
+
+@pytest.mark.parametrize("share", [1.0 - 1e-4, 1.0 + 1e-4])
+def test_a_toolpath_is_run_back_by_no_more_than_the_tolerance(share):
+    along = np.array([0.0, 0.7, 0.7 - 0.4 * share, 0.9])
+    offset = SimpleNamespace(along=lambda places: along)
+    passed = SimpleNamespace(places=None, row=np.arange(4), share=np.zeros(4))
+    assert bool(order_of_places(offset, passed, 0.4)) == (share > 1.0)
+
+
+@pytest.mark.parametrize(("marks", "right"), [((0, -1, 1, 1, 2), True), ((0, 1, 3), False),
+                                              ((0, 1, 0), False)])  # fmt: skip
+def test_marks_go_from_pose_to_pose(marks, right):
+    walk = Walk(np.zeros((len(marks), 1)), np.array(marks))
+    assert (order_of_marks(SimpleNamespace(in_order=True), walk) == "") == right
