@@ -17,7 +17,7 @@ from feasibility.certification.rolls.bounds import (
     vectors_of,
 )
 from feasibility.roll import Roll
-from surfaces import sphere
+from surfaces import cylinder, sphere
 from surfaces.places import Places, offset_surface
 
 S = np.linspace(0.0, 1.0, 101)[:, None]
@@ -107,3 +107,39 @@ def test_over_a_sphere_the_roll_of_a_tool_at_rest_or_turning_is_bounded(referenc
     used = (truth[some] / found[some]).max()
     assert some.sum() > 50
     assert used > 0.9
+
+
+@pytest.mark.parametrize("kind", ["dome", "tube", "by u"])
+def test_references_bend_no_more_than_is_said(kind):
+    """Past where the approach is nearly along the reference, t turns fast."""
+    rng, count = np.random.default_rng(5), 600
+    dome = sphere(1.0, (20, 160), (-180, 180))
+    surface = dome if kind != "tube" else cylinder(1.0, (-170, 170), (-1, 1))
+    offset, along = offset_surface(surface, 0.0), None if kind == "by u" else (1.0, 0.0, 0.0)
+    task = Task(0.0, 90, roll_deg=(-80.0, 80.0), roll_reference=along)
+    held = Held.of(task, surface.cells(2, 2), offset)
+    middle = [np.pi / 2, 0.0] if kind != "tube" else [0.4, 0.0]
+    way = 10.0 ** rng.uniform(-3, -1.3, (count, 1)) * rng.normal(size=(count, 2))
+    beside = np.linalg.norm(way, axis=1, keepdims=True) * rng.uniform(0.7, 3.0, (count, 1))
+    first = middle + beside * rng.choice([-1.0, 1.0], (count, 2)) - 0.5 * way
+    chart = np.zeros(count, dtype=np.int64)
+    path = offset.paths(Places(chart, first), Places(chart, first + way))
+    found = held.references_along(path, held.approaches(path.normals))
+    some = np.isfinite(found.second_u[:, 2]) & (path.share[:, 2] == 0.0)
+    assert some.sum() > 100
+    used = []
+    for s in (0.1, 0.3, 0.5, 0.8):
+        places = Places(chart, first + s * way)
+        b = held.approaches(offset.at(places)[1])
+        t = held.references_along(offset.paths(places, places), np.stack([b] * 4, axis=1)).t[:, 0]
+        ends = found.t[:, 0], found.t[:, 3]
+        normals = [held.approaches(path.normals[:, k]) for k in (0, 3)]
+        pairs = [np.cross(one, other) for one, other in zip(normals, ends, strict=True)]
+        for here, (one, other), second in (
+            (t, ends, found.second_t), (np.cross(b, t), pairs, found.second_u),
+        ):  # fmt: skip
+            off = np.linalg.norm(here - (1.0 - s) * one - s * other, axis=1)[some]
+            most = 0.5 * s * (1.0 - s) * second[some, 2]
+            assert (off <= most + 1e-7).all()
+            used.append((off / most)[off > 1e-4].max(initial=0.0))
+    assert kind != "dome" or min(used) > 0.6
