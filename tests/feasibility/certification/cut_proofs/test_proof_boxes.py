@@ -5,10 +5,12 @@ import pytest
 from known_points import confirmed, known, lost
 from random_arms import random_arm
 
+from feasibility import Task
 from feasibility.certification.cut_proofs import linear_models
-from feasibility.certification.cut_proofs.linear_models import derivatives
+from feasibility.certification.cut_proofs.linear_models import derivatives, target_parts
 from feasibility.certification.lever_bounds import LeverBounds, lever_bounds, longest_levers
 from robots import Kinematics
+from surfaces import sphere
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -60,3 +62,16 @@ def test_remainders_and_levers_hold_all_over_random_boxes(seed):
         seen = np.linalg.norm(moved_columns[..., part], axis=2)[:, turned]
         assert (seen <= bounds.largest[:, turned] + 1e-12).all()
         assert (seen <= caps[turned] + 1e-9).all()
+
+
+def test_targets_are_off_by_what_points_are_and_what_normals_move_them():
+    """T = f + d n, so r_T = r_f + d r_n; the approach is off as the normal is."""
+    dome = sphere(1.0, (10, 60), (0, 90))
+    parts, cells = dome.parts(0.05, 0.05), dome.cells(2, 2)
+    for standoff in (0.0, 0.3):
+        found = target_parts(parts, cells, Task(standoff, 30))
+        assert found.radius[:, 0] == pytest.approx(parts.radius @ [1.0, standoff])
+        assert (found.radius[:, 1] == parts.radius[:, 1]).all()
+    fixed = target_parts(parts, cells, Task(0.3, 30, approach=(0.0, 0.0, -1.0)))
+    assert fixed.radius[:, 0] == pytest.approx(parts.radius @ [1.0, 0.3])
+    assert not fixed.radius[:, 1].any()
