@@ -4,6 +4,7 @@
 # make campaign NAME=oracle   what takes too long for make test (tests/campaigns)
 # make bench BENCH=old.json   the same, with figures in that file and not in out/bench.json
 # make bench-compare OLD=old.json NEW=new.json   what became slower, and counts that changed
+# make mutants ONLY=stretches   small faults put into the code: which of them no test finds; all without ONLY
 # make test-browser   the live page, by mouse and keyboard, in a Chromium
 # make wheel  a wheel in dist/ that brings compiled kernels, for this platform, Python and numba
 # PYTHON=/path/to/python chooses the interpreter (CPython 3.11 or later).
@@ -16,7 +17,7 @@ IS_RECENT := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
 unexport PYTHONDONTWRITEBYTECODE
 
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-browser lint kernels greedy collected wheel bench bench-compare campaign clean distclean
+.PHONY: help demo test test-browser lint kernels greedy collected wheel bench bench-compare campaign mutants clean distclean
 
 help:
 	@sed -n '/^#/!q; s/^# //p' Makefile
@@ -78,6 +79,9 @@ test-browser:
 
 campaign: .venv/installed
 	$(BIN)/python -m pytest -n 2 --dist loadfile -rP tests/campaigns/test_$(NAME).py
+
+mutants: .venv/installed
+	$(BIN)/python tests/mutants/mutants.py "$(ONLY)"
 
 # The tables, on the screen and as JSON; TABLES="greedy path" makes those alone. Where the machine is
 # not quiet, ROUNDS=3 makes all of them three times and keeps the least of each time.

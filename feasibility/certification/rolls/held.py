@@ -45,6 +45,17 @@ class ToolAxes(NamedTuple):
     """(k, 3)"""
 
 
+class ReferencesAlong(NamedTuple):
+    """Reference directions along k paths of places."""
+
+    t: Array
+    """(k, 4, 3) at the four places."""
+    second_t: Array
+    """(k, 3) D_t of the pieces."""
+    second_u: Array
+    """(k, 3) D_u."""
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Held:
     """Approach and reference directions over the places of one surface."""
@@ -118,24 +129,15 @@ class Held:
         count = len(second)
         if self.roll is None:
             return np.zeros(count)
-        known = [self._references(path.place(k), approaches[:, k]) for k in range(4)]
-        references = np.stack([t for t, _ in known], axis=1)
-        sines = np.stack([h for _, h in known], axis=1)
+        references, second_t, second_u = self.references_along(path, approaches)
         share = path.share[..., None]
         ends = (start.x, end.x), (np.cross(start.axes, start.x), np.cross(end.axes, end.x))
         x, y = ((1.0 - share) * one[:, None] + share * other[:, None] for one, other in ends)
         z = vectors_of(x, y, references, np.cross(approaches, references), self.roll)
         unknown = 0.5 * path.share * (1.0 - path.share) * second[:, None]
-        db, dt = np.diff(approaches, axis=1), np.diff(references, axis=1)
-        du = np.diff(np.cross(approaches, references), axis=1)
+        dt, du = np.diff(references, axis=1), np.diff(np.cross(approaches, references), axis=1)
         width = np.diff(path.share, axis=1)
-        second_b, second_t = (
-            self.second_derivatives(path),
-            self._second_of_references(path, db, sines),
-        )
         with np.errstate(invalid="ignore"):  # inf * 0 is NaN, and refused
-            second_u = second_b + second_t
-            second_u += 2.0 * np.linalg.norm(db, axis=2) * np.linalg.norm(dt, axis=2)
             most = width**2 * second[:, None] + ROOT * (second_t + second_u)
             most += products_of_changes(np.diff(x, axis=1), np.diff(y, axis=1), dt, du)
         most[:, 1] = 0.0  # on the spot: right on both sides is enough
@@ -144,6 +146,23 @@ class Held:
             for k in range(3)
         ]
         return np.asarray(np.max(found, axis=0))
+
+    def references_along(self, path: PlacePaths, approaches: Array) -> ReferencesAlong:
+        """t at the places of paths, and how much t and u bend along their pieces.
+
+        Args:
+            path: of places.
+            approaches: (k, 4, 3) at its four places.
+        """
+        known = [self._references(path.place(k), approaches[:, k]) for k in range(4)]
+        references = np.stack([t for t, _ in known], axis=1)
+        sines = np.stack([h for _, h in known], axis=1)
+        db, dt = np.diff(approaches, axis=1), np.diff(references, axis=1)
+        second_t = self._second_of_references(path, db, sines)
+        with np.errstate(invalid="ignore"):  # inf * 0 is NaN, and refused
+            second_u = self.second_derivatives(path) + second_t
+            second_u += 2.0 * np.linalg.norm(db, axis=2) * np.linalg.norm(dt, axis=2)
+        return ReferencesAlong(references, second_t, second_u)
 
     def _second_of_references(self, path: PlacePaths, db: Array, sines: Array) -> Array:
         """(k, 3) D_t of the pieces; 0 where the place changes sides on the spot."""

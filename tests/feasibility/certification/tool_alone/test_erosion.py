@@ -75,3 +75,22 @@ def test_of_other_meshes_nothing_is_known_to_be_left() -> None:
     corners = dented.vertices.copy()
     corners[np.linalg.norm(corners - [0.0, 0.0, 0.05], axis=1).argmin(), 2] = 0.0
     assert planes_around(checked_triangles(corners, dented.faces)) is None
+
+
+def test_open_hollow_and_doubled_meshes_are_told_from_solids() -> None:
+    """Each by one thing alone: a missing triangle, what is inside, or the volume."""
+    box = trimesh.creation.box((0.2, 0.3, 0.1))
+    planes = planes_around(Triangles(box.vertices, box.faces, True))
+    assert planes is not None
+    # Not even by rounding do they hold what is not in the box.
+    assert (box.vertices @ planes[:, :3].T + planes[:, 3]).max(axis=1).min() > 0.0
+    # A triangle at the corner that volumes are seen from adds nothing to the volume.
+    beside = [k for k, face in enumerate(box.faces) if k and box.faces[0, 0] in face]
+    for k in beside:
+        assert planes_around(Triangles(box.vertices, np.delete(box.faces, k, 0), False)) is None
+    inside = trimesh.creation.box((0.1, 0.1, 0.05))
+    both = np.vstack([inside.faces, inside.faces[:, ::-1]]) + len(box.vertices)
+    corners = np.vstack([box.vertices, inside.vertices])
+    assert planes_around(Triangles(corners, np.vstack([box.faces, both]), True)) is None
+    twice = np.vstack([box.faces, box.faces[:, ::-1]])
+    assert planes_around(Triangles(box.vertices, twice, True)) is None
