@@ -65,15 +65,12 @@ def treated_share(
         path: of the tool, on the surface.
         radius: m > 0, half of the footprint.
         rounds: how often faces at the border are cut in four, where the bracket is wide.
-        off: m >= 0, how far the tool may be from the path at most; beyond the radius nothing
-            is known.
+        off: m >= 0, how far the tool may be from the path at most; from the radius on all is open.
     """
     area = float(mesh.areas.sum())
-    if not len(path.points):
-        none = np.zeros(len(mesh.faces))
-        return Treated(area, 0.0, 0.0, mesh, none, none)
-    if off >= radius:
-        return Treated(area, 0.0, 1.0, mesh, np.zeros(len(mesh.faces)), np.ones(len(mesh.faces)))
+    if not len(path.points) or off >= radius:
+        none, most = np.zeros(len(mesh.faces)), float(len(path.points) > 0)
+        return Treated(area, 0.0, most, mesh, none, none + most)
     path = path.no_longer_than(CLOSE * radius)
     found = _bracket(mesh, normals, path, radius, off)
     found = found.where(_connected(mesh, path, found.upper > 0.0))
