@@ -16,6 +16,7 @@ from capsule_arms import (
 )
 
 from feasibility.certification import collision_replay
+from feasibility.certification.collisions.budgets import Budget, TooNear
 from feasibility.collisions import HalfSpace, Obstacle, Soup
 from robots.shapes import Solid
 from robots.urdf import Box, Capsule, Cylinder, Sphere
@@ -171,3 +172,21 @@ def test_several_bodies_of_one_owner():
 def test_the_capsule_helper_lies_along_x():
     ends = along_x(0.6) @ np.array([[0, 0, -0.3, 1], [0, 0, 0.3, 1]]).T
     np.testing.assert_allclose(sorted(ends[0]), [0.0, 0.6], atol=1e-12)
+
+
+@pytest.mark.parametrize("needed", [0.05, 0.079, 0.081, 0.2])
+def test_distances_alone_certify_what_is_there_between_rows_and_no_more(needed):
+    """A body that comes as near as 0.08 m in the middle, by as much as its points move at most."""
+
+    def measured(row, share):
+        return 0.08 + 0.3 * abs(share - 0.5)
+
+    rows, wanted = np.zeros(1, dtype=np.intp), np.array([needed])
+    budget = Budget(measured, np.array([0.3]), 1000)
+    if needed > 0.08:
+        with pytest.raises(TooNear):
+            budget.certify(rows, wanted, 1.0)
+    else:
+        assert needed <= budget.certify(rows, wanted, 1.0) <= 0.08
+    with pytest.raises(TooNear):
+        Budget(measured, np.array([0.3]), 2).certify(rows, wanted, 1.0)
