@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import arm_urdfs
 import numpy as np
 import pytest
+import random_arms
 from capsule_arms import (
     along_x,
     at,
@@ -16,7 +18,8 @@ from capsule_arms import (
 )
 
 from feasibility.certification import collision_replay
-from feasibility.collisions import HalfSpace, Obstacle, Soup
+from feasibility.certification.collisions.budgets import Budget, TooNear
+from feasibility.collisions import Bodies, HalfSpace, Obstacle, Pair, Soup
 from robots.shapes import Solid
 from robots.urdf import Box, Capsule, Cylinder, Sphere
 
@@ -171,3 +174,36 @@ def test_several_bodies_of_one_owner():
 def test_the_capsule_helper_lies_along_x():
     ends = along_x(0.6) @ np.array([[0, 0, -0.3, 1], [0, 0, 0.3, 1]]).T
     np.testing.assert_allclose(sorted(ends[0]), [0.0, 0.6], atol=1e-12)
+
+
+@pytest.mark.parametrize("needed", [0.05, 0.079, 0.081, 0.2])
+def test_distances_alone_certify_what_is_there_between_rows_and_no_more(needed):
+    """A body that comes as near as 0.08 m in the middle, by as much as its points move at most."""
+
+    def measured(row, share):
+        return 0.08 + 0.3 * abs(share - 0.5)
+
+    rows, wanted = np.zeros(1, dtype=np.intp), np.array([needed])
+    budget = Budget(measured, np.array([0.3]), 1000)
+    if needed > 0.08:
+        with pytest.raises(TooNear):
+            budget.certify(rows, wanted, 1.0)
+    else:
+        assert needed <= budget.certify(rows, wanted, 1.0) <= 0.08
+    with pytest.raises(TooNear):
+        Budget(measured, np.array([0.3]), 2).certify(rows, wanted, 1.0)
+
+
+@pytest.mark.parametrize("gap", [0.003, 0.0139, 0.0141, 0.2])
+def test_what_triangles_may_be_off_is_taken_off_their_distance(gap):
+    """A ball at rest before a triangle of a surface that is known to 4 mm; 10 mm are needed."""
+    robot = random_arms.robot_of([arm_urdfs.joint(1)])
+    ball = Solid("tool", 1, np.eye(4), Sphere(0.1))
+    x = 0.1 + gap
+    triangle = np.array([[[x, -1.0, -1.0], [x, 1.0, -1.0], [x, 0.0, 1.0]]])
+    soup, wanted = Soup("surface", triangle, 0.004, False), Pair("tool", "surface", 0.01)
+    found = collision_replay(robot, Bodies((ball,), (), (soup,), (), (wanted,)), np.zeros((1, 1)))
+    assert found.accepted == (gap > 0.014)
+    assert gap - 0.0041 <= found.min_clearance <= gap - 0.004 + 1e-6
+    if found.accepted:
+        assert found.measured_clearance == pytest.approx(gap + 0.004)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import arm_urdfs
 import numpy as np
 import pytest
+from random_arms import robot_of
 
 from feasibility.certification.collisions.first_look import Body, CoupledBodies, FirstLook
+from feasibility.certification.collisions.parting import by_balls, parted
 from feasibility.certification.collisions.pieces import COAL, coal_distance
 from feasibility.certification.collisions.relative_motion import ArmMotion
-from feasibility.certification.collisions.shape_pieces import piece_of
+from feasibility.certification.collisions.shape_pieces import piece_of, sheet_piece
 from feasibility.collisions import HalfSpace
 from robots import load_robot
-from robots.urdf import Box, Capsule, Cylinder
+from robots.urdf import Box, Capsule, Cylinder, Sphere
 
 SHARES = np.linspace(0.0, 1.0, 9)
 
@@ -60,3 +63,39 @@ def test_of_what_has_no_end_nothing_is_told():
     motion = ArmMotion(robot, np.array([np.zeros(6), np.full(6, 0.1)]))
     low = FirstLook(motion, CoupledBodies([(ground, thing)])).low
     assert (low == -np.inf).all()
+
+
+def wall_of(kind, at):
+    """A ball, a box, or a plate of many triangles whose nearest point is at (x, y), m."""
+    place = np.eye(4)
+    place[:2, 3] = at
+    if kind == "triangles":
+        side = np.linspace(-0.5, 0.5, 9)
+        corners = np.array([[at[0], at[1] + y, z] for y in side for z in side]).reshape(9, 9, 3)
+        a, b, c, d = corners[:-1, :-1], corners[1:, :-1], corners[:-1, 1:], corners[1:, 1:]
+        halves = [np.stack(half, axis=2).reshape(-1, 3, 3) for half in ((a, b, c), (b, d, c))]
+        return sheet_piece(np.concatenate(halves), False)
+    place[0, 3] += 0.2
+    return piece_of(Sphere(0.2) if kind == "ball" else Box((0.4, 1.0, 1.0)), place)
+
+
+@pytest.mark.parametrize("kind", ["ball", "box", "triangles"])
+@pytest.mark.parametrize(
+    ("first", "last", "off", "nearest"),
+    [(-0.3, 0.3, 0.0, 1.0), (np.pi / 2, np.pi / 2, 0.05, np.sin(0.05)), (0.2, 0.0, 0.0, 1.0)],
+    ids=["bulges", "deviates", "approaches"],
+)
+def test_a_ball_on_a_circle_comes_as_near_as_is_said(kind, first, last, off, nearest):
+    """A ball of 0.1 m goes round at 1 m, up to x = `nearest`; the wall is 0.05 m beyond."""
+    robot, place = robot_of([arm_urdfs.joint(1), arm_urdfs.joint(2, "fixed", (1, 0, 0))]), np.eye(4)
+    place[0, 3] = 1.0
+    b = piece_of(Sphere(0.1), place)
+    a = wall_of(kind, (nearest + 0.15, np.sqrt(1.0 - nearest**2)))
+    motion = ArmMotion(robot, np.array([[first], [last]]), np.array([[off]]))
+    s = motion.stretches(0, 1, b.centre, b.ball)
+    known = CoupledBodies([(Body(0, a, 0.0), Body(1, b, 0.0))])
+    assert by_balls(a, b, s)[0] <= 0.05 + 1e-9
+    assert FirstLook(motion, known).low[0, 0] <= 0.05 + 1e-9
+    found = parted(a, b, s, np.array([-1.0, 0.0, 0.0]))[0]
+    assert 0.04 <= found <= 0.05 + 1e-9
+    assert kind != "ball" or by_balls(a, b, s)[0] >= 0.04
