@@ -21,7 +21,7 @@ from feasibility.sensitivity.thresholds import Finding, Span, Threshold
 from feasibility.verdict import Answer, Evidence, Verdict
 
 ASKED, LEAST_ASKED = 6, 150_000  # verdicts' worth, and evaluations, for `check` at a far side ...
-ROUNDS = ((1, 30), (4, 20))  # ... as many times that, one after the other, up to so many in all
+ROUNDS = ((1, 30), (4, 16))  # ... as many times that, one after the other, up to so many in all
 GIVEN = 0  # steps from the value given
 
 

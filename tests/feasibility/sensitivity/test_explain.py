@@ -425,7 +425,7 @@ def test_an_explanation_costs_at_most_so_many_evaluations(name: str) -> None:
     """Forty verdicts, cheap as they may be, and what `check` is asked at far sides."""
     explanation = explained(name)
     cost = explanation.verdict.statistics["fk"]
-    assert explanation.evaluations + cost <= 40 * cost + 35 * max(6 * cost, 150_000)
+    assert explanation.evaluations + cost <= 40 * cost + 25 * max(6 * cost, 150_000)
 
 
 def test_progress_counts_the_thresholds_and_may_end_the_work() -> None:

@@ -187,8 +187,8 @@ def test_the_far_side_of_a_margin_is_one_where_check_finds_no_motion_either() ->
     assert len(sides) > 10
     for quantity, other in sides:
         verdict = check(*quantity.applied(given, quantity.steps_to(other.value)))
-        assert verdict.answer is other.answer, quantity.name
-        assert not verdict.feasible
+        assert not verdict.feasible, quantity.name
+        assert verdict.answer is other.answer or other.answer is Answer.UNDECIDED, quantity.name
     assert sum(other.answer is Answer.INFEASIBLE for _, other in sides) > len(sides) // 2
 
 
