@@ -5,6 +5,8 @@ import signal
 from pathlib import Path
 
 import pytest
+import samples
+from approved import approved  # noqa: F401
 from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
 
@@ -17,6 +19,7 @@ providers.is_local_module_file = lambda path: False
 settings.register_profile(
     "suite", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
+settings.register_profile("campaign", settings.get_profile("suite"), max_examples=2000)
 settings.load_profile("suite")
 
 # A shell lets its background jobs ignore Ctrl-C, and their children with them. Tests that interrupt
@@ -41,6 +44,20 @@ LONGEST = (
     "test_any_surface", "test_trajectory_files", "test_set_cover", "test_complete",
     "test_placement_view", "test_kept_kernels",
 )  # fmt: skip
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Two switches of our own."""
+    parser.addoption("--accept", action="store_true", help="write approved texts anew")
+    parser.addoption("--samples", choices=("few", "all"), default="few", help="how much is drawn")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Say how much is drawn at random before tests are collected."""
+    config.addinivalue_line("markers", "sampled: a campaign runs more of it (--samples=all)")
+    if config.getoption("samples") == "all":
+        samples.EVERYTHING = True
+        settings.load_profile("campaign")
 
 
 def pytest_ignore_collect(collection_path: Path) -> bool | None:

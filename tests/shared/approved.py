@@ -1,0 +1,54 @@
+"""Approved texts: what is said and printed, kept as files that people read when they change.
+
+`pytest --accept` writes them anew, and git shows what changed. What differs from one machine or run
+to the next is masked first.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+MASKS = (
+    (re.compile(r"\d+(\.\d+)? s\b"), "# s"),
+    (re.compile(r"\b(pid|port) \d+"), r"\1 #"),
+)
+NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
+
+
+class Approved:
+    """Compares texts with files of `approved/` beside the test."""
+
+    def __init__(self, folder: Path, temporary: Path, accept: bool) -> None:
+        self.folder, self.temporary, self.accept = folder, temporary, accept
+
+    def masked(self, text: str) -> str:
+        """Without folders of this run, and without times."""
+        text = text.replace(str(self.temporary), "FOLDER")
+        for found, instead in MASKS:
+            text = found.sub(instead, text)
+        return text.rstrip() + "\n"
+
+    def __call__(self, name: str, text: str, *, numbers: bool = True) -> None:
+        """Fail unless this is the approved text `name`; with `numbers=False` all numbers are #."""
+        __tracebackhide__ = True
+        path, text = self.folder / f"{name}.txt", self.masked(text)
+        text = text if numbers else NUMBER.sub("#", text)
+        if self.accept:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, "utf-8")
+        known = (
+            path.read_text("utf-8")
+            if path.is_file()
+            else "(nothing: run pytest --accept, and read it)"
+        )
+        assert text == known, f"not what {path.name} has approved"
+
+
+@pytest.fixture
+def approved(request: pytest.FixtureRequest, tmp_path: Path) -> Approved:
+    """approved(name, text): is it word for word what tests/.../approved/name.txt says?"""
+    folder = request.path.parent / "approved"
+    return Approved(folder, tmp_path, request.config.getoption("accept"))
