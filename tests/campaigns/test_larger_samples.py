@@ -5,8 +5,6 @@ import test_checking
 import test_clustering
 import test_coverage
 import test_creases
-import test_division
-import test_explain
 import test_greedy_cases
 import test_mesh_file
 import test_mesh_verdicts
@@ -14,18 +12,6 @@ import test_mesh_witness
 import test_proof_verification
 import test_robot_visuals
 import test_segment_bound
-import test_set_cover
-
-
-@pytest.mark.parametrize(("arm", "number"), test_division.DRAWN)
-def test_divisions(arm, number):
-    test_division.test_random_cases(arm, number)
-
-
-@pytest.mark.parametrize("block", range(20))
-def test_tables_against_brute_force(block):
-    test_set_cover.test_random_tables_against_brute_force(block)
-    test_set_cover.test_the_programme_alone_against_brute_force(block)
 
 
 @pytest.mark.parametrize("kind", test_segment_bound.KINDS)
@@ -77,11 +63,6 @@ def test_edges(name, task):
 @pytest.mark.parametrize("asked", test_creases.MORE_ROUNDED)
 def test_rounded_edges(asked):
     test_creases.test_a_motion_over_a_rounded_edge_far_smaller_than_the_standoff(*asked)
-
-
-@pytest.mark.parametrize("name", test_explain.MORE)
-def test_sides(name):
-    test_explain.test_what_is_said_of_a_side_is_what_a_verdict_says(name)
 
 
 @pytest.mark.parametrize("seed", test_proof_verification.MORE)
