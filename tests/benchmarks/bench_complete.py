@@ -32,7 +32,7 @@ from surfaces import plane
 
 ROOT = Path(__file__).resolve().parents[2]
 PATH_SPEED = 0.1  # [m/s]
-DISCONNECTED = ROOT / "tests" / "oracle" / "puma560_disconnected.json"
+DISCONNECTED = ROOT / "tests" / "questions" / "puma560_disconnected.json"
 GRID = """
 import json, resource, sys, time
 sys.path[:0] = sys.argv[3:]
