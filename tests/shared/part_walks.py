@@ -60,12 +60,17 @@ def at_parameters(surface, u, v):
     return root, (2.0 * at - low[root] - high[root]) / (high[root] - low[root])
 
 
-def walk_all_over(surface, parts, count=10_000):
-    """A `walk` of places all over a patch of one box, from the root."""
-    u, v = spread(surface, count)
-    _, x = at_parameters(surface, u, v)
-    root = np.zeros(count, dtype=int)
-    return walk(parts, root, x, surface.point(u, v), surface.normal(u, v))
+def boxes_of(surface, parts):
+    """(K, 2) lower and upper parameters of every part of a patch that is one box."""
+    (low,), (high,) = surface.part_roots
+    low, high = np.tile(low, (len(parts), 1)), np.tile(high, (len(parts), 1))
+    for part in np.flatnonzero(parts.children[:, 0] >= 0).tolist():
+        axis = parts.axis[part]
+        one, other = parts.children[part]
+        for child in (one, other):
+            low[child], high[child] = low[part], high[part]
+        high[one, axis] = low[other, axis] = (low[part, axis] + high[part, axis]) / 2.0
+    return low, high
 
 
 def spread(surface, count, seed=7):
@@ -106,6 +111,13 @@ def size_of(surface):
     return float(root.radius[0, 0] + np.linalg.norm(root.slopes[0, :, :3], axis=1).sum())
 
 
+def pieces_of(surface):
+    """(patch, sign of its normals) of a patch, or of each piece of a joined surface."""
+    if surface.kind == "piecewise":
+        return list(zip(surface.placed, surface.signs, strict=True))
+    return [(surface, 1.0)]
+
+
 def lost(surface, rng, count=2000):
     """Whether a place's point or normal is outside the model of a part that it lies on."""
     flat = size_of(surface) * 10.0 ** rng.uniform(-4, -1)
@@ -115,41 +127,11 @@ def lost(surface, rng, count=2000):
         weights = rng.dirichlet([0.5, 0.5, 0.5], count)
         places = surface.points_at(face, weights), surface.normals_at(face, weights)
         return not survivors(parts, *places).all()
-    worst = 0.0
-    pieces, signs = [surface], [1.0]
-    if surface.kind == "piecewise":
-        pieces, signs = surface.placed, surface.signs
-    for k, (patch, sign) in enumerate(zip(pieces, signs, strict=True)):
+    worst, pieces = 0.0, pieces_of(surface)
+    for k, (patch, sign) in enumerate(pieces):
         u, v = spread(patch, count, int(rng.integers(2**31)))
         _, x = at_parameters(patch, u, v)
         first = np.full(count, len(pieces) - 1 + k)
         used = walk(parts, first, x, patch.point(u, v), sign * patch.normal(u, v))
         worst = max(worst, used.points, used.normals)
     return worst > 1.0
-
-
-def stated_over_least(patch, rounding):
-    """Errors that affine models over small boxes state, in those that no affine model falls below.
-
-    The models keep to what they state at 21 x 21 places of each box.
-    """
-    rng = np.random.default_rng(3)
-    ends = np.array([patch.u_range, patch.v_range])
-    grid = np.linspace(-1.0, 1.0, 21)
-    x = np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)
-    affine = np.column_stack([np.ones(len(x)), x])
-    ratios = []
-    for _ in range(20):
-        half = np.diff(ends)[:, 0] * rng.uniform(1e-3, 0.02, 2)
-        middle = rng.uniform(ends[:, 0] + half, ends[:, 1] - half)
-        models = patch.part_models((middle - half)[None], (middle + half)[None])
-        u, v = (middle + x * half).T
-        for model, places in zip(
-            models, (patch.local_point(u, v), patch.local_normal(u, v)), strict=True
-        ):
-            best, *_ = np.linalg.lstsq(affine, places, rcond=None)
-            left = np.linalg.norm(places - affine @ best, axis=1).max()
-            ratios.append(max(model.error[0] - rounding, 0.0) / max(left, 1e-15))
-            off = places - affine @ np.vstack([model.centre, model.slopes[0]])
-            assert np.linalg.norm(off, axis=1).max() <= model.error[0] * (1.0 + 1e-9) + 1e-12
-    return ratios
