@@ -9,8 +9,18 @@ from smooth_probes import POSE
 from spline_nets import TURN_KNOTS, full_turn, hood, turned
 
 from surfaces import (
-    bspline, cone, cylinder, ellipsoid, hyperboloid, mesh, parametric, piecewise, plane,
-    revolution, sphere, torus,
+    bspline,
+    cone,
+    cylinder,
+    ellipsoid,
+    hyperboloid,
+    mesh,
+    parametric,
+    piecewise,
+    plane,
+    revolution,
+    sphere,
+    torus,
 )  # fmt: skip
 from surfaces.meshes import TriangleMesh
 

@@ -15,7 +15,16 @@ from specimens import FACETED, SMOOTH
 from spline_nets import quarter_turn, turned
 
 from surfaces import (
-    bspline, cone, cylinder, ellipsoid, hyperboloid, piecewise, plane, revolution, sphere, torus,
+    bspline,
+    cone,
+    cylinder,
+    ellipsoid,
+    hyperboloid,
+    piecewise,
+    plane,
+    revolution,
+    sphere,
+    torus,
 )  # fmt: skip
 from surfaces.places import Places, offset_surface
 
