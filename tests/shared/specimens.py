@@ -76,6 +76,7 @@ EXTREME = {
     "coin": ellipsoid((1.0, 0.8, 0.01), (0, 180), (-100, 260)),
     "cigar": ellipsoid((2.0, 0.1, 0.1), (0, 160), (30, 150), **POSE),
     "ripples": revolution(RIPPLES, (10, 70)),
+    "flared": revolution([(0, 0), (0.05, 0.02), (0.06, 0.3), (0.07, 0.6), (0.5, 0.7)], (0, 100)),
     "rippled disc": revolution(RIPPLES[:, ::-1] + [0.1, 0.0], (10, 12)),
     "weights from 0.1 to 10": bspline(hood(), weights=UNLIKE, **OUT, **POSE),
     "barrel": bspline(BARREL, (2, 2), (TURN_KNOTS, None), BARREL_WEIGHTS, **POSE),

@@ -133,6 +133,7 @@ WAISTS = {
     "steep": hyperboloid(0.5, 0.15, (0, 90), (-0.05, 0.6), **POSE),
     "slim": hyperboloid(0.1, 0.4, (0, 90), (-0.3, 0.2)),
     "round": hyperboloid(0.7, 0.4, (0, 90), (0.3, 0.5)),
+    "fan": hyperboloid(0.1, 0.02, (0, 90), (0.2, 0.4)),
 }
 BENT = {**{name: p for name, p in SMOOTH.items() if hasattr(p, "bounds")}, **WAISTS}
 
