@@ -1,4 +1,4 @@
-"""Patches joined along seams: one patch cut up is the patch, and creases, gaps and turns are told."""
+"""Patches joined along seams: cut up they are the patch; creases, gaps and turns are told."""
 
 from __future__ import annotations
 

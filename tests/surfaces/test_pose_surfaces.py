@@ -1,17 +1,29 @@
-"""Poses as cells: what is made of them, and what is refused."""
+"""Poses in place of a surface: their cells, the curves and paths between them, and their bounds."""
+
+from __future__ import annotations
 
 import math
 
 import numpy as np
 import pytest
+from bounds import holds
 
-from surfaces import SurfaceError, poses, read_poses, sheet_of
+from surfaces import SurfaceError, poses, read_poses
 from surfaces.places import Places, offset_surface
 
 LINE = np.array([[0.4, 0.0, 0.3], [0.4, 0.1, 0.3], [0.4, 0.2, 0.3], [0.4, 0.2, 0.3]])
 UP = np.tile([0.0, 0.0, 2.0], (4, 1))
 TURNED = np.array([[0.0, 0.0, 1.0], [0.6, 0.0, 0.8], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 TILTED = {"position": (1.0, 2.0, 3.0), "rpy_deg": (20.0, -30.0, 50.0)}
+DENSE = np.linspace(0.0, 1.0, 41)
+
+
+def drawn(seed, count=25, **more):
+    """A toolpath that wanders and tilts, placed askew."""
+    rng = np.random.default_rng(seed)
+    points = np.cumsum(rng.normal(0.0, 0.05, (count, 3)), axis=0)
+    normals = np.array([0.0, 0.0, 2.0]) + rng.normal(0.0, 1.0, (count, 3))
+    return poses(points, normals, **TILTED, **more)
 
 
 def test_each_pose_is_a_cell_where_it_is_placed():
@@ -25,29 +37,31 @@ def test_each_pose_is_a_cell_where_it_is_placed():
     assert cells.in_order
 
 
-def test_between_poses_points_run_straight_and_normals_along_great_arcs():
-    cells = poses(LINE, TURNED)
-    t = np.linspace(0.0, 1.0, 41)
-    for k, (i, j) in enumerate(cells.pairs):
-        point, normal = cells.curves.at(np.full(41, k), t)
-        np.testing.assert_allclose(point, LINE[i] + t[:, None] * (LINE[j] - LINE[i]), atol=1e-12)
-        angle = math.acos(TURNED[i] @ TURNED[j])
-        both = np.sin([(1 - t) * angle, t * angle]) / np.sin(angle)
-        arc = both[0][:, None] * TURNED[i] + both[1][:, None] * TURNED[j]
-        off = np.linalg.norm(normal - arc, axis=1).max()
-        assert off <= cells.curves.deviations[k, 1] < 2e-5
-        # Second differences are bounded by what is stated of the second derivative.
-        bend = np.linalg.norm(np.diff(normal, 2, axis=0), axis=1).max() * 40.0**2
-        rows = slice(*cells.curves.first[k : k + 2])
-        assert 0.9 * angle**2 < bend <= cells.curves.derivative_bounds[rows, 1].max() * 1.0001
-
-
 def test_within_a_radius_poses_of_one_side_are_neighbours():
     points = [[0, 0, 0], [0.1, 0, 0], [0.3, 0, 0], [0.1, 0, 0.01]]
     normals = [[0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0.1, -1]]
     cells = poses(points, normals, neighbours=0.15)
-    assert cells.pairs.tolist() == [[0, 1]]
-    assert not cells.in_order
+    assert (cells.pairs.tolist(), cells.in_order) == ([[0, 1]], False)
+
+
+@pytest.mark.parametrize("cells", [poses(LINE, TURNED), drawn(1, neighbours=0.3)], ids=str)
+def test_between_poses_points_run_straight_and_normals_along_great_arcs(cells):
+    one, other = (cells.pairs[:, end] for end in (0, 1))
+    angle = np.arccos(np.clip((cells.normals[one] * cells.normals[other]).sum(axis=1), -1, 1))
+    for k, (i, j) in enumerate(cells.pairs):
+        points, normals = cells.curves.at(np.full(41, k), DENSE)
+        line = cells.centres[i] + DENSE[:, None] * (cells.centres[j] - cells.centres[i])
+        np.testing.assert_allclose(points, line, atol=1e-12)
+        both = np.sin([(1 - DENSE) * angle[k], DENSE * angle[k]]) / np.sin(angle[k])
+        arc = both[0][:, None] * cells.normals[i] + both[1][:, None] * cells.normals[j]
+        off = np.linalg.norm(normals - arc, axis=1)
+        holds(cells.curves.deviations[k, 1], off, used=0.0)
+        # Second differences are bounded by what is stated of the second derivative.
+        bend = np.linalg.norm(np.diff(normals, 2, axis=0), axis=1).max() * 40.0**2
+        rows = slice(*cells.curves.first[k : k + 2])
+        assert 0.9 * angle[k] ** 2 < bend
+        assert bend <= cells.curves.derivative_bounds[rows, 1].max() * 1.0001
+    assert cells.curves.deviations[:, 1].max() < 2e-5
 
 
 def test_places_follow_the_curves_and_tell_turns_on_the_spot_apart():
@@ -68,50 +82,71 @@ def test_places_follow_the_curves_and_tell_turns_on_the_spot_apart():
     np.testing.assert_allclose(found.x[2:, 0], share[2:], atol=1e-9)
 
 
-def test_paths_of_places_stay_within_their_bounds():
-    cells = poses(LINE, TURNED)
-    offset = offset_surface(cells.surface, 0.02)
-    start = Places(np.array([0, 0, 1]), np.array([[0.2, 0.0], [0.5, 0.0], [0.9, 0.0]]))
-    end = Places(np.array([0, 1, 2]), np.array([[0.9, 0.0], [0.4, 0.0], [0.3, 0.0]]))
-    paths = offset.paths(start, end)
+@pytest.mark.parametrize("height", [0.0, 0.02, -0.05])
+def test_paths_of_places_bend_no_more_than_is_said(height):
+    """Over one pose or none; none leads two curves further in one step."""
+    rng = np.random.default_rng(4)
+    cells = drawn(2, tangents=np.cross(rng.normal(size=(25, 3)), rng.normal(size=(25, 3))))
+    offset = offset_surface(cells.surface, height)
+    x, chart = rng.uniform(0, 1, (2, 300, 2)) * [1, 0], rng.integers(0, 24, 300)
+    after = np.minimum(chart + rng.integers(0, 2, 300), 23)
+    paths = offset.paths(Places(chart, x[0]), Places(after, x[1]))
     assert np.isfinite(paths.derivative_bounds).all()
-    for k, piece in ((0, 2), (1, 0), (2, 2)):
-        chart = start.chart[k] if piece == 0 or k == 0 else end.chart[k]
-        x = {0: 0.55, 1: 0.75, 2: 0.15}[k]
-        _, true = offset.at(Places(np.array([chart]), np.array([[x, 0.0]])))
-        line = 0.5 * (paths.normals[k, piece] + paths.normals[k, piece + 1])
-        assert np.linalg.norm(true[0] - line) <= paths.derivative_bounds[k, piece, 1] / 8.0 + 1e-12
-    apart = offset.paths(start.of([0]), Places(np.array([2]), np.array([[0.5, 0.0]])))
-    assert np.isinf(apart.derivative_bounds).any()  # none leads two curves further in one step
+    weight = (0.5 * DENSE * (1.0 - DENSE))[1:-1, None]
+    stated, found, slopes, turned = [], [], [], []
+    for piece in (0, 2):
+        some = paths.share[:, piece + 1] > paths.share[:, piece]
+        one, other = (paths.place(piece + k).of(some) for k in (0, 1))
+        assert (one.chart == other.chart).all()
+        line = one.x[None] + DENSE[:, None, None] * (other.x - one.x)
+        dense = Places(np.tile(one.chart, 41), line.reshape(-1, 2))
+        values = np.stack(offset.at(dense), axis=1).reshape(41, -1, 2, 3)
+        ends = values[[0]] + DENSE[:, None, None, None] * (values[[-1]] - values[[0]])
+        off = np.linalg.norm(values - ends, axis=3)[1:-1]
+        found.append((off / weight[..., None]).max(axis=0))
+        stated.append(paths.derivative_bounds[some, piece])
+        slopes.append(offset.tangent_slopes(one, other))
+        ways = offset.tangents(dense).reshape(41, -1, 3)
+        turned.append(40.0 * np.linalg.norm(np.diff(ways, axis=0), axis=2).max(axis=0))
+    stated, found = np.concatenate(stated), np.concatenate(found)
+    holds(stated[:, 1], found[:, 1], used=0.95, tiny=1e-9)
+    holds(stated[:, 0], found[:, 0], used=0.0, tiny=1e-9)  # offset points run straight
+    holds(np.concatenate(slopes), np.concatenate(turned), used=0.95, tiny=1e-9)
+    far = offset.paths(Places(chart[:1], x[0, :1]), Places((chart[:1] + 12) % 24, x[0, :1]))
+    assert np.isinf(far.derivative_bounds).any()
 
 
-def test_what_makes_no_poses_is_named_all_at_once():
-    with pytest.raises(SurfaceError) as caught:
-        poses([[0, 0, 0], [0, 0, 1]], [[0, 0, 1], [0, 0, 0]], tangents=[[1, 0, 0]], neighbours=-1)
-    text = str(caught.value)
-    for part in ("normals[1] must have a direction", "tangents", "neighbours must be"):
-        assert part in text
-    cases = [
-        (([[0, 0, 0]], [[0, 0, 1]]), "at least 2 poses"),
-        ((LINE, -TURNED * [[1], [1], [1], [-1]], TURNED * [[1], [-1], [1], [1]]), ""),
-        (([[0, 0, 0], [0, 0, math.nan]], [[0, 0, 1]] * 2), "points[1][2] must be a finite number"),
-        (([[0, 0, 0], [0, 0, 1]], [[0, 0, 1], [0, 0, -1]]), "normals[0]"),
-        (([[0, 0, 0], [0, 0, 1]], [[0, 0, 1]] * 3), "normals"),
-        (([[0, 0, 0], [0, 0, 1]], [[0, 0, 1]] * 2, None, [[0, 0, 1]] * 2), "tangents[0]"),
-    ]
-    for arguments, words in cases:
-        if words:
-            with pytest.raises(SurfaceError) as caught:
-                poses(*arguments)
-            assert words in str(caught.value)
-    crowd = np.random.default_rng(0).random((200, 3))
-    with pytest.raises(SurfaceError, match="at most 24 neighbours"):
-        poses(crowd, np.ones((200, 3)), neighbours=2.0)
+@pytest.mark.parametrize("neighbours", ["order", 0.3])
+def test_parts_hold_every_place_of_every_curve(neighbours):
+    cells = drawn(1, neighbours=neighbours)
+    parts = cells.surface.parts(1e-3, 0.01)
+    finest = np.flatnonzero(parts.children[:, 0] < 0)
+    assert parts.radius[finest, 0].max() <= 1e-9
+    assert parts.radius[finest, 1].max() <= 0.01
+    points, normals = cells.trace(cells.pairs, np.linspace(0.0, 1.0, 23))
+    places = np.concatenate([points, normals], axis=2).reshape(-1, 6)
+    held = np.zeros(len(places), dtype=bool)
+    most = 0.0
+    # On a curve x_2 changes nothing; x_1 is where the point is nearest.
+    for k in finest.tolist():
+        centre, slope = parts.centre[k], parts.slopes[k, 0]
+        assert not parts.slopes[k, 1].any()
+        x = np.clip((places - centre)[:, :3] @ slope[:3] / (slope[:3] @ slope[:3]), -1.0, 1.0)
+        off = places - centre - x[:, None] * slope
+        on = np.linalg.norm(off[:, :3], axis=1) <= parts.radius[k, 0] + 1e-9
+        used = np.linalg.norm(off[:, 3:], axis=1) / parts.radius[k, 1]
+        held |= on & (used <= 1.0 + 1e-9)
+        most = max(most, used[on & (used <= 1.0)].max(initial=0.0))
+    assert held.all()
+    assert most > 0.8
 
 
-def test_there_is_no_sheet_between_poses():
-    with pytest.raises(SurfaceError, match="leave collisions with it out"):
-        sheet_of(poses(LINE, UP).surface)
+def test_poses_without_bounds_say_so():
+    own = drawn(2, approaches=np.tile([0.0, 0.0, -1.0], (25, 1)))
+    with pytest.raises(SurfaceError, match="tool axes of their own have no bounds"):
+        own.surface.parts(1e-3, 0.01)
+    with pytest.raises(SurfaceError, match="24 curves; bounds are made for 1 to 20"):
+        drawn(3).surface.parts(1e-3, 0.01, most=20)
 
 
 def test_a_file_of_poses_is_read_in_its_units(tmp_path):
@@ -121,24 +156,4 @@ def test_a_file_of_poses_is_read_in_its_units(tmp_path):
     np.testing.assert_allclose(found.points, LINE[:2], atol=1e-15)
     assert found.approaches is None
     assert poses(**found._asdict()).tangents.tolist() == [[1.0, 0.0, 0.0]] * 2
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("", "header"),
-        ("x,y,z\n1,2,3\n", "nx, ny, nz"),
-        ("x,y,z,nx,ny,nz,ax\n", "ay, az"),
-        ("x,y,z,nx,ny,nz,w\n", "'w'"),
-        ("x,y,z,nx,ny,nz\n1,2,3,0,0,1\n1,2,3\n1,2,x,0,0,1\n", "line 4 'x' is not a finite"),
-        ("x,y,z,nx,ny,nz\n1,2,3\n1,2,nan,0,0,1\n", "line 2 must hold 6 numbers, got 3"),
-        ("x,y,z,nx,ny,nz\n" + "0,0,0,0,0,1\n" * 20_001, "more than 20,000"),
-    ],
-)
-def test_a_file_that_is_none_is_refused_with_its_lines(tmp_path, text, words):
-    file = tmp_path / "path.csv"
-    file.write_text(text)
-    with pytest.raises(SurfaceError) as caught:
-        read_poses(file)
-    assert words in str(caught.value)
-    assert "path.csv" in str(caught.value)
+    assert math.isclose(read_poses(file).points[0, 0], 400.0)

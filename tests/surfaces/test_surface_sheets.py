@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mesh_patches
 import numpy as np
 import pytest
 from bounds import holds
@@ -14,8 +15,9 @@ from smooth_probes import POSE, triangle_distances
 from specimens import EXTREME, cells_of
 
 from coverable_errors import ArgumentError
-from surfaces import SurfaceError, cylinder, plane, poses, sheet_of, sphere
+from surfaces import SurfaceError, cylinder, mesh, plane, poses, sheet_of, sphere
 from surfaces.cell_tiles import cell_tiles
+from surfaces.meshes import TriangleMesh
 from surfaces.places import Places
 
 TURN, SHIFT = Rotation.from_euler("xyz", [0.3, -1.0, 2.0]).as_matrix(), [0.4, -1.0, 2.0]
@@ -194,21 +196,41 @@ def test_what_is_said_of_a_tile_holds_all_over_it(kind, seed):
     assert np.isfinite(bounds.radii).any() or kind == "mesh"
 
 
-def test_tiles_shrink_their_bounds_and_run_the_shorter_way_round():
+def test_normals_that_turn_by_more_than_a_right_angle_over_a_tile_are_not_bounded():
+    """Over a wild mesh: mixed normals leave the cone that those of the corners lie in."""
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        u, v, faces = mesh_patches.grid(8, 8)
+        wild = np.stack([u, v, rng.normal(size=len(u))], axis=1)
+        cells = mesh(TriangleMesh(wild, faces)).cells(count=4)
+        cut = cell_tiles(cells, 0.01)
+        tiles = cut.of_cells(np.arange(len(cells)))
+        stated = cut.bounds(tiles).radii[:, 1]
+        middle = cut.offset.at(tiles.middles)[1]
+        for shares in rng.dirichlet(np.full(3, 0.5), (40, len(tiles.cell))):
+            x = np.einsum("kc,kci->ki", shares, tiles.corners)
+            normals = cut.offset.at(Places(tiles.chart, x))[1]
+            holds(stated, np.linalg.norm(normals - middle, axis=1), used=0.0, tiny=1e-9)
+        assert 0.0 < np.isinf(stated).mean() < 0.2
+
+
+def test_tiles_shrink_their_bounds_fourfold():
     cut = cell_tiles(sphere(1.0, (10, 90), (0, 90)).cells(2, 2), -0.1)
     tiles = cut.of_cells(np.arange(4))
     before = cut.bounds(tiles).radii.max(axis=0)
     for _ in range(4):
         tiles = cut.halves(tiles)
     assert (cut.bounds(tiles).radii.max(axis=0) < before / 12.0).all()
-    for turn, expected in ((360, np.pi / 2), (359, 1.5 * np.pi * 359 / 360)):
-        cut = cell_tiles(sphere(1.0, (80, 100), (0, turn)).cells(1, 4), 0.0)
-        ends = cut.centres(np.array([0, 3]))
-        lines = cut.lines(ends.of(slice(0, 1)), ends.of(slice(1, 2)), np.array([8]))
-        points = cut.offset.at(lines.places)[0]
-        length = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
-        assert length == pytest.approx(expected, rel=0.02)
-        np.testing.assert_allclose(points[[0, -1]], cut.offset.at(ends)[0], atol=1e-12)
+
+
+@pytest.mark.parametrize(("turn", "length"), [(360, np.pi / 2), (359, 1.5 * np.pi * 359 / 360)])
+def test_lines_between_tiles_run_the_shorter_way_round(turn, length):
+    cut = cell_tiles(sphere(1.0, (80, 100), (0, turn)).cells(1, 4), 0.0)
+    ends = cut.centres(np.array([0, 3]))
+    lines = cut.lines(ends.of(slice(0, 1)), ends.of(slice(1, 2)), np.array([8]))
+    points = cut.offset.at(lines.places)[0]
+    assert np.linalg.norm(np.diff(points, axis=0), axis=1).sum() == pytest.approx(length, rel=0.02)
+    np.testing.assert_allclose(points[[0, -1]], cut.offset.at(ends)[0], atol=1e-12)
 
 
 def test_lines_over_the_faces_of_a_mesh_stay_on_them():
