@@ -8,7 +8,7 @@ One row becomes one URDF joint about z, whose origin is that transform at theta_
 xyz = (a, -d sin(alpha), d cos(alpha)), rpy = (alpha, 0, 0). So every link frame of the URDF *is*
 the DH frame of that link, and the URDF's root link carries frame 0.
 
-`python tests/robots/dh.py` writes `robots/puma560/puma560.urdf` anew.
+`python tools/puma560.py` writes `robots/puma560/puma560.urdf` anew; a test compares the two.
 """
 
 from __future__ import annotations
@@ -19,9 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-from coverable_errors import ArgumentError
-
-PUMA560_URDF = Path(__file__).parents[2] / "robots" / "puma560" / "puma560.urdf"
+PUMA560_URDF = Path(__file__).parents[1] / "robots" / "puma560" / "puma560.urdf"
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,22 +73,11 @@ def dh_urdf(
         collisions: solids that can collide.
         without_collisions: links whose drawn solids are none that collide.
         comment: what the file says about them.
-
-    Raises:
-        ArgumentError: the number of limits is not the number of rows, or a shape names a link or
-            colour that does not exist.
     """
     palette = colours or {}
-    if len(limits_deg) != len(rows):
-        raise ArgumentError(f"{len(rows)} DH rows need as many limits, got {len(limits_deg)}")
-    for shape in shapes:
-        if not 0 <= shape.link <= len(rows) or shape.colour not in palette:
-            raise ArgumentError(
-                f"{shape} must name a link in 0 .. {len(rows)} and a colour of {sorted(palette)}"
-            )
     lines = [
         '<?xml version="1.0"?>',
-        "<!-- Written by `python tests/robots/dh.py`; change that file, not this one. -->",
+        "<!-- Written by `python tools/puma560.py`; change that file, not this one. -->",
         *([f"<!-- {comment} -->"] if comment else []),
         f"<robot name={quoteattr(name)}>",
     ]
