@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfaces import Patch
+from surfaces.meshes import MeshSurface, TriangleMesh
+from surfaces.meshes import mesh as surface_of
 
 Floats = NDArray[np.float64]
 
@@ -208,6 +210,42 @@ def folded_sheet(radius: float, facets: int) -> Mesh:
     u, v, faces = grid(8, len(profile) - 1)
     place = np.round(v * (len(profile) - 1)).astype(np.int64)
     return Mesh(np.column_stack([0.3 * u, profile[place]]), faces)
+
+
+def panel_with_hole(edge: float = 0.01) -> MeshSurface:
+    """0.6 x 0.4 m with a hole of 80 mm radius in its middle, as irregular triangles."""
+    rng = np.random.default_rng(3)
+    x, y = np.meshgrid(np.arange(0.0, 0.6 + edge / 2, edge), np.arange(0.0, 0.4 + edge / 2, edge))
+    points = np.column_stack([x.ravel(), y.ravel()])
+    inner = ((points > 1e-9) & (points < [0.6 - 1e-9, 0.4 - 1e-9])).all(axis=1)
+    points[inner] += rng.uniform(-0.2, 0.2, (int(inner.sum()), 2)) * edge
+    off = np.linalg.norm(points - [0.3, 0.2], axis=1)
+    angle = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
+    rim = np.array([0.3, 0.2]) + 0.08 * np.column_stack([np.cos(angle), np.sin(angle)])
+    points = np.concatenate([points[off > 0.08 + 0.4 * edge], rim])
+    faces = flat_faces(points, 0.0)
+    middle = points[faces].mean(axis=1)
+    faces = faces[np.linalg.norm(middle - [0.3, 0.2], axis=1) > 0.0799]
+    return surface_of(TriangleMesh(np.column_stack([points, np.zeros(len(points))]), faces))
+
+
+def roof(angle_deg: float, side: float = 0.3) -> TriangleMesh:
+    """Two plates that meet at an edge along y; the normal turns by the angle there."""
+    half = np.radians(angle_deg) / 2
+    x, z = side * np.cos(half), -side * np.sin(half)
+    vertices = [[0, 0, 0], [0, side, 0], [x, 0, z], [x, side, z], [-x, 0, z], [-x, side, z]]
+    return TriangleMesh(np.array(vertices), [[0, 2, 3], [0, 3, 1], [0, 1, 5], [0, 5, 4]])
+
+
+def can() -> TriangleMesh:
+    """A round tin without its bottom."""
+    turn = np.linspace(0, 2 * np.pi, 48, endpoint=False)
+    circle = 0.15 * np.column_stack([np.cos(turn), np.sin(turn)])
+    low, high = (np.column_stack([circle, np.full(48, z)]) for z in (-0.1, 0.1))
+    k, after = np.arange(48), (np.arange(48) + 1) % 48
+    wall = [np.column_stack([k, after, 48 + k]), np.column_stack([after, 48 + after, 48 + k])]
+    lid = np.column_stack([48 + k, 48 + after, np.full(48, 96)])
+    return TriangleMesh(np.vstack([low, high, [[0, 0, 0.1]]]), np.vstack([*wall, lid]))
 
 
 def joined(faces):

@@ -24,6 +24,13 @@ def plate(nu, nv, width=0.3, height=0.2):
     return np.stack([width * u, height * v, 0 * u], 1), faces
 
 
+def hilly(nu=14, nv=11):
+    """A wavy plate."""
+    vertices, faces = plate(nu, nv)
+    vertices[:, 2] = 0.03 * np.sin(20 * vertices[:, 0]) * np.cos(15 * vertices[:, 1])
+    return vertices, faces
+
+
 def strip(twisted, count=24):
     """A band around a circle, with half a twist (Moebius) or none."""
     angle = 2 * np.pi * np.arange(count) / count
@@ -39,6 +46,29 @@ def strip(twisted, count=24):
     if twisted:
         b[-1], d[-1] = count, 0
     return vertices, np.concatenate([np.stack([a, c, d], 1), np.stack([a, d, b], 1)])
+
+
+def stacked(*parts):
+    """Meshes as one."""
+    starts = np.cumsum([0] + [len(v) for v, _ in parts])
+    faces = [f + k for (_, f), k in zip(parts, starts, strict=False)]
+    return np.concatenate([v for v, _ in parts]), np.concatenate(faces)
+
+
+def chain_of_caps():
+    """Two triangles that share an edge, cut apart by caps on it: faces with no area.
+
+    Three corners lie on that edge, fanned, so that caps lie behind caps.
+    """
+    vertices = [[0, 0, 0], [0.2, 0, 0], [0.1, 0.1, 0], [0.1, -0.1, 0.03]]
+    vertices += [[0.05, 0, 0], [0.1, 0, 0], [0.15, 0, 0]]
+    upper = [[0, 4, 2], [4, 5, 2], [5, 6, 2], [6, 1, 2]]
+    return vertices, [*upper, [0, 5, 4], [0, 6, 5], [0, 1, 6], [1, 0, 3]]
+
+
+def bow_tie():
+    """Two triangles that meet in a point."""
+    return [[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [-0.1, 0, 0], [0, -0.1, 0]], [[0, 1, 2], [0, 3, 4]]
 
 
 def stl(vertices, faces, count=None, normals=None, head=b"made by a test"):
@@ -136,45 +166,36 @@ def glb(content, data, version=2, extra=0):
 def assert_clean(mesh):
     """Everything that a `TriangleMesh` promises, by way of dictionaries."""
     assert isinstance(mesh, TriangleMesh)
-    v, f = mesh.vertices, mesh.faces
+    v, f, edges = mesh.vertices, mesh.faces, mesh.edges
     assert len(f)
-    assert v.dtype == float
-    assert f.dtype == np.int64
+    assert (v.dtype, f.dtype) == (float, np.int64)
     assert np.isfinite(v).all()
     assert sorted(set(f.ravel().tolist())) == list(range(len(v)))
-    directed, corners = defaultdict(list), defaultdict(list)
+    directed, spokes = {}, defaultdict(list)
     for k, (a, b, c) in enumerate(f.tolist()):
         assert len({a, b, c}) == 3
-        for tail, head in ((a, b), (b, c), (c, a)):
-            directed[tail, head].append(k)
-        corners[a].append((b, c))
-        corners[b].append((c, a))
-        corners[c].append((a, b))
-    assert all(len(owners) == 1 for owners in directed.values())
-    shared = {(min(e), max(e)) for e in directed if e[::-1] in directed}
-    edges = mesh.edges
-    assert {(min(e), max(e)) for e in edges.vertices.tolist()} == shared
+        for tail, tip, other in ((a, b, c), (b, c, a), (c, a, b)):
+            assert (tail, tip) not in directed  # so an edge has two faces at most, that agree
+            directed[tail, tip] = k
+            spokes[tail].append((tip, other))
+    shared = {e for e in directed if e[::-1] in directed and directed[e] < directed[e[::-1]]}
+    assert set(map(tuple, edges.vertices.tolist())) == shared
     assert len(edges.vertices) == len(shared)
-    for (a, b), (x, y), length in zip(
-        edges.vertices.tolist(), edges.faces.tolist(), edges.lengths.tolist(), strict=True
-    ):
-        assert directed[a, b] == [x]
-        assert directed[b, a] == [y]
-        assert x < y
-        assert abs(length - np.linalg.norm(v[a] - v[b])) <= 1e-15 + 1e-12 * length
-    lonely = {e: owners[0] for e, owners in directed.items() if e[::-1] not in directed}
-    found = dict(
-        zip(map(tuple, edges.border_vertices.tolist()), edges.border_faces.tolist(), strict=True)
-    )
-    assert found == lonely
-    for spokes in corners.values():  # one fan: from spoke to spoke, all are met
-        following = dict(spokes)
+    sides = [[directed[a, b], directed[b, a]] for a, b in edges.vertices.tolist()]
+    assert edges.faces.tolist() == sides
+    apart = np.linalg.norm(v[edges.vertices[:, 0]] - v[edges.vertices[:, 1]], axis=1)
+    np.testing.assert_allclose(edges.lengths, apart, rtol=1e-12, atol=1e-15)
+    lonely = {e: k for e, k in directed.items() if e[::-1] not in directed}
+    border = map(tuple, edges.border_vertices.tolist())
+    assert dict(zip(border, edges.border_faces.tolist(), strict=True)) == lonely
+    for own in spokes.values():  # one fan: from spoke to spoke, all are met
+        following = dict(own)
         starts = set(following) - set(following.values()) or {next(iter(following))}
         assert len(starts) == 1
         spoke, met = starts.pop(), 0
-        while spoke in following and met < len(spokes):
+        while spoke in following and met < len(own):
             spoke, met = following[spoke], met + 1
-        assert met == len(spokes)
+        assert met == len(own)
     a, b, c = (v[f[:, k]] for k in range(3))
     cross = np.cross(b - a, c - a)
     size = np.linalg.norm(cross, axis=1)
@@ -182,5 +203,4 @@ def assert_clean(mesh):
     assert np.abs(mesh.face_normals - cross / size[:, None]).max() < 1e-12
     assert np.abs(mesh.face_areas - size / 2).max() <= 1e-12 * size.max()
     assert np.abs(np.linalg.norm(corner_normals(mesh), axis=2) - 1).max() < 1e-12
-    for array in (v, f, mesh.face_normals, mesh.face_areas, edges.faces):
-        assert not array.flags.writeable
+    assert not any(x.flags.writeable for x in (v, f, mesh.face_normals, mesh.face_areas))

@@ -1,4 +1,4 @@
-"""The bracket of the treated share against closed forms, and against points drawn by the area."""
+"""The bracket of the treated share: against closed forms, and points drawn by the area."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from pass_metrics import panel_with_hole
+from mesh_patches import panel_with_hole
 from scipy.integrate import quad
 
 from surfaces import cone, cylinder, plane, sphere
@@ -46,9 +46,8 @@ def strips():
 
 
 def stadium():
-    length = 0.3
     line = straight((0.15, 0.2, 0), (0.45, 0.2, 0))
-    return PLATE, lines_of(line), 0.05, (2 * 0.05 * length + math.pi * 0.05**2) / 0.24
+    return PLATE, lines_of(line), 0.05, (2 * 0.05 * 0.3 + math.pi * 0.05**2) / 0.24
 
 
 def annulus():
@@ -118,7 +117,7 @@ BENT = (along_cylinder, sphere_zone, along_cone, beside_and_across_a_hole)
 
 
 @pytest.mark.parametrize("case", [strips, stadium, annulus, *BENT])
-def test_the_bracket_holds_the_closed_form(case) -> None:
+def test_the_bracket_holds_the_closed_form(case):
     mesh, lines, radius, truth = case()
     found = treated_share(mesh, facing(mesh), lines, radius)
     bent = 2e-3 * truth if case in BENT else 1e-6  # the mesh's own error
@@ -128,7 +127,7 @@ def test_the_bracket_holds_the_closed_form(case) -> None:
     assert abs(0.5 * (found.lower + found.upper) - truth) <= 0.005
 
 
-def test_random_points_agree_and_further_rounds_only_narrow_it() -> None:
+def test_random_points_agree_and_further_rounds_only_narrow_it():
     rng = np.random.default_rng(5)
     mesh = working_mesh(sphere(0.25, (50, 110), (0, 90)), 0.02)
     rows = [mesh.corners[rng.integers(len(mesh.faces))].mean(axis=0) for _ in range(12)]
@@ -151,7 +150,7 @@ def test_random_points_agree_and_further_rounds_only_narrow_it() -> None:
     assert found.upper - found.lower < 0.02
 
 
-def test_the_back_of_a_thin_part_is_not_treated_through_it() -> None:
+def test_the_back_of_a_thin_part_is_not_treated_through_it():
     """Two plates 4 mm apart that look away from one another, a footprint of 40 mm."""
     front, back = PLATE, PLATE.vertices - [0.0, 0.0, 0.004]
     both = WorkingMesh(
@@ -173,7 +172,7 @@ def test_the_back_of_a_thin_part_is_not_treated_through_it() -> None:
     assert found.upper - found.lower <= 0.005
 
 
-def test_what_is_not_connected_within_the_ball_is_not_treated() -> None:
+def test_what_is_not_connected_within_the_ball_is_not_treated():
     """Two flanges that look the same way, 30 mm above one another."""
     shelf = PLATE.vertices + np.array([0.0, 0.0, 0.03])
     both = WorkingMesh(
@@ -184,7 +183,7 @@ def test_what_is_not_connected_within_the_ball_is_not_treated() -> None:
     assert found.upper <= 0.5 * 0.25 + 0.005
 
 
-def test_nothing_moves_nothing() -> None:
+def test_nothing_moves_nothing():
     """A rigid motion, the path run backwards, or cut in two, changes the share by rounding only."""
     mesh, lines, radius, _ = stadium()
     found = treated_share(mesh, facing(mesh), lines, radius)
@@ -205,7 +204,7 @@ def test_nothing_moves_nothing() -> None:
     assert treated_share(mesh, facing(mesh), nothing, radius).upper == 0.0
 
 
-def test_shares_of_triangles_below_a_level() -> None:
+def test_shares_of_triangles_below_a_level():
     rng = np.random.default_rng(2)
     values = rng.normal(size=(50, 3))
     weights = rng.dirichlet((1.0, 1.0, 1.0), 200_000)
@@ -214,7 +213,7 @@ def test_shares_of_triangles_below_a_level() -> None:
     assert share_below(np.array([[0.1, 0.1, 0.1], [0.3, 0.3, 0.3]]), 0.2).tolist() == [1.0, 0.0]
 
 
-def test_a_footprint_far_larger_than_the_surface_is_counted_too() -> None:
+def test_a_footprint_far_larger_than_the_surface_is_counted_too():
     """Within reach of everything a path comes by once; at a few pitches, by each of its passes."""
     x = np.linspace(0.0, 0.6, 600)
     rows = [
