@@ -18,7 +18,7 @@ COARSE = {f"{name}, coarse": name for name in ("4a", "4c", "5c")}
 """Paper cases with few cells, whose trajectories take a tenth of the time."""
 BEST = dict.fromkeys((*FEASIBLE, *COARSE), "shortest")
 BEST |= {"5c": "spiral", "5c, coarse": "spiral", "5a": "columns"}
-"""An order for each case; `test_coverage` tries all four for some."""
+"""An order for each case; `test_paths` tries all four for some."""
 PATCHES = ("ur5", "panda")
 SPEED = 0.15  # [m/s]
 

@@ -8,8 +8,19 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mesh_patches import CONNECTED, PATCHES, Mesh, bent, box, grid, hood, islands, joined, sheet
-from mesh_patches import slivers, used
+from mesh_patches import (
+    CONNECTED,
+    PATCHES,
+    Mesh,
+    bent,
+    box,
+    grid,
+    hood,
+    islands,
+    joined,
+    sheet,
+    used,
+)
 from samples import sampled, spread
 
 from surfaces import SurfaceError, mesh
@@ -121,8 +132,9 @@ def test_the_same_cells_again_turned_moved_and_scaled(cut):
         np.testing.assert_array_equal(other.labels, cut.labels)
         moved = scale * cut.vertices @ rotation.T + shift
         np.testing.assert_allclose(other.mesh.vertices, moved, atol=2e-13 * scale)
-    own, still = figures(cut.vertices @ turn.T + 4, cut.faces, cut.normals @ turn.T, cut.labels), (
-        cut.figures
+    own, still = (
+        figures(cut.vertices @ turn.T + 4, cut.faces, cut.normals @ turn.T, cut.labels),
+        (cut.figures),
     )
     np.testing.assert_array_equal(own.faces, still.faces)
     np.testing.assert_allclose(own.centres, still.centres @ turn.T + 4.0, atol=1e-11)
@@ -132,7 +144,7 @@ def test_the_same_cells_again_turned_moved_and_scaled(cut):
     np.testing.assert_array_equal(own.outlines.vertices, still.outlines.vertices)
 
 
-# -- figures --------------------------------------------------------------------------------------
+# -- figures -------------------------------------------------------------------------------------
 
 
 def to_segments(points, starts, ends):
@@ -149,7 +161,9 @@ def test_centres_are_nearest_to_the_centroid_or_deep_inside(cut):
     assert weights.min() >= -1e-12
     np.testing.assert_allclose(weights.sum(axis=1), 1.0, atol=1e-12)
     own = cut.faces[found.faces]
-    points, normals = (np.einsum("nk,nkc->nc", weights, x[own]) for x in (cut.vertices, cut.normals))
+    points, normals = (
+        np.einsum("nk,nkc->nc", weights, x[own]) for x in (cut.vertices, cut.normals)
+    )
     np.testing.assert_allclose(found.centres, points, atol=1e-13)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     np.testing.assert_allclose(found.normals, normals, atol=1e-12)
@@ -300,7 +314,7 @@ def test_advice_on_coarse_cells_does_help():
     assert coarse(Cut(used(Mesh(box().vertices, box().faces[:2])), count=10).figures) == ""
 
 
-# -- numbers of cells, and subdivision -------------------------------------------------------------
+# -- numbers of cells, and subdivision ------------------------------------------------------------
 
 
 def test_pieces_share_cells_by_area_and_size_is_the_side_of_a_square():
@@ -395,7 +409,7 @@ def test_what_makes_no_cells_is_refused(approved):
         surface.cells(5).unravel(5)
 
 
-# -- as cells of a surface -------------------------------------------------------------------------
+# -- as cells of a surface ------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", [name for name in CONNECTED if name != "wedge"])

@@ -32,7 +32,16 @@ SOUP = np.arange(36).reshape(-1, 3)
 SECOND = V + [0.5, 0, 0]
 TRAY = np.delete(F, [4, 5], axis=0)
 WALL = V[[0, 1, 7, 6]], np.array([[0, 1, 2], [0, 2, 3]])
-STAR = [(1, 0, 0), (-4, 1, 0), (0, 0.1, 0), (-4, 4, 0), (0, 2, 0), (2, 9, 0), (1.2, 2, 0), (9, 9, 0)]
+STAR = [
+    (1, 0, 0),
+    (-4, 1, 0),
+    (0, 0.1, 0),
+    (-4, 4, 0),
+    (0, 2, 0),
+    (2, 9, 0),
+    (1.2, 2, 0),
+    (9, 9, 0),
+]
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
 XYZ = ("property float x", "property float y", "property float z")
 LIST = "property list uchar int vertex_indices"

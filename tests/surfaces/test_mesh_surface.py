@@ -59,7 +59,7 @@ def surface(request):
     return meshes()[request.param]
 
 
-# -- nearest places -------------------------------------------------------------------------------
+# -- nearest places ------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 17, 1000])
@@ -141,7 +141,7 @@ def test_points_that_are_not_finite_have_no_face():
         assert np.isfinite(flat.closest(points).height).tolist() == [True, False, False]
 
 
-# -- normals --------------------------------------------------------------------------------------
+# -- normals -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("patch", [
@@ -253,7 +253,7 @@ def test_corners_are_parted_by_creases_alone():
     assert {1, 2, 3} <= counts
 
 
-# -- parts for searches ---------------------------------------------------------------------------
+# -- parts for searches --------------------------------------------------------------------------
 
 
 def places(surface, count=2000, seed=4):
@@ -333,7 +333,7 @@ def test_parts_are_no_larger_than_they_have_to_be():
     assert parts.radius[finest, 1].max() < turn.max() ** 2 / 8.0
 
 
-# -- smoothed copies ------------------------------------------------------------------------------
+# -- smoothed copies -----------------------------------------------------------------------------
 
 LENGTH = 0.1
 

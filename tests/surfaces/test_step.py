@@ -259,7 +259,12 @@ def test_a_case_says_which_faces(folder, keys):
 def test_a_case_with_a_wrong_choice_says_so(folder, monkeypatch, approved):
     monkeypatch.chdir(folder)
     said = []
-    for keys in ("faces = [9]", "", "faces = [3]\ncolour = '#ff0000'", "scale = 0.001\nfaces = [3]"):
+    for keys in (
+        "faces = [9]",
+        "",
+        "faces = [3]\ncolour = '#ff0000'",
+        "scale = 0.001\nfaces = [3]",
+    ):
         with pytest.raises(CaseError) as caught:
             Case.from_toml(CASE.format(keys + "\ncells = 12"), ".").build()
         said.append(str(caught.value))
