@@ -29,7 +29,7 @@ NAN = np.where(np.arange(8)[:, None] == 5, np.nan, V)
 WING = np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0, -0.1, 0], [0, 0, 0.1]])
 NEAR = V[F].reshape(-1, 3) + np.random.default_rng(5).uniform(-2e-8, 2e-8, (36, 3))
 SOUP = np.arange(36).reshape(-1, 3)
-SECOND = V + [0.5, 0, 0]
+SECOND = V + np.array([0.5, 0, 0])
 TRAY = np.delete(F, [4, 5], axis=0)
 WALL = V[[0, 1, 7, 6]], np.array([[0, 1, 2], [0, 2, 3]])
 STAR = [

@@ -130,7 +130,7 @@ def test_faces_by_number():
 
 def test_notes_of_the_whole_stay_and_those_of_the_pieces_are_told_anew():
     cube, faces = w.cube()
-    vertices, faces = w.stacked((cube, faces), (cube + [0.5, 0, 0], faces))
+    vertices, faces = w.stacked((cube, faces), (cube + np.array([0.5, 0, 0]), faces))
     mesh = clean([*vertices, [3, 3, 3]], faces)
     assert len(notes_of(mesh)) == 2
     part = cut_plane(cut_plane(mesh, (0.3, 0, 0), (-1, 0, 0)), (0, 0, 0.1), (0, 0, 1))

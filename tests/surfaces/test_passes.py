@@ -28,7 +28,7 @@ PLATE, ARCH, CAP = SURFACES.values()
 
 
 def unrolled(name, points):
-    """Points (k, 3) on the plate or the arch, laid flat; on the cap as they are, from its centre."""
+    """Points (k, 3) on the plate or the arch, laid flat; on the cap as they are."""
     surface = SURFACES[name]
     own = (points - surface.position) @ surface.rotation
     if name == "arch":
@@ -270,9 +270,11 @@ def test_vertices_that_distances_do_not_reach_take_theirs_from_their_neighbours(
     found = parallel_passes(surface, 0.05, 0.3, step=0.002)
     assert any("the exact distance did not reach" in note for note in found.notes)
     assert found.spacing <= found.widest <= 1.02 * found.spacing
-    turned = lambda x: x @ PLATE.rotation.T + PLATE.position  # where `away` looks for the plate
     for each in found.stretches:
-        lines = [away("plate", turned(each.points), turned(e.points)) for e in exact[each.level]]
+        one, *others = (  # where `away` looks for the plate
+            e.points @ PLATE.rotation.T + PLATE.position for e in (each, *exact[each.level])
+        )
+        lines = [away("plate", one, other) for other in others]
         assert min(line.max() for line in lines) <= 0.02 * found.spacing
 
 

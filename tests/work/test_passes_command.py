@@ -1,4 +1,4 @@
-"""`coverable path --passes`: parallel passes, run in one certified motion, or in as few as can be."""
+"""`coverable path --passes`: parallel passes, run in one certified motion, or in a few."""
 
 from __future__ import annotations
 
