@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from mesh_patches import panel_with_hole
+from mesh_patches import grid, panel_with_hole
 from scipy.integrate import quad
 
 from surfaces import cone, cylinder, plane, sphere
@@ -125,6 +125,27 @@ def test_the_bracket_holds_the_closed_form(case):
     assert found.upper >= truth - bent
     assert found.upper - found.lower <= 0.005
     assert abs(0.5 * (found.lower + found.upper) - truth) <= 0.005
+    # Beside a straight line the distance is linear over a face: of cut faces the share is exact.
+    assert case is not strips or found.lower == pytest.approx(truth, abs=2e-5)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_face_is_treated_more_or_less_than_is_said_of_it(seed):
+    """Large faces that are not cut, about places at random; against points all over each face."""
+    rng = np.random.default_rng(seed)
+    u, v, faces = grid(12, 8)
+    mesh = WorkingMesh(np.column_stack([0.36 * u, 0.24 * v, 0.0 * u]), faces)
+    points = np.column_stack([rng.uniform(0.0, [0.36, 0.24], (8, 2)), np.zeros(8)])
+    lines = ToolLines(points, np.tile([0.0, 0.0, 1.0], (8, 1)), np.arange(8))
+    found = treated_share(mesh, facing(mesh), lines, 0.045, rounds=0)
+    a, b = (x.ravel() for x in np.mgrid[0:60, 0:60])
+    a, b = (x[a + b < 60] / 60 + 1 / 180 for x in (a, b))
+    places = np.stack([1.0 - a - b, a, b], axis=1) @ mesh.corners
+    away = np.linalg.norm(places[:, :, None] - points, axis=3).min(axis=2)
+    truth = (away <= 0.045).mean(axis=1)
+    assert (found.shares <= truth + 0.01).all()
+    assert (found.most >= truth - 0.01).all()
+    assert ((found.most - truth)[truth > 0.0] < 0.1).any()
 
 
 def test_random_points_agree_and_further_rounds_only_narrow_it():
@@ -181,6 +202,22 @@ def test_what_is_not_connected_within_the_ball_is_not_treated():
     )
     found = treated_share(both, facing(both), lines_of(straight((0, 0.2, 0), (0.6, 0.2, 0))), 0.05)
     assert found.upper <= 0.5 * 0.25 + 0.005
+
+
+def test_a_tool_that_may_be_off_treats_less_for_certain_and_more_perhaps():
+    """What it does within 10 mm of a line is in the bracket: wobble, or stop short of the ends."""
+    mesh, line, radius, _ = stadium()
+    found = treated_share(mesh, facing(mesh), line, radius, off=0.01)
+    x = np.linspace(0.15, 0.45, 3000)
+    wobbling = np.column_stack([x, 0.2 + 0.01 * np.sin(400.0 * x), 0.0 * x])
+    for path in (wobbling, straight((0.16, 0.2, 0), (0.44, 0.2, 0))):
+        real = treated_share(mesh, facing(mesh), lines_of(path), radius)
+        assert found.lower <= real.upper
+        assert found.upper >= real.lower
+    least, most = ((2 * r * 0.3 + math.pi * r**2) / 0.24 for r in (0.04, 0.06))
+    assert (found.lower, found.upper) == pytest.approx((least, most), abs=0.01)
+    nothing = treated_share(mesh, facing(mesh), line, radius, off=radius)
+    assert (nothing.lower, nothing.upper) == (0.0, 1.0)
 
 
 def test_nothing_moves_nothing():
