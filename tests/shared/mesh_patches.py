@@ -67,11 +67,7 @@ def dome(nu: int = 40, nv: int = 50) -> Mesh:
 
 def shell(nu: int = 50, nv: int = 30) -> Mesh:
     """Part of a cylinder."""
-    return bent(
-        lambda u, v: (0.5 * np.cos(2.8 * u), 0.5 * np.sin(2.8 * u), 0.9 * v),
-        nu,
-        nv,
-    )
+    return bent(lambda u, v: (0.5 * np.cos(2.8 * u), 0.5 * np.sin(2.8 * u), 0.9 * v), nu, nv)
 
 
 def horn(nu: int = 50, nv: int = 40) -> Mesh:
@@ -104,12 +100,8 @@ def blade(nu: int = 80, nv: int = 40) -> Mesh:
         chord = 0.2 * (1.0 - 0.3 * v)
         x, y = chord * np.cos(angle), 0.15 * chord * np.sin(angle) * (1.0 - 0.7 * np.cos(angle))
         y = y - 0.3 * chord * np.cos(angle) ** 2
-        twist = 0.8 * v
-        return (
-            x * np.cos(twist) - y * np.sin(twist),
-            x * np.sin(twist) + y * np.cos(twist),
-            0.6 * v,
-        )
+        c, s = np.cos(0.8 * v), np.sin(0.8 * v)
+        return x * c - y * s, x * s + y * c, 0.6 * v
 
     return bent(shape, nu, nv)
 
@@ -183,17 +175,8 @@ def used(mesh: Mesh) -> Mesh:
 
 
 CONNECTED: dict[str, Callable[[], Mesh]] = {
-    "sheet": sheet,
-    "dome": dome,
-    "shell": shell,
-    "horn": horn,
-    "hood": hood,
-    "blade": blade,
-    "box": box,
-    "holed": holed,
-    "slivers": slivers,
-    "scattered": scattered,
-    "wedge": wedge,
+    each.__name__: each
+    for each in (sheet, dome, shell, horn, hood, blade, box, holed, slivers, scattered, wedge)
 }
 """Each in one piece."""
 

@@ -1,6 +1,5 @@
 """Repair changes nothing but what it says; triangle meshes hold what they promise."""
 
-import pickle
 import tracemalloc
 from itertools import pairwise
 
@@ -238,18 +237,6 @@ def test_arrays_that_are_no_mesh_are_refused(approved):
                 make(vertices, faces)
             said.append(str(caught.value))
     approved("arrays that are no mesh", "\n".join(said))
-
-
-def test_meshes_pickle_and_stay_protected():
-    mesh = clean([*V, [9, 9, 9]], F)
-    again = pickle.loads(pickle.dumps(mesh))
-    w.assert_clean(again)
-    assert notes_of(again) == notes_of(mesh) != ()
-    assert np.array_equal(again.vertices, mesh.vertices)
-    with pytest.raises(ValueError, match="read-only"):
-        mesh.vertices[0] = 0.0
-    with pytest.raises(AttributeError):
-        mesh.faces = mesh.faces[:1]
 
 
 def test_pieces_are_numbered_by_area():
