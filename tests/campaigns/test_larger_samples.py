@@ -2,13 +2,10 @@
 
 import pytest
 import test_checking
-import test_clustering
-import test_coverage
 import test_creases
 import test_division
 import test_explain
 import test_greedy_cases
-import test_mesh_file
 import test_mesh_verdicts
 import test_mesh_witness
 import test_proof_verification
@@ -87,23 +84,6 @@ def test_sides(name):
 @pytest.mark.parametrize("seed", test_proof_verification.MORE)
 def test_wrong_trees(tmp_path, seed):
     test_proof_verification.test_no_tree_is_accepted_where_a_motion_covers_all(tmp_path, seed)
-
-
-@pytest.mark.parametrize("order", test_coverage.ORDERS)
-@pytest.mark.parametrize("name", test_coverage.TUBES)
-def test_tubes(name, order):
-    test_coverage.test_a_closed_surface_is_not_gone_over_twice(name, order)
-
-
-@pytest.mark.parametrize("count", test_clustering.MANY)
-@pytest.mark.parametrize("name", test_clustering.PATCHES)
-def test_many_cells(name, count):
-    test_clustering.test_cells_are_connected_even_and_complete(name, count)
-
-
-@pytest.mark.parametrize("name", test_mesh_file.GOOD)
-def test_damaged_meshes(name, tmp_path):
-    test_mesh_file.assert_damaged_are_refused_or_clean(name, tmp_path, 1500)
 
 
 @pytest.mark.parametrize("name", test_robot_visuals.LARGE)
