@@ -183,10 +183,26 @@ def turning():
     return robot_of([joint(1), joint(2, "fixed", (0.5, 0, 0))], (1, 0, 0))
 
 
-@pytest.mark.parametrize("kind", ["patch", "triangles", "bent"])
-def test_on_a_circle_errors_and_tilts_are_bounded_and_hardly_more(kind):
-    task = Task(0.0, 60, 0.4, approach=(1.0, 0.0, 0.0) if kind == "bent" else "normal")
-    found = along(turning(), flat(kind), task, -0.15, 0.4)
+def sliding(x=0.0):
+    """An arm of one joint, whose tool slides along y at x and looks along it."""
+    return robot_of([joint(1, "prismatic", (x, 0, 0), axis=(0, 1, 0))], (1, 0, 0))
+
+
+MOTIONS = {
+    "a circle inside a plane": (turning(), flat("patch"), "normal", (-0.15, 0.4)),
+    "a circle inside triangles": (turning(), flat("triangles"), "normal", (-0.15, 0.4)),
+    "a circle inside a wider one": (turning(), flat("bent"), X, (-0.15, 0.4)),
+    "a circle through a plane": (turning(), flat("patch").moved(np.eye(3), -0.04 * X), "normal",
+                                 (-0.403, 0.6)),
+    "a line and a curved wall": (sliding(0.6), flat("bent"), X, (-0.45, 0.45)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_errors_and_tilts_are_bounded_and_hardly_more(name):
+    robot, surface, approach, ends = MOTIONS[name]
+    approach = approach if isinstance(approach, str) else tuple(approach)
+    found = along(robot, surface, Task(0.0, 60, 0.4, approach=approach), *ends)
     holds([b.error[0] for b, _ in found], [there.error.max() for _, there in found])
     assert all(there.chord.max() <= b.chord + 1e-12 for b, there in found)
 
@@ -195,8 +211,7 @@ def test_distances_from_triangles_are_no_less_than_is_said_and_hardly_more():
     """A tool that bends towards a wall, and one that slides past the tip of a thorn, at 0.1 m."""
     wall = mesh(TriangleMesh([[1.5, -1, -1], [1.5, 1, -1], [1.5, 0, 1]], [[0, 1, 2]]))
     thorn = mesh(TriangleMesh([[0.1, 0, 0], [1.1, 0.1, 0.1], [1.1, -0.1, 0.1]], [[0, 1, 2]]))
-    slide = robot_of([joint(1, "prismatic", axis=(0, 1, 0))])
-    for robot, surface, far in ((turning(), wall, 0.5), (slide, thorn, 0.3)):
+    for robot, surface, far in ((turning(), wall, 0.5), (sliding(), thorn, 0.3)):
         for bounds, there in along(robot, surface, Task(0.0, 180, 1.0), -far, far, 2):
             assert bounds.facets <= there.facets.min() + 1e-12
             assert bounds.facets > 0.9 * there.facets.min()

@@ -120,7 +120,9 @@ def places_along(cells, task):
 def raster(name: str) -> Raster:
     """A raster over one of `SURFACES`."""
     cells, task = SURFACES[name](), LAX if name == "sheets" else TASK
-    return Raster(gantry(), cells, task, configurations(*places_along(cells, task)))
+    points, axes = places_along(cells, task)
+    roll = 0.2 * np.sin(np.linspace(0.0, 9.0, len(points)))
+    return Raster(gantry(), cells, task, configurations(points, axes, roll))
 
 
 def marks_of(made: Raster):
