@@ -38,7 +38,8 @@ def gantry() -> Robot:
 def configurations(points, axes, roll=0.0):
     """(k, 6) with the tool at points (k, 3) along axes (k, 3) that look down."""
     x, y, z = np.asarray(axes).T
-    turns = np.column_stack([np.arctan2(y, -z), -np.arcsin(x), np.broadcast_to(roll, x.shape)])
+    about_x = np.unwrap(np.arctan2(y, -z))
+    turns = np.column_stack([about_x, -np.arcsin(x), np.broadcast_to(roll, x.shape)])
     return np.hstack([points - TOOL * np.asarray(axes), turns])
 
 
