@@ -26,7 +26,8 @@ PIPE = cylinder(0.02, (-170, 170), (-1, 1), rpy_deg=(90, 0, 0), **OUT)  # along 
 VALLEY = mesh(TriangleMesh(*mesh_patches.bent(
     lambda u, v: (u - 0.5, v - 0.5, 0.5 * np.abs(u - 0.5)), 2, 1)), **OUT)  # fmt: skip
 STEEP = replace(FLOOR, side="inside")
-SAG = 0.02 - np.hypot(0.0, 0.018)  # m, of a chord of the pipe, nearest to its axis
+RIDGE = mesh(TriangleMesh(*mesh_patches.bent(
+    lambda u, v: (u - 0.5, v - 0.5, np.maximum(0.1 - np.abs(u - 0.5), 0.0)), 10, 1)), **OUT)
 
 LIFTED = {
     "above": (FLOOR, [(0.1, 0.05), (0.9, 0.05)], 0.0),
@@ -40,7 +41,7 @@ LIFTED = {
     "past a pipe": (PIPE, [(-0.5, 0.0195), (0.5, 0.0195)], 0.0),
     "over the border, from below": (FLOOR, [(-0.01, -0.0132), (0.002, 0.001)], 1.37e-3),
     "under a border that is not met": (FLOOR, [(-0.3, -0.2), (-0.001, -0.2)], 0.0),
-    "under a valley": (VALLEY, [(0.0, -0.005), (0.0, -0.006)], 6e-3),
+    "deep under a valley": (VALLEY, [(0.003, -0.01), (0.003, -0.0101)], np.hypot(0.003, 0.0101)),
 }  # fmt: skip
 
 
@@ -55,10 +56,10 @@ def test_a_tool_that_is_lifted_does_not_go_through(name):
     assert bool(faults) == (deep > 0.0), faults
     for fault in faults:
         said = float(fault.text.split(" by ")[1].split()[0])
-        assert said <= 1e3 * deep * 1.001
+        assert said <= 1e3 * deep * 1.002
         assert said >= 1.0
         if "row" in name or "deep" in name:
-            assert said == pytest.approx(1e3 * deep)
+            assert said == pytest.approx(1e3 * deep, rel=1e-3)
 
 
 def test_what_stays_open_is_no_clear_way():
@@ -77,21 +78,17 @@ def test_what_stays_open_is_no_clear_way():
 DOME = cylinder(0.3, (-170, 170), (-0.5, 0.5), rpy_deg=(90, 0, 0), **OUT)  # along y
 
 
+def over(under, feet, normals, works):
+    """Poses over a surface, at which the tool works or not."""
+    made = poses(feet, normals)
+    return replace(made, surface=replace(made.surface, under=under, working=np.array(works, bool)))
+
+
 def over_dome(angles_deg, lifted, works, under=DOME):
     """Poses across the top of a cylinder, some of them lifted by a height (m)."""
-    angle, ends = np.radians(angles_deg), np.zeros(len(angles_deg))
-    normals = np.column_stack([np.sin(angle), ends, np.cos(angle)])
-    feet = normals * (0.3 + np.asarray(lifted))[:, None]
-    made = poses(feet, normals)
-    surface = replace(made.surface, under=under, working=np.asarray(works, dtype=bool))
-    return replace(made, surface=surface), configurations(feet + 0.01 * normals, -normals)
-
-
-def motion(q, per=40):
-    """Rows at the poses and on the way; the joints of a pose turn evenly, as its curve does."""
-    part = np.linspace(0.0, 1.0, per, endpoint=False)[:, None]
-    rows = np.concatenate([a + part * (b - a) for a, b in zip(q[:-1], q[1:], strict=True)])
-    return np.vstack([rows, q[-1:]]), np.arange(len(q)) * per
+    angle = np.radians(angles_deg)
+    normals = np.column_stack([np.sin(angle), 0.0 * angle, np.cos(angle)])
+    return over(under, normals * (0.3 + np.asarray(lifted))[:, None], normals, works)
 
 
 def straight(cells, per=40):
@@ -120,9 +117,6 @@ TOOLPATHS = {
     "through the dome where it is lifted": (
         [-80, -76, -72, 72, 76, 80], [0.0] * 6, [1, 1, 0, 0, 1, 1], DOME, "through the surface",
     ),
-    "on and off through the dome": (
-        [-80, -76, 80, -72, -68], [0, 0, 0.02, 0, 0], [1, 1, 0, 1, 1], DOME, "through the surface",
-    ),
     "over what is not known": (range(-24, 25, 12), [0.0] * 5, [1] * 5, None, ""),
 }  # fmt: skip
 
@@ -131,22 +125,34 @@ TOOLPATHS = {
 def test_poses_over_a_surface_are_right_over_it_where_they_follow(name):
     """Between poses 12 degrees apart a straight line is 1.6 mm below the dome's offset."""
     angles, lifted, works, under, word = TOOLPATHS[name]
-    cells, _ = over_dome(angles, lifted, works, under)
+    cells = over_dome(angles, lifted, works, under)
     q, marks = straight(cells)
     found = replay_over_surface(gantry(), cells, TASK, q, marks=marks)
     assert found.accepted == (not word), found.refusal
     assert word in found.refusal
 
 
-@pytest.mark.parametrize(("deviation", "accepted"), [(1e-4, True), (1.1e-3, False)])
+@pytest.mark.parametrize(("deviation", "accepted"), [(4e-4, True), (6e-4, False), (1.1e-3, False)])
 def test_what_the_surface_under_poses_deviates_by_is_taken_off(deviation, accepted):
+    """The tool is 0.5 mm off."""
     floor = parametric(lambda u, v: (u, v, 0 * u), (-0.5, 0.5), (-0.5, 0.5), **OUT)
-    at = np.column_stack([np.linspace(-0.2, 0.2, 5), np.zeros(5), np.zeros(5)])
-    made = poses(at, np.tile([0.0, 0.0, 1.0], (5, 1)))
-    surface = replace(made.surface, under=replace(floor, off=(deviation, 0)), working=np.ones(5, bool))
-    cells = replace(made, surface=surface)
+    feet, up = np.linspace(-0.2, 0.2, 5)[:, None] * [1.0, 0.0, 0.0], np.tile([0.0, 0.0, 1.0], (5, 1))
+    cells = over(replace(floor, off=(deviation, 0)), feet, up, np.ones(5))
     q, marks = straight(cells)
+    q[:, 2] += 5e-4
     assert replay_over_surface(gantry(), cells, TASK, q, marks=marks).accepted == accepted
+
+
+@pytest.mark.parametrize(("height", "word"), [(0.2, ""), (0.02, "through the surface")])
+def test_the_ways_on_and_off_a_surface_do_not_lead_through_it(height, word):
+    """From before a ridge to beyond it and back, in one segment each."""
+    x, up = np.array([-0.45, -0.4, 0.4, -0.35, -0.3]), np.tile([0.0, 0.0, 1.0], (5, 1))
+    feet = np.column_stack([x, 0.0 * x, np.where(np.arange(5) == 2, height, 0.0)])
+    cells = over(RIDGE, feet, up, [1, 1, 0, 1, 1])
+    q = configurations(feet + 0.01 * up, -up)
+    found = replay_over_surface(gantry(), cells, TASK, q, marks=np.arange(5))
+    assert found.accepted == (not word), found.refusal
+    assert word in found.refusal
 
 
 HOPS = {
