@@ -10,10 +10,13 @@ import mesh_patches
 import numpy as np
 import pytest
 import trimesh
+from bounds import holds
+from gantry import configurations, gantry
 from samples import sampled, spread
 from trimesh.triangles import closest_point
 
 from feasibility import Answer, Task, check, verify
+from feasibility.certification import replay_over_surface
 from robots import Kinematics, load_robot
 from surfaces import cylinder, rotation_from_rpy
 from surfaces.meshes import TriangleMesh, mesh
@@ -80,6 +83,20 @@ def test_a_motion_over_edges_keeps_standoff_and_cone(name):
     assert verdict.certificate.max_position_error <= task.effective_tolerance
     cosine = ((closest + position - tips) * axes).sum(axis=1) / away
     assert np.arccos(np.clip(cosine, -1, 1)).max() <= task.cone + lean + 1e-6
+
+
+def test_the_figure_of_a_motion_over_a_mesh_is_that_of_its_triangles():
+    """Normals are interpolated: at its targets the tool is nearer to the triangles than 30 mm."""
+    part = roof(-20)
+    surface, foot = mesh(part), np.linspace(-0.2, 0.2, 401)[:, None] * np.eye(3)[:1]
+    foot = foot + [0.0, 0.15, 0.0] + np.abs(foot[:, :1]) * [0.0, 0.0, np.tan(np.radians(10))]
+    normal = surface.closest(foot).normal
+    q = configurations(foot + 0.03 * normal, -normal)
+    cells, task = surface.cells(12), Task(0.03, 30, 1e-3)
+    found = replay_over_surface(gantry(), cells, task, q, np.zeros(len(cells), dtype=bool))
+    assert found.accepted, found.refusal
+    away = nearest(part, Kinematics(gantry()).tools(dense(q))[0])[1]
+    holds(found.certificate.max_position_error, task.standoff - away.min(), 0.9)
 
 
 @pytest.mark.parametrize(("standoff", "answer"), [(0.05, "undecided"), (0.0, "feasible")])
