@@ -41,6 +41,7 @@ LIFTED = {
     "past a pipe": (PIPE, [(-0.5, 0.0195), (0.5, 0.0195)], 0.0),
     "over the border, from below": (FLOOR, [(-0.01, -0.0132), (0.002, 0.001)], 1.37e-3),
     "under a border that is not met": (FLOOR, [(-0.3, -0.2), (-0.001, -0.2)], 0.0),
+    "under a border of triangles": (VALLEY, [(-0.9, -0.2), (-0.6, -0.2)], 0.0),
     "deep under a valley": (VALLEY, [(5e-4, -0.01), (5e-4, -0.0101)], np.hypot(5e-4, 0.0101)),
 }  # fmt: skip
 

@@ -38,9 +38,9 @@ FLAT = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0, 0, 0.3))
 DOME = sphere(0.3, (0, 25), (0, 360), side="outside", position=(0.5, 0, 0.1))
 
 
-def test_a_cut_over_parts_of_the_surface(tmp_path):
+def test_a_cut_over_parts_of_the_surface():
     """What points and normals may be off by; normals move targets by the standoff."""
-    robot, _, task, tree = elbow_case(tmp_path)
+    robot, _, task, tree = elbow_case()
     cells = plane((0.99, 1.01), (-0.25, 0.25), "inside", (0, 0, 0.05)).cells(1, 5)
     task, parts = replace(task, standoff=0.05), cells.surface.parts(2.5e-4, 0.08)
 
