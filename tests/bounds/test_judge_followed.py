@@ -20,14 +20,22 @@ from surfaces.meshes import TriangleMesh
 
 OUT = {"side": "outside"}
 TASK = Task(0.01, 20, 1e-3)
-SLIDES = robot_of([joint(k, "prismatic", axis=axis) for k, axis in ((1, (1, 0, 0)), (2, (0, 0, 1)))])
+SLIDES = robot_of(
+    [joint(k, "prismatic", axis=axis) for k, axis in ((1, (1, 0, 0)), (2, (0, 0, 1)))]
+)
 FLOOR = plane((0.0, 1.0), (-1.0, 1.0), **OUT)
 PIPE = cylinder(0.02, (-170, 170), (-1, 1), rpy_deg=(90, 0, 0), **OUT)  # along y, its seam to -x
 VALLEY = mesh(TriangleMesh(*mesh_patches.bent(
     lambda u, v: (u - 0.5, v - 0.5, 0.1 * np.abs(u - 0.5)), 2, 1)), **OUT)  # fmt: skip
 STEEP = replace(FLOOR, side="inside")
-RIDGE = mesh(TriangleMesh(*mesh_patches.bent(
-    lambda u, v: (u - 0.5, v - 0.5, np.maximum(0.1 - np.abs(u - 0.5), 0.0)), 10, 1)), **OUT)
+RIDGE = mesh(
+    TriangleMesh(
+        *mesh_patches.bent(
+            lambda u, v: (u - 0.5, v - 0.5, np.maximum(0.1 - np.abs(u - 0.5), 0.0)), 10, 1
+        )
+    ),
+    **OUT,
+)
 
 LIFTED = {
     "above": (FLOOR, [(0.1, 0.05), (0.9, 0.05)], 0.0),
@@ -137,7 +145,10 @@ def test_poses_over_a_surface_are_right_over_it_where_they_follow(name):
 def test_what_the_surface_under_poses_deviates_by_is_taken_off(deviation, accepted):
     """The tool is 0.5 mm off."""
     floor = parametric(lambda u, v: (u, v, 0 * u), (-0.5, 0.5), (-0.5, 0.5), **OUT)
-    feet, up = np.linspace(-0.2, 0.2, 5)[:, None] * [1.0, 0.0, 0.0], np.tile([0.0, 0.0, 1.0], (5, 1))
+    feet, up = (
+        np.linspace(-0.2, 0.2, 5)[:, None] * [1.0, 0.0, 0.0],
+        np.tile([0.0, 0.0, 1.0], (5, 1)),
+    )
     cells = over(replace(floor, off=(deviation, 0)), feet, up, np.ones(5))
     q, marks = straight(cells)
     q[:, 2] += 5e-4

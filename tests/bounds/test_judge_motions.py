@@ -12,7 +12,14 @@ from arm_urdfs import joint
 from capsule_arms import at as placed
 from capsule_arms import bodies_of, pair
 from gantry import (
-    SURFACES, configurations, gantry, marks_of, places_along, raster, serpentine, tools_of,
+    SURFACES,
+    configurations,
+    gantry,
+    marks_of,
+    places_along,
+    raster,
+    serpentine,
+    tools_of,
 )  # fmt: skip
 from random_arms import planar_arm, robot_of
 from samples import sampled, seeds
@@ -36,7 +43,7 @@ def dense(q, count):
 
 
 def off_and_tilt(cells, task, q):
-    """(k,) m off the offset surface, and (k,) rad of the tool to the normal at the closest point."""
+    """(k,) m off the offset surface, and (k,) rad between tool and normal at the closest point."""
     points, axes = tools_of(q)
     found, sign = cells.surface.closest(points), cells.surface.side_sign
     chord = np.linalg.norm(axes + sign * found.normal, axis=1)
@@ -85,7 +92,9 @@ def test_figures_bound_what_dense_samples_find_and_hardly_more(name):
     assert figures.waypoints == len(made.q)
     back = ask(made, made.q[::-1], marks_of(made)[::-1])
     assert back.accepted, back.refusal
-    assert back.certificate.max_position_error == pytest.approx(figures.max_position_error, rel=1e-6)
+    assert back.certificate.max_position_error == pytest.approx(
+        figures.max_position_error, rel=1e-6
+    )
     assert figures.max_position_error <= made.task.effective_tolerance
     if name in ("mesh", "sheets"):  # there normals do not lead to the closest point
         return
@@ -495,9 +504,10 @@ assert "tool point" in found.refusal
 assert certification.verify_proof(arm, cells, Task(0.0, 20.0), CutTree(Leaf(0))).accepted
 print(*sys.modules)
 """
-SEARCH = tuple(f"feasibility.{name}." for name in ("roadmap", "paper", "search", "compiled")) + (
-    "feasibility.checking.", "robots.chain.",
-)  # fmt: skip
+SEARCH = (
+    *(f"feasibility.{name}." for name in ("roadmap", "paper", "search", "compiled", "checking")),
+    "robots.chain.",
+)
 
 
 def test_judges_and_verifiers_share_no_code_with_the_search():

@@ -13,6 +13,9 @@ from samples import sampled, seeds
 
 from coverable_errors import ArgumentError
 from feasibility import Task
+from feasibility.certification import second_derivatives
+from feasibility.certification.jacobians import jacobians
+from feasibility.certification.lever_bounds import levers_along
 from feasibility.certification.rates import (
     check_rates,
     fastest_anywhere,
@@ -96,6 +99,41 @@ def test_what_is_shown_at_once_of_long_segments_is_true(name, seed):
         found = segment_rates(robot, q[:1], q[-1:], *np.maximum(asked, 1e-6))
         assert found.speed[0] <= speeds.min() + 1e-3 * speeds.max()
         assert found.sigma[0] <= values.min() * (1.0 + 1e-6) + 1e-9
+
+
+@pytest.mark.parametrize("name", ["elbow", "slide", "wrist"])
+def test_a_single_look_shows_what_the_lemmas_say(name):
+    """|p'| >= (|p'(0)| + |p'(1)| - D) / 2, or the chord less D / 2; and of singular values.
+
+    A column changes by its length times all turns up to it, and by what joints behind move; that of
+    a slide by the turns before it alone.
+    """
+    rng = np.random.default_rng(3)
+    robot = robot_of([*CHAINS[name], joint(4, "fixed", (1.0, 0.2, 0.1))], (0.0, 1.0, 0.0))
+    robot, slides = replace(robot, max_velocity=np.ones(3)), robot.prismatic
+    shown = 0
+    for _ in range(40):
+        q = rng.uniform(-3.0, 3.0, 3) + np.array([[0.0], [1.0]]) * rng.uniform(-0.1, 0.1, 3)
+        at, steps = jacobians(Kinematics(robot), q), np.abs(q[1] - q[0])
+        bent = second_derivatives(steps[None], slides, at.levers, np.inf)[0]
+        ends = np.linalg.norm(at.point @ (q[1] - q[0]), axis=1)
+        chord = np.linalg.norm(at.points[1] - at.points[0])
+        speed = max(0.5 * (ends.sum() - bent), chord - 0.5 * bent) / steps.max()
+        square, turns = 0.0, np.where(slides, 0.0, steps)
+        for levers, cap, unit in ((at.levers, np.inf, robot.length_unit), (at.sines, 1.0, 1.0)):
+            (r,) = levers_along(steps[None], slides, levers[:1], levers[1:], cap)
+            for j in range(3):
+                change = r[j] * turns[: j + 1].sum() + (r * steps)[j + 1 :].sum()
+                if slides[j]:
+                    change = turns[:j].sum() if cap > 1.0 else 0.0
+                square += (change / unit) ** 2
+        sigma = 0.5 * (smallest_singular_values(robot, q).sum() - np.sqrt(square))
+        if min(speed, sigma) > 1e-6:
+            found = segment_rates(robot, q[:1], q[1:], speed=1e-6, sigma=1e-6)
+            assert found.speed[0] == pytest.approx(speed)
+            assert found.sigma[0] == pytest.approx(sigma)
+            shown += 1
+    assert shown > 3
 
 
 def test_the_smallest_of_the_singular_values_is_the_fifth():
@@ -199,7 +237,11 @@ IN_PLACE = {  # mm beside the target at both ends; radius (mm) of a whole turn b
 @pytest.mark.parametrize("name", IN_PLACE)
 def test_in_place_is_a_tenth_of_the_tolerance_at_the_ends_and_all_of_it_between(name):
     (first, last), radius, expected = IN_PLACE[name]
-    arm = [joint(1, "prismatic", axis=(1, 0, 0)), joint(2), joint(3, "fixed", (1e-3 * radius, 0, 0))]
+    arm = [
+        joint(1, "prismatic", axis=(1, 0, 0)),
+        joint(2),
+        joint(3, "fixed", (1e-3 * radius, 0, 0)),
+    ]
     at = (1e-3 * radius, 0, 0)
     cells = plane((-0.1, 0.1), (-0.1, 0.1), "outside", at).cells(1, 1)
     rows = np.array([[1e-3 * first, 0.0], [1e-3 * last, 2.0 * np.pi]])

@@ -289,10 +289,8 @@ def test_the_bounds_of_references_are_those_of_the_lemma(kind):
             assert known.second_t[0, k] == pytest.approx(of_t)
             assert known.second_u[0, k] == pytest.approx(of_u)
             one, other = ([(1.0 - s) * v[0] + s * v[1] for v in (x, y)] for s in at[k : k + 2])
-            dx, dy, dt, du = (
-                last - first for first, last in zip((*one, t[k], u[k]), (*other, t[k + 1], u[k + 1]),
-                                                    strict=True)
-            )  # fmt: skip
+            ends = (*one, t[k], u[k]), (*other, t[k + 1], u[k + 1])
+            dx, dy, dt, du = (last - first for first, last in zip(*ends, strict=True))
             most = 2.0 * np.hypot(dt @ dx + du @ dy, du @ dx - dt @ dy)
             most += (at[k + 1] - at[k]) ** 2 * second + np.sqrt(2.0) * (of_t + of_u)
             z0 = vectors_of(*one, t[k], u[k], roll)[None]

@@ -29,14 +29,8 @@ from feasibility.certification.cut_proofs.parts_agreement import (
     places,
 )
 from feasibility.certification.cut_proofs.region import JointRegion
-from feasibility.certification.rolls import (
-    TargetModel,
-    ToolModel,
-    reference_axes,
-    reference_parts,
-    roll_models,
-)
-from feasibility.roll import Roll, projected, roll_of
+from feasibility.certification.rolls import reference_axes
+from feasibility.roll import projected, roll_of
 from robots import Kinematics, load_robot
 from surfaces import cone, cylinder, hyperboloid, plane, sphere, torus
 
@@ -207,12 +201,11 @@ def test_no_region_around_a_known_place_is_said_to_be_empty(seed):
 
 
 UR5 = load_robot("ur5")
-ROLLED = {"roll_deg": (-30, 30), "roll_reference": (1, 0, 0)}
 
 
 @pytest.mark.parametrize("size", [0.02, 0.3])
 def test_models_hold_over_their_boxes_and_hardly_less_would(size):
-    """Of tool point and axis; each joint alone, where its lemma is nearly exact, and all at once."""
+    """Of tool point and axis: each joint alone, of which the lemma is nearly exact, and all."""
     rng, dome = np.random.default_rng(1), sphere(0.3, (0, 25), (0, 360), **OUT)
     task = Task(0.02, 20)
     parts = target_parts(dome.parts(0.01, 0.05), dome.cells(1, 1), task)
@@ -249,69 +242,6 @@ def test_targets_are_off_by_what_points_are_and_what_normals_move_them():
     fixed = target_parts(parts, cells, Task(0.3, 30, approach=(0.0, 0.0, -1.0)))
     assert fixed.radius[:, 0] == pytest.approx(parts.radius @ [1.0, 0.3])
     assert not fixed.radius[:, 1].any()
-
-
-def tool_model(q, half):
-    """x and y about q (n,) over a box of half widths (n,), and what boxes are made of by hand.
-
-    D = sum_j s_j h_j (h_j + 2 sum of the h before j), with sines of 1; moves by all h together.
-    """
-    _, axis = Kinematics(UR5).tool(q)
-    x = reference_axes(UR5, q[None])
-    both = np.stack([x, np.cross(axis, x)], axis=1)
-    turning = Kinematics(UR5).twists(q[None]).transpose(0, 2, 1)[..., 3:]
-    second = half @ (half + 2.0 * (np.cumsum(half) - half))
-    many = np.full((1, 2), second), np.full((1, 2), min(half.sum(), 2.0))
-    return ToolModel(both, np.cross(turning[:, :, None], both[:, None]), *many)
-
-
-def test_models_of_the_roll_hold_over_their_boxes():
-    rng, kinematics = np.random.default_rng(2), Kinematics(UR5)
-    for _ in range(60):
-        roll = Roll(rng.uniform(-3, 3), np.exp(rng.uniform(np.log(0.01), np.log(np.pi / 2))))
-        r, b = across(rng, rng.normal(size=3)), across(rng, rng.normal(size=3))
-        half = np.exp(rng.uniform(np.log(1e-3), np.log(0.2), UR5.n))
-        slopes = 0.05 * rng.normal(size=(1, 2, 3))
-        # The model of b, not made a unit vector, is off one by this at most.
-        radius = np.array([np.linalg.norm(slopes, axis=2).sum() ** 2])
-        held = reference_parts(b[None], slopes, radius, r)
-        q = rng.uniform(-2, 2, UR5.n)
-        target = TargetModel(
-            np.stack([b, held.centre[0]])[None], np.stack([slopes, held.slopes], axis=2),
-            np.ones((1, 2)), np.array([[radius[0], held.radius[0]]]),
-        )  # fmt: skip
-        found = roll_models(tool_model(q, half), target, roll)
-        inner, x = rng.uniform(-1, 1, (200, UR5.n)) * half, rng.uniform(-1, 1, (200, 2))
-        near = b + np.einsum("ki,id->kd", x, slopes[0])
-        near /= np.linalg.norm(near, axis=1, keepdims=True)
-        t, _ = projected(np.tile(r, (200, 1)), near)
-        _, axes = kinematics.tools(q + inner)
-        own = reference_axes(UR5, q + inner)
-        y, u = np.cross(axes, own), np.cross(near, t)
-        cosine, sine = (t * own + u * y).sum(axis=1), (u * own - t * y).sum(axis=1)
-        for end, sign in enumerate((1.0, -1.0)):
-            angle = roll.middle + sign * roll.half
-            true = sign * (np.sin(angle) * cosine - np.cos(angle) * sine) - 1.0
-            made = np.concatenate([inner, x], axis=1) @ found.columns[0, :, end]
-            off = np.abs(found.residual[0, end] + made - true)
-            assert off.max() <= found.radius[0, end] - 1.0 + 1e-12 or found.radius[0, end] == 4.0
-
-
-def test_all_joints_together_turn_the_reference_axis():
-    """A planar chain: M_x is at most the sum of all turns, and the radius has M_x M_p."""
-    task = Task(0.02, 20, **ROLLED)
-    dome = sphere(0.3, (0, 25), (0, 360), **OUT)
-    parts = target_parts(dome.parts(0.01, 0.05), dome.cells(1, 1), task)
-    arm, q = ArmModel(UR5, UR5.lower, UR5.upper), np.zeros(8)
-    part = int(np.argmin(parts.radius[:, 1]))
-    radii = []
-    for count in (1, 6):
-        half = np.append(np.where(np.arange(6) < count, 1e-4, 0.0), [1.0, 1.0])
-        box = Boxes((q - half)[None], (q + half)[None], *np.array([[part], [0]]))
-        radii.append(arm.models(box, parts, Allowed(1e-3, 0.3, 1.0, task.roll)).radius[0, 2:])
-    slope = np.linalg.norm(parts.references.slopes[part], axis=1).sum()
-    assert slope > 1e-3
-    assert (radii[1] - radii[0] > 1e-4 * slope).all()
 
 
 # -- boxes and regions ----------------------------------------------------------------------------

@@ -9,7 +9,16 @@ import numpy as np
 import pytest
 from arm_urdfs import joint
 from proof_cases import (
-    ACROSS, FLAT, QUICK, STORED, elbow, elbow_case, free_elbow_case, rail_case, split, stored_case,
+    ACROSS,
+    FLAT,
+    QUICK,
+    STORED,
+    elbow,
+    elbow_case,
+    free_elbow_case,
+    rail_case,
+    split,
+    stored_case,
     strip,
 )  # fmt: skip
 from random_arms import robot_of

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from gantry import configurations, gantry
@@ -41,12 +43,14 @@ def test_the_share_of_a_motion_agrees_with_points_drawn_by_area(footprint):
     """Of a zigzag; an ellipse treats between what the disc in it and that around it treat."""
     corners = np.array([[0.43, -0.07], [0.66, -0.07], [0.66, 0.03], [0.43, 0.03]])
     s = np.linspace(0.0, 1.0, 60)[:, None]
-    feet = np.vstack([a + s * (b - a) for a, b in zip(corners, corners[1:], strict=False)])
+    feet = np.vstack([a + s * (b - a) for a, b in itertools.pairwise(corners)])
     points = np.column_stack([feet, np.full(len(feet), 0.22)])
     q = configurations(points, np.tile([0.0, 0.0, -1.0], (len(feet), 1)))
     task, walk = Task(0.02, 20, footprint=footprint), Walk(q, np.full(len(q), -1))
     treated = treated_by_walk(gantry(), CELLS, task, walk)
-    small, large = (share_of(feet, 0.5 * end(np.append(footprint, footprint))) for end in (min, max))
+    small, large = (
+        share_of(feet, 0.5 * end(np.append(footprint, footprint))) for end in (min, max)
+    )
     assert treated.area == pytest.approx(0.06)
     assert treated.lower == pytest.approx(small, abs=0.012)  # 4 standard errors: 0.012
     assert treated.upper == pytest.approx(large, abs=0.012)

@@ -59,7 +59,7 @@ def sheet(count=25):
     corner = (np.arange(count - 1)[:, None] * count + np.arange(count - 1)).ravel()
     right, up = corner + 1, corner + count
     faces = np.vstack([np.stack([corner, right, up + 1], 1), np.stack([corner, up + 1, up], 1)])
-    points = np.stack([x, y, z], axis=-1).reshape(-1, 3) + [0.45, 0.05, 0.25]
+    points = np.stack([x + 0.45, y + 0.05, z + 0.25], axis=-1).reshape(-1, 3)
     return mesh(TriangleMesh(points, faces))
 
 
