@@ -234,8 +234,13 @@ def less_deviations(task: Task, surface: Surface) -> Task:
     if not (off or leans):
         return task
     tolerance = task.effective_tolerance - off - task.standoff * leans
-    cone_deg = task.cone_deg - float(np.degrees(2.0 * np.arcsin(min(leans / 2.0, 1.0))))
+    cone_deg = task.cone_deg - _turn_deg(leans)
     return replace(task, tolerance=max(tolerance, 1e-12), cone_deg=max(cone_deg, 0.0))
+
+
+def _turn_deg(leans: float) -> float:
+    """Angle between unit vectors that are so far apart."""
+    return float(np.degrees(2.0 * np.arcsin(min(leans / 2.0, 1.0))))
 
 
 def _too_vague(task: Task, surface: Surface) -> list[MotionFault]:
@@ -246,9 +251,9 @@ def _too_vague(task: Task, surface: Surface) -> list[MotionFault]:
         known = f"targets on the surface are known to {1e3 * (off + task.standoff * leans):.4g} mm"
         allowed = f"{1e3 * task.effective_tolerance:g} mm are allowed"
         faults.append(MotionFault(-1, 0.0, f"{known} only, {allowed}"))
-    turned = float(np.degrees(2.0 * np.arcsin(min(leans / 2.0, 1.0))))
-    if turned > task.cone_deg:
-        text = f"its normals are known to {turned:.4g} deg only, {task.cone_deg:g} deg are allowed"
+    if _turn_deg(leans) > task.cone_deg:
+        known = f"its normals are known to {_turn_deg(leans):.4g} deg only"
+        text = f"{known}, {task.cone_deg:g} deg are allowed"
         faults.append(MotionFault(-1, 0.0, text))
     return faults
 
