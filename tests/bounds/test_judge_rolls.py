@@ -94,43 +94,6 @@ def test_frames_of_the_tool_bend_no_more_than_is_said(seed):
 # -- references along paths of places -------------------------------------------------------------
 
 
-@pytest.mark.parametrize("reference", [(1.0, 0.0, 0.0), None])
-@pytest.mark.parametrize("width", [0.02, 0.2, 0.6])
-def test_over_a_sphere_the_roll_of_a_tool_at_rest_or_turning_is_bounded(reference, width):
-    """Places along a straight line of parameters; the reference is one direction, or u."""
-    rng, count = np.random.default_rng(int(100 * width)), 300
-    surface = sphere(1.0, (20, 160), (-180, 180))
-    offset = offset_surface(surface, 0.0)
-    task = Task(0.0, 90, roll_deg=(-80.0, 80.0), roll_reference=reference)
-    held = Held.of(task, surface.cells(2, 2), offset)
-    first = np.stack([rng.uniform(0.9, 2.2, count), rng.uniform(-2.0, 2.0, count)], axis=1)
-    last = first + width * rng.uniform(-1.0, 1.0, (count, 2))
-    chart = np.zeros(count, dtype=np.int64)
-    path = offset.paths(Places(chart, first), Places(chart, last))
-    approaches = held.approaches(path.normals)
-    turn = 0.5 * width * rng.uniform(-1.0, 1.0, count) * rng.integers(0, 2, count)
-    begin = rng.uniform(-1.3, 1.3, count)
-    t = held.references_along(path, approaches).t[:, 0]
-
-    def frame(angle):
-        """A tool that turns about the approach at the start of each path."""
-        b = approaches[:, 0]
-        return np.cos(angle)[:, None] * t + np.sin(angle)[:, None] * np.cross(b, t), b
-
-    (x0, axes), (x1, _) = frame(begin), frame(begin + turn)
-    ends = ToolAxes(axes, x0), ToolAxes(axes, x1)
-    found = held.rolls_between(*ends, 2.0 * turn**2, path, approaches)
-    truth = np.zeros(count)
-    for s in S[::4, 0]:
-        places = Places(chart, first + s * (last - first))
-        x, b = frame(begin + s * turn)[0], held.approaches(offset.at(places)[1])
-        truth = np.maximum(truth, held.rolls(x, axes, b, places))
-    some = np.isfinite(found)
-    assert (truth[some] <= found[some] + 1e-6).all()
-    assert some.sum() > 40
-    assert (truth[some] / found[some]).max() > 0.9
-
-
 @pytest.mark.parametrize("kind", ["dome", "tube", "by u"])
 def test_references_bend_no_more_than_is_said(kind):
     """Past where the approach is nearly along the reference, t turns fast."""

@@ -14,9 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from coverable_errors import ArgumentError
 from feasibility import Search, Task, check, verify
-from feasibility.cli.main import main
 from feasibility.clock import Clock
-from feasibility.results import load_result
 from feasibility.speed import rate_figures
 from feasibility.speed.rated_graph import grow, rated_graph
 from robots import Kinematics, load_robot
@@ -174,15 +172,3 @@ def test_bad_questions_are_refused():
     for bad in ({"speed": 0.0}, {"speed": "fast"}, {"min_manipulability": -1.0}):
         with pytest.raises(ArgumentError, match=next(iter(bad))):
             replace(TASK, **bad)
-
-
-def test_a_case_says_it_and_its_result_is_verified(tmp_path, capsys):
-    asked = ["task.speed=0.25", "task.min_manipulability=0.01", "surface.cells=[2, 2]"]
-    settings = [part for setting in asked for part in ("--set", setting)]
-    saved = str(tmp_path / "fast.result")
-    assert main(["check", "paper/4a", *settings, "--save", saved]) == 0
-    said = " ".join(capsys.readouterr().out.split())
-    assert "The tool can have 0.25 m/s all along it" in said
-    assert "(required 0.25)" in said
-    assert load_result(saved).verdict.certificate.max_speed > 0.25
-    assert main(["verify", saved]) == 0

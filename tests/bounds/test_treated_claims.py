@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from gantry import configurations, gantry
 from coverable_errors import CoverableError
 from feasibility import Answer, Task, check
 from feasibility.cases import CaseError, load_case
-from feasibility.cli.main import main
 from feasibility.treated import Decision, treated_by_walk, with_coverage
 from feasibility.verdict import Evidence, Walk
 from robots import load_robot
@@ -132,25 +130,6 @@ def test_bad_numbers_are_named(settings):
         load_case("paper/4a", list(settings)).build()
     assert BAD[settings] in str(raised.value)
     assert len(raised.value.faults) == 1
-
-
-def test_the_command_says_what_is_treated_and_how_to_treat_more(capsys):
-    asked = ["check", "paper/4a", "--set", "surface.cells=[4, 5]", "--set", "task.footprint=0.3"]
-    assert main([*asked, "--json"]) == 0
-    treated = json.loads(capsys.readouterr().out)["treated"]
-    assert treated["lower"] <= treated["upper"] < 0.99
-    assert treated["footprint_m"] == [0.3, 0.3]
-    assert len(treated["untreated"][0]["centre"]) == 3
-    assert main(asked) == 0
-    said = " ".join(capsys.readouterr().out.split())
-    for words in ("visits every cell and treats", "surface.cells=auto", "task.coverage=0.99"):
-        assert words in said
-    assert main([*asked, "--set", "task.coverage=0.99"]) == 3
-    assert "not shown to treat enough" in " ".join(capsys.readouterr().out.split())
-    assert main([*asked, "--set", "surface.cells=auto"]) == 0
-    fine = capsys.readouterr().out
-    assert "treats 100.00 % of the area" in fine
-    assert not any(word in fine for word in ("cells=auto cuts", "coverage=0", "--pitch"))
 
 
 def test_visits_are_counted_by_coming_and_going():
