@@ -6,6 +6,7 @@ See `test_starved_judges`: each test first shows that what is not starved is acc
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from capsule_arms import at, bodies_of, capsule_links, pair, planar_arm
 from proof_cases import elbow_case
@@ -38,9 +39,9 @@ FLAT = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0, 0, 0.3))
 DOME = sphere(0.3, (0, 25), (0, 360), side="outside", position=(0.5, 0, 0.1))
 
 
-def test_a_cut_over_parts_of_the_surface(tmp_path):
+def test_a_cut_over_parts_of_the_surface():
     """What points and normals may be off by; normals move targets by the standoff."""
-    robot, _, task, tree = elbow_case(tmp_path)
+    robot, _, task, tree = elbow_case()
     cells = plane((0.99, 1.01), (-0.25, 0.25), "inside", (0, 0, 0.05)).cells(1, 5)
     task, parts = replace(task, standoff=0.05), cells.surface.parts(2.5e-4, 0.08)
 
@@ -98,6 +99,25 @@ def test_a_tool_in_every_pose(size, cone):
     assert confirmed()
     assert not confirmed(size)
     assert not confirmed(tolerance=LARGE)
+
+
+@pytest.mark.parametrize(("wide", "confirmed"), [(0.08, True), (0.034, False)])
+def test_the_corners_of_a_box_of_tilts_count(wide, confirmed):
+    """A ball 300 mm from the tool point, among five; at a tilt between two of them it is clear."""
+    point, up, cone = np.array([0.5, 0, 0.3]), np.array([0, 0, 1.0]), 0.2
+    tilts = [(0.0, 0.0), *((u, v) for u in (-0.1, 0.1) for v in (-0.1, 0.1))]
+    places = [point - 0.3 * pin.exp3(np.array([*tilt, 0.0])) @ up for tilt in tilts]
+    scene = tuple(
+        Obstacle.sphere(f"ball{k}", wide if k else 0.01, at) for k, at in enumerate(places)
+    )
+    asked = Collision(
+        self_=False, surface=False, scene=scene,
+        tool=(ToolShape.sphere(0.002, position=(0, 0, -0.3)),),
+        allow=tuple((name, ball.name) for name in UR5.link_names for ball in scene),
+    )  # fmt: skip
+    bodies = gather(UR5, FLAT, asked, 0.02)
+    found = never_clear(UR5, bodies, cone, 1e-6, point, up, most=20_000)
+    assert found.confirmed == confirmed
 
 
 def test_a_tool_in_a_sheet():

@@ -10,12 +10,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from arm_urdfs import arm, joint, load_text
+from arm_urdfs import joint
 from capsule_arms import at, bodies_of, capsule_links, pair, planar_arm
-from rasters import sheet
+from gantry import configurations, gantry, raster
+from random_arms import robot_of
 from starving import LARGE, Starved, grown
 
-from feasibility import Task, certification, check
+from feasibility import Task, certification
 from feasibility.certification import rates, rolls
 from feasibility.certification.collisions import collision_replay, piece_of
 from feasibility.certification.collisions.budgets import Budget, TooNear
@@ -28,17 +29,13 @@ from feasibility.certification.stretches import Judge
 from feasibility.collisions import Soup
 from feasibility.roll import Roll
 from feasibility.treated import treated_by_walk
-from robots import Kinematics, load_robot
+from feasibility.verdict import Walk
+from robots import Kinematics
 from robots.urdf import Box
-from surfaces import parametric, plane, sphere
+from surfaces import parametric, plane
 from surfaces.places import offset_surface
 
 FAR = 9e3  # m, of an axis: as far as a URDF may put it
-UR5 = load_robot("ur5")
-FLAT = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0, 0, 0.3))
-DOME = sphere(0.3, (0, 25), (0, 360), side="outside", position=(0.5, 0, 0.1))
-
-
 PLANAR, LINKS = planar_arm((0.5, 0.4)), capsule_links((0.5, 0.4), 0.03)
 ROWS = np.array([[0.3, 0.0], [0.2, 0.1], [0.1, 0.2]])  # of the planar arm
 CORNERS = np.array([[0.3, 0.8, -0.1], [0.3, 0.8, 0.1], [0.5, 0.9, 0], [0.5, 1, 0.1]])  # of a sheet
@@ -47,20 +44,21 @@ HELD = {"roll_deg": (-170, 170), "roll_reference": (1, 0, 0)}
 
 
 @pytest.mark.parametrize(
-    ("surface", "cut", "held", "bent"),
+    ("name", "held", "bent"),
     [
-        (DOME, (2, 3), {}, (0, 1)), (sheet(), (6,), {}, (0, 1)), (DOME, (2, 3), HELD, (0, 1, 2)),
-        (FLAT, (2, 3), {"roll_deg": (-90, 90)}, (0, 1, 2)),
+        ("ball", {}, (0, 1)), ("mesh", {}, (0, 1)), ("ball", HELD, (0, 1, 2)),
+        ("plane", {"roll_deg": (-90, 90)}, (0, 1, 2)),
     ],
 )  # fmt: skip
-def test_stretches_of_a_motion(surface, cut, held, bent):
+def test_stretches_of_a_motion(name, held, bent):
     """What tool point, axis, roll (`bent`), places and the u direction may do between rows."""
-    task, cells = Task(0.02, 25, tolerance=2e-3, **held), surface.cells(*cut)
-    rows, share = check(UR5, cells, task).witness.q[:6], np.linspace(0, 1, 200)[:, None]
+    robot, cells, task, q = raster(name)
+    surface, share = cells.surface, np.linspace(0, 1, 20)[:, None]
+    task, rows = replace(task, tolerance=2e-3, **held), q[40:60]
     rows = np.vstack([a + share * (b - a) for a, b in itertools.pairwise(rows)])
     offset = offset_surface(surface, surface.side_sign * task.standoff)
-    judge = Judge(UR5, task, offset, cells)
-    poses, x = certification.placements(UR5, rows), judge.reference_axes(rows)
+    judge = Judge(robot, task, offset, cells)
+    poses, x = certification.placements(robot, rows), judge.reference_axes(rows)
     known = judge.compared(np.arange(len(rows)), 0.0 * rows[:, 0], poses.points, poses.axes, x)
     parts = judge.between_rows(rows, poses, known)
     assert judge.within(judge.bounds(parts)).all()
@@ -79,22 +77,28 @@ def test_stretches_of_a_motion(surface, cut, held, bent):
     if held and "roll_reference" not in held:
         starved.append(Starved(offset, "tangent_slopes", grown))
     for one in starved:
-        blind = Judge(UR5, task, one, cells)
+        blind = Judge(robot, task, one, cells)
         assert not blind.within(blind.bounds(parts)).any()
 
 
 @pytest.mark.parametrize(
-    ("off", "standoff"), [((1.1e-3, 0), 0.02), ((0, 0.06), 0.02), ((0, 0.9), 0)]
-)
-def test_what_a_surface_deviates_by(off, standoff):
-    """Off the points, which leaning normals move by the standoff; and off the cone."""
-    flat = parametric(lambda u, v: (u, v, 0 * u), (0.4, 0.6), (-0.1, 0.1), side="outside",
-                      position=(0, 0, 0.3))  # fmt: skip
-    task, cells = Task(standoff, 30), flat.cells(2, 2)
-    q = check(UR5, cells, task).witness.q
-    assert certification.replay_over_surface(UR5, cells, task, q).accepted
-    worse = replace(flat, off=off).cells(2, 2)
-    assert not certification.replay_over_surface(UR5, worse, task, q).accepted
+    ("off", "standoff", "cone", "accepted"),
+    [((9e-4, 0), 0.02, 30, True), ((1.1e-3, 0), 0.02, 30, False), ((0, 0.04), 0.02, 30, True),
+     ((0, 0.06), 0.02, 30, False), ((0, 0.5), 0.0, 30, True), ((0, 0.53), 0.0, 30, False)],
+)  # fmt: skip
+def test_what_a_surface_deviates_by(off, standoff, cone, accepted):
+    """Off the points, which leaning normals move by the standoff; and off the cone.
+
+    Also a motion that is right to the last digit is refused.
+    """
+    flat = parametric(lambda u, v: (u, v, 0 * u), (0.4, 0.6), (-0.1, 0.1), side="outside")
+    task, cells = Task(standoff, cone), replace(flat, off=off).cells(2, 1)
+    points = cells.centres + np.array([0.0, 0.0, standoff])
+    q = configurations(points, np.tile([0.0, 0.0, -1.0], (2, 1)))
+    for tip in (0.0, 1e-5):
+        q[1, 4] += tip
+        found = certification.replay_over_surface(gantry(), cells, task, q)
+        assert found.accepted == accepted, found.refusal
 
 
 def test_a_roll_between_two_instants_and_over_boxes():
@@ -120,24 +124,24 @@ def test_a_roll_between_two_instants_and_over_boxes():
 
 
 @pytest.mark.parametrize(("turn", "asked"), [(2.5, {"speed": 0.05}), (0.0, {"sigma": 0.2})])
-def test_rates_of_an_arm_with_an_axis_far_away(turn, asked, tmp_path):
+@pytest.mark.parametrize(("far", "accepted"), [(0.0, True), (FAR, False)])
+def test_rates_of_an_arm_with_an_axis_far_away(turn, asked, far, accepted):
     """Two axes in one line that rest, or turn against each other: to the tool it is the same."""
-    for far, accepted in ((0.0, True), (FAR, False)):
-        first = [joint(1), *(joint(k, xyz=(0.3, 0, 0.1), axis=(0, 1, 0)) for k in (2, 3, 4))]
-        last = [joint(5, xyz=(0.1, 0, 0), axis=(1, 0, 0)), joint(6, "prismatic", xyz=(0.1, 0, 0))]
-        twice = [joint(7, xyz=(far, 0, 0)), joint(8), joint(9, "fixed", (0.1 - far, 0, 0.05))]
-        robot = load_text(tmp_path, arm([*first, *last, *twice]), tool_frame="l9")
-        robot = robot.with_limits({"j6": (-np.inf, np.inf)})  # so that lengths are measured by 1 m
-        start = np.array([[0.1, -0.4, 0.9, 0.3, 0.4, 0.2, 0.0, 0.0]])
-        end = start + np.array([0.2, 0.1, -0.1, 0.2, 0.1, 0.1, turn, -turn])
-        found = rates.segment_rates(robot, start, end, **asked)
-        assert found.sampled_speed[0] > 0.05
-        assert found.sampled_sigma[0] > 0.2
-        assert all((getattr(found, name)[0] >= least) == accepted for name, least in asked.items())
-        tool, _ = Kinematics(robot).tool(start[0])
-        spot = plane((0, 1), (0, 1), "outside", tool - (0.5, 0.5, 0.02)).cells(1, 1)
-        rests = start + np.outer([0, 1], [0, 0, 0, 0, 0, 0, 0.05, -0.05])
-        assert rates.in_place(robot, spot, Task(0.02, 30), rests)[0] == accepted
+    first = [joint(1), *(joint(k, xyz=(0.3, 0, 0.1), axis=(0, 1, 0)) for k in (2, 3, 4))]
+    last = [joint(5, xyz=(0.1, 0, 0), axis=(1, 0, 0)), joint(6, "prismatic", xyz=(0.1, 0, 0))]
+    twice = [joint(7, xyz=(far, 0, 0)), joint(8), joint(9, "fixed", (0.1 - far, 0, 0.05))]
+    robot = robot_of([*first, *last, *twice])
+    robot = robot.with_limits({"j6": (-np.inf, np.inf)})  # so that lengths are measured by 1 m
+    start = np.array([[0.1, -0.4, 0.9, 0.3, 0.4, 0.2, 0.0, 0.0]])
+    end = start + np.array([0.2, 0.1, -0.1, 0.2, 0.1, 0.1, turn, -turn])
+    found = rates.segment_rates(robot, start, end, **asked)
+    assert found.sampled_speed[0] > 0.05
+    assert found.sampled_sigma[0] > 0.2
+    assert all((getattr(found, name)[0] >= least) == accepted for name, least in asked.items())
+    tool, _ = Kinematics(robot).tool(start[0])
+    spot = plane((0, 1), (0, 1), "outside", tool - (0.5, 0.5, 0.02)).cells(1, 1)
+    rests = start + np.outer([0, 1], [0, 0, 0, 0, 0, 0, 0.05, -0.05])
+    assert rates.in_place(robot, spot, Task(0.02, 30), rests)[0] == accepted
 
 
 @pytest.mark.parametrize("name", ["delta", "deviation"])
@@ -202,9 +206,10 @@ def test_a_motion_among_bodies():
 
 def test_a_treated_area():
     """How far the path on the surface may be from the places that were looked at."""
-    task, cells = Task(0.02, 30, footprint=0.2), FLAT.cells(2, 2)
-    walk = check(UR5, cells, task).witness
-    assert treated_by_walk(UR5, cells, task, walk).lower > 0.9
-    spun = walk.q[-1:] + 2 * np.pi * np.eye(6)[5:] * 1e6  # more than any number of rows can follow
-    long = replace(walk, q=np.vstack([walk.q, spun]), cell=np.append(walk.cell, -1))
-    assert treated_by_walk(UR5, cells, task, long).lower == 0.0
+    robot, cells, task, q = raster("plane")
+    task = replace(task, footprint=0.2)
+    walk = Walk(q, np.full(len(q), -1))
+    assert treated_by_walk(robot, cells, task, walk).lower > 0.9
+    spun = q[-1:] + 2 * np.pi * np.eye(6)[5:] * 1e6  # more than any number of rows can follow
+    long = replace(walk, q=np.vstack([q, spun]), cell=np.append(walk.cell, -1))
+    assert treated_by_walk(robot, cells, task, long).lower == 0.0
