@@ -158,6 +158,31 @@ def test_a_tool_may_lean_as_far_as_the_cone_and_no_further(lean, turn):
     assert scene.clear_pose(3000, np.random.default_rng(0)) == (lean > 45.0)
 
 
+@pytest.mark.parametrize("angle", [0, 90, 180, 270])
+@pytest.mark.parametrize("wide", [0.006, 0.002])
+def test_a_hole_at_the_border_of_the_cone_is_found(angle, wide):
+    """A ball of 4 mm, 0.2 m behind the tool point, fits into a hole of 6 mm, and not of 2 mm.
+
+    Four blocks around the hole leave nothing else free; it is where a square box of tilts has a
+    corner, further from its middle than from any other border of it.
+    """
+    turn = Rotation.from_euler("z", angle, True)
+    hole, middle = (0.2 * pin.exp3(0.5 * turn.apply(tilt))[:, 2] for tilt in
+                    ([0.93, 0.06, 0.0], [0.5, 0.5, 0.0]))  # fmt: skip
+    x = middle - hole * (middle @ hole) / (hole @ hole)
+    x /= np.linalg.norm(x)
+    frame = np.column_stack([x, np.cross(hole / 0.2, x), hole / 0.2])
+    blocks = []
+    for k, way in ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)):
+        size, place = np.array([0.8, 0.8, 0.3]), np.zeros(3)
+        size[k], place[k] = 0.4, way * (wide + 0.2)
+        at = placed(TARGET + hole + frame @ place, frame)
+        blocks.append(Obstacle(f"block {len(blocks)}", Box(tuple(size.tolist())), at))
+    ball = ToolShape.sphere(0.004, position=(0.0, 0.0, -0.2))
+    scene = over(*blocks, cone_deg=np.degrees(0.5), tool=ball)
+    assert scene.confirmed().confirmed == (wide < 0.003)
+
+
 def test_meshes_are_solids_with_dents_or_sheets():
     ell, block = bracket(), mesh_of(trimesh.creation.box((0.1, 0.1, 0.1)))
     solid = Obstacle("part", ell, placed(TARGET + (-0.025, -0.1, -0.05)))

@@ -25,7 +25,7 @@ from feasibility.roadmap.branch_and_bound.branching import DIRECTIONS
 from feasibility.roadmap.motions import project_near_cell, segment_holds
 from feasibility.roadmap.motions.aiming import aim, bounds_between, stand_still
 from feasibility.roadmap.motions.projection import project
-from feasibility.roadmap.motions.segment_bound import spread
+from feasibility.roadmap.motions.segment_bound import roll_spread, spread
 from feasibility.roadmap.motions.working_memory import place
 from robots import Robot
 from surfaces import Cells, plane
@@ -77,8 +77,10 @@ class Held(NamedTuple):
     """|a - b| is never larger."""
     roll: float
     """rad, the roll is never further from the middle of its range."""
-    at_ends: float
-    """m, how far the tool point is from its targets at the ends, at most."""
+    on_target: bool
+    """Is the tool point as near to its targets at the ends as everywhere in a search?"""
+    roll_off: float
+    """rad, what the roll over the target's frame differs by from that over the curve's."""
 
 
 class Motions:
@@ -101,6 +103,18 @@ class Motions:
         aim(self.arrays, self.work, 0, t)
         place(self.arrays, self.work, 0, q)
         return float(self.work.error[0, 2])
+
+    def roll_rates(self, q0: Floats, q1: Floats, frame: Any, chord: float) -> tuple[float, float]:
+        """Bounds on |psi'| and |psi''| of roll (rad) along a segment, s in 0..1.
+
+        Args:
+            q0, q1: its ends.
+            frame: bounds on the speed of the approach direction, of the frame, and its change.
+            chord: the largest |a - b|.
+        """
+        self.sag(q0, q1)
+        self.work.derivative_bound[5:8] = frame
+        return roll_spread(self.work, chord, 1.0)
 
     def turn_range(self, middle: float, half: float) -> None:
         """Let the roll have another range (rad)."""
@@ -137,7 +151,10 @@ class Motions:
         length, chord, roll = self.work.allowance
         good = bool(position <= 1.0 and turned <= 1.0)
         ends = max(self.work.error[0, 0], self.work.error[1, 0])
-        return Held(good, position * length, turned * chord, turned * roll, float(ends))
+        off = self.arrays.frame_deviations[0, 1] if self.task.roll is not None else 0.0
+        with np.errstate(invalid="ignore"):
+            bounds = position * length, turned * chord, turned * roll
+        return Held(good, *bounds, bool(ends <= self.arrays.near), float(off))
 
     def landed(self, cell: int, guesses: Floats) -> Floats:
         """(k, n) configurations over a cell's centre that Newton finds from guesses."""
