@@ -43,6 +43,7 @@ class ForeignScene:
     """The bodies of a problem as fcl's objects, placed by Pinocchio."""
 
     def __init__(self, robot, bodies):
+        """Half spaces become deep boxes, soups become meshes."""
         self.robot, self.bodies = robot, bodies
         self.data = robot.model.createData()
         self.neutral = pin.neutral(robot.model)
@@ -64,26 +65,41 @@ class ForeignScene:
         entry = (joint, np.asarray(placement), fcl_model(geometry), deviation)
         self.objects.setdefault(owner, []).append(entry)
 
+    def _couples(self, k):
+        """Placed objects of both owners of pair k, and what they may be off (m)."""
+        pair = self.bodies.pairs[k]
+        for one in self.objects[pair.first]:
+            for other in self.objects[pair.second]:
+                yield (*(self._placed(entry) for entry in (one, other)), one[3] + other[3])
+
     def _placed(self, entry):
         joint, placement, model, _ = entry
         world = self.data.oMi[joint].homogeneous @ placement if joint else placement
         return fcl.CollisionObject(model, fcl.Transform(world[:3, :3], world[:3, 3]))
 
+    def touches(self, k):
+        """Does pair k touch, as placed last?"""
+        return any(_touch(first, second) for first, second, _ in self._couples(k))
+
+    def pair_distance(self, k):
+        """m, of pair k as placed last; 0 where they touch (fcl says -1 or more there)."""
+        return min(
+            (0.0 if _touch(a, b) else fcl.distance(a, b, fcl.DistanceRequest())) - off
+            for a, b, off in self._couples(k)
+        )
+
     def distances(self, q, asked=None):
         """The distance (m) of every pair, or of those asked for; at most 0 where they touch."""
-        pin.forwardKinematics(
-            self.robot.model, self.data, pin.integrate(self.robot.model, self.neutral, q)
-        )
-        found = []
-        pairs = self.bodies.pairs
-        for pair in pairs if asked is None else [pairs[k] for k in asked]:
-            least = np.inf
-            for one in self.objects[pair.first]:
-                for other in self.objects[pair.second]:
-                    first, second = self._placed(one), self._placed(other)
-                    least = min(least, _distance(first, second) - one[3] - other[3])
-            found.append(least)
-        return np.array(found)
+        model = self.robot.model
+        pin.forwardKinematics(model, self.data, pin.integrate(model, self.neutral, q))
+        some = range(len(self.bodies.pairs)) if asked is None else asked
+        return np.array([self.pair_distance(k) for k in some])
+
+    def is_clear(self, q):
+        """Is no pair too near? What touches has a distance of 0."""
+        needed = np.array([pair.clearance for pair in self.bodies.pairs])
+        found = self.distances(q)
+        return bool(((found >= needed) & (found > 0.0)).all())
 
     def least_excess(self, rows):
         """The least distance (m) over the pairs' clearances at any row (m, n) of a motion.
@@ -97,12 +113,11 @@ class ForeignScene:
         least = np.inf
         for q, moved in zip(rows, most * way, strict=True):
             asked = np.flatnonzero(until <= moved)
-            if not len(asked):
-                continue
-            needed = [self.bodies.pairs[k].clearance for k in asked]
-            excess = self.distances(q, asked) - needed
-            until[asked] = moved + excess
-            least = min(least, float(excess.min()))
+            if len(asked):
+                needed = [self.bodies.pairs[k].clearance for k in asked]
+                excess = self.distances(q, asked) - needed
+                until[asked] = moved + excess
+                least = min(least, float(excess.min()))
         return least
 
     def _reach(self):
@@ -110,12 +125,11 @@ class ForeignScene:
         model = self.robot.model
         steps = sum(np.linalg.norm(place.translation) for place in model.jointPlacements)
         slides = np.abs([self.robot.lower, self.robot.upper]).max(axis=0)
-        slides = slides[self.robot.prismatic].sum()
         wide = max(
             np.linalg.norm(solid.placement[:3, 3]) + radius_about(solid.geometry)
             for solid in self.bodies.solids
         )
-        return steps + slides + wide
+        return steps + slides[self.robot.prismatic].sum() + wide
 
 
 def radius_about(geometry):
@@ -132,11 +146,8 @@ def radius_about(geometry):
     raise TypeError(geometry)
 
 
-def _distance(first, second):
-    """fcl's distance, 0 where they touch (its distance alone says -1 or more there)."""
-    if fcl.collide(first, second, fcl.CollisionRequest(), fcl.CollisionResult()):
-        return 0.0
-    return fcl.distance(first, second, fcl.DistanceRequest(), fcl.DistanceResult())
+def _touch(first, second):
+    return bool(fcl.collide(first, second, fcl.CollisionRequest(), fcl.CollisionResult()))
 
 
 def samples(q, step):
