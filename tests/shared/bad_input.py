@@ -147,7 +147,9 @@ def stl(triangles: np.ndarray, count: int | None = None) -> bytes:
     """A binary STL of triangles (F, 3, 3); it may say that it holds another number of them."""
     rows = np.zeros(len(triangles), [("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")])
     rows["v"] = triangles
-    return bytes(80) + (len(rows) if count is None else count).to_bytes(4, "little") + rows.tobytes()
+    return (
+        bytes(80) + (len(rows) if count is None else count).to_bytes(4, "little") + rows.tobytes()
+    )
 
 
 def lay_out(folder: Path) -> Path:
