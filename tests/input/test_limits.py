@@ -20,6 +20,7 @@ from typing import NamedTuple
 import hostile_stores
 import hostile_visuals as hostile
 import pytest
+import samples
 from readers import of_bad
 from samples import sampled, seeds, spread
 
@@ -35,6 +36,8 @@ from surfaces.meshes import read_mesh
 MOST_MEMORY = 1 << 30  # [byte]
 MOST_TIME = 20  # [s] of processor time
 PATIENCE = 1800  # [s] after which something is waited for that never comes
+LIGHT = [maker for maker in hostile.MAKERS if maker is not hostile.just_drawn]
+MAKERS = hostile.MAKERS if samples.EVERYTHING else LIGHT
 BALL = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
 
 
@@ -93,7 +96,7 @@ def within_limits(
 
 @sampled
 @pytest.mark.parametrize("seed", seeds(1, all=5))
-@pytest.mark.parametrize("maker", hostile.MAKERS, ids=lambda maker: maker.__name__)
+@pytest.mark.parametrize("maker", MAKERS, ids=lambda maker: maker.__name__)
 def test_a_mesh_that_is_a_trap(maker: hostile.Maker, seed: int, tmp_path: Path) -> None:
     """As a picture of a robot, as its body, and as a surface; first within all limits."""
     folder = tmp_path / "robot"
@@ -128,14 +131,14 @@ def test_a_mesh_that_is_a_trap(maker: hostile.Maker, seed: int, tmp_path: Path) 
 
 @sampled
 def test_many_pictures_at_once(tmp_path: Path) -> None:
-    """Two thousand shapes of as many kinds, and large files one after the other."""
+    """Two thousand shapes of as many kinds, and in a campaign large files one after the other."""
     balls = "".join(
         f'<visual><geometry><sphere radius="0.{k:04}1"/></geometry></visual>' for k in range(2000)
     )
     rows = "".join(f"v {k} 0 0\nv {k} 1 0\nf -1 -2 -3\n" for k in range(300_000))
-    names = [hostile.write(tmp_path, f"{k}.obj", f"v {k} 0 0\n{rows}") for k in spread(range(6), 2)]
-    large = "".join(map(hostile.visual, names)) * (6 // len(names))
-    for number, shapes in enumerate((balls, large)):
+    names = [hostile.write(tmp_path, f"{k}.obj", f"v {k} 0 0\n{rows}") for k in range(6)]
+    large = "".join(map(hostile.visual, names))
+    for number, shapes in enumerate(spread((balls, large), 1)):
         path = tmp_path / hostile.write(tmp_path, f"{number}.urdf", hostile.urdf(shapes))
         outcome = alone(lambda path=path: "\n".join(draw(load_robot(str(path))).notes), tmp_path)
         within_limits(outcome)
