@@ -35,11 +35,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return bad_input.lay_out(tmp_path_factory.mktemp("input"))
 
 
-def slug(name: str) -> str:
-    """What the file of an approved text is called."""
-    return re.sub(r"[^\w.]+", "-", name)
-
-
 def read(reader: str, name: str, folder: Path) -> str:
     """Read a bad input; what is odd about what came of it."""
     one = bad_input.bad(reader)[name]
@@ -81,11 +76,11 @@ def test_what_is_said(reader: str, name: str, folder: Path, approved: Approved) 
     said = said.replace(str(folder), "FOLDER")
     for found, instead in MASKS.items():
         said = re.sub(found, instead, said)
-    approved(f"{reader}/{slug(name)}", said)
+    approved(f"{reader}/{bad_input.slug(name)}", said)
 
 
 def test_every_approved_text_is_asked_for() -> None:
-    known = {f"{reader}/{slug(name)}.txt" for reader, name in BAD}
+    known = {f"{reader}/{bad_input.slug(name)}.txt" for reader, name in BAD}
     texts = Path(__file__).with_name("approved")
     found = {path.relative_to(texts).as_posix() for path in texts.rglob("*.txt")}
     assert {name for name in found if name.split("/")[0] in TABLES} == known

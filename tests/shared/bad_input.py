@@ -51,6 +51,11 @@ def many(text: str) -> str:
     return TIMES.sub(repeated, text)
 
 
+def slug(name: str) -> str:
+    """What the file of its approved text is called."""
+    return re.sub(r"[^\w.]+", "-", name)
+
+
 def with_key(text: str, change: str) -> str:
     """A TOML with one key set or removed."""
     found = KEY.fullmatch(change)
