@@ -120,7 +120,8 @@ def test_a_cylinder_meets_a_half_space_with_either_end(turn):
 
 @pytest.mark.parametrize("gap", [0.003, 0.0139, 0.0141, 0.2])
 @pytest.mark.parametrize(
-    ("names", "joint"), [(("tool", "surface"), 1), (("surface", "tool"), 1), (("tool", "surface"), 0)]
+    ("names", "joint"),
+    [(("tool", "surface"), 1), (("surface", "tool"), 1), (("tool", "surface"), 0)],
 )
 def test_what_triangles_may_be_off_is_taken_off_their_distance(gap, names, joint):
     """A ball before a surface that is known to 4 mm; 10 mm are needed, whoever is named first."""
@@ -152,7 +153,9 @@ def test_a_curved_surface_of_many_triangles_needs_its_clearance_too(needed):
         assert needed <= found.min_clearance <= 0.2
 
 
-GANTRY = planar_arm([0, 0, 0.1], ["prismatic"] * 2 + ["revolute"], [(1, 0, 0), (0, 1, 0), (0, 0, 1)])
+GANTRY = planar_arm(
+    [0, 0, 0.1], ["prismatic"] * 2 + ["revolute"], [(1, 0, 0), (0, 1, 0), (0, 0, 1)]
+)
 
 
 @pytest.mark.parametrize("seed", range(8))

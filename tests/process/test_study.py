@@ -127,12 +127,15 @@ def test_tasks_that_fail_are_told_and_tried_again(pool, here, tmp_path) -> None:
     tasks = numbers(9, study_works.fail_odd)
     tasks.append(StudyTask({"number": 99}, {"number": 99}, study_works.fail_odd))
     with Store(tmp_path / "a.study") as store, open_workers(0) as mine:
-        for _ in range(2):
-            rows = run_tasks(tasks, mine if here else pool, store)
-            assert [row.status for row in rows] == ["done", "failed"] * 5
-            assert {row.result["verdict"] for row in rows[1::2]} == {"undecided"}
-            assert "3 is odd" in rows[3].result["message"]
-            assert "JSON" in rows[9].result["message"]
+        rows = run_tasks(tasks, mine if here else pool, store)
+        assert [row.status for row in rows] == ["done", "failed"] * 5
+        assert {row.result["verdict"] for row in rows[1::2]} == {"undecided"}
+        assert "3 is odd" in rows[3].result["message"]
+        assert "JSON" in rows[9].result["message"]
+        again = numbers(2, study_works.fail_once, folder=str(tmp_path))
+        for status in ("failed", "done", "done"):
+            rows = run_tasks(again, mine if here else pool, store)
+            assert [row.status for row in rows] == [status] * 2
 
 
 def test_work_that_no_worker_can_be_told(pool) -> None:

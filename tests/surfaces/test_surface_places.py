@@ -163,7 +163,10 @@ def test_paths_bend_no_more_than_is_said(named, height):
         found.append(sags(offset, one.of(known), other.of(known)))
         some_known |= known
     stated, found = np.concatenate(stated), np.concatenate(found)
-    used = USED.get(name.removeprefix("open "), (0.9, 0.9) if surface.kind not in ("mesh", "piecewise") else (0.0, 0.0))
+    used = USED.get(
+        name.removeprefix("open "),
+        (0.9, 0.9) if surface.kind not in ("mesh", "piecewise") else (0.0, 0.0),
+    )
     straight = surface.kind == "plane"
     for k in (0, 1):
         large = stated[:, k] > 1e-4

@@ -8,13 +8,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from samples import sampled, seeds
 from timed_motions import UR5, interpolated, motion
 
 from feasibility.timing import Trajectory, motion_limits, used
 from feasibility.timing.between_samples import deviations, deviations_between, motion_near
 from feasibility.timing.sampled_trajectory import KINDS, held_inside, motion_between, past_limits
-from feasibility.timing.smoothing import control_points
+from feasibility.timing.smoothing import Curve, control_points
 from feasibility.timing.speed_limits import fine_grid, squared_speeds
 from feasibility.timing.tool_between_samples import fastest_tool
 from feasibility.verdict import Walk
@@ -32,10 +31,13 @@ def run_named(name):
         return run
     if name == "jumpy":
         return replace(run, ddq=run.ddq + rng.normal(size=run.q.shape))
-    if name == "bulging":  # the first joint goes on, and three parallel ones bulge to one side
+    if name.startswith(
+        "bulging"
+    ):  # the first joint goes on, and three parallel ones bulge to one side
         time, three = 0.02 * np.arange(20.0), np.array([0.0, 1.0, 1.0, 1.0, 0.0, 0.0])
         q = np.array([0.0, -0.8, 0.0, -2.3, -0.5 * np.pi, 0.0]) + np.eye(6)[0] * time[:, None]
-        dq = np.eye(6)[0] + 1e-4 * three * (-1.0) ** np.arange(20)[:, None]
+        speed = 1e-4 if name == "bulging" else 4e-3
+        dq = np.eye(6)[0] + speed * three * (-1.0) ** np.arange(20)[:, None]
         still, nowhere = np.zeros(20), np.full(20, -1)
         return Trajectory(UR5.joint_names, time, q, dq, 0.0 * q, still, nowhere)
     time = np.cumsum(rng.uniform(0.05, 0.15, 12))
@@ -46,7 +48,7 @@ def run_named(name):
     )  # fmt: skip
 
 
-RUNS = ("smooth", "jumpy", "bulging", "far apart")
+RUNS = ("smooth", "jumpy", "bulging", "bulging more", "far apart")
 
 
 def tool_speeds(q, dq):
@@ -72,26 +74,36 @@ def test_the_tool_is_nowhere_faster_than_said_and_nearly_so(name):
     assert used(UR5, run, limits).tool_speed >= min(dense, 1.0) * (1.0 - 1e-9)
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(6, all=300))
-def test_what_is_taken_to_be_slow_enough_is(seed):
-    """One joint, or two, that jerk between two samples at rest: the tool is fastest in between."""
-    rng = np.random.default_rng(seed)
-    joints = np.eye(6)[rng.choice(4, rng.integers(1, 4), replace=False)].sum(axis=0)
-    base = rng.uniform(-1.5, 1.5, 6)
-    step = rng.uniform(0.2, 1.5) * joints * rng.choice([-1.0, 1.0], 6)
-    q = np.array([base, base + step, base + rng.uniform(0.0, 1.0) * step])
-    still = np.zeros((3, 6))
-    dq = still if seed % 2 else rng.normal(0, 0.3, (3, 6)) * joints
-    run = Trajectory(
-        UR5.joint_names, np.array([0.0, 0.7, 1.5]), q, dq, still, np.zeros(3), np.full(3, -1)
-    )
-    dense = 0.0
-    for degree in DEGREES.values():
-        q, dq, _ = interpolated(run, degree, 60)
-        dense = max(dense, tool_speeds(q, dq).max())
-    for enough in np.linspace(0.3, 1.02, 40) * dense:
-        assert dense <= max(fastest_tool(UR5, run, enough), enough) * (1.0 + 1e-9)
+def two_samples(q, last, dq, end):
+    """From one to the other in a second, rad and rad/s."""
+    still, nowhere = np.zeros((2, 6)), np.full(2, -1)
+    return Trajectory(
+        UR5.joint_names, np.array([0.0, 1.0]), np.array([q, last]), np.array([dq, end]), still,
+        np.zeros(2), nowhere,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("what", ["from rest to rest", "ever faster", "stretching out"])
+def test_what_is_fastest_between_samples_is_looked_at(what):
+    """One joint that starts and stops, or slows down just before its end; two that run evenly, past
+    the place where the arm is stretched out. The remainders of the bound are just large enough.
+    """
+    one, two = 0.01 * np.eye(6)[1], np.eye(6)[1] + np.eye(6)[2]
+    base, still = np.array([0.0, -0.8, 0.4, 0.3, 0.5, 0.0]), np.zeros(6)
+    run = {
+        "from rest to rest": two_samples(base, base + one, still, still),
+        "ever faster": two_samples(base, base + 0.75 * one, still, one),
+        "stretching out": two_samples(
+            np.array([0.0, -0.5, -0.5, -1.57, 0.5, 0.0]),
+            np.array([0.0, 0.5, 0.5, -1.57, 0.5, 0.0]), two, two,
+        ),
+    }[what]  # fmt: skip
+    q, dq, _ = interpolated(run, 3, 400)
+    speed = tool_speeds(q, dq)
+    at, dense = max(speed[[0, -1]]), speed.max()
+    assert dense > 1.005 * at
+    for enough in at + np.array([0.05, 0.25, 0.5, 0.75, 0.95]) * (dense - at):
+        assert fastest_tool(UR5, run, enough) >= dense * (1.0 - 1e-3)
 
 
 # -- straight lines in place of polynomials --------------------------------------------------------
@@ -181,9 +193,28 @@ def test_what_a_controller_makes_of_samples_is_near_lines(name, kind):
     assert max(turns) <= near.turn
     if name != "far apart":
         assert max(near.point, near.turn) <= 2e-6
-    if (name, kind) == ("bulging", "cubic"):  # all of them together use most of the bounds
+    if (
+        name.startswith("bulging") and kind == "cubic"
+    ):  # all of them together use most of the bounds
         assert max(points) > 0.78 * near.point > 1e-7
         assert max(turns) > 0.8 * near.turn > 1e-7
+
+
+def test_levers_that_are_longer_between_samples_count_as_they_are_there():
+    """The elbow opens and folds again while the first joint bulges: off the plane of all lines."""
+    q = np.array([0.0, 0.0, -1.2, 0.0, 0.5 * np.pi, 0.0])
+    dq = np.array([4e-6, 0.0, 2.4, 0.0, 0.0, 0.0])
+    still, nowhere, flip = np.zeros((2, 6)), np.full(2, -1), np.array([[-1.0], [1.0]])
+    run = Trajectory(
+        UR5.joint_names, np.array([0.0, 1.0]), q * [[1, 1, 1, 1, 1, 1], [1, 1, -1, 1, 1, 1]],
+        np.where(np.arange(6) == 0, -flip * dq, dq), still, np.zeros(2), nowhere,
+    )  # fmt: skip
+    near = motion_near(UR5, run, "cubic")
+    tips = Kinematics(UR5).tools(interpolated(run, 3, 200)[0])[0]
+    truth = np.abs(tips[:, 1] - tips[0, 1]).max()
+    assert len(near.walk.q) == 2
+    assert truth > 1.1 * 1e-6 * np.hypot(*tips[0, :2])  # so much longer than at its ends
+    assert truth <= near.point <= 2.0 * truth
 
 
 def away(points, line):
@@ -252,3 +283,19 @@ def test_bounds_on_the_speed_hold_on_whole_pieces(name, seed):
     share = np.abs(spline.derivative(1)(k)) * np.sqrt(np.interp(k, fine, x))[:, None]
     assert (share / limits.velocity).max() > 0.9  # tight: somewhere nearly all of it is used
     assert set(KINDS) == set(DEGREES)
+
+
+@pytest.mark.parametrize("width", [0.01, 0.5])
+def test_a_joint_that_is_fastest_in_the_middle_of_a_piece_is_bounded_there(width):
+    """Control points 0, 0, 1, 1: it moves at 1/2 at both ends of the piece, and at 3/4 between."""
+    steps = width * np.array([0.0, 0.0, 1.0, 1.0])[:, None] * np.eye(6)[1]
+    curve = Curve(np.array([0.0, -0.8, 0.4, 0.3, 0.5, 0.0]) + steps, np.array([0, 3]), np.arange(2))
+    spline, grid, k = curve.spline(), np.arange(4.0), np.linspace(0.0, 3.0, 301)
+    slope = spline.derivative(1)(k)
+    assert np.abs(slope).max() == pytest.approx(0.75 * width, rel=1e-3)
+    for speed in (0.1, 50.0):
+        limits = motion_limits(UR5, speed)
+        rate = np.sqrt(np.interp(k, grid, squared_speeds(UR5, spline, grid, limits)))[:, None]
+        tool = np.linalg.norm(Kinematics(UR5).tool_velocities(spline(k), slope * rate), axis=1)
+        assert tool.max() <= speed * (1.0 + 1e-9)
+        assert (np.abs(slope * rate) <= limits.velocity * (1.0 + 1e-9)).all()
