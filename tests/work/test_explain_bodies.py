@@ -46,7 +46,7 @@ def explained_but_limits(task):
             clock.limit = 1e-9
 
     found = explain(UR5, CELLS, task, clock=clock, progress=progress)
-    assert len(found.left_out) == 12
+    assert 10 < len(found.left_out) <= 12
     return found
 
 
