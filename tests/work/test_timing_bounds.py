@@ -75,10 +75,11 @@ def test_the_tool_is_nowhere_faster_than_said_and_nearly_so(name):
 
 
 def two_samples(q, last, dq, end):
-    """From one to the other in a second, rad and rad/s."""
-    still, nowhere = np.zeros((2, 6)), np.full(2, -1)
+    """From one to the other in a second, rad and rad/s; the quintic between them is the cubic."""
+    way, nowhere = last - q, np.full(2, -1)
+    ddq = np.array([6.0 * way - 4.0 * dq - 2.0 * end, 2.0 * dq + 4.0 * end - 6.0 * way])
     return Trajectory(
-        UR5.joint_names, np.array([0.0, 1.0]), np.array([q, last]), np.array([dq, end]), still,
+        UR5.joint_names, np.array([0.0, 1.0]), np.array([q, last]), np.array([dq, end]), ddq,
         np.zeros(2), nowhere,
     )  # fmt: skip
 
