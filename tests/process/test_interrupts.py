@@ -88,7 +88,9 @@ def test_at_any_call_of_a_command_that_writes_files(swallowed, whole, tmp_path):
         with interrupted_at(call, swallowed):
             said = check_all(folder)
         assert (said.status, said.err.endswith(INTERRUPTED)) == (130, True), (call, said)
-        left += [file for file in folder.iterdir() if file.read_bytes() != known[file.name]]
+        for file in folder.iterdir():
+            same = file.read_bytes() == known[file.name]
+            left += [] if same or (file.suffix == ".result" and is_whole(file)) else [file]
         after = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGALRM)
         assert (*after, sys.unraisablehook) == before
     assert left == []
