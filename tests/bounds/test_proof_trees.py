@@ -8,6 +8,7 @@ import mesh_patches
 import numpy as np
 import pytest
 from arm_urdfs import joint
+from gantry import gantry
 from proof_cases import (
     ACROSS,
     FLAT,
@@ -346,3 +347,13 @@ def test_a_cell_that_the_roll_alone_prevents_is_proved(roll):
     found = verify_proof(HELD, TABLE, task, CutTree(Leaf(0)), most=200_000)
     assert found.accepted == (roll == (-2, 2)), found.refusal
     assert found.accepted or "is wrong: the tool can be at its target" in found.refusal
+
+
+@pytest.mark.parametrize(("range_deg", "proved"), [((-80, 80), True), ((-100, 100), False)])
+def test_of_wide_ranges_nothing_is_cut_off(range_deg, proved):
+    """A gantry whose last joint rolls the tool by 94.5 to 97.4 degrees."""
+    limits = {"j6": (1.65, 1.70), **{f"j{k}": (-0.3, 0.3) for k in range(1, 6)}}
+    cells = plane((-0.1, 0.1), (-0.1, 0.1), side="outside").cells(1, 1)
+    task = Task(0.005, 2.0, roll_deg=range_deg, roll_reference=(1, 0, 0))
+    found = verify_proof(gantry().with_limits(limits), cells, task, CutTree(Leaf(0)))
+    assert found.accepted == proved, found.refusal
