@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import mesh_patches
 import numpy as np
+import pinocchio as pin
 import pytest
 from arm_urdfs import joint
 from gantry import gantry
@@ -278,6 +279,17 @@ def test_a_slide_is_not_opened_nor_a_free_joint_weighed_beside_others():
     assert found.refusal == "joint j1 slides and cannot be opened: there are no turns of it"
     found = verified(free_elbow_case(), tree=CutTree(split(0.0, 0, 1, (1.0, 1.0))))
     assert found.refusal == "a cut weighs j2, which has no limits, together with others"
+
+
+def test_arms_that_are_no_chain_are_not_proved_of():
+    """Two joints side by side, of which the second carries the tool."""
+    case, model = elbow_case(), pin.Model()
+    for name in ("j1", "j2"):
+        model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), name)
+    model.addFrame(pin.Frame("l3", 2, 0, pin.SE3.Identity(), pin.FrameType.BODY))
+    found = verified(case, robot=replace(case.robot, model=model))
+    assert "form no serial chain" in found.refusal
+    assert found.boxes == 0
 
 
 @pytest.mark.parametrize("most", [200, 500])
