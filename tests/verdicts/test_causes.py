@@ -206,9 +206,12 @@ def test_what_a_cut_parts_is_proved_and_named():
     tree = verdict.proof
     best = next(q for q, c in zip(verdict.postures, verdict.components, strict=True)
                 if c.tolist() == np.flatnonzero(verdict.covered).tolist())  # fmt: skip
-    for posture, component in zip(verdict.postures, verdict.components, strict=True):
-        if set(component.tolist()) & {cause.cell for cause in apart}:
-            assert tree.parting(tree.folded(posture[None])[0], tree.folded(best[None])[0])
+    for cause in apart:
+        posture = next(q for q, c in zip(verdict.postures, verdict.components, strict=True)
+                       if cause.cell in c.tolist())  # fmt: skip
+        cut = tree.parting(tree.folded(best[None])[0], tree.folded(posture[None])[0])
+        above = tree.folded(best[None])[0] @ np.asarray(cut.weights) > cut.value
+        assert cause.detail.endswith("above" if above else "below")
 
 
 CUT = ("puma560 184", "puma560 188", "puma560 197", "a large square and a stop of the wrist")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import os
 import pickle
-import signal
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -173,39 +172,6 @@ def test_an_interrupt_in_the_progress_report_gets_through_at_once(hard):
     with pytest.raises(KeyboardInterrupt):
         check(*hard, progress=interrupt)
     assert calls == 4
-
-
-TELL_WHEN_SEARCHING = """
-import sys
-from feasibility.cli.main import main
-from feasibility.clock import Clock
-tick, ticks = Clock.tick, []
-def told(*given):
-    ticks.append(given)
-    if len(ticks) == 3:  # the search itself is under way, its kernels are loaded
-        print("searching", flush=True)
-    tick(*given)
-Clock.tick = told
-sys.exit(main(["check", sys.argv[1]]))
-"""
-
-
-def test_ctrl_c_ends_a_hard_search(tmp_path):
-    case = tmp_path / "hard.toml"
-    case.write_text(HARD)
-    child = subprocess.Popen(
-        [sys.executable, "-c", TELL_WHEN_SEARCHING, str(case)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    assert child.stdout.readline() == "searching\n"
-    child.send_signal(signal.SIGINT)
-    out, err = child.communicate(timeout=GUARD_S)
-    assert (child.returncode, out) == (130, "")
-    # Before it there may be a word about kernels that had to be compiled.
-    assert err.endswith("coverable: interrupted\n")
-    assert "Traceback" not in err
 
 
 def test_a_motion_refused_by_a_hair_is_looked_for_again(monkeypatch):

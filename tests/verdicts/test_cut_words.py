@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from random_arms import rail_arm
+from asked import question
+from samples import sampled, seeds
 
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from feasibility.cut_words import lines, nowhere, place_of, sentence, what_opens
@@ -59,7 +60,7 @@ def test_a_single_leaf_names_its_cell() -> None:
 
 
 def test_slides_are_in_millimetres_and_sums_name_their_joints() -> None:
-    robot = rail_arm("ur5")
+    robot = question("on a rail").robot
     (slide,) = np.flatnonzero(robot.prismatic)
     weights = np.zeros(robot.n)
     weights[slide] = 1.0
@@ -84,7 +85,8 @@ def test_a_deep_tree_is_said_without_deep_calls() -> None:
     assert "and 297 more" in sentence(tree, PUMA, CELLS)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@sampled
+@pytest.mark.parametrize("seed", seeds(2, all=20))
 def test_configurations_are_parted_by_the_last_cut_that_both_meet(seed: int) -> None:
     """Against walking down the tree by hand."""
     rng = np.random.default_rng(seed)

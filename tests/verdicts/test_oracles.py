@@ -80,7 +80,8 @@ def test_no_sample_of_a_surface_is_nearer_than_the_referees_nearest_place(name):
     step = 1e-5 * (form.v[1] - form.v[0])
     inner = np.clip(v, form.v[0] + step, form.v[1] - step)
     across = form.at(u, inner + step).points - form.at(u, inner - step).points
-    assert np.abs((across * form.at(u, inner).normals).sum(1) / np.linalg.norm(across, axis=1)).max() < 1e-4  # fmt: skip
+    leaning = (across * form.at(u, inner).normals).sum(axis=1)
+    assert np.abs(leaning / np.linalg.norm(across, axis=1)).max() < 1e-4
     assert np.abs((places.along * places.normals).sum(axis=1)).max() < 1e-6
 
 
@@ -204,7 +205,8 @@ def test_both_domains_hold_the_centres_and_join_the_neighbours():
 @pytest.mark.parametrize("file", STORED)
 def test_no_stored_problem_is_answered_wrongly(file):
     """Nor more cells called covered, or proved uncoverable, than there are."""
-    truths = {f"{arm} {k}": truth for arm in ("puma560", "ur5") for k, (_, truth) in enumerate(read(arm))}  # fmt: skip
+    both = ((arm, enumerate(read(arm))) for arm in ("puma560", "ur5"))
+    truths = {f"{arm} {k}": truth for arm, cases in both for k, (_, truth) in cases}
     asked, undecided, unproved = spread(stored(file), STORED[file]), [], []
     for name in asked:
         verdict, truth = verdict_of(name), known(name)
@@ -278,7 +280,7 @@ def test_the_roll_oracle_knows_every_configuration(arm, solve):
 @pytest.mark.parametrize("seed", seeds(2, all=50))
 @pytest.mark.parametrize("arm", ["ur5", "puma560"])
 def test_verdicts_on_rolls_agree_with_closed_form_kinematics(arm, seed):
-    """Next to the wrist's singularity a cone of half a degree may join more than the oracle sees."""
+    """Next to the wrist's singularity half a degree of cone may join more than the oracle sees."""
     robot, cells, task, asked = roll_question(arm, seed)
     verdict = check(robot, cells, task, Search(seed=0))
     if verdict.feasible:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from feasibility import Task, check, verify
-from feasibility.certification import placements, replay
+from feasibility.certification import replay
 from feasibility.collisions import Collision
 from feasibility.paths import PathError, coverage_path
 from feasibility.roadmap.exploration import Exploration
@@ -29,13 +29,11 @@ def ur5():
     return load_robot("ur5")
 
 
-@pytest.mark.parametrize("low", [-180.0, -60.0])
-def test_poses_at_the_centres_of_cells_cover_what_the_cells_do(low):
-    robot = load_robot("ur5").with_limits({"wrist_2_joint": np.radians([low, 180.0])})
+def test_poses_at_the_centres_of_cells_cover_what_the_cells_do():
+    robot = load_robot("ur5").with_limits({"wrist_2_joint": np.radians([-60.0, 180.0])})
     far = plane((0.3, 1.0), (-0.3, 0.3), position=(0, 0, 0.3), side="outside").cells(4, 4)
-    on_patch = check(robot, far, TASK)
     found = check(robot, poses(far.centres, far.normals, neighbours=0.26), TASK)
-    assert found.covered.tolist() == on_patch.covered.tolist()
+    assert found.covered.tolist() == check(robot, far, TASK).covered.tolist()
     assert not found.covered.all()
 
 
@@ -67,19 +65,6 @@ def test_the_tool_may_turn_on_the_spot_and_a_pose_may_come_twice(ur5, standoff):
     verdict = check(ur5, cells, dataclasses.replace(TASK, standoff=standoff))
     assert verdict.feasible
     assert verify(ur5, cells, verdict.task, verdict.witness.q).holds
-
-
-def test_tool_axes_of_their_own_are_followed_while_targets_stay_on_the_normals(ur5):
-    tilt = np.radians(25.0)
-    axes = np.tile([np.sin(tilt), 0.0, -np.cos(tilt)], (36, 1))
-    cells = poses(PATCH.centres[SNAKE], PATCH.normals[SNAKE], axes)
-    verdict = check(ur5, cells, TASK)
-    walk = verdict.witness
-    found = placements(ur5, walk.q[walk.cell >= 0])
-    aims = PATCH.centres[SNAKE] + [0.0, 0.0, 0.02]
-    assert np.linalg.norm(found.points - aims, axis=1).max() <= 1e-3
-    assert (found.axes @ axes[0]).min() >= np.cos(np.radians(10.0)) - 1e-9
-    assert verify(ur5, cells, TASK, walk.q).holds
 
 
 def test_a_motion_that_goes_back_is_refused_though_it_covers_all(ur5):
@@ -147,10 +132,3 @@ def test_collisions_with_a_surface_are_left_out_where_there_is_none(ur5):
     assert verdict.task.collision.checked == ("self",)
     assert verdict.answer is Answer.FEASIBLE
     assert any("no surface between them" in note for note in cells.notes)
-
-
-def test_a_pose_out_of_reach_is_proved_to_be(ur5):
-    points = [[0.5, 0.0, 0.3], [0.7, 0.0, 0.3], [1.4, 0.0, 0.3]]
-    verdict = check(ur5, poses(points, [[0, 0, 1]] * 3), TASK)
-    assert verdict.answer is Answer.INFEASIBLE
-    assert [cause.kind for cause in verdict.causes] == [CauseKind.OUT_OF_REACH]
