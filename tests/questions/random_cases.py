@@ -13,6 +13,7 @@ import json
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 from oracle_cases import Answer, Problem
 
 HERE = Path(__file__).parent
@@ -57,3 +58,14 @@ def read_between() -> list[Between]:
         rest = [case.pop(field) for field in Between._fields[1:]]
         found.append(Between(Problem.read(case), *rest))
     return found
+
+
+def draw(rng: np.random.Generator, arm: str = "puma560") -> Problem:
+    """One of the stored problems, at random."""
+    problems = read(arm)
+    return problems[int(rng.integers(len(problems)))][0]
+
+
+def draw_ur5(rng: np.random.Generator) -> Problem:
+    """The same for the UR5."""
+    return draw(rng, "ur5")
