@@ -104,9 +104,7 @@ def built_scene(name: str, seed: int) -> BuiltScene | None:
     if blind is None or known is None:
         return None
     drawn = []
-    for number in range(
-        24
-    ):  # where the blind motion passes with a joint, or (every third) anywhere
+    for number in range(24):  # where the blind motion passes with a joint, or (every third) anywhere
         joints = Kinematics(robot).joints(blind.q[rng.integers(len(blind.q))][None]).points[0, 2:]
         k = int(rng.integers(len(joints) - 1))
         place = joints[k] + rng.uniform() * (joints[k + 1] - joints[k])
