@@ -7,6 +7,7 @@ import re
 from dataclasses import replace
 
 import numpy as np
+import plain
 import pytest
 from asked import question, verdict_of
 from dense_replay import tools
@@ -175,6 +176,18 @@ def test_all_that_is_under_a_roof_names_it():
     assert check(verdict.robot, verdict.cells, free).feasible
 
 
+def test_of_many_pairs_the_one_in_the_way_is_named_with_its_distance():
+    """An arm that has hardly any room to move: the referee measures it in the middle."""
+    verdict = verdict_of("too near itself")
+    scene = plain.scene_of(verdict.robot, verdict.cells, verdict.task)
+    pairs = [pair[:2] for pair in scene.pairs]
+    middle = 0.5 * (verdict.robot.lower + verdict.robot.upper)
+    for cause in verdict.causes:
+        there = scene.distances(middle, [pairs.index(cause.pair)])[0]
+        assert abs(cause.clearance - there) < 0.02
+        assert cause.clearance < 0.05
+
+
 # Cells that another motion covers.
 
 
@@ -192,6 +205,18 @@ def test_a_stop_in_the_middle_disconnects():
         size = int(number(r"covers (\d+) of 16", cause.detail))
         holding = [c for c in verdict.components if cause.cell in c.tolist()]
         assert size == max(len(component) for component in holding)
+
+
+@pytest.mark.parametrize("name", ["puma560 262", "puma560 268"])
+def test_of_several_motions_over_a_missed_cell_the_largest_is_named(name):
+    verdict = verdict_of(name)
+    several = 0
+    for cause in verdict.causes:
+        holding = [len(c) for c in verdict.components if cause.cell in c.tolist()]
+        several += len(set(holding)) > 1
+        if cause.kind is CauseKind.DISCONNECTED:
+            assert number(r"covers (\d+) of", cause.detail) == max(holding)
+    assert several
 
 
 def test_what_a_cut_parts_is_proved_and_named():

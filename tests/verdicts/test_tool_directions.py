@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import plain
 import pytest
 import referee
 from asked import question, verdict_of
 
 from feasibility import Task, verify
+from feasibility.division import divide
+from feasibility.paths import coverage_path
 from feasibility.roll import projected, roll_of
 from surfaces import plane
 
@@ -61,3 +64,12 @@ def test_a_wide_cone_is_no_free_axis(cone_deg, holds):
     asked = question("plate")
     judged = verify(asked.robot, away, Task(0.02, cone_deg), verdict.witness.q)
     assert judged.holds == holds
+
+
+def test_paths_and_patches_keep_to_the_roll():
+    """What other questions make of a verdict is held to the same range."""
+    verdict = verdict_of("a square and 15 degrees")
+    walk = coverage_path(verdict, "columns").walk
+    assert plain.faults_of(verdict, walk.q, walk.cell) == []
+    division = divide(verdict.robot, verdict.cells, verdict.task)
+    assert [p.certificate.max_roll <= np.radians(15) for p in division.fewest.patches] == [True]
