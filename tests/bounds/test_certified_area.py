@@ -94,7 +94,7 @@ def test_narrower_limits_and_cones_never_enlarge_the_area():
     cell, q = cell[cell >= 0], verdict.witness.q[first[cell >= 0]]
     limits, shares = np.column_stack([verdict.robot.lower, verdict.robot.upper]), []
     for less, cone_deg in ((0.0, 45.0), (0.02, 12.0), (0.1, 6.0)):
-        robot = load_robot("puma560", limits=limits + [less, -less])
+        robot = load_robot("puma560", limits=limits + np.array([less, -less]))
         task = replace(verdict.task, cone_deg=cone_deg)
         shares.append(area_from(robot, verdict.cells, task, cell, q, 20_000).share)
     assert (np.diff(shares) <= 0.0).all(), shares

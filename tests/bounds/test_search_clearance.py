@@ -56,9 +56,7 @@ def among_boxes(rng, name):
     """A known arm with its own shapes among boxes and a dome."""
     turn = [tuple(rng.uniform(-180.0, 180.0, 3)) for _ in range(4)]
     boxes = [(tuple(rng.uniform(0.01, 0.4, 3)), tuple(rng.uniform(-0.8, 0.8, 3))) for _ in turn]
-    scene = tuple(
-        Obstacle.box(f"box{k}", *box, turn[k]) for k, box in enumerate(boxes)
-    )
+    scene = tuple(Obstacle.box(f"box{k}", *box, turn[k]) for k, box in enumerate(boxes))
     robot, dome = load_robot(name), sphere(0.3, (0, 70), (0, 300), position=(0.6, 0.0, 0.1))
     return robot, gather(robot, dome, Collision(clearance=0.005, scene=scene), 0.02)
 

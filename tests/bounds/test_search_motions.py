@@ -19,10 +19,25 @@ from coverable_arrays import unit_along
 from coverable_errors import ArgumentError
 from feasibility import Search, Task, check
 from feasibility.certification import replay
-from feasibility.roadmap import NODES, Exploration, arrays_of, close, covering_walk, edge_motion
-from feasibility.roadmap import explore, work_for
-from feasibility.roadmap.graph import COMPONENTS, EDGES, WAYPOINTS, add_edge, add_node
-from feasibility.roadmap.graph import empty_roadmap, grown
+from feasibility.roadmap import (
+    NODES,
+    Exploration,
+    arrays_of,
+    close,
+    covering_walk,
+    edge_motion,
+    explore,
+    work_for,
+)
+from feasibility.roadmap.graph import (
+    COMPONENTS,
+    EDGES,
+    WAYPOINTS,
+    add_edge,
+    add_node,
+    empty_roadmap,
+    grown,
+)
 from feasibility.roll import cosine_and_sine, projected, roll_of
 from feasibility.targets import check_references, target_curves, target_parts
 from feasibility.verdict import Walk

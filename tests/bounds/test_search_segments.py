@@ -165,7 +165,8 @@ def test_a_segment_that_is_accepted_holds_everywhere(kind, seed):
     """
     rng, tried, passed, worst = np.random.default_rng([KINDS.index(kind), seed]), 0, 0, 0.0
     for number in range(120):
-        robot = random_arm(rng) if number % 20 == 0 else robot
+        if number % 20 == 0:
+            robot = random_arm(rng)
         cone_deg = float(rng.choice([2.0, 20.0, 60.0, 120.0, 179.0, 180.0]))
         task = Task(float(rng.choice([0.0, 0.05])), cone_deg, 10.0 ** rng.uniform(-4.5, -2.0))
         onto = bool(rng.random() < 0.8)
@@ -203,7 +204,8 @@ def test_the_cone_holds_on_long_segments(kind, seed):
     """
     rng, passed = np.random.default_rng([10 + KINDS.index(kind), seed]), 0
     for number in range(90):
-        robot = random_arm(rng) if number % 15 == 0 else robot
+        if number % 15 == 0:
+            robot = random_arm(rng)
         task = Task(0.01, float(rng.choice([45.0, 100.0, 150.0, 178.0])), 0.15)
         made = surface_segment(rng, robot, kind, task, (0.0, 0.3), 0.1, None)
         motions, cells, q0, q1 = made
@@ -223,7 +225,8 @@ def test_roll_holds_on_a_segment_that_is_accepted(kind, seed):
     """Ranges of 0.5 to 300 deg about a random reference, over the curve and over the own foot."""
     rng, passed = np.random.default_rng([20 + KINDS.index(kind), seed]), 0
     for number in range(128):
-        robot = random_arm(rng) if number % 16 == 0 else robot
+        if number % 16 == 0:
+            robot = random_arm(rng)
         half = float(rng.choice([0.25, 2.0, 15.0, 150.0]))
         cone_deg = float(rng.choice([2.0, 20.0, 60.0, 90.0]))
         task = Task(
