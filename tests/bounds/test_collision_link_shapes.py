@@ -28,7 +28,7 @@ def test_an_arm_has_shapes_and_its_hulls_and_pieces_hold_them(name):
         assert_held(shapes)
         assert max(len(body.vertices) for body in shapes.polytopes) <= 64
         assert len({body.joint for body in shapes.polytopes}) > robot.n // 2
-        assert link_pairs(robot, shapes).asked
+        assert link_pairs(robot, shapes).checked
 
 
 @sampled

@@ -1,4 +1,4 @@
-"""A bound has to hold at every sample, and some sample has to use most of it."""
+"""Bounds against what is really there: never below it, and nearly met somewhere."""
 
 from __future__ import annotations
 
@@ -8,17 +8,24 @@ from numpy.typing import ArrayLike
 TINY = 1e-12
 
 
-def holds(bound: ArrayLike, truth: ArrayLike, used: float = 0.97) -> None:
-    """No truth is above its bound, and the largest share of a bound that one uses is `used`.
+def holds(bound: ArrayLike, truth: ArrayLike, used: float = 0.97, tiny: float = TINY) -> None:
+    """Is the bound at least the truth everywhere, and is `used` of it needed somewhere?
 
-    A bound that is smaller by 1 - used would be wrong, so nobody can make it smaller unnoticed.
+    Args:
+        bound: what is claimed; inf where nothing is, which counts as no use of it.
+        truth: what samples show, of the same shape or one that fits to it.
+        used: the least share of a bound that some truth has to be. A bound of 1 / used of what is
+            claimed would be wrong. 0 where samples cannot come near.
+        tiny: room for rounding, in the unit of both.
     """
     __tracebackhide__ = True
-    most, found = np.broadcast_arrays(np.asarray(bound, float), np.asarray(truth, float))
-    assert found.size, "nothing was sampled"
-    assert not np.isnan(most).any(), "a bound is no number"
-    beyond = found - (most * (1.0 + 1e-12) + TINY)
-    at = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
-    assert (beyond <= 0.0).all(), f"{found[at]:.12g} is above its bound of {most[at]:.12g}"
-    share = float(np.max(np.where(most > TINY, found / np.maximum(most, TINY), 0.0)))
-    assert share >= used, f"no sample uses more than {share:.3f} of its bound"
+    bound, truth = np.broadcast_arrays(np.asarray(bound, float), np.asarray(truth, float))
+    assert bound.size > 0
+    assert not np.isnan(bound).any()
+    assert np.isfinite(truth).all()
+    over = truth - (bound * (1.0 + 1e-12) + tiny)
+    worst = np.unravel_index(np.argmax(over), over.shape)
+    assert over[worst] <= 0.0, f"{truth[worst]:.6g} exceeds {bound[worst]:.6g} at {worst}"
+    some = np.isfinite(bound) & (bound > tiny)
+    share = (truth[some] / bound[some]).max(initial=0.0)
+    assert share >= used, f"no more than {share:.4f} of the bound is ever used"
