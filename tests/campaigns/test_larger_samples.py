@@ -55,8 +55,6 @@ def test_sides(name):
     test_explain.test_what_is_said_of_a_side_is_what_a_verdict_says(name)
 
 
-
-
 @pytest.mark.parametrize("name", test_robot_visuals.LARGE)
 def test_large_visuals(name):
     test_robot_visuals.test_every_link_with_visuals_is_drawn_whole_and_within_its_own_shape(name)
