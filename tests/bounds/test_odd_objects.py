@@ -1,4 +1,4 @@
-"""Odd objects of a scene: what is taken can be used by all libraries beneath, the rest is refused."""
+"""Odd objects of a scene: what is taken can be used by all libraries, the rest is refused."""
 
 from __future__ import annotations
 
