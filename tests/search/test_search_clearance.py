@@ -307,6 +307,26 @@ def test_no_point_moves_further_nor_leaves_its_chord_further_than_bounded():
     assert used["delta"] > 0.5
 
 
+def test_a_lever_that_is_longer_in_the_middle_than_at_the_ends():
+    """Folded, stretched, folded again: the first joint carries the tip further halfway."""
+    robot, tip = planar_arm(2, (-3.1, 3.1)), Polytope("tip", 2, np.array([[LENGTH, 0.0, 0.0]]), 0.0)
+    wall = Polytope("wall", 0, np.array([[9.0, 0.0, 0.0]]), 0.1)
+    pairs = Pair("tip", "wall", 0.0), Pair("l1", "wall", 0.0)
+    buffer = Clearance(robot, of_polytopes([wall, stick("l1", 1), tip], pairs)).buffer
+    tables, used = views(buffer), 0.0
+    for bend in np.linspace(0.5, 3.1, 14):
+        for turn in (1.0, 3.0):
+            q0, q1 = np.array([0.0, -bend]), np.array([turn, bend])
+            tables.configurations[:2] = q0, q1
+            for slot in (0, 1):
+                place_bodies(buffer, np.int64(slot))
+            place_group(buffer, row(buffer, GROUPS, np.int64(2)), np.int64(0), np.int64(1))
+            way = _moved(robot, tip, 0, q0, q1)[0]
+            assert way <= tables.reach[2, 0] + 1e-12
+            used = max(used, way / tables.reach[2, 0])
+    assert used > 0.7
+
+
 def _moved(robot, body, inner, q0, q1):
     """How far vertices move, seen from a joint, and how far they leave their chords."""
     data, track = robot.model.createData(), []
