@@ -36,7 +36,9 @@ UR5 = load_robot("ur5")
 PLATE = plane((0.4, 0.6), (-0.1, 0.1), position=(0.0, 0.0, 0.3), side="outside")
 SHELF = Obstacle.box("shelf", (0.4, 0.4, 0.02), (0.5, 0.0, 0.8), clearance=0.02)
 POST = Obstacle.cylinder("post", 0.05, 1.0, (0.0, 0.6, 0.5))
-TABLE = Axis("table", "revolute", limits_deg=(-180, 180), carries="surface", position=(0.6, 0.1, 0.2))
+TABLE = Axis(
+    "table", "revolute", limits_deg=(-180, 180), carries="surface", position=(0.6, 0.1, 0.2)
+)
 PEG = Obstacle.cylinder("peg", 0.02, 0.2, position=(0.15, 0.1, 0.1), frame="table")
 
 
@@ -114,7 +116,11 @@ def test_a_tool_of_the_case_is_asked_for_and_one_that_touches_is_left_out():
 
 
 def test_what_is_allowed_is_left_out_and_names_that_are_nothing_are_refused_at_once():
-    allow = (("surface", "forearm_link"), ("forearm_link", "shoulder_link"), ("post", "wrist_1_link"))
+    allow = (
+        ("surface", "forearm_link"),
+        ("forearm_link", "shoulder_link"),
+        ("post", "wrist_1_link"),
+    )
     assert left_out(bodies_of(scene=(POST,), allow=allow), "allowed") == both(*allow)
     wrong = {
         "allow": (("link9", "surface"),), "clearances": (("forearm_link", "shelve", 0.1),),
@@ -423,7 +429,10 @@ def test_closed_meshes_are_solids_that_look_outwards_and_others_sheets_that_say_
         assert trimesh.Trimesh(outwards.vertices, outwards.faces).volume == pytest.approx(6.0)
     double = Triangles(FLAT, np.array([[0, 1, 2], [0, 2, 1]]), True)  # closed, but no inside
     tangled = np.concatenate([solid.faces, solid.faces[:1]])
-    for shape in (*(Triangles(solid.vertices, f, True) for f in (solid.faces[:-1], tangled)), double):
+    for shape in (
+        *(Triangles(solid.vertices, f, True) for f in (solid.faces[:-1], tangled)),
+        double,
+    ):
         sheet = Obstacle("part", shape, np.eye(4))
         assert not sheet.geometry.closed
         assert "taken as a sheet" in sheet.notes[0]

@@ -4,7 +4,6 @@ import pytest
 import test_division
 import test_explain
 import test_robot_visuals
-import test_segment_bound
 import test_set_cover
 
 
@@ -19,11 +18,6 @@ def test_tables_against_brute_force(block):
     test_set_cover.test_the_programme_alone_against_brute_force(block)
 
 
-@pytest.mark.parametrize("kind", test_segment_bound.KINDS)
-def test_segments(kind):
-    test_segment_bound.assert_accepted_segments_hold(kind, 100)
-    test_segment_bound.assert_roll_holds(kind, 100)
-    test_segment_bound.assert_the_cone_holds(kind, 100)
 
 
 @pytest.mark.parametrize("name", test_explain.MORE)

@@ -168,7 +168,10 @@ def test_time_limits_coarse_steps_and_bad_starts_are_said():
 
 
 def test_same_seed_same_search():
-    cells, search = cylinder(0.5, (-60, 60), (0, 0.9)).cells(5, 5), greedy(moves="all", step_deg=1.0)
+    cells, search = (
+        cylinder(0.5, (-60, 60), (0, 0.9)).cells(5, 5),
+        greedy(moves="all", step_deg=1.0),
+    )
     one, two = (greedy_check(PUMA, cells, Task(0.005, 20), search) for _ in range(2))
     assert dict(one.statistics) == dict(two.statistics)
     assert nx.utils.edges_equal(one.graph.edges, two.graph.edges)

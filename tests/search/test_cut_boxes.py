@@ -52,9 +52,7 @@ def random_patch(kind, side, rng):
         "cylinder": lambda: cylinder(size, (start, start + b), (-0.2, 0.3), side=side),
         "hyperboloid": lambda: hyperboloid(size, other, (start, start + b), (-0.3, 0.2), side=side),
         "cone": lambda: cone(size, other, (start, start + b), (0.05, 0.2), side=side),
-        "torus": lambda: torus(
-            1.0, 0.3 * size, (start, start + b), (start, start + a), side=side
-        ),
+        "torus": lambda: torus(1.0, 0.3 * size, (start, start + b), (start, start + a), side=side),
     }[kind]()
 
 

@@ -56,9 +56,7 @@ def among_boxes(rng, name):
     """A known arm with its own shapes among boxes and a dome."""
     turn = [tuple(rng.uniform(-180.0, 180.0, 3)) for _ in range(4)]
     boxes = [(tuple(rng.uniform(0.01, 0.4, 3)), tuple(rng.uniform(-0.8, 0.8, 3))) for _ in turn]
-    scene = tuple(
-        Obstacle.box(f"box{k}", *box, turn[k]) for k, box in enumerate(boxes)
-    )
+    scene = tuple(Obstacle.box(f"box{k}", *box, turn[k]) for k, box in enumerate(boxes))
     robot, dome = load_robot(name), sphere(0.3, (0, 70), (0, 300), position=(0.6, 0.0, 0.1))
     return robot, gather(robot, dome, Collision(clearance=0.005, scene=scene), 0.02)
 
@@ -307,6 +305,26 @@ def test_no_point_moves_further_nor_leaves_its_chord_further_than_bounded():
                         used[name] = max(used[name], truth / max(bound, 1e-15))
     assert used["M"] > 0.8
     assert used["delta"] > 0.5
+
+
+def test_a_lever_that_is_longer_in_the_middle_than_at_the_ends():
+    """Folded, stretched, folded again: the first joint carries the tip further halfway."""
+    robot, tip = planar_arm(2, (-3.1, 3.1)), Polytope("tip", 2, np.array([[LENGTH, 0.0, 0.0]]), 0.0)
+    wall = Polytope("wall", 0, np.array([[9.0, 0.0, 0.0]]), 0.1)
+    pairs = Pair("tip", "wall", 0.0), Pair("l1", "wall", 0.0)
+    buffer = Clearance(robot, of_polytopes([wall, stick("l1", 1), tip], pairs)).buffer
+    tables, used = views(buffer), 0.0
+    for bend in np.linspace(0.5, 3.1, 14):
+        for turn in (1.0, 3.0):
+            q0, q1 = np.array([0.0, -bend]), np.array([turn, bend])
+            tables.configurations[:2] = q0, q1
+            for slot in (0, 1):
+                place_bodies(buffer, np.int64(slot))
+            place_group(buffer, row(buffer, GROUPS, np.int64(2)), np.int64(0), np.int64(1))
+            way = _moved(robot, tip, 0, q0, q1)[0]
+            assert way <= tables.reach[2, 0] + 1e-12
+            used = max(used, way / tables.reach[2, 0])
+    assert used > 0.7
 
 
 def _moved(robot, body, inner, q0, q1):

@@ -96,7 +96,8 @@ def test_what_random_arms_reach_is_never_proved_out_of_reach():
     """200 targets of 50 random arms, joints of every kind, 500 boxes each."""
     rng = np.random.default_rng(4)
     for number in range(200):
-        robot = random_arm(rng) if number % 4 == 0 else robot
+        if number % 4 == 0:
+            robot = random_arm(rng)
         task = Task(0.0, float(rng.choice([0.0, 10.0, 90.0])), 10.0 ** rng.uniform(-5, -2))
         q, point, approach = covered(rng, robot, task)
         width = 10.0 ** rng.uniform(-3.0, 0.3, robot.n)
