@@ -1,4 +1,4 @@
-"""How a bound is asked: it holds at every sample, and some sample uses most of it."""
+"""Bounds against what is really there: never below it, and nearly met somewhere."""
 
 from __future__ import annotations
 
@@ -9,19 +9,23 @@ TINY = 1e-12
 
 
 def holds(bound: ArrayLike, truth: ArrayLike, used: float = 0.97, tiny: float = TINY) -> None:
-    """Assert that no sample is above its bound, and that a smaller bound would be wrong.
+    """Is the bound at least the truth everywhere, and is `used` of it needed somewhere?
 
     Args:
-        bound: what is stated; what is not finite states nothing.
-        truth: what is found at samples, of a shape that fits.
-        used: the least share of its bound that some sample has to use; 0 asks only that it holds.
+        bound: what is claimed; inf where nothing is, which counts as no use of it.
+        truth: what samples show, of the same shape or one that fits to it.
+        used: the least share of a bound that some truth has to be. A bound of 1 / used of what is
+            claimed would be wrong. 0 where samples cannot come near.
         tiny: room for rounding, in the unit of both.
     """
     __tracebackhide__ = True
     bound, truth = np.broadcast_arrays(np.asarray(bound, float), np.asarray(truth, float))
-    beyond = truth - bound * (1.0 + 1e-12) - tiny
-    assert not (beyond > 0.0).any(), f"{np.nanmax(beyond):.3g} above the bound"
-    if used:
-        known = np.isfinite(bound) & (bound > tiny)
-        most = float(np.max(truth[known] / bound[known], initial=0.0))
-        assert most >= used, f"only {most:.3g} of the bound is used anywhere"
+    assert bound.size > 0
+    assert not np.isnan(bound).any()
+    assert np.isfinite(truth).all()
+    over = truth - (bound * (1.0 + 1e-12) + tiny)
+    worst = np.unravel_index(np.argmax(over), over.shape)
+    assert over[worst] <= 0.0, f"{truth[worst]:.6g} exceeds {bound[worst]:.6g} at {worst}"
+    some = np.isfinite(bound) & (bound > tiny)
+    share = (truth[some] / bound[some]).max(initial=0.0)
+    assert share >= used, f"no more than {share:.4f} of the bound is ever used"
