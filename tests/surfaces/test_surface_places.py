@@ -61,6 +61,8 @@ SURFACES = {
     "open ellipsoid": ellipsoid((1.0, 0.4, 0.6), (0, 180), (0, 355)),
     "open vase": revolution(VASE, (0, 355)),
     "open egg": revolution(EGG, (0, 355)),
+    "open spout": revolution([(0.9, 0.0), (0.96, 0.02), (0.9, 0.05), (0.9, 0.12)], (0, 355)),
+    "one span": bspline(waves(3, 3, 0.3, 4), (2, 2)),
     "cubic": bspline(waves(6, 7, 0.08, 1)),
     "quadratic": bspline(waves(5, 6, 0.05, 2), (2, 2)),
     "rational": bspline(
@@ -72,7 +74,7 @@ SURFACES = {
 }  # fmt: skip
 # The least share of a bound that some path has to use: of points, and of normals. Control points
 # say little about the third derivatives of a spline, and less of a rational one.
-USED = {"vase": (0.9, 0.5), "egg": (0.9, 0.5), "ellipsoid": (0.9, 0.3), "hyperboloid": (0.9, 0.3),
+USED = {"vase": (0.9, 0.5), "spout": (0.9, 0.2), "one span": (0.9, 0.2), "egg": (0.9, 0.5), "ellipsoid": (0.9, 0.3), "hyperboloid": (0.9, 0.3),
         "cubic": (0.9, 0.2), "quadratic": (0.9, 0.2), "formula": (0.9, 0.1),
         "rational": (1e-3, 1e-4), "half pipe": (1e-3, 1e-4)}  # fmt: skip
 
