@@ -1,4 +1,6 @@
-"""Which pairs of links are asked for, and how often the others collide."""
+"""Which pairs of links are asked for, how often the others collide, how far tools reach."""
+
+from __future__ import annotations
 
 from itertools import combinations
 
@@ -15,15 +17,17 @@ from robots.shapes import (
     link_shapes,
     outer_bodies,
     tool_reach,
-)
+)  # fmt: skip
 from robots.shapes.sampling import PairSampling, random_configurations
 from robots.urdf import Sphere
 
 SRDF = '<robot name="x">{}</robot>'
 PAIR = '<disable_collisions link1="{}" link2="{}" {}/>'
+FRAME = ("", "")
+DRAWN = ('collision="none"', '<visual><geometry><sphere radius="0.05"/></geometry></visual>')
 
 
-def arm(folder, *links, limits=(-3.0, 3.0)):
+def arm(folder, *links):
     """Links l0, l1, ... one above the other by 0.3 m, each hinged about x on the one below."""
     text = "".join(
         f'<link name="l{k}" {mark}>{shapes}</link>' for k, (mark, shapes) in enumerate(links)
@@ -31,12 +35,11 @@ def arm(folder, *links, limits=(-3.0, 3.0)):
     for k in range(1, len(links)):
         text += (
             f'<joint name="j{k}" type="revolute"><parent link="l{k - 1}"/><child link="l{k}"/>'
-            f'<origin xyz="0 0 0.3"/><axis xyz="1 0 0"/>'
-            f'<limit lower="{limits[0]}" upper="{limits[1]}" effort="1" velocity="1"/></joint>'
+            '<origin xyz="0 0 0.3"/><axis xyz="1 0 0"/>'
+            '<limit lower="-3" upper="3" effort="1" velocity="1"/></joint>'
         )
-    path = folder / "arm.urdf"
-    path.write_text(f'<robot name="arm">{text}</robot>')
-    return load_robot(str(path))
+    (folder / "arm.urdf").write_text(f'<robot name="arm">{text}</robot>')
+    return load_robot(str(folder / "arm.urdf"))
 
 
 def ball(radius=0.05, z=0.0):
@@ -45,27 +48,24 @@ def ball(radius=0.05, z=0.0):
     return "", f'<collision>{origin}<geometry><sphere radius="{radius}"/></geometry></collision>'
 
 
-FRAME = ("", "")
-DRAWN = ('collision="none"', '<visual><geometry><sphere radius="0.05"/></geometry></visual>')
-
-
 def sorted_out(pairs):
     return {(out.first, out.second): out.why for out in pairs.left_out}
 
 
-def test_every_pair_is_asked_for_or_left_out_once(tmp_path):
-    for name in ("puma560", "panda", "ur5"):
-        robot = load_robot(name)
-        shapes = link_shapes(robot)
-        pairs = link_pairs(robot, shapes)
-        owners = {body.owner for body in shapes.polytopes}
-        listed = [frozenset(pair) for pair in (*pairs.checked, *sorted_out(pairs))]
-        assert len(listed) == len(set(listed))
-        assert set(listed) == {frozenset(pair) for pair in combinations(owners, 2)}
-        joint = {body.owner: body.joint for body in shapes.polytopes}
-        rigid = {pair for pair, why in sorted_out(pairs).items() if why == "rigid"}
-        assert all((joint[a] == joint[b]) is ((a, b) in rigid) for a, b in sorted_out(pairs))
-        assert all((out.rate is None) is (out.why == "rigid") for out in pairs.left_out)
+@pytest.mark.parametrize("name", ["puma560", "panda", "ur5"])
+def test_every_pair_is_asked_for_or_left_out_once(name):
+    robot = load_robot(name)
+    shapes = link_shapes(robot)
+    pairs, joint = link_pairs(robot, shapes), {body.owner: body.joint for body in shapes.polytopes}
+    listed = [frozenset(pair) for pair in (*pairs.checked, *sorted_out(pairs))]
+    assert len(listed) == len(set(listed))
+    assert set(listed) == {frozenset(pair) for pair in combinations(joint, 2)}
+    for out in pairs.left_out:
+        rigid = joint[out.first] == joint[out.second]
+        assert (out.why == "rigid") is (out.rate is None) is rigid
+    if name == "ur5":  # deep inside each other: coal misses a third where no contacts are asked
+        rates = {(out.first, out.second): out.rate for out in pairs.left_out}
+        assert rates["upper_arm_link", "forearm_link"] == 1.0
 
 
 def test_neighbours_are_adjacent_also_through_frames_but_not_through_bodies(tmp_path):
@@ -87,44 +87,34 @@ def test_pairs_that_always_collide_are_left_out_and_said(tmp_path):
     assert ("l0", "l3") in pairs.checked, "folded up it is inside, stretched out it is not"
 
 
-def test_hulls_alone_leave_no_pair_out(tmp_path):
+def test_hulls_alone_leave_no_pair_out_and_tools_are_asked_for_exactly(tmp_path):
     """A ring around the arm: its hull holds all of it, the ring itself is never touched."""
-    trimesh.creation.annulus(2.0, 2.1, 4.0).export(tmp_path / "ring.stl")
-    ring = '<collision><geometry><mesh filename="ring.stl"/></geometry></collision>'
-    robot = arm(tmp_path, ("", ring), ball(), ball(), ball())
-    shapes = link_shapes(robot)
-    pairs = link_pairs(robot, shapes)
+    ring = trimesh.creation.annulus(2.0, 2.1, 4.0)
+    ring.export(tmp_path / "ring.stl")
+    mesh = '<collision><geometry><mesh filename="ring.stl"/></geometry></collision>'
+    robot = arm(tmp_path, ("", mesh), ball(), ball(), ball())
+    pairs = link_pairs(robot, link_shapes(robot))
     assert set(pairs.checked) == {("l0", "l2"), ("l0", "l3"), ("l1", "l3")}
     (note,) = pairs.notes
     assert "exact shapes do not: l0 - l2, l0 - l3; the search finds nothing" in note
-
-
-def test_tools_that_always_collide_are_asked_for_exactly(tmp_path):
-    """A bar through the base, and a ring around it, both on the last link."""
-    annulus = trimesh.creation.annulus(2.0, 2.1, 4.0)
     robot = arm(tmp_path, ball(0.5), ball(), ball(0.01))
-    shapes, joint = link_shapes(robot), robot.n
-    ring = checked_triangles(annulus.vertices, annulus.faces)
-    for geometry, why in ((ring, None), (Sphere(0.4), "always")):
-        solid = Solid("tool", joint, np.eye(4), geometry)
+    shapes = link_shapes(robot)
+    solid_ring = checked_triangles(ring.vertices, ring.faces)
+    for geometry, why in ((solid_ring, None), (Sphere(0.4), "always")):  # on the last link
+        solid = Solid("tool", robot.n, np.eye(4), geometry)
         pairs = link_pairs(robot, shapes, tool=outer_bodies(solid), tool_solids=[solid])
         assert sorted_out(pairs).get(("l0", "tool")) == why
 
 
 def test_users_and_srdfs_leave_pairs_out_with_their_rates(tmp_path):
     robot = arm(tmp_path, *[ball(0.1)] * 5)
-    file = tmp_path / "arm.srdf"
-    file.write_text(
-        SRDF.format(
-            PAIR.format("l4", "l0", 'reason="User"')
-            + PAIR.format("l0", "l3", 'reason="Never"')
-            + PAIR.format("l1", "l3", "")
-            + PAIR.format("l1", "l4", 'reason="Never"')
-            + PAIR.format("l0", "l1", 'reason="Adjacent"')
-        )
-    )
+    asked = (("l4", "l0", "User"), ("l0", "l3", "Never"), ("l1", "l4", "Never"),
+             ("l0", "l1", "Adjacent"))  # fmt: skip
+    lines = [PAIR.format(a, b, f'reason="{why}"') for a, b, why in asked]
+    (tmp_path / "arm.srdf").write_text(SRDF.format("".join([*lines, PAIR.format("l1", "l3", "")])))
     allow = [("l3", "l1"), ("l2", "shelf")]
-    pairs = link_pairs(robot, link_shapes(robot), allow, file, others=("shelf", "surface"))
+    pairs = link_pairs(robot, link_shapes(robot), allow, tmp_path / "arm.srdf",
+                       others=("shelf", "surface"))  # fmt: skip
     reasons = sorted_out(pairs)
     assert (reasons["l1", "l3"], reasons["l0", "l4"]) == ("allowed", "srdf")
     assert reasons["l0", "l1"] == "adjacent"
@@ -140,20 +130,15 @@ def test_users_and_srdfs_leave_pairs_out_with_their_rates(tmp_path):
     )
 
 
-def test_names_that_do_not_exist_are_one_error(tmp_path):
+def test_names_that_do_not_exist_are_one_error(tmp_path, approved):
     robot = arm(tmp_path, ball(), ball(), ball())
-    shapes = link_shapes(robot)
     file = tmp_path / "other.srdf"
     file.write_text(SRDF.format(PAIR.format("panda_link0", "l1", 'reason="Never"')))
+    allow = [("l1", "l9"), ("shelf", "l0"), ("l0", "ground")]
     with pytest.raises(RobotError) as caught:
-        link_pairs(
-            robot, shapes, [("l1", "l9"), ("shelf", "l0"), ("l0", "ground")], file, (), ("shelf",)
-        )
-    text = str(caught.value)
+        link_pairs(robot, link_shapes(robot), allow, file, (), ("shelf",))
     assert len(caught.value.faults) == 3
-    for words in ("'l9', which is no link or object here; did you mean", "'ground'", "shelf"):
-        assert words in text
-    assert "names links that this robot does not have: panda_link0; is it of another robot?" in text
+    approved("bad_pairs", str(caught.value))
 
 
 def test_shapes_of_a_tool_count_as_bodies_on_the_last_joint(tmp_path):
@@ -184,27 +169,18 @@ def test_rates_of_the_ur5_are_the_known_ones(fineness, which):
         assert low <= rate <= high, (pair, rate)
 
 
-def test_bodies_deep_inside_each_other_collide():
-    """coal misses a third of these where it is not asked for contacts."""
-    robot = load_robot("ur5")
-    pairs = link_pairs(robot, link_shapes(robot))
-    rates = {(out.first, out.second): out.rate for out in pairs.left_out}
-    assert rates["upper_arm_link", "forearm_link"] == 1.0
+@pytest.mark.parametrize("name", ["ur5", "kinova"])
+def test_random_configurations_are_inside_the_limits_and_the_same_each_time(name):
+    robot = load_robot(name)
+    q = random_configurations(robot)
+    assert q.shape == (1000, robot.n)
+    assert np.isfinite(q).all()
+    assert ((q >= robot.lower) & (q <= robot.upper)).all()
+    assert (np.abs(q[:, np.isinf(robot.upper)]) <= np.pi).all()
+    np.testing.assert_array_equal(q, random_configurations(robot))
 
 
-def test_random_configurations_are_inside_the_limits_and_the_same_each_time():
-    for name in ("ur5", "kinova"):
-        robot = load_robot(name)
-        q = random_configurations(robot)
-        assert q.shape == (1000, robot.n)
-        assert np.isfinite(q).all()
-        assert ((q >= robot.lower) & (q <= robot.upper)).all()
-        free = np.isinf(robot.upper)
-        assert (np.abs(q[:, free]) <= np.pi).all()
-        np.testing.assert_array_equal(q, random_configurations(robot))
-
-
-# Arm: (link, mm beyond the tool point, mm from the axis).
+# Arm: link, mm beyond the tool point, mm from the axis.
 REACH = {
     "ur5": ("wrist_3_link", -0.5, 32),
     "xarm7": ("link7", 0.0, 36),
@@ -223,10 +199,8 @@ def test_how_far_tools_reach_beyond_their_point(name):
     assert reaches[0].owner == owner
     assert 1e3 * reaches[0].beyond == pytest.approx(beyond, abs=0.06)
     assert 1e3 * reaches[0].radius == pytest.approx(radius, abs=0.8)
-
-
-def test_a_tool_of_the_user_reaches_too():
-    robot = load_robot("puma560")
-    rod = Polytope("tool", 6, np.array([[0.0, 0, -0.2], [0, 0.01, 0.03]]), 0.002)
-    first = tool_reach(robot, link_shapes(robot), [rod])[0]
-    assert (first.owner, first.beyond, first.radius) == ("tool", pytest.approx(0.032), 0.01)
+    if name == "puma560":  # a tool of the user reaches too
+        rod = Polytope("tool", 6, np.array([[0.0, 0, -0.2], [0, 0.01, 0.03]]), 0.002)
+        first = tool_reach(robot, link_shapes(robot), [rod])[0]
+        assert (first.owner, first.radius) == ("tool", 0.01)
+        assert first.beyond == pytest.approx(0.032)
