@@ -12,7 +12,7 @@ from pathlib import Path
 
 import hostile_visuals as hostile
 import pytest
-from hostile_parts import Maker, urdf, visual, write
+from hostile_visuals import Maker, urdf, visual, write
 
 from coverable_meshes import MeshError, MeshFiles, robot_files
 from coverable_meshes.robot_files import MOST_SECONDS, MOST_TRIANGLES
