@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from samples import sampled, seeds
 
-from feasibility import Task
+from feasibility import Task, verify
 from feasibility.certification import replay, verify_proof
 from feasibility.certification.rates import replay_rates
 from feasibility.clock import Clock
@@ -216,6 +216,11 @@ def test_runs_hold_the_speed_of_the_task():
     along = plan_passes(UR5, parallel_passes(plate, 0.1, math.pi / 2), fast)
     slow = plan_passes(UR5, along.passes, replace(fast, speed=None))
     assert (along.verdict.feasible, slow.verdict.feasible) == (False, True)
+    walk = slow.verdict.witness
+    working = slow.cells.surface.works(walk.cell)
+    for task, holds in ((fast, False), (replace(fast, speed=0.2), True)):
+        judged = verify(UR5, slow.cells, task, walk.q, working=working)
+        assert (judged.holds, "rad/s" in judged.refusal) == (holds, not holds)
     runs = pass_runs(UR5, along.cells, fast, along.places, clock=Clock())
     assert runs.runs
     for run in runs.runs:
