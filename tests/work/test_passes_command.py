@@ -105,6 +105,10 @@ def test_between_stretches_that_are_apart_the_tool_is_lifted():
     cells = pass_toolpath(laid, retract=0.03)
     assert np.ptp(cells.centres[:, 2]) == pytest.approx(0.03)
     assert (cells.centres[:, 2] > 0.02).sum() == 2
+    hollow = cylinder(0.3, (0, 60), (0.0, 0.2), "inside")
+    cells = pass_toolpath(parallel_passes(hollow, 0.1, 0.0, one_way=True), retract=0.03)
+    radius = np.hypot(*cells.centres[:, :2].T)
+    assert (radius.min(), radius.max()) == pytest.approx((0.27, 0.3), abs=1e-6)
     hill = cylinder(0.3, (30, 150), (0.0, 0.2), "outside")
     with pytest.raises(CoverableError, match="run through the surface"):
         pass_toolpath(parallel_passes(hill, 0.1, 0.0, one_way=True), retract=0.01)
