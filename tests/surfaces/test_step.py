@@ -108,7 +108,7 @@ def test_the_deviation_is_right_at_the_poles_of_a_sphere(folder):
     np.testing.assert_allclose(np.linalg.norm(corners, axis=2), 0.3, atol=1e-9)
     shares = np.random.default_rng(1).dirichlet((1, 1, 1), 20)
     off = 0.3 - np.linalg.norm(np.einsum("sk,fki->fsi", shares, corners), axis=2)
-    assert 0.9 * said_deviation(surface) <= off.max() <= 1.01 * said_deviation(surface) < 1e-3
+    assert 0.9 * said_deviation(surface) <= off.max() <= 1.04 * said_deviation(surface) < 3e-3
 
 
 def test_triangles_are_in_metres_as_near_as_is_said_and_look_out_of_the_solid(chosen):
@@ -267,7 +267,7 @@ def test_a_case_with_a_wrong_choice_says_so(folder, monkeypatch, approved):
     ):
         with pytest.raises(CaseError) as caught:
             Case.from_toml(CASE.format(keys + "\ncells = 12"), ".").build()
-        said.append(str(caught.value))
+        said.append(str(caught.value).replace(str(folder), "FOLDER"))
     approved("STEP cases refused", "\n".join(said))
 
 

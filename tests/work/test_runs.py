@@ -122,7 +122,7 @@ def test_cuts_are_made_between_passes_where_they_can_be(turn):
     """Two classes overlap over six stations; the turn between two passes is one of the pieces."""
     over = np.concatenate([np.arange(0, 8), np.arange(2, 10)])
     steps = [(k, k + 1, k + 1, 1) for k in range(7)]
-    steps += [(8 + k, 9 + k, 20 + k, 1) for k in range(7)]
+    steps += [(8 + k, 9 + k, 20 + k, 9) for k in range(7)]  # longer, so that later cuts are shorter
     inside = np.arange(9) != turn
     found = fewest_runs(Stations(over, np.array(steps), np.where(inside, 0.01, 0.0), inside))
     assert [int(over[run.nodes[-1]]) for run in found] == [turn, 9]
