@@ -194,10 +194,10 @@ def hand_made(rng, cells, nodes, density):
     graph = MotionGraph(arrays, work_for(2), pairs, grows=False)
     for cell in range(cells):
         for _ in range(nodes):
-            graph.node(cell, 30.0 * rng.random(2))
+            graph.node(cell, 3.0 * rng.random(2))
     for a, b in product(range(cells * nodes), repeat=2):
         if abs(graph.cell[a] - graph.cell[b]) <= 1 and a < b and rng.random() < density:
-            graph.join(a, b, np.vstack([graph.q[a], 30.0 * rng.random((1, 2)), graph.q[b]]))
+            graph.join(a, b, np.vstack([graph.q[a], 3.0 * rng.random((1, 2)), graph.q[b]]))
     return graph, verdict.cells
 
 
@@ -248,7 +248,7 @@ def test_a_detour_is_the_cheapest():
     """20 rad, what a detour as long as the arm costs."""
     rng, found = np.random.default_rng(5), 0
     for _ in range(40):
-        graph, cells = hand_made(rng, cells=5, nodes=2, density=0.5)
+        graph, cells = hand_made(rng, cells=5, nodes=4, density=0.3)
         weighted = nx.empty_graph(len(graph.cell))
         for x, y in graph.edges.edges:
             apart = np.linalg.norm(cells.centres[graph.cell[x]] - cells.centres[graph.cell[y]])
