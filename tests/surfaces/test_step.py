@@ -17,7 +17,7 @@ import pytest
 from coverable_processes import Ended, Limits, folder_of, run_apart
 from feasibility.cases import Case, CaseError
 from feasibility.cli.main import main
-from surfaces import SurfaceError, mesh, step, step_faces, step_triangles
+from surfaces import SurfaceError, mesh, step, step_faces, step_parts, step_triangles
 from surfaces.step_files import Caps, step_process
 
 SIZE = (0.2, 0.1, 0.05)  # m
@@ -95,6 +95,14 @@ def test_faces_have_numbers_kinds_areas_and_colours(folder, known):
         np.testing.assert_allclose(normal, outwards, atol=1e-9)
         np.testing.assert_allclose(other.centre, turn @ centre + up, atol=1e-9)
         np.testing.assert_allclose(other.normal, turn @ normal, atol=1e-9)
+
+
+def test_all_triangles_look_out_of_the_solid_as_they_come(folder, known):
+    parts = step_parts(folder / "part.step", known)
+    assert sorted(set(parts.owner.tolist())) == list(range(1, 8))
+    a, b, c = parts.vertices[parts.triangles].swapaxes(0, 1)
+    outwards = (a + b + c) / 3.0 - np.array(SIZE) / 2.0
+    assert (np.einsum("fi,fi->f", np.cross(b - a, c - a), outwards) > 0.0).all()
 
 
 def said_deviation(surface):

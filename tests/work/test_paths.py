@@ -186,7 +186,7 @@ def test_a_verdict_from_a_file_has_the_same_path(tmp_path):
 # -- the choice of nodes, on graphs by hand -------------------------------------------------------
 
 
-def hand_made(rng, cells, nodes, density):
+def hand_made(rng, cells, nodes, density, wide=3.0):
     """A graph over cells in a row: some nodes over each, random motions between neighbours."""
     verdict = verdict_of("ur5")
     arrays = arrays_of(verdict.robot, verdict.cells, verdict.task)
@@ -194,10 +194,10 @@ def hand_made(rng, cells, nodes, density):
     graph = MotionGraph(arrays, work_for(2), pairs, grows=False)
     for cell in range(cells):
         for _ in range(nodes):
-            graph.node(cell, 3.0 * rng.random(2))
+            graph.node(cell, wide * rng.random(2))
     for a, b in product(range(cells * nodes), repeat=2):
         if abs(graph.cell[a] - graph.cell[b]) <= 1 and a < b and rng.random() < density:
-            graph.join(a, b, np.vstack([graph.q[a], 3.0 * rng.random((1, 2)), graph.q[b]]))
+            graph.join(a, b, np.vstack([graph.q[a], wide * rng.random((1, 2)), graph.q[b]]))
     return graph, verdict.cells
 
 
@@ -248,7 +248,7 @@ def test_a_detour_is_the_cheapest():
     """20 rad, what a detour as long as the arm costs."""
     rng, found = np.random.default_rng(5), 0
     for _ in range(40):
-        graph, cells = hand_made(rng, cells=5, nodes=4, density=0.3)
+        graph, cells = hand_made(rng, cells=5, nodes=4, density=0.15, wide=1.0)
         weighted = nx.empty_graph(len(graph.cell))
         for x, y in graph.edges.edges:
             apart = np.linalg.norm(cells.centres[graph.cell[x]] - cells.centres[graph.cell[y]])
@@ -298,6 +298,8 @@ def test_home_says_which_turn_and_a_start_is_kept(small):
     assert np.allclose(np.degrees(found.q[0]), home)
     accepted(small, found)
     assert unwound(load_robot("ur5", start=walk.q[0].tolist()), task, walk) is walk
+    home[1] += 1800.0  # beyond the limits: as near as they allow
+    accepted(small, unwound(UR5, replace(task, home_deg=tuple(home.tolist())), walk))
     free = replace(UR5, lower=np.full(6, -np.inf), upper=np.full(6, np.inf))
     far = unwound(free, small.task, Walk(walk.q + 2.0 * np.pi, walk.cell))  # no numpy warning
     assert np.abs(0.5 * (far.q.min(axis=0) + far.q.max(axis=0))).max() <= np.pi + 1e-9
