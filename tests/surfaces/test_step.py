@@ -213,6 +213,7 @@ def answered(arrays=b"", **said):
         (answered(faces=3), BROKEN),
         (answered(b"0" * 12, taken=[1], counts=[2], vertices=0, triangles=1), BROKEN),
         (answered(b"0" * 12, taken=[1, 2], counts=[1], vertices=0, triangles=1), BROKEN),
+        (answered(EYE + np.array([0, 1, 2, 2, 1, 0], "<i4").tobytes(), **WHOLE), BROKEN),
         (answered(vertices=0, triangles=11), "more than 10; take fewer faces"),
         (answered(EYE + np.array([0, 1, 7], "<i4").tobytes(), **WHOLE), "do not exist"),
         (answered(EYE + np.array([0, 1, -2], "<i4").tobytes(), **WHOLE), "do not exist"),
