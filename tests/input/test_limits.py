@@ -17,6 +17,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+import bad_input
 import hostile_stores
 import hostile_visuals as hostile
 import pytest
@@ -24,7 +25,6 @@ import samples
 from readers import of_bad
 from samples import sampled, seeds, spread
 
-import bad_input
 from coverable_errors import CoverableError
 from feasibility.cases import CaseError, load_case
 from feasibility.studies import Store, load_study, open_workers, run_tasks

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import tempfile
 import warnings
 import zipfile
 from collections.abc import Callable
@@ -192,10 +193,9 @@ def members(which: str) -> dict[str, bytes]:
                 node = Cut((1.0, 0, 0, 0, 0, 0), 0.01 * k, Leaf(1), node)
             tree = CutTree(node)
         verdict = replace(small_verdict("long plate"), proof=tree, evidence=Evidence.PROOF)
-    import tempfile
-
     with tempfile.TemporaryDirectory() as folder:
-        with zipfile.ZipFile(save_result(verdict, case, Path(folder) / "good")) as file:
+        saved = save_result(verdict, case, Path(folder) / "good")
+        with zipfile.ZipFile(saved) as file:
             return {name: file.read(name) for name in file.namelist()}
 
 
@@ -219,7 +219,6 @@ def npy(array: np.ndarray, pickled: bool = False) -> bytes:
 def damaged(which: str, change: dict[str, Any]) -> bytes:
     """A result file with one damage, as tests/input/bad/result.toml words it."""
     content = dict(members(which))
-    meta = json.loads(content["meta.json"])
     for kind, value in change.items():
         if kind == "drop":
             del content[value]
@@ -228,26 +227,10 @@ def damaged(which: str, change: dict[str, Any]) -> bytes:
         elif kind == "cut":
             content[value[0]] = content[value[0]][: value[1]]
         elif kind in ("meta", "without", "case"):
-            if kind == "meta":
-                meta |= value
-            elif kind == "without":
-                del meta[value]
-            else:
-                assert meta["case"]["toml"].count(value[0]) == 1
-                meta["case"]["toml"] = meta["case"]["toml"].replace(*value)
-            content["meta.json"] = json.dumps(meta).encode()
+            content["meta.json"] = _other_meta(content["meta.json"], kind, value)
         elif kind in ("at", "rows", "columns", "objects", "floats"):
             name = f"{value if isinstance(value, str) else value[0]}.npy"
-            array = np.load(io.BytesIO(content[name]))
-            if kind == "at":
-                array[tuple(value[1])] = value[2]
-            changes = {
-                "rows": lambda a=array: a[: value[1]],
-                "columns": lambda a=array: a[:, : value[1]],
-                "objects": lambda: np.array([None, {}]),
-                "floats": lambda a=array: a.astype(float),
-            }
-            content[name] = npy(changes.get(kind, lambda a=array: a)(), kind == "objects")
+            content[name] = _other_array(np.load(io.BytesIO(content[name])), kind, value)
         elif kind == "fill":
             content |= {f"x{k}": b"" for k in range(value - len(content))}
     data = packed(content, change.get("twice", ""))
@@ -257,6 +240,29 @@ def damaged(which: str, change: dict[str, Any]) -> bytes:
         assert data.count(there) == 2
         return data.replace(there, claimed)
     return data
+
+
+def _other_meta(text: bytes, kind: str, value: Any) -> bytes:
+    meta = json.loads(text)
+    if kind == "meta":
+        meta |= value
+    elif kind == "without":
+        del meta[value]
+    else:
+        assert meta["case"]["toml"].count(value[0]) == 1
+        meta["case"]["toml"] = meta["case"]["toml"].replace(*value)
+    return json.dumps(meta).encode()
+
+
+def _other_array(array: np.ndarray, kind: str, value: Any) -> bytes:
+    if kind == "at":
+        array[tuple(value[1])] = value[2]
+    elif kind == "rows":
+        array = array[: value[1]]
+    elif kind == "columns":
+        array = array[:, : value[1]]
+    return npy(np.array([None, {}]) if kind == "objects" else array.astype(
+        float if kind == "floats" else array.dtype), kind == "objects")  # fmt: skip
 
 
 def of_bad(reader: str, name: str) -> bytes:
