@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from difflib import get_close_matches
 from functools import partial
 from numbers import Integral, Real
@@ -327,6 +328,33 @@ def close_matches(
     options_by_lower = {option.lower(): option for option in options}
     found = get_close_matches(value.strip().lower(), options_by_lower, most, cutoff)
     return [options_by_lower[word] for word in found]
+
+
+def at_most(value: float, digits: int) -> str:
+    """A number to some significant digits that is no less: a bound that still holds as printed.
+
+    Example:
+        >>> at_most(0.12341, 3), at_most(0.5, 3), at_most(0.0, 3)
+        ('0.124', '0.5', '0')
+    """
+    return _rounded(value, digits, ROUND_CEILING)
+
+
+def at_least(value: float, digits: int) -> str:
+    """A number to some significant digits that is no more.
+
+    Example:
+        >>> at_least(12.999, 3), at_least(-0.12341, 3)
+        ('12.9', '-0.124')
+    """
+    return _rounded(value, digits, ROUND_FLOOR)
+
+
+def _rounded(value: float, digits: int, rounding: str) -> str:
+    """A number with so many significant digits, rounded one way; inf stays inf."""
+    if math.isfinite(value):
+        value = float(Context(prec=digits, rounding=rounding).create_decimal(Decimal(value)))
+    return f"{value:.{digits}g}"
 
 
 def counted(number: int, one: str, several: str = "") -> str:

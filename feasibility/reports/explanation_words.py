@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_errors import counted
+from coverable_errors import at_least, counted
 from feasibility.cut_words import what_opens
 from feasibility.reports.changes import LIMITS, label, shown, worded
 from feasibility.sensitivity import Change, Explanation, Finding, Kind, Quantity, Threshold
@@ -142,14 +142,14 @@ def rates_sentence(explanation: Explanation) -> str:
     if math.isfinite(rates.largest):
         text = (
             f"Inside the joints' velocities a motion over all cells may have up to "
-            f"{rates.largest:.3g} m/s all along, but for stops in place and at corners"
+            f"{at_least(rates.largest, 3)} m/s all along, but for stops in place and at corners"
         )
         if asked.speed is not None:
             text += f" ({asked.speed:g} m/s is required)"
         if rates.witness.speed < rates.largest:
-            text += f"; the covering motion above {rates.witness.speed:.3g} m/s"
+            text += f"; the covering motion above {at_least(rates.witness.speed, 3)} m/s"
         text += ". "
-    least = f"smallest singular value is at least {rates.witness.sigma:.3g}, near cell"
+    least = f"smallest singular value is at least {at_least(rates.witness.sigma, 3)}, near cell"
     return f"{text}The covering motion's {least} {_nearest_singular(explanation)}."
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from coverable_arrays import Array
-from coverable_errors import counted, listed
+from coverable_errors import at_least, at_most, counted, listed
 from feasibility.results import plain
 from feasibility.task import Task
 from feasibility.verdict import Cause, Certificate, Walk
@@ -202,11 +202,12 @@ def certificate_text(
     allowed = "" if tolerance is None else f" (allowed {1e3 * tolerance:.3g})"
     angle = math.degrees(certificate.max_angle)
     margin = limit_margin_deg(robot, certificate, q)
-    limits = f"joints at least {margin:.3g} deg from their limits"
+    limits = f"joints at least {at_least(margin, 3)} deg from their limits"
     parts = [
         counted(certificate.waypoints, noun),
-        f"tool point within {1e3 * certificate.max_position_error:.3g} mm of its surface{allowed}",
-        f"tool axis within {angle:.4g} deg (allowed {task.cone_deg:g})",
+        f"tool point within {at_most(1e3 * certificate.max_position_error, 3)} mm of its "
+        f"surface{allowed}",
+        f"tool axis within {at_most(angle, 4)} deg (allowed {task.cone_deg:g})",
         roll_text(certificate, task),
         limits if 0.0 <= margin < math.inf else "",
         rates_text(certificate, task),
@@ -219,9 +220,9 @@ def rates_text(certificate: Certificate, task: Task) -> str:
     """The largest speed, and the smallest singular value; empty where neither is required."""
     parts = []
     if task.speed is not None and certificate.max_speed is not None:
-        parts.append(f"tool speeds up to {certificate.max_speed:.3g} m/s (required {task.speed:g})")
+        parts.append(f"tool speeds up to {at_least(certificate.max_speed, 3)} m/s (required {task.speed:g})")
     if task.min_manipulability is not None and certificate.min_singular_value is not None:
-        least = f"singular values of at least {certificate.min_singular_value:.3g}"
+        least = f"singular values of at least {at_least(certificate.min_singular_value, 3)}"
         parts.append(f"{least} (required {task.min_manipulability:g})")
     return "; ".join(parts)
 
@@ -232,7 +233,7 @@ def roll_text(certificate: Certificate, task: Task) -> str:
         return ""
     middle, half = math.degrees(task.roll.middle), math.degrees(task.roll.half)
     most = math.degrees(certificate.max_roll)
-    return f"roll within {most:.4g} deg of {middle:.4g} deg (allowed {half:g})"
+    return f"roll within {at_most(most, 4)} deg of {middle:.4g} deg (allowed {half:g})"
 
 
 def clearance_json(certificate: Certificate | CollisionReplay) -> dict[str, Any]:
@@ -255,7 +256,7 @@ def clearance_text(certificate: Certificate | CollisionReplay) -> str:
     """How near which pair came along a motion; empty where that was not looked at."""
     if certificate.min_clearance is None or certificate.nearest_pair is None:
         return ""
-    nearest = f"at least {1e3 * certificate.min_clearance:.3g} mm apart"
+    nearest = f"at least {at_least(1e3 * certificate.min_clearance, 3)} mm apart"
     if certificate.measured_clearance is not None:
         measured = f"{1e3 * certificate.measured_clearance:.3g} mm"
         nearest += f", certified, and {measured} where they were measured nearest"

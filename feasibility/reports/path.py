@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from typing import Any
 
 import numpy as np
 
-from coverable_errors import counted
+from coverable_errors import at_least, at_most, counted
 from feasibility.certification.rates import RateReplay
 from feasibility.collisions import checked, said_of
 from feasibility.entry import Ends
@@ -110,33 +109,6 @@ def short_words(treated: TreatedArea | None, coverage: float | None) -> str:
         f"undecided: the path treats {share} of the area, and "
         f"{100.0 * coverage:g} % is required; passes or cells that are closer treat more."
     )
-
-
-def at_most(value: float, digits: int) -> str:
-    """A number to some significant digits that is no less: a bound that still holds as printed.
-
-    Example:
-        >>> at_most(0.12341, 3), at_most(0.5, 3), at_most(0.0, 3)
-        ('0.124', '0.5', '0')
-    """
-    return _rounded(value, digits, ROUND_CEILING)
-
-
-def at_least(value: float, digits: int) -> str:
-    """A number to some significant digits that is no more.
-
-    Example:
-        >>> at_least(12.999, 3), at_least(-0.12341, 3)
-        ('12.9', '-0.124')
-    """
-    return _rounded(value, digits, ROUND_FLOOR)
-
-
-def _rounded(value: float, digits: int, rounding: str) -> str:
-    """A number with so many significant digits, rounded one way; inf stays inf."""
-    if math.isfinite(value):
-        value = float(Context(prec=digits, rounding=rounding).create_decimal(Decimal(value)))
-    return f"{value:.{digits}g}"
 
 
 def _timing(

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from coverable_arrays import Mask
-from coverable_errors import counted
+from coverable_errors import at_least, counted
 from feasibility.certification.rates import RateReplay, replay_rates
 from feasibility.clock import Clock, OutOfTime
 from feasibility.speed.largest import begin_of, largest_speed
@@ -84,7 +84,7 @@ def _accepted(verdict: Verdict, walk: Walk, certificate: Certificate | None, not
             f"{stops if replayed.stops else ''}."
         )
     if task.min_manipulability is not None:
-        words += f" Its smallest singular value is at least {replayed.sigma:.3g}."
+        words += f" Its smallest singular value is at least {at_least(replayed.sigma, 3)}."
     fast = task.speed is not None
     kept = certificate and replace(
         certificate,

@@ -1,0 +1,122 @@
+"""Pages that commands write: their outlines are approved; they fetch nothing, and take no markup."""
+
+from __future__ import annotations
+
+import html
+import re
+from dataclasses import replace
+
+import pytest
+from command_table import COMMANDS, TABLE
+from page_outline import Page, fetched
+
+from feasibility import check
+from feasibility.cases import load_case
+from feasibility.collisions import UNCHECKED
+from feasibility.division import divide
+from feasibility.placement import Pose, Region, place
+from feasibility.reports import comparison, explanation, study
+from feasibility.sensitivity import explain
+from feasibility.studies import Arm, Comparison, Row, read_study
+from feasibility.viewer import view, view_division, view_placements
+from feasibility.viewer.robot import joint_paths
+
+PAGES = [(command, name) for command, name in COMMANDS if "--html" in TABLE[command][name]]
+PAGES = [one for one in PAGES if one[0] != "show" and one != ("path", "infeasible")]
+EVIL = '</script><script>alert(1)</script><img src=x onerror="alert(2)">/__proto__'
+
+
+@pytest.mark.parametrize(("command", "name"), PAGES)
+def test_the_outline_of_a_page(commands, approved, command, name):
+    text = commands.page(command, name)
+    assert fetched(text) == []
+    assert len(text) < 2_000_000
+    page = Page(text)
+    assert UNCHECKED in html.unescape(text).lower(), "every page says what is not checked"
+    if command == "check":
+        program = page.block("program").decode()
+        assert set(re.findall(r"https?://[\w./]+", program)) <= {"http://www.w3.org/1999/xhtml"}
+    approved(f"pages/{command} {name}", page.outline())
+
+
+def test_a_result_is_shown_as_it_was_when_it_was_found(commands):
+    assert commands.page("show", "a page") == commands.page("check", "files")
+    missed = "cells out of reach", "no motion to write"
+    assert commands.page("show", missed[0]) == commands.page("check", missed[1])
+
+
+@pytest.fixture(scope="module")
+def pages():
+    """Every kind of page, with a case, an arm and a joint whose names are markup."""
+    setup = load_case("paper/4d", ["surface.cells=[3, 3]"]).build()
+    names = (EVIL, *setup.robot.joint_names[1:])
+    robot = replace(setup.robot, name=EVIL, joint_names=names)
+    verdict = check(robot, *setup[1:])
+    region = Region.around(Pose.of_surface(setup.cells.surface), {"x": (3.0, 3.1)})
+    placed = place(robot, setup.cells, setup.task, region)
+    asked = read_study('base.case = "paper/4a"\nvary."task.cone_deg" = [30]\n')
+    result = {"verdict": "undecided", "evidence": "budget", "message": EVIL}
+    rows = [Row({"task.cone_deg": EVIL}, "failed", result, 0.0)]
+    arm = Arm(EVIL, 6, 1.0, "infeasible", "proof", EVIL, cause=EVIL)
+    explained = explain(robot, *setup[1:])
+    return {
+        "view": view(verdict, EVIL).html(),
+        "division": view_division(divide(robot, *setup[1:]),
+                                  EVIL).html(),
+        "placements": view_placements(placed, case=EVIL).html(),
+        "explanation": explanation.as_html(explained, EVIL, view(verdict, EVIL)),
+        "study": study.as_html(replace(asked, name=EVIL, description=EVIL), rows),
+        "comparison": comparison.as_html(Comparison(EVIL, (arm,), divided=True, critical=True)),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "name", ["view", "division", "placements", "explanation", "study", "comparison"]
+)
+def test_names_make_no_markup(pages, name):
+    text = pages[name]
+    whole = Page(text)
+    for page in (whole, *whole.frames):
+        assert page.tags["script"] == (3 if 'id="commands"' in page.text else 0)
+        assert not {"onerror"} & {name for name, _ in page.attributes}
+        assert not [value for name, value in page.attributes if name == "src" and value == "x"]
+    assert fetched(text) == []
+    assert "alert" in html.unescape(text), "the name is there, as text"
+
+
+def test_names_lead_nowhere_in_the_scene(pages):
+    for command in Page(pages["view"]).commands:
+        path = command["path"].replace("<object>", "")
+        assert not re.search(r"[<>\"'&`]", path), path
+        assert not {"__proto__", "constructor"} & set(path.split("/"))
+    robot = load_case("paper/4a").build().robot
+    names = (EVIL, *robot.joint_names[1:])
+    assert len(joint_paths(replace(robot, joint_names=names))[1].split("/")) == 3
+
+
+def test_the_same_answer_gives_the_same_page_and_a_notebook_keeps_it():
+    case = load_case("paper/4a", ["surface.cells=[3, 3]"])
+    drawn, again = (view(check(*case.build()), "paper/4a") for _ in range(2))
+    assert drawn.html() == again.html()
+    bundle = drawn._repr_mimebundle_()
+    frame = bundle["text/html"]
+    assert html.unescape(re.search(r'srcdoc="([^"]*)"', frame)[1]) == drawn.html()
+    assert frame.count(bundle["image/png"]) == 1
+    assert frame.index("<img") < frame.index("<iframe")
+    verdict = check(*case.build())
+    page = verdict._repr_mimebundle_()
+    assert page["text/plain"] == repr(verdict)
+    assert "9 of 9 cells in one motion" in page["text/html"]
+    assert UNCHECKED in page["text/html"].lower()
+
+
+def test_the_page_of_the_motion_has_a_player():
+    case = load_case("paper/4a", ["surface.cells=[2, 2]"])
+    moving = view(check(*case.build()))
+    still = view(check(*load_case("paper/4f", ["surface.cells=[2, 2]"]).build())).html()
+    for part in ('type="range"', 'id="readout"', 'id="pause"'):
+        assert part in moving.html()
+        assert part not in still
+    rows = (("</script><script>alert(1)</script>", "deg", [0.0, 1.0]),)
+    shown = replace(moving.readout, rows=rows, times=(0.0, 1.0))
+    assert rows[0][0] not in replace(moving, readout=shown).html()

@@ -1,0 +1,69 @@
+"""The commands of tests/output/commands.toml: each runs once, in one folder for all of them."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import tomllib
+from functools import cache
+from pathlib import Path
+
+from ask import Said, asked
+
+TABLE = tomllib.loads(Path(__file__).parents[1].joinpath("output/commands.toml").read_text("utf-8"))
+FILES, NUMBERS, REFUSED = (TABLE.pop(name) for name in ("files", "numbers", "refused"))
+COMMANDS = [(command, name) for command in TABLE for name in TABLE[command]]
+NEEDS = {"walk.csv": ("check", "files"), "plate.result": ("check", "files"),
+         "long.result": ("check", "no motion to write"), "greedy.result": ("check", "greedy"),
+         "cut.result": ("check", "cut"), "exhausted.result": ("check", "greedy without a motion")}  # fmt: skip
+BROKEN = {"empty.stl": b"", "zip.stl": b"PK\x03\x04" + bytes(200), "page.stl": b"<html>",
+          "cut.stl": b"x" * 80 + b"\xff\xff\xff\x7f" + bytes(50)}  # fmt: skip
+
+
+def sheet(count: int = 4, size: float = 0.2) -> str:
+    """A flat square of triangles that looks up, as OFF."""
+    step, row = size / count, count + 1
+    points = [f"{i * step} {j * step} 0" for i in range(row) for j in range(row)]
+    corners = [i * row + j for i in range(count) for j in range(count)]
+    faces = [f"3 {k} {k + a} {k + b}" for k in corners for a, b in ((row, row + 1), (row + 1, 1))]
+    return "\n".join(["OFF", f"{len(points)} {len(faces)} 0", *points, *faces, ""])
+
+
+class Commands:
+    """Runs the commands of the table in its folder, each once."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.run = cache(self._run)
+        for name, text in FILES.items():
+            (folder / name).write_text(text)
+        for name, content in BROKEN.items():
+            (folder / name).write_bytes(content)
+        (folder / "sheet.off").write_text(sheet())
+        (folder / "mm.off").write_text(sheet(size=200.0))
+
+    def words(self, command: str, name: str) -> list[str]:
+        """The arguments of a command."""
+        return [command, *shlex.split(TABLE[command][name])]
+
+    def _run(self, command: str, name: str, *more: str) -> Said:
+        words = [*self.words(command, name), *more]
+        for file in set(words) & set(NEEDS):
+            if NEEDS[file] != (command, name):
+                self.run(*NEEDS[file])
+        return self.say(words)
+
+    def say(self, words: list[str]) -> Said:
+        """Run `coverable` with these arguments in the folder."""
+        before = Path.cwd()
+        os.chdir(self.folder)
+        try:
+            return asked(*words)
+        finally:
+            os.chdir(before)
+
+    def page(self, command: str, name: str) -> str:
+        """The page that a command with --html wrote."""
+        self.run(command, name)
+        words = self.words(command, name)
+        return (self.folder / words[words.index("--html") + 1]).read_text("utf-8")
