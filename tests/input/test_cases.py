@@ -226,14 +226,6 @@ def test_every_two_faults_come_together_and_all_of_them_once(tmp_path: Path) -> 
         assert len(set(lines)) == len(lines)
 
 
-def test_many_faults_stay_readable() -> None:
-    with pytest.raises(CaseError) as caught:
-        Case.from_toml(GOOD_CASE + "\n".join(f"k{k} = 1" for k in range(3000)))
-    assert len(caught.value.faults) == 3000
-    assert len(str(caught.value).splitlines()) == 22
-    assert str(caught.value).endswith("... and 2980 more")
-
-
 def test_a_missing_urdf_is_told_before_kernels_are_compiled(tmp_path: Path) -> None:
     lay_out(tmp_path)
     text = changed(goods("case")["mesh"], ["robot.name", "robot.limits", 'robot.urdf = "no.urdf"'])

@@ -172,28 +172,6 @@ def test_a_table_names_its_keys_each_once(table: str) -> None:
     assert ", ".join(keys_of(table)) in said
 
 
-@pytest.mark.parametrize(
-    ("table", "line", "words"),
-    [
-        ("surface", "standoff", "it belongs to [task]"),
-        (
-            "robot",
-            "kind",
-            "it belongs to [surface], [surface.pieces], [collision.scene] or [collision.tool]",
-        ),
-        ("task", "thickness", "it belongs to [collision]"),
-        ("collision", "name", "it belongs to [robot], [robot.axis] or [collision.scene]"),
-        ("task", "search", "it belongs to [search]"),
-        ("surface", "within_deg", "it belongs to [surface.facing]"),
-        ("search", "zzzz", "known are method, seed"),
-    ],
-)
-def test_a_key_of_another_table_is_sent_there(table: str, line: str, words: str) -> None:
-    tables = tables_of("sphere")
-    tables[table][line] = 1
-    assert words in faults_of(tables)[f"{table}.{line}"].message
-
-
 NOTHING = ("x", True, math.nan, math.inf, [], {}, [0, math.nan, 0])
 
 

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import bad_input
+import mesh_writers
 import numpy as np
 import pytest
-from bad_input import changed, goods, lay_out, stl
+from bad_input import changed, goods, lay_out
 
 import surfaces
 from feasibility.cases import OWN_KEYS, Case, CaseError, load_case
@@ -138,10 +139,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "net.json").write_text(json.dumps({"points": points, "degree": [2, 2]}))
     rows = [f"{i},{j},{','.join(map(repr, points[i][j]))}" for i in range(3) for j in range(3)]
     (tmp_path / "net.csv").write_text("\n".join(["row,column,x,y,z", *rows]))
-    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * 0.2
-    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    faces = [[q[0], *q[k : k + 2]] for q in quads for k in (1, 2)]
-    (tmp_path / "cube.stl").write_bytes(stl(corners[faces]))
+    (tmp_path / "cube.stl").write_bytes(mesh_writers.stl(*mesh_writers.cube()))
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

@@ -124,19 +124,6 @@ def test_external_entities_and_the_environment_are_not_read(
     assert b'"none"' in expanded(one_file(tmp_path, '<link name="$(optenv SECRET none)"/>')).text
 
 
-@pytest.mark.parametrize(
-    "expression",
-    [
-        "().__class__", "[x.__class__ for x in [1]]", "(lambda: (lambda: 1).__globals__)()",
-        "(x for x in [1]).gi_frame", "a.f_back", "a.f_globals", "type(1).mro()",
-        "__import__('os')", "(lambda __x: __x)(1)",
-    ],
-)  # fmt: skip
-def test_names_that_lead_out_of_an_expression_are_refused(expression: str) -> None:
-    with pytest.raises(child.Refused, match="in an expression"):
-        child.evaluate(expression, {})
-
-
 def test_an_expression_has_no_built_in_names() -> None:
     assert child.evaluate(" max(a, 2) ** 2 ", {"max": max, "a": 3}) == 9
     for name in ("open", "exec", "getattr", "print"):

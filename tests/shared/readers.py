@@ -21,6 +21,7 @@ import bad_input
 import hostile_visuals as hostile
 import numpy as np
 import pinocchio as pin
+from mesh_files import GOOD
 from small_cases import small_case, small_verdict
 
 from coverable_meshes import MeshFiles
@@ -275,12 +276,6 @@ def _text(reader: str, name: str) -> Callable[[], bytes]:
     return lambda: bad_input.many(bad_input.goods(reader)[name].replace("§", "")).encode()
 
 
-def _stl_text() -> bytes:
-    facet = "facet normal 0 0 1\nouter loop\n{}endloop\nendfacet\n"
-    rows = ["".join(f"vertex {x} {y} {z}\n" for x, y, z in face) for face in bad_input.sheet()]
-    return f"solid part\n{''.join(map(facet.format, rows))}endsolid part\n".encode()
-
-
 def _npy_grid() -> bytes:
     x, y = np.meshgrid([0.0, 0.1, 0.2], [0.0, 0.1, 0.2], indexing="ij")
     return npy(np.stack([x, y, x * y], axis=2))
@@ -292,15 +287,6 @@ def _net_csv() -> bytes:
     return "\n".join(["row,column,x,y,z", *rows, ""]).encode()
 
 
-PATCH = "OFF\n4 2 0\n0 0 0\n1 0 0\n0 1 0\n1 1 0.5\n3 0 1 2\n3 1 3 2\n"
-MESHES = {
-    "binary STL": ("part.stl", lambda: bad_input.stl(bad_input.sheet())),
-    "STL in words": ("part.stl", _stl_text),
-    "OBJ": ("part.obj", lambda: b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 .5\nf 1 2 3\nf 2 4/1/1 3\n"),
-    "PLY": ("part.ply", lambda: hostile.ply().encode()),
-    "OFF": ("part.off", PATCH.encode),
-    "GLB": ("part.glb", lambda: hostile.glb(*hostile.scene_of())),
-}
 READERS = {
     "case": Reader("case.toml", load_case, _text("case", "sphere"), sound_case),
     "study": Reader("study.toml", load_study, STUDY.encode, lambda study, _: None),
@@ -319,8 +305,10 @@ READERS = {
         lambda given, _: made_or_refused(lambda: poses(**given._asdict())),
     ),
     **{
-        name: Reader(file, lambda path: read_mesh(path, 1.0), good, sound_mesh)
-        for name, (file, good) in MESHES.items()
+        file: Reader(
+            file, lambda path: read_mesh(path, 1.0), lambda file=file: GOOD[file], sound_mesh
+        )
+        for file in GOOD
     },
     "GLB of a robot": Reader(
         "part.glb",
