@@ -131,7 +131,7 @@ def test_the_greedy_search_can_be_asked_for(ask):
     ],
 )
 def test_a_bad_case_is_status_2_and_one_message(name, ask, tmp_path):
-    """Every bad case is read in test_case.py; these come from different readers."""
+    """Every bad case is read in test_approved.py; these come from different readers."""
     path = write(tmp_path, BAD_CASES[name].content)
     status, out, err = ask("check", path, "--json")
     assert out == ""

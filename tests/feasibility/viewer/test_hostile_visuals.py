@@ -1,7 +1,7 @@
 """Pictures of robots that are traps: counted before they are made, and nothing beside them opened.
 
 All of them, many times over and with limits on memory and time, are in
-`tests/campaigns/test_hostile_files.py`.
+`tests/input/test_limits.py`.
 """
 
 from __future__ import annotations
