@@ -128,7 +128,9 @@ def scene_outline(commands: Any) -> list[str]:
                      for end in (ends.min(axis=0), ends.max(axis=0)))  # fmt: skip
         box = " ".join(f"{a:.2f}..{b:.2f}" for a, b in zip(low, high, strict=True))
         lines.append(f"{_short(path)}: {box}")
-    moving = dict.fromkeys(f"{_short(re.sub('[0-9]+$', '#', p))} {n}" for p, n in tracks_of(commands))
+    moving = dict.fromkeys(
+        f"{_short(re.sub('[0-9]+$', '#', p))} {n}" for p, n in tracks_of(commands)
+    )
     return [*lines, *(f"moves: {one}" for one in moving)]
 
 
@@ -136,7 +138,9 @@ def _short(path: str) -> str:
     """A path without the joints that lead to its last one."""
     root, *names = path.strip("/").split("/")
     joints = [k for k, name in enumerate(names) if name.startswith("joint ")]
-    return "/".join(["", root, *(["..."] if joints[1:] else []), *names[joints[-1] if joints else 0 :]])
+    return "/".join(
+        ["", root, *(["..."] if joints[1:] else []), *names[joints[-1] if joints else 0 :]]
+    )
 
 
 def fetched(text: str) -> list[str]:
@@ -148,5 +152,3 @@ def fetched(text: str) -> list[str]:
     tags = {"link", "object", "base", "embed"} & set(own.tags)
     return [*re.findall(r"\w+://[\w./]*", plain.replace("http://www.w3.org/2000/svg", "")),
             *asked, *tags]  # fmt: skip
-
-

@@ -517,7 +517,9 @@ TRIAL = {
     "rpy_deg": of(lambda one: list(one.pose.rpy_deg), [float]),
     "stage": of("stage", str),
     **{name: of(name, float) for name in ("in_reach", "probed", "share", "margin")},
-    "margins": of("margins", Maybe({name: of(name, float) for name in ("limits", "cone", "reach")})),
+    "margins": of(
+        "margins", Maybe({name: of(name, float) for name in ("limits", "cone", "reach")})
+    ),
     "cells": of(lambda one: one.covers.shape[1], int),
     "verdict": of("answer", Maybe(str)),
     "evidence": of("evidence", Maybe(str)),
@@ -649,8 +651,8 @@ def _finite(source: Any) -> bool:
 
 def _same(value: Any, source: Any, path: str) -> None:
     if source is not UNKNOWN:
-        source = source if isinstance(value, (dict, list)) or not isinstance(value, str) else str(
-            source
+        source = (
+            source if isinstance(value, (dict, list)) or not isinstance(value, str) else str(source)
         )
         assert close(value, source), f"{path}: {value!r}, and not {source!r}"
 

@@ -4,10 +4,11 @@ import threading
 from types import SimpleNamespace
 
 import pytest
-from guards import GUARD_S
 
 from feasibility.live.jobs import ALONE, Job, Superseded
 from feasibility.live.sessions import LEASE, MOST, Gone, Sessions, TooManyPages
+
+GUARD_S = 1800.0
 
 
 class Worker:

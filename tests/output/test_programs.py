@@ -7,10 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_cases import TEXTS
 from timed_motions import TURN, UR5, at, motion
 
-from feasibility.cli.main import main
 from feasibility.programs import (
     ProgramError,
     ProgramSettings,
@@ -138,18 +136,3 @@ def test_signs_and_endings_are_checked(tmp_path):
     with pytest.raises(FileError, match=r"\.script"):
         save_program(tmp_path / "a.prg", UR5, motion(UR5))
     assert list(tmp_path.iterdir()) == []
-
-
-def test_the_command_writes_them(tmp_path, capsys):
-    case, out = tmp_path / "panel.toml", tmp_path / "run.script"
-    case.write_text(TEXTS["plate"])
-    assert main(["path", str(case), "--program", str(out), "--json"]) == 0
-    assert f"program: {out}" in capsys.readouterr().err
-    time, q = read_script(out.read_text())
-    assert time[-1] > 1.0
-    assert ((q >= UR5.lower) & (q <= UR5.upper)).all()
-    for file, status in (("run.mod", "is of Universal Robots"), ("run.txt", ".src (KUKA KRL)")):
-        assert main(["path", str(case), "--program", str(tmp_path / file)]) == 2
-        assert status in " ".join(capsys.readouterr().err.split())
-    assert main(["path", str(case), "--program", str(out), "--axis-signs", "1,2"]) == 2
-    assert "six numbers" in capsys.readouterr().err

@@ -9,8 +9,6 @@ from pass_metrics import panel_with_hole
 from scipy.spatial.transform import Rotation
 from timed_motions import UR5, motion
 
-from feasibility.cases import Case
-from feasibility.cli.main import main
 from feasibility.programs import ProgramSettings, save_program, working_places, working_times
 from robots import Axis, Kinematics, load_robot
 from surfaces import plane
@@ -51,12 +49,12 @@ def states(text, move):
     return np.array(found), switches
 
 
-def test_a_tool_is_off_while_it_is_lifted(tmp_path, capsys):
+def test_a_tool_is_off_while_it_is_lifted(tmp_path, ask):
     case, out = tmp_path / "plate.toml", tmp_path / "run.script"
     case.write_text(PLATE)
     passes = ["--passes", "0", "--pitch", "0.06", "--one-way", "--approach", "0.05"]
     switch = ["--program", str(out), "--on", "ON", "--off", "OFF"]
-    assert main(["path", str(case), *passes, *switch]) == 0
+    assert ask("path", case, *passes, *switch).status == 0
     text = out.read_text()
     on, switches = states(text, "servoj")
     rows = re.findall(r"servoj\(\[(.*?)\]", text)
@@ -162,50 +160,6 @@ def test_the_head_has_the_frames_of_tool_and_part(tmp_path, ending):
         assert np.abs(place - 1e3 * point).max() <= 2e-3
         assert np.abs(rotation.as_matrix() - turn).max() <= 2e-6
     assert "No controller has run a program" in text
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["--program", "a.mod"], "RAPID is for arms of ABB"),
-        (["--program", "a.txt"], ".ls (FANUC TP) or .jbi (Yaskawa INFORM)"),
-        (["--out", "a.txt"], ".csv, .json or .yaml"),
-        (["--on", "ON", "--off", "OFF"], "--on is of no program; give --program FILE"),
-        (["--program", "a.script", "--on", "ON"], "--off is missing: on and off go together"),
-        (["--program", "a.script", "--on", "A\nB", "--off", "C"], "--on must be one line of plain"),
-        (
-            ["--program", "a.script", "--on", "A", "--off", "B\x1b"],
-            "--off must be one line of plain",
-        ),
-        (["--program", "a.script", "--on", "\N{BULLET}", "--off", "B"], "--on must be one line"),
-        (["--program", "a.script", "--on", " ", "--off", "B"], "--on is missing"),
-        (
-            ["--program", "a.script", "--axis-signs", "1,1,1,1,1,2"],
-            "--axis-signs must be 6 numbers",
-        ),
-        (
-            ["--program", "a.mod", "--program", "a.src", "--on", "A", "--off", "B"],
-            "--on is a line of one language, and the programs are KRL or RAPID",
-        ),
-    ],
-)
-def test_what_cannot_be_written_is_refused_before_anything_is_built(
-    tmp_path, monkeypatch, capsys, arguments, said
-):
-    case = tmp_path / "plate.toml"
-    case.write_text(PLATE)
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(Case, "build", None)
-    assert main(["path", str(case), *arguments]) == 2
-    assert said in " ".join(capsys.readouterr().err.split())
-    assert list(tmp_path.iterdir()) == [case]
-
-
-def test_a_case_without_an_arm_says_so_and_not_something_about_programs(tmp_path, capsys):
-    case = tmp_path / "plate.toml"
-    case.write_text(PLATE.replace('name = "ur5"', 'urdf = "nowhere.urdf"'))
-    assert main(["path", str(case), "--program", str(tmp_path / "a.script")]) == 2
-    assert "nowhere.urdf" in capsys.readouterr().err
 
 
 def test_external_axes_carry_a_part(tmp_path):

@@ -6,6 +6,7 @@ import json
 import zipfile
 
 import pytest
+from ask import asked
 
 from coverable_errors import ArgumentError
 from feasibility import Search, greedy_check
@@ -77,13 +78,13 @@ OTHERS = {
 
 
 def test_every_key_is_a_demand_with_a_judge_or_has_a_reason_to_be_none():
-    asked = [key for demand in DEMANDS for key in demand.keys]
-    assert len(asked) == len(set(asked))
+    judged = [key for demand in DEMANDS for key in demand.keys]
+    assert len(judged) == len(set(judged))
     assert set(IMPOSSIBLE) == {demand.name for demand in DEMANDS}
     for key in all_keys():
         if key.table.partition(".")[0] in ("robot", "task", "collision"):
             names = f"{key.table}.{key.name}", f"{key.table}.*", f"{key.table.partition('.')[0]}.*"
-            known = [name for name in names if name in asked or name in NO_DEMANDS]
+            known = [name for name in names if name in judged or name in NO_DEMANDS]
             assert known, f"{names[0]}: who judges it (feasibility/demands.py), or why nobody?"
     (commands,) = (action for action in _parser()._actions if action.choices)
     assert set(commands.choices) == JUDGING | set(OTHERS)
@@ -92,14 +93,12 @@ def test_every_key_is_a_demand_with_a_judge_or_has_a_reason_to_be_none():
 @pytest.fixture(scope="module")
 def known(tmp_path_factory):
     """A feasible case: its file, its motion, its result, and the result of the greedy search."""
-    from feasibility.cli.main import main
-
     folder = tmp_path_factory.mktemp("demands")
     case, motion, found, tree = (str(folder / name) for name in ("a.toml", "a.csv", "a", "tree"))
     (folder / "a.toml").write_text(CASE)
-    assert main(["check", case, "--witness", motion, "--save", found]) == 0
+    assert asked("check", case, "--witness", motion, "--save", found).status == 0
     settings = [part for setting in GREEDY for part in ("--set", setting)]
-    assert main(["check", case, *settings, "--save", tree]) == 0
+    assert asked("check", case, *settings, "--save", tree).status == 0
     return case, motion, found, tree
 
 
@@ -119,7 +118,7 @@ def says_yes(ask, known, settings):
     """What says that the motion is there: commands, and the search for a placement."""
     case, motion, found, tree = known
     flags = [part for setting in settings for part in ("--set", setting)]
-    asked = {
+    commands = {
         "check": ("check", case, *flags),
         "verify a motion": ("verify", case, motion, *flags),
         "verify a result": ("verify", with_settings(found, settings)),
@@ -128,7 +127,7 @@ def says_yes(ask, known, settings):
         "explain": ("explain", case, *flags),
         "path": ("path", case, *flags),
     }
-    said = {name for name, args in asked.items() if ask(*args)[0] == 0}
+    said = {name for name, args in commands.items() if ask(*args).status == 0}
     setup = load_case(case, settings).build()
     here = Pose.of_surface(setup.cells.surface)
     region = Region.around(here, {"x": (here.position[0] - 1e-3, here.position[0] + 1e-3)})

@@ -1,14 +1,23 @@
 """The drawn arm: every link, in the right place, whatever its files are like."""
 
+import re
+import sys
+from pathlib import Path
+
+import hostile_visuals as hostile
 import numpy as np
 import pinocchio as pin
 import pytest
 import trimesh
+from hostile_parts import urdf, visual, write
+from page_outline import faces_of, points_of
+from samples import sampled, spread
 
+from coverable_meshes import MeshError, MeshFiles, robot_files
 from feasibility.viewer.meshes import Mesh, shaded, thinned, tubes
-from feasibility.viewer.robot import TRIANGLES, draw, joint_paths, joint_placements
+from feasibility.viewer.robot import TRIANGLES, draw, joint_paths
 from feasibility.viewer.threejs import safe_name
-from robots import Kinematics, load_robot
+from robots import load_robot
 from robots.urdf import check_urdf
 
 TWO_LINKS = (
@@ -27,14 +36,12 @@ def drawn(robot):
     """Path -> (vertices, number of faces) of every mesh of the drawing."""
     found = {}
     for command in draw(robot).commands:
+        points, faces = points_of(command), faces_of(command)
+        assert faces.max() < len(points)
         data = command["object"]["geometries"][0]["data"]
-        where = np.frombuffer(data["attributes"]["position"]["array"].data, "<f4")
-        kind = "<u2" if data["index"]["type"] == "Uint16Array" else "<u4"
-        faces = np.frombuffer(data["index"]["array"].data, kind).reshape(-1, 3)
-        assert faces.max() < len(where) // 3
         normals = np.frombuffer(data["attributes"]["normal"]["array"].data, "i1").reshape(-1, 3)
         assert np.allclose(np.linalg.norm(normals / 127.0, axis=1), 1.0, atol=0.02)
-        found[command["path"]] = (where.reshape(-1, 3), len(faces))
+        found[command["path"]] = (points, len(faces))
     return found
 
 
@@ -44,23 +51,20 @@ def two_links(folder, base="", arm=""):
     return load_robot(str(file))
 
 
-# Of many and large files; tried in the campaign larger_samples.
-LARGE = ("panda", "baxter_left")
-
-
-@pytest.mark.parametrize("name", ["puma560", "ur5", "xarm7"])
+@sampled
+@pytest.mark.parametrize("name", spread(["puma560", "ur5", "panda", "baxter_left", "xarm7"], 2))
 def test_every_link_with_visuals_is_drawn_whole_and_within_its_own_shape(name):
     robot = load_robot(name)
     checked = check_urdf(robot.urdf, package_dirs=robot.package_dirs)
     assert not [warning for warning in checked.warnings if warning.startswith("not drawn")]
     parts = drawn(robot)
     paths = joint_paths(robot)
-    for link in {visual.link for visual in checked.visuals}:
+    for link in {one.link for one in checked.visuals}:
         frame = robot.model.frames[robot.model.getFrameId(link, pin.FrameType.BODY)]
         start = f"{paths[frame.parentJoint]}/link {safe_name(link)}/part "
         points = np.concatenate([p for path, (p, _) in parts.items() if path.startswith(start)])
         local = (points - frame.placement.translation) @ frame.placement.rotation
-        bounds = np.array([extent(visual) for visual in checked.visuals if visual.link == link])
+        bounds = np.array([extent(one) for one in checked.visuals if one.link == link])
         low, high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
         assert np.allclose([local.min(axis=0), local.max(axis=0)], [low, high], atol=0.02), link
     assert sum(count for _, count in parts.values()) <= TRIANGLES
@@ -135,16 +139,6 @@ def test_an_arm_without_pictures_is_a_chain_of_capsules(tmp_path):
     assert "two.urdf" in note
 
 
-def test_joint_placements_compose_to_pinocchios_tool():
-    robot = load_robot("kinova")  # three continuous joints
-    rng = np.random.default_rng(1)
-    walk = rng.uniform(-3, 3, (20, robot.n))
-    tip = robot.model.frames[robot.model.getFrameId(robot.tool_frame)].placement.homogeneous
-    for q, steps in zip(walk, joint_placements(robot, walk), strict=True):
-        place = np.linalg.multi_dot([*steps, tip])
-        assert np.allclose(place[:3, 3], Kinematics(robot).tool(q)[0], atol=1e-12)
-
-
 def test_thinning_keeps_the_shape_and_the_budget():
     ball = trimesh.creation.icosphere(subdivisions=6, radius=0.1)
     mesh = Mesh(np.asarray(ball.vertices), np.asarray(ball.faces), (0.5, 0.5, 0.5))
@@ -181,3 +175,68 @@ def test_tubes_run_around_their_lines_at_their_radius():
     centre = np.repeat(arc, 5, axis=0)
     assert np.allclose(np.linalg.norm(vertices[:200] - centre, axis=1), 0.01)
     assert tubes([], 0.01)[1].shape == (0, 3)
+
+
+# -- traps: counted before they are made, and nothing beside them opened --------------------------
+
+LIGHT = [maker for maker in hostile.MAKERS if maker is not hostile.just_drawn]
+opened: list[str] = []
+sys.addaudithook(lambda event, facts: opened.append(str(facts[0])) if event == "open" else None)
+
+
+@pytest.mark.parametrize("maker", LIGHT, ids=lambda maker: maker.__name__)
+def test_a_trap_is_a_note_or_is_left_alone(maker, tmp_path, capfd):
+    path, words = hostile.make(maker, 0, tmp_path / "robot")
+    robot = load_robot(path)
+    opened.clear()
+    drawing = draw(robot)
+    mesh = re.search('filename="(.*?)"', Path(path).read_text())
+    inside = {Path(name).name for name in opened if name.startswith(str(tmp_path))}
+    assert inside <= {"arm.urdf", mesh[1]}, "nothing beside the mesh is opened"
+    assert not [name for name in opened if name.startswith(("/dev", "/etc"))]
+    assert capfd.readouterr() == ("", "")
+    if words:
+        (note,) = drawing.notes
+        assert re.search(f"^not drawn: .*{words}", note)
+    else:
+        assert (drawing.notes, len(drawing.commands)) == ((), 1), "the triangle"
+
+
+def hostile_robot(folder, visuals):
+    return str(folder / write(folder, "arm.urdf", urdf(visuals)))
+
+
+def test_a_mesh_that_is_used_often_is_read_once(tmp_path):
+    names = [write(tmp_path, f"{k}.stl", hostile.stl(k + 1)) for k in range(3)]
+    broken = write(tmp_path, "broken.stl", b"")
+    shapes = "".join(visual(name) for name in (*names, broken) * 300)
+    robot = load_robot(hostile_robot(tmp_path, shapes))
+    opened.clear()
+    (note,) = draw(robot).notes
+    own = [Path(name).name for name in opened if name.endswith(".stl")]
+    assert sorted(set(own)) == ["0.stl", "1.stl", "2.stl", "broken.stl"]
+    assert len(own) <= 2 * 4
+    assert note.startswith("not drawn: a shape of link base and 299 more: broken.stl: is empty")
+
+
+def test_the_triangles_of_all_shapes_together_are_capped(tmp_path, monkeypatch):
+    """Copies of one mesh count, and so do spheres; what came before is drawn."""
+    assert robot_files.MOST_TRIANGLES == 1_500_000
+    monkeypatch.setattr(robot_files, "MOST_TRIANGLES", 60_000)
+    mesh = visual(write(tmp_path, "large.stl", hostile.stl(4_000)))
+    ball = '<visual><geometry><sphere radius="0.1"/></geometry></visual>'
+    drawing = draw(load_robot(hostile_robot(tmp_path, mesh * 18 + ball)))
+    (note,) = drawing.notes
+    assert "link base and 3 more: the robot's shapes have more than 60,000" in note
+    assert 0 < sum(len(faces_of(command)) for command in drawing.commands) <= 4 * 4 * TRIANGLES
+
+
+def test_no_other_file_is_opened_after_the_time_is_up(tmp_path):
+    now = [0.0]
+    files = MeshFiles(clock=lambda: now[0])
+    paths = [str(tmp_path / write(tmp_path, f"{k}.stl", hostile.stl(1))) for k in range(2)]
+    assert len(files.parts(paths[0])) == 1
+    now[0] = 8.1
+    assert len(files.parts(paths[0])) == 1, "it was read before"
+    with pytest.raises(MeshError, match=r"reading took more than 8 s; thin the robot's meshes"):
+        files.parts(paths[1])
