@@ -26,12 +26,11 @@ from feasibility.placement import (
 )
 from feasibility.placement.evaluator import Margins
 from feasibility.placement.stations import fewest_stations
-from feasibility.reports.placement import as_text
 from feasibility.studies import Row, open_workers, run_tasks
 from feasibility.studies.file import read_study
 from feasibility.viewer import poses as pose_layers
 from feasibility.viewer import view_placements, view_study
-from feasibility.viewer.placements import NEARER, same_frame
+from feasibility.viewer.placements import same_frame
 from feasibility.viewer.poses import (
     COLOURS,
     MOST,
@@ -43,7 +42,6 @@ from feasibility.viewer.poses import (
     class_of_share,
     outline,
 )
-from feasibility.viewer.stage import FRAMED
 from feasibility.viewer.threejs import hex_colour
 from robots import load_robot
 from surfaces import cylinder, mesh, plane, sphere, torus
@@ -270,48 +268,6 @@ def test_the_best_placement_plays_the_motion_that_check_finds():
         assert near.max() < 3e-3
 
 
-def test_what_the_best_one_covers_is_filled_where_none_is_feasible():
-    """The first trial covers all but one of the cells."""
-    whole = fabricated()
-    asked = replace(whole, trials=whole.trials[2:])
-    view = view_placements(asked)
-    labels = [entry.label for entry in view.legend.entries]
-    assert "covered there in one motion (5 cells)" in labels
-    assert "not covered there (1 cell)" in labels
-    drawn = objects(view.commands)["/best/not covered there"]
-    there = moved_cells(CELLS, asked.trials[0].pose)
-    np.testing.assert_allclose(
-        (drawn.min(axis=0) + drawn.max(axis=0)) / 2, there.centres[5], atol=1e-4
-    )
-    assert "the best covers 83.3 % of the area" in view.legend.text
-
-
-def test_a_region_out_of_reach_claims_no_share():
-    """Ruled out by proof: no outline but grey ones, and no word of 0 %."""
-    region = Region.around(Pose.of_surface(PLATE), {"x": (3.0, 3.4)})
-    view = view_placements(place(ur5(), CELLS, TASK, region))
-    assert [e.colour for e in classes_of(view).values()] == [COLOURS[Class.UNSEARCHED]]
-    assert "out of reach" in view.legend.text
-    assert "%" not in view.legend.text
-    assert "the best of them" not in [entry.label for entry in view.legend.entries]
-
-
-def test_where_the_time_ran_out_at_once_the_surface_alone_is_drawn():
-    """Nothing was tried, so nothing is said of reach, and no share."""
-    region = Region.around(Pose.of_surface(PLATE), {"x": (0.4, 0.6)})
-    late = place(ur5(), CELLS, TASK, region, time_limit=1e-9)
-    assert late.trials == ()
-    view = view_placements(late)
-    assert "no placement was tried" in view.legend.text
-    assert "reach" not in view.legend.text
-    assert classes_of(view) == {}
-    drawn = objects(view.commands)["/surface/patch"]
-    np.testing.assert_allclose(drawn.min(axis=0), [0.35, -0.1, 0.2], atol=2e-5)
-    np.testing.assert_allclose(drawn.max(axis=0), [0.65, 0.1, 0.2], atol=2e-5)
-    assert "%" not in as_text(late)
-    assert "no placement" in as_text(late)
-
-
 def test_stations_are_drawn_where_they_stand():
     where = poses(2)
     masks = np.array([[1, 1, 1, 1, 0, 0], [0, 0, 0, 1, 1, 1]], dtype=bool)
@@ -336,22 +292,6 @@ def test_stations_are_drawn_where_they_stand():
     assert shown["station 1 (4 cells)"]
     assert shown["station 2 (2 cells)"]
     assert not shown["the best of them"]
-
-
-def test_everything_shown_is_in_the_picture():
-    """Seen from the camera, every point is within the angle that the lens takes in."""
-    region = Region.around(Pose.of_surface(PLATE), {"x": (0.3, 0.7), "yaw_deg": (0, 60)})
-    view = view_placements(place(ur5(), CELLS, TASK, region, count=8, around=1, keep=2))
-    eye, target = np.array(view.camera.eye), np.array(view.camera.target)
-    axis = (target - eye) / np.linalg.norm(target - eye)
-    widest = np.arcsin(np.sin(FRAMED) / NEARER)
-    assert widest < np.arctan(np.tan(np.radians(37.5)) / view.camera.zoom) + 0.02
-    drawn = objects(view.commands)
-    shown = [entry for entry in classes_of(view).values() if entry.shown]
-    assert [entry.path for entry in shown] == ["/poses/feasible"]
-    toward = drawn["/poses/feasible"] - eye
-    angle = np.arccos(toward @ axis / np.linalg.norm(toward, axis=1))
-    assert angle.max() <= widest + 0.01  # tubes are as thick as they are
 
 
 # -- studies ----------------------------------------------------------------------------------
@@ -405,14 +345,6 @@ def test_a_study_is_drawn_for_the_arm_of_its_best_row():
     )  # fmt: skip
     verdict = check(*case.build())
     np.testing.assert_array_equal(view.motion.walk, verdict.witness.q)
-
-
-def test_a_study_needs_a_row_for_each_task():
-    study, rows = decided()
-    with pytest.raises(ValueError, match="got 11 for 12 tasks"):
-        view_study(study.tasks, rows[1:])
-    with pytest.raises(ValueError, match="got 0"):
-        view_study([], [])
 
 
 def test_only_the_pose_may_differ_within_a_picture():
