@@ -1,9 +1,9 @@
 # make demo   set up .venv and decide paper/4a        make bench  the table of speeds
 # make test   set up .venv and run every check        make clean  remove what was made
 # make lint   style and types alone                   make distclean   the same, and .venv
-# make campaign NAME=oracle   what takes too long for make test (tests/campaigns)
+# make campaign NAME=oracle   the same tests with all that takes too long for make test; all without NAME
 # make bench BENCH=old.json   the same, with figures in that file and not in out/bench.json
-# make bench-compare OLD=old.json NEW=new.json   what became slower, and counts that changed
+# make bench-compare OLD=old.json NEW=new.json   two such files side by side
 # make mutants ONLY=stretches   small faults put into the code: which of them no test finds; all without ONLY
 # make test-browser   the live page, by mouse and keyboard, in a Chromium
 # make wheel  a wheel in dist/ that brings compiled kernels, for this platform, Python and numba
@@ -48,6 +48,7 @@ demo: .venv/installed
 lint: .venv/installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/lint-imports
 	$(BIN)/mypy
 
 # Compiles kernels into the cache; one processor is enough for that: the complete search, areas and collisions,
@@ -78,21 +79,23 @@ test-browser:
 	$(BIN)/python -m pytest -rP -p no:nbmake tests/browser/test_live_in_browser.py
 
 campaign: .venv/installed
-	$(BIN)/python -m pytest -n 2 --dist loadfile -rP tests/campaigns/test_$(NAME).py
+	$(BIN)/python -m pytest -n 2 --dist loadfile -rP -p no:nbmake -m sampled --samples=all -k "$(NAME)" tests
 
 mutants: .venv/installed
 	$(BIN)/python tests/mutants/mutants.py "$(ONLY)"
 
-# The tables, on the screen and as JSON; TABLES="greedy path" makes those alone. Where the machine is
-# not quiet, ROUNDS=3 makes all of them three times and keeps the least of each time.
+# Processor times, in a table and as JSON with counts beside them; BENCH_ARGS="-k greedy" runs those alone.
 BENCH := out/bench.json
 bench: .venv/installed
-	$(BIN)/python tests/benchmarks/run.py --json "$(BENCH)" $(addprefix --rounds=,$(ROUNDS)) $(TABLES)
+	@mkdir -p $(dir $(BENCH))
+	$(BIN)/python -m pytest tests/benchmarks -p pytest_benchmark.plugin -p no:nbmake -q \
+	    -o python_files='bench_*.py' -o python_functions='bench_*' --benchmark-timer=time.process_time \
+	    --benchmark-columns=min,median,rounds --benchmark-sort=fullname --benchmark-json=$(BENCH) $(BENCH_ARGS)
 
 # make takes words for targets, so the two files are variables; NEW is what make bench wrote last.
 bench-compare: NEW := $(BENCH)
 bench-compare: .venv/installed
-	@$(BIN)/python tests/benchmarks/benchmark_compare.py "$(OLD)" "$(NEW)"
+	@$(BIN)/pytest-benchmark compare "$(OLD)" "$(NEW)" --group-by=fullname --columns=min --sort=fullname
 
 clean:
 	rm -rf out build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis

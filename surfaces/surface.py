@@ -161,7 +161,7 @@ class Surface(Protected, ABC):
 
 
 def points_of(points: ArrayLike) -> Array:
-    """Points as an array (..., 3).
+    """Points as an array (..., 3); one that is not finite is NaN.
 
     Raises:
         ArgumentError: they do not end in an axis of length 3.
@@ -169,7 +169,8 @@ def points_of(points: ArrayLike) -> Array:
     array = np.asarray(points, dtype=float)
     if array.shape[-1:] != (3,):
         raise ArgumentError(f"points must have shape (..., 3), got {array.shape}")
-    return array
+    finite = np.isfinite(array).all(axis=-1, keepdims=True)
+    return array if finite.all() else np.where(finite, array, np.nan)
 
 
 def max_principal_curvature(steps: Array, turns: Array) -> Array:

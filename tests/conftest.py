@@ -65,7 +65,8 @@ def pytest_ignore_collect(collection_path: Path) -> bool | None:
 
     One such file is a script because its libraries should not be loaded beside Pinocchio's.
     """
-    shared = collection_path.suffix == ".py" and not collection_path.name.startswith("test_")
+    asking = collection_path.name.startswith(("test_", "bench_"))
+    shared = collection_path.suffix == ".py" and not asking
     return True if shared else None
 
 

@@ -95,6 +95,7 @@ def replay_over_surface(
     offset = offset_surface(surface, surface.side_sign * task.standoff)
     judge = Judge(robot, less_deviations(task, surface), offset, cells, curves)
     margin, faults = limits(robot, rows)
+    faults += _too_vague(task, surface)
     if working is None:
         found = _tool_along(judge, rows, cells, marks)
         reached = cells_reached(robot, cells, task, rows, found.samples, marks)
@@ -204,6 +205,7 @@ def _with_what_follows(
     at = off_surface(followed, found.samples)
     kinematics, tolerance = Kinematics(judge.robot), judge.task.effective_tolerance
     faults = lifted_faults(surface.under.wall, rows, at, kinematics, tolerance)
+    faults += _too_vague(judge.task, surface.under)
     for part in followed_parts(judge, followed, rows, found.samples):
         one = _tool_along(over, part.q)
         most = np.maximum(most, one.most)
@@ -232,8 +234,28 @@ def less_deviations(task: Task, surface: Surface) -> Task:
     if not (off or leans):
         return task
     tolerance = task.effective_tolerance - off - task.standoff * leans
-    cone_deg = task.cone_deg - float(np.degrees(2.0 * np.arcsin(min(leans / 2.0, 1.0))))
+    cone_deg = task.cone_deg - _turn_deg(leans)
     return replace(task, tolerance=max(tolerance, 1e-12), cone_deg=max(cone_deg, 0.0))
+
+
+def _turn_deg(leans: float) -> float:
+    """Angle between unit vectors that are so far apart."""
+    return float(np.degrees(2.0 * np.arcsin(min(leans / 2.0, 1.0))))
+
+
+def _too_vague(task: Task, surface: Surface) -> list[MotionFault]:
+    """Faults of all motions: nothing is left of tolerance or cone, so the best would be wrong."""
+    off, leans = surface.deviations
+    faults = []
+    if off + task.standoff * leans >= task.effective_tolerance:
+        known = f"targets on the surface are known to {1e3 * (off + task.standoff * leans):.4g} mm"
+        allowed = f"{1e3 * task.effective_tolerance:g} mm are allowed"
+        faults.append(MotionFault(-1, 0.0, f"{known} only, {allowed}"))
+    if _turn_deg(leans) > task.cone_deg:
+        known = f"its normals are known to {_turn_deg(leans):.4g} deg only"
+        text = f"{known}, {task.cone_deg:g} deg are allowed"
+        faults.append(MotionFault(-1, 0.0, text))
+    return faults
 
 
 class _Between(NamedTuple):

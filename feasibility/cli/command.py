@@ -20,12 +20,14 @@ from typing import TYPE_CHECKING, Any
 from feasibility.cli.console import Bar, print_err, progress_bar
 from feasibility.interrupts import settle
 from feasibility.safe_files import FileError, check_writable, shown_path, write_whole
+from feasibility.search import Progress
 
 if TYPE_CHECKING:
     from feasibility.cases import Case, Setup
     from feasibility.clock import Clock
 
 Command = Callable[[argparse.Namespace, float], int]
+MakeClock = Callable[[float | None, Progress | None], "Clock"]
 
 STATUS = {"feasible": 0, "infeasible": 1, "undecided": 3}
 BAD_INPUT = 2
@@ -157,7 +159,7 @@ def open_case(
     with progress_bar() as progress:
         from coverable_errors import Fault
         from feasibility.cases import CaseError, load_case, unit_notes
-        from feasibility.clock import Clock, OutOfTime
+        from feasibility.clock import OutOfTime
         from feasibility.collisions import gather
         from feasibility.notices import CUTTING, MORE, compiling_notice
 
@@ -167,7 +169,7 @@ def open_case(
             raise CaseError(Fault("search.method", only_complete), case.name)
         check_case(case)
         limit = case.search.time_limit if time_limit is None else time_limit
-        clock = Clock(limit, progress).begin(time.monotonic() - (time.perf_counter() - began))
+        clock = command_clock(args, limit, progress, began)
         doing = "the arm was loaded and the surface cut into cells"
         try:
             with compiling_notice(notice=CUTTING), clock.enforced():
@@ -190,6 +192,16 @@ def open_case(
             text = f"The time limit of {clock.limit:g} s ran out while {doing}"
             files = [f"{flag}: {shown_path(path)}" for flag, path in outputs.items() if path]
             raise TooLate(case, f"{text}; nothing was searched.", files, began) from late
+
+
+def command_clock(
+    args: argparse.Namespace, limit: float | None, progress: Progress, began: float
+) -> Clock:
+    """The clock of a command, which runs since `time.perf_counter()` was `began`."""
+    from feasibility.clock import Clock
+
+    make: MakeClock = getattr(args, "clock", None) or Clock
+    return make(limit, progress).begin(time.monotonic() - (time.perf_counter() - began))
 
 
 def check_outputs(outputs: Mapping[str, str | None], given: str = "") -> None:

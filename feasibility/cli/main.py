@@ -15,7 +15,7 @@ from typing import NoReturn
 
 from coverable_errors import CoverableError
 from feasibility.cli import case_commands, listing, path, place, study_compare, verify, warm_up
-from feasibility.cli.command import BAD_INPUT, STATUS, TooLate, json_text
+from feasibility.cli.command import BAD_INPUT, STATUS, MakeClock, TooLate, json_text
 from feasibility.cli.console import prepare, print_err, print_out
 from feasibility.interrupts import INTERRUPTED, MESSAGE, interruptible, leave_at_once
 
@@ -58,11 +58,12 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str] | None = None, clock: MakeClock | None = None) -> int:
     """Run the command line.
 
     Args:
         argv: the arguments; default those of the process.
+        clock: makes the clock of the command from its time limit and progress; default `Clock`.
 
     Returns:
         The exit status; nothing is raised.
@@ -72,6 +73,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         with interruptible():
             prepare()
             args = _parser().parse_args(argv)
+            args.clock = clock
             try:
                 return int(args.run(args, began))
             except TooLate as late:

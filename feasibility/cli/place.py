@@ -163,8 +163,9 @@ def _further(
             if wanted:
                 chart = map_around_best(placements, evaluator, progress)
     except OutOfTime:
-        missing = [wanted] + ["map"] * (wanted != "map" and args.map is not None)
-        print_err(f"no {' and no '.join(missing)}: the time limit of {clock.limit:g} s ran out")
+        missing = [wanted] * bool(wanted) + ["map"] * (wanted != "map" and args.map is not None)
+        if missing:
+            print_err(f"no {' and no '.join(missing)}: the time limit of {clock.limit:g} s ran out")
     return plan, chart
 
 

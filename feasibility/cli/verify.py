@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import argparse
-import time
 from typing import TYPE_CHECKING
 
-from feasibility.cli.command import TooLate, add_case, add_command, json_text, open_case
+from feasibility.cli.command import (
+    TooLate,
+    add_case,
+    add_command,
+    command_clock,
+    json_text,
+    open_case,
+)
 from feasibility.cli.console import print_out, progress_bar
 from feasibility.cli.passes import add_layout, check_passes, places_asked
 from feasibility.safe_files import shown_path
@@ -83,7 +89,7 @@ def _result(args: argparse.Namespace, began: float) -> int:
     """Check a saved result."""
     with progress_bar() as progress:
         from coverable_errors import CoverableError
-        from feasibility.clock import Clock, OutOfTime
+        from feasibility.clock import OutOfTime
         from feasibility.results import ResultError, case_of_result, load_result
         from feasibility.verifying import verify as run
 
@@ -96,8 +102,7 @@ def _result(args: argparse.Namespace, began: float) -> int:
             )
         try:
             case = case_of_result(args.case).with_overrides(args.settings)
-            clock = Clock(case.search.time_limit, progress)
-            clock.begin(time.monotonic() - (time.perf_counter() - began))
+            clock = command_clock(args, case.search.time_limit, progress, began)
             progress(0, None, "verifying")
             with clock.enforced():
                 result = load_result(args.case)

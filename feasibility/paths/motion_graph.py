@@ -56,6 +56,8 @@ class MotionGraph:
     """Nodes over each cell."""
     edges: nx.Graph = field(default_factory=nx.Graph)
     """Each with its `motion`, from the node of lower index to the other, and its `length`."""
+    grows: bool = True
+    """May motions be made that are not known yet?"""
     _known: dict[tuple[int, bytes], int] = field(default_factory=dict)
 
     @staticmethod
@@ -154,6 +156,8 @@ def step_to(graph: MotionGraph, x: int, cell: int) -> list[int]:
     and the boundary of the cone, and towards the nearest nodes that are known there.
     """
     found = [y for y in graph.edges.neighbors(x) if graph.cell[y] == cell]
+    if not graph.grows:
+        return found
     near = [y for y in _nearest(graph, cell, graph.q[x]) if y not in found]
     found += [y for y in near[:GOALS] if _head_for(graph, x, y)]
     free = _follow(graph, x, cell, None)
@@ -168,7 +172,7 @@ def step_to(graph: MotionGraph, x: int, cell: int) -> list[int]:
 
 def join_self_motions(graph: MotionGraph, x: int) -> None:
     """Join a node with the nearest others over its cell, where a self-motion does."""
-    for y in _nearest(graph, graph.cell[x], graph.q[x])[:NEAREST]:
+    for y in _nearest(graph, graph.cell[x], graph.q[x])[: NEAREST if graph.grows else 0]:
         if y == x or graph.edges.has_edge(x, y):
             continue
         for a, b in ((x, y), (y, x)):

@@ -239,7 +239,7 @@ def _greedy(steps: csr_array, wanted: Mask) -> Ints:
     return np.array(found, dtype=np.int64)
 
 
-def least_length(centres: Array) -> float:
+def least_length(centres: Array, most_spanned: int = MOST_SPANNED) -> float:
     """m, no path through all of these points is shorter.
 
     A path through all points is a tree that spans them, so it is at least as long as the smallest
@@ -249,6 +249,7 @@ def least_length(centres: Array) -> float:
 
     Args:
         centres: (N, 3) m.
+        most_spanned: of more points the smaller bound is taken.
 
     Example:
         >>> least_length(np.array([[0.0, 0, 0], [1, 0, 0], [3, 0, 0], [1, 1, 0]]))
@@ -256,7 +257,7 @@ def least_length(centres: Array) -> float:
     """
     if len(centres) < 2:
         return 0.0
-    if len(centres) <= MOST_SPANNED:
+    if len(centres) <= most_spanned:
         apart = np.maximum(pdist(centres), np.finfo(float).tiny)
         return float(minimum_spanning_tree(squareform(apart)).sum())
     nearest = cKDTree(centres).query(centres, k=2)[0][:, 1]

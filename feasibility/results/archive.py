@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -28,8 +29,11 @@ LARGEST_TEXT = 64 << 20  # bytes of the JSON member, inflated
 MOST_MEMBERS = 64
 DAMAGED = (
     zipfile.BadZipFile, zlib.error, ValueError, RuntimeError, EOFError, OSError, MemoryError,
+    tokenize.TokenError, SyntaxError, TypeError,
 )  # fmt: skip
-"""What numpy and zipfile raise for a file that is none; NotImplementedError is a RuntimeError."""
+"""What numpy and zipfile raise for a file that is none; NotImplementedError is a RuntimeError.
+
+numpy reads the header of an array as Python 2 would have written it, token by token."""
 
 Dtype = type[np.float64] | type[np.int64]
 

@@ -11,12 +11,15 @@ from robots import Robot
 from surfaces import Cells
 
 
-def warm_up_in_turn(lock: Lock, say: Callable[[], None]) -> None:
+def warm_up_in_turn(
+    lock: Lock, say: Callable[[], None], load: Callable[[bool], None] | None = None
+) -> None:
     """`warm_up` in one of several new processes: one of them compiles, the others load the result.
 
     Args:
         lock: shared by these processes.
         say: called in the process that compiles, if that takes long.
+        load: in place of `warm_up`.
     """
     first = lock.acquire(False)
     if not first:
@@ -24,7 +27,7 @@ def warm_up_in_turn(lock: Lock, say: Callable[[], None]) -> None:
         lock.release()
     try:
         with compiling_notice(say=say):
-            warm_up(rarely_used=True)
+            (load or warm_up)(True)
     finally:
         if first:
             lock.release()

@@ -13,7 +13,6 @@ from feasibility.notices import slow_notice
 from feasibility.roadmap import warm_up
 from feasibility.studies.scheduling import BREAKS, WorkersError
 
-CONNECT = 10.0  # [s] for a Dask scheduler to answer
 FIRST_WORKER = 60.0  # [s] for its first worker to be there
 ASK = 2.0  # [s] between two looks at how many workers there are
 
@@ -24,7 +23,7 @@ class DaskWorkers:
     patience = 1  # Dask has tried several workers before it gives a task up
     breaks: tuple[type[BaseException], ...] = BREAKS
 
-    def __init__(self, address: str, warm: bool) -> None:
+    def __init__(self, address: str, warm: bool, connect: float) -> None:
         """Connect; see `open_workers`.
 
         Raises:
@@ -37,7 +36,7 @@ class DaskWorkers:
                 "--dask needs the library distributed: pip install 'coverable[dask]'"
             ) from error
         self.deaths: tuple[type[BaseException], ...] = (KilledWorker,)
-        self._address, self._warm = address, warm
+        self._address, self._warm, self._patience = address, warm, connect
         self._connect()
 
     def _connect(self) -> None:
@@ -49,7 +48,7 @@ class DaskWorkers:
         # closes it while another starts a thread, both wait for one lock for ever; so it goes now.
         gc.collect()
         try:
-            self._client = Client(address, timeout=CONNECT, set_as_default=False)
+            self._client = Client(address, timeout=self._patience, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:  # a timeout is an OSError
             raise WorkersError(
                 f"no Dask scheduler answers at {address!r} ({error}); expected an address such as "

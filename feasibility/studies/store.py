@@ -92,18 +92,19 @@ class Store(AbstractContextManager["Store"]):
         {'verdict': 'feasible'}
     """
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
+    def __init__(self, path: str | os.PathLike[str], *, patience: float = PATIENCE) -> None:
         """Open a store, or make a new one.
 
         Args:
             path: the file; ":memory:" for a store that is gone when it is closed.
+            patience: s that another process may hold the file.
 
         Raises:
             StoreError: the file is something else, damaged, of a later version, or cannot be
                 written.
         """
         self.path = os.fspath(path)
-        self._name = shown_path(path)
+        self._name, self._patience = shown_path(path), patience
         in_memory = self.path == ":memory:"
         fresh = in_memory or self._is_new()
         if not in_memory:
@@ -111,7 +112,7 @@ class Store(AbstractContextManager["Store"]):
         with self._reported():
             self._base = sqlite3.connect(
                 self.path if in_memory else os.path.abspath(self.path),
-                timeout=PATIENCE,
+                timeout=patience,
                 isolation_level=None,
             )
         try:
@@ -191,7 +192,7 @@ class Store(AbstractContextManager["Store"]):
         SQLite does not wait for another process that opens the file at the same moment: it says at
         once that the file is busy, whatever its patience.
         """
-        end = time.monotonic() + PATIENCE
+        end = time.monotonic() + self._patience
         while True:
             try:
                 self._base.execute("PRAGMA journal_mode = WAL").fetchone()

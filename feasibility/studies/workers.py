@@ -25,11 +25,16 @@ from feasibility.studies.scheduling import BREAKS, Workers, WorkersError
 ATTEMPTS = 3  # to start worker processes anew
 
 MOST = 1_000  # processes
+CONNECT = 10.0  # [s] for a Dask scheduler to answer
 
 
 @contextmanager
 def open_workers(
-    count: int | None = None, address: str | None = None, *, warm: bool = True
+    count: int | None = None,
+    address: str | None = None,
+    *,
+    warm: bool = True,
+    connect: float = CONNECT,
 ) -> Iterator[Workers]:
     """Workers for `run_tasks`, until the block ends, and with it their work.
 
@@ -39,6 +44,7 @@ def open_workers(
         address: of a Dask scheduler, such as "tcp://127.0.0.1:8786", instead of processes.
         warm: load the kernels of the search before the first task. Where they have to be compiled,
             one process does it while the others wait, and a line on stderr says so.
+        connect: s for a Dask scheduler to answer.
 
     Raises:
         WorkersError: there is no such scheduler, both are given, or the count is not in 0 .. 1,000.
@@ -56,7 +62,7 @@ def open_workers(
     if address is not None:
         from feasibility.studies.dask_workers import DaskWorkers
 
-        workers = DaskWorkers(address, warm)
+        workers = DaskWorkers(address, warm, connect)
     elif count == 0:
         workers = Here(warm)
     else:

@@ -1,1 +1,1 @@
-"""The PUMA 560 of the paper: its URDF, written by `tests/robots/dh.py`, and its limit sets."""
+"""The PUMA 560 of the paper: its URDF, written by `tools/puma560.py`, and its limit sets."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import tokenize
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,10 @@ from surfaces.surface import SurfaceError
 MOST_BYTES = 16 << 20
 WHAT = "a grid of points (.npy or .csv)"
 UNITS = {"m": 1.0, "mm": 1e-3}
+DAMAGED = (
+    ValueError, EOFError, OSError, MemoryError, SyntaxError, TypeError, tokenize.TokenError,
+)  # fmt: skip
+"""What numpy raises for a file that is none; it reads headers token by token."""
 
 
 def read_grid(path: str | os.PathLike[str], units: str = "m") -> Array:
@@ -59,7 +64,7 @@ def _from_npy(data: bytes, name: str) -> Array:
     """The array of a .npy file."""
     try:
         found: Any = np.load(io.BytesIO(data), allow_pickle=False)
-    except (ValueError, EOFError, OSError, MemoryError, SyntaxError, TypeError) as error:
+    except DAMAGED as error:
         raise SurfaceError(f"is no .npy file that can be read: {str(error)[:120]}", name) from error
     known = isinstance(found, np.ndarray) and found.dtype.kind in "fiu"
     if not known or found.ndim != 3 or found.shape[2] != 3:

@@ -87,7 +87,8 @@ class MeshSurface(Surface):
         """The points of the mesh closest to `points` (..., 3) m; see `ClosestPoint`.
 
         `height` is the distance, positive where the point lies on the outer side of the surface;
-        the mesh ends at its border, so every closest point is inside.
+        the mesh ends at its border, so every closest point is inside. For a point that is not
+        finite it is NaN and not inside.
         """
         points = points_of(points)
         flat = (points.reshape(-1, 3) - self.position) @ self.rotation
@@ -100,7 +101,7 @@ class MeshSurface(Surface):
             v=nowhere,
             height=heights.reshape(shape),
             normal=(normals @ self.rotation.T).reshape(points.shape),
-            inside=np.ones(shape, dtype=bool),
+            inside=(face >= 0).reshape(shape),
         )
 
     def parts(self, flat: float, straight: float, most: int = MOST_PARTS) -> SurfaceParts:

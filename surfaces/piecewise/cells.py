@@ -193,9 +193,11 @@ class PieceCells(Cells):
             some = np.flatnonzero(self.piece[which] == k)
             part = grid.triangles(which[some] - self.first[k], samples, inset)
             vertices[some] = part.vertices.reshape(-1, corners, 3)
-            normals[some] = self.surface.signs[k] * part.normals.reshape(-1, corners, 3)
+            sign = self.surface.signs[k]
+            normals[some] = sign * part.normals.reshape(-1, corners, 3)
             shift = corners * (some - np.arange(len(some)))
-            triangles[some] = part.faces.reshape(-1, faces, 3) + shift[:, None, None]
+            outwards = part.faces[:, :: int(sign)]
+            triangles[some] = outwards.reshape(-1, faces, 3) + shift[:, None, None]
         return CellTriangles(
             vertices.reshape(-1, 3), triangles.reshape(-1, 3), normals.reshape(-1, 3)
         )

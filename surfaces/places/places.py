@@ -162,9 +162,9 @@ class OffsetSurface(ABC):
         return np.full((len(places.chart), 3), np.nan)
 
     def tangent_slopes(self, start: Places, end: Places) -> Array:
-        """(k,) the largest slope of the u direction on straight lines between places of one patch.
+        """(k,) the largest slope of the u direction on straight pieces of paths.
 
-        By the line's own parameter in 0..1; inf where nothing is known.
+        By the piece's own parameter in 0..1; inf where nothing is known.
         """
         return np.full(len(start.chart), np.inf)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from coverable_arrays import Array, Ints
 from coverable_files import FileFault, read_regular
-from coverable_processes import Limits, folder_of, run_apart
+from coverable_processes import Ended, Limits, folder_of, run_apart
 from surfaces.surface import SurfaceError
 
 EXTRA = "needs the extra: pip install 'coverable[step]'"
@@ -36,6 +36,8 @@ class Caps(NamedTuple):
     """bytes of address space; Open CASCADE itself takes 0.6 GB"""
     triangles: int = 2_000_000
     """The most that are taken, as of a mesh file."""
+    run: Callable[[Path, bytes, float, Limits], Ended] = run_apart
+    """What runs the process that reads it."""
 
 
 CAPS = Caps()
@@ -77,7 +79,7 @@ def read_step(path: str | os.PathLike[str], job: Mapping[str, Any], caps: Caps =
         raise SurfaceError(EXTRA)
     limits = Limits(caps.memory, caps.seconds, MOST_FACES * LINE + 36 * caps.triangles)
     line = json.dumps({"library": library, **job}).encode() + b"\n"
-    ended = run_apart(CHILD, line + data, caps.waiting, limits)
+    ended = caps.run(CHILD, line + data, caps.waiting, limits)
     less = "export fewer faces, or ask for a larger deviation"
     if ended.too_late:
         raise SurfaceError(f"could not be read within {caps.waiting:g} s; {less}")

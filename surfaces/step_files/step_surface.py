@@ -91,7 +91,7 @@ def step(
     return mesh(step_triangles(file, faces, colour, deviation), 1.0, side, position, rpy_deg)
 
 
-def step_faces(file: str | os.PathLike[str]) -> tuple[StepFace, ...]:
+def step_faces(file: str | os.PathLike[str], caps: Caps = CAPS) -> tuple[StepFace, ...]:
     """The faces of a STEP file, with what tells them apart.
 
     Raises:
@@ -99,7 +99,7 @@ def step_faces(file: str | os.PathLike[str]) -> tuple[StepFace, ...]:
     """
     name = shown_name(file)
     try:
-        return _faces(read_step(file, {"numbers": [], "colour": ""}))
+        return _faces(read_step(file, {"numbers": [], "colour": ""}, caps))
     except SurfaceError as error:
         raise SurfaceError(error.faults, name) from error
 

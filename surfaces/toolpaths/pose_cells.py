@@ -12,6 +12,7 @@ from coverable_arrays import Array, Ints
 from surfaces.adjacency import Neighbours
 from surfaces.cell_curves import CellCurves
 from surfaces.cells import Cells, CellTriangles, Unrolled
+from surfaces.surface import points_of
 from surfaces.toolpaths.arcs import arc_at, arc_pieces, curves
 from surfaces.toolpaths.pose_surface import PoseSurface
 
@@ -104,7 +105,11 @@ class PoseCells(Cells):
 
     def locate(self, points: ArrayLike) -> Ints:
         """See `Cells.locate`: the pose that is nearest."""
-        return np.asarray(self.surface.tree.query(np.asarray(points, dtype=float))[1], np.int64)
+        points = points_of(points)
+        found = np.full(points.shape[:-1], -1, dtype=np.int64)
+        known = np.isfinite(points).all(axis=-1)
+        found[known] = self.surface.tree.query(points[known])[1]
+        return found
 
     def borders(self, samples: int = 8) -> Array:
         """See `Cells.borders`: the straight lines between poses."""

@@ -2,16 +2,10 @@
 
 import pytest
 import test_checking
-import test_clustering
-import test_coverage
-import test_creases
 import test_division
 import test_explain
 import test_greedy_cases
-import test_mesh_file
 import test_mesh_verdicts
-import test_mesh_witness
-import test_proof_verification
 import test_robot_visuals
 import test_segment_bound
 import test_set_cover
@@ -64,46 +58,11 @@ def test_meshes(name, tmp_path):
     test_mesh_verdicts.test_a_case_as_a_mesh_has_the_same_answer(name, tmp_path)
 
 
-@pytest.mark.parametrize(("robot", "name", "task"), test_mesh_witness.MORE)
-def test_witnesses_over_triangles(robot, name, task):
-    test_mesh_witness.test_a_witness_holds_over_the_triangles_as_given(robot, name, task)
-
-
-@pytest.mark.parametrize(("name", "task"), test_creases.MORE_EDGES)
-def test_edges(name, task):
-    test_creases.test_a_motion_over_edges_keeps_standoff_and_cone(name, task)
-
-
-@pytest.mark.parametrize("asked", test_creases.MORE_ROUNDED)
-def test_rounded_edges(asked):
-    test_creases.test_a_motion_over_a_rounded_edge_far_smaller_than_the_standoff(*asked)
-
-
 @pytest.mark.parametrize("name", test_explain.MORE)
 def test_sides(name):
     test_explain.test_what_is_said_of_a_side_is_what_a_verdict_says(name)
 
 
-@pytest.mark.parametrize("seed", test_proof_verification.MORE)
-def test_wrong_trees(tmp_path, seed):
-    test_proof_verification.test_no_tree_is_accepted_where_a_motion_covers_all(tmp_path, seed)
-
-
-@pytest.mark.parametrize("order", test_coverage.ORDERS)
-@pytest.mark.parametrize("name", test_coverage.TUBES)
-def test_tubes(name, order):
-    test_coverage.test_a_closed_surface_is_not_gone_over_twice(name, order)
-
-
-@pytest.mark.parametrize("count", test_clustering.MANY)
-@pytest.mark.parametrize("name", test_clustering.PATCHES)
-def test_many_cells(name, count):
-    test_clustering.test_cells_are_connected_even_and_complete(name, count)
-
-
-@pytest.mark.parametrize("name", test_mesh_file.GOOD)
-def test_damaged_meshes(name, tmp_path):
-    test_mesh_file.assert_damaged_are_refused_or_clean(name, tmp_path, 1500)
 
 
 @pytest.mark.parametrize("name", test_robot_visuals.LARGE)

@@ -17,7 +17,7 @@ from feasibility.paths import coverage_path
 from robots import Kinematics, RobotError, load_robot
 from surfaces import plane
 
-DISCONNECTED = Path(__file__).parents[1] / "oracle" / "puma560_disconnected.json"
+DISCONNECTED = Path(__file__).parents[1] / "questions" / "puma560_disconnected.json"
 UR5 = load_robot("ur5")
 CLEAR_BUT_FOR_HULLS = (
     [-2.361, 0.726, 0.925, 1.859, -0.731, 3.128, 3.021],  # link5 and link7

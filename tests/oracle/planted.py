@@ -22,7 +22,7 @@ from feasibility.cases import Case
 from feasibility.cases.case import Setup
 from feasibility.cases.toml import toml_document
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1] / "questions"
 T = TypeVar("T")
 
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from oracle_cases import Answer, Problem, patch
 from puma_oracle import Resolution
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1] / "questions"
 TOLERANCE = 1e-3  # [m] the complete search's default
 TABLE_1 = (
     ((-180, 180),) * 6,

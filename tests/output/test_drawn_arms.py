@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 import trimesh
-from hostile_parts import urdf, visual, write
+from hostile_visuals import urdf, visual, write
 from page_outline import faces_of, points_of
 from samples import sampled, spread
 

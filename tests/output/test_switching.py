@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pass_metrics import panel_with_hole
+from mesh_patches import panel_with_hole
 from scipy.spatial.transform import Rotation
 from timed_motions import UR5, motion
 

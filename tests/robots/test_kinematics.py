@@ -1,126 +1,127 @@
-"""Pinocchio's answers against the URDF's own rules, written out without Pinocchio."""
+"""Where arms have their tools: Pinocchio, the compiled chain, the URDF's own rules and yourdfpy."""
+
+from __future__ import annotations
+
+import dataclasses
+import pickle
 
 import numpy as np
 import pytest
+import yourdfpy
 from arm_urdfs import UNLIKE, arm, joint, load_text, placement, random_arm, random_q, unlike
+from samples import sampled, seeds
 
-from robots import Kinematics, list_robots, load_robot, moved_by_joints
+from robots import (
+    Kinematics,
+    RobotError,
+    frames,
+    jacobians,
+    list_robots,
+    load_robot,
+    moved_by_joints,
+)  # fmt: skip
 from robots.urdf import check_urdf
+
+CLOSE = {"rtol": 0, "atol": 1e-12}
+
+
+def by_chain(chain, q):
+    """Point, axis and their Jacobians by the compiled kernels."""
+    n = len(q)
+    origins, axes = np.empty((n, 3)), np.empty((n, 3))
+    point, axis = np.empty(3), np.empty(3)
+    rows = np.empty((3, n)), np.empty((3, n))
+    frames(chain, q, origins, axes, point, axis, np.empty(3))
+    jacobians(chain, origins, axes, point, axis, *rows)
+    return point, axis, *rows
+
+
+def check_arm(robot, rng, samples):
+    """Pinocchio against the URDF's rules, the chain against Pinocchio, slopes as differences."""
+    path = check_urdf(robot.urdf, robot.package_dirs).path_to(robot.tool_frame)
+    kinematics = Kinematics(robot)
+    q = np.array([random_q(robot, rng) for _ in range(samples)])
+    points, axes = kinematics.tools(q)
+    moved = moved_by_joints(robot.chain, q).transpose(2, 0, 1)
+    velocities = kinematics.tool_velocities(q, rates := rng.normal(size=q.shape))
+    for k, (row, twists) in enumerate(zip(q, kinematics.twists(q), strict=True)):
+        values = {**robot.locked, **dict(zip(robot.joint_names, row, strict=True))}
+        expected = placement(path, values)
+        point, axis = kinematics.tool(row)
+        np.testing.assert_allclose((points[k], axes[k]), (point, axis), rtol=0, atol=2e-15)
+        np.testing.assert_allclose(point, expected[:3, 3], **CLOSE)
+        np.testing.assert_allclose(axis, expected[:3, :3] @ robot.approach_axis, **CLOSE)
+        rows = kinematics.jacobians(row)
+        for ours, theirs in zip(by_chain(robot.chain, row), (point, axis, *rows), strict=True):
+            np.testing.assert_allclose(ours, theirs, **CLOSE)
+        np.testing.assert_allclose(moved[k], rows[0].T, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(velocities[k], rows[0] @ rates[k], **CLOSE)
+        at_tool = twists[:3] + np.cross(twists[3:], point, axis=0)
+        np.testing.assert_allclose(at_tool, rows[0], **CLOSE)
+    for i, shift in enumerate(1e-5 * np.eye(robot.n)):
+        ends = zip(kinematics.tool(row + shift), kinematics.tool(row - shift), strict=True)
+        for slopes, (ahead, behind) in zip(rows, ends, strict=True):
+            np.testing.assert_allclose(slopes[:, i], (ahead - behind) / 2e-5, rtol=0, atol=2e-9)
 
 
 @pytest.mark.parametrize("info", list_robots(), ids=lambda info: info.name)
-def test_tool_is_where_the_urdf_puts_it_with_the_locked_joints_held(info):
-    robot = load_robot(info.name)
-    path = check_urdf(robot.urdf, robot.package_dirs).path_to(robot.tool_frame)
-    tool = Kinematics(robot).tool
-    rng = np.random.default_rng(3)
-    for _ in range(20):
-        q = random_q(robot, rng)
-        values = {**robot.locked, **dict(zip(robot.joint_names, q, strict=True))}
-        expected = placement(path, values)
-        point, axis = tool(q)
-        np.testing.assert_allclose(point, expected[:3, 3], rtol=0, atol=1e-12)
-        np.testing.assert_allclose(axis, expected[:3, :3] @ robot.approach_axis, rtol=0, atol=1e-12)
-        assert np.linalg.norm(axis) == pytest.approx(1.0, abs=1e-12)
+def test_arms_of_the_library(info):
+    check_arm(load_robot(info.name), np.random.default_rng(3), 5)
 
 
-@pytest.mark.parametrize("seed", range(30))
-def test_jacobians_are_the_slopes_of_the_tool(seed, tmp_path):
-    rng = np.random.default_rng(100 + seed)
-    robot = load_text(tmp_path, random_arm(rng), approach_axis=rng.normal(size=3))
-    kinematics = Kinematics(robot)
-    q = random_q(robot, rng)
-    point_rows, axis_rows = kinematics.jacobians(q)
-    step = 1e-5
-    for i in range(robot.n):
-        shift = step * np.eye(robot.n)[i]
-        after, before = kinematics.tool(q + shift), kinematics.tool(q - shift)
-        for rows, ahead, behind in zip((point_rows, axis_rows), after, before, strict=True):
-            slope = (ahead - behind) / (2 * step)
-            np.testing.assert_allclose(rows[:, i], slope, rtol=0, atol=2e-9)
+def test_an_arm_on_its_lift():
+    check_arm(unlike(UNLIKE[-1]), np.random.default_rng(3), 5)
 
 
-@pytest.mark.parametrize("seed", range(10))
-def test_the_tool_moves_as_its_jacobian_says(seed, tmp_path):
-    rng = np.random.default_rng(500 + seed)
-    robot = load_text(tmp_path, random_arm(rng))
-    kinematics = Kinematics(robot)
-    q = np.array([random_q(robot, rng) for _ in range(5)])
-    dq = rng.normal(size=q.shape)
-    expected = [kinematics.jacobians(place)[0] @ rate for place, rate in zip(q, dq, strict=True)]
-    np.testing.assert_allclose(kinematics.tool_velocities(q, dq), expected, rtol=0, atol=1e-12)
+@sampled
+@pytest.mark.parametrize("seed", seeds(25, all=500))
+def test_random_chains(seed, tmp_path):
+    """With tool axes of their own, and a TCP and a base besides."""
+    rng = np.random.default_rng(seed)
+    check_arm(load_text(tmp_path, random_arm(rng), approach_axis=rng.normal(size=3)), rng, 5)
 
 
-@pytest.mark.parametrize("seed", range(10))
-def test_the_chain_moves_the_tool_as_pinocchio_does(seed, tmp_path):
-    rng = np.random.default_rng(700 + seed)
-    robot = load_text(tmp_path, random_arm(rng))
-    q = np.array([random_q(robot, rng) for _ in range(5)])
-    expected = [Kinematics(robot).jacobians(row)[0].T for row in q]
-    moved = moved_by_joints(robot.chain, q).transpose(2, 0, 1)
-    np.testing.assert_allclose(moved, expected, rtol=0, atol=1e-9)
+@pytest.mark.parametrize("tilt", [0.0, 1e-15, 1e-9, 1e-8, 1e-7, 1e-3])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_axes_that_are_almost_z_keep_their_tilt(tilt, sign, tmp_path):
+    text = arm([joint(1, axis=(tilt, 0, sign)), joint(2, xyz=(1, 0, 0), axis=(0, tilt, sign))])
+    check_arm(load_text(tmp_path, text), np.random.default_rng(7), 10)
 
 
-@pytest.mark.parametrize("name", UNLIKE)
-def test_many_configurations_are_those_of_one_bit_for_bit(name):
-    robot = unlike(name)
-    kinematics, rng = Kinematics(robot), np.random.default_rng(9)
-    q = np.array([random_q(robot, rng) for _ in range(20)])
-    points, axes = kinematics.tools(q)
-    for row, point, axis in zip(q, points, axes, strict=True):
-        expected_point, expected_axis = kinematics.tool(row)
-        np.testing.assert_array_equal(point, expected_point)
-        np.testing.assert_array_equal(axis, expected_axis)
-    assert [part.shape for part in kinematics.tools(q[:0])] == [(0, 3), (0, 3)]
+NAMES = ("puma560", "ur5", "panda", "kinova", "xarm7", "z1", "tiago", "baxter_left")
 
 
-@pytest.mark.parametrize("seed", range(10))
-def test_twists_moved_to_the_tool_are_its_jacobian(seed, tmp_path):
-    rng = np.random.default_rng(700 + seed)
-    robot = load_text(tmp_path, random_arm(rng), approach_axis=rng.normal(size=3))
-    kinematics = Kinematics(robot)
-    q = np.array([random_q(robot, rng) for _ in range(3)])
-    for row, twists, point in zip(q, kinematics.twists(q), kinematics.tools(q)[0], strict=True):
-        expected = kinematics.jacobians(row)[0]
-        moved = twists[:3] + np.cross(twists[3:], point, axis=0)
-        np.testing.assert_allclose(moved, expected, rtol=0, atol=1e-12)
+@pytest.mark.parametrize("name", NAMES)
+def test_a_second_reader_of_the_same_files_places_the_tool_alike(name):
+    robot = load_robot(name)
+    other = yourdfpy.URDF.load(robot.urdf, load_meshes=False, build_scene_graph=True)
+    held = {joint: value for joint, value in robot.locked.items() if joint in other.joint_map}
+    low, high = np.maximum(robot.lower, -3.0), np.minimum(robot.upper, 3.0)
+    for q in np.random.default_rng(5).uniform(low, high, (8, robot.n)):
+        other.update_cfg(held | dict(zip(robot.joint_names, q.tolist(), strict=True)))
+        placed = other.get_transform(robot.tool_frame, other.base_link)
+        point, axis = Kinematics(robot).tool(q)
+        np.testing.assert_allclose(placed[:3, 3], point, atol=1e-9)
+        np.testing.assert_allclose(placed[:3, :3] @ robot.approach_axis, axis, atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("shapes", "message"),
-    [
-        (((6,), (6,)), r"q must have shape \(m, 6\), got \(6,\)"),
-        (((2, 5), (2, 5)), r"q must have shape \(m, 6\), got \(2, 5\)"),
-        (((2, 6), (3, 6)), r"dq must have the shape of q, \(2, 6\), got \(3, 6\)"),
-    ],
-)
-def test_rows_of_the_wrong_shape_are_refused(shapes, message):
-    with pytest.raises(ValueError, match=message):
-        Kinematics(load_robot("puma560")).tool_velocities(*map(np.zeros, shapes))
+# by hand
 
 
-def test_a_full_turn_is_another_configuration_with_the_same_placement():
-    robot = load_robot("kinova")
-    assert robot.joint_kinds.count("continuous") == 3
-    kinematics = Kinematics(robot)
-    q = np.array([0.3, 2.0, 1.5, -4.0, 3.0, 5.0])
-    for i, kind in enumerate(robot.joint_kinds):
-        turned = q + 2 * np.pi * np.eye(6)[i]
-        for value, expected in zip(kinematics.tool(turned), kinematics.tool(q), strict=True):
-            np.testing.assert_allclose(value, expected, rtol=0, atol=1e-12)
-        assert (robot.lower[i], robot.upper[i]) == (-np.inf, np.inf) or kind == "revolute"
+def test_a_planar_arm(tmp_path):
+    text = arm([joint(1), joint(2, xyz=(2, 0, 0)), joint(3, "fixed", xyz=(1, 0, 0))])
+    robot = load_text(tmp_path, text, approach_axis=(1, 0, 0))
+    expected = [-1, 2, 0], [-1, 0, 0], [[-2, 0], [-1, -1], [0, 0]], [[0, 0], [-1, -1], [0, 0]]
+    for found, value in zip(
+        by_chain(robot.chain, np.array([np.pi / 2] * 2)), expected, strict=True
+    ):
+        np.testing.assert_allclose(found, value, atol=1e-15)
 
 
 def test_an_arm_on_a_rail_moves_with_it(tmp_path):
-    text = arm(
-        [
-            joint(1, "prismatic", axis=(0, 1, 0), limits=(-1.0, 2.0)),
-            joint(2, xyz=(0, 0, 0.5)),
-            joint(3, "prismatic", xyz=(0.4, 0, 0), axis=(2, 0, 0), limits=(0.0, 0.3)),
-        ]
-    )
-    robot = load_text(tmp_path, text)
-    assert robot.joint_kinds == ("prismatic", "revolute", "prismatic")
+    rail = joint(1, "prismatic", axis=(0, 1, 0), limits=(-1.0, 2.0))
+    slide = joint(3, "prismatic", xyz=(0.4, 0, 0), axis=(2, 0, 0), limits=(0.0, 0.3))
+    robot = load_text(tmp_path, arm([rail, joint(2, xyz=(0, 0, 0.5)), slide]))
     np.testing.assert_array_equal(robot.prismatic, [True, False, True])
     point, axis = Kinematics(robot).tool([1.5, np.pi / 2, 0.2])
     np.testing.assert_allclose(point, [0, 1.5 + 0.4 + 0.2, 0.5], atol=1e-15)
@@ -129,7 +130,31 @@ def test_an_arm_on_a_rail_moves_with_it(tmp_path):
     assert robot.reach == pytest.approx(np.hypot(0.5, 2.0) + 0.7)
 
 
-def test_answers_are_copies():
+def test_a_full_turn_is_another_configuration_with_the_same_placement():
+    robot = load_robot("kinova")
+    assert robot.joint_kinds.count("continuous") == 3
+    tool, q = Kinematics(robot).tool, np.array([0.3, 2.0, 1.5, -4.0, 3.0, 5.0])
+    for i, kind in enumerate(robot.joint_kinds):
+        np.testing.assert_allclose(tool(q + 2 * np.pi * np.eye(6)[i]), tool(q), **CLOSE)
+        assert (robot.lower[i], robot.upper[i]) == (-np.inf, np.inf) or kind == "revolute"
+
+
+# what is refused, and what stays
+
+
+@pytest.mark.parametrize("q", [[0.0] * 5, [0.0] * 7, [[0.0] * 6]])
+def test_a_configuration_of_the_wrong_shape_is_refused(q):
+    with pytest.raises(ValueError, match=r"q must have shape \(6,\)"):
+        Kinematics(load_robot("puma560")).tool(q)
+
+
+@pytest.mark.parametrize("shapes", [((6,), (6,)), ((2, 5), (2, 5)), ((2, 6), (3, 6))])
+def test_rows_of_the_wrong_shape_are_refused(shapes):
+    with pytest.raises(ValueError, match="must have"):
+        Kinematics(load_robot("puma560")).tool_velocities(*map(np.zeros, shapes))
+
+
+def test_answers_are_copies_and_no_rows_are_none():
     kinematics = Kinematics(load_robot("puma560"))
     first = [*kinematics.tool(np.zeros(6)), *kinematics.jacobians(np.zeros(6))]
     kept = [array.copy() for array in first]
@@ -137,9 +162,22 @@ def test_answers_are_copies():
     kinematics.jacobians(np.ones(6))
     for array, expected in zip(first, kept, strict=True):
         np.testing.assert_array_equal(array, expected)
+    assert [part.shape for part in kinematics.tools(np.zeros((0, 6)))] == [(0, 3), (0, 3)]
 
 
-@pytest.mark.parametrize("q", [[0.0] * 5, [0.0] * 7, [[0.0] * 6]])
-def test_a_configuration_of_the_wrong_shape_is_refused(q):
-    with pytest.raises(ValueError, match=r"q must have shape \(6,\)"):
-        Kinematics(load_robot("puma560")).tool(q)
+def test_a_chain_is_serial_and_pickles():
+    panda = load_robot("panda")
+    with pytest.raises(RobotError, match="do not form one serial chain"):
+        _ = dataclasses.replace(panda, tool_frame="panda_link3").chain
+    assert panda.chain is panda.chain
+    copy = pickle.loads(pickle.dumps(panda))
+    for value, expected in zip(copy.chain, panda.chain, strict=True):
+        np.testing.assert_array_equal(value, expected)
+
+
+def test_a_chain_that_differs_from_pinocchio_is_refused(monkeypatch):
+    """The one fault that no file can bring about: a rotation that is none of the arm's."""
+    monkeypatch.setattr("robots.chain._rotation_onto", lambda axis: np.eye(3))
+    assert dataclasses.replace(load_robot("panda")).chain  # all its axes are z
+    with pytest.raises(RobotError, match="differ by"):
+        _ = dataclasses.replace(load_robot("ur5")).chain

@@ -1,9 +1,9 @@
-"""A timed motion in closed form, for the tests of programs."""
+"""Timed motions: one in closed form, and what a controller makes of any between its samples."""
 
 import numpy as np
 
 from feasibility.timing import Trajectory
-from robots import load_robot
+from robots import Kinematics, load_robot
 
 UR5 = load_robot("ur5")
 TURN = 180.0 / np.pi
@@ -22,3 +22,50 @@ def motion(robot):
     time = np.sort(np.append(np.arange(0.0, 2.0 + 1e-9, 0.02), 0.1234567))
     still = np.zeros(len(time))
     return Trajectory(robot.joint_names, time, *at(time, robot.n), still, still.astype(int) - 1)
+
+
+def interpolated(run, degree, places):
+    """q, dq and ddq (m, n) between samples as a controller goes, at so many places of each.
+
+    Quintics go through q, dq and ddq of both ends, cubics through q and dq. Polynomials by solving
+    for their coefficients, so that nothing is shared with what made them.
+    """
+    t, powers = np.linspace(0.0, 1.0, places, endpoint=False), np.arange(degree + 1)
+
+    def falling(order):
+        """Factors of the derivatives of the powers."""
+        return np.prod([powers - k for k in range(order)], axis=0) if order else powers**0
+
+    sides = [run.q, run.dq, run.ddq][: (degree + 1) // 2]
+    rows = [
+        np.where(where, falling(order), 0)
+        for order in range(len(sides))
+        for where in (powers == order, powers >= order)  # at 0, at 1
+    ]
+    h = np.diff(run.time)[:, None]
+    ends = np.stack(
+        [side[k : len(run) - 1 + k] * h**order for order, side in enumerate(sides) for k in (0, 1)]
+    )
+    solved = np.linalg.solve(np.vstack(rows).astype(float), ends.reshape(degree + 1, -1))
+    coefficients = solved.reshape(ends.shape)
+    found = []
+    for order, side in enumerate((run.q, run.dq, run.ddq)):
+        values = np.where(powers >= order, falling(order), 0) * t[:, None] ** np.maximum(
+            powers - order, 0
+        )
+        between = np.einsum("tp,pin->itn", values, coefficients) / h[:, None] ** order
+        found.append(np.vstack([between.reshape(-1, run.q.shape[1]), side[-1:]]))
+    return found
+
+
+def keeps_to_limits(robot, run, limits):
+    """Joints, velocities, accelerations and the tool's speed, however samples are interpolated."""
+    kinematics = Kinematics(robot)
+    for degree in (3, 5):
+        q, dq, ddq = interpolated(run, degree, 7)
+        assert (q >= robot.lower).all()
+        assert (q <= robot.upper).all()
+        assert (np.abs(dq) <= limits.velocity * (1 + 1e-9)).all()
+        assert (np.abs(ddq[:-1]) <= limits.acceleration * (1 + 1e-9)).all()
+        speed = [np.linalg.norm(kinematics.jacobians(a)[0] @ b) for a, b in zip(q, dq, strict=True)]
+        assert max(speed) <= limits.tool_speed * (1 + 1e-6)

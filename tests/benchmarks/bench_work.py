@@ -1,0 +1,153 @@
+"""Meshes, and what is built on a verdict: paths, passes, placements, studies, live pages."""
+
+from __future__ import annotations
+
+import http.client
+import itertools
+import json
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from coverable import (
+    Collision,
+    Live,
+    Pose,
+    Region,
+    Task,
+    ToolShape,
+    check,
+    explain,
+    load_case,
+    load_robot,
+    mesh,
+    open_workers,
+    parallel_passes,
+    path,
+    place,
+    plan_passes,
+    read_study,
+    run_tasks,
+    trajectory,
+)  # fmt: skip
+from surfaces import MeshSurface, Surface
+from surfaces.meshes import TriangleMesh
+
+PAPER = [f"paper/{figure}{letter}" for figure in "45" for letter in "abcdef"]
+STUDY = """
+base.case = "paper/4a"
+count = 200
+[vary]
+"surface.position" = { x = { range = [-0.1, 0.1] }, z = { range = [-0.1, 0.1] } }
+"surface.rpy_deg" = { yaw = { range = [-20, 20] } }
+"""
+
+
+def as_mesh(surface: Surface, count: int) -> MeshSurface:
+    """A patch as 2 (count - 1)^2 triangles."""
+    u, v = np.meshgrid(*(np.linspace(*ends, count) for ends in (surface.u_range, surface.v_range)))
+    u, v = u.T.ravel(), v.T.ravel()
+    first = (count * np.arange(count - 1)[:, None] + np.arange(count - 1)).ravel()[:, None]
+    faces = first + np.array([[[0, count, count + 1]], [[0, count + 1, 1]]])
+    faces = faces.reshape(-1, 3)
+    made = TriangleMesh(surface.point(u, v), faces)
+    outward = (made.face_normals * surface.normal(u[faces[:, 0]], v[faces[:, 0]])).sum() > 0.0
+    return mesh(made if outward else TriangleMesh(made.vertices, faces[:, ::-1]), side=surface.side)
+
+
+@pytest.mark.parametrize("count", [None, 20, 70, 316])
+def bench_mesh(count: int | None, measured: Callable[..., Any]) -> None:
+    """4a's dome as a patch and as meshes of up to 200,000 faces: three times the patch at most."""
+    robot, cells, task, _ = load_case("paper/4a").build()
+    cells = cells if count is None else as_mesh(cells.surface, count).cells(90)
+    measured(lambda: check(robot, cells, task))
+
+
+@pytest.mark.parametrize("name", [name for name in PAPER if name[-1] in "abc"])
+def bench_path(name: str, measured: Callable[..., Any]) -> None:
+    """The path over a case and its motion at up to 0.1 m/s; goal of 4a: 300 ms, 15 % revisited."""
+    verdict = check(*load_case(name).build()[:3])
+    if not verdict.feasible:
+        pytest.skip("no motion")
+    share = path(verdict).figures.revisited_share
+    measured(lambda: trajectory(path(verdict), 0.1), 2, samples=len,
+             **{"revisited %": lambda _: round(100.0 * share, 1)})  # fmt: skip
+
+
+@pytest.mark.parametrize("collisions", [False, True])
+def bench_panel(collisions: bool, measured: Callable[..., Any]) -> None:
+    """Passes 30 mm apart over a bent panel of 10,000 faces, timed at 0.25 m/s; goal 3 s."""
+    x, y = (a.ravel() for a in np.meshgrid(np.linspace(0, 0.6, 101), np.linspace(0, 0.4, 51)))
+    first = (101 * np.arange(50)[:, None] + np.arange(100)).ravel()[:, None]
+    faces = first + np.array([[[0, 1, 102]], [[0, 102, 101]]])
+    points = np.column_stack([x, y, 0.06 * (1.0 - (x / 0.3 - 1.0) ** 2)])
+    panel = mesh(
+        TriangleMesh(points, faces.reshape(-1, 3)), side="outside", position=(0.35, -0.2, 0.1)
+    )
+    gun = ToolShape.cylinder(radius=0.015, length=0.14, position=(0.0, 0.0, -0.08))
+    around = Collision(clearance=0.005, tool_clearance=0.01, tool=(gun,))
+    robot = load_robot("ur10", tcp=((0.0, 0.0, 0.15), (0.0, 0.0, 0.0)))
+    task = Task(0.05, 15.0, footprint=0.05, collision=around if collisions else None)
+
+    def work() -> Any:
+        along = plan_passes(robot, parallel_passes(panel, 0.03, overrun=0.0, step=0.03), task)
+        return trajectory(path(along.verdict), speed=0.25)
+
+    measured(work, 2, samples=len)
+
+
+@pytest.mark.parametrize("name", PAPER)
+def bench_explain(name: str, measured: Callable[..., Any]) -> None:
+    """What would make a case feasible; goal: 15 verdicts in the middle, 40 at most."""
+    asked = load_case(name).build()[:3]
+    measured(lambda: explain(*asked), 2, FK=lambda found: int(found.evaluations))
+
+
+@pytest.mark.parametrize("reach", [0.3, 1.5])
+def bench_place(reach: float, measured: Callable[..., Any]) -> None:
+    """64 placements of 4c within a box around its own."""
+    robot, cells, task, search = load_case("paper/4c").build()
+    ranges = {"x": (-reach, reach), "y": (-reach, reach), "yaw_deg": (-90.0, 90.0)}
+    region = Region.around(Pose.of_surface(cells.surface), ranges)
+    measured(lambda: place(robot, cells, task, region, search, count=64), 2,
+             answer=lambda found: str(found.answer))  # fmt: skip
+
+
+@pytest.mark.parametrize("workers", [0, 1, 2])
+def bench_study(workers: int, measured: Callable[..., Any]) -> None:
+    """200 placements of 4a. Run with --benchmark-timer=time.perf_counter to see the speed-up."""
+    tasks = read_study(STUDY).tasks
+    with open_workers(workers) as crew:
+        measured(lambda: run_tasks(tasks, crew), 2, placements=len)
+
+
+@pytest.mark.parametrize("name", ["paper/4a", "paper/5c", "paper/4d"])
+@pytest.mark.parametrize("final", [False, True], ids=["quick look", "certified"])
+def bench_live(name: str, final: bool, measured: Callable[..., Any]) -> None:
+    """What a live page gets over HTTP, the surface a millimetre further each time; goal 100 ms."""
+    case, numbers = load_case(name), itertools.count(1)
+    with Live(case) as live:
+        host, _, there = live.url.removeprefix("http://").partition("/")
+        connection = http.client.HTTPConnection(host, timeout=1800)
+
+        def post(word: str, asked: dict[str, Any]) -> dict[str, Any]:
+            kind = {"Content-Type": "application/json"}
+            connection.request("POST", f"/{there}{word}", json.dumps(asked), kind)
+            found: dict[str, Any] = json.loads(connection.getresponse().read())
+            return found
+
+        session, z = post("open", {})["session"], 1e3 * case.surface.position[2]
+
+        def ask() -> dict[str, Any]:
+            number = next(numbers)
+            asked = {"session": session, "number": number, "final": final,
+                     "values": {"position": [float(number), 0.0, z]}}  # fmt: skip
+            while (reply := post("ask", asked))["status"] == "deciding":
+                pass
+            answer: dict[str, Any] = reply["answer"]
+            return answer
+
+        measured(ask, 5, covered=lambda answer: answer["covered"])
+        connection.close()

@@ -1,0 +1,461 @@
+"""Who is asked to stay clear of whom; objects and tools, where they stand, and what holds them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pinocchio as pin
+import pytest
+import trimesh
+from scipy.optimize import nnls
+from scipy.spatial.transform import Rotation
+
+from coverable_errors import ArgumentError
+from feasibility.certification import collision_replay
+from feasibility.collisions import (
+    TOOL,
+    Collision,
+    HalfSpace,
+    Obstacle,
+    ToolShape,
+    gather,
+    polytopes_of,
+    read_triangles,
+    soup_of,
+    tool_polytopes,
+    tool_solids,
+)
+from feasibility.collisions.overlaps_at_rest import overlap
+from robots import Axis, load_robot
+from robots.shapes import Triangles
+from robots.urdf import Box, Cylinder
+from surfaces import plane, rotation_from_rpy
+
+UR5 = load_robot("ur5")
+PLATE = plane((0.4, 0.6), (-0.1, 0.1), position=(0.0, 0.0, 0.3), side="outside")
+SHELF = Obstacle.box("shelf", (0.4, 0.4, 0.02), (0.5, 0.0, 0.8), clearance=0.02)
+POST = Obstacle.cylinder("post", 0.05, 1.0, (0.0, 0.6, 0.5))
+TABLE = Axis("table", "revolute", limits_deg=(-180, 180), carries="surface", position=(0.6, 0.1, 0.2))
+PEG = Obstacle.cylinder("peg", 0.02, 0.2, position=(0.15, 0.1, 0.1), frame="table")
+
+
+def bodies_of(robot=UR5, standoff=0.02, surface=PLATE, **asked):
+    """The bodies of an arm over the plate."""
+    return gather(robot, surface, Collision(**asked), standoff)
+
+
+def clearances(bodies):
+    """What is asked for, by pair."""
+    asked = {frozenset((pair.first, pair.second)): pair.clearance for pair in bodies.pairs}
+    assert len(asked) == len(bodies.pairs), "a pair is asked for twice"
+    return asked
+
+
+def left_out(bodies, why=None):
+    """Pairs that are left out, for a reason."""
+    return {frozenset((x.first, x.second)) for x in bodies.left_out if why in (None, x.why)}
+
+
+def both(*names):
+    return {frozenset(pair) for pair in names}
+
+
+# pairs
+
+
+def test_every_pair_is_asked_for_or_left_out_with_a_reason():
+    bodies = bodies_of(scene=(SHELF, POST))
+    owners = sorted({solid.owner for solid in bodies.solids})
+    own = both(*((a, b) for a in owners for b in owners if a < b))
+    others = both(*((a, b) for a in owners for b in ("shelf", "post", "surface")))
+    asked = set(clearances(bodies))
+    assert asked | left_out(bodies) == own | others
+    assert not asked & left_out(bodies)
+    # What stands still is not asked for with the scene: no motion changes that.
+    still = {solid.owner for solid in bodies.solids if solid.joint == 0}
+    assert still
+    assert both(*((one, other) for one in still for other in ("shelf", "surface"))) <= left_out(
+        bodies, "rigid")  # fmt: skip
+    assert gather(UR5, PLATE, None, 0.02) is None
+    assert gather(UR5, PLATE, Collision(self_=False, surface=False), 0.02) is None
+
+
+def test_each_pair_has_its_own_clearance():
+    bodies = bodies_of(
+        scene=(SHELF, POST),
+        clearance=0.005,
+        tool_clearance=0.001,
+        clearances=(("forearm_link", "post", 0.03), ("forearm_link", "upper_arm_link", 0.0)),
+    )
+    asked = clearances(bodies)
+    assert asked[frozenset(("forearm_link", "post"))] == 0.03
+    assert asked[frozenset(("wrist_1_link", "post"))] == 0.005
+    assert asked[frozenset(("forearm_link", "shelf"))] == 0.02  # the object's own
+    assert asked[frozenset(("wrist_1_link", "surface"))] == 0.005
+    tool = {solid.owner for solid in bodies.solids if solid.joint == 6}
+    assert {asked[frozenset((owner, "surface"))] for owner in tool} == {0.001}
+    named = clearances(bodies_of(clearance=0.005, tool_links=("wrist_2_link",)))
+    assert named[frozenset(("wrist_2_link", "surface"))] == 0.0
+    assert named[frozenset(("wrist_3_link", "surface"))] == 0.005
+
+
+def test_a_tool_of_the_case_is_asked_for_and_one_that_touches_is_left_out():
+    nozzle = ToolShape.cylinder(0.02, 0.1, (0.0, 0.0, -0.06))
+    bodies = bodies_of(clearance=0.005, tool=(nozzle,), scene=(POST,))
+    asked = clearances(bodies)
+    for other, needed in (("surface", 0.0), ("post", 0.005), ("forearm_link", 0.005)):
+        assert asked[frozenset((TOOL, other))] == needed
+    assert frozenset((TOOL, "wrist_3_link")) in left_out(bodies, "rigid")
+    touching = bodies_of(standoff=0.0)
+    last = {solid.owner for solid in touching.solids if solid.joint == 6}
+    assert left_out(touching, "contact") == both(*((owner, "surface") for owner in last))
+    assert frozenset(("forearm_link", "surface")) in clearances(touching)
+
+
+def test_what_is_allowed_is_left_out_and_names_that_are_nothing_are_refused_at_once():
+    allow = (("surface", "forearm_link"), ("forearm_link", "shoulder_link"), ("post", "wrist_1_link"))
+    assert left_out(bodies_of(scene=(POST,), allow=allow), "allowed") == both(*allow)
+    wrong = {
+        "allow": (("link9", "surface"),), "clearances": (("forearm_link", "shelve", 0.1),),
+        "tool_links": ("hand",), "scene": (SHELF,),
+    }  # fmt: skip
+    with pytest.raises(ArgumentError) as caught:
+        bodies_of(**wrong)
+    text = str(caught.value)
+    assert all(name in text for name in ("link9", "shelve", "hand", "collision.allow[0]"))
+
+
+def test_notes_on_the_standoff_and_a_surface_that_is_thick():
+    """panda's fingers reach 9.5 mm beyond its tool point."""
+    near = [note for note in bodies_of(load_robot("panda"), 0.005).notes if "9.5 mm beyond" in note]
+    assert {note.split()[2] for note in near} == {"panda_leftfinger", "panda_rightfinger"}
+    assert not [note for note in bodies_of(load_robot("panda"), 0.01).notes if "beyond" in note]
+    thin, thick = (bodies_of(thickness=t).soups[0] for t in (0.0, 0.01))
+    assert thin.triangles[..., 2].min() == pytest.approx(0.3)
+    assert thick.triangles[..., 2].min() == pytest.approx(0.29)  # away from the side worked on
+    (note,) = Collision(tool_clearance=0.012).notes_on(0.005)
+    assert "nearer than 7 mm" in note
+    assert not Collision(tool_clearance=0.005).notes_on(0.005)
+    assert not Collision(surface=False, tool_clearance=0.012).notes_on(0.005)
+
+
+# a base inside something: no motion changes it
+
+
+def rigid_notes(name, *scene, **asked):
+    notes = bodies_of(load_robot(name), scene=scene, **asked).notes
+    return [note for note in notes if "rigid to each other" in note]
+
+
+def test_a_base_in_a_block_is_noted_and_one_on_its_table_is_not():
+    block = Obstacle.box("block", (1.0, 1.0, 0.1), (0.0, 0.0, 0.0))  # its top is 50 mm high
+    (note,) = rigid_notes("ur5", block, self_=False)  # one hull for each link
+    assert note.startswith("base_link and block are rigid to each other")
+    still = [body for body in bodies_of(self_=False).polytopes if body.joint == 0]
+    lowest = min(body.vertices[:, 2].min() - body.radius for body in still)
+    assert f"overlap by {1e3 * (0.05 - lowest):.1f} mm" in note
+    assert not rigid_notes("ur5", block, allow=(("base_link", "block"),))
+    for name, floor in (("ur5", 0.0), ("panda", 0.0), ("puma560", -0.7)):
+        assert not rigid_notes(name, Obstacle.halfspace("floor", (0.0, 0.0, floor)))
+
+
+def test_overlaps_of_balls_and_boxes_are_theirs():
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        turn = tuple(Rotation.random(random_state=rng).as_euler("xyz", degrees=True))
+        box = Obstacle.box("b", tuple(rng.uniform(0.1, 0.5, 3)), (0.1, 0.2, 0.3), turn)
+        sizes = np.array(box.geometry.size)
+        own = rng.uniform(-0.7, 0.7, 3) * sizes
+        place = tuple(box.placement[:3, :3] @ own + box.placement[:3, 3])
+        (a,), (b,) = polytopes_of(box, 5.0), polytopes_of(Obstacle.sphere("s", 0.05, place), 5.0)
+        past = np.abs(own) - sizes / 2
+        depth = 0.05 - (past.max() if past.max() < 0 else np.linalg.norm(np.maximum(past, 0.0)))
+        found = overlap(a, b)
+        assert found == pytest.approx(overlap(b, a))
+        assert depth - 1e-9 <= found <= depth + (0.01 if past.max() >= 0.0 else 1e-9)
+
+
+# objects on links, and a world that moves
+
+
+@pytest.mark.parametrize("angle", [0.7, -2.0])
+def test_a_moving_world_is_as_near_as_one_at_rest(angle):
+    """The judge, on the arm with its table, and on the arm alone beside the turned part."""
+    shelf = Obstacle.box("shelf", (0.4, 0.3, 0.02), (0.5, -0.2, 0.75), (0, 10, 20))
+    floor = Obstacle.halfspace("floor", position=(0, 0, -0.3))
+    turn = np.eye(4)
+    turn[:3, :3], turn[:3, 3] = rotation_from_rpy(0, 0, angle), TABLE.position
+    peg = Obstacle("peg", PEG.geometry, turn @ PEG.placement)
+    free, ends = load_robot("ur5", axes=[TABLE]), ((-0.2, 0.2), (-0.15, 0.15))
+    part = plane(*ends, position=(0, 0, 0.02))
+    turned = plane(*ends, position=(0.6, 0.1, 0.22), rpy_deg=(0, 0, np.degrees(angle)))
+    one = bodies_of(free, 0.1, part, scene=(shelf, floor, PEG))
+    other = bodies_of(UR5, 0.1, turned, scene=(shelf, floor, peg))
+    assert [seat.obstacle.name for seat in one.carried] == ["shelf", "floor"]
+    assert [thing.name for thing in one.scene] == ["peg"]
+    hits = 0
+    for q in np.random.default_rng(3).uniform(-1.6, 1.6, (12, 6)):
+        here = collision_replay(free, one, np.array([[angle, *q]]))
+        there = collision_replay(UR5, other, q[None])
+        assert here.accepted == there.accepted
+        hits += not here.accepted
+        if here.accepted:
+            assert here.nearest_pair == there.nearest_pair
+            assert abs(here.min_clearance - there.min_clearance) < 1e-5
+    assert 0 < hits < 12
+
+
+def test_pairs_of_what_the_world_a_table_and_a_forearm_carry():
+    part = plane((-0.2, 0.2), (-0.15, 0.15))
+    bodies = bodies_of(load_robot("ur5", axes=[TABLE]), 0.1, part, scene=(SHELF, PEG))
+    asked = set(clearances(bodies))
+    wanted = ("shelf", "surface"), ("shelf", "peg"), ("base_link", "surface")
+    assert both(*wanted) <= asked  # the base turns round the table
+    assert not both(("peg", "surface"), ("base_link", "shelf")) & asked
+    assert frozenset(("base_link", "shelf")) in left_out(bodies, "rigid")
+    guide = Obstacle.box("guide", (0.05, 0.05, 0.2), position=(0, 0.1, 0.2), frame="forearm_link")
+    bodies = bodies_of(scene=(guide, SHELF))
+    (solid,) = (solid for solid in bodies.solids if solid.owner == "guide")
+    assert solid.joint == 3
+    asked = set(clearances(bodies))
+    assert both(("guide", "surface"), ("wrist_1_link", "guide"), ("guide", "shelf")) <= asked
+    assert not both(("forearm_link", "guide")) & asked
+    rails = [Axis(name, "prismatic", limits=(0, 1)) for name in ("rail", "lift")]
+    assert bodies_of(load_robot("ur5", axes=[*rails, TABLE])).unchecked == ("rail",)
+
+
+def test_the_tool_of_an_arm_that_holds_the_part_is_what_stands_on_the_tool_frame():
+    nozzle = ToolShape.cylinder(0.01, 0.05, position=(0, 0, -0.03))
+    tcp = ((0.7, 0, 0.4), (0, 0, 0))
+    robot = load_robot("ur5", tool_frame="world", tcp=tcp, surface_link="tool0")
+    part = plane((-0.05, 0.05), (-0.05, 0.05))
+    mounted = bodies_of(robot, 0.01, part, tool=(nozzle,), tool_clearance=0.001)
+    near = clearances(mounted)
+    assert near[frozenset((TOOL, "surface"))] == 0.001
+    assert near[frozenset(("base_link", "surface"))] == 0.0
+    named = bodies_of(robot, 0.01, part, tool_links=("base_link",), tool_clearance=0.002)
+    assert clearances(named)[frozenset(("base_link", "surface"))] == 0.002
+    assert not [note for note in mounted.notes if "base_link reach" in note]
+    lost = Obstacle.sphere("ball", 0.1, frame="turntabel")
+    with pytest.raises(ArgumentError, match=r"scene\[0\].frame must be a link .* 'turntabel'"):
+        bodies_of(load_robot("ur5", axes=[TABLE]), 0.1, part, scene=(lost,))
+
+
+# the convex bodies of the search hold objects and tools, and are no larger than they must be
+
+POSE = {"position": (0.3, -1.2, 0.7), "rpy_deg": (25.0, -40.0, 110.0)}
+
+
+def distance(point, polytope):
+    """m from a point to a polytope: the nearest convex combination, by least squares."""
+    system = np.vstack([polytope.vertices.T, np.full(len(polytope.vertices), 1e4)])
+    shares, _ = nnls(system, np.append(point, 1e4), maxiter=1000)
+    shares /= shares.sum()
+    return np.linalg.norm(shares @ polytope.vertices - point) - polytope.radius
+
+
+SHAPES = [
+    (Obstacle.box("a", (0.2, 0.3, 0.4), **POSE), trimesh.creation.box((0.2, 0.3, 0.4)), 0.0),
+    (Obstacle.cylinder("a", 0.2, 0.5, **POSE), trimesh.creation.cylinder(0.2, 0.5, 97), 0.01),
+    (Obstacle.capsule("a", 0.2, 0.5, **POSE), trimesh.creation.capsule(0.5, 0.2), 0.0),
+    (Obstacle.sphere("a", 0.2, POSE["position"]), trimesh.creation.icosphere(3, 0.2), 0.0),
+]
+
+
+@pytest.mark.parametrize(("obstacle", "mesh", "loose"), SHAPES, ids=lambda value: repr(value)[:20])
+def test_outer_bodies_hold_their_shape_closely(obstacle, mesh, loose):
+    (body,) = polytopes_of(obstacle, 2.0)
+    assert (body.owner, body.joint, soup_of(obstacle)) == ("a", 0, None)
+    points, _ = trimesh.sample.sample_surface(mesh, 60, seed=3)
+    turn, place = obstacle.placement[:3, :3], obstacle.placement[:3, 3]
+    points = np.vstack([points, mesh.vertices[:20]]) @ turn.T + place
+    assert max(distance(point, body) for point in points) <= 1e-6
+    # In each direction the body ends where the shape does, but for what is stated.
+    for way in Rotation.random(40, rng=np.random.default_rng(1)).as_matrix()[:, 0]:
+        ends = ((mesh.vertices @ turn.T + place) @ way).max()
+        extra = (body.vertices @ way).max() + body.radius - ends
+        assert -1e-9 <= extra <= loose * 0.2 + 0.003  # 3 mm: the balls of trimesh are inner ones
+
+
+@pytest.mark.parametrize("height", [-5.0, 0.0, 0.3])
+def test_a_half_space_is_as_far_as_its_box_from_all_that_the_arm_reaches(height):
+    floor = Obstacle.halfspace("floor", (4.0, -7.0, height), (30.0, -10.0, 20.0))
+    (box,), rng = polytopes_of(floor, 1.3), np.random.default_rng(2)
+    points = rng.normal(size=(60, 3))
+    points *= 1.3 * rng.uniform(0.2, 1.0, (60, 1)) / np.linalg.norm(points, axis=1)[:, None]
+    for point in points:
+        above = max(0.0, floor.placement[:3, 2] @ (point - floor.placement[:3, 3]))
+        assert distance(point, box) == pytest.approx(above, abs=1e-6)
+
+
+def part_of(mesh, closed=False):
+    """A trimesh as an object, its own word about being closed ignored."""
+    return Obstacle("part", Triangles(mesh.vertices, mesh.faces, closed), np.eye(4))
+
+
+def test_convex_meshes_are_one_body_and_others_are_triangles():
+    for convex in (trimesh.creation.box((1, 2, 3)), trimesh.creation.icosphere(1, 0.3)):
+        (body,) = polytopes_of(part_of(convex), 1.0)
+        assert soup_of(part_of(convex)) is None
+        assert len(body.vertices) == len(convex.vertices)
+    bent = trimesh.creation.box((1, 2, 3)).subdivide()
+    bent.vertices[8] *= 0.9
+    cube, hollow = trimesh.creation.box((1, 1, 1)), trimesh.creation.box((1, 1, 1))
+    hollow.invert()
+    for other in (
+        bent,
+        trimesh.util.concatenate([cube, cube.copy().apply_translation((3, 0, 0))]),
+        trimesh.util.concatenate([trimesh.creation.box((3, 3, 3)), hollow]),
+        trimesh.creation.torus(0.5, 0.1, 8, 6),
+        trimesh.creation.icosphere(3, 0.3),  # convex, but of many vertices
+    ):
+        soup = soup_of(part_of(other))
+        assert polytopes_of(part_of(other), 1.0) is None
+        assert (soup.closed, soup.deviation) == (True, 0.0)
+        found = np.sort(soup.triangles.reshape(-1))
+        assert found == pytest.approx(np.sort(other.triangles.reshape(-1)))
+    assert not soup_of(part_of(trimesh.Trimesh(bent.vertices, bent.faces[1:]))).closed
+
+
+def test_tool_shapes_move_with_the_last_joint():
+    shape = ToolShape.capsule(0.02, 0.1, position=(0.0, 0.01, -0.05), rpy_deg=(90, 0, 0))
+    (solid,), (body,) = tool_solids((shape,), UR5), tool_polytopes((shape,), UR5)
+    assert (solid.owner, body.owner, solid.joint, body.joint) == ("tool", "tool", 6, 6)
+    data, q = UR5.model.createData(), np.array([0.3, -1.0, 0.8, 0.1, 0.5, -0.2])
+    pin.framesForwardKinematics(UR5.model, data, q)
+    flange = data.oMf[UR5.tool_frame_id].homogeneous
+    joint = data.oMi[solid.joint].homogeneous
+    assert np.allclose(joint @ solid.placement, flange @ shape.placement)
+    ends = (np.array([[0.0, 0.06, -0.05, 1.0], [0.0, -0.04, -0.05, 1.0]]) @ flange.T)[:, :3]
+    found = body.vertices @ joint[:3, :3].T + joint[:3, 3]
+    assert np.allclose(found, ends) or np.allclose(found, ends[::-1])
+    assert body.radius == 0.02
+    assert math.isclose(np.linalg.norm(found[0] - found[1]), 0.1)
+
+
+# what objects are, and what is refused
+
+
+def keys_of(make):
+    """The keys of the faults of a call."""
+    with pytest.raises(ArgumentError) as caught:
+        make()
+    return {fault.key for fault in caught.value.faults}
+
+
+def test_objects_stand_where_they_are_put_with_numbers_as_floats():
+    shelf = Obstacle.box("shelf", (0.5, 0.6, 0.02), (0.55, 0.0, 0.5), (10, 20, 30), 0.01)
+    assert (shelf.geometry, shelf.clearance) == (Box((0.5, 0.6, 0.02)), 0.01)
+    assert np.allclose(shelf.placement[:3, :3], rotation_from_rpy(*np.radians([10, 20, 30])))
+    assert shelf.placement[:, 3].tolist() == [0.55, 0.0, 0.5, 1.0]
+    assert not shelf.placement.flags.writeable
+    assert Obstacle.cylinder("post", 0.05, 1).geometry == Cylinder(0.05, 1.0)
+    assert Obstacle.halfspace("floor").geometry == HalfSpace()
+    assert ToolShape.box([1, 2, 3]).geometry == Box((1.0, 2.0, 3.0))
+
+
+@pytest.mark.parametrize(("make", "keys"), [
+    (lambda: Obstacle.box("a", (0.5, 0.0, 1.0)), {"size[1]"}),
+    (lambda: Obstacle.box("a", (0.5, np.inf, 1.0), (0, 0)), {"size", "position"}),
+    (lambda: Obstacle.box("a", (0.5, -1e-3, 1e-9)), {"size[1]", "size[2]"}),
+    (lambda: Obstacle.box("a", "box"), {"size"}),
+    (lambda: Obstacle.sphere("a", 1e200), {"radius"}),
+    (lambda: Obstacle.sphere("a", None, (1e9, 0, 0)), {"radius", "position"}),
+    (lambda: Obstacle.cylinder("a", -1.0, 0.0, clearance=-1.0), {"radius", "length", "clearance"}),
+    (lambda: Obstacle.capsule("a", True, "long", rpy_deg=(0, 0, np.nan)),
+     {"radius", "length", "rpy_deg"}),
+    (lambda: Obstacle.halfspace("", clearance=np.nan), {"name", "clearance"}),
+    (lambda: Obstacle.halfspace("surface"), {"name"}),
+    (lambda: Obstacle.halfspace("a\nb"), {"name"}),
+    (lambda: Obstacle.sphere("ball", 0.1, frame=3), {"frame"}),
+    (lambda: Obstacle("a", 5, np.eye(4)), {"geometry"}),
+    (lambda: Obstacle("a", HalfSpace(), np.diag([1.0, 1.0, -1.0, 1.0])), {"placement"}),
+    (lambda: Obstacle("a", HalfSpace(), np.diag([2.0, 2.0, 2.0, 1.0])), {"placement"}),
+    (lambda: Obstacle("a", HalfSpace(), np.full((4, 4), np.nan)), {"placement"}),
+    (lambda: ToolShape(HalfSpace(), np.eye(4)), {"geometry"}),
+    (lambda: Obstacle.mesh("a", "no such.stl", position=(0, 0)), {"file", "position"}),
+    (lambda: ToolShape.mesh("no such.stl", scale=-1.0), {"scale"}),
+    (lambda: Collision(
+        self_=1, clearance=-1.0, tool_clearance=np.nan, thickness=11.0, shapes="hull",
+        tool_links=("a", "a"), allow=(("a", "a"), "ab", ("b", "c")), srdf=7,
+        clearances=(("c", "b", 0.1), ("a", "b", -1), ("x", "y")),
+        scene=(SHELF, SHELF, 5), tool=(SHELF,)),
+     {"self_", "clearance", "tool_clearance", "thickness", "shapes", "tool_links", "allow[0]",
+      "allow[1]", "srdf", "clearances[0]", "clearances[1].value", "clearances[2]", "scene[2]",
+      "scene", "tool[0]"}),
+    *((lambda key=key: Collision(**{key: 5}), {key})
+      for key in ("allow", "clearances", "scene", "tool", "tool_links")),
+])  # fmt: skip
+def test_all_that_is_wrong_is_named_at_once(make, keys):
+    assert keys_of(make) == keys
+
+
+FLAT = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+
+
+@pytest.mark.parametrize(("vertices", "faces", "key"), [
+    (FLAT * np.nan, [[0, 1, 2]], "vertices"), (FLAT * 1e300, [[0, 1, 2]], "faces"),
+    (FLAT * 1e-12, [[0, 1, 2]], "faces"), (FLAT, [[0, 1, 3]], "faces"),
+    (FLAT, [[0, 1, -1]], "faces"), (FLAT, [[0, 1, 1]], "faces"),
+    (FLAT, np.zeros((0, 3), dtype=int), "faces"), (FLAT, [[0.0, 1.0, 2.0]], "faces"),
+    (FLAT, [[0, 1]], "faces"), (FLAT, "faces", "faces"), (FLAT[:, :2], [[0, 1, 2]], "vertices"),
+    ([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]], "faces"),
+    (FLAT, np.zeros((500_001, 3), dtype=int), "faces"),
+])  # fmt: skip
+def test_triangles_that_bound_nothing_are_refused(vertices, faces, key):
+    made = Triangles(vertices, faces, True)
+    assert keys_of(lambda: Obstacle("a", made, np.eye(4))) == {key}
+
+
+def test_closed_meshes_are_solids_that_look_outwards_and_others_sheets_that_say_so():
+    solid = trimesh.creation.box((1, 2, 3))
+    assert part_of(solid).geometry.closed
+    assert part_of(solid).notes == ()
+    corners = solid.triangles.reshape(-1, 3)  # as an STL has them, nothing shared
+    welded = Obstacle("a", Triangles(corners, np.arange(36).reshape(-1, 3), False), np.eye(4))
+    assert (welded.geometry.closed, len(welded.geometry.vertices)) == (True, 8)
+    turned, inverted = solid.faces.copy(), solid.faces[:, ::-1]
+    turned[0] = turned[0, ::-1]  # as in careless files
+    for faces in (turned, inverted):
+        outwards = Obstacle("a", Triangles(solid.vertices, faces, False), np.eye(4)).geometry
+        assert outwards.closed
+        assert trimesh.Trimesh(outwards.vertices, outwards.faces).volume == pytest.approx(6.0)
+    double = Triangles(FLAT, np.array([[0, 1, 2], [0, 2, 1]]), True)  # closed, but no inside
+    tangled = np.concatenate([solid.faces, solid.faces[:1]])
+    for shape in (*(Triangles(solid.vertices, f, True) for f in (solid.faces[:-1], tangled)), double):
+        sheet = Obstacle("part", shape, np.eye(4))
+        assert not sheet.geometry.closed
+        assert "taken as a sheet" in sheet.notes[0]
+
+
+def test_a_mesh_file_is_read_in_its_unit_and_a_huge_one_refused_by_its_header(tmp_path):
+    file = tmp_path / "part.stl"
+    trimesh.creation.box((400, 300, 200)).export(file)
+    with pytest.raises(ArgumentError, match=r"'part.stl'.*400 m wide.*scale = 0.001"):
+        Obstacle.mesh("part", file)
+    part = Obstacle.mesh("part", file, scale=0.001)
+    assert np.ptp(part.geometry.vertices, axis=0) == pytest.approx([0.4, 0.3, 0.2])
+    assert part.geometry.closed
+    tool = ToolShape.mesh(file, 0.001, rpy_deg=(0, 0, 90))
+    assert (tool.geometry.vertices == part.geometry.vertices).all()
+    with (tmp_path / "huge.stl").open("wb") as stream:
+        stream.write(bytes(80) + (5_000_000).to_bytes(4, "little"))
+        stream.truncate(84 + 50 * 5_000_000)  # a sparse file
+    with pytest.raises(ArgumentError, match="5,000,000 faces, more than"):
+        read_triangles(tmp_path / "huge.stl", 1.0)
+
+
+def test_names_are_judged_with_the_arm():
+    collision = Collision(
+        surface=False, tool_links=("link2", "nozle"), scene=(Obstacle.sphere("link1", 1.0),),
+        allow=(("link1", "link3"), ("surface", "base")), clearances=(("tool", "shelf", 0.1),),
+    )  # fmt: skip
+    links = ("base", "link1", "link2")
+    faults = {fault.key: fault.message for fault in collision.unknown_names(links)}
+    assert set(faults) == {
+        "scene[0].name", "tool_links[1]", "allow[0]", "allow[1]", "clearances[0].pair"
+    }  # fmt: skip
+    assert "surface = true" in faults["allow[1]"]
+    assert 'did you mean "link2"?' in faults["allow[0]"]
+    assert not Collision(allow=(("base", "surface"), ("tool", "link2"))).unknown_names(links)

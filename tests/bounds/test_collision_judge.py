@@ -1,0 +1,372 @@
+"""The judge of collisions on bodies whose distances are known by hand: what it accepts and refuses.
+
+Asked through `collision_replay` alone, which keeps its meaning whatever is behind it.
+"""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from capsule_arms import at, bodies_of, box_mesh, capsule_links, pair, planar_arm, wall_at
+from foreign_clearances import ForeignScene, samples
+from scipy.spatial.transform import Rotation
+
+from coverable_errors import ArgumentError
+from feasibility.certification import collision_replay
+from feasibility.collisions import Bodies, HalfSpace, Obstacle, Soup
+from robots.shapes import Solid, Triangles
+from robots.urdf import Box, Capsule, Cylinder, Sphere
+
+CLOSE = 2e-6  # m, what coal is trusted with
+SLIDE, CRANK, ELBOW = planar_arm([0.1], ["prismatic"]), planar_arm([1.0]), planar_arm([0.5, 0.4])
+LINKS = capsule_links([0.5, 0.4], 0.03)
+SHEET = np.array([[0.5, y, z] for y in (-1, 1) for z in (-1, 1)], dtype=float)
+SHEET = SHEET[[[0, 1, 2], [1, 3, 2]]]
+
+
+def judged(robot, bodies, *rows, off=None):
+    deviations = None if off is None else np.tile(np.array(off, float), (len(rows) - 1, 1))
+    return collision_replay(robot, bodies, np.array(rows, dtype=float), deviations)
+
+
+def sliding(shape, thing, clearance=0.0, place=None, **more):
+    """A shape on a slide along x, and another at x = 1 m."""
+    placed = Obstacle("thing", thing, at(1.0) if place is None else place)
+    solid = Solid("link1", 1, np.eye(4), shape)
+    return bodies_of([solid], [placed], [pair("link1", "thing", clearance)], **more)
+
+
+def touches_from(judge, low, high):
+    """The angle or length between low (accepted) and high (refused) where the judge changes."""
+    assert judge(low).accepted
+    assert not judge(high).accepted
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if judge(middle).accepted else (low, middle)
+    return low
+
+
+@pytest.mark.parametrize("clearance", [0.0, 0.05])
+def test_a_forearm_folds_onto_the_upper_arm(clearance):
+    """The tip of link 3 is sin(angle) l from link 1: 2 r + c there, to the micrometre."""
+    l2, l3, r = 0.3, 0.5, 0.02
+    robot, links = planar_arm([0.6, l2, l3]), capsule_links([0.6, l2, l3], r)
+    bodies = bodies_of(links, pairs=[pair("link1", "link3", clearance)])
+    folded = touches_from(lambda q3: judged(robot, bodies, [0.3, np.pi / 2, q3]), 1.6, np.pi)
+    expected = np.pi / 2 + np.arcsin((l2 - 2 * r - clearance) / l3)
+    assert folded == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize("clearance", [0.0, 0.03])
+def test_an_arm_turns_towards_a_wall(clearance):
+    """The end of link 2 is at 0.9 cos q; its capsule reaches the radius further."""
+    bodies = bodies_of(LINKS, [wall_at(0.7)], [pair("link2", "wall", clearance)])
+    turned = touches_from(lambda q: judged(ELBOW, bodies, [q, 0.0]), 1.5, 0.0)
+    assert turned == pytest.approx(np.arccos((0.7 - 0.03 - clearance) / 0.9), abs=1e-6)
+    swept = touches_from(lambda q: judged(ELBOW, bodies, [1.5, 0.0], [q, 0.0]), 1.4, 0.0)
+    assert swept == pytest.approx(turned, abs=1e-6)
+
+
+SHAPES = {
+    "ball": Sphere(0.1),
+    "box": Box((0.2, 0.3, 0.4)),
+    "capsule": Capsule(0.1, 0.4),
+    "cylinder": Cylinder(0.1, 0.4),
+    "mesh": box_mesh((0.2, 0.3, 0.4)),
+}  # each reaches 0.1 m along x
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("other", SHAPES)
+def test_distances_along_x(name, other):
+    bodies = sliding(SHAPES[name], SHAPES[other])
+    for x in (0.0, 0.75):
+        found = judged(SLIDE, bodies, [x])
+        assert 0.8 - x - 1e-6 <= found.min_clearance <= 0.8 - x
+        assert found.nearest_pair == ("link1", "thing")
+    moved = judged(SLIDE, bodies, [-0.5], [0.75], [0.1])
+    assert 0.9 * 0.05 - 1e-6 <= moved.min_clearance <= 0.05 <= moved.measured_clearance + 1e-6
+    through = judged(SLIDE, bodies, [0.0], [2.0])
+    assert not through.accepted
+    assert through.min_clearance <= 1e-9
+    assert "link1 and thing overlap by" in through.refusal or "touch" in through.refusal
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_distances_from_a_half_space_and_a_sheet(name):
+    solid = Solid("link1", 1, np.eye(4), SHAPES[name])
+    bodies = bodies_of([solid], [wall_at(0.5)], [pair("link1", "wall")])
+    assert judged(SLIDE, bodies, [0.0], [0.3]).min_clearance == pytest.approx(0.1, abs=CLOSE)
+    soup = Soup("surface", SHEET, 0.004, False)
+    bodies = bodies_of([solid], pairs=[pair("link1", "surface")], soups=[soup])
+    assert judged(SLIDE, bodies, [0.0], [0.3]).min_clearance == pytest.approx(0.096, abs=CLOSE)
+    assert not judged(SLIDE, bodies, [0.0], [1.0]).accepted  # through it to its other side
+    beyond = judged(SLIDE, bodies, [0.8], [1.0])
+    assert beyond.min_clearance == pytest.approx(0.196, abs=CLOSE)
+
+
+@pytest.mark.parametrize("turn", [90, -90])
+def test_a_cylinder_meets_a_half_space_with_either_end(turn):
+    """It lies along x, and its ends are 0.1 m from its middle."""
+    solid = Solid("link1", 1, at(rotation=Rotation.from_euler("y", turn, True).as_matrix()),
+                  Cylinder(0.05, 0.2))  # fmt: skip
+    bodies = bodies_of([solid], [wall_at(0.5)], [pair("link1", "wall")])
+    assert judged(SLIDE, bodies, [0.0], [0.3]).min_clearance == pytest.approx(0.1, abs=CLOSE)
+    assert not judged(SLIDE, bodies, [0.0], [0.41]).accepted
+
+
+@pytest.mark.parametrize("gap", [0.003, 0.0139, 0.0141, 0.2])
+@pytest.mark.parametrize(
+    ("names", "joint"), [(("tool", "surface"), 1), (("surface", "tool"), 1), (("tool", "surface"), 0)]
+)
+def test_what_triangles_may_be_off_is_taken_off_their_distance(gap, names, joint):
+    """A ball before a surface that is known to 4 mm; 10 mm are needed, whoever is named first."""
+    triangle = np.array([[[0.1 + gap, -1, -1], [0.1 + gap, 1, -1], [0.1 + gap, 0, 1.0]]])
+    ball = Solid("tool", joint, np.eye(4), Sphere(0.1))
+    soup = Soup("surface", triangle, 0.004, False)
+    bodies = bodies_of([ball], pairs=[pair(*names, 0.01)], soups=[soup])
+    found = judged(CRANK, bodies, [0.0])
+    assert found.accepted == (gap > 0.014)
+    assert gap - 0.0041 <= found.min_clearance <= gap - 0.004 + 1e-6
+    if found.accepted:
+        assert found.measured_clearance == pytest.approx(gap + 0.004)
+
+
+@pytest.mark.parametrize("needed", [0.05, 0.199, 0.203, 0.3])
+def test_a_curved_surface_of_many_triangles_needs_its_clearance_too(needed):
+    """A ball goes past a wavy sheet whose nearest point is 0.2 m from it, halfway."""
+    rows = np.linspace(-0.5, 0.5, 13)
+    z = np.array([[0.3 + 0.2 * (x**2 + y**2) for y in rows] for x in rows])
+    grid = np.stack([*np.meshgrid(rows, rows, indexing="ij"), z], axis=2)
+    a, b, c, d = grid[:-1, :-1], grid[1:, :-1], grid[:-1, 1:], grid[1:, 1:]
+    halves = [np.stack(half, axis=2).reshape(-1, 3, 3) for half in ((a, b, c), (b, d, c))]
+    soup = Soup("surface", np.concatenate(halves), 0.0, False)
+    ball = Solid("tool", 1, np.eye(4), Sphere(0.1))
+    bodies = bodies_of([ball], pairs=[pair("tool", "surface", needed)], soups=[soup])
+    found = judged(SLIDE, bodies, [-0.4], [0.45])
+    assert found.accepted == (needed < 0.2)
+    if found.accepted:
+        assert needed <= found.min_clearance <= 0.2
+
+
+GANTRY = planar_arm([0, 0, 0.1], ["prismatic"] * 2 + ["revolute"], [(1, 0, 0), (0, 1, 0), (0, 0, 1)])
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_of_all_that_is_certified_the_least_counts(seed):
+    """A tilted box goes past another one in some rows: fcl at samples, and what was measured."""
+    rng = np.random.default_rng(seed)
+    turns = Rotation.random(2, rng=rng).as_matrix()
+    solid = Solid("link3", 3, at(rotation=turns[0]), Box(tuple(rng.uniform(0.02, 0.3, 3))))
+    scene = [Obstacle("thing", Box(tuple(rng.uniform(0.02, 0.6, 3))), at(rotation=turns[1]))]
+    bodies = bodies_of([solid], scene, [pair("link3", "thing")])
+    angle = np.sort(rng.uniform(0.0, 4.0, 7))
+    far = rng.uniform(0.5, 0.9, 7)
+    rows = np.column_stack([far * np.cos(angle), far * np.sin(angle), rng.uniform(-1, 1, 7)])
+    found = judged(GANTRY, bodies, *rows)
+    foreign = ForeignScene(GANTRY, bodies)
+    truth = min(foreign.distances(row)[0] for row in samples(rows, 0.01))
+    assert found.accepted == (truth > 0.0)
+    if found.accepted:
+        assert 0.75 * truth <= found.min_clearance <= truth + CLOSE
+        assert found.min_clearance <= found.measured_clearance
+
+
+# what is inside, and what is hollow
+
+
+@pytest.mark.parametrize("closed", [True, False])
+@pytest.mark.parametrize("carried", [True, False])
+def test_a_ball_wholly_inside_a_mesh(closed, carried):
+    """A closed mesh is a solid: nothing may be inside. An open one is a sheet."""
+    both = box_mesh((2.0, 2.0, 2.0), closed), Sphere(0.1)
+    shape, thing = both if carried else both[::-1]
+    found = judged(SLIDE, sliding(shape, thing, place=np.eye(4)), [0.0], [0.2])
+    assert found.accepted is not closed
+    if closed:
+        assert found.faults[0].row == 0
+        assert "one is inside the other" in found.refusal
+    else:
+        assert 0.0 < found.min_clearance <= 0.7
+
+
+def test_a_mesh_within_a_mesh_and_a_room_with_walls():
+    """A room is solid in its walls alone: its inner shell is turned inwards."""
+    inner, outer = box_mesh((1.0, 1.0, 1.0)), box_mesh((1.2, 1.2, 1.2))
+    faces = np.vstack([outer.faces, inner.faces[:, ::-1] + len(outer.vertices)])
+    room = Triangles(np.vstack([outer.vertices, inner.vertices]), faces, True)
+    for thing, far, accepted in ((outer, 0.3, False), (room, 0.3, True), (room, 0.45, False)):
+        bodies = sliding(box_mesh((0.2, 0.2, 0.2)), thing, place=np.eye(4))
+        assert judged(SLIDE, bodies, [-0.2], [far]).accepted is accepted
+
+
+def fork():
+    """Two arms along x, 0.6 m apart: a U-shaped link whose hull is full."""
+    arm, aside = box_mesh((1.0, 0.1, 0.1)), np.array([0.0, 0.35, 0.0])
+    faces = np.vstack([arm.faces, arm.faces + 8])
+    return Triangles(np.vstack([arm.vertices + aside, arm.vertices - aside]), faces, True)
+
+
+@pytest.mark.parametrize("thing", [Cylinder(0.1, 1.0), box_mesh((0.2, 0.2, 1.0)), Sphere(0.1)])
+def test_a_hollow_link_is_not_its_hull(thing):
+    """A post between the arms of the fork: the hull says no, the mesh says 0.2 m."""
+    for clearance, accepted in ((0.19, True), (0.21, False)):
+        found = judged(SLIDE, sliding(fork(), thing, clearance, np.eye(4)), [-0.3], [0.3])
+        assert found.accepted is accepted
+        assert found.min_clearance <= 0.2 + CLOSE
+
+
+@pytest.mark.parametrize("thing", [Sphere(0.1), box_mesh((0.2, 0.2, 0.2))])
+@pytest.mark.parametrize(("clearance", "accepted"), [(0.14, True), (0.16, False)])
+def test_a_hollow_link_that_deviates_needs_more_room(thing, clearance, accepted):
+    """The fork slides along y, by up to 0.05 m more than it is told: 0.15 m are left of 0.2."""
+    across = planar_arm([0.1], ["prismatic"], [(0, 1, 0)])
+    bodies = sliding(fork(), thing, clearance, np.eye(4))
+    found = judged(across, bodies, [0.0], [1e-3], [0.0], off=[0.05])
+    assert found.accepted is accepted
+    assert found.min_clearance <= 0.15 or not accepted
+
+
+def test_several_bodies_of_one_owner():
+    solids = [Solid("link1", 1, at(y=y), Sphere(0.1)) for y in (0.0, 0.3)]
+    scene = [Obstacle("ball", Sphere(0.1), at(y=0.7)), Obstacle("floor", HalfSpace(), at(z=-1.0))]
+    pairs = [pair("link1", "floor"), pair("link1", "ball")]
+    found = judged(SLIDE, bodies_of(solids, scene, pairs), [0.0], [0.0])
+    assert found.min_clearance == pytest.approx(0.2, abs=CLOSE)
+    assert found.nearest_pair == ("link1", "ball")
+
+
+# between rows, beside the straight line, and to a hair
+
+
+@pytest.mark.parametrize("thickness", [0.1, 1e-6])
+@pytest.mark.parametrize("kind", ["box", "mesh", "sheet"])
+def test_a_thin_wall_between_two_rows(kind, thickness):
+    """Both rows are clear of it by 0.3 m: only the middle of the way is not."""
+    size, scene, soups = (1.0, thickness, 1.0), [], []
+    if kind == "sheet":
+        corners = np.array([[x, 0, z] for x in (0.3, 1.3) for z in (-0.5, 0.5)], dtype=float)
+        soups = [Soup("wall", corners[[[0, 1, 2], [1, 3, 2]]], 0.0, False)]
+    else:
+        scene = [Obstacle("wall", Box(size) if kind == "box" else box_mesh(size), at(0.8))]
+    bodies = bodies_of(LINKS, scene, [pair("link2", "wall")], soups)
+    for side in (0.6, -0.6):
+        assert judged(ELBOW, bodies, [side, 0.0]).accepted
+    found = judged(ELBOW, bodies, [0.6, 0.0], [-0.6, 0.0])
+    (fault,) = found.faults
+    assert not found.accepted
+    assert fault.row == 0
+    assert 0.2 < fault.share < 0.8
+    assert "row 1 to 2" in found.refusal
+    assert "link2 and wall" in found.refusal
+
+
+@pytest.mark.parametrize("thing", [Box((0.1, 2.0, 2.0)), box_mesh((0.1, 2.0, 2.0))])
+def test_rows_that_deviate_need_more_room(thing):
+    """A joint 0.02 rad off the line moves the arm's end 0.9 * 0.02 m: 18 mm and the radius."""
+    wall = [Obstacle("wall", thing, at(1.05))]
+    bodies = bodies_of(LINKS, wall, [pair("link2", "wall", 0.05)])
+    rows = [0.3, 0.0], [-0.3, 0.0]
+    straight = judged(ELBOW, bodies, *rows)
+    assert straight.accepted
+    assert 0.9 * 0.07 <= straight.min_clearance <= 0.07
+    bent = judged(ELBOW, bodies, *rows, off=[0.02, 0.0])
+    assert bent.accepted
+    assert bent.min_clearance <= 0.07 - 0.9 * 0.3 * 0.02  # a sine of 0.3 at the rows
+    for off in ([0.03, 0.0], [-0.03, 0.0], [0.0, 0.06]):
+        refused = judged(ELBOW, bodies, *rows, off=off)
+        assert not refused.accepted
+        assert 0.06 < refused.faults[0].distance < 0.08  # measured on the straight line
+
+
+@pytest.mark.parametrize("needed", [0.5, 0.6, 0.699999, 0.8])
+def test_what_balls_part_has_to_be_as_far_as_is_needed(needed):
+    """A second pair is nearer, and needs nothing: what is known of the first one is not enough."""
+    scene = [Obstacle("far", Sphere(0.1), at(y=0.9)), Obstacle("near", Sphere(0.1), at(z=0.21))]
+    solid = Solid("link1", 1, np.eye(4), Sphere(0.1))
+    pairs = [pair("link1", "far", needed), pair("link1", "near")]
+    found = judged(SLIDE, bodies_of([solid], scene, pairs), [0.0], [1e-4])
+    assert found.accepted == (needed < 0.7)
+    assert found.min_clearance == pytest.approx(0.01, abs=1e-6)
+
+
+@pytest.mark.parametrize("less", [1e-3, 1e-8])
+def test_what_cannot_be_decided_is_refused(less):
+    """A ball goes round another one, 0.8 m away everywhere: a hair less is beyond any patience."""
+    solid = Solid("link1", 1, at(1.0), Sphere(0.1))
+    scene = [Obstacle("ball", Sphere(0.1), np.eye(4))]
+    found = judged(CRANK, bodies_of([solid], scene, [pair("link1", "ball", 0.8 - less)]), [0], [2])
+    assert found.accepted == (less > 1e-6)
+    if not found.accepted:
+        assert "not certified" in found.refusal
+        assert np.isnan(found.faults[0].distance)
+
+
+def test_faults_name_pair_place_and_depth_the_nearest_first():
+    scene = [wall_at(0.85), Obstacle("ball", Sphere(0.1), at(0.0, 1.0))]
+    pairs = [pair("link2", "wall", 0.005), pair("link2", "ball", 0.01)]
+    rows = [0.5, 0.0], [0.1, 0.0], [0.5, 0.0], [np.pi / 2, 0.0]
+    found = judged(ELBOW, bodies_of(LINKS, scene, pairs), *rows)
+    assert [fault.pair for fault in found.faults] == [("link2", "wall"), ("link2", "ball")]
+    assert found.nearest_pair == ("link2", "wall")
+    assert found.min_clearance == found.faults[0].distance < 0.0
+    assert found.measured_clearance is None
+    assert "link2 and wall overlap by" in found.refusal
+    assert found.faults[1].distance == pytest.approx(-0.03, abs=0.03)
+    assert judged(ELBOW, bodies_of(LINKS, scene, pairs[:1]), rows[0]).accepted
+    close = bodies_of(LINKS, scene, [pair("link2", "wall", 0.05)])
+    (fault,) = judged(ELBOW, close, rows[0]).faults
+    gap = 0.85 - 0.9 * np.cos(0.5) - 0.03
+    assert fault.distance == pytest.approx(gap, abs=1e-6)
+    assert fault.text == f"link2 and wall are {1e3 * gap:.4g} mm apart, 50 mm are needed"
+
+
+# what is no motion, and what are no bodies
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_values_that_are_no_numbers_are_refused(value):
+    bodies = bodies_of(LINKS, [wall_at(2.0)], [pair("link2", "wall")])
+    found = judged(ELBOW, bodies, [0.0, 0.0], [value, 0.0], [0.0, 0.0])
+    assert found.refusal == "row 2: a joint value is not finite"
+    assert not judged(ELBOW, bodies, [0.0, 0.0], [0.0, 0.0], off=[value, 0.0]).accepted
+
+
+def test_what_cannot_be_judged_is_an_error_with_words():
+    good = bodies_of(LINKS, [wall_at(2.0)], [pair("link2", "wall")])
+    with pytest.raises(ArgumentError, match=r"shape \(m, 2\)"):
+        collision_replay(ELBOW, good, np.zeros((3, 3)))
+    with pytest.raises(ArgumentError, match="deviations"):
+        collision_replay(ELBOW, good, np.zeros((3, 2)), np.zeros((3, 2)))
+    with pytest.raises(ArgumentError, match="shelf"):
+        judged(ELBOW, replace(good, pairs=(pair("link2", "shelf"),)), [0.0, 0.0])
+    gone = Triangles(np.zeros((3, 3)), np.array([[0, 1, 7]]), False)
+    nowhere = Triangles(np.full((3, 3), np.nan), np.array([[0, 1, 2]]), False)
+    nothing = Triangles(np.zeros((0, 3)), np.zeros((0, 3)), False)
+    for shape in (nowhere, gone, nothing, Sphere(np.nan)):
+        with pytest.raises(ArgumentError):
+            bad = replace(good, solids=(Solid("link2", 2, np.eye(4), shape),))
+            judged(ELBOW, bad, [0.0, 0.0], [0.0, 0.0])
+
+
+def test_nothing_asked_is_nothing_measured():
+    found = judged(ELBOW, bodies_of(LINKS), [0.0, 0.0], [0.0, 0.0])
+    assert (found.accepted, found.min_clearance, found.nearest_pair) == (True, None, None)
+    some = bodies_of(LINKS, [wall_at(2.0)], [pair("link2", "wall")])
+    assert collision_replay(ELBOW, some, np.zeros((0, 2))).accepted
+    assert isinstance(pickle.loads(pickle.dumps(some)), Bodies)
+
+
+@pytest.mark.parametrize("faces", [1, 2, 12])
+def test_flat_and_thin_meshes_crash_nothing(faces):
+    """Coal and qhull end the process for a hull of flat points."""
+    box = box_mesh((0.0 if faces < 12 else 1e-9, 0.2, 0.2))
+    mesh = Triangles(box.vertices, box.faces[:faces], False)
+    solid = Solid("link2", 2, at(0.2), mesh)
+    bodies = bodies_of([solid], [wall_at(1.0)], [pair("link2", "wall")])
+    assert judged(ELBOW, bodies, [0.3, 0.0], [-0.3, 0.0]).accepted
+    other = bodies_of([solid], [Obstacle("o", mesh, at(0.8, 0.5))], [pair("link2", "o")])
+    assert judged(ELBOW, other, [-0.3, 0.0], [-0.6, 0.0]).accepted

@@ -1,0 +1,302 @@
+"""Motions among many bodies: the judge of collisions beside python-fcl, and what it certifies."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from capsule_arms import at, bodies_of, box_mesh
+from foreign_clearances import ForeignScene, assert_clear, samples
+from hard_scenes import ARMS, built_scene
+from mesh_patches import grid
+from samples import sampled, spread
+from scipy.spatial.transform import Rotation
+
+from feasibility import Answer, Evidence, Search, Task, check, verify
+from feasibility.certification import collision_replay, replay, replay_over_surface
+from feasibility.certification.collisions import nearest_along
+from feasibility.collisions import (
+    Collision,
+    HalfSpace,
+    Obstacle,
+    Pair,
+    Soup,
+    ToolShape,
+    gather,
+)
+from robots import Kinematics, load_robot
+from robots.shapes import link_shapes
+from robots.urdf import Box, Capsule, Cylinder, Sphere
+from surfaces import hyperboloid, plane
+
+UR5 = load_robot("ur5")
+PLATE = plane((0.4, 0.6), (-0.1, 0.1), position=(0.0, 0.0, 0.3), side="outside")
+CELLS = PLATE.cells(2, 2)
+TASK = Task(standoff=0.02, cone_deg=30)
+EVERY = np.ones(len(CELLS), dtype=bool)
+
+
+def random_scene(name, seed, rows, step, waves):
+    """An arm with its own shapes, three objects, a floor, a wavy sheet; and a random motion."""
+    rng, robot = np.random.default_rng(seed), load_robot(name)
+    solids, scene = link_shapes(robot).solids, []
+    for k in range(3):
+        shapes = (Box(tuple(rng.uniform(0.05, 0.4, 3))), Sphere(0.1), Capsule(0.05, 0.3))
+        shape = (*shapes, Cylinder(0.08, 0.3), box_mesh((0.3, 0.2, 0.1)))[rng.integers(5)]
+        turn = Rotation.from_rotvec(rng.normal(size=3)).as_matrix()
+        scene.append(Obstacle(f"object{k}", shape, at(*rng.uniform(-1, 1, 3), turn)))
+    scene.append(Obstacle("floor", HalfSpace(), at(z=-0.6)))
+    u, v, faces = grid(waves, waves)
+    wavy = np.stack([0.5 * u, 0.5 * v, 0.3 * np.sin(2.0 * u) * np.cos(2.5 * v)], axis=1)
+    sheet = Soup("surface", (rng.uniform(-1, 1, 3) + wavy)[faces], 0.0003, False)
+    joints = {solid.owner: solid.joint for solid in solids}
+    links = list(joints)
+    moving = [link for link in links if joints[link] > 1]
+    pairs = [
+        Pair(a, b, 0.002)
+        for k, a in enumerate(links)
+        for b in links[k + 1 :]
+        if abs(joints[a] - joints[b]) > 1
+    ]
+    pairs += [Pair(link, thing.name, 0.004) for link in moving for thing in scene]
+    pairs += [Pair(link, "surface", 0.001) for link in moving]
+    low, high = np.maximum(robot.lower, -3.0), np.minimum(robot.upper, 3.0)
+    q = np.cumsum(np.vstack([rng.uniform(low, high), step * rng.normal(size=(rows, robot.n))]), 0)
+    return robot, bodies_of(solids, scene, pairs, [sheet]), np.clip(q, low, high)
+
+
+def judged_as_by_fcl(robot, bodies, q, step_deg):
+    """Refused are exactly the pairs that fcl finds too near; the certified bound is below fcl's."""
+    found, foreign = collision_replay(robot, bodies, q), ForeignScene(robot, bodies)
+    rows = samples(q, np.radians(step_deg))
+    least = np.min([foreign.distances(row) for row in rows], axis=0)
+    refused = {fault.pair for fault in found.faults}
+    for pair, distance in zip(bodies.pairs, least, strict=True):
+        if distance < pair.clearance - 1e-5:
+            assert (pair.first, pair.second) in refused
+        elif (pair.first, pair.second) in refused:  # only what samples may have missed by a hair
+            assert distance < pair.clearance + 2e-4, (pair, distance)
+    if found.accepted:
+        assert found.min_clearance <= least.min() + 1e-5
+    return found
+
+
+SCENES = [("ur5", 1), *((name, [500, k]) for k in range(25) for name in ARMS[:5]), ("puma560", 0)]
+
+
+@sampled
+@pytest.mark.parametrize(("name", "seed"), spread(SCENES, 2))
+def test_the_foreign_judge_agrees(name, seed):
+    """The arm itself is often in collision; alone among the objects, both answers occur."""
+    robot, bodies, q = random_scene(name, seed, 2, 0.3, 6 if isinstance(seed, int) else 30)
+    judged_as_by_fcl(robot, bodies, q, 3.0)
+    alone = [one for one in bodies.pairs if one.second in ("surface", "floor")]
+    judged_as_by_fcl(robot, replace(bodies, pairs=tuple(alone)), q, 3.0)
+
+
+def test_order_and_place_do_not_matter():
+    """Shapes and pairs in another order; scene and surface moved with the arm's first joint."""
+    robot, bodies, q = random_scene("ur5", 2, 4, 0.3, 6)
+    found = collision_replay(robot, bodies, q)
+    assert found.accepted
+    turned = replace(
+        bodies,
+        solids=bodies.solids[::-1],
+        scene=bodies.scene[::-1],
+        pairs=tuple(Pair(p.second, p.first, p.clearance) for p in bodies.pairs[::-1]),
+    )
+    other = collision_replay(robot, turned, q)
+    assert (other.accepted, other.min_clearance) == (True, found.min_clearance)
+    assert set(other.nearest_pair) == set(found.nearest_pair)
+    # The UR5's first joint turns about z: links from the second on see the same if all turn.
+    turn = at(rotation=Rotation.from_euler("z", 0.7).as_matrix())
+    pairs = tuple(p for p in bodies.pairs if "base_link" not in (p.first, p.second))
+    moved = replace(
+        bodies,
+        scene=tuple(replace(one, placement=turn @ one.placement) for one in bodies.scene),
+        soups=tuple(replace(s, triangles=s.triangles @ turn[:3, :3].T) for s in bodies.soups),
+        pairs=pairs,
+    )
+    one = collision_replay(robot, replace(bodies, pairs=pairs), q)
+    two = collision_replay(robot, moved, q + 0.7 * np.eye(6)[0])
+    assert one.accepted
+    assert two.accepted
+    assert one.min_clearance == pytest.approx(two.min_clearance, abs=1e-6)
+    assert one.nearest_pair == two.nearest_pair
+
+
+# motions that cover cells
+
+
+def asked(**settings):
+    """The task with what has to stay clear, and the bodies that this means."""
+    task = replace(TASK, collision=Collision(**settings))
+    return task, gather(UR5, PLATE, task.collision, task.standoff)
+
+
+@pytest.fixture(scope="module")
+def walk():
+    """A motion over all cells, clear of itself and of the plate by 5 mm."""
+    return check(UR5, CELLS, TASK, collision=Collision(clearance=0.005)).witness
+
+
+@pytest.fixture(scope="module")
+def least(walk):
+    """m, the distance of each pair along it, at samples by fcl."""
+    foreign = ForeignScene(UR5, asked()[1])
+    return np.min([foreign.distances(row) for row in samples(walk.q, np.radians(3.0))], axis=0)
+
+
+def test_a_covering_motion_with_its_clearance(walk, least):
+    task, bodies = asked(clearance=0.005)
+    alone = replay(UR5, CELLS, TASK, walk, EVERY)
+    assert (alone.certificate.min_clearance, alone.certificate.nearest_pair) == (None, None)
+    found = replay(UR5, CELLS, task, walk, EVERY)
+    assert found.accepted
+    nothing = {"min_clearance": None, "measured_clearance": None, "nearest_pair": None}
+    assert replace(found.certificate, **nothing) == alone.certificate
+    assert 0.5 * least.min() <= found.certificate.min_clearance <= least.min()
+    assert 0.99 * least.min() <= found.certificate.measured_clearance <= 1.05 * least.min()
+    over = replay_over_surface(UR5, CELLS, TASK, walk.q, EVERY, bodies)
+    assert over.accepted
+    assert over.certificate.min_clearance == found.certificate.min_clearance
+    assert over.certificate.nearest_pair == found.certificate.nearest_pair
+    assert verify(UR5, CELLS, task, walk.q).holds
+
+
+def test_what_is_certified_and_what_was_measured_have_the_truth_between_them():
+    """A motion of which little more than half of the clearance is certified."""
+    horn = hyperboloid(
+        0.3696, 0.2754, (-171.5525, -149.8501), (-0.0836, 0.0424), "inside",
+        (-0.147122, 0.019196, 0.458563), (-65.1287, -31.3607, -150.166),
+    )  # fmt: skip
+    scene = (
+        Obstacle.cylinder("o0", 0.105, 0.314, (0.169, 0.46, 0.273), (28.9, -18.6, -22.6)),
+        Obstacle.sphere("o1", 0.028, (0.281, 0.225, 0.615)),
+    )
+    task = Task(0.03, 2.0, 0.000563, collision=Collision(scene=scene))
+    verdict = check(load_robot("ur3"), horn.cells(4, 2), task)
+    bodies = gather(verdict.robot, horn, verdict.task.collision, task.standoff)
+    foreign, certificate = ForeignScene(verdict.robot, bodies), verdict.certificate
+    names = [(pair.first, pair.second) for pair in bodies.pairs]
+    nearest = [names.index(certificate.nearest_pair)]
+    rows = samples(verdict.witness.q, np.radians(1.0))
+    truth = np.min([foreign.distances(row, nearest) for row in rows])
+    assert certificate.min_clearance <= truth <= certificate.measured_clearance + 1e-4
+    assert certificate.measured_clearance <= 1.1 * truth
+
+
+def test_more_clearance_than_there_is_is_refused(walk, least):
+    """And no search with less of the tolerance is to follow: it would make no room."""
+    pair = asked()[1].pairs[int(np.argmin(least))]
+    for more, accepted in ((-2e-3, True), (1e-4, False)):
+        wanted = ((pair.first, pair.second, float(least.min()) + more),)
+        task, _ = asked(clearance=0.0, clearances=wanted)
+        found = replay(UR5, CELLS, task, walk, EVERY)
+        assert found.accepted is accepted
+        assert found.collides is not accepted
+        assert not found.narrowly_refused
+    assert f"{pair.first} and {pair.second} are" in found.refusal
+    assert not verify(UR5, CELLS, task, walk.q).holds
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_a_row_nudged_into_a_shelf_is_refused(walk, share):
+    """A shelf beside the motion: one row is turned until the arm is in it."""
+    shelf = Obstacle.box("shelf", (0.4, 0.02, 0.4), (0.5, 0.38, 0.4))
+    _, bodies = asked(self_=False, surface=False, clearance=0.005, scene=(shelf,))
+    assert collision_replay(UR5, bodies, walk.q).accepted
+    foreign, q = ForeignScene(UR5, bodies), walk.q.copy()
+    row = round(share * (len(q) - 1))
+    pan = np.eye(6)[0]
+    turns = np.linspace(0.0, 2.0 * np.pi, 160)
+    q[row, 0] += next(t for t in turns if foreign.distances(q[row] + t * pan).min() <= 0.0)
+    found = collision_replay(UR5, bodies, q)
+    assert not found.accepted
+    assert all(fault.pair[1] == "shelf" for fault in found.faults)
+    assert all(abs(fault.row + fault.share - row) < 1.0 for fault in found.faults)
+    over = replay_over_surface(UR5, CELLS, TASK, q, None, bodies)
+    assert any("shelf" in str(fault) for fault in over.faults)
+
+
+@pytest.mark.parametrize("thickness", [1e-2, 1e-5])
+def test_a_thin_wall_that_only_the_middle_of_a_segment_meets(thickness):
+    wall = Obstacle.box("wall", (0.6, thickness, 1.0), (0.7, 0.0, 0.5))
+    _, bodies = asked(self_=False, surface=False, scene=(wall,))
+    q = np.array([[-0.9, -1.2, 1.5, -1.8, -1.57, 0.0], [0.9, -1.2, 1.5, -1.8, -1.57, 0.0]])
+    for row in q:
+        assert collision_replay(UR5, bodies, row[None]).accepted
+    assert not collision_replay(UR5, bodies, q).accepted
+    assert collision_replay(UR5, bodies, q + 1.2 * np.eye(6)[0]).accepted
+
+
+# scenes that are built around a known motion
+
+ONCE = [("panda", 1003), ("puma560 on a rail", 1000)]
+BUILT = [ONCE[0], *((name, seed) for seed in range(1000, 1036) for name in ARMS), ONCE[1]]
+
+
+@sampled
+@pytest.mark.parametrize(("name", "seed"), spread(BUILT, 2))
+def test_a_motion_that_exists_is_found_and_right_and_never_said_not_to_exist(name, seed):
+    scene = built_scene(name, seed)
+    if scene is None:
+        pytest.skip("no arm covers that plate")
+    verdict = check(scene.robot, scene.cells, scene.task, Search(seed=0))
+    assert verdict.evidence is not Evidence.PROOF
+    assert not any(cause.proved for cause in verdict.causes)
+    if verdict.answer is Answer.FEASIBLE:
+        assert_clear(verdict, 0.1)
+    if (name, seed) in ONCE:
+        assert scene.blind_collides
+        assert verdict.answer is Answer.FEASIBLE
+
+
+# the nearest pair along a motion
+
+CENTRES, FLOOR = np.array([[0.5, 0.2, 0.5], [-0.3, 0.6, 0.4]]), -1.5
+
+
+def ball_among(*scene):
+    """A ball of 3 cm at the tool point, far in front of the flange, and no other pair."""
+    links = [name for name in UR5.link_names if name.endswith("_link") and name != "ee_link"]
+    allow = tuple((link, one.name) for link in links for one in scene)
+    tool = (ToolShape.sphere(0.03),)
+    return gather(UR5, PLATE, Collision(False, False, scene=scene, tool=tool, allow=allow), 0.02)
+
+
+def test_distances_pairs_and_lines_are_those_of_the_closed_form():
+    scene = [Obstacle.sphere(f"ball {k}", 0.05, tuple(c)) for k, c in enumerate(CENTRES)]
+    bodies = ball_among(*scene, Obstacle.halfspace("floor", (0.0, 0.0, FLOOR)))
+    steps = np.random.default_rng(5).normal(0.0, 0.12, (80, UR5.n))
+    rows = np.array([0.3, -1.5, 1.5, -1.5, -1.5, 0.0]) + np.cumsum(steps, axis=0)
+    found, tips = nearest_along(UR5, bodies, rows), Kinematics(UR5).tools(rows)[0]
+    away = np.linalg.norm(tips[:, None] - CENTRES, axis=2) - 0.08
+    away = np.column_stack([away, tips[:, 2] - FLOOR - 0.03])
+    np.testing.assert_allclose(found.distances, away.min(axis=1), atol=1e-6)
+    names = ["ball 0", "ball 1", "floor"]
+    nearest = [found.pairs[k].names[1] for k in found.which]
+    assert nearest == [names[k] for k in away.argmin(axis=1)]
+    assert len(set(nearest)) > 1, "else nothing changes"
+    for number, pair in enumerate(found.pairs):
+        here = np.flatnonzero(found.which == number)
+        assert set(pair.rows) == set(here) | {k + 1 for k in here if k + 1 < len(rows)}
+        clear = away[pair.rows, names.index(pair.names[1])]
+        lines, at_rows, clear = pair.points[clear > 0], pair.rows[clear > 0], clear[clear > 0]
+        np.testing.assert_allclose(np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1), clear, 0, 1e-6)
+        ends = np.linalg.norm(lines - tips[at_rows, None], axis=2).min(axis=1)
+        np.testing.assert_allclose(ends, 0.03, atol=1e-5)
+    assert nearest_along(UR5, replace(bodies, pairs=()), np.zeros((3, UR5.n))) is None
+
+
+def test_exact_meshes_count_and_not_their_hulls():
+    """Each row against all pairs, asked one by one."""
+    bodies = gather(UR5, PLATE, Collision(), 0.02)
+    steps = np.random.default_rng(6).normal(0.0, 0.05, (8, UR5.n))
+    q = np.array([0.3, -1.2, 1.2, -1.5, -1.5, 0.0]) + np.cumsum(steps, axis=0)
+    found = nearest_along(UR5, bodies, q)
+    for row in range(len(q)):
+        alone = nearest_along(UR5, bodies, q[row : row + 1])
+        assert found.distances[row] == pytest.approx(alone.distances[0], abs=1e-9)
+        assert found.pairs[found.which[row]].names == alone.pairs[0].names

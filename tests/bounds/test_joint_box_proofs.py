@@ -1,0 +1,289 @@
+"""Boxes of joints: bounds that hold, contraction that loses nothing, proofs that are confirmed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bounds import holds
+from capsule_arms import at, bodies_of, box_mesh, pair, planar_arm
+from foreign_clearances import ForeignScene
+from hard_scenes import ARMS, arm, behind_a_wall, bracket, clear_box, within_a_turn
+from samples import sampled, seeds, spread
+from search_kernels import Motions
+
+from feasibility import Answer, CauseKind, Evidence, check
+from feasibility.certification import verify_proof
+from feasibility.certification.joint_boxes import Overlapping
+from feasibility.collisions import HalfSpace, Obstacle, gather
+from feasibility.cut_tree import CutTree, Leaf
+from feasibility.roadmap.joint_boxes import JointBoxes
+from feasibility.roadmap.joint_boxes.at_target import at_target
+from feasibility.roadmap.joint_boxes.frames import Boxes, frames_at, moves, moves_from_tool
+from robots import Kinematics
+from robots.shapes import Solid
+from robots.urdf import Box, Capsule, Cylinder, Sphere
+
+FEW = ("puma560", "puma560 on a rail", "ur5")
+ROUNDING = 1e-9
+X, Y, Z = np.eye(3)
+ANYWHERE = 1e3  # m, that the tool may be off
+
+
+def everywhere(robot, bodies, half, q=None, target=None, off=ANYWHERE):
+    """Is it confirmed that bodies collide all over a box about q, wherever the tool is there?"""
+    q = np.zeros(robot.n) if q is None else np.array(q, float)
+    half = np.broadcast_to(half, q.shape)
+    target = np.zeros(3) if target is None else np.array(target, float)
+    box = (q - half)[None], (q + half)[None], target[None], np.array([off])
+    return bool(Overlapping(robot, bodies).everywhere(*box)[0])
+
+
+def slide(axis):
+    return planar_arm([0.1], ["prismatic"], [tuple(axis)])
+
+
+def in_a_wall(solids, depth, clearance=0.0):
+    """Link 1 in a half space that ends at x = -depth: it gets out at the other side of that."""
+    turn = np.array([[0, 0, -1], [0, 1, 0], [1, 0, 0]], dtype=float)
+    wall = Obstacle("wall", HalfSpace(), at(-depth, rotation=turn))
+    owner = solids[0].owner
+    return bodies_of(solids, [wall], [pair(owner, "wall", clearance)])
+
+
+def on(joint, shape, *place):
+    return Solid(f"link{joint}", joint, at(*place), shape)
+
+
+@pytest.mark.parametrize("clearance", [0.0, 0.02])
+def test_a_slide_gets_a_ball_out_of_a_wall_where_it_does(clearance):
+    bodies = in_a_wall([on(1, Sphere(0.1))], 0.2, clearance)
+    assert everywhere(slide(X), bodies, 0.299 + clearance)
+    assert not everywhere(slide(X), bodies, 0.301 + clearance)
+    assert not everywhere(planar_arm([0, 0.1], ["prismatic"] * 2), in_a_wall(
+        [on(2, Sphere(0.1))], 0.2), 0.16)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("rest", "place", "way", "depth"),
+    [
+        (Sphere(0.1), (0, 0, 0), Z, 0.1),
+        (Box((0.2, 0.3, 0.1)), (0, 0, 0), Z, 0.05),
+        (Capsule(0.05, 0.2), (0, 0, 0.12), Z, 0.03),
+        (Capsule(0.05, 0.2), (0, 0, 0), X, 0.05),
+        (Cylinder(0.1, 0.1), (0, 0, 0), Z, 0.05),
+        (Cylinder(0.05, 0.4), (0, 0, 0), X, 0.05),
+        (HalfSpace(), (0, 0, -0.04), Z, 0.04),
+        (box_mesh((0.2, 0.3, 0.1)), (0, 0, 0), Z, 0.05),
+    ],
+)
+def test_shapes_are_as_deep_as_they_are(rest, place, way, depth):
+    """A ball of 2 cm at a place inside a body gets out on the shortest way, and not before."""
+    scene = [Obstacle("thing", rest, at(0.3, -0.2, 0.1))]
+    ball = on(1, Sphere(0.02), *(np.array([0.3, -0.2, 0.1]) + place))
+    bodies = bodies_of([ball], scene, [pair("link1", "thing")])
+    assert everywhere(slide(way), bodies, depth + 0.019)
+    assert not everywhere(slide(way), bodies, depth + 0.021)
+    far = bodies_of([replace(ball, placement=at(0.3, -0.2, 2.0))], scene, bodies.pairs)
+    assert not everywhere(slide(Z), far, 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("shape", "ahead"),
+    [
+        (Sphere(0.05), 0.05),
+        (Capsule(0.05, 0.2), 0.05),
+        (Cylinder(0.05, 0.2), 0.05),
+        (Box((0.1, 0.2, 0.3)), 0.05),
+        (box_mesh((0.1, 0.2, 0.3)), 0.05),
+        (bracket(), 0.2),  # it reaches from 0 to 0.2 m along x
+    ],
+)
+def test_no_body_reaches_further_into_a_wall_than_it_does(shape, ahead):
+    """How far ahead a body's deepest point is: most of that counts, and never more."""
+    bodies = in_a_wall([on(1, shape)], 0.1)
+    assert everywhere(slide(X), bodies, 0.1 + 0.9 * ahead)
+    assert not everywhere(slide(X), bodies, 0.1 + ahead + 1e-3)
+
+
+@pytest.mark.parametrize(("turn", "claimed"), [(0.29, True), (0.31, False), (1.0, False), (3.0, False)])
+def test_a_joint_turns_a_ball_by_its_lever(turn, claimed):
+    """A ball at 1 m of the axis, 0.1 m large and 0.2 m deep in a wall along the link."""
+    above = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], dtype=float)
+    wall = Obstacle("wall", HalfSpace(), at(y=-0.2, rotation=above))
+    bodies = bodies_of([on(1, Sphere(0.1), 1.0)], [wall], [pair("link1", "wall")])
+    assert everywhere(planar_arm([1.0]), bodies, turn) == claimed
+
+
+def test_of_two_bodies_that_move_only_what_is_between_them_counts():
+    """A ball on link 2, 0.5 m from its axis, in a block on link 1, which turns as it likes."""
+    solids = [on(1, Box((0.4, 0.4, 0.4)), 1.0), on(2, Sphere(0.1), 0.5)]
+    bodies = bodies_of(solids, pairs=[pair("link1", "link2")])
+    robot = planar_arm([0.5, 0.5])
+    assert everywhere(robot, bodies, (3.0, 0.55))
+    assert not everywhere(robot, bodies, (0.0, 0.9))
+
+
+@pytest.mark.parametrize("behind", [0.0, 0.2])
+def test_what_is_near_the_tool_point_is_where_the_target_is(behind):
+    """The tool of two links is at T up to `off`, a wall 0.2 m deep there.
+
+    A ball at the tool point is there whatever the joints do; one that is 0.2 m behind it turns
+    about it, and two radians bring it out of the wall.
+    """
+    robot, target = planar_arm([0.5, 0.5]), np.array([0.7, 0.4, 0.0])
+    wall = Obstacle("wall", Box((0.4, 9.0, 9.0)), at(target[0] - behind))
+    bodies = bodies_of([on(2, Sphere(0.1), 0.5 - behind)], [wall], [pair("link2", "wall")])
+    half, room = ((0.3, 0.3), 0.16) if behind else ((2.0, 2.0), 0.3)
+    assert everywhere(robot, bodies, half, target=target, off=room - 1e-3)
+    assert everywhere(robot, bodies, (1.0, 1.0), target=target, off=0.05) is (behind == 0.0)
+    assert behind or not everywhere(robot, bodies, half, target=target, off=room + 1e-3)
+
+
+def test_a_joint_behind_a_body_moves_the_tool_and_so_the_body():
+    """Elbow up and elbow down reach one target, with the elbow 0.2 m from where it was."""
+    robot, ball = planar_arm([1.0, 0.1]), [on(1, Sphere(0.05), 1.0)]
+    post = Obstacle("post", Sphere(0.05), at(1.0))
+    bodies = bodies_of(ball, [post], [pair("link1", "post")])
+    asked = {"q": (0.0, np.pi / 2), "target": (1.0, 0.1, 0.0), "off": 1e-4}
+    assert not everywhere(robot, bodies, (0.21, 3.2), **asked)
+    foreign = ForeignScene(robot, bodies)
+    other = 2.0 * np.arctan(0.1)
+    assert foreign.distances(np.array([other, -np.pi / 2]))[0] > 0.05
+    tip = Kinematics(robot).tools(np.array([[other, -np.pi / 2]]))[0][0]
+    np.testing.assert_allclose(tip, [1.0, 0.1, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", seeds(10, all=100))
+def test_all_over_what_is_confirmed_fcl_finds_collisions(seed):
+    """Three joints of any kind, a ball or box on each, a body at rest: the largest box claimed."""
+    rng, largest = np.random.default_rng(seed), 0.0
+    kinds = rng.choice(["revolute", "revolute", "prismatic"], 3).tolist()
+    axes = [tuple(np.round(rng.normal(size=3), 3).tolist()) for _ in kinds]
+    robot = planar_arm([0.3, 0.3, 0.3], kinds, axes)
+    shapes = [Sphere(0.15), Box((0.3, 0.2, 0.25)), Capsule(0.1, 0.2)]
+    solids = [on(k, shapes[int(rng.integers(3))], 0.2) for k in (1, 2, 3)]
+    q = rng.uniform(-1.5, 1.5, 3)
+    place = Kinematics(robot).joints(q[None]).points[0, 3] + rng.uniform(-0.1, 0.1, 3)
+    rest = Obstacle("rest", shapes[int(rng.integers(3))], at(*place))
+    pairs = [pair("link3", "rest", 0.01), pair("link1", "link3", 0.01)]
+    bodies = bodies_of(solids, [rest], pairs)
+    share = rng.uniform(0.2, 1.0, 3)
+    for half in np.geomspace(1e-2, 3.0, 40):
+        largest = half if everywhere(robot, bodies, half * share, q) else largest
+    foreign = ForeignScene(robot, bodies)
+    away = np.clip(1.3 * rng.uniform(-1, 1, (300, 3)), -1, 1) * share
+    for each in q + largest * away:
+        assert largest == 0.0 or (foreign.distances(each) < 0.01 + 1e-6).any()
+
+
+# the search's own bounds
+
+
+def random_boxes(name):
+    """40 boxes of all sizes."""
+    rng, robot = np.random.default_rng(5), arm(name)
+    middle = rng.uniform(-2.5, 2.5, (40, robot.n))
+    half = 10.0 ** rng.uniform(-3.0, 0.0, (40, 1)) * rng.uniform(0.0, 1.0, middle.shape)
+    return Boxes(middle - half, middle + half)
+
+
+@pytest.mark.parametrize("name", FEW)
+def test_no_point_moves_further_than_the_bounds(name):
+    """At configurations of boxes, most of them at corners; where the middles are says Pinocchio."""
+    robot, boxes, place = arm(name), random_boxes(name), np.array([[0.2, -0.1, 0.3]])
+    chain, n, rng = robot.chain, robot.n, np.random.default_rng(6)
+    middles, expected = frames_at(chain, boxes.centre), Kinematics(robot).joints(boxes.centre)
+    assert np.abs(middles.points - expected.points).max() < ROUNDING
+    tips = middles.carried(n, chain.translations[-1:])[:, 0]
+    assert np.abs(tips - Kinematics(robot).tools(boxes.centre)[0]).max() < ROUNDING
+    shares = np.clip(1.2 * rng.uniform(-1.0, 1.0, (20, *boxes.low.shape)), -1.0, 1.0)
+    others = [frames_at(chain, q) for q in boxes.centre + shares * boxes.half]
+    for joint in range(1, n + 1):
+        x, inner = middles.carried(joint, place), joint // 2
+        bound = moves(chain, middles, boxes.half, x, joint).by_joint
+        tool, from_tool = moves_from_tool(chain, middles, boxes.half, x, joint)
+        moved, seen, changed = [], [], []
+        for frames in others:
+            y = frames.carried(joint, place)
+            moved.append(np.linalg.norm(y - x, axis=2))
+            own = [
+                np.einsum("mki,mij->mkj", z - f.points[:, inner, None], f.rotations[:, inner])
+                for z, f in ((x, middles), (y, frames))
+            ]
+            seen.append(np.linalg.norm(own[1] - own[0], axis=2))
+            tip = frames.carried(n, chain.translations[-1:])
+            changed.append(np.linalg.norm((y - tip) - (x - tool[:, None]), axis=2))
+        holds(bound.sum(axis=2) + ROUNDING, moved, 0.2)
+        holds(bound[..., inner:].sum(axis=2) + ROUNDING, seen, 0.1)
+        holds(from_tool.sum(axis=2) + ROUNDING, changed, 0.1)
+
+
+@pytest.mark.parametrize("name", FEW)
+def test_contraction_loses_no_configuration_at_the_target(name):
+    cut = 0
+    for seed in range(40):
+        found = clear_box(name, seed, asked_for=False)
+        target = JointBoxes(found.robot, found.bodies, found.task)
+        target = target.target(found.point, found.approach)
+        boxes, chain = Boxes(found.low[None], found.high[None]), found.robot.chain
+        left = at_target(chain, frames_at(chain, boxes.centre), boxes, target, 0.2)
+        assert left.kept[0]
+        assert (left.boxes.low[0] <= found.q + ROUNDING).all()
+        assert (left.boxes.high[0] >= found.q - ROUNDING).all()
+        cut += (left.boxes.high - left.boxes.low).sum() < 0.9 * (found.high - found.low).sum()
+    assert cut > 3
+
+
+# scenes
+
+
+@sampled
+@pytest.mark.parametrize("name", spread(ARMS[::-1], 2))
+def test_nothing_is_claimed_around_clear_configurations(name):
+    asked = 0
+    for seed in seeds(12, all=300):
+        found = clear_box(name, seed)
+        if found is None:
+            continue
+        asked += 1
+        case = JointBoxes(found.robot, found.bodies, found.task)
+        target = case.target(found.point, found.approach)
+        assert case.any_clear(found.q[None]), seed
+        assert case.blocking(target, found.low, found.high, most=200) is None, seed
+        middle, half = 0.5 * (found.low + found.high), 0.5 * (found.high - found.low)
+        around = {"q": middle, "target": found.point, "off": 0.001}
+        assert not everywhere(found.robot, found.bodies, half, **around), seed
+    assert asked >= 2
+
+
+def lands_clear(robot, cells, task, cell, count, rng):
+    """Is one of so many configurations over a cell clear, as fcl sees it?"""
+    bodies = gather(robot, cells.surface, task.collision, task.standoff)
+    scene, motions = ForeignScene(robot, bodies), Motions(robot, cells, task)
+    for q in rng.uniform(*within_a_turn(robot), (count, robot.n)):
+        found = motions.near(cell, q)
+        if found is not None and scene.is_clear(found):
+            return True
+    return False
+
+
+@sampled
+@pytest.mark.parametrize("seed", seeds(1, all=10))
+@pytest.mark.parametrize("name", spread(FEW, 1))
+def test_a_wall_before_a_plate_is_a_proof_that_landings_bear_out(name, seed):
+    robot, cells, task = behind_a_wall(name, seed)
+    verdict = check(robot, cells, task)
+    assert verdict.answer is not Answer.FEASIBLE
+    for cause in verdict.causes:
+        if cause.proved and cause.kind is CauseKind.COLLISION:
+            assert verify_proof(robot, cells, task, CutTree(Leaf(cause.cell))).accepted
+            assert not lands_clear(robot, cells, task, cause.cell, 10, np.random.default_rng(seed))
+    if (name, seed) == ("puma560", 0):
+        assert verdict.evidence is Evidence.PROOF
+        assert "wherever the tool is" in verdict.message
+        (cause,) = verdict.causes
+        assert (cause.proved, cause.kind, bool(cause.pair)) == (True, CauseKind.COLLISION, True)
+        without = replace(task, collision=None)
+        assert not verify_proof(robot, cells, without, verdict.proof).accepted

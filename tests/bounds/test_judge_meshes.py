@@ -1,0 +1,161 @@
+"""Motions over meshes, looked at by the exact distance from the triangles, given and not cut.
+
+Over a convex edge the tool goes round in an arc of the standoff. The closest point of a convex body
+gives the true approach direction too: from the tool point to that point.
+"""
+
+from __future__ import annotations
+
+import mesh_patches
+import numpy as np
+import pytest
+import trimesh
+from bounds import holds
+from gantry import configurations, gantry
+from samples import sampled, spread
+from trimesh.triangles import closest_point
+
+from feasibility import Answer, Task, check, verify
+from feasibility.certification import replay_over_surface
+from robots import Kinematics, load_robot
+from surfaces import cylinder, rotation_from_rpy
+from surfaces.meshes import TriangleMesh, mesh
+
+UR5 = load_robot("ur5")
+AT = (0.5, -0.15, 0.3)
+
+
+def roof(angle_deg):
+    """Two plates of 300 mm; the normal turns by the angle at their edge."""
+    half = np.radians(angle_deg) / 2
+    x, z = 0.3 * np.cos(half), -0.3 * np.sin(half)
+    vertices = [[0, 0, 0], [0, 0.3, 0], [x, 0, z], [x, 0.3, z], [-x, 0, z], [-x, 0.3, z]]
+    return TriangleMesh(np.array(vertices), [[0, 2, 3], [0, 3, 1], [0, 1, 5], [0, 5, 4]])
+
+
+def without_bottom(body):
+    """The faces of a body that do not look down."""
+    kept = trimesh.Trimesh(body.vertices, body.faces[body.face_normals[:, 2] > -0.5])
+    return TriangleMesh(kept.vertices, kept.faces)
+
+
+def dense(q, per_segment=8):
+    part = np.arange(per_segment)[:, None] / per_segment
+    between = q[:-1, None] * (1.0 - part) + q[1:, None] * part
+    return np.concatenate([between.reshape(-1, q.shape[1]), q[-1:]])
+
+
+def nearest(part, points):
+    """(k, 3) closest points on triangles, trying each; and (k,) m how far they are."""
+    best, closest = np.full(len(points), np.inf), np.empty_like(points)
+    for corners in part.vertices[part.faces]:
+        found = closest_point(np.repeat(corners[None], len(points), axis=0), points)
+        away = np.linalg.norm(found - points, axis=1)
+        nearer = away < best
+        best[nearer], closest[nearer] = away[nearer], found[nearer]
+    return closest, best
+
+
+BOX = without_bottom(trimesh.creation.box((0.3, 0.3, 0.2)))
+ROUNDED = TriangleMesh(*mesh_patches.folded_sheet(0.02, 5))
+EDGES = {  # part, place, task, cells, what normals lean by from the facets' own
+    "sharp": (roof(120), AT, Task(0.02, 45, 3e-4), 20, 0.0),
+    "right, far": (roof(90), AT, Task(0.1, 60), 20, 0.0),
+    "blunt": (roof(45), AT, Task(0.02, 20, 3e-4), 12, 0.0),
+    "smooth": (roof(25), AT, Task(0.03, 30, 1e-3), 12, np.radians(25)),
+    "concave": (roof(-20), AT, Task(0.03, 30, 1e-3), 12, np.radians(20)),
+    "rounded": (ROUNDED, (0.45, -0.15, -0.2), Task(0.15, 20, 1e-3), 60, np.pi / 20),
+    "box": (BOX, (0.5, 0, 0.2), Task(0.005, 45), 40, 0.0),
+}
+
+
+@sampled
+@pytest.mark.parametrize("name", spread([*EDGES], 6))  # rounded is left out
+def test_a_motion_over_edges_keeps_standoff_and_cone(name):
+    part, position, task, count, lean = EDGES[name]
+    robot = load_robot("ur10") if name == "rounded" else UR5
+    verdict = check(robot, mesh(part, position=position).cells(count), task)
+    assert verdict.feasible
+    assert verify(robot, verdict.cells, task, verdict.witness.q).holds
+    tips, axes = Kinematics(robot).tools(dense(verdict.witness.q))
+    closest, away = nearest(part, tips - position)
+    assert np.abs(away - task.standoff).max() <= verdict.certificate.max_position_error
+    assert verdict.certificate.max_position_error <= task.effective_tolerance
+    cosine = ((closest + position - tips) * axes).sum(axis=1) / away
+    assert np.arccos(np.clip(cosine, -1, 1)).max() <= task.cone + lean + 1e-6
+
+
+def test_the_figure_of_a_motion_over_a_mesh_is_that_of_its_triangles():
+    """Normals are interpolated: at its targets the tool is nearer to the triangles than 30 mm."""
+    part = roof(-20)
+    surface, foot = mesh(part), np.linspace(-0.2, 0.2, 401)[:, None] * np.eye(3)[:1]
+    foot = foot + [0.0, 0.15, 0.0] + np.abs(foot[:, :1]) * [0.0, 0.0, np.tan(np.radians(10))]
+    normal = surface.closest(foot).normal
+    q = configurations(foot + 0.03 * normal, -normal)
+    cells, task = surface.cells(12), Task(0.03, 30, 1e-3)
+    found = replay_over_surface(gantry(), cells, task, q, np.zeros(len(cells), dtype=bool))
+    assert found.accepted, found.refusal
+    away = nearest(part, Kinematics(gantry()).tools(dense(q))[0])[1]
+    holds(found.certificate.max_position_error, task.standoff - away.min(), 0.9)
+
+
+@pytest.mark.parametrize(("standoff", "answer"), [(0.05, "undecided"), (0.0, "feasible")])
+def test_a_concave_edge_folds_unless_it_is_touched(standoff, answer):
+    """In a trough the tool would have to be in two places: at its distance from either side."""
+    verdict = check(UR5, mesh(roof(-60), position=AT).cells(24), Task(standoff, 60))
+    assert verdict.answer == answer
+    said = "concave" in verdict.message or "nearer than the standoff" in verdict.message
+    assert said == (answer == "undecided")
+
+
+@pytest.mark.parametrize("angle", [95, 150, 170])
+def test_a_point_over_a_sharp_edge_is_outside(angle):
+    """It may lie under the plane of either face."""
+    surface = mesh(roof(angle)).cells(20).surface
+    turn = np.radians(np.linspace(-0.49, 0.49, 25) * angle)
+    over = np.column_stack([np.sin(turn), np.zeros(len(turn)), np.cos(turn)])
+    for y in np.linspace(0.01, 0.29, 4):
+        np.testing.assert_allclose(surface.closest([0.0, y, 0.0] + 0.05 * over).height, 0.05)
+        assert surface.closest([0.0, y, -0.01]).height < 0.0
+
+
+def test_no_motion_is_certified_through_a_thorn():
+    """The tool point keeps its distance from everything, also from what is thin."""
+    x, y = np.meshgrid(np.linspace(0, 0.4, 41), np.linspace(0, 0.3, 31))
+    points, tip = np.column_stack([x.ravel(), y.ravel()]), np.array([0.0807, 0.22])
+    turns = np.arange(6) * np.pi / 3
+    base = tip + 5e-4 * np.column_stack([np.cos(turns), np.sin(turns)])
+    points = np.concatenate([points[np.linalg.norm(points - tip, axis=1) > 2e-3], base, tip[None]])
+    vertices = np.column_stack([points, np.zeros(len(points))])
+    vertices[-1, 2] = 0.015
+    plate = TriangleMesh(vertices, mesh_patches.flat_faces(points, 1e-12))
+    verdict = check(UR5, mesh(plate, position=(0.35, -0.15, 0.2)).cells(40), Task(0.01, 40))
+    if verdict.feasible:
+        tips, _ = Kinematics(UR5).tools(dense(verdict.witness.q))
+        near = TriangleMesh(vertices, plate.faces[(plate.faces >= len(vertices) - 7).any(axis=1)])
+        assert nearest(near, tips - [0.35, -0.15, 0.2])[1].min() >= 9e-3 - 1e-9
+    else:
+        assert verdict.answer is Answer.UNDECIDED
+
+
+THIN = [
+    ("ur5", 0.0108, 0.194, (10, 70, 80), (0.37, -0.32, 0.18), "outside", 0.0, 2.0),
+    ("panda", 0.0127, 0.318, (-40, 130, 70), (0.44, -0.06, 0.25), "inside", 0.003, 0.5),
+]
+
+
+@pytest.mark.parametrize("case", THIN)
+def test_the_cone_holds_along_a_thin_rod_where_the_tool_point_is(case):
+    """A rod curves across the motion only; a tool point to its side has another normal."""
+    name, radius, length, rpy, position, side, standoff, cone = case
+    rod = cylinder(radius, (-10, 10), (0.0, length), side=side, rpy_deg=rpy, position=position)
+    verdict = check(load_robot(name), rod.cells(1, 3), Task(standoff, cone))
+    if not verdict.feasible:
+        assert verdict.answer is Answer.UNDECIDED
+        return
+    tips, axes = Kinematics(verdict.robot).tools(dense(verdict.witness.q))
+    turn = rotation_from_rpy(*np.radians(rpy))
+    off = (tips - np.asarray(position)) @ turn * [1.0, 1.0, 0.0]
+    approach = -rod.side_sign * (off / np.linalg.norm(off, axis=1, keepdims=True)) @ turn.T
+    tilt = 2.0 * np.arcsin(0.5 * np.linalg.norm(axes - approach, axis=1))
+    assert tilt.max() <= verdict.task.cone + 1e-9

@@ -1,0 +1,506 @@
+"""The judges of motions: what is right is accepted, damages are refused, and figures are bounds."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from arm_urdfs import joint
+from capsule_arms import at as placed
+from capsule_arms import bodies_of, pair
+from gantry import (
+    SURFACES,
+    configurations,
+    gantry,
+    marks_of,
+    places_along,
+    raster,
+    serpentine,
+    tools_of,
+)  # fmt: skip
+from random_arms import planar_arm, robot_of
+from samples import sampled, seeds
+
+from feasibility import Search, Task, check
+from feasibility.certification import replay, replay_over_surface
+from feasibility.collisions import Obstacle
+from feasibility.verdict import Walk
+from robots import Kinematics, load_robot
+from robots.shapes import Solid
+from robots.urdf import Sphere
+from surfaces import cylinder, mesh, piecewise, plane, poses, sphere
+from surfaces.meshes import TriangleMesh
+
+
+def dense(q, count):
+    """Rows, and `count` places on the way to the next each time."""
+    part = np.arange(count)[:, None] / count
+    between = q[:-1, None] * (1.0 - part) + q[1:, None] * part
+    return np.concatenate([between.reshape(-1, q.shape[1]), q[-1:]])
+
+
+def off_and_tilt(cells, task, q):
+    """(k,) m off the offset surface, and (k,) rad between tool and normal at the closest point."""
+    points, axes = tools_of(q)
+    found, sign = cells.surface.closest(points), cells.surface.side_sign
+    chord = np.linalg.norm(axes + sign * found.normal, axis=1)
+    return np.abs(found.height - sign * task.standoff), 2.0 * np.arcsin(np.minimum(0.5 * chord, 1))
+
+
+def leaning(name, angle):
+    """A raster whose tool leans to one side by an angle (rad)."""
+    made = raster(name)
+    points, axes = places_along(made.cells, made.task)
+    side = np.cross(axes, [0.3, 0.5, 0.7])
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    q = configurations(points, np.cos(angle) * axes + np.sin(angle) * side)
+    return made._replace(q=q)
+
+
+def off_by(made, row, distance):
+    """Rows with one moved so that the tool goes away from the surface by a distance (m)."""
+    q = made.q.copy()
+    q[row, :3] -= distance * tools_of(q[row : row + 1])[1][0]
+    return q
+
+
+def ask(made, q=None, cell=None, **changes):
+    """`replay` of a raster with its marks, tampered with."""
+    q, cell = made.q if q is None else q, marks_of(made) if cell is None else cell
+    needed = np.ones(len(made.cells), dtype=bool)
+    return replay(made.robot, made.cells, replace(made.task, **changes), Walk(q, cell), needed)
+
+
+@pytest.fixture(params=SURFACES)
+def made(request):
+    """A motion made by other means."""
+    return raster(request.param)
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_figures_bound_what_dense_samples_find_and_hardly_more(name):
+    made = leaning(name, np.radians(9.0))
+    found = replay_over_surface(*made)
+    assert found.accepted, found.refusal
+    assert found.reached.all()
+    figures = found.certificate
+    margin = min((made.q - made.robot.lower).min(), (made.robot.upper - made.q).min())
+    assert figures.min_limit_margin == pytest.approx(margin, abs=1e-12)
+    assert figures.waypoints == len(made.q)
+    back = ask(made, made.q[::-1], marks_of(made)[::-1])
+    assert back.accepted, back.refusal
+    assert back.certificate.max_position_error == pytest.approx(
+        figures.max_position_error, rel=1e-6
+    )
+    assert figures.max_position_error <= made.task.effective_tolerance
+    if name in ("mesh", "sheets"):  # there normals do not lead to the closest point
+        return
+    off, tilt = off_and_tilt(made.cells, made.task, dense(made.q, 10))
+    assert off.max() <= figures.max_position_error + 1e-12
+    assert tilt.max() - 1e-9 <= figures.max_angle <= 1.01 * tilt.max()
+    for share, accepted in ((1.0 + 1e-6, True), (0.98, False)):
+        limits = {"cone_deg": float(share * np.degrees(figures.max_angle))}
+        assert ask(made, **limits).accepted == accepted
+        if off.max() > 1e-9:
+            error = figures.max_position_error if accepted else off.max()
+            assert ask(made, tolerance=max(share * error, 1e-9)).accepted == accepted
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_a_row_that_is_off_is_named_with_its_distance_whatever_its_mark(made, share):
+    row = round(share * (len(made.q) - 1))
+    q = off_by(made, row, 1.5 * made.task.tolerance)
+    cell = marks_of(made)
+    for mark in (cell[row], (cell[0] + 7) % len(made.cells)):
+        cell[row] = mark
+        found = replay_over_surface(*made[:3], q, marks=cell)
+        (fault,) = (fault for fault in found.faults if "tool point" in fault.text)
+        assert str(fault).startswith(f"row {row + 1}: the tool point is 1.5 mm off")
+
+
+# -- damages: each changes a raster, and names a word of the refusal -------------------------------
+
+
+def replaced(**values):
+    return lambda made: made._replace(**{k: change(made) for k, change in values.items()})
+
+
+def with_nan(made):
+    q = made.q.copy()
+    q[7, 3] = np.nan
+    return q
+
+
+def passing(made):
+    table = np.column_stack([made.robot.lower, made.robot.upper])
+    table[2, 1] = made.q[:, 2].max() - 0.01
+    return made.robot.with_limits(table)
+
+
+def surfaced(**changes):
+    return lambda made: replace(made.cells, surface=replace(made.cells.surface, **changes))
+
+
+def lowered(made):
+    surface = made.cells.surface.moved(np.eye(3), [0.0, 0.0, 2.5e-3])
+    return replace(made.cells, surface=surface)
+
+
+def wiggle(made):
+    k = len(made.q) // 2
+    bad = off_by(made, k, 1.5 * made.task.tolerance)[k]
+    return np.vstack([made.q[: k + 1], bad, made.q[k:]])
+
+
+DAMAGES = {
+    "other columns": (replaced(q=lambda made: made.q[:, [1, 0, 2, 3, 4, 5]]), "tool point is"),
+    "a limit": (replaced(robot=passing), "j3 passes its limit by 10 mm"),
+    "the end": (replaced(q=lambda made: made.q[:-12]), "never reached"),
+    "a third taken out": (replaced(q=lambda made: np.vstack([made.q[: len(made.q) // 3],
+                                                             made.q[2 * len(made.q) // 3 :]])),
+                          "never reached"),
+    "on and on": (replaced(q=lambda made: np.vstack([made.q, made.q[-1] + 0.3])), "tool point is"),
+    "other side": (replaced(cells=surfaced(side="inside")), "tilts"),
+    "other standoff": (replaced(task=lambda made: replace(made.task, standoff=0.014)),
+                       "tool point is"),
+    "shifted": (replaced(cells=lowered), "tool point is"),
+    "NaN": (replaced(q=with_nan), "row 8: j4 is not a finite number"),
+    "degrees": (replaced(q=lambda made: 60.0 * made.q), "passes its limit"),
+    "a joint short": (replaced(q=lambda made: made.q[:, :5]), "no motion of 6 joints"),
+    "one row": (replaced(q=lambda made: made.q[0]), "no motion of 6 joints"),
+    "nothing": (replaced(q=lambda made: made.q[:0]), "never reached"),
+    "a row that wiggles": (replaced(q=wiggle), "tool point is 1.5 mm"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_damaged_rasters_are_refused(made, damage):
+    change, word = DAMAGES[damage]
+    outcome = replay_over_surface(*change(made))
+    assert not outcome.accepted
+    assert word in outcome.refusal
+
+
+def test_marks_are_checked(made):
+    """Wrong, swapped, missing and impossible marks."""
+    cell, misplaced = marks_of(made), "is not at its centre's target"
+    rows = np.flatnonzero(cell >= 0)
+    first, other = rows[0], rows[cell[rows] != cell[rows[0]]][0]
+    assert ask(made).accepted
+    for where, what in (
+        (first, cell[other]), ([first, other], cell[[other, first]]),
+        (np.flatnonzero(cell < 0)[3], cell[other]),
+    ):  # fmt: skip
+        wrong = cell.copy()
+        wrong[where] = what
+        assert misplaced in ask(made, cell=wrong).refusal
+    unmarked = ask(made, cell=np.where(cell == cell[other], -1, cell))
+    assert unmarked.accepted  # it is reached, whether it is marked or not
+    for impossible in (len(made.cells), -2, 10**9):
+        wrong = cell.copy()
+        wrong[first] = impossible
+        assert "not one of" in ask(made, cell=wrong).refusal
+    assert "have cells of shape" in ask(made, made.q[1:], cell).refusal
+
+
+def test_a_turn_more_in_one_joint(made):
+    """The tool does not notice 2 pi between two rows; the motion would, but for its own axis."""
+    k = len(made.q) // 2
+    for j in (3, 4, 5):
+        q = made.q.copy()
+        q[k:, j] += 2.0 * np.pi
+        free = made.robot.with_limits(np.full((6, 2), [-np.inf, np.inf]))
+        assert replay_over_surface(free, made.cells, made.task, q).accepted == (j == 5)
+
+
+def test_one_waypoint_for_one_cell():
+    """A motion of one waypoint covers one cell, and only that cell."""
+    made = raster("ball")
+    row = np.flatnonzero(marks_of(made) == 7)[:1]
+    needed = np.arange(len(made.cells)) == 7
+    for rows in (row, np.repeat(row, 2)):
+        walk = Walk(made.q[rows], np.full(len(rows), 7))
+        outcome = replay(*made[:3], walk, needed)
+        assert outcome.accepted
+        assert outcome.certificate.max_angle < 1e-9
+        assert "never reached" in replay(*made[:3], walk, ~needed).refusal
+
+
+def test_no_cells_and_no_rows():
+    made = raster("plane")
+    none = plane((0.35, 0.55), (-0.1, 0.1), side="outside", position=(0, 0, 0.3)).cells(0, 3)
+    for rows in (made.q[:1], made.q[:0]):
+        assert replay_over_surface(made.robot, none, made.task, rows).accepted
+    alone = replay_over_surface(*made[:3], made.q[:1])
+    assert alone.reached.sum() == 1
+    assert not alone.accepted
+
+
+# -- between rows ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("factor", [0.9, 0.999, 1.001, 3.0])
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-2])
+def test_a_motion_that_is_bad_only_between_two_rows(factor, tolerance):
+    """UR5's base alone turns: the tool runs on a circle, and both rows lie on the plane x = c.
+
+    The largest deviation is that of the circle's arc from its chord, known in closed form, so both
+    sides of the border can be asked: a tenth of a percent less is accepted, more is refused.
+    """
+    robot = load_robot("ur5")
+    base = np.array([0.0, -1.2, 1.6, -0.4, -np.pi / 2, 0.0])
+    point, _ = Kinematics(robot).tool(base)
+    radius, turn = np.hypot(*point[:2]), np.arctan2(point[1], point[0])
+    half = np.arccos(1.0 - factor * tolerance / radius)
+    rows = np.array([base, base])
+    rows[:, 0] = [-turn - half, -turn + half]
+    at = (radius * np.cos(half), 0.0, point[2])  # both ends are exactly on the plane
+    face = plane((-0.3, 0.3), (-0.3, 0.3), side="outside", position=at, rpy_deg=(0, 90, 0))
+    task = Task(standoff=0.0, cone_deg=180, tolerance=tolerance)
+    outcome = replay_over_surface(robot, face.cells(1, 1), task, rows, np.zeros(1, dtype=bool))
+    assert outcome.accepted == (factor < 1.0), outcome.refusal
+    if factor > 1.0:
+        assert 0.0 < outcome.faults[0].share < 1.0
+        assert "row 1 to 2" in outcome.refusal
+        assert "tool point is" in outcome.refusal
+
+
+def test_the_figure_of_one_joint_is_its_sagitta():
+    """An arm of a single joint: its tool follows the inside of a cylinder about the axis."""
+    robot = robot_of([joint(1, limits=(-1.0, 1.0)), joint(2, "fixed", (0.5, 0, 0))], (1, 0, 0))
+    cells = cylinder(0.51, (-50, 50), (-0.1, 0.1)).cells(5, 1)
+    q = np.radians(np.linspace(-40, 40, 81))[:, None]
+    cell = np.where(np.arange(81) % 20 == 0, np.arange(81) // 20, -1)
+    outcome = replay(robot, cells, Task(0.01, 10), Walk(q, cell), np.ones(5, dtype=bool))
+    assert outcome.accepted, outcome.refusal
+    sag = 2 * 0.5 * np.radians(1.0) ** 2 / 8
+    assert outcome.certificate.max_position_error == pytest.approx(sag, rel=0.05)
+
+
+@pytest.mark.parametrize(("beside", "accepted"), [(0.0, True), (9e-4, True), (1.1e-3, False)])
+def test_a_marked_row_is_at_its_centre_within_the_tolerance(beside, accepted):
+    arm = planar_arm(3)
+    q = np.array([[0.0, 0.9, -0.9]])
+    (point,), _ = Kinematics(arm).tools(q)
+    u, v = ((point[k] - 0.1 + by, point[k] + 0.1 + by) for k, by in ((0, beside), (1, 0.0)))
+    cells = plane(u, v, position=(0, 0, point[2]), side="outside").cells(1, 1)
+    outcome = replay(arm, cells, Task(0.0, 180, 1e-3), Walk(q, np.array([0])), np.zeros(1, bool))
+    assert outcome.accepted is accepted
+
+
+@pytest.mark.parametrize("cone", [15.0, 5.0])
+def test_the_figure_of_a_single_cell_is_that_of_the_closest_point_inside_the_cone(cone):
+    """Beside the only centre of a small ball the normal turns; 4 mm aside it does by 10 deg."""
+    ball = sphere(0.02, (0, 30), (0, 360), side="outside", position=(0.5, 0.1, 0.4)).cells(1, 1)
+    target = Task(0.002, cone).targets(ball).points[0]
+    normal = (target - [0.5, 0.1, 0.4]) / 0.022
+    across = np.cross(normal, [0.3, 0.5, 0.7])
+    point = target + 0.004 * across / np.linalg.norm(across)
+    q = configurations(point[None], -normal[None])
+    task, needed = Task(0.002, cone, 5e-3), np.ones(1, dtype=bool)
+    found = replay(gantry(), ball, task, Walk(q, np.array([0])), needed)
+    turn = np.arctan(4.0 / 22.0)
+    assert found.accepted
+    assert found.certificate.max_angle == pytest.approx(turn if cone > 10.0 else 0.0, abs=1e-6)
+    verdict = check(load_robot("ur5"), ball, Task(0.002, 0.5, 5e-3), Search(seed=1))
+    assert verdict.feasible
+    assert verdict.certificate.max_angle <= np.radians(0.5)
+
+
+def test_over_a_fold_only_a_single_waypoint_is_certified():
+    """A standoff as large as the radius: no bound on the normals holds, so no motion passes."""
+    arm = robot_of([joint(i, "prismatic", axis=np.eye(3)[i - 1]) for i in (1, 2, 3)])
+    cells = sphere(0.1, (0, 180), (-180, 180), side="inside").cells(4, 4)
+    task, nowhere = Task(0.1, 180, 0.05), np.zeros(16, dtype=bool)
+    q = np.array([[0.0, 0.0, 0.0], [0.01, 0.0, 0.0]])
+    for a, b in cells.pairs:
+        assert not replay(arm, cells, task, Walk(q, np.array([a, b])), nowhere).accepted
+    assert replay(arm, cells, task, Walk(q[:1], np.array([5])), nowhere).accepted
+
+
+# -- places ---------------------------------------------------------------------------------------
+
+
+LEVEL = 0.31  # m, where the tool of the raster over the plane is
+
+
+def two_plates(gap):
+    """Two flat pieces, one above the other."""
+    levels = LEVEL, LEVEL + gap
+    pieces = [plane((0.35, 0.55), (-0.1, 0.1), position=(0, 0, z)) for z in levels]
+    return piecewise(pieces, side="outside").cells((4, 5))
+
+
+def scroll(gap):
+    """A mesh like a rolled sheet, flat on top: two sheets above each other, joined far away."""
+    flat, ring = np.linspace(0.3, 0.6, 31), np.linspace(0.0, 1.0, 41)[1:-1]
+    angle, size = np.pi / 2 - 2 * np.pi * ring, 0.25
+    x = np.concatenate([flat, 0.45 + size * np.cos(angle) + 0.15 * (1 - 2 * ring), flat])
+    around = LEVEL - size + size * np.sin(angle) + gap * ring
+    z = np.concatenate([0 * flat + LEVEL, around, 0 * flat + LEVEL + gap])
+    y = np.tile(np.linspace(-0.1, 0.1, 9), (len(x), 1))
+    points = np.stack([x[:, None] + 0 * y, y, z[:, None] + 0 * y], axis=-1).reshape(-1, 3)
+    corner = (np.arange(len(x) - 1)[:, None] * 9 + np.arange(8)).ravel()
+    faces = [np.stack([corner, corner + a, corner + b], 1) for a, b in ((9, 10), (10, 1))]
+    return mesh(TriangleMesh(points, np.concatenate(faces))).cells(count=40)
+
+
+@pytest.mark.parametrize("kind", [two_plates, scroll])
+def test_a_jump_between_two_sheets_is_refused(kind):
+    """Both are within the tolerance half way, but no path on the surface leads across."""
+    gap, made = 1.5e-3, raster("plane")
+    cells, task = kind(gap), Task(standoff=0.0, cone_deg=20, tolerance=1e-3)
+    away = off_by(made, len(made.q) - 1, gap)[-1:]
+
+    def judged(rows):
+        return replay_over_surface(made.robot, cells, task, rows, np.zeros(len(cells), dtype=bool))
+
+    for rows in (made.q, np.vstack([away, away])):
+        assert judged(rows).accepted
+    outcome = judged(np.vstack([made.q, away]))
+    assert not outcome.accepted
+    assert "jumps" in outcome.refusal
+
+
+@pytest.mark.parametrize(("polar", "azimuth"), [
+    (np.linspace(0.8, -0.8, 400), 0.7), (np.linspace(0.8, -0.8, 401), -2.0),
+    (0.5, np.linspace(0.3, 7.3, 900)),
+])  # fmt: skip
+def test_over_a_pole_and_around_a_closed_surface(polar, azimuth):
+    """Straight over the pole of a ball, also with a row on it, and once around it and on."""
+    made = raster("ball")
+    polar, azimuth = np.broadcast_arrays(polar, azimuth)
+    s = np.sin(polar)
+    normal = np.stack([s * np.cos(azimuth), s * np.sin(azimuth), np.cos(polar)], -1)
+    rows = configurations(made.cells.surface.position + 0.13 * normal, -normal)
+    outcome = replay_over_surface(*made[:3], rows, np.zeros(len(made.cells), dtype=bool))
+    assert outcome.accepted, outcome.refusal
+
+
+@pytest.mark.parametrize(("by", "good"), [(0.9e-3, True), (1.1e-3, False)])
+def test_beyond_the_border_the_place_stays_on_it(by, good):
+    """Within the tolerance of the border's targets is on the surface; a little more is not."""
+    made = raster("plane")
+    surface = made.cells.surface
+    low = tools_of(made.q)[0][:, 0].min() + by
+    cells = replace(made.cells, surface=replace(surface, u_range=(low, surface.u_range[1])))
+    none = np.zeros(len(cells), dtype=bool)
+    assert replay_over_surface(made.robot, cells, made.task, made.q, none).accepted == good
+
+
+def test_a_cell_reached_between_rows_counts():
+    """The tool passes a centre between two rows that are both beside it."""
+    made = raster("plane")
+    points = tools_of(made.q)[0]
+    aims = made.task.targets(made.cells).points
+    near = np.linalg.norm(points[:, None] - aims, axis=2).min(axis=1) < 1.5e-3
+    ends = [serpentine(made.cells)[5 * k + e] for k in range(4) for e in (0, -1)]
+    near &= np.linalg.norm(points[:, None] - aims[ends], axis=2).min(axis=1) > 1.5e-3
+    rows = made.q[~near]
+    away = np.linalg.norm(tools_of(rows)[0][:, None] - aims, axis=2).min(axis=0)
+    assert (away > made.task.tolerance).sum() > 6
+    outcome = replay_over_surface(*made[:3], rows)
+    assert outcome.accepted, outcome.refusal
+
+
+def test_a_toolpath_is_run_from_its_first_pose_to_its_last():
+    """Along a square and then across it: poses of other passes are nearer than both ends."""
+    flat = np.array([(0.4, -0.1), (0.6, -0.1), (0.6, 0.1), (0.4, 0.1), (0.4, -0.1), (0.6, 0.1)])
+    up = np.tile([0.0, 0.0, 1.0], (6, 1))
+    line, task = poses(np.column_stack([flat, np.full(6, 0.2)]), up), Task(0.02, 20, 5e-4)
+    q = dense(configurations(np.column_stack([flat, np.full(6, 0.22)]), -up), 9)
+    marks = np.where(np.arange(len(q)) % 9 == 0, np.arange(len(q)) // 9, -1)
+    assert replay_over_surface(gantry(), line, task, q, marks=marks).accepted
+    back = replay_over_surface(gantry(), line, task, np.vstack([q[:6], q[3:]]))
+    assert "back along the toolpath" in back.refusal
+    for rows in (q[::-1], q[len(q) // 2 :]):
+        assert not replay_over_surface(gantry(), line, task, rows).accepted
+
+
+def test_bodies_that_are_too_near_are_a_fault_of_a_motion_over_a_surface():
+    made = raster("plane")
+    ball = Solid("link6", 6, placed(), Sphere(0.02))
+    for height, accepted in ((0.5, True), (0.43, False)):
+        post = Obstacle("post", Sphere(0.02), placed(0.45, 0.0, height))
+        bodies = bodies_of([ball], [post], [pair("link6", "post", 0.001)])
+        assert replay_over_surface(*made, bodies=bodies).accepted == accepted
+
+
+# -- random motions -------------------------------------------------------------------------------
+
+
+SMOOTH = ("plane", "ball", "pipe", "ring", "spline")
+BESIDE = 1.0  # rad/m: how much the normal may turn beside the place, for each metre off
+
+
+@sampled
+@pytest.mark.parametrize("seed", seeds(8, all=200))
+@pytest.mark.parametrize("name", SMOOTH)
+def test_random_motions_are_accepted_where_dense_samples_say_so(name, seed):
+    """Rows taken out, moved, tilted and joined in other ways, judged at the edge of what they do.
+
+    The tolerance is chosen near to what samples show, just above or just below.
+    """
+    made, rng = raster(name), np.random.default_rng([seed, len(name)])
+    begin, stride = rng.integers(0, len(made.q) - 24), rng.choice([1, 2, 5, 10])
+    rows = np.minimum(begin + stride * np.arange(24), len(made.q) - 1)
+    rows = [rows, np.sort(rng.choice(rows, 12, replace=False)), np.r_[rows, rows[::-1]]][seed % 3]
+    q = made.q[rows] + rng.normal(size=(len(rows), 6)) * 10.0 ** rng.uniform(-7, -3)
+    samples = dense(q, 60)
+    off, tilt = off_and_tilt(made.cells, made.task, samples)
+    place = made.cells.surface.closest(tools_of(samples)[0]).normal
+    steps = np.linalg.norm(np.diff(place, axis=0), axis=1)
+    steady = (steps <= 300.0 * np.linalg.norm(np.diff(samples[:, :3], axis=0), axis=1) + 1e-6).all()
+    inside = made.cells.surface.closest(tools_of(samples)[0]).inside.all()
+    tolerance = off.max() * rng.choice([0.9, 0.99, 0.9999, 1.0001, 1.02, 1.5])
+    cone = tilt.max() * rng.choice([0.99, 1.02, 1.3]) if rng.random() < 0.5 else np.radians(20.0)
+    task = replace(made.task, tolerance=max(tolerance, 1e-9), cone_deg=min(np.degrees(cone), 180.0))
+    outcome = replay_over_surface(
+        made.robot, made.cells, task, q, np.zeros(len(made.cells), dtype=bool)
+    )
+    most = task.tolerance * (1.0 + 1e-9)
+    if off.max() > most or tilt.max() > task.cone + BESIDE * off.max():
+        assert not outcome.accepted
+    elif steady and inside and off.max() < 0.99 * most and tilt.max() < 0.99 * task.cone:
+        assert outcome.accepted, outcome.refusal
+
+
+# -- no code of the search ------------------------------------------------------------------------
+
+
+LOADING = """
+import sys
+from dataclasses import replace
+import numpy as np
+import feasibility
+from feasibility import Task, certification
+from feasibility.cut_tree import CutTree, Leaf
+from feasibility.verdict import Walk
+from robots import load_robot
+from surfaces import plane
+cells, arm = plane((5.0, 6.0), (0.0, 1.0)).cells(1, 2), load_robot("puma560")
+none = np.zeros(2, dtype=bool)
+found = certification.replay(arm, cells, Task(0.0, 20.0), Walk(np.zeros((2, 6)), none - 1), none)
+assert "tool point" in found.refusal
+assert certification.verify_proof(arm, cells, Task(0.0, 20.0), CutTree(Leaf(0))).accepted
+print(*sys.modules)
+"""
+SEARCH = (
+    *(f"feasibility.{name}." for name in ("roadmap", "paper", "search", "compiled", "checking")),
+    "robots.chain.",
+)
+
+
+def test_judges_and_verifiers_share_no_code_with_the_search():
+    """Neither with the paper's nor with the complete one, nor their compiled kinematics."""
+    run = subprocess.run(
+        [sys.executable, "-c", LOADING], capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 0, run.stderr
+    loaded = set(run.stdout.split())
+    assert "feasibility.certification.motion_replay" in loaded
+    assert "feasibility.certification.cut_proofs.proof_verification" in loaded
+    assert not [name for name in loaded if f"{name}.".startswith(SEARCH)]

@@ -1,0 +1,360 @@
+"""The judge of the roll: its bounds hold where they are sampled, and both judges obey them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from arm_urdfs import joint
+from bounds import holds
+from gantry import SURFACES, raster, references_of, tools_of
+from random_arms import random_arm, robot_of
+from samples import sampled, seeds
+
+from feasibility import Task
+from feasibility.certification import placements, replay, replay_over_surface
+from feasibility.certification.rolls import Held, ToolAxes, reference_axes, tool_frames
+from feasibility.certification.rolls.bounds import (
+    largest_off,
+    off_middle,
+    products_of_changes,
+    vectors_of,
+)
+from feasibility.roll import Roll, projected
+from feasibility.targets import u_directions
+from feasibility.verdict import Walk
+from surfaces import cylinder, sphere
+from surfaces.places import PlacePaths, Places, offset_surface
+
+S = np.linspace(0.0, 1.0, 101)[:, None]
+X, Y, Z = np.eye(3)
+
+
+def lines(rng, count, size):
+    """(4, 2, k, 3) ends of straight lines of x, y, t and u, no unit vectors between the ends."""
+    start = np.linalg.qr(rng.normal(size=(4, count, 3, 3)))[0][:, :, 0]
+    return np.stack([start, start + size * rng.normal(size=start.shape)]).transpose(1, 0, 2, 3)
+
+
+@pytest.mark.parametrize("half", [0.4, np.pi / 2, 2.5])
+@pytest.mark.parametrize("middle", [0.0, 2.0])
+def test_a_range_holds_the_roll_all_along_and_hardly_less_would(half, middle):
+    rng, roll, used = np.random.default_rng(3), Roll(middle, half), []
+    for size in (0.03, 0.3, 1.0):
+        x, y, t, u = lines(rng, 300, size)
+        z0, z1 = (vectors_of(x[k], y[k], t[k], u[k], roll) for k in (0, 1))
+        second = products_of_changes(*(one[1] - one[0] for one in (x, y, t, u)))
+        unknown = size * rng.random((len(z0), 2)) * rng.integers(0, 2, (1, 2))
+        found = largest_off(z0, z1, second, unknown, half)
+        at = ((1.0 - S[..., None]) * one[0] + S[..., None] * one[1] for one in (x, y, t, u))
+        z = vectors_of(*at, roll)
+        # What is not known of both ends may point anywhere.
+        for angle in np.linspace(-np.pi, np.pi, 7):
+            way = np.array([np.cos(angle), np.sin(angle)])
+            less = (1.0 - S) * unknown[:, 0] + S * unknown[:, 1]
+            truth = off_middle(z + less[..., None] * way).max(axis=0)
+            some = np.isfinite(found)
+            assert (truth[some] <= found[some] + 1e-6).all()
+            used.append((truth / found)[some & (truth > 0.05)].max(initial=0.0))
+    assert max(used) > 0.97
+
+
+def test_wide_ranges_are_certified_from_end_to_end():
+    """A slow turn from one end of a range of 300 degrees to the other, in parts."""
+    angle = np.radians(np.linspace(-149, 149, 60))
+    z, none = 2.0 * np.column_stack([np.cos(angle), np.sin(angle)]), np.zeros((59, 2))
+    bend = 2.0 * np.diff(angle) ** 2
+    bound = largest_off(z[:-1], z[1:], bend, none, np.radians(150))
+    assert np.isfinite(bound).all()
+    assert (bound >= np.maximum(np.abs(angle[1:]), np.abs(angle[:-1])) - 1e-9).all()
+    across = 2.0 * np.array([[-1.0, 0.1], [-1.0, -0.1]])
+    assert not np.isfinite(largest_off(across[:1], across[1:], bend[:1], none[:1], 3.0))
+
+
+@sampled
+@pytest.mark.parametrize("seed", seeds(6, all=60))
+def test_frames_of_the_tool_bend_no_more_than_is_said(seed):
+    rng = np.random.default_rng(seed)
+    alone = robot_of([joint(1), joint(2, "fixed", (0.5, 0, 0))])  # both of its axes turn about z
+    robot = random_arm(rng) if seed else alone
+    ends = rng.uniform(-1.0, 1.0, (2, robot.n))
+    steps = np.abs(np.diff(ends, axis=0))
+    axes, x = placements(robot, ends).axes, reference_axes(robot, ends)
+    bound = tool_frames(robot, ends, axes, x).second_derivatives(robot, steps)[0]
+    q = ends[0] + S * (ends[1] - ends[0])
+    x, axes = reference_axes(robot, q), placements(robot, q).axes
+    bent = [np.diff(one, n=2, axis=0) * 100.0**2 for one in (x, np.cross(axes, x))]
+    truth = sum(np.linalg.norm(one, axis=1).max() for one in bent)
+    assert truth <= bound * (1.0 + 1e-3)
+    assert seed or truth > 0.99 * bound
+
+
+# -- references along paths of places -------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["dome", "tube", "by u"])
+def test_references_bend_no_more_than_is_said(kind):
+    """Past where the approach is nearly along the reference, t turns fast."""
+    rng, count = np.random.default_rng(5), 400
+    surface = cylinder(1.0, (-170, 170), (-1, 1)) if kind == "tube" else None
+    surface = surface or sphere(1.0, (20, 160), (-180, 180))
+    offset, along = offset_surface(surface, 0.0), None if kind == "by u" else (1.0, 0.0, 0.0)
+    task = Task(0.0, 90, roll_deg=(-80.0, 80.0), roll_reference=along)
+    held = Held.of(task, surface.cells(2, 2), offset)
+    middle = [np.pi / 2, 0.0] if kind != "tube" else [0.4, 0.0]
+    way = 10.0 ** rng.uniform(-3, -1.3, (count, 1)) * rng.normal(size=(count, 2))
+    beside = np.linalg.norm(way, axis=1, keepdims=True) * rng.uniform(0.7, 3.0, (count, 1))
+    first = middle + beside * rng.choice([-1.0, 1.0], (count, 2)) - 0.5 * way
+    chart = np.zeros(count, dtype=np.int64)
+    path = offset.paths(Places(chart, first), Places(chart, first + way))
+    found = held.references_along(path, held.approaches(path.normals))
+    some = np.isfinite(found.second_u[:, 2]) & (path.share[:, 2] == 0.0)
+    assert some.sum() > 80
+    ends = [(held.approaches(path.normals[:, k]), found.t[:, k]) for k in (0, 3)]
+    used = []
+    for s in (0.1, 0.5, 0.8):
+        places = Places(chart, first + s * way)
+        b = held.approaches(offset.at(places)[1])
+        t = held.references_along(offset.paths(places, places), np.stack([b] * 4, axis=1)).t[:, 0]
+        for here, (one, other), second in (
+            (t, [t for _, t in ends], found.second_t),
+            (np.cross(b, t), [np.cross(b, t) for b, t in ends], found.second_u),
+        ):
+            off = np.linalg.norm(here - (1.0 - s) * one - s * other, axis=1)[some]
+            most = 0.5 * s * (1.0 - s) * second[some, 2]
+            assert (off <= most + 1e-7).all()
+            used.append((off / most)[off > 1e-4].max(initial=0.0))
+    assert kind != "dome" or min(used) > 0.6
+
+
+def made_up(approach, along, smooth, share=0.0):
+    """One path of places s = 0 to 1 where approach and u direction are functions of s.
+
+    Bounds on their derivatives are measured. `along` may be one direction, too.
+    """
+    fixed = not callable(along)
+    e = (lambda s: np.tile(along, (len(s), 1))) if fixed else along
+    s = np.linspace(0.0, 1.0, 2001)
+    slope = np.linalg.norm(np.diff(e(s), axis=0), axis=1).max() * 2000.0
+    bent = np.linalg.norm(np.diff(approach(s), n=2, axis=0), axis=1).max() * 2000.0**2
+    offset = SimpleNamespace(
+        tangents=lambda places: e(places.x[:, 0]),
+        tangent_slopes=lambda start, end: slope * (end.x - start.x)[:, 0],
+    )
+    roll = Roll(0.0, np.radians(80.0))
+    held = Held(offset, 1.0, None, np.asarray(along) if fixed else None, roll, smooth)
+    at = np.array([0.0, share, share, 1.0])
+    pieces = np.diff(at)[None, :, None] ** 2 * [0.0, bent]
+    x = np.stack([at, 0.0 * at], axis=1)[None]
+    none = np.zeros((1, 4), dtype=np.int64)
+    return held, PlacePaths(at[None], np.zeros((1, 4, 3)), approach(at)[None], pieces, none, x), e
+
+
+def unit(vectors):
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def bump(s):
+    """1 in the middle, 0 at both ends."""
+    return (4.0 * s * (1.0 - s))[:, None]
+
+
+def tent(s):
+    return np.minimum(2.0 * s, 2.0 - 2.0 * s)[:, None]
+
+
+def still(s):
+    return np.tile(-Z, (len(s), 1))
+
+
+def swaying(s):
+    return unit(-Z + 2e-3 * bump(s) * Y)
+
+
+NEAR = 0.05  # of a reference to the approach
+MADE_UP = {
+    "u turns out and back": (still, lambda s: unit(X + 5e-3 * tent(s) * Y), 0.97),
+    "u turns out and back, past the approach": (
+        still, lambda s: unit(-Z + NEAR * (X + 0.9 * tent(s) * (0.436 * Y - 0.9 * X))), 0.1,
+    ),
+    "the approach sways, over facets": (swaying, X + Z, 0.2),
+    "the approach sways": (swaying, 0.3 * X - 0.954 * Z, 0.45),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MADE_UP)
+def test_references_of_directions_that_go_out_and_back(name):
+    """What is as bad as the bounds allow: an arc out, and the same way back."""
+    approach, along, used = MADE_UP[name]
+    along = along if callable(along) else unit(along)
+    held, path, e = made_up(approach, along, smooth="facets" not in name)
+    found = held.references_along(path, path.normals)
+    s = S[:, 0]
+    b = approach(s)
+    t, _ = projected(e(s), b)
+    for here, second, share in (
+        (t, found.second_t, used), (np.cross(b, t), found.second_u, 0.9 * used)
+    ):  # fmt: skip
+        off = np.linalg.norm(here - (1.0 - S) * here[0] - S * here[-1], axis=1)
+        holds(0.5 * s * (1.0 - s) * second[0, 2] + 1e-9, off, share)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5])
+def test_a_tool_that_turns_out_and_back_is_rolled_by_that(share):
+    """By 0.03 rad off the straight line between its ends, also at a place in its middle."""
+    held, path, _ = made_up(still, X, True, share)
+    s = S[:, 0]
+    angle = 0.4 + 0.03 * bump(s)[:, 0]
+    x = np.cos(angle)[:, None] * X - np.sin(angle)[:, None] * Y
+    second = 2.0 * np.linalg.norm(np.diff(x, n=2, axis=0), axis=1).max(keepdims=True) * 100.0**2
+    ends = [ToolAxes(-Z[None], x[[k]]) for k in (0, -1)]
+    holds(held.rolls_between(*ends, second, path, path.normals), angle.max(), 0.97)
+
+
+@pytest.mark.parametrize("kind", ["fixed", "fixed, over facets", "u"])
+def test_the_bounds_of_references_are_those_of_the_lemma(kind):
+    """A second reading of `rolls.held`, term by term: also of terms that others outweigh."""
+    rng, half = np.random.default_rng(8), np.radians(85.0)
+    for _ in range(12):
+        b = unit(-Z + 0.1 * rng.normal(size=(4, 3)))
+        e = unit(X + 0.1 * rng.normal(size=(4, 3))) if kind == "u" else np.tile(X, (4, 1))
+        b[2], e[2] = b[1], e[1]
+        bent, slopes = rng.uniform(0.01, 0.05, 3), rng.uniform(0.01, 0.1, 3)
+        offset = SimpleNamespace(
+            tangents=lambda places, e=e: e[places.x[:, 0].astype(int)],
+            tangent_slopes=lambda one, other, slopes=slopes: slopes[one.x[:, 0].astype(int)],
+        )
+        roll = Roll(0.1, half)
+        held = Held(offset, 1.0, None, None if kind == "u" else X, roll, kind == "fixed")
+        at = np.array([0.0, 0.4, 0.4, 1.0])
+        number = np.stack([np.arange(4.0), np.zeros(4)], axis=1)[None]
+        bounds = np.stack([0.0 * bent, bent], axis=1)[None]
+        chart = np.zeros((1, 4), dtype=np.int64)
+        path = PlacePaths(at[None], np.zeros((1, 4, 3)), b[None], bounds, chart, number)
+        across = e - (e * b).sum(axis=1, keepdims=True) * b
+        h, t = np.linalg.norm(across, axis=1), unit(across)
+        u = np.cross(b, t)
+        x, axes = unit(X + 0.1 * rng.normal(size=(2, 3))), unit(-Z + 0.1 * rng.normal(size=(2, 3)))
+        y, second, worst = np.cross(axes, x), rng.uniform(0.01, 0.05), []
+        known = held.references_along(path, path.normals)
+        for k in (0, 2):
+            db = np.linalg.norm(b[k + 1] - b[k])
+            beta = db + bent[k] / 2.0
+            own = slopes[k] if kind == "u" else 0.0
+            least = min(h[k], h[k + 1]) - (beta + own) / 2.0
+            of_t = 4.0 * (beta + own) / least
+            if kind == "fixed":
+                curved = (2.0 * bent[k] + 2.0 * beta**2) / least
+                of_t = min(of_t, curved + 2.0 / np.sqrt(3.0) * (beta / least) ** 2)
+            of_u = bent[k] + of_t + 2.0 * db * np.linalg.norm(t[k + 1] - t[k])
+            assert known.second_t[0, k] == pytest.approx(of_t)
+            assert known.second_u[0, k] == pytest.approx(of_u)
+            one, other = ([(1.0 - s) * v[0] + s * v[1] for v in (x, y)] for s in at[k : k + 2])
+            ends = (*one, t[k], u[k]), (*other, t[k + 1], u[k + 1])
+            dx, dy, dt, du = (last - first for first, last in zip(*ends, strict=True))
+            most = 2.0 * np.hypot(dt @ dx + du @ dy, du @ dx - dt @ dy)
+            most += (at[k + 1] - at[k]) ** 2 * second + np.sqrt(2.0) * (of_t + of_u)
+            z0 = vectors_of(*one, t[k], u[k], roll)[None]
+            z1 = vectors_of(*other, t[k + 1], u[k + 1], roll)[None]
+            unknown = np.array([[s * (1.0 - s) / 2.0 * second for s in at[k : k + 2]]])
+            worst.append(largest_off(z0, z1, np.array([most]), unknown, half)[0])
+        ends = [ToolAxes(axes[k : k + 1], x[k : k + 1]) for k in (0, 1)]
+        found = held.rolls_between(*ends, np.array([second]), path, path.normals)
+        assert found[0] == pytest.approx(max(worst), abs=1e-7)
+
+
+# -- both judges of motions -----------------------------------------------------------------------
+
+
+REFERENCES = {
+    "plane": None, "ball": (0.2, 1.0, 0.0), "pipe": None, "ring": None, "spline": None,
+    "mesh": (1.0, 0.3, 0.1), "sheets": (1.0, 0.0, 0.0),
+}  # fmt: skip
+BESIDE = 0.5  # deg
+
+
+def rolls(cells, q, reference):
+    """(k,) rad, over the closest points of the surface."""
+    points, axes = tools_of(q)
+    found = cells.surface.closest(points)
+    b = -cells.surface.side_sign * found.normal
+    e = u_directions(cells.surface, points - found.height[:, None] * found.normal)
+    if reference is not None:
+        e = np.tile(cells.surface.rotation @ unit(np.array(reference)), (len(b), 1))
+    t = unit(e - (e * b).sum(axis=1, keepdims=True) * b)
+    x, u = references_of(q), np.cross(b, t)
+    y = np.cross(axes, x)
+    return np.arctan2((u * x - t * y).sum(axis=1), (t * x + u * y).sum(axis=1))
+
+
+def limited(name, low=-BESIDE, high=BESIDE):
+    """A raster, with a task whose range is that of dense samples and a little more or less."""
+    made, reference = raster(name), REFERENCES[name]
+    found = np.unwrap(rolls(made.cells, made.q, reference))
+    middle = rolls(made.cells, 0.5 * (made.q[1:] + made.q[:-1]), reference)
+    aside = (middle - found[:-1] + np.pi) % (2 * np.pi) - np.pi
+    seen = np.degrees(np.concatenate([found, found[:-1] + aside]))
+    turn = 360.0 * np.round(seen.mean() / 360.0)
+    most = seen.min() - turn + low, seen.max() - turn + high
+    return made._replace(task=replace(made.task, roll_deg=most, roll_reference=reference))
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_motions_within_the_range_are_accepted_and_beyond_one_end_refused_there(name):
+    made = limited(name)
+    found = replay_over_surface(*made)
+    assert found.accepted, found.refusal
+    off = np.abs(made.task.roll.off(rolls(made.cells, made.q, REFERENCES[name])))
+    assert off.max() - 1e-6 <= found.certificate.max_roll <= made.task.roll.half + 1e-9
+    for ends in ((-BESIDE, -BESIDE), (BESIDE, BESIDE)):
+        made = limited(name, *ends)
+        found = replay_over_surface(*made)
+        (fault,) = (fault for fault in found.faults if "the roll is" in str(fault))
+        off = np.abs(made.task.roll.off(rolls(made.cells, made.q, REFERENCES[name])))
+        assert off[fault.row] == pytest.approx(off.max(), abs=1e-6)
+        assert 0.49 < float(fault.text.split()[3]) < 0.51
+
+
+@pytest.mark.parametrize("name", ["plane", "pipe", "mesh"])
+@pytest.mark.parametrize("turn", [2 * np.pi, -2 * np.pi])
+def test_a_turn_of_the_tool_between_two_rows_is_seen(name, turn):
+    """Every row is right; only between them the roll is not."""
+    made, k = limited(name), 40
+    q = made.q.copy()
+    q[k:, 5] += turn
+    found = replay_over_surface(made.robot, made.cells, made.task, q)
+    assert [fault.row for fault in found.faults] == [k - 1]
+    assert "the roll is" in found.refusal
+
+
+@pytest.mark.parametrize("long_way", [False, True])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_the_long_way_round_is_refused(sign, long_way):
+    """Over one cell, from one end of the range to the other."""
+    made = raster("plane")
+    roll = np.degrees(rolls(made.cells, made.q[:1], None)[0])
+    task = replace(made.task, roll_deg=(roll - 20.0, roll + 20.0))
+    rows = np.repeat(made.q[:1], 2, axis=0)
+    rows[:, 5] += sign * np.radians([-19.0, 19.0 - 360.0 * long_way])
+    none = np.zeros(len(made.cells), dtype=bool)
+    walk = Walk(rows, np.array([0, 0]))
+    for found in (
+        replay(made.robot, made.cells, task, walk, none),
+        replay_over_surface(made.robot, made.cells, task, rows, none),
+    ):
+        assert found.accepted is not long_way
+        if found.accepted:
+            assert np.radians(19.0) - 1e-6 <= found.certificate.max_roll <= task.roll.half
+
+
+def test_without_limits_nothing_is_said_of_the_roll():
+    made = raster("plane")
+    assert replay_over_surface(*made).certificate.max_roll is None
+    free = made._replace(task=replace(made.task, roll_deg=(-180, 180)))
+    assert replay_over_surface(*free).accepted
+    held = replace(made.task, approach=(0, 0, -1))
+    assert replay_over_surface(made.robot, made.cells, held, made.q).accepted
+    held = replace(held, approach=(0, 1, -1))
+    assert "tool axis tilts 45" in replay_over_surface(made.robot, made.cells, held, made.q).refusal

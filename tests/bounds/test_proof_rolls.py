@@ -1,0 +1,144 @@
+"""Models of the roll over boxes, which proofs rest on: samples, and a second reading of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from feasibility import Task
+from feasibility.certification.cut_proofs.linear_models import (
+    Allowed,
+    ArmModel,
+    Boxes,
+    target_parts,
+)
+from feasibility.certification.rolls import (
+    TargetModel,
+    ToolModel,
+    reference_axes,
+    reference_parts,
+    roll_models,
+)
+from feasibility.roll import Roll, projected
+from robots import Kinematics, load_robot
+from surfaces import sphere
+
+UR5 = load_robot("ur5")
+ROLLED = {"roll_deg": (-30, 30), "roll_reference": (1, 0, 0)}
+
+
+def unit(vector):
+    return vector / np.linalg.norm(vector)
+
+
+def tool_model(q, half):
+    """x and y about q (n,) over a box of half widths (n,), and what boxes are made of by hand.
+
+    D = sum_j s_j h_j (h_j + 2 sum of the h before j), with sines of 1; moves by all h together.
+    """
+    _, axis = Kinematics(UR5).tool(q)
+    x = reference_axes(UR5, q[None])
+    both = np.stack([x, np.cross(axis, x)], axis=1)
+    turning = Kinematics(UR5).twists(q[None]).transpose(0, 2, 1)[..., 3:]
+    second = half @ (half + 2.0 * (np.cumsum(half) - half))
+    many = np.full((1, 2), second), np.full((1, 2), min(half.sum(), 2.0))
+    return ToolModel(both, np.cross(turning[:, :, None], both[:, None]), *many)
+
+
+def test_models_of_the_roll_hold_over_their_boxes():
+    rng, kinematics = np.random.default_rng(2), Kinematics(UR5)
+    for _ in range(60):
+        roll = Roll(rng.uniform(-3, 3), np.exp(rng.uniform(np.log(0.01), np.log(np.pi / 2))))
+        r, b = unit(rng.normal(size=3)), unit(rng.normal(size=3))
+        half = np.exp(rng.uniform(np.log(1e-3), np.log(0.2), UR5.n))
+        slopes = 0.05 * rng.normal(size=(1, 2, 3))
+        # The model of b, not made a unit vector, is off one by this at most.
+        radius = np.array([np.linalg.norm(slopes, axis=2).sum() ** 2])
+        held = reference_parts(b[None], slopes, radius, r)
+        q = rng.uniform(-2, 2, UR5.n)
+        target = TargetModel(
+            np.stack([b, held.centre[0]])[None], np.stack([slopes, held.slopes], axis=2),
+            np.ones((1, 2)), np.array([[radius[0], held.radius[0]]]),
+        )  # fmt: skip
+        found = roll_models(tool_model(q, half), target, roll)
+        inner, x = rng.uniform(-1, 1, (200, UR5.n)) * half, rng.uniform(-1, 1, (200, 2))
+        near = b + np.einsum("ki,id->kd", x, slopes[0])
+        near /= np.linalg.norm(near, axis=1, keepdims=True)
+        t, _ = projected(np.tile(r, (200, 1)), near)
+        _, axes = kinematics.tools(q + inner)
+        own = reference_axes(UR5, q + inner)
+        y, u = np.cross(axes, own), np.cross(near, t)
+        cosine, sine = (t * own + u * y).sum(axis=1), (u * own - t * y).sum(axis=1)
+        for end, sign in enumerate((1.0, -1.0)):
+            angle = roll.middle + sign * roll.half
+            true = sign * (np.sin(angle) * cosine - np.cos(angle) * sine) - 1.0
+            made = np.concatenate([inner, x], axis=1) @ found.columns[0, :, end]
+            off = np.abs(found.residual[0, end] + made - true)
+            assert off.max() <= found.radius[0, end] - 1.0 + 1e-12 or found.radius[0, end] == 4.0
+
+
+def test_all_joints_together_turn_the_reference_axis():
+    """A planar chain: M_x is at most the sum of all turns, and the radius has M_x M_p."""
+    task = Task(0.02, 20, **ROLLED)
+    dome = sphere(0.3, (0, 25), (0, 360), side="outside")
+    parts = target_parts(dome.parts(0.01, 0.05), dome.cells(1, 1), task)
+    arm, q = ArmModel(UR5, UR5.lower, UR5.upper), np.zeros(8)
+    part = int(np.argmin(parts.radius[:, 1]))
+    radii = []
+    for count in (1, 6):
+        half = np.append(np.where(np.arange(6) < count, 1e-4, 0.0), [1.0, 1.0])
+        box = Boxes((q - half)[None], (q + half)[None], *np.array([[part], [0]]))
+        radii.append(arm.models(box, parts, Allowed(1e-3, 0.3, 1.0, task.roll)).radius[0, 2:])
+    slope = np.linalg.norm(parts.references.slopes[part], axis=1).sum()
+    assert slope > 1e-3
+    assert (radii[1] - radii[0] > 1e-4 * slope).all()
+
+
+def lengths(vectors):
+    return sum(float(np.linalg.norm(vector)) for vector in vectors)
+
+
+def test_radii_are_those_of_the_lemma():
+    """A second reading of `rolls.box_models`, term by term: also of terms that others outweigh."""
+    rng, root = np.random.default_rng(7), np.sqrt(3.0)
+    for _ in range(10):
+        r, b = unit(rng.normal(size=3)), 1.02 * unit(rng.normal(size=3))
+        slopes, r_b = 0.02 * rng.normal(size=(2, 3)), rng.uniform(1e-3, 1e-2)
+        held = reference_parts(b[None], slopes[None], np.array([r_b]), r)
+        shortest = np.linalg.norm(b) - lengths(slopes) - r_b
+        beta, off = lengths(slopes) / shortest, r_b / shortest
+        h = np.linalg.norm(np.cross(r, unit(b))) - beta - off
+        if h < 0.1:
+            continue
+        bent = (2.0 * 2.0 / root * beta**2 + 2.0 * beta**2) / h + 2.0 / root * (beta / h) ** 2
+        assert held.radius[0] == pytest.approx(0.5 * bent + off / h)
+
+        t, k, r_t = held.centre[0], held.slopes[0], float(held.radius[0])
+        half = rng.uniform(0.2, 1.0, 2)
+        x = unit(rng.normal(size=3))
+        y, columns = unit(np.cross(x, rng.normal(size=3))), 0.3 * rng.normal(size=(1, 6, 2, 3))
+        second, moves = rng.uniform(0.0, 0.1, (2, 1, 2))
+        tool = ToolModel(np.stack([x, y])[None], columns, second, moves)
+        values, both = np.stack([b, t])[None], np.stack([slopes, k], axis=1)[None]
+        target = TargetModel(values, both, half[None], np.array([[r_b, r_t]]))
+        roll = Roll(rng.uniform(-3, 3), rng.uniform(0.1, 1.5))
+        found = roll_models(tool, target, roll)
+        spans = [lengths(half[:, None] * one) for one in (slopes, k)]
+        size_b, size_t = (float(np.linalg.norm(one)) for one in (b, t))
+        r_u = (
+            (size_b + spans[0]) * r_t + (size_t + spans[1]) * r_b + r_b * r_t + spans[0] * spans[1]
+        )
+        u = np.cross(b, t)
+        du = [np.cross(slopes[i], t) + np.cross(b, k[i]) for i in (0, 1)]
+        for end, sign in enumerate((1.0, -1.0)):
+            c, s = (sign * f(roll.middle + sign * roll.half) for f in (np.cos, np.sin))
+            p, q = s * t - c * u, c * t + s * u
+            moved = [
+                lengths(half[i] * (one * k[i] + other * du[i]) for i in (0, 1))
+                for one, other in ((s, -c), (c, s))
+            ]
+            radius = 1.0 + (abs(s) + abs(c)) * (r_t + r_u)
+            for one, v in enumerate((p, q)):
+                radius += 0.5 * second[0, one] * np.linalg.norm(v) + moves[0, one] * moved[one]
+            assert found.radius[0, end] == pytest.approx(min(radius, 4.0), abs=1e-7)
+            assert found.residual[0, end] == pytest.approx(x @ p + y @ q - 1.0)

@@ -1,0 +1,215 @@
+"""Each quantity that a judge takes off its allowance is made absurdly large: nothing is accepted.
+
+A judge that forgets a margin still accepts what is right, so that tests of right motions do not
+notice; nor do dense samples, which stay far below most bounds. Starved of its allowance it must
+refuse. Each test first shows that the judge accepts what is not starved.
+"""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from arm_urdfs import joint
+from capsule_arms import at, bodies_of, capsule_links, pair, planar_arm
+from gantry import configurations, gantry, raster
+from random_arms import robot_of
+from starving import LARGE, Starved, grown
+
+from feasibility import Task, certification
+from feasibility.certification import rates, rolls
+from feasibility.certification.collisions import collision_replay, piece_of
+from feasibility.certification.collisions.budgets import Budget, TooNear
+from feasibility.certification.collisions.descent import Descent, rough_bounds
+from feasibility.certification.collisions.mesh_pieces import MeshPart
+from feasibility.certification.collisions.pairing import Pairing
+from feasibility.certification.collisions.parting import by_balls, guesses, parted
+from feasibility.certification.collisions.relative_motion import ArmMotion
+from feasibility.certification.stretches import Judge
+from feasibility.collisions import Soup
+from feasibility.roll import Roll
+from feasibility.treated import treated_by_walk
+from feasibility.verdict import Walk
+from robots import Kinematics
+from robots.urdf import Box
+from surfaces import parametric, plane
+from surfaces.places import offset_surface
+
+FAR = 9e3  # m, of an axis: as far as a URDF may put it
+PLANAR, LINKS = planar_arm((0.5, 0.4)), capsule_links((0.5, 0.4), 0.03)
+ROWS = np.array([[0.3, 0.0], [0.2, 0.1], [0.1, 0.2]])  # of the planar arm
+CORNERS = np.array([[0.3, 0.8, -0.1], [0.3, 0.8, 0.1], [0.5, 0.9, 0], [0.5, 1, 0.1]])  # of a sheet
+FACES = np.array([[0, 1, 2], [1, 2, 3]])
+HELD = {"roll_deg": (-170, 170), "roll_reference": (1, 0, 0)}
+
+
+@pytest.mark.parametrize(
+    ("name", "held", "bent"),
+    [
+        ("ball", {}, (0, 1)), ("mesh", {}, (0, 1)), ("ball", HELD, (0, 1, 2)),
+        ("plane", {"roll_deg": (-90, 90)}, (0, 1, 2)),
+    ],
+)  # fmt: skip
+def test_stretches_of_a_motion(name, held, bent):
+    """What tool point, axis, roll (`bent`), places and the u direction may do between rows."""
+    robot, cells, task, q = raster(name)
+    surface, share = cells.surface, np.linspace(0, 1, 20)[:, None]
+    task, rows = replace(task, tolerance=2e-3, **held), q[40:60]
+    rows = np.vstack([a + share * (b - a) for a, b in itertools.pairwise(rows)])
+    offset = offset_surface(surface, surface.side_sign * task.standoff)
+    judge = Judge(robot, task, offset, cells)
+    poses, x = certification.placements(robot, rows), judge.reference_axes(rows)
+    known = judge.compared(np.arange(len(rows)), 0.0 * rows[:, 0], poses.points, poses.axes, x)
+    parts = judge.between_rows(rows, poses, known)
+    assert judge.within(judge.bounds(parts)).all()
+    for column in bent:
+        bounds = judge.bounds(replace(parts, second=grown(parts.second, column)))
+        assert not judge.within(bounds).any()
+        assert column or not (np.isfinite(bounds.facets) & (bounds.facets > 0.0)).any()
+    away = replace(parts, end=replace(parts.end, points=parts.end.points + LARGE))
+    facets = judge.bounds(away).facets
+    assert not (np.isfinite(facets) & (facets > judge.least_distance)).any()
+
+    def unknown(column):
+        return lambda path: path._replace(derivative_bounds=grown(path.derivative_bounds, column))
+
+    starved = [Starved(offset, "paths", unknown(column)) for column in (0, 1)]
+    if held and "roll_reference" not in held:
+        starved.append(Starved(offset, "tangent_slopes", grown))
+    for one in starved:
+        blind = Judge(robot, task, one, cells)
+        assert not blind.within(blind.bounds(parts)).any()
+
+
+@pytest.mark.parametrize(
+    ("off", "standoff", "cone", "accepted"),
+    [((9e-4, 0), 0.02, 30, True), ((1.1e-3, 0), 0.02, 30, False), ((0, 0.04), 0.02, 30, True),
+     ((0, 0.06), 0.02, 30, False), ((0, 0.5), 0.0, 30, True), ((0, 0.53), 0.0, 30, False)],
+)  # fmt: skip
+def test_what_a_surface_deviates_by(off, standoff, cone, accepted):
+    """Off the points, which leaning normals move by the standoff; and off the cone.
+
+    Also a motion that is right to the last digit is refused.
+    """
+    flat = parametric(lambda u, v: (u, v, 0 * u), (0.4, 0.6), (-0.1, 0.1), side="outside")
+    task, cells = Task(standoff, cone), replace(flat, off=off).cells(2, 1)
+    points = cells.centres + np.array([0.0, 0.0, standoff])
+    q = configurations(points, np.tile([0.0, 0.0, -1.0], (2, 1)))
+    for tip in (0.0, 1e-5):
+        q[1, 4] += tip
+        found = certification.replay_over_surface(gantry(), cells, task, q)
+        assert found.accepted == accepted, found.refusal
+
+
+def test_a_roll_between_two_instants_and_over_boxes():
+    z, none = np.array([[2.0, 0.0]]), np.zeros((1, 2))
+    assert np.isfinite(rolls.largest_off(z, z, np.zeros(1), none, 0.5))
+    assert not np.isfinite(rolls.largest_off(z, z, np.full(1, LARGE), none, 0.5))
+    for end in (0, 1):
+        assert not np.isfinite(rolls.largest_off(z, z, np.zeros(1), grown(none, end), 0.5))
+    x, y, b = np.eye(3)
+    bits = np.full((1, 2), 0.01)
+    tool = rolls.ToolModel(np.stack([x, y])[None], np.full((1, 6, 2, 3), 0.1), bits, bits)
+    aim = rolls.TargetModel(np.stack([b, x])[None], np.full((1, 2, 2, 3), 1e-3), 100 * bits, bits)
+
+    def radius(tool=tool, aim=aim):
+        return rolls.roll_models(tool, aim, Roll(0.3, 0.5)).radius
+
+    assert (radius() < 1.1).all()
+    for k in (0, 1):
+        for starved in ({"second": grown(bits, k)}, {"moves": grown(bits, k)}):
+            assert (radius(tool._replace(**starved)) >= 2.0).all()  # |F - 1| is never more than 1
+        for name in ("half", "radius"):
+            assert (radius(aim=aim._replace(**{name: grown(bits, k)})) >= 2.0).all()
+
+
+@pytest.mark.parametrize(("turn", "asked"), [(2.5, {"speed": 0.05}), (0.0, {"sigma": 0.2})])
+@pytest.mark.parametrize(("far", "accepted"), [(0.0, True), (FAR, False)])
+def test_rates_of_an_arm_with_an_axis_far_away(turn, asked, far, accepted):
+    """Two axes in one line that rest, or turn against each other: to the tool it is the same."""
+    first = [joint(1), *(joint(k, xyz=(0.3, 0, 0.1), axis=(0, 1, 0)) for k in (2, 3, 4))]
+    last = [joint(5, xyz=(0.1, 0, 0), axis=(1, 0, 0)), joint(6, "prismatic", xyz=(0.1, 0, 0))]
+    twice = [joint(7, xyz=(far, 0, 0)), joint(8), joint(9, "fixed", (0.1 - far, 0, 0.05))]
+    robot = robot_of([*first, *last, *twice])
+    robot = robot.with_limits({"j6": (-np.inf, np.inf)})  # so that lengths are measured by 1 m
+    start = np.array([[0.1, -0.4, 0.9, 0.3, 0.4, 0.2, 0.0, 0.0]])
+    end = start + np.array([0.2, 0.1, -0.1, 0.2, 0.1, 0.1, turn, -turn])
+    found = rates.segment_rates(robot, start, end, **asked)
+    assert found.sampled_speed[0] > 0.05
+    assert found.sampled_sigma[0] > 0.2
+    assert all((getattr(found, name)[0] >= least) == accepted for name, least in asked.items())
+    tool, _ = Kinematics(robot).tool(start[0])
+    spot = plane((0, 1), (0, 1), "outside", tool - (0.5, 0.5, 0.02)).cells(1, 1)
+    rests = start + np.outer([0, 1], [0, 0, 0, 0, 0, 0, 0.05, -0.05])
+    assert rates.in_place(robot, spot, Task(0.02, 30), rests)[0] == accepted
+
+
+@pytest.mark.parametrize("name", ["delta", "deviation"])
+def test_bodies_along_a_stretch(name):
+    """How far their points may leave the chord, and be moved by joints off the line besides."""
+    motion, link = ArmMotion(PLANAR, ROWS), LINKS[1]
+    b = piece_of(link.geometry, link.placement)
+    box = piece_of(Box((0.2, 0.2, 0.2)), at(0.3, 0.8))
+    mesh = MeshPart(CORNERS, FACES, False)
+    fed = motion.stretches(0, 2, b.centre, b.ball)
+    hungry = replace(fed, **{name: np.full(2, 1e30)})
+
+    def least(s):
+        planes = [parted(box, b, s, n) for n in guesses(box, b, s)]
+        return np.concatenate([by_balls(box, b, s), *planes, rough_bounds(mesh.tree, b, s)])
+
+    def left(s):
+        return len(Descent(mesh.tree, b, 0.01, 0.02).parted(s).at)
+
+    def refused(s):
+        pairing = Pairing(box, b, (0, 2), motion, s)
+        pairing.certify(0.01, 0.02)
+        return pairing.place is not None
+
+    assert (least(fed) > 0.01).all()
+    assert not (least(hungry) > 0.01).any()
+    assert left(fed) == 0
+    assert left(hungry) == 2 * len(FACES)
+    assert not refused(fed)
+    assert refused(hungry)
+    balls = np.array([0, 2]), np.array([[0.4, 0.8, 0], b.centre]), np.array([0.1, b.ball])
+    moving, boxes = motion.body_motions(*balls), (np.full((2, 3), 0.1), np.array([[0, 1]]))
+    assert (motion.outer_bounds(moving, *balls, *boxes) > 0.01).all()
+    worse = replace(moving, **{name: grown(getattr(moving, name))})
+    assert not (motion.outer_bounds(worse, *balls, *boxes) > 0.01).any()
+
+
+def test_distances_along_a_motion():
+    def bound(moved):
+        return Budget(lambda row, share: 0.5, np.full(2, moved), 100).certify(
+            np.arange(2), np.full(2, 0.1), 0.2
+        )
+
+    assert bound(0.0) == 0.5
+    with pytest.raises(TooNear):
+        bound(LARGE)
+
+
+def test_a_motion_among_bodies():
+    """The clearance, what a sheet stands out by, and how far joints are off the line."""
+
+    def accepted(clearance=0.01, stands_out=0.0, off=0.0):
+        soup = Soup("wall", CORNERS[FACES], stands_out, False)
+        bodies = bodies_of(LINKS, soups=[soup], pairs=[pair("link2", "wall", clearance)])
+        return collision_replay(PLANAR, bodies, ROWS, np.full((2, 2), off)).accepted
+
+    assert accepted()
+    assert not accepted(clearance=LARGE)
+    assert not accepted(stands_out=LARGE)
+    assert not accepted(off=LARGE)
+
+
+def test_a_treated_area():
+    """How far the path on the surface may be from the places that were looked at."""
+    robot, cells, task, q = raster("plane")
+    task = replace(task, footprint=0.2)
+    walk = Walk(q, np.full(len(q), -1))
+    assert treated_by_walk(robot, cells, task, walk).lower > 0.9
+    spun = q[-1:] + 2 * np.pi * np.eye(6)[5:] * 1e6  # more than any number of rows can follow
+    long = replace(walk, q=np.vstack([q, spun]), cell=np.append(walk.cell, -1))
+    assert treated_by_walk(robot, cells, task, long).lower == 0.0

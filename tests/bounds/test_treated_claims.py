@@ -1,0 +1,144 @@
+"""The treated share of certified motions, and what a demanded coverage makes of an answer."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from gantry import configurations, gantry
+
+from coverable_errors import CoverableError
+from feasibility import Answer, Task, check
+from feasibility.cases import CaseError, load_case
+from feasibility.treated import Decision, treated_by_walk, with_coverage
+from feasibility.verdict import Evidence, Walk
+from robots import load_robot
+from surfaces import plane, poses
+from surfaces.passes import ToolLines, visits
+
+UR5 = load_robot("ur5")
+CELLS = plane((0.0, 0.3), (0.0, 0.2), "outside", (0.4, -0.1, 0.2)).cells(3, 2)
+TASK = Task(standoff=0.02, cone_deg=20)
+WIDE = {"standoff": 0.02, "cone_deg": 20, "footprint": 0.08}
+
+
+@pytest.fixture(scope="module")
+def found():
+    return check(UR5, CELLS, Task(**WIDE))
+
+
+def share_of(feet, radius):
+    """By other code: points drawn by area, and their distance from dense feet by brute force."""
+    drawn = np.random.default_rng(4).uniform([0.4, -0.1], [0.7, 0.1], (20_000, 2))
+    squared = np.full(len(drawn), np.inf)
+    for some in np.array_split(feet[:, :2], 40):
+        away = ((drawn[:, None] - some[None]) ** 2).sum(axis=2).min(axis=1)
+        squared = np.minimum(squared, away)
+    return float((squared <= radius**2).mean())
+
+
+@pytest.mark.parametrize("footprint", [0.05, 0.08, (0.05, 0.08), (0.08, 0.05)])
+def test_the_share_of_a_motion_agrees_with_points_drawn_by_area(footprint):
+    """Of a zigzag; an ellipse treats between what the disc in it and that around it treat."""
+    corners = np.array([[0.43, -0.07], [0.66, -0.07], [0.66, 0.03], [0.43, 0.03]])
+    s = np.linspace(0.0, 1.0, 60)[:, None]
+    feet = np.vstack([a + s * (b - a) for a, b in itertools.pairwise(corners)])
+    points = np.column_stack([feet, np.full(len(feet), 0.22)])
+    q = configurations(points, np.tile([0.0, 0.0, -1.0], (len(feet), 1)))
+    task, walk = Task(0.02, 20, footprint=footprint), Walk(q, np.full(len(q), -1))
+    treated = treated_by_walk(gantry(), CELLS, task, walk)
+    small, large = (
+        share_of(feet, 0.5 * end(np.append(footprint, footprint))) for end in (min, max)
+    )
+    assert treated.area == pytest.approx(0.06)
+    assert treated.lower == pytest.approx(small, abs=0.012)  # 4 standard errors: 0.012
+    assert treated.upper == pytest.approx(large, abs=0.012)
+    assert treated.lower <= treated.upper
+    assert treated.upper - treated.lower <= (0.006 if small == large else 1.0)
+    assert 0.0 < treated.twice < treated.upper
+    left = sum(each.area for each in treated.untreated) / treated.area
+    assert left == pytest.approx(1.0 - treated.upper, abs=0.008)
+    for each in treated.untreated:
+        away = np.linalg.norm(feet - each.centre[:2], axis=1).min()
+        assert away > 0.5 * np.max(footprint) - 0.02
+    sizes = [each.area for each in treated.untreated]
+    assert sizes == sorted(sizes, reverse=True)
+
+
+def test_a_footprint_changes_neither_verdict_nor_search(found):
+    alone = check(UR5, CELLS, TASK)
+    assert (alone.answer, alone.message) == (found.answer, found.message)
+    assert alone.statistics == found.statistics
+    assert np.array_equal(alone.witness.q, found.witness.q)
+    assert alone.treated is None
+
+
+@pytest.mark.parametrize(("beyond", "answer"), [(-1e-6, "feasible"), (1e-6, "undecided")])
+def test_coverage_decides_by_the_lower_end(found, beyond, answer):
+    low, high = found.treated.lower, found.treated.upper
+    verdict = check(UR5, CELLS, Task(**WIDE, coverage=low + beyond))
+    assert str(verdict.answer) == answer
+    assert (verdict.witness is None) == (answer == "undecided")
+    assert verdict.treated.lower == low
+    assert verdict.covered.all()
+    assert f"{100 * high:.1f}"[:3] in verdict.message
+
+
+@pytest.mark.parametrize("answer", [Answer.INFEASIBLE, Answer.FEASIBLE, Answer.UNDECIDED])
+def test_what_is_not_measured_is_not_enough_and_what_is_proved_stays_proved(answer):
+    evidence = {Answer.INFEASIBLE: Evidence.PROOF, Answer.FEASIBLE: Evidence.WITNESS}
+    given = Decision(answer, evidence.get(answer, Evidence.BUDGET), "It is so.")
+    left = with_coverage(given, Task(**WIDE, coverage=0.5), None)
+    if answer is Answer.FEASIBLE:
+        assert left[:2] == (Answer.UNDECIDED, Evidence.BUDGET)
+    else:
+        assert left == given
+    assert with_coverage(given, Task(**WIDE), None) == given
+
+
+def test_automatic_cells_are_fine_enough():
+    """On a panel and over a dome every place is treated by a tool that visits the centres."""
+    case = load_case("paper/4a", ["surface.cells=auto", "task.footprint=0.4"])
+    verdict = check(*case.build())
+    assert verdict.feasible
+    assert verdict.treated.lower >= 0.999
+    assert case.from_toml(case.to_toml()) == case
+    assert case.surface.is_grid
+    with pytest.raises(CaseError, match=r"makes .* cells"):
+        load_case("paper/4a", ["surface.cells=auto", "task.footprint=1e-3"]).build()
+
+
+def test_between_poses_nothing_can_be_treated():
+    cells = poses([[0.4, 0.0, 0.2], [0.5, 0.0, 0.2]], [[0, 0, 1], [0, 0, 1]])
+    with pytest.raises(CoverableError, match="no surface to treat"):
+        check(UR5, cells, Task(**WIDE))
+
+
+BAD = {
+    ("task.footprint=0",): "footprint: must be a finite number > 0",
+    ("task.footprint=[0.1, -0.1]",): "footprint: must be a diameter > 0",
+    ("task.footprint=0.1", "task.coverage=1.2"): "coverage: must be a share above 0",
+    ("task.coverage=0.9",): "needs a footprint",
+    ("surface.cells=auto",): "without a footprint",
+}
+
+
+@pytest.mark.parametrize("settings", BAD)
+def test_bad_numbers_are_named(settings):
+    with pytest.raises(CaseError) as raised:
+        load_case("paper/4a", list(settings)).build()
+    assert BAD[settings] in str(raised.value)
+    assert len(raised.value.faults) == 1
+
+
+def test_visits_are_counted_by_coming_and_going():
+    rows = [np.linspace((-0.05, y, 0.0), (0.65, y, 0.0), 200) for y in (0.1, 0.14)]
+    normals = np.tile([0.0, 0.0, 1.0], (400, 1))
+    path = ToolLines(np.concatenate(rows), normals, np.repeat([0, 1], 200))
+    at = np.array([[0.3, 0.08, 0.0], [0.3, 0.12, 0.0], [0.3, 0.2, 0.0], [0.3, 0.15, 0.0]])
+    up = np.tile([0.0, 0.0, 2.0], (4, 1))
+    assert visits(at, up, path, 0.03).tolist() == [1, 2, 0, 1]
+    assert visits(at, -up, path, 0.03).tolist() == [0, 0, 0, 0]
+    back = ToolLines(np.concatenate([rows[0], rows[0][::-1]]), normals, np.zeros(400, dtype=int))
+    assert visits(np.array([[0.6, 0.1, 0.0]]), up[:1], back, 0.03).tolist() == [2]

@@ -1,0 +1,412 @@
+"""Cases: the built-in ones, what settings change, paths, faults together, caps, units, words."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import os
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tomli_w
+from bad_input import GOOD_CASE, changed, goods, lay_out
+from small_cases import TEXTS
+
+from feasibility import Search, Task
+from feasibility.cases import Case, CaseError, builtin_cases, load_case, unit_notes
+from feasibility.cases.robot_table import RobotPart
+from feasibility.cases.surface_table import SurfacePart
+from feasibility.cases.toml import parse_toml, too_much
+from feasibility.cli.main import main
+
+# Table II: position and cone; Table I by name; Table III by kind.
+PAPER = {
+    "4a": ("sphere", "set-1", (0, 0, 0), 45),
+    "4b": ("sphere", "set-2", (0, 0, 0), 45),
+    "4c": ("cylinder", "set-1", (0, 0, 0), 45),
+    "4d": ("cylinder", "set-3", (0, 0, 0), 45),
+    "4e": ("hyperboloid", "set-1", (0, 0, 0), 45),
+    "4f": ("hyperboloid", "set-4", (0, 0, 0), 45),
+    "5a": ("sphere", "set-1", (0, 0, 0), 5),
+    "5b": ("sphere", "set-1", (0.005, 0, 0), 10),
+    "5c": ("cylinder", "set-1", (0, 0.055, 0), 5),
+    "5d": ("cylinder", "set-1", (0, 0.055, 0), 10),
+    "5e": ("hyperboloid", "set-1", (1.095, 0, 0), 10),
+    "5f": ("hyperboloid", "set-1", (1.15, 0, 0), 20),
+}
+SURFACES = {
+    "sphere": {"radius": 1.0, "u_deg": (10.0, 90.0), "v_deg": (10.0, 180.0)},
+    "cylinder": {"radius": 0.5, "u_deg": (-60.0, 60.0), "v": (0.0, 0.9)},
+    "hyperboloid": {"radius": 0.5, "flare": 0.5, "u_deg": (130.0, 220.0), "v": (0.0, 0.5)},
+}
+
+
+def test_the_twelve_cases_of_the_paper_are_built_in() -> None:
+    assert list(builtin_cases()) == [f"paper/{name}" for name in PAPER]
+    for name, (kind, limits, position, cone) in PAPER.items():
+        case = builtin_cases()[f"paper/{name}"]
+        part = SurfacePart(kind, SURFACES[kind], (9, 10), position=tuple(map(float, position)))
+        robot, task = RobotPart(name="puma560", limits=limits), Task(0.005, float(cone))
+        assert case == Case(robot, part, task, Search())
+        assert case.description
+        assert case.name == f"paper/{name}"
+
+
+def test_a_built_in_case_builds_what_the_paper_describes() -> None:
+    robot, cells, task, search = load_case("paper/5e").build()
+    assert (robot.name, robot.n, cells.shape, task.cone_deg) == ("puma560", 6, (9, 10), 10.0)
+    assert np.degrees(robot.upper).tolist() == pytest.approx([180] * 6)
+    assert cells.surface.side == "inside"
+    # The middle cell of a row: height 0.225 m, angle 175 degrees, about the moved axis.
+    radius, angle = 0.5 * math.hypot(1.0, 0.225 / 0.5), math.radians(175)
+    expected = [1.095 + radius * math.cos(angle), radius * math.sin(angle), 0.225]
+    assert cells.centres[cells.index(4, 4)] == pytest.approx(expected, abs=1e-12)
+    assert search == Search()
+
+
+def test_settings_replace_add_and_remove_keys_and_tables() -> None:
+    case = load_case("paper/4a")
+    settings = ["task.cone_deg=10", "surface.position=[0, 0.5, 0]", "robot.limits=set-2"]
+    moved = case.with_overrides([*settings, "search.seed=7"])
+    assert moved == replace(
+        case,
+        robot=replace(case.robot, limits="set-2"),
+        surface=replace(case.surface, position=(0.0, 0.5, 0.0)),
+        task=Task(0.005, 10.0),
+        search=Search(seed=7),
+    )
+    free = case.with_overrides(["robot.limits=", "robot.limits_deg.joint4=[-90, 90]"])
+    assert free.robot == RobotPart(name="puma560", limits_deg={"joint4": (-90.0, 90.0)})
+    assert case == load_case("paper/4a")  # unchanged
+    both = Case.from_toml(GOOD_CASE, overrides=["collision.clearance=0.01", "search.seed=3"])
+    assert both.with_overrides(["collision=", "search="]) == Case.from_toml(GOOD_CASE)
+    assert Case.from_toml(GOOD_CASE, overrides=["collision.clearance="]).collision is None
+    # What has changed is said beside the built-in words, which speak of the cone before.
+    assert moved.description.endswith(f"cone 45 deg; changed: {', '.join(settings)}, search.seed=7")
+
+
+def test_a_setting_can_complete_a_file_with_windows_line_ends(tmp_path: Path) -> None:
+    text = changed(GOOD_CASE, "task.cone_deg").replace("\n", "\r\n")
+    (tmp_path / "case.toml").write_bytes(b"\xef\xbb\xbf" + text.encode())
+    assert load_case(tmp_path / "case.toml", ["task.cone_deg=45"]) == Case.from_toml(GOOD_CASE)
+    with pytest.raises(CaseError, match=r'did you mean "paper/4a"\?'):
+        load_case("paper/4A")
+
+
+def test_paths_are_relative_to_the_case_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = changed(goods("case")["mesh"], ["robot.name", "robot.limits", 'robot.urdf = "arm.urdf"'])
+    text = changed(text, 'robot.package_dirs = ["meshes"]') + '[collision]\nsrdf = "a.srdf"\n'
+    text += '[[collision.scene]]\nname = "a"\nkind = "mesh"\nfile = "b.stl"\n'
+    (tmp_path / "case.toml").write_text(text)
+    (elsewhere := tmp_path / "elsewhere").mkdir()
+    case = load_case(tmp_path / "case.toml")  # and no file is opened
+    monkeypatch.chdir(elsewhere)
+    monkeypatch.setenv("HOME", str(elsewhere))
+    assert Case.from_toml(case.to_toml()) == case
+    for moved, folder in (
+        (case, tmp_path),
+        (Case.from_toml(text, "~"), elsewhere),
+        (Case.from_toml(text), elsewhere),
+    ):
+        assert case.collision
+        if moved is not case and folder == elsewhere:
+            moved = Case.from_toml(text.replace('= "part', '= "~/part'), elsewhere)
+        assert moved.surface.values["file"] == str(folder / "part.stl")
+        assert moved.robot.urdf == str(folder / "arm.urdf")
+        assert moved.robot.package_dirs == (str(folder / "meshes"),)
+        assert moved.collision is not None
+        assert moved.collision.srdf == str(folder / "a.srdf")
+        assert moved.collision.scene[0].values["file"] == str(folder / "b.stl")
+    other = case.with_overrides(["surface.file=other.stl", "robot.urdf=x.urdf"])
+    assert other.surface.values["file"] == str(elsewhere / "other.stl")
+    assert other.robot.urdf == str(elsewhere / "x.urdf")
+
+
+def test_limits_frames_and_axes_come_through(tmp_path: Path) -> None:
+    """By name and in their own units, and where each of them ends in the robot that is built."""
+    four = load_case("paper/4a", ["robot.limits=", "robot.limits_deg={ joint4 = [-90, 45] }"])
+    plain = load_case("paper/4a", ["robot.limits="]).build().robot
+    degrees = np.degrees(np.column_stack([plain.lower, plain.upper]))
+    degrees[3] = [-90, 45]
+    robot = four.build().robot
+    found = np.degrees(np.column_stack([robot.lower, robot.upper]))
+    assert found == pytest.approx(degrees, abs=1e-12)
+    lay_out(tmp_path)
+    changes = ["robot.limits_deg = { turn = [-90, 450] }", "robot.limits_m = { slide = [0, 0.5] }"]
+    slider = Case.from_toml(changed(goods("case")["slider"], changes), tmp_path).build().robot
+    assert slider.lower.tolist() == pytest.approx([0.0, -math.pi / 2])
+    assert slider.upper.tolist() == pytest.approx([0.5, 2.5 * math.pi])
+    mounted = Case.from_toml(goods("case")["mounted"])
+    assert Case.from_toml(mounted.to_toml()) == mounted
+    robot = mounted.build().robot
+    assert robot.joint_names[:2] == ("table", "rail")
+    assert robot.surface_link == "table"
+    np.testing.assert_allclose(robot.upper[:2], [np.pi / 2, 0.5])
+    wrist = mounted.with_overrides(["surface.frame=forearm_link"]).build().robot
+    assert wrist.joint_names == ("wrist_1_joint", "wrist_2_joint", "wrist_3_joint")
+    short = mounted.with_overrides(["robot.limits_m={ rail = [0, 0.1] }"])
+    assert short.build().robot.upper[1] == 0.1
+    posed = load_case("paper/4a", [
+        "robot.limits=", "robot.name=ur5", "robot.reference_axis=[0, 1, 1]",
+        "robot.tcp={ position = [0, 0, 0.12], rpy_deg = [0, 90, 0] }",
+        "robot.base={ position = [0, 0, 0.8], rpy_deg = [0, 0, 90] }",
+    ]).build().robot  # fmt: skip
+    tcp, base = [[0, 0, 1, 0], [0, 1, 0, 0], [-1, 0, 0, 0.12]], [[0, -1, 0, 0], [1, 0, 0, 0]]
+    np.testing.assert_allclose(posed.tcp[:3], tcp, atol=1e-12)
+    np.testing.assert_allclose(posed.base[:3], [*base, [0, 0, 1, 0.8]], atol=1e-12)
+    np.testing.assert_allclose(posed.reference_axis, [0, 1, 0])
+
+
+# faults together
+
+ARM = """
+<robot name="arm"><link name="base"/><link name="cart"/><link name="upper"/><link name="hand"/>
+<link name="finger"/>
+<joint name="slide" type="prismatic"><parent link="base"/><child link="cart"/>
+<axis xyz="1 0 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+<joint name="turn" type="revolute"><parent link="cart"/><child link="upper"/>
+<origin xyz="0 0 1"/><axis xyz="0 0 1"/><limit lower="-1" upper="1"/></joint>
+<joint name="wrist" type="revolute"><parent link="upper"/><child link="hand"/>
+<origin xyz="1 0 0"/><axis xyz="0 1 0"/><limit lower="-1" upper="1"/></joint>
+<joint name="grip" type="prismatic"><parent link="hand"/><child link="finger"/>
+<axis xyz="0 1 0"/><limit lower="0" upper="0.1" effort="1" velocity="1"/></joint></robot>
+"""
+# The place of a value that is wrong, the value, and what a message says of it.
+FAULTS = [
+    ("robot.lock.elbow", 0.0, "lock names 'elbow'"),
+    ("robot.lock.grip", 9.0, "lock holds joint 'grip'"),
+    ("robot.lock.wrist", "shut", "robot.lock.wrist: must be a finite number"),
+    ("robot.limits_deg.turn", [10, -10], "robot.limits_deg.turn"),
+    ("robot.limits_deg.slide", [-1, 1], "gives degrees for joint 'slide'"),
+    ("robot.limits_deg.ellbow", [-1, 1], "'ellbow'"),
+    ("robot.limits_m.wrist2", "wide", "robot.limits_m.wrist2"),
+    ("robot.limits_m.turn2", [0, 1], "'turn2'"),
+    ("robot.tool_frame", "hnad", "no link 'hnad'"),
+    ("robot.approach_axis", [0, 0, 0], "robot.approach_axis"),
+    ("robot.package_dirs", "meshes", "robot.package_dirs"),
+    ("robot.colour", "red", "robot.colour"),
+    ("surface.file", "no.stl", "no.stl"),
+    ("surface.scale", -1.0, "surface.scale"),
+    ("surface.position", [0, 0], "surface.position"),
+    ("surface.cut", {"point": [0, 0, 0]}, "surface.cut.normal"),
+    ("task.standoff", -1.0, "task.standoff"),
+    ("task.cone_deg", None, "task.cone_deg: is missing"),
+    ("search.seed", -1, "search.seed"),
+]
+
+
+def message(folder: Path, faults: object) -> str:
+    """What reading and building a case with these faults says; empty where nothing is wrong."""
+    tables: dict[str, dict[str, object]] = {
+        "robot": {"urdf": "arm.urdf", "tool_frame": "hand"},
+        "surface": {"kind": "mesh", "file": "square.off", "side": "outside", "cells": 12},
+        "task": {"standoff": 0.0, "cone_deg": 30},
+        "search": {},
+    }
+    for place, value, _ in faults:  # type: ignore[attr-defined]
+        *folders, key = place.split(".")
+        table = tables
+        for name in folders:
+            table = table.setdefault(name, {})
+        table[key] = value
+        if value is None:
+            del table[key]
+    try:
+        Case.from_toml(tomli_w.dumps(tables), folder).build()
+    except CaseError as error:
+        return str(error)
+    return ""
+
+
+def test_every_two_faults_come_together_and_all_of_them_once(tmp_path: Path) -> None:
+    """Also those that only a URDF shows, or only a mesh."""
+    (tmp_path / "arm.urdf").write_text(ARM)
+    (tmp_path / "square.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+    assert message(tmp_path, []) == ""
+    for faults in [*itertools.combinations(FAULTS, 2), FAULTS]:
+        said = message(tmp_path, faults)
+        assert all(words in said for _, _, words in faults), said
+        lines = said.splitlines()[1:]
+        assert len(set(lines)) == len(lines)
+
+
+def test_many_faults_stay_readable() -> None:
+    with pytest.raises(CaseError) as caught:
+        Case.from_toml(GOOD_CASE + "\n".join(f"k{k} = 1" for k in range(3000)))
+    assert len(caught.value.faults) == 3000
+    assert len(str(caught.value).splitlines()) == 22
+    assert str(caught.value).endswith("... and 2980 more")
+
+
+def test_a_missing_urdf_is_told_before_kernels_are_compiled(tmp_path: Path) -> None:
+    lay_out(tmp_path)
+    text = changed(goods("case")["mesh"], ["robot.name", "robot.limits", 'robot.urdf = "no.urdf"'])
+    (tmp_path / "case.toml").write_text(text)
+    ended = subprocess.run(
+        [sys.executable, "-m", "feasibility.cli", "check", "case.toml"],
+        cwd=tmp_path,
+        env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (ended.returncode, ended.stdout) == (2, "")
+    assert "no.urdf: there is no such file" in ended.stderr
+    assert not list((tmp_path / "kernels").rglob("*.nb*"))
+
+
+# the edges of TOML that is read: 16 brackets, keys of 8 parts, 50,000 keys
+
+
+@pytest.mark.parametrize(
+    ("text", "excess"),
+    [
+        (f"x = {'[' * 16}{']' * 16}", ""),
+        (f"x = {'[' * 17}{']' * 17}", "17 brackets are open at once, more than 16"),
+        ("x = [[" + "{a = [" * 7 + "1" + "]}" * 7 + "]]", ""),
+        ("x = [[[" + "{a = [" * 7 + "1" + "]}" * 7 + "]]]", "17 brackets are open at once"),
+        ('a . "b\\"".\'c\'.d.e.f.g.h = 1', ""),
+        ('a . "b\\"".\'c\'.d.e.f.g.h.i = 1', "a key has 9 parts, more than 8"),
+        ("[[a.b.c.d.e.f.g.h.i]]", "a key has 9 parts"),
+        ("x = {a.b.c.d.e.f.g.h.i = 1}", "a key has 9 parts"),
+        ("\n".join(f"k{k} = {k}.5" for k in range(50_000)), ""),
+        ("\n".join(f"k{k} = {k}.5" for k in range(50_001)), "has 50,001 keys, more than 50,000"),
+        ("\n".join(f"[a.b.k{k}]" for k in range(16_667)), "has 50,001 keys"),
+        ("[a.b.c.d]\ne.f.g.h = 1", ""),
+        ("[a.b.c.d]\ne.f.g.h.i = 1", "at most 8 tables inside each other"),
+        ("a.b.c.d = [[{e.f.g.h.i = [1]}]]", "at most 8 tables inside each other"),
+        *[
+            (form.format(inside), "")
+            for inside in ("[" * 99, "a." * 99 + "a", "a = 1, " * 50_001)
+            for form in ('a = "{}"', "a = '{}'", 'a = """\n{}"\\""" """', "#{}", "'#' = 1\n#{}")
+        ],
+    ],
+    ids=lambda text: text[:12],
+)
+def test_a_document_is_read_up_to_its_caps(text: str, excess: str) -> None:
+    """What strings and comments hold does not count, and what is read comes back."""
+    assert excess in too_much(text) or excess.startswith("at most")
+    if excess:
+        with pytest.raises(CaseError, match=re.escape(excess)):
+            Case.from_toml(text)
+    else:
+        assert too_much(text) == ""
+        tables = parse_toml(text)
+        assert parse_toml(tomli_w.dumps(tables)) == tables
+
+
+# numbers a thousand times too large, or radians
+
+ASKED = {
+    "surface.u=[350, 650]": "surface.u .* millimetres.*\\[0.35, 0.65\\]",
+    "surface.position=[400, 0, 100]": "surface.position .* millimetres.*\\[0.4, 0.0, 0.1\\]",
+    "task.standoff=20": "task.standoff .* millimetres.* 0.02",
+    "robot.tcp.position=[0, 0, 5]": "robot.tcp.position .* millimetres.* 0.005",
+    "task.cone_deg=0.785": "task.cone_deg .* radians.* 44.98",
+    "surface.rpy_deg=[0, 0, 1.57]": "surface.rpy_deg .* radians.* 89.95",
+    "task.roll_deg=[-0.26, 0.26]": "task.roll_deg .* radians.*-14.9",
+    f"robot.limits_deg={[[-3.1, 3.1]] * 6}": "robot.limits_deg .* radians.* 177.6",
+    "robot.start_deg=[0, -1.5, 1.2, 0, 1.57, 0]": "robot.start_deg .* radians.* 68.75",
+}
+TAKEN = (
+    "surface.position=[12, 0, 0]", "surface.u=[0, 25]", "task.standoff=1.5", "task.cone_deg=3",
+    "task.roll_deg=[-5, 5]", "robot.limits_deg.elbow_joint=[-2, 2]", "surface.rpy_deg=[0, 0, 1]",
+)  # fmt: skip
+
+
+def test_what_looks_like_another_unit_is_asked_and_no_more() -> None:
+    for setting in (*ASKED, *TAKEN):
+        case = Case.from_toml(TEXTS["plate"], overrides=[setting])
+        notes = unit_notes(case.to_tables(), case.robot.build().length_unit)
+        assert len(notes) == (setting in ASKED)
+        assert not notes or re.search(ASKED[setting], notes[0])
+    for case in builtin_cases().values():
+        assert unit_notes(case.to_tables(), case.robot.build().reach) == ()
+    wall = {"surface": {"kind": "plane", "u": (0.0, 600.0)}}  # compared with the reach of the arm
+    assert (len(unit_notes(wall, 3.0)), unit_notes(wall, math.inf)) == (1, ())
+
+
+def test_the_command_asks_and_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "case.toml").write_text(TEXTS["plate"])
+    asked = ["check", str(tmp_path / "case.toml"), "--set", "surface.position=[400, 0, 100]"]
+    assert main(asked) == 1
+    assert capsys.readouterr().err.startswith("note: surface.position")
+
+
+# a changed case in the words of its file
+
+FILE = """\
+# My cell.
+[robot]
+urdf = "arms/my.urdf"  # the small one
+
+[surface]  # from CAD
+kind = "mesh"
+file = "part #1.stl"   # beside this file
+position = [
+    0.4,  # forwards
+    -0.1, 0.2,
+]
+side = "outside"
+cells = 6
+
+[task]
+standoff = 0.02
+cone_deg = 30          # of the nozzle
+
+[[collision.scene]]    # a shelf
+name = "shelf"
+kind = "mesh"
+file = "/abs/shelf.stl"
+"""
+CHANGES = {
+    (): [],
+    ("task.cone_deg=25.5",): [("cone_deg = 30 ", "cone_deg = 25.5 ")],
+    ("surface.rpy_deg=[0, 0, 5]",): [("cells = 6\n", "cells = 6\nrpy_deg = [0.0, 0.0, 5.0]\n")],
+    ("robot.limits_deg.a=[-1, 1]", "task.standoff=0.1"): [
+        ("one\n", "one\nlimits_deg.a = [-1.0, 1.0]\n"), ("= 0.02", "= 0.1"),
+    ],
+    ("surface.file=../other.stl",): [('"part #1.stl"', '"../other.stl"')],
+    ("search.seed=4",): [("shelf.stl\"\n", "shelf.stl\"\n\n[search]\nseed = 4\n")],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("settings", CHANGES)
+def test_only_what_has_changed_is_changed(
+    settings: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Comments, paths and short arrays stay as the file has them."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "case.toml").write_text(FILE)
+    case, expected = load_case("case.toml", settings), FILE
+    for old, new in CHANGES[settings]:
+        expected = expected.replace(old, new, 1)
+    assert case.as_written() == expected
+    assert Case.from_toml(case.as_written(), tmp_path) == case
+    assert "\nposition = [0.0, 0.0, 0.0]\n" in load_case("paper/4a").as_written()
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        ("collision=",),
+        ("collision.scene=",),
+        ("robot.urdf=", "robot.name=ur5", "robot.tcp={ position = [0, 0, 0.1] }"),
+        ("surface.position=", "task.roll_deg=[-5, 5]", "task.home_deg=[1, 2]"),
+    ],
+)
+def test_what_is_written_says_the_case(settings: tuple[str, ...], tmp_path: Path) -> None:
+    """However the file is written, or where it alone is no case."""
+    alone_none = TEXTS["plate"].replace("task.cone_deg = 30", "")
+    for text in (FILE, TEXTS["plate"], TEXTS["long plate"], alone_none):
+        more = ["task.cone_deg=9"] if text == alone_none else []
+        case = Case.from_toml(text, tmp_path, overrides=[*settings, *more])
+        assert Case.from_toml(case.as_written(), tmp_path) == case
+        assert str(tmp_path) not in case.as_written()

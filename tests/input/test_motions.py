@@ -1,0 +1,155 @@
+"""Motions and trajectories as files: columns by name, the same numbers back, YAML for ROS."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bad_input import SLIDER
+from path_cases import SPEED, path_of, run_of, verdict_of
+from readers import sound_trajectory
+
+from feasibility.paths import coverage_path
+from feasibility.reports.path import as_json, as_text
+from feasibility.results import load_motion, load_trajectory, save_trajectory
+from feasibility.safe_files import FileError
+from feasibility.timing import Trajectory, motion_limits
+from robots import Robot, load_robot
+
+ROWS = np.array([[0.1, -1.2, 1.3, -0.4, -1.5, 0.6], [0.2, -1.1, 1.2, -0.3, -1.4, 0.7]])
+PUMA = load_robot("puma560")
+NAMES = PUMA.joint_names
+
+
+def text_of(names=NAMES, rows=ROWS, separator: str = ",") -> str:
+    lines = [separator.join(names), *(separator.join(map(repr, row)) for row in rows.tolist())]
+    return "\n".join(lines) + "\n"
+
+
+@pytest.fixture
+def read(tmp_path: Path):
+    """Read a text as a motion of a robot."""
+
+    def reading(text: str, robot: Robot = PUMA):
+        (tmp_path / "motion.csv").write_bytes(text.encode())
+        return load_motion(tmp_path / "motion.csv", robot)
+
+    return reading
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_columns_go_by_name(separator: str, read) -> None:
+    """In any order, in degrees where their name says so, and with the small things files have."""
+    order = [3, 0, 5, 1, 4, 2]
+    names = [f"{NAMES[k]}_deg" if k in (1, 4) else NAMES[k] for k in order]
+    rows = np.where(np.isin(order, (1, 4)), np.degrees(ROWS[:, order]), ROWS[:, order])
+    found = read("\ufeff" + text_of(names, rows, separator).replace("\n", " \r\n") + "\n\n")
+    np.testing.assert_allclose(found.q, ROWS, atol=1e-15)
+    assert found.notes == ()
+
+
+def test_columns_beside_the_joints(read, tmp_path: Path) -> None:
+    extra = np.column_stack([np.arange(2.0), ROWS, np.zeros(2), [4, 5], [1, 0]])
+    head = ["time", *NAMES, f"{NAMES[0]}_velocity", "cell", "working"]
+    text = text_of(head, extra).replace("4.0,1.0", "4,1").replace("5.0,0.0", ",0")
+    found = read(text)
+    assert np.array_equal(found.q, ROWS)
+    assert found.notes == (f"not used: time, {NAMES[0]}_velocity",)
+    assert found.marks.tolist() == [4, -1]
+    assert found.working.tolist() == [True, False]
+    odd = read(text.replace("4,1\n", "4.5,1\n"))
+    assert odd.marks is None
+    assert odd.notes == (f"not used: time, {NAMES[0]}_velocity, cell",)
+    rows = np.vstack([ROWS, ROWS[-1:]])
+    rows[2, 5] -= 2 * np.pi
+    assert read(text_of(rows=rows)).notes == (
+        "joint6 moves by more than half a turn from row 2 to 3; values must be unwrapped",
+    )
+    run = replace(small_run(k=2, n=6), joint_names=NAMES[::-1], q=ROWS[:, ::-1])
+    found = load_motion(save_trajectory(tmp_path / "run.json", run), PUMA)
+    assert np.array_equal(found.q, ROWS)
+    assert found.marks.tolist() == run.cell.tolist()
+
+
+def test_millimetres_on_a_rail(tmp_path: Path, read) -> None:
+    (tmp_path / "slider.urdf").write_text(SLIDER)
+    robot = load_robot(str(tmp_path / "slider.urdf"))
+    rows = np.array([[0.5, 3.0], [0.6, 4.0]])
+    assert np.array_equal(read(text_of(robot.joint_names, rows), robot).q, rows)
+    rows[:, 0] *= 1e3
+    with pytest.raises(FileError, match="holds millimetres, it seems: slide is 600 where"):
+        read(text_of(robot.joint_names, rows), robot)
+
+
+def small_run(k: int, n: int, seed: int = 0) -> Trajectory:
+    """A made-up trajectory."""
+    rng = np.random.default_rng(seed)
+    return Trajectory(
+        joint_names=tuple(f'joint {j}, "{"ä" * j}"' for j in range(n)),
+        time=np.cumsum(rng.random(k)),
+        q=rng.normal(size=(k, n)) * 10.0 ** rng.integers(-12, 3, (k, n)),
+        dq=rng.normal(size=(k, n)),
+        ddq=rng.normal(size=(k, n)),
+        tool_speed=rng.random(k),
+        cell=rng.integers(-1, 3, k),
+    )
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_is_written_is_read_back(seed: int, tmp_path: Path) -> None:
+    run = small_run(k=1 + seed, n=1 + seed, seed=seed)
+    sound_trajectory(run, tmp_path)
+    at_work = replace(run, working=np.arange(1 + seed) % 2 == 0, collisions=("self",))
+    for ending in ("csv", "json"):
+        again = load_trajectory(save_trajectory(tmp_path / f"run.{ending}", at_work))
+        assert again.working.tolist() == at_work.working.tolist()
+    assert again.collisions == ("self",)
+    for name in ("run.txt", "run"):
+        with pytest.raises(FileError, match=r"ends in \.csv, \.json or \.yaml"):
+            save_trajectory(tmp_path / name, run)
+
+
+def test_yaml_is_what_ros_reads(tmp_path: Path) -> None:
+    yaml = pytest.importorskip("yaml")
+    run = small_run(k=4, n=3)
+    q = run.q.copy()
+    q[1] = [1e-5, -1e16, -0.0]  # YAML 1.1 takes 1e-05 for text
+    run = replace(run, q=q)
+    message = yaml.safe_load(save_trajectory(tmp_path / "run.yml", run).read_text("utf-8"))
+    assert set(message) == {"joint_names", "points"}
+    assert message["joint_names"] == list(run.joint_names)
+    assert len(message["points"]) == 4
+    for k, point in enumerate(message["points"]):
+        arrays = {"positions": run.q, "velocities": run.dq, "accelerations": run.ddq}
+        assert set(point) == {*arrays, "time_from_start"}
+        for name, array in arrays.items():
+            assert all(isinstance(value, float) for value in point[name])
+            assert point[name] == array[k].tolist()
+        start = point["time_from_start"]
+        assert 0 <= start["nanosec"] < 10**9
+        assert start["sec"] + 1e-9 * start["nanosec"] == pytest.approx(run.time[k], abs=1e-9)
+
+
+def test_the_report_says_what_a_path_holds() -> None:
+    path, run = path_of("5c, coarse"), run_of("5c, coarse")
+    record = as_json(path, run, limits := motion_limits(path.robot, SPEED))
+    assert record == json.loads(json.dumps(record, allow_nan=False))
+    assert record["covered_m"] + record["revisited_m"] == pytest.approx(record["length_m"])
+    assert record["visits"] == path.visits.tolist()
+    travel = [joint["travel_deg"] for joint in record["joint_travel"].values()]
+    assert np.radians(travel) == pytest.approx(path.figures.travel)
+    assert record["trajectory"]["duration_s"] == run.duration
+    assert record["trajectory"]["limits"]["tool_speed"] == SPEED
+    assert as_json(path)["trajectory"] is None
+    text = as_text(path, run, limits)
+    assert text.startswith("path: one continuous motion over 16 cells.")
+    assert f"{path.figures.length:.4g} m on the surface" in text
+    assert f"{run.duration:.4g} s" in text
+    assert max(map(len, text.splitlines())) <= 100
+    assert "time" not in as_text(path)
+    one = coverage_path(verdict_of("5c, coarse"), only=[0])
+    assert as_json(one)["length_ratio"] is None
+    assert "over 1 cell." in as_text(one)

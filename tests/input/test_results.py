@@ -1,0 +1,288 @@
+"""Result files: what was saved comes back exactly, for its own case alone, and is written whole."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import zipfile
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bad_input import NET_POINTS, sheet, stl
+from readers import TREE, members, packed
+from small_cases import TEXTS, small_case, small_verdict
+
+from feasibility import Evidence, check, verify
+from feasibility.cases import Case, load_case
+from feasibility.cut_tree import CutTree, Leaf
+from feasibility.results import ResultError, load_result, plain, save_result
+from feasibility.safe_files import FileError, check_writable, write_whole
+from feasibility.verdict import Verdict, Walk
+from feasibility.version import version
+from feasibility.viewer import view
+
+UR5 = """
+robot.name = "ur5"
+surface = {{ kind = "{kind}", file = "{file}", side = "outside", cells = {cells}, \
+position = [0.4, -0.1, 0.3] }}
+task = {{ standoff = 0.02, cone_deg = 30 }}
+"""
+
+
+def same_graph(a: Any, b: Any) -> None:
+    assert type(a) is type(b)
+    assert list(a.nodes) == list(b.nodes)
+    for cell, q in a.nodes(data="q"):
+        assert np.array_equal(q, b.nodes[cell]["q"]) if q is not None else not b.nodes[cell]["q"]
+    ends = [sorted(map(tuple, map(list if g.is_directed() else sorted, g.edges))) for g in (a, b)]
+    assert ends[0] == ends[1]
+    for i, j, motion in a.edges(data="motion"):
+        assert np.array_equal(motion, b.edges[i, j]["motion"])
+
+
+def again(verdict: Verdict, case: Case, folder: Path) -> Verdict:
+    """The verdict out of a file, which holds nothing but numbers and one text."""
+    loaded = load_result(save_result(verdict, case, folder / "a.result"))
+    assert (loaded.case, loaded.case.name, loaded.version) == (case, case.name, version())
+    path = folder / "b.result"
+    assert (
+        save_result(loaded.verdict, case, path).read_bytes() == (folder / "a.result").read_bytes()
+    )
+    return loaded.verdict
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_a_result_comes_back_exactly(name: str, tmp_path: Path) -> None:
+    """One for each kind of answer: a witness, causes, the tree of the paper's search."""
+    before = small_verdict(name)
+    kinds = (before.witness, before.causes, before.tree)
+    assert kinds[list(TEXTS).index(name)]
+    after = again(before, small_case(name), tmp_path)
+    for key in ("answer", "evidence", "message", "method", "seed", "start", "causes", "task",
+                "certificate", "proof", "n_edges", "pairs_left_out", "unchecked_links"):  # fmt: skip
+        assert getattr(after, key) == getattr(before, key), key
+    assert dict(after.timing) == dict(before.timing)
+    assert dict(after.statistics) == plain(before.statistics)
+    for pair in zip(
+        (before.covered, before.postures, before.cells.centres, before.robot.lower,
+         *before.components),
+        (after.covered, after.postures, after.cells.centres, after.robot.lower, *after.components),
+        strict=True,
+    ):  # fmt: skip
+        assert np.array_equal(*pair)
+    same_graph(before.graph, after.graph)
+    for one, other in ((before.tree, after.tree), (before.witness, after.witness)):
+        assert (one is None) == (other is None)
+    if before.tree is not None:
+        same_graph(before.tree, after.tree)
+    if before.witness is not None:
+        assert np.array_equal(after.witness.q, before.witness.q)
+        assert np.array_equal(after.witness.cell, before.witness.cell)
+    assert repr(after) == repr(before)
+    for member, data in members("plate").items():
+        if member != "meta.json":
+            assert np.load(io.BytesIO(data)).dtype in (np.float64, np.int64)
+
+
+@pytest.mark.parametrize(
+    "tree", [TREE, CutTree(Leaf(2)), CutTree(Leaf(0), ((1, -0.5), (4, 0.0)))], ids=str
+)
+def test_a_proof_comes_back_as_it_was(tree: CutTree, tmp_path: Path) -> None:
+    verdict = replace(small_verdict("long plate"), proof=tree, evidence=Evidence.PROOF)
+    assert again(verdict, small_case("long plate"), tmp_path).proof == tree
+
+
+def test_every_key_of_the_task_comes_back(tmp_path: Path) -> None:
+    numbers = {
+        "speed": "0.02", "min_manipulability": "1e-3", "home_deg": "[0, -90, 90, 0, 90, 0]",
+        "approach": "[0, 0, -1]", "roll_deg": "[-90, 90]", "roll_reference": "[0, 1, 0]",
+        "footprint": "[0.06, 0.04]", "coverage": "0.9", "tolerance": "0.002",
+    }  # fmt: skip
+    case = small_case("plate").with_overrides([f"task.{key}={v}" for key, v in numbers.items()])
+    assert all(getattr(case.task, field.name) is not None for field in fields(case.task)
+               if field.name not in ("collision", "smooth"))  # fmt: skip
+    assert again(replace(small_verdict("plate"), task=case.task), case, tmp_path).task == case.task
+
+
+def test_a_verdict_is_kept_beside_its_own_case_alone(tmp_path: Path) -> None:
+    for setting in ("task.cone_deg=31", "search.seed=1", "search.method=greedy"):
+        other = small_case("plate").with_overrides([setting])
+        with pytest.raises(ResultError, match=r"the verdict is not about case 'plate'"):
+            save_result(small_verdict("plate"), other, tmp_path / "a.result")
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_earlier_format_and_as_many_members_as_may_be(tmp_path: Path) -> None:
+    content = dict(members("plate"))
+    meta = {**json.loads(content["meta.json"]), "format_version": 3}
+    del meta["has_postures"], content["postures.npy"]
+    content["meta.json"] = json.dumps(meta).encode()
+    content |= {f"x{k}": b"" for k in range(64 - len(content))}
+    (tmp_path / "a.result").write_bytes(packed(content))
+    loaded = load_result(tmp_path / "a.result").verdict
+    assert loaded.feasible
+    assert loaded.postures is None
+
+
+@pytest.mark.parametrize("kind", ["mesh", "bspline"])
+def test_a_result_is_not_shown_on_another_surface(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A file that has changed, is gone or another; what another file holds is never said."""
+    file = tmp_path / {"mesh": "part.stl", "bspline": "net.json"}[kind]
+    cells = "12" if kind == "mesh" else "[3, 4]"
+    (tmp_path / "a.toml").write_text(UR5.format(kind=kind, file=file.name, cells=cells))
+
+    def write(change: float) -> None:
+        points = np.array(NET_POINTS) + [0, 0, change]
+        net = json.dumps({"points": points.tolist(), "degree": [2, 2]}).encode()
+        file.write_bytes(stl(sheet() + change) if kind == "mesh" else net)
+
+    write(0.0)
+    case = load_case(tmp_path / "a.toml")
+    verdict = check(*case.build())
+    monkeypatch.chdir("/")
+    assert again(verdict, case, tmp_path).feasible
+    saved = tmp_path / "a.result"
+    write(1e-4)
+    with pytest.raises(ResultError, match=f"{file.name}.*in other places now; run the check"):
+        load_result(saved)
+    if kind == "mesh":
+        file.write_bytes(stl(sheet()[:, ::-1]))  # the same, but it looks down
+        with pytest.raises(ResultError, match="in other places now"):
+            load_result(saved)
+    file.unlink()
+    with pytest.raises(ResultError, match=r"surface\.file.*no such file"):
+        load_result(saved)
+    secret = tmp_path / "secret.json"
+    secret.write_text('{"password": "tulip"}')
+    with zipfile.ZipFile(saved) as zipped:
+        content = {name: zipped.read(name) for name in zipped.namelist()}
+    for other in ("/dev/zero", "/etc/passwd", "/proc/self/environ", str(secret)):
+        meta = content["meta.json"].decode().replace(str(file), other)
+        (tmp_path / "bad.result").write_bytes(packed({**content, "meta.json": meta.encode()}))
+        with pytest.raises(ResultError, match=r"surface\.file") as caught:
+            load_result(tmp_path / "bad.result")
+        assert not {"tulip", "root:"} & set(str(caught.value).replace('"', " ").split())
+
+
+# with collisions
+
+BOX = """
+robot.name = "ur5"
+surface = {{ kind = "plane", u = [0.4, 0.6], v = [-0.1, 0.1], cells = [2, 2], side = "outside", \
+position = [0, 0, 0.3] }}
+task = {{ standoff = 0.02, cone_deg = 30 }}
+[collision]
+clearance = {clearance}
+[[collision.scene]]
+name = "box"
+kind = "box"
+size = [0.1, 0.1, 0.6]
+position = {place}
+"""
+
+
+def test_a_result_with_collisions_holds_for_its_own_scene_alone(tmp_path: Path) -> None:
+    def case_of(clearance: float = 0.005, place: str = "[0.75, 0, 0.3]") -> Case:
+        return Case.from_toml(BOX.format(clearance=clearance, place=place), name="box")
+
+    def holds(verdict: Verdict, case: Case) -> Any:
+        return verify(load_result(save_result(verdict, case, tmp_path / "a.result")))
+
+    verdict = check(*case_of().build())
+    after = again(verdict, case_of(), tmp_path)
+    assert after.certificate == verdict.certificate
+    assert after.certificate.nearest_pair is not None
+    assert after.pairs_left_out == verdict.pairs_left_out != ()
+    assert after.task.collision.checked == ("self", "surface", "scene")
+    assert after.task.collision.scene[0].placement[0, 3] == 0.75
+    kept = holds(verdict, case_of())
+    assert kept.holds
+    assert kept.certificate.min_clearance >= 0.0
+    for other, words in ((case_of(place="[0.5, 0, 0.6]"), "box"), (case_of(0.5), "are needed")):
+        found = holds(verdict, other)
+        assert not found.holds
+        assert words in found.refusal
+    walk = verdict.witness
+    into = np.insert(walk.q, 1, walk.q[0], axis=0)
+    into[1, :3] = [0.0, -0.6, 0.6]  # stretched out towards the box
+    q, cell = np.insert(into, 2, walk.q[0], axis=0), np.insert(walk.cell, [1, 1], -1)
+    found = holds(replace(verdict, witness=Walk(q=q, cell=cell)), case_of())
+    assert not found.holds
+    assert "and box overlap" in found.refusal
+
+
+# written whole or not at all
+
+
+def no_space(*_: object) -> None:
+    raise OSError(28, "No space left on device")
+
+
+def test_saving_is_all_or_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No other thread sees another umask either, and no page is left half written."""
+    path, args = tmp_path / "a.result", (small_verdict("plate"), small_case("plate"))
+    path.write_bytes(b"what was there")
+    monkeypatch.setattr(os, "umask", None)
+    monkeypatch.setattr(os, "fsync", no_space)
+    with pytest.raises(ResultError, match=r"a\.result: cannot be written: no space left"):
+        save_result(*args, path)
+    assert path.read_bytes() == b"what was there"
+    monkeypatch.undo()
+    save_result(*args, path)
+    assert load_result(path).verdict.feasible
+    assert [file.name for file in tmp_path.iterdir()] == ["a.result"]
+    page, drawn = tmp_path / "page.html", view(args[0])
+    assert drawn.save_html(page) == page
+    before = page.read_bytes()
+    monkeypatch.setattr(os, "replace", no_space)
+    with pytest.raises(FileError, match="cannot be written"):
+        drawn.save_html(page)
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["a.result", "page.html"]
+    assert page.read_bytes() == before
+
+
+def test_places_that_cannot_be_written_are_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").touch()
+    for path, words in (
+        ("/dev/full", "/dev/full: cannot be written: no space left"),
+        (tmp_path / "no" / "a.result", "there is no folder"),
+        (tmp_path, "is a folder"),
+        (tmp_path / "file" / "a.result", "there is no folder"),
+    ):
+        with pytest.raises(ResultError, match=words):
+            save_result(small_verdict("plate"), small_case("plate"), path)
+    allowed = os.access  # a folder that takes no files, as /dev is to everyone but root
+    monkeypatch.setattr(
+        os, "access", lambda path, mode: str(path) != "/dev" and allowed(path, mode)
+    )
+    check_writable("/dev/null")
+    with pytest.raises(FileError, match="cannot be written to"):
+        check_writable("/dev/coverable.csv")
+
+
+def test_permissions_links_and_pipes_stay_as_they_were(tmp_path: Path) -> None:
+    args = small_verdict("plate"), small_case("plate")
+    save_result(*args, tmp_path / "new")
+    (tmp_path / "plain").touch()
+    assert (tmp_path / "new").stat().st_mode == (tmp_path / "plain").stat().st_mode
+    (tmp_path / "plain").chmod(0o640)
+    (tmp_path / "link").symlink_to("plain")
+    save_result(*args, tmp_path / "link")
+    assert (tmp_path / "link").is_symlink()
+    assert load_result(tmp_path / "plain").verdict.feasible
+    assert (tmp_path / "plain").stat().st_mode & 0o777 == 0o640
+    os.mkfifo(tmp_path / "pipe")
+    reading = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
+    data = os.urandom(20_000)  # a pipe holds 64 kB
+    write_whole(tmp_path / "pipe", lambda stream: stream.write(data))
+    assert os.read(reading, 30_000) == data
+    os.close(reading)
+    assert (tmp_path / "pipe").is_fifo()

@@ -1,0 +1,186 @@
+"""Algorithms 1 and 2 on arms and patches small enough to know the answer, and their ends."""
+
+from __future__ import annotations
+
+import math
+
+import networkx as nx
+import numpy as np
+import pytest
+from arm_urdfs import joint
+from random_arms import robot_of
+from scipy.spatial.transform import Rotation
+
+from feasibility import Answer, CauseKind, Evidence, Search, Task, greedy_check
+from feasibility.paper.algorithm_2 import tree_search
+from feasibility.paper.continuity import JSpace, Outcome
+from feasibility.paper.jcell_steps import Steps
+from robots import load_robot
+from surfaces import cylinder, plane, sphere
+
+PUMA = load_robot("puma560", limits="set-1")
+
+
+def planar_arm(low=-3.1, high=3.1):
+    """Two links of 1 m in the xy plane; the tool axis is +x of the second."""
+    turning = joint(1, limits=(low, high)), joint(2, xyz=(1, 0, 0), limits=(-3.1, 3.1))
+    return robot_of([*turning, joint(3, "fixed", (1, 0, 0))], (1.0, 0.0, 0.0))
+
+
+def gantry(x=(-2.0, 2.0)):
+    """Three prismatic joints along x, y and z; the tool axis is +z, so tool point = q."""
+    ranges = x, (-2.0, 2.0), (-2.0, 2.0)
+    return robot_of(
+        [joint(i + 1, "prismatic", axis=np.eye(3)[i], limits=ranges[i]) for i in range(3)]
+    )
+
+
+def greedy(**settings):
+    return Search(method="greedy", **settings)
+
+
+def edges(graph):
+    return {(min(e), max(e)) for e in graph.edges}
+
+
+# An arc of a circle of radius 1.5 m about the base: elbow angle and shoulder angle are independent,
+# so turning the shoulder alone runs along the arc, and the shoulder's limits cut it where they say.
+ARC = cylinder(1.5, (0, 80), (-0.1, 0.1), side="inside").cells(8, 1)  # 10 degrees each
+ELBOW = math.acos(1.5**2 / 2.0 - 1.0)  # cosine rule: |p|^2 = 2 + 2 cos(elbow)
+
+
+def test_planar_arm_covers_the_arc_cell_by_cell():
+    verdict = greedy_check(planar_arm(), ARC, Task(0.0, 60), greedy(step_deg=0.1))
+    assert verdict.answer is Answer.FEASIBLE
+    assert edges(verdict.graph) == {(i, i + 1) for i in range(7)}
+    assert verdict.start == 4
+    assert set(verdict.tree.edges) == {(4, 3), (3, 2), (2, 1), (1, 0), (4, 5), (5, 6), (6, 7)}
+    assert list(verdict.tree) == [4, 3, 2, 1, 0, 5, 6, 7]  # depth first
+    assert verdict.statistics["calls"] == 7
+    for cell in range(8):
+        shoulder, elbow = verdict.graph.nodes[cell]["q"]
+        assert abs(abs(elbow) - ELBOW) < 1e-6
+        polar = math.degrees(shoulder + elbow / 2)  # of the tool point
+        assert 10 * cell - 1e-9 <= polar <= 10 * (cell + 1) + 1e-9
+
+
+@pytest.mark.parametrize("last", [44.0, 53.0, 67.0])
+def test_shoulder_limit_cuts_the_arc_where_it_stands(last):
+    """Elbow down, the tool is at shoulder + elbow / 2; elbow up it is at shoulder - |elbow| / 2.
+
+    The lower limit leaves the branch with the elbow up without a start in the middle of the arc.
+    """
+    arm = planar_arm(-1.0, math.radians(last - math.degrees(ELBOW) / 2))
+    verdict = greedy_check(arm, ARC, Task(0.0, 60), greedy(step_deg=0.1))
+    reached = math.floor(last / 10)
+    assert (verdict.answer, verdict.evidence) == (Answer.INFEASIBLE, Evidence.EXHAUSTED)
+    assert "not found by the greedy search" in verdict.message
+    assert np.flatnonzero(verdict.covered).tolist() == list(range(reached + 1))
+    assert edges(verdict.graph) == {(i, i + 1) for i in range(reached)}
+    assert [cause.cell for cause in verdict.causes] == list(range(reached + 1, 8))
+    kinds = {(cause.kind, cause.proved) for cause in verdict.causes}
+    assert kinds == {(CauseKind.DISCONNECTED, False)}
+
+
+@pytest.mark.parametrize("moves", ["single", "all"])
+def test_gantry_over_a_plane(moves):
+    """Every move is a translation, so each of the 8 neighbours can be entered from each cell."""
+    cells, arm = plane((0, 0.4), (0, 0.3), side="inside").cells(4, 3), gantry()
+    verdict = greedy_check(arm, cells, Task(0.05, 30), greedy(step_deg=0.2, moves=moves))
+    assert verdict.answer is Answer.FEASIBLE
+    assert edges(verdict.graph) == {tuple(pair) for pair in cells.pairs.tolist()}
+    assert verdict.statistics["capped"] == 0
+    assert verdict.certificate.max_angle == 0.0
+    step = Steps.of(arm, cells, Task(0.05, 30), greedy(step_deg=0.2)).size
+    np.testing.assert_allclose(step, math.radians(0.2) * arm.reach)
+    # x <= 0.25: cells of the third column of four are touched, those of the fourth are not.
+    verdict = greedy_check(gantry((-1.0, 0.25)), cells, Task(0.05, 30), greedy(step_deg=0.2))
+    assert verdict.covered.tolist() == [True] * 9 + [False] * 3
+    assert edges(verdict.graph) == {(i, j) for i, j in cells.pairs.tolist() if j < 9}
+
+
+DOME = sphere(1.0, (10, 90), (10, 180))
+
+
+def test_capped_is_not_exhausted_and_memory_grows_without_changing_the_answer():
+    """A call of 60,000 J-cells outgrows its first memory; the same J-cells come out."""
+    cells = sphere(1.0, (10, 90), (10, 180), position=(0.005, 0, 0)).cells(9, 10)
+    task = Task(0.005, 10)
+    verdict = greedy_check(PUMA, cells, task, greedy(starts=1, cap=2000))
+
+    def called(a, k, cap):
+        space = JSpace(PUMA, cells, task, verdict.graph.nodes[a]["q"], greedy(cap=cap))
+        return space.continuity(np.zeros(6), k)
+
+    ends = [(a, k) for a in verdict.tree for k in cells.neighbours.of(a).tolist()
+            if not verdict.graph.has_edge(a, k)]  # fmt: skip
+    a, k = next(pair for pair in ends if called(*pair, 60_000).outcome is Outcome.CAPPED)
+    few, many = called(a, k, 50), called(a, k, 60_000)
+    assert (few.outcome, few.checked, len(few.jcells)) == (Outcome.CAPPED, 50, 0)
+    assert (many.outcome, many.checked) == (Outcome.CAPPED, 60_000)
+
+
+def test_rigid_motion_of_arm_and_surface_changes_nothing():
+    """The base moved by a transform, and the patch with it: the same graph and tree."""
+    robot, task = load_robot("puma560", limits="set-2"), Task(0.005, 5)
+    place, angles = (0.3, -0.7, 1.1), (0.4, -0.9, 2.1)
+    arm = load_robot("puma560", limits="set-2", base=(place, tuple(np.degrees(angles))))
+    turn = Rotation.from_euler("xyz", angles).as_matrix()
+    patch = cylinder(0.5, (-60, 60), (0, 0.9), position=(0.01, 0.03, 0.02))
+    search = greedy(moves="all", step_deg=1.0, cap=2000)
+    here = greedy_check(robot, patch.cells(9, 10), task, search)
+    q = here.graph.nodes[here.start]["q"]
+    one, other = (
+        tree_search(JSpace(r, s.cells(9, 10), task, q, search), s.cells(9, 10), here.start)
+        for r, s in ((robot, patch), (arm, patch.moved(turn, place)))
+    )
+    assert 10 < len(one.jcell) < 90
+    assert (one.parent, one.calls) == (other.parent, other.calls)
+    assert {k: len(v) for k, v in one.edges.items()} == {k: len(v) for k, v in other.edges.items()}
+
+
+def test_no_cells_one_cell_and_cells_out_of_reach():
+    for shape, count in (((0, 3), 0), ((1, 1), 1)):
+        verdict = greedy_check(PUMA, sphere(1.0, (40, 50), (80, 90)).cells(*shape), Task(0.005, 45))
+        assert verdict.answer is Answer.FEASIBLE
+        assert verdict.n_covered == len(verdict.covered) == count
+        assert (verdict.graph.number_of_edges(), verdict.causes) == (0, ())
+    far = sphere(1.0, (10, 90), (10, 180), position=(9, 0, 0)).cells(3, 3)
+    verdict = greedy_check(PUMA, far, Task(0.005, 45), greedy())
+    assert (verdict.answer, verdict.n_covered, verdict.tree) == (Answer.INFEASIBLE, 0, None)
+    assert "no configuration was found" in verdict.message
+    assert {(c.kind, c.proved) for c in verdict.causes} == {(CauseKind.OUT_OF_REACH, True)}
+    assert len(verdict.causes) == 9
+
+
+def test_time_limits_coarse_steps_and_bad_starts_are_said():
+    slow = greedy(step_deg=0.001, time_limit=0.05)
+    verdict = greedy_check(PUMA, DOME.cells(30, 30), Task(0.005, 45), slow)
+    assert (verdict.answer, verdict.evidence) == (Answer.UNDECIDED, Evidence.BUDGET)
+    assert "time limit" in verdict.message
+    cells = DOME.cells(3, 3)
+    verdict = greedy_check(PUMA, cells, Task(0.005, 45, tolerance=1e-6), greedy(step_deg=1.0))
+    assert verdict.answer is Answer.INFEASIBLE
+    assert "too coarse" in verdict.message
+    for start, said in ((np.zeros(6), "start must satisfy"), ([0.0, math.nan], "6 finite joint")):
+        with pytest.raises(ValueError, match=said):
+            greedy_check(PUMA, cells, Task(0.005, 45), greedy(), start=start)
+
+
+def test_same_seed_same_search():
+    cells, search = cylinder(0.5, (-60, 60), (0, 0.9)).cells(5, 5), greedy(moves="all", step_deg=1.0)
+    one, two = (greedy_check(PUMA, cells, Task(0.005, 20), search) for _ in range(2))
+    assert dict(one.statistics) == dict(two.statistics)
+    assert nx.utils.edges_equal(one.graph.edges, two.graph.edges)
+    for cell in one.tree:
+        np.testing.assert_array_equal(one.tree.nodes[cell]["q"], two.tree.nodes[cell]["q"])
+
+
+@pytest.mark.parametrize("name", ["panda", "kinova"])
+def test_library_arms_cover_a_table(name):
+    cells = plane((0.35, 0.5), (-0.1, 0.1), position=(0, 0, 0.22), side="outside").cells(3, 3)
+    search = greedy(moves="all", step_deg=0.5)
+    verdict = greedy_check(load_robot(name), cells, Task(0.02, 20), search)
+    assert verdict.answer is Answer.FEASIBLE, verdict.message
+    assert verdict.certificate.max_angle <= math.radians(20)
+    assert nx.is_arborescence(verdict.tree)

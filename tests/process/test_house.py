@@ -1,0 +1,78 @@
+"""What is held of the code as a whole: what is loaded when, and sizes. Layers: pyproject.toml."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("coverable_meshes", "robots", "surfaces", "feasibility")
+FILES = [
+    *ROOT.glob("coverable*.py"),
+    *(p for room in PACKAGES for p in (ROOT / room).rglob("*.py")),
+]
+HEAVY = {"OCP", "collada", "distributed", "matplotlib", "meshcat", "rich", "trimesh", "yourdfpy"}
+
+
+def loaded(code: str) -> set[str]:
+    """All modules after some code, in a new process."""
+    said = f"{code}\nimport sys\nprint(*sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", said], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    return set(done.stdout.splitlines()[-1].split())
+
+
+@pytest.mark.parametrize(
+    ("code", "more"),
+    [
+        ("import coverable", {"numpy", "numba", "pinocchio", "scipy"}),
+        ("import coverable_command, feasibility.cli.main", {"numba", "pinocchio", "coal"}),
+        ("import coverable as c; c.check(*c.load_case('paper/4a').build()[:3])", set()),
+    ],
+    ids=["import", "command", "check"],
+)
+def test_heavy_libraries_are_loaded_where_they_are_used(code: str, more: set[str]) -> None:
+    assert not {name.split(".")[0] for name in loaded(code)} & (HEAVY | more)
+
+
+def test_loading_the_judge_loads_nothing_of_the_search() -> None:
+    found = loaded("from feasibility.certification import replay; replay.__module__")
+    ours = {name for name in found if name.startswith("feasibility.")}
+    searching = ("roadmap", "paper", "area", "checking", "attempts", "collisions.kernels")
+    assert "feasibility.certification.motion_replay" in ours
+    assert not [
+        name for name in ours if name.startswith(tuple(f"feasibility.{s}" for s in searching))
+    ]
+    assert "robots.chain" not in found
+
+
+def test_no_folder_holds_more_than_twenty_modules() -> None:
+    folders = {path.parent for path in [*FILES, *(ROOT / "tests").rglob("*.py")]}
+    for folder in folders:
+        assert len([p for p in folder.glob("*.py") if p.stem != "__init__"]) <= 20, folder
+
+
+def test_no_function_has_more_than_seventy_lines() -> None:
+    for path in FILES:
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+                assert (node.end_lineno or 0) - node.lineno < 70, f"{path}: {node.name}"
+
+
+def test_kernels_are_made_by_our_decorators_alone() -> None:
+    """Numba's own would keep a kernel by its own file, and not by what it calls."""
+    for path in FILES:
+        text = path.read_text("utf-8").replace("from coverable_kernels import njit", "")
+        assert path.name.startswith("coverable_") or "import njit" not in text, path
+        assert path.name.startswith("coverable_") or "numba import cfunc" not in text, path
+
+
+def test_contributing_names_every_room() -> None:
+    table = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+    for folder in {path.parent.relative_to(ROOT) for path in FILES} - {Path()}:
+        assert f"`{folder}/`" in table, folder

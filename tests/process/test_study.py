@@ -1,0 +1,467 @@
+"""Studies: the table is the same whoever works, however a pool breaks and everyone is killed."""
+
+from __future__ import annotations
+
+import csv
+import io
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import BrokenExecutor, CancelledError, Future
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+import study_works
+from jobs import TEXTS, case_named, coverable, verdict_named
+
+from feasibility.cases import as_read
+from feasibility.roadmap import warm_up_in_turn
+from feasibility.studies import (
+    Store,
+    StudyTask,
+    WorkersError,
+    bits_of,
+    cells_of,
+    load_study,
+    open_workers,
+    run_tasks,
+)
+from feasibility.studies.store import StoreError
+
+SHARED = Path(study_works.__file__).parent
+
+
+def numbers(count, work=study_works.double, **more):
+    """Tasks about the numbers 0, 1, 2, ..."""
+    return [StudyTask({"number": k, **more}, {"number": k}, work) for k in range(count)]
+
+
+def facts(rows):
+    """Rows without the time that they took."""
+    return [(dict(row.parameters), row.status, row.result) for row in rows]
+
+
+@pytest.fixture(scope="module")
+def pool():
+    """Two worker processes."""
+    with open_workers(2, warm=False) as workers:
+        yield workers
+
+
+# -- one task --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_an_outcome_says_what_the_verdict_says(name) -> None:
+    verdict, case = verdict_named(name), case_named(name)
+    with open_workers(0) as workers:
+        (row,) = run_tasks([StudyTask(as_read(case.to_tables()), {})], workers)
+    outcome, areas, n = row.result, verdict.cells.areas, len(verdict.cells)
+    assert (outcome["verdict"], outcome["evidence"]) == (str(verdict.answer), str(verdict.evidence))
+    assert (outcome["covered"], outcome["message"]) == (verdict.n_covered, verdict.message)
+    assert outcome["share"] == pytest.approx(areas[verdict.covered].sum() / areas.sum())
+    assert sum(outcome["causes"].values()) == n - verdict.n_covered >= outcome["examined"]
+    assert set(outcome["causes"]) <= {str(cause.kind) for cause in verdict.causes}
+    covers = {tuple(np.flatnonzero(cells_of(bits, n))) for bits in outcome["components"]}
+    known = [set(cells.tolist()) for cells in verdict.components]
+    assert {
+        tuple(sorted(own)) for own in known if not any(own < other for other in known)
+    } == covers
+    assert (outcome["margins"] is None) == (not verdict.feasible)
+    if verdict.feasible:
+        q, robot, margins = verdict.witness.q, verdict.robot, outcome["margins"]
+        least = np.degrees(np.minimum(q - robot.lower, robot.upper - q).min())
+        assert margins["limit_deg"] == pytest.approx(least)
+        assert 0.0 <= margins["cone_deg"] <= verdict.task.cone_deg
+        assert 0.0 < margins["reach_m"] < robot.reach
+
+
+def test_bits_hold_any_cells() -> None:
+    rng = np.random.default_rng(1)
+    for n in (0, 1, 7, 8, 9, 90):
+        cover = rng.random(n) < 0.5
+        assert np.array_equal(cells_of(bits_of(cover), n), cover)
+    with pytest.raises(ValueError, match="cells"):
+        cells_of("ff", 9)
+
+
+# -- many tasks ------------------------------------------------------------------------------------
+
+
+def test_rows_come_in_the_order_of_the_tasks(pool, tmp_path) -> None:
+    """Whatever the order in which they end: here the first one is the last to end."""
+    work = study_works.double_but_the_first_is_last
+    tasks, seen = numbers(40, work, mark=str(tmp_path / "mark"), last=39), []
+    rows = run_tasks(tasks, pool, progress=lambda done, total, text: seen.append((done, total)))
+    assert [row.result["double"] for row in rows] == list(range(0, 80, 2))
+    assert seen == sorted(seen)
+    assert seen[-1] == (40, 40)
+    assert run_tasks([], pool) == ()
+
+
+def test_the_same_task_is_done_once_and_only_what_has_changed_again(pool, tmp_path) -> None:
+    tasks = [StudyTask({"n": k % 3}, {"k": k}, study_works.whoami) for k in range(12)]
+    with Store(tmp_path / "a.study") as store:
+        rows = run_tasks(tasks, pool, store)
+        assert len(store) == 3
+    assert [dict(row.parameters) for row in rows] == [{"k": k} for k in range(12)]
+    assert all(row.result == rows[k % 3].result for k, row in enumerate(rows))
+    there = {row.result["pid"] for row in rows}
+    assert os.getpid() not in there
+    more = [StudyTask({"n": k}, {}, study_works.whoami) for k in range(5)]
+    with Store(tmp_path / "a.study") as store, open_workers(0) as workers:
+        after = run_tasks(more, workers, store)
+    assert {row.result["pid"] for row in after[:3]} <= there
+    assert {row.result["pid"] for row in after[3:]} == {os.getpid()}
+
+
+@pytest.mark.parametrize("here", [True, False])
+def test_tasks_that_fail_are_told_and_tried_again(pool, here, tmp_path) -> None:
+    tasks = numbers(9, study_works.fail_odd)
+    tasks.append(StudyTask({"number": 99}, {"number": 99}, study_works.fail_odd))
+    with Store(tmp_path / "a.study") as store, open_workers(0) as mine:
+        for _ in range(2):
+            rows = run_tasks(tasks, mine if here else pool, store)
+            assert [row.status for row in rows] == ["done", "failed"] * 5
+            assert {row.result["verdict"] for row in rows[1::2]} == {"undecided"}
+            assert "3 is odd" in rows[3].result["message"]
+            assert "JSON" in rows[9].result["message"]
+
+
+def test_work_that_no_worker_can_be_told(pool) -> None:
+    with pytest.raises(WorkersError, match="cannot run the tasks"):
+        run_tasks([StudyTask({}, {}, lambda tables: {})], pool)
+    with pytest.raises(WorkersError, match="not both"), open_workers(2, "tcp://127.0.0.1:1"):
+        pass
+    with pytest.raises(ValueError, match=r"0 \.\. 1,000"), open_workers(-1):
+        pass
+
+
+# -- a pool that breaks ----------------------------------------------------------------------------
+
+BREAKS = [
+    BrokenProcessPool("a child process terminated abruptly"),
+    BrokenExecutor("broken"),
+    CancelledError(),
+    OSError("handle is closed"),
+    ValueError("I/O operation on closed file"),
+    RuntimeError("cannot schedule new futures after shutdown"),
+    EOFError(),
+    BrokenPipeError(32, "Broken pipe"),
+    ConnectionResetError(104, "Connection reset by peer"),
+    TimeoutError("timed out"),
+]
+
+
+class StandIn:
+    """Workers that do a task here and now, and break at the n-th one, as real ones may."""
+
+    breaks = deaths = (BrokenExecutor, CancelledError, EOFError, OSError, RuntimeError, ValueError)
+    patience, width = 3, 2
+
+    def __init__(self, where, error, at) -> None:
+        self.where, self.error, self.at = where, error, at
+        self.submitted, self.renewed, self.broken = 0, 0, False
+
+    def submit(self, work, *arguments):
+        if self.broken and self.where == "submit":
+            raise self.error
+        self.submitted += 1
+        future = Future()
+        if self.submitted in self.at:
+            self.broken = True
+            if self.where == "submit":
+                raise self.error
+        if not self.broken:
+            future.set_result(work(*arguments))
+        elif self.where == "result":
+            future.set_exception(self.error)
+        return future  # or one that never ends
+
+    def renew(self):
+        self.renewed, self.broken = self.renewed + 1, False
+
+    def close(self):
+        pass
+
+
+@pytest.mark.parametrize("where", ["submit", "result", "never"])
+@pytest.mark.parametrize("error", BREAKS, ids=repr)
+def test_a_break_of_any_kind_starts_a_new_pool_and_loses_nothing(where, error) -> None:
+    """Python 3.11 forgets tasks that are submitted when a worker dies: they never end."""
+    workers = StandIn(where, error, at=(1, 7, 12))
+    rows = run_tasks(numbers(12), workers)
+    assert [(row.status, row.result["double"]) for row in rows] == [
+        ("done", 2 * k) for k in range(12)
+    ]
+    assert workers.renewed == 3
+
+
+def test_pools_that_break_at_every_task_end_the_study_and_lose_nothing() -> None:
+    workers = StandIn("submit", OSError("handle is closed"), at=range(5, 10_000))
+    with Store(":memory:") as store:
+        with pytest.raises(WorkersError, match="what was finished is kept"):
+            run_tasks(numbers(12), workers, store)
+        assert len(store) == 4
+    assert workers.renewed < 50
+
+
+# -- killing ---------------------------------------------------------------------------------------
+
+
+def test_a_worker_that_dies_costs_its_own_task_alone(tmp_path) -> None:
+    """The deadly ones are given up, and only they; what was beside them is done."""
+    tasks = numbers(40, study_works.die_first, folder=str(tmp_path), deadly=[7, 23], once=[11, 12])
+    killed = []
+
+    def kill(done, total, text) -> None:
+        if done == total and not killed:  # from outside, when all is done
+            victim = multiprocessing.active_children()[-1]
+            os.kill(victim.pid, signal.SIGKILL)
+            killed.append(victim.pid)
+
+    with open_workers(2, warm=False) as workers:
+        rows = run_tasks(tasks, workers, progress=kill)
+        # What is left of the pool still works.
+        assert run_tasks(numbers(3), workers)[2].result["double"] == 4
+    for k, row in enumerate(rows):
+        if k in (7, 23):
+            assert (row.status, row.result["verdict"]) == ("failed", "undecided")
+            assert "worker died, 3 times" in row.result["message"]
+        else:
+            assert (row.status, row.result["double"]) == ("done", 2 * k)
+    assert killed
+
+
+COMMAND = """
+import sys
+from feasibility.cli.main import main
+if __name__ == "__main__":
+    if sys.argv.pop(1) == "stop":
+        from study_works import stop_after_keeping
+        stop_after_keeping()
+    sys.exit(main(sys.argv[1:]))
+"""
+
+
+def start(how: str, *arguments: object) -> subprocess.Popen[str]:
+    """The command in another process, which may stop as soon as it has kept something."""
+    path = os.pathsep.join([str(SHARED), *filter(None, sys.path)])
+    return subprocess.Popen(
+        [sys.executable, "-c", COMMAND, how, *map(str, arguments)],
+        env={**os.environ, "PYTHONPATH": path}, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        text=True, start_new_session=True,
+    )  # fmt: skip
+
+
+def wait_until_kept(process) -> None:
+    """Until a process that stops then has stopped."""
+    line = process.stdout.readline()
+    assert line == "kept\n", process.stderr.read()
+
+
+def stored(path) -> int:
+    """How many rows a store holds."""
+    if not path.exists():
+        return 0
+    with Store(path) as store:
+        return len(store)
+
+
+def children_of(pid: int) -> set[int]:
+    """Processes that a process has started."""
+    found = set[int]()
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = path.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        if int(fields[1]) == pid and fields[0] != "Z":
+            found.add(int(path.parent.name))
+    return found
+
+
+def wait_until_gone(pids) -> None:
+    """Until there are no such processes, but for their remains."""
+    while any(state(pid) not in ("", "Z") for pid in pids):
+        time.sleep(0.01)
+
+
+def state(pid: int) -> str:
+    """Of a process; empty where there is none."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return ""
+
+
+@pytest.fixture(scope="module")
+def in_peace(tmp_path_factory):
+    """A study file, and the CSV table that the command writes of it, left in peace."""
+    folder = tmp_path_factory.mktemp("peace")
+    study = folder / "plates.toml"
+    study.write_text(study_works.STUDY, encoding="utf-8")
+    assert coverable(*asked(study, folder, "0"), "--workers", 0).status == 0
+    text = (folder / "0.csv").read_text(encoding="utf-8")
+    verdicts = [line["verdict"] for line in csv.DictReader(io.StringIO(text))]
+    assert len(verdicts) == 24
+    assert min(verdicts.count("feasible"), verdicts.count("infeasible")) >= 6
+    return study, text
+
+
+def asked(study, folder, stem):
+    """`coverable study` with its files in a folder."""
+    return "study", study, "--out", folder / f"{stem}.study", "--csv", folder / f"{stem}.csv"
+
+
+def test_the_command_killed_and_run_again(in_peace, tmp_path) -> None:
+    """What was kept stays, workers end with their parent, and the table is that of one run."""
+    study, text = in_peace
+    before = set(multiprocessing.active_children())
+    path, held, orphans = tmp_path / "a.study", [], set[int]()
+    for count in (0, 1):
+        with start("stop", *asked(study, tmp_path, "a"), "--workers", count) as process:
+            wait_until_kept(process)
+            orphans |= children_of(process.pid)
+            process.kill()
+        held.append(stored(path))
+        assert not (tmp_path / "a.csv").exists()
+    assert 0 < held[0] < held[1] < 24
+    with Store(path) as store:
+        assert len(store.find(task.key for task in load_study(study).tasks)) == held[-1]
+    said = coverable(*asked(study, tmp_path, "a"), "--workers", 1)
+    assert said.status == 0
+    assert f"{held[-1]} finished cases" in said.err
+    assert (tmp_path / "a.csv").read_text(encoding="utf-8") == text
+    assert set(multiprocessing.active_children()) <= before
+    assert orphans
+    wait_until_gone(orphans)
+
+
+def test_two_commands_with_one_store(in_peace, tmp_path) -> None:
+    """One in another process, and one here that begins once the other has kept something."""
+    study, text = in_peace
+    shared = tmp_path / "a.study"
+    other = "study", study, "--out", shared, "--csv", tmp_path / "b.csv"
+    with start("run", *other, "--workers", 0) as process:
+        while not stored(shared) and process.poll() is None:
+            time.sleep(0.01)
+        assert coverable(*asked(study, tmp_path, "a"), "--workers", 0).status == 0
+        _, err = process.communicate()
+    assert process.returncode == 0, err
+    for table in (tmp_path / "a.csv", tmp_path / "b.csv"):
+        assert table.read_text(encoding="utf-8") == text
+    assert stored(shared) == 24
+
+
+def test_ctrl_c_stores_and_leaves_no_worker(in_peace, tmp_path) -> None:
+    """A terminal sends it to the workers too: neither they nor their parent write a traceback."""
+    with start("stop", *asked(in_peace[0], tmp_path, "a"), "--workers", 1) as process:
+        wait_until_kept(process)
+        children = children_of(process.pid)
+        os.killpg(process.pid, signal.SIGINT)
+        out, err = process.communicate()
+    held = stored(tmp_path / "a.study")
+    assert 0 < held < 24
+    assert (process.returncode, out.replace("kept\n", "")) == (130, "")
+    lines = err.splitlines()
+    assert lines[-1] == "coverable: interrupted"
+    assert f"{held} cases are stored" in lines[-2]
+    assert "Traceback" not in err
+    assert children
+    wait_until_gone(children)
+
+
+def test_a_full_disk_ends_a_study_and_loses_nothing(in_peace, tmp_path) -> None:
+    study, text = in_peace
+    path = tmp_path / "a.study"
+    with Store(path) as store:
+        store._base.execute("PRAGMA max_page_count = 4")  # SQLite's own full disk
+        tasks = load_study(study).tasks
+        held = 0
+        with open_workers(0) as workers, pytest.raises(StoreError, match="disk is full"):
+            for task in tasks:  # each is kept as it comes
+                run_tasks([task], workers, store)
+                held += 1
+        assert 0 < held == len(store) < 24
+    assert coverable(*asked(study, tmp_path, "a"), "--workers", 0).status == 0
+    assert (tmp_path / "a.csv").read_text(encoding="utf-8") == text
+    assert stored(path) == 24
+
+
+DYING = """
+import os
+if __name__ != "__main__":
+    os._exit(3)  # a worker imports this module first
+from feasibility.studies import StudyTask, WorkersError, open_workers, run_tasks
+from study_works import double
+try:
+    with open_workers(1) as workers:
+        run_tasks([StudyTask({"number": 1}, {}, double)], workers)
+except WorkersError as error:
+    print(error)
+"""
+
+
+def test_workers_that_die_while_starting_are_not_started_for_ever(tmp_path) -> None:
+    script = tmp_path / "dying.py"
+    script.write_text(DYING)
+    path = os.pathsep.join([str(SHARED), *filter(None, sys.path)])
+    done = subprocess.run(
+        [sys.executable, script], env={**os.environ, "PYTHONPATH": path},
+        capture_output=True, text=True, check=False, timeout=1800,
+    )  # fmt: skip
+    assert "died while starting, 3 times; what was finished is kept" in done.stdout, done.stderr
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_the_others_wait_for_the_first_to_compile(fails) -> None:
+    """Threads in the place of processes: nobody else loads while the first one is at it."""
+    gate, entered, may_end = Gate(), [], threading.Event()
+
+    def load(rarely_used: bool) -> None:
+        entered.append(threading.current_thread())
+        if len(entered) == 1:
+            may_end.wait()
+            if fails:
+                raise ValueError("no memory")
+
+    def begin() -> None:
+        with suppress(ValueError):
+            warm_up_in_turn(gate, int, load)
+
+    threads = [threading.Thread(target=begin) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for _ in threads[1:]:
+        gate.waiting.acquire()
+    while not entered:
+        time.sleep(0.001)
+    assert len(entered) == 1
+    may_end.set()
+    for thread in threads:
+        thread.join()
+    assert sorted(map(id, entered)) == sorted(map(id, threads))
+    assert gate.acquire(False)
+
+
+class Gate:
+    """A lock that counts those who wait for it."""
+
+    def __init__(self) -> None:
+        self.lock, self.waiting = threading.Lock(), threading.Semaphore(0)
+
+    def acquire(self, block=True):
+        if block:
+            self.waiting.release()
+        return self.lock.acquire(block)
+
+    def release(self):
+        self.lock.release()

@@ -1,0 +1,221 @@
+"""Study files: the tasks they make, against products and counts; faults, all of them at once."""
+
+from __future__ import annotations
+
+import itertools
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from feasibility.cases import Case, CaseError, as_read, load_case, toml_document
+from feasibility.studies import case_of, load_study, read_study
+
+GRID = """
+base.case = "paper/4a"
+[vary]
+robots = ["ur5", { name = "puma560", limits = "set-2" }]
+"task.cone_deg" = [20, 45]
+"surface.position" = { x = [0.0, 0.1], z = { from = 0, to = 1, steps = 3 } }
+[vary.surface]
+cells = [[3, 4], [9, 10]]
+"""
+SAMPLED = """
+base.case = "paper/4a"
+[vary]
+"surface.position" = { x = { range = [-0.5, 0.5] }, y = { range = [1, 3] } }
+"surface.rpy_deg".yaw = { range = [-90, 90] }
+"task.standoff" = { range = [0.001, 0.01] }
+sampler = "sobol"
+count = 50
+seed = 3
+"""
+
+
+def keys(text: str, folder=None) -> list[str]:
+    return [task.key for task in read_study(text, folder).tasks]
+
+
+def test_tasks_are_the_product_in_order_and_cases_written_in_full() -> None:
+    study = read_study(GRID)
+    robots = ["ur5", {"name": "puma560", "limits": "set-2"}]
+    product = list(
+        itertools.product(robots, [20.0, 45.0], [0.0, 0.1], [0.0, 0.5, 1.0], [[3, 4], [9, 10]])
+    )
+    labels = "robot", "task.cone_deg", "surface.position.x", "surface.position.z", "surface.cells"
+    assert study.labels == labels
+    assert [tuple(task.parameters.values()) for task in study.tasks] == product
+    assert len({task.key for task in study.tasks}) == len(product) == 48
+    for task, (robot, cone, x, z, cells) in zip(study.tasks, product, strict=True):
+        tables = task.tables
+        assert tables["robot"] == ({"name": robot} if isinstance(robot, str) else robot)
+        assert tables["task"]["cone_deg"] == cone
+        assert tables["surface"]["position"] == [x, 0.0, z]
+        assert tables["surface"]["cells"] == cells
+        # What the case of it writes: so keys do not depend on how it is said.
+        case = Case.from_toml(toml_document(tables))
+        assert json.loads(json.dumps(tables)) == as_read(case.to_tables())
+
+
+def test_samples_are_a_sobol_sequence_in_the_ranges() -> None:
+    tasks = read_study(SAMPLED).tasks
+    values = np.array([list(task.parameters.values()) for task in tasks])
+    low, high = np.array([[-0.5, 1, -90, 0.001], [0.5, 3, 90, 0.01]])
+    assert values.shape == (50, 4)
+    unit = (values - low) / (high - low)
+    assert ((unit >= 0) & (unit <= 1)).all()
+    # Any 2^k points of the sequence have one point in each of the 2^k slices of every axis.
+    for axis in range(4):
+        assert sorted((32 * unit[:32, axis]).astype(int)) == list(range(32))
+    assert keys(SAMPLED) == [task.key for task in tasks]
+    assert not set(keys(SAMPLED.replace("seed = 3", "seed = 4"))) & set(keys(SAMPLED))
+    assert keys(SAMPLED.replace("count = 50", "count = 64"))[:50] == keys(SAMPLED)
+
+
+def test_steps_are_even_and_end_where_they_should() -> None:
+    text = 'base.case = "paper/4a"\nvary."task.cone_deg" = { from = 45, to = 10.1, steps = 7 }'
+    values = [task.parameters["task.cone_deg"] for task in read_study(text).tasks]
+    assert values == pytest.approx(np.linspace(45, 10.1, 7), abs=1e-12)
+    assert (values[0], values[-1]) == (45, 10.1)
+
+
+def test_the_base_is_a_case_with_keys_replaced(tmp_path) -> None:
+    (tmp_path / "mine.toml").write_text(load_case("paper/5a").to_toml())
+    text = (
+        'base.case = "mine.toml"\nbase.robot = { name = "ur5", base.position = [0, 0, 0.1] }\n'
+        'base.task.standoff = 0.02\nvary."task.cone_deg" = [20]\n'
+        'vary.robots = ["ur3", { name = "ur10", base.position = [0, 0, 0.2] }]'
+    )
+    mine = as_read(load_case("paper/5a").to_tables())
+    mine["task"] |= {"cone_deg": 20.0, "standoff": 0.02}
+    for task, name, z in zip(
+        read_study(text, tmp_path).tasks, ("ur3", "ur10"), (0.1, 0.2), strict=True
+    ):  # arms stand where the case has its arm, unless they say otherwise
+        assert (task.tables["robot"]["name"], task.tables["task"]) == (name, mine["task"])
+        assert task.tables["robot"]["base"]["position"] == [0.0, 0.0, z]
+        assert task.tables["surface"] == mine["surface"]
+
+
+def test_the_key_says_what_a_task_is_and_nothing_else() -> None:
+    plain = keys('base.case = "paper/4a"\nvary."task.cone_deg" = [20, 30]')
+    said_otherwise = keys(
+        'vary.task.cone_deg = { from = 20.0, to = 30.0, steps = 2 }\ndescription = "same"\n'
+        'base = { case = "paper/4a", task = { cone_deg = 7 }, surface = { position = [0, 0, 0] } }'
+    )
+    assert plain == said_otherwise
+    assert keys('base.case = "paper/4a"\nvary."task.cone_deg" = [30, 20]') == plain[::-1]
+    other = keys('base.case = "paper/4a"\nbase.search.seed = 1\nvary."task.cone_deg" = [20, 30]')
+    assert not set(other) & set(plain)
+
+
+FACET = (
+    "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 0.1 0 0\nvertex 0 {y} 0\n"
+    "endloop\nendfacet\nendsolid a\n"
+)
+COLLISION = """
+base.case = "paper/4a"
+base.collision.scene = [{ name = "part", kind = "mesh", file = "a.stl" }]
+base.collision.srdf = "a.srdf"
+[vary]
+"collision.clearance" = [0.0, 0.01]
+[vary.collision]
+tool = [[], [{ kind = "mesh", file = "b.stl" }]]
+"""
+
+
+def test_files_that_a_case_names_are_part_of_its_key(tmp_path) -> None:
+    files = [tmp_path / name for name in ("a.stl", "a.srdf", "b.stl")]
+
+    def after(changed: int | None = None) -> list[str]:
+        for k, file in enumerate(files):
+            file.write_text("new content" if k == changed else "old")
+        return keys(COLLISION, tmp_path)
+
+    first = after()
+    assert len(set(first)) == 4
+    for changed, same in ((0, []), (1, []), (2, [0, 2])):
+        again = after(changed)
+        assert [k for k in range(4) if again[k] == first[k]] == same, changed
+    assert after() == first
+    mesh = (
+        'base.robot.name = "ur5"\nbase.surface = { kind = "mesh", file = "a.stl", scale = 1.0, '
+        'cells = 2, side = "outside" }\n'
+        'base.task = { standoff = 0.01, cone_deg = 30 }\nvary."task.cone_deg" = [20]'
+    )
+    made = []
+    for y in (0.1, 0.2, 0.1):
+        files[0].write_text(FACET.format(y=y))
+        made += keys(mesh, tmp_path)
+    assert made[0] == made[2] != made[1]
+
+
+WHOLE = "[[-90, 90], [-90, 90], [-90, 90], [-90, 90], [-90, 90], [-90, 90]]"
+VARY = 'base.case = "paper/4a"\n[vary]\n'
+ARMS = 'base.case = "paper/4a"\nbase.robot.name = "puma560"\nvary.robots = ["puma560", "ur5"]\n'
+FAULTY = [
+    "a = 1",
+    "base = [",
+    "base = 3\nvary = 4",
+    'base.case = "paper/4z"\nbase.taks = {}\nvary.count = 3',
+    'base.case = "paper/4a"\nvary = {}',
+    'base.case = "none.toml"\nother = 1\nvary.robbots = 1',
+    'base.case = "paper/4a"\nbase.robot = 3\nvary.task = 5\nvary.robots = []\nvary.seed = -1',
+    VARY + 'robots = ["ur5", "urfive", { name = "ur5", limitss = 3 }, { urdf = "none.urdf" }]\n'
+    '"task.cone_deg" = [20, -1, nan, "a", true]\n"task.standof" = [1]\n'
+    '"surface.radius" = { from = 1, to = 1, steps = 1 }\n"surface.cells" = [[1, 2], [3]]',
+    VARY + 'robots = ["ur5", 7]',
+    VARY + '"surface.position".y = { range = [0.4, 0.2] }\n"surface.position".z = { range = [0.4, '
+    '0.4] }\n"surface.position".x = { range = [0.4, inf] }\n"surface.positon" = [1]\ncount = 4',
+    VARY + 'robots = ["puma560", "ur5"]\n"robot.limits" = ["set-1", "set-9"]',
+    VARY + '"task.cone_deg" = 30\n"surface.position" = 2024-01-01',
+    VARY + '"task.cone_deg" = [30]\ntask.cone_deg = [40]',
+    VARY + '"surface.position" = { x = { from = 0, to = 1, steps = 2000 }, '
+    "y = { from = 0, to = 1, steps = 999 } }",
+    VARY + '"task.cone_deg" = { from = 10, to = 45, steps = 20000 }',
+    VARY + '"task.standoff" = [0.1, -1, -2]\n'
+    '"task.cone_deg" = { from = 170, to = 200, steps = 31 }',
+    # each value is good with the first of the other; causes are told once for all that have them
+    f'{ARMS}vary."robot.limits_deg" = [{WHOLE}, {{ joint1 = [-90, 90] }}, {{ joint2 = [0, 9] }}]\n'
+    '"vary"."task.cone_deg" = [20, 30, 45]',
+]
+
+
+def test_every_fault_is_told_with_its_place(approved, tmp_path) -> None:
+    told = []
+    for text in FAULTY:
+        with pytest.raises(CaseError) as caught:
+            read_study(text, tmp_path)
+        assert all(fault.message for fault in caught.value.faults)
+        told.append(f"{text}\n->\n{caught.value}")
+    approved("faulty_studies", "\n\n\n".join(told))
+    (tmp_path / "latin.toml").write_bytes(b"a = '\xff'")
+    (tmp_path / "large.toml").write_bytes(b"#" * 300_000)
+    for name in ("none.toml", ".", "latin.toml", "large.toml"):
+        with pytest.raises(CaseError, match=r"no such file|is a folder|UTF-8|larger than"):
+            load_study(tmp_path / name)
+
+
+JUNK = ["1", "-1", "0", "nan", "inf", "''", "'x'", "[]", "{}", "[[]]", "true", "1979-05-27",
+        "[1, 'a']", "{ range = 3 }", "{ from = 'a', to = 1, steps = 2 }", "[[1, 2, 3]]",
+        "{ range = [1, 2], steps = 3 }", "{ x = {} }", "{ x = 1 }", str(10**400)]  # fmt: skip
+PLACES = [
+    "base.robot", "base.task.cone_deg", "vary.robots", 'vary."task.cone_deg"',
+    'vary."surface.position"', "vary.surface.rpy_deg", "vary.count", 'vary."robot.limits_deg"',
+    'vary."surface.position.x"', 'vary."search.seed"', 'vary."surface.u_deg"', 'vary.""',
+    'vary."."', 'vary."robot.lock.a"', "description",
+]  # fmt: skip
+
+
+@settings(max_examples=25)
+@given(st.sampled_from(PLACES), st.sampled_from(JUNK))
+def test_whatever_stands_for_a_value_the_answer_is_a_study_or_places(place, value) -> None:
+    extra = "" if place.startswith("vary") else 'vary."task.cone_deg" = [30]\n'
+    try:
+        study = read_study(f'base.case = "paper/4a"\n{extra}{place} = {value}')
+    except CaseError as error:
+        assert error.faults
+        assert all(fault.message for fault in error.faults)
+    else:
+        assert all(np.isfinite(case_of(task.tables).task.cone_deg) for task in study.tasks)

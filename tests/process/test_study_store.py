@@ -1,0 +1,385 @@
+"""The store of a study: what goes in comes out, and nothing else is touched or believed."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import resource
+import signal
+import sqlite3
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
+
+import pytest
+from jobs import case_named, coverable
+
+from feasibility.cases import load_case
+from feasibility.placement import Pose, StudyEvaluator
+from feasibility.safe_files import FileError
+from feasibility.studies import Store, StudyTask, compare, open_workers, run_tasks
+from feasibility.studies.store import Record, StoreError
+
+
+def record(k: int, status: str = "done", size: int = 10) -> Record:
+    return Record(f"key{k}", {"k": k}, status, {"verdict": "feasible", "text": "x" * size}, 0.5 * k)
+
+
+def facts(found: dict[str, Record]) -> dict[str, tuple]:
+    return {key: (r.key, r.parameters, r.status, r.result, r.seconds) for key, r in found.items()}
+
+
+def rows_of(path) -> list[tuple]:
+    """All rows of a store."""
+    with closing(sqlite3.connect(path)) as base:
+        return base.execute("SELECT * FROM tasks ORDER BY key").fetchall()
+
+
+def put(path, *row) -> None:
+    """Replace a row."""
+    with closing(sqlite3.connect(path)) as base:
+        base.execute("INSERT OR REPLACE INTO tasks VALUES (?, ?, ?, ?, ?)", row)
+        base.commit()
+
+
+def run_sql(path, *programs: str) -> None:
+    """Change a store as another program might."""
+    with closing(sqlite3.connect(path)) as base:
+        for program in programs:
+            base.execute(program)
+        base.commit()
+
+
+# -- what is kept ----------------------------------------------------------------------------------
+
+
+def test_what_is_kept_is_found_also_by_two_at_a_time(tmp_path) -> None:
+    path = tmp_path / "a.study"
+    records = [record(k, "failed" if k % 3 == 0 else "done") for k in range(20)]
+    with Store(path) as store, Store(path) as other:
+        store.keep(records[:12])
+        store.keep([])
+        other.keep(records[12:])
+        assert len(store) == 20
+    with Store(path) as store:
+        found = store.find([f"key{k}" for k in range(5, 30)])
+        assert facts(found) == facts({r.key: r for r in records[5:]})
+        again = Record("key7", {"k": 7}, "done", {"new": True}, 1.0)
+        store.keep([again])
+        assert facts(store.find(["key7"])) == facts({"key7": again})
+        assert len(store) == 20
+
+
+def test_records_are_kept_all_or_none(tmp_path) -> None:
+    with Store(tmp_path / "a.study") as store:
+        store.keep([record(1)])
+        with pytest.raises(StoreError):
+            store.keep([record(2), Record("key3", {}, "perhaps", {}, 1.0)])  # type: ignore[arg-type]
+        with pytest.raises(ValueError, match="JSON"):
+            store.keep([record(2), Record("key4", {}, "done", {"x": float("nan")}, 1.0)])
+        assert len(store) == 1
+
+
+def test_many_open_a_new_file_at_the_same_moment(tmp_path) -> None:
+    def opened(path):
+        with Store(path) as store:
+            return store.find(["k"])
+
+    with ThreadPoolExecutor(4) as pool:
+        for number in range(30):
+            assert list(pool.map(opened, [tmp_path / f"{number}.study"] * 4)) == [{}] * 4
+
+
+KEEP_ON = """
+import sys
+from feasibility.studies.store import Record, Store
+with Store(sys.argv[1]) as store:
+    for k in range(100_000):
+        store.keep([Record(f"key{k}", {"k": k}, "done", {"text": "x" * 2000}, 1.0)])
+        print(k, flush=True)
+"""
+
+
+def test_a_killed_writer_loses_nothing_that_it_had_kept(tmp_path) -> None:
+    path = tmp_path / "a.study"
+    command = [sys.executable, "-c", KEEP_ON, str(path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        for line in process.stdout:
+            if line == "150\n":
+                process.kill()
+                break
+        last = [150, *map(int, process.stdout.read().split())][-1]
+    with Store(path) as store:
+        keys = {f"key{k}" for k in range(last + 2)}
+        found = store.find(keys)
+        # The one that was being written may be there or not.
+        assert keys - {f"key{last + 1}"} <= set(found)
+        assert all(r.result == {"text": "x" * 2000} for r in found.values())
+
+
+def test_a_full_disk_loses_nothing_that_was_kept(tmp_path) -> None:
+    """No file of this process may grow beyond a limit: writing fails as on a full disk."""
+    path = tmp_path / "a.study"
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    kept, message = 0, ""
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, hard))
+        with Store(path) as store:
+            while not message:
+                try:
+                    store.keep([record(kept, size=5_000)])
+                    kept += 1
+                except StoreError as error:
+                    message = str(error)
+            assert "what was kept before stays" in message
+            assert len(store) == kept > 3
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        signal.signal(signal.SIGXFSZ, before)
+    with Store(path) as store:
+        assert set(store.find(f"key{k}" for k in range(1000))) == {f"key{k}" for k in range(kept)}
+        store.keep([record(kept, size=5_000)])
+        assert len(store) == kept + 1
+
+
+def test_a_locked_store_says_so(tmp_path) -> None:
+    path = tmp_path / "a.study"
+    with (
+        Store(path, patience=0.1) as store,
+        closing(sqlite3.connect(path, isolation_level=None)) as base,
+    ):
+        store.keep([record(1)])
+        base.execute("BEGIN IMMEDIATE")
+        with pytest.raises(StoreError, match="held by another process"):
+            store.keep([record(2)])
+        base.execute("ROLLBACK")
+        store.keep([record(3)])
+        assert set(store.find(["key1", "key2", "key3"])) == {"key1", "key3"}
+
+
+# -- what no study has written ---------------------------------------------------------------------
+
+
+def test_a_file_of_someone_else_is_refused_and_left_alone(tmp_path) -> None:
+    names = "letter.txt", "short.bin", "other.db", "named.db", "old.study", "new.study"
+    letter, short, other, named, old, new = (tmp_path / name for name in names)
+    letter.write_text("Dear Sir or Madam, " * 100)
+    short.write_bytes(b"\1")
+    run_sql(other, "CREATE TABLE tasks (key, parameters, status, result, seconds)")
+    run_sql(named, "PRAGMA application_id = 77")
+    for path, written in ((old, 1), (new, 99)):  # of another format
+        with Store(path) as store:
+            store.keep([record(1)])
+        run_sql(path, f"PRAGMA user_version = {written}")
+    words = {
+        letter: "is not a study", short: "is not a study", other: "of another program",
+        named: "of another program", old: "of format 1,", new: "of format 99,",
+    }  # fmt: skip
+    for path, word in words.items():
+        before = path.read_bytes()
+        with pytest.raises(StoreError, match=word) as caught:
+            Store(path)
+        assert str(path) in str(caught.value)
+        assert path.read_bytes() == before
+        assert sorted(tmp_path.iterdir()) == sorted(words)
+    assert issubclass(StoreError, FileError)
+
+
+def test_places_that_are_no_files(tmp_path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    for path, word in (
+        (tmp_path, "is a folder"),
+        (tmp_path / "none" / "a.study", "no folder"),
+        (tmp_path / "pipe", "not a regular file"),
+        ("a\0b", "cannot be"),
+    ):
+        with pytest.raises(StoreError, match=word):
+            Store(path)
+    for end in ("-wal", "-shm", "-journal"):  # a pipe beside a store is not waited for
+        with Store(tmp_path / f"{end}.study") as store:
+            store.keep([record(1)])
+        os.mkfifo(tmp_path / f"{end}.study{end}")
+        with pytest.raises(StoreError, match=f"{end} is not a regular file"):
+            Store(tmp_path / f"{end}.study")
+
+
+def test_damage_is_told_and_never_believed(tmp_path) -> None:
+    """Bytes are overwritten at random: a store either says so, or gives records in shape."""
+    path = tmp_path / "a.study"
+    records = [record(k, size=700) for k in range(60)]
+    with Store(path) as store:
+        store.keep(records)
+    whole, rng, told = path.read_bytes(), random.Random(5), 0
+    for _ in range(60):
+        data = bytearray(whole)
+        start, length = rng.randrange(len(data)), rng.choice([4, 40, 4096])
+        for k in range(start, min(start + length, len(data))):
+            data[k] = rng.randrange(256)
+        path.write_bytes(data[: rng.choice([len(data), len(data), len(data) // 2])])
+        try:
+            with Store(path) as store:
+                found = facts(store.find(r.key for r in records))
+        except StoreError:
+            told += 1
+        else:  # a text may be changed without a trace (SQLite has no checksums)
+            assert all(f[2] in ("done", "failed") and type(f[3]) is dict for f in found.values())
+        for end in ("-wal", "-shm"):
+            (tmp_path / f"a.study{end}").unlink(missing_ok=True)
+    assert told > 10
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        ("{}", "done", "{", 1.0),
+        ("{}", "done", "[]", 1.0),
+        ("3", "done", "{}", 1.0),
+        (b"\xff", "done", "{}", 1.0),
+        ("{}", "done", "[" * 100_000, 1.0),
+        ("{}", "done", '{"a": Infinity}', 1.0),
+        ("{}", "done", '{"share": 1e999}', 1.0),
+        ("{}", "done", "{}", "soon"),
+        ("{}", "done", "{}", -1.0),
+        ("{}", "done", "{}", float("inf")),
+    ],
+    ids=str,
+)
+def test_rows_that_no_study_has_written(tmp_path, row) -> None:
+    path = tmp_path / "a.study"
+    with Store(path) as store:
+        store.keep([])
+    put(path, "k", *row)
+    with Store(path) as store, pytest.raises(StoreError, match="damaged"):
+        store.find(["k"])
+
+
+PROGRAMS = {
+    "a view that never ends": "CREATE VIEW v AS WITH RECURSIVE n(k) AS "
+    "(SELECT 1 UNION ALL SELECT k FROM n) SELECT k FROM n",
+    "a trigger": "CREATE TRIGGER t AFTER INSERT ON tasks BEGIN DELETE FROM tasks; END",
+    "a column that is computed": "ALTER TABLE tasks ADD COLUMN more AS (zeroblob(900000000))",
+    "another column": "ALTER TABLE tasks RENAME COLUMN result TO outcome",
+    "another table": "DROP TABLE tasks; CREATE TABLE tasks (key)",
+    "text that is none": "UPDATE tasks SET result = CAST(x'7bff7d' AS TEXT)",
+    "text without end": "UPDATE tasks SET result = CAST(printf('%.*c', 80000000, 'x') AS TEXT)",
+}
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory):
+    """A study of two cases with its store; one tampered with is one message and shows nothing."""
+    folder = tmp_path_factory.mktemp("study")
+    (folder / "study.toml").write_text(
+        'base.case = "paper/4a"\nbase.surface = { cells = [2, 3] }\nvary."task.cone_deg" = [30, 45]'
+    )
+    assert ask(folder, folder / "out.study").status == 0
+    return folder
+
+
+def ask(folder, store, *more):
+    """The command on a study, from what a store holds."""
+    return coverable("study", folder / "study.toml", "--out", store, "--workers", 0, *more)
+
+
+def refused(folder, store) -> str:
+    """What it says of a store that it does not believe."""
+    page, table = store.with_name("page.html"), store.with_name("table.csv")
+    said = ask(folder, store, "--html", page, "--csv", table)
+    assert (said.status, said.out) == (2, "")
+    assert not page.exists()
+    assert not table.exists()
+    assert store.name in said.err
+    assert all(line.isprintable() for line in said.err.splitlines())
+    return said.err
+
+
+def copied(good, tmp_path):
+    """A copy of the store."""
+    path = tmp_path / "copy.study"
+    path.write_bytes((good / "out.study").read_bytes())
+    return path
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_a_store_that_holds_a_program_is_refused(program, good, tmp_path) -> None:
+    path = copied(good, tmp_path)
+    with closing(sqlite3.connect(path)) as base:
+        base.executescript(PROGRAMS[program])
+    assert "copy.study" in refused(good, path)
+
+
+SCRIPT = "<script>alert(1)</script>"
+ODD = (5, None, True, "", SCRIPT, "maybe", [], {}, -1, 1e300, 10**30, [[]], [SCRIPT], "\x1b[2J")
+ALLOWED = {
+    "message": ("", SCRIPT, "maybe"), "margins": (None,), "certificate": (None,),
+    "components": ([],), "causes": ({},), "unchecked_links": ([], [SCRIPT]),
+    **dict.fromkeys(("seed", "edges", "pairs", "examined", "fk", "covered"), (5,)),
+}  # fmt: skip
+
+
+def test_every_value_of_a_result_is_judged(good, tmp_path) -> None:
+    """Each key of a stored verdict, replaced by each odd value that it may not have."""
+    task = StudyTask(load_case("paper/4a").to_tables(), {})
+    result = json.loads(rows_of(good / "out.study")[0][3])
+    assert task.fault is not None
+    assert task.fault(result) == ""
+    for key in result:
+        for odd in ODD:
+            allowed = any(odd == one and type(odd) is type(one) for one in ALLOWED.get(key, ()))
+            assert (task.fault({**result, key: odd}) == "") == allowed, (key, odd)
+        assert key in task.fault({k: v for k, v in result.items() if k != key})
+    assert "more" in task.fault({**result, "more": 1})
+    assert "share" in task.fault({**result, "share": 1.5})
+    assert "covered is more than cells" in task.fault({**result, "covered": 10**6})
+    assert "components" in task.fault({**result, "components": ["zz"]})
+    path = copied(good, tmp_path)
+    for key, odd in (("verdict", "maybe"), ("share", -1), ("components", [SCRIPT])):
+        row = rows_of(good / "out.study")[0]
+        put(path, *row[:3], json.dumps({**result, key: odd}), 1.0)
+        assert f"{key} must be" in refused(good, path) or key == "components"
+
+
+def test_what_a_store_may_say_is_no_program_on_the_page(good, tmp_path) -> None:
+    path, page = copied(good, tmp_path), tmp_path / "page.html"
+    for key, parameters, status, text, seconds in rows_of(path):
+        put(
+            path,
+            key,
+            parameters,
+            status,
+            json.dumps({**json.loads(text), "message": SCRIPT}),
+            seconds,
+        )
+    assert ask(good, path, "--html", page).status == 0
+    assert SCRIPT not in page.read_text()
+
+
+def test_what_works_keep_is_what_is_read_again_and_judged(tmp_path) -> None:
+    """Outcomes, arms and trials: a second run reads all from the store, and believes no oddity."""
+    case = case_named("plate").with_overrides(["surface.cells=[2, 2]"])
+    poses = [Pose.of_values([x, 0.0, 0.3, 0.0, 0.0, 0.0]) for x in (0.0, 0.2, 3.0)]
+    path = tmp_path / "all.study"
+
+    def run(store) -> None:
+        with open_workers(0) as workers:
+            compare(case, ["ur3", "ur5"], workers, store=store)
+            evaluator = StudyEvaluator(case, workers, store)
+            evaluator.try_all(poses, early=True)
+            evaluator.check_all(poses, causes=True)
+            run_tasks([StudyTask(case.to_tables(), {})], workers, store)
+
+    for _ in range(2):
+        with Store(path) as store:
+            run(store)
+            assert len(store) == 2 + 3 + 3 + 1
+    for key, *between, text, seconds in rows_of(path):
+        result = json.loads(text)
+        name = "verdict" if "verdict" in result else "answer"
+        put(path, key, *between, json.dumps({**result, name: 5}), seconds)
+        with Store(path) as store, pytest.raises(StoreError, match=f"{name} must be"):
+            run(store)
+        put(path, key, *between, text, seconds)

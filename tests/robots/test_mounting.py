@@ -1,0 +1,314 @@
+"""What an arm stands on, carries, and works on: tcp, base, axes, and the link with the surface."""
+
+from __future__ import annotations
+
+import math
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from arm_urdfs import arm, joint, load_text, random_arm, random_q
+from scipy.spatial.transform import Rotation
+from two_trees import Tree, cell_text, random_values, write
+
+from robots import Axis, Kinematics, RobotError, load_robot
+from robots.mounting import about_fixed_axes
+from robots.shapes import link_shapes
+
+POSE = ((0.03, -0.02, 0.12), (20.0, -30.0, 75.0))
+STAND = ((0.4, -0.3, 0.8), (5.0, 10.0, 90.0))
+CLOSE = {"rtol": 0, "atol": 1e-12}
+
+
+def said(make, *arguments, **named):
+    """What is said by the refusal, on one line."""
+    with pytest.raises(RobotError) as caught:
+        make(*arguments, **named)
+    return " / ".join(str(caught.value).splitlines())
+
+
+def matrix(pose):
+    placed = np.eye(4)
+    placed[:3, :3] = Rotation.from_euler("xyz", pose[1], degrees=True).as_matrix()
+    placed[:3, 3] = pose[0]
+    return placed
+
+
+def tool_placement(robot, q):
+    """(4, 4) the TCP where the robot's model has it."""
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, Kinematics(robot).configuration(q))
+    return pin.updateFramePlacement(robot.model, data, robot.tool_frame_id).homogeneous.copy()
+
+
+def test_roll_pitch_and_yaw_are_scipys_to_the_last_bit():
+    rng = np.random.default_rng(0)
+    right = np.array([0.0, 0.5 * math.pi, -0.5 * math.pi, math.pi, -math.pi])
+    for rpy in [*rng.uniform(-7.0, 7.0, (200, 3)), *rng.choice(right, (50, 3))]:
+        expected = Rotation.from_euler("xyz", rpy).as_matrix()
+        np.testing.assert_array_equal(about_fixed_axes(*rpy.tolist()), expected)
+
+
+# tcp, base, reference axis
+
+
+@pytest.mark.parametrize("given", [POSE, matrix(POSE), pin.SE3(matrix(POSE))])
+def test_a_pose_is_a_pair_or_a_matrix(given):
+    robot = load_robot("ur5", tcp=given, base=given)
+    for placed in (robot.tcp, robot.base, pickle.loads(pickle.dumps(robot)).tcp):
+        np.testing.assert_allclose(placed, matrix(POSE), atol=1e-15)
+    assert repr(robot) == "Robot('ur5', 6 joints, tool 'tool0' + (0.03, -0.02, 0.12) m)"
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_tcp_and_base_are_where_they_are_said_to_be(seed, tmp_path):
+    """In the model and in the chain; and a TCP by a fixed joint of the file is the same."""
+    rng = np.random.default_rng(seed)
+    text = random_arm(rng)
+    plain, moved = load_text(tmp_path, text), load_text(tmp_path, text, tcp=POSE, base=STAND)
+    for _ in range(10):
+        q = random_q(plain, rng)
+        expected = matrix(STAND) @ tool_placement(plain, q) @ matrix(POSE)
+        np.testing.assert_allclose(tool_placement(moved, q), expected, atol=1e-11)
+        turned = np.eye(3)
+        for rotation, slides, x in zip(moved.chain.rotations, moved.prismatic, q, strict=True):
+            turn = Rotation.from_rotvec([0, 0, 0 if slides else x]).as_matrix()
+            turned = turned @ rotation @ turn
+        for axis in ("approach", "reference"):
+            placed = turned @ getattr(moved.chain, axis)
+            given = expected[:3, :3] @ getattr(moved, f"{axis}_axis")
+            np.testing.assert_allclose(placed, given, atol=1e-11)
+    xyz, rpy = (" ".join(map(repr, map(float, x))) for x in (POSE[0], np.radians(POSE[1])))
+    end = (f'<link name="tip"/><joint name="to tip" type="fixed">'
+           f'<parent link="{moved.tool_frame}"/><child link="tip"/><origin xyz="{xyz}" rpy="{rpy}"/></joint></robot>')  # fmt: skip
+    given = load_text(tmp_path, text, tcp=POSE)
+    joined = load_text(tmp_path, text.replace("</robot>", end), tool_frame="tip")
+    for one, other in zip(given.chain, joined.chain, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-14)
+    assert np.isclose(given.reach, joined.reach)
+
+
+@pytest.mark.parametrize(
+    ("approach", "reference", "expected"),
+    [
+        ((0, 0, 1), None, (1, 0, 0)),
+        ((-2, 0, 0), None, (0, 0, 1)),
+        ((1, 1e-7, 0), None, (0, 0, 1)),
+        ((1, 0, 1), None, (np.sqrt(0.5), 0, -np.sqrt(0.5))),
+        ((0, 0, 1), (0, 3e200, 5e200), (0, 1, 0)),
+    ],
+)
+def test_the_reference_axis_is_across_the_approach_axis(approach, reference, expected):
+    robot = load_robot("ur5", approach_axis=np.array(approach), reference_axis=reference)
+    np.testing.assert_allclose(robot.reference_axis, expected, atol=2e-7)
+    assert abs(robot.reference_axis @ robot.approach_axis) < 1e-15
+    assert np.isclose(np.linalg.norm(robot.reference_axis), 1.0, atol=1e-15)
+
+
+# a cell as one file: the chain between the surface's link and the tool
+
+ARM = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint",
+       "wrist_2_joint", "wrist_3_joint")  # fmt: skip
+CHAINS = {
+    "two axes": ("jig", "tool0", ("turn", "tilt", "rail", *ARM)),
+    "tilt": ("cradle", "tool0", ("tilt", "rail", *ARM)),
+    "in the hall": ("hall", "tool0", ("rail", *ARM)),
+    "middle of the arm": ("upper_arm_link", "tool0", ARM[2:]),
+    "held part": ("tool0", "hall", (*ARM[::-1], "rail")),
+    "held part, tool on the table": ("tool0", "jig", (*ARM[::-1], "rail", "tilt", "turn")),
+}
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory):
+    return write(tmp_path_factory.mktemp("cell"), cell_text())
+
+
+@pytest.fixture(scope="module")
+def tree(cell):
+    return Tree(cell)
+
+
+@pytest.mark.parametrize("name", CHAINS)
+def test_chain_links_and_reach_are_those_of_the_tree(name, cell, tree):
+    link, tool, joints = CHAINS[name]
+    robot = load_robot(cell, tool_frame=tool, surface_link=link)
+    assert robot.joint_names == joints
+    bodies = {f.name for f in tree.model.frames if f.type == pin.FrameType.BODY}
+    assert set(robot.link_names) == bodies
+    kinematics, data = Kinematics(robot), robot.model.createData()
+    rng = np.random.default_rng(7)
+    points = []
+    for k in range(60):
+        q = random_values(robot, rng)
+        values = {**robot.locked, **dict(zip(joints, q, strict=True))}
+        expected = tree.relative(link, tool, values)
+        pin.computeJointJacobians(robot.model, data, kinematics.configuration(q))
+        pin.framesForwardKinematics(robot.model, data, kinematics.configuration(q))
+        np.testing.assert_allclose(data.oMf[robot.tool_frame_id].homogeneous, expected, **CLOSE)
+        points.append(kinematics.tool(q)[0])
+        np.testing.assert_allclose(points[-1], expected[:3, 3], **CLOSE)
+        columns = pin.getFrameJacobian(robot.model, data, robot.tool_frame_id, pin.LOCAL)
+        wanted = tree.relative_jacobian(link, tool, values, joints)
+        np.testing.assert_allclose(columns.reshape(6, -1), wanted, **CLOSE)
+        for frame, place in zip(robot.model.frames, data.oMf, strict=True) if k < 5 else ():
+            if frame.type == pin.FrameType.BODY:
+                there = tree.relative(link, frame.name, values)
+                np.testing.assert_allclose(place.homogeneous, there, **CLOSE)
+        world = data.oMf[robot.world_frame_id].homogeneous
+        np.testing.assert_allclose(world, tree.relative(link, "hall", values), **CLOSE)
+    assert robot.chain is not None  # compares itself with Pinocchio
+    assert (robot.distance_from_base(np.array(points)) <= robot.reach + 1e-12).all()
+
+
+def test_limits_velocities_tcp_and_base_stay_with_their_joints(cell, tree):
+    pose = {"tcp": ((0.01, 0.02, 0.1), (10, 20, 30)), "base": ((1, 2, 3), (20, 0, 45))}
+    plain = load_robot(cell, tool_frame="tool0", **pose)
+    robot = load_robot(cell, tool_frame="tool0", surface_link="jig", start=np.linspace(0, 0.8, 9),
+                       **pose)  # fmt: skip
+    order = [robot.joint_names.index(joint) for joint in plain.joint_names]
+    for part in ("lower", "upper", "max_velocity", "joint_kinds"):
+        np.testing.assert_array_equal(np.array(getattr(robot, part))[order], getattr(plain, part))
+    turn, tilt = (robot.joint_names.index(joint) for joint in ("turn", "tilt"))
+    assert (robot.lower[tilt], robot.upper[tilt], robot.upper[turn]) == (-1.0, 1.2, np.inf)
+    assert (robot.max_velocity[turn], robot.max_velocity[tilt]) == (2.0, 1.1)
+    np.testing.assert_allclose(robot.tcp, plain.tcp, atol=1e-14)
+    np.testing.assert_allclose(robot.base, plain.base, atol=1e-14)
+    q = random_values(robot, np.random.default_rng(0))
+    values = dict(zip(robot.joint_names, q, strict=True))
+    expected = tree.relative("jig", "tool0", values) @ [*plain.tcp[:3, 3], 1.0]
+    np.testing.assert_allclose(Kinematics(robot).tool(q)[0], expected[:3], atol=1e-12)
+    again = pickle.loads(pickle.dumps(robot))
+    assert again.surface_link == "jig"
+    np.testing.assert_array_equal(again.start, robot.start)
+    assert "9 joints" in repr(again)
+    assert repr(again).endswith("seen from 'jig')")
+
+
+def test_a_joint_that_moves_both_is_held_and_a_note_says_so(cell):
+    asked = {"tool_frame": "tool0", "surface_link": "upper_arm_link"}
+    robot = load_robot(cell, **asked)
+    held = [note for note in robot.notes if "moves both" in note]
+    assert [note.split("'")[1] for note in held] == ["rail", *ARM[:2]]
+    assert "held at 0 m" in held[0]
+    assert "held at 0 rad" in held[1]
+    by_hand = load_robot(cell, tool_frame="tool0").relative_to("upper_arm_link")
+    assert [note for note in by_hand.notes if "moves both" in note] == held
+    for one, other in zip(robot.chain, by_hand.chain, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-12)
+    asked_for = load_robot(cell, **asked, lock={"rail": 0.2})
+    assert not [note for note in asked_for.notes if "'rail'" in note]
+
+
+def test_seen_from_two_links_in_turn_and_with_a_locked_table(cell):
+    there = load_robot(cell, tool_frame="tool0", surface_link="jig").relative_to("cradle")
+    once = load_robot(cell, tool_frame="tool0", surface_link="cradle")
+    assert there.joint_names == once.joint_names == ("tilt", "rail", *ARM)
+    q = random_values(there, np.random.default_rng(1))
+    np.testing.assert_allclose(Kinematics(there).tool(q), Kinematics(once).tool(q), atol=1e-12)
+    np.testing.assert_allclose(there.base, once.base, atol=1e-12)
+    table = {"turn": (0.7, 0.7), "tilt": (0.3, 0.3), "rail": (0.5, 0.5)}
+    robot = load_robot(cell, tool_frame="tool0", surface_link="jig", limits=table)
+    assert np.isclose(robot.reach, load_robot("ur5").reach)
+    q = np.array([random_values(robot, np.random.default_rng(k)) for k in range(100)])
+    points, _ = Kinematics(robot).tools(q)
+    assert (robot.distance_from_base(points) <= robot.reach + 1e-12).all()
+
+
+# axes composed with an arm
+
+RAIL = Axis("rail", "prismatic", (1, 0, 0), limits=(-1.0, 1.5), position=(0, -1, 0.3),
+            rpy_deg=tuple(np.degrees([0, 0.1, 0.2])), max_velocity=0.7)  # fmt: skip
+TILT = Axis("tilt", "revolute", (0, 1, 0.1), limits=(-1.0, 1.2), position=(0.7, 0, 0.4),
+            rpy_deg=(np.degrees(0.2), 0, 0), carries="surface", max_velocity=1.1)  # fmt: skip
+TURN = Axis("turn", "revolute", (0, 0, -1), position=(0, 0, 0.2), carries="surface", max_velocity=2)
+
+
+def test_a_composed_cell_is_the_cell_that_one_urdf_describes(cell, tree):
+    base = ((0, 0, 0.1), (0, 0, np.degrees(1.0)))
+    composed = load_robot("ur5", axes=[RAIL, TILT, TURN], base=base)
+    whole = load_robot(cell, tool_frame="tool0", surface_link="turntable")
+    assert (composed.joint_names, composed.surface_link) == (whole.joint_names, "turn")
+    for part in ("lower", "upper"):
+        np.testing.assert_allclose(getattr(composed, part), getattr(whole, part))
+    np.testing.assert_allclose(composed.max_velocity[:3], whole.max_velocity[:3])
+    q = random_values(composed, np.random.default_rng(0))
+    values = dict(zip(composed.joint_names, q, strict=True))
+    expected = tree.relative("turntable", "tool0", values)[:3, 3]
+    np.testing.assert_allclose(Kinematics(composed).tool(q)[0], expected, atol=1e-12)
+    rail = Rotation.from_euler("xyz", [0, 0.1, 0.2]).as_matrix()
+    np.testing.assert_allclose(composed.base[:3, 3], rail @ [0, 0, 0.1] + [0, -1, 0.3], atol=1e-12)
+    # The arm keeps its shapes and names.
+    again = link_shapes(pickle.loads(pickle.dumps(composed)))
+    alone = link_shapes(load_robot("ur5"))
+    assert [solid.owner for solid in again.solids] == [solid.owner for solid in alone.solids]
+    moved = {solid.owner: solid.joint for solid in again.solids}
+    assert moved["base_link"] == composed.joint_names.index("rail") + 1
+    assert moved["wrist_3_link"] == composed.n
+
+
+def test_two_axes_that_carry_the_base_stand_on_one_another():
+    lift = Axis("lift", "prismatic", limits=(0, 1), position=(0, 0, 0.2))
+    robot = load_robot("puma560", limits="set-1", axes=[RAIL, lift])
+    assert robot.joint_names == ("rail", "lift", *load_robot("puma560").joint_names)
+    np.testing.assert_array_equal(robot.upper[:3], [1.5, 1.0, robot.limit_sets["set-1"][2, 1]])
+    assert robot.surface_link is None
+    zero, up = np.zeros((2, 8))
+    up[1] = 0.4
+    tool = Kinematics(robot).tool
+    turned = np.array([np.cos(0.2) * np.sin(0.1), np.sin(0.2) * np.sin(0.1), np.cos(0.1)])
+    np.testing.assert_allclose(tool(up)[0] - tool(zero)[0], 0.4 * turned, atol=1e-12)
+
+
+def test_axes_are_locked_and_limited_and_leave_names_alone(tmp_path):
+    robot = load_robot("ur5", axes=[RAIL, TURN], lock={"turn": 0.5}, limits={"rail": (0.0, 0.2)})
+    assert (robot.joint_names[0], robot.n, robot.locked["turn"]) == ("rail", 7, 0.5)
+    assert (robot.lower[0], robot.upper[0]) == (0.0, 0.2)
+    robot = load_text(tmp_path, arm([joint(1), joint(2)]), axes=[TURN])
+    assert (robot.tool_frame, robot.joint_names) == ("l2", ("turn", "j1", "j2"))
+    text = arm([joint(1), joint(2)]).replace('"l0"', '"world"').replace('"j1"', '"mount"')
+    robot = load_text(tmp_path, text, axes=[Axis("rail", "prismatic", limits=(0, 1))])
+    assert robot.joint_names == ("rail", "mount", "j2")
+    assert {"world", "world 2", "rail"} <= set(robot.link_names)
+    assert robot.root_link == "world"
+
+
+# what is refused
+
+
+def test_what_makes_no_sense(approved, cell):
+    good = {"name": "rail", "kind": "prismatic", "axis": (1, 0, 0), "limits": (0, 1)}
+    assert Axis(**good).axis == (1.0, 0.0, 0.0)
+    lines = [f"axis {wrong}: {said(Axis, **{**good, **wrong})}" for wrong in (
+        {"kind": "screw"}, {"name": " "}, {"limits": None}, {"limits": (2, 1)},
+        {"limits": None, "limits_deg": (0, 1)}, {"axis": (0, 0, 0)}, {"position": (0, 0)},
+        {"carries": "tool"}, {"max_velocity": 0.0},
+    )]  # fmt: skip
+    many = [Axis(f"a{k}", "revolute") for k in range(21)]
+    lines += [f"axes {name}: {said(load_robot, 'ur5', axes=axes)}" for name, axes in {
+        "twice": [RAIL, RAIL], "a joint": [Axis("elbow_joint", "revolute")],
+        "a link": [Axis("tool0", "revolute")], "universe": [Axis("universe", "revolute")],
+        "many": many, "a word": "rail",
+    }.items()]  # fmt: skip
+    lines += [f"{name}: {said(load_robot, 'ur5', **asked)}" for name, asked in {
+        "kilometres": {"tcp": ((0, 0, 1e4), (0, 0, 0))},
+        "NaN": {"tcp": ((0, 0, np.nan), (0, 0, 0))},
+        "a letter": {"tcp": ((0, 0, 0), "z")}, "mirror": {"tcp": np.diag([1, 1, -1, 1])},
+        "infinite": {"tcp": np.diag([np.inf, 1, 1, 1])}, "7": {"base": 7},
+        "parallel": {"reference_axis": (0, 0, -2)}, "none": {"reference_axis": (0, 0, 0)},
+        "all": {"tcp": 7, "base": ((0, 0, 2e4), (0, 0, 0)), "reference_axis": (0, 0, 0)},
+    }.items()]  # fmt: skip
+    lines += [
+        f"{asked}: " + said(load_robot, cell, **{"tool_frame": "tool0", **asked}) for asked in (
+            {"surface_link": "jib"}, {"surface_link": "tool0"}, {"surface_link": "ee_link"},
+            {"surface_link": "hall", "tool_frame": "hall"},
+            {"surface_link": "jig", "tool_frame": "cradle", "lock": {"turn": 1.0}},
+        )
+    ]  # fmt: skip
+    robot = load_robot(cell, tool_frame="tool0")
+    lines += [f"from {link}: {said(robot.relative_to, link)}" for link in ("jib", "ee_link")]
+    lines.append("alike: " + said(replace, load_robot("ur5"), reference_axis=(0, 0, 1)))
+    text = "\n".join(lines).replace(cell, "CELL").replace(load_robot("ur5").urdf, "UR5")
+    approved("bad_mounting", text)

@@ -1,0 +1,199 @@
+"""Bad input as data: good files, and what is changed in them, of tests/input/bad/READER.toml.
+
+The table [good] holds good texts; every other table says, for one of them, what its bad ones have
+for it, by name:
+
+    "name" = 'table.key = value'   a key of a TOML that is set, or removed where there is no "="
+    "name" = 'text'                what takes the place of § in it, or comes behind it
+    "name" = [...]                 several keys, or the texts old, new, old, new ...
+
+[whole] has texts for themselves, [encoded] an encoding and a text, [set] settings of a built-in
+case. In all of them «x»×3 is xxx, and in the x of it # counts from 0 and @ from 1.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import tomllib
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+TABLES = Path(__file__).parents[1] / "input" / "bad"
+TIMES = re.compile(r"«([^»]*)»×(\d+)")
+KEY = re.compile(r"(robot|surface|task|collision|search|serach|tusk)\.([^ ]+)(?: = (.*))?")
+
+
+class Bad(NamedTuple):
+    """One bad input."""
+
+    good: str
+    """The table that it is from: of which good text it is, or one of the tables of their own."""
+    change: Any
+    """As the table has it."""
+    content: bytes
+    """Of the file; empty where there is none."""
+
+
+def many(text: str) -> str:
+    """A text with what is written once, and meant many times, as often as it is meant."""
+
+    def repeated(found: re.Match[str]) -> str:
+        unit, times = found[1], int(found[2])
+        if "#" not in unit and "@" not in unit:
+            return unit * times
+        parts = (unit.replace("#", str(k)).replace("@", str(k + 1)) for k in range(times))
+        return "".join(parts)
+
+    return TIMES.sub(repeated, text)
+
+
+def slug(name: str) -> str:
+    """What the file of its approved text is called."""
+    return re.sub(r"[^\w.]+", "-", name)
+
+
+def with_key(text: str, change: str) -> str:
+    """A TOML with one key set or removed."""
+    found = KEY.fullmatch(change)
+    assert found, change
+    table, key, value = found.groups()
+    if f"[{table}]\n" not in text:
+        text = f"{text}[{table}]\n"
+    before, inside = text.split(f"[{table}]\n")
+    rows = re.match(r"(?:[^\[\n].*\n)*", inside)[0].splitlines(keepends=True)  # type: ignore[index]
+    after = inside[sum(map(len, rows)) :]
+    if value is None:
+        kept = [row for row in rows if not row.startswith(f"{key} = ")]
+        assert len(kept) < len(rows), f"there is no {key}"
+    else:
+        row, had = f"{key} = {value}\n", [row.split(" = ")[0] for row in rows]
+        kept = [row if name == key else old for name, old in zip(had, rows, strict=True)]
+        kept += [] if key in had else [row]
+    return f"{before}[{table}]\n{''.join(kept)}{after}"
+
+
+def changed(text: str, change: str | list[str]) -> str:
+    """A good text with a change, as the tables write it."""
+    if isinstance(change, str) and not KEY.fullmatch(change):
+        return text.replace("§", change) if "§" in text else f"{text}{change}\n"
+    changes = [change] if isinstance(change, str) else change
+    if all(KEY.fullmatch(one) for one in changes):
+        for one in changes:
+            text = with_key(text, one)
+        return text
+    for old, new in zip(changes[::2], changes[1::2], strict=True):
+        assert text.count(old), f"{old!r} is not in the good text"
+        text = text.replace(old, new, 1)
+    return text
+
+
+@cache
+def goods(reader: str) -> dict[str, str]:
+    """The good texts of a reader, by name; those of cases whole."""
+    found: dict[str, str] = dict(_tables(reader).get("good", {}))
+    head = found.pop("head", "")
+    return {name: text if "[robot]" in text else head + text for name, text in found.items()}
+
+
+@cache
+def bad(reader: str) -> dict[str, Bad]:
+    """The bad inputs of a reader, by name."""
+    found = {}
+    for table, changes in _tables(reader).items():
+        for name, change in changes.items() if table != "good" else ():
+            assert name not in found, name
+            found[name] = Bad(table, change, _content(reader, table, change))
+    return found
+
+
+def _content(reader: str, table: str, change: Any) -> bytes:
+    if isinstance(change, dict) or table == "set":
+        return b""
+    if table == "whole":
+        return many(change).encode("latin-1" if reader == "result" else "utf-8")
+    if table == "encoded":
+        return many(change[1]).encode(change[0])
+    return many(changed(goods(reader)[table], change)).encode()
+
+
+@cache
+def _tables(reader: str) -> dict[str, Any]:
+    return tomllib.loads((TABLES / f"{reader}.toml").read_text("utf-8"))
+
+
+GOOD_CASE = goods("case")["sphere"]
+"""A small case of the paper's sphere."""
+
+SLIDER = """
+<robot name="slider"><link name="base"/><link name="cart"/><link name="tool"/>
+<joint name="slide" type="prismatic"><parent link="base"/><child link="cart"/>
+<axis xyz="1 0 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+<joint name="turn" type="continuous"><parent link="cart"/><child link="tool"/>
+<origin xyz="0 0 1"/><axis xyz="0 0 1"/></joint></robot>
+"""
+POSES = "x,y,z,nx,ny,nz\n400,0,300,0,0,1\n400,100,300,0,0,1\n400,150,300,0,0,1\n"
+NET_POINTS = [[[0.1 * i, 0.1 * j, 0.01 * i * j] for j in range(3)] for i in range(3)]
+
+
+def sheet(width: float = 0.2, count: int = 5) -> np.ndarray:
+    """Triangles (F, 3, 3) m of a flat square that looks up, from the origin on."""
+    x, y = np.meshgrid(*[np.linspace(0.0, width, count + 1)] * 2, indexing="ij")
+    at = np.stack([x, y, 0 * x], axis=2)
+    a, b, c, d = at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]
+    halves = np.stack([np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)], axis=2)
+    return halves.reshape(-1, 3, 3)
+
+
+def stl(triangles: np.ndarray, count: int | None = None) -> bytes:
+    """A binary STL of triangles (F, 3, 3); it may say that it holds another number of them."""
+    rows = np.zeros(len(triangles), [("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")])
+    rows["v"] = triangles
+    return (
+        bytes(80) + (len(rows) if count is None else count).to_bytes(4, "little") + rows.tobytes()
+    )
+
+
+def lay_out(folder: Path) -> Path:
+    """Write the files that bad cases name, good ones and bad ones."""
+    flat = sheet()
+    nan = flat.copy()
+    nan[1, 1, 1] = np.nan
+    side = 2.0 * sheet(100.0, 1)
+    x, y = np.meshgrid([400.0, 500.0, 600.0], [-100.0, 0.0, 100.0, 200.0], indexing="ij")
+    grid = np.stack([x, y, 300.0 + 0 * x], axis=2)
+    texts = {
+        "slider.urdf": SLIDER,
+        "panda.srdf": '<robot name="panda"><disable_collisions link1="panda_link1" '
+        'link2="panda_link2" reason="Adjacent"/></robot>',
+        "toolpath.csv": POSES,
+        "nan.csv": POSES.replace("0,0,1\n400,100", "0,0,0\n400,nan"),
+        "zero.csv": POSES.replace("0,0,1\n400,100", "0,0,0\n400,100"),
+        "one.csv": "".join(POSES.splitlines(keepends=True)[:2]),
+        "broken.xacro": "<robot><link></robot>",
+    }
+    meshes = {
+        "part": flat, "millimetres": 1000 * flat, "nan": nan, "empty": flat[:0],
+        "line": flat * [1, 0, 0], "fixture": side,
+        "thirteen": np.concatenate([flat + [k, 0, 0] for k in range(13)]),
+    }  # fmt: skip
+    for name, text in texts.items():
+        (folder / name).write_text(text)
+    for name, triangles in meshes.items():
+        (folder / f"{name}.stl").write_bytes(stl(triangles))
+    with (folder / "many.stl").open("wb") as stream:
+        stream.write(stl(flat[:0], 5_000_000))
+        stream.truncate(84 + 50 * 5_000_000)  # takes no room on the disk
+    np.save(folder / "points.npy", grid)
+    grid[1, 2, 2] = np.nan
+    np.save(folder / "nan.npy", grid)
+    (folder / "link.xacro").symlink_to("/etc/passwd")
+    (folder / "endless-include.xacro").write_text(
+        '<robot xmlns:xacro="http://www.ros.org/wiki/xacro">'
+        '<xacro:include filename="endless-include.xacro"/></robot>'
+    )
+    os.mkfifo(folder / "pipe.xacro")
+    return folder

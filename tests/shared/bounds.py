@@ -1,0 +1,31 @@
+"""Bounds against what is really there: never below it, and nearly met somewhere."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+TINY = 1e-12
+
+
+def holds(bound: ArrayLike, truth: ArrayLike, used: float = 0.97, tiny: float = TINY) -> None:
+    """Is the bound at least the truth everywhere, and is `used` of it needed somewhere?
+
+    Args:
+        bound: what is claimed; inf where nothing is, which counts as no use of it.
+        truth: what samples show, of the same shape or one that fits to it.
+        used: the least share of a bound that some truth has to be. A bound of 1 / used of what is
+            claimed would be wrong. 0 where samples cannot come near.
+        tiny: room for rounding, in the unit of both.
+    """
+    __tracebackhide__ = True
+    bound, truth = np.broadcast_arrays(np.asarray(bound, float), np.asarray(truth, float))
+    assert bound.size > 0
+    assert not np.isnan(bound).any()
+    assert np.isfinite(truth).all()
+    over = truth - (bound * (1.0 + 1e-12) + tiny)
+    worst = np.unravel_index(np.argmax(over), over.shape)
+    assert over[worst] <= 0.0, f"{truth[worst]:.6g} exceeds {bound[worst]:.6g} at {worst}"
+    some = np.isfinite(bound) & (bound > tiny)
+    share = (truth[some] / bound[some]).max(initial=0.0)
+    assert share >= used, f"no more than {share:.4f} of the bound is ever used"

@@ -1,0 +1,344 @@
+"""Arms among random objects, with what python-fcl says of them: known motions, poses, walls.
+
+A built scene has a known motion: obstacles stand where another motion passes, and elsewhere, as
+long as the judge of collisions (coal) finds the known one further from them than is asked.
+"""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from foreign_clearances import ForeignScene
+
+from feasibility import Search, Task, check
+from feasibility.certification import collision_replay
+from feasibility.certification.tool_alone import PoseCheck, never_clear
+from feasibility.collisions import Bodies, Collision, Obstacle, ToolShape, gather
+from feasibility.roadmap.tool_alone import ToolAlone, ToolBlocked
+from robots import Axis, Kinematics, Robot, load_robot
+from robots.shapes import Triangles, checked_triangles
+from surfaces import Cells, Surface, plane
+
+ARMS = ("ur5", "panda", "kinova", "xarm7", "puma560", "puma560 on a rail")
+CLEARANCE = 0.005  # m, that is asked for
+ROOM = 0.02  # m, that the known motion keeps from every obstacle
+UR5 = load_robot("ur5")
+PLATE = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0.0, 0.0, 0.3))
+CELLS = PLATE.cells(1, 1)
+
+
+@cache
+def arm(name: str) -> Robot:
+    """The arm of that name, with its own collision shapes."""
+    if name != "puma560 on a rail":
+        return load_robot(name)
+    return load_robot("puma560", axes=[Axis("rail", "prismatic", (0, 1, 0), limits=(-0.5, 0.5))])
+
+
+def within_a_turn(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
+    """The limits, at most half a turn to either side."""
+    return np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi)
+
+
+def upright(rng: np.random.Generator, size: float) -> np.ndarray:
+    """A vector of that length in any direction."""
+    vector = rng.normal(size=3)
+    return size * vector / np.linalg.norm(vector)
+
+
+def a_plate(rng: np.random.Generator, robot: Robot) -> tuple[Cells, Task]:
+    """A plate that looks up, or at the arm, or between, somewhere around the arm."""
+    reach = min(robot.reach, 1.0)
+    away, turn = rng.uniform(0.4, 0.65) * reach, rng.uniform(-60.0, 60.0)
+    tilt, height = rng.uniform(0.0, 90.0), rng.uniform(0.0, 0.4) * reach
+    position = (away * np.cos(np.radians(turn)), away * np.sin(np.radians(turn)), height)
+    half, place = rng.uniform(0.08, 0.15) * reach, tuple(np.array(position) + robot.base_point)
+    plate = plane((-half, half), (-half, half), "outside", place, (0.0, -tilt, turn))
+    return plate.cells(3, 4), Task(standoff=0.05, cone_deg=float(rng.uniform(15.0, 40.0)))
+
+
+def random_object(rng: np.random.Generator, name: str, around: np.ndarray) -> Obstacle:
+    """A body of a size of 5 to 30 cm near a place."""
+    place = {
+        "position": tuple(around + rng.uniform(-0.15, 0.15, 3)),
+        "rpy_deg": tuple(rng.uniform(-180.0, 180.0, 3)),
+    }
+    size = rng.uniform(0.05, 0.3, 3).tolist()
+    match int(rng.integers(5)):
+        case 0:
+            return Obstacle.box(name, size, **place)
+        case 1:
+            return Obstacle.cylinder(name, size[0] / 2, size[1], **place)
+        case 2:
+            return Obstacle.sphere(name, size[0] / 2, place["position"])
+        case 3:
+            return Obstacle.capsule(name, size[0] / 2, size[1], **place)
+    return Obstacle.halfspace(name, **place)
+
+
+# scenes with a known motion
+
+
+class BuiltScene(NamedTuple):
+    """A question whose answer is known: feasible."""
+
+    robot: Robot
+    cells: Cells
+    task: Task
+    blind_collides: bool
+    """Does the motion that is found without collisions collide?"""
+
+
+def built_scene(name: str, seed: int) -> BuiltScene | None:
+    """The scene of that number; None where the plate cannot be covered without obstacles either."""
+    rng, robot = np.random.default_rng([seed, zlib.crc32(name.encode())]), arm(name)
+    cells, task = a_plate(rng, robot)
+    blind = check(robot, cells, task).witness
+    alone = replace(task, collision=Collision(clearance=CLEARANCE))
+    known = None if blind is None else _another_motion(rng, robot, cells, alone, blind.q)
+    if blind is None or known is None:
+        return None
+    drawn = []
+    for number in range(24):  # where the blind motion passes with a joint, or (every third) anywhere
+        joints = Kinematics(robot).joints(blind.q[rng.integers(len(blind.q))][None]).points[0, 2:]
+        k = int(rng.integers(len(joints) - 1))
+        place = joints[k] + rng.uniform() * (joints[k + 1] - joints[k])
+        if number % 3 == 2:
+            place = robot.base_point + rng.uniform(-0.8, 0.8, 3) * min(robot.reach, 1.0)
+        drawn.append(random_object(rng, f"object{number}", place))
+    apart = Collision(self_=False, surface=False, clearance=ROOM, scene=tuple(drawn))
+    bodies = gather(robot, cells.surface, apart, task.standoff)
+    hit = {fault.pair[1] for fault in collision_replay(robot, bodies, known).faults}
+    scene = tuple(one for one in drawn if one.name not in hit)[:6]
+    task = replace(task, collision=Collision(clearance=CLEARANCE, scene=scene))
+    bodies = gather(robot, cells.surface, task.collision, task.standoff)
+    assert collision_replay(robot, bodies, known).accepted
+    collides = not collision_replay(robot, bodies, blind.q).accepted
+    return BuiltScene(robot, cells, task, collides)
+
+
+def _another_motion(
+    rng: np.random.Generator, robot: Robot, cells: Cells, task: Task, blind: np.ndarray
+) -> np.ndarray | None:
+    """A motion that has a joint where the blind one never has it; or any other; or none."""
+    for joint in rng.permutation(robot.n)[:3].tolist():
+        low, high = float(robot.lower[joint]), float(robot.upper[joint])
+        below, above = blind[:, joint].min() - 0.3, blind[:, joint].max() + 0.3
+        ranges = [(low, below), (above, high)]
+        if not np.isfinite(low + high):  # a joint that turns freely
+            ranges = [(below - np.pi, below), (above, above + np.pi)]
+        ranges = [(lower, upper) for lower, upper in ranges if lower < upper]
+        if ranges:
+            chosen = {robot.joint_names[joint]: ranges[int(rng.integers(len(ranges)))]}
+            found = check(robot.with_limits(chosen), cells, task)
+            if found.witness is not None:
+                return found.witness.q
+    found = check(robot, cells, task, Search(seed=1))
+    return None if found.witness is None else found.witness.q
+
+
+# a tool over one target
+
+
+def bracket() -> Triangles:
+    """An L of 0.2 m: not convex."""
+    ell = np.array([[0.0, 0.0], [0.2, 0.0], [0.2, 0.05], [0.05, 0.05], [0.05, 0.2], [0.0, 0.2]])
+    bottom, top = (np.column_stack([ell, np.full(6, z)]) for z in (0.0, 0.1))
+    caps = [[0, 3, 1], [1, 3, 2], [0, 4, 3], [0, 5, 4]]
+    upper = [[a + 6, c + 6, b + 6] for a, b, c in caps]
+    walls = [[k, (k + 1) % 6, (k + 1) % 6 + 6] for k in range(6)]
+    walls += [[k, (k + 1) % 6 + 6, k + 6] for k in range(6)]
+    return checked_triangles(np.vstack([bottom, top]), np.array(caps + upper + walls))
+
+
+@dataclass(frozen=True)
+class Over:
+    """A tool over one cell."""
+
+    robot: Robot
+    surface: Surface
+    task: Task
+    point: np.ndarray
+    approach: np.ndarray
+
+    @classmethod
+    def cell(cls, robot: Robot, cells: Cells, task: Task, cell: int = 0) -> Over:
+        targets = task.targets(cells)
+        return cls(robot, cells.surface, task, targets.points[cell], targets.approaches[cell])
+
+    @property
+    def bodies(self) -> Bodies:
+        return gather(self.robot, self.surface, self.task.collision, self.task.standoff)
+
+    def claimed(self) -> ToolBlocked | None:
+        """What the search says."""
+        task = self.task
+        alone = ToolAlone(self.robot, self.bodies, task.cone, task.effective_tolerance)
+        return alone.blocking(self.point, self.approach)
+
+    def confirmed(self) -> PoseCheck:
+        """What the verifier says."""
+        numbers = self.task.cone, self.task.effective_tolerance
+        return never_clear(self.robot, self.bodies, *numbers, self.point, self.approach)
+
+    def clear_pose(self, count: int, rng: np.random.Generator) -> bool:
+        """Is one of so many random poses inside cone and tolerance clear of all that is at rest?
+
+        Many are at the border of the cone, where there is most room.
+        """
+        scene = ToolPoses(self.robot, self.bodies)
+        frame = self.robot.model.frames[self.robot.tool_frame_id].placement
+        axis = frame.rotation @ self.robot.approach_axis
+        onto = pin.Quaternion.FromTwoVectors(axis, self.approach).toRotationMatrix()
+        for k in range(count):
+            tilt = np.cross(self.approach, rng.normal(size=3))
+            angle = self.task.cone * (1.0 if k % 2 else np.sqrt(rng.uniform()))
+            tilt *= angle / np.linalg.norm(tilt)
+            turn = pin.exp3(tilt) @ pin.exp3(rng.uniform(-np.pi, np.pi) * self.approach) @ onto
+            off = upright(rng, self.task.effective_tolerance * rng.uniform() ** 0.1)
+            if scene.clear(pin.SE3(turn, self.point + off - turn @ frame.translation)):
+                return True
+        return False
+
+
+class ToolPoses(ForeignScene):
+    """The tool among what is at rest, for fcl."""
+
+    def __init__(self, robot: Robot, bodies: Bodies) -> None:
+        """Only pairs of the last joint and what is at rest are asked for."""
+        super().__init__(robot, bodies)
+        joint = {owner: entries[0][0] for owner, entries in self.objects.items()}
+        self.asked = [
+            (k, pair)
+            for k, pair in enumerate(bodies.pairs)
+            if sorted((joint[pair.first], joint[pair.second])) == [0, robot.n]
+        ]
+        self.meshes = {
+            one.name: one
+            for one in bodies.scene
+            if isinstance(one.geometry, Triangles) and one.geometry.closed
+        }
+
+    def clear(self, pose: pin.SE3) -> bool:
+        """Is no pair too near? Of meshes, fcl knows the triangles: what is inside is asked for."""
+        self.data.oMi[self.robot.n] = pose
+        for k, pair in self.asked:
+            if self._swallowed(pose, pair.first, pair.second):
+                return False
+            if self.touches(k) or self.pair_distance(k) < pair.clearance:
+                return False
+        return True
+
+    def _swallowed(self, pose: pin.SE3, first: str, second: str) -> bool:
+        """Is a corner or the middle of what moves inside a closed mesh of the scene?"""
+        import trimesh
+
+        mesh = self.meshes.get(first) or self.meshes.get(second)
+        if mesh is None:
+            return False
+        solid = trimesh.Trimesh(mesh.geometry.vertices, mesh.geometry.faces, process=False)
+        for one in self.bodies.solids:
+            if one.joint == self.robot.n and one.owner in (first, second):
+                own = np.zeros(3)
+                if isinstance(one.geometry, Triangles):
+                    own = one.geometry.vertices[one.geometry.faces[0, 0]]
+                middle = pose.homogeneous @ one.placement @ np.append(own, 1.0)
+                there = (middle[:3] - mesh.placement[:3, 3]) @ mesh.placement[:3, :3]
+                if bool(solid.contains(there[None])[0]):
+                    return True
+        return False
+
+
+def random_over(seed: int) -> Over:
+    """One or two objects near the target, and a tool of one shape; links are left out."""
+    rng = np.random.default_rng(seed)
+    around = np.array([0.5, 0.0, 0.37])
+    scene = tuple(random_object(rng, f"object{k}", around) for k in range(rng.integers(1, 3)))
+    clearance = float(rng.choice([0.0, 0.01]))
+    tools = [
+        ToolShape.cylinder(0.01, 0.1, position=(0.0, 0.0, -0.05)),
+        ToolShape.box((0.03, 0.02, 0.1), position=(0.01, 0.0, -0.05)),
+        ToolShape.capsule(0.015, 0.08, position=(0.0, 0.0, -0.06)),
+        ToolShape.sphere(0.04, position=(0.0, 0.0, -0.05)),
+    ]
+    asked = Collision(
+        self_=False, surface=False, clearance=clearance, scene=scene,
+        tool=(tools[int(rng.integers(4))],),
+        allow=tuple((name, one.name) for name in UR5.link_names for one in scene),
+    )  # fmt: skip
+    return Over.cell(UR5, CELLS, Task(0.02, float(rng.uniform(1, 90)), 0.001, collision=asked))
+
+
+def covered_target(rng: np.random.Generator, robot: Robot, q: np.ndarray, cone_deg: float):
+    """A point and an approach that q covers: off by up to 1 mm, and by up to the cone."""
+    points, axes = Kinematics(robot).tools(q[None])
+    tilt = np.cross(axes[0], rng.normal(size=3))
+    tilt *= np.radians(cone_deg) * rng.uniform() / np.linalg.norm(tilt)
+    return points[0] + upright(rng, 0.001 * rng.uniform()), pin.exp3(tilt) @ axes[0]
+
+
+def planted_over(name: str, seed: int) -> Over | None:
+    """A pose that an arm gets to, and a target that it covers, among objects; None if it collides."""
+    rng, robot = np.random.default_rng([seed, 1]), arm(name)
+    q, cone_deg = rng.uniform(*within_a_turn(robot)), float(rng.uniform(1.0, 60.0))
+    point, approach = covered_target(rng, robot, q, cone_deg)
+    scene = tuple(random_object(rng, f"object{k}", point) for k in range(rng.integers(1, 4)))
+    asked = Collision(surface=False, clearance=float(rng.choice([0.0, 0.005])), scene=scene)
+    over = Over(robot, PLATE, Task(0.02, cone_deg, 0.001, collision=asked), point, approach)
+    frames = Kinematics(robot).joints(q[None])
+    pose = pin.SE3(frames.rotations[0, -1], frames.points[0, -1])
+    return over if ToolPoses(robot, over.bodies).clear(pose) else None
+
+
+# walls before plates, and boxes of joints around configurations that are clear
+
+
+def behind_a_wall(name: str, seed: int) -> tuple[Robot, Cells, Task]:
+    """A plate, and a wall before it that nothing reaches around."""
+    rng, robot = np.random.default_rng([seed, 3]), arm(name)
+    reach, base = min(robot.reach, 1.0), np.array(robot.base_point)
+    away, up = rng.uniform(0.6, 0.7), rng.uniform(-0.1, 0.3)
+    at = tuple(base + reach * np.array([away, rng.uniform(-0.2, 0.2), up]))
+    ends, tilt = (-0.08 * reach, 0.08 * reach), -rng.uniform(0.0, 60.0)
+    plate = plane(ends, ends, "outside", at, (0.0, tilt, 0.0))
+    thick = rng.uniform(0.18, 0.25)
+    place = tuple(base + np.array([reach * rng.uniform(0.28, 0.32), 0.0, 0.0]))
+    wall = Obstacle.box("wall", (thick, 5.0, 5.0), place, (0.0, rng.uniform(-8.0, 8.0), 0.0))
+    asked = Collision(clearance=CLEARANCE, scene=(wall,))
+    return robot, plate.cells(1, 1), Task(0.02, float(rng.uniform(5, 25)), 0.001, collision=asked)
+
+
+class ClearBox(NamedTuple):
+    """A box of joints around a configuration that is clear, whose tool is at a target."""
+
+    robot: Robot
+    bodies: Bodies
+    task: Task
+    point: np.ndarray
+    approach: np.ndarray
+    q: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+def clear_box(name: str, seed: int, asked_for: bool = True) -> ClearBox | None:
+    """A random one, near objects; None where the configuration collides, if that is asked for."""
+    rng, robot = np.random.default_rng([seed, 4]), arm(name)
+    q = rng.uniform(*within_a_turn(robot))
+    around = Kinematics(robot).joints(q[None]).points[0, int(rng.integers(2, robot.n + 1))]
+    around = around + rng.normal(scale=0.25, size=3)
+    scene = tuple(random_object(rng, f"object{i}", around) for i in range(2))
+    asked = Collision(surface=False, clearance=float(rng.choice([0.0, 0.005])), scene=scene)
+    task = Task(0.02, float(rng.uniform(1.0, 60.0)), 0.001, collision=asked)
+    bodies = gather(robot, PLATE, asked, task.standoff)
+    if asked_for and not ForeignScene(robot, bodies).is_clear(q):
+        return None
+    point, approach = covered_target(rng, robot, q, task.cone_deg)
+    half = 10.0 ** rng.uniform(-3.0, -0.3) * rng.uniform(0.1, 1.0, robot.n)
+    middle = q + half * rng.uniform(-1.0, 1.0, robot.n)
+    return ClearBox(robot, bodies, task, point, approach, q, middle - half, middle + half)

@@ -1,0 +1,123 @@
+"""Small questions that are answered at once, the command in this process, a clock that runs out."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import math
+import re
+import time
+from collections.abc import Iterator
+from functools import cache, partial
+from typing import Any, NamedTuple
+
+from feasibility import Verdict, check
+from feasibility.cases import Case
+from feasibility.cli.main import main
+from feasibility.clock import Clock, OutOfTime
+
+PLATE = """
+robot.name = "ur5"
+surface.kind = "plane"
+surface.u = [0.4, 0.6]
+surface.v = [-0.1, 0.1]
+surface.cells = [3, 4]
+surface.position = [0, 0, 0.3]
+surface.side = "outside"
+task.standoff = 0.02
+task.cone_deg = 30
+"""  # feasible; keys can follow
+TEXTS = {
+    "plate": PLATE,
+    # begins within reach and ends outside: proved infeasible
+    "long plate": PLATE.replace("0.6]", "2.4]").replace("[3, 4]", "[4, 2]"),
+}
+
+
+@cache
+def case_named(name: str) -> Case:
+    """The case of that name."""
+    return Case.from_toml(TEXTS[name], name=name)
+
+
+@cache
+def verdict_named(name: str) -> Verdict:
+    """What `check` says of it."""
+    return check(*case_named(name).build())
+
+
+class Said(NamedTuple):
+    """What a command left."""
+
+    status: int
+    out: str
+    err: str
+
+    @property
+    def words(self) -> str:
+        """stdout in one line."""
+        return " ".join(self.out.split())
+
+
+def coverable(*args: object, clock: Any = None) -> Said:
+    """Run the command in this process."""
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        status = main([str(arg) for arg in args], clock)
+    assert "Traceback" not in err.getvalue(), err.getvalue()
+    assert "bug in coverable" not in err.getvalue(), err.getvalue()
+    # A machine that compiles kernels says so; that it does has its own test.
+    return Said(
+        status, out.getvalue(), re.sub(r"compiling .*first run only.*\n", "", err.getvalue())
+    )
+
+
+class EndingClock(Clock):
+    """A clock whose time is up at the n-th look at it, wherever in the work that is.
+
+    A block that is `enforced` ends at once then, as it would when its work never ended. Clocks that
+    are made of it (`part`) count with it.
+    """
+
+    def __init__(self, limit: float | None = 3600.0, progress: Any = None, at: float = math.inf):
+        super().__init__(limit, progress)
+        self.at, self.looks = at, [0]
+
+    def _look(self) -> bool:
+        self.looks[0] += 1
+        return self.looks[0] > self.at
+
+    @property
+    def deadline(self) -> float:
+        """Long ago, from the n-th look on."""
+        return time.monotonic() - 1e6 if self._look() else super().deadline
+
+    @property
+    def out_of_time(self) -> bool:
+        """From the n-th look on."""
+        return self._look()
+
+    def part(self, share: float, progress: Any = None) -> Clock:
+        """Another one, which counts the same looks."""
+        made = EndingClock(self.limit, progress, self.at)
+        made.looks = self.looks
+        return made.begin(time.monotonic())
+
+    @contextlib.contextmanager
+    def enforced(self) -> Iterator[None]:
+        """The time may be up in this block, or later."""
+        if self._look():
+            raise OutOfTime
+        yield
+
+
+def ends_at(look: float, made: list[EndingClock] | None = None) -> Any:
+    """Makes such clocks, for a command; they are added to a list."""
+
+    def make(limit: float | None, progress: Any) -> EndingClock:
+        clock = EndingClock(limit, progress, look)
+        if made is not None:
+            made.append(clock)
+        return clock
+
+    return partial(make)

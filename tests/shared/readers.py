@@ -1,0 +1,345 @@
+"""Every reader of files that anybody may have written: a good file, and what must hold of any read.
+
+Whatever the bytes are, it raises one `CoverableError` with its faults, or gives a value that is
+sound: finite, in range, and the same when it is written and read again.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import warnings
+import zipfile
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import bad_input
+import hostile_visuals as hostile
+import numpy as np
+import pinocchio as pin
+from small_cases import small_case, small_verdict
+
+from coverable_meshes import MeshFiles
+from feasibility import Evidence
+from feasibility.cases import Case, load_case
+from feasibility.cut_tree import Cut, CutTree, Leaf
+from feasibility.results import (
+    load_motion,
+    load_result,
+    load_trajectory,
+    save_result,
+    save_trajectory,
+)
+from feasibility.studies import load_study
+from robots import load_robot
+from robots.urdf import CheckedUrdf, check_urdf, read_srdf
+from robots.urdf.expansion import expanded
+from surfaces import SurfaceError, bspline, grid, poses, read_grid, read_net, read_poses
+from surfaces.meshes import read_mesh
+
+SRDF = (
+    '<robot name="r"><disable_collisions link1="a" link2="b" reason="Adjacent"/>'
+    '<disable_collisions link1="b" link2="c" reason="Never"/></robot>'
+)
+XACRO = (
+    '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arg name="a" default="1"/>'
+    '<xacro:macro name="m" params="k"><link name="l${2 * k}"/></xacro:macro><xacro:m k="$(arg a)"/>'
+    "</robot>"
+)
+STUDY = 'base.case = "paper/4a"\nvary."task.cone_deg" = [30, 45]\n'
+TREE = CutTree(
+    Cut(
+        (0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
+        -1.43,
+        Cut((0.5, 0.0, 0.0, 1.0, 0.0, 0.0), 0.25, Leaf(3), Leaf(0)),
+        Leaf(7),
+    ),
+    ((5, 3.1),),
+)
+"""Proves nothing; whether it does is not asked of a reader."""
+
+
+class Reader(NamedTuple):
+    """One kind of file."""
+
+    file: str
+    """A name that it may have."""
+    read: Callable[[Path], Any]
+    good: Callable[[], bytes]
+    sound: Callable[[Any, Path], None]
+    """Fails where a value that was read is none; may write into a folder."""
+
+
+def sound_case(case: Case, folder: Path) -> None:
+    assert Case.from_toml(case.to_toml()) == case
+
+
+def sound_urdf(checked: CheckedUrdf, _: Path) -> None:
+    """The text for the native parser holds the robot that is described, and no other."""
+    model = pin.buildModelFromXML(checked.text)
+    moving = [info for info in checked.joints if info.moves]
+    assert set(model.names) == {"universe", *(info.name for info in moving)}
+    for info in moving:
+        entry = model.joints[model.getJointId(info.name)]
+        assert entry.nv == 1
+        assert (
+            (info.fault is None) == (info.lower is not None)
+            or info.mimic
+            or "mimic" in (info.fault or "")
+        )
+        if entry.nq == 1 and info.lower is not None:
+            assert model.lowerPositionLimit[entry.idx_q] == info.lower
+            assert model.upperPositionLimit[entry.idx_q] == info.upper > info.lower
+        elif entry.nq == 1:  # not locked where the file states no limits
+            assert np.ptp([model.lowerPositionLimit, model.upperPositionLimit]) > 1.0
+        assert np.isclose(np.linalg.norm(info.axis), 1.0, rtol=0, atol=1e-14)
+    placements = link_placements(model, {info.name: 0.3 for info in moving})
+    assert set(placements) == set(checked.links)
+    for placement in placements.values():
+        rotation = placement[:3, :3]
+        assert np.abs(rotation.T @ rotation - np.eye(3)).max() < 1e-12
+        assert np.linalg.det(rotation) > 0
+
+
+def link_placements(model: pin.Model, values: dict[str, float]) -> dict[str, np.ndarray]:
+    """(4, 4) of every link in the root frame, with each joint at its value by name."""
+    q = pin.neutral(model)
+    for name, entry in zip(list(model.names)[1:], list(model.joints)[1:], strict=True):
+        value = values[name]
+        turned = [value] if entry.nq == 1 else [np.cos(value), np.sin(value)]
+        q[entry.idx_q : entry.idx_q + entry.nq] = turned
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, q)
+    return {
+        frame.name: data.oMf[i].homogeneous
+        for i, frame in enumerate(model.frames)
+        if frame.type == pin.FrameType.BODY
+    }
+
+
+def sound_net(net: Any, folder: Path) -> None:
+    kept = {key: value for key, value in net._asdict().items() if value is not None}
+    (folder / "again.json").write_text(json.dumps(kept))
+    assert read_net(folder / "again.json")._replace(degree=net.degree) == net
+    made_or_refused(lambda: bspline(**net._asdict()))
+
+
+def made_or_refused(make: Callable[[], Any]) -> None:
+    """A surface of finite cells, or a sentence."""
+    try:
+        made = make()
+    except SurfaceError as error:
+        assert error.faults  # noqa: PT017 - both outcomes are right
+        return
+    centres = made.centres if hasattr(made, "centres") else made.cells(2, 2).centres
+    assert np.isfinite(centres).all()
+
+
+def sound_mesh(mesh: Any, _: Path) -> None:
+    assert np.isfinite(mesh.vertices).all()
+    assert sorted(set(mesh.faces.ravel().tolist())) == list(range(len(mesh.vertices)))
+    assert (mesh.face_areas > 0).all()
+
+
+def sound_parts(parts: Any, _: Path) -> None:
+    for part in parts:
+        assert 0 <= part.faces.min() <= part.faces.max() < len(part.vertices)
+
+
+def sound_result(result: Any, folder: Path) -> None:
+    path = save_result(result.verdict, result.case, folder / "again")
+    after = load_result(path)
+    assert (after.case, repr(after.verdict)) == (result.case, repr(result.verdict))
+    assert save_result(after.verdict, after.case, folder / "more").read_bytes() == path.read_bytes()
+
+
+def sound_trajectory(run: Any, folder: Path) -> None:
+    assert np.isfinite(run.q).all()
+    assert (np.diff(run.time) > 0.0).all()
+    for ending in ("csv", "json"):
+        again = load_trajectory(save_trajectory(folder / f"again.{ending}", run))
+        assert again.joint_names == run.joint_names
+        for name in ("time", "q", "dq", "ddq", "tool_speed", "cell"):
+            assert np.array_equal(getattr(again, name), getattr(run, name))
+
+
+def sound_motion(motion: Any, folder: Path) -> None:
+    assert motion.q.shape[1] == 6
+    assert np.isfinite(motion.q).all()
+    rows = [",".join(map(repr, row)) for row in motion.q.tolist()]
+    names = ",".join(load_robot("puma560").joint_names)
+    (folder / "again.csv").write_text("\n".join([names, *rows]))
+    assert np.array_equal(load_motion(folder / "again.csv", load_robot("puma560")).q, motion.q)
+
+
+def sound_srdf(pairs: Any, _: Path) -> None:
+    assert all(link.strip() for link in pairs.named)
+    assert {link for pair in pairs.taken for link in pair} <= pairs.named
+
+
+@cache
+def members(which: str) -> dict[str, bytes]:
+    """What is in the result file of a small verdict: "plate", "proof" or "deep"."""
+    verdict, case = small_verdict("plate"), small_case("plate")
+    if which != "plate":
+        tree, case = TREE, small_case("long plate")
+        if which == "deep":
+            node: Cut | Leaf = Leaf(0)
+            for k in range(201):
+                node = Cut((1.0, 0, 0, 0, 0, 0), 0.01 * k, Leaf(1), node)
+            tree = CutTree(node)
+        verdict = replace(small_verdict("long plate"), proof=tree, evidence=Evidence.PROOF)
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as folder:
+        with zipfile.ZipFile(save_result(verdict, case, Path(folder) / "good")) as file:
+            return {name: file.read(name) for name in file.namelist()}
+
+
+def packed(content: dict[str, bytes], twice: str = "") -> bytes:
+    """A zip of members, one of them perhaps twice."""
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as file, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for name in (*content, *filter(None, [twice])):
+            file.writestr(name, content[name])
+    return stream.getvalue()
+
+
+def npy(array: np.ndarray, pickled: bool = False) -> bytes:
+    """An array as a member of a result."""
+    stream = io.BytesIO()
+    np.save(stream, array, allow_pickle=pickled)
+    return stream.getvalue()
+
+
+def damaged(which: str, change: dict[str, Any]) -> bytes:
+    """A result file with one damage, as tests/input/bad/result.toml words it."""
+    content = dict(members(which))
+    meta = json.loads(content["meta.json"])
+    for kind, value in change.items():
+        if kind == "drop":
+            del content[value]
+        elif kind == "member":
+            content[value[0]] = bad_input.many(value[1]).encode("latin-1")
+        elif kind == "cut":
+            content[value[0]] = content[value[0]][: value[1]]
+        elif kind in ("meta", "without", "case"):
+            if kind == "meta":
+                meta |= value
+            elif kind == "without":
+                del meta[value]
+            else:
+                assert meta["case"]["toml"].count(value[0]) == 1
+                meta["case"]["toml"] = meta["case"]["toml"].replace(*value)
+            content["meta.json"] = json.dumps(meta).encode()
+        elif kind in ("at", "rows", "columns", "objects", "floats"):
+            name = f"{value if isinstance(value, str) else value[0]}.npy"
+            array = np.load(io.BytesIO(content[name]))
+            if kind == "at":
+                array[tuple(value[1])] = value[2]
+            changes = {
+                "rows": lambda a=array: a[: value[1]],
+                "columns": lambda a=array: a[:, : value[1]],
+                "objects": lambda: np.array([None, {}]),
+                "floats": lambda a=array: a.astype(float),
+            }
+            content[name] = npy(changes.get(kind, lambda a=array: a)(), kind == "objects")
+        elif kind == "fill":
+            content |= {f"x{k}": b"" for k in range(value - len(content))}
+    data = packed(content, change.get("twice", ""))
+    if "claims" in change:  # in the headers of the zip, not in what is there
+        name, size = change["claims"]
+        claimed, there = (number.to_bytes(4, "little") for number in (size, len(content[name])))
+        assert data.count(there) == 2
+        return data.replace(there, claimed)
+    return data
+
+
+def of_bad(reader: str, name: str) -> bytes:
+    """The bytes of a bad input of the tables."""
+    one = bad_input.bad(reader)[name]
+    return damaged(one.good, one.change) if isinstance(one.change, dict) else one.content
+
+
+def _text(reader: str, name: str) -> Callable[[], bytes]:
+    return lambda: bad_input.many(bad_input.goods(reader)[name].replace("§", "")).encode()
+
+
+def _stl_text() -> bytes:
+    facet = "facet normal 0 0 1\nouter loop\n{}endloop\nendfacet\n"
+    rows = ["".join(f"vertex {x} {y} {z}\n" for x, y, z in face) for face in bad_input.sheet()]
+    return f"solid part\n{''.join(map(facet.format, rows))}endsolid part\n".encode()
+
+
+def _npy_grid() -> bytes:
+    x, y = np.meshgrid([0.0, 0.1, 0.2], [0.0, 0.1, 0.2], indexing="ij")
+    return npy(np.stack([x, y, x * y], axis=2))
+
+
+def _net_csv() -> bytes:
+    points = bad_input.NET_POINTS
+    rows = [f"{i},{j},{','.join(map(repr, points[i][j]))}" for i in range(3) for j in range(3)]
+    return "\n".join(["row,column,x,y,z", *rows, ""]).encode()
+
+
+PATCH = "OFF\n4 2 0\n0 0 0\n1 0 0\n0 1 0\n1 1 0.5\n3 0 1 2\n3 1 3 2\n"
+MESHES = {
+    "binary STL": ("part.stl", lambda: bad_input.stl(bad_input.sheet())),
+    "STL in words": ("part.stl", _stl_text),
+    "OBJ": ("part.obj", lambda: b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 .5\nf 1 2 3\nf 2 4/1/1 3\n"),
+    "PLY": ("part.ply", lambda: hostile.ply().encode()),
+    "OFF": ("part.off", PATCH.encode),
+    "GLB": ("part.glb", lambda: hostile.glb(*hostile.scene_of())),
+}
+READERS = {
+    "case": Reader("case.toml", load_case, _text("case", "sphere"), sound_case),
+    "study": Reader("study.toml", load_study, STUDY.encode, lambda study, _: None),
+    "urdf": Reader("arm.urdf", check_urdf, _text("urdf", "arm"), sound_urdf),
+    "xacro": Reader("arm.xacro", lambda p: expanded(str(p)), XACRO.encode, lambda text, _: None),
+    "srdf": Reader("arm.srdf", read_srdf, SRDF.encode, sound_srdf),
+    "net as JSON": Reader("net.json", read_net, _text("net", "json"), sound_net),
+    "net as CSV": Reader("net.csv", read_net, _net_csv, sound_net),
+    "grid": Reader(
+        "grid.npy", read_grid, _npy_grid, lambda points, _: made_or_refused(lambda: grid(points))
+    ),
+    "poses": Reader(
+        "poses.csv",
+        lambda path: read_poses(path, "mm"),
+        bad_input.POSES.encode,
+        lambda given, _: made_or_refused(lambda: poses(**given._asdict())),
+    ),
+    **{
+        name: Reader(file, lambda path: read_mesh(path, 1.0), good, sound_mesh)
+        for name, (file, good) in MESHES.items()
+    },
+    "GLB of a robot": Reader(
+        "part.glb",
+        lambda path: MeshFiles().parts(str(path)),
+        lambda: hostile.glb(*hostile.scene_of()),
+        sound_parts,
+    ),
+    "COLLADA": Reader(
+        "part.dae",
+        lambda path: MeshFiles().parts(str(path)),
+        lambda: hostile.collada(scene=hostile.shown()).encode(),
+        sound_parts,
+    ),
+    "result": Reader("a.result", load_result, lambda: packed(members("plate")), sound_result),
+    "proof": Reader("a.result", load_result, lambda: packed(members("proof")), sound_result),
+    "trajectory as CSV": Reader(
+        "run.csv", load_trajectory, _text("trajectory", "csv"), sound_trajectory
+    ),
+    "trajectory as JSON": Reader(
+        "run.json", load_trajectory, _text("trajectory", "json"), sound_trajectory
+    ),
+    "motion": Reader(
+        "motion.csv",
+        lambda path: load_motion(path, load_robot("puma560")),
+        _text("motion", "two"),
+        sound_motion,
+    ),
+}

@@ -1,0 +1,197 @@
+"""What the kernels of the search say, in words that stay: one place for their work arrays."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility import Task
+from feasibility.collisions import (
+    Bodies,
+    blamed,
+    clearance_gradient,
+    collision_buffer,
+    configuration_bounds,
+    nearest,
+    segment_clear,
+)
+from feasibility.roadmap import Ruling, arrays_of, margin_shares, root_box, rule, work_for
+from feasibility.roadmap.branch_and_bound.box_bounds import static_levers
+from feasibility.roadmap.branch_and_bound.box_contraction import shrink
+from feasibility.roadmap.branch_and_bound.boxes import Slabs, box_work
+from feasibility.roadmap.branch_and_bound.branching import DIRECTIONS
+from feasibility.roadmap.motions import project_near_cell, segment_holds
+from feasibility.roadmap.motions.aiming import aim, bounds_between, stand_still
+from feasibility.roadmap.motions.projection import project
+from feasibility.roadmap.motions.segment_bound import roll_spread, spread
+from feasibility.roadmap.motions.working_memory import place
+from robots import Robot
+from surfaces import Cells, plane
+
+Floats = NDArray[np.float64]
+
+
+class Clearance:
+    """How far the bodies of an arm are apart, as the search sees them."""
+
+    def __init__(self, robot: Robot, bodies: Bodies) -> None:
+        """Ready for many questions."""
+        self.n, self.buffer = robot.n, collision_buffer(bodies, robot)
+
+    def margin(self, q0: Any, q1: Any) -> float:
+        """m, that a segment has to spare at least; not more than 0 where it may collide."""
+        ends = (np.array(q, dtype=float).reshape(self.n) for q in (q0, q1))
+        return segment_clear(self.buffer, *ends)
+
+    def clear(self, q0: Any, q1: Any) -> bool:
+        """Is a segment certainly clear?"""
+        return self.margin(q0, q1) > 0.0
+
+    def bounds(self, q: Any) -> Floats:
+        """(P,) m, lower bounds of the distances of all pairs."""
+        return configuration_bounds(self.buffer, np.array(q, dtype=float).reshape(self.n))
+
+    def push(self, q: Floats, length: float) -> tuple[float, Floats]:
+        """How much something presses (0: nothing is near), and a step away from it."""
+        step = np.zeros(self.n)
+        return clearance_gradient(self.buffer, q, step, length), step
+
+    def nearest(self, q: Floats) -> Any:
+        """The nearest pair and its points."""
+        return nearest(self.buffer, q)
+
+    def blamed(self) -> int:
+        """The pair for which the last segment was refused."""
+        return blamed(self.buffer)
+
+
+class Held(NamedTuple):
+    """What is certain of a segment, beside its moving target."""
+
+    holds: bool
+    off: float
+    """m, the tool point is never further from its target."""
+    chord: float
+    """|a - b| is never larger."""
+    roll: float
+    """rad, the roll is never further from the middle of its range."""
+    on_target: bool
+    """Is the tool point as near to its targets at the ends as everywhere in a search?"""
+    roll_off: float
+    """rad, what the roll over the target's frame differs by from that over the curve's."""
+
+
+class Motions:
+    """Segments over the cells of one question."""
+
+    def __init__(self, robot: Robot, cells: Cells | None = None, task: Task | None = None) -> None:
+        """With no cells: only how the tool moves is asked."""
+        cells = plane((-1, 1), (-1, 1)).cells(1, 1) if cells is None else cells
+        self.task = Task(0.0, 30) if task is None else task
+        self.arrays, self.work = arrays_of(robot, cells, self.task), work_for(robot.n)
+
+    def sag(self, q0: Floats, q1: Floats) -> tuple[float, float]:
+        """Bounds on |p''| (m) and |a''| of tool point and tool axis along a segment, s in 0..1."""
+        place(self.arrays, self.work, 0, q0)
+        place(self.arrays, self.work, 1, q1)
+        return spread(self.arrays, self.work, q0, q1)
+
+    def roll_off(self, q: Floats, t: float = 0.0) -> float:
+        """Roll at a configuration over a curve's target at t, off the middle of its range, rad."""
+        aim(self.arrays, self.work, 0, t)
+        place(self.arrays, self.work, 0, q)
+        return float(self.work.error[0, 2])
+
+    def roll_rates(self, q0: Floats, q1: Floats, frame: Any, chord: float) -> tuple[float, float]:
+        """Bounds on |psi'| and |psi''| of roll (rad) along a segment, s in 0..1.
+
+        Args:
+            q0, q1: its ends.
+            frame: bounds on the speed of the approach direction, of the frame, and its change.
+            chord: the largest |a - b|.
+        """
+        self.sag(q0, q1)
+        self.work.derivative_bound[5:8] = frame
+        return roll_spread(self.work, chord, 1.0)
+
+    def turn_range(self, middle: float, half: float) -> None:
+        """Let the roll have another range (rad)."""
+        self.arrays = self.arrays._replace(roll=np.array([middle, half]))
+
+    def onto(self, q: Floats, t: float = 1.0) -> Floats | None:
+        """Newton from q onto the target of the first curve at t; None where it fails."""
+        found = q.copy()
+        aim(self.arrays, self.work, 0, t)
+        bounds_between(self.arrays, self.work, 0, 0.0, 1.0)
+        place(self.arrays, self.work, 1, found)
+        self.work.secondary_step[:] = 0.0
+        there = project(self.arrays, self.work, found, 1e-6, np.inf, 60)
+        return found if there else None
+
+    def along_curve(self, q0: Floats, q1: Floats) -> Held:
+        """A segment whose target runs along the whole of the first curve."""
+        bounds_between(self.arrays, self.work, 0, 0.0, 1.0)
+        for slot, q in enumerate((q0, q1)):
+            aim(self.arrays, self.work, 0, float(slot))
+            place(self.arrays, self.work, slot, q)
+        return self._held(q0, q1)
+
+    def at_rest(self, q0: Floats, q1: Floats, point: Floats, approach: Floats) -> Held:
+        """A segment whose target stays where it is."""
+        self.work.target[0], self.work.target[1] = point, approach
+        stand_still(self.arrays, self.work)
+        for slot, q in enumerate((q0, q1)):
+            place(self.arrays, self.work, slot, q)
+        return self._held(q0, q1)
+
+    def _held(self, q0: Floats, q1: Floats) -> Held:
+        position, turned = segment_holds(self.arrays, self.work, q0, q1)
+        length, chord, roll = self.work.allowance
+        good = bool(position <= 1.0 and turned <= 1.0)
+        ends = max(self.work.error[0, 0], self.work.error[1, 0])
+        off = self.arrays.frame_deviations[0, 1] if self.task.roll is not None else 0.0
+        with np.errstate(invalid="ignore"):
+            bounds = position * length, turned * chord, turned * roll
+        return Held(good, *bounds, bool(ends <= self.arrays.near), float(off))
+
+    def landed(self, cell: int, guesses: Floats) -> Floats:
+        """(k, n) configurations over a cell's centre that Newton finds from guesses."""
+        found = guesses.copy()
+        margins = margin_shares(self.arrays, self.work, cell, found)
+        return found[margins >= 0.0]
+
+    def near(self, cell: int, q: Floats, steps: int = 60) -> Floats | None:
+        """A configuration within tolerance and cone of a cell's target, from q; or None."""
+        found = q.copy()
+        there = project_near_cell(self.arrays, self.work, cell, found, np.int64(steps))
+        return found if there else None
+
+
+class Ruled(NamedTuple):
+    """What branch and bound says of one target."""
+
+    ruling: Ruling
+    found: Floats
+    """A configuration, where it was reached."""
+    boxes: int
+
+
+def ruled(robot: Robot, cells: Cells, task: Task, boxes: int = 2000, cell: int = 0) -> Ruled:
+    """Can a cell be covered at all? With so many boxes at most."""
+    arrays = arrays_of(robot, cells, task)
+    stack = root_box(arrays)
+    outcome, found = rule(arrays, work_for(robot.n), cell, stack, boxes)
+    return Ruled(outcome, found, int(stack.counts[1]))
+
+
+def contracted(
+    arrays: Any, places: Any, part: int, slabs: Slabs, low: Floats, high: Floats
+) -> tuple[bool, Floats, Floats]:
+    """Is something left of a box of joints and x in a part of the surface, and what?"""
+    n = len(arrays.lower)
+    low, high, space = low.copy(), high.copy(), box_work(n, len(low) - n)
+    static_levers(arrays, space.longest)
+    code, _ = shrink(arrays, work_for(n), places, part, slabs, DIRECTIONS, space, low, high)
+    return code != 1, low, high

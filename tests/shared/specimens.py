@@ -1,0 +1,177 @@
+"""Specimens of every kind of surface, extreme ones among them; and their formulas once more."""
+
+from __future__ import annotations
+
+import numpy as np
+from mesh_patches import of_patch
+from scipy.interpolate import BSpline
+from smooth_probes import POSE
+from spline_nets import TURN_KNOTS, full_turn, hood, turned
+
+from surfaces import (
+    bspline,
+    cone,
+    cylinder,
+    ellipsoid,
+    hyperboloid,
+    mesh,
+    parametric,
+    piecewise,
+    plane,
+    revolution,
+    sphere,
+    torus,
+)  # fmt: skip
+from surfaces.meshes import TriangleMesh
+
+OUT = {"side": "outside"}
+VASE = [(0.3, 0.0), (0.5, 0.2), (0.35, 0.5), (0.4, 0.8), (0.2, 1.0)]
+EGG = [(0.0, -0.5), (0.3, -0.3), (0.35, 0.1), (0.2, 0.4), (0.0, 0.5)]
+WEIGHTS = np.random.default_rng(3).uniform(0.5, 2.0, hood().shape[:2])
+UNLIKE = 10.0 ** np.random.default_rng(11).uniform(-1.0, 1.0, (6, 7))
+TWICE = np.array([0, 0, 0, 0, 0.5, 0.5, 1, 1, 1, 1])
+PIPE, PIPE_WEIGHTS = turned([(0.5, -0.2), (0.5, 0.6)], [1, 1], *full_turn())
+BARREL, BARREL_WEIGHTS = turned([(0.3, 0), (0.5, 0.5), (0.2, 1)], [1, 2, 1], *full_turn())
+_Z = np.linspace(0.0, 1.0, 60)
+RIPPLES = np.column_stack([0.3 + 0.003 * np.sin(20.0 * _Z), _Z])
+
+SMOOTH = {
+    "dome": sphere(1.0, (10, 90), (10, 180)),
+    "ball": sphere(0.6, (0, 180), (-180, 180), **OUT, **POSE),
+    "cap": sphere(2.5, (120, 180), (200, 560), **POSE),
+    "shell": cylinder(0.8, (-60, 100), (0, 0.9)),
+    "pipe": cylinder(0.2, (90, 450), (-3, -1), **OUT, **POSE),
+    "horn": hyperboloid(0.5, 0.5, (0, 180), (0, 0.5)),
+    "tower": hyperboloid(2.0, 3.0, (-180, 180), (-4, 1), **OUT, **POSE),
+    "flat cone": hyperboloid(0.1, 0.03, (300, 420), (0.05, 0.2), **POSE),
+    "sheet": plane((0.0, 0.6), (-0.4, 0.4)),
+    "wall": plane((1, 2), (5, 9), **OUT, **POSE),
+    "funnel": cone(0.2, 1.0, (0, 360), (-0.1, 0.4), **POSE),
+    "spike": cone(0.5, -0.25, (-70, 100), (-0.3, 1.5), **OUT),
+    "doughnut": torus(0.5, 0.2, (-180, 180), (0, 360), **OUT, **POSE),
+    "bend": torus(0.8, 0.1, (30, 130), (100, 280)),
+    "egg": ellipsoid((0.5, 0.6, 0.9), (0, 180), (10, 370), **POSE),
+    "lens": ellipsoid((1.0, 1.0, 0.2), (5, 85), (-100, 60), **OUT),
+    "vase": revolution(VASE, (0, 360), **POSE),
+    "turned egg": revolution(EGG, (-30, 90)),
+    "hood": bspline(hood(), **POSE),
+    "part of degree 5": bspline(hood(9, 8), degree=(5, 2), u=(0.21, 0.77), v=(0.1, 0.5)),
+    "rational": bspline(hood(), weights=WEIGHTS, u=(0.1, 0.8)),
+    "spline pipe": bspline(PIPE, (2, 1), (TURN_KNOTS, None), PIPE_WEIGHTS, **POSE),
+    "formula": parametric(
+        lambda u, v: (u, v, 0.3 * np.sin(2 * u) * v), (0.0, 1.0), (0.0, 0.8), **POSE
+    ),
+}  # fmt: skip
+CLOSED = {"ball": "v", "cap": "v", "pipe": "u", "tower": "u", "funnel": "u", "doughnut": "uv",
+          "egg": "v", "vase": "v", "spline pipe": "u"}  # fmt: skip
+POLES = {"ball": (True, True), "cap": (False, True), "egg": (True, True)}
+
+EXTREME = {
+    "trumpet": hyperboloid(0.01, 0.001, (0, 360), (-0.7, 1.0), **POSE),
+    "almost a pipe": hyperboloid(0.3, 3000.0, (0, 360), (0.1, 1.0)),
+    "needle": cone(0.2, 1.0, (0, 360), (-0.199999, 0.4)),
+    "disc": cone(0.5, -400.0, (200, 300), (-0.002, 0.001), **POSE),
+    "wire": torus(0.5, 0.0005, (0, 360), (0, 360)),
+    "fat ring": torus(0.5, 0.4999, (0, 360), (90, 270)),
+    "coin": ellipsoid((1.0, 0.8, 0.01), (0, 180), (-100, 260)),
+    "cigar": ellipsoid((2.0, 0.1, 0.1), (0, 160), (30, 150), **POSE),
+    "ripples": revolution(RIPPLES, (10, 70)),
+    "flared": revolution([(0, 0), (0.05, 0.02), (0.06, 0.3), (0.07, 0.6), (0.5, 0.7)], (0, 100)),
+    "rippled disc": revolution(RIPPLES[:, ::-1] + [0.1, 0.0], (10, 12)),
+    "weights from 0.1 to 10": bspline(hood(), weights=UNLIKE, **OUT, **POSE),
+    "barrel": bspline(BARREL, (2, 2), (TURN_KNOTS, None), BARREL_WEIGHTS, **POSE),
+    "double knots": bspline(hood(6, 6), knots=(TWICE, None)),
+    "bilinear": bspline([[(x, y, x * y) for y in (0, 1)] for x in (0, 1)], degree=(1, 1)),
+    "far away": bspline(hood() + 1e3, weights=UNLIKE),
+}
+
+
+def ridge(count, turn_deg):
+    """Two flat strips of triangles that meet at an angle."""
+    x, y = np.linspace(-0.5, 0.5, 2 * count + 1), np.linspace(0.0, 0.5, count + 1)
+    x, y = np.meshgrid(x, y, indexing="ij")
+    tilt = np.radians(turn_deg / 2)
+    return _bent(x * np.cos(tilt), y, -np.abs(x) * np.sin(tilt))
+
+
+def bowl(count):
+    """A paraboloid of triangles."""
+    x, y = np.meshgrid(*[np.linspace(-0.4, 0.4, count)] * 2, indexing="ij")
+    return _bent(x, y, 0.6 * (x**2 + y**2) + 0.1 * x * y)
+
+
+def _bent(x, y, z):
+    rows, columns = x.shape
+    first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    quads = np.column_stack([first, first + columns, first + columns + 1, first + 1])
+    faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    return mesh(TriangleMesh(np.stack([x, y, z], axis=-1).reshape(-1, 3), faces))
+
+
+def flat(name, count=12):
+    """A smooth specimen as triangles."""
+    return mesh(TriangleMesh(*of_patch(SMOOTH[name], count, count)))
+
+
+FACETED = {
+    "mesh of the dome": flat("dome"),
+    "bowl": bowl(14).cells(count=30).surface,
+    "ridge": ridge(4, 70).cells(count=12).surface,
+    "halves": piecewise([sphere(0.2, (0, 80), a) for a in ((0, 180), (180, 360))], **POSE),
+    "can": piecewise(
+        [cylinder(0.3, (0, 360), (0, 0.5)),
+         ellipsoid((0.3, 0.3, 0.1), (0, 90), (0, 360), position=(0, 0, 0.5))], **OUT, **POSE,
+    ),
+    "flap": piecewise(
+        [plane((0, 1), (0, 1)), plane((0, 1), (0, 1), position=(0, 1, 0), rpy_deg=(50, 0, 0))]
+    ),
+    "turned over": piecewise(
+        [plane((0.0, 0.2), (0.0, 0.2)), plane((0.0, 0.2), (0.0, 0.2), rpy_deg=(180, 0, 180))]
+    ),
+}  # fmt: skip
+ALL = {**SMOOTH, **FACETED}
+
+
+def cells_of(surface, nu, nv):
+    """About nu x nv cells of any surface, of each piece."""
+    if surface.kind == "mesh":
+        return surface.cells(count=max(nu * nv // 2, 1))
+    if surface.kind == "piecewise":
+        return surface.cells([(nu, nv)] * len(surface.pieces))
+    return surface.cells(nu, nv)
+
+
+def formula(s, u, v):
+    """Points (k, 3) in the own frame, None for kinds without a formula of their own."""
+    c, d, r = np.cos(u), np.sin(u), None
+    match s.kind:
+        case "plane":
+            return np.stack([u, v, 0 * u], -1)
+        case "sphere" | "ellipsoid":
+            axes = (s.radius,) * 3 if s.kind == "sphere" else s.semi_axes
+            return np.stack([d * np.cos(v), d * np.sin(v), c], -1) * axes
+        case "torus":
+            ring = s.ring + s.tube * np.cos(v)
+            return np.stack([ring * c, ring * d, s.tube * np.sin(v)], -1)
+        case "cylinder":
+            r = s.radius + 0 * v
+        case "hyperboloid":
+            r = s.waist * np.sqrt(1 + (v / s.flare) ** 2)
+        case "cone":
+            r = s.radius + s.slope * v
+        case "bspline":
+            return _sum_of_basis(s.net, u, v)
+        case _:
+            return None
+    return np.stack([r * c, r * d, v], -1)
+
+
+def _sum_of_basis(net, u, v):
+    m, n = net.points.shape[:2]
+    rows = [
+        np.stack([BSpline(k, np.eye(count)[i], p)(x) for i in range(count)])
+        for k, p, count, x in zip(net.knots, net.degree, (m, n), (u, v), strict=True)
+    ]
+    weights = np.ones((m, n)) if net.weights is None else net.weights
+    share = np.einsum("ik,jk,ij->kij", *rows, weights)
+    return np.einsum("kij,ijc->kc", share, net.points) / share.sum(axis=(1, 2))[:, None]

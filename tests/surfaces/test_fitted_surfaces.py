@@ -1,0 +1,134 @@
+"""Surfaces from a user's formula, from grids of points, and from a class of one's own."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bounds import holds
+from user_formulas import EQUAL, ball, ring, sampled
+
+from surfaces import SurfaceError, bspline, grid, parametric, piecewise, sheet_of
+from surfaces.places import Places, offset_surface
+
+PAGE = Path(__file__).parents[2] / "docs" / "own_surfaces.md"
+
+
+@pytest.mark.parametrize("name", EQUAL)
+def test_a_formula_makes_the_patch_that_it_is_equal_to(name):
+    formula, u, v, patch = EQUAL[name]
+    found = parametric(formula, u, v)
+    off, leans = found.deviations
+    assert 0.0 < off < 3e-7
+    assert leans < 1e-5
+    mine, exact = found.cells(7, 6), patch.cells(7, 6)
+    sign = np.sign((mine.normals * exact.normals).sum(axis=1))
+    assert (sign == sign[0]).all()
+    assert np.linalg.norm(mine.normals - sign[0] * exact.normals, axis=1).max() <= leans + 1e-12
+    np.testing.assert_allclose(mine.areas, exact.areas, rtol=1e-5)
+    assert mine.pairs.tolist() == exact.pairs.tolist()
+    # Between the places where it was measured, too.
+    some = np.random.default_rng(0).uniform(*zip(u, v, strict=True), size=(2000, 2)).T
+    holds(off, np.linalg.norm(found.point(*some) - patch.point(*some), axis=1), used=0.3)
+
+
+def test_parts_hold_the_formula_itself_and_not_only_its_spline():
+    formula, u, v, _ = EQUAL["sphere"]
+    found = parametric(formula, u, v)
+    spline = bspline(
+        found.net.points, found.net.degree, found.net.knots, found.net.weights,
+        found.u_range, found.v_range, side=found.side,
+    )  # fmt: skip
+    one, other = (surface.parts(1e-3, 1e-2, 63).radius for surface in (found, spline))
+    known = (other < 0.5).all(axis=1)
+    assert known.sum() > 30
+    more = np.tile(found.deviations, (known.sum(), 1))
+    assert (one - other)[known] == pytest.approx(more, rel=1e-6)
+
+
+def test_ends_that_meet_smoothly_are_joined_and_those_at_a_kink_are_not():
+    whole = parametric(ring, (0, math.tau), (0, math.tau))
+    tube = grid(sampled(ring, (0, math.tau), (0, 1.0), (33, 5)))
+    assert (whole.u_closed, whole.v_closed, tube.u_closed, tube.v_closed) == (*[True] * 3, False)
+    assert len(whole.cells(5, 4).pairs) == 4 * 20
+
+    def leaf(u, v):
+        return u * (1 - u), u * (1 - u) * (0.7 - u), v + 0 * u
+
+    kinked, corner = parametric(leaf, (0, 1), (0, 1)), grid(sampled(leaf, (0, 1), (0, 1), (21, 5)))
+    assert not kinked.u_closed
+    assert not corner.u_closed
+    assert any("kink" in note for note in kinked.notes)
+    assert any("crease" in note for note in corner.notes)
+
+
+def test_it_states_its_deviation_and_where_outward_is():
+    found = parametric(ball, (0.2, 1.2), (0, 1), side="outside")
+    middle = found.normal(0.7, 0.5)
+    assert "deviates by at most" in found.notes[0]
+    assert f"({middle[0]:.3g}, {middle[1]:.3g}, {middle[2]:.3g})" in found.notes[1]
+    assert middle @ found.point(0.7, 0.5) > 0.99
+    joined = piecewise([found, parametric(ball, (0.2, 1.2), (1, 2))])
+    each = [piece.deviations for piece in joined.pieces]
+    assert joined.deviations == tuple(np.max(each, axis=0))
+    flat = grid(sampled(lambda u, v: (u, v, 0.0 * u), (0, 1), (0, 2), (4, 5)))
+    assert flat.normal(0.5, 0.5).tolist() == [0.0, 0.0, 1.0]
+    assert "(0, 0, 1) in the middle" in flat.notes[1]
+
+
+@pytest.mark.parametrize("name", EQUAL)
+def test_a_grid_runs_through_its_points_and_near_the_surface_they_are_of(name):
+    formula, u, v, patch = EQUAL[name]
+    points = sampled(formula, u, v, (25, 31))
+    found = grid(points)
+    if name != "hyperboloid":  # whose rows are not evenly far apart
+        nodes = np.meshgrid(*(np.linspace(0, 1, count) for count in (25, 31)), indexing="ij")
+        np.testing.assert_allclose(found.point(*nodes), points, atol=1e-12)
+    assert np.abs(found.closest(points.reshape(-1, 3)).height).max() < 1e-12
+    off = np.abs(patch.closest(found.cells(9, 9).centres).height).max()
+    stated = float(found.notes[0].split("by up to ")[1].split(" mm")[0]) / 1e3
+    # The bilinear surface cuts off the sagitta of a step; the spline does not.
+    assert off < min(1e-5, 0.01 * stated)
+    assert 1e-5 < stated < 1e-2
+
+
+# the page on surfaces of one's own
+
+
+@pytest.fixture(scope="module")
+def names():
+    found = {}
+    for block in re.findall(r"^```python\n(.*?)^```$", PAGE.read_text("utf-8"), re.M | re.S):
+        exec(compile(block, PAGE.name, "exec", dont_inherit=True), found)
+    return found
+
+
+def test_the_class_of_the_page_is_the_surface_of_its_formula(names):
+    formula, own = names["cells"], names["same"]
+    np.testing.assert_allclose(own.centres, formula.centres, atol=1e-12)
+    np.testing.assert_allclose(own.normals, formula.normals, atol=1e-12)
+    np.testing.assert_allclose(own.areas, formula.areas, rtol=1e-9)
+    points = np.random.default_rng(0).uniform([-0.1, 0.1, 0.0], [0.1, 0.5, 0.2], (200, 3))
+    mine, spline = names["own"].closest(points), names["formula"].closest(points)
+    np.testing.assert_allclose(mine.height, spline.height, atol=1e-12)
+    assert mine.inside.all()
+
+
+def test_a_kind_that_says_no_more_of_itself_is_followed_but_not_bounded(names):
+    own = names["own"]
+    assert np.abs(own.cells(6, 8).curves.deviations[:, 0]).max() < 1e-6
+    with pytest.raises(SurfaceError, match="no bounds are known"):
+        sheet_of(own)
+    offset = offset_surface(own, 0.01)
+    points = own.point([0.0, 0.01], [0.3, 0.3])
+    places = offset.nearest(points, points, 1e-3)
+    # The bounds along a path are measured: twice the second differences, which is no proof.
+    measured = offset.paths(places.of([0]), places.of([1])).derivative_bounds[0, 2]
+    t = np.linspace(0.0, 0.01, 41)
+    line = offset.at(Places(np.zeros(41, dtype=int), np.column_stack([t, np.full(41, 0.3)])))
+    for some, bound in zip(line, measured.tolist(), strict=True):
+        second = np.linalg.norm(np.diff(some, 2, axis=0), axis=1).max() * 40**2
+        assert 1.5 * second < bound < 3.0 * second

@@ -1,0 +1,288 @@
+"""Patches joined along seams: cut up they are the patch; creases, gaps and turns are told."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from smooth_probes import POSE, least_distances
+from spline_nets import hood, quarter_turn, turned
+
+from surfaces import SurfaceError, bspline, cone, cylinder, piecewise, plane, sphere
+
+PLATE = plane((0.0, 0.2), (0.0, 0.2))
+# A patch, the patches that it is cut into, and how its cells are cut.
+WHOLE = {
+    "hood": (bspline(hood()), [bspline(hood(), u=(0, 0.5)), bspline(hood(), u=(0.5, 1))], (6, 7)),
+    "hood across": (
+        bspline(hood()), [bspline(hood(), v=(0, 0.5)), bspline(hood(), v=(0.5, 1))], (7, 6),
+    ),
+    "pipe": (
+        cylinder(0.3, (0, 360), (0, 0.5)),
+        [cylinder(0.3, ends, (0, 0.5)) for ends in ((0, 180), (180, 360))], (8, 3),
+    ),
+    "zone": (
+        sphere(0.5, (20, 150), (0, 360)),
+        [sphere(0.5, (20, 150), ends) for ends in ((-90, 90), (90, 270))], (5, 12),
+    ),
+    "four corners": (
+        plane((0, 1), (0, 1)),
+        [plane(u, v) for u in ((0, 0.5), (0.5, 1)) for v in ((0, 0.5), (0.5, 1))], (6, 8),
+    ),
+}  # fmt: skip
+
+
+def hinged(*angles_deg, **more):
+    """A plate and others hinged to its side at x = 0, turned about y by angles."""
+    plates = [plane((-0.2, 0.0), (0.0, 0.2), rpy_deg=(0.0, angle, 0.0)) for angle in angles_deg]
+    return piecewise([PLATE, *plates], **more)
+
+
+def strip(half_turns, count=6):
+    """A ring of splines that twists by some half turns."""
+    pieces = []
+    for k in range(count):
+        share = np.linspace(k, k + 1, 4)[:, None] / count
+        angle, twist = math.tau * share, math.pi * half_turns * share
+        out = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=-1)
+        across = np.cos(twist)[..., None] * out + np.sin(twist)[..., None] * [0.0, 0.0, 1.0]
+        pieces.append(bspline(out + np.linspace(-0.2, 0.2, 4)[:, None] * across))
+    return pieces
+
+
+@pytest.fixture(scope="module", params=WHOLE)
+def alike(request):
+    """The cells of one patch, and those of its pieces."""
+    one, pieces, shape = WHOLE[request.param]
+    names = ("u_range", "v_range")
+    counts = [
+        tuple(round(n * np.ptp(getattr(piece, name)) / np.ptp(getattr(one, name)))
+              for n, name in zip(shape, names, strict=True))
+        for piece in pieces
+    ]  # fmt: skip
+    return one.cells(*shape), piecewise(pieces).cells(counts)
+
+
+def names(cells):
+    """Cells by their rounded centres, whatever their numbers."""
+    return [tuple(np.round(centre, 9) + 0.0) for centre in cells.centres]
+
+
+def test_a_patch_in_pieces_has_the_cells_and_neighbours_of_the_whole(alike):
+    whole, parts = alike
+    number = {name: k for k, name in enumerate(names(whole))}
+    mine = [number[name] for name in names(parts)]
+    assert sorted(mine) == list(range(len(whole)))
+    assert parts.surface.notes == ()
+    assert parts.areas.sum() == pytest.approx(whole.areas.sum(), rel=1e-9)
+    for k in range(len(parts)):  # clockwise, from whichever neighbour on
+        ours = [mine[other] for other in parts.neighbours.of(k)]
+        theirs = whole.neighbours.of(mine[k]).tolist()
+        turn = ours.index(theirs[0])
+        assert ours[turn:] + ours[:turn] == theirs
+
+
+def test_its_curves_and_closest_points_are_those_of_the_whole(alike):
+    whole, parts = alike
+    pair = np.repeat(np.arange(len(parts.curves)), 11)
+    points, normals = parts.curves.at(pair, np.tile(np.linspace(0, 1, 11), len(parts.curves)))
+    assert parts.curves.deviations.max() < 1e-5
+    for surface in (whole.surface, parts.surface):
+        on = surface.closest(points)
+        assert on.inside.all()
+        assert (np.abs(on.height) <= parts.curves.deviations[pair, 0] + 1e-12).all()
+        apart = np.linalg.norm(normals - on.normal, axis=1)
+        assert (apart <= parts.curves.deviations[pair, 1] + 1e-9).all()
+    rng = np.random.default_rng(3)
+    ends = whole.centres.min(axis=0) - 0.1, whole.centres.max(axis=0) + 0.1
+    over = parts.seam_pairs.crossings + 0.01 * parts.seam_pairs.normals[:, 0]
+    points = np.concatenate([rng.uniform(*ends, (400, 3)), over])
+    one, other = whole.surface.closest(points), parts.surface.closest(points)
+    some = one.inside
+    assert (some == other.inside).all()
+    assert some[400:].all()
+    assert np.abs(one.height[some] - other.height[some]).max() < 1e-9
+    clear = some & (np.linalg.norm(points, axis=1) > 1e-3)  # of the middle of a ball
+    assert np.abs(one.normal[clear] - other.normal[clear]).max() < 1e-5
+    here, there = whole.locate(points), parts.locate(points)
+    assert ((here >= 0) == (there >= 0)).all()
+    off = np.linalg.norm(whole.centres[here[some]] - parts.centres[there[some]], axis=1) > 1e-9
+    assert not off[: some[:400].sum()].any()  # on borders alone two cells may be right
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_pieces_on_each_other_are_refused(name):
+    whole, pieces, _ = WHOLE[name]
+    for some in ([whole, whole], [*pieces, pieces[0]], [pieces[1], whole]):
+        with pytest.raises(SurfaceError, match="lie on each other"):
+            piecewise(some)
+
+
+def test_heights_are_distances_to_the_nearest_piece():
+    """By a search without slopes over every piece; at an outer crease to the crease itself."""
+    can = cylinder(0.2, (-90, 90), (0, 0.4))
+    lid = cone(0.2, -0.5, (-90, 90), (0, 0.2), position=(0, 0, 0.4))
+    surface = piecewise([can, lid])
+    assert "crease of up to 26.6 degrees" in surface.notes[0]
+    points = np.random.default_rng(4).uniform((0.1, -0.1, 0.3), (0.4, 0.1, 0.5), (40, 3))
+    found = surface.closest(points)
+    assert found.inside.all()
+    away = [least_distances(p, points, p.u_range, p.v_range) for p in surface.pieces]
+    assert np.abs(found.height) == pytest.approx(np.min(away, axis=0), abs=1e-12)
+    x, y, z = points.T
+    outside = np.hypot(x, y) > 0.2 - 0.5 * np.maximum(0.0, z - 0.4)
+    assert np.array_equal(found.height > 0, outside)
+
+
+def test_long_sides_against_short_ones():
+    """One plate beside two: neighbours by shared borders, brute force over intervals."""
+    surface = piecewise(
+        [plane((0, 0.5), (0, 1.0)), plane((0.5, 1), (0, 0.37)), plane((0.5, 1), (0.37, 1.0))]
+    )
+    counts = [(2, 5), (2, 3), (3, 4)]
+    cells = surface.cells(counts)
+    assert (surface.notes, len(surface.seams)) == ((), 3)
+    edges = [np.linspace(0, 1, 6), np.linspace(0, 0.37, 4), np.linspace(0.37, 1, 5)]
+    expected = set()
+    for other, j in itertools.product((1, 2), range(5)):
+        for k in range(counts[other][1]):
+            ends = edges[0][j : j + 2], edges[other][k : k + 2]
+            shared = min(e[1] for e in ends) - max(e[0] for e in ends)
+            assert not 0.0 < shared < 0.02  # so that no pair is a matter of taste
+            if shared > 0.0:
+                expected.add((cells.index(0, 1, j), cells.index(other, 0, k)))
+    across = {tuple(pair) for pair in cells.seam_pairs.pairs.tolist() if cells.piece[pair[0]] == 0}
+    assert across == expected
+    assert cells.curves.deviations.max() < 1e-6
+
+
+def test_pieces_that_meet_in_a_point_are_not_joined():
+    surface = piecewise([plane((0, 1), (0, 1)), plane((1, 2), (1, 2))])
+    assert (surface.seams, surface.groups) == ((), ((0,), (1,)))
+    assert "touch nowhere (0; 1)" in surface.notes[0]
+    assert len(surface.cells((3, 3)).seam_pairs.pairs) == 0
+
+
+@pytest.mark.parametrize(("apart", "joined"), [(0.0, True), (0.9e-4, True), (1.1e-4, False)])
+def test_borders_join_within_the_gap(apart, joined):
+    pieces = [plane((0, 1), (0, 1)), plane((1 + apart, 2), (0, 1))]
+    cells = piecewise(pieces).cells((3, 3))
+    assert len(cells.surface.seams) == joined
+    assert len(cells.seam_pairs.pairs) == (7 if joined else 0)
+    middles, _ = cells.curves.at(np.arange(len(cells.pairs)), np.full(len(cells.pairs), 0.5))
+    on = cells.surface.closest(middles)
+    assert on.inside.all()
+    assert np.abs(on.height).max() <= apart
+    assert len(piecewise(pieces, gap=2e-4).seams) == 1
+
+
+@pytest.mark.parametrize("order", [*itertools.permutations(range(4))][::5], ids=str)
+def test_pieces_are_turned_to_one_outside(order):
+    """A chain with two of four upside down, in any order: all as the first defines."""
+
+    def inward(turn):
+        """A quarter as an exact spline whose normal points to the axis."""
+        way, weights = quarter_turn()
+        net = turned([[0.3, 0.0], [0.3, 0.5]], [1, 1], way[::-1], weights[::-1])
+        return bspline(net[0], (2, 1), weights=net[1], rpy_deg=(0, 0, turn))
+
+    def outward(turn):
+        return cylinder(0.3, (turn, turn + 90), (0, 0.5))
+
+    pieces = [outward(0), inward(90), outward(180), inward(270)]
+    surface = piecewise([pieces[k] for k in order])
+    cells = surface.cells((4, 4))
+    away = (cells.normals * cells.centres * (1, 1, 0)).sum(axis=1)
+    assert ((away > 0) == (order[0] % 2 == 0)).all()
+    assert [k % 2 != order[0] % 2 for k in order] == list(surface.turned)
+    assert sum("turned over" in note for note in surface.notes) == 2
+
+
+def test_a_twisted_ring_is_refused_and_an_untwisted_one_is_not():
+    ring = piecewise(strip(0))
+    assert (len(ring.seams), ring.turned) == (6, (False,) * 6)
+    for pieces in (strip(1), strip(1)[::-1]):
+        with pytest.raises(SurfaceError, match="Moebius"):
+            piecewise(pieces)
+    assert len(piecewise(strip(1)[:-1]).seams) == 4
+    assert len(piecewise(strip(2)).seams) == 6
+
+
+@pytest.mark.parametrize("angle", [-90.0, 5.0, 60.0, 120.0])
+def test_a_crease_is_told_with_its_angle(angle):
+    surface = hinged(angle)
+    assert len(surface.notes) == 1
+    assert f"crease of up to {abs(angle):g} degrees" in surface.notes[0]
+    cells = surface.cells((3, 4))
+    assert cells.seam_pairs.creases == pytest.approx(math.radians(abs(angle)), abs=1e-9)
+    # Curves across it deviate by at least half of the angle, those along it by nothing.
+    deviations = cells.curves.deviations[:, 1]
+    across = cells.piece[cells.pairs[:, 0]] != cells.piece[cells.pairs[:, 1]]
+    assert (deviations[across] >= 2.0 * math.sin(0.25 * math.radians(abs(angle)))).all()
+    assert deviations[~across].max() < 1e-12
+    pair = np.repeat(np.arange(len(cells.pairs)), 23)
+    points, normals = cells.curves.at(pair, np.tile(np.linspace(0, 1, 23), len(cells.pairs)))
+    on = surface.closest(points)
+    assert on.inside.all()
+    assert (np.abs(on.height) <= cells.curves.deviations[pair, 0] + 1e-12).all()
+    assert (np.linalg.norm(normals - on.normal, axis=1) <= deviations[pair] + 1e-12).all()
+
+
+def test_seams_of_full_and_of_half_turns():
+    """Closed borders that begin at different angles; one cell that is half around."""
+    stacked = piecewise(
+        [cylinder(0.3, (0, 360), (0, 0.4)),
+         cylinder(0.3, (-77, 283), (0, 0.4), position=(0, 0, 0.4))]
+    )  # fmt: skip
+    cells = stacked.cells((9, 3))
+    met = np.bincount(cells.seam_pairs.pairs.ravel(), minlength=len(cells))
+    assert (stacked.notes, sorted(set(met.tolist())), (met > 0).sum()) == ((), [0, 2], 18)
+    assert cells.curves.deviations.max() < 1e-5
+    shells = piecewise([cylinder(0.3, ends, (0, 0.4)) for ends in ((0, 180), (180, 360))])
+    assert len(shells.seams) == 2
+    cells = shells.cells((1, 2))
+    assert cells.curves.deviations.max() < 1e-3
+    middles, _ = cells.curves.at(np.arange(len(cells.pairs)), np.full(len(cells.pairs), 0.5))
+    assert np.hypot(middles[:, 0], middles[:, 1]) == pytest.approx(0.3, abs=1e-3)
+
+
+def test_a_rigid_motion_moves_everything_along():
+    pieces = [bspline(hood(), u=pair) for pair in ((0.0, 0.45), (0.45, 1.0))]
+    placed, rest = piecewise(pieces, **POSE), piecewise(pieces)
+    here = rest.cells([(4, 7), (5, 7)])
+    turn, shift = placed.rotation, placed.position
+    for there in (placed, rest.moved(turn, shift)):
+        there = there.cells([(4, 7), (5, 7)])
+        assert (here.pairs == there.pairs).all()
+        assert (here.neighbours.indices == there.neighbours.indices).all()
+        for part, add in (("centres", shift), ("normals", 0.0)):
+            moved = getattr(here, part) @ turn.T + add
+            assert moved == pytest.approx(getattr(there, part), abs=1e-12)
+        moved = here.seam_pairs.crossings @ turn.T + shift
+        assert moved == pytest.approx(there.seam_pairs.crossings, abs=1e-12)
+        bounds = there.curves.derivative_bounds
+        assert here.curves.derivative_bounds == pytest.approx(bounds, abs=1e-7)
+
+
+def test_cells_count_piece_by_piece():
+    cells = hinged(30.0).cells([(2, 3), (4, 5)])
+    assert cells.shape == (26,)
+    expected = [(0, 0, 0), (0, 1, 2), (1, 0, 0), (1, 3, 4)]
+    assert [cells.unravel(k) for k in (0, 5, 6, 25)] == expected
+    assert all(cells.index(*cells.unravel(k)) == k for k in range(26))
+    for ask in (lambda: cells.unravel(-1), lambda: cells.unravel(26), lambda: cells.index(2, 0, 0)):
+        with pytest.raises(IndexError):
+            ask()
+    drawn = cells.triangles(np.array([7, 0, 25]), samples=2, inset=0.1)
+    corners = drawn.vertices[drawn.faces]
+    double = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = 0.5 * np.linalg.norm(double, axis=1).reshape(3, 8).sum(axis=1)
+    assert areas == pytest.approx(0.81 * cells.areas[[7, 0, 25]], rel=1e-9)
+    flat = cells.unrolled()
+    for centre, line in zip(flat.centres, flat.outlines, strict=True):
+        assert line.mean(axis=0) == pytest.approx(centre, abs=0.05)
+    alone = piecewise([plane((0, 1), (0, 1))])
+    assert [len(alone.cells(shape).pairs) for shape in ((3, 3), (0, 3))] == [20, 0]
+    assert len(hinged(30.0).cells([(0, 3), (2, 3)]).seam_pairs.pairs) == 0

@@ -1,0 +1,187 @@
+"""Curves between cells of meshes: on the surface within what they say, at rest over creases."""
+
+from __future__ import annotations
+
+import mesh_patches
+import numpy as np
+import pytest
+from mesh_patches import can, roof
+
+from feasibility import Task
+from feasibility.targets import blocked_curves
+from surfaces.curve_fitting import CurveFit
+from surfaces.meshes import TriangleMesh, mesh
+from surfaces.meshes.cells.reshaped_curves import _shortest
+
+
+def squares(size: float, seed: int, count: int = 674) -> TriangleMesh:
+    """A flat sheet of squares that grew at random: full of notches, holes and narrow places."""
+    rng = np.random.default_rng(seed)
+    taken, front = set(), [(0, 0)]
+    while len(taken) < count:
+        i, j = front.pop(int(rng.integers(len(front))))
+        if (i, j) not in taken:
+            taken.add((i, j))
+            front += [(i + 1, j), (i - 1, j), (i, j + 1), (i, j - 1)]
+    vertices, faces = {}, []
+    for i, j in sorted(taken):
+        corners = ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1))
+        a, b, c, d = (vertices.setdefault(corner, len(vertices)) for corner in corners)
+        faces += [[a, b, c], [a, c, d]]
+    return TriangleMesh(np.array([[size * x, size * y, 0.0] for x, y in vertices]), faces)
+
+
+def corner() -> TriangleMesh:
+    """A sheet like an L."""
+    u, v, faces = mesh_patches.grid(40, 40)
+    i, j = np.divmod(np.arange(1600), 40)
+    flat = np.column_stack([0.4 * u, 0.4 * v, 0.0 * u])
+    own = faces[np.repeat((i < 9) | (j < 9), 2)]
+    return TriangleMesh(*mesh_patches.used(mesh_patches.Mesh(flat, own)))
+
+
+def box() -> TriangleMesh:
+    made = mesh_patches.box()
+    return TriangleMesh(0.4 * made.vertices, made.faces)
+
+
+def plain(name):
+    return lambda: TriangleMesh(*mesh_patches.PATCHES[name]())
+
+
+def folded(radius, facets):
+    return lambda: TriangleMesh(*mesh_patches.folded_sheet(radius, facets))
+
+
+# Meshes and how many cells; then by how much their curves say that they deviate at most, m.
+SMOOTH = {name: (plain(name), 60, 0.05) for name in ("sheet", "dome", "shell", "horn", "hood")}
+SMOOTH |= {
+    "holed": (plain("holed"), 20, 0.01), "slivers": (plain("slivers"), 60, 0.05),
+    "squares": (lambda: squares(0.02, 3), 20, 0.025), "corner": (corner, 20, 0.05),
+}  # fmt: skip
+BENT = {"6 mm, fine": (0.006, 20, 0.02), "6 mm": (0.006, 5, 0.015), "20 mm": (0.02, 5, 0.006)}
+CREASED = {"roof 40": lambda: roof(40), "roof 90": lambda: roof(90), "roof 140": lambda: roof(140),
+           "box": box, "can": can}  # fmt: skip
+
+
+def off(cells, which, count=200):
+    """At odd places of some curves: m from the surface, what normals are off, and what is said."""
+    pair = np.repeat(which, count)
+    t = np.random.default_rng(0).uniform(size=count)
+    points, normals = cells.curves.at(pair, np.tile(t, len(which)))
+    on = cells.surface.closest(points)
+    turned = np.linalg.norm(normals - on.normal, axis=1)
+    return np.abs(on.height), turned, *cells.curves.deviations[pair].T
+
+
+@pytest.mark.parametrize("name", SMOOTH)
+def test_curves_deviate_by_no_more_than_they_say(name):
+    """Against the closest point of the surface; and begin and end at the centres of their cells.
+
+    What is said is measured at even places, and half as much more: rarely it takes a little more.
+    """
+    make, count, share = SMOOTH[name]
+    cells = mesh(make(), rpy_deg=(10, 20, 30)).cells(count)
+    curves = cells.curves
+    away, turned, said, bent = off(cells, np.arange(len(curves)))
+    assert (away <= 1.3 * said + 1e-9).all()
+    assert (away <= said + 1e-9).mean() > 0.999
+    assert (turned <= 1.1 * bent + 1e-9).all()
+    assert bent.max() < 0.02
+    assert curves.deviations[:, 0].max() < share * cells.surface.mean_edge_length
+    for end in (0, 1):
+        points, normals = curves.at(np.arange(len(curves)), np.full(len(curves), float(end)))
+        np.testing.assert_allclose(points, cells.centres[cells.pairs[:, end]], atol=1e-9)
+        np.testing.assert_allclose(normals, cells.normals[cells.pairs[:, end]], atol=1e-9)
+
+
+@pytest.mark.parametrize(("seed", "size", "count"), [(0, 0.019, 200), (10, 0.0231, 674)])
+def test_an_exactly_flat_mesh_is_neither_creased_nor_rough(seed, size, count):
+    cells = mesh(squares(size, seed), position=(0.5, 0, 0.2)).cells(count)
+    assert blocked_curves(cells, Task(standoff=0.005, cone_deg=1)) == ""
+
+
+def over_the_bend(cells):
+    """Curves that turn by more than 30 degrees."""
+    normals = cells.normals[cells.pairs]
+    return np.flatnonzero((normals[:, 0] * normals[:, 1]).sum(axis=1) < np.cos(np.radians(30)))
+
+
+@pytest.mark.parametrize("name", BENT)
+def test_ways_over_a_bend_stay_as_near_to_the_surface_as_they_say(name):
+    radius, facets, deviation = BENT[name]
+    cells = mesh(folded(radius, facets)()).cells(60)
+    which = over_the_bend(cells)
+    assert len(which) >= 5
+    away, turned, said, bent = off(cells, which, 300)
+    assert (away <= said + 1e-9).all()
+    assert (turned <= bent).all()
+    # At an even pace over the surface: 0.24, 0.07 and 0.025.
+    assert np.median(cells.curves.deviations[which, 1]) < deviation
+
+
+@pytest.mark.parametrize("radius", [0.006, 0.02])
+def test_a_target_far_above_a_bend_runs_forwards(radius):
+    cells = mesh(folded(radius, 20)()).cells(60)
+    curves, which = cells.curves, over_the_bend(cells)
+    some = which[curves.deviations[which, 1] < 0.03]
+    assert len(some) > 0.8 * len(which)
+    assert not curves.folds(0.15)[some].any()
+    assert curves.folds(-2.0 * radius)[some].any()  # on the concave side
+
+
+@pytest.mark.parametrize("angle", [40, 90, 150, -90])
+def test_a_way_crosses_the_crease_where_it_is_shortest(angle):
+    """Against every place of the edge, and from either side alone."""
+    rng, made = np.random.default_rng(abs(angle)), roof(angle)
+    edge, inwards = made.vertices[[0, 1]], made.vertices[[2, 4]]
+    along = edge[0] + np.linspace(0.0, 1.0, 20_001)[:, None] * (edge[1] - edge[0])
+    for _ in range(20):
+        right, left = (
+            share[0] * place + share[1] * edge[1]
+            for place, share in zip(inwards, rng.uniform(0.05, 0.9, (2, 2)), strict=True)
+        )
+        found = _shortest(np.array([right, left]), edge[None], inwards[None])
+        lengths = np.linalg.norm(along - right, axis=1) + np.linalg.norm(along - left, axis=1)
+        at = np.linalg.norm(found - right) + np.linalg.norm(found - left)
+        assert at <= lengths.min() + 1e-12
+        assert at == pytest.approx(lengths.min(), abs=1e-7)
+        assert np.isnan(_shortest(np.array([right, 0.5 * right]), edge[None], inwards[None])).all()
+
+
+@pytest.mark.parametrize("name", CREASED)
+def test_creased_curves_are_smooth_in_time_and_stay_on_the_surface(name):
+    """In four parts, at rest between them."""
+    cells = mesh(CREASED[name]()).cells(60)
+    curves = cells.curves
+    which = np.flatnonzero(curves.creased)
+    assert len(which) >= 5
+    for k in which:
+        cubics = curves.cubics[curves.first[k] : curves.first[k + 1]]
+        slopes = cubics[:, 1] + 2.0 * cubics[:, 2] + 3.0 * cubics[:, 3]
+        np.testing.assert_allclose(cubics.sum(axis=1)[:-1], cubics[1:, 0], atol=1e-12)
+        np.testing.assert_allclose(slopes[:-1], cubics[1:, 1], atol=1e-9)
+        rests = len(cubics) // 4 * np.arange(1, 4)
+        assert np.abs(cubics[rests, 1]).max() < 1e-12
+        assert np.abs(slopes[rests - 1]).max() < 1e-12
+    assert np.flatnonzero(curves.rests).size == 6 * len(which)
+    away, turned, said, bent = off(cells, which)
+    assert (away <= said + 1e-9).all()
+    good = bent < 0.01
+    assert good.mean() > 0.7
+    assert (turned[good] <= 1.1 * bent[good]).all()
+
+
+@pytest.mark.parametrize("counts", [(1, 8, 4), (8, 4, 16), (4, 64, 1)])
+def test_the_last_fit_of_a_curve_counts(counts):
+    """However many pieces it had before, the others keep theirs."""
+    rng, (before, after, others) = np.random.default_rng(0), counts
+    fits = [
+        (np.array([1, 3]), rng.normal(size=(2, before, 4, 6))),
+        (np.array([0, 2]), rng.normal(size=(2, others, 4, 6))),
+        (np.array([3]), rng.normal(size=(1, after, 4, 6))),
+    ]
+    curves = CurveFit(None, np.zeros((4, 2)), np.zeros((4, 2)), np.zeros(4, bool), fits).joined()
+    expected = [fits[1][1][0], fits[0][1][0], fits[1][1][1], fits[2][1][0]]
+    assert np.diff(curves.first).tolist() == [len(cubics) for cubics in expected]
+    np.testing.assert_array_equal(curves.cubics, np.concatenate(expected))

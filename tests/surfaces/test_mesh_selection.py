@@ -1,0 +1,146 @@
+"""Parts of meshes: exact areas, however the cut runs."""
+
+import mesh_writers as w
+import numpy as np
+import pytest
+from samples import sampled, seeds
+
+from surfaces import SurfaceError, cut_box, cut_plane, faces_within_cone, take_faces
+from surfaces.meshes.repair import clean, notes_of
+
+CUBE = clean(*w.cube(0.2))
+HILLY = clean(*w.hilly())
+
+
+def area_beyond(mesh, point, normal):
+    """By clipping one triangle after the other (Sutherland and Hodgman)."""
+    total = 0.0
+    for triangle in mesh.vertices[mesh.faces]:
+        heights = (triangle - point) @ normal
+        corners = []
+        for k in range(3):
+            p, q, hp, hq = triangle[k], triangle[k - 2], heights[k], heights[k - 2]
+            if hp >= 0:
+                corners.append(p)
+            if hp * hq < 0:
+                corners.append(p + hp / (hp - hq) * (q - p))
+        for k in range(1, len(corners) - 1):
+            cross = np.cross(corners[k] - corners[0], corners[k + 1] - corners[0])
+            total += 0.5 * np.linalg.norm(cross)
+    return total
+
+
+@sampled
+@pytest.mark.parametrize("seed", seeds(10, all=200))
+def test_the_two_sides_of_a_cut_make_up_the_whole(seed):
+    rng, mesh = np.random.default_rng(seed), (CUBE, HILLY)[seed % 2]
+    middle = mesh.vertices.mean(axis=0) + rng.normal(0, 0.03, 3)
+    normal = rng.normal(0, 1, 3)
+    unit = normal / np.linalg.norm(normal)
+    over, under = cut_plane(mesh, middle, normal), cut_plane(mesh, middle, -normal)
+    for part, sign in ((over, 1), (under, -1)):
+        w.assert_clean(part)
+        assert (sign * (part.vertices - middle) @ unit).min() > -1e-6
+        assert part.area == pytest.approx(area_beyond(mesh, middle, sign * unit), rel=1e-9)
+        # What was no border before now lies in the plane; of a closed mesh all of it.
+        ends = part.vertices[part.edges.border_vertices]
+        in_plane = (np.abs((ends - middle) @ unit) < 1e-12).all(axis=1)
+        assert in_plane.all() if mesh is CUBE else in_plane.any()
+    assert over.area + under.area == pytest.approx(mesh.area, rel=1e-12)
+    assert over.history != under.history
+    assert len(over.history) == 1
+
+
+# What a cut leaves of a mesh, in m^2, where planes run along edges, through vertices and faces.
+PLATE = clean(*w.plate(6, 4, 0.6, 0.4))
+FLAT = clean(*w.plate(7, 5, 0.3, 0.2))
+KNOWN = {
+    "along edges": (lambda: cut_plane(PLATE, (0.3, 0, 0), (1, 0, 0)), 0.12),
+    "along diagonals": (lambda: cut_plane(PLATE, (0, 0, 0), (1, -1, 0)), 0.16),
+    "across diagonals": (lambda: cut_plane(PLATE, (0, 0.4, 0), (1, 1, 0)), 0.16),
+    "faces in the plane": (lambda: cut_plane(CUBE, (0, 0, 0), (0, 0, 1)), 0.24),
+    "faces in the plane alone": (lambda: cut_plane(CUBE, (0, 0, 0.2), (0, 0, 1)), 0.04),
+    "box": (lambda: cut_box(FLAT, (0.1, 0.05, -1), (0.25, 0.15, 1)), 0.015),
+    "box round all": (lambda: cut_box(FLAT, (-1, -1, -1), (1, 1, 1)), 0.06),
+    "top": (lambda: faces_within_cone(CUBE, (0, 0, 1), 1e-3), 0.04),
+    "all but the bottom": (lambda: faces_within_cone(CUBE, (0, 0, 1), 90), 0.2),
+    "three sides": (lambda: faces_within_cone(CUBE, (1, 1, 1), 60), 0.12),
+}
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_parts_by_hand(name):
+    made, area = KNOWN[name]
+    part = made()
+    w.assert_clean(part)
+    assert part.area == pytest.approx(area)
+
+
+def test_a_cut_that_leaves_parts_hanging_in_a_point_parts_them():
+    """Two peaks above the plane that share one saddle vertex."""
+    vertices = [[0, 0, 0], [1, 1, 1], [1, -1, 1], [-1, 1, 1], [-1, -1, 1], [2, 0, -1]]
+    vertices += [[0, 2, -1], [-2, 0, -1], [0, -2, -1]]
+    faces = [[0, 2, 1], [0, 3, 4], [0, 1, 6], [0, 6, 3], [0, 4, 8], [0, 8, 2]]
+    part = cut_plane(clean(vertices, faces), (0, 0, 0), (0, 0, 1))
+    w.assert_clean(part)
+    assert len(np.unique(part.pieces)) == 2
+    assert any("2 separate pieces" in note for note in notes_of(part))
+
+
+def test_a_box_is_six_planes():
+    low, high = np.array([0.05, 0.031, -0.02]), np.array([0.222, 0.177, 0.011])
+    part = expected = cut_box(HILLY, low, high)
+    w.assert_clean(part)
+    assert (part.vertices >= low - 1e-6).all()
+    assert (part.vertices <= high + 1e-6).all()
+    expected = HILLY
+    for axis in np.eye(3):
+        expected = cut_plane(cut_plane(expected, low, axis), high, -axis)
+    assert part.area == pytest.approx(expected.area, rel=1e-9)
+    assert len(part.history) == 1
+    assert f"{part.area:.4g} of {HILLY.area:.4g} m^2" in part.history[0]
+
+
+@pytest.mark.parametrize("angle", [5.0, 30.0, 90.0, 180.0])
+def test_faces_that_look_up(angle):
+    chosen = np.degrees(np.arccos(np.clip(HILLY.face_normals[:, 2], -1, 1))) <= angle
+    part = faces_within_cone(HILLY, (0, 0, 7), angle)
+    w.assert_clean(part)
+    assert np.array_equal(part.vertices[part.faces], HILLY.vertices[HILLY.faces[chosen]])
+
+
+def test_faces_by_number():
+    part = take_faces(HILLY, [7, 3, 3, 200])
+    assert np.array_equal(part.vertices[part.faces], HILLY.vertices[HILLY.faces[[3, 7, 200]]])
+    w.assert_clean(part)
+    chosen = HILLY.face_areas > np.median(HILLY.face_areas)
+    assert take_faces(HILLY, chosen).area == pytest.approx(HILLY.face_areas[chosen].sum())
+
+
+def test_notes_of_the_whole_stay_and_those_of_the_pieces_are_told_anew():
+    cube, faces = w.cube()
+    vertices, faces = w.stacked((cube, faces), (cube + np.array([0.5, 0, 0]), faces))
+    mesh = clean([*vertices, [3, 3, 3]], faces)
+    assert len(notes_of(mesh)) == 2
+    part = cut_plane(cut_plane(mesh, (0.3, 0, 0), (-1, 0, 0)), (0, 0, 0.1), (0, 0, 1))
+    assert ["no face uses" in notes_of(part)[0], len(notes_of(part))] == [True, 3]
+    assert "12 faces" in notes_of(part)[1]
+
+
+WRONG = [
+    (cut_plane, (0, 0, 9), (0, 0, 1)), (cut_box, (1, 1, 1), (2, 2, 2)),
+    (faces_within_cone, (0, 0, -1), 20), (take_faces, []),
+    (cut_plane, (0, 0), (0, 0, np.nan)), (cut_plane, (0, 0, 0), (0, 0, 0)),
+    (cut_box, (0, 0, 0), (1, 0, 1)), (cut_box, (0, 0, np.inf), "x"),
+    (faces_within_cone, (0, 0, 0), -3), (faces_within_cone, (0, 0, 1), 200),
+    *[(take_faces, each) for each in ([0, 400], [-1], [0.5], [[1], [1, 2]], "all", [True, False])],
+]  # fmt: skip
+
+
+def test_nothing_left_and_bad_numbers_are_said(approved):
+    said = []
+    for cut, *arguments in WRONG:
+        with pytest.raises(SurfaceError) as caught:
+            cut(HILLY, *arguments)
+        said.append(str(caught.value))
+    approved("parts that are none", "\n".join(said))

@@ -1,0 +1,399 @@
+"""Meshes as surfaces: nearest places, continuous normals over creases too, parts, smoothed copies.
+
+What holds of every kind of surface is asked of meshes in the contract of surfaces.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from functools import cache
+
+import mesh_patches
+import networkx as nx
+import numpy as np
+import pytest
+from mesh_patches import bent, can, roof
+from part_walks import survivors
+from samples import sampled, seeds
+from triangle_probes import KINDS, assert_nearest, degenerate, least_distances, scattered
+
+from coverable_errors import CoverableError
+from surfaces import cylinder, mesh, sphere
+from surfaces.meshes import FaceTree, TriangleMesh, smoothed
+from surfaces.meshes.facets import facets_of
+from surfaces.meshes.normals import sectors
+
+POSE = {"position": (0.3, -1.2, 0.7), "rpy_deg": (25.0, -40.0, 110.0)}
+
+
+def rough(count=6, seed=2):
+    """A sheet with random heights: normals of neighbours differ by any angle, creases all over."""
+    u, v, faces = mesh_patches.grid(count, count)
+    z = np.random.default_rng(seed).normal(scale=0.05, size=len(u))
+    return TriangleMesh(np.stack([u, v, z], axis=1), faces)
+
+
+def plain(name, **sizes):
+    return TriangleMesh(*getattr(mesh_patches, name)(**sizes))
+
+
+@cache
+def meshes():
+    """Of smooth shapes, and of shapes with creases, as they are and cut into cells."""
+    triangle = TriangleMesh([[0, 0, 0], [1, 0, 0], [0.3, 0.2, 0.1]], [[0, 1, 2]])
+    return {
+        "a triangle": mesh(triangle, **POSE),
+        "sheet": mesh(plain("sheet", n=10), **POSE),
+        "dome": mesh(plain("dome", nu=20, nv=25), side="inside"),
+        "horn": mesh(plain("horn", nu=24, nv=20), **POSE),
+        "box": mesh(plain("box"), **POSE),
+        "box of cells": mesh(plain("box"), **POSE).cells(count=8).surface,
+        "rough": mesh(rough(), **POSE),
+        "rough cells": mesh(rough(), **POSE).cells(count=12).surface,
+    }
+
+
+@pytest.fixture(params=list(meshes()))
+def surface(request):
+    return meshes()[request.param]
+
+
+# -- nearest places ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 17, 1000])
+def test_nearest_places_are_those_of_a_look_at_each(count):
+    rng = np.random.default_rng(count)
+    assert_nearest(scattered(count, rng.choice([0.01, 0.3]), rng), 1.5 * rng.normal(size=(100, 3)))
+
+
+@sampled
+@pytest.mark.parametrize("seed", seeds(1, all=100))
+@pytest.mark.parametrize("kind", KINDS)
+def test_triangles_that_are_none_have_nearest_places_too(kind, seed):
+    rng = np.random.default_rng([seed, KINDS.index(kind)])
+    corners = degenerate(kind, rng)
+    lines = corners[rng.integers(0, 300, 60), 0] + 1e-3 * rng.normal(size=(60, 3))
+    points = np.concatenate([1.5 * rng.normal(size=(60, 3)), lines, corners[:20, 1]])
+    assert_nearest(corners, points)
+    for _ in range(seed > 0):  # and of any size, in a campaign
+        some = scattered(int(rng.integers(1, 3000)), 10.0 ** rng.uniform(-4, 1), rng)
+        assert_nearest(some, 2.0 * rng.normal(size=(20, 3)))
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 64, 333])
+def test_each_box_holds_its_triangles_and_each_triangle_is_there_once(count):
+    corners = scattered(count, 0.1, np.random.default_rng(count))
+    corners[::3] = corners[0]  # of equal ones there may be any number
+    tree = FaceTree.of(corners)
+    assert sorted(tree.order) == list(range(count))
+    np.testing.assert_array_equal(tree.corners, corners[tree.order])
+    for level in range(tree.depth + 1):
+        for node in range(2**level):
+            some = tree.corners[(node * count) >> level : ((node + 1) * count) >> level]
+            box = np.concatenate([some.min(axis=(0, 1)), some.max(axis=(0, 1))])
+            np.testing.assert_array_equal(tree.boxes[2**level - 1 + node], box)
+
+
+def test_over_an_edge_the_triangle_given_first_counts_whatever_the_rounding():
+    """Over the edges of an octahedron two faces are equally near, over its vertices four."""
+    rng = np.random.default_rng(0)
+    vertices = np.concatenate([np.eye(3), -np.eye(3)])
+    octants = np.array(list(itertools.product((0, 3), repeat=3))) + np.arange(3)
+    for _ in range(50):
+        faces = rng.permutation(octants)
+        frame = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        tree = FaceTree.of(vertices[faces] @ frame)
+        for some in (*itertools.combinations(range(6), 1), *itertools.combinations(range(6), 2)):
+            holds = np.isin(faces, some).sum(axis=1) == len(some)
+            if holds.any():
+                point = rng.uniform(1.0, 3.0) * vertices[list(some)].sum(axis=0) @ frame
+                assert tree.nearest(point[None])[0] == np.flatnonzero(holds)[0]
+
+
+@pytest.mark.parametrize("name", ["dome", "box", "blade", "slivers", "scattered"])
+def test_heights_are_distances_from_the_nearest_triangle(name):
+    """On, near and far from meshes of even and odd triangles; outside is on the faces' side."""
+    rng, surface = np.random.default_rng(3), mesh(plain(name), **POSE)
+    local = surface.mesh.vertices[surface.mesh.faces]
+    low, high = local.min(axis=(0, 1)), local.max(axis=(0, 1))
+    points = rng.uniform(low - 0.3, high + 0.3, (60, 3))
+    placed = points @ surface.rotation.T + surface.position
+    found = surface.closest(placed.reshape(2, 30, 3))
+    height = found.height.ravel()
+    np.testing.assert_allclose(np.abs(height), least_distances(local, points), atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(found.normal, axis=2), 1.0, atol=1e-12)
+    assert found.inside.all()
+    assert np.isnan(found.u).all()
+    if name == "box":
+        within = ((points > low) & (points < high)).all(axis=1)
+        np.testing.assert_array_equal(height < 0.0, within)
+
+
+def test_points_that_are_not_finite_have_no_face():
+    flat = mesh(plain("sheet", n=4))
+    points = np.array([[0.1, 0.1, 1.0], [np.nan, 0.0, 0.0], [0.0, np.inf, 0.0]])
+    faces, weights = flat.face_tree.nearest(points)
+    assert (faces >= 0).tolist() == [True, False, False]
+    assert np.isfinite(weights).all(axis=1).tolist() == [True, False, False]
+    with np.errstate(invalid="ignore"):
+        assert np.isfinite(flat.closest(points).height).tolist() == [True, False, False]
+
+
+# -- normals -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("patch", [
+    sphere(1.0, (10, 90), (10, 180)), cylinder(0.4, (0, 200), (0, 0.6), side="outside"),
+])  # fmt: skip
+def test_a_fine_mesh_has_the_normals_of_its_patch(patch):
+    """Interpolated, a twentieth of what the facets are off, away from the border."""
+    surface = mesh(TriangleMesh(*mesh_patches.of_patch(patch, 60, 80)), side=patch.side)
+    rng = np.random.default_rng(1)
+    u, v = (rng.uniform(*r, 300) * 0.9 + 0.05 * sum(r) for r in (patch.u_range, patch.v_range))
+    found, normal = surface.closest(patch.point(u, v)), patch.normal(u, v)
+    off = np.linalg.norm(found.normal - normal, axis=1)
+    facets = surface.mesh.face_normals[surface.nearest(patch.point(u, v))[0]]
+    assert np.median(off) < 0.05 * np.median(np.linalg.norm(facets - normal, axis=1))
+    assert off.max() < 0.02
+
+
+def test_a_crease_keeps_its_faces_flat():
+    """On a box every corner of a face has the face's normal, before and after it is cut."""
+    cells = meshes()["box"].cells(60)
+    for surface in (meshes()["box"], cells.surface):
+        expected = np.repeat(surface.mesh.face_normals[:, None], 3, axis=1)
+        np.testing.assert_allclose(surface.corner_normals, expected, atol=1e-9)
+    # On the rims both sides have one normal each vertex, to which theirs turn.
+    fine = cells.surface
+    at = np.zeros((len(fine.mesh.vertices), 3))
+    at[fine.mesh.faces.ravel()] = fine.crease_normals.reshape(-1, 3)
+    np.testing.assert_array_equal(at[fine.mesh.faces], fine.crease_normals)
+    assert "crease" in " ".join(cells.notes)
+
+
+CREASED = {"roof": lambda: roof(90), "steep roof": lambda: roof(140), "box": lambda: plain("box"),
+           "can": can}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CREASED)
+def test_the_normal_is_continuous_and_turns_no_faster_than_is_said(name):
+    """From either face of an edge, where three creases meet too; by differences, most on strips."""
+    cells = mesh(CREASED[name]()).cells(50)
+    surface, edges = cells.surface, cells.surface.mesh.edges
+    faces, rng = surface.mesh.faces, np.random.default_rng(3)
+    for share in [0.0, 1.0, *rng.uniform(size=7)]:
+        one, other = (
+            surface.normals_at(f, (faces[f] == edges.vertices[:, [0]]) * (1.0 - share)
+                               + (faces[f] == edges.vertices[:, [1]]) * share)
+            for f in edges.faces.T
+        )  # fmt: skip
+        np.testing.assert_allclose(one, other, atol=1e-12)
+    creased = np.flatnonzero(surface.on_crease.any(axis=1))
+    face = rng.choice(creased, 20_000)
+    weights = rng.dirichlet([1, 1, 1], len(face)) * np.where(surface.on_crease[face], 20.0, 1.0)
+    weights /= weights.sum(axis=1, keepdims=True)
+    step = 1e-4 * rng.normal(size=(len(face), 3))
+    ahead = weights + step - step.mean(axis=1, keepdims=True)
+    inside = (ahead > 0.0).all(axis=1)
+    way = np.einsum("kc,kci->ki", ahead - weights, surface.mesh.vertices[faces[face]])
+    turn = surface.normals_at(face, ahead) - surface.normals_at(face, weights)
+    rate = (np.linalg.norm(turn, axis=1) / np.linalg.norm(way, axis=1))[inside]
+    said = cells.max_curvature[cells.labels[face[inside]]]
+    assert (rate <= said * (1.0 + 1e-6)).all()
+    assert (rate / said).max() > 0.6
+
+
+def test_the_normal_turns_in_a_narrow_strip_alone():
+    """On a roof: the plates' own normals but for a tenth of the small faces along the edge."""
+    surface = mesh(roof(90)).cells(60).surface
+    x = np.linspace(-0.2, 0.2, 4001)
+    points = np.column_stack([x * np.cos(np.pi / 4), np.full(4001, 0.11), -np.abs(x) * 0.7071])
+    normals = surface.closest(points).normal
+    flat = np.column_stack([np.sign(x), 0 * x, np.ones(4001)]) / np.sqrt(2)
+    turned = np.linalg.norm(normals - flat, axis=1) > 1e-6
+    assert turned.any()
+    assert np.abs(x[turned]).max() < 0.1 * surface.mean_edge_length
+    assert normals[2000] == pytest.approx([0, 0, 1], abs=1e-9)
+
+
+def test_normals_turn_as_the_corners_say():
+    """n along the sum of w_c (own_c + t (crease_c - own_c)), t from the weight on the crease."""
+    rng, surface = np.random.default_rng(4), mesh(plain("box"), **POSE).cells(60).surface
+    creased = np.flatnonzero(surface.on_crease.any(axis=1))
+    face = np.concatenate([creased, rng.integers(0, len(surface.mesh.faces), 50)])
+    weights = rng.dirichlet(np.ones(3), len(face)) ** rng.choice([1.0, 8.0], (len(face), 1))
+    weights /= weights.sum(axis=1, keepdims=True)
+    on_crease = (weights * surface.on_crease[face]).sum(axis=1)
+    share = np.clip(1.0 - (1.0 - on_crease) / 0.1, 0.0, 1.0)[:, None, None]
+    assert 0.0 < share.mean() < 1.0
+    own, crease = surface.corner_normals[face], surface.crease_normals[face]
+    mean = (weights[..., None] * (own + share * (crease - own))).sum(axis=1)
+    expected = mean / np.linalg.norm(mean, axis=1, keepdims=True) @ surface.rotation.T
+    np.testing.assert_allclose(surface.normals_at(face, weights), expected, rtol=0, atol=1e-15)
+
+
+def test_corners_are_parted_by_creases_alone():
+    """Against the faces round every vertex, one by one, on a rough sheet full of broken creases."""
+    made = rough(11, seed=5)
+    parts, normals, counts = sectors(made), made.face_normals, set()
+    for vertex in range(144):
+        around, here = nx.Graph(), np.flatnonzero((made.faces == vertex).any(axis=1)).tolist()
+        around.add_nodes_from(here)
+        for one, other in itertools.combinations(here, 2):
+            edge = set(made.faces[one]) & set(made.faces[other])
+            if len(edge) == 2 and normals[one] @ normals[other] >= np.cos(np.radians(30.0)):
+                around.add_edge(one, other)
+        own = {f: int(parts[f][made.faces[f] == vertex][0]) for f in here}
+        groups = [{own[f] for f in group} for group in nx.connected_components(around)]
+        assert all(len(group) == 1 for group in groups)
+        assert len(set().union(*groups)) == len(groups)
+        counts.add(len(groups))
+    assert {1, 2, 3} <= counts
+
+
+# -- parts for searches --------------------------------------------------------------------------
+
+
+def places(surface, count=2000, seed=4):
+    """Faces (k,) and weights (k, 3): inside, on edges and corners, and on strips along creases."""
+    rng = np.random.default_rng(seed)
+    face = rng.integers(len(surface.mesh.faces), size=count)
+    creased = np.flatnonzero(surface.on_crease.any(axis=1))
+    if len(creased):
+        face[::2] = rng.choice(creased, len(face[::2]))
+    weights = rng.dirichlet([1.0, 1.0, 1.0], count)
+    weights[rng.uniform(size=(count, 3)) < 0.1] = 0.0
+    weights[::4] *= np.where(surface.on_crease[face], 1.0, 0.1 * rng.uniform(size=(count, 1)))[::4]
+    weights[weights.sum(axis=1) == 0.0, 0] = 1.0
+    return face, weights / weights.sum(axis=1, keepdims=True)
+
+
+def test_every_place_reaches_a_finest_part(surface):
+    """And so do nearest places of points above, with the normals that motions are judged by."""
+    face, weights = places(surface)
+    points, normals = surface.points_at(face, weights), surface.normals_at(face, weights)
+    for most in (1, 50, 2000):
+        parts = surface.parts(1e-3, 0.05, most)
+        assert survivors(parts, points, normals).all()
+        assert len(parts) <= most
+    off = np.random.default_rng(6).normal(scale=0.01, size=(len(face), 1))
+    above = points + off * normals
+    near = surface.points_at(*surface.nearest(above))
+    assert survivors(parts, near, surface.closest(above).normal).all()
+
+
+@pytest.mark.parametrize("name", ["dome", "horn", "box of cells", "rough cells"])
+def test_smaller_radii_lose_places(name):
+    surface = meshes()[name]
+    face, weights = places(surface)
+    points, normals = surface.points_at(face, weights), surface.normals_at(face, weights)
+    parts = surface.parts(1e-3, 0.05, 100)
+    for column in (0, 1):
+        radius = parts.radius.copy()
+        radius[:, column] *= 0.8
+        assert not survivors(replace(parts, radius=radius), points, normals).all()
+
+
+@pytest.mark.parametrize("straight", [0.02, 0.2, 5.0])
+def test_facets_are_the_mesh_and_their_normals_its_own(surface, straight):
+    normals = surface.corner_normals, surface.crease_normals
+    facets = facets_of(surface.face_balls[0], *normals, surface.on_crease, straight)
+    sides = facets.corners[:, 1:] - facets.corners[:, :1]
+    areas = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / 2.0
+    assert areas.sum() == pytest.approx(surface.mesh.area)
+    assert areas.min() > 0.0
+    share = np.random.default_rng(8).dirichlet([1.0, 1.0, 1.0], len(areas))
+    a, b, c = share.T
+    basis = np.stack([a * a, b * b, c * c, 2 * a * b, 2 * b * c, 2 * c * a], axis=1)
+    direction = np.einsum("gk,gkd->gd", basis, facets.normals)
+    length = np.linalg.norm(direction, axis=1)
+    place = np.einsum("gk,gkd->gd", share, facets.corners)
+    found = surface.normals_at(*surface.nearest(place @ surface.rotation.T + surface.position))
+    assert (np.abs(length - 1.0) <= facets.off + 1e-12).all()
+    assert direction / length[:, None] == pytest.approx(found @ surface.rotation, abs=1e-7)
+
+
+def test_parts_are_no_larger_than_they_have_to_be():
+    """Flat sides are flat parts; over one face without a crease points are affine."""
+    box = meshes()["box"].parts(1e-3, 0.05)
+    finest = box.children[:, 0] < 0
+    assert box.radius[finest].max() < 1e-11
+    assert finest.sum() <= 12
+    sheet = meshes()["sheet"].parts(1e-3, 0.05)
+    assert len(sheet) == 1
+    sides = np.linalg.norm(sheet.slopes[0, :, :3], axis=1)
+    assert np.sort(2.0 * sides) == pytest.approx([0.4, 0.6], rel=0.02)
+    dome, parts = meshes()["dome"], meshes()["dome"].parts(1e-12, 1e-12)
+    finest = parts.children[:, 0] < 0
+    assert finest.sum() == len(dome.mesh.faces)
+    assert parts.radius[finest, 0].max() < 1e-11
+    turn = np.linalg.norm(dome.corner_normals - np.roll(dome.corner_normals, 1, 1), axis=2)
+    assert parts.radius[finest, 1].max() < turn.max() ** 2 / 8.0
+
+
+# -- smoothed copies -----------------------------------------------------------------------------
+
+LENGTH = 0.1
+
+
+def bead(flank: float):
+    """0.6 x 0.4 m with a ridge 8 mm high across, its flanks so wide (m)."""
+
+    def shape(u, v):
+        x = 0.6 * u
+        return x, 0.4 * v, 0.008 * np.clip((0.015 + flank - abs(x - 0.31)) / flank, 0.0, 1.0)
+
+    return bent(shape, 40, 40)
+
+
+@pytest.mark.parametrize(("share", "kept"), [(4.0, 0.996), (1.0, 0.5), (0.5, 1.0 / 17.0)])
+def test_a_wave_of_the_length_keeps_half_its_height(share, kept):
+    wave = bent(
+        lambda u, v: (u, 0.5 * v, 1e-3 * np.sin(2.0 * np.pi * u / (share * LENGTH))), 200, 100
+    )
+    corners = smoothed(mesh(TriangleMesh(*wave)), LENGTH, 1.0).mesh.vertices
+    inner = (abs(corners[:, :2] - [0.5, 0.25]) < [0.3, 0.1]).all(axis=1)
+    assert abs(corners[inner, 2]).max() == pytest.approx(1e-3 * kept, rel=0.1)
+
+
+def test_planes_stay_up_to_their_borders_needles_or_not():
+    """Rows down to a micrometre wide, far from the origin."""
+    flat = bent(lambda u, v: (5.0 + 0.6 * u, 7.0 + 0.4 * v**9, 0.3 * u + 0.2), 12, 6)
+    assert smoothed(mesh(TriangleMesh(*flat)), LENGTH, 1.0).smoothing.off < 1e-9
+
+
+@pytest.mark.parametrize("flank", [0.008, 0.035])
+@pytest.mark.parametrize("cut", [False, True])
+def test_neither_is_further_from_the_other_than_is_said(flank, cut):
+    """Of the cells too, whose triangles are other ones; the surface before is kept for the rest."""
+    rng, (vertices, faces) = np.random.default_rng(1), bead(flank)
+    given = mesh(TriangleMesh(vertices, faces))
+    smooth = smoothed(given, LENGTH, 0.01)
+    smooth = smooth.cells(20).surface if cut else smooth
+    assert 1e-3 < smooth.smoothing.off < 0.008
+    assert smooth.deviations == (smooth.smoothing.off, 0.0)
+    corners, copied = vertices[faces], smooth.mesh.vertices[smooth.mesh.faces]
+    apart = [
+        least_distances(triangles, rng.choice(points, 12, replace=False)).max()
+        for own, triangles in ((copied, corners), (corners, copied))
+        for points in (own[:, 0], own.mean(axis=1))
+    ]
+    assert max(apart) <= smooth.smoothing.off + 1e-12
+    assert max(apart) >= 0.4 * smooth.smoothing.off  # of which sliding along the sheet is a part
+    some = rng.choice(smooth.wall.mesh.vertices, 12, replace=False)
+    assert least_distances(corners, some).max() < 1e-12
+    assert smooth.wall.mesh.area == pytest.approx(given.mesh.area, rel=1e-9)
+    assert smoothed(given, LENGTH, 1e-3).deviations == (0.0, 0.0)  # more than the tolerance
+
+
+def test_it_moves_with_its_wall_and_lengths_that_make_no_sense_are_refused():
+    given = mesh(TriangleMesh(*bead(0.01)))
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    moved = smoothed(given, LENGTH, 0.01).moved(turn, [1.0, 2.0, 3.0])
+    place = given.mesh.vertices[:9] @ turn.T + [1.0, 2.0, 3.0]
+    assert np.abs(moved.wall.closest(place).height).max() < 1e-12
+    for length, said in ((0.0, "length"), (np.nan, "length"), (1e-4, "take .* m or more")):
+        with pytest.raises(CoverableError, match=said):
+            smoothed(given, length, 0.01)

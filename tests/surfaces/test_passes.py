@@ -1,0 +1,300 @@
+"""Passes keep their distance on the surface, go round holes, and run in the order they say.
+
+Distances are known in closed form on surfaces that can be unrolled, or are round.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from mesh_patches import grid, of_patch, panel_with_hole
+from pygeodesic import geodesic
+
+from coverable_errors import CoverableError
+from surfaces import bspline, cylinder, mesh, piecewise, plane, sphere, torus
+from surfaces.meshes import TriangleMesh
+from surfaces.passes import parallel_passes
+
+HALF = math.pi / 2
+SURFACES = {
+    "plate": plane((0.0, 0.6), (0.0, 0.4), position=(0.3, -0.2, 0.5), rpy_deg=(20, -35, 50)),
+    "arch": cylinder(0.3, (10, 100), (0, 0.5), position=(0.1, 0.2, 0.3), rpy_deg=(15, 25, 35)),
+    "cap": sphere(0.4, (60, 120), (-35, 35), rpy_deg=(5, 10, 15)),
+}
+PLATE, ARCH, CAP = SURFACES.values()
+
+
+def unrolled(name, points):
+    """Points (k, 3) on the plate or the arch, laid flat; on the cap as they are."""
+    surface = SURFACES[name]
+    own = (points - surface.position) @ surface.rotation
+    if name == "arch":
+        return np.column_stack([0.3 * np.arctan2(own[:, 1], own[:, 0]), own[:, 2]])
+    return own
+
+
+def away(name, points, line):
+    """(k,) m on the surface, from points (k, 3) to the nearest place of a line (m, 3)."""
+    a, b = unrolled(name, points), unrolled(name, line)
+    if name == "cap":  # great circles to the line's many points
+        chords = np.linalg.norm(a[:, None] - b[None], axis=2).min(axis=1)
+        return 2.0 * 0.4 * np.arcsin(0.5 * chords / 0.4)
+    start, piece = b[:-1], np.diff(b, axis=0)
+    share = ((a[:, None] - start) * piece).sum(axis=2) / (piece**2).sum(axis=1)
+    nearest = start + np.clip(share, 0.0, 1.0)[:, :, None] * piece
+    return np.linalg.norm(a[:, None] - nearest, axis=2).min(axis=1)
+
+
+def by_level(found):
+    """The stretches of each pass."""
+    assert sorted({each.level for each in found.stretches}) == list(range(found.count))
+    return [[e for e in found.stretches if e.level == level] for level in range(found.count)]
+
+
+def inwards(found):
+    """Each stretch beside those of the next pass towards the first one."""
+    levels, middle = by_level(found), (found.count - 1) / 2
+    for level, row in enumerate(levels):
+        inner = level + (1 if level < middle - 0.5 else -1 if level > middle + 0.5 else 0)
+        if inner != level:
+            yield from ((each, levels[inner]) for each in row)
+
+
+@pytest.mark.parametrize("direction", [0.0, HALF, 0.4])
+@pytest.mark.parametrize("name", SURFACES)
+def test_the_pitch_holds_on_the_surface(name, direction):
+    """From each outer pass to its inner neighbour, towards the first pass, within 2 %.
+
+    What lies beyond the inner pass's ends is for the test of oblique passes.
+    """
+    found = parallel_passes(SURFACES[name], 0.03, direction, step=0.002)
+    assert found.spacing <= 0.03
+    checked = 0
+    for each, (other, *_) in inwards(found):
+        distances = away(name, each.points, other.points)
+        # Beside the end of the inner pass there is none of it to be away from.
+        ends = [away(name, each.points, other.points[some]) for some in ([0, 1], [-2, -1])]
+        beside = distances < 0.9999 * np.minimum(*ends)
+        assert np.abs(distances[beside] / found.spacing - 1.0).max() <= 0.02
+        checked += int(beside.sum())
+    assert checked > 500
+
+
+@pytest.mark.parametrize("by", ["planes", "distance"])
+def test_planes_say_how_far_apart_they_are_where_a_surface_slopes(by):
+    """On a cylinder, planes a pitch apart are R (asin((k + 1) P / R) - asin(k P / R)) apart."""
+    found = parallel_passes(ARCH, 0.03, HALF, by=by, step=0.01)
+    assert (found.widest == found.spacing) == (by == "distance")
+    flat = [unrolled("arch", row[0].points)[5, 0] for row in by_level(found)]
+    gaps = np.abs(np.diff(flat))
+    assert gaps.max() <= found.widest * 1.001
+    if by == "planes":
+        at = -0.3 * math.sin(math.pi / 4) + (np.arange(found.count) + 0.5) * found.spacing
+        assert np.allclose(np.sort(gaps), np.sort(np.diff(0.3 * np.arcsin(at / 0.3))), rtol=5e-3)
+        assert gaps.max() > 1.2 * found.spacing
+
+
+def test_lines_of_constant_parameters():
+    surface = sphere(0.4, (50, 90), (0, 60))
+    found = parallel_passes(surface, 0.03, HALF, by="parameters")
+    for each in found.stretches:
+        assert np.ptp(surface.closest(each.points).u) < 1e-4
+    assert found.widest == pytest.approx(found.spacing, rel=1e-3)  # parallels are evenly apart
+    meridians = parallel_passes(surface, 0.03, 0.0, by="parameters")
+    assert meridians.spacing <= 0.03  # where they are widest apart, at the equator
+    (note,) = parallel_passes(PLATE, 0.05, HALF / 2, by="parameters").notes
+    assert "45 deg from the requested direction" in note  # along u or v alone
+    assert not parallel_passes(PLATE, 0.05, HALF, by="parameters").notes
+
+
+def test_a_hole_parts_passes_and_leaves_them_straight():
+    found = parallel_passes(panel_with_hole(), 0.03)
+    assert found.count == math.ceil(0.4 / 0.03)
+    assert any("1 hole" in note for note in found.notes)
+    for level, row in enumerate(by_level(found)):
+        height = 0.4 * (level + 0.5) / found.count
+        chord = 2.0 * math.sqrt(max(0.08**2 - (height - 0.2) ** 2, 0.0))
+        y = np.concatenate([each.points[:, 1] for each in row])
+        assert np.abs(y - height).max() <= 0.02 * found.spacing
+        assert len(row) == (2 if chord > 0.0 else 1)
+        assert sum(each.length for each in row) == pytest.approx(0.6 - chord, abs=2e-3)
+        for each in row:
+            off = np.linalg.norm(each.points[:, :2] - [0.3, 0.2], axis=1)
+            assert off.min() >= 0.08 - 2e-4
+
+
+def test_every_other_pass_is_turned_round_unless_it_is_one_way():
+    for one_way in (False, True):
+        found = parallel_passes(PLATE, 0.05, one_way=one_way)
+        own = [(each.points @ PLATE.rotation)[[0, -1], 0] for each in found.stretches]
+        forward = [bool(ends[1] > ends[0]) for ends in own]
+        assert len(set(forward)) == (1 if one_way else 2)
+        assert all(a != b for a, b in pairwise(forward)) != one_way
+
+
+def test_overrun_goes_straight_on_beyond_the_border():
+    found = parallel_passes(ARCH, 0.05, HALF, overrun=0.04)
+    for each in found.stretches:
+        on = np.flatnonzero(each.on_surface)
+        assert (np.diff(on) == 1).all()  # the overrun is at both ends
+        assert on[0] == len(each.points) - 1 - on[-1] > 0
+        own = (each.points - ARCH.position) @ ARCH.rotation
+        assert own[:, 2].min() == pytest.approx(-0.04, abs=1e-6)
+        assert own[:, 2].max() == pytest.approx(0.54, abs=1e-6)
+        assert np.allclose(np.linalg.norm(own[:, :2], axis=1), 0.3, atol=1e-6)
+        assert np.allclose(np.linalg.norm(each.normals, axis=1), 1.0)
+
+
+def test_points_lie_on_the_surface_and_evenly():
+    surface = torus(0.4, 0.1, (0, 120), (0, 180))
+    found = parallel_passes(surface, 0.02, step=0.005)
+    for each in found.stretches:
+        at = surface.closest(each.points)
+        assert np.abs(at.height).max() <= 1e-7
+        assert np.allclose(at.normal, each.normals, atol=1e-9)
+        assert np.linalg.norm(np.diff(each.points, axis=0), axis=1).max() <= 0.0051
+    assert found.length > 0.95 * surface.area(*surface.u_range, *surface.v_range) / found.pitch
+
+
+def test_round_a_tube_and_along_it():
+    tube = cylinder(0.1, (0, 360), (0, 0.3))
+    rings = parallel_passes(tube, 0.02, 0.0)
+    assert rings.count == 15
+    assert all(each.closed for each in rings.stretches)
+    assert all(np.array_equal(each.points[0], each.points[-1]) for each in rings.stretches)
+    along = parallel_passes(tube, 0.02, HALF)
+    assert along.count == len(along.stretches) == math.ceil(math.tau * 0.1 / 0.02 - 0.01)
+    angle = np.sort([math.atan2(*each.points[3, 1::-1]) % math.tau for each in along.stretches])
+    assert np.allclose(np.diff(angle) * 0.1, along.spacing, rtol=0.02)
+
+
+def test_pieces_are_sewn_along_their_seam():
+    """A flat plate and a quarter of a cylinder that go over into one another, cut differently."""
+    flat = plane((-0.3, 0.0), (0.0, 0.4), position=(0.0, 0.0, 0.2))
+    bend = cylinder(0.2, (0, 90), (-0.4, 0.0), side="outside", rpy_deg=(90, 0, 0))
+    surface = piecewise([flat, bend], side="outside")
+    found, length = parallel_passes(surface, 0.03, (1.0, 0.0, 0.0)), 0.3 + 0.1 * math.pi
+    assert found.count == math.ceil(0.4 / 0.03)
+    for each in found.stretches:
+        assert each.length == pytest.approx(length, rel=1e-3)
+        assert np.ptp(each.points[:, 1]) <= 0.02 * found.spacing
+    assert parallel_passes(surface, 0.03, (0.0, 1.0, 0.0)).count == math.ceil(length / 0.03)
+
+
+def test_a_spline_as_patch_and_as_mesh_gets_the_same_passes():
+    u = np.linspace(0.0, 1.0, 7)
+    x, y = np.meshgrid(0.5 * u, 0.4 * u, indexing="ij")
+    patch = bspline(np.stack([x, y, 0.05 * np.sin(4 * x) * np.cos(5 * y)], axis=2))
+    one, other = (
+        parallel_passes(each, 0.05, (1.0, 0.2, 0.0))
+        for each in (patch, mesh(TriangleMesh(*of_patch(patch, 40, 40))))
+    )
+    assert one.count == other.count > 5
+    assert one.spacing == pytest.approx(other.spacing, rel=2e-3)
+    assert one.length == pytest.approx(other.length, rel=5e-3)
+
+
+def test_over_many_triangles_distances_are_taken_on_a_copy():
+    """The passes lie on the surface itself, and keep their pitch within 2 %."""
+    rng = np.random.default_rng(0)
+    u, v = np.meshgrid(np.linspace(0.2, 1.7, 180), np.linspace(0.0, 0.5, 150), indexing="ij")
+    for values, step in ((u, 1.5 / 180), (v, 0.5 / 150)):
+        values[1:-1, 1:-1] += rng.uniform(-0.2, 0.2, (178, 148)) * step
+    points = 0.3 * np.stack([np.cos(u), np.sin(u), v / 0.3], axis=-1).reshape(-1, 3)
+    own = points @ ARCH.rotation.T + ARCH.position
+    fine = mesh(TriangleMesh(own, grid(179, 149)[2]), side="outside")
+    found = parallel_passes(fine, 0.05, 0.5, step=0.004)
+    assert any("a copy of" in note for note in found.notes)
+    for each, inner in inwards(found):
+        assert np.abs(fine.closest(each.points).height).max() <= 1e-7
+        lines = [away("arch", each.points, other.points) for other in inner]
+        assert np.abs(np.min(lines, axis=0) / found.spacing - 1.0).max() <= 0.02
+
+
+def test_one_pass_is_enough_for_a_narrow_plate():
+    found = parallel_passes(plane((0.0, 0.3), (0.0, 0.4)), 1.0, HALF)
+    assert (found.count, found.dropped) == (1, 0.0)
+    assert found.length == pytest.approx(0.4)
+    assert np.allclose(found.stretches[0].points[:, 0], 0.15)
+
+
+@pytest.mark.parametrize("degrees", [20, 45, 110, 150])
+@pytest.mark.parametrize("name", ["plate", "cap"])
+def test_oblique_passes_stay_parallel_beyond_the_ends_of_the_first(name, degrees):
+    """Straight on the plate, and on the sphere circles about one great circle, to their ends.
+
+    (On the arch the first pass is the section with a plane, no straight line when laid flat.)
+    """
+    found = parallel_passes(SURFACES[name], 0.03, math.radians(degrees), step=0.004)
+    assert not any("kinks" in note for note in found.notes)
+    rows = [
+        np.concatenate([unrolled(name, each.points) for each in row]) for row in by_level(found)
+    ]
+    line = rows[len(rows) // 2]
+    along, _, least = np.linalg.svd(line - line.mean(axis=0))[2][[0, 1, -1]]
+    across = np.cross([0.0, 0.0, 1.0], along)
+    heights = [0.4 * np.arcsin(x @ least / 0.4) if name == "cap" else x @ across for x in rows]
+    assert max(map(np.ptp, heights)) <= 0.02 * found.spacing
+    gaps = np.abs(np.diff([height.mean() for height in heights]))
+    assert np.abs(gaps / found.spacing - 1.0).max() <= 0.02
+
+
+@pytest.mark.parametrize("source", [7, 10**9, 2**32 - 1])
+def test_vertices_that_distances_do_not_reach_take_theirs_from_their_neighbours(
+    source, monkeypatch
+):
+    """Rounding may lose vertices, two beside each other too; passes stay where they were.
+
+    pygeodesic names any source of such vertices, and fails where its array cannot hold that.
+    """
+    rng, surface = np.random.default_rng(5), panel_with_hole(0.02)
+    exact = by_level(parallel_passes(surface, 0.05, 0.3, step=0.002))
+
+    class Forgetful(geodesic.PyGeodesicAlgorithmExact):
+        failed = source < 2**31
+
+        def geodesicDistances(self, sources, targets):
+            found, nearest = super().geodesicDistances(sources, targets)
+            if not Forgetful.failed:
+                Forgetful.failed = True
+                raise OverflowError
+            some = np.flatnonzero(found > 0.02)
+            lost = rng.choice(some, len(some) // 20, replace=False)
+            found[lost], nearest[lost] = np.inf, min(source, 10**9)
+            return found, nearest
+
+    monkeypatch.setattr(geodesic, "PyGeodesicAlgorithmExact", Forgetful)
+    found = parallel_passes(surface, 0.05, 0.3, step=0.002)
+    assert any("the exact distance did not reach" in note for note in found.notes)
+    assert found.spacing <= found.widest <= 1.02 * found.spacing
+    for each in found.stretches:
+        one, *others = (  # where `away` looks for the plate
+            e.points @ PLATE.rotation.T + PLATE.position for e in (each, *exact[each.level])
+        )
+        lines = [away("plate", one, other) for other in others]
+        assert min(line.max() for line in lines) <= 0.02 * found.spacing
+
+
+def test_bad_input_is_named(approved):
+    u, v, faces = grid(4, 4)
+    points = np.column_stack([u, v, np.zeros_like(u)])
+    both = np.concatenate([points, points + np.array([2.0, 0.0, 0.0])])
+    apart = mesh(TriangleMesh(both, np.concatenate([faces, faces + len(points)])))
+    asked = [
+        (PLATE, {"pitch": 0.0}), (PLATE, {"pitch": math.nan, "overrun": -1.0}),
+        (PLATE, {"pitch": 0.03, "direction": PLATE.rotation[:, 2]}),
+        (PLATE, {"pitch": 0.03, "direction": math.inf}),
+        (PLATE, {"pitch": 0.03, "direction": (1.0, 0.0)}), (PLATE, {"pitch": 0.03, "by": "heat"}),
+        (PLATE, {"pitch": 1e-6}), (apart, {"pitch": 0.2}),
+        (panel_with_hole(0.05), {"pitch": 0.05, "by": "parameters"}),
+    ]  # fmt: skip
+    said = []
+    for surface, arguments in asked:
+        with pytest.raises(CoverableError) as caught:
+            parallel_passes(surface, **arguments)
+        said.append(str(caught.value))
+    approved("passes refused", "\n".join(said))
+    assert parallel_passes(apart, 0.2, by="planes").length > 8.0  # the remedy that is named

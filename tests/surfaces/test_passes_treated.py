@@ -1,0 +1,270 @@
+"""The bracket of the treated share: against closed forms, and points drawn by the area."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from mesh_patches import grid, panel_with_hole
+from scipy.integrate import quad
+
+from surfaces import cone, cylinder, plane, sphere
+from surfaces.passes import (
+    ToolLines,
+    WorkingMesh,
+    parallel_passes,
+    treated_share,
+    visits,
+    working_mesh,
+)
+from surfaces.passes.treated import share_below
+
+
+def facing(mesh: WorkingMesh) -> np.ndarray:
+    normals = mesh.doubled_areas
+    return normals / np.linalg.norm(normals, axis=1)[:, None]
+
+
+def lines_of(*rows: np.ndarray, normal=(0.0, 0.0, 1.0)) -> ToolLines:
+    points = np.concatenate(rows)
+    normals = np.broadcast_to(np.asarray(normal, float), points.shape).copy()
+    return ToolLines(points, normals, np.repeat(np.arange(len(rows)), [len(row) for row in rows]))
+
+
+def straight(a, b, step=0.0035) -> np.ndarray:
+    count = math.ceil(np.linalg.norm(np.subtract(b, a)) / step) + 1
+    return np.linspace(a, b, count)
+
+
+PLATE = working_mesh(plane((0.0, 0.6), (0.0, 0.4)), 0.007)
+
+
+def strips():
+    rows = [straight((-0.03, y, 0), (0.63, y, 0)) for y in (0.05, 0.15, 0.25, 0.35)]
+    return PLATE, lines_of(*rows), 0.02, 4 * 0.04 / 0.4
+
+
+def stadium():
+    line = straight((0.15, 0.2, 0), (0.45, 0.2, 0))
+    return PLATE, lines_of(line), 0.05, (2 * 0.05 * 0.3 + math.pi * 0.05**2) / 0.24
+
+
+def annulus():
+    angle = np.linspace(0.0, math.tau, 300)
+    ring = np.column_stack([0.3 + 0.1 * np.cos(angle), 0.2 + 0.1 * np.sin(angle), 0 * angle])
+    return PLATE, lines_of(ring), 0.02, 4 * math.pi * 0.1 * 0.02 / 0.24
+
+
+def along_cylinder():
+    """The half width of a ball on a cylinder, passes along it: 2 R asin(r / 2R)."""
+    surface = cylinder(0.3, (0, 90), (0.0, 0.5))
+    angles = np.radians([15.0, 45.0, 75.0])
+    out = np.column_stack([np.cos(angles), np.sin(angles), 0.0 * angles])
+    rows = [straight((*0.3 * way[:2], -0.03), (*0.3 * way[:2], 0.53)) for way in out]
+    lines = lines_of(*rows)
+    lines = lines._replace(normals=out[lines.stretch])
+    truth = 3 * 2 * (2 * 0.3 * math.asin(0.03 / 0.6)) / (0.3 * math.pi / 2)
+    return working_mesh(surface, 0.007), lines, 0.03, truth
+
+
+def sphere_zone():
+    """Parallels of a sphere: cos(t - a) - cos(t + a), a = 2 asin(r / 2R)."""
+    surface = sphere(0.3, (40, 90), (0, 120))
+    found = parallel_passes(surface, 0.09, math.pi / 2, by="parameters", step=0.003, overrun=0.04)
+    a, low, high = 2 * math.asin(0.02 / 0.6), math.radians(40), math.radians(90)
+    polar = [math.acos(each.points[len(each.points) // 2, 2] / 0.3) for each in found.stretches]
+    bands = sum(math.cos(t - a) - math.cos(t + a) for t in polar)
+    points = np.concatenate([each.points for each in found.stretches])
+    stretch = np.repeat(np.arange(len(polar)), [len(each.points) for each in found.stretches])
+    lines = ToolLines(points, points / np.linalg.norm(points, axis=1)[:, None], stretch)
+    return working_mesh(surface, 0.006), lines, 0.02, bands / (math.cos(low) - math.cos(high))
+
+
+def along_cone():
+    """Along lines through the apex: at s from it the ball reaches where s sin(angle) = r."""
+    slope, radius, half = 0.5, 0.03, math.atan(0.5)
+    surface = cone(0.1, slope, (0, 180), (0.1, 0.5))
+    azimuths = np.radians([30.0, 90.0, 150.0])
+    rows, normals = [], []
+    for azimuth in azimuths:
+        out = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
+        rows.append(straight(*[(0.1 + slope * z) * out + [0, 0, z] for z in (0.06, 0.54)]))
+        normals.append(out * math.cos(half) - [0.0, 0.0, math.sin(half)])
+    lines = lines_of(*rows)
+    lines = lines._replace(normals=np.array(normals)[lines.stretch])
+
+    def width(s: float) -> float:
+        apart = math.sqrt(1.0 - (radius / s) ** 2) - math.cos(half) ** 2
+        return 2.0 * s * math.sin(half) * math.acos(apart / math.sin(half) ** 2)
+
+    low, high = ((0.1 + slope * z) / math.sin(half) for z in (0.1, 0.5))
+    area = math.pi * math.sin(half) * (high**2 - low**2) / 2.0
+    return working_mesh(surface, 0.006), lines, radius, 3.0 * quad(width, low, high)[0] / area
+
+
+def beside_and_across_a_hole():
+    """Strips less what the hole takes from them: a segment of its circle, and a slice of it."""
+    rows = [straight((-0.04, y, 0), (0.64, y, 0)) for y in (0.1, 0.2, 0.35)]
+    segment = 0.08**2 * math.acos(0.07 / 0.08) - 0.07 * math.sqrt(0.08**2 - 0.07**2)
+    across = 2.0 * (0.03 * math.sqrt(0.08**2 - 0.03**2) + 0.08**2 * math.asin(0.03 / 0.08))
+    treated = 3 * 0.06 * 0.6 - segment - across
+    share = treated / (0.24 - math.pi * 0.08**2)
+    return working_mesh(panel_with_hole(), 0.007), lines_of(*rows), 0.03, share
+
+
+BENT = (along_cylinder, sphere_zone, along_cone, beside_and_across_a_hole)
+
+
+@pytest.mark.parametrize("case", [strips, stadium, annulus, *BENT])
+def test_the_bracket_holds_the_closed_form(case):
+    mesh, lines, radius, truth = case()
+    found = treated_share(mesh, facing(mesh), lines, radius)
+    bent = 2e-3 * truth if case in BENT else 1e-6  # the mesh's own error
+    assert found.lower <= truth + bent
+    assert found.upper >= truth - bent
+    assert found.upper - found.lower <= 0.005
+    assert abs(0.5 * (found.lower + found.upper) - truth) <= 0.005
+    # Beside a straight line the distance is linear over a face: of cut faces the share is exact.
+    assert case is not strips or found.lower == pytest.approx(truth, abs=2e-5)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_face_is_treated_more_or_less_than_is_said_of_it(seed):
+    """Large faces that are not cut, about places at random; against points all over each face."""
+    rng = np.random.default_rng(seed)
+    u, v, faces = grid(12, 8)
+    mesh = WorkingMesh(np.column_stack([0.36 * u, 0.24 * v, 0.0 * u]), faces)
+    points = np.column_stack([rng.uniform(0.0, [0.36, 0.24], (8, 2)), np.zeros(8)])
+    lines = ToolLines(points, np.tile([0.0, 0.0, 1.0], (8, 1)), np.arange(8))
+    found = treated_share(mesh, facing(mesh), lines, 0.045, rounds=0)
+    a, b = (x.ravel() for x in np.mgrid[0:60, 0:60])
+    a, b = (x[a + b < 60] / 60 + 1 / 180 for x in (a, b))
+    places = np.stack([1.0 - a - b, a, b], axis=1) @ mesh.corners
+    away = np.linalg.norm(places[:, :, None] - points, axis=3).min(axis=2)
+    truth = (away <= 0.045).mean(axis=1)
+    assert (found.shares <= truth + 0.01).all()
+    assert (found.most >= truth - 0.01).all()
+    assert ((found.most - truth)[truth > 0.0] < 0.1).any()
+
+
+def test_random_points_agree_and_further_rounds_only_narrow_it():
+    rng = np.random.default_rng(5)
+    mesh = working_mesh(sphere(0.25, (50, 110), (0, 90)), 0.02)
+    rows = [mesh.corners[rng.integers(len(mesh.faces))].mean(axis=0) for _ in range(12)]
+    points = np.array(rows)
+    normals = points / np.linalg.norm(points, axis=1)[:, None]
+    lines = ToolLines(points, normals, np.arange(12))
+    areas = mesh.areas
+    face = rng.choice(len(areas), 40_000, p=areas / areas.sum())
+    weights = rng.dirichlet((1.0, 1.0, 1.0), 40_000)
+    places = np.einsum("kc,kci->ki", weights, mesh.corners[face])
+    near = np.linalg.norm(places[:, None] - points, axis=2).min(axis=1)
+    before = (0.0, 1.0)
+    for rounds in range(4):
+        found = treated_share(mesh, facing(mesh), lines, 0.045, rounds)
+        assert before[0] - 1e-9 <= found.lower <= found.upper <= before[1] + 1e-9
+        before = found.lower, found.upper
+        inside = float((near <= 0.045).mean())
+        spread = 4.0 * math.sqrt(inside * (1.0 - inside) / len(near))
+        assert found.lower - spread <= inside <= found.upper + spread
+    assert found.upper - found.lower < 0.02
+
+
+def test_the_back_of_a_thin_part_is_not_treated_through_it():
+    """Two plates 4 mm apart that look away from one another, a footprint of 40 mm."""
+    front, back = PLATE, PLATE.vertices - [0.0, 0.0, 0.004]
+    both = WorkingMesh(
+        np.concatenate([front.vertices, back]),
+        np.concatenate([front.faces, front.faces[:, ::-1] + len(back)]),
+    )
+    one = lines_of(straight((-0.03, 0.2, 0), (0.63, 0.2, 0)))
+    found = treated_share(both, facing(both), one, 0.02)
+    assert found.lower == pytest.approx(0.5 * 0.1, abs=2e-3)
+    assert found.upper == pytest.approx(0.5 * 0.1, abs=2e-3)
+    # Lines on both sides, those beneath nearer to some places than those above.
+    other = ToolLines(
+        np.concatenate([one.points, one.points + np.array([0.0, 0.01, -0.004])]),
+        np.concatenate([one.normals, -one.normals]),
+        np.concatenate([one.stretch, one.stretch + 1]),
+    )
+    found = treated_share(both, facing(both), other, 0.02)
+    assert found.lower <= 0.1 <= found.upper
+    assert found.upper - found.lower <= 0.005
+
+
+def test_what_is_not_connected_within_the_ball_is_not_treated():
+    """Two flanges that look the same way, 30 mm above one another."""
+    shelf = PLATE.vertices + np.array([0.0, 0.0, 0.03])
+    both = WorkingMesh(
+        np.concatenate([PLATE.vertices, shelf]),
+        np.concatenate([PLATE.faces, PLATE.faces + len(shelf)]),
+    )
+    found = treated_share(both, facing(both), lines_of(straight((0, 0.2, 0), (0.6, 0.2, 0))), 0.05)
+    assert found.upper <= 0.5 * 0.25 + 0.005
+
+
+def test_a_tool_that_may_be_off_treats_less_for_certain_and_more_perhaps():
+    """What it does within 10 mm of a line is in the bracket: wobble, or stop short of the ends."""
+    mesh, line, radius, _ = stadium()
+    found = treated_share(mesh, facing(mesh), line, radius, off=0.01)
+    x = np.linspace(0.15, 0.45, 3000)
+    wobbling = np.column_stack([x, 0.2 + 0.01 * np.sin(400.0 * x), 0.0 * x])
+    for path in (wobbling, straight((0.16, 0.2, 0), (0.44, 0.2, 0))):
+        real = treated_share(mesh, facing(mesh), lines_of(path), radius)
+        assert found.lower <= real.upper
+        assert found.upper >= real.lower
+    least, most = ((2 * r * 0.3 + math.pi * r**2) / 0.24 for r in (0.04, 0.06))
+    assert (found.lower, found.upper) == pytest.approx((least, most), abs=0.01)
+    nothing = treated_share(mesh, facing(mesh), line, radius, off=radius)
+    assert (nothing.lower, nothing.upper) == (0.0, 1.0)
+
+
+def test_nothing_moves_nothing():
+    """A rigid motion, the path run backwards, or cut in two, changes the share by rounding only."""
+    mesh, lines, radius, _ = stadium()
+    found = treated_share(mesh, facing(mesh), lines, radius)
+    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    turn *= np.linalg.det(turn)
+    moved = WorkingMesh(mesh.vertices @ turn.T + 2.0, mesh.faces)
+    others = [
+        (moved, ToolLines(lines.points @ turn.T + 2.0, lines.normals @ turn.T, lines.stretch)),
+        (mesh, ToolLines(lines.points[::-1], lines.normals, lines.stretch)),
+    ]
+    for other, path in others:
+        again = treated_share(other, facing(other), path, radius)
+        assert again.lower == pytest.approx(found.lower, abs=1e-6)
+        assert again.upper == pytest.approx(found.upper, abs=1e-6)
+    wider = treated_share(mesh, facing(mesh), lines, 1.1 * radius)
+    assert wider.lower > found.lower
+    nothing = ToolLines(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.int64))
+    assert treated_share(mesh, facing(mesh), nothing, radius).upper == 0.0
+
+
+def test_shares_of_triangles_below_a_level():
+    rng = np.random.default_rng(2)
+    values = rng.normal(size=(50, 3))
+    weights = rng.dirichlet((1.0, 1.0, 1.0), 200_000)
+    for row, share in zip(values, share_below(values, 0.2), strict=True):
+        assert share == pytest.approx((weights @ row <= 0.2).mean(), abs=5e-3)
+    assert share_below(np.array([[0.1, 0.1, 0.1], [0.3, 0.3, 0.3]]), 0.2).tolist() == [1.0, 0.0]
+
+
+def test_a_footprint_far_larger_than_the_surface_is_counted_too():
+    """Within reach of everything a path comes by once; at a few pitches, by each of its passes."""
+    x = np.linspace(0.0, 0.6, 600)
+    rows = [
+        np.column_stack([x[:: 1 if k % 2 else -1], np.full(600, 0.02 * k + 0.01), 0.0 * x])
+        for k in range(20)
+    ]
+    points = np.concatenate(rows)
+    up = np.tile([0.0, 0.0, 1.0], (len(points), 1))
+    line = ToolLines(points, up, np.zeros(len(points), dtype=np.int64))
+    places = np.random.default_rng(1).uniform(0.0, [0.6, 0.4, 0.0], (4000, 3))
+    for radius in (1.0, 100.0):
+        assert (visits(places, up[:4000], line, radius) == 1).all()
+    inner = np.abs(places - [0.3, 0.2, 0.0]).max(axis=1) < 0.1
+    for radius, passes in ((0.03, 3.0), (0.05, 5.0)):
+        assert visits(places[inner], up[:4000][inner], line, radius).mean() == pytest.approx(
+            passes, rel=0.06
+        )

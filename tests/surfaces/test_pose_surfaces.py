@@ -1,0 +1,159 @@
+"""Poses in place of a surface: their cells, the curves and paths between them, and their bounds."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from bounds import holds
+
+from surfaces import SurfaceError, poses, read_poses
+from surfaces.places import Places, offset_surface
+
+LINE = np.array([[0.4, 0.0, 0.3], [0.4, 0.1, 0.3], [0.4, 0.2, 0.3], [0.4, 0.2, 0.3]])
+UP = np.tile([0.0, 0.0, 2.0], (4, 1))
+TURNED = np.array([[0.0, 0.0, 1.0], [0.6, 0.0, 0.8], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+TILTED = {"position": (1.0, 2.0, 3.0), "rpy_deg": (20.0, -30.0, 50.0)}
+DENSE = np.linspace(0.0, 1.0, 41)
+
+
+def drawn(seed, count=25, **more):
+    """A toolpath that wanders and tilts, placed askew."""
+    rng = np.random.default_rng(seed)
+    points = np.cumsum(rng.normal(0.0, 0.05, (count, 3)), axis=0)
+    normals = np.array([0.0, 0.0, 2.0]) + rng.normal(0.0, 1.0, (count, 3))
+    return poses(points, normals, **TILTED, **more)
+
+
+def test_each_pose_is_a_cell_where_it_is_placed():
+    cells = poses(LINE, UP, TURNED, [[3, 0, 1]] * 4, **TILTED)
+    turn, at = cells.surface.rotation, np.array(TILTED["position"])
+    np.testing.assert_allclose(cells.centres, LINE @ turn.T + at, atol=1e-12)
+    np.testing.assert_allclose(cells.normals, np.tile(turn[:, 2], (4, 1)), atol=1e-12)
+    np.testing.assert_allclose(cells.approaches, TURNED @ turn.T, atol=1e-12)
+    np.testing.assert_allclose(cells.tangents, np.tile(turn[:, 0], (4, 1)), atol=1e-12)
+    assert cells.pairs.tolist() == [[0, 1], [1, 2], [2, 3]]
+    assert cells.in_order
+
+
+def test_within_a_radius_poses_of_one_side_are_neighbours():
+    points = [[0, 0, 0], [0.1, 0, 0], [0.3, 0, 0], [0.1, 0, 0.01]]
+    normals = [[0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0.1, -1]]
+    cells = poses(points, normals, neighbours=0.15)
+    assert (cells.pairs.tolist(), cells.in_order) == ([[0, 1]], False)
+
+
+@pytest.mark.parametrize("cells", [poses(LINE, TURNED), drawn(1, neighbours=0.3)], ids=str)
+def test_between_poses_points_run_straight_and_normals_along_great_arcs(cells):
+    one, other = (cells.pairs[:, end] for end in (0, 1))
+    angle = np.arccos(np.clip((cells.normals[one] * cells.normals[other]).sum(axis=1), -1, 1))
+    for k, (i, j) in enumerate(cells.pairs):
+        points, normals = cells.curves.at(np.full(41, k), DENSE)
+        line = cells.centres[i] + DENSE[:, None] * (cells.centres[j] - cells.centres[i])
+        np.testing.assert_allclose(points, line, atol=1e-12)
+        both = np.sin([(1 - DENSE) * angle[k], DENSE * angle[k]]) / np.sin(angle[k])
+        arc = both[0][:, None] * cells.normals[i] + both[1][:, None] * cells.normals[j]
+        off = np.linalg.norm(normals - arc, axis=1)
+        holds(cells.curves.deviations[k, 1], off, used=0.0)
+        # Second differences are bounded by what is stated of the second derivative.
+        bend = np.linalg.norm(np.diff(normals, 2, axis=0), axis=1).max() * 40.0**2
+        rows = slice(*cells.curves.first[k : k + 2])
+        assert 0.9 * angle[k] ** 2 < bend
+        assert bend <= cells.curves.derivative_bounds[rows, 1].max() * 1.0001
+    assert cells.curves.deviations[:, 1].max() < 2e-5
+
+
+def test_places_follow_the_curves_and_tell_turns_on_the_spot_apart():
+    cells = poses(LINE, TURNED)
+    offset = offset_surface(cells.surface, 0.02)
+    targets = LINE + 0.02 * TURNED
+    chart, share = np.array([0, 1, 2, 2]), np.array([0.3, 0.7, 0.2, 0.9])
+    there = Places(chart, np.column_stack([share, np.zeros(4)]))
+    points, directions = offset.at(there)
+    ahead = targets[chart] + share[:, None] * (targets[chart + 1] - targets[chart])
+    np.testing.assert_allclose(points, ahead, atol=1e-12)
+    found = offset.nearest(points, points - 0.02 * directions, 1e-3)
+    assert found.chart.tolist() == chart.tolist()
+    np.testing.assert_allclose(found.x[:, 0], share, atol=1e-6)
+    spot = offset_surface(cells.surface, 0.0)
+    points, directions = spot.at(there)
+    found = spot.nearest(points, points - spot.least_look * directions, 1e-3)
+    np.testing.assert_allclose(found.x[2:, 0], share[2:], atol=1e-9)
+
+
+@pytest.mark.parametrize("height", [0.0, 0.02, -0.05])
+def test_paths_of_places_bend_no_more_than_is_said(height):
+    """Over one pose or none; none leads two curves further in one step."""
+    rng = np.random.default_rng(4)
+    cells = drawn(2, tangents=np.cross(rng.normal(size=(25, 3)), rng.normal(size=(25, 3))))
+    offset = offset_surface(cells.surface, height)
+    x, chart = rng.uniform(0, 1, (2, 300, 2)) * [1, 0], rng.integers(0, 24, 300)
+    after = np.minimum(chart + rng.integers(0, 2, 300), 23)
+    paths = offset.paths(Places(chart, x[0]), Places(after, x[1]))
+    assert np.isfinite(paths.derivative_bounds).all()
+    weight = (0.5 * DENSE * (1.0 - DENSE))[1:-1, None]
+    stated, found, slopes, turned = [], [], [], []
+    for piece in (0, 2):
+        some = paths.share[:, piece + 1] > paths.share[:, piece]
+        one, other = (paths.place(piece + k).of(some) for k in (0, 1))
+        assert (one.chart == other.chart).all()
+        line = one.x[None] + DENSE[:, None, None] * (other.x - one.x)
+        dense = Places(np.tile(one.chart, 41), line.reshape(-1, 2))
+        values = np.stack(offset.at(dense), axis=1).reshape(41, -1, 2, 3)
+        ends = values[[0]] + DENSE[:, None, None, None] * (values[[-1]] - values[[0]])
+        off = np.linalg.norm(values - ends, axis=3)[1:-1]
+        found.append((off / weight[..., None]).max(axis=0))
+        stated.append(paths.derivative_bounds[some, piece])
+        slopes.append(offset.tangent_slopes(one, other))
+        ways = offset.tangents(dense).reshape(41, -1, 3)
+        turned.append(40.0 * np.linalg.norm(np.diff(ways, axis=0), axis=2).max(axis=0))
+    stated, found = np.concatenate(stated), np.concatenate(found)
+    holds(stated[:, 1], found[:, 1], used=0.95, tiny=1e-9)
+    holds(stated[:, 0], found[:, 0], used=0.0, tiny=1e-9)  # offset points run straight
+    holds(np.concatenate(slopes), np.concatenate(turned), used=0.95, tiny=1e-9)
+    far = offset.paths(Places(chart[:1], x[0, :1]), Places((chart[:1] + 12) % 24, x[0, :1]))
+    assert np.isinf(far.derivative_bounds).any()
+
+
+@pytest.mark.parametrize("neighbours", ["order", 0.3])
+def test_parts_hold_every_place_of_every_curve(neighbours):
+    cells = drawn(1, neighbours=neighbours)
+    parts = cells.surface.parts(1e-3, 0.01)
+    finest = np.flatnonzero(parts.children[:, 0] < 0)
+    assert parts.radius[finest, 0].max() <= 1e-9
+    assert parts.radius[finest, 1].max() <= 0.01
+    points, normals = cells.trace(cells.pairs, np.linspace(0.0, 1.0, 23))
+    places = np.concatenate([points, normals], axis=2).reshape(-1, 6)
+    held = np.zeros(len(places), dtype=bool)
+    most = 0.0
+    # On a curve x_2 changes nothing; x_1 is where the point is nearest.
+    for k in finest.tolist():
+        centre, slope = parts.centre[k], parts.slopes[k, 0]
+        assert not parts.slopes[k, 1].any()
+        x = np.clip((places - centre)[:, :3] @ slope[:3] / (slope[:3] @ slope[:3]), -1.0, 1.0)
+        off = places - centre - x[:, None] * slope
+        on = np.linalg.norm(off[:, :3], axis=1) <= parts.radius[k, 0] + 1e-9
+        used = np.linalg.norm(off[:, 3:], axis=1) / parts.radius[k, 1]
+        held |= on & (used <= 1.0 + 1e-9)
+        most = max(most, used[on & (used <= 1.0)].max(initial=0.0))
+    assert held.all()
+    assert most > 0.8
+
+
+def test_poses_without_bounds_say_so():
+    own = drawn(2, approaches=np.tile([0.0, 0.0, -1.0], (25, 1)))
+    with pytest.raises(SurfaceError, match="tool axes of their own have no bounds"):
+        own.surface.parts(1e-3, 0.01)
+    with pytest.raises(SurfaceError, match="24 curves; bounds are made for 1 to 20"):
+        drawn(3).surface.parts(1e-3, 0.01, most=20)
+
+
+def test_a_file_of_poses_is_read_in_its_units(tmp_path):
+    file = tmp_path / "path.csv"
+    file.write_text("tx,ty,tz,x,y,z,nx,ny,nz\n1,0,0, 400,0,300,0,0,1\n1,0,0,400,100,300,0,0,1\n")
+    found = read_poses(file, "mm")
+    np.testing.assert_allclose(found.points, LINE[:2], atol=1e-15)
+    assert found.approaches is None
+    assert poses(**found._asdict()).tangents.tolist() == [[1.0, 0.0, 0.0]] * 2
+    assert math.isclose(read_poses(file).points[0, 0], 400.0)

@@ -1,0 +1,263 @@
+"""Bounds on whole surfaces (parts, turning normals, curvatures) hold, and hardly less would do.
+
+Asked of specimens and of random surfaces of every kind, at every level of every tree.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from bounds import holds
+from part_walks import at_parameters, boxes_of, lost, pieces_of, residuals, spread, survivors, walk
+from random_surfaces import KINDS, random_surface
+from samples import sampled, seeds
+from smooth_probes import POSE
+from specimens import EXTREME, FACETED, SMOOTH
+
+from coverable_errors import ArgumentError
+from surfaces import cylinder, hyperboloid, plane, sphere
+
+PATCHES = {**SMOOTH, **EXTREME}
+FLAT, STRAIGHT, MOST = 2e-3, 0.05, 400
+GRID = np.array(list(itertools.product(np.linspace(-1.0, 1.0, 9), repeat=2)))
+
+
+@pytest.fixture(scope="module", params=PATCHES, ids=str)
+def patch(request):
+    return PATCHES[request.param]
+
+
+@pytest.fixture(scope="module")
+def tree(patch):
+    """Its parts, and off (K, 81, 2): how far points and normals of their boxes are off the models;
+    and the least (K, 2) that any affine model of the same places could be off."""
+    parts = patch.parts(FLAT, STRAIGHT, MOST)
+    low, high = boxes_of(patch, parts)
+    u, v = np.moveaxis((low + high)[:, None] / 2.0 + GRID * (high - low)[:, None] / 2.0, 2, 0)
+    values = np.concatenate([patch.point(u, v), patch.normal(u, v)], axis=2)
+    models = parts.centre[:, None] + np.einsum("gc,kcd->kgd", GRID, parts.slopes)
+    best = np.column_stack([np.ones(len(GRID)), GRID])
+    best = best @ np.linalg.pinv(best)
+    least = values - np.einsum("gh,khd->kgd", best, values)
+    off, least = (np.linalg.norm(a.reshape(*a.shape[:2], 2, 3), axis=3)
+                  for a in (values - models, least))  # fmt: skip
+    return parts, off, least.max(axis=1)
+
+
+def test_parts_hold_all_their_places_and_smaller_radii_would_not(patch, tree):
+    parts, off, _ = tree
+    assert patch.kind != "plane" or parts.radius.max() < 2e-12
+    for k in (0, 1):
+        flat = parts.radius[:, k].max() < 1e-11
+        holds(parts.radius[:, k, None], off[..., k], used=0.0 if flat else 0.8)
+
+
+def test_the_finest_parts_are_near_the_least_possible(patch, tree):
+    """No affine model leaves much less than what is stated of small parts."""
+    parts, _, least = tree
+    rounding = 3e-14 * np.abs(parts.centre).max() + 1e-11
+    for k in (0, 1):
+        small = parts.radius[:, k] < (0.02, 0.2)[k] * min(1.0, parts.radius[0, k])
+        known = (parts.children[:, 0] < 0) & small & (least[:, k] > 100.0 * rounding)
+        ratio = (parts.radius[known, k] - rounding) / least[known, k]
+        assert not known.any() or np.median(ratio) <= 3.5
+
+
+def test_the_tree_is_one_and_is_cut_as_asked(patch, tree):
+    parts, *_ = tree
+    inner = parts.children[:, 0] >= 0
+    children = parts.children[inner]
+    assert np.sort(children.ravel()).tolist() == list(range(1, len(parts)))
+    assert (children > np.flatnonzero(inner)[:, None]).all()
+    assert (parts.children[~inner] == -1).all()
+    assert np.isfinite(parts.radius).all()
+    for most in (1, 2, 50):
+        fewer = patch.parts(FLAT, STRAIGHT, most)
+        rough = (fewer.radius[fewer.children[:, 0] < 0] > [FLAT, STRAIGHT]).any()
+        assert len(fewer) <= most
+        assert not rough or len(fewer) + 2 > most
+    coarse, fine = (patch.parts(flat, 1e9, 4000) for flat in (8e-3, 2e-3))
+    assert len(fine) < 7 * len(coarse) or patch.kind == "plane"  # halved sides: a quarter
+
+
+@pytest.mark.parametrize("name", FACETED)
+def test_parts_of_joined_surfaces_and_meshes_hold_their_places(name):
+    surface = FACETED[name]
+    parts = surface.parts(FLAT, STRAIGHT, MOST)
+    finest = parts.children[:, 0] < 0
+    assert (parts.radius[finest] <= [FLAT, STRAIGHT]).all() or len(parts) + 2 > MOST
+    if surface.kind == "mesh":
+        face = np.arange(len(surface.mesh.faces)).repeat(8)
+        weights = np.random.default_rng(2).dirichlet([0.5, 0.5, 0.5], len(face))
+        places = surface.points_at(face, weights), surface.normals_at(face, weights)
+        assert survivors(parts, *places).all()
+        return
+    assert any(surface.turned) == (name == "turned over")
+    above = np.full(len(parts), -1)
+    above[parts.children[~finest]] = np.flatnonzero(~finest)[:, None]
+    for k, (piece, sign) in enumerate(pieces_of(surface)):
+        u, v = spread(piece, 2000)
+        first = np.full(len(u), len(surface.pieces) - 1 + k)
+        places = piece.point(u, v), sign * piece.normal(u, v)
+        used = walk(parts, first, at_parameters(piece, u, v)[1], *places)
+        assert max(used.points, used.normals) <= 1.0
+        over = above[first[0]]
+        while over >= 0:  # parts above several pieces are balls
+            held = residuals(parts, np.full(len(u), over), np.zeros((len(u), 2)), *places)
+            assert (held <= parts.radius[over]).all()
+            over = above[over]
+
+
+@sampled
+@pytest.mark.parametrize("seed", seeds(4, all=300))
+@pytest.mark.parametrize("kind", KINDS)
+def test_random_surfaces_lie_in_their_parts(kind, seed):
+    rng = np.random.default_rng([seed, *map(ord, kind)])
+    surface = random_surface(kind, rng)
+    assert not lost(surface, rng), surface
+
+
+@pytest.mark.parametrize("limits", [(0.0, 1.0), (1.0, -1.0), (np.nan, 1.0), (1.0, np.nan)])
+def test_limits_that_no_part_keeps_are_refused(limits):
+    with pytest.raises(ArgumentError, match="above 0"):
+        sphere(1.0, (10, 90), (0, 90)).parts(*limits)
+
+
+# how fast normals turn, over and beside a patch
+
+WAISTS = {
+    "bell": hyperboloid(0.5, 0.5, (0, 90), (0.1, 0.9)),
+    "steep": hyperboloid(0.5, 0.15, (0, 90), (-0.05, 0.6), **POSE),
+    "slim": hyperboloid(0.1, 0.4, (0, 90), (-0.3, 0.2)),
+    "round": hyperboloid(0.7, 0.4, (0, 90), (0.3, 0.5)),
+    "fan": hyperboloid(0.1, 0.02, (0, 90), (0.2, 0.4)),
+}
+BENT = {**{name: p for name, p in SMOOTH.items() if hasattr(p, "bounds")}, **WAISTS}
+
+
+def turning(surface, height, slack, count=8000):
+    """Largest |Dm x| and |D^2 m[x, x]| of the normal field m, by central differences."""
+    rng = np.random.default_rng(0)
+    u, v = (rng.uniform(*ends, count) for ends in (surface.u_range, surface.v_range))
+    h = height + slack * rng.uniform(-1, 1, count)
+    points = surface.point(u, v) + h[:, None] * surface.normal(u, v)
+    # Along the meridian, and anywhere.
+    ahead = surface.point(u, v + 1e-7) - surface.point(u, v)
+    ways = rng.normal(size=(count, 3))
+    ways[: count // 2] = ahead[: count // 2] / np.linalg.norm(ahead, axis=1)[: count // 2, None]
+    tilt = rng.uniform(-1.5, 1.5, (count // 2, 1))
+    ways[: count // 2] += tilt * surface.normal(u, v)[: count // 2]
+    ways /= np.linalg.norm(ways, axis=1)[:, None]
+    step = 1e-3 / max(surface.bounds(height, slack).curvature, 1.0)
+    after, here, before = (surface.closest(points + s * step * ways).normal for s in (1, 0, -1))
+    return (
+        np.linalg.norm(after - before, axis=1) / (2 * step),
+        np.linalg.norm(after - 2 * here + before, axis=1) / step**2,
+    )
+
+
+@pytest.mark.parametrize("share", [(0.0, 0.0), (0.3, 0.0), (-0.3, 0.05), (-0.6, 0.2), (2.0, 0.5)])
+@pytest.mark.parametrize("name", BENT)
+def test_normals_turn_no_faster_than_is_said(name, share):
+    surface = BENT[name]
+    if surface.kind == "plane":
+        assert [*vars_of(surface.bounds(-5.0, 1.0))] == [0.0, 0.0]
+        return
+    radius = 1.0 / surface.bounds(0.0).curvature
+    height, slack = share[0] * radius, share[1] * radius
+    bounds = surface.bounds(height, slack)
+    if math.isinf(bounds.curvature):
+        assert surface.kind == "hyperboloid"  # bends both ways, so normals meet on either side
+        assert math.isinf(bounds.second_derivative)
+        return
+    first, second = turning(surface, height, slack)
+    tight = 0.0 if slack else 1.0
+    # Truncation of the differences is of the order of (step * curvature)^2.
+    holds(bounds.curvature * (1 + 1e-5), first, used=0.93 * tight, tiny=1e-9)
+    least = 0.7 if surface.kind == "hyperboloid" else 0.93
+    holds(bounds.second_derivative * (1 + 1e-4), second, used=least * tight, tiny=1e-6)
+    wider = surface.bounds(height, slack + 0.01 * radius)
+    assert wider.curvature >= bounds.curvature
+    assert wider.second_derivative >= bounds.second_derivative
+
+
+def vars_of(bounds):
+    return bounds.curvature, bounds.second_derivative
+
+
+@pytest.mark.parametrize("height", [-0.3, 0.0, 0.4])
+def test_turning_of_spheres_and_cylinders_is_exact(height):
+    for surface in (sphere(0.5, (10, 90), (0, 90)), cylinder(0.5, (0, 90), (0, 1))):
+        rho = 0.5 + height - 0.1
+        expected = [1 / rho, 2 / math.sqrt(3) / rho**2]
+        assert [*vars_of(surface.bounds(height, 0.1))] == pytest.approx(expected, rel=1e-11)
+
+
+BALL, ROD = sphere(0.5, (10, 90), (0, 90)), cylinder(0.5, (0, 90), (0, 1))
+HORN, BELL = (hyperboloid(0.5, 0.4, (0, 90), ends) for ends in ((-0.1, 1), (0.5, 1)))
+FOLDS = [
+    (BALL, -0.45, 0.04, False), (BALL, -0.45, 0.05, True), (BALL, -0.6, 0.01, True),
+    (ROD, -0.5, 0.0, True), (ROD, 50.0, 1.0, False),
+    # Meridian radius at the waist: flare^2 / waist = 0.32, on the outside.
+    (HORN, 0.31, 0.0, False), (HORN, 0.32, 0.0, True), (HORN, 0.30, 0.03, True),
+    (HORN, -0.49, 0.0, False), (HORN, -0.5, 0.0, True),
+    # Off the waist the normals from z and -z meet first.
+    (BELL, 0.7158, 0.0, False), (BELL, 0.7159, 0.0, True), (BELL, 0.7, 0.0159, True),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("surface", "height", "slack", "folds"), FOLDS)
+def test_nothing_is_said_exactly_where_the_parallel_surface_folds(surface, height, slack, folds):
+    assert [math.isinf(each) for each in vars_of(surface.bounds(height, slack))] == [folds] * 2
+
+
+@pytest.mark.parametrize("name", BENT)
+def test_below_the_least_height_without_a_bound_no_closest_point_jumps(name):
+    surface = BENT[name]
+    u, v = (np.linspace(*ends, 200)[1:-1] for ends in (surface.u_range, surface.v_range))
+    for sign in (-1.0, 1.0):
+        low, high = 0.0, 1e3
+        if np.isfinite(surface.bounds(sign * high).curvature):
+            continue
+        for _ in range(60):
+            middle = (low + high) / 2
+            finite = np.isfinite(surface.bounds(sign * middle).curvature)
+            low, high = (middle, high) if finite else (low, middle)
+        for height, jumps in ((0.98 * low, False), (1.02 * low, True)):
+            found = surface.closest(surface.point(u, v) + sign * height * surface.normal(u, v))
+            off = np.linalg.norm(surface.point(found.u, found.v) - surface.point(u, v), axis=1)
+            assert (off < 1e-6).all() != jumps
+
+
+# curvatures at the centres of cells
+
+
+@pytest.mark.parametrize("name", SMOOTH)
+def test_the_max_curvature_is_the_largest_of_many_directions(name):
+    surface = SMOOTH[name]
+    cells = surface.cells(4, 5)
+    angle = np.linspace(0.0, math.pi, 90, endpoint=False)
+    widths = [np.ptp(surface.u_range), np.ptp(surface.v_range)]
+    u, v = cells.u[:, None], cells.v[:, None]
+    rates = []
+    for scale in (0.1, 1.0, 10.0):  # of parameters, whose units differ
+        du, dv = 1e-5 * widths[0] * np.cos(angle) * scale, 1e-5 * widths[1] * np.sin(angle)
+        turn = surface.normal(u + du, v + dv) - surface.normal(u - du, v - dv)
+        step = surface.point(u + du, v + dv) - surface.point(u - du, v - dv)
+        rates.append(np.linalg.norm(turn, axis=2) / np.linalg.norm(step, axis=2))
+    best = np.max(rates, axis=(0, 2))
+    assert (best <= cells.max_curvature * (1 + 1e-3) + 1e-6).all()
+    assert (best >= cells.max_curvature * 0.97 - 1e-6).all()
+
+
+def test_parallel_surfaces_bend_as_their_formulas_say():
+    """1 / (R + h) on a sphere; nothing on a plane."""
+    dome = SMOOTH["dome"].cells(9, 10)
+    for height in (-0.5, -0.005, 0.0, 0.3):
+        bent = dome.curves.curvature(height)
+        assert bent.max() == pytest.approx(1.0 / (1.0 + height), rel=1e-4)
+        assert dome.parallel_curvature(height).max() == pytest.approx(1.0 / (1.0 + height), rel=0.1)
+    assert plane((0, 1), (0, 1)).cells(3, 3).curves.curvature(0.1).max() < 1e-12

@@ -1,0 +1,302 @@
+"""Paths of places over every kind of surface, at every scale: what is said along them holds.
+
+Pairs are near and far, across seams, poles, kinks, edges and creases. Each straight piece of a path
+is looked at in dense samples, against the bound that is stated for it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from bounds import holds
+from random_surfaces import random_surface
+from smooth_probes import tangents
+from specimens import EGG, FACETED, SMOOTH, VASE
+from spline_nets import quarter_turn, turned
+
+from surfaces import (
+    bspline,
+    cone,
+    cylinder,
+    ellipsoid,
+    hyperboloid,
+    piecewise,
+    plane,
+    revolution,
+    sphere,
+    torus,
+)  # fmt: skip
+from surfaces.places import Places, offset_surface
+
+DENSE = np.linspace(0.0, 1.0, 33)
+WEIGHT = (0.5 * DENSE * (1.0 - DENSE))[1:-1]
+
+
+def waves(rows, columns, depth, seed):
+    rng = np.random.default_rng(seed)
+    x, y = np.meshgrid(np.linspace(0, 1, rows), np.linspace(0, 0.8, columns), indexing="ij")
+    return np.stack([x, y, rng.uniform(-depth, depth, x.shape)], axis=-1)
+
+
+def half_pipe():
+    """As NURBS: quadratic, with a knot of full multiplicity."""
+    turn, weights = quarter_turn()
+    turn = np.concatenate([turn, turn[1:] @ [[0, 1], [-1, 0]]])
+    points, weights = turned([(1, 0), (1, 0.6)], [1, 1], turn, np.r_[weights, weights[1:]])
+    return bspline(points, (2, 1), ([0, 0, 0, 0.5, 0.5, 1, 1, 1], None), weights)
+
+
+SURFACES = {
+    "plane": SMOOTH["sheet"],
+    "sphere": sphere(1.2, (0, 180), (0, 360), position=(1, 2, 3), rpy_deg=(10, 20, 30)),
+    "cylinder": cylinder(0.7, (0, 360), (0.0, 1.0)),
+    "hyperboloid": hyperboloid(0.5, 0.2, (0, 360), (-0.6, 0.8)),
+    "cone": cone(0.2, 1.5, (0, 360), (-0.12, 0.5)),
+    "torus": torus(0.5, 0.2, (0, 360), (0, 360)),
+    "ellipsoid": ellipsoid((1.0, 0.4, 0.6), (0, 180), (0, 360)),
+    "vase": SMOOTH["vase"],
+    "egg": revolution(EGG, (0, 360)),
+    # Not closed, so that paths may run nearly all around, and beside a pole.
+    "open sphere": sphere(0.8, (0, 180), (0, 355)),
+    "open ellipsoid": ellipsoid((1.0, 0.4, 0.6), (0, 180), (0, 355)),
+    "open vase": revolution(VASE, (0, 355)),
+    "open egg": revolution(EGG, (0, 355)),
+    "cubic": bspline(waves(6, 7, 0.08, 1)),
+    "quadratic": bspline(waves(5, 6, 0.05, 2), (2, 2)),
+    "rational": bspline(
+        waves(6, 6, 0.05, 3), weights=np.random.default_rng(3).uniform(0.5, 2.0, (6, 6))
+    ),
+    "half pipe": half_pipe(),
+    "formula": SMOOTH["formula"],
+    **FACETED,
+}  # fmt: skip
+# The least share of a bound that some path has to use: of points, and of normals. Control points
+# say little about the third derivatives of a spline, and less of a rational one.
+USED = {"vase": (0.9, 0.5), "egg": (0.9, 0.5), "ellipsoid": (0.9, 0.3), "hyperboloid": (0.9, 0.3),
+        "cubic": (0.9, 0.2), "quadratic": (0.9, 0.2), "formula": (0.9, 0.1),
+        "rational": (1e-3, 1e-4), "half pipe": (1e-3, 1e-4)}  # fmt: skip
+
+
+@pytest.fixture(scope="module", params=SURFACES)
+def named(request):
+    return request.param, SURFACES[request.param]
+
+
+def on_mesh(surface, count, rng):
+    """Pairs on one face, on two with an edge in common, and with a vertex at least."""
+    faces, edges = surface.mesh.faces, surface.mesh.edges.faces
+    face = rng.integers(0, len(faces), count)
+    start, end = (rng.dirichlet((0.5, 0.5, 0.5), count)[:, 1:] for _ in range(2))
+    near = slice(3 * count // 4, 7 * count // 8)
+    end[near] = start[near] + 0.05 * (end[near] - start[near])
+    other, across = face.copy(), rng.integers(0, len(edges), count // 2)
+    face[: count // 2], other[: count // 2] = edges[across].T
+    for k in range(count // 2, 3 * count // 4):
+        other[k] = rng.choice(np.flatnonzero((faces == faces[face[k], 0]).any(axis=1)))
+    return Places(face, start), Places(other, end)
+
+
+def pairs(surface, count, rng):
+    """Pairs of places near to each other, at many scales."""
+    if surface.kind == "mesh":
+        return on_mesh(surface, count, rng)
+    patches = surface.placed if surface.kind == "piecewise" else (surface,)
+    chart = rng.integers(0, len(patches), count)
+    low, high = (
+        np.array([[patches[k].u_range[e], patches[k].v_range[e]] for k in chart]) for e in (0, 1)
+    )
+    start = low + rng.uniform(0, 1, (count, 2)) * (high - low)
+    reach = 10.0 ** rng.uniform(-4, 0.0, (count, 1))
+    end = start + reach * rng.uniform(-1, 1, (count, 2)) * (high - low)
+    if surface.kind == "piecewise":  # half of them on two pieces
+        half = count // 2
+        end[:half] = np.clip(end, low, high)[half - 1 :: -1] if half else end
+        other = chart.copy()
+        other[:half] = chart[half - 1 :: -1]
+        return Places(chart, start), Places(other, np.clip(end, *_limits(patches, other)))
+    # At a pole, some around it; and in one coordinate alone, where bounds are reached.
+    start[: count // 8, 0] = low[0, 0] + 0.02 * rng.uniform(0, 1, count // 8) * (high - low)[0, 0]
+    end[: count // 8, 0] = start[: count // 8, 0] + reach[: count // 8, 0] * (high - low)[0, 0]
+    half = slice(0, count // 16)
+    end[half, 1] = low[0, 1] + rng.uniform(0, 1, count // 16) * (high - low)[0, 1]
+    for axis, some in ((0, slice(count // 2, 5 * count // 8)), (1, slice(5 * count // 8, -20))):
+        end[some, axis] = start[some, axis]
+    for axis, period in enumerate(surface.periods):
+        if period:
+            end[:, axis] = low[:, axis] + np.mod(end[:, axis] - low[:, axis], period)
+    return Places(chart, start), Places(chart, np.clip(end, low, high))
+
+
+def _limits(patches, chart):
+    return (
+        np.array([[patches[k].u_range[e], patches[k].v_range[e]] for k in chart]) for e in (0, 1)
+    )
+
+
+def sags(offset, one, other):
+    """(k, 2) how far points and normals (over straight lines in the parameters) bend."""
+    x = one.x[:, None] + DENSE[:, None] * (other.x - one.x)[:, None]
+    dense = Places(np.repeat(one.chart, len(DENSE)), x.reshape(-1, 2))
+    found = []
+    for values in offset.at(dense):
+        values = values.reshape(-1, len(DENSE), 3)
+        line = values[:, :1] + DENSE[:, None] * (values[:, -1:] - values[:, :1])
+        off = np.linalg.norm(values - line, axis=2)[:, 1:-1]
+        found.append((off / WEIGHT).max(axis=1))
+    return np.stack(found, axis=1)
+
+
+@pytest.mark.parametrize("height", [0.0, -0.05, 0.08])
+def test_paths_bend_no_more_than_is_said(named, height):
+    name, surface = named
+    start, end = pairs(surface, 1200, np.random.default_rng(2))
+    offset = offset_surface(surface, height)
+    path = offset.paths(start, end)
+    stated, found, some_known = [], [], np.zeros(len(start.chart), dtype=bool)
+    for piece in (0, 2):
+        one, other = path.place(piece), path.place(piece + 1)
+        bounds = path.derivative_bounds[:, piece]
+        known = np.isfinite(bounds).all(axis=1) & (one.chart >= 0)
+        known &= path.share[:, piece + 1] > path.share[:, piece]
+        assert (one.chart == other.chart)[known].all()
+        stated.append(bounds[known])
+        found.append(sags(offset, one.of(known), other.of(known)))
+        some_known |= known
+    stated, found = np.concatenate(stated), np.concatenate(found)
+    used = USED.get(name.removeprefix("open "), (0.9, 0.9) if surface.kind not in ("mesh", "piecewise") else (0.0, 0.0))
+    straight = surface.kind == "plane"
+    for k in (0, 1):
+        large = stated[:, k] > 1e-4
+        holds(stated[:, k], found[:, k], used=0.0, tiny=2e-10)
+        if not straight:
+            # Beside the surface the heights count alike on both sides, though one bends less.
+            share = used[k] if height == 0.0 or k else 0.6 * used[k]
+            holds(stated[large, k], found[large, k], used=share, tiny=2e-10)
+    # And most of what is short is bounded.
+    step = np.linalg.norm(end.x - start.x, axis=1)
+    short = (start.chart == end.chart) & (step < 0.02)
+    if name in ("rational", "half pipe"):
+        short &= step < 0.002
+    assert some_known[short].mean() > 0.9 or name in ("ridge", "can")
+
+
+@pytest.mark.parametrize("height", [0.0, -0.05])
+def test_paths_begin_and_end_where_they_should_and_do_not_jump(named, height):
+    _, surface = named
+    offset = offset_surface(surface, height)
+    start, end = pairs(surface, 200, np.random.default_rng(1))
+    path = offset.paths(start, end)
+    for k, places in ((0, start), (3, end)):
+        points, normals = offset.at(places)
+        np.testing.assert_allclose(path.points[:, k], points, atol=1e-12)
+        np.testing.assert_allclose(path.normals[:, k], normals, atol=1e-12)
+    assert (np.diff(path.share, axis=1) >= 0.0).all()
+    assert (path.share[:, 0] == 0.0).all()
+    assert (path.share[:, 3] == 1.0).all()
+    for k in range(4):
+        np.testing.assert_allclose(offset.at(path.place(k))[0], path.points[:, k], atol=1e-12)
+    known = np.isfinite(path.derivative_bounds).all(axis=(1, 2)) & (path.share[:, 1] > 0.0)
+    if height == 0.0:  # where a path changes sides, it does so at one place
+        jumps = np.linalg.norm(path.points[:, 2] - path.points[:, 1], axis=1)
+        assert (jumps[known] <= 2e-4).all()
+    assert known.any() or surface.kind not in ("mesh", "piecewise")
+    # No path is the long way round a seam.
+    if surface.kind not in ("mesh", "piecewise", "bspline"):
+        for axis, period in enumerate(surface.periods):
+            legs = np.abs(path.x[:, [1, 3], axis] - path.x[:, [0, 2], axis])
+            assert not period or (legs <= 0.5 * period + 1e-9).all()
+
+
+def test_nearest_places_are_no_further_than_samples(named):
+    """No place of a sample is nearer to a point beside the offset surface."""
+    _, surface = named
+    rng, height = np.random.default_rng(3), 0.02
+    offset = offset_surface(surface, height)
+    at, _ = pairs(surface, 150, rng)
+    point, normal = offset.at(at)
+    point = point + 1e-3 * rng.normal(size=point.shape)
+    found = offset.nearest(point, point - height * normal, 1e-3)
+    away = np.linalg.norm(offset.at(found)[0] - point, axis=1)
+    before = np.linalg.norm(offset.at(at)[0] - point, axis=1)
+    slack = 1e-4 if surface.kind == "mesh" else 1e-9
+    assert (away <= before + slack).mean() > 0.97
+
+
+def test_a_second_guess_is_taken_where_it_is_nearer_and_only_there():
+    """A thin plate: over its far side the closest point of the surface is on the near side."""
+    plate = piecewise(
+        [plane((0, 1), (0, 1)), plane((0, 1), (0, 1), position=(0, 1, 0.01), rpy_deg=(180, 0, 0))]
+    )
+    offset = offset_surface(plate, 0.02)  # they face each other: beyond the other one
+    places = Places(np.array([0, 1]), np.array([[0.3, 0.4], [0.6, 0.2]]))
+    points, normals = offset.at(places)
+    found = offset.nearest(points, points - 0.02 * normals, 1e-3)
+    np.testing.assert_allclose(offset.at(found)[0], points, atol=1e-9)
+    assert found.chart.tolist() == [0, 1]
+
+
+def test_places_that_are_none(named):
+    """NaN in, NaN out."""
+    _, surface = named
+    offset = offset_surface(surface, 0.01)
+    points = np.full((2, 3), np.nan)
+    places = offset.nearest(points, points, 1e-3)
+    assert np.isnan(offset.at(places)[0]).all()
+    path = offset.paths(places, places)
+    assert not (np.isfinite(path.derivative_bounds).all() and np.isfinite(path.points).all())
+
+
+def test_paths_over_a_pole_stay_on_their_piece():
+    """What is known of their places, as how the u direction turns, is that of the right piece."""
+    ball = sphere(1.0, (0, 80), (0, 360), position=(0.0, 0.0, 2.0))
+    offset = offset_surface(piecewise([plane((0.0, 0.3), (0.0, 0.3)), ball]), 0.05)
+    start, end = (Places(np.array([1]), np.array([[0.02, v]])) for v in (0.1, 3.1))
+    path = offset.paths(start, end)
+    assert 0.0 < path.share[0, 1] < 1.0
+    np.testing.assert_array_equal(path.chart, [[1, 1, 1, 1]])
+    np.testing.assert_allclose(path.x[0, :3, 0], [0.02, 0.0, 0.0])
+    assert (offset.tangent_slopes(path.place(0), path.place(1)) > 0.01).all()
+
+
+# the u direction
+
+
+@pytest.mark.parametrize("name", [n for n, s in SURFACES.items() if s.kind != "mesh"])
+def test_the_u_direction_turns_no_faster_than_is_said(name):
+    surface = SURFACES[name]
+    start, end = pairs(surface, 400, np.random.default_rng(5))
+    offset = offset_surface(surface, 0.03)
+    path = offset.paths(start, end)
+    legs = [[path.place(piece + k) for piece in (0, 2)] for k in (0, 1)]
+    start, end = (Places.join(*leg) for leg in legs)
+    # Over several kinks nothing is known of a path.
+    some = np.isfinite(path.derivative_bounds[:, [0, 2]]).all(axis=2).T.ravel()
+    start, end = start.of(some), end.of(some)
+    stated = offset.tangent_slopes(start, end)
+    x = start.x[:, None] + DENSE[:, None] * (end.x - start.x)[:, None]
+    ways = offset.tangents(Places(np.repeat(start.chart, len(DENSE)), x.reshape(-1, 2)))
+    slope = np.linalg.norm(np.diff(ways.reshape(*x.shape[:2], 3), axis=1), axis=2) / DENSE[1]
+    known = np.isfinite(stated) & (stated > 1e-3)
+    holds(stated[:, None], slope, used=0.0, tiny=1e-6)
+    flat = surface.kind == "plane" or name in ("flap", "turned over", "formula", "rational")
+    rough = name in ("half pipe", "egg", "vase", "cubic", "quadratic", "hyperboloid")
+    if not flat:
+        holds(stated[known, None], slope[known], used=0.1 if rough else 0.8, tiny=1e-6)
+
+
+@pytest.mark.parametrize("name", SMOOTH)
+def test_u_directions_are_those_in_which_u_grows(name):
+    cells = SMOOTH[name].cells(3, 4)
+    along, _ = tangents(SMOOTH[name], cells.u, cells.v, 1e-4)
+    expected = along / np.linalg.norm(along, axis=1, keepdims=True)
+    np.testing.assert_allclose(cells.tangents, expected, atol=1e-7)
+
+
+def test_joined_pieces_have_those_of_each_and_a_mesh_has_none():
+    pieces = [plane((0, 1), (0, 1)), plane((1, 2), (0, 1))]
+    joined = piecewise(pieces, rpy_deg=(0, 0, 90)).cells((2, 3))
+    np.testing.assert_allclose(joined.tangents, np.tile([0.0, 1.0, 0.0], (12, 1)), atol=1e-9)
+    mesh = random_surface("mesh", np.random.default_rng(0))
+    assert mesh.cells(5).tangents is None
+    places = Places(np.zeros(2, dtype=np.int64), np.full((2, 2), 0.2))
+    assert np.isinf(offset_surface(mesh, 0.0).tangent_slopes(places, places)).all()

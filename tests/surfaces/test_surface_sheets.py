@@ -1,0 +1,257 @@
+"""Surfaces as triangles and as tiles: no place is further from them than is stated."""
+
+from __future__ import annotations
+
+import mesh_patches
+import numpy as np
+import pytest
+from bounds import holds
+from part_walks import pieces_of, size_of, spread
+from random_surfaces import KINDS, random_surface
+from samples import sampled, seeds
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+from smooth_probes import POSE, triangle_distances
+from specimens import EXTREME, cells_of
+
+from coverable_errors import ArgumentError
+from surfaces import SurfaceError, cylinder, mesh, plane, poses, sheet_of, sphere
+from surfaces.cell_tiles import cell_tiles
+from surfaces.meshes import TriangleMesh
+from surfaces.places import Places
+
+TURN, SHIFT = Rotation.from_euler("xyz", [0.3, -1.0, 2.0]).as_matrix(), [0.4, -1.0, 2.0]
+
+
+def places(surface, rng, count):
+    """Points and outward normals all over a surface, on its borders and corners too."""
+    if surface.kind == "mesh":
+        face = rng.integers(len(surface.mesh.faces), size=count)
+        weights = rng.dirichlet([0.5, 0.5, 0.5], count)
+        turned = surface.mesh.face_normals[face] @ surface.rotation.T
+        return surface.points_at(face, weights), turned
+    found = []
+    for piece, sign in pieces_of(surface):
+        u, v = spread(piece, count, int(rng.integers(2**31)))
+        found.append(np.hstack([piece.point(u, v), sign * piece.normal(u, v)]))
+    both = np.concatenate(found)
+    return both[:, :3], both[:, 3:]
+
+
+def distances(surface, wanted, depth, rng, most=600, count=80):
+    """How far places in a thick surface are from its sheet, and what is stated."""
+    sheet = sheet_of(surface, wanted, most, depth)
+    points, normals = places(surface, rng, count)
+    deep = depth * rng.choice([0.0, 1.0, rng.uniform()], (len(points), 1))
+    far = triangle_distances(points - surface.side_sign * deep * normals, sheet.triangles)
+    # Thin triangles lose digits in their distances.
+    return far, sheet.deviation + 1e-12 * np.abs(sheet.triangles).max()
+
+
+@sampled
+@pytest.mark.parametrize("seed", seeds(4, all=100))
+@pytest.mark.parametrize("thick", [False, True])
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_place_is_further_from_its_sheet_than_stated(kind, thick, seed):
+    rng = np.random.default_rng([seed, int(thick), *map(ord, kind)])
+    surface = random_surface(kind, rng)
+    size = size_of(surface)
+    depth = size * 10.0 ** rng.uniform(-3, 0) if thick else 0.0
+    wanted = size * 10.0 ** rng.uniform(-4, -1)
+    far, stated = distances(surface, wanted, depth, rng, int(rng.integers(2, 600)))
+    assert far.max() <= stated, surface
+
+
+@pytest.mark.parametrize("name", EXTREME)
+@pytest.mark.parametrize("most", [2, 8, 100])
+def test_few_triangles_of_extreme_surfaces_are_as_near_as_stated(name, most):
+    """Where one triangle is far around the axis, or over it; two of them are a convex tile."""
+    far, stated = distances(EXTREME[name], 1e-4, 0.0, np.random.default_rng(3), most, 400)
+    assert far.max() <= stated
+    tiles = sheet_of(EXTREME[name], 1e-4, most).own.reshape(-1, 2, 3, 3)
+    looks = np.cross(tiles[:, :, 1] - tiles[:, :, 0], tiles[:, :, 2] - tiles[:, :, 0])
+    assert ((looks[:, 0] * looks[:, 1]).sum(axis=1) >= 0.0).all()
+
+
+@pytest.mark.parametrize("wanted", [1e-3, 1e-5])
+def test_the_deviation_is_used_and_kept(wanted):
+    surface = cylinder(0.5, (-60, 60), (0.0, 0.9))
+    far, stated = distances(surface, wanted, 0.0, np.random.default_rng(1), 100_000, 400)
+    holds(stated, far, used=0.5)
+    assert stated <= wanted + 1e-9
+
+
+def test_layers_of_a_thick_sheet_leave_no_more_between_them_than_stated():
+    """Between two layers of a plane that bends nowhere there is nothing else."""
+    surface = plane((0, 1), (0, 1), **POSE)
+    rng = np.random.default_rng(1)
+    for steps in (1, 2):
+        sheet = sheet_of(surface, 0.05 / steps, 2 * (steps + 1), 0.1)
+        points, normals = places(surface, rng, 100)
+        deep = 0.1 * (np.arange(100) % 41)[:, None] / 40.0
+        far = triangle_distances(points - surface.side_sign * deep * normals, sheet.triangles)
+        holds(sheet.deviation, far, used=0.99)
+
+
+def test_triangles_are_few_and_stay_near():
+    dome = sphere(1.0, (10, 90), (10, 180))
+    sheet = sheet_of(dome, 2e-4)
+    height = np.abs(np.linalg.norm(sheet.triangles.reshape(-1, 3), axis=1) - 1.0)
+    assert height.max() <= sheet.deviation <= 2e-4  # so clearances are no larger than they must be
+    assert len(sheet.triangles) < 6_000
+    coarse = sheet_of(sphere(1.0, (0, 180), (0, 360)), 1e-6, most=2_000)
+    assert len(coarse.triangles) <= 2_000
+    assert 1e-6 < coarse.deviation < 0.01
+    wall = plane((0.0, 0.6), (0.0, 0.4), **POSE)
+    flat = sheet_of(wall)
+    assert flat.triangles.shape == (2, 3, 3)
+    assert flat.deviation < 1e-9
+    corners = wall.point([0.0, 0.6, 0.6, 0.0], [0.0, 0.0, 0.4, 0.4])
+    away = np.linalg.norm(flat.triangles.reshape(-1, 1, 3) - corners, axis=2)
+    assert max(away.min(axis=1).max(), away.min(axis=0).max()) < 1e-8
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_rigid_motion_moves_the_sheet_along(kind):
+    surface = random_surface(kind, np.random.default_rng([8, *map(ord, kind)]))
+    here, there = (
+        sheet_of(each, 1e-2, 600, 1e-3) for each in (surface, surface.moved(TURN, SHIFT))
+    )
+    assert np.array_equal(here.own, there.own)
+    assert here.deviation == there.deviation
+    carried = here.triangles @ TURN.T + SHIFT
+    apart, partner = cKDTree(carried.reshape(-1, 9)).query(there.triangles.reshape(-1, 9))
+    assert apart.max() < 1e-9 * max(1.0, np.abs(carried).max())
+    assert len(np.unique(partner)) == len(np.unique(carried.reshape(-1, 9), axis=0))
+
+
+def test_surfaces_of_other_shapes_have_triangles_of_their_own():
+    shapes = [
+        plane((0, 1), (0, 1)), plane((0, 1), (0, 2)), plane((0, 1), (0, 1), side="outside"),
+        sphere(1.0, (10, 90), (0, 90)), sphere(1.1, (10, 90), (0, 90)),
+    ]  # fmt: skip
+    sheets = [sheet_of(shape, 1e-2, 600, 1e-3).triangles for shape in shapes]
+    for k, one in enumerate(sheets):
+        assert not any(np.array_equal(one, other) for other in sheets[:k])
+
+
+def test_a_mesh_gives_its_own_triangles():
+    surface = random_surface("mesh", np.random.default_rng(5))
+    sheet = sheet_of(surface)
+    own = surface.mesh.vertices[surface.mesh.faces] @ surface.rotation.T + surface.position
+    assert sheet.deviation == 0.0
+    assert (sheet.triangles == own).all()
+
+
+@pytest.mark.parametrize(("side", "sign"), [("outside", -1.0), ("inside", 1.0)])
+def test_thickness_lies_away_from_the_working_side(side, sign):
+    sheet = sheet_of(plane((0, 1), (0, 1), side=side), thickness=0.002)
+    heights = sign * sheet.triangles[..., 2]
+    assert [heights.min(), heights.max()] == pytest.approx([0.0, 0.002], abs=1e-12)
+    assert sheet.deviation <= 4.1e-4
+
+
+@pytest.mark.parametrize(
+    ("bad", "named"),
+    [({"deviation": 0.0}, "deviation"), ({"thickness": -1.0}, "thickness"),
+     ({"thickness": np.nan}, "thickness"), ({"most": 1}, "most")],
+)  # fmt: skip
+def test_numbers_that_make_no_sheet_are_named(bad, named):
+    with pytest.raises(ArgumentError, match=named):
+        sheet_of(plane((0, 1), (0, 1)), **bad)
+
+
+# tiles of cells
+
+
+@sampled
+@pytest.mark.parametrize("seed", seeds(4, all=50))
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_said_of_a_tile_holds_all_over_it(kind, seed):
+    rng = np.random.default_rng([seed, *map(ord, kind)])
+    surface = random_surface(kind, rng)
+    cells = cells_of(surface, *rng.integers(1, 4, 2).tolist())
+    cut = cell_tiles(cells, float(rng.normal() * np.sqrt(cells.areas.mean())))
+    tiles = cut.of_cells(np.arange(len(cells)))
+    total = cut.areas(tiles).sum()
+    assert total == pytest.approx(cells.areas.sum(), rel=1e-6)
+    for _ in range(int(rng.integers(0, 6))):
+        halves = cut.halves(tiles)
+        both = cut.areas(halves).reshape(-1, 2).sum(axis=1)
+        np.testing.assert_allclose(both, cut.areas(tiles), rtol=1e-6, atol=1e-9 * total)
+        tiles = halves.of(rng.permutation(len(halves.cell))[:60])
+    bounds, count = cut.bounds(tiles), len(tiles.cell)
+    scale = 1.0 + np.abs(bounds.corners[:, :, 0]).max()
+    for k in range(8):
+        if tiles.corners.shape[1] == 3:
+            shares = rng.dirichlet(np.full(3, 0.5), count)
+        else:
+            s, t = rng.beta(0.5, 0.5, (2, count)) if k else np.ones((2, count))
+            shares = np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=1)
+        x = np.einsum("kc,kci->ki", shares, tiles.corners)
+        found = np.stack(cut.offset.at(Places(tiles.chart, x)), axis=1)
+        mixed = np.einsum("kc,kcpi->kpi", shares, bounds.corners[:, : shares.shape[1]])
+        off = np.linalg.norm(found - mixed, axis=2)
+        assert (off <= bounds.radii + 1e-9 * scale).all(), surface
+    assert np.isfinite(bounds.radii).any() or kind == "mesh"
+
+
+def test_normals_that_turn_by_more_than_a_right_angle_over_a_tile_are_not_bounded():
+    """Over a wild mesh: mixed normals leave the cone that those of the corners lie in."""
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        u, v, faces = mesh_patches.grid(8, 8)
+        wild = np.stack([u, v, rng.normal(size=len(u))], axis=1)
+        cells = mesh(TriangleMesh(wild, faces)).cells(count=4)
+        cut = cell_tiles(cells, 0.01)
+        tiles = cut.of_cells(np.arange(len(cells)))
+        stated = cut.bounds(tiles).radii[:, 1]
+        middle = cut.offset.at(tiles.middles)[1]
+        for shares in rng.dirichlet(np.full(3, 0.5), (40, len(tiles.cell))):
+            x = np.einsum("kc,kci->ki", shares, tiles.corners)
+            normals = cut.offset.at(Places(tiles.chart, x))[1]
+            holds(stated, np.linalg.norm(normals - middle, axis=1), used=0.0, tiny=1e-9)
+        assert 0.0 < np.isinf(stated).mean() < 0.2
+
+
+def test_tiles_shrink_their_bounds_fourfold():
+    cut = cell_tiles(sphere(1.0, (10, 90), (0, 90)).cells(2, 2), -0.1)
+    tiles = cut.of_cells(np.arange(4))
+    before = cut.bounds(tiles).radii.max(axis=0)
+    for _ in range(4):
+        tiles = cut.halves(tiles)
+    assert (cut.bounds(tiles).radii.max(axis=0) < before / 12.0).all()
+
+
+@pytest.mark.parametrize(("turn", "length"), [(360, np.pi / 2), (359, 1.5 * np.pi * 359 / 360)])
+def test_lines_between_tiles_run_the_shorter_way_round(turn, length):
+    cut = cell_tiles(sphere(1.0, (80, 100), (0, turn)).cells(1, 4), 0.0)
+    ends = cut.centres(np.array([0, 3]))
+    lines = cut.lines(ends.of(slice(0, 1)), ends.of(slice(1, 2)), np.array([8]))
+    points = cut.offset.at(lines.places)[0]
+    assert np.linalg.norm(np.diff(points, axis=0), axis=1).sum() == pytest.approx(length, rel=0.02)
+    np.testing.assert_allclose(points[[0, -1]], cut.offset.at(ends)[0], atol=1e-12)
+
+
+def test_lines_over_the_faces_of_a_mesh_stay_on_them():
+    cells = random_surface("mesh", np.random.default_rng(3)).cells(count=4)
+    cut = cell_tiles(cells, 0.01)
+    indptr, touching = cut.touching
+    face = np.flatnonzero(np.diff(indptr))[:20]
+    other = touching[indptr[face]]
+    tiles = cut.of_cells(np.arange(4))
+    row = np.argsort(tiles.chart)
+    ends = [tiles.of(row[chart]).middles for chart in (face, other)]
+    lines = cut.lines(*ends, np.full(len(face), 3))
+    weights = np.column_stack([1.0 - lines.places.x.sum(axis=1), lines.places.x])
+    assert (weights >= -1e-12).all()
+    for k in range(len(face)):
+        charts = lines.places.chart[lines.first[k] : lines.first[k + 1]]
+        assert charts.tolist() == [face[k]] * 4 + [other[k]] * 3
+
+
+def test_between_poses_there_is_no_surface():
+    cells = poses([[0.4, 0, 0], [0.5, 0, 0]], [[0, 0, 1], [0, 0, 1]])
+    assert cell_tiles(cells, 0.0) is None
+    with pytest.raises(SurfaceError, match="leave collisions with it out"):
+        sheet_of(cells.surface)

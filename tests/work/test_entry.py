@@ -1,0 +1,110 @@
+"""Entry and exit: straight along the approach direction, from and to home, inside all limits."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from dense_replay import dense
+from jobs import PLATE, coverable
+from timed_motions import keeps_to_limits
+
+from feasibility import Task, check
+from feasibility.certification import collision_replay
+from feasibility.collisions import Collision, Obstacle, gather
+from feasibility.entry import ends_of, entered
+from feasibility.paths import PathError, coverage_path
+from feasibility.results import load_trajectory
+from feasibility.timing import motion_limits, trajectory
+from robots import Kinematics, load_robot
+from surfaces import plane
+
+UR5 = load_robot("ur5")
+CELLS = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0, 0, 0.3)).cells(2, 2)
+HOME = (0.0, -90.0, 90.0, -90.0, -90.0, 0.0)
+TASK = Task(standoff=0.02, cone_deg=15, home_deg=HOME)
+
+
+@pytest.fixture(scope="module")
+def path():
+    return coverage_path(check(UR5, CELLS, TASK))
+
+
+def test_the_tool_comes_and_goes_straight_along_the_approach(path):
+    ends = ends_of(path, 0.08)
+    assert np.array_equal(ends.entry[0], np.radians(HOME))
+    assert np.array_equal(ends.exit[-1], np.radians(HOME))
+    assert np.array_equal(ends.entry[-1], path.walk.q[0])
+    assert np.array_equal(ends.exit[0], path.walk.q[-1])
+    free = replace(path, task=replace(TASK, home_deg=None))
+    alone = ends_of(free, 0.08)
+    assert (ends.from_home, alone.from_home) == (True, False)
+    for rows in (alone.entry[::-1], alone.exit):
+        points, axes = Kinematics(UR5).tools(dense(rows))
+        away = points - points[0]
+        assert np.abs(away[:, :2]).max() <= 1e-3
+        assert away[-1, 2] == pytest.approx(0.08, abs=1e-6)
+        assert np.abs(axes - axes[0]).max() <= 0.01
+        assert (np.diff(away[:, 2]) >= -1e-9).all()
+        assert points[-1, 2] == pytest.approx(0.3 + 0.02 + 0.08, abs=2e-3)
+
+
+def test_the_whole_motion_keeps_to_all_limits_and_the_path_stays_as_it_is(path):
+    limits, run = motion_limits(UR5, 0.2), trajectory(path, 0.2)
+    whole = entered(path, run, ends_of(path, 0.05), limits, 0.02)
+    assert np.allclose(whole.q[[0, -1]], np.radians(HOME))
+    assert np.abs(whole.dq[[0, -1]]).max() <= 1e-9
+    keeps_to_limits(UR5, whole, limits)
+    begin = int(np.flatnonzero(whole.cell >= 0)[0])
+    middle = slice(begin, begin + len(run))
+    for name in ("q", "dq", "ddq", "cell"):
+        assert np.array_equal(getattr(whole, name)[middle], getattr(run, name))
+    assert np.allclose(np.diff(whole.time[middle]), np.diff(run.time), atol=2e-9)
+    assert (whole.cell[:begin] == -1).all()
+    assert not whole.working[: begin - 1].any()
+    assert whole.working[middle].all()
+
+
+def test_the_way_home_leads_around_what_is_in_its_way():
+    asked = Collision(surface=False, clearance=0.005)
+    alone = coverage_path(check(UR5, CELLS, replace(TASK, collision=asked)))
+    straight = dense(np.stack([np.radians(HOME), ends_of(alone, 0.05).entry[-2]]), 2)[1]
+    place = Kinematics(UR5).tool(straight)[0]
+    ball = Obstacle.sphere("ball", 0.03, position=tuple(place))
+    task = replace(TASK, collision=replace(asked, scene=(ball,)))
+    ends = ends_of(replace(alone, task=task), 0.05)
+    bodies = gather(UR5, CELLS.surface, task.collision, task.standoff)
+    for rows in (ends.entry, ends.exit):
+        assert collision_replay(UR5, bodies, rows).accepted
+    assert not collision_replay(UR5, bodies, np.stack([ends.entry[0], ends.entry[-11]])).accepted
+
+
+def test_what_cannot_be_had_is_said(path):
+    with pytest.raises(PathError, match=r"entry: the tool cannot be drawn back by 2000 mm: after"):
+        ends_of(path, 2.0)
+    point = Kinematics(UR5).tool(np.radians(HOME))[0]
+    ball = Obstacle.sphere("ball", 0.1, position=tuple(point))
+    asked = Collision(self_=False, surface=False, scene=(ball,))
+    with pytest.raises(PathError, match=r"entry: home_deg: .*ball"):
+        ends_of(replace(path, task=replace(TASK, collision=asked)), 0.05)
+    for home, said in (
+        ((0.0, 1.0), "shoulder_pan_joint"), ((*HOME[:5], 400.0), "wrist_3_joint at 400"),
+    ):  # fmt: skip
+        with pytest.raises(ValueError, match=said):
+            check(UR5, CELLS, replace(TASK, home_deg=home))
+    with pytest.raises(ValueError, match="finite"):
+        replace(TASK, home_deg=(0.0, np.nan))
+
+
+def test_the_command_goes_from_home_to_home_at_the_speed_of_the_task(tmp_path):
+    case, out = tmp_path / "panel.toml", tmp_path / "run.csv"
+    case.write_text(PLATE + "task.speed = 0.15\ntask.home_deg = [0, -90, 90, -90, -90, 0]\n")
+    said = coverable("path", case, "--json", "--approach", "0.03", "--out", out)
+    told = json.loads(said.out)
+    assert (said.status, told["ends"]["approach_m"]) == (0, 0.03)
+    assert told["trajectory"]["limits"]["tool_speed"] == 0.15
+    assert (told["rates"]["speed_m_per_s"], told["rates"]["holds"]) == (0.15, True)
+    run = load_trajectory(out)
+    assert np.allclose(run.q[[0, -1]], np.radians(HOME))

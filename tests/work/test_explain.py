@@ -1,0 +1,437 @@
+"""What would make a case feasible, and the margins of a feasible one, held to `check`.
+
+Thresholds that geometry gives in closed form, and each side of every threshold asked again, in
+cases that are built from scratch.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from jobs import case_named, coverable
+from samples import EVERYTHING, sampled
+
+from feasibility import Answer, Evidence, Search, Task, check
+from feasibility.cases import Case, load_case
+from feasibility.certification import replay
+from feasibility.sensitivity import Kind, explain, last_true
+from robots import Kinematics, load_robot
+from surfaces import cylinder, plane, poses, sphere
+
+PUMA, UR5 = load_robot("puma560", limits="set-1"), load_robot("ur5")
+PLATE = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0.0, 0.0, 0.3))
+STIFF = PUMA.with_limits({f"joint{k}": (0.0, 0.0) for k in (4, 5, 6)})
+"""joint4 to joint6 held: the tool stands along the forearm, and only joints 1 to 3 aim it."""
+WALL = plane((-0.2, 0.2), (-0.2, 0.2), "outside", (0.6, 0.1, 0.2), (0.0, 90.0, 0.0))
+RING = PUMA.with_limits({"joint1": np.radians([-30.0, 20.0])})
+CASES = {
+    "plate": lambda: (UR5, PLATE.cells(2, 2), Task(0.02, 30)),
+    "long plate": lambda: case_named("long plate").build()[:3],
+    "stiff wrist": lambda: (STIFF, WALL.cells(3, 3), Task(0.0, 20)),
+    # the tool at the plate's place is below the reach; the standoff lifts it
+    "deep plate": lambda: (
+        UR5,
+        plane((0.5, 0.6), (-0.05, 0.05), "outside", (0.0, 0.0, -0.75)).cells(2, 2),
+        Task(0.01, 40),
+    ),
+    "4a": lambda: load_case("paper/4a").build()[:3],
+    "4d": lambda: load_case("paper/4d").build()[:3],
+    "5e": lambda: load_case("paper/5e").build()[:3],
+    "dome": lambda: (
+        load_robot("panda"),
+        sphere(0.25, (10, 50), (150, 230), position=(0.65, 0, 0.1), side="outside").cells(9, 10),
+        Task(0.02, 25),
+    ),
+}
+
+
+@cache
+def given_case(name):
+    return CASES[name]()
+
+
+@cache
+def explained(name):
+    return explain(*given_case(name))
+
+
+def threshold_of(explanation, name):
+    return next(t for t in explanation.thresholds if t.quantity.name == name)
+
+
+def case_at(case, quantity, value):
+    """The case with a quantity at a value, without the product's own way of changing it."""
+    robot, cells, task = case
+    if quantity.kind is Kind.CONE:
+        task = Task(task.standoff, math.degrees(value), task.tolerance)
+    elif quantity.kind is Kind.STANDOFF:
+        task = Task(value, task.cone_deg, task.tolerance)
+    elif quantity.kind is Kind.SHIFT:
+        surface = cells.surface.moved(np.eye(3), value * np.array(quantity.axis))
+        cells = surface.cells(*cells.shape)
+    else:
+        limits = [robot.lower[quantity.joint], robot.upper[quantity.joint]]
+        limits[quantity.kind is Kind.UPPER] = value
+        robot = robot.with_limits({robot.joint_names[quantity.joint]: limits})
+    return robot, cells, task
+
+
+def verdict_at(case, threshold, value):
+    return check(*case_at(case, threshold.quantity, value))
+
+
+# -- both sides of every threshold -----------------------------------------------------------------
+
+ASKED = ["plate", "stiff wrist", "deep plate", "4d"] + ["4a", "5e", "dome"] * EVERYTHING
+
+
+@sampled
+@pytest.mark.parametrize("name", ASKED)
+def test_what_is_said_of_a_side_is_what_a_verdict_says(name):
+    """Feasible sides are, with a motion that holds all of the changed case; proved ones are not."""
+    case, sides = given_case(name), 0
+    every = np.ones(len(case[1]), dtype=bool)
+    for found in explained(name).thresholds:
+        for side in (found.feasible, found.other):
+            if side is None:
+                continue
+            verdict = verdict_at(case, found, side.value)
+            sides += 1
+            if side is found.feasible:
+                assert side.evidence is Evidence.WITNESS
+                assert replay(
+                    *case_at(case, found.quantity, side.value), side.witness, every
+                ).accepted
+                assert verdict.feasible, found.quantity.name
+            else:
+                assert not verdict.feasible, found.quantity.name
+                assert verdict.answer is side.answer or side.answer is Answer.UNDECIDED
+    assert sides >= 12
+
+
+@pytest.mark.parametrize("name", ["plate", "4a"])
+def test_margins_run_from_the_case_as_it_stands_inwards(name):
+    explanation = explained(name)
+    assert explanation.verdict.feasible
+    assert explanation.dropped is None
+    decided = 0
+    for found in explanation.thresholds:
+        quantity, way = found.quantity, np.sign(found.quantity.end - found.quantity.given)
+        assert way * (found.feasible.value - quantity.given) >= 0.0
+        assert way * (quantity.end - found.feasible.value) >= 0.0
+        assert found.margin == abs(found.feasible.value - quantity.given)
+        if found.other is None:
+            assert found.feasible.value == quantity.end
+        else:
+            assert way * (found.other.value - found.feasible.value) > 0.0
+            assert found.resolution == abs(found.other.value - found.feasible.value)
+            decided += found.other.answer is Answer.INFEASIBLE
+    assert decided > len(explanation.thresholds) // 4
+
+
+def test_what_is_varied_and_how_far():
+    """Cone to 3 and 180 degrees, limits by a full turn, standoff and shifts by half a metre."""
+    names = [t.quantity.name for t in explained("4d").thresholds]
+    assert len(set(names)) == len(names) == 1 + 12 + 2 + 6
+    robot, _, task = given_case("4d")
+    for t in explained("4d").thresholds:  # infeasible: towards more freedom
+        q = t.quantity
+        ends = {Kind.CONE: math.pi, Kind.SHIFT: 0.5}.get(q.kind, 0.0)
+        if q.kind is Kind.STANDOFF:
+            ends = task.standoff + 0.5 if q.name == "larger standoff" else 0.0
+        if q.joint >= 0:
+            ends = q.given + (2 * math.pi if q.kind is Kind.UPPER else -2 * math.pi)
+            assert q.given == (robot.upper if q.kind is Kind.UPPER else robot.lower)[q.joint]
+            low, high = (robot.model.lowerPositionLimit, robot.model.upperPositionLimit)
+            ends = np.clip(ends, low[q.joint] - 2 * math.pi, high[q.joint] + 2 * math.pi)
+        assert q.end == pytest.approx(ends, abs=1e-9)
+    for t in explained("plate").thresholds:  # feasible: towards less, limits of 0.1 degree at last
+        q = t.quantity
+        if q.kind is Kind.CONE:
+            assert q.end == pytest.approx(math.radians(3))
+        if q.joint >= 0:
+            other = (UR5.lower if q.kind is Kind.UPPER else UR5.upper)[q.joint]
+            assert abs(q.end - other) == pytest.approx(math.radians(0.1))
+    kinova = load_robot("kinova")
+    cells = PLATE.cells(1, 1)
+    free = explain(kinova, cells, Task(0.02, 30)).thresholds
+    joints = {t.quantity.joint for t in free} - {-1}
+    assert joints == set(np.flatnonzero(np.isfinite(kinova.lower)).tolist())
+    nothing = {t.quantity.name for t in explain(UR5, cells, Task(0.0, 3)).thresholds}
+    assert not nothing & {"cone", "smaller standoff"}
+
+
+# -- thresholds in closed form ---------------------------------------------------------------------
+
+
+def test_4d_names_joint1_and_granting_what_it_needs_is_enough():
+    """The wrist centre's azimuth less asin(0.1 / 0.495) is where joint1 must stand."""
+    case, found = given_case("4d"), threshold_of(explained("4d"), "joint1 upper limit")
+    needed = np.degrees(case[1].u.max()) - math.degrees(math.asin(0.1 / 0.495))
+    value = found.feasible.value
+    assert abs(math.degrees(value) - needed) <= 0.2
+    assert math.degrees(found.resolution) <= 0.5 + 1e-9
+    assert verdict_at(case, found, value + math.radians(0.1)).feasible
+    less = verdict_at(case, found, value - math.radians(0.5))
+    assert (less.answer, less.evidence) == (Answer.INFEASIBLE, Evidence.PROOF)
+    dropped = explained("4d").dropped  # what no motion covers
+    assert dropped.cells.tolist() == list(range(60, 90))
+    assert dropped.share == pytest.approx(1 / 3)
+    assert dropped.area == pytest.approx(0.5 * math.radians(40) * 0.9)
+    rest = np.arange(90) < 60
+    assert replay(*case, dropped.witness, rest).accepted
+
+
+def branch_tilts(point, approach):
+    """Angle (degrees) of the tool along the forearm, for each closed-form branch of joints 1..3."""
+    elbow, tilts = math.hypot(0.1, 0.7), []
+    radius = math.sqrt(point[0] ** 2 + point[1] ** 2 - 0.1**2)
+    for sign in (1.0, -1.0):
+        q1 = math.atan2(point[1], point[0]) - math.atan2(0.1, sign * radius)
+        far = math.hypot(radius, point[2])
+        bend = math.acos((far**2 - 0.7**2 - elbow**2) / (2 * 0.7 * elbow))
+        for turn in (bend, -bend):
+            q2 = math.atan2(-point[2], sign * radius) - math.atan2(
+                elbow * math.sin(turn), 0.7 + elbow * math.cos(turn)
+            )
+            q = np.array([q1, q2, turn - math.atan2(0.7, 0.1), 0.0, 0.0, 0.0])
+            at, axis = Kinematics(PUMA).tool(np.arctan2(np.sin(q), np.cos(q)))
+            np.testing.assert_allclose(at, point, atol=1e-9)
+            tilts.append(math.degrees(math.acos(np.clip(axis @ approach, -1.0, 1.0))))
+    return tilts
+
+
+def test_the_cone_a_stiff_wrist_needs_is_that_of_the_geometry():
+    """The covering motion keeps to one branch of the arm: the least of their largest tilts."""
+    case, found = given_case("stiff wrist"), threshold_of(explained("stiff wrist"), "cone")
+    points, approaches, _ = case[2].targets(case[1])
+    tilts = np.array([branch_tilts(p, a) for p, a in zip(points, approaches, strict=True)])
+    assert -0.2 <= math.degrees(found.feasible.value) - tilts.max(axis=0).min() <= 1.0
+    assert found.other.value < found.feasible.value
+    # A wider joint never needs a wider cone.
+    limits = {f"joint{k}": np.radians([-15.0, 15.0]) for k in (4, 5)}
+    wider = threshold_of(
+        explain(STIFF.with_limits(limits), WALL.cells(3, 3), Task(0.0, 10)), "cone"
+    )
+    assert wider.feasible.value < found.feasible.value
+
+
+@pytest.mark.parametrize("which", ["lower", "upper"])
+def test_a_ring_needs_of_joint1_what_its_azimuth_asks_for(which):
+    """Two limits are in the way: one is enough once the other is wide."""
+    cells = cylinder(0.6, (-60, 60), (0.2, 0.3)).cells(6, 1)
+    azimuth, offset = np.degrees(cells.u), math.degrees(math.asin(0.1 / 0.58))
+    needed = azimuth.max() - offset if which == "upper" else azimuth.min() - offset
+    limits = np.radians([-120.0, 20.0] if which == "upper" else [-30.0, 120.0])
+    found = explain(RING.with_limits({"joint1": limits}), cells, Task(0.02, 40))
+    threshold = threshold_of(found, f"joint1 {which} limit")
+    # Stretched arms that reach backwards would need more than this, in either direction.
+    assert abs(math.degrees(threshold.feasible.value) - needed) <= 0.3
+
+
+def test_a_ring_that_a_stop_cuts_in_two_needs_joint1_to_pass_it():
+    """Every cell is reached, forwards or backwards, yet no motion turns from one to the other.
+
+    Forwards joint1 stands at the azimuth less the offset, so the far end of the ring asks for 145
+    degrees; backwards, as the mirror image, for the same in the other direction.
+    """
+    arm = PUMA.with_limits({"joint1": np.radians([-100.0, 100.0])})
+    ring = cylinder(0.6, (20, 160), (0.2, 0.3)).cells(8, 1)
+    explanation = explain(arm, ring, Task(0.02, 40))
+    assert explanation.verdict.evidence is Evidence.PROOF
+    needed = np.degrees(ring.u).max() - math.degrees(math.asin(0.1 / 0.58))
+    for name, sign in (("joint1 upper limit", 1.0), ("joint1 lower limit", -1.0)):
+        found = threshold_of(explanation, name)
+        assert abs(sign * math.degrees(found.feasible.value) - needed) <= 0.2
+    assert len(explanation.dropped.cells) == 8 - explanation.verdict.n_covered
+    assert explanation.dropped.waypoints is not None
+
+
+def test_4a_may_lose_as_much_of_joint1_as_the_azimuth_leaves():
+    """Arm forwards, joint1 stands at the azimuth less an offset; backwards, half a turn further."""
+    _, cells, task = given_case("4a")
+    radii = np.linalg.norm(task.targets(cells).points[:, :2], axis=1)
+    azimuth, offset = np.degrees(cells.v), np.degrees(np.arcsin(0.1 / radii))
+    lower, upper = (
+        threshold_of(explained("4a"), f"joint1 {end} limit") for end in ("lower", "upper")
+    )
+    assert math.degrees(lower.feasible.value) == pytest.approx((azimuth - offset).min(), abs=1.0)
+    backwards = azimuth - 180.0 + offset
+    assert math.degrees(upper.feasible.value) == pytest.approx(backwards.max(), abs=1.0)
+
+
+def test_a_standoff_that_lifts_the_tool_has_two_ends():
+    case = given_case("deep plate")
+    found = threshold_of(explained("deep plate"), "larger standoff")
+    assert not explained("deep plate").verdict.feasible
+    assert found.other.value < found.feasible.value <= found.span.feasible.value
+    for value in (found.feasible.value, found.span.feasible.value):
+        assert verdict_at(case, found, value).feasible
+
+
+def test_nothing_helps_a_plate_that_leaves_the_room():
+    explanation = explained("long plate")
+    for found in explanation.thresholds:
+        assert found.feasible is None, found.quantity.name
+        assert (found.resolution, found.margin) == (None, -1.0)
+        assert (found.other.answer, found.other.evidence) == (Answer.INFEASIBLE, Evidence.PROOF)
+        assert found.quantity.monotone or found.each_proved
+    missed = np.flatnonzero(~explanation.verdict.covered)
+    np.testing.assert_array_equal(explanation.dropped.cells, missed)
+    assert explanation.dropped.share == pytest.approx(len(missed) / 8)
+    assert explanation.pair is None
+
+
+# -- in the words of the case file -----------------------------------------------------------------
+
+SETS = {
+    "named set": ["robot.name=puma560", "robot.limits=set-3", "task.cone_deg=45",
+                  "surface.side=inside", "surface.kind=cylinder", "surface.radius=0.5",
+                  "surface.u_deg=[0, 40]", "surface.u=", "surface.v=[0, 0.3]",
+                  "surface.cells=[5, 2]", "surface.position=", "task.standoff=0.005"],
+    "by name": ["robot.limits_deg={ shoulder_pan_joint = [-10, 10] }", "surface.u=[0.3, 0.5]",
+                "surface.v=[-0.3, 0.3]", "surface.cells=[1, 3]", "surface.position=[0, 0, 0.2]"],
+    "shift": ["surface.u=[-0.1, 0.1]", "surface.cells=[3, 3]", "surface.position=[0.95, 0, 0.2]"],
+    # out of reach along the diagonal: no shift along one axis is enough
+    "diagonal": ["surface.u=[-0.15, 0.15]", "surface.v=[-0.15, 0.15]", "surface.cells=[3, 3]",
+                 "surface.position=[0.8, 0.8, 0.2]"],
+    "two joints": ["robot.limits_deg={ shoulder_pan_joint = [-10, 10], elbow_joint = [-10, 10] }",
+                   "surface.u=[0.3, 0.6]", "surface.v=[-0.4, 0.4]", "surface.cells=[3, 5]",
+                   "surface.position=[0, 0, 0.2]"],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_the_change_that_is_named_first_makes_the_case_feasible(name, tmp_path):
+    """`check` with the `--set` that is offered says so, and neither change of a pair alone does."""
+    case = case_named("plate").with_overrides(SETS[name])
+    (tmp_path / "case.toml").write_text(case.to_toml())
+    (tmp_path / "motions").mkdir()
+    said = coverable("explain", tmp_path / "case.toml", "--json", "--witness", tmp_path / "motions")
+    told = json.loads(said.out)
+    assert (said.status, told["verdict"]) == (1, "infeasible")
+    sets = told["useful"]["set"]
+    assert len(sets) == (2 if name in ("diagonal", "two joints") else 1)
+    assert (told["pair"] is None) == (len(sets) == 1)
+    assert check(*Case.from_toml(case.to_toml()).with_overrides(sets).build()).feasible
+    if len(sets) == 2:
+        assert not any(t["feasible"] for t in told["thresholds"])
+        for alone in sets:
+            assert not check(*case.with_overrides([alone]).build()).feasible
+        motion = tmp_path / "motions" / "pair.csv"
+        options = [part for text in sets for part in ("--set", text)]
+        assert coverable("verify", tmp_path / "case.toml", motion, *options).status == 0
+
+
+def test_every_threshold_and_joint_is_told_with_its_numbers(tmp_path):
+    case = case_named("plate").with_overrides(["surface.cells=[1, 2]"])
+    (tmp_path / "case.toml").write_text(case.to_toml())
+    told = json.loads(coverable("explain", tmp_path / "case.toml", "--json").out)
+    found = explain(*case.build()[:3])
+    for row, threshold in zip(told["thresholds"], found.thresholds, strict=True):
+        q = threshold.quantity
+        unit, scale = ("deg", 180.0 / math.pi) if q.unit == "rad" else ("m", 1.0)
+        assert row[f"given_{unit}"] == pytest.approx(scale * q.given, abs=1e-5)
+        for key, side in (("feasible", threshold.feasible), ("other", threshold.other)):
+            assert (row[key] is None) == (side is None)
+            if side is not None:
+                assert row[key][f"value_{unit}"] == pytest.approx(scale * side.value, abs=1e-5)
+                assert row[key]["verdict"] == str(side.answer)
+    q = found.verdict.witness.q
+    for row, low, high in zip(told["joints"], *np.degrees([q.min(0), q.max(0)]), strict=True):
+        ends = [float(x) for x in row["used"].replace("deg", "").split("..")]
+        np.testing.assert_allclose(ends, [low, high], atol=0.051)
+
+
+# -- the search, asked from outside ----------------------------------------------------------------
+
+
+@settings(max_examples=25)
+@given(st.integers(1, 60), st.data())
+def test_bisection_ends_beside_a_failure_whatever_the_answers(size, data):
+    """And at the one place where the answers turn, in as few questions as there have to be."""
+    turn = data.draw(st.integers(0, size - 1))
+    answers = data.draw(st.lists(st.booleans(), min_size=size + 1, max_size=size + 1))
+    for gallop in (False, True):
+        for sign in (1, -1):
+            asked = []
+
+            def holds(k, asked=asked, sign=sign):
+                asked.append(k)
+                assert 0 < sign * k < size
+                return sign * k <= turn
+
+            assert last_true(holds, 0, sign * size, gallop) == sign * turn
+            assert len(asked) <= (2 if gallop else 1) * math.ceil(math.log2(size)) + 1
+        for good, bad in ((0, size), (size, 0)):
+            k, step = last_true(answers.__getitem__, good, bad, gallop), 1 if bad > good else -1
+            assert k == good or answers[k]
+            assert k + step == bad or not answers[k + step]
+
+
+def test_the_same_question_gets_the_same_answer():
+    one, other = explained("long plate"), explain(*given_case("long plate"))
+    sides = [
+        [
+            (t.quantity.name, t.feasible and t.feasible.value, t.other and t.other.value)
+            for t in e.thresholds
+        ]
+        for e in (one, other)
+    ]
+    assert sides[0] == sides[1]
+    assert one.evaluations == other.evaluations
+
+
+def test_toolpaths_stay_in_their_order_and_are_not_divided():
+    s = np.linspace(0.0, 1.0, 6)
+    points = np.column_stack([0.4 + 0.2 * s, 0.1 * np.sin(5.0 * s), 0.2 + 0.0 * s])
+    walk = poses(points, np.tile((0.0, 0.0, 1.0), (6, 1)), side="outside")
+    found = explain(UR5, walk, Task(0.01, 10.0))
+    assert len(found.thresholds) >= 6
+    for threshold in found.thresholds:
+        marks = threshold.feasible.witness.cell
+        marks = marks[marks >= 0]
+        assert np.array_equal(np.unique(marks), np.arange(6))
+        assert (np.diff(marks) >= 0).all()
+    far = np.column_stack([np.linspace(0.7, 1.1, 4), np.zeros(4), np.full(4, 0.2)])
+    walk = poses(far, np.tile((0.0, 0.0, 1.0), (4, 1)), side="outside")
+    found = explain(UR5, walk, Task(0.01, 10.0))
+    assert found.verdict.answer is Answer.INFEASIBLE
+    helping = [t.quantity.axis for t in found.thresholds if t.feasible is not None]
+    assert helping == [(-1, 0, 0)]
+
+
+def test_edges():
+    empty = explain(UR5, PLATE.cells(0, 3), Task(0.02, 30))
+    assert (empty.verdict.feasible, empty.thresholds, empty.dropped) == (True, (), None)
+    with pytest.raises(ValueError, match="method must be 'complete'"):
+        explain(*given_case("plate"), Search(method="greedy"))
+    late = explain(*given_case("4d"), Search(time_limit=1e-9))
+    assert late.verdict.answer is Answer.UNDECIDED
+    assert not any(t.feasible for t in late.thresholds)
+    assert len(late.left_out) == 21 - len(late.thresholds) > 0
+
+
+class Enough(Exception):
+    pass
+
+
+def test_progress_counts_the_thresholds_and_may_end_the_work():
+    seen = []
+
+    def report(done, total, text):
+        seen.append((done, total))
+        if done == 3:
+            raise Enough
+
+    with pytest.raises(Enough):
+        explain(*given_case("long plate"), progress=report)
+    assert [done for done, _ in seen] == sorted(done for done, _ in seen)
+    assert {total for _, total in seen} <= {None, 21}
+    assert seen[-1] == (3, 21)

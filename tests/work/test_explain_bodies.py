@@ -1,0 +1,193 @@
+"""What would make a case with collisions feasible; and `check` told the motion of a case nearby."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from feasibility import Answer, Search, Task, check
+from feasibility.cases import load_case
+from feasibility.certification import replay
+from feasibility.clock import Clock
+from feasibility.collisions import Collision, Obstacle, ToolShape
+from feasibility.sensitivity import Kind, explain
+from feasibility.verdict import Walk
+from robots import load_robot
+from surfaces import plane
+
+UR5 = load_robot("ur5")
+PLATE = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0.0, 0.0, 0.3))
+CELLS = PLATE.cells(1, 2)
+WALL_AT, RADIUS, TOLERANCE = 0.63, 0.05, 0.001  # m
+ROOM = WALL_AT - 0.5 - RADIUS
+"""m, between the wall and a ball around the tool point over the cells, whose centres are at 0.5."""
+WALL = Obstacle.halfspace("wall", position=(WALL_AT, 0.0, 0.0), rpy_deg=(0.0, -90.0, 0.0))
+POST = Obstacle.box("post", (0.1, 0.1, 1.0), position=(-0.6, -0.6, 0.5))
+
+
+@cache
+def explained(clearance):
+    ball = ToolShape.sphere(RADIUS)
+    asked = Collision(
+        self_=False, surface=False, clearance=clearance, scene=(WALL, POST), tool=(ball,)
+    )
+    return explain(UR5, CELLS, Task(0.02, 30, TOLERANCE, collision=asked))
+
+
+def threshold_of(explanation, name):
+    return next(t for t in explanation.thresholds if t.quantity.name == name)
+
+
+@pytest.mark.parametrize("clearance", [0.01, 0.095])
+def test_the_clearance_is_the_room_between_wall_and_tool(clearance):
+    found = explained(clearance)
+    assert found.verdict.feasible == (clearance < ROOM)
+    value = threshold_of(found, "clearance").feasible.value
+    assert ROOM - 0.003 < value <= ROOM + TOLERANCE
+    # Every motion holds with the collisions of its own case.
+    task, count = found.verdict.task, 0
+    for threshold in found.thresholds:
+        q, side = threshold.quantity, threshold.feasible
+        if side is None or q.kind not in (Kind.CLEARANCE, Kind.SHIFT, Kind.WITHOUT):
+            continue
+        settings, cells = task.collision, CELLS
+        if q.kind is Kind.SHIFT:
+            cells = PLATE.moved(np.eye(3), side.value * np.array(q.axis)).cells(1, 2)
+        elif q.kind is Kind.CLEARANCE:
+            settings = replace(settings, clearance=side.value)
+        else:
+            kept = tuple(one for one in (WALL, POST) if one.name != q.obstacle)
+            settings = replace(settings, scene=kept) if q.obstacle else None
+        changed = replace(task, collision=settings)
+        assert replay(UR5, cells, changed, side.witness, np.ones(2, dtype=bool)).accepted
+        count += 1
+    assert count >= 4
+
+
+def test_the_surface_moves_towards_the_wall_by_the_room_at_most():
+    found = threshold_of(explained(0.01), "shift along +x").feasible
+    assert ROOM - 0.01 - 0.003 < found.value <= ROOM - 0.01 + TOLERANCE
+    away = threshold_of(explained(0.095), "shift along -x").feasible
+    assert 0.095 - ROOM - TOLERANCE <= away.value < 0.095 - ROOM + 0.003
+
+
+def test_the_object_in_the_way_is_named_and_only_that():
+    left_out = [t for t in explained(0.095).thresholds if t.quantity.kind is Kind.WITHOUT]
+    helps = {t.quantity.name: t.feasible is not None for t in left_out}
+    assert helps == {"without collisions": True, "without wall": True, "without post": False}
+    assert not [t for t in explained(0.01).thresholds if t.quantity.kind is Kind.WITHOUT]
+
+
+def test_what_is_left_out_takes_its_pairs_along():
+    asked = Collision(
+        self_=False, surface=False, scene=(WALL, POST), tool=(ToolShape.sphere(RADIUS),),
+        allow=(("forearm_link", "post"),), clearances=(("tool", "wall", 0.2),),
+    )  # fmt: skip
+    found = explain(UR5, CELLS, Task(0.02, 30, TOLERANCE, collision=asked))
+    assert threshold_of(found, "without wall").feasible is not None
+    assert threshold_of(found, "without post").feasible is None
+
+
+def test_tool_clearance_ends_at_what_reaches_beyond_the_tool_point():
+    """A nozzle that reaches 5 mm beyond the tool point is 15 mm off a plane 20 mm away."""
+    nozzle = ToolShape.cylinder(0.002, 0.2, position=(0.0, 0.0, -0.095))
+    asked = Collision(self_=False, tool=(nozzle,), tool_links=("wrist_3_link",))
+    found = explain(UR5, CELLS, Task(0.02, 10, TOLERANCE, collision=asked))
+    value = threshold_of(found, "tool clearance").feasible.value
+    assert 0.008 < value <= 0.015 + TOLERANCE
+
+
+# -- `check`, told a motion ------------------------------------------------------------------------
+
+WHOLE = (UR5, PLATE.cells(3, 3), Task(0.02, 30))
+
+
+def test_a_known_motion_is_taken_as_it_is_where_the_replay_accepts_it():
+    verdict = check(*WHOLE)
+    again = check(*WHOLE, Search(seed=5), seeds=verdict.witness)
+    assert (again.feasible, again.n_covered, again.n_edges) == (True, 9, verdict.n_edges)
+    assert set(again.witness.cell[again.witness.cell >= 0].tolist()) == set(range(9))
+    assert again.statistics["fk"] <= verdict.statistics["fk"]
+
+
+def test_a_motion_of_a_case_nearby_leads_to_one_of_this_case():
+    near = PLATE.moved(np.eye(3), np.array([0.01, 0.0, 0.0])).cells(3, 3)
+    verdict = check(UR5, near, Task(0.02, 30))
+    every = np.ones(9, dtype=bool)
+    assert not replay(*WHOLE, verdict.witness, every).accepted
+    again = check(*WHOLE, seeds=verdict.witness)
+    assert replay(*WHOLE, again.witness, every).accepted
+
+
+@pytest.mark.parametrize("damage", ["nan", "joints", "cells", "rows", "greedy"])
+def test_seeds_that_fit_neither_arm_nor_cells_are_refused(damage):
+    q, cell = np.zeros((2, 6)), np.array([0, 1])
+    if damage == "nan":
+        q[0, 3] = np.nan
+    elif damage == "joints":
+        q = q[:, :5]
+    elif damage == "cells":
+        cell[1] = 9
+    elif damage == "rows":
+        cell = cell[:1]
+    search = Search("greedy" if damage == "greedy" else "complete")
+    with pytest.raises(ValueError, match="greedy" if damage == "greedy" else "seeds"):
+        check(*WHOLE, search, seeds=Walk(q, cell))
+
+
+NARROW_CASE = """
+[robot]
+name = "talos_left"
+[robot.limits_deg]
+arm_left_2_joint = [83.7913, 142.0486]
+arm_left_4_joint = [-121.5879, -56.8754]
+arm_left_7_joint = [-36.765, 24.3572]
+[surface]
+kind = "cone"
+cells = [1, 2]
+radius = 0.6672
+slope = 0.736
+u_deg = [72.2804, 101.5253]
+v = [0.0, 0.2384]
+position = [1.236883, -0.196841, 0.817147]
+rpy_deg = [-147.4784, -16.242, -133.9677]
+side = "outside"
+[task]
+standoff = 0.055370055943281066
+cone_deg = 1.0
+tolerance = 0.007184648809461151
+"""
+"""Feasible by a motion that few seeds of a search find."""
+
+
+def test_a_motion_found_beside_a_case_is_tried_on_the_case_itself(tmp_path):
+    """`check` alone may end without it; `explain` must not call a case infeasible and say how its
+    own motions cover it. Once it is told the motion, `check` finds what `explain` found.
+    """
+    (tmp_path / "narrow.toml").write_text(NARROW_CASE)
+    robot, cells, task, *_ = load_case(tmp_path / "narrow.toml").build()
+    found = explain(robot, cells, task)
+    assert found.verdict.feasible
+    assert found.alone is None or found.alone.answer is not Answer.FEASIBLE
+    some = [t for t in found.thresholds if t.margin > 0.0 and t.quantity.joint >= 0]
+    assert len(some) > 5
+    for threshold in some:
+        q, side = threshold.quantity, threshold.feasible
+        limits = [robot.lower[q.joint], robot.upper[q.joint]]
+        limits[q.kind is Kind.UPPER] = side.value
+        arm = robot.with_limits({robot.joint_names[q.joint]: limits})
+        assert check(arm, cells, task, Search(seed=7), seeds=side.witness).feasible, q.name
+
+
+def test_a_search_ends_after_so_many_evaluations_on_any_machine():
+    """As at the deadline: undecided, and why cells are missed can still be read."""
+    robot, cells, task, _ = load_case("paper/5f").with_overrides(["task.standoff=0.505"]).build()
+    clock = Clock()
+    clock.evaluations = 30_000
+    verdict = check(robot, cells, task, clock=clock)
+    assert verdict.answer is Answer.UNDECIDED
+    assert 30_000 < verdict.statistics["fk"] < 100_000
+    assert len(verdict.causes) == len(cells) - verdict.n_covered

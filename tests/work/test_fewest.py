@@ -1,0 +1,262 @@
+"""The fewest patches and stations: hundreds of small tables against brute force, and real sizes."""
+
+from __future__ import annotations
+
+from functools import reduce
+from itertools import combinations
+from operator import or_
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from samples import sampled, seeds
+
+from feasibility.division import set_cover, undominated
+from feasibility.division.connected_labels import count_of
+from feasibility.division.partition import fewest_patches
+from feasibility.placement.stations import fewest_stations
+from surfaces import plane
+
+
+@st.composite
+def tables(draw, rows=5, cells=9):
+    """Which of some motions cover which of some cells, and which cells touch."""
+    n = draw(st.integers(1, cells))
+    count = draw(st.integers(1, rows))
+    covers = draw(st.lists(st.integers(0, 2**n - 1), min_size=count, max_size=count))
+    pairs = list(combinations(range(n), 2))
+    kept = draw(st.lists(st.booleans(), min_size=len(pairs), max_size=len(pairs)))
+    made = np.array([[mask >> c & 1 for c in range(n)] for mask in covers], dtype=bool)
+    return made, np.array([p for p, k in zip(pairs, kept, strict=True) if k]).reshape(-1, 2)
+
+
+def random_table(seed):
+    """Up to 5 components over up to 9 cells, and which of them touch."""
+    rng = np.random.default_rng([5, seed])
+    n, rows = int(rng.integers(1, 10)), int(rng.integers(1, 6))
+    covers = rng.random((rows, n)) < rng.uniform(0.2, 0.9)
+    pairs = np.array(list(combinations(range(n), 2)), dtype=np.int64).reshape(-1, 2)
+    return covers, pairs[rng.random(len(pairs)) < rng.uniform(0.1, 0.7)]
+
+
+def bits(cells):
+    return sum(1 << int(c) for c in np.flatnonzero(cells))
+
+
+def fewest_by_brute_force(covers):
+    """Size of the smallest choice of rows that has all that any row has."""
+    masks, everything = [bits(row) for row in covers], bits(covers.any(axis=0))
+    for count in range(len(masks) + 1):
+        for choice in combinations(masks, count):
+            if (
+                sum(1 << c for c in range(covers.shape[1]) if any(m >> c & 1 for m in choice))
+                == everything
+            ):
+                return count
+    raise AssertionError("all rows together have everything")
+
+
+def connected_by_brute_force(covers, pairs):
+    """Fewest blocks of a set partition, each block connected and inside one row.
+
+    Over all subsets: the block of the subset's first cell, and the best partition of the rest.
+    """
+    n = covers.shape[1]
+    touching = [0] * n
+    for i, j in pairs.tolist():
+        touching[i] |= 1 << j
+        touching[j] |= 1 << i
+    masks = [bits(row) for row in covers]
+
+    def connected(subset):
+        reached = subset & -subset
+        while True:
+            more = reached
+            for c in range(n):
+                if reached >> c & 1:
+                    more |= touching[c] & subset
+            if more == reached:
+                return reached == subset
+            reached = more
+
+    everything = bits(covers.any(axis=0))
+    subsets = [s for s in range(1, 1 << n) if s & everything == s]
+    blocks = {s for s in subsets if any(s & m == s for m in masks) and connected(s)}
+    best = {0: 0}
+    for subset in subsets:
+        first = subset & -subset
+        rest = part = subset ^ first
+        best[subset] = n + 1
+        while True:
+            if part | first in blocks:
+                best[subset] = min(best[subset], 1 + best[rest ^ part])
+            if part == 0:
+                break
+            part = (part - 1) & rest
+    return best[everything]
+
+
+def assert_cover(cover, covers, needed, pairs):
+    """Each needed cell that can be covered is in one patch, each patch in one row; both plans."""
+    for found in (cover.fewest, cover.connected):
+        inside = found.patch >= 0
+        assert (inside == (needed & covers.any(axis=0))).all()
+        assert sorted(set(found.patch[inside].tolist())) == list(range(len(found)))
+        assert covers[found.rows[found.patch[inside]], np.flatnonzero(inside)].all()
+        assert found.pieces == count_of(found.patch, pairs)
+        assert found.bound <= len(found) <= found.pieces
+    assert cover.connected.pieces == len(cover.connected)
+    assert len(set(cover.fewest.rows.tolist())) == len(cover.fewest)
+    assert (cover.left_out == (needed & ~covers.any(axis=0))).all()
+    assert (cover.fewest is cover.connected) == (len(cover.fewest) == len(cover.connected))
+
+
+@sampled
+@pytest.mark.parametrize("block", seeds(3, all=20))
+def test_random_tables_against_brute_force(block):
+    """In some of them connectedness costs patches, in some it does not; the order is no matter."""
+    costs, rng = 0, np.random.default_rng(block)
+    for seed in range(40 * block, 40 * block + 40):
+        covers, pairs = random_table(seed)
+        n = covers.shape[1]
+        needed = rng.random(n) < 0.6 if seed % 4 == 0 else np.ones(n, dtype=bool)
+        cover = fewest_patches(covers, needed, pairs)
+        assert_cover(cover, covers, needed, pairs)
+        assert cover.fewest.optimal
+        assert cover.connected.optimal
+        # Cells that are not needed are as if they were not there: they connect nothing.
+        left = (np.cumsum(needed) - 1)[pairs[needed[pairs].all(axis=1)]]
+        assert len(cover.fewest) == fewest_by_brute_force(covers[:, needed])
+        assert len(cover.connected) == connected_by_brute_force(covers[:, needed], left)
+        costs += len(cover.connected) > len(cover.fewest)
+        place, mixed = rng.permutation(n), np.empty_like(covers)
+        mixed[:, place] = covers
+        again = np.empty_like(needed)
+        again[place] = needed
+        two = fewest_patches(mixed[rng.permutation(len(covers))], again, place[pairs])
+        assert len(two.fewest) == len(cover.fewest)
+        assert len(two.connected) == len(cover.connected)
+    assert 0 < costs < 40
+
+
+@given(tables(rows=8, cells=12), st.lists(st.integers(0, 8), min_size=3, max_size=3))
+def test_stations_against_brute_force(table, cuts):
+    """Each cell is given to one station, which covers it; motions of several placements."""
+    covers, wanted = table[0], table[0].any(axis=0)
+    parts = np.split(np.arange(len(covers)), np.sort(np.minimum(cuts, len(covers))))
+    found = fewest_stations([covers[part] for part in parts], covers.shape[1])
+    assert found.optimal
+    assert len(found) == fewest_by_brute_force(covers)
+    given = [cell for station in found.stations for cell in station.cells.tolist()]
+    assert sorted(given) == np.flatnonzero(wanted).tolist()
+    assert found.left_out.tolist() == np.flatnonzero(~wanted).tolist()
+    for station in found.stations:
+        assert len(station.cells)
+        assert station.covers[station.cells].all()
+        assert (covers[parts[station.placement][station.component]] == station.covers).all()
+    sizes = [len(station.cells) for station in found.stations]
+    assert sizes == sorted(sizes, reverse=True)
+
+
+def test_nothing_covers_nothing():
+    none, whole = np.zeros((0, 0), dtype=bool), np.ones((1, 3), dtype=bool)
+    found = fewest_stations([none, whole[:0], whole], 3)
+    assert [(s.placement, s.cells.tolist()) for s in found.stations] == [(2, [0, 1, 2])]
+    assert len(fewest_stations([], 0)) == 0
+    assert fewest_stations([none], 2).left_out.tolist() == [0, 1]
+    for shape in ((0, 0), (0, 4), (3, 0), (3, 4)):
+        needed = np.ones(shape[1], dtype=bool)
+        cover = fewest_patches(
+            np.zeros(shape, dtype=bool), needed, np.zeros((0, 2), dtype=np.int64)
+        )
+        assert len(cover.fewest) == len(cover.connected) == 0
+        assert cover.fewest.optimal
+        assert cover.left_out.all()
+
+
+def grid(nu, nv):
+    """Pairs of cells that share a side (not only a corner)."""
+    k = np.arange(nu * nv).reshape(nu, nv)
+    down = np.stack([k[:-1].ravel(), k[1:].ravel()], axis=1)
+    return np.vstack([down, np.stack([k[:, :-1].ravel(), k[:, 1:].ravel()], axis=1)])
+
+
+@pytest.mark.parametrize("half", [1, 2])
+def test_two_bars_that_cross(half):
+    """Two motions, but three patches: one bar cuts the other."""
+    i, j = np.divmod(np.arange(121), 11)
+    bars = np.array([abs(i - 5) < half, abs(j - 5) < half])
+    everywhere = np.ones(121, dtype=bool)
+    cover = fewest_patches(bars, everywhere, grid(11, 11))
+    assert_cover(cover, bars, everywhere, grid(11, 11))
+    assert (len(cover.fewest), cover.fewest.pieces) == (2, 3)
+    assert (len(cover.connected), cover.connected.bound) == (3, 3)
+    # Where corners count as touching, wide bars can pass through each other.
+    corners = plane((0, 1), (0, 1)).cells(11, 11).pairs
+    assert len(fewest_patches(bars, everywhere, corners).connected) == (3 if half == 1 else 2)
+
+
+def blobs(nu, nv, count, level, seed):
+    """(count, nu * nv) smooth random regions: where a random wave pattern is above a level."""
+    rng = np.random.default_rng(seed)
+    u, v = np.meshgrid(np.linspace(0, 1, nu), np.linspace(0, 1, nv), indexing="ij")
+    waves = np.zeros((count, nu, nv))
+    for k in range(count):
+        for _ in range(6):
+            a, b, phase = rng.normal(0, 4), rng.normal(0, 4), rng.uniform(0, 2 * np.pi)
+            waves[k] += np.sin(a * u + b * v + phase)
+    return (waves > level).reshape(count, -1)
+
+
+@pytest.mark.parametrize(
+    ("nu", "nv", "count", "level"), [(9, 10, 12, 0.5), (30, 30, 3, -0.5), (50, 50, 50, 1.2)]
+)
+def test_tables_of_real_sizes_are_solved_to_the_optimum(nu, nv, count, level):
+    everywhere, pairs = np.ones(nu * nv, dtype=bool), plane((0, 1), (0, 1)).cells(nu, nv).pairs
+    covers = blobs(nu, nv, count, level, 0)
+    cover = fewest_patches(covers, everywhere, pairs)
+    assert_cover(cover, covers, everywhere, pairs)
+    assert cover.fewest.optimal
+    assert cover.connected.optimal
+
+
+def test_without_time_there_is_a_gap_and_it_is_honest():
+    """A valid partition all the same, and bounds that the optimum keeps."""
+    for seed in (0, 2):
+        covers, everywhere = blobs(10, 10, 40, 1.4, 100 + seed), np.ones(100, dtype=bool)
+        hasty = fewest_patches(covers, everywhere, grid(10, 10), time_limit=0.0)
+        best = fewest_patches(covers, everywhere, grid(10, 10))
+        for cover in (hasty, best):
+            assert_cover(cover, covers, everywhere, grid(10, 10))
+        for early, final in ((hasty.fewest, best.fewest), (hasty.connected, best.connected)):
+            assert final.optimal
+            assert early.bound <= len(final) <= len(early)
+    # Small ones are solved before anybody looks at the clock.
+    everywhere = np.ones(18 * 18, dtype=bool)
+    gaps = [
+        fewest_patches(blobs(18, 18, 150, 1.5, seed), everywhere, grid(18, 18), time_limit=0.0)
+        for seed in (100, 101, 102)
+    ]
+    assert any(one.connected.bound < len(one.connected) for one in gaps)
+
+
+@given(tables())
+def test_undominated_sets(table):
+    """Against the definition; of equal sets the first stays, empty ones go."""
+    sets = [frozenset(np.flatnonzero(row).tolist()) for row in table[0]]
+    kept = [
+        k for k, own in enumerate(sets)
+        if own and not any(own < other for other in sets) and own not in sets[:k]
+    ]  # fmt: skip
+    assert undominated(table[0]).tolist() == kept
+
+
+def test_bad_input():
+    three = np.ones(3, dtype=bool)
+    with pytest.raises(ValueError, match=r"got \(2, 4\) and \(3,\)"):
+        fewest_patches(np.ones((2, 4), dtype=bool), three, np.zeros((0, 2)))
+    with pytest.raises(ValueError, match=r"cells 0 \.\. 2"):
+        fewest_patches(np.ones((2, 3), dtype=bool), three, np.array([[0, 3]]))
+    with pytest.raises(ValueError, match=r"element 1 .* is in no set"):
+        set_cover(np.array([[True, False]]), 1.0)

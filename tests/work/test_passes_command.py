@@ -1,0 +1,230 @@
+"""`coverable path --passes`: parallel passes, run in one certified motion, or in a few."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from coverable_errors import CoverableError
+from feasibility import Task, check, verify
+from feasibility.cli.main import main
+from feasibility.collisions import Collision
+from robots import Kinematics, load_robot
+from surfaces import cylinder, parallel_passes, pass_toolpath, plane, poses
+from surfaces.passes import pass_route
+from surfaces.toolpaths import PoseCells
+
+UR5 = load_robot("ur5")
+TASK = Task(standoff=0.02, cone_deg=20)
+SQUARE = plane((0.0, 0.2), (0.0, 0.2), "outside", (0.4, -0.1, 0.2))
+ARCH = cylinder(0.3, (60, 120), (0.0, 0.2), "outside", (0.45, -0.1, 0.0), (-90, 0, 0))
+PANEL = """
+robot.name = "ur5"
+surface.kind = "plane"
+surface.u = [0.0, {wide}]
+surface.v = [0.0, 0.2]
+surface.cells = [2, 2]
+surface.position = [0.4, -0.1, 0.2]
+surface.side = "outside"
+task.standoff = 0.02
+task.cone_deg = 20
+"""
+CASES = {
+    "panel": PANEL.format(wide=0.2),
+    "plate": PANEL.format(wide=0.3) + "task.footprint = 0.05\ntask.coverage = 0.9\n",
+    "pipe": """
+        robot.name = "ur5"
+        surface = { kind = "cylinder", radius = 0.15, u_deg = [50, 130], v = [0.0, 0.3],
+            position = [0.5, 0.15, 0.0], rpy_deg = [90, 0, 0], side = "outside", cells = [4, 4] }
+        task = { standoff = 0.0, cone_deg = 30, tolerance = 0.0005 }
+    """.replace("\n            ", " "),
+    "round": """
+        robot.name = "ur5"
+        robot.limits_deg = { shoulder_pan_joint = [-180, 180], wrist_2_joint = [-100, 100] }
+        surface = { kind = "cylinder", radius = 0.3, u_deg = [-170, 170], v = [0.0, 0.1],
+            position = [0.0, 0.0, 0.25], side = "outside", cells = [2, 2] }
+        task = { standoff = 0.12, cone_deg = 20, footprint = 0.1 }
+    """.replace("\n            ", " "),
+}
+
+
+@pytest.fixture
+def path(tmp_path, capsys):
+    """path(case, ...) -> status, stdout in one line or as JSON, stderr in one line."""
+
+    def asked(name, *arguments, command="path"):
+        file = tmp_path / f"{name}.toml"
+        file.write_text(CASES[name])
+        status = main([command, str(file), *map(str, arguments)])
+        out, err = capsys.readouterr()
+        assert "Traceback" not in err
+        found = json.loads(out) if "--json" in arguments else " ".join(out.split())
+        return status, found, " ".join(err.split())
+
+    return asked
+
+
+def test_passes_in_one_motion(path, tmp_path):
+    out = tmp_path / "run.csv"
+    asked = ("--passes", "0", "--pitch", "0.05", "--json", "--out", out)
+    status, found, _ = path("panel", *asked)
+    laid = found["passes"]
+    assert (status, found["verdict"], found["order"], laid["count"]) == (0, "feasible", "given", 4)
+    assert laid["spacing_m"] == pytest.approx(0.05)
+    assert laid["length_m"] == pytest.approx(0.8, rel=1e-3)
+    assert found["length_m"] == pytest.approx(0.8 + 3 * 0.05, rel=1e-2)
+    assert len(out.read_text().splitlines()) > 100
+    status, said, _ = path("panel", "--passes", "0,1,0", "--pitch", "0.07", "--one-way")
+    assert (status, "along 3 passes" in said) == (0, True)
+
+
+@pytest.mark.parametrize(("surface", "direction"), [(SQUARE, 0.0), (ARCH, 0.0), (ARCH, np.pi / 2)])
+def test_the_motion_keeps_to_the_passes(surface, direction):
+    """Looked at at twenty places of each segment, against the surface itself."""
+    cells = pass_toolpath(parallel_passes(surface, 0.04, direction, step=0.01))
+    verdict = check(UR5, cells, TASK)
+    assert verdict.feasible
+    q, share = verdict.witness.q, np.linspace(0.0, 1.0, 21)[:, None, None]
+    dense = (q[None, :-1] + share * np.diff(q, axis=0)[None]).transpose(1, 0, 2).reshape(-1, UR5.n)
+    points, axes = Kinematics(UR5).tools(dense)
+    at = surface.closest(points)
+    chord_sag = 0.01**2 / (8 * 0.3)
+    assert np.abs(at.height - 0.02).max() <= 1e-3 + chord_sag  # beside one another, so never lifted
+    assert (-(axes * at.normal).sum(axis=1)).min() >= np.cos(np.radians(20.0)) - 1e-3
+    targets = cells.centres + 0.02 * cells.normals
+    away = np.linalg.norm(targets[:, None] - points[None, ::7], axis=2).min(axis=1)
+    assert away.max() <= 5e-3
+    assert verify(UR5, cells, TASK, q).holds
+
+
+def test_between_stretches_that_are_apart_the_tool_is_lifted():
+    laid = parallel_passes(plane((0.0, 0.2), (0.0, 0.2), "outside"), 0.1, one_way=True)
+    cells = pass_toolpath(laid, retract=0.03)
+    assert np.ptp(cells.centres[:, 2]) == pytest.approx(0.03)
+    assert (cells.centres[:, 2] > 0.02).sum() == 2
+    hill = cylinder(0.3, (30, 150), (0.0, 0.2), "outside")
+    with pytest.raises(CoverableError, match="run through the surface"):
+        pass_toolpath(parallel_passes(hill, 0.1, 0.0, one_way=True), retract=0.01)
+
+
+def test_the_surface_under_the_passes_is_no_less_a_wall():
+    plate = plane((0.0, 0.1), (0.0, 0.1), "outside", (0.45, 0.0, 0.2))
+    cells = pass_toolpath(parallel_passes(plate, 0.1))
+    assert cells.surface.wall is plate
+    moved = cells.surface.moved(np.eye(3), (0.0, 0.0, 0.1))
+    assert moved.wall.position.tolist() == pytest.approx([0.45, 0.0, 0.3])
+    clear = Task(standoff=0.03, cone_deg=5, collision=Collision(self_=False, clearance=0.005))
+    verdict = check(UR5, cells, clear)
+    assert verdict.feasible
+    assert "surface" in verdict.certificate.nearest_pair
+    assert 0.005 <= verdict.certificate.min_clearance <= 0.031
+
+
+def test_bad_arguments_are_said(path, approved):
+    along = ("--passes", "0", "--pitch", "0.05")
+    asked = [along[:2], along[2:], (*along, "--order", "rows"), ("--passes", "north", *along[2:])]
+    asked += [("--passes", "0,0,1", *along[2:]), ("--passes", "0", "--pitch", "1e-6")]
+    asked += [("--passes", "1,0,0", "--pitch", "0.1", "--cross")]
+    found = [path("panel", *arguments) for arguments in asked]
+    assert {status for status, _, _ in found} == {2}
+    approved("bad passes", "\n".join(err for _, _, err in found))
+
+
+def test_passes_too_fast_for_the_joints_are_left_out_with_the_joint(path):
+    status, out, _ = path("panel", "--passes", "0", "--pitch", "0.1", "--set", "task.speed=6")
+    assert status == 3
+    expected = ("none was found that does so at 6 m/s", "no part of them can be run")
+    for words in (*expected, "along stretch 1: ", "rad/s; it allows 3.15"):
+        assert words in out
+
+
+@pytest.mark.parametrize(
+    "more", [[], ["--overrun", "0.02"], ["--one-way"], ["--approach", "0.03"]], ids=str
+)
+def test_verify_accepts_what_path_has_certified(path, tmp_path, more):
+    """Between the passes it once went 2.3 mm into the part."""
+    out, laid = tmp_path / "run.csv", ["--passes", "90", "--pitch", "0.06"]
+    status, said, _ = path("pipe", *laid, *more, "--out", out)
+    assert status == 0
+    assert ("the tool is lifted 3 times" in said) == ("--one-way" in more)
+    assert ("beyond the border by up to 20 mm" in said) == ("--overrun" in more)
+    status, said, _ = path("pipe", out, *laid, command="verify")
+    assert (status, "places along them reached" in said) == (0, True)
+    assert path("pipe", out, "--passes", "0", "--pitch", "0.06", command="verify")[0] == 1
+    if more:
+        text = out.read_text().splitlines()
+        assert text[1].endswith(",working")
+        out.write_text("\n".join([text[1], *(f"{row[:-1]}1" for row in text[2:])]))
+        status, said, _ = path("pipe", out, *laid, command="verify")
+        assert (status, "off its surface" in said) == (1, True)
+
+
+def test_a_way_through_the_part_is_refused():
+    """Straight from pass to pass, as poses alone would have it, and lifted through the part."""
+    part = cylinder(0.15, (50, 130), (0.0, 0.3), "outside", (0.5, 0.15, 0.0), (90, 0, 0))
+    task = Task(0.0, 30, 5e-4)
+    route = pass_route(parallel_passes(part, 0.06, np.pi / 2))
+    kept = route.places.stretch >= 0
+    cut = poses(route.places.points[kept], route.places.normals[kept])
+    verdict = check(UR5, cut, task)
+    assert verdict.feasible  # there is no surface that anybody knows of
+    q, on = verdict.witness.q, np.ones(kept.sum(), dtype=bool)
+    over = PoseCells.of(replace(cut.surface, under=part, working=on))
+    assert "off its surface" in verify(UR5, over, task, q).refusal
+    lifted = on.copy()
+    ends = np.flatnonzero(np.diff(route.places.stretch[kept]))
+    lifted[[*ends, *(ends + 1)]] = False
+    through = PoseCells.of(replace(cut.surface, under=part, working=lifted))
+    assert "goes through the surface where it is lifted" in verify(UR5, through, task, q).refusal
+    assert not check(UR5, over, task).feasible
+
+
+# -- more than one motion, and directions ---------------------------------------------------------
+
+
+def test_passes_are_cut_where_they_cannot_be_run(path, tmp_path):
+    switch = ("--program", tmp_path / "run.script", "--on", "ON", "--off", "OFF", "--json")
+    asked = ("--passes", "0", "--pitch", "0.1", "--out", tmp_path / "run.csv")
+    status, found, _ = path("round", *asked, *switch)
+    runs, cuts = found["runs"], found["cuts"]
+    assert (status, found["verdict"]) == (1, "infeasible")
+    assert len(runs) == len(cuts) + 1 > 1
+    assert (found["left_out_m"], found["refused"]) == (0.0, [])
+    assert all("limit" in cut["cause"] for cut in cuts)
+    assert {stretch for run in runs for stretch in run["stretches"]} == {1}
+    for cut, before, after in zip(cuts, runs, runs[1:], strict=False):
+        assert before["poses"][1] == cut["poses"][0] <= cut["poses"][1] == after["poses"][0]
+        assert len(cut["waypoints"][0]) == len(cut["joints"]) == 6
+    names = [f"run_{k + 1}" for k in range(len(runs))]
+    assert sorted(file.stem for file in tmp_path.glob("run_*.csv")) == names
+    for name in names:
+        lines = (tmp_path / f"{name}.script").read_text().split()
+        assert lines.count("ON") == lines.count("OFF") == 1
+    assert found["treated"]["lower"] > 0.97
+
+
+def test_the_best_direction_has_the_fewest_passes(path, tmp_path):
+    html, asked = tmp_path / "view.html", ("--pitch", "0.05", "--json", "--passes")
+    status, found, _ = path("plate", *asked, "best", "--html", html)
+    assert (status, found["passes"]["count"]) == (0, 4)
+    assert found["treated"]["lower"] >= 0.99
+    page = html.read_text()
+    assert all(name in page for name in ("4 passes in one motion", "numbers", "treated once"))
+    status, found, _ = path("plate", *asked, "0", "--cross")
+    assert (status, found["passes"]["count"]) == (0, 4 + 6)
+
+
+def test_stripes_are_said_to_be_left_where_they_are(path):
+    """Where the pitch is wider than the footprint; not where all is treated by crossing passes."""
+    wide = ("--passes", "0", "--pitch", "0.1")
+    status, out, err = path("plate", *wide)
+    assert (status, "stripes up to 50 mm wide are left between" in out) == (3, True)
+    assert "undecided: the path treats" in err
+    status, out, _ = path("plate", *wide, "--set", "task.coverage=")
+    assert (status, "untreated: " in out) == (0, True)
+    crossed = ("--pitch", "0.05", "--cross", "--set", "task.footprint=0.0499")
+    status, out, _ = path("plate", "--passes", "0", *crossed)
+    assert (status, "to 100.00 % of" in out, "stripes" in out) == (0, True, False)

@@ -1,0 +1,225 @@
+"""Motions along passes over random surfaces, before a referee that shares nothing with the product.
+
+The tool is where Pinocchio says; the surfaces are formulas and triangles of the referee.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from mesh_patches import Mesh, flat_faces, used
+from referee import Facets, Form, angles_between, on_triangles
+from samples import EVERYTHING, sampled, seeds
+from scipy.spatial.transform import Rotation
+
+from feasibility import Task, verify
+from feasibility.paths import coverage_path
+from feasibility.runs import PlannedPasses, plan_passes
+from feasibility.timing import trajectory
+from robots import load_robot
+from surfaces import SurfaceError, cone, cylinder, hyperboloid, mesh, plane, sphere, torus
+from surfaces.meshes import TriangleMesh
+from surfaces.passes import parallel_passes
+
+ARMS = {"ur5": 0.5, "ur10": 0.7, "panda": 0.5, "puma560": 0.6}  # and m, where the surfaces stand
+KINDS = ("plane", "cylinder", "sphere", "cone", "torus", "hyperboloid", "bumps", "bumps with hole")
+MAKERS = {"cylinder": cylinder, "cone": cone, "hyperboloid": hyperboloid}
+PLACES = 12  # of each segment that are looked at
+ROUNDING = 1e-6  # [m], [rad]
+BLENDED = math.radians(2.0)  # how far normals of triangles may be from otherwise blended ones
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """One random case."""
+
+    arm: str
+    surface: Any
+    form: Form | Facets
+    task: Task
+    direction: float
+    pitch: float
+    overrun: float
+    one_way: bool
+
+    @cached_property
+    def planned(self) -> PlannedPasses:
+        """Passes, and the verdict on one motion along them."""
+        laid = parallel_passes(
+            self.surface, self.pitch, self.direction, overrun=self.overrun, one_way=self.one_way
+        )
+        return plan_passes(load_robot(self.arm), laid, self.task, retract=0.03)
+
+
+def drawn(number):
+    """The case of a number."""
+    rng = np.random.default_rng([28, number])
+    arm = tuple(ARMS)[number // len(KINDS) % len(ARMS)]
+    surface, form = surface_of(KINDS[number % len(KINDS)], rng, ARMS[arm])
+    task = Task(
+        standoff=float(rng.choice([0.0, 0.005, 0.03])), cone_deg=float(rng.uniform(12.0, 30.0)),
+        tolerance=float(rng.choice([5e-4, 1e-3])), footprint=0.05,
+    )  # fmt: skip
+    return Drawn(
+        arm, surface, form, task,
+        direction=float(rng.choice([0.0, math.pi / 2, rng.uniform(0.0, math.pi)])),
+        pitch=float(rng.uniform(0.03, 0.08)), overrun=float(rng.choice([0.0, 0.0, 0.01])),
+        one_way=bool(rng.random() < 0.2),
+    )  # fmt: skip
+
+
+def surface_of(kind, rng, far):
+    """A surface of some 0.2 m in front of the arm, tilted by up to 20 degrees; and as a formula.
+
+    Those of revolution lie, so that what looks up is worked on.
+    """
+    tilt = Rotation.from_euler("xyz", rng.uniform(-20, 20, 3), degrees=True)
+    at = np.array([far, rng.uniform(-0.1, 0.1), rng.uniform(0.0, 0.2)])
+    wide, deep = rng.uniform(0.1, 0.2, 2)
+    if kind.startswith("bumps"):
+        return bumps(rng, wide, deep, tilt, at, kind.endswith("hole"))
+    radius = float(rng.uniform(0.12, 0.4))
+    half = wide / radius / 2
+    lying = tilt * Rotation.from_euler("x", 90, degrees=True)
+    u, v, size, low = (math.pi / 2 - half, math.pi / 2 + half), (-deep / 2, deep / 2), (), radius
+    if kind == "plane":
+        u, lying, low = (-wide / 2, wide / 2), tilt, 0.0
+    elif kind == "sphere":
+        lying = tilt * Rotation.from_euler("y", -90, degrees=True)
+        v, size = (-deep / radius / 2, deep / radius / 2), (radius,)
+    elif kind == "torus":
+        tube = 0.8 * radius
+        v, size, low = (-deep / tube / 2, deep / tube / 2), (radius, tube), radius + tube
+    else:
+        size = {"cylinder": (radius,), "cone": (radius, float(rng.uniform(-0.3, 0.3))),
+                "hyperboloid": (radius, float(rng.uniform(0.15, 0.4)))}[kind]  # fmt: skip
+    below = tilt.apply([0, 0, -low]) + at
+    pose = ("outside", below, lying.as_euler("xyz", degrees=True))
+    degrees = tuple(np.degrees(u)), tuple(np.degrees(v))
+    if kind == "plane":
+        made = plane(u, v, *pose)
+    elif kind in ("sphere", "torus"):
+        made = (sphere if kind == "sphere" else torus)(*size, *degrees, *pose)
+    else:
+        made = MAKERS[kind](*size, degrees[0], v, *pose)
+    return made, Form(kind, size, u, v, True, below, lying.as_matrix())
+
+
+def bumps(rng, wide, deep, tilt, at, hole):
+    """Irregular triangles with waves some millimetres high."""
+    x, y = np.meshgrid(np.linspace(0, wide, 25), np.linspace(0, deep, 25))
+    points = np.column_stack([x.ravel(), y.ravel()])
+    inner = ((points > 0) & (points < [wide, deep])).all(axis=1)
+    points[inner] += rng.uniform(-0.001, 0.001, (int(inner.sum()), 2))
+    faces = flat_faces(points, 0.0)
+    if hole:
+        middle = points[faces].mean(axis=1)
+        faces = faces[np.linalg.norm(middle - [wide / 2, deep / 2], axis=1) > 0.03]
+    waves = rng.uniform(-0.002, 0.002, 2)
+    z = waves[0] * np.sin(20 * points[:, 0]) + waves[1] * np.cos(15 * points[:, 1])
+    own = used(Mesh(np.column_stack([points - [wide / 2, deep / 2], z]), faces))
+    surface = mesh(
+        TriangleMesh(*own), side="outside", position=at, rpy_deg=tilt.as_euler("xyz", degrees=True)
+    )
+    corners = tilt.apply(own.vertices) + at
+    form = Facets(corners, own.faces, True)
+    sides = np.sort(own.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    each, count = np.unique(sides, axis=0, return_counts=True)
+    form.border = corners[each[count == 1]]
+    return surface, form
+
+
+def nearest(form, points):
+    """Places of a surface, with its normals, and which of them lie on its border."""
+    where = form.nearest(points)
+    places = form.at(*where)
+    if isinstance(form, Form):
+        return places.points, places.normals, np.isin(where[0], form.u) | np.isin(where[1], form.v)
+    row, edge = np.divmod(np.arange(len(points) * len(form.border)), len(form.border))
+    away = on_triangles(places.points[row], form.border[edge][:, [0, 1, 1]])[1]
+    return places.points, places.normals, away.reshape(len(points), -1).min(axis=1) < 1e-7
+
+
+def tools(robot, q):
+    """(m, 3) tool points and axes, by Pinocchio alone."""
+    data, points, axes = robot.model.createData(), [], []
+    for row in q:
+        full = pin.integrate(robot.model, pin.neutral(robot.model), np.ascontiguousarray(row))
+        pin.forwardKinematics(robot.model, data, full)
+        pin.updateFramePlacements(robot.model, data)
+        placed = data.oMf[robot.tool_frame_id]
+        points.append(placed.translation.copy())
+        axes.append(placed.rotation @ robot.approach_axis)
+    return np.array(points), np.array(axes)
+
+
+def worst(case, q, cell):
+    """How far a motion with marked rows leaves what it has to keep, sampled between its rows.
+
+    rad or m beyond a limit; m beyond the tolerance and rad beyond the cone where the tool works; m
+    below the surface where it is lifted or beyond the border. All are at most 0 where it is right.
+    """
+    along, task = case.planned, case.task
+    robot, on = along.verdict.robot, along.places.on_surface
+    limit = max(float((robot.lower - q).max()), float((q - robot.upper).max()))
+    marks = np.flatnonzero(cell >= 0)
+    share = np.linspace(0.0, 1.0, PLACES, endpoint=False)[:, None, None]
+    dense = (q[None, :-1] + share * np.diff(q, axis=0)).transpose(1, 0, 2).reshape(-1, robot.n)
+    row = np.repeat(np.arange(len(q) - 1), PLACES)
+    before = marks[np.clip(np.searchsorted(marks, row, "right") - 1, 0, len(marks) - 2)]
+    after = marks[np.clip(np.searchsorted(marks, row, "right"), 1, len(marks) - 1)]
+    works = on[cell[before]] & on[cell[after]]
+    faceted = isinstance(case.form, Facets)
+    some = slice(None, None, 1 + len(dense) // 3000 if faceted else 1)
+    dense, works = dense[some], works[some]
+    points, axes = tools(robot, dense)
+    feet, normals, border = nearest(case.form, points)
+    heights = ((points - feet) * normals).sum(axis=1)
+    if faceted:
+        off = np.abs(np.linalg.norm(points - feet, axis=1) - task.standoff)
+    else:
+        off = np.linalg.norm(points - feet - task.standoff * normals, axis=1)
+    angles = angles_between(axes, -normals) - (BLENDED if faceted else 0.0)
+    deep = -heights[~works & ~border] - task.effective_tolerance
+    beyond = float(off[works].max()) - task.effective_tolerance
+    return limit, beyond, float((angles[works] - task.cone).max()), float(deep.max(initial=-1.0))
+
+
+@pytest.fixture(scope="module")
+def held():
+    """Of each case whether a motion was found."""
+    return {}
+
+
+@sampled
+@pytest.mark.parametrize("number", seeds(len(KINDS), all=200))
+def test_what_is_called_feasible_is_right_over_the_surface(number, held):
+    """The motion and its trajectory; and one that comes down by three tolerances is refused."""
+    case = drawn(number)
+    held[number] = False
+    try:
+        along = case.planned
+    except SurfaceError:  # the tool would have to be lifted further
+        return
+    robot, cells, task = along.verdict.robot, along.cells, along.verdict.task
+    if not along.verdict.feasible:
+        return
+    held[number] = True
+    run = trajectory(coverage_path(along.verdict), 0.2)
+    for q, cell in ((along.verdict.witness.q, along.verdict.witness.cell), (run.q, run.cell)):
+        found = verify(robot, cells, task, q, working=cells.surface.works(cell))
+        assert found.holds, found.refusal
+        assert max(worst(case, q, cell)) <= ROUNDING
+    bent = q + 0.03 * np.sin(np.arange(len(q)) / 7.0)[:, None] * np.eye(robot.n)[1]
+    assert max(worst(case, bent, cell)) > ROUNDING
+    assert not verify(robot, cells, task, bent, working=cells.surface.works(cell)).holds
+
+
+def test_most_have_a_motion(held):
+    assert sum(held.values()) >= (0.9 if EVERYTHING else 0.6) * len(held)

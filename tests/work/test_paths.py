@@ -1,0 +1,324 @@
+"""Coverage paths: replayed, judged and measured by others, their choices against brute force."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise, product
+
+import networkx as nx
+import numpy as np
+import pytest
+from dense_replay import assert_motion, assert_over, dense
+from path_cases import BEST, FEASIBLE, PATCHES, path_of, verdict_of
+from samples import sampled, seeds, spread
+
+from feasibility import Answer, Task, check
+from feasibility.certification import replay
+from feasibility.paths import MotionGraph, PathError, coverage_path, motion_graph_of, unwound
+from feasibility.paths.ladder import joint_route
+from feasibility.paths.metrics import revisiting
+from feasibility.paths.motion_graph import joint_length, rewound, windings
+from feasibility.paths.order import ORDERS, closed_sides, grid_order
+from feasibility.results import load_result, save_result
+from feasibility.roadmap import arrays_of, work_for
+from feasibility.verdict import Walk
+from robots import Kinematics, load_robot
+from surfaces import cylinder, plane
+
+NAMES = (*FEASIBLE, *PATCHES)
+ASKED = [
+    *product(("4a", "4e", "5c", *PATCHES), ORDERS),
+    *((name, BEST[name]) for name in FEASIBLE if name not in ("4a", "4e", "5c")),
+]
+UR5 = load_robot("ur5")  # whose joints turn by a turn either way
+
+
+def accepted(verdict, walk, needed=None):
+    """The certificate of a walk that the product's replay and foreign formulas accept."""
+    needed = np.ones(len(verdict.cells), dtype=bool) if needed is None else needed
+    found = replay(verdict.robot, verdict.cells, verdict.task, walk, needed)
+    assert found.accepted, found.refusal
+    marks = walk.cell >= 0
+    assert needed[np.unique(walk.cell[marks])].sum() == needed.sum()
+    assert_over(verdict, walk.cell[marks], walk.q[marks])
+    return found.certificate
+
+
+def beginnings(cells, order):
+    """An order of a grid begun anywhere that it can be."""
+    shape, closed = cells.shape, closed_sides(cells)
+    rows, columns = (range(n if close else 1) for n, close in zip(shape, closed, strict=True))
+    for begin in product(rows, columns):
+        for upside in product((False, True), repeat=2):
+            yield grid_order(order, *shape, begin, upside).tolist()
+
+
+@pytest.mark.parametrize(("name", "order"), ASKED)
+def test_a_path_is_one_motion_through_every_cell_in_its_order(name, order):
+    """It holds between its waypoints too, and revisits little in the order that suits it best."""
+    verdict, path = verdict_of(name), path_of(name, order)
+    assert accepted(verdict, path.walk) == path.certificate
+    firsts = list(dict.fromkeys(path.visits.tolist()))
+    assert sorted(firsts) == list(range(len(verdict.cells)))
+    if path.figures.revisited == 0.0 and order != "shortest":
+        assert firsts in beginnings(verdict.cells, order)
+    if order == BEST.get(name, "rows"):
+        assert_motion(verdict, path.walk.q)
+        assert path.figures.revisited_share <= 0.01
+
+
+TUBES = {
+    # Joints that turn on with the surface, and stop at their limits somewhere on the way.
+    "ur5 around": ("ur5", 0.48, "outside", (0, 0.32), 0.19, 60, 0.1),
+    "ur5 within": ("ur5", 0.203, "inside", (0.37, 0.46), 0.14, 60, 0.1),
+    "stops at 180": ("ur5_limited", 0.157, "inside", (0.54, -0.04), 0.23, 60, 0.05),
+    "panda": ("panda", 0.217, "inside", (0, 0.37), 0.25, 45, 0.05),
+}
+
+
+@cache
+def tube(name):
+    """The verdict of a closed cylinder."""
+    arm, radius, side, (x, z), height, cone, standoff = TUBES[name]
+    ring = cylinder(radius, (0, 360), (0, height), position=(x, 0, z), side=side)
+    return check(load_robot(arm), ring.cells(12, 6), Task(standoff=standoff, cone_deg=cone))
+
+
+@sampled
+@pytest.mark.parametrize(("name", "order"), spread([*product(TUBES, ORDERS)], 6))
+def test_a_closed_surface_is_not_gone_over_twice(name, order):
+    """Some joint cannot turn on where the surface does: the path begins there."""
+    verdict = tube(name)
+    path = coverage_path(verdict, order)
+    accepted(verdict, path.walk)
+    assert_motion(verdict, path.walk.q)
+    assert path.figures.revisited_share <= 0.01
+    if order != "shortest":
+        assert list(dict.fromkeys(path.visits.tolist())) in beginnings(verdict.cells, order)
+
+
+def test_a_motion_in_another_winding_is_the_same_work():
+    verdict = tube("ur5 around")
+    graph = motion_graph_of(verdict)
+    nodes = joint_route(graph, verdict.cells, np.arange(3)).nodes
+    walk, found = graph.walk(nodes), windings(graph, nodes)
+    for joint, times in product(range(6), (-2, -1, 1, 2)):
+        turn = 2 * np.pi * times * np.eye(6)[joint]
+        fits = (walk.q + turn >= UR5.lower).all() and (walk.q + turn <= UR5.upper).all()
+        assert fits == any(np.array_equal(turn, one) for one in found)
+    assert found
+    needed = np.isin(np.arange(len(verdict.cells)), [0, 1, 2])
+    for turn in found:
+        moved = graph.walk(rewound(graph, nodes, turn))
+        assert np.array_equal(moved.cell, walk.cell)
+        assert moved.q == pytest.approx(walk.q + turn, abs=1e-12)
+        accepted(verdict, moved, needed)
+
+
+@pytest.mark.parametrize("name", ["4c", "5c", *PATCHES])
+def test_the_figures_of_a_path_measured_again(name):
+    verdict, path = verdict_of(name), path_of(name)
+    robot, walk, figures = verdict.robot, path.walk, path.figures
+    # Lengths: straight from closest point to closest point along a much denser walk.
+    points, _ = Kinematics(robot).tools(dense(walk.q, 16))
+    on = verdict.cells.surface.closest(points)
+    feet = points - on.height[:, None] * on.normal
+    way = np.linalg.norm(np.diff(feet, axis=0), axis=1)
+    assert figures.length == pytest.approx(way.sum(), rel=1e-3)
+    by_mark, seen, start = [0.0, 0.0], {int(walk.cell[0])}, 0
+    for k in np.flatnonzero(walk.cell >= 0)[1:].tolist():
+        by_mark[int(walk.cell[k]) in seen] += way[16 * start : 16 * k].sum()
+        seen.add(int(walk.cell[k]))
+        start = k
+    assert [figures.covered, figures.revisited] == pytest.approx(by_mark, rel=1e-3, abs=1e-9)
+    # A path through the centres is no shorter; this one passes them within the tolerance.
+    assert figures.length >= figures.least_length - 2e-3 * len(verdict.cells)
+    assert figures.travel == pytest.approx(np.abs(np.diff(walk.q, axis=0)).sum(axis=0))
+    assert figures.turn_margin == np.minimum(walk.q - robot.lower, robot.upper - walk.q).min()
+    assert figures.slide_margin == np.inf
+    assert -1e-9 <= figures.cone_margin <= verdict.task.cone
+    assert figures.singular_value == pytest.approx(_singular_value(robot, walk.q), rel=1e-4)
+
+
+def _singular_value(robot, q, step=1e-6):
+    """The smallest of five singular values, by finite differences of the tool's place."""
+    kinematics, smallest = Kinematics(robot), np.inf
+    for row in q:
+        shifts = np.vstack([step * np.eye(robot.n), -step * np.eye(robot.n)])
+        points, axes = kinematics.tools(row + shifts)
+        both = np.hstack([points / robot.reach, axes])
+        columns = (both[: robot.n] - both[robot.n :]).T / (2 * step)
+        smallest = min(smallest, np.linalg.svd(columns, compute_uv=False)[4])
+    return smallest
+
+
+def test_segments_that_lead_to_a_known_cell():
+    walk = Walk(q=np.zeros((8, 2)), cell=np.array([0, -1, 1, -1, 0, 0, -1, 2]))
+    assert revisiting(walk).tolist() == [False, False, True, True, True, False, False]
+
+
+def test_some_cells_only_of_a_feasible_surface_or_of_one_that_is_not():
+    verdict = verdict_of("4d")
+    path = coverage_path(verdict, "rows", only=np.flatnonzero(verdict.covered).tolist())
+    accepted(verdict, path.walk, verdict.covered)
+    assert_motion(verdict, path.walk.q)
+    wanted = [0, 1, 2, 12, 22, 88]
+    path = coverage_path(verdict_of("4c"), "shortest", only=wanted)
+    assert set(path.visits.tolist()) >= set(wanted)
+    assert len(path.visits) < 30
+    single = coverage_path(verdict_of("4c"), "rows", only=[7])
+    assert single.visits.tolist() == [7]
+    assert (single.figures.length, single.figures.revisited_share) == (0.0, 0.0)
+
+
+def test_a_verdict_from_a_file_has_the_same_path(tmp_path):
+    from feasibility.cases import load_case
+
+    case = load_case("paper/4a", ["surface.cells=[4, 4]"])
+    verdict = check(*case.build())
+    loaded = load_result(save_result(verdict, case, tmp_path / "4a.cover")).verdict
+    for order in ORDERS:
+        first, second = coverage_path(verdict, order), coverage_path(loaded, order)
+        assert np.array_equal(first.walk.q, second.walk.q)
+        assert np.array_equal(first.walk.cell, second.walk.cell)
+
+
+# -- the choice of nodes, on graphs by hand -------------------------------------------------------
+
+
+def hand_made(rng, cells, nodes, density):
+    """A graph over cells in a row: some nodes over each, random motions between neighbours."""
+    verdict = verdict_of("ur5")
+    arrays = arrays_of(verdict.robot, verdict.cells, verdict.task)
+    pairs = {(k, k + 1): k for k in range(cells - 1)}
+    graph = MotionGraph(arrays, work_for(2), pairs, grows=False)
+    for cell in range(cells):
+        for _ in range(nodes):
+            graph.node(cell, 30.0 * rng.random(2))
+    for a, b in product(range(cells * nodes), repeat=2):
+        if abs(graph.cell[a] - graph.cell[b]) <= 1 and a < b and rng.random() < density:
+            graph.join(a, b, np.vstack([graph.q[a], 30.0 * rng.random((1, 2)), graph.q[b]]))
+    return graph, verdict.cells
+
+
+@sampled
+@pytest.mark.parametrize("seed", seeds(10, all=200))
+def test_nodes_are_chosen_for_the_least_travel(seed):
+    graph, cells = hand_made(np.random.default_rng(seed), cells=5, nodes=3, density=1.0)
+    nodes = joint_route(graph, cells, np.arange(5), wind=False).nodes
+    assert [graph.cell[x] for x in nodes] == list(range(5))
+    choices = product(*(graph.over[cell] for cell in range(5)))
+    travel = [sum(graph.length(x, y) for x, y in pairwise(c)) for c in (nodes, *choices)]
+    assert travel[0] == pytest.approx(min(travel), rel=1e-12)
+
+
+def test_detours_go_through_known_motions_to_every_cell():
+    """And are given up where they revisit more than is allowed."""
+    rng, reached, refused, given_up = np.random.default_rng(7), 0, 0, 0
+    while reached < 30 or refused < 10 or given_up < 5:
+        graph, cells = hand_made(rng, 6, 3, density=float(rng.choice([0.2, 0.4, 0.6])))
+        order = rng.permutation(6)
+        joined = [{graph.cell[x] for x in part} for part in nx.connected_components(graph.edges)]
+        if not any(len(part) == 6 for part in joined):
+            with pytest.raises(PathError, match="no known motion leads from"):
+                joint_route(graph, cells, order, wind=False)
+            refused += 1
+        elif all(len(part) == 6 for part in joined):
+            found = joint_route(graph.copy(), cells, order, wind=False)
+            nodes = found.nodes
+            assert {graph.cell[x] for x in nodes} == set(range(6))
+            assert graph.cell[nodes[0]] == order[0]
+            assert all(graph.edges.has_edge(x, y) for x, y in pairwise(nodes))
+            walk = graph.walk(nodes)
+            assert walk.cell[walk.cell >= 0].tolist() == [graph.cell[x] for x in nodes]
+            assert np.array_equal(walk.q[walk.cell >= 0], [graph.q[x] for x in nodes])
+            reached += 1
+            most = found.revisited * (1 + 1e-9)
+            same = joint_route(graph.copy(), cells, order, wind=False, most_revisited=most)
+            assert same.nodes == nodes
+            if found.revisited > 0.0:
+                half = 0.5 * found.revisited
+                less = joint_route(graph.copy(), cells, order, wind=False, most_revisited=half)
+                assert (less.nodes, less.revisited) == ([], np.inf)
+                assert less.stuck == found.stuck[: len(less.stuck)] != []
+                given_up += 1
+
+
+def test_a_detour_is_the_cheapest():
+    """20 rad, what a detour as long as the arm costs."""
+    rng, found = np.random.default_rng(5), 0
+    for _ in range(40):
+        graph, cells = hand_made(rng, cells=5, nodes=2, density=0.5)
+        weighted = nx.empty_graph(len(graph.cell))
+        for x, y in graph.edges.edges:
+            apart = np.linalg.norm(cells.centres[graph.cell[x]] - cells.centres[graph.cell[y]])
+            cost = joint_length(graph.motion(x, y)) + 20.0 * apart / graph.arrays.scale
+            weighted.add_edge(x, y, weight=cost)
+        lengths = [
+            nx.dijkstra_path_length(weighted, x, y)
+            for x, y in product(graph.over[0], graph.over[4])
+            if nx.has_path(weighted, x, y)
+        ]
+        if lengths:
+            nodes = joint_route(graph, cells, np.array([0, 4]), wind=False).nodes
+            length = nx.path_weight(weighted, nodes, "weight")
+            assert length == pytest.approx(min(lengths), rel=1e-12)
+            found += 1
+    assert found > 10
+
+
+# -- full turns -----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def small():
+    cells = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0.0, 0.0, 0.2)).cells(2, 2)
+    return check(UR5, cells, Task(standoff=0.02, cone_deg=20))
+
+
+@pytest.mark.parametrize("turns", [[0, 1, 0, 0, 0, 0], [1, 0, 0, 1, 0, 1]])
+def test_full_turns_are_undone_and_the_replay_accepts_it(small, turns):
+    walk = small.witness
+    middle = 0.5 * (walk.q.min(axis=0) + walk.q.max(axis=0))
+    far = Walk(walk.q - 2.0 * np.pi * np.sign(middle) * turns, walk.cell)
+    assert (far.q >= UR5.lower).all()
+    assert (far.q <= UR5.upper).all()
+    found = unwound(UR5, small.task, far)
+    assert np.abs(0.5 * (found.q.min(axis=0) + found.q.max(axis=0))).max() <= np.pi + 1e-9
+    accepted(small, found)
+    assert np.abs(coverage_path(replace(small, witness=far)).walk.q).max() <= 1.5 * np.pi
+
+
+def test_home_says_which_turn_and_a_start_is_kept(small):
+    walk = small.witness
+    home = np.degrees(walk.q[0])
+    home[1] += 360.0 if home[1] < 0 else -360.0
+    task = replace(small.task, home_deg=tuple(home.tolist()))
+    found = unwound(UR5, task, walk)
+    assert np.allclose(np.degrees(found.q[0]), home)
+    accepted(small, found)
+    assert unwound(load_robot("ur5", start=walk.q[0].tolist()), task, walk) is walk
+    free = replace(UR5, lower=np.full(6, -np.inf), upper=np.full(6, np.inf))
+    far = unwound(free, small.task, Walk(walk.q + 2.0 * np.pi, walk.cell))  # no numpy warning
+    assert np.abs(0.5 * (far.q.min(axis=0) + far.q.max(axis=0))).max() <= np.pi + 1e-9
+
+
+# -- what cannot be asked -------------------------------------------------------------------------
+
+
+def test_what_has_no_path_is_said(approved):
+    verdict, patch = verdict_of("4d"), verdict_of("ur5")
+    missed = int(np.flatnonzero(~verdict.covered)[0])
+    undecided = replace(verdict, answer=Answer.UNDECIDED, graph=None, causes=())
+    greedy = replace(patch, method="greedy")
+    empty = check(patch.robot, patch.cells.surface.cells(0, 3), patch.task)
+    asked = [(verdict, {}), (undecided, {}), (greedy, {}), (empty, {}), (patch, {"only": []})]
+    asked += [(verdict, {"only": [missed, -1, 90]}), (patch, {"order": "snake"})]
+    asked += [(patch, {"only": only}) for only in ([1.5], ["0"], [None], [10**30])]
+    said = []
+    for one, arguments in asked:
+        with pytest.raises(PathError) as caught:
+            coverage_path(one, **arguments)
+        said.append(str(caught.value))
+    approved("what has no path", "\n".join(said))

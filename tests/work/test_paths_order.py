@@ -1,0 +1,176 @@
+"""Orders of cells: permutations, steps between neighbours, and lengths against brute force."""
+
+from __future__ import annotations
+
+from itertools import pairwise, permutations, product
+from types import SimpleNamespace
+
+import networkx as nx
+import numpy as np
+import pytest
+from mesh_patches import sheet
+from path_cases import verdict_of
+from samples import sampled, seeds
+
+from feasibility.paths import PathError, coverage_path
+from feasibility.paths.order import (
+    GRID_ORDERS,
+    ORDERS,
+    closed_sides,
+    grid_order,
+    least_length,
+    route,
+    route_length,
+    step_lengths,
+)
+from feasibility.paths.two_opt import improved, tour_length
+from surfaces import cylinder, mesh, plane, sphere
+from surfaces.meshes import TriangleMesh
+
+SHAPES = [(0, 3), (1, 1), (1, 5), (5, 1), (2, 2), (2, 5), (5, 2), (3, 3), (4, 6), (6, 4), (6, 6)]
+
+
+@pytest.mark.parametrize("order", GRID_ORDERS)
+@pytest.mark.parametrize(("rows", "columns"), SHAPES)
+def test_grid_orders_step_from_cell_to_the_next(order, rows, columns):
+    found = grid_order(order, rows, columns)
+    assert sorted(found.tolist()) == list(range(rows * columns))
+    i, j = np.divmod(found, columns)
+    assert (np.abs(np.diff(i)) + np.abs(np.diff(j)) == 1).all()
+    if order == "rows":
+        assert (np.diff(i) >= 0).all()
+    if order == "columns":
+        assert (np.diff(j) >= 0).all()
+    if order == "spiral":  # outside in: cells never come nearer to the outside again
+        depth = np.minimum(np.minimum(i, rows - 1 - i), np.minimum(j, columns - 1 - j))
+        assert (np.diff(depth) >= 0).all()
+
+
+@pytest.mark.parametrize("order", GRID_ORDERS)
+@pytest.mark.parametrize("closed", [(True, False), (False, True), (False, False)])
+def test_orders_begun_elsewhere_step_from_cell_to_the_next_too(order, closed):
+    """Only over the seam of a grid that closes there."""
+    shape = (5, 4)
+    for begin in np.ndindex(*(n if c else 1 for n, c in zip(shape, closed, strict=True))):
+        for flipped in product((False, True), repeat=2):
+            found = grid_order(order, *shape, begin, flipped)
+            assert sorted(found.tolist()) == list(range(20))
+            steps = np.abs(np.diff(np.stack(np.divmod(found, 4)), axis=1))
+            for axis in (0, 1):
+                if closed[axis]:
+                    steps[axis] = np.minimum(steps[axis], shape[axis] - steps[axis])
+            assert (steps.sum(axis=0) == 1).all()
+            first = np.add(begin, [n - 1 if t else 0 for n, t in zip(shape, flipped, strict=True)])
+            assert np.divmod(found[0], 4) == tuple(first % shape)
+
+
+def test_grids_that_close_on_themselves():
+    closed = {
+        (True, False): [cylinder(0.5, (0, 360), (0, 1)).cells(3, 2)],
+        (False, True): [sphere(0.5, (k, 90), (0, 360)).cells(3, 8) for k in (0, 20)],
+        (False, False): [
+            cylinder(0.5, (0, 350), (0, 1)).cells(9, 2),
+            cylinder(0.5, (0, 360), (0, 1)).cells(2, 3),
+            plane((0, 1), (0, 1)).cells(3, 3),
+        ],
+    }
+    for sides, grids in closed.items():
+        assert all(closed_sides(cells) == sides for cells in grids)
+
+
+@sampled
+@pytest.mark.parametrize("seed", seeds(6, all=100))
+def test_no_path_is_shorter_than_the_least_length(seed):
+    """Of points that are spanned by a tree, and of too many for that."""
+    rng = np.random.default_rng(seed)
+    points = rng.random((rng.integers(2, 8), 3))
+    apart = np.linalg.norm(points[:, None] - points, axis=2)
+    routes = permutations(range(len(points)))
+    shortest = min(sum(apart[a, b] for a, b in pairwise(order)) for order in routes)
+    tree = nx.minimum_spanning_tree(nx.from_numpy_array(apart)).size("weight")
+    assert least_length(points) == pytest.approx(tree, rel=1e-12)
+    assert least_length(points) <= shortest * (1 + 1e-12)
+    assert 0.0 < least_length(points, most_spanned=1) <= tree * (1 + 1e-12)
+
+
+def test_the_least_length_of_few_points():
+    assert least_length(np.zeros((0, 3))) == least_length(np.zeros((1, 3))) == 0.0
+    assert least_length(np.zeros((4, 3))) == pytest.approx(0.0, abs=1e-300)
+
+
+@sampled
+@pytest.mark.parametrize("seed", seeds(8, all=200))
+def test_an_improved_tour_has_no_better_neighbour(seed):
+    """Of those with a part turned round, or a part of up to three moved elsewhere."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(2, 12))
+    points = rng.random((n, 2))
+    distance = np.linalg.norm(points[:, None] - points, axis=2)
+    start = rng.permutation(n)
+    tour = improved(distance, start)
+    assert sorted(tour.tolist()) == list(range(n))
+    others = [start]
+    for i in range(n):
+        for j in range(i + 1, n + 1):
+            part, rest = tour[i:j], np.concatenate([tour[:i], tour[j:]])
+            others.append(np.concatenate([tour[:i], part[::-1], tour[j:]]))
+            for k in range(len(rest) + 1) if j - i <= 3 else ():
+                others += [np.concatenate([rest[:k], p, rest[k:]]) for p in (part, part[::-1])]
+    assert tour_length(distance, tour) <= min(tour_length(distance, x) for x in others) + 1e-8
+
+
+@pytest.mark.parametrize("name", ["4a", "4c", "5a", "5c"])
+def test_the_shortest_order_is_no_longer_than_the_others(name):
+    cells = verdict_of(name).cells
+    steps = step_lengths(cells, cells.pairs)
+    lengths = {order: route_length(steps, route(cells, order)) for order in ORDERS}
+    assert lengths["shortest"] <= min(lengths.values()) * (1 + 1e-9)
+    assert lengths["shortest"] >= least_length(cells.centres) * (1 - 1e-9)
+    for order in ORDERS:
+        assert sorted(route(cells, order).tolist()) == list(range(len(cells)))
+
+
+def test_on_square_cells_the_shortest_order_is_the_shortest_there_is():
+    cells = plane((0, 0.5), (0, 0.7)).cells(5, 7)
+    steps = step_lengths(cells, cells.pairs)
+    assert route_length(steps, route(cells, "shortest")) == pytest.approx(3.4, rel=1e-9)
+    assert least_length(cells.centres) == pytest.approx(3.4, rel=1e-9)
+
+
+def test_the_length_of_a_route_goes_round_what_does_not_touch():
+    cells = plane((0, 0.3), (0, 0.1)).cells(3, 1)
+    steps = step_lengths(cells, cells.pairs)
+    assert route_length(steps, np.array([0, 2, 1])) == pytest.approx(0.3, rel=1e-12)
+    alone = step_lengths(cells, np.array([[0, 1]]))
+    assert route_length(alone, np.array([0, 1, 2])) == np.inf
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_only_needed_cells_are_visited_and_one_is_an_order_of_its_own(order):
+    cells = cylinder(0.5, (-60, 60), (0.0, 0.9)).cells(4, 5)
+    needed = np.random.default_rng(3).random(20) < 0.5
+    found = route(cells, order, needed)
+    assert sorted(found.tolist()) == np.flatnonzero(needed).tolist()
+    one = plane((0.0, 0.1), (0.0, 0.1)).cells(1, 1)
+    assert route(one, order).tolist() == [0]
+    assert route_length(step_lengths(one, one.pairs), np.array([0])) == 0.0
+
+
+def test_the_shortest_order_of_cells_in_two_pieces_names_each_once():
+    cells = plane((0, 0.4), (0, 0.2)).cells(4, 2)
+    pairs = cells.pairs[(cells.pairs < 4).all(axis=1) | (cells.pairs >= 4).all(axis=1)]
+    assert sorted(route(cells, "shortest", None, pairs).tolist()) == list(range(8))
+
+
+def test_cells_of_a_mesh_have_the_shortest_order_alone():
+    cells = mesh(TriangleMesh(*sheet(12))).cells(12)
+    assert sorted(route(cells, "shortest").tolist()) == list(range(len(cells)))
+    for order in GRID_ORDERS:
+        for ask in (
+            lambda order=order: route(cells, order),
+            lambda order=order: coverage_path(SimpleNamespace(cells=cells), order),  # asks no arm
+        ):
+            with pytest.raises(PathError, match=f"{order}.*not.*use order 'shortest'"):
+                ask()
+    with pytest.raises(PathError, match=r"'zigzag'.*rows, columns, spiral, shortest"):
+        route(cells, "zigzag")

@@ -1,0 +1,507 @@
+"""Placements: found where there are some, and again by `check`; refused where a bound shows it.
+
+Bounds on regions against dense samples; who tries placements, and who stops it, change nothing.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from jobs import PLATE, coverable
+from samples import sampled, spread
+
+from feasibility import Answer, CauseKind, Evidence, Search, Task, check
+from feasibility.cases import Case
+from feasibility.collisions import Collision, Obstacle, ToolShape
+from feasibility.placement import (
+    AXES,
+    LocalEvaluator,
+    PlacementError,
+    Pose,
+    Region,
+    Stage,
+    StudyEvaluator,
+    Trial,
+    moved_cells,
+    place,
+    placement_map,
+    station_plan,
+    trial_table,
+)
+from feasibility.placement.reach_bound import Reach
+from feasibility.studies import Store, open_workers
+from robots import load_robot
+from surfaces import mesh, plane, rotation_from_rpy, sphere
+from surfaces.meshes import TriangleMesh
+
+SHIFT, TURN_DEG = 0.3, 40.0  # [m], [deg] that a surface is moved by, at most
+WIDTHS = np.array([SHIFT] * 3 + [TURN_DEG] * 3)
+PUMA = 'robot = { name = "puma560", limits = "set-1" }\n'
+TEXTS = {
+    "puma560 dome": PUMA + """
+        surface.kind = "sphere"
+        surface.radius = 1.0
+        surface.u_deg = [20, 80]
+        surface.v_deg = [40, 130]
+        surface.cells = [4, 5]
+        task = { standoff = 0.005, cone_deg = 25 }""",
+    "puma560 pipe": PUMA + """
+        surface.kind = "cylinder"
+        surface.radius = 0.5
+        surface.u_deg = [-40, 40]
+        surface.v = [0.1, 0.6]
+        surface.cells = [5, 4]
+        task = { standoff = 0.005, cone_deg = 30 }""",
+    "ur5 plate": """
+        robot = { name = "ur5" }
+        surface.kind = "plane"
+        surface.u = [-0.25, 0.25]
+        surface.v = [-0.2, 0.2]
+        surface.cells = [5, 4]
+        surface.position = [0.5, 0, 0.2]
+        surface.side = "outside"
+        task = { standoff = 0.02, cone_deg = 20 }""",
+    "ur5 pipe": """
+        robot = { name = "ur5" }
+        surface.kind = "cylinder"
+        surface.radius = 0.15
+        surface.u_deg = [100, 260]
+        surface.v = [-0.2, 0.2]
+        surface.position = [0.65, 0, 0.3]
+        surface.side = "outside"
+        surface.cells = [5, 4]
+        task = { standoff = 0.02, cone_deg = 20 }""",
+    "panda plate": """
+        robot = { name = "panda" }
+        surface.kind = "plane"
+        surface.u = [-0.2, 0.2]
+        surface.v = [-0.2, 0.2]
+        surface.cells = [4, 4]
+        surface.position = [0.5, 0, 0.2]
+        surface.side = "outside"
+        task = { standoff = 0.02, cone_deg = 15 }""",
+}  # fmt: skip
+MOVED = [("ur5 plate", 3), ("panda plate", 3), ("ur5 pipe", 8), ("puma560 pipe", 21),
+         ("puma560 dome", 12), ("puma560 dome", 21), ("puma560 pipe", 2), ("ur5 pipe", 3),
+         ("ur5 pipe", 15), ("ur5 plate", 9), ("panda plate", 10)]  # fmt: skip
+
+
+@cache
+def case_of(name):
+    return Case.from_toml(TEXTS[name], name=name)
+
+
+@cache
+def setup_of(name):
+    return case_of(name).build()
+
+
+def moved_away(name, seed):
+    """A pose up to 0.3 m and 40 degrees, along and about each axis, from where the surface is."""
+    own = Pose.of_surface(setup_of(name).cells.surface).values
+    shift = np.random.default_rng([7, seed]).uniform(-1.0, 1.0, 6) * WIDTHS
+    return Pose.of_values(np.round(own + shift, 6))
+
+
+def region_about(pose, widths=WIDTHS):
+    """All poses within some widths of one."""
+    ends = zip(AXES, pose.values.tolist(), widths, strict=True)
+    return Region.around(pose, {name: (v - w, v + w) for name, v, w in ends})
+
+
+def case_at(name, pose):
+    """The case with its surface at a pose, read anew."""
+    position, rpy = list(pose.position), list(pose.rpy_deg)
+    sets = [f"surface.position={position}", f"surface.rpy_deg={rpy}"]
+    return case_of(name).with_overrides(sets).build()
+
+
+# -- what the search finds -------------------------------------------------------------------------
+
+
+@sampled
+@pytest.mark.parametrize(("name", "seed"), [*spread(MOVED[:4], 4), *spread(MOVED, 1)[1:]])
+def test_a_surface_moved_away_is_put_back(name, seed):
+    """Infeasible where it was moved to; in the region around there is a place, and check agrees."""
+    away = moved_away(name, seed)
+    moved = case_at(name, away)
+    assert check(*moved).answer is Answer.INFEASIBLE
+    region = region_about(away)
+    found = place(*moved[:3], region, moved.search, count=32, around=2, keep=2)
+    assert (found.answer, found.evidence) == (Answer.FEASIBLE, Evidence.WITNESS)
+    for trial in found.found:
+        assert region.holds(trial.pose)
+        assert check(*case_at(name, trial.pose)).feasible
+        assert (trial.complete, trial.share) == (True, 1.0)
+        three = trial.margins.limits, trial.margins.cone, trial.margins.reach
+        assert 0.0 <= trial.margin == min(three) <= 1.0
+    margins = [trial.margin for trial in found.found]
+    assert margins == sorted(margins, reverse=True)
+    assert found.best is found.found[0]
+
+
+class Nobody:
+    """An evaluator that must not be asked."""
+
+    batch = 1
+
+    def try_all(self, poses, early):
+        raise AssertionError("no search should be run")
+
+    check_all = try_all
+
+
+def test_a_region_far_away_is_refused_by_the_bound_alone():
+    for name in TEXTS:
+        setup = setup_of(name)
+        far = Pose.of_surface(setup.cells.surface).values + np.array([3.0, 0, 0, 0, 0, 0])
+        region = region_about(Pose.of_values(far))
+        found = place(*setup[:3], region, setup.search, evaluator=Nobody())
+        assert (found.answer, found.evidence) == (Answer.INFEASIBLE, Evidence.PROOF)
+        assert (found.cause, found.found) == (CauseKind.OUT_OF_REACH, ())
+
+
+def test_none_in_a_region_within_reach():
+    """The plate faces the floor below the arm; no bound sees it, and the cause is told."""
+    setup, floor = setup_of("ur5 plate"), Pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    region = Region.around(floor, {"x": (-0.05, 0.05), "y": (-0.05, 0.05)})
+    narrow = Task(standoff=0.02, cone_deg=5)
+    found = place(setup.robot, setup.cells, narrow, region, count=2, around=0)
+    assert (found.answer, found.evidence) == (Answer.INFEASIBLE, Evidence.EXHAUSTED)
+    verdict = check(setup.robot, moved_cells(setup.cells, found.best.pose), narrow)
+    areas = verdict.cells.areas
+    assert found.share == pytest.approx(areas[verdict.covered].sum() / areas.sum()) < 1.0
+    assert sum(found.causes.values()) == (~verdict.covered).sum()
+    assert found.causes[str(found.cause)] == max(found.causes.values())
+
+
+class Doubting(LocalEvaluator):
+    """`check` never agrees."""
+
+    def check_all(self, poses, causes):
+        undecided = {"answer": Answer.UNDECIDED, "evidence": Evidence.BUDGET}
+        return [Trial(pose, Stage.CHECK, 1.0, **undecided) for pose in poses]
+
+
+def test_the_seed_decides_which_places_are_tried_and_check_what_is_answered():
+    setup = setup_of("panda plate")
+    region = region_about(Pose.of_surface(setup.cells.surface))
+    ask = {"count": 8, "around": 1, "keep": 1}
+    one, two = (place(*setup[:3], region, Search(seed=3), **ask) for _ in range(2))
+    assert [trial_table(t) for t in one.trials] == [trial_table(t) for t in two.trials]
+    other = place(*setup[:3], region, Search(seed=4), **ask)
+    assert [t.pose for t in other.trials] != [t.pose for t in one.trials]
+    doubted = place(*setup[:3], region, Search(seed=3), evaluator=Doubting(*setup), **ask)
+    assert any(trial.complete for trial in doubted.trials)
+    assert (doubted.answer, doubted.found) == (Answer.UNDECIDED, ())
+
+
+def test_a_ctrl_c_ends_it_with_the_best_so_far():
+    class Stopping(LocalEvaluator):
+        """Tries some placements; then there is a Ctrl-C."""
+
+        tried = 0
+
+        def try_at(self, pose, early=True):
+            self.tried += 1
+            if self.tried > 20:
+                raise KeyboardInterrupt
+            return super().try_at(pose, early)
+
+    setup = setup_of("ur5 plate")
+    region = Region.around(Pose.of_surface(setup.cells.surface), {"x": (0.0, 0.3)})
+    found = place(*setup[:3], region, setup.search, evaluator=Stopping(*setup), interruptible=True)
+    assert (found.answer, found.interrupted) == (Answer.FEASIBLE, True)
+    assert found.best.margin == max(trial.margin for trial in found.trials) > 0.0
+    assert check(*case_at("ur5 plate", found.best.pose)).feasible
+    with pytest.raises(KeyboardInterrupt):
+        place(*setup[:3], region, setup.search, evaluator=Stopping(*setup))
+
+
+WALL_AT, RADIUS, CLEARANCE = 0.8, 0.05, 0.01  # m
+ROOM = WALL_AT - 0.5 - RADIUS - CLEARANCE
+"""m that the surface may move towards the wall, with a ball around the tool point."""
+
+
+def test_no_place_is_feasible_whose_motion_would_not_stay_clear():
+    cells = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0.0, 0.0, 0.3)).cells(1, 2)
+    wall = Obstacle.halfspace("wall", position=(WALL_AT, 0.0, 0.0), rpy_deg=(0.0, -90.0, 0.0))
+    asked = Collision(
+        self_=False, clearance=CLEARANCE, scene=(wall,), tool=(ToolShape.sphere(RADIUS),),
+        allow=(("tool", "surface"),),
+    )  # fmt: skip
+    region = Region.around(Pose.of_surface(cells.surface), {"x": (0.0, 2.0 * ROOM)})
+    beside = Task(0.02, 30, 0.001, collision=asked)
+    found = place(load_robot("ur5"), cells, beside, region, count=6, around=0, keep=3)
+    assert max(trial.pose.position[0] for trial in found.trials) > ROOM + 0.001
+    assert max(trial.pose.position[0] for trial in found.found) <= ROOM + 0.001
+    free = LocalEvaluator(load_robot("ur5"), cells, replace(beside, collision=None), Search())
+    assert free.try_at(Pose((ROOM + 0.05, 0.0, 0.3), (0.0, 0.0, 0.0))).complete
+
+
+# -- bounds ----------------------------------------------------------------------------------------
+
+
+def test_the_bound_on_a_region_holds_for_its_placements():
+    """Against samples and corners of regions, some near the edge of reach; and it proves some."""
+    proved = several = 0
+    reaches = [Reach.of(*setup_of(name)[:3]) for name in TEXTS]
+    picks = np.array(np.meshgrid(*[[0, 1]] * 6)).reshape(6, -1).T
+    tight = []
+    for k in range(80):
+        reach, rng = reaches[k % len(reaches)], np.random.default_rng([21, k])
+        far = rng.normal(size=3)
+        far *= rng.uniform(0.8, 1.6) * (reach.reach + 0.3) / np.linalg.norm(far)
+        centre = np.concatenate([far, rng.uniform(-180.0, 180.0, 3)])
+        region = region_about(Pose.of_values(centre), rng.uniform(0.0, [0.4] * 3 + [40.0] * 3))
+        beyond = reach.beyond(region)
+        corners = np.where(picks == 0, region.low, region.high)
+        furthest = reach.distances(np.vstack([region.samples(64, k), corners])).max(axis=1)
+        if beyond is not None:
+            assert furthest.min() >= beyond.distance - 1e-9
+            assert beyond.distance > reach.reach + reach.tolerance
+            proved += 1
+            several += beyond.boxes > 1
+            tight.append(beyond.distance / furthest.min())
+        else:  # a pose in reach, or nearly so
+            assert furthest.min() <= 1.05 * (reach.reach + reach.tolerance)
+    assert 20 < proved < 80
+    assert several > 5
+    assert max(tight) > 0.97
+
+
+def test_distances_are_those_of_the_targets_and_what_is_discarded_is_infeasible():
+    setup = setup_of("ur5 plate")
+    robot, cells, task, _ = setup[:4]
+    reach, placer = Reach.of(robot, cells, task), LocalEvaluator(*setup)
+    origin = robot.model.jointPlacements[1].translation
+    region = Region.around(Pose.of_surface(cells.surface), {"x": (0.5, 1.4), "z": (0, 0.5)})
+    discarded = 0
+    for row in region.samples(16, 0):
+        moved = moved_cells(cells, Pose.of_values(row))
+        away = np.linalg.norm(task.targets(moved).points - origin, axis=1)
+        assert reach.distances(row[None])[0] == pytest.approx(away, abs=1e-12)
+        trial = placer.try_at(Pose.of_values(row))
+        out = away > robot.reach + 0.001
+        assert (trial.stage is Stage.BOUND) == out.any()
+        if out.any():
+            areas = moved.areas
+            assert trial.in_reach == pytest.approx(areas[~out].sum() / areas.sum())
+            verdict = check(robot, moved, task)
+            assert (verdict.answer, verdict.evidence) == (Answer.INFEASIBLE, Evidence.PROOF)
+            assert areas[verdict.covered].sum() <= trial.in_reach * areas.sum() + 1e-12
+            discarded += 1
+    assert 3 < discarded < 17
+
+
+# -- one placement ---------------------------------------------------------------------------------
+
+
+def roof():
+    """Cells of a roof of many triangles."""
+    x, y = (a.ravel() for a in np.meshgrid(np.linspace(-0.2, 0.2, 13), np.linspace(0, 0.3, 9)))
+    k = np.arange(9 * 13).reshape(9, 13)
+    a, b, c, d = k[:-1, :-1], k[:-1, 1:], k[1:, 1:], k[1:, :-1]
+    faces = np.vstack([np.stack(t, axis=-1).reshape(-1, 3) for t in ((a, b, c), (a, c, d))])
+    vertices = np.column_stack([x, y, 0.1 * x**2 + 0.05 * y**2])
+    return mesh(TriangleMesh(vertices, faces), position=(0.5, 0, 0.1)).cells(count=8)
+
+
+def test_moved_cells_are_those_of_the_case_and_a_mesh_moves_rigidly():
+    for name in TEXTS:
+        for seed in range(2):
+            pose = moved_away(name, seed)
+            built, moved = case_at(name, pose).cells, moved_cells(setup_of(name).cells, pose)
+            for field in ("centres", "normals", "areas"):
+                assert (getattr(moved, field) == getattr(built, field)).all()
+            assert (moved.curves.cubics == built.curves.cubics).all()
+    cells, pose = roof(), Pose((0.1, -0.2, 0.3), (10.0, -70.0, 130.0))
+    moved = moved_cells(cells, pose)
+    turn = pose.rotation @ cells.surface.rotation.T
+    assert np.abs(moved.surface.closest(moved.centres).height).max() < 1e-9
+    assert moved.normals == pytest.approx(cells.normals @ turn.T, abs=1e-12)
+    assert (moved.locate(moved.centres) == np.arange(len(cells))).all()
+
+
+@pytest.mark.parametrize("name", ["ur5 plate", "puma560 dome"])
+def test_what_a_place_is_said_to_cover_one_motion_covers(name):
+    """Each component is replayed over the moved cells; what no search found is not."""
+    setup = setup_of(name)
+    placer = LocalEvaluator(*setup)
+    for seed in (9, 12):
+        trial = placer.try_at(moved_away(name, seed), early=False)
+        assert len(trial.covers)
+        areas = setup.cells.areas
+        assert trial.share == pytest.approx(areas[trial.covers[0]].sum() / areas.sum())
+        for component in range(min(len(trial.covers), 3)):
+            assert placer.replayed(trial, component) == ""
+        more = replace(trial, covers=np.ones((1, len(setup.cells)), dtype=bool))
+        assert trial.complete or "did not find" in placer.replayed(more, 0)
+
+
+def test_stations_share_out_what_no_placement_covers_alone(tmp_path):
+    """Every cell to exactly one station, each with a replayed motion, two at the proven least."""
+    (tmp_path / "plate.toml").write_text(PLATE)
+    long = ["surface.u=[-0.1, 0.1]", "surface.v=[-0.9, 0.9]", "surface.cells=[1, 9]",
+            "surface.position=[0.5, 0, 0.3]"]  # fmt: skip
+    sets = [part for text in long for part in ("--set", text)]
+    said = coverable(
+        "place", tmp_path / "plate.toml", *sets, "--y", -0.6, 0.6, "--count", 8, "--stations",
+        "--json", "--workers", 0,
+    )  # fmt: skip
+    told = json.loads(said.out)["stations"]
+    assert said.status == 1
+    assert sorted(cell for one in told["stations"] for cell in one["cells"]) == list(range(9))
+    assert all(one["certified"] for one in told["stations"])
+    assert (told["left_out"], told["optimal"]) == ([], True)
+    assert len(told["stations"]) == told["at_least"] == 2
+    # A sphere's shell around the tool.
+    setup = setup_of("ur5 plate")
+    shell = sphere(0.35, (20, 160), (0, 360), side="outside").cells(3, 6)
+    region = Region.around(
+        Pose((0.6, 0.0, 0.3), (0.0, 0.0, 0.0)), {"x": (0.5, 0.9), "yaw_deg": (-180, 180)}
+    )
+    found = place(setup.robot, shell, setup.task, region, count=6, around=0)
+    plan = station_plan(found, LocalEvaluator(setup.robot, shell, setup.task, Search()), count=6)
+    assert found.answer is Answer.INFEASIBLE
+    assert plan.refusals == ("",) * len(plan.stations)
+    given = [cell for one in plan.stations.stations for cell in one.cells.tolist()]
+    assert sorted([*given, *plan.stations.left_out.tolist()]) == list(range(18))
+    for trial, station in zip(plan.trials, plan.stations.stations, strict=True):
+        assert (trial.covers[station.component] == station.covers).all()
+
+
+# -- workers, stores, maps, the command ------------------------------------------------------------
+
+
+def test_who_tries_placements_changes_nothing_and_a_store_saves_the_work(tmp_path):
+    case, setup = case_of("ur5 plate"), setup_of("ur5 plate")
+    region = region_about(moved_away("ur5 plate", 3))
+    ask = {"count": 8, "around": 1, "keep": 1}
+    here = place(*setup[:3], region, setup.search, **ask)
+    expected, counts = [trial_table(trial) for trial in here.trials], []
+    for count in (1, 0, 0):
+        with open_workers(count) as workers, Store(tmp_path / "placements.db") as store:
+            evaluator = StudyEvaluator(case, workers, store)
+            kept = place(*setup[:3], region, setup.search, evaluator=evaluator, **ask)
+            counts.append(len(store))
+        assert [trial_table(trial) for trial in kept.trials] == expected
+    assert counts[0] == counts[1] == counts[2] > 8
+    assert {trial.stage for trial in here.trials} >= {Stage.SEARCH, Stage.CHECK}
+    with open_workers(0) as workers:  # a case that its workers cannot build
+        evaluator = StudyEvaluator(case, workers)
+        evaluator.tables = {**evaluator.tables, "robot": {"name": "no such arm"}}
+        nothing = place(*setup[:3], region, evaluator=evaluator, count=4, around=1)
+    assert nothing.answer is Answer.UNDECIDED
+    assert "could not be tried" in nothing.message
+
+
+def test_a_map_tells_what_single_placements_tell():
+    setup = setup_of("panda plate")
+    evaluator, own = LocalEvaluator(*setup), Pose.of_surface(setup.cells.surface)
+    region = Region.around(own, {"x": (0.3, 1.2), "y": (-0.3, 0.3), "yaw_deg": (-40, 40)})
+    chart = placement_map(evaluator, region, own, shape=(3, 2, 2))
+    assert chart.axes == ("x", "y", "yaw_deg")
+    for index in np.ndindex(3, 2, 2):
+        values = chart.held.values
+        for axis, ticks, k in zip(chart.axes, chart.ticks, index, strict=True):
+            values[list(AXES).index(axis)] = ticks[k]
+        trial = evaluator.try_at(Pose.of_values(values), early=False)
+        assert (chart.share[index], chart.margin[index]) == (trial.share, trial.margin)
+    assert chart.share.max() == 1.0 > chart.share.min()
+    with pytest.raises(PlacementError, match="z: does not vary"):
+        placement_map(evaluator, region, chart.held, axes=("x", "z"))
+
+
+def test_the_command_answers_with_places_that_check_accepts(tmp_path):
+    """Infeasible where it stands; what `place` answers, `check` accepts, from the same shell."""
+    case = tmp_path / "plate.toml"
+    case.write_text(PLATE + "surface.rpy_deg = [0, 0, 0]\n")
+    small = ("--set", "surface.cells=[3,3]")
+    assert coverable("check", case, "--set", "surface.position=[0.6, 0, 0.3]").status == 1
+    files = {name: tmp_path / name for name in ("p.csv", "p.svg", "p.study", "p.html")}
+    flags = [part for flag, name in zip(("--csv", "--map", "--out", "--html"), files, strict=True)
+             for part in (flag, files[name])]  # fmt: skip
+    said = coverable(
+        "place", case, *small, "--x", -0.2, 0.6, "--yaw", -20, 20, "--count", 8, "--json", *flags,
+        "--workers", 0,
+    )  # fmt: skip
+    told = json.loads(said.out)
+    assert (said.status, told["answer"]) == (0, "feasible")
+    for found in told["placements"]:
+        assert -0.2 <= found["position"][0] <= 0.6
+        assert -20 <= found["rpy_deg"][2] <= 20
+        sets = [f"surface.position={found['position']}", f"surface.rpy_deg={found['rpy_deg']}"]
+        options = [part for text in sets for part in ("--set", text)]
+        assert coverable("check", case, *small, *options).status == 0
+    lines = list(csv.DictReader(files["p.csv"].read_text("utf-8").splitlines()))
+    assert sum(line["verdict"] == "feasible" for line in lines) >= len(told["placements"]) > 0
+    shares = [float(line["share"]) for line in lines]
+    assert shares == sorted(shares, reverse=True)
+    assert "<svg" in files["p.svg"].read_text("utf-8")
+    assert told["map"]["axes"] == ["x", "yaw_deg"]
+    where = ("place", case, *small, "--x", 2.5, 3, "--json", "--stations", "--workers", 0)
+    told = json.loads(coverable(*where).out)
+    assert (told["answer"], told["evidence"], told["cause"]) == (
+        "infeasible",
+        "proof",
+        "out_of_reach",
+    )
+    # Nothing was searched there, so 0 % would be a claim that nobody has looked into.
+    assert (told["placements"], told["share"]) == ([], None)
+    assert told["stations"]["left_out"] == list(range(9))
+
+
+# -- regions ---------------------------------------------------------------------------------------
+
+ANGLES = st.floats(-180.0, 180.0)
+
+
+@settings(max_examples=25)
+@given(ANGLES, st.one_of(st.floats(-90.0, 90.0), st.sampled_from([-90.0, 90.0])), ANGLES)
+def test_a_surface_says_where_it_stands(roll, pitch, yaw):
+    surface = plane((0, 1), (0, 1), position=(1, 2, 3), rpy_deg=(roll, pitch, yaw))
+    pose = Pose.of_surface(surface)
+    assert pose.position == (1.0, 2.0, 3.0)
+    assert pose.rotation == pytest.approx(surface.rotation, abs=1e-7)
+    assert rotation_from_rpy(*np.radians(pose.rpy_deg)) == pytest.approx(pose.rotation)
+
+
+def test_samples_lie_in_the_region_and_fill_it():
+    held = Pose((0.1, 0.2, 0.3), (0.0, 0.0, 0.0))
+    region = Region.around(held, {"x": (-1 / 3, 1 / 3), "yaw_deg": (-0.0000004, 90)})
+    values = region.samples(64, 5)
+    assert len(values) >= 64
+    assert all(region.holds(Pose.of_values(row), 0.0) for row in values)
+    assert (values[:, [1, 2, 3, 4]] == np.array([0.2, 0.3, 0.0, 0.0])).all()
+    quarters, _, _ = np.histogram2d(values[1:, 0], values[1:, 5], bins=(4, 4))
+    assert (quarters > 0).all()
+
+
+def test_questions_that_make_no_sense_are_refused_with_all_that_is_wrong():
+    pose, setup = Pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), setup_of("ur5 plate")
+    for ranges in (
+        {"x": (1, -1), "y": (0, math.nan), "z": (0, 1e9), "yaw_deg": (-400, 400)},
+        {"yaw": (0, 1), "x": 3, "y": ("a", 2), "z": (1, 2, 3)},
+        {}, {"x": (0.5, 0.5)},
+    ):  # fmt: skip
+        with pytest.raises(PlacementError) as told:
+            Region.around(pose, ranges)
+        wrong = [name for name in ranges if len(ranges) > 1] or ["nothing varies"]
+        assert all(name in str(told.value) for name in wrong)
+    empty = plane((0, 1), (0, 1)).cells(0, 3)
+    with pytest.raises(PlacementError) as told:
+        place(
+            setup.robot, empty, setup.task, region_about(pose), Search(method="greedy"), count=0,
+            around=-1, keep=0, time_limit=0.0,
+        )  # fmt: skip
+    for words in ("no cells", "greedy", "count", "around", "keep", "time_limit"):
+        assert words in str(told.value)

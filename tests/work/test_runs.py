@@ -1,0 +1,238 @@
+"""Passes that no single motion runs: the fewest interruptions, where they are, and what is proved.
+
+The fewest against all choices, and against reaching as far as one can; then a ring about an arm
+whose first joint stops, and plates beyond its reach.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from samples import sampled, seeds
+
+from feasibility import Task
+from feasibility.certification import replay, verify_proof
+from feasibility.certification.rates import replay_rates
+from feasibility.clock import Clock
+from feasibility.reports import pass_runs as report
+from feasibility.runs import Stations, fewest_runs, pass_runs, plan_passes, poses_between
+from feasibility.viewer.passes import view_passes
+from robots import load_robot
+from surfaces import plane, poses
+from surfaces.passes import PassPlaces, parallel_passes
+
+# -- the fewest -----------------------------------------------------------------------------------
+
+
+def drawn(rng, stations, classes, share):
+    """A node over some stations for each class, joined with the next one where both are there."""
+    there = rng.random((stations, classes)) < share
+    number = np.full((stations, classes), -1)
+    number[there] = np.arange(there.sum())
+    steps = [
+        (number[i, a], number[i + 1, b])
+        for i, a, b in itertools.product(range(stations - 1), range(classes), range(classes))
+        if there[i, a] and there[i + 1, b] and rng.random() < (0.8 if a == b else 0.15)
+    ]
+    steps = [(x, y, k + 1, 1) for k, (x, y) in enumerate(steps)]
+    inside = rng.random(stations - 1) < 0.8
+    pieces = np.where(inside, rng.integers(1, 4, stations - 1), 0).astype(float)
+    over = np.repeat(np.arange(stations), there.sum(axis=1))
+    return Stations(over, np.array(steps, dtype=np.int64).reshape(-1, 4), pieces, inside)
+
+
+def measured(stations, found):
+    """Undone length and runs, with everything about the runs checked."""
+    edges = {int(number): (int(x), int(y)) for x, y, number, _ in stations.steps}
+    done, last = np.zeros(len(stations.pieces), dtype=bool), -1
+    for run in found:
+        assert [edges[number] for number in run.route] == list(itertools.pairwise(run.nodes))
+        first, end = (int(stations.over[run.nodes[k]]) for k in (0, -1))
+        assert last <= first < end
+        assert not done[first:end].any()
+        done[first:end], last = True, end
+    return float(stations.pieces[~done].sum()), len(found)
+
+
+def by_force(stations):
+    """The best of all choices of pieces that are worked on, each run as far as sets of nodes go."""
+    count, after = len(stations.pieces), {}
+    for x, y, _, _ in stations.steps.tolist():
+        after.setdefault(x, set()).add(y)
+    over = [set(np.flatnonzero(stations.over == i).tolist()) for i in range(count + 1)]
+    best = (np.inf, 0)
+    for worked in itertools.product((False, True), repeat=count):
+        runs, possible, here = 0, True, set()
+        for i, on in enumerate(worked):
+            if not on:
+                here = set()
+                continue
+            ahead = {y for x in here for y in after.get(x, ())}
+            if not ahead:
+                ahead, runs = {y for x in over[i] for y in after.get(x, ())}, runs + 1
+            possible, here = possible and bool(ahead), ahead
+        undone = float(stations.pieces[~np.array(worked)].sum())
+        if possible:
+            best = min(best, (undone, runs))
+    return best
+
+
+@sampled
+@pytest.mark.parametrize("seed", seeds(3, all=100))
+def test_no_choice_leaves_less_or_has_fewer_runs(seed):
+    rng, several = np.random.default_rng(seed), 0
+    for share in np.tile([0.4, 0.7, 0.95], 15):
+        stations = drawn(rng, int(rng.integers(2, 9)), int(rng.integers(1, 4)), share)
+        found = measured(stations, fewest_runs(stations))
+        assert found == by_force(stations)
+        several += found[1] > 1
+    assert several > 2
+
+
+@sampled
+@pytest.mark.parametrize("seed", seeds(20, all=400))
+def test_classes_that_last_are_run_as_far_as_any_reaches(seed):
+    """Intervals of stations, one a class: the greedy cover by the furthest reach is the best."""
+    rng, stations, classes = np.random.default_rng(seed), 60, 12
+    low = np.concatenate([[0], rng.integers(0, stations - 1, classes - 1)])
+    high = np.minimum(low + rng.integers(4, 30, classes), stations - 1)
+    over, steps = [], []
+    for a, b in zip(low.tolist(), high.tolist(), strict=True):
+        first = len(over)
+        over += range(a, b + 1)
+        steps += [(first + k, first + k + 1, len(steps) + k + 1, 1) for k in range(b - a)]
+    ones = np.ones(stations - 1)
+    asked = Stations(np.array(over), np.array(steps), ones, ones > 0)
+    here, runs, undone = 0, 0, 0.0
+    while here < stations - 1:
+        reach = max((b for a, b in zip(low, high, strict=True) if a <= here < b), default=-1)
+        if reach < 0:
+            here, undone = here + 1, undone + 1.0
+        else:
+            here, runs = int(reach), runs + 1
+    assert measured(asked, fewest_runs(asked)) == (undone, runs)
+
+
+def test_cuts_are_made_between_passes_where_they_can_be():
+    """Two classes overlap over six stations; the turn between two passes is one of the pieces."""
+    over = np.concatenate([np.arange(0, 8), np.arange(2, 10)])
+    steps = [(k, k + 1, k + 1, 1) for k in range(7)]
+    steps += [(8 + k, 9 + k, 20 + k, 1) for k in range(7)]
+    inside = np.ones(9, dtype=bool)
+    inside[4] = False
+    found = fewest_runs(Stations(over, np.array(steps), np.where(inside, 0.01, 0.0), inside))
+    assert [int(over[run.nodes[-1]]) for run in found] == [4, 9]
+    assert int(over[found[1].nodes[0]]) in (4, 5)
+
+
+# -- of arms --------------------------------------------------------------------------------------
+
+DEG = math.pi / 180.0
+LIMITS = [[-150, 150], [-170, -10], [-150, 150], [-180, 180], [-180, 180], [-180, 180]]
+UR5 = load_robot("ur5")
+SHORT = load_robot("ur5", limits=[[a * DEG, b * DEG] for a, b in LIMITS])
+TASK = Task(standoff=0.02, cone_deg=10)
+
+
+def ring(count=30):
+    """A toolpath of most of a circle about the base, all of it one stretch."""
+    angle = np.linspace(-170.0, 170.0, count) * DEG
+    points = np.column_stack([0.5 * np.cos(angle), 0.5 * np.sin(angle), np.full(count, 0.2)])
+    cells = poses(points, np.tile([0.0, 0.0, 1.0], (count, 1)))
+    stretch, on = np.zeros(count, dtype=np.int64), np.ones(count, dtype=bool)
+    return cells, PassPlaces(cells.centres, cells.normals, stretch, on)
+
+
+@pytest.fixture(scope="module")
+def found():
+    cells, places = ring()
+    return pass_runs(SHORT, cells, TASK, places), cells
+
+
+def test_runs_work_on_all_of_it_and_are_replayed(found):
+    runs, cells = found
+    assert len(runs.runs) > 1
+    assert (runs.left_out, runs.gaps, runs.refusals) == (0.0, (), ())
+    for run in runs.runs:
+        assert replay(SHORT, cells, TASK, run.walk, run.needed).accepted
+    for cut, (a, b) in zip(runs.cuts, itertools.pairwise(runs.runs), strict=True):
+        assert int(a.visits[-1]) <= int(b.visits[0]) <= int(a.visits[-1]) + 1
+        assert cut.cause
+        assert (cut.move.start == a.walk.q[-1]).all()
+        assert (cut.move.end == b.walk.q[0]).all()
+
+
+def test_no_fewer_runs_are_proved_and_the_proofs_hold(found):
+    """Each piece by the independent verifier; where a lemma's assumption fails, so does this."""
+    runs, cells = found
+    assert 1 <= len(runs.parted) <= len(runs.cuts)
+    last = 0
+    for one in runs.parted:
+        assert last <= one.first < one.last < len(cells)
+        last = one.last
+        own = poses_between(cells, one.first, one.last)
+        assert np.allclose(own.centres, cells.centres[one.first : one.last + 1])
+        assert verify_proof(SHORT, own, TASK, one.proof).accepted
+        # Every run ends, or begins, strictly inside.
+        assert not any(
+            run.visits[0] <= one.first and run.visits[-1] >= one.last for run in runs.runs
+        )
+        # The arm with its own limits runs the piece: the same tree is refused.
+        assert not verify_proof(UR5, own, TASK, one.proof).accepted
+    whole_cells, places = ring(20)
+    whole = pass_runs(UR5, whole_cells, TASK, places)
+    assert len(whole.runs) == 1
+    assert whole.parted == whole.cuts == whole.gaps == ()
+
+
+def test_what_is_left_out_is_named_with_its_cause():
+    plate = plane((0.6, 1.0), (-0.1, 0.1), "outside", (0.0, 0.0, 0.2))
+    along = plan_passes(UR5, parallel_passes(plate, 0.1), replace(TASK, cone_deg=20))
+    runs = pass_runs(UR5, along.cells, along.task, along.places, proof=along.verdict.proof)
+    assert runs.gaps
+    lengths = [float(run.figures.length) for run in runs.runs]
+    assert 0.0 < runs.left_out < along.passes.length
+    assert runs.left_out + sum(lengths) == pytest.approx(along.passes.length, abs=0.2)
+    assert all(f"along stretch {1 + gap.stretches[0]}: " in gap.cause for gap in runs.gaps)
+    labels = [entry.label for entry in view_passes(along, runs.runs).legend.entries]
+    assert "left out" in labels
+    told = report.as_json(along, replace(runs, runs=()), [], None)
+    assert sum(gap["length_m"] for gap in told["left_out"]) == pytest.approx(told["left_out_m"])
+    assert told["at_least"]["interruptions"] == len(runs.parted) == 1
+    (proof,) = told["at_least"]["proofs"]
+    first, last = proof["poses"]
+    assert first < first + proof["tree"]["cell"][0] < last
+    text = " ".join(report.as_text(along, replace(runs, runs=()), [], None).split())
+    assert f"{runs.left_out:.4g} m of {along.passes.length:.4g} m of passes; of stretch" in text
+
+
+def test_runs_hold_the_speed_of_the_task():
+    plate = plane((0.35, 0.65), (-0.2, 0.2), "outside", (0.0, 0.0, 0.1))
+    fast = Task(standoff=0.02, cone_deg=20, speed=1.3)
+    along = plan_passes(UR5, parallel_passes(plate, 0.1, math.pi / 2), fast)
+    slow = plan_passes(UR5, along.passes, replace(fast, speed=None))
+    assert (along.verdict.feasible, slow.verdict.feasible) == (False, True)
+    runs = pass_runs(UR5, along.cells, fast, along.places, clock=Clock())
+    assert runs.runs
+    for run in runs.runs:
+        assert not replay_rates(UR5, along.cells, fast, run.walk).refusals
+    said = [cut.cause for cut in runs.cuts] + [gap.cause for gap in runs.gaps]
+    assert any("would need" in cause and "rad/s; it allows 3.15" in cause for cause in said)
+    assert any("along stretch" in cause for cause in said)
+
+
+def test_overrun_beyond_reach_is_shortened_and_said():
+    plate = plane((0.55, 0.75), (-0.1, 0.1), "outside", (0.0, 0.0, 0.2))
+    laid = parallel_passes(plate, 0.1, overrun=0.4, step=0.05)
+    along = plan_passes(UR5, laid, replace(TASK, cone_deg=20))
+    assert along.verdict.feasible
+    assert "ends is shortened to what can be reached" in " ".join(along.passes.notes)
+    assert laid.length - 0.8 < along.passes.length < laid.length - 0.1
+    for short, each in zip(along.passes.stretches, laid.stretches, strict=True):
+        assert short.on_surface.sum() == each.on_surface.sum()
+        assert np.isin(short.points, each.points).all()
+    assert len(along.cells) == len(along.places.points)

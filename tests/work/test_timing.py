@@ -1,0 +1,302 @@
+"""Timed motions: limits everywhere, not only at samples; the same path; replayed from outside."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from dense_replay import assert_motion, assert_over, dense
+from jobs import PLATE, verdict_named
+from samples import EVERYTHING, sampled
+from timed_motions import interpolated, keeps_to_limits
+
+from feasibility import Task, check
+from feasibility.cases import load_case
+from feasibility.certification import collision_replay, replay
+from feasibility.collisions import Collision, Obstacle, gather
+from feasibility.paths import PathError, coverage_path
+from feasibility.timing import Trajectory, motion_limits, trajectory, used
+from feasibility.timing.fastest_speeds import Rows, fastest_speeds
+from feasibility.timing.path_timing import timed_moves
+from robots import Kinematics, load_robot
+from surfaces import plane, sphere
+
+SPEED, ROUNDING = 0.15, 1.0 + 1e-9  # [m/s], [1]
+UR5 = load_robot("ur5")
+POST = Obstacle.box("post", (0.1, 0.1, 0.6), position=(0.75, 0.0, 0.3))
+AMONG = Collision(clearance=0.005, scene=(POST,))
+FLAT = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside")
+BALL = sphere(0.25, (10, 45), (150, 210), position=(0.65, 0, 0.1), side="outside")
+CASES = {
+    "5c, coarse": lambda: load_case("paper/5c", ["surface.cells=[4, 4]"]).build()[:3],
+    "ur5": lambda: (UR5, FLAT.cells(3, 4), Task(standoff=0.02, cone_deg=25)),
+    "panda": lambda: (load_robot("panda"), BALL.cells(3, 4), Task(standoff=0.02, cone_deg=25)),
+    "post": lambda: (UR5, FLAT.cells(2, 3), Task(0.02, cone_deg=30, collision=AMONG)),
+    **{f"5{k}": (lambda k=k: load_case(f"paper/5{k}").build()[:3]) for k in "c" * EVERYTHING},
+}
+
+
+@cache
+def verdict_of(name):
+    return check(*CASES[name]())
+
+
+@cache
+def path_of(name):
+    return coverage_path(verdict_of(name), "spiral" if name.startswith("5c") else "rows")
+
+
+@cache
+def run_of(name):
+    return trajectory(path_of(name), SPEED)
+
+
+# -- the trajectory as a whole ---------------------------------------------------------------------
+
+
+@sampled
+@pytest.mark.parametrize("name", CASES)
+def test_a_trajectory_is_its_path_and_keeps_to_all_limits_however_it_is_interpolated(name):
+    verdict, run, path = verdict_of(name), run_of(name), path_of(name)
+    robot, limits = verdict.robot, motion_limits(verdict.robot, SPEED)
+    every = np.ones(len(verdict.cells), dtype=bool)
+    assert replay(robot, verdict.cells, verdict.task, run.walk, every).accepted
+    marks = run.cell >= 0
+    assert_over(verdict, run.cell[marks], run.q[marks])
+    assert np.array_equal(run.cell[marks], path.visits)
+    keeps_to_limits(robot, run, limits)
+    for degree in (3, 5):  # what a controller makes of it stays on the surface
+        assert_motion(verdict, interpolated(run, degree, 3)[0])
+    # Speeds are those of the tool, by Pinocchio; at rest at both ends; whole nanoseconds.
+    kinematics = Kinematics(robot)
+    speed = [
+        np.linalg.norm(kinematics.jacobians(q)[0] @ dq) for q, dq in zip(run.q, run.dq, strict=True)
+    ]
+    assert run.tool_speed == pytest.approx(speed, rel=1e-9, abs=1e-12)
+    assert not run.dq[[0, -1]].any()
+    assert np.abs(run.time * 1e9 - np.rint(run.time * 1e9)).max() < 1e-5
+    # No faster than the tool's way at full speed, and not much slower: the arm stops nowhere.
+    points, _ = kinematics.tools(dense(path.walk.q, 8))
+    way = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
+    assert run.tool_way == pytest.approx(way, rel=0.02)
+    assert 0.98 * way <= run.duration * SPEED <= 1.6 * way + SPEED
+
+
+def test_what_is_used_is_what_it_comes_to():
+    run, limits = run_of("ur5"), motion_limits(UR5, SPEED)
+    here, shares = used(UR5, run, limits), []
+    assert 0.9 < here.too_fast <= 1.0
+    for degree in (3, 5):
+        _, dq, ddq = interpolated(run, degree, 200)
+        shares.append([np.abs(dq).max(axis=0), np.abs(ddq[:-1]).max(axis=0)])
+    most = np.max(shares, axis=0)
+    for share, limit, reached in (
+        (here.velocity, limits.velocity, most[0]),
+        (here.acceleration, limits.acceleration, most[1]),
+    ):
+        assert share * limit == pytest.approx(reached, rel=0.02)
+        assert (share * limit >= reached * (1 - 1e-9)).all()
+    weaker = replace(limits, acceleration=limits.acceleration / 9.0)
+    assert used(UR5, run, weaker).too_fast == pytest.approx(3.0 * here.acceleration.max() ** 0.5)
+
+
+def test_slower_tools_weaker_joints_and_longer_periods():
+    path = path_of("ur5")
+    fast, slow = trajectory(path, 0.2), trajectory(path, 0.05)
+    assert slow.duration > 3 * fast.duration
+    assert slow.tool_speed.max() <= 0.05 * ROUNDING
+    weak = trajectory(path, 0.2, velocity=0.05, acceleration=[0.1] * 6)
+    assert weak.duration > fast.duration
+    assert np.abs(weak.dq).max() > 0.04
+    keeps_to_limits(UR5, weak, motion_limits(UR5, 0.2, 0.05, 0.1))
+    assert np.array_equal(weak.cell[weak.cell >= 0], fast.cell[fast.cell >= 0])
+    coarse = trajectory(path, 0.2, period=0.04)
+    assert len(coarse) < 0.7 * len(fast)
+    assert coarse.duration == pytest.approx(fast.duration, rel=0.1)
+    single = trajectory(coverage_path(verdict_named("plate"), only=[5]))
+    assert (len(single), single.duration, single.cell.tolist()) == (1, 0.0, [5])
+
+
+@pytest.mark.parametrize("name", ["panda", "ur5"])
+def test_joint_limits_that_the_path_touches_are_nowhere_passed(name):
+    """By the extrema of the cubics between samples, in closed form."""
+    path = path_of(name)
+    lower, upper = path.walk.q.min(axis=0), path.walk.q.max(axis=0)
+    limits = np.column_stack([lower, np.maximum(upper, lower + 1e-3)])
+    path = replace(path, robot=path.robot.with_limits(limits))
+    run = trajectory(path, SPEED)
+    h = np.diff(run.time)[:, None]
+    q, last, slope, end = run.q[:-1], run.q[1:], h * run.dq[:-1], h * run.dq[1:]
+    c, d = 3.0 * (last - q) - 2.0 * slope - end, slope + end - 2.0 * (last - q)
+    found, root = [q, last], np.sqrt(np.maximum(c**2 - 3.0 * d * slope, 0.0))
+    sign = np.where(c >= 0.0, 1.0, -1.0)  # roots in the form that does not cancel
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for t in (-(c + sign * root) / (3.0 * d), -slope / (c + sign * root)):
+            t = np.where(np.isfinite(t), np.clip(t, 0.0, 1.0), 0.0)
+            found.append(q + t * (slope + t * (c + t * d)))
+    least, most = np.min(found, axis=(0, 1)), np.max(found, axis=(0, 1))
+    assert (least >= path.robot.lower).all()
+    assert (most <= path.robot.upper).all()
+    # The limits are touched, or nearly so: the test would see a motion that passes them.
+    assert min((least - path.robot.lower).min(), (path.robot.upper - most).min()) < 1e-6
+    assert replay(path.robot, path.cells, path.task, run.walk, path.needed).accepted
+
+
+def test_an_arm_on_a_rail(tmp_path):
+    (tmp_path / "rail.toml").write_text(
+        PLATE + 'robot.axis = [{ name = "rail", type = "prismatic", direction = [0, 1, 0], '
+        "limits_m = [-0.3, 0.3] }]\n"
+    )
+    robot, cells, task, *_ = load_case(tmp_path / "rail.toml").build()
+    path = coverage_path(check(robot, cells, task), "columns")
+    run = trajectory(path, 0.2, velocity=1.0, acceleration=3.0)
+    assert robot.prismatic.sum() == 1
+    keeps_to_limits(robot, run, motion_limits(robot, 0.2, 1.0, 3.0))
+    assert replay(robot, cells, task, run.walk, path.needed).accepted
+
+
+# -- the fastest there is --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_speeds_are_those_of_one_linear_program(seed):
+    """Where accelerations count for more than bends, the fastest profile has the largest x at every
+    place at once, so the largest sum too.
+    """
+    from scipy.optimize import linprog
+
+    rng, m, r = np.random.default_rng(seed), 12, 5
+    most = rng.uniform(0.5, 4.0, m)
+    d = rng.normal(size=(m - 1, r))
+    c = -d * rng.uniform(0.2, 3.0, (m - 1, r))
+    d[rng.random((m - 1, r)) < 0.2] = 0.0
+    x = fastest_speeds(most, Rows.of(c, d))
+    rows, at = np.zeros((m - 1, r, m)), np.arange(m - 1)
+    rows[at, :, at], rows[at, :, at + 1] = c, d
+    rows = rows.reshape(-1, m)
+    most[[0, -1]] = 0.0
+    best = linprog(
+        -np.ones(m), np.vstack([rows, -rows]), np.ones(2 * len(rows)), bounds=[(0, b) for b in most]
+    )
+    assert (np.abs(rows @ x) <= 1.0 + 1e-9).all()
+    assert ((x >= 0.0) & (x <= most)).all()
+    assert x == pytest.approx(best.x, abs=1e-7)
+
+
+def test_a_motion_takes_hardly_longer_than_toppra_says():
+    """Along the curve that the samples are on, toppra asks for no less but in rounding."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # its sources hold escapes that Python frowns at
+        import toppra
+        from toppra.algorithm import TOPPRA
+        from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
+    rows = np.random.default_rng(0).uniform(-1.0, 1.0, (5, 6))
+    limits = motion_limits(UR5, 1e3)  # of the joints alone
+    run = timed_moves(UR5, rows, 0.3, limits, 0.01, 1.0)
+    keeps_to_limits(UR5, run, limits)
+    assert np.allclose(run.q[[0, -1]], rows[[0, -1]])
+    for name, given in (("velocity", run.dq), ("acceleration", run.ddq)):
+        assert (np.abs(given) / getattr(limits, name)).max() > 0.9
+    h = np.diff(run.time)
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(run.q, axis=0), axis=1))])
+    curve = toppra.SplineInterpolator(s / s[-1], run.q)
+    both = [
+        constraint(np.column_stack([-most, most]))
+        for constraint, most in (
+            (JointVelocityConstraint, limits.velocity),
+            (JointAccelerationConstraint, limits.acceleration),
+        )
+    ]
+    least = TOPPRA(both, curve, gridpoints=s / s[-1]).compute_trajectory()
+    assert 0.97 <= run.duration / least.duration <= 1.1
+    assert h.min() > 0.0
+
+
+# -- among bodies ----------------------------------------------------------------------------------
+
+
+def bodies_of(task):
+    return gather(UR5, FLAT, task.collision, task.standoff)
+
+
+def test_a_run_past_a_post_keeps_its_clearance_everywhere():
+    """Single configurations of the quintics, densely: none is nearer than it may be."""
+    run = run_of("post")
+    assert run.collisions == ("self", "surface", "scene")
+    bodies = bodies_of(path_of("post").task)
+    for degree in (3, 5):
+        for row in interpolated(run, degree, 2)[0][::9]:
+            assert collision_replay(UR5, bodies, row[None]).accepted
+
+
+@pytest.mark.parametrize("what", ["in the way", "where it passes", "hardly clear"])
+def test_a_timed_motion_that_would_collide_is_refused_with_the_pair(what):
+    """An object that the path passes through, a ball that only it meets; or sharper turns do."""
+    path = path_of("post")
+    if what == "hardly clear":  # rounding its corners may take nothing of the clearance it keeps
+        nearest = path.certificate
+        tight = (*nearest.nearest_pair, nearest.min_clearance - 1e-5)
+        task = replace(path.task, collision=replace(AMONG, clearances=(tight,)))
+        run = trajectory(replace(path, task=task), SPEED)
+        for row in interpolated(run, 5, 2)[0][::9]:
+            assert collision_replay(UR5, bodies_of(task), row[None]).accepted
+        return
+    if what == "in the way":
+        ahead = Obstacle.box("bracket", (0.05, 0.05, 0.3), position=(0.5, 0.0, 0.5))
+    else:
+        half = Kinematics(UR5).joints(run_of("post").q[len(run_of("post")) // 2][None])
+        middle = half.points[0, -1]
+        ahead = Obstacle.sphere("bracket", 0.01, position=tuple(middle))
+    task = replace(path.task, collision=Collision(self_=False, surface=False, scene=(ahead,)))
+    with pytest.raises(PathError, match=r"\w+ and bracket"):
+        trajectory(replace(path, task=task), SPEED)
+
+
+# -- what cannot be asked --------------------------------------------------------------------------
+
+
+def test_limits_and_numbers_that_are_none():
+    puma = replace(load_robot("puma560"), max_velocity=np.nan)
+    with pytest.raises(PathError, match=r"joint1, .*give velocity"):
+        motion_limits(puma, 0.1)
+    assert motion_limits(puma, 0.1, velocity=2.0).acceleration.tolist() == [4.0] * 6
+    some = replace(puma, max_velocity=[1.0, np.nan, 1.0, np.inf, 1.0, 1.0])
+    with pytest.raises(PathError, match="for joint2, joint4; give"):
+        motion_limits(some, 0.1)
+    path = path_of("ur5")
+    for bad in (0.0, -0.1, np.nan, np.inf, "fast", None, True):
+        with pytest.raises(PathError, match="tool speed"):
+            trajectory(path, bad)
+    for bad in (0.0, -1.0, np.nan, np.inf, [1.0, 2.0], "1 rad/s", [1.0] * 5 + [0.0]):
+        for what in ("velocity", "acceleration"):
+            with pytest.raises(PathError, match=f"{what} must be"):
+                trajectory(path, **{what: bad})
+    for bad in (0.0, -1.0, np.nan, 1e-9, 1e9, "often"):
+        with pytest.raises(PathError, match="the period must be"):
+            trajectory(path, period=bad)
+    with pytest.raises(PathError, match=r"(?s)tool speed.*velocity must be.*acceleration must be"):
+        motion_limits(UR5, -1, velocity=-1, acceleration=-1)
+    off = replace(path, walk=replace(path.walk, q=path.walk.q + 0.1))
+    with pytest.raises(PathError, match="no smooth motion was found"):
+        trajectory(off)
+
+
+def test_a_trajectory_checks_its_arrays():
+    good = {
+        "joint_names": ("a", "b"), "time": [0.0, 1.0], "q": np.zeros((2, 2)),
+        "dq": np.zeros((2, 2)), "ddq": np.zeros((2, 2)), "tool_speed": [0.0, 0.0], "cell": [0, -1],
+    }  # fmt: skip
+    assert not Trajectory(**good).q.flags.writeable
+    bad = {
+        "joint_names": ("a", "a"), "time": [0.0, 0.0], "q": np.zeros((2, 3)),
+        "dq": np.full((2, 2), np.nan), "tool_speed": [0.0], "cell": [0, -2],
+    }  # fmt: skip
+    said = r"(?s)name twice.*q must have.*dq must hold.*times must.*cells"
+    for name, value in bad.items():
+        with pytest.raises(ValueError, match=r"\w"):
+            Trajectory(**good | {name: value})
+    with pytest.raises(ValueError, match=said):
+        Trajectory(**good | bad)
