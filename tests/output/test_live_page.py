@@ -304,7 +304,8 @@ def test_a_browser_that_keeps_its_connection_hears_that_all_is_over():
 
 
 def test_bodies_are_kept_clear_of():
-    case = PLATE.with_overrides(["collision.self=true", "collision.clearance=0.005"])
+    settings = ["collision.surface=false", "collision.clearance=0.005", "surface.cells=[1, 1]"]
+    case = PLATE.with_overrides(settings)
     bench = Workbench(case)
     answers = Answers(Controls(case, bench.setup.robot), bench)
     quick, full = (answers(Job("page", 1, final, {})) for final in (False, True))

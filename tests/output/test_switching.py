@@ -14,20 +14,6 @@ from robots import Axis, Kinematics, load_robot
 from surfaces import plane
 from surfaces.passes import PassPlaces, parallel_passes
 
-PLATE = """
-[robot]
-name = "ur5"
-[surface]
-kind = "plane"
-u = [0.0, 0.3]
-v = [0.0, 0.2]
-position = [0.35, -0.1, 0.2]
-side = "outside"
-cells = [3, 3]
-[task]
-standoff = 0.02
-cone_deg = 20
-"""
 MARKED = ProgramSettings(on="ON", off="OFF")
 LIFT = 0.022  # [m] over the plate: standoff and tolerance, and no more
 
