@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from command_table import FILES
 from mesh_patches import panel_with_hole
 from scipy.spatial.transform import Rotation
 from timed_motions import UR5, motion
@@ -37,7 +38,7 @@ def states(text, move):
 
 def test_a_tool_is_off_while_it_is_lifted(tmp_path, ask):
     case, out = tmp_path / "plate.toml", tmp_path / "run.script"
-    case.write_text(PLATE)
+    case.write_text(FILES["panel.toml"])
     passes = ["--passes", "0", "--pitch", "0.06", "--one-way", "--approach", "0.05"]
     switch = ["--program", str(out), "--on", "ON", "--off", "OFF"]
     assert ask("path", case, *passes, *switch).status == 0
@@ -47,7 +48,7 @@ def test_a_tool_is_off_while_it_is_lifted(tmp_path, ask):
     points, _ = Kinematics(UR5).tools([[float(word) for word in row.split(",")] for row in rows])
     height = points[:, 2] - 0.2
     assert (height[on] <= LIFT).all()
-    along = (points[:, 0] > 0.352) & (points[:, 0] < 0.648)  # passes run along x
+    along = (points[:, 0] > 0.402) & (points[:, 0] < 0.598)  # passes run along x
     assert on[(height <= LIFT) & along].all()
     assert len(switches) == 2 * 4
     assert "The tool is on along 4 stretches" in text
