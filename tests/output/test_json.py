@@ -78,10 +78,7 @@ def of_path(args):
         found = pass_runs(
             setup.robot, along.cells, verdict.task, along.places, verdict.seed, proof=verdict.proof
         )
-        period = 0.1 if args.program else 0.02
-        if any(file.endswith(".script") for file in args.program):
-            period = 0.008
-        timed = [trajectory(run, speed, period=period, **timing) for run in found.runs]
+        timed = [trajectory(run, speed, period=0.02, **timing) for run in found.runs]
         treated = along.treated(*(run.walk for run in found.runs)) if found.runs else None
         return SimpleNamespace(along=along, found=found, timed=timed, treated=treated), schema.RUNS
     if not verdict.feasible:
@@ -90,7 +87,7 @@ def of_path(args):
     treated = treated_by_walk(setup.robot, path.cells, setup.task, path.walk)
     if along is not None:
         treated = along.treated(path.walk)
-    run = trajectory(path, speed, period=0.02 if not args.program else 0.008, **timing)
+    run = trajectory(path, speed, period=0.02, **timing)
     ends = None if args.approach is None else ends_of(path, args.approach)
     if ends is not None:
         from feasibility.entry import entered

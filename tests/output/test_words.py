@@ -20,9 +20,9 @@ from feasibility import Answer, Evidence, check
 from feasibility.cases import all_keys, builtin_cases, load_case
 from feasibility.collisions import CHECKABLE, UNCHECKED
 from feasibility.cut_words import place_of
-from feasibility.division import Reconfiguration
+from feasibility.division import Reconfiguration, divide
 from feasibility.paths import coverage_path
-from feasibility.reports import comparison, study, too_late
+from feasibility.reports import comparison, division, study, too_late
 from feasibility.reports import explanation as explained
 from feasibility.reports import verdict as report
 from feasibility.results import load_motion, load_result
@@ -145,6 +145,12 @@ def test_the_motion_as_a_table_is_the_motion(commands):
     assert "\r" not in text
     commands.run("check", "no motion to write")
     assert not (commands.folder / "none.csv").exists()
+
+
+def test_a_number_of_motions_is_the_least_only_where_the_search_has_ended(plate):
+    found = divide(*plate[0].build()[:3])
+    assert (found.fewest.optimal, division.as_json(found)["optimal"]) == (True, True)
+    assert division.as_json(replace(found, ended=False))["optimal"] is False
 
 
 # -- other sentences ------------------------------------------------------------------------------

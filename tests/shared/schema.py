@@ -392,7 +392,7 @@ def joints_moved(move: Any) -> list[dict[str, Any]]:
 
 
 PLAN = {
-    "optimal": bool,
+    "optimal": of(lambda one: one.ended and one.fewest.optimal, bool),
     "at_least": of("fewest.bound", int),
     "patches": of(lambda one: [(patch, one) for patch in one.fewest.patches], [{
         "cells": of(lambda one: [index(one[1].cells, k) for k in one[0].cells], [[int]]),
