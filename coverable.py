@@ -31,11 +31,10 @@ if TYPE_CHECKING:
         greedy_check,
         verify,
     )
-    from feasibility.area import CertifiedArea, certified_area
     from feasibility.cases import Case, CaseError, builtin_cases, load_case
     from feasibility.certification import replay
     from feasibility.collisions import Collision, Obstacle, ToolShape
-    from feasibility.division import Division, divide, patch_areas
+    from feasibility.division import Division, divide
     from feasibility.live import Live, live
     from feasibility.paper import LiteralSearch, starts
     from feasibility.paths import CoveragePath, PathError, coverage_path
@@ -138,20 +137,20 @@ if TYPE_CHECKING:
 # fmt: off
 __all__ = [
     "Answer", "ArgumentError", "Axis", "Case", "CaseError", "Cause", "CauseKind", "Cells",
-    "CertifiedArea", "Collision", "Comparison", "CoverableError", "CoveragePath", "Division",
+    "Collision", "Comparison", "CoverableError", "CoveragePath", "Division",
     "Evidence", "Explanation",
     "LiteralSearch", "Live", "LocalEvaluator", "MeshSurface", "Obstacle", "PassRuns",
     "Patch", "PathError", "Piecewise", "Placements", "PlannedPasses", "Plot", "Pose",
     "ProgramSettings",
     "Region", "Robot", "RobotError", "Search", "Store", "Study", "Surface", "SurfaceError",
     "Task", "ToolShape", "Trajectory", "TreatedArea", "Verdict", "Verification", "View",
-    "__version__", "bspline", "builtin_cases", "certified_area", "check", "compare",
+    "__version__", "bspline", "builtin_cases", "check", "compare",
     "comparison_chart", "comparison_text", "cone", "coverage_path", "cut_box", "cut_plane",
     "cylinder", "divide", "division_text", "ellipsoid", "explain", "explanation_text",
     "faces_within_cone", "greedy_check", "grid", "hyperboloid", "list_robots", "live",
     "load_case", "load_motion", "load_result", "load_robot", "load_study", "load_trajectory",
     "mesh", "motion_limits", "open_workers", "parallel_passes", "parametric", "pass_runs",
-    "pass_toolpath", "patch_areas", "path", "path_text", "piecewise", "place",
+    "pass_toolpath", "path", "path_text", "piecewise", "place",
     "placement_map", "placement_text", "plan_best_passes", "plan_passes", "plane",
     "plot_causes", "plot_graph", "plot_map", "plot_sides", "plot_transition", "plot_view",
     "plot_views", "poses", "read_grid", "read_net", "read_poses", "read_study", "replay",
@@ -169,7 +168,6 @@ _ROOMS = (
     "feasibility",
     "feasibility.collisions",
     "feasibility.cases",
-    "feasibility.area",
     "feasibility.certification",
     "feasibility.paper",
     "feasibility.paths",

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from functools import cached_property
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -225,18 +224,6 @@ class Verdict:
     def n_covered(self) -> int:
         """Number of cells that the best single component visits."""
         return int(self.covered.sum())
-
-    @cached_property
-    def certified_area(self) -> Any:
-        """The part of the area over which the motion found is known to reach every place.
-
-        A `feasibility.area.CertifiedArea`, found when first read: that takes several times as long
-        as most verdicts.
-
-        Raises:
-            ArgumentError: there is none, see `feasibility.area.certified_area`.
-        """
-        return import_module("feasibility.area").certified_area(self)
 
     def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, str]:
         """Table, causes and picture, for notebooks; see `feasibility.reports.notebook`.

@@ -52,11 +52,6 @@ def add(subcommands: argparse._SubParsersAction) -> None:
         help="write the covering motion as CSV (feasible only); with --json, - puts it into the "
         "object",
     )
-    parser.add_argument(
-        "--area", action="store_true",
-        help="certify the area too, not the cells' centres alone: the part of the surface over "
-        "which the motion is known to reach every place",
-    )  # fmt: skip
     parser.add_argument("--save", metavar="RESULT", help="write a result file for `coverable show`")
     parser.add_argument(
         "--seeds", metavar="MOTION",
@@ -93,10 +88,6 @@ def add(subcommands: argparse._SubParsersAction) -> None:
         "report how the joints move from one to the next.",
         epilog=LATER_STATUSES,
     )  # fmt: skip
-    parser.add_argument(
-        "--area", action="store_true",
-        help="certify the area of each patch too, not the centres of its cells alone",
-    )  # fmt: skip
     parser = add_command(
         subcommands, "explain", explain, add_case, add_html,
         help="what would make a case feasible, and the margins of a feasible one",
@@ -126,7 +117,6 @@ def check(args: argparse.Namespace, began: float) -> int:
     witness = None if within else args.witness
     outputs = {"--save": args.save, "--html": args.html, "--witness": witness}
     with open_case(args, began, outputs) as opened:
-        from feasibility.area import measured_area
         from feasibility.checking import check as run
         from feasibility.reports import verdict as report
 
@@ -135,12 +125,11 @@ def check(args: argparse.Namespace, began: float) -> int:
         verdict = run(*opened.setup, seeds=seeds, clock=opened.clock)
         verdict.causes  # noqa: B018 - looked into within the time limit
         verdict.treated  # noqa: B018 - measured within the time limit
-        area = measured_area(verdict, opened.clock) if args.area else None
     if args.json:
-        found = report.as_json(verdict, loaded, area)
+        found = report.as_json(verdict, loaded)
         print_out(json_text(found | ({"witness": report.witness_json(verdict)} if within else {})))
     else:
-        print_out(report.as_text(verdict, case, loaded, area))
+        print_out(report.as_text(verdict, case, loaded))
     if args.save is not None:
         from feasibility.results import save_result
 
@@ -239,21 +228,18 @@ def divide(args: argparse.Namespace, began: float) -> int:
     """`coverable divide CASE`: the fewest sub-patches, each covered by one continuous motion."""
     with open_case(args, began, {"--html": args.html}, WHY_COMPLETE["divide"]) as opened:
         from feasibility.division import divide as run
-        from feasibility.division import patch_areas
         from feasibility.reports import division as report
 
         loaded = opened.so_far()
         division = run(*opened.setup, clock=opened.clock)
-        areas = patch_areas(division, opened.clock) if args.area else None
     if args.json:
-        print_out(json_text(report.as_json(division, loaded, areas)))
+        print_out(json_text(report.as_json(division, loaded)))
     else:
-        print_out(report.as_text(division, opened.case.name, loaded, areas))
+        print_out(report.as_text(division, opened.case.name, loaded))
     if args.html is not None:
         from feasibility.viewer import view_division
 
-        shown = None if isinstance(areas, str) else areas
-        page = view_division(division, opened.case.name, shown).html()
+        page = view_division(division, opened.case.name).html()
         write_text(args.html, page, "view")
     return report.STATUS[report.answer_of(division)]
 

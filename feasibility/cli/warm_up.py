@@ -38,15 +38,13 @@ cells = [3, 3]
 """
 CLEAR = ("--set", "collision.clearance=0.005")
 FEW = ("--set", "surface.cells=[2, 2]")
-FAR = "surface.position=[4, 0, 0]"
 COMMANDS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("the search", ("check", "paper/4a")),
     ("proofs", ("check", "paper/4d")),
-    ("certified areas", ("check", "paper/4a", "--set", FAR, "--area")),
     ("collisions", ("check", "paper/5e", *CLEAR)),
     ("proofs with collisions", ("check", "paper/5f", *CLEAR, "--set", "surface.cells=[3, 3]")),
     ("thresholds with collisions", ("explain", "paper/4a", *CLEAR, *FEW)),
-    ("meshes", ("check", "mesh.toml", "--area")),
+    ("meshes", ("check", "mesh.toml")),
     ("the greedy search", ("check", "paper/4f", "--set", "search.method=greedy")),
     ("the greedy search on triangles", ("check", "torus.toml")),
     ("explain", ("explain", "paper/4c")),

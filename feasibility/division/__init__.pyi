@@ -6,8 +6,6 @@ from .division import Plan as Plan
 from .division import SubPatch as SubPatch
 from .free_motion import FreeSpace as FreeSpace
 from .free_motion import free_motion as free_motion
-from .patch_areas import PatchAreas as PatchAreas
-from .patch_areas import patch_areas as patch_areas
 from .plans import collect_components as collect_components
 from .plans import connect_pairs as connect_pairs
 from .proved_bound import ProvedBound as ProvedBound

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from coverable_errors import counted
-from feasibility.area import percent_down
 from feasibility.collisions import checked, said_of
 from feasibility.cut_words import lines as proof_lines
 from feasibility.division import Apart, Division, Plan, Reconfiguration, SubPatch
@@ -30,7 +29,7 @@ from feasibility.version import version
 from surfaces import Cells
 
 if TYPE_CHECKING:
-    from feasibility.division import PatchAreas
+    pass
 
 PHASES = {"search_s": "search", "divide_s": "division"}
 STATUS = {"complete": 0, "partial": 1, "undecided": 3}
@@ -59,15 +58,12 @@ def answer_of(division: Division) -> str:
     return "undecided" if division.lacking else "complete"
 
 
-def as_json(
-    division: Division, before_s: float = 0.0, areas: PatchAreas | str | None = None
-) -> dict[str, Any]:
+def as_json(division: Division, before_s: float = 0.0) -> dict[str, Any]:
     """The division as the object that `coverable divide --json` prints.
 
     Args:
         division: the division.
         before_s: seconds of imports and files before it began; they count as loading.
-        areas: the certified areas of the patches, or why there are none; None without.
     """
     cells, fewest, connected = division.cells, division.fewest, division.connected
     return {
@@ -85,22 +81,11 @@ def as_json(
         "collisions": checked(division.task.collision),
         "lacking": division.lacking,
         "message": division.message,
-        **_areas_json(areas),
         "timing": seconds(division.timing, PHASES, before_s),
         "robot": division.robot.name,
         "seed": int(division.seed),
         "version": version(),
     }
-
-
-def _areas_json(areas: PatchAreas | str | None) -> dict[str, Any]:
-    """Certified areas: of all patches together as a share of all cells, and of each."""
-    if areas is None:
-        return {}
-    if isinstance(areas, str):
-        return {"certified_area": None, "certified_area_note": areas}
-    each = [None if found is None else found.area for found in areas.patches]
-    return {"certified_area": areas.share, "certified_area_m2": areas.area, "of_patches_m2": each}
 
 
 def _apart_json(apart: Apart, division: Division) -> dict[str, Any]:
@@ -158,9 +143,7 @@ def _move_json(move: Reconfiguration, k: int) -> dict[str, Any]:
     }
 
 
-def as_text(
-    division: Division, title: str, before_s: float = 0.0, areas: PatchAreas | str | None = None
-) -> str:
+def as_text(division: Division, title: str, before_s: float = 0.0) -> str:
     """The division for people: the answer, the patches and moves in order, what is left out."""
     answer = answer_of(division)
     head = SENTENCES[answer]
@@ -175,7 +158,6 @@ def as_text(
         ("case", title),
         ("covered", f"{covered}, in {_motions(division)}"),
         ("found", division.message),
-        ("certified", _areas_text(areas, division)),
         ("time", seconds_text(division.timing, PHASES, before_s)),
     ]
     lines = summary(head, rows, said_of(division.robot, division.task.collision))
@@ -196,18 +178,6 @@ def as_text(
         unsettled = counted(len(division.unsettled), "cell")
         lines += ["", "Not decided:", f"  {unsettled}: the time limit ran out first"]
     return "\n".join(lines)
-
-
-def _areas_text(areas: PatchAreas | str | None, division: Division) -> str:
-    """What is certified of the patches together, and of each."""
-    if areas is None or isinstance(areas, str):
-        return areas or ""
-    each = [
-        f"patch {k + 1} {'none' if found is None else percent_down(found.area / patch.area)}"
-        for k, (found, patch) in enumerate(zip(areas.patches, division.patches, strict=True))
-    ]
-    of_all = f"{percent_down(areas.share)} of the area, {areas.area:.3g} of {areas.whole:.3g} m2"
-    return of_all + (f" ({', '.join(each)})" if each else "")
 
 
 def _indented(line: str) -> str:

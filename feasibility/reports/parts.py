@@ -220,8 +220,9 @@ def rates_text(certificate: Certificate, task: Task) -> str:
     """The largest speed, and the smallest singular value; empty where neither is required."""
     parts = []
     if task.speed is not None and certificate.max_speed is not None:
-        most = at_least(certificate.max_speed, 3)
-        parts.append(f"tool speeds up to {most} m/s (required {task.speed:g})")
+        parts.append(
+            f"tool speeds up to {at_least(certificate.max_speed, 3)} m/s (required {task.speed:g})"
+        )
     if task.min_manipulability is not None and certificate.min_singular_value is not None:
         least = f"singular values of at least {at_least(certificate.min_singular_value, 3)}"
         parts.append(f"{least} (required {task.min_manipulability:g})")

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from coverable_errors import counted
-from feasibility.area import area_json, area_words
 from feasibility.cases import OWN_KEYS, Case
 from feasibility.collisions import checked, said_of
 from feasibility.cut_words import lines as proof_lines
@@ -29,9 +28,6 @@ from feasibility.treated import share_words, treated_json, treated_words
 from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict, Walk
 from feasibility.version import version
 from surfaces import Cells
-
-if TYPE_CHECKING:
-    from feasibility.area import CertifiedArea
 
 DETAILS = 3  # cells of one group whose details are listed
 ENOUGH = 0.99  # [1] share of the area, below which it is said how to treat more
@@ -63,15 +59,12 @@ CAUSES = {
 }
 
 
-def as_json(
-    verdict: Verdict, before_s: float = 0.0, area: CertifiedArea | str | None = None
-) -> dict[str, Any]:
+def as_json(verdict: Verdict, before_s: float = 0.0) -> dict[str, Any]:
     """The verdict as the object that `coverable check --json` prints.
 
     Args:
         verdict: of either method.
         before_s: seconds of imports and files before the check began; they count as loading.
-        area: the certified area, or why there is none; None where it was not wanted.
     """
     q = None if verdict.witness is None else verdict.witness.q
     return {
@@ -88,7 +81,6 @@ def as_json(
         "proof": proof_json(verdict.proof, verdict.robot, verdict.cells),
         "treated": treated_json(verdict.treated),
         **smooth_json(verdict.cells.surface),
-        **({} if area is None else area_json(area)),
         "timing": seconds(verdict.timing, PHASES, before_s),
         "robot": verdict.robot.name,
         "method": verdict.method,
@@ -107,12 +99,7 @@ def _message(verdict: Verdict) -> str:
     return f"{verdict.message} Why {why} missed was not looked into: the time limit ran out."
 
 
-def as_text(
-    verdict: Verdict,
-    case: Case,
-    before_s: float = 0.0,
-    area: CertifiedArea | str | None = None,
-) -> str:
+def as_text(verdict: Verdict, case: Case, before_s: float = 0.0) -> str:
     """The verdict for people: the answer first, its evidence, why cells are missed.
 
     The arguments are those of `as_json`, and the case for its name.
@@ -127,7 +114,6 @@ def as_text(
     rows = [
         title,
         *rows_of(verdict),
-        ("certified", "" if area is None else area_words(area)),
         ("no shape", ", ".join(verdict.unchecked_links)),
         ("left out", left_out_text(verdict.pairs_left_out)),
         ("time", seconds_text(verdict.timing, PHASES, before_s)),

@@ -17,13 +17,12 @@ from coverable_errors import counted
 from feasibility.treated import TreatedArea, share_words
 from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer import threejs
-from feasibility.viewer.areas import certified_layer, painted_layers
+from feasibility.viewer.areas import painted_layers
 from feasibility.viewer.cell_meshes import cell_size
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.meshes import tubes
 from feasibility.viewer.playback import Playback, paced, timed
 from feasibility.viewer.scene import (
-    PATCHES,
     TRAIL,
     Layer,
     cells_layers,
@@ -37,7 +36,7 @@ from feasibility.viewer.viewer import View, compose, titled
 from robots import Kinematics, Robot
 
 if TYPE_CHECKING:
-    from feasibility.division import Division, PatchAreas, Reconfiguration
+    from feasibility.division import Division, Reconfiguration
     from feasibility.paths import CoveragePath
     from feasibility.timing import MotionLimits, Trajectory
 
@@ -47,7 +46,6 @@ BANDS: tuple[tuple[float, Colour, str], ...] = (
     (0.9, (0.95, 0.70, 0.10), "joints at 50 to 90 % of them"),
     (np.inf, (0.80, 0.10, 0.10), "joints above 90 % of them"),
 )  # share of the velocity limits, colour and words of a piece of the trail
-SHADE = 0.6  # [1] of a patch's colour: of what is certified of it
 STROKES = 160  # pieces of the trail that appear one after the other
 DENSE = 24  # points drawn of one move between patches
 FEW = 2  # joints of a move that the legend names
@@ -102,15 +100,12 @@ def view_path(
     return replace(drawn, readout=replace(drawn.readout, duration=trajectory.duration))
 
 
-def view_division(
-    division: Division, case: str | None = None, areas: PatchAreas | None = None
-) -> View:
+def view_division(division: Division, case: str | None = None) -> View:
     """The patches of the plan with the fewest motions, and the moves between them in red.
 
     Args:
         division: the division.
         case: name of the case, for the title.
-        areas: the certified area of each patch, to be tinted too.
     """
     robot, cells, plan = division.robot, division.cells, division.fewest
     names = [
@@ -119,12 +114,6 @@ def view_division(
     ]
     parts = [*cells_layers(cells), *patch_layers(cells, plan.patch_of(len(cells)), names)]
     parts += _left_out(division)
-    for k, area in enumerate(() if areas is None else areas.patches):
-        if area is not None:
-            share = min(area.area / plan.patches[k].area, 1.0)
-            red, green, blue = (SHADE * part for part in PATCHES[k % len(PATCHES)])
-            name, tint = f"certified of patch {k + 1}", (red, green, blue)
-            parts.append(certified_layer(area, name, share, tint))
     walks = [patch.walk.q for patch in plan.patches if len(patch.walk.q)]
     motion = None
     if walks:

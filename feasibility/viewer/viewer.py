@@ -13,7 +13,7 @@ import html
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,7 @@ from feasibility.task import Task
 from feasibility.verdict import Verdict
 from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer import threejs
-from feasibility.viewer.areas import area_layers, certified_layer, with_certified_share
+from feasibility.viewer.areas import area_layers
 from feasibility.viewer.frames import carried, root_in_world, triads, world_tracks
 from feasibility.viewer.html_page import Camera, Entry, Legend, Readout, page
 from feasibility.viewer.live_server import LiveView
@@ -131,16 +131,13 @@ def view(verdict: Verdict, case: str | None = None, *, play: bool = True, at: fl
     parts = layers(verdict)
     if verdict.treated is not None:
         parts += area_layers(verdict.treated, verdict.cells.surface.side_sign)
-    area = vars(verdict).get("certified_area")  # drawn where it is known already
-    if area is not None:
-        parts.append(certified_layer(area))
     if motion is not None:
         parts.append(trail(verdict.cells, motion))
     covered = f"{verdict.n_covered} of {counted(len(verdict.cells), 'cell')}"
     text = f"{verdict.robot.name}: {covered} in one continuous motion ({verdict.method} search)"
     if verdict.proof is not None:
         text += f". Proved: {sentence(verdict.proof, verdict.robot, verdict.cells)}."
-    drawn = compose(
+    return compose(
         verdict.robot,
         verdict.cells,
         titled(f"{verdict.answer} ({verdict.evidence}), {covered}", case),
@@ -152,10 +149,6 @@ def view(verdict: Verdict, case: str | None = None, *, play: bool = True, at: fl
         at=at,
         task=verdict.task,
     )
-    if area is None or motion is None or drawn.readout is None:
-        return drawn
-    shares = with_certified_share(drawn.readout, verdict.robot, area, motion)
-    return replace(drawn, readout=shares)
 
 
 def compose(

@@ -65,7 +65,7 @@ def test_what_is_refused_is_one_message_on_stderr_and_status_2(commands, approve
         assert "bug" not in said.err
         assert {file.name for file in commands.folder.iterdir()} == before, "no file is written"
         texts.append(f"$ coverable {line}".rstrip() + "\n" + masked(said.err.rstrip(), commands))
-    approved(f"refused/{command}", "\n\n".join(texts))
+    approved(f"refused/{command}", "\n".join(texts))
 
 
 def test_the_flags_of_every_command(commands, approved):

@@ -14,7 +14,6 @@ from command_table import COMMANDS, NUMBERS, TABLE
 from schema import conforms
 
 from feasibility import check, verify
-from feasibility.area import certified_area
 from feasibility.cases import load_case
 from feasibility.cli.main import _parser
 from feasibility.division import divide
@@ -48,9 +47,8 @@ def of_check(args):
         q = load_motion(args.seeds, setup.robot).q
         seeds = Walk(q, np.full(len(q), -1))
     found = check(*setup, seeds=seeds)
-    area = certified_area(found) if args.area else None
     given = {} if args.witness != "-" else {"witness": schema.of(lambda one: one, schema.WITNESS)}
-    return SimpleNamespace(area=area, **_fields(found)), {**schema.CHECK, **given}
+    return SimpleNamespace(**_fields(found)), {**schema.CHECK, **given}
 
 
 def _fields(one):

@@ -43,7 +43,7 @@ def test_heavy_libraries_are_loaded_where_they_are_used(code: str, more: set[str
 def test_loading_the_judge_loads_nothing_of_the_search() -> None:
     found = loaded("from feasibility.certification import replay; replay.__module__")
     ours = {name for name in found if name.startswith("feasibility.")}
-    searching = ("roadmap", "paper", "area", "checking", "attempts", "collisions.kernels")
+    searching = ("roadmap", "paper", "checking", "attempts", "collisions.kernels")
     assert "feasibility.certification.motion_replay" in ours
     assert not [
         name for name in ours if name.startswith(tuple(f"feasibility.{s}" for s in searching))

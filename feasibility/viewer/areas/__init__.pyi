@@ -1,5 +1,3 @@
-from .certified import certified_layer as certified_layer
-from .certified import with_certified_share as with_certified_share
 from .treated import Painted as Painted
 from .treated import area_layers as area_layers
 from .treated import painted_layers as painted_layers
