@@ -22,7 +22,7 @@ from feasibility.collisions import CHECKABLE, UNCHECKED
 from feasibility.cut_words import place_of
 from feasibility.division import Reconfiguration, divide
 from feasibility.paths import coverage_path
-from feasibility.reports import comparison, division, study, too_late
+from feasibility.reports import comparison, division, path, study, too_late
 from feasibility.reports import explanation as explained
 from feasibility.reports import verdict as report
 from feasibility.results import load_motion, load_result
@@ -153,6 +153,14 @@ def test_a_number_of_motions_is_the_least_only_where_the_search_has_ended(plate)
     found = divide(*plate[0].build()[:3])
     assert (found.fewest.optimal, division.as_json(found)["optimal"]) == (True, True)
     assert division.as_json(replace(found, ended=False))["optimal"] is False
+
+
+def test_what_a_path_goes_over_again_is_not_covered_twice(plate):
+    found = coverage_path(plate[1], "rows")
+    length = found.figures.length
+    told = path.as_json(replace(found, figures=replace(found.figures, revisited=0.25 * length)))
+    assert told["covered_m"] == pytest.approx(0.75 * length)
+    assert told["revisited_share"] == pytest.approx(1 / 3)
 
 
 # -- other sentences ------------------------------------------------------------------------------
