@@ -1,11 +1,8 @@
 """The larger part of what `make test` tries a sample of."""
 
 import pytest
-import test_checking
 import test_division
 import test_explain
-import test_greedy_cases
-import test_mesh_verdicts
 import test_robot_visuals
 import test_segment_bound
 import test_set_cover
@@ -29,40 +26,9 @@ def test_segments(kind):
     test_segment_bound.assert_the_cone_holds(kind, 100)
 
 
-@pytest.mark.parametrize(
-    "ask",
-    [
-        test_checking.test_the_verdict_fits_together,
-        test_checking.test_the_graph_is_one_component_of_motions_that_hold,
-        test_checking.test_the_certificate_bounds_what_the_witness_does,
-        test_checking.test_the_seed_does_not_decide,
-    ],
-    ids=lambda ask: ask.__name__,
-)
-@pytest.mark.parametrize(("arm", "number"), test_checking.ALL)
-def test_verdicts(arm, number, ask):
-    ask(arm, number)
-
-
-@pytest.mark.parametrize(
-    ("name", "moves"),
-    [(name, moves) for moves, names in test_greedy_cases.DEAR.items() for name in names],
-)
-def test_greedy(name, moves):
-    test_greedy_cases.test_case(name, moves)
-    test_greedy_cases.test_every_stored_path_replays(name, moves)
-
-
-@pytest.mark.parametrize("name", test_mesh_verdicts.MORE)
-def test_meshes(name, tmp_path):
-    test_mesh_verdicts.test_a_case_as_a_mesh_has_the_same_answer(name, tmp_path)
-
-
 @pytest.mark.parametrize("name", test_explain.MORE)
 def test_sides(name):
     test_explain.test_what_is_said_of_a_side_is_what_a_verdict_says(name)
-
-
 
 
 @pytest.mark.parametrize("name", test_robot_visuals.LARGE)

@@ -39,7 +39,7 @@ from feasibility.verdict import Walk
 from robots import Kinematics, load_robot
 from surfaces import mesh
 
-NAMES = ("5c, coarse", *PATCHES)  # the whole cases: make campaign NAME=whole_trajectories
+NAMES = ("5c, coarse", *PATCHES)
 ROUNDING = 1.0 + 1e-9
 
 
