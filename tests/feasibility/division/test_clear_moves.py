@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from capsule_arms import at, capsule_links, pair, planar_arm
 
+from coverable_errors import at_least
 from feasibility import Task
 from feasibility.certification import collision_replay
 from feasibility.collisions import Bodies, Collision, Obstacle, collision_buffer, gather
@@ -182,7 +183,9 @@ def test_the_reports_follow_the_move() -> None:
     assert found["patches"][0]["certificate"]["min_clearance_m"] >= 0.0
     text = " ".join(as_text(division, "behind").split())
     assert f"through {len(move.via)} configuration" in text
-    assert f"bodies at least {1e3 * (move.replayed.min_clearance or 0):.3g} mm apart" in text
+    assert (
+        f"bodies at least {at_least(1e3 * (move.replayed.min_clearance or 0), 3)} mm apart" in text
+    )
 
 
 def test_a_move_that_is_not_found_is_said() -> None:
