@@ -101,21 +101,30 @@ def test_in_a_callback_of_the_interpreter():
         def __del__(self):
             signal.raise_signal(signal.SIGINT)
 
-    with pytest.raises(KeyboardInterrupt), interruptible():
-        Dying()
-        while True:  # ended by the second attempt alone
-            pass
+    def work():
+        with interruptible():
+            Dying()
+            while True:  # ended by the second attempt alone
+                pass
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
 
 
 def test_in_a_compiled_module_that_prints_and_drops_it():
     """As the generated code of Cython does where nothing can be raised."""
-    with pytest.raises(KeyboardInterrupt), interruptible():
-        try:
-            signal.raise_signal(signal.SIGINT)
-        except KeyboardInterrupt as error:
-            sys.excepthook(type(error), error, error.__traceback__)
-        while True:
-            pass
+
+    def work():
+        with interruptible():
+            try:
+                signal.raise_signal(signal.SIGINT)
+            except KeyboardInterrupt as error:
+                sys.excepthook(type(error), error, error.__traceback__)
+            while True:
+                pass
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
 
 
 def test_a_second_one_ends_the_process_and_leaves_no_file(tmp_path):
@@ -234,7 +243,7 @@ def interrupt(event, about):
 sys.addaudithook(interrupt)
 from coverable_command import run
 run()
-"""  # Ctrl-C, to the whole group as from a terminal, at the n-th event from our first instruction on
+"""  # Ctrl-C, to the whole group as from a terminal, at the n-th event from our first one on
 STUDY = 'base.case = "plate.toml"\nvary."task.cone_deg" = [20, 30, 40, 50, 60, 70]\n'
 RANGE = ("--x", "0.3", "0.5", "--count", "8")
 TABLES = ("--csv", "p.csv", "--map", "p.png", "--html", "p.html")

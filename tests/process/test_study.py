@@ -127,12 +127,15 @@ def test_tasks_that_fail_are_told_and_tried_again(pool, here, tmp_path) -> None:
     tasks = numbers(9, study_works.fail_odd)
     tasks.append(StudyTask({"number": 99}, {"number": 99}, study_works.fail_odd))
     with Store(tmp_path / "a.study") as store, open_workers(0) as mine:
-        for _ in range(2):
-            rows = run_tasks(tasks, mine if here else pool, store)
-            assert [row.status for row in rows] == ["done", "failed"] * 5
-            assert {row.result["verdict"] for row in rows[1::2]} == {"undecided"}
-            assert "3 is odd" in rows[3].result["message"]
-            assert "JSON" in rows[9].result["message"]
+        rows = run_tasks(tasks, mine if here else pool, store)
+        assert [row.status for row in rows] == ["done", "failed"] * 5
+        assert {row.result["verdict"] for row in rows[1::2]} == {"undecided"}
+        assert "3 is odd" in rows[3].result["message"]
+        assert "JSON" in rows[9].result["message"]
+        again = numbers(2, study_works.fail_once, folder=str(tmp_path))
+        for status in ("failed", "done", "done"):
+            rows = run_tasks(again, mine if here else pool, store)
+            assert [row.status for row in rows] == [status] * 2
 
 
 def test_work_that_no_worker_can_be_told(pool) -> None:
@@ -381,16 +384,18 @@ def test_ctrl_c_stores_and_leaves_no_worker(in_peace, tmp_path) -> None:
 
 def test_a_full_disk_ends_a_study_and_loses_nothing(in_peace, tmp_path) -> None:
     study, text = in_peace
-    path = tmp_path / "a.study"
+    path, held = tmp_path / "a.study", []
     with Store(path) as store:
         store._base.execute("PRAGMA max_page_count = 4")  # SQLite's own full disk
-        tasks = load_study(study).tasks
-        held = 0
-        with open_workers(0) as workers, pytest.raises(StoreError, match="disk is full"):
-            for task in tasks:  # each is kept as it comes
-                run_tasks([task], workers, store)
-                held += 1
-        assert 0 < held == len(store) < 24
+
+        def work() -> None:
+            with open_workers(0) as workers:
+                for task in load_study(study).tasks:  # each is kept as it comes
+                    held.append(run_tasks([task], workers, store))
+
+        with pytest.raises(StoreError, match="disk is full"):
+            work()
+        assert 0 < len(held) == len(store) < 24
     assert coverable(*asked(study, tmp_path, "a"), "--workers", 0).status == 0
     assert (tmp_path / "a.csv").read_text(encoding="utf-8") == text
     assert stored(path) == 24

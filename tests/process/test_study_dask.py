@@ -54,7 +54,10 @@ def test_a_worker_killed_under_the_command(tmp_path) -> None:
 def test_a_scheduler_that_is_lost_or_was_never_there() -> None:
     """One clear message, and what was finished is kept."""
     for address in ("nonsense://x", "", "127.0.0.1:1"):
-        with pytest.raises(WorkersError, match="Dask scheduler"), open_workers(address=address, connect=0.3):
+        with (
+            pytest.raises(WorkersError, match="Dask scheduler"),
+            open_workers(address=address, connect=0.3),
+        ):
             pass
     tasks = [StudyTask({"number": k}, {"k": k}, study_works.double) for k in range(40)]
     made = cluster(1)
@@ -63,7 +66,10 @@ def test_a_scheduler_that_is_lost_or_was_never_there() -> None:
         if 5 < done < total:
             made.close()
 
-    with Store(":memory:") as store, open_workers(address=made.scheduler_address, connect=0.3) as there:
+    with (
+        Store(":memory:") as store,
+        open_workers(address=made.scheduler_address, connect=0.3) as there,
+    ):
         with pytest.raises(WorkersError, match="was lost; what was finished is kept"):
             run_tasks(tasks, there, store, lose)
         assert 5 < len(store) < 40

@@ -10,6 +10,7 @@ import json
 import math
 import signal
 import time
+from contextlib import suppress
 from functools import cache
 
 import numpy as np
@@ -235,45 +236,44 @@ def test_compiling_moves_the_deadline_and_nothing_else_does():
     assert Clock().start().left == math.inf
 
 
+def within(clock, work):
+    """Some work in a command, as long as there is time."""
+    with interruptible(), clock.enforced():
+        work()
+
+
+def for_ever():
+    while True:
+        pass
+
+
 def test_work_that_never_ends_is_ended_soon_after_its_limit():
     """Not before the limit, so that what looks at the clock itself ends first."""
-    with interruptible():
-        clock = Clock(0.01).start()
-        with pytest.raises(OutOfTime), clock.enforced():
-            while True:
-                pass
-        assert clock.left < -0.3
+    clock = Clock(0.01).start()
+    with pytest.raises(OutOfTime):
+        within(clock, for_ever)
+    assert clock.left < -0.3
 
 
-def test_a_library_that_drops_the_end_of_time_changes_nothing():
-    with interruptible():
-        late = Clock(1.0).begin(time.monotonic() - 10.0)
+def test_what_drops_the_end_of_time_changes_nothing():
+    """A library, or a callback of the interpreter: it is asked again."""
 
-        def drops():
-            try:
-                while True:
-                    pass
-            except Exception:  # noqa: BLE001 - as libraries do
-                return
-
-        with pytest.raises(OutOfTime), late.enforced():
-            drops()
-
-
-def test_a_callback_of_the_interpreter_that_drops_it_is_asked_again():
     class Callback:
         def __del__(self):
-            while time.monotonic() >= 0.0:  # until the time is up, which is dropped here
-                pass
+            for_ever()
 
-    ended = []
-    with interruptible():
+    def library():
+        with suppress(Exception):
+            for_ever()
+
+    def interpreter():
+        Callback()
+        for_ever()
+
+    for work in (library, interpreter):
         late = Clock(1.0).begin(time.monotonic() - 10.0)
-        with pytest.raises(OutOfTime), late.enforced():
-            Callback()
-            while True:
-                ended.append(1)
-    assert ended
+        with pytest.raises(OutOfTime):
+            within(late, work)
 
 
 def test_elsewhere_than_in_a_command_nothing_is_enforced():

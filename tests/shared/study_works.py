@@ -48,6 +48,15 @@ def fail_odd(tables):
     return {"verdict": "feasible", "number": tables["number"]}
 
 
+def fail_once(tables):
+    """Refuse what was not tried before."""
+    mark = Path(tables["folder"]) / f"tried {tables['number']}"
+    if not mark.exists():
+        mark.touch()
+        raise ValueError("not yet")
+    return double(tables)
+
+
 STUDY = """
 base.robot.name = "ur5"
 base.surface = { kind = "plane", u = [0.4, 0.6], v = [-0.1, 0.1], cells = [2, 2], side = "outside" }

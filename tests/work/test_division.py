@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from cut_verdicts import disconnected_problem
 from dense_replay import assert_motion
-from jobs import coverable, verdict_named
+from jobs import coverable
 from oracle_build import built
 from random_arms import planar_arm
 from random_cases import draw, draw_ur5
@@ -23,9 +23,8 @@ from feasibility import Answer, Search, Task, check
 from feasibility.cases import load_case
 from feasibility.certification import replay, verify_proof
 from feasibility.certification.rates import replay_rates
-from feasibility.collisions import Collision
 from feasibility.cut_tree import Leaf
-from feasibility.division import divide, patch_areas
+from feasibility.division import divide
 from feasibility.division.connected_labels import count_of
 from feasibility.division.reconfiguration import itinerary
 from feasibility.verdict import CauseKind, Walk
@@ -306,7 +305,7 @@ def test_turns_along_a_chain_of_patches_and_many_of_them():
     assert len(found.moves) == 29
 
 
-# -- the report, and areas -------------------------------------------------------------------------
+# -- the report ------------------------------------------------------------------------------------
 
 
 def test_the_numbers_of_the_command_are_those_of_the_division(tmp_path):
@@ -344,24 +343,3 @@ def test_the_numbers_of_the_command_are_those_of_the_division(tmp_path):
         coverable("divide", "paper/4f", "--json", "--set", "search.time_limit=1e-6").out
     )
     assert late.get("optimal", False) is False
-
-
-def test_patches_are_areas_of_their_own_motions():
-    made = divide(*[getattr(verdict_named("plate"), name) for name in ("robot", "cells", "task")])
-    (patch,) = made.patches
-    half = len(patch.cells) // 2
-    both = tuple(
-        replace(patch, cells=cells, area=float(made.cells.areas[cells].sum()))
-        for cells in (patch.cells[:half], patch.cells[half:])
-    )
-    made = replace(made, fewest=replace(made.fewest, patches=both))
-    areas = patch_areas(made)
-    for patch, found in zip(made.patches, areas.patches, strict=True):
-        assert set(found.tiles.cell.tolist()) == set(patch.cells.tolist())
-        assert found.area == pytest.approx(patch.area)
-    assert areas.share == pytest.approx(areas.area / made.cells.areas.sum())
-    refused = replace(both[0], refusal="for a test")
-    plan = replace(made.fewest, patches=(refused, both[1]))
-    assert patch_areas(replace(made, fewest=plan)).patches[0] is None
-    bodies = replace(made, task=replace(made.task, collision=Collision()))
-    assert "where collisions are checked" in patch_areas(bodies)

@@ -49,10 +49,7 @@ def fewest_by_brute_force(covers):
     masks, everything = [bits(row) for row in covers], bits(covers.any(axis=0))
     for count in range(len(masks) + 1):
         for choice in combinations(masks, count):
-            if (
-                sum(1 << c for c in range(covers.shape[1]) if any(m >> c & 1 for m in choice))
-                == everything
-            ):
+            if reduce(or_, choice, 0) == everything:
                 return count
     raise AssertionError("all rows together have everything")
 

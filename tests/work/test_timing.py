@@ -150,8 +150,8 @@ def test_joint_limits_that_the_path_touches_are_nowhere_passed(name):
 
 def test_an_arm_on_a_rail(tmp_path):
     (tmp_path / "rail.toml").write_text(
-        PLATE + 'robot.axis = [{ name = "rail", type = "prismatic", direction = [0, 1, 0], '
-        "limits_m = [-0.3, 0.3] }]\n"
+        PLATE + 'robot.axis = [{ name = "rail", type = "prismatic", carries = "base", '
+        "axis = [0, 1, 0], limits_m = [-0.3, 0.3], max_velocity_m = 0.5 }]\n"
     )
     robot, cells, task, *_ = load_case(tmp_path / "rail.toml").build()
     path = coverage_path(check(robot, cells, task), "columns")
