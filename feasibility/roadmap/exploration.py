@@ -162,10 +162,11 @@ class Exploration:
         return int((self.pairs[:-1] == 1).sum())
 
     def roots(self) -> list[int]:
-        """Root components, the largest first."""
+        """Root components, the largest first; of several as large `best` is first."""
         slots = np.arange(self.roadmap.counters[COMPONENTS])
         roots = slots[self.roadmap.parent[slots] == slots]
-        return [int(r) for r in roots[np.argsort(-self.roadmap.size[roots], kind="stable")]]
+        order = np.lexsort((roots != self.best, -self.roadmap.size[roots]))
+        return [int(r) for r in roots[order]]
 
     def sizes(self, most: int | None = None) -> tuple[int, ...]:
         """How many cells the components cover, the largest ones first."""

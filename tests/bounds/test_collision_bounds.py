@@ -269,13 +269,14 @@ def test_bounds_of_many_triangles_are_never_above_the_distance_and_seldom_far_be
     rng = np.random.default_rng(3)
     robot = planar_arm([0.3, 0.4, 0.1], ["revolute", "revolute", "prismatic"])
     sheet, piece = sheet_piece(dome(20), False), piece_of(body, at(0.05))
-    walk = np.cumsum(rng.normal(size=(60, 3)) * [0.08, 0.08, 0.02], axis=0) + [0.6, 0.3, 0.2]
+    walk = np.cumsum(rng.normal(size=(60, 3)) * [0.08, 0.08, 0.02], axis=0)
+    walk += [0.6, 0.3, 0.2]
     motion = ArmMotion(robot, walk, np.full((59, 3), [0.0, 0.0, off]))
     s = motion.stretches(0, 3, piece.centre, piece.ball)
     true = np.empty(len(s.row))
     for row in s.row:
         q = walk[row] + np.linspace(0, 1, 7)[:, None] * (walk[row + 1] - walk[row])
-        moved = [q + [0.0, 0.0, way * off] for way in ((-1, 0, 1) if off else (0,))]
+        moved = [q + np.array([0.0, 0.0, way * off]) for way in ((-1, 0, 1) if off else (0,))]
         one = ArmMotion(robot, np.concatenate(moved)).stretches(0, 3, piece.centre, 0.0)
         poses = [*zip(one.first.rotations, one.first.points, strict=True)]
         poses.append((one.last.rotations[-1], one.last.points[-1]))
@@ -294,7 +295,7 @@ def test_bounds_of_many_triangles_are_never_above_the_distance_and_seldom_far_be
 @pytest.mark.parametrize("off", [0.0, 0.05])
 def test_a_ball_before_small_triangles_is_nearer_where_it_deviates(off):
     """A ball of 0.1 m on a slide, and triangles of 1 mm, 1 m ahead of it."""
-    corners = np.random.default_rng(0).uniform(-5e-4, 5e-4, (20, 3, 3)) + [1.0, 0.0, 0.0]
+    corners = np.random.default_rng(0).uniform(-5e-4, 5e-4, (20, 3, 3)) + np.array([1.0, 0.0, 0.0])
     sheet, ball = sheet_piece(corners, False), piece_of(Sphere(0.1), np.eye(4))
     motion = ArmMotion(planar_arm([0.1], ["prismatic"]), np.zeros((2, 1)), np.array([[off]]))
     s = motion.stretches(0, 1, ball.centre, ball.ball)

@@ -49,6 +49,16 @@ def touches_from(judge, low, high):
     return low
 
 
+@pytest.mark.parametrize("turn", [90, -90])
+def test_a_cylinder_meets_a_half_space_with_either_end(turn):
+    """It lies along x, and its ends are 0.1 m from its middle."""
+    solid = Solid("link1", 1, at(rotation=Rotation.from_euler("y", turn, True).as_matrix()),
+                  Cylinder(0.05, 0.2))  # fmt: skip
+    bodies = bodies_of([solid], [wall_at(0.5)], [pair("link1", "wall")])
+    assert judged(SLIDE, bodies, [0.0], [0.3]).min_clearance == pytest.approx(0.1, abs=CLOSE)
+    assert not judged(SLIDE, bodies, [0.0], [0.41]).accepted
+
+
 @pytest.mark.parametrize("clearance", [0.0, 0.05])
 def test_a_forearm_folds_onto_the_upper_arm(clearance):
     """The tip of link 3 is sin(angle) l from link 1: 2 r + c there, to the micrometre."""
@@ -106,16 +116,6 @@ def test_distances_from_a_half_space_and_a_sheet(name):
     assert not judged(SLIDE, bodies, [0.0], [1.0]).accepted  # through it to its other side
     beyond = judged(SLIDE, bodies, [0.8], [1.0])
     assert beyond.min_clearance == pytest.approx(0.196, abs=CLOSE)
-
-
-@pytest.mark.parametrize("turn", [90, -90])
-def test_a_cylinder_meets_a_half_space_with_either_end(turn):
-    """It lies along x, and its ends are 0.1 m from its middle."""
-    solid = Solid("link1", 1, at(rotation=Rotation.from_euler("y", turn, True).as_matrix()),
-                  Cylinder(0.05, 0.2))  # fmt: skip
-    bodies = bodies_of([solid], [wall_at(0.5)], [pair("link1", "wall")])
-    assert judged(SLIDE, bodies, [0.0], [0.3]).min_clearance == pytest.approx(0.1, abs=CLOSE)
-    assert not judged(SLIDE, bodies, [0.0], [0.41]).accepted
 
 
 @pytest.mark.parametrize("gap", [0.003, 0.0139, 0.0141, 0.2])
@@ -350,8 +350,8 @@ def test_what_cannot_be_judged_is_an_error_with_words():
     nowhere = Triangles(np.full((3, 3), np.nan), np.array([[0, 1, 2]]), False)
     nothing = Triangles(np.zeros((0, 3)), np.zeros((0, 3)), False)
     for shape in (nowhere, gone, nothing, Sphere(np.nan)):
+        bad = replace(good, solids=(Solid("link2", 2, np.eye(4), shape),))
         with pytest.raises(ArgumentError):
-            bad = replace(good, solids=(Solid("link2", 2, np.eye(4), shape),))
             judged(ELBOW, bad, [0.0, 0.0], [0.0, 0.0])
 
 

@@ -228,6 +228,12 @@ def test_tolerance_and_cone_are_exact(share):
         assert judge.within(at).all() == (share > 1.0)
 
 
+@pytest.mark.parametrize(("cone", "chord"), [(60, 1.0), (90, 2**0.5), (120, 3**0.5), (180, np.inf)])
+def test_the_chord_of_a_cone_is_that_of_its_angle(cone, chord):
+    """Up to 180 degrees, where any axis will do."""
+    assert Task(0.0, cone).cone_chord == pytest.approx(chord)
+
+
 @pytest.mark.parametrize("value", [1.0 - 1e-4, 1.0 + 1e-4, np.nan])
 @pytest.mark.parametrize("name", ["error", "chord", "roll", "facets"])
 def test_a_row_is_at_fault_where_it_is_not_within_one_of_its_margins(name, value):

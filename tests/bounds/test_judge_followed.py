@@ -141,9 +141,12 @@ def test_poses_over_a_surface_are_right_over_it_where_they_follow(name):
     assert word in found.refusal
 
 
-@pytest.mark.parametrize(("deviation", "accepted"), [(4e-4, True), (6e-4, False), (1.1e-3, False)])
-def test_what_the_surface_under_poses_deviates_by_is_taken_off(deviation, accepted):
-    """The tool is 0.5 mm off."""
+@pytest.mark.parametrize(
+    ("deviation", "off", "accepted"),
+    [(4e-4, 5e-4, True), (6e-4, 5e-4, False), (9e-4, 0.0, True), (1.1e-3, 0.0, False)],
+)
+def test_what_the_surface_under_poses_deviates_by_is_taken_off(deviation, off, accepted):
+    """Also where the tool is exactly right."""
     floor = parametric(lambda u, v: (u, v, 0 * u), (-0.5, 0.5), (-0.5, 0.5), **OUT)
     feet, up = (
         np.linspace(-0.2, 0.2, 5)[:, None] * [1.0, 0.0, 0.0],
@@ -151,7 +154,7 @@ def test_what_the_surface_under_poses_deviates_by_is_taken_off(deviation, accept
     )
     cells = over(replace(floor, off=(deviation, 0)), feet, up, np.ones(5))
     q, marks = straight(cells)
-    q[:, 2] += 5e-4
+    q[:, 2] += off
     assert replay_over_surface(gantry(), cells, TASK, q, marks=marks).accepted == accepted
 
 

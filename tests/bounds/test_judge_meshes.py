@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 import trimesh
 from bounds import holds
-from gantry import configurations, gantry
+from gantry import configurations, dense, gantry
+from referee import Facets
 from samples import sampled, spread
-from trimesh.triangles import closest_point
 
 from feasibility import Answer, Task, check, verify
 from feasibility.certification import replay_over_surface
@@ -39,21 +39,11 @@ def without_bottom(body):
     return TriangleMesh(kept.vertices, kept.faces)
 
 
-def dense(q, per_segment=8):
-    part = np.arange(per_segment)[:, None] / per_segment
-    between = q[:-1, None] * (1.0 - part) + q[1:, None] * part
-    return np.concatenate([between.reshape(-1, q.shape[1]), q[-1:]])
-
-
 def nearest(part, points):
-    """(k, 3) closest points on triangles, trying each; and (k,) m how far they are."""
-    best, closest = np.full(len(points), np.inf), np.empty_like(points)
-    for corners in part.vertices[part.faces]:
-        found = closest_point(np.repeat(corners[None], len(points), axis=0), points)
-        away = np.linalg.norm(found - points, axis=1)
-        nearer = away < best
-        best[nearer], closest[nearer] = away[nearer], found[nearer]
-    return closest, best
+    """(k, 3) closest points on triangles; and (k,) m how far they are."""
+    facets = Facets(part.vertices, part.faces, True)
+    closest = facets.at(*facets.nearest(points)).points
+    return closest, np.linalg.norm(closest - points, axis=1)
 
 
 BOX = without_bottom(trimesh.creation.box((0.3, 0.3, 0.2)))
@@ -77,7 +67,7 @@ def test_a_motion_over_edges_keeps_standoff_and_cone(name):
     verdict = check(robot, mesh(part, position=position).cells(count), task)
     assert verdict.feasible
     assert verify(robot, verdict.cells, task, verdict.witness.q).holds
-    tips, axes = Kinematics(robot).tools(dense(verdict.witness.q))
+    tips, axes = Kinematics(robot).tools(dense(verdict.witness.q, 8))
     closest, away = nearest(part, tips - position)
     assert np.abs(away - task.standoff).max() <= verdict.certificate.max_position_error
     assert verdict.certificate.max_position_error <= task.effective_tolerance
@@ -95,7 +85,7 @@ def test_the_figure_of_a_motion_over_a_mesh_is_that_of_its_triangles():
     cells, task = surface.cells(12), Task(0.03, 30, 1e-3)
     found = replay_over_surface(gantry(), cells, task, q, np.zeros(len(cells), dtype=bool))
     assert found.accepted, found.refusal
-    away = nearest(part, Kinematics(gantry()).tools(dense(q))[0])[1]
+    away = nearest(part, Kinematics(gantry()).tools(dense(q, 8))[0])[1]
     holds(found.certificate.max_position_error, task.standoff - away.min(), 0.9)
 
 
@@ -131,7 +121,7 @@ def test_no_motion_is_certified_through_a_thorn():
     plate = TriangleMesh(vertices, mesh_patches.flat_faces(points, 1e-12))
     verdict = check(UR5, mesh(plate, position=(0.35, -0.15, 0.2)).cells(40), Task(0.01, 40))
     if verdict.feasible:
-        tips, _ = Kinematics(UR5).tools(dense(verdict.witness.q))
+        tips, _ = Kinematics(UR5).tools(dense(verdict.witness.q, 8))
         near = TriangleMesh(vertices, plate.faces[(plate.faces >= len(vertices) - 7).any(axis=1)])
         assert nearest(near, tips - [0.35, -0.15, 0.2])[1].min() >= 9e-3 - 1e-9
     else:
@@ -153,7 +143,7 @@ def test_the_cone_holds_along_a_thin_rod_where_the_tool_point_is(case):
     if not verdict.feasible:
         assert verdict.answer is Answer.UNDECIDED
         return
-    tips, axes = Kinematics(verdict.robot).tools(dense(verdict.witness.q))
+    tips, axes = Kinematics(verdict.robot).tools(dense(verdict.witness.q, 8))
     turn = rotation_from_rpy(*np.radians(rpy))
     off = (tips - np.asarray(position)) @ turn * [1.0, 1.0, 0.0]
     approach = -rod.side_sign * (off / np.linalg.norm(off, axis=1, keepdims=True)) @ turn.T

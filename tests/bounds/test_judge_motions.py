@@ -14,6 +14,7 @@ from capsule_arms import bodies_of, pair
 from gantry import (
     SURFACES,
     configurations,
+    dense,
     gantry,
     marks_of,
     places_along,
@@ -22,7 +23,8 @@ from gantry import (
     tools_of,
 )  # fmt: skip
 from random_arms import planar_arm, robot_of
-from samples import sampled, seeds
+from referee import Facets
+from samples import EVERYTHING, sampled, seeds
 
 from feasibility import Search, Task, check
 from feasibility.certification import replay, replay_over_surface
@@ -35,19 +37,23 @@ from surfaces import cylinder, mesh, piecewise, plane, poses, sphere
 from surfaces.meshes import TriangleMesh
 
 
-def dense(q, count):
-    """Rows, and `count` places on the way to the next each time."""
-    part = np.arange(count)[:, None] / count
-    between = q[:-1, None] * (1.0 - part) + q[1:, None] * part
-    return np.concatenate([between.reshape(-1, q.shape[1]), q[-1:]])
-
-
 def off_and_tilt(cells, task, q):
-    """(k,) m off the offset surface, and (k,) rad between tool and normal at the closest point."""
-    points, axes = tools_of(q)
-    found, sign = cells.surface.closest(points), cells.surface.side_sign
-    chord = np.linalg.norm(axes + sign * found.normal, axis=1)
-    return np.abs(found.height - sign * task.standoff), 2.0 * np.arcsin(np.minimum(0.5 * chord, 1))
+    """(k,) m off the offset surface, and (k,) rad between tool and normal at the closest point.
+
+    Of a mesh those of a reader that shares nothing with `surfaces`; its normals are interpolated.
+    """
+    (points, axes), surface = tools_of(q), cells.surface
+    sign = surface.side_sign
+    if surface.kind == "mesh":
+        facets = Facets(surface.mesh.vertices, surface.mesh.faces, sign > 0.0)
+        (found,) = facets.over(points, task.standoff)
+        normal = found.normals
+        off = np.linalg.norm(points - found.points - sign * task.standoff * normal, axis=1)
+    else:
+        found = surface.closest(points)
+        normal, off = found.normal, np.abs(found.height - sign * task.standoff)
+    chord = np.linalg.norm(axes + sign * normal, axis=1)
+    return off, 2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0))
 
 
 def leaning(name, angle):
@@ -96,12 +102,12 @@ def test_figures_bound_what_dense_samples_find_and_hardly_more(name):
         figures.max_position_error, rel=1e-6
     )
     assert figures.max_position_error <= made.task.effective_tolerance
-    if name in ("mesh", "sheets"):  # there normals do not lead to the closest point
+    if name == "sheets":  # at a crease normals do not lead to the closest point
         return
     off, tilt = off_and_tilt(made.cells, made.task, dense(made.q, 10))
-    assert off.max() <= figures.max_position_error + 1e-12
-    assert tilt.max() - 1e-9 <= figures.max_angle <= 1.01 * tilt.max()
-    for share, accepted in ((1.0 + 1e-6, True), (0.98, False)):
+    assert off.max() <= figures.max_position_error + (1e-7 if name == "mesh" else 1e-12)
+    assert tilt.max() - 1e-9 <= figures.max_angle <= 1.02 * tilt.max()
+    for share, accepted in ((1.0 + 1e-6, True), (0.97, False)):
         limits = {"cone_deg": float(share * np.degrees(figures.max_angle))}
         assert ask(made, **limits).accepted == accepted
         if off.max() > 1e-9:
@@ -432,13 +438,13 @@ def test_bodies_that_are_too_near_are_a_fault_of_a_motion_over_a_surface():
 # -- random motions -------------------------------------------------------------------------------
 
 
-SMOOTH = ("plane", "ball", "pipe", "ring", "spline")
+RANDOM = ("plane", "ball", "pipe", "ring", "spline", *(("mesh",) if EVERYTHING else ()))
 BESIDE = 1.0  # rad/m: how much the normal may turn beside the place, for each metre off
 
 
 @sampled
 @pytest.mark.parametrize("seed", seeds(8, all=200))
-@pytest.mark.parametrize("name", SMOOTH)
+@pytest.mark.parametrize("name", RANDOM)
 def test_random_motions_are_accepted_where_dense_samples_say_so(name, seed):
     """Rows taken out, moved, tilted and joined in other ways, judged at the edge of what they do.
 
@@ -461,10 +467,16 @@ def test_random_motions_are_accepted_where_dense_samples_say_so(name, seed):
     outcome = replay_over_surface(
         made.robot, made.cells, task, q, np.zeros(len(made.cells), dtype=bool)
     )
-    most = task.tolerance * (1.0 + 1e-9)
+    most = task.tolerance * (1.0 + 1e-9) + 2e-7 * (name == "mesh")
     if off.max() > most or tilt.max() > task.cone + BESIDE * off.max():
         assert not outcome.accepted
-    elif steady and inside and off.max() < 0.99 * most and tilt.max() < 0.99 * task.cone:
+    elif (
+        name != "mesh"
+        and steady
+        and inside
+        and off.max() < 0.99 * most
+        and tilt.max() < 0.99 * task.cone
+    ):
         assert outcome.accepted, outcome.refusal
 
 

@@ -244,6 +244,34 @@ def test_targets_are_off_by_what_points_are_and_what_normals_move_them():
     assert not fixed.radius[:, 1].any()
 
 
+def test_bodies_are_asked_to_overlap_wherever_the_target_of_a_box_may_be():
+    """Off its middle by the tolerance, by what the part is off, and by all that x moves it."""
+    dome, asked = sphere(0.3, (0, 25), (0, 360), **OUT), []
+
+    class Asked:
+        """Takes note of what it is asked, and knows nothing."""
+
+        def everywhere(self, low, high, target, off):
+            asked.append((target, off))
+            return np.zeros(len(low), dtype=bool)
+
+    parts = target_parts(dome.parts(0.01, 0.05), dome.cells(1, 1), Task(0.02, 20))
+    arm, part = ArmModel(UR5, UR5.lower, UR5.upper), int(np.argmax(parts.radius[:, 0]))
+    allowed = Allowed(10.0, 4.0, 0.5)  # so that nothing is excluded
+    search = Emptiness(arm, parts, lambda cell: part, allowed, lambda: None, Asked())
+    q, x = np.zeros(6), np.array([0.3, -0.2])
+    half = np.append(np.full(6, 1e-3), [0.5, 0.25])
+    centre = np.append(q, x)
+    box = Boxes((centre - half)[None], (centre + half)[None], *np.array([[part], [0]]))
+    search.examine(box, JointRegion.box(q - 1.0, q + 1.0))
+    ((target, off),) = asked
+    slopes = parts.slopes[part][:, :3]
+    assert target[0] == pytest.approx(parts.centre[part, :3] + x @ slopes)
+    moved = 0.5 * np.linalg.norm(slopes[0]) + 0.25 * np.linalg.norm(slopes[1])
+    assert off[0] == pytest.approx(10.0 + parts.radius[part, 0] + moved)
+    assert min(parts.radius[part, 0], moved) > 1e-3
+
+
 # -- boxes and regions ----------------------------------------------------------------------------
 
 

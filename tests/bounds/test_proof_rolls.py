@@ -24,7 +24,6 @@ from robots import Kinematics, load_robot
 from surfaces import sphere
 
 UR5 = load_robot("ur5")
-ROLLED = {"roll_deg": (-30, 30), "roll_reference": (1, 0, 0)}
 
 
 def unit(vector):
@@ -78,20 +77,22 @@ def test_models_of_the_roll_hold_over_their_boxes():
 
 
 def test_all_joints_together_turn_the_reference_axis():
-    """A planar chain: M_x is at most the sum of all turns, and the radius has M_x M_p."""
-    task = Task(0.02, 20, **ROLLED)
+    """What each joint alone adds to the radii, all together add at least."""
     dome = sphere(0.3, (0, 25), (0, 360), side="outside")
+    task = Task(0.02, 20, roll_deg=(-30, 30), roll_reference=(1, 0, 0))
     parts = target_parts(dome.parts(0.01, 0.05), dome.cells(1, 1), task)
-    arm, q = ArmModel(UR5, UR5.lower, UR5.upper), np.zeros(8)
+    arm, q = ArmModel(UR5, UR5.lower, UR5.upper), np.append(np.full(6, 0.5), [0.0, 0.0])
     part = int(np.argmin(parts.radius[:, 1]))
-    radii = []
-    for count in (1, 6):
-        half = np.append(np.where(np.arange(6) < count, 1e-4, 0.0), [1.0, 1.0])
+
+    def radii(joints):
+        half = np.append(1e-4 * joints, [1.0, 1.0])
         box = Boxes((q - half)[None], (q + half)[None], *np.array([[part], [0]]))
-        radii.append(arm.models(box, parts, Allowed(1e-3, 0.3, 1.0, task.roll)).radius[0, 2:])
-    slope = np.linalg.norm(parts.references.slopes[part], axis=1).sum()
-    assert slope > 1e-3
-    assert (radii[1] - radii[0] > 1e-4 * slope).all()
+        return arm.models(box, parts, Allowed(1e-3, 0.3, 1.0, task.roll)).radius[0, 2:]
+
+    none = radii(np.zeros(6))
+    alone = sum(radii(one) - none for one in np.eye(6))
+    assert (alone > 1e-6).all()
+    assert (radii(np.ones(6)) - none >= 0.999 * alone).all()
 
 
 def lengths(vectors):

@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import mesh_patches
 import numpy as np
+import pinocchio as pin
 import pytest
 from arm_urdfs import joint
+from gantry import gantry
 from proof_cases import (
     ACROSS,
     FLAT,
@@ -279,6 +281,17 @@ def test_a_slide_is_not_opened_nor_a_free_joint_weighed_beside_others():
     assert found.refusal == "a cut weighs j2, which has no limits, together with others"
 
 
+def test_arms_that_are_no_chain_are_not_proved_of():
+    """Two joints side by side, of which the second carries the tool."""
+    case, model = elbow_case(), pin.Model()
+    for name in ("j1", "j2"):
+        model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), name)
+    model.addFrame(pin.Frame("l3", 2, 0, pin.SE3.Identity(), pin.FrameType.BODY))
+    found = verified(case, robot=replace(case.robot, model=model))
+    assert "form no serial chain" in found.refusal
+    assert found.boxes == 0
+
+
 @pytest.mark.parametrize("most", [200, 500])
 def test_the_budget_ends_a_proof_that_would_succeed(most):
     found = verified(stored_case(0), most=most)
@@ -346,3 +359,13 @@ def test_a_cell_that_the_roll_alone_prevents_is_proved(roll):
     found = verify_proof(HELD, TABLE, task, CutTree(Leaf(0)), most=200_000)
     assert found.accepted == (roll == (-2, 2)), found.refusal
     assert found.accepted or "is wrong: the tool can be at its target" in found.refusal
+
+
+@pytest.mark.parametrize(("range_deg", "proved"), [((-80, 80), True), ((-100, 100), False)])
+def test_of_wide_ranges_nothing_is_cut_off(range_deg, proved):
+    """A gantry whose last joint rolls the tool by 94.5 to 97.4 degrees."""
+    limits = {"j6": (1.65, 1.70), **{f"j{k}": (-0.3, 0.3) for k in range(1, 6)}}
+    cells = plane((-0.1, 0.1), (-0.1, 0.1), side="outside").cells(1, 1)
+    task = Task(0.005, 2.0, roll_deg=range_deg, roll_reference=(1, 0, 0))
+    found = verify_proof(gantry().with_limits(limits), cells, task, CutTree(Leaf(0)))
+    assert found.accepted == proved, found.refusal

@@ -10,11 +10,9 @@ import pinocchio as pin
 import pytest
 from capsule_arms import at, bodies_of, capsule_links, pair, planar_arm
 from proof_cases import elbow_case
-from starving import LARGE, Starved, grown
+from starving import LARGE, grown
 
-from feasibility import Task, check
-from feasibility.area import certified_area
-from feasibility.certification.areas import tiles_hold
+from feasibility import Task
 from feasibility.certification.cut_proofs.box_exclusion import contract, separated
 from feasibility.certification.cut_proofs.linear_models import (
     Allowed,
@@ -23,7 +21,6 @@ from feasibility.certification.cut_proofs.linear_models import (
     target_parts,
 )
 from feasibility.certification.cut_proofs.proof_verification import verify_on
-from feasibility.certification.jacobians import jacobians
 from feasibility.certification.joint_boxes import Overlapping
 from feasibility.certification.tool_alone import never_clear
 from feasibility.collisions import Collision, Obstacle, ToolShape, gather
@@ -31,7 +28,6 @@ from robots import Kinematics, load_robot
 from robots.shapes import Solid
 from robots.urdf import Sphere
 from surfaces import plane, sphere
-from surfaces.cell_tiles import cell_tiles
 
 FAR = 9e3  # m
 UR5 = load_robot("ur5")
@@ -154,22 +150,3 @@ def test_boxes_in_which_bodies_overlap(seen_from):
     for j in range(3):
         assert not overlap(np.where(np.arange(3) == j, LARGE, half))
     assert overlap(half, off=LARGE) == (seen_from == "base")
-
-
-def test_tiles_of_a_certified_area():
-    """Where places and normals may be, what the joints do meanwhile, and what leads to them."""
-    task, cells = Task(0.02, 25), DOME.cells(2, 3)
-    area = certified_area(check(UR5, cells, task))
-    cut = cell_tiles(cells, cells.surface.side_sign * task.standoff)
-    null = np.linalg.svd(jacobians(Kinematics(UR5), area.q).point)[2][:, -1, :, None]
-
-    def held(cut=cut, task=task, aside=0.0):
-        return tiles_hold(UR5, task, cut, area.tiles, area.q, area.gains + aside * null)
-
-    assert held().all()
-    free = replace(task, cone_deg=180.0)  # or the tilt alone would refuse them
-    for column, wanted in ((0, free), (1, task)):
-        wide = Starved(cut, "bounds", lambda b, k=column: b._replace(radii=grown(b.radii, k)))
-        assert held(task=wanted).all()
-        assert not held(wide, wanted).any()
-    assert not held(task=free, aside=1e9).any()

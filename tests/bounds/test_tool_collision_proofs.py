@@ -185,8 +185,8 @@ def test_a_hole_at_the_border_of_the_cone_is_found(angle, wide):
 
 def test_meshes_are_solids_with_dents_or_sheets():
     ell, block = bracket(), mesh_of(trimesh.creation.box((0.1, 0.1, 0.1)))
-    solid = Obstacle("part", ell, placed(TARGET + (-0.025, -0.1, -0.05)))
-    hollow = Obstacle("part", ell, placed(TARGET + (-0.125, -0.125, -0.05)))
+    solid = Obstacle("part", ell, placed(TARGET - np.array([0.025, 0.1, 0.05])))
+    hollow = Obstacle("part", ell, placed(TARGET - np.array([0.125, 0.125, 0.05])))
     convex = Obstacle("part", block, placed(TARGET))
     for obstacle, swallows in ((solid, True), (hollow, False), (convex, True)):
         scene = over(obstacle, cone_deg=5.0)

@@ -229,35 +229,6 @@ def test_a_question_that_nobody_heard_is_asked_again(tab):
     assert values(tab)["cone_deg"] == 25
 
 
-def test_answers_while_something_is_dragged(browser):
-    """Prints how many there are in a second, for paper/4a; nothing is asked of that number."""
-    with Live(load_case("paper/4a")) as live:
-        page = opened(browser, live)
-        counted = page.evaluate(
-            """async () => {
-              const {panel, questions} = window.page, from = questions.counts.answered;
-              const begin = performance.now();
-              for (let k = 0; performance.now() - begin < 6000; k += 1) {
-                panel.change((values) => { values.position[0] = 20 * Math.sin(k / 30); }, false);
-                await new Promise((done) => setTimeout(done, 10));
-              }
-              const seconds = (performance.now() - begin) / 1000;
-              return [questions.counts.answered - from, seconds];
-            }"""
-        )
-        quick_looks, seconds = counted
-        assert quick_looks > 0
-        print(f"paper/4a, 90 cells: {quick_looks / seconds:.1f} quick looks a second")
-        began, count = time.perf_counter(), 0
-        while time.perf_counter() - began < 4.0:
-            page.evaluate("window.page.panel.change((v) => { v.position[0] += 1; }, true)")
-            certified(page, "feasible")
-            count += 1
-        taken = (time.perf_counter() - began) / count
-        print(f"paper/4a: {1e3 * taken:.0f} ms from letting go to the certified answer")
-        page.close()
-
-
 def test_a_notebook_shows_the_page_over_a_picture_that_outlives_it(browser):
     """The output stands on a page of another origin, as Jupyter's do."""
     live = Live(Case.from_toml(PLATE, name="plate"))

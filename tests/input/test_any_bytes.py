@@ -30,7 +30,7 @@ ODD = (
     b"nan", b"-inf", b"1e400", b"1e308", b"-1e16", b"0", b"-1", b"0.5", b"2147483648", b"true",
     b"9" * 400, b"9" * 5000, b"1 2", b"1,5", b"0x10", b"1_0", b"", b" ", b"null", b"{}", b"[]",
     b"[[]]", b"\xff", b"\0", b"&x;", b"${x}", b"../../x.stl", b"/etc/passwd", b"/dev/zero",
-    b"fixed", b"continuous", b"universe", b"link1", b"mesh", b"sphere", b"1e-320", "é\u202e".encode(),
+    b"fixed", b"continuous", b"universe", b"link1", b"mesh", b"sphere", "é\u202e".encode(),
 )  # fmt: skip
 PIECES = (
     b'"', b"'", b"<", b">", b"/>", b"&", b"]]>", b"-->", b"<!--", b"<!DOCTYPE a>", b"[", b"]",
@@ -69,13 +69,15 @@ def read(name: str, data: bytes, folder: Path) -> object:
     path = folder / reader.file
     path.write_bytes(data)
     opened.clear()
+    found = refused = None
     try:
         found = reader.read(path)
     except CoverableError as error:
-        assert error.faults
-        assert all(line.isprintable() for line in str(error).split("\n"))
-        assert len(str(error)) < 8000
-        found = None
+        refused = error
+    if refused is not None:
+        assert refused.faults
+        assert all(line.isprintable() for line in str(refused).split("\n"))
+        assert len(str(refused)) < 8000
     inside = {Path(one).name for one in opened if one.startswith(str(folder))}
     assert inside <= {reader.file}
     assert not [one for one in opened if re.match("/etc|/dev/(?!null)", one)]

@@ -20,10 +20,11 @@ from surfaces import bspline, read_net
 
 TABLES = tuple(sorted(path.stem for path in bad_input.TABLES.glob("*.toml")))
 BAD = [(reader, name) for reader in TABLES for name in bad_input.bad(reader)]
-# What parsers and numpy say differs from one version to the next, and paths from machine to machine.
+# What parsers and numpy say differs with their version, and paths with the machine.
 MASKS = {
     r"(not valid TOML: |is not JSON: |broken XML \()[^\n(]*?(?= \(at|\)|$)": r"\1#",
     r"(\.npy' is damaged: ).*": r"\1#",
+    r"[\d.]+ kB of it text": "# of it text",  # with times in it
     r"\S*/site-packages/": "PACKAGES/",
     re.escape(f"{Path(__file__).parents[2]}/"): "",
 }
@@ -64,13 +65,15 @@ def read(reader: str, name: str, folder: Path) -> str:
 
 @pytest.mark.parametrize(("reader", "name"), BAD, ids=map("-".join, BAD))
 def test_what_is_said(reader: str, name: str, folder: Path, approved: Approved) -> None:
+    refused = None
     try:
         said = f"It is read.\n{read(reader, name, folder)}"
     except CoverableError as error:
-        said = str(error)
-        assert error.faults
-        again = pickle.loads(pickle.dumps(error))
-        assert (str(again), again.faults) == (said, error.faults)
+        said, refused = str(error), error
+    if refused is not None:
+        assert refused.faults
+        again = pickle.loads(pickle.dumps(refused))
+        assert (str(again), again.faults) == (said, refused.faults)
     assert len(said) < 4000
     assert all(line.isprintable() for line in said.split("\n"))
     said = said.replace(str(folder), "FOLDER")

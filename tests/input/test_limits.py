@@ -17,20 +17,22 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+import bad_input
 import hostile_stores
 import hostile_visuals as hostile
 import pytest
 import samples
-from readers import of_bad
-from samples import sampled, seeds, spread
+from readers import READERS, of_bad
+from samples import sampled, seeds
 
-import bad_input
 from coverable_errors import CoverableError
-from feasibility.cases import CaseError, load_case
+from feasibility.cases import load_case
+from feasibility.results import load_trajectory
 from feasibility.studies import Store, load_study, open_workers, run_tasks
 from feasibility.viewer.robot import draw
 from robots import load_robot
 from robots.shapes import link_shapes
+from surfaces import read_net
 from surfaces.meshes import read_mesh
 
 MOST_MEMORY = 1 << 30  # [byte]
@@ -38,6 +40,13 @@ MOST_TIME = 20  # [s] of processor time
 PATIENCE = 1800  # [s] after which something is waited for that never comes
 LIGHT = [maker for maker in hostile.MAKERS if maker is not hostile.just_drawn]
 MAKERS = hostile.MAKERS if samples.EVERYTHING else LIGHT
+CASE = READERS["case"]
+ASKED: dict[str, tuple[Callable[[Path], object], ...]] = {
+    **{reader: (READERS[reader].read,) for reader in ("motion", "srdf", "urdf", "result")},
+    "case": (load_case, load_study),
+    "net": (read_net,),
+    "trajectory": (load_trajectory,),
+}
 BALL = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
 
 
@@ -129,70 +138,29 @@ def test_a_mesh_that_is_a_trap(maker: hostile.Maker, seed: int, tmp_path: Path) 
         assert others[2]
 
 
-@sampled
-def test_many_pictures_at_once(tmp_path: Path) -> None:
-    """Two thousand shapes of as many kinds, and in a campaign large files one after the other."""
-    balls = "".join(
-        f'<visual><geometry><sphere radius="0.{k:04}1"/></geometry></visual>' for k in range(2000)
-    )
-    rows = "".join(f"v {k} 0 0\nv {k} 1 0\nf -1 -2 -3\n" for k in range(300_000))
-    names = [hostile.write(tmp_path, f"{k}.obj", f"v {k} 0 0\n{rows}") for k in range(6)]
-    large = "".join(map(hostile.visual, names))
-    for number, shapes in enumerate(spread((balls, large), 1)):
-        path = tmp_path / hostile.write(tmp_path, f"{number}.urdf", hostile.urdf(shapes))
-        outcome = alone(lambda path=path: "\n".join(draw(load_robot(str(path))).notes), tmp_path)
-        within_limits(outcome)
-        assert re.search("more than (1,500,000 triangles|8 s)", outcome.said)
+def test_every_bad_input_of_the_tables(tmp_path: Path) -> None:
+    """One after the other, those of TOML as cases, as studies and as settings."""
+    bad_input.lay_out(tmp_path)
 
+    def read_all() -> str:
+        said = []
+        for reader in ("case", "net", "motion", "trajectory", "srdf", "urdf", "result"):
+            for name, one in bad_input.bad(reader).items():
+                file = name if reader in ("net", "trajectory") else READERS.get(reader, CASE).file
+                (tmp_path / file).write_bytes(of_bad(reader, name))
+                for read in ASKED.get(reader, ()):
+                    try:
+                        read(tmp_path / file)
+                    except CoverableError as error:
+                        said.append(str(error))
+                if one.good == "whole" and reader == "case":
+                    with pytest.raises(CoverableError):
+                        load_case("paper/4a", [one.content.decode().strip()])
+        return "\n".join(said)
 
-KINDS = (
-    "a{dots} = 1", "[a{dots}]", "[[a{dots}]]", "x = {{a{dots} = 1}}", "x = {open}1{close}",
-    "x = {inline}1{ends}", "{many}", "{tables}", "{wide}", '"a\\""{quoted} = 1', "x = {digits}",
-    "x = {open}", 'x = "{escapes}', "x = '''{dots}", "{dots}", "x = {{{wide_inline}}}",
-)  # fmt: skip
-
-
-def deep(rng: random.Random, kind: str) -> str:
-    """TOML of at most 250 kB that is deep, long or broken, and never a case."""
-    n = rng.choice((17, 300, 5_000, 40_000))
-    part = rng.choice(("a", "'a'", '"a"', '"é"'))
-    return kind.format(
-        dots=f".{part}" * (n if len(part) < 3 else n // 2),
-        quoted='."a\\""' * n,
-        open="[" * n,
-        close="]" * n,
-        inline="{a = " * (n // 2),
-        ends="}" * (n // 2),
-        many="\n".join(f"k{k}.a = 1" for k in range(min(n, 20_000))),
-        tables="\n".join(f"[t.k{k}]" for k in range(min(n, 20_000))),
-        wide="\n".join(f"{'b.' * 7}k{k} = 1" for k in range(min(n, 10_000))),
-        wide_inline=", ".join(f"k{k} = 1" for k in range(min(n, 20_000))),
-        digits="9" * n,
-        escapes='\\"' * n,
-    )[:250_000]
-
-
-@sampled
-@pytest.mark.parametrize("seed", seeds(1, all=10))
-def test_toml_that_is_deep_or_long(seed: int, tmp_path: Path) -> None:
-    path = tmp_path / "deep.toml"
-    rng = random.Random(seed)
-
-    def read() -> str:
-        found = []
-        for kind in KINDS:
-            text = deep(rng, kind)
-            path.write_text(text)
-            for load in (load_case, load_study):
-                with pytest.raises(CaseError, match=r"deep\.toml: ") as caught:
-                    load(path)
-                found.append(str(caught.value))
-            with pytest.raises(CaseError) as caught:
-                load_case("paper/4a", [text.strip()])
-            found.append(str(caught.value))
-        return "\n".join(found)
-
-    within_limits(alone(read, tmp_path), {"deep.toml", "answer.json"}, tmp_path)
+    outcome = alone(read_all, tmp_path)
+    within_limits(outcome)
+    assert outcome.said.count("\n") > 500
 
 
 @pytest.fixture(scope="module")

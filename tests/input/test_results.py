@@ -33,11 +33,18 @@ task = {{ standoff = 0.02, cone_deg = 30 }}
 """
 
 
+SAME = (
+    "answer", "evidence", "message", "method", "seed", "start", "causes", "task", "certificate",
+    "proof", "n_edges", "pairs_left_out", "unchecked_links",
+)  # fmt: skip
+
+
 def same_graph(a: Any, b: Any) -> None:
     assert type(a) is type(b)
     assert list(a.nodes) == list(b.nodes)
     for cell, q in a.nodes(data="q"):
-        assert np.array_equal(q, b.nodes[cell]["q"]) if q is not None else not b.nodes[cell]["q"]
+        other = b.nodes[cell]["q"]
+        assert other is q if q is None else np.array_equal(q, other)
     ends = [sorted(map(tuple, map(list if g.is_directed() else sorted, g.edges))) for g in (a, b)]
     assert ends[0] == ends[1]
     for i, j, motion in a.edges(data="motion"):
@@ -62,8 +69,7 @@ def test_a_result_comes_back_exactly(name: str, tmp_path: Path) -> None:
     kinds = (before.witness, before.causes, before.tree)
     assert kinds[list(TEXTS).index(name)]
     after = again(before, small_case(name), tmp_path)
-    for key in ("answer", "evidence", "message", "method", "seed", "start", "causes", "task",
-                "certificate", "proof", "n_edges", "pairs_left_out", "unchecked_links"):  # fmt: skip
+    for key in SAME:
         assert getattr(after, key) == getattr(before, key), key
     assert dict(after.timing) == dict(before.timing)
     assert dict(after.statistics) == plain(before.statistics)
@@ -138,7 +144,7 @@ def test_a_result_is_not_shown_on_another_surface(
     (tmp_path / "a.toml").write_text(UR5.format(kind=kind, file=file.name, cells=cells))
 
     def write(change: float) -> None:
-        points = np.array(NET_POINTS) + [0, 0, change]
+        points = np.add(NET_POINTS, [0, 0, change])
         net = json.dumps({"points": points.tolist(), "degree": [2, 2]}).encode()
         file.write_bytes(stl(sheet() + change) if kind == "mesh" else net)
 

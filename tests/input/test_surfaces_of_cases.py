@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import bad_input
+import mesh_writers
 import numpy as np
 import pytest
-from bad_input import changed, goods, lay_out, stl
+from bad_input import changed, goods, lay_out
 
 import surfaces
 from feasibility.cases import OWN_KEYS, Case, CaseError, load_case
@@ -33,50 +34,113 @@ RATIONAL = [
     "surface.u = [0.25, 1]",
     "surface.v = [0, 1.5]",
 ]
-# The good text, more keys, and what makes the same surface.
-MADE: dict[str, tuple[str, list[str], Callable[..., Any]]] = {
-    "cone": ("cone", [], lambda **k: surfaces.cone(0.2, -0.5, (0, 90), (0.0, 0.3), **k)),
+GRID = {"grid": (3, 4)}
+CUBE = 'surface.file = "cube.stl"'
+NET_FILE = ["surface.points", "surface.degree", 'surface.file = "{}"']
+METRES = ['surface.file = "millimetres.stl"', "surface.scale = 0.001"]
+SIZED = ["surface.cells", "surface.cell_size = 0.05"]
+BOX = (0.05, 0, -1), (0.5, 0.15, 0.1)
+PIECES = (
+    'surface.pieces = [{ kind = "bspline", file = "net.json", cells = [3, 4] }, '
+    '{ kind = "plane", u = [0, 0.2], v = [-0.1, 0.1], rpy_deg = [0, 0, 90], '
+    "position = [0.5, 0, 0], cells = [2, 2] }, "
+    '{ kind = "grid", file = "points.npy", units = "mm", cells = [2, 3] }]'
+)
+
+
+def net(**more: Any) -> Any:
+    return surfaces.bspline(bad_input.NET_POINTS, **{"degree": (2, 2), **more})
+
+
+def grid(**more: Any) -> Any:
+    x, y = np.meshgrid([400.0, 500.0, 600.0], [-100.0, 0.0, 100.0, 200.0], indexing="ij")
+    return surfaces.grid(1e-3 * np.stack([x, y, 300.0 + 0 * x], axis=2), **more)
+
+
+def part(take: Callable[[Any], Any]) -> Callable[..., Any]:
+    return lambda **k: mesh(take(read_mesh("cube.stl")), **k)
+
+
+# Of a case the good text and its changes, what makes the same surface, and how that is cut.
+MADE: dict[str, tuple[str, list[str], Callable[..., Any], dict[str, Any]]] = {
+    "cone": ("cone", [], lambda **k: surfaces.cone(0.2, -0.5, (0, 90), (0.0, 0.3), **k), GRID),
     "torus": (
-        "torus", [],
-        lambda **k: surfaces.torus(0.5, 0.125, u_deg=(0, 90), v_deg=(-180, 180), **k),
+        "torus", [], lambda **k: surfaces.torus(0.5, 0.125, (0, 90), (-180, 180), **k), GRID,
     ),
     "ellipsoid": (
-        "ellipsoid", [], lambda **k: surfaces.ellipsoid((1.0, 0.8, 0.5), (10, 90), (0, 360), **k),
+        "ellipsoid", [],
+        lambda **k: surfaces.ellipsoid((1.0, 0.8, 0.5), (10, 90), (0, 360), **k), GRID,
     ),
     "revolution": (
         "revolution", [],
         lambda **k: surfaces.revolution(
             [(0.2, 0.0), (0.3, 0.2), (0.1, 0.5)], angle_deg=(0, 180), **k
-        ),
+        ), GRID,
     ),
-    "bspline": ("bspline", [], lambda **k: surfaces.bspline(NET_POINTS, degree=(2, 2), **k)),
+    "bspline": ("bspline", [], lambda **k: surfaces.bspline(NET_POINTS, (2, 2), **k), GRID),
     "rational net": (
         "bspline", RATIONAL,
         lambda **k: surfaces.bspline(
             NET_POINTS, degree=(2, 2), knots=([0, 0, 0, 1, 1, 1], [0, 0, 0, 2, 2, 2]),
             weights=[[1, 2, 1], [1, 1, 1], [1, 0.5, 1]], u=(0.25, 1), v=(0, 1.5), **k,
-        ),
+        ), GRID,
+    ),
+    "net in JSON": ("bspline", [*NET_FILE[:2], NET_FILE[2].format("net.json")], net, GRID),
+    "net in CSV": (  # which says no degree; the case does
+        "bspline", [*NET_FILE[:1], NET_FILE[2].format("net.csv")], net, GRID,
+    ),
+    "net in other ways": (  # what the case says replaces what the file says
+        "bspline",
+        [NET_FILE[0], "surface.degree = [1, 2]", "surface.v = [0.5, 1]",
+         NET_FILE[2].format("net.json")],
+        lambda **k: net(degree=(1, 2), v=(0.5, 1), **k), GRID,
+    ),
+    "grid": ("grid", [], grid, GRID),
+    "mesh": ("mesh", [], lambda **k: mesh("part.stl", **k), {"count": 12}),
+    "fewer cells": ("mesh", ["surface.cells = 7"], lambda **k: mesh("part.stl", **k), {"count": 7}),
+    "half the size": (
+        "mesh", ["surface.scale = 0.5"], lambda **k: mesh("part.stl", 0.5, **k), {"count": 12},
+    ),
+    "millimetres": (
+        "mesh", METRES, lambda **k: mesh("millimetres.stl", 0.001, **k), {"count": 12},
+    ),
+    "cells of a size": ("mesh", SIZED, lambda **k: mesh("part.stl", **k), {"size": 0.05}),
+    "box": (
+        "mesh", ["surface.box = [[0.05, 0, -1], [0.5, 0.15, 0.1]]", CUBE],
+        part(lambda m: cut_box(m, *BOX)), {"count": 12},
+    ),
+    "cut": (
+        "mesh", ["surface.cut = { point = [0, 0, 0.05], normal = [0, 0, 2] }", CUBE],
+        part(lambda m: cut_plane(m, (0, 0, 0.05), (0, 0, 2))), {"count": 12},
+    ),
+    "facing": (
+        "mesh", ["surface.facing = { direction = [0, 0, 1], within_deg = 45 }", CUBE],
+        part(lambda m: faces_within_cone(m, (0, 0, 1), 45)), {"count": 12},
+    ),
+    "faces": (
+        "mesh", ["surface.faces = [0, 1, 7]", CUBE], part(lambda m: take_faces(m, [0, 1, 7])),
+        {"count": 12},
+    ),
+    "pieces": (
+        "piecewise", [PIECES, "surface.gap = 1e-5"],
+        lambda **k: surfaces.piecewise(
+            [net(), surfaces.plane((0, 0.2), (-0.1, 0.1), position=(0.5, 0, 0), rpy_deg=(0, 0, 90)),
+             grid()], gap=1e-5, **k,
+        ), {"counts": [(3, 4), (2, 2), (2, 3)]},
     ),
 }  # fmt: skip
 
 
-def same_cells(a: Any, b: Any) -> None:
-    assert a.shape == b.shape
-    for name in ("centres", "normals", "areas", "pairs"):
-        assert np.array_equal(getattr(a, name), getattr(b, name)), name
-    assert a.surface.side == b.surface.side
-    assert type(a.surface) is type(b.surface)
-
-
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    """Where the files of surfaces lie, with a control net as JSON and as CSV."""
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where the files of surfaces lie, with a control net as JSON and as CSV, and a cube."""
     lay_out(tmp_path)
     points = bad_input.NET_POINTS
-    net = {"points": points, "degree": [2, 2]}
-    (tmp_path / "net.json").write_text(json.dumps(net))
+    (tmp_path / "net.json").write_text(json.dumps({"points": points, "degree": [2, 2]}))
     rows = [f"{i},{j},{','.join(map(repr, points[i][j]))}" for i in range(3) for j in range(3)]
     (tmp_path / "net.csv").write_text("\n".join(["row,column,x,y,z", *rows]))
+    (tmp_path / "cube.stl").write_bytes(mesh_writers.stl(*mesh_writers.cube()))
+    monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
@@ -90,133 +154,55 @@ def case_of(folder: Path, good: str, *changes: str) -> Case:
 
 @pytest.mark.parametrize("side", ["inside", "outside"])
 @pytest.mark.parametrize("name", MADE)
-def test_a_patch_is_what_its_constructor_makes(name: str, side: str, tmp_path: Path) -> None:
-    good, more, make = MADE[name]
-    case = case_of(tmp_path, good, *POSED, *more, f'surface.side = "{side}"')
-    same_cells(case.surface.cut(), make(side=side, **POSE).cells(3, 4))
+def test_a_surface_is_what_its_constructor_makes(name: str, side: str, folder: Path) -> None:
+    good, changes, make, cut = MADE[name]
+    case = case_of(folder, good, *POSED, *changes, f'surface.side = "{side}"')
+    found, made = case.surface.cut(), make(side=side, **POSE)
+    if "grid" in cut:
+        expected = made.cells(*cut["grid"])
+    else:
+        expected = made.cells(cut["counts"]) if "counts" in cut else made.cells(**cut)
+    assert found.shape == expected.shape
+    for key in ("centres", "normals", "areas", "pairs"):
+        np.testing.assert_allclose(
+            getattr(found, key), getattr(expected, key), rtol=0, atol=1e-12, err_msg=key
+        )
+    assert (found.surface.side, type(found.surface)) == (side, type(made))
+    if CUBE in changes:
+        assert found.areas.sum() < 0.99 * 6 * 0.04
+        assert any("kept" in note or "chosen" in note for note in found.notes)
 
 
-def test_every_kind_has_a_constructor() -> None:
+def test_every_kind_has_a_constructor_and_files_give_their_names(folder: Path) -> None:
     assert all(callable(getattr(surfaces, kind)) for kind in OWN_KEYS)
-    assert load_case("paper/4a").surface.label == "sphere"
-    assert load_case("paper/4a").surface.counts == [9, 10]
-
-
-def test_a_net_from_a_file(folder: Path) -> None:
-    """What a case says replaces what the file says; a CSV says no degree, and the case does."""
-    points, no_points = bad_input.NET_POINTS, ["surface.points", "surface.degree", *POSED]
-    made = surfaces.bspline(points, degree=(2, 2), side="inside", **POSE)
-    case = case_of(folder, "bspline", *no_points, 'surface.file = "net.json"')
-    assert case.surface.values == {"file": str(folder / "net.json")}
-    assert case.surface.label == "net.json"
-    same_cells(case.surface.cut(), made.cells(3, 4))
-    of_csv = ['surface.file = "net.csv"', "surface.degree = [2, 2]"]
-    same_cells(case_of(folder, "bspline", *no_points, *of_csv).surface.cut(), made.cells(3, 4))
-    flat = ["surface.degree = [1, 2]", "surface.v = [0.5, 1]", 'surface.file = "net.csv"']
-    made = surfaces.bspline(points, degree=(1, 2), v=(0.5, 1), side="inside", **POSE)
-    same_cells(case_of(folder, "bspline", *no_points, *flat).surface.cut(), made.cells(3, 4))
-    kinked = [[[x, y, abs(x - 0.1)] for x, y, _ in row] for row in points]
+    for good, label, counts in (
+        ("sphere", "sphere", [9, 10]), ("mesh", "part.stl", [12]), ("grid", "points.npy", [3, 4]),
+        ("piecewise", "piecewise", []),
+    ):  # fmt: skip
+        part = case_of(folder, good).surface
+        assert (part.label, part.counts) == (label, counts)
+    kinked = [[[x, y, abs(x - 0.1)] for x, y, _ in row] for row in bad_input.NET_POINTS]
     (folder / "net.json").write_text(json.dumps({"points": kinked, "degree": [1, 2]}))
+    case = case_of(folder, "bspline", *NET_FILE[:2], NET_FILE[2].format("net.json"))
     with pytest.raises(CaseError, match=r"net\.json: the patch must be smooth, but has a kink"):
         case.build()
 
 
-def test_pieces_are_what_the_constructor_makes(folder: Path) -> None:
-    pieces = (
-        'surface.pieces = [{ kind = "bspline", file = "net.json", cells = [3, 4] }, '
-        '{ kind = "plane", u = [0, 0.2], v = [-0.1, 0.1], rpy_deg = [0, 0, 90], '
-        "position = [0.5, 0, 0], cells = [2, 2] }, "
-        '{ kind = "grid", file = "points.npy", units = "mm", cells = [2, 3] }]'
-    )
-    case = case_of(folder, "piecewise", pieces, "surface.gap = 1e-5", *POSED)
-    x, y = np.meshgrid([0.4, 0.5, 0.6], [-0.1, 0.0, 0.1, 0.2], indexing="ij")
-    made = surfaces.piecewise(
-        [
-            surfaces.bspline(bad_input.NET_POINTS, degree=(2, 2)),
-            surfaces.plane((0, 0.2), (-0.1, 0.1), position=(0.5, 0, 0), rpy_deg=(0, 0, 90)),
-            surfaces.grid(np.stack([x, y, 0.3 + 0 * x], axis=2)),
-        ],
-        side="inside", gap=1e-5, **POSE,
-    )  # fmt: skip
-    cells = case.surface.cut()
-    assert len(cells) == 12 + 4 + 6
-    made_cells = made.cells([(3, 4), (2, 2), (2, 3)])
-    np.testing.assert_allclose(cells.centres, made_cells.centres, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(cells.normals, made_cells.normals, rtol=0, atol=1e-12)
-    assert (case.surface.label, case.surface.counts) == ("piecewise", [])
-    assert case.surface.values["pieces"][0].values == {"file": str(folder / "net.json")}
-
-
-def test_grids_and_poses_are_their_points(folder: Path) -> None:
-    grid = case_of(folder, "grid", "surface.cells = [2, 3]", "surface.position = [0.1, 0, 0]")
-    cells = grid.surface.cut()
-    assert cells.shape == (2, 3)
-    np.testing.assert_allclose(cells.centres[0], [0.55, -0.05, 0.3], atol=1e-12)
-    assert grid.surface.label == "points.npy"
-    case = case_of(folder, "poses", "surface.position = [0.1, 0, 0]")
-    cells = case.surface.cut()
+def test_poses_are_cells_in_order_or_within_a_radius(folder: Path) -> None:
+    cells = case_of(folder, "poses", "surface.position = [0.1, 0, 0]").surface.cut()
     np.testing.assert_allclose(cells.centres[2], [0.5, 0.15, 0.3], atol=1e-15)
     assert cells.in_order
     near = case_of(folder, "poses", "surface.neighbours = 0.07")
     assert near.surface.cut().pairs.tolist() == [[1, 2]]
-    assert near.surface.build().kind == "poses"
-
-
-def cube(size: float = 0.2) -> np.ndarray:
-    """Triangles of a cube from the origin on, that look outwards."""
-    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * size
-    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    return corners[[[q[0], *q[k : k + 2]] for q in quads for k in (1, 2)]]
-
-
-def test_a_mesh_is_what_its_constructor_makes(folder: Path) -> None:
-    case = case_of(folder, "mesh", *POSED)
-    made = mesh(folder / "part.stl", None, "outside", **POSE)
-    assert (case.surface.label, case.surface.counts) == ("part.stl", [12])
-    same_cells(case.surface.cut(), made.cells(count=12))
-    same_cells(case.with_overrides(["surface.cells=7"]).surface.cut(), made.cells(count=7))
-    half = mesh(folder / "part.stl", 0.5, "outside", **POSE)
-    same_cells(case.with_overrides(["surface.scale=0.5"]).surface.cut(), half.cells(count=12))
-    sized = case.with_overrides(["surface.cells=", "surface.cell_size=0.05"])
-    assert (sized.surface.cells, sized.surface.counts) == (None, [])
-    same_cells(sized.surface.cut(), made.cells(size=0.05))
-    assert len(sized.surface.cut()) == 16
-    big = ["surface.file=millimetres.stl", "surface.scale=0.001"]
-    found = load_case(folder / "case.toml", [f"{big[0][:13]}{folder}/{big[0][13:]}", big[1]])
-    assert found.surface.cut().areas.sum() == pytest.approx(0.04, rel=1e-6)
-
-
-BOX = (0.05, 0, -1), (0.5, 0.15, 0.1)
-SOME = {
-    "box = [[0.05, 0, -1], [0.5, 0.15, 0.1]]": lambda m: cut_box(m, *BOX),
-    "cut = { point = [0, 0, 0.05], normal = [0, 0, 2] }": lambda m: cut_plane(
-        m, (0, 0, 0.05), (0, 0, 2)
-    ),
-    "facing = { direction = [0, 0, 1], within_deg = 45 }": lambda m: faces_within_cone(
-        m, (0, 0, 1), 45
-    ),
-    "faces = [0, 1, 7]": lambda m: take_faces(m, [0, 1, 7]),
-}
-
-
-@pytest.mark.parametrize("key", SOME)
-def test_a_part_of_a_mesh(key: str, folder: Path) -> None:
-    (folder / "part.stl").write_bytes(stl(cube()))
-    whole = read_mesh(folder / "part.stl")
-    found = case_of(folder, "mesh", f"surface.{key}").surface.cut()
-    same_cells(found, mesh(SOME[key](whole), side="outside").cells(count=12))
-    assert found.areas.sum() < 0.99 * whole.area
-    assert any("kept" in note or "chosen" in note for note in found.notes)
 
 
 def test_parts_of_parts(folder: Path) -> None:
     """The upper half of the sides along y, by hand; faces count in the whole mesh."""
-    (folder / "part.stl").write_bytes(stl(cube()))
-    faces = np.flatnonzero(read_mesh(folder / "part.stl").face_normals @ [0, 1, 0] > 0.9).tolist()
+    faces = np.flatnonzero(read_mesh("cube.stl").face_normals @ [0, 1, 0] > 0.9).tolist()
     upper = "surface.box = [[-1, -1, 0.1], [1, 1, 1]]"
     facing = "surface.facing = { direction = [0, 1, 0], within_deg = 5 }"
     for key in (facing, f"surface.faces = {faces}"):
-        cells = case_of(folder, "mesh", upper, key).surface.cut()
+        cells = case_of(folder, "mesh", upper, key, CUBE).surface.cut()
         assert cells.areas.sum() == pytest.approx(0.2 * 0.2 / 2, rel=1e-6)
         assert cells.centres[:, 2].min() > 0.1
         assert np.abs(cells.normals - [0, 1, 0]).max() < 1e-6

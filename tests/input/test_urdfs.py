@@ -167,7 +167,7 @@ def test_shapes_of_visuals_and_collisions(tmp_path: Path) -> None:
 
 NAMED = '<robot name="mine"><link name="base"><collision><geometry><mesh filename="{}"/></geometry>\
 </collision></link></robot>'
-BODY = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+BODY = Path(__file__).with_name("good").joinpath("body.obj").read_text()
 
 
 def package(folder: Path, name: str = "") -> Path:

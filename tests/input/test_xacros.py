@@ -18,63 +18,23 @@ from robots.shapes import link_shapes
 from robots.urdf import UrdfError, check_urdf, read_srdf
 from robots.urdf.expansion import child, expanded, xacro_files
 
+GOOD = Path(__file__).with_name("good")
 HEAD = '<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">'
-ARM = f"""<?xml version="1.0"?>
-{HEAD}
-  <xacro:arg name="reach" default="0.4"/>
-  <xacro:arg name="prefix" default=""/>
-  <xacro:arg name="capped" default="false"/>
-  <xacro:include filename="$(find pkg)/macros/segment.xacro"/>
-  <xacro:property name="limits" value="${{xacro.load_yaml('../config/limits.yaml')}}"/>
-  <link name="$(arg prefix)l0"/>
-  <xacro:segment i="1" length="$(arg reach)"/>
-  <xacro:segment i="2" length="${{2 * $(arg reach)}}"/>
-  <xacro:if value="$(arg capped)"><link name="cap"/>
-    <joint name="c" type="fixed"><parent link="$(arg prefix)l2"/><child link="cap"/></joint>
-  </xacro:if>
-</robot>"""
-SEGMENT = f"""{HEAD}<xacro:macro name="segment" params="i length">
-  <link name="$(arg prefix)l${{i}}"><collision><geometry>
-    <mesh filename="${{'$(find pkg)' if i == 1 else 'package://pkg'}}/meshes/body.obj"/>
-  </geometry></collision></link>
-  <joint name="$(arg prefix)j${{i}}" type="revolute">
-    <parent link="$(arg prefix)l${{i - 1}}"/><child link="$(arg prefix)l${{i}}"/>
-    <origin xyz="0 0 ${{length}}" rpy="0 ${{pi / 2}} 0"/><axis xyz="0 1 0"/>
-    <limit lower="${{-radians(limits['turn'])}}" upper="${{radians(limits.turn)}}"
-           effort="1" velocity="1"/>
-  </joint></xacro:macro></robot>"""
-BODY = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
-CASE = """
-[robot]
-urdf = "arm.urdf.xacro"
-xacro_args = { reach = 1, prefix = "b_" }
-limits_deg = { b_j1 = [-10, 10] }
-[surface]
-kind = "plane"
-u = [0, 1]
-v = [0, 1]
-cells = [2, 2]
-[task]
-standoff = 0.1
-cone_deg = 10
-"""
+PACKAGE = {
+    "urdf/arm.urdf.xacro": "arm.urdf.xacro", "urdf/case.toml": "xacro.toml",
+    "macros/segment.xacro": "segment.xacro", "meshes/body.obj": "body.obj",
+}  # fmt: skip
 
 
 @pytest.fixture
 def arm(tmp_path: Path) -> Path:
-    """A ROS package, in a folder of another name, with an arm whose files lie in several folders."""
-    files = {
-        "urdf/arm.urdf.xacro": ARM,
-        "urdf/case.toml": CASE,
-        "macros/segment.xacro": SEGMENT,
-        "config/limits.yaml": "turn: 90",
-        "meshes/body.obj": BODY,
-        "package.xml": "<package><name>pkg</name></package>",
-    }
-    for name, text in files.items():
-        path = tmp_path / "clone-main" / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)
+    """A ROS package in a folder of another name, with an arm whose files lie in several."""
+    for inner in ("urdf", "macros", "meshes", "config"):
+        (tmp_path / "clone-main" / inner).mkdir(parents=True)
+    for name, file in PACKAGE.items():
+        (tmp_path / "clone-main" / name).write_text((GOOD / file).read_text())
+    (tmp_path / "clone-main" / "config" / "limits.yaml").write_text("turn: 90")
+    (tmp_path / "clone-main" / "package.xml").write_text("<package><name>pkg</name></package>")
     return tmp_path / "clone-main" / "urdf" / "arm.urdf.xacro"
 
 
@@ -164,19 +124,6 @@ def test_external_entities_and_the_environment_are_not_read(
     assert b'"none"' in expanded(one_file(tmp_path, '<link name="$(optenv SECRET none)"/>')).text
 
 
-@pytest.mark.parametrize(
-    "expression",
-    [
-        "().__class__", "[x.__class__ for x in [1]]", "(lambda: (lambda: 1).__globals__)()",
-        "(x for x in [1]).gi_frame", "a.f_back", "a.f_globals", "type(1).mro()",
-        "__import__('os')", "(lambda __x: __x)(1)",
-    ],
-)  # fmt: skip
-def test_names_that_lead_out_of_an_expression_are_refused(expression: str) -> None:
-    with pytest.raises(child.Refused, match="in an expression"):
-        child.evaluate(expression, {})
-
-
 def test_an_expression_has_no_built_in_names() -> None:
     assert child.evaluate(" max(a, 2) ** 2 ", {"max": max, "a": 3}) == 9
     for name in ("open", "exec", "getattr", "print"):
@@ -226,7 +173,7 @@ def test_a_file_is_expanded_again_only_where_it_or_what_it_looked_at_has_changed
     run = xacro_files.run_apart
     monkeypatch.setattr(xacro_files, "run_apart", lambda *job: runs.append(job) or run(*job))
     include = '<xacro:include filename="more.xacro" optional="true"/></robot>'
-    arm.write_text(ARM.replace("</robot>", include))
+    arm.write_text(arm.read_text().replace("</robot>", include))
     first = expanded(str(arm))
     names = ("urdf/arm.urdf.xacro", "urdf/more.xacro", "config/limits.yaml", "macros/segment.xacro")
     assert set(first.files) == {str(arm.parents[1] / name) for name in names}

@@ -14,8 +14,7 @@ from command_table import COMMANDS, NUMBERS, TABLE
 from schema import conforms
 
 from feasibility import check, verify
-from feasibility.area import certified_area
-from feasibility.cases import builtin_cases, load_case
+from feasibility.cases import load_case
 from feasibility.cli.main import _parser
 from feasibility.division import divide
 from feasibility.entry import ends_of
@@ -31,7 +30,7 @@ from feasibility.treated import treated_by_walk
 from feasibility.verdict import Walk
 from surfaces.passes import parallel_passes
 
-ASKED = [(command, TABLE[command][name]) for command, name in COMMANDS if command != "show"]
+ASKED = [one for one in COMMANDS if one[0] not in ("show", "cases")]
 ASKED += [(command, line) for command in NUMBERS for line in NUMBERS[command]]
 
 
@@ -48,9 +47,8 @@ def of_check(args):
         q = load_motion(args.seeds, setup.robot).q
         seeds = Walk(q, np.full(len(q), -1))
     found = check(*setup, seeds=seeds)
-    area = certified_area(found) if args.area else None
     given = {} if args.witness != "-" else {"witness": schema.of(lambda one: one, schema.WITNESS)}
-    return SimpleNamespace(area=area, **_fields(found)), {**schema.CHECK, **given}
+    return SimpleNamespace(**_fields(found)), {**schema.CHECK, **given}
 
 
 def _fields(one):
@@ -78,10 +76,7 @@ def of_path(args):
         found = pass_runs(
             setup.robot, along.cells, verdict.task, along.places, verdict.seed, proof=verdict.proof
         )
-        period = 0.1 if args.program else 0.02
-        if any(file.endswith(".script") for file in args.program):
-            period = 0.008
-        timed = [trajectory(run, speed, period=period, **timing) for run in found.runs]
+        timed = [trajectory(run, speed, period=0.02, **timing) for run in found.runs]
         treated = along.treated(*(run.walk for run in found.runs)) if found.runs else None
         return SimpleNamespace(along=along, found=found, timed=timed, treated=treated), schema.RUNS
     if not verdict.feasible:
@@ -90,7 +85,7 @@ def of_path(args):
     treated = treated_by_walk(setup.robot, path.cells, setup.task, path.walk)
     if along is not None:
         treated = along.treated(path.walk)
-    run = trajectory(path, speed, period=0.02 if not args.program else 0.008, **timing)
+    run = trajectory(path, speed, period=0.02, **timing)
     ends = None if args.approach is None else ends_of(path, args.approach)
     if ends is not None:
         from feasibility.entry import entered
@@ -149,18 +144,15 @@ def refuse(word):
     raise AssertionError(f"{word} in JSON")
 
 
-def answered(commands, line):
-    """What a command line answers with --json, and its status."""
-    words = shlex.split(line.replace(".study", ".again"))  # what is stored already is not asked
-    said = commands.say([*words, "--json"])
-    return words, said, json.loads(said.out, parse_constant=refuse)
-
-
-@pytest.mark.parametrize(("command", "line"), [one for one in ASKED if one[0] in PYTHON])
-def test_the_numbers_are_those_of_python(commands, command, line):
-    for needed in (("check", "files"), ("check", "cut"), ("check", "greedy")):
-        commands.run(*needed)
-    words, said, found = answered(commands, f"{command} {line}")
+@pytest.mark.parametrize(("command", "name"), ASKED)
+def test_the_numbers_are_those_of_python(commands, command, name):
+    if name in TABLE[command]:
+        words, said = commands.words(command, name), commands.run(command, name, "--json")
+    else:
+        commands.run("check", "files")
+        words = [command, *shlex.split(name)]
+        said = commands.say([*words, "--json"])
+    found = json.loads(said.out, parse_constant=refuse)
     source, wanted = PYTHON[command](_parser().parse_args(words))
     conforms(found, wanted, source)
     word = found.get("verdict") or found.get("answer")

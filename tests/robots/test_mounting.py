@@ -82,7 +82,8 @@ def test_tcp_and_base_are_where_they_are_said_to_be(seed, tmp_path):
             np.testing.assert_allclose(placed, given, atol=1e-11)
     xyz, rpy = (" ".join(map(repr, map(float, x))) for x in (POSE[0], np.radians(POSE[1])))
     end = (f'<link name="tip"/><joint name="to tip" type="fixed">'
-           f'<parent link="{moved.tool_frame}"/><child link="tip"/><origin xyz="{xyz}" rpy="{rpy}"/></joint></robot>')  # fmt: skip
+           f'<parent link="{moved.tool_frame}"/><child link="tip"/>'
+           f'<origin xyz="{xyz}" rpy="{rpy}"/></joint></robot>')  # fmt: skip
     given = load_text(tmp_path, text, tcp=POSE)
     joined = load_text(tmp_path, text.replace("</robot>", end), tool_frame="tip")
     for one, other in zip(given.chain, joined.chain, strict=True):

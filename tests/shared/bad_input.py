@@ -128,13 +128,7 @@ def _tables(reader: str) -> dict[str, Any]:
 GOOD_CASE = goods("case")["sphere"]
 """A small case of the paper's sphere."""
 
-SLIDER = """
-<robot name="slider"><link name="base"/><link name="cart"/><link name="tool"/>
-<joint name="slide" type="prismatic"><parent link="base"/><child link="cart"/>
-<axis xyz="1 0 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
-<joint name="turn" type="continuous"><parent link="cart"/><child link="tool"/>
-<origin xyz="0 0 1"/><axis xyz="0 0 1"/></joint></robot>
-"""
+SLIDER = TABLES.with_name("good").joinpath("slider.urdf").read_text()
 POSES = "x,y,z,nx,ny,nz\n400,0,300,0,0,1\n400,100,300,0,0,1\n400,150,300,0,0,1\n"
 NET_POINTS = [[[0.1 * i, 0.1 * j, 0.01 * i * j] for j in range(3)] for i in range(3)]
 
@@ -178,7 +172,7 @@ def lay_out(folder: Path) -> Path:
     meshes = {
         "part": flat, "millimetres": 1000 * flat, "nan": nan, "empty": flat[:0],
         "line": flat * [1, 0, 0], "fixture": side,
-        "thirteen": np.concatenate([flat + [k, 0, 0] for k in range(13)]),
+        "thirteen": np.concatenate([np.add(flat, [k, 0, 0]) for k in range(13)]),
     }  # fmt: skip
     for name, text in texts.items():
         (folder / name).write_text(text)

@@ -13,9 +13,14 @@ from ask import Said, asked
 TABLE = tomllib.loads(Path(__file__).parents[1].joinpath("output/commands.toml").read_text("utf-8"))
 FILES, NUMBERS, REFUSED = (TABLE.pop(name) for name in ("files", "numbers", "refused"))
 COMMANDS = [(command, name) for command in TABLE for name in TABLE[command]]
-NEEDS = {"walk.csv": ("check", "files"), "plate.result": ("check", "files"),
-         "long.result": ("check", "no motion to write"), "greedy.result": ("check", "greedy"),
-         "cut.result": ("check", "cut"), "exhausted.result": ("check", "greedy without a motion")}  # fmt: skip
+NEEDS = {
+    "walk.csv": ("check", "files"),
+    "plate.result": ("check", "files"),
+    "long.result": ("check", "no motion to write"),
+    "greedy.result": ("check", "greedy"),
+    "cut.result": ("check", "cut"),
+    "exhausted.result": ("check", "greedy without a motion"),
+}
 BROKEN = {"empty.stl": b"", "zip.stl": b"PK\x03\x04" + bytes(200), "page.stl": b"<html>",
           "cut.stl": b"x" * 80 + b"\xff\xff\xff\x7f" + bytes(50)}  # fmt: skip
 

@@ -285,7 +285,7 @@ def covered_target(rng: np.random.Generator, robot: Robot, q: np.ndarray, cone_d
 
 
 def planted_over(name: str, seed: int) -> Over | None:
-    """A pose that an arm gets to, and a target that it covers, among objects; None if it collides."""
+    """A pose of an arm and a target that it covers, among objects; None if it collides."""
     rng, robot = np.random.default_rng([seed, 1]), arm(name)
     q, cone_deg = rng.uniform(*within_a_turn(robot)), float(rng.uniform(1.0, 60.0))
     point, approach = covered_target(rng, robot, q, cone_deg)

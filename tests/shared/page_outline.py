@@ -116,10 +116,13 @@ class Page(HTMLParser):
 
 
 def scene_outline(commands: Any) -> list[str]:
-    """A line for each object, those that only differ in a number at the end together."""
+    """A line for each object, those that only differ in a number at the end together.
+
+    The arm itself, which is drawn alike everywhere, is left out.
+    """
     boxes: dict[str, list[np.ndarray]] = {}
     for one in commands:
-        if one["type"] == "set_object":
+        if one["type"] == "set_object" and not re.match(r"/robot/.*link ", one["path"]):
             boxes.setdefault(re.sub(r"\d+$", "#", one["path"]), []).append(points_of(one))
     lines = []
     for path, parts in boxes.items():
@@ -128,9 +131,8 @@ def scene_outline(commands: Any) -> list[str]:
                      for end in (ends.min(axis=0), ends.max(axis=0)))  # fmt: skip
         box = " ".join(f"{a:.2f}..{b:.2f}" for a, b in zip(low, high, strict=True))
         lines.append(f"{_short(path)}: {box}")
-    moving = dict.fromkeys(
-        f"{_short(re.sub('[0-9]+$', '#', p))} {n}" for p, n in tracks_of(commands)
-    )
+    parts = [(p, n) for p, n in tracks_of(commands) if not p.startswith("/robot")]
+    moving = dict.fromkeys(f"{_short(re.sub('[0-9]+$', '#', p))} {n}" for p, n in parts)
     return [*lines, *(f"moves: {one}" for one in moving)]
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import tempfile
 import warnings
 import zipfile
 from collections.abc import Callable
@@ -20,6 +21,7 @@ import bad_input
 import hostile_visuals as hostile
 import numpy as np
 import pinocchio as pin
+from mesh_files import GOOD
 from small_cases import small_case, small_verdict
 
 from coverable_meshes import MeshFiles
@@ -192,10 +194,9 @@ def members(which: str) -> dict[str, bytes]:
                 node = Cut((1.0, 0, 0, 0, 0, 0), 0.01 * k, Leaf(1), node)
             tree = CutTree(node)
         verdict = replace(small_verdict("long plate"), proof=tree, evidence=Evidence.PROOF)
-    import tempfile
-
     with tempfile.TemporaryDirectory() as folder:
-        with zipfile.ZipFile(save_result(verdict, case, Path(folder) / "good")) as file:
+        saved = save_result(verdict, case, Path(folder) / "good")
+        with zipfile.ZipFile(saved) as file:
             return {name: file.read(name) for name in file.namelist()}
 
 
@@ -219,7 +220,6 @@ def npy(array: np.ndarray, pickled: bool = False) -> bytes:
 def damaged(which: str, change: dict[str, Any]) -> bytes:
     """A result file with one damage, as tests/input/bad/result.toml words it."""
     content = dict(members(which))
-    meta = json.loads(content["meta.json"])
     for kind, value in change.items():
         if kind == "drop":
             del content[value]
@@ -228,26 +228,10 @@ def damaged(which: str, change: dict[str, Any]) -> bytes:
         elif kind == "cut":
             content[value[0]] = content[value[0]][: value[1]]
         elif kind in ("meta", "without", "case"):
-            if kind == "meta":
-                meta |= value
-            elif kind == "without":
-                del meta[value]
-            else:
-                assert meta["case"]["toml"].count(value[0]) == 1
-                meta["case"]["toml"] = meta["case"]["toml"].replace(*value)
-            content["meta.json"] = json.dumps(meta).encode()
+            content["meta.json"] = _other_meta(content["meta.json"], kind, value)
         elif kind in ("at", "rows", "columns", "objects", "floats"):
             name = f"{value if isinstance(value, str) else value[0]}.npy"
-            array = np.load(io.BytesIO(content[name]))
-            if kind == "at":
-                array[tuple(value[1])] = value[2]
-            changes = {
-                "rows": lambda a=array: a[: value[1]],
-                "columns": lambda a=array: a[:, : value[1]],
-                "objects": lambda: np.array([None, {}]),
-                "floats": lambda a=array: a.astype(float),
-            }
-            content[name] = npy(changes.get(kind, lambda a=array: a)(), kind == "objects")
+            content[name] = _other_array(np.load(io.BytesIO(content[name])), kind, value)
         elif kind == "fill":
             content |= {f"x{k}": b"" for k in range(value - len(content))}
     data = packed(content, change.get("twice", ""))
@@ -259,6 +243,29 @@ def damaged(which: str, change: dict[str, Any]) -> bytes:
     return data
 
 
+def _other_meta(text: bytes, kind: str, value: Any) -> bytes:
+    meta = json.loads(text)
+    if kind == "meta":
+        meta |= value
+    elif kind == "without":
+        del meta[value]
+    else:
+        assert meta["case"]["toml"].count(value[0]) == 1
+        meta["case"]["toml"] = meta["case"]["toml"].replace(*value)
+    return json.dumps(meta).encode()
+
+
+def _other_array(array: np.ndarray, kind: str, value: Any) -> bytes:
+    if kind == "at":
+        array[tuple(value[1])] = value[2]
+    elif kind == "rows":
+        array = array[: value[1]]
+    elif kind == "columns":
+        array = array[:, : value[1]]
+    return npy(np.array([None, {}]) if kind == "objects" else array.astype(
+        float if kind == "floats" else array.dtype), kind == "objects")  # fmt: skip
+
+
 def of_bad(reader: str, name: str) -> bytes:
     """The bytes of a bad input of the tables."""
     one = bad_input.bad(reader)[name]
@@ -267,12 +274,6 @@ def of_bad(reader: str, name: str) -> bytes:
 
 def _text(reader: str, name: str) -> Callable[[], bytes]:
     return lambda: bad_input.many(bad_input.goods(reader)[name].replace("§", "")).encode()
-
-
-def _stl_text() -> bytes:
-    facet = "facet normal 0 0 1\nouter loop\n{}endloop\nendfacet\n"
-    rows = ["".join(f"vertex {x} {y} {z}\n" for x, y, z in face) for face in bad_input.sheet()]
-    return f"solid part\n{''.join(map(facet.format, rows))}endsolid part\n".encode()
 
 
 def _npy_grid() -> bytes:
@@ -286,15 +287,6 @@ def _net_csv() -> bytes:
     return "\n".join(["row,column,x,y,z", *rows, ""]).encode()
 
 
-PATCH = "OFF\n4 2 0\n0 0 0\n1 0 0\n0 1 0\n1 1 0.5\n3 0 1 2\n3 1 3 2\n"
-MESHES = {
-    "binary STL": ("part.stl", lambda: bad_input.stl(bad_input.sheet())),
-    "STL in words": ("part.stl", _stl_text),
-    "OBJ": ("part.obj", lambda: b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 .5\nf 1 2 3\nf 2 4/1/1 3\n"),
-    "PLY": ("part.ply", lambda: hostile.ply().encode()),
-    "OFF": ("part.off", PATCH.encode),
-    "GLB": ("part.glb", lambda: hostile.glb(*hostile.scene_of())),
-}
 READERS = {
     "case": Reader("case.toml", load_case, _text("case", "sphere"), sound_case),
     "study": Reader("study.toml", load_study, STUDY.encode, lambda study, _: None),
@@ -313,8 +305,10 @@ READERS = {
         lambda given, _: made_or_refused(lambda: poses(**given._asdict())),
     ),
     **{
-        name: Reader(file, lambda path: read_mesh(path, 1.0), good, sound_mesh)
-        for name, (file, good) in MESHES.items()
+        file: Reader(
+            file, lambda path: read_mesh(path, 1.0), lambda file=file: GOOD[file], sound_mesh
+        )
+        for file in GOOD
     },
     "GLB of a robot": Reader(
         "part.glb",

@@ -521,6 +521,7 @@ def on_triangles(points: Floats, corners: Floats) -> tuple[Floats, Floats]:
 
 # Bodies, by python-fcl.
 
+TOUCHING = -1e-3  # m, in place of the distance of bodies that share a point: fcl does not know it
 DEEP = 20.0  # m, a box in place of a half space: fcl crashes on a half space beside a mesh
 
 
@@ -629,7 +630,7 @@ class Scene:
         return fcl.CollisionObject(model, fcl.Transform(at[:3, :3], at[:3, 3]))
 
     def distances(self, q: ArrayLike, asked: Sequence[int] | None = None) -> Floats:
-        """(pairs,) m at one configuration, at most 0 where they touch."""
+        """(pairs,) m at one configuration; `TOUCHING` where bodies share a point."""
         import fcl
 
         frames, found = self._frames(np.atleast_2d(q)), []
@@ -640,7 +641,7 @@ class Scene:
                     a, b = (self._placed(*each, frames, 0) for each in (one, other))
                     touch = fcl.collide(a, b, fcl.CollisionRequest(), fcl.CollisionResult())
                     apart = fcl.distance(a, b, fcl.DistanceRequest(), fcl.DistanceResult())
-                    least = min(least, (0.0 if touch else apart) - one[0].off - other[0].off)
+                    least = min(least, (TOUCHING if touch else apart) - one[0].off - other[0].off)
             found.append(least)
         return np.array(found)
 

@@ -202,16 +202,6 @@ CHECK = {
     }]),
     "proof": of(proof, Maybe(PROOF)),
     "treated": TREATED,
-    "certified_area": of(lambda one: getattr(one, "area", None) and one.area.share,
-                         Perhaps(float)),
-    "certified_area_m2": of(lambda one: getattr(one, "area", None) and one.area.area,
-                            Perhaps(float)),
-    "partly_certified": of(
-        lambda one: None if getattr(one, "area", None) is None else
-        [(k, share, one) for k, share in enumerate(one.area.shares) if share < 1.0 - 1e-9],
-        Perhaps([{"cell": of(lambda one: index(one[2].cells, one[0]), [int]),
-                  "share": of(lambda one: float(one[1]), float)}]),
-    ),
     "timing": SECONDS,
     "robot": of("robot.name", str),
     "method": of("method", OneOf("complete", "greedy")),
@@ -392,7 +382,7 @@ def joints_moved(move: Any) -> list[dict[str, Any]]:
 
 
 PLAN = {
-    "optimal": bool,
+    "optimal": of(lambda one: one.ended and one.fewest.optimal, bool),
     "at_least": of("fewest.bound", int),
     "patches": of(lambda one: [(patch, one) for patch in one.fewest.patches], [{
         "cells": of(lambda one: [index(one[1].cells, k) for k in one[0].cells], [[int]]),

@@ -138,9 +138,11 @@ class Motions:
             place(self.arrays, self.work, slot, q)
         return self._held(q0, q1)
 
-    def at_rest(self, q0: Floats, q1: Floats, point: Floats, approach: Floats) -> Held:
+    def at_rest(
+        self, q0: Floats, q1: Floats, point: Any, approach: Any, reference: Any = (1.0, 0.0, 0.0)
+    ) -> Held:
         """A segment whose target stays where it is."""
-        self.work.target[0], self.work.target[1] = point, approach
+        self.work.target[:3] = point, approach, reference
         stand_still(self.arrays, self.work)
         for slot, q in enumerate((q0, q1)):
             place(self.arrays, self.work, slot, q)
@@ -151,7 +153,8 @@ class Motions:
         length, chord, roll = self.work.allowance
         good = bool(position <= 1.0 and turned <= 1.0)
         ends = max(self.work.error[0, 0], self.work.error[1, 0])
-        off = self.arrays.frame_deviations[0, 1] if self.task.roll is not None else 0.0
+        beside = self.arrays.frame_deviations[:1, 1:]
+        off = beside.max(initial=0.0) if self.task.roll is not None else 0.0
         with np.errstate(invalid="ignore"):
             bounds = position * length, turned * chord, turned * roll
         return Held(good, *bounds, bool(ends <= self.arrays.near), float(off))

@@ -1,6 +1,7 @@
 """Cells of meshes: every face in one connected cell of even area, and figures by brute force."""
 
 import math
+import pickle
 from functools import cached_property
 
 import networkx as nx
@@ -405,6 +406,7 @@ def test_what_makes_no_cells_is_refused(approved):
             ask()
         said.append(str(caught.value))
     approved("what makes no cells", "\n".join(said))
+    assert surface.cells(5).unravel(4) == (4,)
     with pytest.raises(IndexError):
         surface.cells(5).unravel(5)
 
@@ -434,6 +436,9 @@ def test_cutting_leaves_the_surface_what_it_was(name):
     assert length == pytest.approx(expected, rel=1e-12)
     outlines = cells.unrolled().outlines
     assert len(outlines) == N
+    again = pickle.loads(pickle.dumps(cells))
+    np.testing.assert_array_equal(again.centres, cells.centres)
+    np.testing.assert_array_equal(again.pairs, cells.pairs)
     assert all((loop[0] == loop[-1]).all() for loop in outlines)
 
 

@@ -181,6 +181,7 @@ def test_fans_are_parted_and_nothing_moves():
     parted, numbers, added = one_fan_each(vertices, faces)
     assert added == 2
     assert np.array_equal(parted[numbers], vertices[faces])
+    assert (numbers[:6, 0] == 0).all()  # the first keeps the old vertex
     mesh = clean(vertices, faces)
     w.assert_clean(mesh)
     assert sorted(np.bincount(mesh.pieces)) == [6, 6, 6]

@@ -17,7 +17,7 @@ import pytest
 from coverable_processes import Ended, Limits, folder_of, run_apart
 from feasibility.cases import Case, CaseError
 from feasibility.cli.main import main
-from surfaces import SurfaceError, mesh, step, step_faces, step_triangles
+from surfaces import SurfaceError, mesh, step, step_faces, step_parts, step_triangles
 from surfaces.step_files import Caps, step_process
 
 SIZE = (0.2, 0.1, 0.05)  # m
@@ -97,6 +97,14 @@ def test_faces_have_numbers_kinds_areas_and_colours(folder, known):
         np.testing.assert_allclose(other.normal, turn @ normal, atol=1e-9)
 
 
+def test_all_triangles_look_out_of_the_solid_as_they_come(folder, known):
+    parts = step_parts(folder / "part.step", known)
+    assert sorted(set(parts.owner.tolist())) == list(range(1, 8))
+    a, b, c = parts.vertices[parts.triangles].swapaxes(0, 1)
+    outwards = (a + b + c) / 3.0 - np.array(SIZE) / 2.0
+    assert (np.einsum("fi,fi->f", np.cross(b - a, c - a), outwards) > 0.0).all()
+
+
 def said_deviation(surface):
     """m, out of the first note."""
     return float(re.search(r"at most (\S+) mm off", surface.notes[0])[1]) * 1e-3
@@ -108,7 +116,7 @@ def test_the_deviation_is_right_at_the_poles_of_a_sphere(folder):
     np.testing.assert_allclose(np.linalg.norm(corners, axis=2), 0.3, atol=1e-9)
     shares = np.random.default_rng(1).dirichlet((1, 1, 1), 20)
     off = 0.3 - np.linalg.norm(np.einsum("sk,fki->fsi", shares, corners), axis=2)
-    assert 0.9 * said_deviation(surface) <= off.max() <= 1.01 * said_deviation(surface) < 1e-3
+    assert 0.9 * said_deviation(surface) <= off.max() <= 1.04 * said_deviation(surface) < 3e-3
 
 
 def test_triangles_are_in_metres_as_near_as_is_said_and_look_out_of_the_solid(chosen):
@@ -205,6 +213,7 @@ def answered(arrays=b"", **said):
         (answered(faces=3), BROKEN),
         (answered(b"0" * 12, taken=[1], counts=[2], vertices=0, triangles=1), BROKEN),
         (answered(b"0" * 12, taken=[1, 2], counts=[1], vertices=0, triangles=1), BROKEN),
+        (answered(EYE + np.array([0, 1, 2, 2, 1, 0], "<i4").tobytes(), **WHOLE), BROKEN),
         (answered(vertices=0, triangles=11), "more than 10; take fewer faces"),
         (answered(EYE + np.array([0, 1, 7], "<i4").tobytes(), **WHOLE), "do not exist"),
         (answered(EYE + np.array([0, 1, -2], "<i4").tobytes(), **WHOLE), "do not exist"),
@@ -267,7 +276,7 @@ def test_a_case_with_a_wrong_choice_says_so(folder, monkeypatch, approved):
     ):
         with pytest.raises(CaseError) as caught:
             Case.from_toml(CASE.format(keys + "\ncells = 12"), ".").build()
-        said.append(str(caught.value))
+        said.append(str(caught.value).replace(str(folder), "FOLDER"))
     approved("STEP cases refused", "\n".join(said))
 
 

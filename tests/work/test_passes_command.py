@@ -105,6 +105,10 @@ def test_between_stretches_that_are_apart_the_tool_is_lifted():
     cells = pass_toolpath(laid, retract=0.03)
     assert np.ptp(cells.centres[:, 2]) == pytest.approx(0.03)
     assert (cells.centres[:, 2] > 0.02).sum() == 2
+    hollow = cylinder(0.3, (0, 60), (0.0, 0.2), "inside")
+    cells = pass_toolpath(parallel_passes(hollow, 0.1, 0.0, one_way=True), retract=0.03)
+    radius = np.hypot(*cells.centres[:, :2].T)
+    assert (radius.min(), radius.max()) == pytest.approx((0.27, 0.3), abs=1e-6)
     hill = cylinder(0.3, (30, 150), (0.0, 0.2), "outside")
     with pytest.raises(CoverableError, match="run through the surface"):
         pass_toolpath(parallel_passes(hill, 0.1, 0.0, one_way=True), retract=0.01)
@@ -174,11 +178,12 @@ def test_a_way_through_the_part_is_refused():
     q, on = verdict.witness.q, np.ones(kept.sum(), dtype=bool)
     over = PoseCells.of(replace(cut.surface, under=part, working=on))
     assert "off its surface" in verify(UR5, over, task, q).refusal
-    lifted = on.copy()
     ends = np.flatnonzero(np.diff(route.places.stretch[kept]))
-    lifted[[*ends, *(ends + 1)]] = False
-    through = PoseCells.of(replace(cut.surface, under=part, working=lifted))
-    assert "goes through the surface where it is lifted" in verify(UR5, through, task, q).refusal
+    for some in ([*ends, *(ends + 1)], ends + 1):  # and where it is lifted on the way alone
+        working = np.isin(np.arange(len(on)), some, invert=True)
+        through = PoseCells.of(replace(cut.surface, under=part, working=working))
+        said = verify(UR5, through, task, q).refusal
+        assert "goes through the surface where it is lifted" in said
     assert not check(UR5, over, task).feasible
 
 

@@ -29,7 +29,8 @@ from surfaces.passes import parallel_passes
 
 ARMS = {"ur5": 0.5, "ur10": 0.7, "panda": 0.5, "puma560": 0.6}  # and m, where the surfaces stand
 KINDS = ("plane", "cylinder", "sphere", "cone", "torus", "hyperboloid", "bumps", "bumps with hole")
-MAKERS = {"cylinder": cylinder, "cone": cone, "hyperboloid": hyperboloid}
+MAKERS = {"cylinder": cylinder, "sphere": sphere, "cone": cone, "torus": torus,
+          "hyperboloid": hyperboloid}  # fmt: skip
 PLACES = 12  # of each segment that are looked at
 ROUNDING = 1e-6  # [m], [rad]
 BLENDED = math.radians(2.0)  # how far normals of triangles may be from otherwise blended ones
@@ -84,31 +85,35 @@ def surface_of(kind, rng, far):
     wide, deep = rng.uniform(0.1, 0.2, 2)
     if kind.startswith("bumps"):
         return bumps(rng, wide, deep, tilt, at, kind.endswith("hole"))
+    if kind == "plane":
+        u, v, pose = (-wide / 2, wide / 2), (-deep / 2, deep / 2), (at, angles_of(tilt))
+        return plane(u, v, "outside", *pose), Form("plane", (), u, v, True, at, tilt.as_matrix())
     radius = float(rng.uniform(0.12, 0.4))
     half = wide / radius / 2
     lying = tilt * Rotation.from_euler("x", 90, degrees=True)
     u, v, size, low = (math.pi / 2 - half, math.pi / 2 + half), (-deep / 2, deep / 2), (), radius
-    if kind == "plane":
-        u, lying, low = (-wide / 2, wide / 2), tilt, 0.0
-    elif kind == "sphere":
-        lying = tilt * Rotation.from_euler("y", -90, degrees=True)
-        v, size = (-deep / radius / 2, deep / radius / 2), (radius,)
-    elif kind == "torus":
-        tube = 0.8 * radius
-        v, size, low = (-deep / tube / 2, deep / tube / 2), (radius, tube), radius + tube
-    else:
-        size = {"cylinder": (radius,), "cone": (radius, float(rng.uniform(-0.3, 0.3))),
-                "hyperboloid": (radius, float(rng.uniform(0.15, 0.4)))}[kind]  # fmt: skip
+    match kind:
+        case "sphere":
+            lying = tilt * Rotation.from_euler("y", -90, degrees=True)
+            v, size = (-deep / radius / 2, deep / radius / 2), (radius,)
+        case "torus":
+            tube = 0.8 * radius
+            v, size, low = (-deep / tube / 2, deep / tube / 2), (radius, tube), radius + tube
+        case "cylinder":
+            size = (radius,)
+        case "cone":
+            size = (radius, float(rng.uniform(-0.3, 0.3)))
+        case "hyperboloid":
+            size = (radius, float(rng.uniform(0.15, 0.4)))
     below = tilt.apply([0, 0, -low]) + at
-    pose = ("outside", below, lying.as_euler("xyz", degrees=True))
-    degrees = tuple(np.degrees(u)), tuple(np.degrees(v))
-    if kind == "plane":
-        made = plane(u, v, *pose)
-    elif kind in ("sphere", "torus"):
-        made = (sphere if kind == "sphere" else torus)(*size, *degrees, *pose)
-    else:
-        made = MAKERS[kind](*size, degrees[0], v, *pose)
+    spans = [np.degrees(u), np.degrees(v) if kind in ("sphere", "torus") else v]
+    made = MAKERS[kind](*size, *map(tuple, spans), "outside", below, angles_of(lying))
     return made, Form(kind, size, u, v, True, below, lying.as_matrix())
+
+
+def angles_of(turn):
+    """Roll, pitch and yaw, degrees."""
+    return turn.as_euler("xyz", degrees=True)
 
 
 def bumps(rng, wide, deep, tilt, at, hole):
@@ -124,9 +129,7 @@ def bumps(rng, wide, deep, tilt, at, hole):
     waves = rng.uniform(-0.002, 0.002, 2)
     z = waves[0] * np.sin(20 * points[:, 0]) + waves[1] * np.cos(15 * points[:, 1])
     own = used(Mesh(np.column_stack([points - [wide / 2, deep / 2], z]), faces))
-    surface = mesh(
-        TriangleMesh(*own), side="outside", position=at, rpy_deg=tilt.as_euler("xyz", degrees=True)
-    )
+    surface = mesh(TriangleMesh(*own), side="outside", position=at, rpy_deg=angles_of(tilt))
     corners = tilt.apply(own.vertices) + at
     form = Facets(corners, own.faces, True)
     sides = np.sort(own.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)

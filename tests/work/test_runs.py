@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from samples import sampled, seeds
 
-from feasibility import Task
+from feasibility import Task, verify
 from feasibility.certification import replay, verify_proof
 from feasibility.certification.rates import replay_rates
 from feasibility.clock import Clock
@@ -117,16 +117,16 @@ def test_classes_that_last_are_run_as_far_as_any_reaches(seed):
     assert measured(asked, fewest_runs(asked)) == (undone, runs)
 
 
-def test_cuts_are_made_between_passes_where_they_can_be():
+@pytest.mark.parametrize("turn", range(2, 7))
+def test_cuts_are_made_between_passes_where_they_can_be(turn):
     """Two classes overlap over six stations; the turn between two passes is one of the pieces."""
     over = np.concatenate([np.arange(0, 8), np.arange(2, 10)])
     steps = [(k, k + 1, k + 1, 1) for k in range(7)]
-    steps += [(8 + k, 9 + k, 20 + k, 1) for k in range(7)]
-    inside = np.ones(9, dtype=bool)
-    inside[4] = False
+    steps += [(8 + k, 9 + k, 20 + k, 9) for k in range(7)]  # longer, so that later cuts are shorter
+    inside = np.arange(9) != turn
     found = fewest_runs(Stations(over, np.array(steps), np.where(inside, 0.01, 0.0), inside))
-    assert [int(over[run.nodes[-1]]) for run in found] == [4, 9]
-    assert int(over[found[1].nodes[0]]) in (4, 5)
+    assert [int(over[run.nodes[-1]]) for run in found] == [turn, 9]
+    assert int(over[found[1].nodes[0]]) in (turn, turn + 1)
 
 
 # -- of arms --------------------------------------------------------------------------------------
@@ -216,6 +216,11 @@ def test_runs_hold_the_speed_of_the_task():
     along = plan_passes(UR5, parallel_passes(plate, 0.1, math.pi / 2), fast)
     slow = plan_passes(UR5, along.passes, replace(fast, speed=None))
     assert (along.verdict.feasible, slow.verdict.feasible) == (False, True)
+    walk = slow.verdict.witness
+    working = slow.cells.surface.works(walk.cell)
+    for task, holds in ((fast, False), (replace(fast, speed=0.2), True)):
+        judged = verify(UR5, slow.cells, task, walk.q, working=working)
+        assert (judged.holds, "rad/s" in judged.refusal) == (holds, not holds)
     runs = pass_runs(UR5, along.cells, fast, along.places, clock=Clock())
     assert runs.runs
     for run in runs.runs:

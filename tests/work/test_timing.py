@@ -35,7 +35,10 @@ CASES = {
     "ur5": lambda: (UR5, FLAT.cells(3, 4), Task(standoff=0.02, cone_deg=25)),
     "panda": lambda: (load_robot("panda"), BALL.cells(3, 4), Task(standoff=0.02, cone_deg=25)),
     "post": lambda: (UR5, FLAT.cells(2, 3), Task(0.02, cone_deg=30, collision=AMONG)),
-    **{f"5{k}": (lambda k=k: load_case(f"paper/5{k}").build()[:3]) for k in "c" * EVERYTHING},
+    **{
+        k: (lambda k=k: load_case(f"paper/{k}").build()[:3])
+        for k in ("4a", "4c", "5c") * EVERYTHING
+    },
 }
 
 

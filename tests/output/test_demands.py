@@ -1,0 +1,175 @@
+"""Whatever a case demands, no command says "feasible" or "holds" where it is not held."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+
+import pytest
+from ask import asked
+
+from coverable_errors import ArgumentError
+from feasibility import Search, greedy_check
+from feasibility.cases import all_keys, load_case
+from feasibility.cli.main import _parser
+from feasibility.demands import DEMANDS
+from feasibility.placement import LocalEvaluator, Pose, Region, place, station_plan
+from feasibility.results import load_result
+
+CASE = """
+    robot.name = "ur5"
+    robot.limits_deg.shoulder_pan_joint = [-60, 40]
+    robot.limits_deg.shoulder_lift_joint = [-100, -20]
+    robot.limits_deg.elbow_joint = [20, 120]
+    robot.limits_deg.wrist_1_joint = [40, 130]
+    robot.limits_deg.wrist_2_joint = [60, 140]
+    robot.limits_deg.wrist_3_joint = [-200, -120]
+    surface.kind = "plane"
+    surface.u = [0.4, 0.6]
+    surface.v = [-0.1, 0.1]
+    surface.cells = [2, 2]
+    surface.position = [0, 0, 0.3]
+    surface.side = "outside"
+    task = { standoff = 0.02, cone_deg = 30 }
+"""
+GREEDY = ("search.method=greedy", "search.step_deg=0.5", "search.moves=all", "task.tolerance=0.02")
+FLOOD = '[{ name = "flood", kind = "box", size = [0.3, 0.3, 0.1], position = [0.5, 0, 0.37] }]'
+IMPOSSIBLE = {
+    "standoff": ["task.standoff=2.5"],
+    "tolerance": ["surface.position=[0, 0, 1.5]"],
+    "cone": ["task.approach=[0, 0, 1]"],
+    "roll": ["task.roll_deg=[70, 75]"],
+    "limits": ["robot.limits_deg.elbow_joint=[-1, 1]"],
+    "collisions": [
+        "collision.self=false",
+        "collision.surface=false",
+        "search.time_limit=10",
+        f"collision.scene={FLOOD}",
+    ],
+    "start": ["robot.start_deg=[0, -90, 90, 90, 90, -160]"],
+    "speed": ["task.speed=3.0"],
+    "distance from singularities": ["task.min_manipulability=0.9"],
+    "coverage": ["task.footprint=0.005", "task.coverage=0.99"],
+}
+"""Of each demand, what no motion of this arm holds."""
+OF_THE_ARM = "says which arm it is"
+MEASURE = "says what another demand is measured by"
+NO_DEMANDS = {
+    **dict.fromkeys(
+        ("robot.name", "robot.urdf", "robot.xacro_args", "robot.package_dirs", "robot.tool_frame",
+         "robot.lock", "robot.axis", "robot.base", "robot.base.*", "robot.axis.*"),
+        OF_THE_ARM,
+    ),
+    **dict.fromkeys(
+        ("robot.approach_axis", "robot.reference_axis", "robot.tcp", "robot.tcp.*",
+         "task.footprint"),
+        MEASURE,
+    ),
+    "task.smooth": "says which surface is meant: all judges take the smoothed copy",
+    "task.home_deg": "says where path comes from: the entry is checked as it is made",
+}  # fmt: skip
+JUDGING = {"check", "verify", "divide", "explain", "path", "place"}
+OTHERS = {
+    **dict.fromkeys(("live", "study", "compare"), "what they say is what check says"),
+    "warm-up": "compiles, and is about no case",
+    "show": "shows what a file says, and judges nothing",
+    **dict.fromkeys(("cases", "robots", "keys"), "are about no motion"),
+}
+
+
+def test_every_key_is_a_demand_with_a_judge_or_has_a_reason_to_be_none():
+    judged = [key for demand in DEMANDS for key in demand.keys]
+    assert len(judged) == len(set(judged))
+    assert set(IMPOSSIBLE) == {demand.name for demand in DEMANDS}
+    for key in all_keys():
+        if key.table.partition(".")[0] in ("robot", "task", "collision"):
+            names = f"{key.table}.{key.name}", f"{key.table}.*", f"{key.table.partition('.')[0]}.*"
+            known = [name for name in names if name in judged or name in NO_DEMANDS]
+            assert known, f"{names[0]}: who judges it (feasibility/demands.py), or why nobody?"
+    (commands,) = (action for action in _parser()._actions if action.choices)
+    assert set(commands.choices) == JUDGING | set(OTHERS)
+
+
+@pytest.fixture(scope="module")
+def known(tmp_path_factory):
+    """A feasible case: its file, its motion, its result, and the result of the greedy search."""
+    folder = tmp_path_factory.mktemp("demands")
+    case, motion, found, tree = (str(folder / name) for name in ("a.toml", "a.csv", "a", "tree"))
+    (folder / "a.toml").write_text(CASE)
+    assert asked("check", case, "--witness", motion, "--save", found).status == 0
+    settings = [part for setting in GREEDY for part in ("--set", setting)]
+    assert asked("check", case, *settings, "--save", tree).status == 0
+    return case, motion, found, tree
+
+
+def with_settings(path, settings):
+    """The same result file, as if it had been found for the case with these settings."""
+    with zipfile.ZipFile(path) as file:
+        members = {name: file.read(name) for name in file.namelist()}
+    meta = json.loads(members["meta.json"])
+    meta["case"]["toml"] = load_result(path).case.with_overrides(settings).to_toml()
+    with zipfile.ZipFile(f"{path}.forged", "w") as file:
+        for name, data in {**members, "meta.json": json.dumps(meta).encode()}.items():
+            file.writestr(name, data)
+    return f"{path}.forged"
+
+
+def says_yes(ask, known, settings):
+    """What says that the motion is there: commands, and the search for a placement."""
+    case, motion, found, tree = known
+    flags = [part for setting in settings for part in ("--set", setting)]
+    commands = {
+        "check": ("check", case, *flags),
+        "verify a motion": ("verify", case, motion, *flags),
+        "verify a result": ("verify", with_settings(found, settings)),
+        "verify a tree": ("verify", with_settings(tree, settings)),
+        "divide": ("divide", case, *flags),
+        "explain": ("explain", case, *flags),
+        "path": ("path", case, *flags),
+    }
+    said = {name for name, args in commands.items() if ask(*args).status == 0}
+    setup = load_case(case, settings).build()
+    here = Pose.of_surface(setup.cells.surface)
+    region = Region.around(here, {"x": (here.position[0] - 1e-3, here.position[0] + 1e-3)})
+    try:
+        placed = place(*setup[:3], region, count=1, around=0, keep=1)
+    except ValueError:  # refused
+        return said
+    if placed.answer == "feasible":
+        said.add("place")
+    plan = station_plan(placed, LocalEvaluator(*setup[:3], Search()), count=1)
+    whole = len(plan.stations) > 0 and not len(plan.stations.left_out)
+    return said | {"stations"} if whole and plan.certified and not plan.not_judged else said
+
+
+def test_every_command_says_yes_where_everything_holds(ask, known):
+    assert len(says_yes(ask, known, [])) == 9
+
+
+@pytest.mark.parametrize("demand", [demand.name for demand in DEMANDS])
+def test_no_command_says_yes_where_a_demand_is_not_held(ask, known, demand):
+    assert says_yes(ask, known, IMPOSSIBLE[demand]) == set()
+
+
+def test_what_is_not_held_is_named_as_the_cause(ask, known):
+    """`explain` advised 21 changes of limits where the coverage is what is missing."""
+    coverage, speed = (
+        [part for setting in IMPOSSIBLE[name] for part in ("--set", setting)]
+        for name in ("coverage", "speed")
+    )
+    said = {name: ask(name, known[0], *coverage)[1] for name in ("explain", "divide")}
+    assert all("99 % is required" in " ".join(text.split()) for text in said.values())
+    assert "makes it feasible" not in said["explain"]
+    for name in ("explain", "divide"):
+        assert "at 3 m/s" in " ".join(ask(name, known[0], *speed)[1].split())
+    setup = load_case(known[0], IMPOSSIBLE["speed"]).build()
+    region = Region.around(Pose.of_surface(setup.cells.surface), {"x": (0.0, 0.01)})
+    found = place(*setup[:3], region, count=1, around=0, keep=1)
+    assert "none was found that does so at 3 m/s" in found.message
+    assert found.cause is None
+
+
+def test_the_greedy_search_refuses_what_it_does_not_judge():
+    setup = load_case("paper/4a", ["task.speed=0.1"]).build()
+    with pytest.raises(ArgumentError, match="needs the complete search"):
+        greedy_check(*setup[:3])

@@ -1,0 +1,243 @@
+"""The drawn arm: every link, in the right place, whatever its files are like."""
+
+import re
+import sys
+from pathlib import Path
+
+import hostile_visuals as hostile
+import numpy as np
+import pinocchio as pin
+import pytest
+import trimesh
+from hostile_visuals import urdf, visual, write
+from page_outline import faces_of, points_of
+from samples import sampled, spread
+
+from coverable_meshes import MeshError, MeshFiles, robot_files
+from feasibility.viewer.meshes import Mesh, shaded, thinned, tubes
+from feasibility.viewer.robot import TRIANGLES, draw, joint_paths
+from feasibility.viewer.threejs import safe_name
+from robots import load_robot
+from robots.urdf import check_urdf
+
+TWO_LINKS = (
+    '<robot name="two"><link name="base">{base}</link><link name="arm">{arm}</link>'
+    '<link name="tip"/>'
+    '<joint name="turn" type="revolute"><parent link="base"/><child link="arm"/>'
+    '<origin xyz="0 0 1"/><axis xyz="0 0 1"/>'
+    '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+    '<joint name="end" type="fixed"><parent link="arm"/><child link="tip"/>'
+    '<origin xyz="0.5 0 0"/></joint></robot>'
+)
+SHAPE = '<visual><origin xyz="0 0 0.1"/><geometry>{}</geometry></visual>'
+
+
+def drawn(robot):
+    """Path -> (vertices, number of faces) of every mesh of the drawing."""
+    found = {}
+    for command in draw(robot).commands:
+        points, faces = points_of(command), faces_of(command)
+        assert faces.max() < len(points)
+        data = command["object"]["geometries"][0]["data"]
+        normals = np.frombuffer(data["attributes"]["normal"]["array"].data, "i1").reshape(-1, 3)
+        assert np.allclose(np.linalg.norm(normals / 127.0, axis=1), 1.0, atol=0.02)
+        found[command["path"]] = (points, len(faces))
+    return found
+
+
+def two_links(folder, base="", arm=""):
+    file = folder / "two.urdf"
+    file.write_text(TWO_LINKS.format(base=base, arm=arm))
+    return load_robot(str(file))
+
+
+@sampled
+@pytest.mark.parametrize("name", spread(["puma560", "ur5", "panda", "baxter_left", "xarm7"], 2))
+def test_every_link_with_visuals_is_drawn_whole_and_within_its_own_shape(name):
+    robot = load_robot(name)
+    checked = check_urdf(robot.urdf, package_dirs=robot.package_dirs)
+    assert not [warning for warning in checked.warnings if warning.startswith("not drawn")]
+    parts = drawn(robot)
+    paths = joint_paths(robot)
+    for link in {one.link for one in checked.visuals}:
+        frame = robot.model.frames[robot.model.getFrameId(link, pin.FrameType.BODY)]
+        start = f"{paths[frame.parentJoint]}/link {safe_name(link)}/part "
+        points = np.concatenate([p for path, (p, _) in parts.items() if path.startswith(start)])
+        local = (points - frame.placement.translation) @ frame.placement.rotation
+        bounds = np.array([extent(one) for one in checked.visuals if one.link == link])
+        low, high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
+        assert np.allclose([local.min(axis=0), local.max(axis=0)], [low, high], atol=0.02), link
+    assert sum(count for _, count in parts.values()) <= TRIANGLES
+
+
+def extent(visual):
+    """Lowest and highest corner of a visual in its link's frame, read another way."""
+    shape = visual.geometry
+    if hasattr(shape, "path"):
+        body = trimesh.load(shape.path, force="mesh", process=False)
+        body.apply_scale(shape.scale)
+    elif hasattr(shape, "size"):
+        body = trimesh.creation.box(shape.size)
+    elif hasattr(shape, "length"):
+        body = trimesh.creation.cylinder(radius=shape.radius, height=shape.length, sections=96)
+    else:
+        body = trimesh.creation.icosphere(subdivisions=4, radius=shape.radius)
+    return body.apply_transform(visual.origin).bounds
+
+
+@pytest.mark.parametrize(
+    ("shape", "size"),
+    [
+        ('<box size="0.2 0.4 0.6"/>', (0.2, 0.4, 0.6)),
+        ('<cylinder radius="0.1" length="0.6"/>', (0.2, 0.2, 0.6)),
+        ('<capsule radius="0.1" length="0.4"/>', (0.2, 0.2, 0.6)),
+        ('<sphere radius="0.1"/>', (0.2, 0.2, 0.2)),
+    ],
+)
+def test_simple_shapes_have_their_size_and_their_middle(tmp_path, shape, size):
+    robot = two_links(tmp_path, arm=SHAPE.format(shape))
+    ((path, (points, _)),) = drawn(robot).items()
+    assert path == "/robot/joint turn/link arm/part 0"
+    assert np.allclose(np.ptp(points, axis=0), size, atol=2e-3)
+    assert np.allclose(points.min(axis=0) + points.max(axis=0), [0, 0, 0.2], atol=2e-3)
+
+
+def test_a_mesh_is_scaled_and_placed(tmp_path):
+    trimesh.creation.box((1, 2, 3)).export(tmp_path / "box.stl")
+    mesh = '<mesh filename="box.stl" scale="0.1 0.1 -0.1"/>'
+    ((points, faces),) = drawn(two_links(tmp_path, base=SHAPE.format(mesh))).values()
+    assert faces == 12
+    assert np.allclose(points.min(axis=0), [-0.05, -0.1, -0.05], atol=1e-4)
+    assert np.allclose(points.max(axis=0), [0.05, 0.1, 0.25], atol=1e-4)
+
+
+@pytest.mark.parametrize("content", [None, b"solid nothing", b"\0" * 84, b"\xff" * 200])
+def test_a_mesh_that_cannot_be_had_becomes_a_capsule_and_a_note(tmp_path, content):
+    if content is not None:
+        (tmp_path / "lost.stl").write_bytes(content)
+    robot = two_links(
+        tmp_path,
+        base=SHAPE.format('<box size="0.1 0.1 0.1"/>'),
+        arm=SHAPE.format('<mesh filename="lost.stl"/>'),
+    )
+    notes = draw(robot).notes
+    assert len(notes) == 1
+    assert "lost.stl" in notes[0]
+    parts = drawn(robot)
+    assert set(parts) == {"/robot/link base/part 0", "/robot/joint turn/link capsule/part 1"}
+    points, _ = parts["/robot/joint turn/link capsule/part 1"]
+    assert points[:, 0].min() < 0 < 0.49 < points[:, 0].max(), "from the joint to the tool"
+
+
+def test_an_arm_without_pictures_is_a_chain_of_capsules(tmp_path):
+    bare, late = two_links(tmp_path), two_links(tmp_path)
+    assert len(drawn(bare)) == 2
+    (tmp_path / "two.urdf").unlink()
+    assert draw(bare).notes == ()  # files are read once for each robot
+    assert len(drawn(late)) == 2
+    (note,) = draw(late).notes
+    assert "two.urdf" in note
+
+
+def test_thinning_keeps_the_shape_and_the_budget():
+    ball = trimesh.creation.icosphere(subdivisions=6, radius=0.1)
+    mesh = Mesh(np.asarray(ball.vertices), np.asarray(ball.faces), (0.5, 0.5, 0.5))
+    (thin,) = thinned([mesh], 5_000)
+    assert 500 < len(thin.faces) <= 5_000
+    assert np.abs(np.linalg.norm(thin.vertices, axis=1) - 0.1).max() < 3e-3
+    volume = trimesh.Trimesh(thin.vertices, thin.faces, process=False).volume
+    assert volume == pytest.approx(ball.volume, rel=0.03)
+    (same,) = thinned([mesh], 10**6)
+    assert len(same.faces) == len(ball.faces)
+
+
+def test_edges_stay_sharp_and_round_parts_look_round():
+    box = trimesh.creation.box((1, 1, 1))
+    split, normals = shaded(Mesh(box.vertices, box.faces, (1, 1, 1)))
+    assert len(split.vertices) == 24
+    assert np.allclose(np.sort(np.abs(normals), axis=1), [0, 0, 1])
+    assert np.allclose(split.vertices[split.faces], box.vertices[box.faces])
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    split, normals = shaded(Mesh(ball.vertices, ball.faces, (1, 1, 1)))
+    assert len(split.vertices) == len(ball.vertices)
+    assert (np.einsum("ij,ij->i", normals, split.vertices) > 0.999).all()
+
+
+def test_tubes_run_around_their_lines_at_their_radius():
+    t = np.linspace(0, 1, 40)[:, None]
+    arc = np.hstack([np.cos(t), np.sin(t), t])
+    straight = np.array([[0, 0, 0], [0, 0, 1.0], [0, 0, 1.0]])
+    point = np.zeros((3, 3))
+    vertices, faces = tubes([arc, straight, point], 0.01)
+    assert len(vertices) == 5 * (40 + 2)
+    assert len(faces) == 10 * (39 + 1)
+    assert np.allclose(np.linalg.norm(vertices[-10:, :2], axis=1), 0.01)
+    centre = np.repeat(arc, 5, axis=0)
+    assert np.allclose(np.linalg.norm(vertices[:200] - centre, axis=1), 0.01)
+    assert tubes([], 0.01)[1].shape == (0, 3)
+
+
+# -- traps: counted before they are made, and nothing beside them opened --------------------------
+
+LIGHT = [maker for maker in hostile.MAKERS if maker is not hostile.just_drawn]
+opened: list[str] = []
+sys.addaudithook(lambda event, facts: opened.append(str(facts[0])) if event == "open" else None)
+
+
+@pytest.mark.parametrize("maker", LIGHT, ids=lambda maker: maker.__name__)
+def test_a_trap_is_a_note_or_is_left_alone(maker, tmp_path, capfd):
+    path, words = hostile.make(maker, 0, tmp_path / "robot")
+    robot = load_robot(path)
+    opened.clear()
+    drawing = draw(robot)
+    mesh = re.search('filename="(.*?)"', Path(path).read_text())
+    inside = {Path(name).name for name in opened if name.startswith(str(tmp_path))}
+    assert inside <= {"arm.urdf", mesh[1]}, "nothing beside the mesh is opened"
+    assert not [name for name in opened if name.startswith(("/dev", "/etc"))]
+    assert capfd.readouterr() == ("", "")
+    if words:
+        (note,) = drawing.notes
+        assert note.startswith("not drawn: ")
+        assert re.search(words, note)
+    else:
+        assert (drawing.notes, len(drawing.commands)) == ((), 1), "the triangle"
+
+
+def hostile_robot(folder, visuals):
+    return str(folder / write(folder, "arm.urdf", urdf(visuals)))
+
+
+def test_a_mesh_that_is_used_often_is_read_once(tmp_path):
+    names = [write(tmp_path, f"{k}.stl", hostile.stl(k + 1)) for k in range(3)]
+    broken = write(tmp_path, "broken.stl", b"")
+    shapes = "".join(visual(name) for name in (*names, broken) * 300)
+    robot = load_robot(hostile_robot(tmp_path, shapes))
+    opened.clear()
+    (note,) = draw(robot).notes
+    own = [Path(name).name for name in opened if name.endswith(".stl")]
+    assert sorted(set(own)) == ["0.stl", "1.stl", "2.stl", "broken.stl"]
+    assert len(own) <= 2 * 4
+    assert note.startswith("not drawn: a shape of link base and 299 more: broken.stl: is empty")
+
+
+def test_the_triangles_of_all_shapes_together_are_capped(tmp_path, monkeypatch):
+    """Copies of one mesh count, and so do spheres; what came before is drawn."""
+    assert robot_files.MOST_TRIANGLES == 1_500_000
+    monkeypatch.setattr(robot_files, "MOST_TRIANGLES", 60_000)
+    mesh = visual(write(tmp_path, "large.stl", hostile.stl(4_000)))
+    ball = '<visual><geometry><sphere radius="0.1"/></geometry></visual>'
+    drawing = draw(load_robot(hostile_robot(tmp_path, mesh * 18 + ball)))
+    (note,) = drawing.notes
+    assert "link base and 3 more: the robot's shapes have more than 60,000" in note
+    assert 0 < sum(len(faces_of(command)) for command in drawing.commands) <= 4 * 4 * TRIANGLES
+
+
+def test_no_other_file_is_opened_after_the_time_is_up(tmp_path):
+    now = [0.0]
+    files = MeshFiles(clock=lambda: now[0])
+    paths = [str(tmp_path / write(tmp_path, f"{k}.stl", hostile.stl(1))) for k in range(2)]
+    assert len(files.parts(paths[0])) == 1
+    now[0] = 8.1
+    assert len(files.parts(paths[0])) == 1, "it was read before"
+    with pytest.raises(MeshError, match=r"reading took more than 8 s; thin the robot's meshes"):
+        files.parts(paths[1])

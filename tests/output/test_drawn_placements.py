@@ -1,0 +1,355 @@
+"""Pictures of poses: each that was tried is drawn where it was, in the colour of its share."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+import trimesh
+from mesh_writers import cube, plate
+from page_outline import points_of
+from scipy.spatial.transform import Rotation
+
+from feasibility import Answer, Evidence, Search, Task, check
+from feasibility.cases import Case
+from feasibility.placement import (
+    Placements,
+    Pose,
+    Region,
+    Stage,
+    StationPlan,
+    Trial,
+    moved_cells,
+    place,
+)
+from feasibility.placement.evaluator import Margins
+from feasibility.placement.stations import fewest_stations
+from feasibility.studies import Row, open_workers, run_tasks
+from feasibility.studies.file import read_study
+from feasibility.viewer import poses as pose_layers
+from feasibility.viewer import view_placements, view_study
+from feasibility.viewer.placements import same_frame
+from feasibility.viewer.poses import (
+    COLOURS,
+    MOST,
+    MOST_DRAWN,
+    Class,
+    Tried,
+    class_layers,
+    class_of_row,
+    class_of_share,
+    outline,
+)
+from feasibility.viewer.threejs import hex_colour
+from robots import load_robot
+from surfaces import cylinder, mesh, plane, sphere, torus
+
+PLATE = plane((-0.15, 0.15), (-0.1, 0.1), position=(0.5, 0, 0.2), side="outside")
+CELLS = PLATE.cells(3, 2)
+TASK = Task(standoff=0.02, cone_deg=30)
+
+
+@cache
+def ur5():
+    return load_robot("ur5")
+
+
+def poses(count, seed=0):
+    """Poses in front of the arm."""
+    rng = np.random.default_rng(seed)
+    low, high = [0.3, -0.4, 0.1, -40, -40, -90], [0.8, 0.4, 0.5, 40, 40, 90]
+    return [Pose.of_values(row) for row in rng.uniform(low, high, (count, 6)).round(6)]
+
+
+def covers(share):
+    """One component that covers so many of the six cells."""
+    return (np.arange(6) < round(6 * share))[None]
+
+
+def fabricated(*extra):
+    """A search without an answer whose trials fall into every class but 'feasible'."""
+    at = iter(poses(40))
+    margins = Margins(0.3, 0.2, 0.1)
+    trials = [
+        *(Trial(next(at), Stage.SEARCH, 1.0, 1.0, 1.0, margins, covers(1)) for _ in range(2)),
+        *(Trial(next(at), Stage.SEARCH, 1.0, 1.0, s, covers=covers(s)) for s in (5 / 6, 0.75)),
+        *(Trial(next(at), Stage.SEARCH, 1.0, 1.0, s, covers=covers(s)) for s in (2 / 3, 0.6, 0.5)),
+        *(Trial(next(at), Stage.SEARCH, 1.0, 1.0, 1 / 3, covers=covers(1 / 3)) for _ in range(4)),
+        *(Trial(next(at), Stage.CHECK, 1.0, 1.0, s, answer=Answer.INFEASIBLE)
+          for s in (1 / 6, 0.0, 0.0, 0.0, 0.0)),
+        *(Trial(next(at), Stage.PROBE, 1.0, 0.5) for _ in range(6)),
+        Trial(next(at), Stage.BOUND, 0.5),
+        *(Trial(next(at), Stage.FAILED, 0.0, message="no") for _ in range(3)),
+        *extra,
+    ]  # fmt: skip
+    region = Region.around(Pose.of_surface(PLATE), {"x": (0.2, 0.9)})
+    return Placements(
+        ur5(), CELLS, TASK, region, Answer.INFEASIBLE, Evidence.EXHAUSTED, "", (), tuple(trials),
+        None, statistics={"bound": 11},
+    )  # fmt: skip
+
+
+EXPECTED = {
+    Class.WHOLE: 2, Class.MOST: 2, Class.HALF: 3, Class.SOME: 4, Class.LITTLE: 5,
+    Class.UNSEARCHED: 7, Class.FAILED: 3,
+}  # fmt: skip
+
+
+def objects(commands):
+    """Path -> corners of every object."""
+    return {c["path"]: points_of(c) for c in commands if c["type"] == "set_object"}
+
+
+def colour_of(view, path):
+    """The colour that an object is drawn in."""
+    (command,) = (c for c in view.commands if c["type"] == "set_object" and c["path"] == path)
+    return command["object"]["materials"][0]["color"]
+
+
+def classes_of(view):
+    """Label -> entry of every class in the legend."""
+    return {e.label: e for e in view.legend.entries if e.path and e.path.startswith("/poses/")}
+
+
+def turned(points, pose):
+    """Points of the surface's frame at a pose, by scipy's fixed-axis angles."""
+    turn = Rotation.from_euler("xyz", pose.rpy_deg, degrees=True)
+    return turn.apply(np.reshape(points, (-1, 3))) + pose.position
+
+
+# -- classes ----------------------------------------------------------------------------------
+
+
+def test_every_class_is_in_the_legend_with_its_number_and_its_colour():
+    view = view_placements(fabricated())
+    entries = classes_of(view)
+    assert list(entries) == [f"{kind} ({number})" for kind, number in EXPECTED.items()]
+    hidden = {c["path"] for c in view.commands if c.get("property") == "visible" and not c["value"]}
+    for kind, entry in zip(EXPECTED, entries.values(), strict=True):
+        assert entry.colour == COLOURS[kind]
+        assert colour_of(view, entry.path) == hex_colour(COLOURS[kind])
+        assert not entry.shown, "dots are off at first"
+        assert entry.path in hidden
+    assert "26 placements tried, 11 more discarded as out of reach" in view.legend.text
+    assert view.motion is None
+
+
+def test_every_pose_that_is_not_feasible_is_a_dot_where_the_surface_was_tried():
+    """The middle of the outline, against scipy's rotations; hundreds of them are one object."""
+    asked = fabricated()
+    lines = outline(CELLS)
+    middle = (lines.min(axis=(0, 1)) + lines.max(axis=(0, 1))) / 2
+    for times in (1, 30):
+        view = view_placements(replace(asked, trials=asked.trials * times))
+        kinds = [pose_layers.class_of_trial(trial) for trial in asked.trials]
+        assert len(classes_of(view)) == len(EXPECTED)
+        for kind, entry in zip(EXPECTED, classes_of(view).values(), strict=True):
+            poses = [t.pose for t, k in zip(asked.trials, kinds, strict=True) if k is kind] * times
+            got = objects(view.commands)[entry.path].reshape(len(poses), 6, 3)
+            want = np.concatenate([turned(middle, pose) for pose in poses])
+            np.testing.assert_allclose(got.mean(axis=1), want, atol=2e-5)
+            assert np.ptp(got, axis=1).max() < 0.05
+
+
+@pytest.mark.parametrize(
+    ("share", "kind"),
+    [(1.0, Class.WHOLE), (1 - 1e-12, Class.WHOLE), (0.999, Class.MOST), (0.75, Class.MOST),
+     (0.7499, Class.HALF), (0.5, Class.HALF), (0.4999, Class.SOME), (0.25, Class.SOME),
+     (0.2499, Class.LITTLE), (0.0, Class.LITTLE)],
+)  # fmt: skip
+def test_the_class_of_a_share(share, kind):
+    assert class_of_share(share) is kind
+
+
+def test_whole_shares_are_feasible_only_where_that_was_said():
+    """A row that failed has no share; one that ran out of time keeps the share it found."""
+    row = Row({}, "done", {"verdict": "feasible", "share": 1.0}, 0.1)
+    assert class_of_row(row) is Class.FEASIBLE
+    late = {"verdict": "undecided", "share": 1.0}
+    assert class_of_row(replace(row, result=late)) is Class.WHOLE
+    assert class_of_row(replace(row, result={**late, "share": 0.6})) is Class.HALF
+    died = {"verdict": "undecided", "evidence": "budget", "message": "its worker died"}
+    assert class_of_row(replace(row, status="failed", result=died)) is Class.FAILED
+
+
+def test_of_many_poses_some_are_drawn_and_the_legend_says_so():
+    tried = [Tried(pose, Class.FEASIBLE, None) for pose in poses(450)]
+    lines = outline(CELLS)
+    (layer,) = class_layers(lines, tried)
+    assert layer.entry.label == f"feasible ({MOST_DRAWN} of 450 drawn)"
+    assert layer.entry.shown
+    drawn = objects(layer.commands)[layer.entry.path].reshape(MOST_DRAWN, -1, 3)
+    middles = np.array([turned(lines.mean(axis=(0, 1)), one.pose)[0] for one in tried])
+    which = [int(np.linalg.norm(middles - part.mean(0), axis=1).argmin()) for part in drawn]
+    assert which[0] == 0
+    assert which[-1] == 449
+    assert set(np.diff(which)) == {2, 3}  # spread evenly: 449 / 199
+
+
+# -- outlines ---------------------------------------------------------------------------------
+
+
+def length(lines):
+    """Of all segments together, m."""
+    return float(np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1).sum())
+
+
+@pytest.mark.parametrize(
+    ("cells", "expected"),
+    [
+        (CELLS, 2 * (0.3 + 0.2)),
+        (cylinder(0.3, angle_deg=(0, 360), height=(0.0, 0.5)).cells(24, 3), 4 * np.pi * 0.3),
+        (cylinder(0.3, angle_deg=(0, 90), height=(0.0, 0.5)).cells(12, 3), np.pi * 0.3 + 1.0),
+        (sphere(0.4, polar_deg=(0, 90), azimuth_deg=(0, 360)).cells(4, 24), 2 * np.pi * 0.4),
+        # Closed: three sections, each a full circle.
+        (sphere(0.4, polar_deg=(0, 180), azimuth_deg=(0, 360)).cells(12, 24), 6 * np.pi * 0.4),
+    ],
+)
+def test_an_outline_is_the_rim_or_three_sections(cells, expected):
+    """Its length against the formula; every end lies on the surface, the stroke's tip beside it."""
+    lines = outline(cells)
+    surface = cells.surface
+    world = lines @ surface.rotation.T + surface.position
+    heights = surface.closest(world.reshape(-1, 3)).height.reshape(-1, 2)
+    stroke = np.abs(heights[:, 1]) > 0.02
+    assert stroke.sum() <= 1
+    assert (np.sign(heights[stroke, 1]) == surface.side_sign).all()
+    assert np.abs(heights[~stroke]).max() < 0.02 * 0.4
+    assert length(lines[~stroke]) == pytest.approx(expected, rel=0.02)
+    assert len(lines) <= MOST + 1
+
+
+def test_an_outline_does_not_depend_on_where_the_surface_stands():
+    ring = torus(0.4, 0.1, (0, 270), (0, 180)).cells(9, 4)
+    for cells in (CELLS, ring):
+        for pose in poses(3):
+            there = outline(moved_cells(cells, pose))
+            np.testing.assert_allclose(there, outline(cells), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("triangles", "expected"), [(plate(40, 40), 2 * (0.3 + 0.2)), (cube(0.2), 3 * 4 * 0.2)]
+)
+def test_the_outline_of_a_mesh(triangles, expected):
+    """Of a sheet with many triangles its edges, thinned; of a whole cube three square sections."""
+    cells = mesh(trimesh.Trimesh(*triangles, process=False)).cells(count=24)
+    lines = outline(cells)
+    flat = np.ptp(triangles[0], axis=0).min() == 0.0
+    assert length(lines[:-1] if flat else lines) == pytest.approx(expected, rel=0.05)
+    assert 4 < len(lines) <= MOST + 1
+
+
+# -- the best one -----------------------------------------------------------------------------
+
+
+def test_the_best_placement_plays_the_motion_that_check_finds():
+    region = Region.around(Pose.of_surface(PLATE), {"x": (0.3, 0.7), "yaw_deg": (0, 60)})
+    found = place(ur5(), CELLS, TASK, region, count=8, around=1, keep=2)
+    assert found.answer is Answer.FEASIBLE
+    view = view_placements(found, case="plate")
+    there = moved_cells(CELLS, found.best.pose)
+    verdict = check(ur5(), there, TASK, Search())
+    np.testing.assert_array_equal(view.motion.walk, verdict.witness.q)
+    heights = there.surface.closest(view.motion.points).height
+    assert np.abs(heights - TASK.standoff).max() < 2e-3
+    number = f"{len(found.found)} of {len(found.trials)}"
+    assert view.legend.title == f"plate: feasible (witness), {number} placements feasible"
+    entries = classes_of(view)
+    assert f"feasible ({len(found.found)})" in entries
+    counted = sum(int(re.search(r"\((\d+)\)", label)[1]) for label in entries)
+    assert counted == len(found.trials)
+    # Thick: every point of the tubes lies near the outline, drawn where one was found.
+    drawn = objects(view.commands)["/poses/feasible"].reshape(len(found.found), -1, 3)
+    for part, trial in zip(drawn, found.found, strict=True):
+        want = turned(outline(CELLS), trial.pose)
+        near = np.linalg.norm(part[:, None] - want[None], axis=2).min(axis=1)
+        assert near.max() < 3e-3
+
+
+def test_stations_are_drawn_where_they_stand():
+    where = poses(2)
+    masks = np.array([[1, 1, 1, 1, 0, 0], [0, 0, 0, 1, 1, 1]], dtype=bool)
+    trials = tuple(
+        Trial(pose, Stage.SEARCH, 1.0, 1.0, 0.5, covers=mask[None])
+        for pose, mask in zip(where, masks, strict=True)
+    )
+    stations = fewest_stations([mask[None] for mask in masks], 6)
+    plan = StationPlan(stations, tuple(trials[s.placement] for s in stations.stations), ("", ""))
+    asked = fabricated(*trials)
+    view = view_placements(asked, plan=plan)
+    assert "2 stations cover 6 of 6 cells" in view.legend.text
+    drawn = objects(view.commands)
+    for k, (station, trial) in enumerate(zip(stations.stations, plan.trials, strict=True)):
+        centres = moved_cells(CELLS, trial.pose).centres[station.cells]
+        points = drawn[f"/stations/station {k + 1}/cells"]
+        away = np.linalg.norm(points[:, None] - centres[None], axis=2).min(axis=1)
+        assert away.max() < 0.5 * np.hypot(0.1, 0.1) + 1e-6
+        cone_chord = drawn[f"/stations/station {k + 1}/outline"]
+        np.testing.assert_allclose(cone_chord, turned(outline(CELLS), trial.pose), atol=2e-5)
+    shown = {entry.label: entry.shown for entry in view.legend.entries}
+    assert shown["station 1 (4 cells)"]
+    assert shown["station 2 (2 cells)"]
+    assert not shown["the best of them"]
+
+
+# -- studies ----------------------------------------------------------------------------------
+
+STUDY = """
+[base.robot]
+name = "ur5"
+[base.surface]
+kind = "plane"
+u = [-0.15, 0.15]
+v = [-0.1, 0.1]
+cells = [3, 2]
+side = "outside"
+[base.task]
+standoff = 0.02
+cone_deg = 30
+[vary]
+robots = ["ur5", "panda"]
+"surface.position" = { x = [0.45, 0.6, 2.0], y = 0, z = 0.2 }
+"surface.rpy_deg".yaw = [0, 45]
+"""
+
+
+@cache
+def decided():
+    study = read_study(STUDY)
+    with open_workers(0) as workers:
+        return study, run_tasks(study.tasks, workers)
+
+
+def test_a_study_is_drawn_for_the_arm_of_its_best_row():
+    """Against a count by hand of the rows of that arm."""
+    study, rows = decided()
+    view = view_study(study.tasks, rows, "s")
+    mine = [row for row in rows if row.parameters["robot"] == view.robot.name]
+    assert len(mine) == 6
+    assert "6 of 12 cases" in view.legend.text
+    feasible = [row for row in mine if row.result["verdict"] == "feasible"]
+    entries = classes_of(view)
+    assert f"feasible ({len(feasible)})" in entries
+    assert sum(int(re.search(r"\((\d+)\)", label)[1]) for label in entries) == 6
+    low = [r for r in mine if r.result["verdict"] != "feasible" and r.result["share"] < 0.25]
+    assert f"less than 25 % ({len(low)})" in entries
+    assert len(low) >= 2
+    best = max(feasible, key=lambda row: row.result["margins"]["limit_deg"])
+    where = {k: best.parameters[f"surface.{k}"] for k in ("position.x", "rpy_deg.yaw")}
+    case = Case.from_toml(
+        re.sub(r"\[base\.(\w+)\]", r"[\1]", STUDY.split("[vary]")[0]),
+        overrides=[f"robot.name={view.robot.name}", f"surface.rpy_deg=[0,0,{where['rpy_deg.yaw']}]",
+                   f"surface.position=[{where['position.x']}, 0, 0.2]"],
+    )  # fmt: skip
+    verdict = check(*case.build())
+    np.testing.assert_array_equal(view.motion.walk, verdict.witness.q)
+
+
+def test_only_the_pose_may_differ_within_a_picture():
+    study, _ = decided()
+    arms = [task.parameters["robot"] for task in study.tasks]
+    for row in (0, 11):
+        assert same_frame(study.tasks, row) == [k for k in range(12) if arms[k] == arms[row]]

@@ -1,0 +1,387 @@
+"""Drawn surfaces: cells are filled by their own triangles, in the colour of what became of them."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+from made_up import missing
+from matplotlib.collections import LineCollection, PathCollection, PolyCollection
+from matplotlib.colors import to_rgb
+from mesh_patches import grid
+from page_outline import faces_of, points_of
+
+from feasibility import CauseKind, Task, check
+from feasibility.cases import load_case
+from feasibility.results import load_result
+from feasibility.verdict import Cause
+from feasibility.viewer import cell_meshes as cell_shapes
+from feasibility.viewer import plot_sides, scene, view
+from feasibility.viewer.cell_meshes import make_display_mesh
+from feasibility.viewer.cut_sides import sides_of
+from feasibility.viewer.figures import plot_causes, plot_graph, plot_transition, unrolled_edges
+from robots import load_robot
+from surfaces import cylinder, mesh, sphere
+from surfaces.meshes.cells import MeshCells
+
+COUNT = 24
+MISSED = {2, 3, 7, 11, 15, 20}
+DOME = sphere(radius=1.0, polar_deg=(10, 90), azimuth_deg=(10, 180), side="inside")
+
+
+def triangles(nu, nv, shape):
+    """A unit square bent by (u, v) -> points, as a mesh of 2 nu nv triangles."""
+    u, v, faces = grid(nu, nv)
+    return trimesh.Trimesh(shape(u, v), faces, process=False)
+
+
+def sheet(u, v):
+    return np.stack([u, 0.7 * v, 0.0 * u], axis=-1)
+
+
+def wave(u, v):
+    return np.stack([u, v, 0.1 * np.sin(5.0 * u) * np.cos(4.0 * v)], axis=-1)
+
+
+def dome(u, v):
+    return DOME.point(np.radians(10 + 80 * u), np.radians(10 + 170 * v))
+
+
+def blocks(surface, across):
+    """Cells of a mesh as squares of a grid over x and y; quicker than cutting it."""
+    middles = surface.mesh.vertices[surface.mesh.faces].mean(axis=1)
+    low, high = surface.mesh.vertices.min(axis=0), surface.mesh.vertices.max(axis=0)
+    share = (middles - low)[:, :2] / (high - low)[:2]
+    row, column = np.floor(across * share).astype(int).T
+    return MeshCells.of(surface, row * across + column)
+
+
+@pytest.fixture(scope="module")
+def puma():
+    return load_robot("puma560", limits="set-1")
+
+
+@pytest.fixture(scope="module")
+def cells():
+    return mesh(triangles(30, 40, dome), side="inside").cells(count=COUNT)
+
+
+@pytest.fixture(scope="module")
+def fine():
+    """30,000 triangles in 25 cells, turned and moved."""
+    surface = mesh(triangles(150, 100, wave), position=(0.3, -0.2, 0.5), rpy_deg=(20, -40, 70))
+    return MeshCells.of(surface, blocks(mesh(triangles(150, 100, wave)), 5).labels)
+
+
+@pytest.fixture(scope="module")
+def on_mesh(puma, cells):
+    """The dome as a mesh, some cells missed."""
+    return missing(check(puma, cells, Task(0.005, 45)), MISSED)
+
+
+@pytest.fixture(scope="module")
+def on_grid(puma):
+    """The dome as a grid, some cells missed."""
+    return missing(check(puma, DOME.cells(5, 6), Task(0.005, 45)), {5, 6, 13, 14, 15, 22})
+
+
+def areas_of(vertices, faces):
+    a, b, c = np.moveaxis(vertices[faces], 1, 0)
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2.0
+
+
+def edges_of(faces, labels):
+    """Labels of the faces at each edge, edge by edge."""
+    found = defaultdict(list)
+    for face, label in zip(faces.tolist(), labels.tolist(), strict=True):
+        for a, b in zip(face, face[1:] + face[:1], strict=True):
+            found[min(a, b), max(a, b)].append(label)
+    return found
+
+
+def objects(commands):
+    return {c["path"]: c for c in commands if c["type"] == "set_object"}
+
+
+def test_each_cell_is_filled_by_its_own_triangles(cells):
+    for k in range(COUNT):
+        drawn = cell_shapes.patch(cells, np.array([k]))
+        assert areas_of(drawn.vertices, drawn.faces).sum() == pytest.approx(cells.areas[k])
+        assert set(cells.locate(drawn.vertices[drawn.faces].mean(axis=1)).tolist()) == {k}
+        a, b, c = np.moveaxis(drawn.vertices[drawn.faces], 1, 0)
+        looks = np.cross(b - a, c - a)
+        assert ((looks * drawn.normals[drawn.faces[:, 0]]).sum(axis=1) > 0.0).all()
+        np.testing.assert_allclose(np.linalg.norm(drawn.normals, axis=1), 1.0, atol=1e-12)
+    whole = cell_shapes.patch(cells, np.arange(COUNT))
+    assert len(whole.vertices) == len(cells.surface.mesh.vertices), "triangles share corners"
+    closest_point = cells.surface.closest(whole.vertices)
+    np.testing.assert_allclose(closest_point.height, 0.0, atol=1e-12)
+    np.testing.assert_allclose(closest_point.normal, whole.normals, atol=1e-6)
+
+
+def test_borders_are_the_edges_between_cells_and_the_rim(cells):
+    around = edges_of(cells.surface.mesh.faces, cells.labels)
+    expected = {edge for edge, labels in around.items() if len(labels) == 1 or len(set(labels)) > 1}
+    lines = cell_shapes.borders(cells)
+    numbers = {tuple(p): k for k, p in enumerate(cells.surface.mesh.vertices.tolist())}
+    drawn = [tuple(sorted(numbers[tuple(p)] for p in line)) for line in lines.tolist()]
+    assert len(drawn) == len(expected)
+    assert set(drawn) == expected
+    length = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1).sum()
+    cone_chord = cells.surface.mesh.edges.border_lengths.sum()
+    assert length == pytest.approx(cells.figures.borders.lengths.sum() + cone_chord)
+
+
+def test_creases_stay_sharp():
+    """A box keeps its three normals at a corner, and has no border within one side."""
+    box = mesh(trimesh.creation.box((0.2, 0.3, 0.4)))
+    sides = np.argmax(np.abs(box.mesh.face_normals), axis=1)
+    sides = 2 * sides + (box.mesh.face_normals.max(axis=1) > 0.5)
+    cells = MeshCells.of(box, sides)
+    drawn = cell_shapes.patch(cells, np.arange(6))
+    assert len(drawn.vertices) == 24
+    a, b, c = np.moveaxis(drawn.vertices[drawn.faces], 1, 0)
+    flat = np.cross(b - a, c - a) / np.linalg.norm(np.cross(b - a, c - a), axis=1)[:, None]
+    np.testing.assert_allclose(drawn.normals[drawn.faces], flat[:, None].repeat(3, 1), atol=1e-12)
+    lines = cell_shapes.borders(cells)
+    lengths = np.sort(np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1))
+    np.testing.assert_allclose(lengths, np.repeat([0.2, 0.3, 0.4], 4))
+
+
+def test_shrunk_cells_part_from_their_neighbours():
+    """On a flat sheet a cell that is drawn a fifth smaller has 0.64 of its area."""
+    cells = mesh(triangles(30, 30, sheet)).cells(count=12)
+    drawn = cell_shapes.patch(cells, np.arange(12), inset=0.2)
+    area = np.bincount(cells.labels, areas_of(drawn.vertices, drawn.faces), 12)
+    np.testing.assert_allclose(area, 0.64 * cells.areas, rtol=1e-9)
+    used = [set(drawn.faces[cells.labels == k].ravel().tolist()) for k in range(12)]
+    assert sum(map(len, used)) == len(set().union(*used)), "no corner belongs to two cells"
+    corners = cells.surface.mesh.vertices[cells.surface.mesh.faces]
+    centres = cells.centres[cells.labels][:, None]
+    np.testing.assert_allclose(drawn.vertices[drawn.faces], centres + 0.8 * (corners - centres))
+
+
+def test_a_fine_mesh_is_thinned_and_its_cells_still_meet_as_they_did(fine):
+    display = make_display_mesh(fine, budget=4_000)
+    assert len(display.faces) <= 4_000 < len(fine.labels)
+    turned = fine.surface.mesh.vertices @ fine.surface.rotation.T + fine.surface.position
+    corners = set(map(tuple, turned.round(12).tolist()))
+    assert set(map(tuple, display.vertices.round(12).tolist())) <= corners
+    area = np.bincount(display.labels, areas_of(display.vertices, display.faces), 25)
+    np.testing.assert_allclose(area, fine.areas, rtol=0.06)
+    assert area.sum() == pytest.approx(fine.areas.sum(), rel=0.005)
+    closest_point = fine.surface.closest(display.vertices)
+    assert ((closest_point.normal * display.normals).sum(axis=1) > np.cos(np.radians(2.0))).all()
+    around = edges_of(display.places[display.faces], display.labels)
+    met = {tuple(sorted(set(labels))) for labels in around.values() if len(set(labels)) == 2}
+    assert met == set(map(tuple, fine.pairs.tolist()))
+    lines = display.borders()
+    length = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1).sum()
+    cone_chord = fine.surface.mesh.edges.border_lengths.sum()
+    assert length == pytest.approx(fine.figures.borders.lengths.sum() + cone_chord, rel=0.02)
+    assert len(lines) < len(fine.borders()) / 2
+
+
+def test_small_cells_survive_thinning():
+    """Single faces among large cells are drawn, however coarse the picture."""
+    surface = mesh(triangles(60, 60, wave))
+    labels = blocks(surface, 2).labels.copy()
+    labels[[100, 2000, 5000]] = [4, 5, 6]
+    cells = MeshCells.of(surface, labels)
+    display = make_display_mesh(cells, budget=500)
+    assert len(display.faces) < 1_500
+    assert set(display.labels.tolist()) == set(range(7))
+    area = np.bincount(display.labels, areas_of(display.vertices, display.faces), 7)
+    assert (area[4:] > 0.0).all()
+
+
+def test_a_mesh_within_the_budget_is_drawn_as_it_is(fine):
+    display = make_display_mesh(fine, budget=len(fine.labels))
+    assert len(display.faces) == len(fine.labels)
+    np.testing.assert_array_equal(display.labels, fine.labels)
+    assert len(display.borders()) == len(fine.borders())
+
+
+@pytest.mark.parametrize("kind", ["on_mesh", "on_grid"])
+def test_edges_run_from_target_to_target_at_the_standoff(kind, request):
+    verdict = request.getfixturevalue(kind)
+    cells = verdict.cells
+    lines, points = scene.edge_lines(verdict), verdict.task.targets(cells).points
+    assert len(lines) == verdict.graph.number_of_edges() > 20
+    rows = {tuple(pair): k for k, pair in enumerate(cells.pairs.tolist())}
+    for pair, line in zip(verdict.graph.edges, lines, strict=True):
+        np.testing.assert_allclose(line[[0, -1]], points[list(pair)], atol=1e-9)
+        off = np.array([0.0, 0.0])  # facets of a mesh are not its normals
+        if kind == "on_mesh":
+            off = np.array(cells.curves.deviations[rows[tuple(sorted(pair))]])
+        height = cells.surface.closest(line).height
+        allowed = off @ [1.0, 0.005] + 1e-5
+        assert np.abs(height + 0.005).max() <= allowed, "on the tool's side, not through it"
+
+
+@pytest.mark.parametrize("kind", ["on_mesh", "on_grid"])
+def test_missed_cells_have_the_colour_of_their_cause(kind, request):
+    verdict = request.getfixturevalue(kind)
+    drawn = view(verdict)
+    shown = objects(drawn.commands)
+    entries = {entry.path: entry for entry in drawn.legend.entries}
+    seen, kinds = {}, {cause.cell: cause.kind for cause in verdict.causes}
+    for path in (path for path in shown if path.startswith("/cells/")):
+        middles = points_of(shown[path])[faces_of(shown[path])].mean(axis=1)
+        own = set(verdict.cells.locate(middles).tolist())
+        seen |= dict.fromkeys(own, path)
+        words = {(kinds[k].replace("_", " ") if k in kinds else "") for k in own}
+        assert len(words) == 1
+        assert entries[path].label.replace(": ", " ").split("(")[0].strip() == (
+            f"not covered {words.pop()}".strip()
+        )
+        assert entries[path].label.endswith(f"({len(own)})")
+    assert set(seen) == set(np.flatnonzero(~verdict.covered).tolist())
+    assert len({entries[path].colour for path in seen.values()}) == len(set(seen.values()))
+    area = areas_of(points_of(shown["/surface/patch"]), faces_of(shown["/surface/patch"])).sum()
+    assert area == pytest.approx(verdict.cells.areas.sum(), rel=2e-3)
+
+
+def test_missed_cells_have_the_colour_of_the_pair_in_the_way(on_grid):
+    pairs = {1: ("forearm", "shelf"), 2: ("forearm", "shelf"), 5: ("link6", "wall")}
+    causes = [Cause(k, CauseKind.COLLISION, False, "", pair) for k, pair in pairs.items()]
+    causes += [Cause(7, CauseKind.DISCONNECTED, False, "", ("forearm", "shelf"))]
+    drawn = view(missing(on_grid, {1, 2, 5, 7, 8}, causes))
+    labels = {entry.label: entry for entry in drawn.legend.entries}
+    wanted = ("collision: forearm and shelf (2 cells)", "collision: link6 and wall (1 cell)",
+              "disconnected: forearm and shelf (1 cell)")  # fmt: skip
+    found = [labels[f"not covered: {words}"] for words in wanted]
+    assert len({entry.colour for entry in found}) == 3
+    centres, shown = on_grid.cells.centres, objects(drawn.commands)
+    for entry, own in zip(found, ({1, 2}, {5}, {7}), strict=True):
+        away = np.linalg.norm(points_of(shown[entry.path])[:, None] - centres, axis=2)
+        assert own <= set(away.argmin(axis=1).tolist())
+
+
+def test_frames_show_approach_and_reference_at_the_targets(on_grid):
+    task = replace(on_grid.task, roll_deg=(-15, 30), approach=(0, 0.5, -1))
+    shown = {layer.entry.label: layer for layer in scene.layers(replace(on_grid, task=task))}
+    targets = task.targets(on_grid.cells)
+    approach, reference = (
+        points_of(shown[name].commands[0]).reshape(-1, 2, 3)
+        for name in ("approach directions", "roll 0 (allowed -15 to 30 deg)")
+    )
+    assert np.allclose(approach[:, 1], targets.points, atol=2e-5)
+    assert np.allclose(reference[:, 0], targets.points, atol=2e-5)
+    for found, right in ((approach, targets.approaches), (reference, targets.references)):
+        along = np.diff(found, axis=1)[:, 0]
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        assert np.allclose(along, right, atol=1e-3)
+    names = {layer.entry.label for layer in scene.layers(on_grid)}
+    assert not any("roll" in name or "approach" in name for name in names)
+
+
+def test_the_two_sides_of_a_cut_are_drawn_and_named(commands):
+    commands.run("check", "cut")
+    verdict = load_result(commands.folder / "cut.result").verdict
+    sides, root = sides_of(verdict), verdict.proof.root
+    parts = {layer.entry.label: layer for layer in scene.layers(verdict)}
+    for k, name in enumerate(sides.names):
+        own = set(np.flatnonzero(sides.labels == k).tolist())
+        if own:
+            (command,) = parts[name].commands
+            middles = points_of(command)[faces_of(command)].mean(axis=1)
+            assert set(verdict.cells.locate(middles).tolist()) == own
+    for node, side in ((root.below, 0), (root.above, 1)):  # not reached on the leaf's own side
+        assert sides.labels[node.cell] == 1 - side
+    marks = points_of(parts[sides.lost_name].commands[0]).reshape(2, 6, 3).mean(axis=1)
+    np.testing.assert_allclose(marks, verdict.cells.centres[list(sides.lost)], atol=1e-4)
+    assert next(label for label in parts if label.startswith(("below", "above"))).count("joint")
+    figure = plot_sides(verdict)
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert words[-1] == sides.lost_name
+    with pytest.raises(ValueError, match="proof is a cut"):
+        plot_sides(check(*load_case("paper/4d", ["surface.cells=[3, 3]"]).build()))
+
+
+def test_the_picture_of_a_large_mesh_is_small(puma):
+    """120,000 triangles as a page of less than two million bytes, most of them the viewer's."""
+    cells = blocks(mesh(triangles(300, 200, sheet), side="inside", position=(4, 0.2, -0.3)), 4)
+    page = view(check(puma, cells, Task(0.005, 45))).html()
+    assert len(page) < 2_000_000
+    ball = mesh(trimesh.creation.icosphere(3, 0.2), position=(4.0, 0.0, 0.5))
+    drawn = view(check(puma, MeshCells.of(ball, np.zeros(1280, dtype=int)), Task(0.005, 45)))
+    assert "1 cell" in [entry.label for entry in drawn.legend.entries]
+    shown = objects(drawn.commands)["/surface/patch"]
+    area = areas_of(points_of(shown), faces_of(shown)).sum()
+    assert area == pytest.approx(ball.mesh.area, rel=1e-3)
+
+
+def test_patches_are_coloured_by_their_number(cells):
+    labels = np.arange(COUNT) % 4 - 1  # some cells in none
+    layers = scene.patch_layers(cells, labels, ["a <b>", "c/d", "e", "empty"])
+    assert [layer.entry.label for layer in layers] == ["a <b>", "c/d", "e"]
+    assert len({layer.entry.colour for layer in layers}) == 3
+    for k, layer in enumerate(layers):
+        (command,) = layer.commands
+        assert re.fullmatch(r"/patches/[^/<>]+", command["path"])
+        middles = points_of(command)[faces_of(command)].mean(axis=1)
+        assert set(cells.locate(middles).tolist()) == set(np.flatnonzero(labels == k).tolist())
+
+
+# -- flat pictures --------------------------------------------------------------------------------
+
+
+def collections(figure, kind):
+    return [part for part in figure.axes[0].collections if type(part) is kind]
+
+
+@pytest.mark.parametrize("kind", ["on_mesh", "on_grid"])
+def test_the_flat_graph_and_causes_show_every_cell_once(kind, request):
+    verdict = request.getfixturevalue(kind)
+    cells = verdict.cells
+    flat = (
+        cells.unrolled().centres
+        if kind == "on_mesh"
+        else (np.degrees(np.column_stack([cells.v, cells.u])))
+    )
+    figure = plot_graph(verdict)
+    lines = collections(figure, LineCollection)[-1].get_segments()
+    drawn = {frozenset(map(tuple, np.round(line, 5).tolist())) for line in lines}
+    ends = flat.round(5).tolist()
+    assert drawn == {frozenset((tuple(ends[a]), tuple(ends[b]))) for a, b in verdict.graph.edges}
+    dots = {d.get_label(): d for d in collections(figure, PathCollection)}
+    missed = dots["not covered"].get_offsets()
+    np.testing.assert_allclose(missed, flat[~verdict.covered], atol=1e-5)
+    assert f"{verdict.covered.sum()} of {len(cells)} cells" in figure.axes[0].get_title()
+    boxes = defaultdict(int)
+    for part in collections(plot_causes(verdict), PolyCollection):
+        boxes[to_rgb(part.get_facecolor()[0])] += len(part.get_paths())
+    assert sum(boxes.values()) == len(cells)
+    for kind in CauseKind:
+        own = sum(cause.kind == kind for cause in verdict.causes)
+        assert boxes[to_rgb(scene.CAUSES[kind])] == own
+    assert boxes[to_rgb(scene.MISSED)] == 1
+
+
+def test_edges_over_a_seam_leave_at_one_border_and_come_in_at_the_other(puma):
+    tube = cylinder(0.5, angle_deg=(0, 360), height=(0.0, 0.4), position=(4, 0, 0))
+    verdict = check(puma, tube.cells(4, 1), Task(0.005, 45))
+    graph = verdict.graph.copy()
+    graph.add_edges_from([(0, 1), (1, 2), (2, 3), (3, 0)])
+    lines = unrolled_edges(replace(verdict, graph=graph))
+    angles = [sorted(line[:, 1].round(6).tolist()) for line in lines]
+    assert sorted(angles) == [[0, 45], [45, 135], [135, 225], [225, 315], [315, 360]]
+
+
+def test_a_transition_shows_every_waypoint_over_its_cell(on_grid):
+    a, b = max(on_grid.graph.edges)
+    axes = plot_transition(on_grid, (b, a)).axes[0]
+    walk = on_grid.graph.edges[a, b]["motion"]
+    moving = np.sort(np.argsort(-np.ptp(walk, axis=0))[:2])
+    dots = [d.get_offsets() for d in axes.collections if type(d) is PathCollection]
+    shown = {tuple(row) for row in np.concatenate(dots).round(9)}
+    assert shown == {tuple(row) for row in np.degrees(walk[:, moving]).round(9)}
+    names = [f"{on_grid.robot.joint_names[joint]} (degrees)" for joint in moving]
+    assert [axes.get_xlabel(), axes.get_ylabel()] == names
+    with pytest.raises(ValueError, match="no edge between the cells 0 and 29"):
+        plot_transition(on_grid, (0, 29))

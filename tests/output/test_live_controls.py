@@ -1,0 +1,148 @@
+"""What the page can change: values of the page into a case, and a case into values."""
+
+import math
+
+import numpy as np
+import pytest
+from command_table import FILES
+
+from feasibility.cases import Case, CaseError, load_case
+from feasibility.live.controls import Controls
+from feasibility.live.workbench import Workbench
+
+PLATE = Case.from_toml(FILES["plate.toml"], name="plate")
+RAIL = Case.from_toml(FILES["rail.toml"])
+
+
+def controls_of(case):
+    return Controls(case, case.robot.build(case.surface.frame))
+
+
+@pytest.fixture(scope="module")
+def plate():
+    return controls_of(PLATE)
+
+
+def test_values_are_those_of_the_case_in_millimetres_and_degrees():
+    case = load_case("paper/5c")
+    values = controls_of(case).values
+    assert values["position"] == [1000.0 * v for v in case.surface.position]
+    assert values["rpy_deg"] == list(case.surface.rpy_deg)
+    assert values["cone_deg"] == case.task.cone_deg == 5.0
+    robot = case.robot.build()
+    for name, low, high in zip(robot.joint_names, robot.lower, robot.upper, strict=True):
+        assert np.allclose(np.radians(values["limits"][name]), [low, high], atol=1e-11)
+
+
+def test_values_that_are_as_they_were_leave_the_case_as_it_was_written(tmp_path):
+    for name in ("paper/4b", "paper/5c"):
+        controls = controls_of(load_case(name))
+        assert controls.changed(controls.values) is controls.changed({}) is controls.case
+    text = f"# Mine.\n{FILES['plate.toml']}# The end.\n"
+    (tmp_path / "plate.toml").write_text(text)
+    changed = controls_of(load_case(tmp_path / "plate.toml")).changed({"cone_deg": 22})
+    assert changed.as_written() == text.replace("cone_deg = 30", "cone_deg = 22.0")
+
+
+def test_a_changed_case_has_exactly_the_values_and_reads_back(plate):
+    before = plate.values
+    values = {
+        "position": [12.5, -30.0, 300.1],
+        "rpy_deg": [0.0, 5.5, -90.0],
+        "standoff": 12.3,
+        "cone_deg": 17.25,
+        "limits": {**before["limits"], "wrist_3_joint": [-30.5, 40.0]},
+    }
+    changed = plate.changed(values)
+    assert changed.surface.position == (0.0125, -0.03, 0.3001)
+    assert changed.surface.rpy_deg == (0.0, 5.5, -90.0)
+    assert (changed.task.standoff, changed.task.cone_deg) == (0.0123, 17.25)
+    assert controls_of(changed).values == values
+    assert Case.from_toml(changed.to_toml()) == changed
+    # One value alone changes nothing else.
+    alone = plate.changed({"cone_deg": 12})
+    assert alone == PLATE.with_overrides(["task.cone_deg=12"])
+
+
+def test_limits_of_one_joint_keep_those_of_a_named_set():
+    controls = controls_of(load_case("paper/4b"))
+    changed = controls.changed({"limits": {"joint4": [-20, 20]}})
+    assert changed.robot.limits is None
+    old, new = controls.robot, changed.robot.build()
+    fourth = old.joint_names.index("joint4")
+    others = np.arange(old.n) != fourth
+    assert np.allclose(new.lower[others], old.lower[others], rtol=0, atol=1e-11)
+    assert np.allclose(new.upper[others], old.upper[others], rtol=0, atol=1e-11)
+    assert (new.lower[fourth], new.upper[fourth]) == (math.radians(-20), math.radians(20))
+
+
+def test_joints_that_slide_have_millimetres_and_joints_that_turn_freely_no_limits():
+    rail = controls_of(RAIL)
+    assert rail.values["limits"]["rail"] == [-200.0, 200.0]
+    shown = {joint["name"]: joint for joint in rail.described()["joints"]}
+    assert (shown["rail"]["unit"], shown["shoulder_pan_joint"]["unit"]) == ("mm", "deg")
+    changed = rail.changed({"limits": {"rail": [0, 100]}}).robot.build()
+    assert (changed.lower[0], changed.upper[0]) == (0.0, 0.1)
+    kinova = PLATE.with_overrides(["robot.name=kinova"])
+    free = controls_of(kinova)
+    joints = free.robot.joint_names
+    assert [name for name in joints if free.values["limits"][name] is None] == [
+        name
+        for name, kind in zip(joints, free.robot.joint_kinds, strict=True)
+        if kind == "continuous"
+    ]
+    held = free.changed({"limits": {joints[0]: [-90, 90]}}).robot.build()
+    assert np.isfinite(held.lower).sum() == np.isfinite(free.robot.lower).sum() + 1
+
+
+SENSELESS = (
+    {"standoff": -3}, {"cone_deg": 200}, {"limits": {"elbow_joint": [20, -20]}},
+    {"limits": {"elbow_joint": [5, 5]}}, {"limits": {"elbow_joint": None}},
+    {"limits": {"no such": [1, 2]}}, {"position": [1, 2]}, {"position": [1, 2, 1e300]},
+    {"cone_deg": "steep"}, {"cone_deg": math.nan}, {"cone_deg": True},
+    {"robot": {"urdf": "/etc/passwd"}}, [1], None,
+    {"standoff": "far", "rpy_deg": 3, "limits": 4},
+)  # fmt: skip
+
+
+def test_what_makes_no_sense_is_refused_in_words(plate, approved):
+    said = []
+    for values in SENSELESS:
+        with pytest.raises(CaseError) as refused:
+            plate.changed(values)
+        said.append(f"{values}\n  {refused.value}")
+    assert len(refused.value.faults) == 3, "all faults are told together"
+    approved("live/refused", "\n".join(said))
+
+
+def test_a_workbench_builds_what_the_case_builds_and_keeps_what_has_not_changed(plate):
+    bench = Workbench(plate.case)
+    assert bench.build(plate.changed({})) is bench.setup
+    turned = plate.changed({"position": [10, 0, 310], "rpy_deg": [0, 0, 30]})
+    built, plain = bench.build(turned), turned.build()
+    assert built.robot is bench.setup.robot  # neither a name nor a limit has changed
+    assert np.array_equal(built.cells.centres, plain.cells.centres)
+    assert np.array_equal(built.cells.normals, plain.cells.normals)
+    assert (built.task, built.search) == (plain.task, plain.search)
+    assert bench.build(turned).cells is built.cells
+    narrow = plate.changed({"limits": {"elbow_joint": [-90, 90]}})
+    assert bench.build(narrow).cells is bench.setup.cells
+    assert np.array_equal(bench.build(narrow).robot.upper, narrow.build().robot.upper)
+
+
+def test_for_a_quick_look_the_curves_are_moved_and_as_they_would_be_fitted(plate):
+    bench = Workbench(plate.case)
+    turned = plate.changed({"position": [10, 0, 310], "rpy_deg": [5, 10, 30]})
+    rough, plain = (bench.build(turned, roughly).cells for roughly in (True, False))
+    assert bench.build(turned, roughly=True).cells is rough is not plain
+    assert np.array_equal(rough.centres, plain.centres)
+    assert np.allclose(rough.curves.cubics, plain.curves.cubics, atol=1e-12)
+    assert np.array_equal(rough.curves.first, plain.curves.first)
+    assert not np.array_equal(rough.curves.cubics, bench.setup.cells.curves.cubics)
+
+
+def test_a_workbench_says_what_does_not_go_together():
+    case = PLATE.with_overrides(["robot.start_deg=[0, -90, 90, 0, 90, 0]"])
+    narrow = controls_of(case).changed({"limits": {"elbow_joint": [-10, 10]}})
+    with pytest.raises(CaseError, match="start"):
+        Workbench(case).build(narrow)

@@ -1,0 +1,408 @@
+"""The arm in a view moves like Pinocchio's, the world stands still, its server lets nobody in."""
+
+from __future__ import annotations
+
+import itertools
+import signal
+import socket
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+from dataclasses import replace
+from pathlib import Path
+
+import networkx as nx
+import numpy as np
+import pinocchio as pin
+import psutil
+import pytest
+from page_outline import points_of, tracks_of
+from scipy.spatial import KDTree
+from scipy.spatial.transform import Rotation
+
+from feasibility import Task, check
+from feasibility.cases import load_case
+from feasibility.collisions import Collision, Obstacle, ToolShape
+from feasibility.division import Reconfiguration, divide
+from feasibility.paths import coverage_path
+from feasibility.timing import trajectory
+from feasibility.treated import treated_by_walk
+from feasibility.verdict import Walk
+from feasibility.viewer import playback as motion
+from feasibility.viewer import view, view_division, view_path
+from feasibility.viewer.frames.standing_world import GROUP
+from feasibility.viewer.live_server import LiveView
+from feasibility.viewer.robot import joint_paths
+from feasibility.viewer.viewer import compose, show
+from robots import Axis, Kinematics, load_robot
+from surfaces import plane
+
+GUARD_S = 1800.0
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def verdict():
+    return check(*load_case("paper/4a", ["surface.cells=[4, 5]"]).build())
+
+
+@pytest.fixture(scope="module")
+def drawn(verdict):
+    return view(verdict, "paper/4a")
+
+
+def placed(commands):
+    """Path -> (4, 4) where a command leaves the group there."""
+    return {c["path"]: np.reshape(c["matrix"], (4, 4)).T
+            for c in commands if c["type"] == "set_transform"}  # fmt: skip
+
+
+def place_of(commands, path):
+    """(4, 4) of the group at a path in the world."""
+    places, place, names = placed(commands), np.eye(4), path.strip("/").split("/")
+    for k in range(len(names)):
+        place = place @ places.get("/" + "/".join(names[: k + 1]), np.eye(4))
+    return place
+
+
+def object_at(commands, end):
+    """The path of the one object whose path ends so, and its points in the world."""
+    (found,) = [c for c in commands if c["type"] == "set_object" and c["path"].endswith(end)]
+    place = place_of(commands, found["path"])
+    return found["path"], points_of(found) @ place[:3, :3].T + place[:3, 3]
+
+
+# -- the motion -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["puma", "rail"])
+def test_key_frames_place_every_joint_where_pinocchio_does(drawn, name):
+    commands, robot, played = drawn.commands, drawn.robot, drawn.motion
+    if name == "rail":  # a slide before joints that turn
+        rail = Axis("rail", "prismatic", (1, 0, 0), limits=(-2.0, 4.0))
+        robot = load_robot("ur5", axes=[rail])
+        walk = np.linspace(np.zeros(7), [1.5, 2.0, 0.4, -0.6, 0.9, 0.1, 0.3], 9)
+        played = motion.paced(robot, walk, False, "test")
+        cells = plane((0, 0.2), (0, 0.2)).cells(2, 2)
+        commands = compose(robot, cells, "", "", [], played, resting=walk[0]).commands
+    tracks, rest = tracks_of(commands), placed(commands)
+    data, paths = robot.model.createData(), joint_paths(robot)[1:]
+    turns = {path: keys for (path, kind), keys in tracks.items() if kind == ".quaternion"}
+    for times, values in turns.values():
+        rows = values.reshape(-1, 4)
+        assert len(times) <= 400
+        assert ((rows[1:] * rows[:-1]).sum(axis=1) > 0).all(), "no jump of sign"
+    for k, time in enumerate(times):
+        pin.forwardKinematics(
+            robot.model, data, Kinematics(robot).configuration(played.at(np.array([time]))[0])
+        )
+        place = np.eye(4)
+        for joint, path in enumerate(paths):
+            step = rest[path].copy()
+            if (path, ".quaternion") in tracks:
+                quaternion = tracks[path, ".quaternion"][1].reshape(-1, 4)[k]
+                step[:3, :3] = Rotation.from_quat(quaternion).as_matrix()
+            if (path, ".position") in tracks:
+                step[:3, 3] = tracks[path, ".position"][1].reshape(-1, 3)[k]
+            place = place @ step
+            assert np.allclose(place, data.oMi[joint + 1].homogeneous, atol=2e-5)
+
+
+def test_the_readout_is_what_pinocchio_says(verdict, drawn):
+    shown, robot, surface = drawn.readout, verdict.robot, verdict.cells.surface
+    assert [row[:2] for row in shown.rows[6:]] == [("distance", "mm"), ("angle", "deg")]
+    columns, data = np.array([row[2] for row in shown.rows]), robot.model.createData()
+    for k in range(0, len(shown.times), 7):
+        q = drawn.motion.at(np.array([shown.times[k]]))[0]
+        assert np.allclose(columns[:6, k], np.degrees(q), atol=0.06)
+        pin.framesForwardKinematics(robot.model, data, q)
+        tool = data.oMf[robot.tool_frame_id]
+        away = tool.translation - surface.position
+        distance = 1.0 - np.linalg.norm(away)  # inside a dome of 1 m
+        angle = np.degrees(np.arccos(tool.rotation @ robot.approach_axis @ away / (1 - distance)))
+        assert np.allclose(columns[6:, k], [1e3 * distance, angle], atol=0.1)
+
+
+def test_what_plays_is_the_witness_at_an_even_pace(verdict, drawn):
+    played = drawn.motion
+    assert not played.there_and_back
+    np.testing.assert_array_equal(played.walk, verdict.witness.q)
+    assert 6.0 <= played.seconds[-1] <= 60.0
+    even = played.at(np.linspace(0, played.seconds[-1], 200))
+    lengths = np.linalg.norm(np.diff([Kinematics(verdict.robot).tool(q)[0] for q in even], axis=0),
+                             axis=1)  # fmt: skip
+    assert lengths.max() < 1.5 * lengths.mean()
+    wrist = np.zeros((3, 6))
+    wrist[1:, 5] = [1.0, 3.0]  # the tool point stays where it is
+    still = motion.paced(verdict.robot, wrist, False, "test").seconds
+    assert np.allclose(still / still[-1], [0.0, 1 / 3, 1.0])
+    waiting = view(verdict, play=False, at=0.5)
+    middle = played.at(np.array([played.seconds[-1] / 2]))[0]
+    data = verdict.robot.model.createData()
+    pin.forwardKinematics(verdict.robot.model, data, middle)
+    last = place_of(waiting.commands, joint_paths(verdict.robot)[-1])
+    assert np.allclose(last, data.oMi[6].homogeneous, atol=1e-6)
+
+
+def test_without_a_witness_the_longest_path_of_the_tree_is_one_motion():
+    case = load_case("paper/4a", ["search.method=greedy", "surface.cells=[2, 2]",
+                                  "search.step_deg=1"])  # fmt: skip
+    found = check(*case.build())
+    cells = motion.longest_path(found.tree, found.cells.centres)
+    assert cells[0] == found.start
+    assert all(found.tree.has_edge(a, b) for a, b in itertools.pairwise(cells))
+    walk = motion.walk_along(found.graph, cells)
+    for cell in cells:
+        assert (np.abs(walk - found.graph.nodes[cell]["q"]).max(axis=1) < 1e-9).any()
+    graph = found.graph.copy()
+    a, b = next((a, b) for a, b in itertools.pairwise(cells[1:])) if cells[2:] else cells[:2]
+    graph.edges[a, b]["motion"] = graph.edges[a, b]["motion"] + 0.1
+    if cells[2:]:
+        with pytest.raises(ValueError, match=r"starts 0\.1 rad"):
+            view(replace(found, graph=graph))
+    tree = nx.DiGraph([(0, 1), (0, 5), (5, 6), (6, 7)])
+    centres = np.arange(8.0)[:, None] * [1.0, 0.0, 0.0]
+    centres[1] = [3.0, 0.0, 0.0]
+    assert motion.longest_path(tree, centres) == [0, 5, 6, 7]
+    centres[1] = [9.0, 0.0, 0.0]
+    assert motion.longest_path(tree, centres) == [0, 1]
+
+
+# -- frames, and a world that stands still while the part moves -----------------------------------
+
+
+@pytest.fixture(scope="module")
+def table():
+    """An arm whose part stands on a turning table, with a shelf of the world: arm, view."""
+    axis = Axis("table", "revolute", limits_deg=(-180, 180), carries="surface",
+                position=(0.6, 0.1, 0.2))  # fmt: skip
+    nozzle = ((0.02, 0, 0.12), (0, 30, 0))
+    robot = load_robot("ur5", tcp=nozzle, base=((0, 0, 0.3), (0, 0, 90)), axes=[axis])
+    walk = np.linspace(np.zeros(7), [2.0, 0.4, -0.6, 0.9, 0.1, 0.3, 0.2], 12)
+    shelf = Obstacle.box("shelf", (0.4, 0.3, 0.02), position=(0.5, -0.2, 0.9))
+    played = motion.paced(robot, walk, False, "a motion")
+    cells = plane((-0.2, 0.2), (-0.1, 0.1)).cells(2, 2)
+    task = Task(0.05, 30, collision=Collision(scene=(shelf,)))
+    drawn = compose(robot, cells, "", "", [], played, resting=walk[0], play=False, task=task)
+    return robot, drawn.commands
+
+
+def test_the_frames_are_where_they_are(table):
+    robot, commands = table
+    data = robot.model.createData()
+    zero = Kinematics(robot).configuration(np.zeros(7))
+    pin.framesForwardKinematics(robot.model, data, zero)
+    for name, number in (
+        ("TCP", robot.tool_frame_id),
+        ("base", robot.model.getFrameId(robot.root_link, pin.FrameType.BODY)),
+        ("surface frame", robot.model.getFrameId("table", pin.FrameType.BODY)),
+    ):
+        expected = data.oMf[robot.world_frame_id].actInv(data.oMf[number])
+        _, points = object_at(commands, f"/frame of the {name}")
+        np.testing.assert_allclose(points[0], expected.translation, atol=4e-5)
+        axes = points[1::2] - points[0]
+        axes /= np.linalg.norm(axes, axis=1)[:, None]
+        np.testing.assert_allclose(axes.T, expected.rotation, atol=2e-3)
+    path, points = object_at(commands, "/root frame")
+    assert path == "/root frame"  # of the world: it does not move with the surface
+    np.testing.assert_allclose(points[0], 0.0, atol=1e-9)
+
+
+def test_the_world_stands_still_while_the_motion_plays(table):
+    robot, commands = table
+    path, points = object_at(commands, "shelf/body")
+    assert path.startswith(GROUP)
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    np.testing.assert_allclose(middle, (0.5, -0.2, 0.9), atol=1e-4)
+    tracks = tracks_of(commands)
+
+    def turns(where):
+        return Rotation.from_quat(tracks[where, ".quaternion"][1].reshape(-1, 4)).as_matrix()
+
+    world = turns(GROUP)
+    still = world @ turns(GROUP + joint_paths(robot)[1])  # seen from what the table carries
+    np.testing.assert_allclose(still, np.broadcast_to(still[0], still.shape), atol=1e-5)
+    assert np.ptp(world, axis=0).max() > 0.5
+
+
+# -- bodies ---------------------------------------------------------------------------------------
+
+
+def test_bodies_move_with_the_arm_and_the_nearest_pair_has_its_distance(verdict):
+    scene = (Obstacle.box("shelf", (0.4, 0.3, 0.02), (0.3, -0.6, 0.5), (0.0, 0.0, 30.0)),
+             Obstacle.capsule("pipe", 0.05, 0.4, (-0.8, 0.0, 0.2)))  # fmt: skip
+    ball = ToolShape.sphere(0.01, (0.0, 0.0, -0.02))
+    asked = Collision(surface=False, scene=scene, tool=(ball,))
+    drawn = view(replace(verdict, task=replace(verdict.task, collision=asked)), play=False, at=0.5)
+    commands, places = drawn.commands, placed(drawn.commands)
+    _, shelf = object_at(commands, "shelf/body")
+    own = (shelf - scene[0].placement[:3, 3]) @ scene[0].placement[:3, :3]
+    np.testing.assert_allclose(np.abs(own), np.tile([0.2, 0.15, 0.01], (len(own), 1)), atol=2e-5)
+    _, pipe = object_at(commands, "pipe/body")
+    axis = np.clip(pipe[:, 2], 0.0, 0.4)
+    away = pipe - np.column_stack([-0.8 + 0 * axis, 0 * axis, axis])
+    np.testing.assert_allclose(np.linalg.norm(away, axis=1), 0.05, atol=2e-4)
+    joints = [path for path in places if path.startswith("/robot")]
+    assert len(joints) == 6
+    for path in joints:
+        np.testing.assert_array_equal(places[path], places[path.replace("/robot", "/hulls", 1)])
+    *_, (name, unit, values) = drawn.readout.rows
+    assert (name, unit, len(values)) == ("clearance", "mm", len(drawn.readout.times))
+    times = np.array(drawn.readout.times)
+    (shown,) = [c["path"] for c in commands if c.get("property") == "visible" and c["value"]
+                and "/nearest pair/" in c["path"]]  # fmt: skip
+    frame = int(np.searchsorted(times, drawn.start, side="right")) - 1
+    assert shown.endswith(drawn.readout.nearest[frame])
+    first, second = (places[f"{shown}/{end}"][:3, 3] for end in ("first", "second"))
+    line = places[f"{shown}/line"]
+    np.testing.assert_allclose(line @ [0.0, 0.0, 0.0, 1.0], [*first, 1.0], atol=1e-9)
+    np.testing.assert_allclose(line @ [0.0, 0.0, 1.0, 1.0], [*second, 1.0], atol=1e-9)
+    between = np.interp(drawn.start, times, values)
+    assert 1e3 * np.linalg.norm(second - first) == pytest.approx(between, abs=5.0)
+    seen = {path: keys[1] for (path, kind), keys in tracks_of(commands).items()
+            if kind == ".visible"}  # fmt: skip
+    for path, visible in seen.items():
+        assert visible == [path.endswith(f" {name}") for name in drawn.readout.nearest]
+
+
+# -- paths and divisions --------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def path(verdict):
+    return coverage_path(verdict, "rows")
+
+
+def test_at_any_time_what_is_painted_is_what_the_tool_has_come_by(path):
+    radius, height = 0.08, path.task.standoff
+    task = replace(path.task, footprint=2.0 * radius)
+    drawn = view_path(path, treated=treated_by_walk(path.robot, path.cells, task, path.walk))
+    tracks = tracks_of(drawn.commands)
+    when = {p: keys[0][1] for (p, kind), keys in tracks.items() if kind == ".visible"}
+    strokes = [p for p in when if "painted trail/" in p]
+    assert np.all(np.diff([when[p] for p in sorted(strokes)]) > 0.0)
+    parts = [c for c in drawn.commands if c.get("path", "").startswith("/treated/")
+             and c["type"] == "set_object" and c["path"] in when]  # fmt: skip
+    middles = [points_of(c).reshape(-1, 3, 3).mean(axis=1) for c in parts]
+    shown = np.repeat([when[c["path"]] for c in parts], list(map(len, middles)))
+    end = drawn.motion.seconds[-1]
+    for now in (0.2 * end, 0.5 * end, 0.8 * end):
+        behind = drawn.motion.tool_at(np.linspace(0.0, now, 4_000))
+        away, _ = KDTree(behind).query(np.concatenate(middles))
+        assert (shown[away < np.hypot(0.8 * radius, height)] <= now + 0.01 * end).all()
+        assert (shown[away > np.hypot(2.0 * radius, height)] >= now - 0.01 * end).all()
+
+
+def test_the_slider_shows_the_time_of_a_trajectory(path):
+    """Not that of the view, which shows long ones in a minute."""
+    run = trajectory(path, 0.05)
+    drawn = view_path(path, run)
+    assert run.duration > 60.0 >= drawn.readout.times[-1] - 1e-9
+    assert drawn.readout.duration == run.duration
+    assert view_path(path).readout.duration is None
+    np.testing.assert_array_equal(view_path(path).motion.walk, path.walk.q)
+
+
+def test_moves_between_patches_are_drawn_where_the_tool_goes():
+    """Made of two walks by hand: the arm goes straight from one to the other."""
+    whole = divide(*load_case("paper/4d", ["surface.cells=[3, 3]"]).build()[:3])
+    patch, robot = whole.fewest.patches[0], whole.robot
+    half = len(patch.walk.q) // 2
+    walks = (Walk(patch.walk.q[:half], patch.walk.cell[:half]),
+             Walk(patch.walk.q[::-1], patch.walk.cell[::-1]))  # fmt: skip
+    parts = tuple(replace(patch, walk=walk) for walk in walks)
+    ends = walks[0].q[-1], walks[1].q[0]
+    move = Reconfiguration(robot.joint_names, robot.prismatic, *ends)
+    two = replace(whole, fewest=replace(whole.fewest, patches=parts, moves=(move,)))
+    drawn = view_division(two)
+    assert any("move from patch 1 to 2" in entry.label for entry in drawn.legend.entries)
+    walk, rest = drawn.motion.walk, len(walks[1].q)
+    np.testing.assert_array_equal(walk[:half], walks[0].q)
+    np.testing.assert_array_equal(walk[-rest:], walks[1].q)
+    between = walk[half - 1 : len(walk) - rest + 1]
+    share = np.linspace(0.0, 1.0, len(between))[:, None]
+    np.testing.assert_allclose(between, ends[0] + share * (ends[1] - ends[0]), atol=1e-12)
+
+
+# -- windows and their server ---------------------------------------------------------------------
+
+
+def test_the_server_answers_its_own_address_on_the_loopback_alone():
+    with LiveView("<p>caf\u00e9</p>") as live:
+        listening = [c.laddr.ip for c in psutil.Process().net_connections("tcp")
+                     if c.status == psutil.CONN_LISTEN and c.laddr.port == live.port]  # fmt: skip
+        assert listening == ["127.0.0.1"]
+        with urllib.request.urlopen(live.url, timeout=GUARD_S) as answer:
+            assert answer.read().decode() == "<p>caf\u00e9</p>"
+            assert answer.headers["Content-Type"] == "text/html; charset=utf-8"
+        for url, headers in [
+            (f"http://127.0.0.1:{live.port}/", {}),
+            (live.url + "../../etc/passwd", {}),
+            (live.url, {"Host": "evil.example"}),
+            (live.url, {"Host": "127.0.0.1.evil.example:80"}),
+            (live.url, {"Origin": "http://evil.example"}),
+        ]:
+            request = urllib.request.Request(url, headers=headers)
+            with pytest.raises(urllib.error.HTTPError, match="404") as refused:
+                urllib.request.urlopen(request, timeout=GUARD_S)
+            refused.value.close()
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection(("127.0.0.1", live.port), timeout=GUARD_S)
+    live.close()
+
+
+def test_the_server_dies_with_its_owner_even_when_that_is_killed():
+    program = (
+        "from feasibility.viewer.live_server import LiveView\n"
+        "live = LiveView('page')\n"
+        "import sys; sys.stdout.write(f'{live.port}\\n'); sys.stdout.flush(); live.wait()\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, cwd=ROOT, text=True
+    ) as owner:
+        port = int(owner.stdout.readline())
+        assert psutil.Process(owner.pid).children(recursive=True) == []
+        socket.create_connection(("127.0.0.1", port), timeout=GUARD_S).close()
+        owner.send_signal(signal.SIGKILL)
+        owner.wait(timeout=GUARD_S)
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection(("127.0.0.1", port), timeout=GUARD_S)
+
+
+def test_a_browser_that_goes_away_is_no_fault(capfd):
+    with LiveView("page" * 1_000_000) as live:
+        with socket.create_connection(("127.0.0.1", live.port), timeout=GUARD_S) as browser:
+            browser.sendall(f"GET {live.url} HTTP/1.1\r\n".encode())
+        with socket.create_connection(("127.0.0.1", live.port), timeout=GUARD_S) as browser:
+            path, host = live.url.split(str(live.port))[1], f"127.0.0.1:{live.port}"
+            browser.sendall(f"GET {path} HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())
+            assert browser.recv(15) == b"HTTP/1.1 200 OK"
+        with urllib.request.urlopen(live.url, timeout=GUARD_S) as answer:
+            assert len(answer.read()) == 4_000_000
+    assert capfd.readouterr().err == ""
+
+
+def test_show_opens_a_window_waits_in_scripts_and_is_the_view_in_notebooks(verdict, monkeypatch):
+    opened = []
+    monkeypatch.setattr("webbrowser.open", lambda url: opened.append(url) or True)
+    with show(verdict, block=False), urllib.request.urlopen(opened[0], timeout=GUARD_S) as answer:
+        assert answer.read().decode() == view(verdict).html()
+
+    def interrupt(live):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(LiveView, "wait", interrupt)
+    monkeypatch.delattr(sys, "ps1", raising=False)
+    live = show(verdict)
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection(("127.0.0.1", live.port), timeout=GUARD_S)
+
+    class IPython:
+        get_ipython = staticmethod(lambda: type("Shell", (), {"kernel": object()}))
+
+    monkeypatch.setitem(sys.modules, "IPython", IPython)
+    monkeypatch.setattr("webbrowser.open", pytest.fail)
+    shown = show(verdict)
+    monkeypatch.delitem(sys.modules, "IPython")  # matplotlib would ask it more
+    assert "<iframe srcdoc=" in shown._repr_mimebundle_()["text/html"]

@@ -1,0 +1,159 @@
+"""The picture painted without a browser: what is in it, where, and what hides what."""
+
+from __future__ import annotations
+
+import base64
+import io
+import math
+import sys
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from made_up import missing
+from PIL import Image
+
+from feasibility import check
+from feasibility.cases import load_case
+from feasibility.viewer import plot_graph, plot_views, threejs, view
+from feasibility.viewer import robot as robot_visuals
+from feasibility.viewer.html_page import Camera
+from feasibility.viewer.painter import LENS, painted
+from feasibility.viewer.stage import camera_on
+from robots import load_robot
+from surfaces import plane
+
+SIZE = (160, 120)
+EYE = (4.0, 0.0, 0.0)
+FRONT = Camera((0.0, 0.0, 0.0), EYE, zoom=2.0)  # right is +y, up is +z
+RED, GREEN, BLUE = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+SQUARE = np.array([[0, -1, -1], [0, 1, -1], [0, 1, 1], [0, -1, 1]], dtype=float)
+HALVES = np.array([[0, 1, 2], [0, 2, 3]])
+
+
+def square(path, colour, size=0.5, x=0.0, **looks):
+    """A square across the view, `size` m from middle to side, at a distance of 4 - x m."""
+    return threejs.mesh_object(path, size * SQUARE + [x, 0, 0], HALVES, colour, lit=False, **looks)
+
+
+def mask(image, colour):
+    return np.abs(image - colour).max(axis=2) < 0.02
+
+
+def test_a_square_is_where_the_lens_puts_it() -> None:
+    image = painted([square("/a", RED)], FRONT, *SIZE)
+    assert image.shape == (120, 160, 3)
+    rows, columns = np.nonzero(mask(image, RED))
+    side = 0.5 / 4.0 / (LENS / 2.0) * 60  # pixels from the middle
+    assert abs(rows.min() - (60 - side)) <= 1.0
+    assert abs(rows.max() + 1 - (60 + side)) <= 1.0
+    assert abs(columns.min() - (80 - side)) <= 1.0
+    assert abs(columns.max() + 1 - (80 + side)) <= 1.0
+
+
+def test_up_is_up_and_right_is_right() -> None:
+    dots = [square("/up", RED, 0.1), square("/right", GREEN, 0.1)]
+    placed = [np.eye(4), np.eye(4)]
+    placed[0][:3, 3], placed[1][:3, 3] = [0, 0, 0.6], [0, 0.6, 0]
+    moves = [
+        threejs.transform(path, place)
+        for path, place in zip(("/up", "/right"), placed, strict=True)
+    ]
+    image = painted([*dots, *moves], FRONT, *SIZE)
+    up, right = (np.argwhere(mask(image, colour)).mean(axis=0) for colour in (RED, GREEN))
+    assert up[0] < 40
+    assert abs(up[1] - 79.5) < 1.0
+    assert right[1] > 100
+    assert abs(right[0] - 59.5) < 1.0
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_what_is_nearer_hides_what_is_behind(order) -> None:
+    image = painted([square("/far", RED), square("/near", BLUE, x=1.0)][::order], FRONT, *SIZE)
+    assert not mask(image, RED).any()
+    assert mask(image, BLUE).sum() > 500
+
+
+def test_what_is_half_transparent_shows_what_is_behind() -> None:
+    glass = square("/near", BLUE, 1.0, x=1.0, opacity=0.5)
+    image = painted([glass, square("/far", RED)], FRONT, *SIZE)
+    assert mask(image, (0.5, 0.0, 0.5)).sum() > 500
+
+
+def test_the_whole_arm_is_in_the_picture_wherever_the_surface_stands() -> None:
+    """Of a PUMA in random postures, with planes all around it, painted without anything else."""
+    puma, rng = load_robot("puma560"), np.random.default_rng(5)
+    drawing = robot_visuals.draw(puma)
+    for _ in range(8):
+        x, y, z = rng.uniform([-0.8, -0.6, -0.2], [0.6, 0.2, 0.6])
+        cells = plane((x, x + 0.3), (y, y + 0.4), position=(0, 0, z), side="outside").cells(2, 2)
+        q = rng.uniform(puma.lower, puma.upper)
+        camera = camera_on(puma, cells, q, drawing.lowest)
+        arm = [*drawing.commands, *robot_visuals.pose(puma, q, robot_visuals.ROBOT)]
+        image = painted(arm, camera, 180, 112)
+        assert (image < 0.9).all(axis=2).sum() > 100
+        for edge in (image[0], image[-1], image[:, 0], image[:, -1]):
+            assert (edge == 1.0).all()
+
+
+def test_hidden_parts_and_what_is_behind_the_camera_are_not_painted() -> None:
+    empty = painted([], FRONT, *SIZE)
+    hidden = threejs.set_property("/a", "visible", False)
+    assert np.array_equal(painted([square("/a/b", RED), hidden], FRONT, *SIZE), empty)
+    assert np.array_equal(painted([square("/a", RED, x=5.0)], FRONT, *SIZE), empty)
+    shown = threejs.set_property("/a", "visible", True)
+    assert mask(painted([square("/a/b", RED), hidden, shown], FRONT, *SIZE), RED).any()
+
+
+def test_lines_lie_on_what_they_are_drawn_on_and_are_hidden_behind_it() -> None:
+    ends = np.array([[0, -0.4, 0.0], [0, 0.4, 0.0]])
+    line = threejs.segments("/line", ends, GREEN)
+    assert mask(painted([square("/a", RED), line], FRONT, *SIZE), GREEN).sum() > 20
+    near = square("/a", RED, x=1.0)
+    assert not mask(painted([near, line], FRONT, *SIZE), GREEN).any()
+
+
+def test_joints_carry_what_comes_after_them() -> None:
+    """Two turns of 45 degrees about x bring the square from +y to +z."""
+    turn = np.eye(4)
+    c = math.sqrt(0.5)
+    turn[1:3, 1:3] = [[c, -c], [c, c]]
+    part = threejs.mesh_object("/j/k/p", 0.1 * SQUARE + [0, 0.6, 0], HALVES, RED, lit=False)
+    image = painted(
+        [part, threejs.transform("/j", turn), threejs.transform("/j/k", turn)], FRONT, *SIZE
+    )
+    row, column = np.argwhere(mask(image, RED)).mean(axis=0)
+    assert row < 40
+    assert abs(column - 79.5) < 1.0
+
+
+@pytest.fixture(scope="module")
+def dome():
+    return check(*load_case("paper/4a", ["surface.cells=[4, 5]"]).build())
+
+
+def test_a_view_leaves_a_picture_beside_the_page(dome) -> None:
+    """It holds the arm, the missed cells and the edges."""
+    bundle = view(missing(dome, {5, 6, 13}), play=False)._repr_mimebundle_()
+    with Image.open(io.BytesIO(base64.b64decode(bundle["image/png"]))) as image:
+        pixels = np.asarray(image.convert("RGB"), dtype=int)
+    red, green, blue = np.moveaxis(pixels, -1, 0)
+    assert ((blue > 180) & (red < 90) & (green < 120)).sum() > 200, "edges of G"
+    assert ((red > 110) & (green < 60) & (blue < 90)).sum() > 200, "cells out of reach"
+    assert ((green > 1.5 * red) & (green > 1.5 * blue)).sum() > 10, "the start"
+    assert ((red > 1.5 * green) & (red > 1.5 * blue) & (red > 150)).sum() > 5, "the x axis"
+    assert len(bundle["image/png"]) < 150_000, "notebooks keep many"
+
+
+def test_small_pictures_stand_below_their_titles(dome) -> None:
+    drawn = view(dome, play=False)
+    figure = plot_views({"one": drawn, "two: $x$": drawn, "three": drawn}, columns=2)
+    shown = [axes for axes in figure.axes if axes.images]
+    assert [axes.get_title() for axes in shown] == ["one", r"two: \$x\$", "three"]
+
+
+def test_plots_leave_matplotlib_alone_and_need_no_display(dome) -> None:
+    before, pyplot = dict(mpl.rcParams), "matplotlib.pyplot" in sys.modules
+    assert plot_graph(dome)._repr_png_().startswith(b"\x89PNG")
+    assert dict(mpl.rcParams) == before
+    assert ("matplotlib.pyplot" in sys.modules) == pyplot

@@ -1,0 +1,324 @@
+"""The command as a process: what it loads, who reads it, bugs and trouble, waiting, Ctrl-C."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import io
+import json
+import os
+import pty
+import re
+import signal
+import subprocess
+import sys
+import threading
+import tomllib
+import urllib.request
+from pathlib import Path
+
+import numba
+import pytest
+from samples import EVERYTHING
+
+import feasibility.checking
+from feasibility import Answer, notices
+from feasibility.cli import command, console
+from feasibility.cli import main as cli
+from feasibility.cli.warm_up import COMMANDS
+from feasibility.notices import NOTICE, compiling_notice
+from feasibility.version import version
+from feasibility.viewer.live_server import LiveView
+
+ROOT = Path(__file__).parents[2]
+COMMAND = [sys.executable, "-m", "feasibility.cli"]
+GUARD_S = 1800.0
+SMALL = ("check", "paper/4a", "--set", "surface.cells=[2, 2]")
+LOADED = (
+    "import sys; from feasibility.cli.main import main; status = main(sys.argv[1:])\n"
+    "print(*sys.modules, file=sys.stderr)"
+)
+
+
+def run(*args, **options):
+    """Run the command as a process of its own."""
+    given = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True} | options
+    return subprocess.run([*COMMAND, *args], timeout=GUARD_S, check=False, cwd=ROOT, **given)
+
+
+# -- what is loaded -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("args", [["--help"], ["check", "--help"], ["--version"], ["chek"]])
+def test_help_loads_no_heavy_library(args):
+    done = subprocess.run(
+        [sys.executable, "-c", LOADED, *args], capture_output=True, text=True, check=True
+    )
+    loaded = {name.partition(".")[0] for name in done.stderr.splitlines()[-1].split()}
+    assert "feasibility" in loaded
+    heavy = {"numpy", "pinocchio", "scipy", "networkx", "numba", "rich", "robots"}
+    assert not heavy & loaded
+
+
+def test_a_plain_check_loads_only_what_it_needs():
+    done = subprocess.run(
+        [sys.executable, "-c", LOADED, "check", "paper/4a"],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    loaded = set(done.stderr.split())
+    assert {"numba", "pinocchio", "feasibility.roadmap.complete"} <= loaded
+    late = {"networkx", "scipy.spatial", "scipy.optimize", "trimesh", "matplotlib",
+            "urllib.request", "feasibility.collisions.gathering", "feasibility.paper.greedy",
+            "surfaces.passes"}  # fmt: skip
+    assert not late & loaded
+
+
+def test_the_installed_command_is_this_one(ask):
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert project["scripts"] == {"coverable": "coverable_command:run"}
+    assert ask("--version") == (0, f"coverable {version()}\n", "")
+
+
+# -- who reads it ---------------------------------------------------------------------------------
+
+
+def test_a_reader_that_leaves_is_no_error():
+    first, rest = os.pipe()
+    os.close(first)
+    child = run("cases", stdout=rest)
+    os.close(rest)
+    assert (child.returncode, child.stderr) == (0, "")
+
+
+def test_a_full_disk_under_stdout_is_status_2():
+    with open("/dev/full", "w") as full:
+        child = run("cases", stdout=full)
+    assert (child.returncode, child.stderr) == (2, "coverable: No space left on device\n")
+
+
+def test_answers_survive_a_narrow_encoding():
+    done = run(*SMALL, "--set", "robot.name=пума", env={**os.environ, "PYTHONIOENCODING": "ascii"})
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "there is no robot" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+@pytest.mark.parametrize("stream", [io.StringIO, Terminal])
+def test_progress_shows_on_a_terminal_and_nowhere_else(monkeypatch, stream):
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr(sys, "stderr", stream())
+    with console.Bar() as bar:
+        bar(1, None, "looking [around]")
+        bar(9, 9, "cells")
+    assert ("9/9" in sys.stderr.getvalue()) == (stream is Terminal)
+    assert sys.stderr.getvalue() == "" or stream is Terminal
+
+
+def test_a_terminal_sees_progress_and_stdout_the_answer_alone():
+    program = (
+        "import sys, feasibility.checking as c; from feasibility.cli.main import main\n"
+        "real = c.check\n"
+        "def told(*a, clock, **more):\n"
+        "    clock.report(3, 12, 'a search'); return real(*a, clock=clock, **more)\n"
+        "c.check = told; sys.exit(main(sys.argv[1:]))"
+    )
+    leader, follower = pty.openpty()
+    child = subprocess.Popen(
+        [sys.executable, "-c", program, *SMALL, "--json"],
+        stdout=subprocess.PIPE, stderr=follower, env={**os.environ, "TERM": "xterm"}, cwd=ROOT,
+    )  # fmt: skip
+    os.close(follower)
+    seen = b""
+    with contextlib.suppress(OSError):  # the other end has closed
+        while chunk := os.read(leader, 4096):
+            seen += chunk
+    out, _ = child.communicate(timeout=GUARD_S)
+    os.close(leader)
+    assert child.returncode == 0
+    assert json.loads(out)["verdict"] == "feasible"
+    assert b"a search" in seen
+
+
+# -- bugs and trouble -----------------------------------------------------------------------------
+
+
+@pytest.fixture
+def search(monkeypatch):
+    """search(error or function): takes the place of the search."""
+
+    def becomes(what):
+        def run(*_, **__):
+            if isinstance(what, BaseException):
+                raise what
+            return what()
+
+        monkeypatch.setattr(feasibility.checking, "check", run)
+
+    return becomes
+
+
+def test_a_bug_says_that_it_is_one(ask, search, monkeypatch, capsys):
+    search(KeyError("a slip"))
+    said = ask(*SMALL)
+    assert (said.status, said.out) == (2, "")
+    assert "this is a bug in coverable: KeyError: 'a slip'" in said.err
+    assert "COVERABLE_TRACEBACK=1" in said.err
+    monkeypatch.setenv("COVERABLE_TRACEBACK", "1")
+    assert cli.main(list(SMALL)) == 2
+    assert "Traceback (most recent call last)" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (OSError(errno.ENOSPC, "No space left on device", "x"), "x: No space left on device"),
+        (MemoryError(), "not enough memory; use fewer cells"),
+        (ImportError("libpinocchio.so: cannot open"), "libpinocchio.so: cannot open"),
+    ],
+)
+def test_trouble_of_the_machine_is_status_2_and_no_bug(ask, search, error, words):
+    search(error)
+    said = ask(*SMALL)
+    assert (said.status, said.out) == (2, "")
+    assert words in said.err
+    assert "bug" not in said.err
+
+
+def test_what_a_library_says_of_an_interrupt_is_no_error(ask, search):
+    def broken():
+        with contextlib.suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        raise ImportError("some part of it failed to import")
+
+    search(broken)
+    assert ask(*SMALL) == (130, "", "coverable: interrupted\n")
+
+
+def test_every_answer_has_its_status():
+    assert command.STATUS == {"feasible": 0, "infeasible": 1, "undecided": 3}
+    assert set(command.STATUS) == set(map(str, Answer))
+
+
+@pytest.mark.parametrize("line", ["check paper/4a --save no/a --html no/b --witness no/c",
+                                  "path paper/4a --order spiral --passes 0 --pitch 0.1",
+                                  "path paper/4a --program a.mod", "divide paper/4a --html no/b",
+                                  "verify paper/4a no.csv"])  # fmt: skip
+def test_what_cannot_be_done_is_refused_before_any_search(ask, search, line):
+    search(AssertionError("the search must not run"))
+    said = ask(*line.split())
+    assert said.status == 2
+    assert "must not run" not in said.err
+
+
+# -- waiting for kernels --------------------------------------------------------------------------
+
+
+def out_of_patience():
+    for thread in threading.enumerate():
+        if isinstance(thread, threading.Timer):
+            thread.join()
+
+
+def compiled():
+    numba.njit(lambda x: x + 1)(1)
+
+
+def test_a_long_wait_for_kernels_is_explained_once_for_each_purpose(monkeypatch):
+    monkeypatch.setattr(sys, "stderr", io.StringIO())
+    with compiling_notice(patience=1e6):
+        compiled()
+    with compiling_notice(patience=0.0):
+        out_of_patience()  # but nothing is compiled
+    assert sys.stderr.getvalue() == ""
+    with compiling_notice(patience=0.0):
+        with compiling_notice(patience=0.0, notice=notices.COLLISIONS):
+            out_of_patience()
+            compiled()
+            compiled()
+        assert sys.stderr.getvalue() == notices.COLLISIONS + "\n"
+        compiled()
+    assert sys.stderr.getvalue() == notices.COLLISIONS + "\n" + NOTICE + "\n"
+    assert len({notices.CUTTING, notices.GREEDY, notices.COLLISIONS, NOTICE}) == 4
+
+
+def test_who_waits_is_told_for_what_and_how_to_have_it_all_at_once(capsys, monkeypatch):
+    real = feasibility.checking.check
+
+    def slow(*args, **more):
+        compiled()
+        return real(*args, **more)
+
+    monkeypatch.setattr(feasibility.checking, "check", slow)
+    monkeypatch.setattr(notices, "PATIENCE", 0.0)
+    assert cli.main(list(SMALL)) == 0
+    said = capsys.readouterr().err
+    assert "what else `coverable check` needs" in said
+    assert "`coverable warm-up` compiles all" in said
+
+
+def test_every_command_of_a_warm_up_is_one():
+    for _, arguments in COMMANDS:
+        assert cli._parser().parse_args(arguments).command == arguments[0]
+
+
+@pytest.mark.sampled
+@pytest.mark.skipif(not EVERYTHING, reason="a campaign runs it: it compiles everything")
+def test_after_a_warm_up_nothing_is_compiled(ask):
+    from numba.core import event
+
+    assert json.loads(ask("warm-up", "--json").out)["compiled"] >= 0
+    with event.install_recorder("numba:compile") as recorded:
+        for line in ("check paper/4b --json", "path paper/5d --passes 90 --pitch 0.2",
+                     "explain paper/4a --set collision.clearance=0.01 --set surface.cells=[2,2]",
+                     "divide paper/4f"):  # fmt: skip
+            assert ask(*line.split()).status in (0, 1, 3)
+        assert recorded.buffer == []
+    assert ask("warm-up").out == "everything is compiled already\n"
+
+
+# -- pages until Ctrl-C ---------------------------------------------------------------------------
+
+
+def test_show_serves_the_view_until_ctrl_c(commands, monkeypatch):
+    commands.run("check", "files")
+    seen = []
+
+    def wait(live):
+        with urllib.request.urlopen(live.url, timeout=GUARD_S) as page:
+            seen.append((live.url, page.read()))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(LiveView, "wait", wait)
+    said = commands.say(["show", "plate.result", "--no-browser"])
+    ((url, page),) = seen
+    assert (said.status, said.err.strip()) == (0, f"view: {url} (served until Ctrl-C)")
+    assert b"plate.toml: feasible" in page
+
+
+def test_a_live_page_is_served_until_ctrl_c_which_is_its_end_and_no_fault():
+    """Right after a question, too."""
+
+    def post(url, **asked):
+        kind = {"Content-Type": "application/json"}
+        request = urllib.request.Request(url, data=json.dumps(asked).encode(), headers=kind)
+        with urllib.request.urlopen(request, timeout=GUARD_S) as reply:
+            return json.loads(reply.read())
+
+    with subprocess.Popen(
+        [*COMMAND, "live", "paper/4a", "--no-browser"], cwd=ROOT, text=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    ) as child:  # fmt: skip
+        line = child.stderr.readline()
+        wanted = r"live: (http://127\.0\.0\.1:\d+/\S+/) \(served until Ctrl-C\)\n"
+        url = re.fullmatch(wanted, line)[1]
+        session = post(url + "open")["session"]
+        reply = post(url + "ask", session=session, number=1, final=True, values={})
+        assert reply["status"] in ("deciding", "answered")
+        child.send_signal(signal.SIGINT)
+        out, err = child.communicate(timeout=GUARD_S)
+    assert (child.returncode, out, err.strip()) == (0, "", "")

@@ -1,0 +1,327 @@
+"""What sentences say: bounds that hold as printed, each cause and each cut, what is not checked."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import json
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from command_table import COMMANDS, TABLE
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coverable_errors import at_least, at_most
+from feasibility import Answer, Evidence, check
+from feasibility.cases import all_keys, builtin_cases, load_case
+from feasibility.collisions import CHECKABLE, UNCHECKED
+from feasibility.cut_words import place_of
+from feasibility.division import Reconfiguration, divide
+from feasibility.paths import coverage_path
+from feasibility.reports import comparison, division, path, study, too_late
+from feasibility.reports import explanation as explained
+from feasibility.reports import verdict as report
+from feasibility.results import load_motion, load_result
+from feasibility.results.trajectory_files import (
+    as_csv,
+    as_json_text,
+    from_csv,
+    from_json_text,
+)
+from feasibility.sensitivity import Explanation, Finding, Kind, Quantity, Threshold
+from feasibility.studies import Comparison, Row, Study, read_study
+from feasibility.timing import trajectory
+from feasibility.verdict import Cause, CauseKind, Certificate, Walk
+from robots import GROUPS, list_robots
+
+LEAST = {
+    r"bodies at least (\S+) mm apart": lambda one: 1e3 * one["min_clearance_m"],
+    r"joints at least (\S+) deg from": lambda one: one["min_limit_margin_deg"],
+    r"singular values of at least (\S+) ": lambda one: one.get("min_singular_value"),
+    r"tool speeds up to (\S+) m/s": lambda one: one.get("max_speed_m_per_s"),
+}
+MOST = {
+    r"tool point within (\S+) mm of": lambda one: 1e3 * one["max_position_error_m"],
+    r"tool within (\S+) mm": lambda one: 1e3 * one["max_position_error_m"],
+    r"axis within (\S+) deg": lambda one: one["max_angle_deg"],
+    r"roll within (\S+) deg": lambda one: one["max_roll_deg"],
+}
+PRINTED = [(c, n) for c, n in COMMANDS if c in ("check", "path", "verify")]
+
+
+@pytest.mark.parametrize(("command", "name"), PRINTED)
+def test_bounds_that_are_printed_hold(commands, command, name):
+    """A clearance as printed is never larger than the certified one, nor an error smaller."""
+    text = " ".join(commands.run(command, name).out.split())
+    found = commands.run(command, name, "--json").out
+    certificate = json.loads(found).get("certificate") if found else None
+    for patterns, holds in ((LEAST, lambda a, b: a <= b), (MOST, lambda a, b: a >= b)):
+        for pattern, value in patterns.items():
+            for printed in re.findall(pattern, text) if certificate else ():
+                true = value(certificate)
+                if true is None:  # of a path, which has it elsewhere
+                    continue
+                assert holds(float(printed), true), f"{pattern}: {printed}, {true}"
+                assert float(printed) == pytest.approx(true, rel=0.011, abs=1e-12)
+
+
+@pytest.mark.parametrize("digits", [1, 3, 4])
+@given(value=st.floats(-1e9, 1e9).filter(lambda x: x == 0.0 or abs(x) > 1e-9))
+def test_bounds_are_rounded_to_where_they_hold(digits, value):
+    above, below = float(at_most(value, digits)), float(at_least(value, digits))
+    assert below <= value <= above
+    assert above - below <= 10.0 ** (1 - digits) * abs(value) * (1 + 1e-9)
+    for text in (at_most(value, digits), at_least(value, digits)):
+        assert len(text.split("e")[0].strip("-0.").replace(".", "")) <= digits
+
+
+def test_a_certified_clearance_is_rounded_down_whatever_it_is():
+    case = load_case("paper/4a", ["surface.cells=[2, 2]"])
+    verdict = check(*case.build())
+    pair = {"measured_clearance": 1.0, "nearest_pair": ("a", "b")}
+    for least in (0.0099996, 0.0123456, 0.9999999):
+        made = replace(verdict.certificate, min_clearance=least, min_limit_margin=least, **pair)
+        text = " ".join(report.as_text(replace(verdict, certificate=made), case).split())
+        assert float(re.search(r"bodies at least (\S+) mm", text)[1]) <= 1e3 * least
+        assert float(re.search(r"joints at least (\S+) deg", text)[1]) <= math.degrees(least)
+
+
+# -- verdicts -------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def plate(commands):
+    """The plate of the table, and its verdict."""
+    case = load_case(commands.folder / "plate.toml")
+    return case, check(*case.build())
+
+
+@pytest.mark.parametrize("kind", CauseKind)
+def test_causes_are_grouped_and_the_largest_group_comes_first(plate, approved, kind):
+    case, verdict = plate
+    own = [Cause(k, kind, True, f"detail {k}") for k in range(4)]
+    other = Cause(5, CauseKind.ORIENTATION, False, "detail 5")
+    covered = np.array([False] * 4 + [True, False])
+    made = replace(
+        verdict, answer=Answer.INFEASIBLE, evidence=Evidence.EXHAUSTED, message="Said so.",
+        causes=(other, *own), covered=covered, certificate=None, witness=None,
+    )  # fmt: skip
+    text = report.as_text(made, case)
+    assert text.startswith("infeasible: no single continuous motion")
+    text = text[text.index("Not covered:") :].replace("\n\n", "\n")
+    approved(f"causes/{kind}", text)
+    cells = [row["cell"] for row in report.as_json(made)["uncovered"]]
+    assert cells == [[1, 2], [0, 0], [0, 1], [0, 2], [1, 0]]
+
+
+def test_over_no_cells_there_is_nothing_to_cover(plate):
+    case, _ = plate
+    setup = case.build()
+    empty = check(setup.robot, setup.cells.surface.cells(0, 3), setup.task)
+    text = report.as_text(empty, case)
+    assert text.startswith("feasible: there are no cells, so there is nothing to cover")
+    assert "motion" not in text
+    assert "there is nothing to cover" in repr(empty)
+    assert report.as_csv(empty) is None
+
+
+def test_json_has_no_nan_where_joints_have_no_limits_and_degrees_of_turning_joints_alone(plate):
+    free = replace(plate[1], certificate=Certificate(2, 0.0, 0.0, math.inf))
+    text = json.dumps(report.as_json(free), allow_nan=False)
+    assert json.loads(text)["certificate"]["min_limit_margin_deg"] is None
+
+
+def test_the_motion_as_a_table_is_the_motion(commands):
+    commands.run("check", "files")
+    verdict = load_result(commands.folder / "plate.result").verdict
+    text = (commands.folder / "walk.csv").read_bytes().decode()
+    header, *rows = csv.reader(text.splitlines())
+    assert header == ["cell", *verdict.robot.joint_names]
+    assert [[float(value) for value in row[1:]] for row in rows] == verdict.witness.q.tolist()
+    assert {row[0] for row in rows} - {""} == {str(cell) for cell in range(6)}
+    assert text.endswith("\n")
+    assert "\r" not in text
+    commands.run("check", "no motion to write")
+    assert not (commands.folder / "none.csv").exists()
+
+
+def test_a_number_of_motions_is_the_least_only_where_the_search_has_ended(plate):
+    found = divide(*plate[0].build()[:3])
+    assert (found.fewest.optimal, division.as_json(found)["optimal"]) == (True, True)
+    assert division.as_json(replace(found, ended=False))["optimal"] is False
+
+
+def test_what_a_path_goes_over_again_is_not_covered_twice(plate):
+    found = coverage_path(plate[1], "rows")
+    length = found.figures.length
+    told = path.as_json(replace(found, figures=replace(found.figures, revisited=0.25 * length)))
+    assert told["covered_m"] == pytest.approx(0.75 * length)
+    assert told["revisited_share"] == pytest.approx(1 / 3)
+
+
+# -- other sentences ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("n", "most"), [(1, 1), (3, 2), (4, 2), (7, 3)])
+def test_a_long_move_names_its_largest_parts_and_counts_the_rest(n, most):
+    rng = np.random.default_rng(10 * n + most)
+    end = rng.permutation(np.arange(1, n + 1)) * np.where(rng.random(n) < 0.5, -0.3, 0.3)
+    names = tuple(f"j{k}" for k in range(n))
+    move = Reconfiguration(names, np.zeros(n, dtype=bool), np.zeros(n), end)
+    whole = move.described().split(", ")
+    assert [part.split()[0] for part in whole] == [names[k] for k in np.argsort(-np.abs(end))]
+    told = move.described(most).split(", ")
+    assert told == (whole if n <= most + 1 else [*whole[:most], f"{n - most} more"])
+
+
+def test_groups_of_numbers_stand_in_their_order():
+    """Samples come in the order in which they were drawn; words stay as they were given."""
+    depths = (np.random.default_rng(1).permutation(9) - 4) / 100.0
+    arms = ["ur5", "panda", "kinova"]
+    points = [{"robot": arm, "z": float(z)} for z in depths for arm in arms]
+    rows = [Row(point, "done", {}, 0.0) for point in points]
+    groups = study.groups_of(Study("a study", "", (), ("robot", "z")), rows)
+    assert list(groups["robot"]) == arms
+    assert list(map(float, groups["z"])) == sorted(depths.tolist())
+    assert {sum(map(len, by_value.values())) for by_value in groups.values()} == {len(rows)}
+
+
+@pytest.mark.parametrize("side", [-1, 0, 1])
+def test_a_motion_across_a_cut_opens_it(commands, side):
+    """One threshold of the cone, made up: feasible at 9 degrees, by a motion on a side or both."""
+    commands.run("check", "cut")
+    verdict = load_result(commands.folder / "cut.result").verdict
+    root = verdict.proof.root
+    q = np.zeros((2, 6))
+    q[:, root.joint] = root.value + np.array([[-0.2, -0.1], [-0.1, 0.1], [0.1, 0.2]][side + 1])
+    cone = Quantity(Kind.CONE, "cone", "rad", math.radians(3), math.pi, 0.1, True)
+    walk = Walk(q, np.array([0, 1]))
+    found = Finding(math.radians(9), Answer.FEASIBLE, Evidence.WITNESS, "a motion", witness=walk)
+    made = Explanation(verdict, (Threshold(cone, found, None),), (), None, 0, 0.0)
+    (threshold,) = explained.as_json(made, "x")["thresholds"]
+    place = place_of(root, verdict.robot)
+    lost = list(verdict.cells.unravel((root.below if side < 0 else root.above).cell))
+    said = f"the motion then crosses {place}, which no motion can now"
+    if side:
+        said = f"cell {lost} can then be covered {'below' if side < 0 else 'above'}"
+    assert said in threshold["opens"]
+    assert threshold["opens"] in threshold["sentence"]
+    assert said in " ".join(explained.as_text(made, "x").split())
+    bare = replace(made, thresholds=(Threshold(cone, replace(found, witness=None), None),))
+    assert explained.as_json(bare, "x")["thresholds"][0]["opens"] is None
+
+
+# -- collisions -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", [one for one in COMMANDS if one[0] not in ("show", "cases")])
+def test_every_text_says_in_one_line_what_is_checked(commands, name):
+    said = commands.run(*name)
+    texts = [line for line in f"{said.out}\n{said.err}".splitlines() if "ollisions" in line]
+    asked = [line for line in texts if UNCHECKED in line.lower() or "are checked with" in line]
+    assert len(asked) == 1, texts
+    clear = "scene" in TABLE[name[0]][name[1]] or "collision" in TABLE[name[0]][name[1]]
+    assert (UNCHECKED in asked[0].lower()) == (not clear)
+
+
+@pytest.mark.parametrize("asked", [(), ("self=true",), ("self=false",), ("clearance=0.01",)])
+def test_comparisons_studies_and_late_answers_say_what_the_case_asks_for(asked):
+    settings = [f"collision.{one}" for one in asked]
+    case = load_case("paper/4a", settings)
+    names = [] if case.collision is None else list(case.collision.checked)
+    assert names == [name for name in ("self", "surface") if asked and asked != (f"{name}=false",)]
+    found = Comparison("x", (), divided=False, critical=False, collision=case.collision)
+    assert comparison.as_json(found)["collisions"] == names
+    assert too_late.as_json(case, "late", 1.0)["collisions"] == names
+    said = too_late.as_text(case, "late").lower()
+    assert (UNCHECKED in " ".join(said.split())) == (not names)
+    assert all(CHECKABLE[name].split()[-1] in said for name in names)
+
+
+def test_a_study_says_what_all_its_cases_check():
+    def of(*lines):
+        return read_study("\n".join(['base.case = "paper/4a"', *lines]))
+
+    mixed = of('vary."collision.surface" = [true, false]', 'vary."collision.self" = [true]')
+    none = of('vary."task.cone_deg" = [30, 40]')
+    alike = of('vary."collision.clearance" = [0.0, 0.01]')
+    assert study.as_json(mixed, [])["collisions"] == ["self"]
+    assert "in 1 of 2 cases collisions are checked with the arm itself" in study.as_text(mixed, [])
+    assert study.as_json(alike, [])["collisions"] == ["self", "surface"]
+    assert UNCHECKED not in study.as_text(alike, [])
+    assert study.as_json(none, [])["collisions"] == []
+    assert UNCHECKED in study.as_html(none, []).lower()
+
+
+def test_trajectories_say_it_in_their_header_and_are_read_back(commands, plate, tmp_path):
+    commands.run("path", "feasible")
+    run = trajectory(coverage_path(plate[1]), 0.1)
+    table, text = as_csv(run), as_json_text(run)
+    assert table.splitlines()[0] == f"# {UNCHECKED}"
+    assert json.loads(text)["collisions"] == []
+    assert f"# {UNCHECKED}" in (commands.folder / "run.yaml").read_text().splitlines()[:2]
+    older = {key: value for key, value in json.loads(text).items() if key != "collisions"}
+    for again in (from_csv(table), from_json_text(text), from_json_text(json.dumps(older)),
+                  from_csv(table.partition("\n")[2])):  # fmt: skip
+        assert (again.q == run.q).all()
+    (tmp_path / "run.csv").write_text(table)
+    assert (load_motion(tmp_path / "run.csv", plate[1].robot).q == run.q).all()
+    lines = table.splitlines()
+    (tmp_path / "run.csv").write_text("\n".join([*lines[:3], "1,2", *lines[3:]]))
+    with pytest.raises(ValueError, match="line 4"):  # as an editor counts them
+        load_motion(tmp_path / "run.csv", plate[1].robot)
+
+
+def test_the_body_that_would_do_does(commands):
+    said = " ".join(commands.run("check", "collisions").out.split())
+    shape = re.search(r'kind = "capsule", (.*?) would do', said)[1].replace("0.0,", "0,")
+    words = [*commands.words("check", "collisions"), "--json"]
+    assert json.loads(commands.say(words).out)["unchecked_links"] == ["tool0 to TCP"]
+    with_body = [*words, "--set", f'collision.tool=[{{kind="capsule", {shape}}}]']
+    assert json.loads(commands.say(with_body).out)["unchecked_links"] == []
+
+
+# -- lists ----------------------------------------------------------------------------------------
+
+
+def test_keys_prints_each_key_with_type_unit_default_and_meaning(ask):
+    said = ask("keys")
+    for key in all_keys():
+        for text in (key.written, key.type, key.unit, key.default or "needed", key.meaning):
+            assert text in said.out
+    for asked, wanted in (
+        ("task", lambda key: key.table == "task"),
+        ("surface", lambda key: key.table.startswith("surface")),
+        ("mesh", lambda key: key.kind == "mesh"),
+        ("surface step", lambda key: key.kind == "step"),
+    ):
+        rows = json.loads(ask("keys", *asked.split(), "--json").out)["keys"]
+        found = [(row["table"], row["kind"] or "", row["key"], row["meaning"]) for row in rows]
+        expected = filter(wanted, all_keys())
+        assert found == [(key.table, key.kind or "", key.name, key.meaning) for key in expected]
+
+
+def test_robots_and_cases_list_all_there_are(ask):
+    said = ask("robots")
+    listed = {line.split()[0]: line for line in said.out.splitlines() if " m  " in line}
+    assert (said.status, said.err, list(listed)) == (0, "", [one.name for one in list_robots()])
+    heads = [said.out.index(title.capitalize()) for title in GROUPS.values()]
+    assert heads == sorted(heads)
+    for words in ("1.41 m", "-180..180", "set-1, set-2, set-3, set-4"):
+        assert words in listed["puma560"]
+    for words in ("6 (3 continuous)", "free, 47..313, 19..341, free, 30..330, free"):
+        assert words in listed["kinova"]
+    rows = {row["name"]: row for row in json.loads(ask("robots", "--json").out)["robots"]}
+    assert list(rows) == list(listed)
+    assert rows["puma560"]["joints"][0]["limits_deg"] == [-180.0, 180.0]
+    assert rows["kinova"]["joints"][0]["limits_deg"] is None
+    assert len(rows["panda"]["joints"]) == rows["panda"]["degrees_of_freedom"] == 7
+    groups = [list(GROUPS).index(row["group"]) for row in rows.values()]
+    assert all(a <= b for a, b in itertools.pairwise(groups))
+    cases = json.loads(ask("cases", "--json").out)["cases"]
+    assert [row["name"] for row in cases] == list(builtin_cases())
+    assert cases[0]["cells"] == [9, 10]

@@ -1,0 +1,238 @@
+"""The paper's search on surfaces of every kind: what it reaches, and who has to accept it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import mesh_patches
+import numpy as np
+import pytest
+from meshed_patches import in_cells_of
+from samples import sampled, spread
+
+from feasibility import Answer, Evidence, Search, Task, check, greedy_check
+from feasibility.paper import starts, tree_walk
+from feasibility.paper.exact_rolls import rolls_at
+from feasibility.paper.jcell_steps import Steps
+from feasibility.paper.tree_replay import Path, replay_stored, replay_tree, within_cells
+from feasibility.roll import projected, roll_of
+from robots import Kinematics, load_robot
+from surfaces import (
+    bspline,
+    cell_under,
+    cone,
+    ellipsoid,
+    mesh,
+    piecewise,
+    plane,
+    revolution,
+    sphere,
+    torus,
+    triangulation,
+)
+from surfaces.meshes import TriangleMesh
+
+PUMA, UR5 = load_robot("puma560", limits="set-1"), load_robot("ur5")
+TASK = Task(0.005, 45)
+COARSE = Search(method="greedy", step_deg=0.5)
+DOME = sphere(1.0, (10, 90), (10, 180), side="inside").cells(5, 6)
+RING = torus(0.8, 0.3, (20, 60), (-20, 20), side="inside").cells(3, 3)
+
+
+def test_the_mesh_of_a_dome_is_searched_as_the_dome():
+    """From every start over the middle cell the same cells are reached."""
+    cells, (points, approaches, _) = DOME, TASK.targets(DOME)
+    meshed, middle = in_cells_of(cells, 6), 15
+    for q in starts(PUMA, points[middle], approaches[middle], TASK.cone):
+        one = greedy_check(PUMA, cells, TASK, COARSE, start=q)
+        other = greedy_check(PUMA, meshed, TASK, COARSE, start=q)
+        assert (one.start, one.answer, one.evidence) == (other.start, other.answer, other.evidence)
+        np.testing.assert_array_equal(one.covered, other.covered)
+
+
+@pytest.mark.parametrize("cells", [RING, in_cells_of(RING, 6)], ids=["ring", "mesh"])
+def test_triangles_say_what_the_surface_says(cells):
+    """Heights, normals and cells within the stated deviations; beyond the border there is none."""
+    rng = np.random.default_rng(0)
+    for height in (-0.02, 0.03):
+        made = triangulation(cells, height, 2e-3)
+        some = rng.integers(len(cells), size=300)
+        points = cells.centres[some] + height * cells.normals[some]
+        points += 0.05 * rng.normal(size=points.shape)
+        near = cells.surface.closest(points)
+        points -= (near.height - height)[:, None] * near.normal
+        exact, where = cells.surface.closest(points), cells.locate(points)
+        found = np.array([cell_under(made.kernel, *point) for point in points])
+        over = found[:, 0] >= 0
+        off = np.abs(found[over, 1] - exact.height[over]).max()
+        turn = np.linalg.norm(found[over, 2:] - exact.normal[over], axis=1).max()
+        assert off <= made.kernel.deviation + 1e-12
+        assert turn <= made.turn + 1e-12
+        sure = over & (found[:, 0] < len(cells))
+        np.testing.assert_array_equal(found[sure, 0], where[sure])
+        assert sure.sum() > 100
+        assert (where[~over] == -1).all()
+
+
+def test_the_replay_of_a_tree_judges_between_jcells():
+    verdict = greedy_check(PUMA, RING, TASK, COARSE)
+    assert verdict.feasible
+    assert replay_stored(verdict, COARSE).accepted
+    steps, start = Steps.of(PUMA, RING, TASK, COARSE), verdict.start
+    paths = [Path(start, start, verdict.tree.nodes[start]["q"][None])]
+    paths += [Path(a, b, motion) for a, b, motion in verdict.tree.edges(data="motion")]
+    assert replay_tree(PUMA, RING, TASK, steps, paths).accepted
+    points, axes = Kinematics(PUMA).tools(np.concatenate([path.q for path in paths]))
+    found = RING.surface.closest(points)
+    error = np.abs(found.height + TASK.standoff).max()
+    assert error <= verdict.certificate.max_position_error + 1e-5 <= steps.tolerance
+    tight = replace(steps, tolerance=0.95 * error)
+    assert "off its surface" in replay_tree(PUMA, RING, TASK, tight, paths).refusal
+    tilt = np.degrees(np.arccos(np.einsum("ki,ki->k", axes, found.normal))).max()
+    narrow = replace(TASK, cone_deg=0.95 * tilt)
+    assert "the tool axis tilts" in replay_tree(PUMA, RING, narrow, steps, paths).refusal
+    swapped = paths[:1] + [replace(path, neighbour=path.cell) for path in paths[1:]]
+    assert "in the cell it claims" in replay_tree(PUMA, RING, TASK, steps, swapped).refusal
+
+
+def test_creases_are_named_and_not_crossed():
+    task = Task(0.005, 20, tolerance=1e-3)
+    u, v, faces = mesh_patches.grid(8, 8)
+    z = 0.2 + np.tan(np.radians(17.0)) * np.minimum(0.4 * u, 0.4 - 0.4 * u)
+    roof = TriangleMesh(np.column_stack([0.35 + 0.4 * u, 0.4 * v - 0.2, z]), faces)
+    roof = mesh(roof, side="outside").cells(count=12)
+    search = Search(method="greedy", step_deg=0.5, cap=300, starts=1)
+    verdict = greedy_check(UR5, roof, task, search)
+    assert verdict.answer is Answer.INFEASIBLE
+    assert not (verdict.covered & roof.creased).any()
+    assert verdict.covered.any()
+    assert "where the surface is creased or most curved" in verdict.message
+    far = 0.35 + 0.2 * np.cos(np.radians(10.0)), 0.2 + 0.2 * np.sin(np.radians(10.0))
+    sides = [
+        plane((0, 0.2), (-0.1, 0.1), position=(0.35, 0, 0.2), rpy_deg=(0, -10, 0)),
+        plane((0, 0.2), (-0.1, 0.1), position=(far[0], 0, far[1]), rpy_deg=(0, 10, 0)),
+    ]
+    halves = piecewise(sides, side="outside").cells((2, 2))
+    verdict = greedy_check(UR5, halves, task, replace(search, step_deg=0.2))
+    assert "4 pairs of cells on both sides of a crease were left out" in verdict.message
+    assert len(set(halves.piece[np.flatnonzero(verdict.covered)].tolist())) == 1
+
+
+def test_a_roll_that_is_limited_is_kept_between_jcells():
+    cells = sphere(0.5, (15, 40), (-40, 40), position=(0.3, 0, -0.3), side="outside").cells(3, 3)
+    task = Task(0.005, 45, roll_deg=(-20, 20), roll_reference=(1, 0, 0))
+    verdict = greedy_check(PUMA, cells, task, COARSE)
+    assert verdict.feasible, verdict.message
+    walk, kinematics = tree_walk(verdict), Kinematics(PUMA)
+    share = np.linspace(0.0, 1.0, 5)[:-1, None, None]
+    q = (walk.q[:-1] + share * np.diff(walk.q, axis=0)).reshape(-1, PUMA.n)
+    points, axes = kinematics.tools(q)
+    x = np.array([kinematics.rotation(row) @ PUMA.reference_axis for row in q])
+    approaches = -cells.surface.closest(points).normal
+    references, _ = projected(np.array([1.0, 0.0, 0.0]), approaches)
+    rolls = np.degrees(roll_of(x, axes, references, approaches))
+    assert np.abs(rolls).max() <= np.degrees(verdict.certificate.max_roll) <= 20.0
+    assert np.ptp(rolls) > 10.0
+    held = replace(task, roll_deg=(-5, 5))
+    assert not greedy_check(PUMA, cells, held, COARSE).feasible
+    assert not replay_stored(replace(verdict, task=held), COARSE).accepted
+
+
+@pytest.mark.parametrize(("moves", "step"), [("single", 0.1), ("all", 0.5)])
+def test_the_covering_walk_takes_whole_steps_inside_all_constraints_over_every_cell(moves, step):
+    search = Search(method="greedy", moves=moves, step_deg=step)
+    verdict = greedy_check(PUMA, DOME, TASK, search)
+    walk = tree_walk(verdict)
+    moved = np.diff(walk.q, axis=0) / np.radians(step)
+    count = np.abs(moved).max(axis=1).round().astype(int)
+    assert (count >= 1).all()
+    steps_of_one = np.abs(moved / count[:, None])
+    assert set(steps_of_one.round(7).ravel()) <= {0.0, 1.0}
+    assert moves == "all" or (steps_of_one.round().sum(axis=1) == 1).all()
+    parts = [a + np.arange(k)[:, None] * (b - a) / k
+             for a, b, k in zip(walk.q[:-1], walk.q[1:], count, strict=True)]  # fmt: skip
+    q, steps = np.concatenate([*parts, walk.q[-1:]]), Steps.of(PUMA, DOME, TASK, search)
+    assert ((q >= PUMA.lower) & (q <= PUMA.upper)).all()
+    points, axes = Kinematics(PUMA).tools(q)
+    near, sign = DOME.surface.closest(points), DOME.surface.side_sign
+    assert near.inside.all()
+    off = np.abs(near.height - sign * TASK.standoff).max()
+    assert off + steps.sag.max() <= steps.tolerance
+    chord = np.linalg.norm(axes + sign * near.normal, axis=1).max() + steps.turn.max()
+    assert 2.0 * np.arcsin(0.5 * chord) <= TASK.cone
+    at = np.column_stack([near.u, near.v])
+    assert all(within_cells(DOME, at, [cell] * len(q)).any() for cell in range(len(DOME)))
+    # A row is at a cell only where the tool is at its centre.
+    points, targets = Kinematics(PUMA).tools(walk.q)[0], TASK.targets(DOME).points
+    away = np.linalg.norm(points[:, None] - targets, axis=2)
+    np.testing.assert_array_equal(walk.cell >= 0, away.min(axis=1) <= 1e-3)
+    rows = np.flatnonzero(walk.cell >= 0)
+    np.testing.assert_array_equal(walk.cell[rows], away[rows].argmin(axis=1))
+    arm = PUMA.with_limits({"joint1": np.radians([-30.0, 20.0])})
+    assert not greedy_check(arm, DOME, TASK, replace(search, moves="all")).feasible
+
+
+# beside the complete search, over random surfaces of every kind before a UR5
+
+KINDS = ("torus", "cone", "ellipsoid", "revolution", "bspline", "piecewise", "mesh", "creased mesh")
+
+
+def cells_of(kind, rng):
+    """Cells of a random surface of a kind, somewhere in front of the arm."""
+    position = rng.uniform((0.35, -0.3, -0.2), (0.55, 0.3, 0.2)).tolist()
+    pose = {"side": "outside", "position": position}
+    axes, height = rng.uniform(0.15, 0.4, 3).tolist(), 0.08 * rng.normal(size=(3, 3))
+    size, slope, tilt = rng.uniform(0.08, 0.15), rng.uniform(-0.5, 0.5), rng.uniform(-15, 15)
+    if kind == "bspline":
+        places = np.stack(np.meshgrid([0.0, 0.2, 0.4], [-0.2, 0.0, 0.2], indexing="ij"), axis=-1)
+        net = np.concatenate([places, height[..., None]], axis=-1).tolist()
+        return bspline(net, degree=(2, 2), **pose).cells(4, 5)
+    if kind == "piecewise":
+        ends = (-0.2, 0.0), (0.0, 0.2)
+        halves = [plane(ends[0], (-0.2, 0.2)), plane(ends[1], (-0.2, 0.2), rpy_deg=(0, tilt, 0))]
+        return piecewise(halves, **pose).cells((2, 3))
+    if "mesh" in kind:
+        u, v, faces = mesh_patches.grid(15, 15)
+        u, v = 0.3 * u, 0.3 * v - 0.15
+        z = 0.04 * rng.normal() * np.sin(9 * u) * np.cos(8 * v)
+        if kind == "creased mesh":
+            z = np.tan(np.radians(2 * tilt)) * np.minimum(u, 0.3 - u)
+        return mesh(TriangleMesh(np.stack([u, v, z], axis=1), faces), **pose).cells(count=16)
+    profile = [(0.0, 0.2), (0.1, 0.17), (0.2, 0.1), (0.25, 0.0)]
+    return {
+        "torus": lambda: torus(0.25, size, (-50, 50), (50, 130), **pose),
+        "cone": lambda: cone(0.3, slope, (140, 220), (0.0, 0.3), **pose),
+        "ellipsoid": lambda: ellipsoid(axes, (0, 60), (0, 360), **pose),
+        "revolution": lambda: revolution(profile, (0, 360), **pose),
+    }[kind]().cells(4, 5)
+
+
+BESIDE = [(kind, seed) for seed in range(6) for kind in KINDS]
+
+
+@sampled
+@pytest.mark.parametrize(("kind", "seed"), spread(BESIDE, 2))
+def test_no_proof_says_that_a_centre_is_out_of_reach_that_the_greedy_search_reaches(kind, seed):
+    """To touch a cell is not to reach its centre, but where it does, nothing may deny it."""
+    rng = np.random.default_rng([seed, *map(ord, kind)])
+    cells, turn = cells_of(kind, rng), 60.0 if seed % 2 else 180.0
+    limited = {"roll_deg": (-turn, turn), "roll_reference": (0.2, 1, 0.1)} if seed % 2 else {}
+    task = Task(
+        rng.uniform(0.003, 0.03), rng.uniform(15, 45), [None, 1e-3, 3e-3][seed % 3], **limited
+    )
+    search = Search(method="greedy", step_deg=0.3, moves="all", cap=2000, starts=3)
+    greedy, complete = greedy_check(UR5, cells, task, search), check(UR5, cells, task)
+    assert greedy.answer is not Answer.UNDECIDED, greedy.message
+    proved = [cause.cell for cause in complete.causes if cause.proved]
+    if complete.evidence is Evidence.PROOF and proved and greedy.tree is not None:
+        motions = [motion for _, _, motion in greedy.tree.edges(data="motion")]
+        if motions:
+            q, targets = np.concatenate(motions), task.targets(cells)
+            points, axes = Kinematics(UR5).tools(q)
+            near = np.linalg.norm(points[:, None] - targets.points, axis=2)
+            chord = np.linalg.norm(axes[:, None] - targets.approaches, axis=2)
+            covers = (near <= task.effective_tolerance) & (chord <= task.cone_chord)
+            if task.roll is not None:
+                roll = rolls_at(Kinematics(UR5), cells, task, q)
+                covers &= (np.abs(task.roll.off(roll)) <= np.radians(turn))[:, None]
+            assert not covers.any(axis=0)[proved].any()

@@ -1,0 +1,429 @@
+"""The bodies of links: where they are, what stands in for what, what is refused, what they hold."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from dataclasses import replace
+from itertools import combinations
+from pathlib import Path
+
+import coal
+import hostile_visuals as hostile
+import mesh_patches
+import numpy as np
+import pinocchio as pin
+import pytest
+import trimesh
+from arm_urdfs import placement, random_q
+from mesh_writers import stl
+from samples import sampled, seeds
+from scipy.spatial import ConvexHull
+
+from coverable_meshes import robot_files
+from feasibility.collisions import Obstacle
+from robots import Kinematics, RobotError, list_robots, load_robot
+from robots.shapes import (
+    Polytope,
+    Triangles,
+    checked_triangles,
+    link_pairs,
+    link_shapes,
+    solid_faces,
+    with_crude_links_cut,
+)  # fmt: skip
+from robots.shapes.sampling import PairSampling, random_configurations
+from robots.urdf import Box, Cylinder, Sphere, check_urdf
+
+opened: list[str] = []
+sys.addaudithook(lambda event, facts: opened.append(str(facts[0])) if event == "open" else None)
+
+LINKS = (
+    '<robot name="three"><link name="base">{base}</link><link name="arm" {mark}>{arm}</link>'
+    '<link name="hand">{hand}</link><link name="tip"/>'
+    '<joint name="turn" type="revolute"><parent link="base"/><child link="arm"/>'
+    '<origin xyz="0 0 1"/><axis xyz="0 0 1"/>'
+    '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+    '<joint name="bend" type="revolute"><parent link="arm"/><child link="hand"/>'
+    '<origin xyz="0.5 0 0"/><axis xyz="0 1 0"/>'
+    '<limit lower="-2" upper="2" effort="1" velocity="1"/></joint>'
+    '<joint name="end" type="fixed"><parent link="hand"/><child link="tip"/>'
+    '<origin xyz="0.5 0 0"/></joint></robot>'
+)
+BOX = '<{0}><origin xyz="0 0 0.1"/><geometry><box size="0.1 0.1 0.1"/></geometry></{0}>'
+MESH = '<{0}><geometry><mesh filename="{1}"/></geometry></{0}>'
+COLLISION, VISUAL = BOX.format("collision"), BOX.format("visual")
+BALL = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+
+
+def three(folder, base=COLLISION, arm=COLLISION, hand=COLLISION, mark=""):
+    """An arm of two joints."""
+    (folder / "three.urdf").write_text(LINKS.format(base=base, arm=arm, hand=hand, mark=mark))
+    return load_robot(str(folder / "three.urdf"))
+
+
+def owners(shapes):
+    return [solid.owner for solid in shapes.solids]
+
+
+def assert_held(shapes):
+    """Every point of every solid is in one of the polytopes of its link."""
+    for solid in shapes.solids:
+        if isinstance(solid.geometry, Triangles):
+            some = np.random.default_rng(0).permutation(len(solid.geometry.vertices))[:400]
+            points = np.asarray(solid.geometry.vertices[some])
+        elif isinstance(solid.geometry, Cylinder):
+            angle, half = np.linspace(0, 2 * np.pi, 100), solid.geometry.length / 2
+            rim = solid.geometry.radius * np.column_stack([np.cos(angle), np.sin(angle)])
+            ends = [np.column_stack([rim, np.full(100, z)]) for z in (-half, half)]
+            points = np.concatenate(ends)
+        else:  # exact hulls: their own tests
+            continue
+        points = points @ solid.placement[:3, :3].T + solid.placement[:3, 3]
+        out = np.full(len(points), np.inf)
+        for body in shapes.polytopes:
+            if (body.owner, body.joint) == (solid.owner, solid.joint) and len(body.vertices) > 3:
+                planes = ConvexHull(body.vertices).equations
+                # Never more than the distance from the body.
+                beyond = (points @ planes[:, :3].T + planes[:, 3]).max(axis=1) - body.radius
+                out = np.minimum(out, beyond)
+        assert out.max() <= 1e-9, f"{solid.owner}: {out.max()} m outside"
+
+
+FEW = ["puma560", "ur5", "panda", "talos_arm"]
+NAMES = [*FEW, *(info.name for info in list_robots() if info.name not in FEW)]
+
+
+@sampled
+@pytest.mark.parametrize("name", [NAMES[k] for k in seeds(4, all=len(NAMES))])
+def test_bodies_are_where_the_urdf_has_them_and_hulls_and_pieces_hold_them(name):
+    """Placements by joints of the URDF, locked ones and fixed links included, without Pinocchio."""
+    robot = load_robot(name)
+    shapes, pieces = link_shapes(robot), link_shapes(robot, "pieces")
+    checked = check_urdf(robot.urdf, robot.package_dirs)
+    sources = {
+        link: [s.origin for s in (*checked.collisions.shapes, *checked.visuals) if s.link == link]
+        for link in checked.links
+    }
+    q = random_q(robot, np.random.default_rng(0))
+    values = {**robot.locked, **dict(zip(robot.joint_names, q, strict=True))}
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, Kinematics(robot).configuration(q))
+    seen = Counter()
+    for solid in shapes.solids:
+        here = data.oMi[solid.joint].homogeneous @ solid.placement
+        origin = sources[solid.owner][seen[solid.owner]]
+        seen[solid.owner] += 1
+        there = placement(checked.path_to(solid.owner), values) @ origin
+        np.testing.assert_allclose(here, there, rtol=0, atol=1e-9)
+    assert [solid.geometry for solid in pieces.solids] == [s.geometry for s in shapes.solids]
+    assert len(pieces.polytopes) >= len(shapes.polytopes)
+    for each in (shapes, pieces):
+        assert_held(each)
+        assert max(len(body.vertices) for body in each.polytopes) <= 64
+        assert len({body.joint for body in each.polytopes}) > robot.n // 2
+    assert link_pairs(robot, shapes).checked
+
+
+def test_the_same_content_is_read_once(tmp_path, monkeypatch):
+    read, real = [], robot_files.read_parts_of
+    monkeypatch.setattr(robot_files, "read_parts_of", lambda f: read.append(f.name) or real(f))
+    for name, size in (("a.stl", 1.0), ("copy.stl", 1.0), ("b.stl", 1.5)):
+        trimesh.creation.box((size, 0.37, 0.41)).export(tmp_path / name)
+    names = ("a.stl", "a.stl", "copy.stl", "b.stl")
+    robot = three(tmp_path, base="".join(MESH.format("collision", name) for name in names))
+    first, again = link_shapes(robot), link_shapes(robot)
+    assert read == ["a.stl", "b.stl"]
+    for old, new in zip(first.solids[:4], again.solids[:4], strict=True):
+        assert old.geometry is new.geometry
+    trimesh.creation.box((2.5, 0.37, 0.41)).export(tmp_path / "a.stl")
+    assert np.ptp(link_shapes(robot).solids[0].geometry.vertices[:, 0]) == 2.5
+    assert read[2:] == ["a.stl"]
+
+
+def test_a_mesh_is_scaled_mirrored_and_closed(tmp_path):
+    trimesh.creation.box((1, 2, 3)).export(tmp_path / "box.stl")
+    mesh = MESH.format("collision", 'box.stl" scale="1 -0.1 0.2')
+    body = link_shapes(three(tmp_path, base=mesh)).solids[0].geometry
+    assert (body.closed, len(body.vertices), len(body.faces)) == (True, 8, 12)
+    assert np.allclose(np.ptp(body.vertices, axis=0), [1, 0.2, 0.6])
+
+
+# Shapes of base, arm and hand: which of them have a body, and which cannot be checked.
+BROKEN, LOST = MESH.format("collision", "broken.stl"), MESH.format("collision", "lost.stl")
+STAND_INS = {
+    "as they are": ({}, "base arm hand", ()),
+    "visuals": ({"base": VISUAL, "arm": BROKEN + VISUAL}, "base arm hand", ()),
+    "both broken": ({"arm": BROKEN + MESH.format("visual", "w.stl")}, "base hand", ("arm",)),
+    "no file": ({"arm": LOST}, "base hand", ("arm",)),
+    "outside": ({"arm": MESH.format("collision", "../o.stl")}, "base hand", ("arm",)),
+    "absolute": ({"arm": MESH.format("collision", "/etc/passwd")}, "base hand", ("arm",)),
+    "a step file": ({"arm": MESH.format("collision", "a.step")}, "base hand", ("arm",)),
+    "one of two": ({"arm": LOST + COLLISION}, "base arm hand", ("arm",)),
+    "on purpose": ({"arm": VISUAL, "mark": 'collision="none"'}, "base hand", ("arm",)),
+    "no such mark": ({"arm": VISUAL, "mark": 'collision="no"'}, "base arm hand", ()),
+    "a mark and a shape": ({"mark": 'collision="none"'}, "base arm hand", ()),
+    "no base": ({"base": ""}, "arm hand", ()),
+    "a gap": ({"arm": ""}, "base hand", ("arm",)),
+}
+
+
+def test_what_stands_in_and_what_is_not_checked(tmp_path, approved):
+    (tmp_path / "broken.stl").write_bytes(b"solid nothing")
+    lines = []
+    for name, (parts, bodies, unchecked) in STAND_INS.items():
+        robot = three(tmp_path, **parts)
+        shapes = link_shapes(robot)
+        assert (owners(shapes), shapes.unchecked) == (bodies.split(), unchecked), name
+        lines += [f"{name}: {note}" for note in (*robot.notes, *shapes.notes)]
+    nothing = {"base": "", "arm": "", "hand": ""}
+    robot = three(tmp_path)
+    wrong = {"nothing": three(tmp_path, **nothing), "no path": replace(robot, urdf=None)}
+    for name, one in wrong.items():
+        with pytest.raises(RobotError) as caught:
+            link_shapes(one)
+        lines.append(f"{name}: {caught.value}")
+    robot = three(tmp_path, **nothing | {"base": LOST})
+    with pytest.raises(RobotError, match=r"no link has a shape .*lost\.stl"):
+        link_shapes(robot)
+    (tmp_path / "three.urdf").unlink()
+    with pytest.raises(RobotError, match="there is no such file"):
+        link_shapes(robot)
+    approved("stand_ins", "\n".join(lines))
+
+
+# meshes that are traps
+
+LIGHT = [maker for maker in hostile.MAKERS if maker is not hostile.just_drawn]
+
+
+@pytest.mark.parametrize("maker", LIGHT, ids=lambda maker: maker.__name__)
+def test_a_mesh_that_is_a_trap_is_a_note(maker, tmp_path, capfd):
+    """The link has a ball too, so that the arm is not refused."""
+    path, words = hostile.make(maker, 0, tmp_path / "robot")
+    text = Path(path).read_text().replace("<visual>", BALL + "<collision>")
+    Path(path).write_text(text.replace("</visual>", "</collision>"))
+    robot = load_robot(path)
+    opened.clear()
+    shapes = link_shapes(robot)
+    mesh = text.split('filename="')[1].split('"')[0]
+    inside = {Path(name).name for name in opened if name.startswith(str(tmp_path))}
+    assert inside <= {"arm.urdf", mesh}, "nothing beside the mesh is opened"
+    assert not [name for name in opened if name.startswith(("/dev", "/etc"))]
+    assert capfd.readouterr() == ("", "")
+    assert shapes.unchecked == (("base", "tip") if words else ("tip",))
+    assert (len(shapes.notes), len(shapes.solids)) == (bool(words), 1 + (not words))
+    assert_held(shapes)
+
+
+NAN, INF = float("nan"), float("inf")
+CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+FACES = np.array([[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]])
+NONE = np.empty((0, 3), int)
+REFUSED = {
+    "no vertices": (np.empty((0, 3)), FACES), "no faces": (CORNERS, NONE),
+    "nothing": (np.empty((0, 3)), NONE), "nan": (CORNERS + np.array([NAN, 0, 0]), FACES),
+    "one nan": (np.vstack([CORNERS, [0, NAN, 0]]), FACES),
+    "infinite": (np.full((4, 3), INF), FACES), "minus infinite": (CORNERS - [0, 0, INF], FACES),
+    "huge": (CORNERS * 1e5, FACES), "largest": (CORNERS * 1.7e308, FACES),
+    "far away": (CORNERS + 1e9, FACES), "negative index": (CORNERS, FACES - 1),
+    "large index": (CORNERS, FACES + 1), "largest index": (CORNERS, FACES + (2**62)),
+    "one point": (np.ones((3, 3)), FACES[:1]), "one corner": (CORNERS, np.zeros((5, 3), int)),
+    "an edge": (CORNERS, np.array([[0, 1, 1], [1, 0, 0]])),
+    "a line": (np.outer([0, 1, 2], np.ones(3)), FACES[:1]), "in a plane": (CORNERS[:, :2], FACES),
+    "quads": (CORNERS, np.array([[0, 1, 2, 3]])), "all at once": (np.full((4, 3), NAN), NONE),
+}  # fmt: skip
+
+
+def test_triangles_that_are_no_body_are_refused(approved):
+    lines = []
+    for name, (vertices, faces) in REFUSED.items():
+        with np.errstate(all="ignore"), pytest.raises(RobotError) as caught:
+            checked_triangles(vertices, faces, "hand.stl")
+        lines.append(f"{name}: " + " / ".join(str(caught.value).splitlines()))
+    approved("bad_triangles", "\n".join(lines))
+
+
+def grid(height):
+    """Triangles over 20 x 20 points."""
+    x, y, faces = mesh_patches.grid(19, 19)
+    return 0.01 * np.column_stack([19 * x, 19 * y, height(19 * x, 19 * y)]), faces
+
+
+def two(one, other):
+    return np.concatenate([one, other]), np.concatenate([FACES, 4 + FACES])
+
+
+# Bodies, and whether they are closed.
+ODD = {
+    "one triangle": (CORNERS, FACES[:1], False), "flat": (*grid(lambda x, y: 0 * x), False),
+    "all but flat": (*grid(lambda x, y: 1e-9 * x * y), False),
+    "a wave": (*grid(lambda x, y: np.sin(x)), False),
+    "a hair thick": (CORNERS * [1, 1, 1e-12], FACES, False),
+    "a needle": (CORNERS * [1, 1e-9, 1e-9], FACES, False), "tiny": (CORNERS * 1e-7, FACES, True),
+    "as large as can be": (CORNERS * 1e4, FACES, True),
+    "inside out": (CORNERS, FACES[:, ::-1], True),
+    "every face twice": (CORNERS, np.concatenate([FACES, FACES]), False),
+    "degenerate": (CORNERS, np.concatenate([FACES, [[0, 0, 1], [2, 2, 2]]]), True),
+    "unused vertices": (np.concatenate([CORNERS, 5 + CORNERS]), FACES, True),
+    "far from its frame": (0.1 * CORNERS + 5e3, FACES, True),
+    "two bodies": (*two(CORNERS, 3 + CORNERS), True),
+    "small and large": (*two(1e-6 * CORNERS, 10 * CORNERS), True),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_odd_bodies_have_hulls_that_coal_takes(name, tmp_path):
+    """coal's own hull ends the process for flat points; here pairs are tested with each body."""
+    vertices, faces, closed = ODD[name]
+    (tmp_path / "odd.stl").write_bytes(stl(vertices, faces))
+    odd = MESH.format("collision", "odd.stl")
+    links = f'<link name="a">{BALL}</link><link name="b">{odd}</link><link name="c">{BALL}</link>'
+    joints = "".join(
+        f'<joint name="{a}{b}" type="continuous"><parent link="{a}"/><child link="{b}"/>'
+        '<origin xyz="0 0 0.5"/><axis xyz="1 0 0"/></joint>'
+        for a, b in ("ab", "bc")
+    )
+    (tmp_path / "arm.urdf").write_text(f'<robot name="odd">{links}{joints}</robot>')
+    robot = load_robot(str(tmp_path / "arm.urdf"))
+    for fineness in ("hulls", "pieces"):
+        shapes = link_shapes(robot, fineness)
+        assert (shapes.notes, shapes.unchecked) == ((), ())
+        assert_held(shapes)
+        pairs = link_pairs(robot, shapes)
+        assert {out.why for out in pairs.left_out} == {"adjacent"}
+        assert pairs.checked == (("a", "c"),)
+    assert shapes.solids[1].geometry.closed is closed
+
+
+@pytest.mark.parametrize(
+    "vertices", [np.zeros((3, 3)), np.eye(3), np.outer(np.arange(5), [1, 2, 3.0])]
+)
+def test_flat_tools_do_not_end_the_process(vertices):
+    robot = load_robot("puma560")
+    pairs = link_pairs(robot, link_shapes(robot), tool=[Polytope("tool", 6, vertices, 0.001)])
+    assert ("base", "tool") in pairs.checked
+
+
+# what is a solid, of links and of objects alike
+
+CUBE = trimesh.creation.box((1.0, 2.0, 3.0))
+TURNED = np.concatenate([CUBE.faces[:1, ::-1], CUBE.faces[1:]])
+SOLIDS = {
+    "a box": (CUBE.vertices, CUBE.faces, 6.0),
+    "a box inside out": (CUBE.vertices, CUBE.faces[:, ::-1], 6.0),
+    "mirrored": (CUBE.vertices * [-1.0, 1.0, 1.0], CUBE.faces, 6.0),
+    "a face is missing": (CUBE.vertices, CUBE.faces[1:], None),
+    "a face twice": (CUBE.vertices, np.concatenate([CUBE.faces, CUBE.faces[:1]]), None),
+    "a face turned over": (CUBE.vertices, TURNED, 6.0),
+    "two faces back to back": (CUBE.vertices, np.array([[0, 1, 2], [0, 2, 1]]), None),
+    "flat": (CUBE.vertices * [1.0, 1.0, 1e-10], CUBE.faces, None),
+}
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_links_and_objects_agree_on_what_is_a_solid(name):
+    vertices, faces, volume = SOLIDS[name]
+    assert (solid_faces(np.asarray(vertices), faces) is None) == (volume is None)
+    link = checked_triangles(vertices, faces)
+    thing = Obstacle("a", Triangles(vertices, faces, False), np.eye(4)).geometry
+    assert link.closed == thing.closed == (volume is not None)
+    for one in (link, thing) if volume is not None else ():
+        body = trimesh.Trimesh(one.vertices, one.faces, process=False)
+        assert body.is_winding_consistent
+        assert body.volume == pytest.approx(volume)
+
+
+def test_tangled_bodies_look_outwards_and_a_klein_bottle_is_a_sheet():
+    """Two boxes, all faces turned at random; and what no turning makes agree."""
+    faces = np.concatenate([CUBE.faces, 8 + CUBE.faces])
+    turned = np.random.default_rng(0).random(24)[:, None] < 0.5
+    both = np.concatenate([CUBE.vertices, CUBE.vertices + 5.0])
+    body = checked_triangles(both, np.where(turned, faces[:, ::-1], faces))
+    assert body.closed
+    assert trimesh.Trimesh(body.vertices, body.faces).volume == pytest.approx(12.0)
+    number, faces = np.arange(36).reshape(6, 6), []
+    for i, j in np.ndindex(6, 6):
+        row = number[i + 1] if i < 5 else number[0, -np.arange(6)]  # joined the other way
+        a, b, c, d = number[i, j], number[i, (j + 1) % 6], row[j], row[(j + 1) % 6]
+        faces += [[a, b, d], [a, d, c]]
+    points = np.random.default_rng(1).normal(size=(36, 3))
+    assert solid_faces(points, np.array(faces)) is None
+
+
+# bodies collide where the shapes do
+
+EXACT = ("puma560", "ur5", "panda", "kinova", "xarm7")
+
+
+@sampled
+@pytest.mark.parametrize("name", [EXACT[k] for k in seeds(2, all=5)])
+def test_hulls_and_pieces_collide_wherever_the_exact_shapes_do(name):
+    """Of exact shapes, one call of coal for each pair."""
+    robot = load_robot(name)
+    hulls, pieces = link_shapes(robot), link_shapes(robot, "pieces")
+    joint = {body.owner: body.joint for body in hulls.polytopes}
+    pairs = [(a, b) for a, b in combinations(joint, 2) if joint[a] != joint[b]]
+    q = random_configurations(robot)[:40]
+    bodies = [(solid, _coal(solid.geometry)) for solid in hulls.solids]
+    data, exact = robot.model.createData(), np.zeros((len(q), len(pairs)), dtype=bool)
+    for row, configuration in enumerate(q):
+        pin.forwardKinematics(robot.model, data, Kinematics(robot).configuration(configuration))
+        poses = [data.oMi[solid.joint] * pin.SE3(np.array(solid.placement)) for solid, _ in bodies]
+        poses = [coal.Transform3s(pose.rotation, pose.translation) for pose in poses]
+        for i, j in combinations(range(len(bodies)), 2):
+            pair = bodies[i][0].owner, bodies[j][0].owner
+            column = [k for k, each in enumerate(pairs) if set(each) == set(pair)]
+            if column and not exact[row, column[0]]:
+                result = coal.CollisionResult()
+                coal.collide(bodies[i][1], poses[i], bodies[j][1], poses[j],
+                             coal.CollisionRequest(), result)  # fmt: skip
+                exact[row, column[0]] = result.isCollision()
+    assert exact.any()
+    for shapes in (hulls, pieces):
+        found = PairSampling(robot, shapes.polytopes).collisions(pairs, q)
+        assert not (exact & ~found).any()
+
+
+def _coal(geometry):
+    match geometry:
+        case Triangles(vertices, faces):
+            mesh = coal.BVHModelOBBRSS()
+            points, corners = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+            points.extend(list(np.array(vertices)))
+            corners.extend([coal.Triangle(*map(int, face)) for face in faces])
+            mesh.beginModel(len(faces), len(vertices))
+            mesh.addSubModel(points, corners)
+            mesh.endModel()
+            return mesh
+        case Box(size):
+            return coal.Box(*size)
+        case Sphere(radius):
+            return coal.Sphere(radius)
+        case Cylinder(radius, length):
+            return coal.Cylinder(radius, length)
+    raise AssertionError(geometry)
+
+
+def test_l_shaped_links_are_cut_from_the_start_and_then_meet_as_rarely_as_they_do():
+    robot = load_robot("ur5")
+    hulls = link_shapes(robot)
+    cut = with_crude_links_cut(robot, hulls, link_pairs(robot, hulls).checked)
+    before, after = (Counter(b.owner for b in s.polytopes) for s in (hulls, cut))
+    more = {owner for owner in after if after[owner] > before[owner]}
+    assert {"base_link", "upper_arm_link", "forearm_link"} <= more
+    assert "ee_link" not in more
+    assert cut.solids == hulls.solids
+    q = random_configurations(robot)[200:600]  # others than those that were looked at
+    for pair in (("base_link", "upper_arm_link"), ("forearm_link", "wrist_2_link")):
+        crude, fine, exact = (
+            PairSampling(robot, bodies).collisions([pair], q).mean()
+            for bodies in (hulls.polytopes, cut.polytopes, cut.solids)
+        )
+        assert crude > exact + 0.2
+        assert exact <= fine < exact + 0.05
+    assert with_crude_links_cut(robot, hulls, ()) is hulls
+    for name in ("panda", "puma560"):  # whose hulls do
+        robot = load_robot(name)
+        hulls = link_shapes(robot)
+        assert with_crude_links_cut(robot, hulls, link_pairs(robot, hulls).checked) is hulls

@@ -1,0 +1,367 @@
+"""The clearance that the search compiles: what it calls clear is clear for coal at every sample."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pinocchio as pin
+import pytest
+import trimesh
+from random_arms import planar_arm
+from random_bodies import CoalScene, all_pairs, hulls, of_polytopes, serial_arm
+from samples import sampled, spread
+from scipy.spatial.transform import Rotation
+from search_kernels import Clearance
+
+from feasibility.collisions import Collision, Obstacle, Pair, Soup, counts, gather
+from feasibility.collisions.kernels.box_tree import box_tree, moved
+from feasibility.collisions.kernels.link_frames import chord_deviation, place_bodies
+from feasibility.collisions.kernels.link_frames import spread as place_group
+from feasibility.collisions.kernels.tables import (
+    AXES,
+    FIRST,
+    GROUPS,
+    HALF,
+    LAST,
+    LEFT,
+    MIDDLE,
+    RIGHT,
+    row,
+    views,
+)
+from robots import load_robot
+from robots.shapes import Polytope
+from surfaces import sphere
+
+LENGTH, RADIUS = 0.3, 0.03  # m, of each link, a capsule along x
+FINE = np.deg2rad(0.1)  # between samples, of the joint that moves most
+
+
+def needed(bodies):
+    """(P,) m, the clearance of each pair, and what triangles may be off."""
+    extra = {soup.owner: soup.deviation for soup in bodies.soups}
+    return np.array([pair.clearance + extra.get(pair.second, 0.0) for pair in bodies.pairs])
+
+
+def among_walls(rng, kinds):
+    """An arm of made-up joints and bodies among triangles."""
+    robot, n = serial_arm(rng, kinds), len(kinds)
+    walls = rng.normal(size=(8, 1, 3)) * 0.5 + rng.normal(size=(8, 3, 3)) * 0.2
+    pairs = (*all_pairs(n + 1, 0.01), *(Pair(f"b{k}", "wall", 0.0) for k in range(1, n + 1)))
+    return robot, of_polytopes(hulls(rng, n), pairs, Soup("wall", walls, 0.002, False))
+
+
+def among_boxes(rng, name):
+    """A known arm with its own shapes among boxes and a dome."""
+    turn = [tuple(rng.uniform(-180.0, 180.0, 3)) for _ in range(4)]
+    boxes = [(tuple(rng.uniform(0.01, 0.4, 3)), tuple(rng.uniform(-0.8, 0.8, 3))) for _ in turn]
+    scene = tuple(Obstacle.box(f"box{k}", *box, turn[k]) for k, box in enumerate(boxes))
+    robot, dome = load_robot(name), sphere(0.3, (0, 70), (0, 300), position=(0.6, 0.0, 0.1))
+    return robot, gather(robot, dome, Collision(clearance=0.005, scene=scene), 0.02)
+
+
+@pytest.mark.parametrize("kinds", ["RRRR", "RPRR", "PPRRR"])
+def test_bounds_are_what_coal_measures(kinds):
+    """Never more; and less by no more than rounding where bodies are apart. Of triangles too."""
+    rng, apart = np.random.default_rng(7), 0
+    for k in range(4):
+        robot = serial_arm(rng, kinds)
+        if k % 2:
+            bodies = of_polytopes(hulls(rng, robot.n), all_pairs(robot.n + 1, 0.0))
+        else:
+            robot, bodies = among_walls(rng, kinds)
+        clearance, scene = Clearance(robot, bodies), CoalScene(robot, bodies)
+        for q in rng.uniform(-2.0, 2.0, (30, robot.n)):
+            bounds, truth = clearance.bounds(q), scene.distances(q)
+            clear = truth > 1e-6
+            assert (bounds[clear] <= truth[clear] + 2e-6).all()
+            assert (bounds[clear] >= truth[clear] - 2e-6).all()
+            assert (bounds[~clear] <= 1e-9).all()
+            apart += int(clear.sum())
+    assert apart > 400
+
+
+@pytest.mark.parametrize("kinds", ["RRRR", "RPRR", "PRPR"])
+def test_no_segment_with_a_collision_is_called_clear(kinds):
+    rng, clear, refused, collides = np.random.default_rng(11), 0, 0, 0
+    for _ in range(3):
+        robot, bodies = among_walls(rng, kinds)
+        clearance, scene, needs = Clearance(robot, bodies), CoalScene(robot, bodies), needed(bodies)
+        for size in np.repeat([1e-3, 0.02, 0.1, 0.5], 7):
+            q = rng.uniform(-2.0, 2.0, 4)
+            for _ in range(3):
+                end = q + rng.uniform(-1.0, 1.0, 4) * size
+                margin = clearance.margin(q, end)
+                count = min(int(np.abs(end - q).max() / FINE) + 2, 15)
+                rows = q + np.linspace(0.0, 1.0, count)[:, None] * (end - q)
+                least = min((scene.distances(each) - needs).min() for each in rows)
+                if margin > 0.0:
+                    assert least >= -1e-9
+                    assert margin <= (scene.distances(end) - needs).min() + 1e-7
+                    clear, q = clear + 1, end
+                else:
+                    assert 0 <= clearance.blamed() < len(needs)
+                    refused, collides = refused + 1, collides + (least < 0.0)
+    assert clear > 30
+    assert collides > 10
+    assert refused - collides < 0.1 * (clear + refused)
+
+
+ATTACKS = [("ur5", 0), *((name, seed) for name in ("ur5", "panda", "RRRRR", "RPRRR", "PRPRR")
+                         for seed in range(1000, 1040)), ("PRPRR", 0)]  # fmt: skip
+
+
+@sampled
+@pytest.mark.parametrize(("name", "seed"), spread(ATTACKS, 2))
+def test_short_walks_that_are_called_clear_are(name, seed):
+    """Each segment from the end of the last clear one, of steps of 1 mm or mrad to 0.5."""
+    rng, clear, refused = np.random.default_rng(seed), 0, 0
+    made = among_walls if set(name) <= {"R", "P"} else among_boxes
+    robot, bodies = made(rng, name)
+    clearance, scene, needs = Clearance(robot, bodies), CoalScene(robot, bodies), needed(bodies)
+    low, high = np.maximum(robot.lower, -3.0), np.minimum(robot.upper, 3.0)
+    for _ in range(5):
+        q, size = rng.uniform(low, high), rng.choice([1e-3, 0.01, 0.05, 0.2, 0.5])
+        for _ in range(3):
+            end = q + rng.uniform(-1.0, 1.0, robot.n) * size
+            if not clearance.clear(q, end):
+                refused += 1
+                continue
+            clear += 1
+            count = int(np.abs(end - q).max() / FINE) + 2
+            rows = q + np.linspace(0.0, 1.0, count)[:, None] * (end - q)
+            assert not any((scene.distances(each) - needs).min() < -1e-9 for each in rows)
+            q = end
+    assert clear + refused == 15
+
+
+# by hand
+
+
+def stick(owner, joint):
+    """A link of the planar arm."""
+    return Polytope(owner, joint, np.array([[0.0, 0.0, 0.0], [LENGTH, 0.0, 0.0]]), RADIUS)
+
+
+def one_pair(*bodies, clearance=0.0, soup=None):
+    """The clearance of a planar arm of one link from the other body."""
+    other = bodies[1].owner if soup is None else soup.owner
+    pairs = (Pair(bodies[0].owner, other, clearance),)
+    everything = of_polytopes(list(bodies), pairs, *([] if soup is None else [soup]))
+    return Clearance(planar_arm(1), everything)
+
+
+def test_an_arm_folds_onto_itself_where_it_should():
+    """Links 1 and 3 of three, q3 = pi / 2: in the plane, the ends of one against the other."""
+    arm = [stick(f"l{k}", k) for k in (1, 3)]
+    clearance = Clearance(planar_arm(3), of_polytopes(arm, (Pair("l3", "l1", 0.004),)))
+    apart, first = 0, np.array([[0.0, 0.0], [LENGTH, 0.0]])
+    for q2 in np.linspace(1.2, 2.3, 12):
+        start = LENGTH * np.array([1.0 + np.cos(q2), np.sin(q2)])
+        third = np.array([start, start + LENGTH * np.array([-np.sin(q2), np.cos(q2)])])
+        if third[1, 1] <= 0.0:
+            continue  # they may cross
+        ends = [_from_segment(p, first) for p in third] + [_from_segment(p, third) for p in first]
+        bound = clearance.bounds([0.3, q2, np.pi / 2])[0]
+        assert bound == pytest.approx(min(ends) - 2 * RADIUS, abs=1e-6)
+        apart += 1
+    assert apart > 5
+
+
+def _from_segment(point, ends):
+    along = ends[1] - ends[0]
+    share = np.clip((point - ends[0]) @ along / (along @ along), 0.0, 1.0)
+    return float(np.linalg.norm(point - ends[0] - share * along))
+
+
+@pytest.mark.parametrize("kind", ["hull", "triangles"])
+def test_a_wall_is_met_at_the_angle_known(kind):
+    """The tip's ball, at (L cos q, L sin q), and a wall x >= w: cos q = (w - r - c) / L."""
+    wall, c = 0.25, 0.005
+    touching = np.arccos((wall - RADIUS - c) / LENGTH)
+    corners = np.array([[x, y, z] for x in (wall, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+    if kind == "hull":
+        clearance = one_pair(stick("l1", 1), Polytope("wall", 0, corners, 0.0), clearance=c)
+    else:
+        soup = Soup("wall", np.array([corners[:3], corners[1:4]]), 0.0, False)
+        clearance = one_pair(stick("l1", 1), clearance=c, soup=soup)
+    assert clearance.clear(touching + 1e-3, touching + 1e-5)
+    assert not clearance.clear(touching + 1e-3, touching - 1e-5)
+    assert not clearance.clear(touching + 1e-3, -touching - 1e-3)
+
+
+def wall_and_stick(kind):
+    """A wall 1 mm thick, and a stick on a turning joint that passes through it at 0.5 rad."""
+    turned = np.array([[np.cos(0.5), -np.sin(0.5)], [np.sin(0.5), np.cos(0.5)]])
+    flat = np.array([[0.2, -5e-4], [1.0, -5e-4], [1.0, 5e-4], [0.2, 5e-4]]) @ turned.T
+    wall = np.array([[x, y, z] for x, y in flat for z in (-0.1, 0.1)])
+    thin = np.array([[x, y, z] for x in (0.1, 0.5) for y in (-0.01, 0.01) for z in (-0.01, 0.01)])
+    if kind == "hull":
+        return one_pair(Polytope("stick", 1, thin, 0.0), Polytope("wall", 0, wall, 0.0))
+    corners = wall[[0, 2, 1, 3]]  # one face of it
+    soup = Soup("wall", np.array([corners[:3], corners[1:]]), 0.0, False)
+    return one_pair(Polytope("stick", 1, thin, 0.0), soup=soup)
+
+
+@pytest.mark.parametrize("kind", ["hull", "triangles"])
+def test_a_thin_wall_is_never_jumped(kind):
+    clearance = wall_and_stick(kind)
+    for a in np.linspace(-2.0, 0.3, 12):
+        assert clearance.clear(a, a)
+        for b in np.linspace(0.7, 2.0, 12):
+            assert clearance.clear(b, b)
+            assert not clearance.clear(a, b)
+            assert not clearance.clear(b, a)
+    for a in np.linspace(-2.0, 0.2, 10):
+        assert clearance.clear(a, a + 0.2)
+
+
+def test_no_number_is_never_clear():
+    clearance = wall_and_stick("hull")
+    for bad in (np.nan, np.inf, -np.inf):
+        assert not clearance.clear(bad, bad)
+        assert not clearance.clear(-1.0, bad)
+        assert not clearance.clear(bad, -1.0)
+        assert clearance.clear(-1.0, -1.0)
+
+
+def test_small_steps_far_from_everything_take_no_distance():
+    clearance = wall_and_stick("hull")
+    for a, b in pairwise(np.linspace(-2.0, -1.0, 201)):
+        assert clearance.clear(a, b)
+    done = counts(clearance.buffer)
+    assert done.segments == 200
+    assert done.swept <= 10
+
+
+def test_what_is_inside_a_closed_body_collides():
+    """Nothing touches its triangles; of an open body that is all there is to say."""
+    ball = np.array(trimesh.creation.icosphere(2, radius=1.0).triangles)
+    for closed in (True, False):
+        clearance = one_pair(stick("l1", 1), soup=Soup("ball", ball, 0.0, closed))
+        for q in np.linspace(-2.0, 2.0, 9):
+            assert clearance.clear(q, q) is not closed
+            assert bool(clearance.bounds(q)[0] < -0.5) is closed
+        aside = Soup("ball", ball + np.array([3.0, 0.0, 0.0]), 0.0, closed)
+        assert one_pair(stick("l1", 1), soup=aside).clear(0.0, 0.0)
+
+
+def test_the_nearest_points_are_where_they_are():
+    ball = Polytope("ball", 0, np.array([[0.0, 1.0, 0.0]]), 0.2)
+    found = one_pair(stick("l1", 1), ball).nearest(np.array([np.pi / 2]))
+    assert found.pair == 0
+    assert found.distance == pytest.approx(1.0 - LENGTH - RADIUS - 0.2, abs=1e-9)
+    points = sorted([found.point_first[1], found.point_second[1]])
+    assert points == pytest.approx([LENGTH + RADIUS, 0.8], abs=1e-6)
+
+
+def test_the_push_is_the_gradient_of_the_nearest_distance():
+    rng, checked = np.random.default_rng(5), 0
+    while checked < 6:
+        robot = serial_arm(rng, "RPRR")
+        clearance = Clearance(robot, of_polytopes(hulls(rng, 4), (Pair("b4", "b0", 0.0),)))
+        for q in rng.uniform(-1.0, 1.0, (20, 4)):
+            if 0.005 < clearance.bounds(q)[0] < 0.045:
+                share, step = clearance.push(q, 0.01)
+                assert 0.0 < share < 1.0
+                assert np.linalg.norm(step) <= 0.01 + 1e-12
+                ends = [[clearance.bounds(q + way * e)[0] for way in (1, -1)] for e in
+                        1e-5 * np.eye(4)]  # fmt: skip
+                rates = np.diff(ends, axis=1)[:, 0] / -2e-5
+                cosine = rates @ step / np.linalg.norm(rates) / np.linalg.norm(step)
+                assert cosine > 0.8  # its direction is good to a tenth of the distance
+                checked += 1
+    ball = Polytope("ball", 0, np.array([[2.0, 0.0, 0.0]]), 0.1)
+    assert one_pair(stick("l1", 1), ball).push(np.array([0.5]), 0.1) == (0.0, 0.0)
+
+
+# the bounds behind
+
+
+def test_no_point_moves_further_nor_leaves_its_chord_further_than_bounded():
+    """M and delta of every group, seen from every joint before it, against 20 samples."""
+    rng, used = np.random.default_rng(2), {"M": 0.0, "delta": 0.0}
+    for kinds in ("RRRR", "RPRR", "PRPR"):
+        robot = serial_arm(rng, kinds)
+        bodies = of_polytopes(hulls(rng, 4), all_pairs(5, 0.0))
+        buffer = Clearance(robot, bodies).buffer
+        tables = views(buffer)
+        for size in np.repeat([1e-3, 0.03, 0.5], 3):
+            q0 = rng.uniform(-2.0, 2.0, 4)
+            q1 = q0 + rng.uniform(-1.0, 1.0, 4) * size
+            tables.configurations[:2] = q0, q1
+            for slot in (0, 1):
+                place_bodies(buffer, np.int64(slot))
+            for body in (body for body in bodies.polytopes if body.joint):
+                group = row(buffer, GROUPS, np.int64(body.joint))
+                place_group(buffer, group, np.int64(0), np.int64(1))
+                for inner in range(body.joint):
+                    ends = (np.int64(inner), np.int64(0), np.int64(1))
+                    bounds = tables.reach[body.joint, inner], chord_deviation(buffer, group, *ends)
+                    found = _moved(robot, body, inner, q0, q1)
+                    for name, bound, truth in zip(used, bounds, found, strict=True):
+                        assert truth <= bound + 1e-12
+                        used[name] = max(used[name], truth / max(bound, 1e-15))
+    assert used["M"] > 0.8
+    assert used["delta"] > 0.5
+
+
+def test_a_lever_that_is_longer_in_the_middle_than_at_the_ends():
+    """Folded, stretched, folded again: the first joint carries the tip further halfway."""
+    robot, tip = planar_arm(2, (-3.1, 3.1)), Polytope("tip", 2, np.array([[LENGTH, 0.0, 0.0]]), 0.0)
+    wall = Polytope("wall", 0, np.array([[9.0, 0.0, 0.0]]), 0.1)
+    pairs = Pair("tip", "wall", 0.0), Pair("l1", "wall", 0.0)
+    buffer = Clearance(robot, of_polytopes([wall, stick("l1", 1), tip], pairs)).buffer
+    tables, used = views(buffer), 0.0
+    for bend in np.linspace(0.5, 3.1, 14):
+        for turn in (1.0, 3.0):
+            q0, q1 = np.array([0.0, -bend]), np.array([turn, bend])
+            tables.configurations[:2] = q0, q1
+            for slot in (0, 1):
+                place_bodies(buffer, np.int64(slot))
+            place_group(buffer, row(buffer, GROUPS, np.int64(2)), np.int64(0), np.int64(1))
+            way = _moved(robot, tip, 0, q0, q1)[0]
+            assert way <= tables.reach[2, 0] + 1e-12
+            used = max(used, way / tables.reach[2, 0])
+    assert used > 0.7
+
+
+def _moved(robot, body, inner, q0, q1):
+    """How far vertices move, seen from a joint, and how far they leave their chords."""
+    data, track = robot.model.createData(), []
+    shares = np.linspace(0.0, 1.0, 21)
+    for s in shares:
+        pin.forwardKinematics(robot.model, data, q0 + s * (q1 - q0))
+        pose = data.oMi[inner].inverse() * data.oMi[body.joint]
+        track.append(body.vertices @ pose.rotation.T + pose.translation)
+    track, s = np.array(track), shares[:, None, None]
+    chord = (1.0 - s) * track[0] + s * track[-1]
+    length = np.linalg.norm(np.diff(track, axis=0), axis=2).sum(axis=0)
+    return length.max(), np.linalg.norm(track - chord, axis=2).max()
+
+
+def held(tree, node):
+    """The corners of all triangles under a node, whose box has to hold them."""
+    each = tree.nodes[node]
+    own = tree.corners[int(each[FIRST]) : int(each[LAST])]
+    if each[LEFT] < 0:
+        assert len(own) == 3
+        corners = own
+    else:
+        corners = np.concatenate([held(tree, int(each[side])) for side in (LEFT, RIGHT)])
+    along = np.abs((corners - each[MIDDLE : MIDDLE + 3]) @ each[AXES:HALF].reshape(3, 3).T)
+    assert (along <= each[HALF:]).all()
+    return corners
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0])
+@pytest.mark.parametrize("count", [1, 37])
+def test_boxes_of_a_moved_tree_hold_the_moved_triangles(count, size):
+    rng = np.random.default_rng(count)
+    triangles = size * (rng.normal(size=(count, 1, 3)) + 0.1 * rng.normal(size=(count, 3, 3)))
+    turn, shift = Rotation.random(random_state=rng).as_matrix(), np.array([3.0, -2.0, 0.5])
+    found = held(moved(box_tree(triangles), turn, shift), 0)
+    carried = (triangles @ turn.T + shift).reshape(-1, 3)
+    assert np.abs(found[:, None] - carried[None]).max(axis=2).min(axis=0).max() < 1e-14
+    assert len(found) == 3 * count

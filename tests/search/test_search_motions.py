@@ -1,0 +1,303 @@
+"""What the search stores holds: targets and their curves, configurations, motions, the walk."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from arm_urdfs import FREE, joint
+from bounds import holds
+from dense_replay import tools
+from part_walks import at_parameters, walk
+from part_walks import spread as spread_over
+from random_arms import QUESTIONS, finite_limits, planar_arm, question, robot_of
+from search_kernels import Motions
+
+from coverable_arrays import unit_along
+from coverable_errors import ArgumentError
+from feasibility import Search, Task, check
+from feasibility.certification import replay
+from feasibility.roadmap import (
+    NODES,
+    Exploration,
+    arrays_of,
+    close,
+    covering_walk,
+    edge_motion,
+    explore,
+)
+from feasibility.roadmap.graph import (
+    EDGES,
+)
+from feasibility.roll import cosine_and_sine, projected, roll_of
+from feasibility.targets import check_references, target_curves, target_parts
+from feasibility.verdict import Walk
+from robots import load_robot
+from surfaces import cylinder, hyperboloid, plane, sphere
+
+DOME = sphere(1.0, (10, 90), (10, 180), rpy_deg=(30, 0, 20), position=(1, 2, 3)).cells(4, 5)
+PIPE = cylinder(0.2, (0, 360), (0, 1), side="outside", rpy_deg=(0, 50, 0)).cells(6, 3)
+TASKS = {
+    "along u": Task(0.01, 20, roll_deg=(-15, 15)),
+    "along z": Task(0.01, 20, roll_deg=(-15, 15), roll_reference=(0.3, 0.2, 1)),
+    "held upright": Task(0.01, 20, roll_deg=(0, 0), approach=(0.2, 0.1, -1)),
+    "all fixed": Task(0.01, 20, roll_deg=(0, 5), approach=(0, 0, -2), roll_reference=(1, 2, 0)),
+}
+
+
+# targets
+
+
+def along(first, cubics, curves, t):
+    """Piece, and value, first and second derivatives by t (k, 3) of cubics at t of curves (k,)."""
+    count = np.diff(first)[curves]
+    piece = np.minimum((t * count).astype(int), count - 1)
+    s, c = (t * count - piece)[:, None], cubics[first[curves] + piece].swapaxes(0, 1)
+    values = c[0] + s * (c[1] + s * (c[2] + s * c[3]))
+    slopes = (c[1] + s * (2.0 * c[2] + s * 3.0 * c[3])) * count[:, None]
+    bends = (2.0 * c[2] + 6.0 * s * c[3]) * count[:, None] ** 2
+    return first[curves] + piece, (values, slopes, bends)
+
+
+def frames_over(task, surface, u, v):
+    """Approach directions and references (k, 3) over places, by the definition."""
+    approach = -surface.side_sign * surface.normal(u, v)
+    if task.approach is not None:
+        approach = np.tile(surface.rotation @ unit_along(task.approach), (len(u), 1))
+    along_u = surface.tangent(u, v)
+    if task.roll_reference is not None:
+        along_u = np.tile(surface.rotation @ unit_along(task.roll_reference), (len(u), 1))
+    return approach, projected(along_u, approach)[0]
+
+
+@pytest.mark.parametrize("cells", [DOME, PIPE], ids=["dome", "pipe"])
+@pytest.mark.parametrize("name", TASKS)
+def test_frames_follow_the_surface_within_their_bounds_and_turn_no_faster(name, cells):
+    task, surface, rng = TASKS[name], cells.surface, np.random.default_rng(5)
+    found = target_curves(cells, task)
+    curves, t = rng.integers(0, len(cells.pairs), 2000), rng.random(2000)
+    piece, (value, slope, bend) = along(found.first, found.frames.cubics, curves, t)
+    _, (b, _, _) = along(found.first, found.cubics[:, :, 3:], curves, t)
+    closest = surface.closest(cells.curves.at(curves, t)[0])
+    approach, right = frames_over(task, surface, closest.u, closest.v)
+    assert np.linalg.norm(b - approach, axis=1).max() <= found.deviations[:, 1].max() + 1e-12
+    off = np.linalg.norm(value - right, axis=1)
+    assert (off <= found.frames.deviations[curves] + 2 * found.deviations[curves, 1] + 1e-8).all()
+    bounds = found.frames.derivative_bounds[piece]
+    for truth, bound in ((slope, bounds[:, 0]), (bend, bounds[:, 1])):
+        holds(bound + 1e-9, np.linalg.norm(truth, axis=1), 0.9 if bound.max() > 1e-6 else 0.0)
+    # Beside a centre, on the target surface, in any direction.
+    cell = rng.integers(0, len(cells), 500)
+    x = np.column_stack([cells.u, cells.v])[cell]
+    moved = [*x.T], [*(x + 1e-4 * rng.normal(size=x.shape)).T]
+    height = surface.side_sign * task.standoff
+    ends = [surface.point(*uv) + height * surface.normal(*uv) for uv in moved]
+    refs = [frames_over(task, surface, *uv)[1] for uv in moved]
+    step, turn = (np.linalg.norm(two[1] - two[0], axis=1) for two in (ends, refs))
+    assert (turn <= found.frames.centre_curvature * step + 1e-8).all()
+
+
+def test_curves_begin_with_the_targets_of_the_cells_and_an_approach_keeps_them():
+    for task in TASKS.values():
+        targets, found = task.targets(PIPE), target_curves(PIPE, task)
+        assert np.abs((targets.references * targets.approaches).sum(axis=1)).max() < 1e-12
+        starts = found.frames.cubics[found.first[:-1], 0]
+        assert np.allclose(starts, targets.references[PIPE.pairs[:, 0]], atol=1e-12)
+    upright, usual = Task(0.01, 20, approach=(0, 0, -3)), Task(0.01, 20)
+    assert target_curves(PIPE, usual).frames is None
+    assert usual.targets(PIPE).references is None
+    assert np.array_equal(upright.targets(PIPE).points, usual.targets(PIPE).points)
+    assert np.allclose(upright.targets(PIPE).approaches, -PIPE.surface.rotation[:, 2])
+    found, other = target_curves(PIPE, upright), target_curves(PIPE, usual)
+    assert np.array_equal(found.cubics[..., :3], other.cubics[..., :3])
+    assert np.array_equal(found.derivative_bounds[:, 0], other.derivative_bounds[:, 0])
+    assert not found.curvature.any()
+    assert not found.deviations[:, 1].any()
+
+
+def test_the_roll_is_that_of_the_least_rotation_and_a_range_a_middle_and_a_half():
+    """Swing x from a to b by Rodrigues' formula, and measure its angle from t."""
+    rng = np.random.default_rng(3)
+    a, b, x, t = rng.normal(size=(4, 200, 3))
+    a, b = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in (a, b))
+    x, t = projected(x / np.linalg.norm(x, axis=1, keepdims=True), a)[0], projected(t, b)[0]
+    axis, cosine = np.cross(a, b), (a * b).sum(axis=1)[:, None]
+    swung = cosine * x + np.cross(axis, x)
+    swung += (axis * x).sum(axis=1)[:, None] * axis / (1.0 + cosine)
+    angle = np.arctan2((np.cross(b, t) * swung).sum(axis=1), (t * swung).sum(axis=1))
+    assert np.allclose(np.cos(roll_of(x, a, t, b) - angle), 1.0)
+    assert np.allclose(np.hypot(*cosine_and_sine(x, a, t, b)), 1.0 + cosine[:, 0])
+    assert Task(0.01, 20, roll_deg=(170, 190)).roll == pytest.approx((np.pi, np.radians(10)))
+    assert Task(0.01, 120, roll_deg=(-180, 180)).roll is None
+    off = Task(0.01, 20, roll_deg=(170, 190)).roll.off(np.radians([-175.0, 175.0, 0.0]))
+    assert np.degrees(np.abs(off)) == pytest.approx([5, 5, 180])
+    assert np.sign(off[:2]).tolist() == [1, -1]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"roll_deg": (15, -15)}, "empty"),
+        ({"roll_deg": (0, 400)}, "-360 .. 360"),
+        ({"roll_deg": "free"}, "roll_deg must"),
+        ({"cone_deg": 95, "roll_deg": (-15, 15)}, "cone_deg must be 90 or less"),
+        ({"approach": "down"}, "'normal' or a direction"),
+        ({"approach": (0, 0, 0)}, "approach must be three"),
+        ({"roll_reference": (1, 2)}, "roll_reference must be three"),
+    ],
+)
+def test_a_task_that_cannot_be_is_refused(wrong, said):
+    with pytest.raises(ArgumentError, match=said):
+        Task(**{"standoff": 0.01, "cone_deg": 20.0, **wrong})
+
+
+def test_a_reference_along_the_approach_is_refused_with_its_cells():
+    cells = plane((0, 1), (0, 1)).cells(2, 2)
+    upright = Task(0.1, 20, roll_deg=(-1, 1), roll_reference=(0, 0.01, 1))
+    with pytest.raises(ArgumentError, match=r"at cells \[0, 0\], \[0, 1\], \[1, 0\] and 1 more"):
+        check_references(cells, upright)
+    check_references(cells, Task(0.1, 20, roll_reference=(0, 0, 1)))
+
+
+PATCHES = {
+    "dome": DOME.surface,
+    "horn": hyperboloid(0.5, 0.5, (0, 180), (0, 0.5), side="outside"),
+    "pipe": PIPE.surface,
+    "wall": plane((0, 1), (0, 1)),
+}
+
+
+@pytest.mark.parametrize("standoff", [0.0, 0.3])
+@pytest.mark.parametrize("name", PATCHES)
+def test_targets_and_approaches_lie_in_their_parts(name, standoff):
+    surface = PATCHES[name]
+    parts = target_parts(surface, standoff, flat=0.004, straight=0.05)
+    u, v = spread_over(surface, 3000)
+    sign, normal = surface.side_sign, surface.normal(u, v)
+    targets = surface.point(u, v) + sign * standoff * normal
+    x = at_parameters(surface, u, v)[1]
+    used = walk(parts, np.zeros(len(u), dtype=int), x, targets, -sign * normal)
+    assert max(used.points, used.normals) <= 1.0
+    assert (parts.radius[used.finest] <= [0.004, 0.05]).all()
+
+
+# configurations
+
+
+@pytest.mark.parametrize("name", QUESTIONS)
+@pytest.mark.parametrize("cone_deg", [1.0, 120.0])
+def test_configurations_over_a_cell_obey_every_constraint(name, cone_deg):
+    """Newton's from random guesses over three cells; Pinocchio says where they are."""
+    robot, cells, task = question(name)
+    task = Task(task.standoff, cone_deg, 1e-3)
+    motions, targets, rng, found = Motions(robot, cells, task), task.targets(cells), 0, 0
+    rng = np.random.default_rng(1)
+    for cell in rng.choice(len(cells), 3, replace=False):
+        guesses = rng.uniform(*finite_limits(robot), (20, robot.n))
+        on = motions.landed(cell, guesses)
+        near = [q for q in (motions.near(cell, q) for q in guesses) if q is not None]
+        for q, tolerance in ((on, 0.02e-3 + 1e-12), (np.array(near).reshape(-1, robot.n), 1e-3)):
+            if len(q):
+                points, axes = tools(robot, q)
+                assert ((q >= robot.lower) & (q <= robot.upper)).all()
+                assert np.linalg.norm(points - targets.points[cell], axis=1).max() <= tolerance
+                chord = np.linalg.norm(axes - targets.approaches[cell], axis=1).max()
+                assert chord <= 2.0 * np.sin(task.cone / 2.0) + 1e-12
+        found += len(on)
+    assert found > 3
+
+
+@pytest.mark.parametrize("short", [0.3, 0.99, 1.01])
+def test_a_target_beyond_reach_is_covered_within_the_tolerance_and_no_further(short):
+    """A planar arm of three links, and one small cell a share of the tolerance beyond its reach."""
+    robot = planar_arm(3)
+    (reach,), _ = tools(robot, np.zeros((1, 3)))
+    x, size = reach[0] + short * 0.01, 0.02
+    patch = plane((x - size, x + size), (reach[1] - size, reach[1] + size), side="outside")
+    cells = patch.cells(1, 1)
+    for seed in range(3 if short < 1.0 else 1):
+        verdict = check(robot, cells, Task(0.0, 180.0, 0.01), Search(seed=seed))
+        assert verdict.evidence == ("witness" if short < 1.0 else "proof")
+        if short < 1.0:
+            (point,), _ = tools(robot, verdict.witness.q[:1])
+            assert 0.999 * short * 0.01 <= np.linalg.norm(point - cells.centres[0]) <= 0.01
+
+
+def test_the_cone_of_a_sphere_is_kept_off_the_target_too():
+    """Where the surface bends, the approach direction beside the target is another."""
+    robot, task, feasible = load_robot("puma560"), Task(0.0, 30.0, 0.01), 0
+    ball = sphere(0.2, (80, 100), (170, 190), side="outside", position=(1.0, 0.1, 0.0))
+    for push in np.linspace(0.55, 0.7, 8):
+        cells = ball.moved(np.eye(3), (push, 0.0, 0.0)).cells(1, 1)
+        verdict, targets = check(robot, cells, task), task.targets(cells)
+        if verdict.feasible:
+            feasible += 1
+            (point,), (axis,) = tools(robot, verdict.witness.q[:1])
+            assert np.linalg.norm(point - targets.points[0]) <= 0.01
+            chord = np.linalg.norm(axis - targets.approaches[0])
+            assert chord <= 2.0 * np.sin(np.radians(15.0)) + 1e-12
+    assert feasible > 0
+
+
+@pytest.mark.parametrize(
+    ("stroke", "tool", "feasible"),
+    [((-3.9, -2.5), -3.0, True), ((-3.9, -2.5), 1.0, False), ((50.0, 60.0), 55.0, True),
+     ((-np.inf, -2.5), -7.0, True), (FREE, 8.0, True)],
+)  # fmt: skip
+def test_a_slide_whose_stroke_lies_far_out(stroke, tool, feasible):
+    """Guesses stay inside the limits, wherever these are; what is out of reach is proved so."""
+    sliding = joint(1, "prismatic", axis=(1, 0, 0), limits=(-1, 1))
+    robot = robot_of([sliding, joint(2)]).with_limits({"j1": stroke})
+    cells = plane((tool - 0.1, tool + 0.1), (-1e-4, 1e-4), side="outside").cells(3, 1)
+    guesses = Exploration(robot, cells, arrays_of(robot, cells, Task(0.0, 180)), 0).guesses(50)
+    assert ((guesses >= robot.lower) & (guesses <= robot.upper)).all()
+    verdict = check(robot, cells, Task(0.0, 180))
+    assert (verdict.feasible, verdict.evidence) == (feasible, "witness" if feasible else "proof")
+
+
+# motions, and the walk
+
+
+def refusal(robot, cells, task, q, first, last):
+    """Why the replay refuses a motion from one cell's centre to another's; empty if it does not."""
+    marks = np.full(len(q), -1)
+    marks[0], marks[-1] = first, last
+    return replay(robot, cells, task, Walk(q, marks), np.zeros(len(cells), dtype=bool)).refusal
+
+
+def assert_walked(roadmap, walk):
+    """Only steps of stored motions, and marks where nodes are; returns the cells in order."""
+    steps = set()
+    for e in range(int(roadmap.counters[EDGES])):
+        motion = [tuple(q) for q in edge_motion(roadmap, e)]
+        steps |= set(pairwise(motion)) | set(pairwise(motion[::-1]))
+    used = int(roadmap.counters[NODES])
+    nodes = {tuple(roadmap.q[x]): int(roadmap.cell[x]) for x in range(used)}
+    rows = [tuple(q) for q in walk.q]
+    assert set(pairwise(rows)) <= steps
+    assert [nodes.get(row, -1) for row in rows] == walk.cell.tolist()
+    return walk.cell[walk.cell >= 0].tolist()
+
+
+@pytest.mark.parametrize("name", QUESTIONS)
+def test_every_motion_that_a_search_stores_holds_and_the_walk_takes_them_alone(name):
+    """Spread, explored and closed: edges run from node to node, and the judge accepts them."""
+    robot, cells, task = question(name)
+    exploration = Exploration(robot, cells, arrays_of(robot, cells, task), 0)
+    explore(exploration)
+    for cell in range(0, len(cells), 3):
+        exploration.add_seeds(cell, exploration.guesses(3))
+        exploration.explore_self_motions(cell)
+    close(exploration)
+    roadmap = exploration.roadmap
+    count = int(roadmap.counters[EDGES])
+    assert count >= len(cells) - 1
+    for e in range(count):
+        (x, y), motion = roadmap.ends[e], edge_motion(roadmap, e)
+        assert (motion[0] == roadmap.q[x]).all()
+        assert (motion[-1] == roadmap.q[y]).all()
+        assert refusal(robot, cells, task, motion, roadmap.cell[x], roadmap.cell[y]) == ""
+    order = assert_walked(roadmap, covering_walk(roadmap, exploration.best))
+    assert set(order) == set(range(len(cells)))
+    assert len(order) <= 1.4 * len(cells)

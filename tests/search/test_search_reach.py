@@ -1,0 +1,224 @@
+"""Branch and bound never rules out a configuration that exists, and proves plain impossibility."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from arm_urdfs import FREE, joint
+from dense_replay import tools
+from random_arms import (
+    planar_arm,
+    rail_arm,
+    random_arm,
+    random_configuration,
+    random_turn,
+    robot_of,
+    tilted,
+    turn_onto,
+)
+from search_kernels import Motions, ruled
+
+from feasibility import Task
+from feasibility.roadmap import Exploration, Ruling, arrays_of, root_box
+from robots import load_robot
+from surfaces import plane
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def one_target(point, approach, rng):
+    """One cell whose target, without a standoff, is a point and an approach direction."""
+    turn = turn_onto(UP, -approach, rng)
+    return plane((-0.01, 0.01), (-0.01, 0.01), side="outside").moved(turn, point).cells(1, 1)
+
+
+MADE = {
+    "puma560": lambda: load_robot("puma560", limits="set-1"),
+    "ur5": lambda: load_robot("ur5"),
+    "panda": lambda: load_robot("panda"),
+    "planar": lambda: planar_arm(3),
+    "long planar": lambda: planar_arm(5, (-0.9, 1.1)),
+    "ur5 on a rail": lambda: rail_arm("ur5"),
+    "ur5, far windings": lambda: load_robot("ur5", limits=np.radians([[190.0, 560.0]] * 6)),
+    "free joints": lambda: robot_of(
+        [
+            joint(1, "continuous", limits=FREE),
+            joint(2, "continuous", (0.1, 0, 0.3), (np.pi / 2, 0, 0), limits=FREE),
+            joint(3, "continuous", (0.3, 0, 0), (0, np.pi / 2, 0), limits=FREE),
+            joint(4, "prismatic", (0.2, 0, 0), axis=(1, 0, 0), limits=(0.0, 0.4)),
+        ]
+    ),
+}
+some_arm = cache(lambda name: MADE[name]())
+
+
+def covered(rng, robot, task):
+    """A configuration at random, and a target that it just covers: point, approach."""
+    q = random_configuration(robot, rng)
+    (point,), (axis,) = tools(robot, q[None])
+    offset = rng.normal(size=3)
+    offset *= 0.999 * task.tolerance / np.linalg.norm(offset)
+    return q, point + offset, tilted(axis, 0.9999 * task.cone, rng)
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_what_an_arm_reaches_is_never_proved_out_of_reach(name):
+    """60 targets an arm: 480 in all, from configurations that may be at limits or singular.
+
+    The target is as far off as the tolerance allows and as tilted as the cone allows (0 to 180
+    degrees), so that a bound that is slightly too tight would be found. The joints are held
+    to boxes about the configuration, 1e-3 to 2 rad wide, which branch and bound can finish; the
+    configuration may be at their borders. Boxes beside it are often proved, which shows this.
+    """
+    robot, rng, beside = some_arm(name), np.random.default_rng(sum(name.encode())), []
+    for k in range(60):
+        task = Task(0.0, (0.0, 0.01, 5.0, 45.0, 120.0, 180.0)[k % 6], (1e-3, 1e-5, 0.02)[k % 3])
+        q, point, approach = covered(rng, robot, task)
+        cells = one_target(point, approach, rng)
+        width = 10.0 ** rng.uniform(-3.0, 0.3)
+        low = q - np.clip(rng.uniform(-0.3, 1.3, robot.n), 0.0, 1.0) * width
+        box = robot.with_limits(np.column_stack([low, np.maximum(low + width, q)]))
+        outcome, found, _ = ruled(box, cells, task)
+        assert outcome is not Ruling.PROVED, (q.tolist(), box.lower, box.upper, task)
+        if outcome is Ruling.REACHED:
+            (there,), (held,) = tools(robot, found[None])
+            assert np.linalg.norm(there - point) <= task.tolerance + 1e-12
+            assert np.arccos(np.clip(held @ approach, -1, 1)) <= task.cone + 1e-7
+        shifted = np.column_stack([low, low + width]) + 1.5 * width + 0.05
+        beside.append(ruled(robot.with_limits(shifted), cells, task).ruling)
+    assert beside.count(Ruling.PROVED) >= 20
+    assert ruled(robot, cells, task).ruling is not Ruling.PROVED
+
+
+def test_what_random_arms_reach_is_never_proved_out_of_reach():
+    """200 targets of 50 random arms, joints of every kind, 500 boxes each."""
+    rng = np.random.default_rng(4)
+    for number in range(200):
+        if number % 4 == 0:
+            robot = random_arm(rng)
+        task = Task(0.0, float(rng.choice([0.0, 10.0, 90.0])), 10.0 ** rng.uniform(-5, -2))
+        q, point, approach = covered(rng, robot, task)
+        width = 10.0 ** rng.uniform(-3.0, 0.3, robot.n)
+        low = q - rng.random(robot.n) * width
+        box = robot.with_limits(np.column_stack([low, np.maximum(low + width, q)]))
+        outcome = ruled(box, one_target(point, approach, rng), task, 500).ruling
+        assert outcome is not Ruling.PROVED, (robot.lower, robot.upper, q.tolist(), task)
+
+
+@pytest.mark.parametrize("name", ["puma560", "planar", "free joints"])
+def test_newton_finds_nothing_where_there_is_a_proof(name):
+    """60 random targets, near the edge of what the arm can do: both answers come up."""
+    robot, rng, proved = some_arm(name), np.random.default_rng(7), 0
+    for _ in range(60):
+        direction = rng.normal(size=3)
+        if name == "planar":
+            direction[2] = 0.0
+        point = direction / np.linalg.norm(direction) * rng.uniform(0.2, 1.3) * robot.reach
+        task, cells = Task(0.0, 70.0, 1e-3), one_target(point, random_turn(rng)[0], rng)
+        if ruled(robot, cells, task).ruling is not Ruling.PROVED:
+            continue
+        proved += 1
+        low, high = np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi)
+        guesses = rng.uniform(low, high, (25, robot.n))
+        assert not len(Motions(robot, cells, task).landed(0, guesses))
+    assert 5 <= proved < 60
+
+
+@pytest.mark.parametrize(
+    ("name", "most"), [("puma560", 20_000), ("planar", 2000), ("free joints", 20_000)]
+)
+def test_beyond_reach_is_proved(name, most):
+    """1.02 times the reach away from the shoulder, in 10 directions."""
+    rng, robot = np.random.default_rng(5), some_arm(name)
+    shoulder = robot.model.jointPlacements[1].translation
+    for _ in range(10):
+        direction = random_turn(rng)[0]
+        if name == "planar":
+            direction = np.array([*direction[:2], 0.0]) / np.linalg.norm(direction[:2])
+        cells = one_target(shoulder + 1.02 * robot.reach * direction, -direction, rng)
+        assert ruled(robot, cells, Task(0.0, 180, 1e-3), most).ruling is Ruling.PROVED
+
+
+def test_a_planar_arm_cannot_point_out_of_its_plane():
+    """The tool axis lies in the plane: 90 degrees from z, whatever the joints do."""
+    robot, rng = planar_arm(3), np.random.default_rng(6)
+    for distance in (0.1, 0.4, 0.8):
+        cells = one_target(np.array([distance, 0.1, 0.0]), UP, rng)
+        assert ruled(robot, cells, Task(0.0, 85.0, 1e-3), 5000).ruling is Ruling.PROVED
+        assert ruled(robot, cells, Task(0.0, 90.1, 1e-3), 5000).ruling is not Ruling.PROVED
+    # Nor can it leave the plane, be it by little more than the tolerance.
+    for height, impossible in ((1.1e-3, True), (0.9e-3, False)):
+        cells = one_target(np.array([0.5, 0.1, height]), UP, rng)
+        outcome = ruled(robot, cells, Task(0.0, 180.0, 1e-3), 20_000).ruling
+        assert (outcome is Ruling.PROVED) == impossible
+
+
+def crank(low_deg, high_deg, kind="revolute"):
+    """A single link of 0.5 m about z."""
+    limits = tuple(np.radians([low_deg, high_deg]).tolist()) if kind == "revolute" else FREE
+    return robot_of([joint(1, kind, limits=limits), joint(2, "fixed", (0.5, 0, 0))])
+
+
+def at_angle(angle):
+    return 0.5 * np.array([np.cos(angle), np.sin(angle), 0.0])
+
+
+@pytest.mark.parametrize(
+    ("limits", "inside", "outside"),
+    [
+        ((120, 240), (120, 150, 180, -150, -120), (119, -119, 0, 90, -90)),
+        ((-30, 30), (-30, 0, 30, 360), (31, -31, 180)),
+        ((170, 190), (170, 180, -170), (169, -169, 0)),
+        ((300, 420), (300, -60, 0, 59, 60), (299, 61, 180)),
+        ((-400, -300), (-40, 0, 60), (-41, 61, 180)),
+        ((-180, 180), (-180, 180, 0, 90), ()),
+        ((0, 360), (0, 360, -90, -1, 180), ()),
+        ((10, 369), (10, 9, 369, -170), (9.5,)),
+        ((10, 371), (10, 9.5, 180, -5), ()),
+        ((1000, 1400), (0, 90, 180, 270), ()),
+    ],
+)
+def test_limits_are_real_intervals_and_full_turns_are_not_cut(limits, inside, outside):
+    """Angles (degrees) of a crank that are inside limits, and that are not, by any winding."""
+    rng, robot, task = np.random.default_rng(8), crank(*limits), Task(0.0, 180, 1e-4)
+    for angles, expected in ((inside, Ruling.REACHED), (outside, Ruling.PROVED)):
+        for angle in np.radians(angles):
+            outcome = ruled(robot, one_target(at_angle(angle), UP, rng), task).ruling
+            at_limit = expected is Ruling.REACHED and outcome is Ruling.UNKNOWN
+            assert outcome is expected or at_limit, (np.degrees(angle), outcome)
+
+
+@pytest.mark.parametrize("limits", [(10, 371), (190, 560), (-350, 20), (1000, 1400)])
+def test_what_branch_and_bound_finds_is_seeded_at_its_winding(limits):
+    """It searches one turn about zero; the limits may lie elsewhere. The seed must not be lost."""
+    rng, turning = np.random.default_rng(11), tuple(np.radians(limits).tolist())
+    elbow = joint(2, xyz=(0.3, 0, 0), limits=(-1.5, 1.5))
+    robot = robot_of([joint(1, limits=turning), elbow, joint(3, "fixed", (0.3, 0, 0))])
+    for angle in np.radians([-170.0, -90.0, -10.0, 5.0, 95.0, 175.0]):
+        cells = one_target(at_angle(angle), UP, rng)
+        exploration = Exploration(robot, cells, arrays_of(robot, cells, Task(0.0, 180, 1e-2)), 0)
+        outcome = exploration.rule(0, root_box(exploration.arrays), 2000)
+        assert outcome in (Ruling.REACHED, Ruling.UNKNOWN)
+        assert exploration.reached[0]
+
+
+def test_a_continuous_joint_turns_all_the_way():
+    """No angle of a free crank is proved out of reach."""
+    rng, robot = np.random.default_rng(9), crank(0, 0, "continuous")
+    for angle in np.linspace(-np.pi, np.pi, 33):
+        cells = one_target(at_angle(angle), UP, rng)
+        assert ruled(robot, cells, Task(0.0, 180, 1e-4)).ruling is Ruling.REACHED
+
+
+@pytest.mark.parametrize("limits", [FREE, (0.0, np.inf), (-np.inf, 1.0)])
+def test_a_slide_without_ends_proves_nothing(limits):
+    """Boxes of infinite width cannot be split to the end: the ruling stays unknown."""
+    rng, turning = np.random.default_rng(10), joint(2, limits=(-3.0, 3.0))
+    sliding = joint(1, "prismatic", axis=(1, 0, 0), limits=(-1.0, 1.0))
+    robot = robot_of([sliding, turning, joint(3, "fixed", (0.5, 0, 0))]).with_limits({"j1": limits})
+    for x in (0.7, 30.0, -30.0):
+        (point,), _ = tools(robot, np.array([[np.clip(x, *limits), 0.4]]))
+        outcome = ruled(robot, one_target(point, UP, rng), Task(0.0, 180, 1e-3)).ruling
+        assert outcome is not Ruling.PROVED

@@ -1,0 +1,443 @@
+"""The search's bound between samples, against dense sampling by Pinocchio, on random arms."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from arm_urdfs import joint
+from bounds import holds
+from dense_replay import tools
+from random_arms import (
+    between,
+    deviation,
+    planar_arm,
+    random_arm,
+    random_configuration,
+    random_surface,
+    random_turn,
+    robot_of,
+    tilted,
+    turn_onto,
+)
+from samples import sampled, seeds
+from scipy.spatial.transform import Rotation
+from search_kernels import Motions
+
+from feasibility import Task
+from feasibility.roadmap.motions.roll import frame_rates, roll_off_middle
+from feasibility.roadmap.motions.segment_bound import peak
+from feasibility.roll import Roll, projected, roll_of
+from robots import load_robot
+from surfaces import cylinder, sphere
+from surfaces.patches import GridCells
+
+ROUNDING = 1e-12
+KINDS = ["sphere", "cylinder", "hyperboloid", "plane"]
+
+
+def references(robot, q):
+    """The reference axes (k, 3) of configurations (k, n), by Pinocchio."""
+    turned = replace(robot, approach_axis=robot.reference_axis, reference_axis=robot.approach_axis)
+    return tools(turned, q)[1]
+
+
+def sag_of(values, s):
+    """(k,) how far values (k, 3) along s are off their chord, over s (1 - s) / 2; ends left out."""
+    chord = (1.0 - s[:, None]) * values[0] + s[:, None] * values[-1]
+    off = np.linalg.norm(values - chord, axis=1)[1:-1]
+    return np.maximum(off - ROUNDING, 0.0) / (0.5 * s * (1.0 - s))[1:-1]
+
+
+# the tool along a segment
+
+
+def test_second_derivatives_bound_the_sag_of_every_segment():
+    """500 segments of 50 arms, steps of 1e-4 to 3 rad in all joints or in a few."""
+    rng, bounds, truths = np.random.default_rng(1), [], []
+    for _ in range(50):
+        robot = random_arm(rng)
+        motions = Motions(robot)
+        for _ in range(10):
+            q0 = random_configuration(robot, rng)
+            step = rng.normal(size=robot.n) * 10.0 ** rng.uniform(-4.0, 0.5)
+            if rng.random() < 0.5:
+                step *= rng.random(robot.n) < 0.4
+            s, q = between(q0, q0 + step, 32)
+            truths.append([sag_of(values, s).max() for values in tools(robot, q)])
+            bounds.append(np.multiply(motions.sag(q0, q0 + step), 1.0 + 1e-9) + 1e-8)
+    for bound, truth in zip(np.transpose(bounds), np.transpose(truths), strict=True):
+        holds(bound, truth, 0.99)
+        some = bound > 1e-6
+        assert np.median(truth[some] / bound[some]) > 0.15
+
+
+def test_levers_hold_where_they_are_longer_in_the_middle_than_at_the_ends():
+    """Folded, stretched, folded again: the lever of the first joint peaks halfway.
+
+    Ends: the second joint at -+bend, so that the tool is as near to the first axis at both. All
+    terms of the second derivative point to the base where the arm is stretched.
+    """
+    robot, bounds, truths = planar_arm(2, (-3.1, 3.1)), [], []
+    motions, s, h = Motions(robot), np.linspace(0.01, 0.99, 99)[:, None], 1e-4
+    for bend in np.linspace(0.05, 3.1, 30):
+        for turn in (0.01, 0.1, 1.0, 3.0):
+            q0, q1 = np.array([0.0, -bend]), np.array([turn, bend])
+            before, at, behind = (tools(robot, q0 + t * (q1 - q0))[0] for t in (s - h, s, s + h))
+            second = np.linalg.norm(before - 2.0 * at + behind, axis=1) / h**2
+            truths.append(second.max())
+            bounds.append(motions.sag(q0, q1)[0] * (1.0 + 1e-6) + 1e-6)
+    holds(bounds, truths, 0.9)
+
+
+def test_peak_is_the_largest_value():
+    """Against 2,001 points of the parabola, for random ones; exactly at its corner cases."""
+    rng, s = np.random.default_rng(2), np.linspace(0.0, 1.0, 2001)
+    for _ in range(500):
+        (a, b), most = rng.uniform(0.0, 1.0, 2), 10.0 ** rng.uniform(-3.0, 2.0)
+        sampled_most = ((1.0 - s) * a + s * b + 0.5 * most * s * (1.0 - s)).max()
+        assert sampled_most <= peak(a, b, most) * (1.0 + 1e-12)
+        assert peak(a, b, most) <= sampled_most + 0.5 * most * 2.6e-7
+    assert (peak(0.3, 0.3, 0.0), peak(0.0, 0.5, 1.0)) == (0.3, 0.5)
+    assert peak(0.2, 0.2, 8.0) == pytest.approx(1.2, rel=1e-15)
+    assert peak(0.1, 0.2, np.inf) == np.inf
+    assert all(np.isnan(peak(*np.where(np.arange(3) == k, np.nan, 0.1))) for k in range(3))
+
+
+# segments beside a moving target
+
+
+def two_cells(surface, parameters):
+    """Two neighbouring cells of a patch with their centres at given parameters (2, 2)."""
+    u, v = np.transpose(parameters)
+    points, normals = surface.point(u, v), surface.normal(u, v)
+    return GridCells(surface, points, normals, np.ones(2), (1, 2), u=u, v=v)
+
+
+def surface_segment(rng, robot, kind, task, offsets, longest, onto):
+    """A segment that starts near a random target surface, its axis at some share of the cone.
+
+    Its targets run along a curve from the closest point of one end to that of the other. Returns
+    motions, cells, q0, q1, or None where Newton does not bring the second end onto the surface.
+    """
+    surface = random_surface(rng, kind)
+    u, v = (rng.uniform(*span) * 0.9 for span in (surface.u_range, surface.v_range))
+    sign, normal = surface.side_sign, surface.normal(u, v)
+    target = surface.point(u, v) + sign * task.standoff * normal
+    q0 = random_configuration(robot, rng)
+    (point,), (axis,) = tools(robot, q0[None])
+    share = rng.random() if onto is not None else rng.uniform(0.5, 1.0)
+    approach = tilted(axis, share * min(task.cone, 3.1), rng)
+    offset = rng.normal(size=3)
+    offset *= rng.choice(offsets) * task.tolerance / np.linalg.norm(offset)
+    turn = turn_onto(-sign * normal, approach, rng)
+    surface = surface.moved(turn, point + offset - turn @ target)
+    q1 = q0 + rng.normal(size=robot.n) * 10.0 ** rng.uniform(-3.0, longest)
+    (away,), _ = tools(robot, q1[None])
+    closest = surface.closest(np.array([surface.point(u, v), away]))
+    cells = two_cells(surface, np.column_stack([closest.u, closest.v]))
+    motions = Motions(robot, cells, task)
+    if task.roll is not None:
+        middle = motions.roll_off(q0) + rng.uniform(-1.0, 1.0) * task.roll.half
+        motions.turn_range(middle, task.roll.half)
+    if onto:
+        q1 = motions.onto(q1)
+    return None if q1 is None else (motions, cells, q0, q1)
+
+
+def beside_the_curve(robot, cells, task, q):
+    """Distance from the moving target and |a - b|, at even places of the curve; and its normals."""
+    points, axes = tools(robot, q)
+    s = np.linspace(0.0, 1.0, len(q))
+    on_curve, normal = cells.curves.at(np.zeros(len(q), dtype=np.int64), s)
+    sign = cells.surface.side_sign
+    off = np.linalg.norm(points - on_curve - sign * task.standoff * normal, axis=1)
+    return off, np.linalg.norm(axes + sign * normal, axis=1), normal
+
+
+@sampled
+@pytest.mark.parametrize("seed", seeds(1, all=10))
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_segment_that_is_accepted_holds_everywhere(kind, seed):
+    """Segments at either side of random surfaces in any pose, 120 of each kind, 40 samples on each.
+
+    It accepts a fair part, and some use at least half of what it allows beyond the ends' errors.
+    """
+    rng, tried, passed, worst = np.random.default_rng([KINDS.index(kind), seed]), 0, 0, 0.0
+    for number in range(120):
+        if number % 20 == 0:
+            robot = random_arm(rng)
+        cone_deg = float(rng.choice([2.0, 20.0, 60.0, 120.0, 179.0, 180.0]))
+        task = Task(float(rng.choice([0.0, 0.05])), cone_deg, 10.0 ** rng.uniform(-4.5, -2.0))
+        onto = bool(rng.random() < 0.8)
+        made = surface_segment(rng, robot, kind, task, (0.0, 0.02, 0.7), -0.3, onto)
+        if made is None:
+            continue
+        motions, cells, q0, q1 = made
+        held, tried = motions.along_curve(q0, q1), tried + 1
+        if not held.holds:
+            continue
+        passed += 1
+        q = between(q0, q1, 40)[1]
+        off, chord, _ = beside_the_curve(robot, cells, task, q)
+        assert off.max() <= min(held.off + ROUNDING, task.tolerance)
+        if cone_deg < 180.0:
+            assert chord.max() <= held.chord + ROUNDING
+            if held.on_target:
+                own = deviation(cells.surface, task.standoff, *tools(robot, q)).chord
+                assert 2.0 * np.arcsin(np.minimum(0.5 * own, 1.0)).max() <= task.cone + 1e-9
+        ends = max(off[0], off[-1])
+        if held.off - ends > 1e-7:
+            worst = max(worst, (off.max() - ends) / (held.off - ends))
+    assert tried > 54
+    assert passed > 24
+    assert worst > 0.5
+
+
+@sampled
+@pytest.mark.parametrize("seed", seeds(1, all=10))
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_cone_holds_on_long_segments(kind, seed):
+    """The tolerance is 0.15 m, and cones go beyond 90 deg.
+
+    There a normal that bulges between the ends turns away from the axis: the bound covers that.
+    """
+    rng, passed = np.random.default_rng([10 + KINDS.index(kind), seed]), 0
+    for number in range(90):
+        if number % 15 == 0:
+            robot = random_arm(rng)
+        task = Task(0.01, float(rng.choice([45.0, 100.0, 150.0, 178.0])), 0.15)
+        made = surface_segment(rng, robot, kind, task, (0.0, 0.3), 0.1, None)
+        motions, cells, q0, q1 = made
+        held = motions.along_curve(q0, q1)
+        if held.off <= 0.15:
+            passed += 1
+            off, chord, _ = beside_the_curve(robot, cells, task, between(q0, q1, 20)[1])
+            assert off.max() <= held.off + ROUNDING
+            assert chord.max() <= held.chord + ROUNDING
+    assert passed > 25
+
+
+@sampled
+@pytest.mark.parametrize("seed", seeds(1, all=10))
+@pytest.mark.parametrize("kind", KINDS)
+def test_roll_holds_on_a_segment_that_is_accepted(kind, seed):
+    """Ranges of 0.5 to 300 deg about a random reference, over the curve and over the own foot."""
+    rng, passed = np.random.default_rng([20 + KINDS.index(kind), seed]), 0
+    for number in range(128):
+        if number % 16 == 0:
+            robot = random_arm(rng)
+        half = float(rng.choice([0.25, 2.0, 15.0, 150.0]))
+        cone_deg = float(rng.choice([2.0, 20.0, 60.0, 90.0]))
+        task = Task(
+            float(rng.choice([0.0, 0.05])), cone_deg, 10.0 ** rng.uniform(-3.5, -2.0),
+            roll_deg=(-half, half), roll_reference=tuple(rng.normal(size=3).tolist()),
+        )  # fmt: skip
+        made = surface_segment(rng, robot, kind, task, (0.0, 0.02), -0.3, True)
+        held = None if made is None else made[0].along_curve(*made[2:])
+        if held is None or not held.holds:
+            continue
+        passed += 1
+        motions, cells, q0, q1 = made
+        roll, q = Roll(*motions.arrays.roll.tolist()), between(q0, q1, 20)[1]
+        (points, axes), x = tools(robot, q), references(robot, q)
+        _, _, normals = beside_the_curve(robot, cells, task, q)
+
+        def off_middle(normals, cells=cells, task=task, axes=axes, x=x, roll=roll):
+            b = -cells.surface.side_sign * normals
+            t, sine = projected(np.broadcast_to(task.fixed_reference(cells), b.shape), b)
+            return np.where(sine > 0.02, np.abs(roll.off(roll_of(x, axes, t, b))), 0.0).max()
+
+        assert off_middle(normals) <= min(held.roll + held.roll_off, roll.half)
+        if held.on_target:
+            assert off_middle(cells.surface.closest(points).normal) <= roll.half
+    assert passed > 20
+
+
+@pytest.mark.parametrize("kind", ["sphere", "cylinder"])
+@pytest.mark.parametrize("half", [0.01, 0.1, 0.3])
+def test_a_normal_that_bulges_away_from_a_fixed_axis(kind, half):
+    """A gantry with its tool turned away: 2 cos(half / 2) at the ends, 2 in the middle.
+
+    The growth is at least 0.2 of what the bound allows for (the most that a bound by the ends'
+    norms alone can do here is 0.43, and as much again is for the normal at the closest point).
+    """
+    gantry = robot_of([joint(i, "prismatic", axis=np.eye(3)[i - 1]) for i in (1, 2, 3)], (1, 0, 0))
+    ball, pipe = sphere(1, (20, 160), (-90, 90), side="outside"), cylinder(1, (-90, 90), (-1, 1))
+    surface = ball if kind == "sphere" else replace(pipe, side="outside")
+    ends = [(np.pi / 2, a) if kind == "sphere" else (a, 0.0) for a in (-half, half)]
+    # The approach direction is -x where the surface's outward normal is +x.
+    motions = Motions(gantry, two_cells(surface, ends), Task(0.0, 179.0, 0.1))
+    held = motions.along_curve(*(np.array([np.cos(a), np.sin(a), 0.0]) for a in (-half, half)))
+    assert 1.0 - np.cos(half) <= held.off <= 1.2 * (1.0 - np.cos(half))
+    end = 2.0 * np.cos(half / 2.0)
+    assert held.chord >= 2.0 - ROUNDING
+    assert (2.0 - end) / (held.chord - end) > 0.2
+
+
+def test_the_cone_holds_at_the_tool_point_s_own_place_on_the_surface():
+    """The tool goes round a small circle across a ball's normal, beside the curve between its ends.
+
+    Its axis stays; halfway it is 20 mm further out than the curve, where the normal leans more.
+    """
+    robot = robot_of([joint(1, xyz=(0, 0.22, 0)), joint(2, "fixed", (0, 0.1, 0))], (0, 0, -1))
+    turn = np.arcsin(0.6)
+    ends = tools(robot, np.array([[turn], [-turn]]))[0]
+    ball = sphere(1.0, (0, 90), (-180, 180), side="outside")
+    down = np.sqrt(1.0 - ends[0, 0] ** 2 - ends[0, 1] ** 2)
+    ball = ball.moved(np.eye(3), (0.0, 0.0, -down))
+    at = ball.closest(ends)
+    motions = Motions(robot, two_cells(ball, np.column_stack([at.u, at.v])), Task(0.0, 30.0, 0.2))
+    held = motions.along_curve(np.array([turn]), np.array([-turn]))
+    assert held.on_target
+    own = deviation(ball, 0.0, *tools(robot, np.linspace(turn, -turn, 41)[:, None])).chord
+    assert own.max() <= held.chord
+    assert own.max() - own[0] > 0.35 * (held.chord - own[0])
+
+
+def test_nothing_that_is_not_a_number_passes():
+    """NaN or infinity in a joint, or a surface that folds, never certifies a segment."""
+    q, up = np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.0, 1.0])
+    motions = Motions(planar_arm(3), None, Task(0.0, 100, 1.0))
+    there = motions.at_rest(q, q, np.zeros(3), up)
+    assert there.holds
+    assert there.chord == pytest.approx(np.sqrt(2.0))
+    for bad in (np.nan, np.inf):
+        assert not motions.at_rest(q, np.array([0.1, bad, 0.3]), np.zeros(3), up).holds
+    assert motions.at_rest(q, q + 1e-3, np.zeros(3), up).holds
+    motions.arrays = motions.arrays._replace(curvature=np.inf)
+    assert not motions.at_rest(q, q + 1e-3, np.zeros(3), up).holds
+
+
+# roll
+
+
+def wrapped(angle):
+    return (angle + np.pi) % (2.0 * np.pi) - np.pi
+
+
+def test_roll_is_the_angle_left_by_the_least_rotation_onto_the_approach():
+    """Random frames, tilts up to 170 deg, any middle of the range."""
+    rng = np.random.default_rng(1)
+    for _ in range(300):
+        x, _, a = random_turn(rng).T
+        b = tilted(a, rng.uniform(0.0, 2.97), rng)
+        t = np.cross(b, rng.normal(size=3))
+        t, middle = t / np.linalg.norm(t), rng.uniform(-7.0, 7.0)
+        across = np.cross(a, b)
+        angle = np.arctan2(np.linalg.norm(across), a @ b)
+        carried = Rotation.from_rotvec(across / np.linalg.norm(across) * angle).apply(x)
+        expected = np.arctan2(np.cross(b, t) @ carried, t @ carried)
+        off = roll_off_middle(np.array([np.zeros(3), b, t]), a, x, middle)
+        assert -np.pi <= off <= np.pi
+        assert abs(wrapped(off + middle - expected)) < 1e-10
+
+
+def random_frame(rng, size):
+    """A cubic b and t (4, 3) each, near unit vectors at right angles, that turn by about `size`."""
+    cubics = np.zeros((2, 4, 3))
+    cubics[:, 0] = random_turn(rng)[:2]
+    cubics[:, 1:] = rng.normal(size=(2, 3, 3)) * size * 10.0 ** rng.uniform(-2, 0, (2, 3, 1))
+    return cubics
+
+
+def frame_along(cubics, s):
+    """Unit b (k, 3), and t made a unit vector across it."""
+    b, t = (s[:, None] ** np.arange(4) @ cubic for cubic in cubics)
+    b = b / np.linalg.norm(b, axis=1)[:, None]
+    t = t - (t * b).sum(axis=1)[:, None] * b
+    return b, t / np.linalg.norm(t, axis=1)[:, None]
+
+
+def bounds_of(cubics):
+    """The arguments of `frame_rates` for cubics of b and t, by 400 samples."""
+    s = np.linspace(0.0, 1.0, 401)
+    powers = s[:, None] ** np.arange(4)
+    (b, t), right = (powers @ cubic for cubic in cubics), frame_along(cubics, s)
+    slope = np.linalg.norm(powers[:, :3] @ (cubics[1, 1:] * [[1], [2], [3]]), axis=1).max()
+    ends = [np.linalg.norm(powers[:, :2] @ (c[2:] * [[2], [6]]), axis=1).max() for c in cubics]
+    off, aside = (np.linalg.norm(c - r, axis=1).max() for c, r in zip((b, t), right, strict=True))
+    return np.linalg.norm(b[-1] - b[0]), ends[0], slope, ends[1], off, aside
+
+
+def test_the_turning_of_a_frame_is_bounded():
+    """Random frames, dense differences of their rotations; the bounds are not loose either."""
+    rng, s, used = np.random.default_rng(2), np.linspace(0.0, 1.0, 201), []
+    for _ in range(200):
+        cubics = random_frame(rng, 10.0 ** rng.uniform(-2.5, -0.6))
+        bounds = frame_rates(*bounds_of(cubics))
+        if bounds[0] < np.inf:
+            b, t = frame_along(cubics, s)
+            turns = Rotation.from_matrix(np.stack([t, np.cross(b, t), b], axis=2))
+            om = (turns[1:] * turns[:-1].inv()).as_rotvec() * 200.0
+            speed, change = (np.linalg.norm(np.diff(x, axis=0), axis=1) * 200.0 for x in (b, om))
+            found = np.array([speed.max(), np.linalg.norm(om, axis=1).max(), change.max()])
+            assert (found <= np.array(bounds) * (1.0 + 1e-3) + 1e-6).all()
+            used.append(found / np.maximum(bounds, 1e-9))
+    assert len(used) > 150
+    assert (np.median(used, axis=0) > 0.2).all()
+
+
+@pytest.mark.parametrize("turn", [0.1, 2.0, 2.0 * np.pi, 4.0 * np.pi])
+def test_a_tool_that_turns_all_around_does_not_keep_its_roll(turn):
+    """About its own axis: after whole turns the roll is what it was, and was everything between."""
+    robot = robot_of([joint(1, limits=(-20.0, 20.0)), joint(2, "fixed")])
+    task = Task(0.0, 30, roll_deg=(-10, 10), roll_reference=(1, 0, 0))
+    held = Motions(robot, None, task).at_rest(np.zeros(1), np.array([turn]), np.zeros(3), (0, 0, 1))
+    assert held.holds == (turn < 0.17)
+
+
+@pytest.mark.parametrize("size", [1e-3, 0.01, 0.05])
+def test_two_joints_across_the_tool_axis_turn_the_roll_as_fast_as_is_said(size):
+    """Joints about x and y under a tool axis along z: the second derivative of roll is d1 d2."""
+    robot = robot_of([joint(1, axis=(1, 0, 0)), joint(2, axis=(0, 1, 0)), joint(3, "fixed")])
+    task = Task(0.0, 90, roll_deg=(-10, 10), roll_reference=(1, 0, 0))
+    q0, q1, h = np.zeros(2), size * np.array([1.0, 2.0]), 1e-2
+    s = np.concatenate([np.linspace(h, 1.0 - h, 50) + way * h for way in (-1, 0, 1)])
+    q = q0 + s[:, None] * (q1 - q0)
+    axes, b = tools(robot, q)[1], np.tile([0.0, 0.0, 1.0], (len(q), 1))
+    psi = roll_of(references(robot, q), axes, np.tile([1.0, 0.0, 0.0], (len(q), 1)), b)
+    before, at, behind = psi.reshape(3, -1)
+    second = np.abs(before - 2.0 * at + behind) / h**2
+    chord = np.linalg.norm(axes - b, axis=1).max()
+    _, most = Motions(robot, None, task).roll_rates(q0, q1, (0.0, 0.0, 0.0), chord)
+    holds(most * (1.0 + 1e-6) + 1e-9, second.max(), 0.7)
+
+
+@pytest.mark.parametrize("name", ["puma560", "ur5", "panda", "random"])
+def test_second_derivatives_bound_the_sag_of_roll(name):
+    """Steps up to 0.6 rad a joint, tilts to 60 deg, frames at rest or turning.
+
+    Roll stays as near to its chord as the bound allows, some of it by a third of that; and it
+    changes by no more than its rate.
+    """
+    rng, used = np.random.default_rng(sum(name.encode())), []
+    task = Task(0.0, 90, roll_deg=(-10, 10), roll_reference=(1, 0, 0))
+    for number in range(80):
+        if number == 0 or (name == "random" and number % 4 == 0):
+            robot = random_arm(rng) if name == "random" else load_robot(name)
+            motions = Motions(robot, None, task)
+        q0 = random_configuration(robot, rng)
+        step = rng.normal(size=robot.n) * 10.0 ** rng.uniform(-2.0, -0.3)
+        step *= rng.random(robot.n) < rng.choice([0.4, 1.0])
+        q1 = q0 + np.clip(step, -0.6, 0.6)
+        s, q = between(q0, q1, 24)
+        (_, axes), x = tools(robot, q), references(robot, q)
+        cubics = random_frame(rng, 0.0 if rng.random() < 0.4 else 10.0 ** rng.uniform(-2, -0.8))
+        onto = Rotation.align_vectors(tilted(axes[0], rng.uniform(0.0, 1.0), rng), cubics[0, 0])[0]
+        cubics = onto.apply(cubics.reshape(-1, 3)).reshape(2, 4, 3)
+        b, t = frame_along(cubics, s)
+        chord = np.linalg.norm(axes - b, axis=1).max() * (1.0 + 1e-3)
+        rate, most = motions.roll_rates(q0, q1, frame_rates(*bounds_of(cubics)), chord)
+        if not (chord < 1.3 and most < np.inf):
+            continue
+        psi = np.unwrap(roll_of(x, axes, t, b))
+        sag = np.abs(psi - (1.0 - s) * psi[0] - s * psi[-1])
+        allowed = 0.5 * most * s * (1.0 - s)
+        assert (sag <= allowed + 1e-9).all()
+        assert np.abs(psi - psi[0]).max() <= rate + 1e-9
+        if most > 1e-4:
+            used.append((sag[1:-1] / allowed[1:-1]).max())
+    assert len(used) > 35
+    assert max(used) > 0.35

@@ -1,0 +1,31 @@
+"""Verdicts changed by hand: some cells missed, for causes of every kind."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+
+import numpy as np
+
+from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict
+
+
+def missing(
+    verdict: Verdict, missed: Collection[int], causes: Collection[Cause] | None = None
+) -> Verdict:
+    """The same without some cells; by default causes take turns, and the last cell has none."""
+    kinds = list(CauseKind)
+    if causes is None:
+        causes = [Cause(cell, kinds[k % len(kinds)], proved=True, detail="made up")
+                  for k, cell in enumerate(sorted(missed)[:-1])]  # fmt: skip
+    covered, graph = verdict.covered.copy(), verdict.graph.copy()
+    covered[list(missed)] = False
+    graph.remove_edges_from([edge for edge in graph.edges if set(edge) & set(missed)])
+    for cell in missed:
+        graph.nodes[cell]["q"] = None
+    start = int(np.flatnonzero(covered)[0]) if covered.any() else None
+    return replace(
+        verdict, answer=Answer.INFEASIBLE, evidence=Evidence.EXHAUSTED, message="Made up.",
+        covered=covered, causes=tuple(causes), graph=graph, n_edges=graph.number_of_edges(),
+        start=start, witness=None, certificate=None, tree=None, components=(),
+    )  # fmt: skip

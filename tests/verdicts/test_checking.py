@@ -1,0 +1,297 @@
+"""`check` itself: the same question has the same answer; budgets, progress and interruption."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+import networkx as nx
+import numpy as np
+import plain
+import pytest
+from asked import case_of, question, verdict_of
+
+from coverable_errors import ArgumentError
+from feasibility import Answer, Evidence, Search, Task, Verdict, check, greedy_check, verify
+from feasibility.cases import Case
+from feasibility.collisions import Collision
+from feasibility.reports.verdict import as_json
+from feasibility.results import load_result, save_result
+from feasibility.roadmap import warm_up
+from feasibility.roadmap.exploration import BUDGET
+from surfaces import piecewise, plane
+from surfaces.meshes import TriangleMesh, mesh
+
+GUARD_S = 1800.0  # against hanging alone
+FEW = (
+    "paper 5d",
+    "long plate",
+    "puma560 20",
+    "puma560 190",
+    "ur5 12",
+    "dome of halves",
+    "beside a post",
+)
+
+
+def same(one, other):
+    """Equal to the last bit."""
+    assert (one.answer, one.evidence, one.message) == (other.answer, other.evidence, other.message)
+    np.testing.assert_array_equal(one.covered, other.covered)
+    assert (one.witness is None) == (other.witness is None)
+    if one.witness is not None:
+        np.testing.assert_array_equal(one.witness.q, other.witness.q)
+        np.testing.assert_array_equal(one.witness.cell, other.witness.cell)
+    assert one.statistics == other.statistics
+    assert one.causes == other.causes
+
+
+def ask(name, **given):
+    _, _, robot, cells, task, search = question(name)
+    return check(robot, cells, task, given.pop("search", search), **given)
+
+
+@pytest.mark.parametrize("name", FEW)
+def test_a_seed_fixes_the_verdict_and_the_motion(name):
+    """Nor does it matter who looks on, or a time limit that is not reached."""
+    told = []
+    progress = lambda done, total, text: told.append((done, total, text))  # noqa: E731
+    seed = question(name).search.seed
+    same(
+        verdict_of(name), ask(name, search=Search(seed=seed, time_limit=3600.0), progress=progress)
+    )
+    total = len(question(name).cells)
+    assert told
+    assert all(0 <= done <= (total if most is None else most) for done, most, _ in told)
+    assert all(text for _, _, text in told)
+
+
+def test_threads_do_not_disturb_each_other():
+    with ThreadPoolExecutor(4) as pool:
+        for name, verdict in zip(FEW, pool.map(ask, FEW), strict=True):
+            same(verdict_of(name), verdict)
+
+
+PRINT_WITNESS = """
+import hashlib
+from feasibility import Task, check
+from robots import load_robot
+from surfaces import plane
+patch = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside")
+walk = check(load_robot("ur5"), patch.cells(3, 4), Task(standoff=0.02, cone_deg=30)).witness
+print(hashlib.sha256(walk.q.tobytes() + walk.cell.tobytes()).hexdigest())
+"""
+
+
+def test_another_process_finds_the_same_motion():
+    walk = verdict_of("plate").witness
+    here = hashlib.sha256(walk.q.tobytes() + walk.cell.tobytes()).hexdigest()
+    other = subprocess.run(
+        [sys.executable, "-c", PRINT_WITNESS],
+        env={**os.environ, "PYTHONHASHSEED": "1"},
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=GUARD_S,
+    )
+    assert other.stdout.strip() == here
+
+
+# Budgets and interruption: all cells are reached, in several components that nothing joins, and
+# there are too many of them to end soon.
+
+HARD = """
+robot = { name = "puma560", limits_deg = [
+    [-180, 180], [-180, 180], [-180, 180], [-140.6, 65.3], [-180, 123.7], [-180, 180]] }
+task = { standoff = 0, cone_deg = 20.7 }
+[surface]
+kind = "hyperboloid"
+radius = 0.22
+flare = 0.48
+u_deg = [-91, 134]
+v = [-0.39, 0.376]
+position = [-0.4, -0.69, -0.466]
+rpy_deg = [-45.7, 111.4, -144.1]
+side = "outside"
+cells = [240, 200]
+"""
+
+
+@pytest.fixture(scope="module")
+def hard():
+    return Case.from_toml(HARD).build()[:3]
+
+
+class Clock:
+    """The search's clock, on which the time limit passes at the k-th look."""
+
+    def __init__(self, looks: int) -> None:
+        self.looks = -1  # the first one starts it
+        self.enough = looks
+
+    def monotonic(self) -> float:
+        self.looks += 1
+        return 0.0 if self.looks < self.enough else np.inf
+
+
+@pytest.mark.parametrize("looks", [1, 2, 5, 40])
+def test_a_time_limit_is_honoured(looks, hard, monkeypatch):
+    warm_up()
+    clock = Clock(looks)
+    monkeypatch.setattr("feasibility.clock.time", clock)
+    verdict = check(*hard, Search(time_limit=3600.0))
+    assert (verdict.answer, verdict.evidence) == (Answer.UNDECIDED, Evidence.BUDGET)
+    assert "time limit" in verdict.message
+    assert (verdict.witness, verdict.certificate) == (None, None)
+    # The compiled loops come back soon, and nothing goes on once the time is up.
+    assert clock.looks <= looks + 2
+    assert verdict.statistics["fk"] <= 1.1 * BUDGET * looks
+    # What was found until then stands.
+    assert (verdict.n_covered > 0) == (looks > 1)
+    assert verdict.n_covered < len(verdict.cells) == len(verdict.graph)
+    covered = np.flatnonzero(verdict.covered)[::97]
+    q = np.array([verdict.graph.nodes[int(k)]["q"] for k in covered]).reshape(-1, 6)
+    points, _, _ = plain.arm_of(verdict.robot).tool(q)
+    aims, _ = plain.targets_of(verdict.cells, verdict.task)
+    assert (np.linalg.norm(points - aims[covered], axis=1) <= 1e-3).all()
+
+
+def test_an_interrupt_in_the_progress_report_gets_through_at_once(hard):
+    calls = 0
+
+    def interrupt(done, total, text):
+        nonlocal calls
+        calls += 1
+        if calls == 4:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        check(*hard, progress=interrupt)
+    assert calls == 4
+
+
+def test_a_motion_refused_by_a_hair_is_looked_for_again(monkeypatch):
+    """The search is made to use more than the tolerance; the second time it keeps to less."""
+    from feasibility.roadmap import search
+
+    made, asked, most = search.arrays_of, [], 1
+    warm_up()
+
+    def generous(robot, cells, task):
+        given = made(robot, cells, task)
+        asked.append(given.tolerance)
+        return given._replace(tolerance=2.0 * given.tolerance) if len(asked) <= most else given
+
+    monkeypatch.setattr(search, "arrays_of", generous)
+    verdict = ask("paper 4c")
+    assert asked == pytest.approx([1e-3, 0.9e-3])
+    assert verdict.feasible
+    assert plain.faults_of(verdict) == []
+    asked, most = [], 2
+    again = ask("paper 4c")
+    assert again.answer == "undecided"
+    assert again.witness is None
+
+
+# What a verdict holds, and what it is asked of.
+
+
+@pytest.mark.parametrize("name", ["plate", "long plate", "greedy dome", "loaded", "pickled"])
+def test_the_graph_is_what_people_draw_and_networkx_writes(name, tmp_path):
+    verdict = verdict_of({"loaded": "plate", "pickled": "long plate"}.get(name, name))
+    if name == "loaded":
+        verdict = load_result(save_result(verdict, case_of("plate"), tmp_path / "a")).verdict
+    if name == "pickled":
+        verdict = pickle.loads(pickle.dumps(verdict))
+        assert all(isinstance(vars(Verdict)[n], property) for n in ("graph", "causes", "tree"))
+        assert {"graph", "causes", "tree"} <= set(dir(verdict))
+    cells, nodes = verdict.cells, verdict.graph.nodes
+    assert list(nodes) == list(range(len(cells)))
+    assert np.array([nodes[k]["point"] for k in nodes]) == pytest.approx(cells.centres, abs=1e-12)
+    assert np.array([nodes[k]["normal"] for k in nodes]) == pytest.approx(cells.normals, abs=1e-12)
+    assert [nodes[k]["index"] for k in nodes] == [tuple(cells.unravel(k)) for k in nodes]
+    assert [nodes[k]["covered"] for k in nodes] == verdict.covered.tolist()
+    nx.write_graphml(verdict.graph, tmp_path / "g.graphml")
+    back = nx.read_graphml(tmp_path / "g.graphml", node_type=int)
+    assert set(back.edges) == set(verdict.graph.edges)
+    for k, node in verdict.graph.nodes.items():
+        for key in ("point", "normal", "q"):
+            if node[key] is not None:  # every digit
+                assert [float(x) for x in back.nodes[k][key].split()] == node[key].tolist()
+    for a, b, motion in verdict.graph.edges(data="motion"):
+        rows = [[float(x) for x in row.split()] for row in back.edges[a, b]["motion"].split(";")]
+        assert rows == motion.tolist()
+
+
+SQUARE = plane((0, 1), (0, 1))
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (SQUARE, "surface.cells(9, 10)"),
+        (mesh(TriangleMesh(np.eye(3), [[0, 1, 2]])), "surface.cells(count=100)"),
+        (piecewise([SQUARE]), "surface.cells([(3, 4)"),
+        (lambda u, v: (u, v, 0.0), "parametric(g, u=(0, 1), v=(0, 1)).cells(9, 10)"),
+        (5, "surface.cells(9, 10)"),
+        (None, "surface.cells(9, 10)"),
+    ],
+)
+def test_what_is_not_cut_into_cells_is_answered_with_how_to_cut_it(given, words):
+    with pytest.raises(TypeError) as caught:
+        check(question("plate").robot, given, Task(standoff=0.0, cone_deg=30))
+    assert words in str(caught.value)
+
+
+@pytest.mark.parametrize("shape", [(0, 0), (0, 5), (5, 0)])
+def test_no_cells_at_all_are_covered(shape):
+    asked = question("small dome")
+    verdict = check(asked.robot, asked.cells.surface.cells(*shape), asked.task)
+    assert (verdict.answer, verdict.evidence) == (Answer.FEASIBLE, Evidence.WITNESS)
+    assert (verdict.n_covered, verdict.n_edges, verdict.causes) == (0, 0, ())
+
+
+def test_joints_with_limits_of_no_width_are_joints_that_are_held():
+    locked, asked = verdict_of("beside held joints"), question("small dome")
+    held = asked.robot.with_limits(dict.fromkeys(("joint1", "joint4", "joint6"), (0.0, 0.0)))
+    verdict = check(held, locked.cells, locked.task)
+    assert (verdict.answer, verdict.evidence) == (locked.answer, locked.evidence)
+    assert verdict.covered.reshape(4, 3).tolist() == [[False, True, False]] * 4
+
+
+def test_a_finer_tolerance_needs_more_waypoints():
+    fine, plain_one = (verdict_of(n) for n in ("a hundredth of a millimetre", "small dome"))
+    assert fine.certificate.waypoints / 9 > 3 * plain_one.certificate.waypoints / 20
+
+
+def test_what_collides_is_refused_and_nothing_asked_is_no_collision():
+    """A motion that was found without a roof leads through it; the greedy search knows none."""
+    _, _, robot, cells, task, _ = question("under a roof")
+    from dataclasses import replace
+
+    free = check(robot, cells, replace(task, collision=None))
+    assert verify(robot, cells, free.task, free.witness.q).holds
+    judged = verify(robot, cells, task, free.witness.q)
+    assert not judged.holds
+    assert any("roof" in fault.text for fault in judged.faults)
+    assert not verify(replace(free, task=task)).holds
+    assert not check(robot, cells, task, seeds=free.witness).feasible
+    none = check(robot, cells, task, collision=Collision(self_=False, surface=False))
+    one, other = (as_json(answer) for answer in (none, free))
+    assert {k: v for k, v in one.items() if k != "timing"} == {
+        k: v for k, v in other.items() if k != "timing"
+    }
+    with pytest.raises(ArgumentError, match="knows no collisions"):
+        greedy_check(robot, cells, task)
+
+
+def test_links_are_cut_into_pieces_only_where_hulls_are_in_the_way():
+    verdict = verdict_of("beside a hull")
+    assert verdict.task.collision.shapes == "pieces"
+    assert "so the links were cut into convex pieces" in verdict.message
+    for name in ("clear of itself", "too near itself"):
+        assert verdict_of(name).task.collision.shapes == "hulls"

@@ -1,0 +1,166 @@
+"""The covering walk on hand-made roadmaps: every cell, only stored motions, few detours."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import networkx as nx
+import numpy as np
+import pytest
+from asked import question
+from samples import sampled, seeds
+
+from feasibility.roadmap import (
+    NODES,
+    Exploration,
+    arrays_of,
+    close,
+    covering_walk,
+    edge_motion,
+    explore,
+    work_for,
+)
+from feasibility.roadmap.graph import (
+    COMPONENTS,
+    EDGES,
+    WAYPOINTS,
+    add_edge,
+    add_node,
+    empty_roadmap,
+    grown,
+)
+from surfaces import plane
+
+
+def roadmap_of(graph, cells, cell_of=None, rng=None):
+    """A roadmap with the nodes 0 .. n - 1 and edges of a graph, one slot a connected component.
+
+    Every waypoint is a pair of numbers of its own, so that a walk can be read back.
+    """
+    rng = np.random.default_rng(0) if rng is None else rng
+    _, _, robot, one, task, _ = question("one cell")
+    arrays = arrays_of(robot, one, task)
+    work = work_for(6)
+    roadmap = empty_roadmap(cells, 6)
+    slot_of = {}
+    for slot, members in enumerate(nx.connected_components(graph)):
+        roadmap.counters[COMPONENTS] = slot + 1
+        roadmap = grown(roadmap)
+        slot_of |= dict.fromkeys(members, slot)
+    for x in range(len(graph)):
+        roadmap = grown(roadmap)
+        cell = x if cell_of is None else cell_of[x]
+        add_node(arrays, work, roadmap, cell, rng.random(6), slot_of[x])
+    for x, y in graph.edges:
+        roadmap = grown(roadmap)
+        rows = int(rng.integers(1, 5))
+        first = int(roadmap.counters[WAYPOINTS])
+        roadmap.waypoints[first : first + rows] = rng.random((rows, 6))
+        roadmap.waypoints[first + rows - 1] = roadmap.q[y]
+        add_edge(roadmap, x, y, rows)
+    return roadmap, slot_of
+
+
+def check_walk(roadmap, walk):
+    """Only steps of stored motions, and marks where nodes are; returns the cells in order."""
+    steps = set()
+    for e in range(int(roadmap.counters[EDGES])):
+        motion = [tuple(q) for q in edge_motion(roadmap, e)]
+        steps |= set(pairwise(motion)) | set(pairwise(motion[::-1]))
+    used = int(roadmap.counters[NODES])
+    nodes = {tuple(roadmap.q[x]): int(roadmap.cell[x]) for x in range(used)}
+    rows = [tuple(q) for q in walk.q]
+    assert set(pairwise(rows)) <= steps
+    for row, cell in zip(rows, walk.cell, strict=True):
+        assert nodes.get(row, -1) == cell
+    return walk.cell[walk.cell >= 0].tolist()
+
+
+def visits(graph, cells, **options):
+    """The cells that the walk of a connected graph visits, in order; all of them."""
+    roadmap, _ = roadmap_of(graph, cells, **options)
+    order = check_walk(roadmap, covering_walk(roadmap, 0))
+    assert set(order) == set(range(cells))
+    return order
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 50])
+def test_a_line_is_walked_once(n):
+    """From one end to the other, and in either order of its edges' ends."""
+    backwards = nx.relabel_nodes(nx.path_graph(n), {k: n - 1 - k for k in range(n)})
+    for graph in (nx.path_graph(n), backwards):
+        assert visits(graph, n) in (list(range(n)), list(range(n))[::-1])
+
+
+@pytest.mark.parametrize("leaves", [2, 3, 7, 30])
+def test_a_star_is_walked_from_leaf_to_leaf(leaves):
+    """Each leaf once, the centre between any two: 2 leaves - 1 visits, the fewest there are."""
+    order = visits(nx.star_graph(leaves), leaves + 1)
+    assert len(order) == 2 * leaves - 1
+    assert order[1::2] == [0] * (leaves - 1)
+
+
+def test_a_grid_of_eight_neighbours_takes_few_detours():
+    """Grids up to 12 x 12: at most 15 per cent more visits than cells."""
+    for nu, nv in ((1, 12), (2, 2), (3, 3), (9, 10), (12, 12)):
+        cells = plane((0, 1), (0, 1)).cells(nu, nv)
+        graph = nx.empty_graph(nu * nv)
+        graph.add_edges_from(cells.pairs.tolist())
+        assert len(visits(graph, nu * nv)) <= 1.15 * nu * nv + 1
+
+
+@sampled
+@pytest.mark.parametrize("seed", seeds(5, all=60))
+def test_random_trees_and_graphs(seed):
+    """A tree of n nodes takes at most twice its edges; more edges never hurt a valid walk."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(2, 120))
+    tree = nx.Graph([(k, int(rng.integers(0, k))) for k in range(1, n)])
+    assert len(visits(tree, n, rng=rng)) <= 2 * (n - 1) + 1
+    tree.add_edges_from((int(a), int(b)) for a, b in rng.integers(0, n, (n, 2)) if a != b)
+    assert len(visits(tree, n, rng=rng)) <= 2 * (n - 1) + 1
+
+
+@sampled
+@pytest.mark.parametrize("seed", seeds(3, all=40))
+def test_several_nodes_over_one_cell(seed):
+    """Cells, not nodes, have to be visited: some nodes are left out, no cell is."""
+    rng = np.random.default_rng(seed)
+    n, cells = 90, 30
+    cell_of = np.concatenate([np.arange(cells), rng.integers(0, cells, n - cells)])
+    tree = nx.Graph([(k, int(rng.integers(max(0, k - 6), k))) for k in range(1, n)])
+    roadmap, _ = roadmap_of(tree, cells, cell_of=cell_of, rng=rng)
+    order = check_walk(roadmap, covering_walk(roadmap, 0))
+    assert set(order) == set(range(cells))
+    assert len(order) <= 2 * (n - 1) + 1
+
+
+def test_only_the_component_asked_for():
+    """Two lines and a lone node: each walk keeps to its own."""
+    graph = nx.disjoint_union_all([nx.path_graph(4), nx.path_graph(5), nx.empty_graph(1)])
+    roadmap, slot_of = roadmap_of(graph, 10)
+    for first, expected in ((0, range(4)), (4, range(4, 9)), (9, range(9, 10))):
+        order = check_walk(roadmap, covering_walk(roadmap, slot_of[first]))
+        assert sorted(order) == list(expected)
+
+
+def test_a_component_that_is_not_connected_gives_no_covering_walk():
+    """Nodes marked as one component without motions between them: no motion is invented."""
+    graph = nx.disjoint_union(nx.path_graph(3), nx.path_graph(3))
+    roadmap, _ = roadmap_of(graph, 6)
+    roadmap.component[:6] = 0
+    roadmap.cover[0, :6] = 1
+    order = check_walk(roadmap, covering_walk(roadmap, 0))
+    assert set(order) != set(range(6))
+
+
+@pytest.mark.parametrize("name", ["small dome", "plate", "panda over a saddle", "on a rail"])
+def test_the_walk_of_a_search(name):
+    """Every cell, along stored motions alone, with at most 40 per cent more visits than cells."""
+    _, _, robot, cells, task, _ = question(name)
+    exploration = Exploration(robot, cells, arrays_of(robot, cells, task), 0)
+    explore(exploration)
+    close(exploration)
+    order = check_walk(exploration.roadmap, covering_walk(exploration.roadmap, exploration.best))
+    assert set(order) == set(range(len(cells)))
+    assert len(order) <= 1.4 * len(cells)

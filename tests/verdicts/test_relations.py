@@ -1,0 +1,300 @@
+"""Questions whose answers have a known relation: the same asked otherwise, or less asked."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import plain
+import pytest
+from asked import question, tables_of, verdict_of
+from samples import sampled, seeds, spread
+
+from feasibility import CauseKind, Task, check
+from feasibility.cases import Case
+from feasibility.certification import replay
+from feasibility.collisions import Obstacle
+from feasibility.verdict import Answer, Walk
+from robots import Robot, load_robot
+from surfaces import rotation_from_rpy
+
+ALIKE = (
+    ("4d as a cone", "paper 4d"),
+    ("5a as an ellipsoid", "paper 5a"),
+    ("coarse dome of points", "coarse dome"),
+    ("coarse dome of points beyond reach", "coarse dome beyond reach"),
+    ("waist of points", "waist"),
+    ("waist of poses", "waist"),
+    ("ring of poses", "ring"),
+    ("a turntable that is held", "a turned plate"),
+)
+NEARLY = (("4a as a mesh", "paper 4a"), ("4d as a mesh", "paper 4d"), ("5e as a mesh", "paper 5e"),
+          ("hood as a mesh", "hood"), ("4a in halves", "paper 4a"))  # fmt: skip
+LESS = (  # asked less, or allowed more
+    ("a turntable that is held", "on a turntable"),
+    ("on a turntable", "on a rail and a turntable"),
+    ("off the rail", "on a rail"),
+    ("half turns", "full turns"),
+    ("a square and a fixed tool", "a square and 15 degrees"),
+    ("a large square and a stop of the wrist", "a large square, a stop and 15 degrees"),
+    ("half a degree", "small dome"),
+    ("small dome", "any axis"),
+    ("a tenth of a millimetre", "plate"),
+    ("plate", "a centimetre"),
+    ("a wall 5e", "paper 5e"),
+    ("paper 5c", "paper 5d"),
+    ("4a within 15 degrees", "paper 4a"),
+)
+PROBLEMS = [f"puma560 {k}" for k in range(0, 270, 9)] + [f"ur5 {k}" for k in range(0, 34, 6)]
+
+
+@pytest.mark.parametrize(("one", "other"), ALIKE)
+def test_one_question_asked_otherwise_has_one_answer(one, other):
+    one, other = verdict_of(one), verdict_of(other)
+    assert (one.answer, one.evidence) == (other.answer, other.evidence)
+    assert one.covered.tolist() == other.covered.tolist()
+
+
+@pytest.mark.parametrize(("one", "other"), NEARLY)
+def test_cells_that_lie_elsewhere_cover_as_much(one, other):
+    one, other = verdict_of(one), verdict_of(other)
+    assert (one.answer, one.evidence) == (other.answer, other.evidence)
+    assert one.cells.areas.sum() == pytest.approx(other.cells.areas.sum(), rel=1e-3)
+    shares = [v.cells.areas[v.covered].sum() / v.cells.areas.sum() for v in (one, other)]
+    assert shares[0] == pytest.approx(shares[1], abs=0.03)
+    assert one.statistics["fk"] <= 2 * other.statistics["fk"]
+
+
+def no_less(narrow, wide):
+    """Whatever the narrower question covers in one motion, the wider one does."""
+    wider = [set(component.tolist()) for component in wide.components]
+    for component in narrow.components[:1]:
+        assert any(set(component.tolist()) <= other for other in wider)
+    assert wide.n_covered >= narrow.n_covered
+    assert not (narrow.feasible and wide.answer is Answer.INFEASIBLE)
+    # A proof holds for all that is narrower. (A cell that a cut parts from the best motion is
+    # proved too, but another motion covers it.)
+    reached = {int(k) for component in narrow.components for k in component}
+    lost = [cause for cause in wide.causes if cause.kind is not CauseKind.DISCONNECTED]
+    assert not reached & {cause.cell for cause in lost if cause.proved}
+
+
+@pytest.mark.parametrize(("narrow", "wide"), LESS)
+def test_a_question_that_asks_less_loses_nothing(narrow, wide):
+    no_less(verdict_of(narrow), verdict_of(wide))
+    assert verdict_of(wide).statistics["fk"] <= 5 * verdict_of(narrow).statistics["fk"] + 2000
+
+
+def wider(tables, what, rng):
+    """A joint's limit up to 90 degrees further out; cone or tolerance up to three times wider."""
+    robot, task = dict(tables["robot"]), dict(tables["task"])
+    if what == "limit":
+        limits = [list(pair) for pair in robot["limits_deg"]]
+        end = int(rng.integers(2))
+        limits[rng.integers(len(limits))][end] += (1 if end else -1) * float(rng.uniform(1, 90))
+        robot["limits_deg"] = limits
+    elif what == "cone":
+        task["cone_deg"] = min(task["cone_deg"] * float(rng.uniform(1.05, 3.0)), 180.0)
+    else:
+        task["tolerance"] = task.get("tolerance", 1e-3) * float(rng.uniform(1.05, 3.0))
+    return tables | {"robot": robot, "task": task}
+
+
+def asked(tables):
+    import tomli_w
+
+    return check(*Case.from_toml(tomli_w.dumps(tables)).build())
+
+
+@sampled
+@pytest.mark.parametrize("seed", seeds(1, all=3))
+@pytest.mark.parametrize("what", ["limit", "cone", "tolerance"])
+@pytest.mark.parametrize("name", spread(PROBLEMS, 4))
+def test_what_is_wider_loses_nothing(name, what, seed):
+    rng = np.random.default_rng([len(what), int(name.split()[1]), seed])
+    no_less(verdict_of(name), asked(wider(tables_of(name), what, rng)))
+
+
+@sampled
+@pytest.mark.parametrize("name", spread(PROBLEMS, 3))
+def test_finer_cells_lose_only_new_ones(name):
+    """Three times finer both ways: every centre is one of the finer centres."""
+    q, coarse = question(name), verdict_of(name)
+    nu, nv = q.cells.shape
+    fine = check(q.robot, q.cells.surface.cells(3 * nu, 3 * nv), q.task)
+    old = np.arange(9 * nu * nv).reshape(3 * nu, 3 * nv)[1::3, 1::3].ravel()
+    component = set(coarse.components[0].tolist()) if coarse.components else set()
+    kept = [set(np.flatnonzero(np.isin(old, c)).tolist()) for c in fine.components]
+    assert not component or any(component <= cells for cells in kept)
+    lost = {c.cell for c in fine.causes if c.proved and c.kind is not CauseKind.DISCONNECTED}
+    assert not lost & {int(old[k]) for k in component}
+
+
+def same(one, other, order=None):
+    """The same answer, for the same cells (other's cell order[k] is one's cell k)."""
+    order = np.arange(len(one.cells)) if order is None else order
+    assert one.answer is other.answer
+    assert one.n_covered == other.n_covered
+    # Two components may cover as many cells: the same sets have to be there.
+    mine = {frozenset(component.tolist()) for component in one.components} or {frozenset()}
+    assert frozenset(np.flatnonzero(other.covered[order]).tolist()) in mine
+    if other.feasible:
+        assert plain.faults_of(other) == []
+
+
+def arm_moved(robot, change):
+    """The arm with every fixed placement of its tree changed: another world, the same joints."""
+    model = robot.model.copy()
+    for k in range(1, model.njoints):
+        model.jointPlacements[k] = change(model.jointPlacements[k], k == 1)
+    frames = [f.placement for f in model.frames]
+    for k, frame in enumerate(model.frames):
+        frame.placement = change(frames[k], frame.parentJoint == 0)
+    kept = {name: getattr(robot, name) for name in Robot.__dataclass_fields__}
+    return Robot(**(kept | {"model": model, "urdf": None}))
+
+
+@sampled
+@pytest.mark.parametrize("factor", [0.1, 20.0])
+@pytest.mark.parametrize("name", spread(PROBLEMS, 3))
+def test_a_larger_world_is_no_other(name, factor):
+    q, surface = question(name), dict(tables_of(name)["surface"])
+
+    def grown(placement, first):
+        return pin.SE3(placement.rotation, factor * placement.translation)
+
+    for key in ("radius", "flare", "u", "v", "position"):
+        if key in surface:
+            surface[key] = (factor * np.array(surface[key])).tolist()
+    cells = Case.from_toml(_toml(tables_of(name) | {"surface": surface})).build().cells
+    task = Task(factor * q.task.standoff, q.task.cone_deg, factor * 1e-3)
+    other = check(arm_moved(q.robot, grown), cells, task)
+    assert verdict_of(name).answer is other.answer
+    assert verdict_of(name).n_covered == other.n_covered
+
+
+def _toml(tables):
+    import tomli_w
+
+    return tomli_w.dumps(tables)
+
+
+@sampled
+@pytest.mark.parametrize("name", [*spread(PROBLEMS, 3), "beside a post", "torus"])
+def test_moving_all_by_one_rigid_motion_changes_nothing(name):
+    """Arm, surface and scene."""
+    q, angles, shift = question(name), (0.4, -0.7, 1.9), np.array([0.5, -1.0, 0.3])
+    motion = pin.SE3(rotation_from_rpy(*angles), shift)
+    name_of = q.robot.name
+    limits = np.column_stack([q.robot.lower, q.robot.upper])
+    robot = load_robot(name_of, base=motion).with_limits(limits)
+    surface = q.cells.surface.moved(motion.rotation, shift)
+    task = q.task
+    if task.collision is not None:
+        scene = tuple(
+            Obstacle(one.name, one.geometry, motion.homogeneous @ one.placement)
+            for one in task.collision.scene
+        )
+        task = replace(task, collision=replace(task.collision, scene=scene))
+    same(verdict_of(name), check(robot, surface.cells(*q.cells.shape), task))
+
+
+@pytest.mark.parametrize("name", ["torus", "4a in halves", "hood as a mesh"])
+def test_a_turn_about_the_first_axis_turns_the_motion(name):
+    """The limits of the first joint go along: the motion found here, turned, is one there."""
+    q, angle = question(name), math.radians(37.0)
+    turned = q.cells.surface.moved(rotation_from_rpy(0.0, 0.0, angle), np.zeros(3))
+    counts = getattr(q.cells, "counts", None) or getattr(q.cells, "shape", None)
+    there = turned.cells(len(q.cells)) if name.endswith("mesh") else (
+        turned.cells(*counts) if isinstance(counts[0], int) else turned.cells(counts)
+    )  # fmt: skip
+    limits = np.column_stack([q.robot.lower, q.robot.upper])
+    limits[0] += angle
+    walk = verdict_of(name).witness
+    along = walk.q.copy()
+    along[:, 0] += angle
+    every = np.ones(len(there), dtype=bool)
+    again = replay(q.robot.with_limits(limits), there, q.task, Walk(along, walk.cell), every)
+    assert again.accepted, again.refusal
+
+
+@sampled
+@pytest.mark.parametrize("name", spread(PROBLEMS, 4))
+def test_a_mirror_changes_nothing(name):
+    """In the plane y = 0: turns run the other way, and one parameter of the surface does."""
+    q, tables = question(name), tables_of(name)
+    flip = np.diag([1.0, -1.0, 1.0])
+
+    def image(placement, first):
+        return pin.SE3(flip @ placement.rotation @ flip, flip @ placement.translation)
+
+    # Joints about y turn as before, others the other way round: q becomes -q.
+    about_y = np.array(["RY" in joint.shortname() for joint in q.robot.model.joints[1:]])
+    limits = np.column_stack([q.robot.lower, q.robot.upper])
+    limits = np.where(about_y[:, None], limits, -limits[:, ::-1])
+    arm = arm_moved(q.robot, image).with_limits(limits)
+    surface, kind = dict(tables["surface"]), tables["surface"]["kind"]
+    x, y, z = surface["position"]
+    roll, pitch, yaw = surface["rpy_deg"]
+    surface |= {"position": [x, -y, z], "rpy_deg": [-roll, pitch, -yaw]}
+    key = {"plane": "v", "sphere": "v_deg"}.get(kind, "u_deg")
+    surface[key] = [-surface[key][1], -surface[key][0]]
+    cells = Case.from_toml(_toml(tables | {"surface": surface})).build().cells
+    order = np.arange(len(cells)).reshape(cells.shape)
+    order = (order[:, ::-1] if kind in ("plane", "sphere") else order[::-1]).ravel()
+    np.testing.assert_allclose(cells.centres[order], q.cells.centres @ flip, atol=1e-9)
+    one, other = verdict_of(name), check(arm, cells, q.task)
+    assert one.answer is other.answer
+    assert one.n_covered == other.n_covered
+
+
+@pytest.mark.parametrize("limits", ["set-1", "set-3"])
+def test_the_order_of_cells_does_not_decide(limits):
+    """One patch, parametrised upside down."""
+    q = question("paper 4a")
+    robot, task = q.robot.with_limits(limits), Task(standoff=0.005, cone_deg=25)
+    from surfaces import sphere
+
+    one = sphere(1.0, (20, 80), (-30, 150)).cells(5, 7)
+    other = sphere(1.0, (100, 160), (-150, 30), rpy_deg=(180, 0, 0)).cells(5, 7)
+    order = np.arange(35).reshape(5, 7)[::-1, ::-1].ravel()
+    np.testing.assert_allclose(other.centres[order], one.centres, atol=1e-12)
+    one, other = check(robot, one, task), check(robot, other, task)
+    assert (one.answer, one.evidence, one.n_edges) == (other.answer, other.evidence, other.n_edges)
+    np.testing.assert_array_equal(one.covered, other.covered[order])
+
+
+def test_reference_and_range_of_a_roll_turned_together_are_the_same():
+    """Roll is measured about the approach direction, here down."""
+    q = question("a square and 15 degrees")
+    turn = math.radians(-70.0)
+    reference = (math.cos(turn), math.sin(turn), 0.0)
+    other = replace(q.task, roll_reference=reference, roll_deg=(-85.0, -55.0))
+    found = check(q.robot, q.cells, other)
+    assert found.feasible
+    asked_for = plain.asked_of(q.task, q.cells)
+    form = plain.surface_of(q.cells.surface)
+    aims = plain.targets_of(q.cells, q.task)
+    assert plain.referee.judge(plain.arm_of(q.robot), form, asked_for, found.witness.q, aims) == []
+
+
+def test_all_rolls_are_free_roll():
+    """To the last bit, and to the last evaluation of the arm."""
+    q = question("a square and 15 degrees")
+    free, whole = (
+        check(q.robot, q.cells, replace(q.task, roll_deg=r)) for r in (None, (-170, 190))
+    )
+    np.testing.assert_array_equal(free.witness.q, whole.witness.q)
+    assert free.statistics["fk"] == whole.statistics["fk"]
+    assert free.certificate.max_roll is None
+
+
+def test_a_body_far_away_changes_nothing():
+    q = question("clear of itself")
+    far = Obstacle.box("cabinet", (0.2, 0.2, 0.2), (0.0, 3.0, 0.0))
+    task = replace(q.task, collision=replace(q.task.collision, scene=(far,)))
+    with_cabinet, without = check(q.robot, q.cells, task), verdict_of("clear of itself")
+    assert with_cabinet.statistics["fk"] == without.statistics["fk"]
+    np.testing.assert_array_equal(with_cabinet.witness.q, without.witness.q)
