@@ -60,7 +60,7 @@ kernels: .venv/installed
 
 greedy: .venv/installed
 	@$(BIN)/coverable check paper/4f --set search.method=greedy >/dev/null || test $$? -eq 1
-	@$(BIN)/coverable check tests/feasibility/paper/greedy_on_a_torus.toml >/dev/null
+	@$(BIN)/coverable check tests/paper/greedy_on_a_torus.toml >/dev/null
 
 # What the tests import is compiled once, and not by each of the two processes that run them; they
 # say it where that fails.

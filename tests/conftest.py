@@ -34,15 +34,6 @@ gc.disable()
 LONGEST = (
     "06_collisions", "05_which_robot_where", "01_paper_cases", "03_mesh_surface",
     "04_from_verdict_to_motion", "08_paint_a_panel", "02_your_own_robot", "07_positioner_and_tcp",
-    "test_docs", "test_study", "test_passes", "test_study_commands", "test_placement",
-    "test_explain", "test_checking", "test_path_runs", "test_mesh_witness", "test_new_kinds",
-    "test_segment_bound", "test_urdf", "test_timing", "test_step_files", "test_greedy_cases",
-    "test_division", "test_mesh_verdicts", "test_clustering", "test_piecewise", "test_creases",
-    "test_imports", "test_study_dask", "test_other_kinds", "test_oracles", "test_literal",
-    "test_box_containment", "test_mesh_file", "test_cli", "test_coverage", "test_properties",
-    "test_proof_verification", "test_known_feasible", "test_refinement", "test_metamorphic",
-    "test_any_surface", "test_trajectory_files", "test_set_cover", "test_complete",
-    "test_placement_view", "test_kept_kernels",
 )  # fmt: skip
 
 

@@ -13,9 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import samples
 
 from feasibility.cases import builtin_cases
 
+pytestmark = [samples.sampled, pytest.mark.skipif(not samples.EVERYTHING, reason="minutes")]
 ROOT = Path(__file__).parents[2]
 CASES = sorted(builtin_cases())
 CODE = """
