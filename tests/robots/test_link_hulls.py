@@ -36,13 +36,15 @@ def volume(vertices):
 
 def random_bodies():
     rng = np.random.default_rng(0)
-    for k in range(15):
+    for k in range(60):
         size = 10.0 ** rng.uniform(-3, 2)
         points = rng.normal(size=(int(rng.integers(4, 900)), 3))
         if k % 3 == 1:
             points /= np.linalg.norm(points, axis=1, keepdims=True)
         if k % 3 == 2:
             points = np.clip(points, -1, 1) * rng.uniform(1e-3, 1, 3)
+        if k % 3 == 1:  # lenses and needles, whose furthest points are beyond an edge of the hull
+            points *= 10.0 ** rng.uniform(-2.5, 0, 3)
         yield size * points @ Rotation.random(random_state=k).as_matrix() + rng.normal(size=3)
 
 
@@ -54,9 +56,11 @@ def test_no_point_stands_out_of_its_hull_and_the_hull_is_close():
         wide = np.ptp(points, axis=0).max()
         outer = points[ConvexHull(points).vertices]
         # A ball of 64 vertices evenly spread has caps of 3 % of its radius.
-        assert hull.radius <= (1e-11 if len(outer) <= 64 else 0.04) * wide
+        assert hull.radius <= (1e-11 * wide if len(outer) <= 64 else 0.04 * wide + 2e-4)
         assert {tuple(v) for v in hull.vertices} <= {tuple(p) for p in points}
-        some = outer[np.random.default_rng(1).permutation(len(outer))[:200]]
+        some = np.array(
+            [v for v in outer if tuple(v) not in {tuple(x) for x in hull.vertices}] or outer
+        )
         off = np.array([distance(point, hull.vertices) for point in some])
         holds(hull.radius, off, used=0.0, tiny=MARGIN * max(1, np.ptp(points)))
         if len(outer) > 64:

@@ -74,7 +74,8 @@ SURFACES = {
 }  # fmt: skip
 # The least share of a bound that some path has to use: of points, and of normals. Control points
 # say little about the third derivatives of a spline, and less of a rational one.
-USED = {"vase": (0.9, 0.5), "spout": (0.9, 0.2), "one span": (0.9, 0.2), "egg": (0.9, 0.5), "ellipsoid": (0.9, 0.3), "hyperboloid": (0.9, 0.3),
+USED = {"vase": (0.9, 0.5), "spout": (0.9, 0.2), "one span": (0.9, 0.2),
+        "egg": (0.9, 0.5), "ellipsoid": (0.9, 0.3), "hyperboloid": (0.9, 0.3),
         "cubic": (0.9, 0.2), "quadratic": (0.9, 0.2), "formula": (0.9, 0.1),
         "rational": (1e-3, 1e-4), "half pipe": (1e-3, 1e-4)}  # fmt: skip
 
@@ -242,6 +243,20 @@ def test_a_second_guess_is_taken_where_it_is_nearer_and_only_there():
     found = offset.nearest(points, points - 0.02 * normals, 1e-3)
     np.testing.assert_allclose(offset.at(found)[0], points, atol=1e-9)
     assert found.chart.tolist() == [0, 1]
+
+
+def test_no_path_is_known_between_faces_and_pieces_that_are_apart():
+    """Not over an edge or a vertex, nor over a seam, is there a place that belongs to both."""
+    for name in ("bowl", "ridge", "apart"):
+        surface = piecewise([plane((k, k + 0.5), (0, 1)) for k in (0, 2)], side="inside")
+        surface = FACETED.get(name, surface)
+        last = len(surface.mesh.faces) - 1 if name != "apart" else 1
+        start, end = (Places(np.array([c]), np.array([[0.3, 0.3]])) for c in (0, last))
+        if name == "apart":
+            end.x[0, 0] = 2.2
+        path = offset_surface(surface, 0.01).paths(start, end)
+        known = np.isfinite(path.derivative_bounds[:, [0, 2]]).all(axis=(1, 2))
+        assert not known.any(), name
 
 
 def test_places_that_are_none(named):

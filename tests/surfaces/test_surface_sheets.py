@@ -1,8 +1,7 @@
-"""Surfaces as triangles and as tiles: no place is further from them than is stated."""
+"""Surfaces as triangles: no place is further from them than is stated."""
 
 from __future__ import annotations
 
-import mesh_patches
 import numpy as np
 import pytest
 from bounds import holds
@@ -12,13 +11,10 @@ from samples import sampled, seeds
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 from smooth_probes import POSE, triangle_distances
-from specimens import EXTREME, cells_of
+from specimens import EXTREME
 
 from coverable_errors import ArgumentError
-from surfaces import SurfaceError, cylinder, mesh, plane, poses, sheet_of, sphere
-from surfaces.cell_tiles import cell_tiles
-from surfaces.meshes import TriangleMesh
-from surfaces.places import Places
+from surfaces import SurfaceError, cylinder, plane, poses, sheet_of, sphere
 
 TURN, SHIFT = Rotation.from_euler("xyz", [0.3, -1.0, 2.0]).as_matrix(), [0.4, -1.0, 2.0]
 
@@ -161,97 +157,7 @@ def test_numbers_that_make_no_sheet_are_named(bad, named):
         sheet_of(plane((0, 1), (0, 1)), **bad)
 
 
-# tiles of cells
-
-
-@sampled
-@pytest.mark.parametrize("seed", seeds(4, all=50))
-@pytest.mark.parametrize("kind", KINDS)
-def test_what_is_said_of_a_tile_holds_all_over_it(kind, seed):
-    rng = np.random.default_rng([seed, *map(ord, kind)])
-    surface = random_surface(kind, rng)
-    cells = cells_of(surface, *rng.integers(1, 4, 2).tolist())
-    cut = cell_tiles(cells, float(rng.normal() * np.sqrt(cells.areas.mean())))
-    tiles = cut.of_cells(np.arange(len(cells)))
-    total = cut.areas(tiles).sum()
-    assert total == pytest.approx(cells.areas.sum(), rel=1e-6)
-    for _ in range(int(rng.integers(0, 6))):
-        halves = cut.halves(tiles)
-        both = cut.areas(halves).reshape(-1, 2).sum(axis=1)
-        np.testing.assert_allclose(both, cut.areas(tiles), rtol=1e-6, atol=1e-9 * total)
-        tiles = halves.of(rng.permutation(len(halves.cell))[:60])
-    bounds, count = cut.bounds(tiles), len(tiles.cell)
-    scale = 1.0 + np.abs(bounds.corners[:, :, 0]).max()
-    for k in range(8):
-        if tiles.corners.shape[1] == 3:
-            shares = rng.dirichlet(np.full(3, 0.5), count)
-        else:
-            s, t = rng.beta(0.5, 0.5, (2, count)) if k else np.ones((2, count))
-            shares = np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=1)
-        x = np.einsum("kc,kci->ki", shares, tiles.corners)
-        found = np.stack(cut.offset.at(Places(tiles.chart, x)), axis=1)
-        mixed = np.einsum("kc,kcpi->kpi", shares, bounds.corners[:, : shares.shape[1]])
-        off = np.linalg.norm(found - mixed, axis=2)
-        assert (off <= bounds.radii + 1e-9 * scale).all(), surface
-    assert np.isfinite(bounds.radii).any() or kind == "mesh"
-
-
-def test_normals_that_turn_by_more_than_a_right_angle_over_a_tile_are_not_bounded():
-    """Over a wild mesh: mixed normals leave the cone that those of the corners lie in."""
-    for seed in range(6):
-        rng = np.random.default_rng(seed)
-        u, v, faces = mesh_patches.grid(8, 8)
-        wild = np.stack([u, v, rng.normal(size=len(u))], axis=1)
-        cells = mesh(TriangleMesh(wild, faces)).cells(count=4)
-        cut = cell_tiles(cells, 0.01)
-        tiles = cut.of_cells(np.arange(len(cells)))
-        stated = cut.bounds(tiles).radii[:, 1]
-        middle = cut.offset.at(tiles.middles)[1]
-        for shares in rng.dirichlet(np.full(3, 0.5), (40, len(tiles.cell))):
-            x = np.einsum("kc,kci->ki", shares, tiles.corners)
-            normals = cut.offset.at(Places(tiles.chart, x))[1]
-            holds(stated, np.linalg.norm(normals - middle, axis=1), used=0.0, tiny=1e-9)
-        assert 0.0 < np.isinf(stated).mean() < 0.2
-
-
-def test_tiles_shrink_their_bounds_fourfold():
-    cut = cell_tiles(sphere(1.0, (10, 90), (0, 90)).cells(2, 2), -0.1)
-    tiles = cut.of_cells(np.arange(4))
-    before = cut.bounds(tiles).radii.max(axis=0)
-    for _ in range(4):
-        tiles = cut.halves(tiles)
-    assert (cut.bounds(tiles).radii.max(axis=0) < before / 12.0).all()
-
-
-@pytest.mark.parametrize(("turn", "length"), [(360, np.pi / 2), (359, 1.5 * np.pi * 359 / 360)])
-def test_lines_between_tiles_run_the_shorter_way_round(turn, length):
-    cut = cell_tiles(sphere(1.0, (80, 100), (0, turn)).cells(1, 4), 0.0)
-    ends = cut.centres(np.array([0, 3]))
-    lines = cut.lines(ends.of(slice(0, 1)), ends.of(slice(1, 2)), np.array([8]))
-    points = cut.offset.at(lines.places)[0]
-    assert np.linalg.norm(np.diff(points, axis=0), axis=1).sum() == pytest.approx(length, rel=0.02)
-    np.testing.assert_allclose(points[[0, -1]], cut.offset.at(ends)[0], atol=1e-12)
-
-
-def test_lines_over_the_faces_of_a_mesh_stay_on_them():
-    cells = random_surface("mesh", np.random.default_rng(3)).cells(count=4)
-    cut = cell_tiles(cells, 0.01)
-    indptr, touching = cut.touching
-    face = np.flatnonzero(np.diff(indptr))[:20]
-    other = touching[indptr[face]]
-    tiles = cut.of_cells(np.arange(4))
-    row = np.argsort(tiles.chart)
-    ends = [tiles.of(row[chart]).middles for chart in (face, other)]
-    lines = cut.lines(*ends, np.full(len(face), 3))
-    weights = np.column_stack([1.0 - lines.places.x.sum(axis=1), lines.places.x])
-    assert (weights >= -1e-12).all()
-    for k in range(len(face)):
-        charts = lines.places.chart[lines.first[k] : lines.first[k + 1]]
-        assert charts.tolist() == [face[k]] * 4 + [other[k]] * 3
-
-
 def test_between_poses_there_is_no_surface():
     cells = poses([[0.4, 0, 0], [0.5, 0, 0]], [[0, 0, 1], [0, 0, 1]])
-    assert cell_tiles(cells, 0.0) is None
     with pytest.raises(SurfaceError, match="leave collisions with it out"):
         sheet_of(cells.surface)
