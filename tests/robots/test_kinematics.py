@@ -108,37 +108,6 @@ def test_a_second_reader_of_the_same_files_places_the_tool_alike(name):
 # by hand
 
 
-def test_a_planar_arm(tmp_path):
-    text = arm([joint(1), joint(2, xyz=(2, 0, 0)), joint(3, "fixed", xyz=(1, 0, 0))])
-    robot = load_text(tmp_path, text, approach_axis=(1, 0, 0))
-    expected = [-1, 2, 0], [-1, 0, 0], [[-2, 0], [-1, -1], [0, 0]], [[0, 0], [-1, -1], [0, 0]]
-    for found, value in zip(
-        by_chain(robot.chain, np.array([np.pi / 2] * 2)), expected, strict=True
-    ):
-        np.testing.assert_allclose(found, value, atol=1e-15)
-
-
-def test_an_arm_on_a_rail_moves_with_it(tmp_path):
-    rail = joint(1, "prismatic", axis=(0, 1, 0), limits=(-1.0, 2.0))
-    slide = joint(3, "prismatic", xyz=(0.4, 0, 0), axis=(2, 0, 0), limits=(0.0, 0.3))
-    robot = load_text(tmp_path, arm([rail, joint(2, xyz=(0, 0, 0.5)), slide]))
-    np.testing.assert_array_equal(robot.prismatic, [True, False, True])
-    point, axis = Kinematics(robot).tool([1.5, np.pi / 2, 0.2])
-    np.testing.assert_allclose(point, [0, 1.5 + 0.4 + 0.2, 0.5], atol=1e-15)
-    np.testing.assert_allclose(axis, [0, 0, 1], atol=1e-15)
-    # Furthest from the rail's origin: at its end, stretched.
-    assert robot.reach == pytest.approx(np.hypot(0.5, 2.0) + 0.7)
-
-
-def test_a_full_turn_is_another_configuration_with_the_same_placement():
-    robot = load_robot("kinova")
-    assert robot.joint_kinds.count("continuous") == 3
-    tool, q = Kinematics(robot).tool, np.array([0.3, 2.0, 1.5, -4.0, 3.0, 5.0])
-    for i, kind in enumerate(robot.joint_kinds):
-        np.testing.assert_allclose(tool(q + 2 * np.pi * np.eye(6)[i]), tool(q), **CLOSE)
-        assert (robot.lower[i], robot.upper[i]) == (-np.inf, np.inf) or kind == "revolute"
-
-
 # what is refused, and what stays
 
 

@@ -9,24 +9,17 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
-from arm_urdfs import arm, joint, load_text, random_arm, random_q
+from arm_urdfs import arm, joint, load_text, random_arm, random_q, said
 from scipy.spatial.transform import Rotation
 from two_trees import Tree, cell_text, random_values, write
 
-from robots import Axis, Kinematics, RobotError, load_robot
+from robots import Axis, Kinematics, load_robot
 from robots.mounting import about_fixed_axes
 from robots.shapes import link_shapes
 
 POSE = ((0.03, -0.02, 0.12), (20.0, -30.0, 75.0))
 STAND = ((0.4, -0.3, 0.8), (5.0, 10.0, 90.0))
 CLOSE = {"rtol": 0, "atol": 1e-12}
-
-
-def said(make, *arguments, **named):
-    """What is said by the refusal, on one line."""
-    with pytest.raises(RobotError) as caught:
-        make(*arguments, **named)
-    return " / ".join(str(caught.value).splitlines())
 
 
 def matrix(pose):

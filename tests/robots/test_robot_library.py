@@ -6,12 +6,11 @@ import random
 import subprocess
 import sys
 from importlib.metadata import distribution
-from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 import pytest
-from arm_urdfs import arm, joint, load_text, random_q
+from arm_urdfs import arm, joint, load_text, random_q, said
 from samples import sampled, seeds
 
 from robots import Kinematics, RobotError, list_robots, load_robot
@@ -24,13 +23,6 @@ USUAL = ("tcp", "tool0", "flange", "ee_link")
 @pytest.fixture(scope="module", params=ROBOTS)
 def robot(request):
     return load_robot(request.param)
-
-
-def said(make, *arguments, **named):
-    """What is said by the refusal, on one line."""
-    with pytest.raises(RobotError) as caught:
-        make(*arguments, **named)
-    return " / ".join(str(caught.value).splitlines())
 
 
 # every listed robot
@@ -139,36 +131,6 @@ def fixed(*edges):
 
 
 # As makers write them: what hangs on the arm, and the link that is taken.
-MADE = {
-    "kuka": (fixed(("wrist", "tool0"), ("base_link", "base")), "tool0"),
-    "flange before tool": (
-        fixed(("wrist", "flange"), ("flange", "tool0"), ("base_link", "base")), "tool0"),
-    "fingers": (fixed(("wrist", "tool0"), ("tool0", "left"), ("tool0", "right")), "tool0"),
-    "tcp wins": (fixed(("wrist", "ee_link"), ("wrist", "tool0"), ("wrist", "tcp")), "tcp"),
-    "one end moves": (fixed(("base_link", "base"), ("base_link", "camera")), "wrist"),
-    "a tool on the table": (
-        fixed(("base_link", "tcp"), ("wrist", "flange"), ("wrist", "cam")), "flange"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", MADE)
-def test_a_urdf_as_it_comes(tmp_path, name):
-    edges, expected = MADE[name]
-    robot = load_text(tmp_path, tree(edges))
-    assert robot.tool_frame == expected
-    (note,) = (note for note in robot.notes if note.startswith(f"tool_frame is {expected!r}"))
-    beside = {"left", "right"} if name == "fingers" else set()
-    # What no joint moves, or only together with the tool, is no choice.
-    assert {child for _, child, _ in edges if f"'{child}'" in note.partition(";")[2]} == beside
-    assert load_text(tmp_path, tree(edges), tool_frame="upper").tool_frame == "upper"
-
-
-@pytest.mark.parametrize("urdf", sorted({i.urdf for i in ROBOTS.values() if i.name[:2] == "ur"}))
-def test_universal_robots_as_they_come(urdf):
-    share = next(f for f in distribution("example-robot-data").files if f.name == "package.xml")
-    robot = load_robot(urdf, package_dirs=Path(str(share.locate())).resolve().parent.parent)
-    assert (robot.tool_frame, robot.n) == ("tool0", 6)
-    assert any("tool_frame is 'tool0'" in note for note in robot.notes)
 
 
 def random_tree(rng):

@@ -8,19 +8,12 @@ from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
-from arm_urdfs import UNLIKE, arm, joint, load_text, random_arm, random_q, unlike
+from arm_urdfs import UNLIKE, arm, joint, load_text, random_arm, random_q, said, unlike
 from samples import sampled, seeds
 
 from robots import Kinematics, RobotError, load_robot
 
 PUMA = load_robot("puma560")
-
-
-def said(make, *arguments, **named):
-    """What is said by the refusal, on one line."""
-    with pytest.raises(RobotError) as caught:
-        make(*arguments, **named)
-    return " / ".join(str(caught.value).splitlines())
 
 
 def test_arrays_are_copies_that_cannot_be_written():
@@ -112,14 +105,6 @@ def test_pickle_round_trip(name):
     assert copy.limit_sets.keys() == robot.limit_sets.keys()
     q = random_q(robot, np.random.default_rng(0))
     np.testing.assert_array_equal(Kinematics(copy).tool(q), Kinematics(robot).tool(q))
-
-
-def test_what_is_shown_of_it():
-    assert repr(PUMA) == "Robot('puma560', 6 joints, tool 'link6')"
-    off = ([0.1, -1e-28, 0.2], [0, 0, 0])  # without the noise of rounding
-    assert "tool 'tool0' + (0.1, 0, 0.2) m" in repr(load_robot("ur5", tcp=off))
-    assert PUMA.notes == ()
-    assert ["continuous" in note for note in load_robot("kinova").notes] == [True] * 3
 
 
 # reach

@@ -6,10 +6,19 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
-from robots import Robot, list_robots, load_robot
+from robots import Robot, RobotError, list_robots, load_robot
 from robots.urdf import JointInfo
+
+
+def said(make, *arguments, **named) -> str:
+    """What is said by a refusal, on one line."""
+    with pytest.raises(RobotError) as caught:
+        make(*arguments, **named)
+    return " / ".join(str(caught.value).splitlines())
+
 
 FREE = (-float("inf"), float("inf"))
 

@@ -249,21 +249,6 @@ def flat(n, labels):
     return figures(np.column_stack([u, v, 0 * u]), faces, up, np.repeat(np.ravel(labels), 2))
 
 
-def test_four_squares_and_a_cross_by_hand():
-    # 2 3    seen from above; 0 and 3 touch in a point only
-    # 0 1
-    found = flat(2, [0, 2, 1, 3])
-    assert found.borders.pairs.tolist() == [[0, 1], [0, 2], [1, 3], [2, 3]]
-    np.testing.assert_allclose(found.borders.lengths, 0.5)
-    middles = [[0.5, 0.25, 0], [0.25, 0.5, 0], [0.75, 0.5, 0], [0.5, 0.75, 0]]
-    np.testing.assert_allclose(found.borders.midpoints, middles)
-    assert [found.neighbours.of(k).tolist() for k in range(4)] == [[1, 2], [0, 3], [0, 3], [1, 2]]
-    np.testing.assert_allclose(found.centres[2], [0.25, 0.75, 0])
-    np.testing.assert_allclose(found.normals, [[0, 0, 1]] * 4)
-    # The middle cell, from the left, clockwise: left, above, right, below.
-    assert flat(3, [[5, 1, 6], [4, 0, 2], [7, 3, 8]]).neighbours.of(0).tolist() == [1, 2, 3, 4]
-
-
 def signed(found, cell):
     """m^2: outer loops run counter-clockwise and holes clockwise."""
     return sum(np.cross(p[:-1], p[1:])[:, 2].sum() / 2 for p in found.outlines.of(cell))

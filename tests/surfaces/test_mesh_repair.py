@@ -20,15 +20,6 @@ V, F = w.cube()
 UNCLEAN = {"caps": w.chain_of_caps(), "bow tie": w.bow_tie(), "wavy": w.hilly(12, 9)}
 
 
-def test_a_clean_mesh_stays_as_it_is():
-    vertices, faces = UNCLEAN["wavy"]
-    mesh = clean(vertices, faces)
-    w.assert_clean(mesh)
-    assert np.array_equal(mesh.vertices, vertices)
-    assert np.array_equal(mesh.faces, faces)
-    assert notes_of(mesh) == ()
-
-
 @pytest.mark.parametrize("name", UNCLEAN)
 def test_cleaning_again_moving_and_scaling_change_nothing_more(name):
     vertices, faces = UNCLEAN[name]

@@ -5,8 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 import pickle
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -15,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from specimens import ALL, SMOOTH, cells_of
 
-from surfaces import SurfaceError, bspline, cylinder, plane, sphere, torus
+from surfaces import SurfaceError, cylinder, plane, sphere, torus
 from surfaces.adjacency import grid_neighbours
 from surfaces.patches import cell_at, closest_on_patch
 from surfaces.patches.closed_form_kernels import wrap
@@ -315,18 +313,3 @@ def test_parallel_curves_fold_where_they_reach_the_radius(side):
         assert not found[along].any()
     for name in ("doughnut", "egg", "hood"):
         assert not CELLS[name].curves.folds(0.005 * side).any()
-
-
-def test_a_seam_with_a_kink_is_not_joined():
-    """A drop: its ends meet at a point, at an angle."""
-    net = np.array([[(0, 0, z), (1, -1, z), (1, 1, z), (0, 0, z)] for z in (0.0, 1.0)])
-    drop = bspline(net, (1, 3))
-    assert (drop.u_closed, drop.v_closed) == (False, False)
-    assert len(drop.cells(2, 3).pairs) == 11
-
-
-def test_importing_surfaces_loads_nothing_heavy():
-    heavy = "{'numba', 'pinocchio', 'networkx', 'scipy', 'trimesh'}"
-    script = f"import sys, surfaces; sys.exit(', '.join({heavy} & set(sys.modules)) or None)"
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (0, "")

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from smooth_probes import POSE, extrapolated_area, least_distances, same_surface, tangents
 from specimens import ALL, CLOSED, POLES, SMOOTH, cells_of, formula
-from spline_nets import TURN_KNOTS, full_turn, meridian, quarter_turn, turned
 
 from surfaces import (
     bspline,
@@ -325,24 +324,6 @@ def test_moved_and_pickled_surfaces_are_the_same(name):
     assert not hasattr(surface, "bounds") or moved.bounds(0.01) == surface.bounds(0.01)
 
 
-def arc_ball():
-    angle = np.radians(np.linspace(-90, 90, 41))
-    profile = np.column_stack([np.cos(angle), np.sin(angle)])
-    profile[[0, -1], 0] = 0.0
-    return revolution(profile, (0, 360), **POSE)
-
-
-def spline_ring():
-    circle, weights = full_turn()
-    points, weights = turned(circle * 0.2 + [0.6, 0.0], weights, *full_turn())
-    return bspline(points, (2, 2), (TURN_KNOTS, TURN_KNOTS), weights, **POSE)
-
-
-def spline_belt():
-    points, weights = turned(*meridian(0.7, -20, 65), *quarter_turn())
-    return bspline(points, (2, 2), None, weights, **POSE)
-
-
 # Made in another way; equal to it; to within, m.
 TWINS = {
     "round ellipsoid": (ellipsoid((0.7,) * 3, (10, 170), (-50, 60), **POSE),
@@ -351,9 +332,6 @@ TWINS = {
                    cylinder(0.7, (-50, 60), (0, 2), **POSE), 1e-13),
     "two points turned": (revolution([(0.5, 0.0), (0.4, 1.0)], (-50, 50)),
                           cone(0.5, -0.1, (-50, 50), (0, 1)), 1e-13),
-    "arc turned": (arc_ball(), sphere(1.0, (0, 180), (0, 360), **POSE), 1e-6),
-    "spline ring": (spline_ring(), torus(0.6, 0.2, (0, 360), (0, 360), **POSE), 1e-13),
-    "spline belt": (spline_belt(), sphere(0.7, (25, 110), (0, 90), **POSE), 1e-13),
     "spline pipe": (SMOOTH["spline pipe"], cylinder(0.5, (0, 360), (-0.2, 0.6), **POSE), 1e-13),
 }  # fmt: skip
 
