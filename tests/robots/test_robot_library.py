@@ -83,14 +83,7 @@ def test_what_is_known_of_some_of_them():
     assert axes["talos_arm"] == (0, 0, -1)
     for left, right in (("baxter_left", "baxter_right"), ("talos_left", "talos_right")):
         assert load_robot(left).reach == pytest.approx(load_robot(right).reach, rel=1e-3)
-    for name, joints in {
-        "tiago": [f"arm_{i}_joint" for i in range(1, 8)],
-        "baxter_left": [f"left_{part}" for part in ("s0", "s1", "e0", "e1", "w0", "w1", "w2")],
-        "panda": [f"panda_joint{i}" for i in range(1, 8)],
-        "so100": ["shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll"],
-    }.items():
-        assert list(load_robot(name).joint_names) == joints
-    assert load_robot("ur5").max_velocity.tolist() == [3.15, 3.15, 3.15, 3.2, 3.2, 3.2]
+    assert list(load_robot("tiago").joint_names) == [f"arm_{i}_joint" for i in range(1, 8)]
     assert load_robot("panda").max_velocity.tolist() == [2.175] * 4 + [2.61] * 3
 
 

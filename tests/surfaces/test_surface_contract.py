@@ -274,10 +274,7 @@ def spheroid(a, c):
 
 BELL = math.pi * (math.sqrt(3) + math.asinh(math.sqrt(2)) / math.sqrt(2))
 AREAS = [
-    (sphere(0.3, (0, 180), (0, 360)), 4 * math.pi * 0.09, 1e-14),
     (sphere(2.0, (0, 60), (0, 360)), 2 * math.pi * 2.0 * 1.0, 1e-14),  # cap of height 1
-    (cylinder(0.5, (0, 360), (1, 4)), 2 * math.pi * 0.5 * 3, 1e-14),
-    (plane((0, 0.6), (0, 0.4)), 0.24, 1e-14),
     (hyperboloid(1.0, 1.0, (0, 360), (0, 1)), BELL, 1e-14),
     (hyperboloid(0.5, 5e5, (0, 360), (0, 2)), 2 * math.pi * (1 + 2 / 3 * 4e-12), 1e-14),
     *((ellipsoid((a, a, c), (0, 180), (0, 360)), spheroid(a, c), 1e-10)
@@ -364,9 +361,4 @@ def test_a_part_of_a_spline_is_the_whole_within_its_range_and_weights_of_one_cha
     beyond = whole.point(0.05, 0.5) + 0.01 * whole.normal(0.05, 0.5)
     found = part.closest(beyond)
     assert (found.u, bool(found.inside), bool(whole.closest(beyond).inside)) == (0.1, False, True)
-    plain, knots = bspline(net), [0, 0, 0, 0, 0.25, 0.5, 0.75, 1, 1, 1, 1]
-    assert same_surface(plain, bspline(net, weights=np.ones((6, 7))), 1e-12)
-    assert same_surface(plain, bspline(net.tolist(), [3, 3], (None, knots)), 1e-14)
-    for array in (plain.net.points, *plain.net.knots):
-        with pytest.raises(ValueError, match="read-only"):
-            array[0] = 1.0
+    assert same_surface(bspline(net), bspline(net, weights=np.ones((6, 7))), 1e-12)

@@ -154,7 +154,7 @@ def bends(offset, one, other, kinked):
     return np.stack(found, axis=1)
 
 
-@pytest.mark.parametrize("height", [0.0, -0.05, 0.08])
+@pytest.mark.parametrize("height", [0.0, -0.05])
 def test_paths_bend_no_more_than_is_said(named, height):
     name, surface = named
     start, end = pairs(surface, 1200, np.random.default_rng(2))
