@@ -18,7 +18,6 @@ from robots.shapes import (
     outer_bodies,
     tool_reach,
 )  # fmt: skip
-from robots.shapes.sampling import random_configurations
 from robots.urdf import Sphere
 
 SRDF = '<robot name="x">{}</robot>'
@@ -150,17 +149,6 @@ def test_shapes_of_a_tool_count_as_bodies_on_the_last_joint(tmp_path):
 
 
 # Reference: exact meshes collide in 4.6 %, 5.2 %, 7 % of other random configurations.
-
-
-@pytest.mark.parametrize("name", ["ur5", "kinova"])
-def test_random_configurations_are_inside_the_limits_and_the_same_each_time(name):
-    robot = load_robot(name)
-    q = random_configurations(robot)
-    assert q.shape == (1000, robot.n)
-    assert np.isfinite(q).all()
-    assert ((q >= robot.lower) & (q <= robot.upper)).all()
-    assert (np.abs(q[:, np.isinf(robot.upper)]) <= np.pi).all()
-    np.testing.assert_array_equal(q, random_configurations(robot))
 
 
 # Arm: link, mm beyond the tool point, mm from the axis.

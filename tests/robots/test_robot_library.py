@@ -285,17 +285,6 @@ def test_a_file_is_a_robot_named_after_it_with_its_path_kept_absolute(tmp_path, 
         assert found.urdf == str(tmp_path / "test_arm.urdf")
 
 
-def test_meshes_in_packages_need_their_folder(tmp_path):
-    (tmp_path / "packages" / "my_arm").mkdir(parents=True)
-    folder = tmp_path / "packages"
-    for given in ((folder,), str(folder)):
-        assert load_text(tmp_path, arm([joint(1)]), package_dirs=given).package_dirs == (
-            str(folder),
-        )
-    shipped = load_robot("panda", package_dirs=(folder,))
-    assert (shipped.package_dirs[0], len(shipped.package_dirs)) == (str(folder), 2)
-
-
 def test_what_pinocchio_prints_is_in_the_error(capfd):
     from robots.pinocchio_model import parse
 

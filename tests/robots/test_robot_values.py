@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 import re
-from dataclasses import FrozenInstanceError, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,22 +14,6 @@ from samples import sampled, seeds
 from robots import Kinematics, RobotError, load_robot
 
 PUMA = load_robot("puma560")
-
-
-def test_arrays_are_copies_that_cannot_be_written():
-    lower = np.full(6, -1.0)
-    robot = replace(PUMA, lower=lower, approach_axis=(0, 3e300, 4e300))
-    lower[:] = 5.0
-    np.testing.assert_array_equal(robot.lower, [-1.0] * 6)
-    np.testing.assert_allclose(robot.approach_axis, [0, 0.6, 0.8])  # of length one
-    for array in (robot.lower, robot.upper, robot.approach_axis, robot.limit_sets["set-2"]):
-        with pytest.raises(ValueError, match="read-only"):
-            array[0] = 0.0
-    with pytest.raises(FrozenInstanceError):
-        robot.name = "other"
-    for mapping in (robot.limit_sets, robot.locked):
-        with pytest.raises(TypeError):
-            mapping["joint1"] = 0.0
 
 
 CHANGES = {

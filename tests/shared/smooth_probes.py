@@ -12,17 +12,6 @@ def random_parameters(surface, count, seed=7):
     return rng.uniform(*surface.u_range, count), rng.uniform(*surface.v_range, count)
 
 
-def tangents(surface, u, v, step=1e-5):
-    """Central differences of fourth order."""
-
-    def slope(du, dv):
-        near = surface.point(u + du, v + dv) - surface.point(u - du, v - dv)
-        far = surface.point(u + 2 * du, v + 2 * dv) - surface.point(u - 2 * du, v - 2 * dv)
-        return (8 * near - far) / (12 * step)
-
-    return slope(step, 0.0), slope(0.0, step)
-
-
 def triangle_area(surface, count):
     """Area of the triangles over a grid of parameters."""
     u, v = (np.linspace(*ends, count + 1) for ends in (surface.u_range, surface.v_range))

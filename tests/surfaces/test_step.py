@@ -190,9 +190,7 @@ def answered(arrays=b"", **said):
 @pytest.mark.parametrize(
     ("written", "words"),
     [
-        (b"", BROKEN),
-        (b"\xff\n", BROKEN),
-        (b"[]\n", BROKEN),
+        *((each, BROKEN) for each in (b"", b"\xff\n", b"[]\n")),
         (answered(faces=[{"kind": "plane"}]), BROKEN),
         (answered(b"0" * 35, vertices=1, triangles=1), BROKEN),
         (answered(vertices=-1, triangles=2), BROKEN),

@@ -182,15 +182,6 @@ def test_sizes_must_be_whole_numbers(bad):
                 ask(k)
 
 
-def test_once_around_is_the_range_in_the_units_of_the_picture():
-    """A spline counts as its knots do, an angle in degrees."""
-    ball, pipe = CELLS["ball"].unrolled(), CELLS["pipe"].unrolled()
-    assert ball.turns == (pytest.approx(360.0, rel=1e-12), np.inf)
-    assert pipe.turns == (np.inf, pytest.approx(360.0, rel=1e-12))
-    assert CELLS["spline pipe"].unrolled().turns == (np.inf, 1.0)
-    assert CELLS["hood"].unrolled().turns == (np.inf, np.inf)
-
-
 # compiled: the same closest points, and the cell they fall in
 
 
