@@ -25,14 +25,14 @@ CLOSE = {"rtol": 0, "atol": 1e-12}
 
 
 def by_chain(chain, q):
-    """Point, axis and their Jacobians by the compiled kernels."""
+    """Point, axis, their Jacobians and the reference axis by the compiled kernels."""
     n = len(q)
     origins, axes = np.empty((n, 3)), np.empty((n, 3))
-    point, axis = np.empty(3), np.empty(3)
+    point, axis, reference = np.empty((3, 3))
     rows = np.empty((3, n)), np.empty((3, n))
-    frames(chain, q, origins, axes, point, axis, np.empty(3))
+    frames(chain, q, origins, axes, point, axis, reference)
     jacobians(chain, origins, axes, point, axis, *rows)
-    return point, axis, *rows
+    return point, axis, *rows, reference
 
 
 def check_arm(robot, rng, samples):
@@ -49,7 +49,8 @@ def check_arm(robot, rng, samples):
         np.testing.assert_allclose(point, placed[0][k], **CLOSE)
         np.testing.assert_allclose(axis, placed[1][k], **CLOSE)
         rows = kinematics.jacobians(row)
-        for ours, theirs in zip(by_chain(robot.chain, row), (point, axis, *rows), strict=True):
+        expected = point, axis, *rows, placed[2][k]
+        for ours, theirs in zip(by_chain(robot.chain, row), expected, strict=True):
             np.testing.assert_allclose(ours, theirs, **CLOSE)
         np.testing.assert_allclose(moved[k], rows[0].T, rtol=0, atol=1e-9)
         np.testing.assert_allclose(velocities[k], rows[0] @ rates[k], **CLOSE)
