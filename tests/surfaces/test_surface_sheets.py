@@ -46,7 +46,7 @@ def distances(surface, wanted, depth, rng, most=600, count=80):
 
 
 @sampled
-@pytest.mark.parametrize("seed", seeds(4, all=100))
+@pytest.mark.parametrize("seed", seeds(3, all=100))
 @pytest.mark.parametrize("thick", [False, True])
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_place_is_further_from_its_sheet_than_stated(kind, thick, seed):
