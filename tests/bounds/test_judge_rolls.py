@@ -130,10 +130,7 @@ def test_references_bend_no_more_than_is_said(kind):
 
 
 def made_up(approach, along, smooth, share=0.0):
-    """One path of places s = 0 to 1 where approach and u direction are functions of s.
-
-    Bounds on their derivatives are measured. `along` may be one direction, too.
-    """
+    """One path of places s = 0 to 1 where approach and u direction are functions of s."""
     fixed = not callable(along)
     e = (lambda s: np.tile(along, (len(s), 1))) if fixed else along
     s = np.linspace(0.0, 1.0, 2001)

@@ -11,7 +11,7 @@ case is trusted only where both give the same answer.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,15 +23,10 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One question: can the arm cover these cells in one motion? Lengths in m, angles in degrees.
+    """One question: can the arm cover these cells in one motion? Lengths in m, angles in deg."""
 
-    `u` and `v` are in degrees where the parameter is an angle, else in m.
-    """
-
-    kind: str
-    """'sphere', 'cylinder', 'hyperboloid' or 'plane'."""
-    size: tuple[float, ...]
-    """Sphere, cylinder: (radius,); hyperboloid: (waist, flare); plane: ()."""
+    kind: str  # 'sphere', 'cylinder', 'hyperboloid' or 'plane'
+    size: tuple[float, ...]  # Sphere, cylinder: (radius,); hyperboloid: (waist, flare); plane: ()
     u: tuple[float, float]
     v: tuple[float, float]
     position: tuple[float, float, float]
@@ -40,28 +35,7 @@ class Problem:
     cells: tuple[int, int]
     standoff: float
     cone_deg: float
-    limits_deg: tuple[tuple[float, float], ...]
-    """(lower, upper) of each joint, base to tip."""
-
-    def varied(self, cone: float = 1.0, limits_deg: float = 0.0, standoff: float = 0.0) -> Problem:
-        """The same problem, a little wider or tighter.
-
-        Args:
-            cone: factor on the cone.
-            limits_deg: by how much every limit moves outwards (negative: inwards).
-            standoff: m, added to the standoff; may take it below zero.
-        """
-        moved = tuple((low - limits_deg, high + limits_deg) for low, high in self.limits_deg)
-        return replace(
-            self,
-            cone_deg=min(self.cone_deg * cone, 180.0),
-            limits_deg=moved,
-            standoff=self.standoff + standoff,
-        )
-
-    def plain(self) -> dict[str, Any]:
-        """The problem as JSON holds it."""
-        return asdict(self)
+    limits_deg: tuple[tuple[float, float], ...]  # (lower, upper) of each joint, base to tip
 
     @staticmethod
     def read(plain: dict[str, Any]) -> Problem:
@@ -126,12 +100,9 @@ class Problem:
 class Domain(NamedTuple):
     """Samples of the parameters, and which of them are next to each other."""
 
-    uv: Floats
-    """(S, 2) rad or m."""
-    links: Ints
-    """(L, 2) pairs of samples."""
-    centres: Ints
-    """(N,) the sample at each cell's centre, row by row."""
+    uv: Floats  # (S, 2) rad or m
+    links: Ints  # (L, 2) pairs of samples
+    centres: Ints  # (N,) the sample at each cell's centre, row by row
 
 
 def _pairs(nu: int, nv: int) -> Ints:
@@ -184,12 +155,9 @@ def net(problem: Problem, pieces: Ints | int) -> Domain:
 class Answer(NamedTuple):
     """What an oracle says."""
 
-    feasible: bool
-    """One component covers every cell."""
-    covered: int
-    """Cells of the best single component."""
-    reachable: int
-    """Cells that some component covers."""
+    feasible: bool  # One component covers every cell
+    covered: int  # Cells of the best single component
+    reachable: int  # Cells that some component covers
 
 
 def answer(cells: int, cell: Ints, component: Ints) -> Answer:

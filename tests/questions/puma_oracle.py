@@ -42,13 +42,11 @@ BRANCHES = np.array([(s, e) for s in (1.0, -1.0) for e in (1.0, -1.0)])
 class Resolution(NamedTuple):
     """How finely the oracle looks."""
 
-    rows: float = 7.0
-    """theta5 rows in one cone angle; the step stays within 0.4 .. 2.5 degrees."""
+    rows: float = 7.0  # theta5 rows in one cone angle; the step stays within 0.4 .. 2.5 degrees
     turn_deg: float = 4.0
     """Largest change of a joint, or of the approach direction in link 3, between samples; never
     more than a third of the cone, so that the cones of neighbouring samples overlap."""
-    samples: int = 6000
-    """Patch: most samples in all, where that leaves three across a cell."""
+    samples: int = 6000  # Patch: most samples in all, where that leaves three across a cell
 
 
 STANDARD = Resolution()
@@ -165,10 +163,7 @@ def _turns(limits: Floats) -> Ints:
 
 
 def _fold_samples(problem: Problem, domain: Domain) -> tuple[Domain, Ints]:
-    """The domain with the last reachable point of every line that leaves the reach.
-
-    Also returns the indices of the samples that were added.
-    """
+    """The domain with the last reachable point of every line that leaves the reach."""
     reached = (slack(problem.targets(*domain.uv.T)[0]) >= 0.0).all(axis=-1)
     a, b = domain.links.T
     cut = reached[a] != reached[b]
@@ -202,20 +197,13 @@ def _pieces(problem: Problem, turn_deg: float) -> Ints:
 class Fibres(NamedTuple):
     """Every arm branch over every sample, with what its wrist may do."""
 
-    sample: Ints
-    """(A,) sample of each arm node."""
-    branch: Ints
-    """(A,) row of `BRANCHES`."""
-    theta: Floats
-    """(A, 3) theta1 to theta3, unwrapped, inside the limits."""
-    arm: Ints
-    """(A,) row of `spans`; nodes that differ in whole turns share one."""
-    links: Ints
-    """(L, 2) pairs of arm nodes that a continuous motion of theta1 to theta3 joins."""
-    rows: Floats
-    """(R,) theta5."""
-    spans: Floats
-    """(P, R, slots, 2) allowed theta4."""
+    sample: Ints  # (A,) sample of each arm node
+    branch: Ints  # (A,) row of `BRANCHES`
+    theta: Floats  # (A, 3) theta1 to theta3, unwrapped, inside the limits
+    arm: Ints  # (A,) row of `spans`; nodes that differ in whole turns share one
+    links: Ints  # (L, 2) pairs of arm nodes that a continuous motion of theta1 to theta3 joins
+    rows: Floats  # (R,) theta5
+    spans: Floats  # (P, R, slots, 2) allowed theta4
 
 
 def fibres(problem: Problem, domain: Domain, folds: Ints, row_step: float) -> Fibres:
@@ -280,14 +268,7 @@ def _rows(limits: Floats, step: float) -> Floats:
 
 
 def solve(problem: Problem, on: str = "patch", resolution: Resolution = STANDARD) -> Answer:
-    """The oracle's answer.
-
-    Args:
-        problem: what is asked.
-        on: the domain, 'patch' or 'net'; see `oracle_cases`. On the net a line that leaves the
-            reach leads nowhere; on the patch two branches may meet at its end.
-        resolution: how finely to look.
-    """
+    """The oracle's answer."""
     n_cells = problem.cells[0] * problem.cells[1]
     if (problem.limits[:, 0] > problem.limits[:, 1]).any():
         return Answer(n_cells == 0, 0, 0)

@@ -45,10 +45,8 @@ class Resolution(NamedTuple):
 
     steps: float = 8.0
     """Grid steps of theta5 and of psi in one cone angle; they stay within 2 .. 5 degrees."""
-    pieces: int = 6
-    """Net: pieces of a line between centres."""
-    refine: int = 3
-    """Patch: samples across a cell, odd."""
+    pieces: int = 6  # Net: pieces of a line between centres
+    refine: int = 3  # Patch: samples across a cell, odd
 
 
 STANDARD = Resolution()
@@ -58,10 +56,7 @@ STANDARD = Resolution()
 def arm(
     x: float, y: float, z: float, s: float, e: float, theta5: float, psi: float, out: Floats
 ) -> float:
-    """Fill theta1 to theta4 (mod 2 pi) for a tool point; returns cos(theta3), beyond +-1 if none.
-
-    The point must be further than d4 + d6 from the first axis.
-    """
+    """Fill theta1 to theta4 (mod 2 pi) for a point beyond d4 + d6; returns cos(theta3)."""
     c5, s5, cp, sp = np.cos(theta5), np.sin(theta5), np.cos(psi), np.sin(psi)
     aside = D4 + D6 * c5
     along = s * np.sqrt(x * x + y * y - aside * aside)
@@ -87,11 +82,7 @@ def _fill(
     place: NDArray[np.int32],
     theta: Floats,
 ) -> int:
-    """Number the valid places of the grid and keep their joints; returns how many there are.
-
-    `place` is (S, 2, R, C, 2); `theta` is (room, 4). Without room, what the cone lets through is
-    counted, which is never less.
-    """
+    """Number the valid places of the grid and keep their joints; returns how many there are."""
     count, trial = 0, np.zeros(4)
     cosines, sines = np.cos(columns), np.sin(columns)
     for i in range(len(points)):
@@ -199,11 +190,7 @@ def _components(
 
 
 def solve(problem: Problem, on: str = "patch", resolution: Resolution = STANDARD) -> Answer:
-    """The oracle's answer; see `puma_oracle.solve`.
-
-    Raises:
-        ValueError: the patch comes too close to the first axis.
-    """
+    """The oracle's answer; see `puma_oracle.solve`."""
     n_cells = problem.cells[0] * problem.cells[1]
     limits = problem.limits
     domain: Domain = (

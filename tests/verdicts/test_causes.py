@@ -10,7 +10,7 @@ import numpy as np
 import plain
 import pytest
 from asked import question, verdict_of
-from dense_replay import tools
+from plain import tools
 
 from feasibility import CauseKind, Search, Task, check
 from feasibility.collisions import Collision, Obstacle, ToolShape
