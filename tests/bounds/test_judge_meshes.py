@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 import trimesh
 from bounds import holds
-from gantry import configurations, dense, gantry
+from gantry import configurations, gantry
 from referee import Facets
+from referee import evenly as dense
 from samples import sampled, spread
 
 from feasibility import Answer, Task, check, verify

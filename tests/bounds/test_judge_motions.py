@@ -14,7 +14,6 @@ from capsule_arms import bodies_of, pair
 from gantry import (
     SURFACES,
     configurations,
-    dense,
     gantry,
     marks_of,
     places_along,
@@ -23,6 +22,7 @@ from gantry import (
 )  # fmt: skip
 from random_arms import planar_arm, robot_of
 from referee import Facets
+from referee import evenly as dense
 from samples import EVERYTHING, sampled, seeds
 
 from feasibility import Search, Task, check

@@ -11,6 +11,7 @@ from arm_urdfs import joint
 from bounds import holds
 from gantry import SURFACES, raster, references_of, tools_of
 from random_arms import random_arm, robot_of
+from referee import roll_about, unit
 from samples import sampled, seeds
 
 from feasibility import Task
@@ -149,10 +150,6 @@ def made_up(approach, along, smooth, share=0.0):
     return held, PlacePaths(at[None], np.zeros((1, 4, 3)), approach(at)[None], pieces, none, x), e
 
 
-def unit(vectors):
-    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-
-
 def bump(s):
     """1 in the middle, 0 at both ends."""
     return (4.0 * s * (1.0 - s))[:, None]
@@ -280,10 +277,7 @@ def rolls(cells, q, reference):
     e = u_directions(cells.surface, points - found.height[:, None] * found.normal)
     if reference is not None:
         e = np.tile(cells.surface.rotation @ unit(np.array(reference)), (len(b), 1))
-    t = unit(e - (e * b).sum(axis=1, keepdims=True) * b)
-    x, u = references_of(q), np.cross(b, t)
-    y = np.cross(axes, x)
-    return np.arctan2((u * x - t * y).sum(axis=1), (t * x + u * y).sum(axis=1))
+    return roll_about(references_of(q), axes, e, b)
 
 
 def limited(name, low=-BESIDE, high=BESIDE):

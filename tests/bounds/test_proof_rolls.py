@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from referee import unit
 
 from feasibility import Task
 from feasibility.certification.cut_proofs.linear_models import (
@@ -24,10 +25,6 @@ from robots import Kinematics, load_robot
 from surfaces import sphere
 
 UR5 = load_robot("ur5")
-
-
-def unit(vector):
-    return vector / np.linalg.norm(vector)
 
 
 def tool_model(q, half):

@@ -1,12 +1,7 @@
-"""Problems for the oracles: a patch, a task and limits, with geometry of the oracles' own.
+"""Problems for the oracles: a patch, a task and limits as plain numbers, over the referee's forms.
 
-Nothing here is shared with the packages under test: surfaces are evaluated from their formulas,
-and neighbours are enumerated from the grid. A problem is plain numbers, so that it fits in JSON.
-
-Two domains stand for "the patch". A `net` is the cells' centres and the lines between neighbouring
-centres, straight in the parameters: where a search that goes from centre to centre can be. The
-`patch` is a fine grid over whole cells: wherever a tool could go without leaving the surface. A
-case is trusted only where both give the same answer.
+A `net` is the cells' centres and straight lines between neighbours: where a search from centre to
+centre can be. A `patch` is a fine grid over whole cells: wherever a tool could go on the surface.
 """
 
 from __future__ import annotations
@@ -16,8 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from referee import Floats, Form, turn
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
@@ -60,41 +55,12 @@ class Problem:
             np.radians(v) if self.kind == "sphere" else v,
         )
 
-    def rotation(self) -> Floats:
-        """(3, 3) Rz(yaw) Ry(pitch) Rx(roll)."""
-        (cr, cp, cy), (sr, sp, sy) = (
-            np.cos(np.radians(self.rpy_deg)),
-            np.sin(np.radians(self.rpy_deg)),
-        )
-        about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
-        about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
-        about_z = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
-        return np.asarray(about_z @ about_y @ about_x, dtype=float)
-
     def targets(self, u: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """Target points (..., 3) m and approach directions (..., 3) at parameters (rad or m)."""
-        one, zero = np.ones_like(u * v), np.zeros_like(u * v)
-        if self.kind == "sphere":
-            normal = np.stack(
-                [np.sin(u) * np.cos(v) * one, np.sin(u) * np.sin(v) * one, np.cos(u) * one], -1
-            )
-            point = self.size[0] * normal
-        elif self.kind == "plane":
-            normal = np.stack([zero, zero, one], -1)
-            point = np.stack([u * one, v * one, zero], -1)
-        else:
-            waist = self.size[0]
-            slant = v / self.size[1] if self.kind == "hyperboloid" else 0.0 * v
-            stretch = np.sqrt(1.0 + slant**2)
-            slope = waist * slant / (self.size[-1] * stretch)
-            radius = waist * stretch
-            normal = np.stack([np.cos(u) * one, np.sin(u) * one, -slope * one], -1)
-            normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-            point = np.stack([radius * np.cos(u), radius * np.sin(u), v * one], -1)
-        sign = -1.0 if self.side == "inside" else 1.0
-        turn = self.rotation()
-        placed = (point + sign * self.standoff * normal) @ turn.T + np.array(self.position)
-        return placed, -sign * normal @ turn.T
+        """Target points (k, 3) m and approach directions (k, 3) at parameters (k,)."""
+        turned, outside = turn(np.radians(self.rpy_deg)), self.side == "outside"
+        form = Form(self.kind, self.size, *self.ranges, outside, self.position, turned)
+        there = form.at(u, v)
+        return there.points + form.sign * self.standoff * there.normals, -form.sign * there.normals
 
 
 class Domain(NamedTuple):

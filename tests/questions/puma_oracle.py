@@ -1,26 +1,11 @@
 """Whether a PUMA covers a patch, from its closed-form inverse kinematics.
 
-The tool point of this PUMA is its wrist centre, so theta1 to theta3 alone place it: four arm
-branches (shoulder s, elbow e) for a target p, from eq. (8) of the paper:
-
-    K = (|p|^2 - a2^2 - a3^2 - d3^2 - d4^2) / (2 a2) = a3 cos theta3 - d4 sin theta3
-    -sin(theta1) p_x + cos(theta1) p_y = d3
-
-In link frame 3 the tool axis is (-s5 c4, c5, s5 s4): theta5 is a polar angle about the frame's y
-axis, theta4 an azimuth. With m the approach direction in that frame, rho = hypot(m_x, m_z) and
-phi = atan2(m_z, -m_x), the cone asks for
-
-    s5 rho cos(theta4 - phi) + c5 m_y >= cos(alpha),
-
-so at one theta5 the allowed theta4 are intervals about phi (phi + pi where s5 < 0), repeated every
-2 pi and cut by the limits, or the whole range. The wrist is therefore exact in theta4 and sampled
-in theta5 only; theta5 = 0 and +-pi are always among the samples, because there theta4 is free and
-joins what is separate elsewhere. theta6 moves neither point nor axis.
-
-A node is (sample of the surface, arm branch with its turns, theta5 row, theta4 interval). Nodes are
-joined where intervals overlap: in neighbouring rows, and in the same row of neighbouring samples
-with the same branch and continuous joints. Where a line of the patch leaves the arm's reach, its
-last reachable point is added as a sample: two elbows (or shoulders) meet there and are joined.
+Its tool point is the wrist centre: theta1 to theta3 place it, in four branches (shoulder s, elbow
+e; eq. (8) of the paper). In link frame 3 the tool axis is (-s5 c4, c5, s5 s4), so with m the
+approach there, rho = hypot(m_x, m_z) and phi = atan2(m_z, -m_x), the cone asks for
+s5 rho cos(theta4 - phi) + c5 m_y >= cos(alpha): intervals of theta4 at each sampled theta5 (0 and
++-pi among them, where theta4 is free). Nodes are (sample, branch with turns, theta5, interval),
+joined where intervals overlap. Where a line leaves the reach two branches meet at its last point.
 """
 
 from __future__ import annotations

@@ -1,10 +1,8 @@
 """Stored problems of random patches and limits, and what the oracles say of them.
 
-Drawn at random and kept only where verdict and number of covered cells stay the same on both
-domains of the oracles, at two resolutions, with the cone 2 % (UR5: 6 %) and every limit 0.5 (2)
-degrees tighter and wider, and with the surface moved by the task's tolerance (UR5: three times
-that) along its normal and in four directions of space. Those of "apart" are without that filter:
-what an oracle says of a little tighter and of a little wider limits and cone is kept with them.
+Drawn at random, and kept only where the answer stays the same on both domains, at two resolutions,
+and with cone, limits and place of the surface a little tighter, wider and elsewhere; those of
+"apart" are without that filter, with the oracles' answers to a little tighter and wider ones.
 """
 
 from __future__ import annotations

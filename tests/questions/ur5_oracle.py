@@ -1,25 +1,11 @@
 """Whether a UR5 covers a patch, from closed-form inverse kinematics on a grid of wrist angles.
 
-The tool point of this UR5 (`tool0`) lies on the axis of its last joint, and the tool axis is that
-axis, so theta6 moves neither. Seen from the frame that turns with theta1 (x1 out along the arm, y1
-along the axes of joints 2 to 4, z up), with psi = theta2 + theta3 + theta4,
-
-    tool axis = (s5 cos psi, c5, -s5 sin psi)
-    tool point, y1:  d4 + d6 c5
-    tool point, x1:  l2 c2 + l3 c23 - d5 sin psi + d6 s5 cos psi
-    tool point, z - d1:  -l2 s2 - l3 s23 - d5 cos psi - d6 s5 sin psi
-
-Given the tool point, theta5 and psi therefore fix everything but two signs: theta1 follows from y1
-(shoulder s), theta2 and theta3 from the two-link arm in the x1 z plane (elbow e). Over a point of
-the surface the configurations are, for each pair of signs, a region of the (theta5, psi) torus:
-inside the cone, within the stretch of the two links, and inside the limits of joints 1 to 4. The
-torus is sampled as a grid, theta5 over its real range (0 and +-pi among the rows), psi around the
-circle.
-
-Neighbours in the grid, and equal places of neighbouring samples of the surface, are joined where
-every joint stays continuous. The two elbows meet where the links are stretched out: they are
-joined where a neighbour lies inside the cone but beyond the stretch. The shoulders would meet
-within d4 + d6 of the first axis; patches that come closer than `CLEARANCE` are refused.
+theta6 moves neither tool point nor axis. In the frame that turns with theta1 (x1 out along the arm,
+y1 along the axes of joints 2 to 4), with psi = theta2 + theta3 + theta4, the tool axis is
+(s5 cos psi, c5, -s5 sin psi) and the tool point d4 + d6 c5 along y1,
+l2 c2 + l3 c23 - d5 sin psi + d6 s5 cos psi along x1 and d1 - l2 s2 - l3 s23 - d5 cos psi
+- d6 s5 sin psi up: theta5 and psi fix all but two signs. Neighbours in that grid and over
+neighbouring samples are joined where joints stay continuous; elbows meet where links are stretched.
 """
 
 from __future__ import annotations

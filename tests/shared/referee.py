@@ -191,19 +191,17 @@ class Form:
     """A patch of a surface by its formula. Lengths in m, angles in rad."""
 
     kind: str
+    # Sphere, cylinder (r); cone (r, slope); torus (ring, tube); hyperboloid (waist, flare);
+    # ellipsoid (a, b, c); else ().
     size: Sequence[float]
-    """sphere, cylinder (r); cone (r, slope); torus (ring, tube); hyperboloid (waist, flare);
-    ellipsoid (a, b, c); plane and the others ()."""
     u: tuple[float, float]
     v: tuple[float, float]
     outside: bool
     position: ArrayLike = (0.0, 0.0, 0.0)
     rotation: ArrayLike = field(default_factory=lambda: np.eye(3))
+    # (u, v) to points (k, 3) in its own frame, for other kinds; of a revolution its `spline_curve`.
     formula: Callable[..., Floats] | None = None
-    """(u, v) to points (k, 3) in its own frame, for kinds that are not named above; of a
-    revolution its `spline_curve`."""
-    periods: tuple[float, float] = (0.0, 0.0)
-    """Of u and v where they are angles, else 0; known for named kinds."""
+    periods: tuple[float, float] = (0.0, 0.0)  # of u and v where they are angles, else 0
 
     def __post_init__(self) -> None:
         self.position, self.rotation = np.array(self.position), np.array(self.rotation)
@@ -596,10 +594,10 @@ class Scene:
             name: [(shape, fcl_object(shape.geometry)) for shape in bodies[name]] for name in asked
         }
 
-    def _placed(self, shape: Shape, model: Any, frames: Mapping[str, Floats], row: int) -> Any:
+    def _placed(self, shape: Shape, model: Any, frames: Mapping[str, Floats]) -> Any:
         import fcl
 
-        at = shape.placement if shape.link is None else frames[shape.link][row] @ shape.placement
+        at = shape.placement if shape.link is None else frames[shape.link][0] @ shape.placement
         if shape.geometry[0] == "halfspace":
             at = at.copy()
             at[:3, 3] -= 0.5 * DEEP * at[:3, 2]
@@ -614,7 +612,7 @@ class Scene:
             least = np.inf
             for one in self.bodies[self.pairs[k][0]]:
                 for other in self.bodies[self.pairs[k][1]]:
-                    a, b = (self._placed(*each, frames, 0) for each in (one, other))
+                    a, b = (self._placed(*each, frames) for each in (one, other))
                     touch = fcl.collide(a, b, fcl.CollisionRequest(), fcl.CollisionResult())
                     apart = fcl.distance(a, b, fcl.DistanceRequest(), fcl.DistanceResult())
                     least = min(least, (TOUCHING if touch else apart) - one[0].off - other[0].off)
@@ -665,13 +663,11 @@ class Asked(NamedTuple):
     standoff: float
     tolerance: float
     cone: float  # rad
-    roll: tuple[float, float] | None = None
-    """rad, the least and the largest; None where it is free."""
-    reference: Floats | None = None
-    """(3,) in the root frame: where the reference axis is to point at a roll of 0; None for the
-    direction in which u grows."""
-    approach: Floats | None = None
-    """(3,) unit, where the tool is to point all over the surface; None for along the normals."""
+    roll: tuple[float, float] | None = None  # rad, the least and the largest; None where it is free
+    reference: Floats | None = (
+        None  # (3,) root frame, the axis at a roll of 0; None for where u grows
+    )
+    approach: Floats | None = None  # (3,) unit, all over the surface; None for along the normals
 
 
 def evenly(rows: ArrayLike, per_segment: int = 20) -> Floats:
