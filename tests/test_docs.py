@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import ast
 import base64
-import importlib.util
 import io
 import json
 import os
 import re
+import runpy
 import shlex
 import shutil
 import subprocess
@@ -152,7 +152,7 @@ def test_complete_columns_of_the_table(name: str) -> None:
     assert row["complete"].startswith("**") is missed
 
 
-@pytest.mark.parametrize("name", ["4a", "4b", "4c", "4d", "4e", "5a", "5b"])
+@pytest.mark.parametrize("name", ["4a", "4d", "5b"])
 def test_greedy_column_of_the_table(name: str) -> None:
     """The quick ones; `make bench` prints them all."""
     robot, cells, task, _ = builtin_cases()[f"paper/{name}"].build()
@@ -324,10 +324,5 @@ def test_notebooks_stay_small() -> None:
 
 @pytest.mark.parametrize("name", ["search", "collisions", "work", "process"])
 def test_benchmarks_load(name: str) -> None:
-    path = ROOT / f"tests/benchmarks/bench_{name}.py"
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    assert any(word.startswith("bench_") for word in dir(module))
+    found = runpy.run_path(str(ROOT / f"tests/benchmarks/bench_{name}.py"))
+    assert any(word.startswith("bench_") for word in found)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ask import asked
+from jobs import coverable as asked
 from small_cases import TEXTS
 
 from feasibility.cli.main import main

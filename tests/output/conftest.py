@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
-from ask import ask  # noqa: F401
 from command_table import Commands
+from jobs import Said, coverable
+
+
+@pytest.fixture
+def ask() -> Callable[..., Said]:
+    """ask(arguments) -> status, stdout, stderr of a command that runs in this process."""
+    return coverable
 
 
 @pytest.fixture(scope="session")

@@ -6,7 +6,7 @@ import json
 import zipfile
 
 import pytest
-from ask import asked
+from jobs import coverable as asked
 
 from coverable_errors import ArgumentError
 from feasibility import Search, greedy_check

@@ -11,7 +11,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -82,7 +81,7 @@ def test_at_any_call_of_a_command_that_writes_files(swallowed, whole, tmp_path):
     assert calls > 300
     before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGALRM), sys.unraisablehook
     left = []
-    for call in spread(range(calls - 9), 40):  # a call more or less is made from run to run
+    for call in spread(range(calls - 9), 20):  # a call more or less is made from run to run
         folder = tmp_path / str(call) / "out"
         folder.mkdir(parents=True)
         with interrupted_at(call, swallowed):
@@ -282,12 +281,10 @@ def test_at_a_random_event(number, tmp_path):
     (tmp_path / "plate.toml").write_text(PLATE)
     (tmp_path / "s.toml").write_text(STUDY)
     event = int(rng.integers(1, 40_000))
-    began = time.monotonic()
     done = process(
         AT_EVENT, event, command, *COMMANDS[command], cwd=tmp_path, start_new_session=True,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
     )  # fmt: skip
-    print(f"{command} at {event}: {done.returncode} after {time.monotonic() - began:.1f} s")
     assert done.returncode in (130, 0, 1), done.stderr  # or it has fewer events
     assert (done.returncode == 130) == done.stderr.endswith(INTERRUPTED)
     assert "Traceback" not in done.stderr

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import site
 import subprocess
 import sys
@@ -125,21 +124,5 @@ def test_with_another_numba_it_compiles(
     installed: Path, from_source: dict[str, Any], tmp_path: Path
 ) -> None:
     count, _, answers = told(installed, tmp_path, "paper/4a", "other numba")
-    assert count > 20
-    assert answers["paper/4a"] == from_source["paper/4a"]
-
-
-def test_an_edited_kernel_is_compiled(
-    installed: Path, from_source: dict[str, Any], tmp_path: Path
-) -> None:
-    copy = tmp_path / "site"
-    _, file, _ = told(installed, tmp_path, "paper/4a")
-    shutil.copytree(file.parents[1], copy, ignore=shutil.ignore_patterns("*.pth", "__pycache__"))
-    edited = copy / "robots" / "chain.py"
-    text, length = edited.read_text("utf-8"), "    n = q.shape[0]\n    xx, xy"
-    assert text.count(length) == 1
-    edited.write_text(text.replace(length, length.replace("[0]", "[0] + 0")), "utf-8")
-    count, file, answers = told(installed, tmp_path, "paper/4a", PYTHONPATH=str(copy))
-    assert copy in file.parents
     assert count > 20
     assert answers["paper/4a"] == from_source["paper/4a"]

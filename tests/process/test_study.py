@@ -33,7 +33,6 @@ from feasibility.studies import (
     open_workers,
     run_tasks,
 )
-from feasibility.studies.store import StoreError
 
 SHARED = Path(study_works.__file__).parent
 
@@ -41,11 +40,6 @@ SHARED = Path(study_works.__file__).parent
 def numbers(count, work=study_works.double, **more):
     """Tasks about the numbers 0, 1, 2, ..."""
     return [StudyTask({"number": k, **more}, {"number": k}, work) for k in range(count)]
-
-
-def facts(rows):
-    """Rows without the time that they took."""
-    return [(dict(row.parameters), row.status, row.result) for row in rows]
 
 
 @pytest.fixture(scope="module")
@@ -278,31 +272,25 @@ def stored(path) -> int:
         return len(store)
 
 
+def processes() -> dict[int, int]:
+    """The parent of each process that has not ended."""
+    found = {}
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            fields = path.read_text().rpartition(")")[2].split()
+            found |= {int(path.parent.name): int(fields[1])} if fields[0] != "Z" else {}
+    return found
+
+
 def children_of(pid: int) -> set[int]:
     """Processes that a process has started."""
-    found = set[int]()
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = path.read_text().rpartition(")")[2].split()
-        except OSError:
-            continue
-        if int(fields[1]) == pid and fields[0] != "Z":
-            found.add(int(path.parent.name))
-    return found
+    return {child for child, parent in processes().items() if parent == pid}
 
 
 def wait_until_gone(pids) -> None:
     """Until there are no such processes, but for their remains."""
-    while any(state(pid) not in ("", "Z") for pid in pids):
+    while pids & processes().keys():
         time.sleep(0.01)
-
-
-def state(pid: int) -> str:
-    """Of a process; empty where there is none."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
-    except OSError:
-        return ""
 
 
 @pytest.fixture(scope="module")
@@ -348,22 +336,6 @@ def test_the_command_killed_and_run_again(in_peace, tmp_path) -> None:
     wait_until_gone(orphans)
 
 
-def test_two_commands_with_one_store(in_peace, tmp_path) -> None:
-    """One in another process, and one here that begins once the other has kept something."""
-    study, text = in_peace
-    shared = tmp_path / "a.study"
-    other = "study", study, "--out", shared, "--csv", tmp_path / "b.csv"
-    with start("run", *other, "--workers", 0) as process:
-        while not stored(shared) and process.poll() is None:
-            time.sleep(0.01)
-        assert coverable(*asked(study, tmp_path, "a"), "--workers", 0).status == 0
-        _, err = process.communicate()
-    assert process.returncode == 0, err
-    for table in (tmp_path / "a.csv", tmp_path / "b.csv"):
-        assert table.read_text(encoding="utf-8") == text
-    assert stored(shared) == 24
-
-
 def test_ctrl_c_stores_and_leaves_no_worker(in_peace, tmp_path) -> None:
     """A terminal sends it to the workers too: neither they nor their parent write a traceback."""
     with start("stop", *asked(in_peace[0], tmp_path, "a"), "--workers", 1) as process:
@@ -380,25 +352,6 @@ def test_ctrl_c_stores_and_leaves_no_worker(in_peace, tmp_path) -> None:
     assert "Traceback" not in err
     assert children
     wait_until_gone(children)
-
-
-def test_a_full_disk_ends_a_study_and_loses_nothing(in_peace, tmp_path) -> None:
-    study, text = in_peace
-    path, held = tmp_path / "a.study", []
-    with Store(path) as store:
-        store._base.execute("PRAGMA max_page_count = 4")  # SQLite's own full disk
-
-        def work() -> None:
-            with open_workers(0) as workers:
-                for task in load_study(study).tasks:  # each is kept as it comes
-                    held.append(run_tasks([task], workers, store))
-
-        with pytest.raises(StoreError, match="disk is full"):
-            work()
-        assert 0 < len(held) == len(store) < 24
-    assert coverable(*asked(study, tmp_path, "a"), "--workers", 0).status == 0
-    assert (tmp_path / "a.csv").read_text(encoding="utf-8") == text
-    assert stored(path) == 24
 
 
 DYING = """

@@ -8,7 +8,7 @@ import tomllib
 from functools import cache
 from pathlib import Path
 
-from ask import Said, asked
+from jobs import Said, coverable
 
 TABLE = tomllib.loads(Path(__file__).parents[1].joinpath("output/commands.toml").read_text("utf-8"))
 FILES, NUMBERS, REFUSED = (TABLE.pop(name) for name in ("files", "numbers", "refused"))
@@ -63,7 +63,7 @@ class Commands:
         before = Path.cwd()
         os.chdir(self.folder)
         try:
-            return asked(*words)
+            return coverable(*words)
         finally:
             os.chdir(before)
 

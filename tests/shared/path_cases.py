@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import cache
 
 import asked
-import timed_motions
 
 from feasibility import Task, check
 from feasibility.cases import load_case
@@ -52,13 +51,3 @@ def path_of(name, order=None):
 def run_of(name):
     """Its trajectory at `SPEED`."""
     return trajectory(path_of(name), SPEED)
-
-
-def interpolated(run, degree, per_interval):
-    """See `timed_motions.interpolated`."""
-    return timed_motions.interpolated(run, degree, per_interval)
-
-
-def assert_keeps_to_limits(verdict, run, limits):
-    """See `timed_motions.keeps_to_limits`."""
-    timed_motions.keeps_to_limits(verdict.robot, run, limits)

@@ -8,8 +8,6 @@ from operator import or_
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from samples import sampled, seeds
 
 from feasibility.division import set_cover, undominated
@@ -17,18 +15,6 @@ from feasibility.division.connected_labels import count_of
 from feasibility.division.partition import fewest_patches
 from feasibility.placement.stations import fewest_stations
 from surfaces import plane
-
-
-@st.composite
-def tables(draw, rows=5, cells=9):
-    """Which of some motions cover which of some cells, and which cells touch."""
-    n = draw(st.integers(1, cells))
-    count = draw(st.integers(1, rows))
-    covers = draw(st.lists(st.integers(0, 2**n - 1), min_size=count, max_size=count))
-    pairs = list(combinations(range(n), 2))
-    kept = draw(st.lists(st.booleans(), min_size=len(pairs), max_size=len(pairs)))
-    made = np.array([[mask >> c & 1 for c in range(n)] for mask in covers], dtype=bool)
-    return made, np.array([p for p, k in zip(pairs, kept, strict=True) if k]).reshape(-1, 2)
 
 
 def random_table(seed):
@@ -137,14 +123,16 @@ def test_random_tables_against_brute_force(block):
     assert 0 < costs < 40
 
 
-@given(tables(rows=8, cells=12), st.lists(st.integers(0, 8), min_size=3, max_size=3))
-def test_stations_against_brute_force(table, cuts):
+@pytest.mark.parametrize("seed", range(25))
+def test_stations_against_brute_force(seed):
     """Each cell is given to one station, which covers it; motions of several placements."""
-    covers, wanted = table[0], table[0].any(axis=0)
-    parts = np.split(np.arange(len(covers)), np.sort(np.minimum(cuts, len(covers))))
+    rng = np.random.default_rng([6, seed])
+    covers = rng.random((rng.integers(1, 9), rng.integers(1, 13))) < rng.uniform(0.1, 0.9)
+    parts = np.split(np.arange(len(covers)), np.sort(rng.integers(0, len(covers) + 1, 3)))
     found = fewest_stations([covers[part] for part in parts], covers.shape[1])
     assert found.optimal
     assert len(found) == fewest_by_brute_force(covers)
+    wanted = covers.any(axis=0)
     given = [cell for station in found.stations for cell in station.cells.tolist()]
     assert sorted(given) == np.flatnonzero(wanted).tolist()
     assert found.left_out.tolist() == np.flatnonzero(~wanted).tolist()
@@ -238,15 +226,16 @@ def test_without_time_there_is_a_gap_and_it_is_honest():
     assert any(one.connected.bound < len(one.connected) for one in gaps)
 
 
-@given(tables())
-def test_undominated_sets(table):
+def test_undominated_sets():
     """Against the definition; of equal sets the first stays, empty ones go."""
-    sets = [frozenset(np.flatnonzero(row).tolist()) for row in table[0]]
-    kept = [
-        k for k, own in enumerate(sets)
-        if own and not any(own < other for other in sets) and own not in sets[:k]
-    ]  # fmt: skip
-    assert undominated(table[0]).tolist() == kept
+    for seed in range(60):
+        covers = random_table(seed)[0][:, : 1 + seed % 5]
+        sets = [frozenset(np.flatnonzero(row).tolist()) for row in covers]
+        kept = [
+            k for k, own in enumerate(sets)
+            if own and not any(own < other for other in sets) and own not in sets[:k]
+        ]  # fmt: skip
+        assert undominated(covers).tolist() == kept
 
 
 def test_bad_input():

@@ -12,15 +12,13 @@ from coverable_errors import CoverableError
 from feasibility import Task, check, verify
 from feasibility.cli.main import main
 from feasibility.collisions import Collision
-from robots import Kinematics, load_robot
+from robots import load_robot
 from surfaces import cylinder, parallel_passes, pass_toolpath, plane, poses
 from surfaces.passes import pass_route
 from surfaces.toolpaths import PoseCells
 
 UR5 = load_robot("ur5")
 TASK = Task(standoff=0.02, cone_deg=20)
-SQUARE = plane((0.0, 0.2), (0.0, 0.2), "outside", (0.4, -0.1, 0.2))
-ARCH = cylinder(0.3, (60, 120), (0.0, 0.2), "outside", (0.45, -0.1, 0.0), (-90, 0, 0))
 PANEL = """
 robot.name = "ur5"
 surface.kind = "plane"
@@ -81,25 +79,6 @@ def test_passes_in_one_motion(path, tmp_path):
     assert (status, "along 3 passes" in said) == (0, True)
 
 
-@pytest.mark.parametrize(("surface", "direction"), [(SQUARE, 0.0), (ARCH, 0.0), (ARCH, np.pi / 2)])
-def test_the_motion_keeps_to_the_passes(surface, direction):
-    """Looked at at twenty places of each segment, against the surface itself."""
-    cells = pass_toolpath(parallel_passes(surface, 0.04, direction, step=0.01))
-    verdict = check(UR5, cells, TASK)
-    assert verdict.feasible
-    q, share = verdict.witness.q, np.linspace(0.0, 1.0, 21)[:, None, None]
-    dense = (q[None, :-1] + share * np.diff(q, axis=0)[None]).transpose(1, 0, 2).reshape(-1, UR5.n)
-    points, axes = Kinematics(UR5).tools(dense)
-    at = surface.closest(points)
-    chord_sag = 0.01**2 / (8 * 0.3)
-    assert np.abs(at.height - 0.02).max() <= 1e-3 + chord_sag  # beside one another, so never lifted
-    assert (-(axes * at.normal).sum(axis=1)).min() >= np.cos(np.radians(20.0)) - 1e-3
-    targets = cells.centres + 0.02 * cells.normals
-    away = np.linalg.norm(targets[:, None] - points[None, ::7], axis=2).min(axis=1)
-    assert away.max() <= 5e-3
-    assert verify(UR5, cells, TASK, q).holds
-
-
 def test_between_stretches_that_are_apart_the_tool_is_lifted():
     laid = parallel_passes(plane((0.0, 0.2), (0.0, 0.2), "outside"), 0.1, one_way=True)
     cells = pass_toolpath(laid, retract=0.03)
@@ -135,14 +114,6 @@ def test_bad_arguments_are_said(path, approved):
     found = [path("panel", *arguments) for arguments in asked]
     assert {status for status, _, _ in found} == {2}
     approved("bad passes", "\n".join(err for _, _, err in found))
-
-
-def test_passes_too_fast_for_the_joints_are_left_out_with_the_joint(path):
-    status, out, _ = path("panel", "--passes", "0", "--pitch", "0.1", "--set", "task.speed=6")
-    assert status == 3
-    expected = ("none was found that does so at 6 m/s", "no part of them can be run")
-    for words in (*expected, "along stretch 1: ", "rad/s; it allows 3.15"):
-        assert words in out
 
 
 @pytest.mark.parametrize(

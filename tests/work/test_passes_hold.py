@@ -11,8 +11,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
+import plain
 import pytest
+from dense_replay import tools
 from mesh_patches import Mesh, flat_faces, used
 from referee import Facets, Form, angles_between, on_triangles
 from samples import EVERYTHING, sampled, seeds
@@ -42,12 +43,23 @@ class Drawn:
 
     arm: str
     surface: Any
-    form: Form | Facets
     task: Task
     direction: float
     pitch: float
     overrun: float
     one_way: bool
+
+    @cached_property
+    def form(self) -> Form | Facets:
+        """The surface as a formula of the referee, or as its triangles, with their border."""
+        form = plain.surface_of(self.surface)
+        if isinstance(form, Facets):
+            faces = self.surface.mesh.faces
+            sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+            each, count = np.unique(sides, axis=0, return_counts=True)
+            placed = self.surface.mesh.vertices @ self.surface.rotation.T + self.surface.position
+            form.border = placed[each[count == 1]]
+        return form
 
     @cached_property
     def planned(self) -> PlannedPasses:
@@ -62,13 +74,13 @@ def drawn(number):
     """The case of a number."""
     rng = np.random.default_rng([28, number])
     arm = tuple(ARMS)[number // len(KINDS) % len(ARMS)]
-    surface, form = surface_of(KINDS[number % len(KINDS)], rng, ARMS[arm])
+    surface = surface_of(KINDS[number % len(KINDS)], rng, ARMS[arm])
     task = Task(
         standoff=float(rng.choice([0.0, 0.005, 0.03])), cone_deg=float(rng.uniform(12.0, 30.0)),
         tolerance=float(rng.choice([5e-4, 1e-3])), footprint=0.05,
     )  # fmt: skip
     return Drawn(
-        arm, surface, form, task,
+        arm, surface, task,
         direction=float(rng.choice([0.0, math.pi / 2, rng.uniform(0.0, math.pi)])),
         pitch=float(rng.uniform(0.03, 0.08)), overrun=float(rng.choice([0.0, 0.0, 0.01])),
         one_way=bool(rng.random() < 0.2),
@@ -76,47 +88,39 @@ def drawn(number):
 
 
 def surface_of(kind, rng, far):
-    """A surface of some 0.2 m in front of the arm, tilted by up to 20 degrees; and as a formula.
+    """A surface of some 0.2 m in front of the arm, tilted by up to 20 degrees.
 
     Those of revolution lie, so that what looks up is worked on.
     """
     tilt = Rotation.from_euler("xyz", rng.uniform(-20, 20, 3), degrees=True)
     at = np.array([far, rng.uniform(-0.1, 0.1), rng.uniform(0.0, 0.2)])
     wide, deep = rng.uniform(0.1, 0.2, 2)
+    pose = at, tilt.as_euler("xyz", degrees=True)
     if kind.startswith("bumps"):
-        return bumps(rng, wide, deep, tilt, at, kind.endswith("hole"))
+        return bumps(rng, wide, deep, pose, kind.endswith("hole"))
     if kind == "plane":
-        u, v, pose = (-wide / 2, wide / 2), (-deep / 2, deep / 2), (at, angles_of(tilt))
-        return plane(u, v, "outside", *pose), Form("plane", (), u, v, True, at, tilt.as_matrix())
+        return plane((-wide / 2, wide / 2), (-deep / 2, deep / 2), "outside", *pose)
     radius = float(rng.uniform(0.12, 0.4))
-    half = wide / radius / 2
+    half = math.degrees(wide / radius / 2)
     lying = tilt * Rotation.from_euler("x", 90, degrees=True)
-    u, v, size, low = (math.pi / 2 - half, math.pi / 2 + half), (-deep / 2, deep / 2), (), radius
+    u, v, size, low = (90 - half, 90 + half), (-deep / 2, deep / 2), (radius,), radius
     match kind:
         case "sphere":
             lying = tilt * Rotation.from_euler("y", -90, degrees=True)
-            v, size = (-deep / radius / 2, deep / radius / 2), (radius,)
+            v = tuple(np.degrees([-deep / radius / 2, deep / radius / 2]))
         case "torus":
             tube = 0.8 * radius
-            v, size, low = (-deep / tube / 2, deep / tube / 2), (radius, tube), radius + tube
-        case "cylinder":
-            size = (radius,)
+            v = tuple(np.degrees([-deep / tube / 2, deep / tube / 2]))
+            size, low = (radius, tube), radius + tube
         case "cone":
             size = (radius, float(rng.uniform(-0.3, 0.3)))
         case "hyperboloid":
             size = (radius, float(rng.uniform(0.15, 0.4)))
     below = tilt.apply([0, 0, -low]) + at
-    spans = [np.degrees(u), np.degrees(v) if kind in ("sphere", "torus") else v]
-    made = MAKERS[kind](*size, *map(tuple, spans), "outside", below, angles_of(lying))
-    return made, Form(kind, size, u, v, True, below, lying.as_matrix())
+    return MAKERS[kind](*size, u, v, "outside", below, lying.as_euler("xyz", degrees=True))
 
 
-def angles_of(turn):
-    """Roll, pitch and yaw, degrees."""
-    return turn.as_euler("xyz", degrees=True)
-
-
-def bumps(rng, wide, deep, tilt, at, hole):
+def bumps(rng, wide, deep, pose, hole):
     """Irregular triangles with waves some millimetres high."""
     x, y = np.meshgrid(np.linspace(0, wide, 25), np.linspace(0, deep, 25))
     points = np.column_stack([x.ravel(), y.ravel()])
@@ -129,13 +133,7 @@ def bumps(rng, wide, deep, tilt, at, hole):
     waves = rng.uniform(-0.002, 0.002, 2)
     z = waves[0] * np.sin(20 * points[:, 0]) + waves[1] * np.cos(15 * points[:, 1])
     own = used(Mesh(np.column_stack([points - [wide / 2, deep / 2], z]), faces))
-    surface = mesh(TriangleMesh(*own), side="outside", position=at, rpy_deg=angles_of(tilt))
-    corners = tilt.apply(own.vertices) + at
-    form = Facets(corners, own.faces, True)
-    sides = np.sort(own.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    each, count = np.unique(sides, axis=0, return_counts=True)
-    form.border = corners[each[count == 1]]
-    return surface, form
+    return mesh(TriangleMesh(*own), side="outside", position=pose[0], rpy_deg=pose[1])
 
 
 def nearest(form, points):
@@ -147,19 +145,6 @@ def nearest(form, points):
     row, edge = np.divmod(np.arange(len(points) * len(form.border)), len(form.border))
     away = on_triangles(places.points[row], form.border[edge][:, [0, 1, 1]])[1]
     return places.points, places.normals, away.reshape(len(points), -1).min(axis=1) < 1e-7
-
-
-def tools(robot, q):
-    """(m, 3) tool points and axes, by Pinocchio alone."""
-    data, points, axes = robot.model.createData(), [], []
-    for row in q:
-        full = pin.integrate(robot.model, pin.neutral(robot.model), np.ascontiguousarray(row))
-        pin.forwardKinematics(robot.model, data, full)
-        pin.updateFramePlacements(robot.model, data)
-        placed = data.oMf[robot.tool_frame_id]
-        points.append(placed.translation.copy())
-        axes.append(placed.rotation @ robot.approach_axis)
-    return np.array(points), np.array(axes)
 
 
 def worst(case, q, cell):

@@ -21,7 +21,6 @@ from feasibility.paths.ladder import joint_route
 from feasibility.paths.metrics import revisiting
 from feasibility.paths.motion_graph import joint_length, rewound, windings
 from feasibility.paths.order import ORDERS, closed_sides, grid_order
-from feasibility.results import load_result, save_result
 from feasibility.roadmap import arrays_of, work_for
 from feasibility.verdict import Walk
 from robots import Kinematics, load_robot
@@ -169,18 +168,6 @@ def test_some_cells_only_of_a_feasible_surface_or_of_one_that_is_not():
     single = coverage_path(verdict_of("4c"), "rows", only=[7])
     assert single.visits.tolist() == [7]
     assert (single.figures.length, single.figures.revisited_share) == (0.0, 0.0)
-
-
-def test_a_verdict_from_a_file_has_the_same_path(tmp_path):
-    from feasibility.cases import load_case
-
-    case = load_case("paper/4a", ["surface.cells=[4, 4]"])
-    verdict = check(*case.build())
-    loaded = load_result(save_result(verdict, case, tmp_path / "4a.cover")).verdict
-    for order in ORDERS:
-        first, second = coverage_path(verdict, order), coverage_path(loaded, order)
-        assert np.array_equal(first.walk.q, second.walk.q)
-        assert np.array_equal(first.walk.cell, second.walk.cell)
 
 
 # -- the choice of nodes, on graphs by hand -------------------------------------------------------

@@ -33,13 +33,12 @@ from feasibility.placement import (
     moved_cells,
     place,
     placement_map,
-    station_plan,
     trial_table,
 )
 from feasibility.placement.reach_bound import Reach
 from feasibility.studies import Store, open_workers
 from robots import load_robot
-from surfaces import mesh, plane, rotation_from_rpy, sphere
+from surfaces import mesh, plane, rotation_from_rpy
 from surfaces.meshes import TriangleMesh
 
 SHIFT, TURN_DEG = 0.3, 40.0  # [m], [deg] that a surface is moved by, at most
@@ -47,49 +46,28 @@ WIDTHS = np.array([SHIFT] * 3 + [TURN_DEG] * 3)
 PUMA = 'robot = { name = "puma560", limits = "set-1" }\n'
 TEXTS = {
     "puma560 dome": PUMA + """
-        surface.kind = "sphere"
-        surface.radius = 1.0
-        surface.u_deg = [20, 80]
-        surface.v_deg = [40, 130]
-        surface.cells = [4, 5]
-        task = { standoff = 0.005, cone_deg = 25 }""",
+surface = { kind = "sphere", radius = 1.0, u_deg = [20, 80], v_deg = [40, 130], cells = [4, 5] }
+task = { standoff = 0.005, cone_deg = 25 }""",
     "puma560 pipe": PUMA + """
-        surface.kind = "cylinder"
-        surface.radius = 0.5
-        surface.u_deg = [-40, 40]
-        surface.v = [0.1, 0.6]
-        surface.cells = [5, 4]
-        task = { standoff = 0.005, cone_deg = 30 }""",
+surface = { kind = "cylinder", radius = 0.5, u_deg = [-40, 40], v = [0.1, 0.6], cells = [5, 4] }
+task = { standoff = 0.005, cone_deg = 30 }""",
     "ur5 plate": """
-        robot = { name = "ur5" }
-        surface.kind = "plane"
-        surface.u = [-0.25, 0.25]
-        surface.v = [-0.2, 0.2]
-        surface.cells = [5, 4]
-        surface.position = [0.5, 0, 0.2]
-        surface.side = "outside"
-        task = { standoff = 0.02, cone_deg = 20 }""",
+robot.name = "ur5"
+surface = { kind = "plane", u = [-0.25, 0.25], v = [-0.2, 0.2], cells = [5, 4], \
+position = [0.5, 0, 0.2], side = "outside" }
+task = { standoff = 0.02, cone_deg = 20 }""",
     "ur5 pipe": """
-        robot = { name = "ur5" }
-        surface.kind = "cylinder"
-        surface.radius = 0.15
-        surface.u_deg = [100, 260]
-        surface.v = [-0.2, 0.2]
-        surface.position = [0.65, 0, 0.3]
-        surface.side = "outside"
-        surface.cells = [5, 4]
-        task = { standoff = 0.02, cone_deg = 20 }""",
+robot.name = "ur5"
+surface = { kind = "cylinder", radius = 0.15, u_deg = [100, 260], v = [-0.2, 0.2], \
+position = [0.65, 0, 0.3], side = "outside", cells = [5, 4] }
+task = { standoff = 0.02, cone_deg = 20 }""",
     "panda plate": """
-        robot = { name = "panda" }
-        surface.kind = "plane"
-        surface.u = [-0.2, 0.2]
-        surface.v = [-0.2, 0.2]
-        surface.cells = [4, 4]
-        surface.position = [0.5, 0, 0.2]
-        surface.side = "outside"
-        task = { standoff = 0.02, cone_deg = 15 }""",
+robot.name = "panda"
+surface = { kind = "plane", u = [-0.2, 0.2], v = [-0.2, 0.2], cells = [4, 4], \
+position = [0.5, 0, 0.2], side = "outside" }
+task = { standoff = 0.02, cone_deg = 15 }""",
 }  # fmt: skip
-MOVED = [("ur5 plate", 3), ("panda plate", 3), ("ur5 pipe", 8), ("puma560 pipe", 21),
+MOVED = [("ur5 plate", 3), ("puma560 pipe", 21), ("ur5 pipe", 8), ("panda plate", 3),
          ("puma560 dome", 12), ("puma560 dome", 21), ("puma560 pipe", 2), ("ur5 pipe", 3),
          ("ur5 pipe", 15), ("ur5 plate", 9), ("panda plate", 10)]  # fmt: skip
 
@@ -128,7 +106,7 @@ def case_at(name, pose):
 
 
 @sampled
-@pytest.mark.parametrize(("name", "seed"), [*spread(MOVED[:4], 4), *spread(MOVED, 1)[1:]])
+@pytest.mark.parametrize(("name", "seed"), [*MOVED[:2], *spread(MOVED, 2)[2:]])
 def test_a_surface_moved_away_is_put_back(name, seed):
     """Infeasible where it was moved to; in the region around there is a place, and check agrees."""
     away = moved_away(name, seed)
@@ -192,15 +170,10 @@ class Doubting(LocalEvaluator):
         return [Trial(pose, Stage.CHECK, 1.0, **undecided) for pose in poses]
 
 
-def test_the_seed_decides_which_places_are_tried_and_check_what_is_answered():
+def test_what_check_does_not_say_is_no_answer():
     setup = setup_of("panda plate")
     region = region_about(Pose.of_surface(setup.cells.surface))
-    ask = {"count": 8, "around": 1, "keep": 1}
-    one, two = (place(*setup[:3], region, Search(seed=3), **ask) for _ in range(2))
-    assert [trial_table(t) for t in one.trials] == [trial_table(t) for t in two.trials]
-    other = place(*setup[:3], region, Search(seed=4), **ask)
-    assert [t.pose for t in other.trials] != [t.pose for t in one.trials]
-    doubted = place(*setup[:3], region, Search(seed=3), evaluator=Doubting(*setup), **ask)
+    doubted = place(*setup[:3], region, evaluator=Doubting(*setup), count=8, around=1, keep=1)
     assert any(trial.complete for trial in doubted.trials)
     assert (doubted.answer, doubted.found) == (Answer.UNDECIDED, ())
 
@@ -332,20 +305,18 @@ def test_moved_cells_are_those_of_the_case_and_a_mesh_moves_rigidly():
     assert (moved.locate(moved.centres) == np.arange(len(cells))).all()
 
 
-@pytest.mark.parametrize("name", ["ur5 plate", "puma560 dome"])
-def test_what_a_place_is_said_to_cover_one_motion_covers(name):
+@pytest.mark.parametrize(("name", "seed"), [("ur5 plate", 9), ("puma560 dome", 12)])
+def test_what_a_place_is_said_to_cover_one_motion_covers(name, seed):
     """Each component is replayed over the moved cells; what no search found is not."""
     setup = setup_of(name)
-    placer = LocalEvaluator(*setup)
-    for seed in (9, 12):
-        trial = placer.try_at(moved_away(name, seed), early=False)
-        assert len(trial.covers)
-        areas = setup.cells.areas
-        assert trial.share == pytest.approx(areas[trial.covers[0]].sum() / areas.sum())
-        for component in range(min(len(trial.covers), 3)):
-            assert placer.replayed(trial, component) == ""
-        more = replace(trial, covers=np.ones((1, len(setup.cells)), dtype=bool))
-        assert trial.complete or "did not find" in placer.replayed(more, 0)
+    placer, areas = LocalEvaluator(*setup), setup.cells.areas
+    trial = placer.try_at(moved_away(name, seed), early=False)
+    assert len(trial.covers)
+    assert trial.share == pytest.approx(areas[trial.covers[0]].sum() / areas.sum())
+    for component in range(min(len(trial.covers), 3)):
+        assert placer.replayed(trial, component) == ""
+    more = replace(trial, covers=np.ones((1, len(setup.cells)), dtype=bool))
+    assert trial.complete or "did not find" in placer.replayed(more, 0)
 
 
 def test_stations_share_out_what_no_placement_covers_alone(tmp_path):
@@ -364,20 +335,6 @@ def test_stations_share_out_what_no_placement_covers_alone(tmp_path):
     assert all(one["certified"] for one in told["stations"])
     assert (told["left_out"], told["optimal"]) == ([], True)
     assert len(told["stations"]) == told["at_least"] == 2
-    # A sphere's shell around the tool.
-    setup = setup_of("ur5 plate")
-    shell = sphere(0.35, (20, 160), (0, 360), side="outside").cells(3, 6)
-    region = Region.around(
-        Pose((0.6, 0.0, 0.3), (0.0, 0.0, 0.0)), {"x": (0.5, 0.9), "yaw_deg": (-180, 180)}
-    )
-    found = place(setup.robot, shell, setup.task, region, count=6, around=0)
-    plan = station_plan(found, LocalEvaluator(setup.robot, shell, setup.task, Search()), count=6)
-    assert found.answer is Answer.INFEASIBLE
-    assert plan.refusals == ("",) * len(plan.stations)
-    given = [cell for one in plan.stations.stations for cell in one.cells.tolist()]
-    assert sorted([*given, *plan.stations.left_out.tolist()]) == list(range(18))
-    for trial, station in zip(plan.trials, plan.stations.stations, strict=True):
-        assert (trial.covers[station.component] == station.covers).all()
 
 
 # -- workers, stores, maps, the command ------------------------------------------------------------

@@ -7,8 +7,10 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import path_cases
 import pytest
 from jobs import PLATE, verdict_named
+from path_cases import PATCHES, SPEED
 from plain import assert_motion, assert_over
 from referee import evenly as dense
 from samples import EVERYTHING, sampled
@@ -23,34 +25,21 @@ from feasibility.timing import Trajectory, motion_limits, trajectory, used
 from feasibility.timing.fastest_speeds import Rows, fastest_speeds
 from feasibility.timing.path_timing import timed_moves
 from robots import Kinematics, load_robot
-from surfaces import plane, sphere
+from surfaces import plane
 
-SPEED, ROUNDING = 0.15, 1.0 + 1e-9  # [m/s], [1]
 UR5 = load_robot("ur5")
 POST = Obstacle.box("post", (0.1, 0.1, 0.6), position=(0.75, 0.0, 0.3))
 AMONG = Collision(clearance=0.005, scene=(POST,))
 FLAT = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside")
-BALL = sphere(0.25, (10, 45), (150, 210), position=(0.65, 0, 0.1), side="outside")
-CASES = {
-    "5c, coarse": lambda: load_case("paper/5c", ["surface.cells=[4, 4]"]).build()[:3],
-    "ur5": lambda: (UR5, FLAT.cells(3, 4), Task(standoff=0.02, cone_deg=25)),
-    "panda": lambda: (load_robot("panda"), BALL.cells(3, 4), Task(standoff=0.02, cone_deg=25)),
-    "post": lambda: (UR5, FLAT.cells(2, 3), Task(0.02, cone_deg=30, collision=AMONG)),
-    **{
-        k: (lambda k=k: load_case(f"paper/{k}").build()[:3])
-        for k in ("4a", "4c", "5c") * EVERYTHING
-    },
-}
-
-
-@cache
-def verdict_of(name):
-    return check(*CASES[name]())
+CASES = ("5c, coarse", *PATCHES, *("4a", "4c", "5c") * EVERYTHING)
 
 
 @cache
 def path_of(name):
-    return coverage_path(verdict_of(name), "spiral" if name.startswith("5c") else "rows")
+    """With a post that the tool passes; or one of the paths that several files look at."""
+    if name != "post":
+        return path_cases.path_of(name)
+    return coverage_path(check(UR5, FLAT.cells(2, 3), Task(0.02, 30, collision=AMONG)), "rows")
 
 
 @cache
@@ -64,16 +53,15 @@ def run_of(name):
 @sampled
 @pytest.mark.parametrize("name", CASES)
 def test_a_trajectory_is_its_path_and_keeps_to_all_limits_however_it_is_interpolated(name):
-    verdict, run, path = verdict_of(name), run_of(name), path_of(name)
-    robot, limits = verdict.robot, motion_limits(verdict.robot, SPEED)
-    every = np.ones(len(verdict.cells), dtype=bool)
-    assert replay(robot, verdict.cells, verdict.task, run.walk, every).accepted
+    run, path = run_of(name), path_of(name)
+    robot, limits = path.robot, motion_limits(path.robot, SPEED)
+    assert replay(robot, path.cells, path.task, run.walk, path.needed).accepted
     marks = run.cell >= 0
-    assert_over(verdict, run.cell[marks], run.q[marks])
+    assert_over(path, run.cell[marks], run.q[marks])
     assert np.array_equal(run.cell[marks], path.visits)
     keeps_to_limits(robot, run, limits)
     for degree in (3, 5):  # what a controller makes of it stays on the surface
-        assert_motion(verdict, interpolated(run, degree, 3)[0])
+        assert_motion(path, interpolated(run, degree, 3)[0])
     # Speeds are those of the tool, by Pinocchio; at rest at both ends; whole nanoseconds.
     kinematics = Kinematics(robot)
     speed = [
@@ -111,7 +99,7 @@ def test_slower_tools_weaker_joints_and_longer_periods():
     path = path_of("ur5")
     fast, slow = trajectory(path, 0.2), trajectory(path, 0.05)
     assert slow.duration > 3 * fast.duration
-    assert slow.tool_speed.max() <= 0.05 * ROUNDING
+    assert slow.tool_speed.max() <= 0.05 * (1.0 + 1e-9)
     weak = trajectory(path, 0.2, velocity=0.05, acceleration=[0.1] * 6)
     assert weak.duration > fast.duration
     assert np.abs(weak.dq).max() > 0.04
