@@ -64,10 +64,8 @@ def test_a_number_of_threads_that_is_none(value: str, monkeypatch: pytest.Monkey
     "args",
     [
         ("check", "paper/4a", *SMALL, "--html", "view.html"),
-        ("check", "paper/4a", *SMALL, "--witness", "w.csv"),
         ("study", "study.toml", "--out", "out.study"),
         ("check", "case.toml"),
-        ("show", "some.result"),
     ],
 )
 def test_a_working_directory_that_is_gone(
@@ -97,37 +95,19 @@ def test_counts_and_speeds_beyond_all_use() -> None:
     ):
         assert words in said(*args)
     robot = load_robot("puma560")
-    for power in range(-320, 309, 4):
-        value = float(f"1e{power}")
-        if -6 <= power <= 6:
-            assert motion_limits(robot, value, value, value).tool_speed == value
-            continue
-        for given in ((value,), (0.1, value), (0.1, 1.0, value), (0.1, np.full(6, value))):
-            with pytest.raises(PathError):
-                motion_limits(robot, *given)
+    assert motion_limits(robot, 1e-6, 1e6, 1e-6).tool_speed == 1e-6
+    for given in ((1e-7,), (0.1, 1e7), (0.1, 1.0, 1e-320), (0.1, np.full(6, 1e308))):
+        with pytest.raises(PathError):
+            motion_limits(robot, *given)
 
 
-# scenes that leave no room
-
-SCENES = {
-    "more clearance than standoff": (
-        "tool_clearance = 0.05", "wrist_3_link and surface", "larger than the standoff (20 mm)",
-    ),
-    "the base swallowed": (
-        '[[collision.scene]]\nname = "rock"\nkind = "sphere"\nradius = 0.3',
-        "shoulder_link and rock", "",
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", SCENES)
-def test_what_leaves_no_room_is_a_verdict_with_its_cause(name: str, tmp_path: Path) -> None:
-    lines, pair, told = SCENES[name]
-    (tmp_path / "case.toml").write_text(f"{TEXTS['plate']}\n[collision]\n{lines}")
-    status, out, err = asked("check", tmp_path / "case.toml", "--json")
+def test_what_leaves_no_room_is_a_verdict_with_its_cause(tmp_path: Path) -> None:
+    """More clearance than standoff."""
+    (tmp_path / "case.toml").write_text(f"{TEXTS['plate']}\n[collision]\ntool_clearance = 0.05")
+    status, out, err = asked("check", tmp_path / "case.toml", "--json", *SMALL)
     answer = json.loads(out)
     assert (status, answer["verdict"]) in ((1, "infeasible"), (3, "undecided"))
-    assert (answer["covered"], len(answer["uncovered"])) == (0, 12)
+    assert (answer["covered"], len(answer["uncovered"])) == (0, 2)
     assert {cause["cause"] for cause in answer["uncovered"]} == {"collision"}
-    assert all(pair in cause["detail"] for cause in answer["uncovered"])
-    assert told in err
+    assert all("wrist_3_link and surface" in cause["detail"] for cause in answer["uncovered"])
+    assert "larger than the standoff (20 mm)" in err
