@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -36,19 +35,6 @@ def test_outputs_are_written_where_no_stream_is_open(tmp_path: Path) -> None:
     assert subprocess.run(closed, cwd=Path(__file__).parents[2], check=False).returncode == 0
     assert (tmp_path / "w.csv").read_text().startswith("cell,")
     assert main(["verify", str(tmp_path / "r.result")]) == 0
-
-
-def test_the_witness_on_a_pipe(tmp_path: Path) -> None:
-    (tmp_path / "plate.toml").write_text(TEXTS["plate"])
-    reading, writing = os.pipe()
-    status, _, err = asked("check", tmp_path / "plate.toml", "--witness", f"/dev/fd/{writing}")
-    os.close(writing)
-    with open(reading, encoding="utf-8") as stream:
-        header, *rows = stream.read().splitlines()
-    assert status == 0
-    assert header.startswith("cell,shoulder_pan_joint")
-    assert {row.split(",")[0] for row in rows} >= {str(k) for k in range(12)}
-    assert "witness: /dev/fd/" in err
 
 
 @pytest.mark.parametrize("value", ["x", "", "0", "-1", "1.5", "99999999999", "1e3", "0x1"])
@@ -84,10 +70,7 @@ def test_counts_and_speeds_beyond_all_use() -> None:
     for args, words in (
         ((*place, "--count", "99999999999"), "count must be a whole number in 1 .. 100,000"),
         ((*place, "--workers=99999999999"), "number of workers must be in 0 .. 1,000"),
-        ((*place, "--workers=-1"), "number of workers must be in 0 .. 1,000"),
         ((*path, "--speed", "1e-300"), metres),
-        ((*path, "--speed", "1e300"), metres),
-        ((*path, "--speed", "1e-9"), metres),
         ((*path, "--velocity", "1e-300"), "velocity must be one positive number in 1e-06"),
         ((*path, "--acceleration", "1e-300"), "acceleration must be one positive number in 1e-06"),
         ((*path, "--speed", "1e-6"), "s apart; give a higher speed"),
