@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import re
 from dataclasses import replace
@@ -12,7 +11,6 @@ import numpy as np
 import pytest
 import tomli_w
 from bad_input import GOOD_CASE, changed, goods, lay_out
-from samples import spread
 from small_cases import TEXTS
 
 from feasibility import Search, Task
@@ -149,67 +147,6 @@ def test_limits_frames_and_axes_come_through(tmp_path: Path) -> None:
     np.testing.assert_allclose(posed.tcp[:3], tcp, atol=1e-12)
     np.testing.assert_allclose(posed.base[:3], [*base, [0, 0, 1, 0.8]], atol=1e-12)
     np.testing.assert_allclose(posed.reference_axis, [0, 1, 0])
-
-
-# faults together
-
-# The place of a value that is wrong, the value, and what a message says of it.
-FAULTS = [
-    ("robot.lock.elbow", 0.0, "lock names 'elbow'"),
-    ("robot.lock.grip", 9.0, "lock holds joint 'grip'"),
-    ("robot.lock.wrist", "shut", "robot.lock.wrist: must be a finite number"),
-    ("robot.limits_deg.turn", [10, -10], "robot.limits_deg.turn"),
-    ("robot.limits_deg.slide", [-1, 1], "gives degrees for joint 'slide'"),
-    ("robot.limits_deg.ellbow", [-1, 1], "'ellbow'"),
-    ("robot.limits_m.wrist2", "wide", "robot.limits_m.wrist2"),
-    ("robot.limits_m.turn2", [0, 1], "'turn2'"),
-    ("robot.tool_frame", "hnad", "no link 'hnad'"),
-    ("robot.approach_axis", [0, 0, 0], "robot.approach_axis"),
-    ("robot.package_dirs", "meshes", "robot.package_dirs"),
-    ("robot.colour", "red", "robot.colour"),
-    ("surface.file", "no.stl", "no.stl"),
-    ("surface.scale", -1.0, "surface.scale"),
-    ("surface.position", [0, 0], "surface.position"),
-    ("surface.cut", {"point": [0, 0, 0]}, "surface.cut.normal"),
-    ("task.standoff", -1.0, "task.standoff"),
-    ("task.cone_deg", None, "task.cone_deg: is missing"),
-    ("search.seed", -1, "search.seed"),
-]
-
-
-def message(folder: Path, faults: object) -> str:
-    """What reading and building a case with these faults says; empty where nothing is wrong."""
-    tables: dict[str, dict[str, object]] = {
-        "robot": {"urdf": "arm.urdf", "tool_frame": "hand"},
-        "surface": {"kind": "mesh", "file": "square.off", "side": "outside", "cells": 12},
-        "task": {"standoff": 0.0, "cone_deg": 30},
-        "search": {},
-    }
-    for place, value, _ in faults:  # type: ignore[attr-defined]
-        *folders, key = place.split(".")
-        table = tables
-        for name in folders:
-            table = table.setdefault(name, {})
-        table[key] = value
-        if value is None:
-            del table[key]
-    try:
-        Case.from_toml(tomli_w.dumps(tables), folder).build()
-    except CaseError as error:
-        return str(error)
-    return ""
-
-
-def test_two_faults_come_together_and_all_of_them_once(tmp_path: Path) -> None:
-    """Also those that only a URDF shows, or only a mesh."""
-    (tmp_path / "arm.urdf").write_text((GOOD / "gripper.urdf").read_text())
-    (tmp_path / "square.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
-    assert message(tmp_path, []) == ""
-    for faults in [*spread([*itertools.combinations(FAULTS, 2)], 60), FAULTS]:
-        said = message(tmp_path, faults)
-        assert all(words in said for _, _, words in faults), said
-        lines = said.splitlines()[1:]
-        assert len(set(lines)) == len(lines)
 
 
 # the edges of TOML that is read: 16 brackets, keys of 8 parts, 50,000 keys

@@ -160,6 +160,7 @@ def lay_out(folder: Path) -> Path:
     grid = np.stack([x, y, 300.0 + 0 * x], axis=2)
     texts = {
         "slider.urdf": SLIDER,
+        "gripper.urdf": (TABLES.with_name("good") / "gripper.urdf").read_text(),
         "panda.srdf": '<robot name="panda"><disable_collisions link1="panda_link1" '
         'link2="panda_link2" reason="Adjacent"/></robot>',
         "toolpath.csv": POSES,
