@@ -42,8 +42,8 @@ def read(reader: str, name: str, folder: Path) -> str:
     if one.good == "set":
         load_case("paper/4a", list(map(bad_input.many, one.change))).build()
         return ""
-    own_name = reader in ("net", "trajectory")
-    path = folder / (name if own_name else READERS[reader].file)
+    files = {"net": name, "trajectory": name, "case": "case.toml"}
+    path = folder / (files.get(reader) or READERS[reader].file)
     path.write_bytes(of_bad(reader, name))
     if reader == "case":
         load_case(path).build()

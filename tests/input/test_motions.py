@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from bad_input import SLIDER
-from path_cases import SPEED, path_of, run_of, verdict_of
 from readers import sound_trajectory
 
-from feasibility.paths import coverage_path
-from feasibility.reports.path import as_json, as_text
 from feasibility.results import load_motion, load_trajectory, save_trajectory
 from feasibility.safe_files import FileError
-from feasibility.timing import Trajectory, motion_limits
+from feasibility.timing import Trajectory
 from robots import Robot, load_robot
 
 ROWS = np.array([[0.1, -1.2, 1.3, -0.4, -1.5, 0.6], [0.2, -1.1, 1.2, -0.3, -1.4, 0.7]])
@@ -131,25 +127,3 @@ def test_yaml_is_what_ros_reads(tmp_path: Path) -> None:
         start = point["time_from_start"]
         assert 0 <= start["nanosec"] < 10**9
         assert start["sec"] + 1e-9 * start["nanosec"] == pytest.approx(run.time[k], abs=1e-9)
-
-
-def test_the_report_says_what_a_path_holds() -> None:
-    path, run = path_of("5c, coarse"), run_of("5c, coarse")
-    record = as_json(path, run, limits := motion_limits(path.robot, SPEED))
-    assert record == json.loads(json.dumps(record, allow_nan=False))
-    assert record["covered_m"] + record["revisited_m"] == pytest.approx(record["length_m"])
-    assert record["visits"] == path.visits.tolist()
-    travel = [joint["travel_deg"] for joint in record["joint_travel"].values()]
-    assert np.radians(travel) == pytest.approx(path.figures.travel)
-    assert record["trajectory"]["duration_s"] == run.duration
-    assert record["trajectory"]["limits"]["tool_speed"] == SPEED
-    assert as_json(path)["trajectory"] is None
-    text = as_text(path, run, limits)
-    assert text.startswith("path: one continuous motion over 16 cells.")
-    assert f"{path.figures.length:.4g} m on the surface" in text
-    assert f"{run.duration:.4g} s" in text
-    assert max(map(len, text.splitlines())) <= 100
-    assert "time" not in as_text(path)
-    one = coverage_path(verdict_of("5c, coarse"), only=[0])
-    assert as_json(one)["length_ratio"] is None
-    assert "over 1 cell." in as_text(one)

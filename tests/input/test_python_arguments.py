@@ -45,13 +45,6 @@ def test_every_set_of_faults_is_named_and_nothing_else(kind):
             assert f"{fault.key} must " in str(caught.value)
 
 
-def test_numbers_of_numpy_will_do():
-    task = Task(standoff=np.float64(0.02), cone_deg=np.int64(20), tolerance=np.float32(0.001))
-    assert (task.standoff, task.cone_deg) == (0.02, 20)
-    search = Search(seed=np.int64(3), starts=np.int32(2), time_limit=np.float64(5))
-    assert (search.seed, search.starts, search.time_limit) == (3, 2, 5)
-
-
 def test_arguments_in_another_order_or_of_another_kind():
     plate = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside")
     good = (load_robot("ur5"), plate.cells(2, 2), Task(standoff=0.02, cone_deg=20), Search())

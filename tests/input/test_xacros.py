@@ -124,11 +124,21 @@ def test_external_entities_and_the_environment_are_not_read(
     assert b'"none"' in expanded(one_file(tmp_path, '<link name="$(optenv SECRET none)"/>')).text
 
 
-def test_an_expression_has_no_built_in_names() -> None:
+ESCAPES = (
+    "[x.__class__ for x in [1]]", "(lambda: (lambda: 1).__globals__)()", "(lambda __x: __x)(1)",
+    "a.f_back", "(x for x in [1]).gi_frame", "(lambda: 1).f_globals", "str.mro()",
+    "__import__('os')", "a.cr_code", "a.ag_frame", "a.f_locals", "a.f_builtins", "a.f_code",
+)  # fmt: skip
+
+
+def test_an_expression_has_no_built_in_names_and_no_way_to_them() -> None:
     assert child.evaluate(" max(a, 2) ** 2 ", {"max": max, "a": 3}) == 9
     for name in ("open", "exec", "getattr", "print"):
         with pytest.raises(NameError):
             child.evaluate(name, {})
+    for expression in ESCAPES:
+        with pytest.raises(child.Refused):
+            child.evaluate(expression, {"a": 1, "str": str})
 
 
 def test_the_gate_holds_without_the_other_fences(tmp_path: Path) -> None:

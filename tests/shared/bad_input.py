@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from mesh_writers import stl, stl_of
 
 TABLES = Path(__file__).parents[1] / "input" / "bad"
 TIMES = re.compile(r"«([^»]*)»×(\d+)")
@@ -133,6 +134,13 @@ POSES = "x,y,z,nx,ny,nz\n400,0,300,0,0,1\n400,100,300,0,0,1\n400,150,300,0,0,1\n
 NET_POINTS = [[[0.1 * i, 0.1 * j, 0.01 * i * j] for j in range(3)] for i in range(3)]
 
 
+def net_csv() -> bytes:
+    """The same net, as rows."""
+    rows = [f"{i},{j},{x!r},{y!r},{z!r}" for i, row in enumerate(NET_POINTS)
+            for j, (x, y, z) in enumerate(row)]  # fmt: skip
+    return "\n".join(["row,column,x,y,z", *rows, ""]).encode()
+
+
 def sheet(width: float = 0.2, count: int = 5) -> np.ndarray:
     """Triangles (F, 3, 3) m of a flat square that looks up, from the origin on."""
     x, y = np.meshgrid(*[np.linspace(0.0, width, count + 1)] * 2, indexing="ij")
@@ -140,15 +148,6 @@ def sheet(width: float = 0.2, count: int = 5) -> np.ndarray:
     a, b, c, d = at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]
     halves = np.stack([np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)], axis=2)
     return halves.reshape(-1, 3, 3)
-
-
-def stl(triangles: np.ndarray, count: int | None = None) -> bytes:
-    """A binary STL of triangles (F, 3, 3); it may say that it holds another number of them."""
-    rows = np.zeros(len(triangles), [("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")])
-    rows["v"] = triangles
-    return (
-        bytes(80) + (len(rows) if count is None else count).to_bytes(4, "little") + rows.tobytes()
-    )
 
 
 def lay_out(folder: Path) -> Path:
@@ -161,6 +160,7 @@ def lay_out(folder: Path) -> Path:
     grid = np.stack([x, y, 300.0 + 0 * x], axis=2)
     texts = {
         "slider.urdf": SLIDER,
+        "gripper.urdf": (TABLES.with_name("good") / "gripper.urdf").read_text(),
         "panda.srdf": '<robot name="panda"><disable_collisions link1="panda_link1" '
         'link2="panda_link2" reason="Adjacent"/></robot>',
         "toolpath.csv": POSES,
@@ -177,9 +177,9 @@ def lay_out(folder: Path) -> Path:
     for name, text in texts.items():
         (folder / name).write_text(text)
     for name, triangles in meshes.items():
-        (folder / f"{name}.stl").write_bytes(stl(triangles))
+        (folder / f"{name}.stl").write_bytes(stl_of(triangles))
     with (folder / "many.stl").open("wb") as stream:
-        stream.write(stl(flat[:0], 5_000_000))
+        stream.write(stl([], [], count=5_000_000))
         stream.truncate(84 + 50 * 5_000_000)  # takes no room on the disk
     np.save(folder / "points.npy", grid)
     grid[1, 2, 2] = np.nan

@@ -6,6 +6,7 @@ sound: finite, in range, and the same when it is written and read again.
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import tempfile
@@ -24,6 +25,7 @@ import pinocchio as pin
 from mesh_files import GOOD
 from small_cases import small_case, small_verdict
 
+from coverable_errors import CoverableError
 from coverable_meshes import MeshFiles
 from feasibility import Evidence
 from feasibility.cases import Case, load_case
@@ -64,6 +66,9 @@ TREE = CutTree(
 """Proves nothing; whether it does is not asked of a reader."""
 
 
+GRID = np.stack(np.broadcast_arrays([[0.0], [0.1], [0.2]], [[0.0, 0.1, 0.2]], 0.01), axis=2)
+
+
 class Reader(NamedTuple):
     """One kind of file."""
 
@@ -77,6 +82,9 @@ class Reader(NamedTuple):
 
 def sound_case(case: Case, folder: Path) -> None:
     assert Case.from_toml(case.to_toml()) == case
+    assert case.with_overrides([]) == case
+    with contextlib.suppress(CoverableError):  # whatever its numbers are, or a sentence
+        case.build()
 
 
 def sound_urdf(checked: CheckedUrdf, _: Path) -> None:
@@ -140,6 +148,22 @@ def made_or_refused(make: Callable[[], Any]) -> None:
     assert np.isfinite(centres).all()
 
 
+def sound_grid(points: Any, _: Path) -> None:
+    made_or_refused(lambda: grid(points))
+
+
+def sound_poses(given: Any, _: Path) -> None:
+    made_or_refused(lambda: poses(**given._asdict()))
+
+
+def read_alone(*_: object) -> None:
+    """That it is read is all."""
+
+
+def parts_of(path: Path) -> Any:
+    return MeshFiles().parts(str(path))
+
+
 def sound_mesh(mesh: Any, _: Path) -> None:
     assert np.isfinite(mesh.vertices).all()
     assert sorted(set(mesh.faces.ravel().tolist())) == list(range(len(mesh.vertices)))
@@ -172,9 +196,8 @@ def sound_motion(motion: Any, folder: Path) -> None:
     assert motion.q.shape[1] == 6
     assert np.isfinite(motion.q).all()
     rows = [",".join(map(repr, row)) for row in motion.q.tolist()]
-    names = ",".join(load_robot("puma560").joint_names)
-    (folder / "again.csv").write_text("\n".join([names, *rows]))
-    assert np.array_equal(load_motion(folder / "again.csv", load_robot("puma560")).q, motion.q)
+    (folder / "again.csv").write_text("\n".join([",".join(PUMA.joint_names), *rows]))
+    assert np.array_equal(load_motion(folder / "again.csv", PUMA).q, motion.q)
 
 
 def sound_srdf(pairs: Any, _: Path) -> None:
@@ -276,64 +299,30 @@ def _text(reader: str, name: str) -> Callable[[], bytes]:
     return lambda: bad_input.many(bad_input.goods(reader)[name].replace("§", "")).encode()
 
 
-def _npy_grid() -> bytes:
-    x, y = np.meshgrid([0.0, 0.1, 0.2], [0.0, 0.1, 0.2], indexing="ij")
-    return npy(np.stack([x, y, x * y], axis=2))
-
-
-def _net_csv() -> bytes:
-    points = bad_input.NET_POINTS
-    rows = [f"{i},{j},{','.join(map(repr, points[i][j]))}" for i in range(3) for j in range(3)]
-    return "\n".join(["row,column,x,y,z", *rows, ""]).encode()
-
-
+PUMA = load_robot("puma560")
+CASES = "sphere", "revolution", "bspline", "piecewise", "scene", "mounted"
 READERS = {
-    "case": Reader("case.toml", load_case, _text("case", "sphere"), sound_case),
-    "study": Reader("study.toml", load_study, STUDY.encode, lambda study, _: None),
+    **{f"case: {kind}": Reader("case.toml", load_case, _text("case", kind), sound_case)
+       for kind in CASES},
+    "study": Reader("study.toml", load_study, STUDY.encode, read_alone),
     "urdf": Reader("arm.urdf", check_urdf, _text("urdf", "arm"), sound_urdf),
-    "xacro": Reader("arm.xacro", lambda p: expanded(str(p)), XACRO.encode, lambda text, _: None),
+    "xacro": Reader("arm.xacro", lambda path: expanded(str(path)), XACRO.encode, read_alone),
     "srdf": Reader("arm.srdf", read_srdf, SRDF.encode, sound_srdf),
     "net as JSON": Reader("net.json", read_net, _text("net", "json"), sound_net),
-    "net as CSV": Reader("net.csv", read_net, _net_csv, sound_net),
-    "grid": Reader(
-        "grid.npy", read_grid, _npy_grid, lambda points, _: made_or_refused(lambda: grid(points))
-    ),
-    "poses": Reader(
-        "poses.csv",
-        lambda path: read_poses(path, "mm"),
-        bad_input.POSES.encode,
-        lambda given, _: made_or_refused(lambda: poses(**given._asdict())),
-    ),
-    **{
-        file: Reader(
-            file, lambda path: read_mesh(path, 1.0), lambda file=file: GOOD[file], sound_mesh
-        )
-        for file in GOOD
-    },
-    "GLB of a robot": Reader(
-        "part.glb",
-        lambda path: MeshFiles().parts(str(path)),
-        lambda: hostile.glb(*hostile.scene_of()),
-        sound_parts,
-    ),
-    "COLLADA": Reader(
-        "part.dae",
-        lambda path: MeshFiles().parts(str(path)),
-        lambda: hostile.collada(scene=hostile.shown()).encode(),
-        sound_parts,
-    ),
+    "net as CSV": Reader("net.csv", read_net, bad_input.net_csv, sound_net),
+    "grid": Reader("grid.npy", read_grid, lambda: npy(GRID), sound_grid),
+    "poses": Reader("poses.csv", lambda path: read_poses(path, "mm"), bad_input.POSES.encode,
+                    sound_poses),
+    **{file: Reader(file, lambda path: read_mesh(path, 1.0), lambda file=file: GOOD[file],
+                    sound_mesh) for file in GOOD},
+    "GLB of a robot": Reader("part.glb", parts_of, hostile.glb, sound_parts),
+    "COLLADA": Reader("part.dae", parts_of, hostile.GOOD.encode, sound_parts),
     "result": Reader("a.result", load_result, lambda: packed(members("plate")), sound_result),
     "proof": Reader("a.result", load_result, lambda: packed(members("proof")), sound_result),
-    "trajectory as CSV": Reader(
-        "run.csv", load_trajectory, _text("trajectory", "csv"), sound_trajectory
-    ),
-    "trajectory as JSON": Reader(
-        "run.json", load_trajectory, _text("trajectory", "json"), sound_trajectory
-    ),
-    "motion": Reader(
-        "motion.csv",
-        lambda path: load_motion(path, load_robot("puma560")),
-        _text("motion", "two"),
-        sound_motion,
-    ),
-}
+    "trajectory as CSV": Reader("run.csv", load_trajectory, _text("trajectory", "csv"),
+                                sound_trajectory),
+    "trajectory as JSON": Reader("run.json", load_trajectory, _text("trajectory", "json"),
+                                 sound_trajectory),
+    "motion": Reader("motion.csv", lambda path: load_motion(path, PUMA), _text("motion", "two"),
+                     sound_motion),
+}  # fmt: skip
