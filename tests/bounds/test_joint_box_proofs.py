@@ -129,11 +129,7 @@ def test_of_two_bodies_that_move_only_what_is_between_them_counts():
 
 @pytest.mark.parametrize("behind", [0.0, 0.2])
 def test_what_is_near_the_tool_point_is_where_the_target_is(behind):
-    """The tool of two links is at T up to `off`, a wall 0.2 m deep there.
-
-    A ball at the tool point is there whatever the joints do; one that is 0.2 m behind it turns
-    about it, and two radians bring it out of the wall.
-    """
+    """The tool of two links is at T up to `off`, a wall 0.2 m deep there."""
     robot, target = planar_arm([0.5, 0.5]), np.array([0.7, 0.4, 0.0])
     wall = Obstacle("wall", Box((0.4, 9.0, 9.0)), at(target[0] - behind))
     bodies = bodies_of([on(2, Sphere(0.1), 0.5 - behind)], [wall], [pair("link2", "wall")])

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-import os
 
 import numpy as np
 import pytest
 from capsule_arms import box_mesh
-from mesh_writers import stl_of
 from samples import sampled, seeds
 
-from coverable_errors import CoverableError
 from feasibility.certification import collision_replay
 from feasibility.collisions import (
     Bodies,
@@ -62,7 +59,7 @@ def test_shapes_at_the_edge_of_what_is_taken_can_be_used(kind, sizes):
 
 
 @sampled
-@pytest.mark.parametrize("seed", seeds(12, all=400))
+@pytest.mark.parametrize("seed", seeds(6, all=400))
 def test_sheets_and_tangles_can_be_used(seed):
     """Open, inverted, doubled, thin, flat, or any triangles of a few points at any scale."""
     rng, cube = np.random.default_rng(seed), box_mesh((1.0, 1.0, 1.0))
@@ -84,21 +81,3 @@ def test_sheets_and_tangles_can_be_used(seed):
             vertices = vertices * [1.0, 1e-4, 1e-4]
     made = Triangles(vertices * rng.choice([1e-3, 1.0, 1e3]), faces, bool(rng.random() < 0.5))
     use(Obstacle("thing", made, np.eye(4)), (ToolShape(made, np.eye(4)),))
-
-
-@pytest.mark.parametrize("what", ["missing", "empty", "pipe", "folder", "noise", "sparse", "cut"])
-def test_files_that_are_no_meshes_are_refused_and_open_nothing(what, tmp_path):
-    path, rng = tmp_path / "part.stl", np.random.default_rng(0)
-    if what == "pipe":
-        os.mkfifo(path)
-    elif what == "folder":
-        path.mkdir()
-    elif what == "sparse":
-        path.touch()
-        os.truncate(path, 1 << 40)
-    elif what != "missing":
-        whole = {"empty": b"", "cut": stl_of(np.ones((9, 3, 3)))[:-7], "noise": rng.bytes(999)}
-        path.write_bytes(whole[what])
-    for make in (lambda: Obstacle.mesh("a", path, 1.0), lambda: ToolShape.mesh(path, 1.0)):
-        with pytest.raises(CoverableError):
-            make()

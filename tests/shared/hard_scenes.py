@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
+import trimesh
 from foreign_clearances import ForeignScene
 
 from feasibility import Search, Task, check
@@ -189,10 +190,7 @@ class Over:
         return never_clear(self.robot, self.bodies, *numbers, self.point, self.approach)
 
     def clear_pose(self, count: int, rng: np.random.Generator) -> bool:
-        """Is one of so many random poses inside cone and tolerance clear of all that is at rest?
-
-        Many are at the border of the cone, where there is most room.
-        """
+        """Is one of so many random poses inside cone and tolerance clear of all that is at rest?"""
         scene = ToolPoses(self.robot, self.bodies)
         frame = self.robot.model.frames[self.robot.tool_frame_id].placement
         axis = frame.rotation @ self.robot.approach_axis
@@ -209,42 +207,38 @@ class Over:
 
 
 class ToolPoses(ForeignScene):
-    """The tool among what is at rest, for fcl."""
+    """The tool among what is at rest, for fcl; only pairs of these are asked for."""
 
     def __init__(self, robot: Robot, bodies: Bodies) -> None:
-        """Only pairs of the last joint and what is at rest are asked for."""
         super().__init__(robot, bodies)
-        joint = {owner: entries[0][0] for owner, entries in self.objects.items()}
-        self.asked = [
-            (k, pair)
-            for k, pair in enumerate(bodies.pairs)
-            if sorted((joint[pair.first], joint[pair.second])) == [0, robot.n]
-        ]
+        joint = {owner: shapes[0][0].link or 0 for owner, shapes in self.bodies.items()}
+        self.pairs = [one for one in self.pairs if {joint[one[0]], joint[one[1]]} == {0, robot.n}]
         self.meshes = {
             one.name: one
             for one in bodies.scene
             if isinstance(one.geometry, Triangles) and one.geometry.closed
         }
 
+    def _frames(self, q: np.ndarray) -> dict:
+        return {self.robot.n: self.pose.homogeneous[None]}
+
     def clear(self, pose: pin.SE3) -> bool:
         """Is no pair too near? Of meshes, fcl knows the triangles: what is inside is asked for."""
-        self.data.oMi[self.robot.n] = pose
-        for k, pair in self.asked:
-            if self._swallowed(pose, pair.first, pair.second):
-                return False
-            if self.touches(k) or self.pair_distance(k) < pair.clearance:
-                return False
-        return True
+        self.pose = pose
+        if any(self._swallowed(pose, *pair[:2]) for pair in self.pairs):
+            return False
+        return all(
+            self.distances(np.zeros(1), [k])[0] >= max(pair[2], 1e-12)
+            for k, pair in enumerate(self.pairs)
+        )
 
     def _swallowed(self, pose: pin.SE3, first: str, second: str) -> bool:
         """Is a corner or the middle of what moves inside a closed mesh of the scene?"""
-        import trimesh
-
         mesh = self.meshes.get(first) or self.meshes.get(second)
         if mesh is None:
             return False
         solid = trimesh.Trimesh(mesh.geometry.vertices, mesh.geometry.faces, process=False)
-        for one in self.bodies.solids:
+        for one in self.asked.solids:
             if one.joint == self.robot.n and one.owner in (first, second):
                 own = np.zeros(3)
                 if isinstance(one.geometry, Triangles):
