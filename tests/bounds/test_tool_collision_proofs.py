@@ -71,9 +71,9 @@ def test_random_scenes_hold_both_answers():
 @sampled
 @pytest.mark.parametrize("name", spread(ARMS, 2))
 def test_a_cell_with_a_known_pose_is_never_proved(name):
-    scenes = [planted_over(name, seed) for seed in seeds(12, all=150)]
+    scenes = [planted_over(name, seed) for seed in seeds(7, all=150)]
     known = [one for one in scenes if one is not None]
-    assert len(known) >= 3
+    assert len(known) >= 2
     for one in known:
         assert one.claimed() is None
         assert not one.confirmed().confirmed

@@ -170,10 +170,10 @@ def test_a_case_that_falls_apart_does_so_whatever_its_surface_is_made_of(number)
 
 def test_a_feasible_case_is_never_proved_whatever_its_surface_is_made_of():
     rng, refused = np.random.default_rng(5), 0
-    for problem in stored("puma560", feasible=True)[::14]:
+    for problem in stored("puma560", feasible=True)[::28]:
         robot, _, task = case("puma560", problem)
         for kind, cells in remade(problem).items():
             outcome = proved_wrongly(robot, cells, task, rng)
             assert outcome is not True, (problem.kind, kind)
             refused += outcome is False
-    assert refused >= 4
+    assert refused >= 2

@@ -65,9 +65,9 @@ def covered(rng, robot, task):
 
 @pytest.mark.parametrize("name", [*MADE, "random"])
 def test_what_an_arm_reaches_is_never_proved_out_of_reach(name):
-    """60 targets an arm: 480 in all, from configurations that may be at limits or singular."""
+    """40 targets an arm, 120 of random ones; configurations may be at limits or singular."""
     rng, beside = np.random.default_rng(sum(name.encode())), []
-    for k in range(120 if name == "random" else 60):
+    for k in range(120 if name == "random" else 40):
         if k % 4 == 0:
             robot = random_arm(rng) if name == "random" else some_arm(name)
         task = Task(0.0, (0.0, 0.01, 5.0, 45.0, 120.0, 180.0)[k % 6], (1e-3, 1e-5, 0.02)[k % 3])
@@ -84,7 +84,7 @@ def test_what_an_arm_reaches_is_never_proved_out_of_reach(name):
             assert np.arccos(np.clip(held @ approach, -1, 1)) <= task.cone + 1e-7
         shifted = np.column_stack([low, low + width]) + 1.5 * width + 0.05
         beside.append(ruled(robot.with_limits(shifted), cells, task).ruling)
-    assert beside.count(Ruling.PROVED) >= 20
+    assert beside.count(Ruling.PROVED) >= 12
     assert ruled(robot, cells, task).ruling is not Ruling.PROVED
 
 

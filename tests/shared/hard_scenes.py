@@ -65,21 +65,16 @@ def a_plate(rng: np.random.Generator, robot: Robot) -> tuple[Cells, Task]:
 
 def random_object(rng: np.random.Generator, name: str, around: np.ndarray) -> Obstacle:
     """A body of a size of 5 to 30 cm near a place."""
-    place = {
-        "position": tuple(around + rng.uniform(-0.15, 0.15, 3)),
-        "rpy_deg": tuple(rng.uniform(-180.0, 180.0, 3)),
-    }
-    size = rng.uniform(0.05, 0.3, 3).tolist()
-    match int(rng.integers(5)):
-        case 0:
-            return Obstacle.box(name, size, **place)
-        case 1:
-            return Obstacle.cylinder(name, size[0] / 2, size[1], **place)
-        case 2:
-            return Obstacle.sphere(name, size[0] / 2, place["position"])
-        case 3:
-            return Obstacle.capsule(name, size[0] / 2, size[1], **place)
-    return Obstacle.halfspace(name, **place)
+    position = tuple(around + rng.uniform(-0.15, 0.15, 3))
+    turn, size = tuple(rng.uniform(-180.0, 180.0, 3)), rng.uniform(0.05, 0.3, 3).tolist()
+    made = (
+        lambda: Obstacle.box(name, size, position, turn),
+        lambda: Obstacle.cylinder(name, size[0] / 2, size[1], position, turn),
+        lambda: Obstacle.sphere(name, size[0] / 2, position),
+        lambda: Obstacle.capsule(name, size[0] / 2, size[1], position, turn),
+        lambda: Obstacle.halfspace(name, position, turn),
+    )
+    return made[int(rng.integers(5))]()
 
 
 # scenes with a known motion
@@ -105,9 +100,7 @@ def built_scene(name: str, seed: int) -> BuiltScene | None:
     if blind is None or known is None:
         return None
     drawn = []
-    for number in range(
-        24
-    ):  # where the blind motion passes with a joint, or (every third) anywhere
+    for number in range(24):  # where the blind motion has a joint, or (every third) anywhere
         joints = Kinematics(robot).joints(blind.q[rng.integers(len(blind.q))][None]).points[0, 2:]
         k = int(rng.integers(len(joints) - 1))
         place = joints[k] + rng.uniform() * (joints[k + 1] - joints[k])
