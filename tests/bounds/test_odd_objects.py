@@ -62,7 +62,7 @@ def test_shapes_at_the_edge_of_what_is_taken_can_be_used(kind, sizes):
 
 
 @sampled
-@pytest.mark.parametrize("seed", seeds(12, all=400))
+@pytest.mark.parametrize("seed", seeds(6, all=400))
 def test_sheets_and_tangles_can_be_used(seed):
     """Open, inverted, doubled, thin, flat, or any triangles of a few points at any scale."""
     rng, cube = np.random.default_rng(seed), box_mesh((1.0, 1.0, 1.0))
@@ -88,17 +88,13 @@ def test_sheets_and_tangles_can_be_used(seed):
 
 @pytest.mark.parametrize("what", ["missing", "empty", "pipe", "folder", "noise", "sparse", "cut"])
 def test_files_that_are_no_meshes_are_refused_and_open_nothing(what, tmp_path):
-    path, rng = tmp_path / "part.stl", np.random.default_rng(0)
-    if what == "pipe":
-        os.mkfifo(path)
-    elif what == "folder":
-        path.mkdir()
-    elif what == "sparse":
-        path.touch()
-        os.truncate(path, 1 << 40)
-    elif what != "missing":
-        whole = {"empty": b"", "cut": stl_of(np.ones((9, 3, 3)))[:-7], "noise": rng.bytes(999)}
+    path, noise = tmp_path / "part.stl", np.random.default_rng(0).bytes(999)
+    whole = {"empty": b"", "cut": stl_of(np.ones((9, 3, 3)))[:-7], "noise": noise, "sparse": b""}
+    if what in whole:
         path.write_bytes(whole[what])
+    if what == "sparse":
+        os.truncate(path, 1 << 40)
+    {"pipe": os.mkfifo, "folder": os.mkdir}.get(what, lambda path: None)(path)
     for make in (lambda: Obstacle.mesh("a", path, 1.0), lambda: ToolShape.mesh(path, 1.0)):
         with pytest.raises(CoverableError):
             make()

@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 import trimesh
+from capsule_arms import at
 from hard_scenes import ARMS, CELLS, UR5, Over, a_plate, arm, bracket, planted_over, random_over
 from random_arms import planar_arm
 from samples import sampled, seeds, spread
@@ -39,14 +40,6 @@ def mesh_of(body):
     return checked_triangles(body.vertices, body.faces)
 
 
-def placed(place, rotation=None):
-    matrix = np.eye(4)
-    matrix[:3, 3] = place
-    if rotation is not None:
-        matrix[:3, :3] = rotation
-    return matrix
-
-
 BLOCK = mesh_of(trimesh.creation.box((0.2, 0.3, 0.1)))
 ROUND = mesh_of(trimesh.creation.icosphere(subdivisions=1, radius=0.1))
 CONE = mesh_of(trimesh.creation.cone(0.1, 0.2, sections=8))
@@ -57,11 +50,11 @@ MESHES = [BLOCK, ROUND, bracket()]
 # scenes
 
 
-SCENES = [*range(20, 42), *range(1000, 1500)]
+SCENES = [*range(20, 42, 2), *range(1000, 1500)]
 
 
 @sampled
-@pytest.mark.parametrize("seed", SCENES[: len(seeds(22, 522))])
+@pytest.mark.parametrize("seed", SCENES[: len(seeds(11, 511))])
 def test_what_is_claimed_is_confirmed_and_no_pose_is_clear(seed):
     scene, rng = random_over(seed), np.random.default_rng(seed)
     claimed, clear = scene.claimed(), scene.clear_pose(30 if seed < 1000 else 2000, rng)
@@ -71,16 +64,16 @@ def test_what_is_claimed_is_confirmed_and_no_pose_is_clear(seed):
 
 
 def test_random_scenes_hold_both_answers():
-    claims = [random_over(seed).claimed() is not None for seed in range(20, 42)]
-    assert 4 <= sum(claims) <= 18
+    claims = [random_over(seed).claimed() is not None for seed in SCENES[:11]]
+    assert 2 <= sum(claims) <= 9
 
 
 @sampled
 @pytest.mark.parametrize("name", spread(ARMS, 2))
 def test_a_cell_with_a_known_pose_is_never_proved(name):
-    scenes = [planted_over(name, seed) for seed in seeds(12, all=150)]
+    scenes = [planted_over(name, seed) for seed in seeds(7, all=150)]
     known = [one for one in scenes if one is not None]
-    assert len(known) >= 3
+    assert len(known) >= 2
     for one in known:
         assert one.claimed() is None
         assert not one.confirmed().confirmed
@@ -120,8 +113,8 @@ def over(*scene, cone_deg=30.0, tool=NOZZLE, **asked):
 @pytest.mark.parametrize("clearance", [0.0, 0.01])
 def test_a_ball_beside_a_wall_is_proved_up_to_the_tolerance(gap, clearance):
     """The ball's middle is the tool point: its distance is the same in every pose."""
-    at = 0.5 + 0.05 + clearance + gap
-    wall = Obstacle.halfspace("wall", position=(at, 0.0, 0.0), rpy_deg=(0.0, -90.0, 0.0))
+    far = 0.5 + 0.05 + clearance + gap
+    wall = Obstacle.halfspace("wall", position=(far, 0.0, 0.0), rpy_deg=(0.0, -90.0, 0.0))
     scene = over(wall, cone_deg=180.0, tool=ToolShape.sphere(0.05), clearance=clearance)
     claimed = scene.claimed()
     assert (claimed is not None) == (gap < -0.001)
@@ -131,25 +124,10 @@ def test_a_ball_beside_a_wall_is_proved_up_to_the_tolerance(gap, clearance):
         assert claimed.distance == pytest.approx(clearance + gap)
 
 
-@pytest.mark.parametrize("depth", [0.003, 0.0009])
-def test_a_nozzle_beside_a_wall_cannot_lean_away_at_its_tip(depth):
-    """The rim of the tip, 10 mm wide, overlaps the wall by `depth`, less 0.15 mm at 10 degrees.
-
-    So it is free where the tolerance of 1 mm makes up for that, and only there.
-    """
-    wall = Obstacle.halfspace("wall", position=(0.51 - depth, 0, 0), rpy_deg=(0.0, -90.0, 0.0))
-    scene = over(wall, cone_deg=10.0)
-    assert (scene.claimed() is not None) == (depth > 0.00115)
-    assert scene.confirmed().confirmed == (depth > 0.00115)
-
-
 @pytest.mark.parametrize("lean", [12.0, 44.0, 46.0, 60.0])
 @pytest.mark.parametrize("turn", [0.0, 45.0])
 def test_a_tool_may_lean_as_far_as_the_cone_and_no_further(lean, turn):
-    """A ball 0.2 m behind the tool point is out of a slab once the tool leans by 45 degrees.
-
-    The slab lies to both sides of the axis along one direction; along the other it has no end.
-    """
+    """A ball 0.2 m behind the tool point is out of a slab once the tool leans by 45 degrees."""
     ball = ToolShape.sphere(0.02, position=(0.0, 0.0, -0.2))
     wide = 2.0 * (0.2 * np.sin(np.radians(45.0)) - 0.02)  # free from there, but for the tolerance
     slab = Obstacle.box("slab", (wide, 9.0, 9.0), tuple(TARGET), (0.0, 0.0, turn))
@@ -161,11 +139,7 @@ def test_a_tool_may_lean_as_far_as_the_cone_and_no_further(lean, turn):
 @pytest.mark.parametrize("angle", [0, 90, 180, 270])
 @pytest.mark.parametrize("wide", [0.006, 0.002])
 def test_a_hole_at_the_border_of_the_cone_is_found(angle, wide):
-    """A ball of 4 mm, 0.2 m behind the tool point, fits into a hole of 6 mm, and not of 2 mm.
-
-    Four blocks around the hole leave nothing else free; it is where a square box of tilts has a
-    corner, further from its middle than from any other border of it.
-    """
+    """A ball of 4 mm, 0.2 m behind the tool point, fits into a hole of 6 mm, and not of 2 mm."""
     turn = Rotation.from_euler("z", angle, True)
     hole, middle = (0.2 * pin.exp3(0.5 * turn.apply(tilt))[:, 2] for tilt in
                     ([0.93, 0.06, 0.0], [0.5, 0.5, 0.0]))  # fmt: skip
@@ -176,8 +150,8 @@ def test_a_hole_at_the_border_of_the_cone_is_found(angle, wide):
     for k, way in ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)):
         size, place = np.array([0.8, 0.8, 0.3]), np.zeros(3)
         size[k], place[k] = 0.4, way * (wide + 0.2)
-        at = placed(TARGET + hole + frame @ place, frame)
-        blocks.append(Obstacle(f"block {len(blocks)}", Box(tuple(size.tolist())), at))
+        stands = at(*(TARGET + hole + frame @ place), frame)
+        blocks.append(Obstacle(f"block {len(blocks)}", Box(tuple(size.tolist())), stands))
     ball = ToolShape.sphere(0.004, position=(0.0, 0.0, -0.2))
     scene = over(*blocks, cone_deg=np.degrees(0.5), tool=ball)
     assert scene.confirmed().confirmed == (wide < 0.003)
@@ -185,9 +159,9 @@ def test_a_hole_at_the_border_of_the_cone_is_found(angle, wide):
 
 def test_meshes_are_solids_with_dents_or_sheets():
     ell, block = bracket(), mesh_of(trimesh.creation.box((0.1, 0.1, 0.1)))
-    solid = Obstacle("part", ell, placed(TARGET - np.array([0.025, 0.1, 0.05])))
-    hollow = Obstacle("part", ell, placed(TARGET - np.array([0.125, 0.125, 0.05])))
-    convex = Obstacle("part", block, placed(TARGET))
+    solid = Obstacle("part", ell, at(*(TARGET - [0.025, 0.1, 0.05])))
+    hollow = Obstacle("part", ell, at(*(TARGET - [0.125, 0.125, 0.05])))
+    convex = Obstacle("part", block, at(*TARGET))
     for obstacle, swallows in ((solid, True), (hollow, False), (convex, True)):
         scene = over(obstacle, cone_deg=5.0)
         assert (scene.claimed() is not None) == swallows
@@ -230,7 +204,7 @@ def test_a_crate_that_swallows_the_target_is_a_proof():
     assert cause.clearance < -0.05
     assert verify_proof(UR5, CELLS, task, verdict.proof).accepted
     # The same leaf is refused where the crate is not there, or far enough.
-    for scene in ((), (replace(CRATE, placement=placed((0.5, 0.0, 1.5))),)):
+    for scene in ((), (replace(CRATE, placement=at(0.5, 0.0, 1.5)),)):
         freed = replace(task, collision=replace(asked, scene=scene))
         assert not verify_proof(UR5, CELLS, freed, CutTree(Leaf(0))).accepted
 
@@ -247,7 +221,7 @@ TIP, AXIS = np.array([0.3, 0.1, 0.0]), np.array([0.0, 0.0, 1.0])
 def test_what_may_be_moved_collides_up_to_what_is_left_of_the_clearance(moved, wanted, still):
     ball = Body(Sphere(0.1), np.eye(4))
     turn = Rotation.from_euler("x", -90, degrees=True).as_matrix()  # its z is y
-    rest = Body(Sphere(0.2), np.eye(4)) if still == "ball" else Body(HalfSpace(), placed(0.0, turn))
+    rest = Body(Sphere(0.2), np.eye(4)) if still == "ball" else Body(HalfSpace(), at(rotation=turn))
     couple = Couple(ball, rest, wanted, TIP, AXIS)
     edge = (0.3 if still == "ball" else 0.1) + wanted - moved
     for beyond, said in ((3e-5, False), (-3e-5, True)):
@@ -286,9 +260,9 @@ def test_of_a_surface_s_triangles_what_they_may_be_off_is_lost():
 def test_one_gap_at_any_roll_is_enough(gap):
     """A ball goes round the tool axis, through a wall that leaves out one direction."""
     # The tool axis of the arm is x of the last joint, and the tip 0.3 m along it.
-    tool = Solid("tool", 2, placed((0.3, 0.0, 0.3)), Sphere(0.05))
+    tool = Solid("tool", 2, at(0.3, 0.0, 0.3), Sphere(0.05))
     turn = pin.exp3(np.array([0.0, 0.0, gap or 0.0]))
-    wall = placed(turn @ [-0.4 if gap is not None else 0.0, 0.0, 0.0], turn)
+    wall = at(*(turn @ [-0.4 if gap is not None else 0.0, 0.0, 0.0]), turn)
     scene = (Obstacle("wall", Box((1.0, 1.0, 0.2)), wall),)
     bodies = Bodies((tool,), (), (), scene, (Pair("tool", "wall", 0.0),))
     asked = planar_arm(2), bodies, 0.0, 1e-3, np.zeros(3), np.array([0.0, 0.0, 1.0])
@@ -398,7 +372,7 @@ def test_balls_are_inside(shape):
 def test_distances_are_no_less_than_they_are(shape):
     """All of a ball as large as the depth is inside; coal finds the body as near as is said."""
     rng = np.random.default_rng(1)
-    place = placed((0.3, -0.2, 0.1), Rotation.random(random_state=2).as_matrix())
+    place = at(0.3, -0.2, 0.1, Rotation.random(random_state=2).as_matrix())
     corners = shape.vertices if isinstance(shape, Triangles) else np.array([[0.15], [-0.15]])
     own = rng.uniform(corners.min(axis=0) - 0.02, corners.max(axis=0) + 0.02, (150, 3))
     points = own @ place[:3, :3].T + place[:3, 3]

@@ -34,13 +34,10 @@ class Known(NamedTuple):
 
     arrays: object
     places: object
-    at_rest: object
-    """The target alone."""
+    at_rest: object  # the target alone
     q: np.ndarray
-    parts: np.ndarray
-    """(k,) parts that the place lies on."""
-    x: np.ndarray
-    """(k, 2) its parameters there."""
+    parts: np.ndarray  # (k,) parts that the place lies on
+    x: np.ndarray  # (k, 2) its parameters there
 
 
 def random_patch(kind, side, rng):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from itertools import count
 
-import mesh_patches
 import numpy as np
 import pytest
 from cut_attempts import nothing, prove, proved_wrongly
+from mesh_patches import of_patch
 from random_cases import built, read, surface_of
 from samples import sampled, seeds, spread
 from scipy.interpolate import make_interp_spline
@@ -16,7 +16,6 @@ from feasibility.cut_tree import Cut, Leaf
 from feasibility.roadmap import Ruling
 from feasibility.roadmap.branch_and_bound.branching import branch_and_bound
 from feasibility.roadmap.cuts import components_of
-from feasibility.roadmap.cuts.findings import projected, random_targets
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions import arrays_of
 from robots import load_robot
@@ -48,21 +47,6 @@ def test_cases_that_fall_apart_are_proved_and_proved_again(proved):
         for region, node in proving.statements():
             assert proving.ruling(region, node) is Ruling.PROVED
     assert len(branch_and_bound.signatures) == 1  # compiled once
-
-
-def test_newton_finds_nothing_on_a_cut_or_in_a_leaf(proved):
-    rng = np.random.default_rng(1)
-    for proving in proved:
-        prover = proving.prover
-        for region, node in proving.statements():
-            if isinstance(node, Leaf):
-                target = np.hstack([t[node.cell] for t in prover.arrays[3:5]])
-                targets = np.tile(target, (300, 1))
-            else:
-                region = region.on(np.array(node.weights), node.value)
-                targets = random_targets(prover.places, 300, rng)
-            work = prover.findings.work
-            assert not len(projected(prover.arrays, work, region, targets, 1, rng)), node
 
 
 def test_a_cut_through_the_motion_set_and_a_leaf_of_a_covered_cell_are_refuted(proved):
@@ -143,51 +127,30 @@ def remade(problem):
     made = {
         "piecewise": piecewise(halves, **pose).cells(counts),
         "bspline": _spline(surface, pose).cells(nu, nv),
-        "mesh": _mesh(surface, pose),
     }
+    corners = of_patch(make(*problem.size, problem.u, problem.v, side=problem.side), 30, 30)
+    sides = np.diff(corners.vertices[corners.faces], axis=1)
+    if np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).min() > 1e-9:  # else a pole
+        made["mesh"] = mesh(TriangleMesh(*corners), **pose).cells(count=nu * nv)
     if problem.kind == "sphere":
         polar = np.radians(np.linspace(problem.u[1], problem.u[0], 41))
         profile = problem.size[0] * np.column_stack([np.sin(polar), np.cos(polar)])
         profile[np.abs(profile[:, 0]) < 1e-9, 0] = 0.0
         made["revolution"] = revolution(profile, problem.v, **pose).cells(nu, nv)
-    if made["mesh"] is None:
-        del made["mesh"]
-    else:
-        made["mesh"] = made["mesh"].cells(count=nu * nv)
     return made
-
-
-def _grid(surface, count):
-    """Points (count, count, 3) in the own frame at even parameters."""
-    u, v = (np.linspace(*ends, count) for ends in (surface.u_range, surface.v_range))
-    return surface.local_point(*np.meshgrid(u, v, indexing="ij"))
 
 
 def _spline(surface, pose):
     """Through points of the surface; its parameters are even where those are."""
     t = np.linspace(0.0, 1.0, 13)
-    along = make_interp_spline(t, _grid(surface, 13), 3)
-    net = make_interp_spline(t, np.moveaxis(along.c, 1, 0), 3).c
-    points, knots = np.moveaxis(net, 1, 0), along.t
+    u, v = (np.linspace(*ends, 13) for ends in (surface.u_range, surface.v_range))
+    along = make_interp_spline(t, surface.local_point(*np.meshgrid(u, v, indexing="ij")), 3)
+    points = np.moveaxis(make_interp_spline(t, np.moveaxis(along.c, 1, 0), 3).c, 1, 0)
+    made = bspline(points, (3, 3), (along.t, along.t), **pose)
     middle = (np.array(sum(ends) / 2.0) for ends in (surface.u_range, surface.v_range))
-    made = bspline(points, (3, 3), (knots, knots), **pose)
     if made.local_normal(np.array(0.5), np.array(0.5)) @ surface.local_normal(*middle) < 0.0:
-        made = bspline(points[::-1], (3, 3), (knots, knots), **pose)
+        made = bspline(points[::-1], (3, 3), (along.t, along.t), **pose)
     return made
-
-
-def _mesh(surface, pose):
-    """Triangles over even parameters; None where some are none, at a pole."""
-    _, _, faces = mesh_patches.grid(30, 30)
-    points = _grid(surface, 31).reshape(-1, 3)
-    sides = points[faces[:, 1:]] - points[faces[:, :1]]
-    across = np.cross(sides[:, 0], sides[:, 1])
-    if np.linalg.norm(across, axis=1).min() < 1e-9:
-        return None
-    middle = points[faces].mean(axis=1) @ surface.rotation.T + surface.position
-    outward = surface.closest(middle).normal @ surface.rotation
-    return mesh(TriangleMesh(points, faces[:, ::-1] if (across * outward).sum() < 0 else faces),
-                **pose)  # fmt: skip
 
 
 APART = [4, *range(5, 30), 30]
@@ -206,10 +169,10 @@ def test_a_case_that_falls_apart_does_so_whatever_its_surface_is_made_of(number)
 
 def test_a_feasible_case_is_never_proved_whatever_its_surface_is_made_of():
     rng, refused = np.random.default_rng(5), 0
-    for problem in spread(stored("puma560", feasible=True)[::14], 99):
+    for problem in stored("puma560", feasible=True)[::28]:
         robot, _, task = case("puma560", problem)
         for kind, cells in remade(problem).items():
             outcome = proved_wrongly(robot, cells, task, rng)
             assert outcome is not True, (problem.kind, kind)
             refused += outcome is False
-    assert refused >= 4
+    assert refused >= 2

@@ -50,11 +50,7 @@ def assert_every_statement_is_true(proving):
 
 
 def test_elbow_up_and_elbow_down():
-    """At 0.5 m the elbow is bent by 67 degrees, the first joint then 34 from the target.
-
-    The limits let it follow the arc from -6 degrees on with the elbow on one side, and up to 6 with
-    it on the other: all cells can be covered, and no motion covers all.
-    """
+    """At 0.5 m the elbow is bent by 67 degrees, the first joint then 34 from the target."""
     proving = prove(two_links(), arc(0.5), ANY_AXIS)
     assert not proving.exploration.complete
     assert proving.exploration.reached.all()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -14,7 +12,7 @@ from samples import sampled, spread
 from scipy.spatial.transform import Rotation
 from search_kernels import Clearance
 
-from feasibility.collisions import Collision, Obstacle, Pair, Soup, counts, gather
+from feasibility.collisions import Collision, Obstacle, Pair, Soup, gather
 from feasibility.collisions.kernels.box_tree import box_tree, moved
 from feasibility.collisions.kernels.link_frames import chord_deviation, place_bodies
 from feasibility.collisions.kernels.link_frames import spread as place_group
@@ -82,58 +80,38 @@ def test_bounds_are_what_coal_measures(kinds):
     assert apart > 400
 
 
-@pytest.mark.parametrize("kinds", ["RRRR", "RPRR", "PRPR"])
-def test_no_segment_with_a_collision_is_called_clear(kinds):
-    rng, clear, refused, collides = np.random.default_rng(11), 0, 0, 0
-    for _ in range(3):
-        robot, bodies = among_walls(rng, kinds)
-        clearance, scene, needs = Clearance(robot, bodies), CoalScene(robot, bodies), needed(bodies)
-        for size in np.repeat([1e-3, 0.02, 0.1, 0.5], 7):
-            q = rng.uniform(-2.0, 2.0, 4)
-            for _ in range(3):
-                end = q + rng.uniform(-1.0, 1.0, 4) * size
-                margin = clearance.margin(q, end)
-                count = min(int(np.abs(end - q).max() / FINE) + 2, 15)
-                rows = q + np.linspace(0.0, 1.0, count)[:, None] * (end - q)
-                least = min((scene.distances(each) - needs).min() for each in rows)
-                if margin > 0.0:
-                    assert least >= -1e-9
-                    assert margin <= (scene.distances(end) - needs).min() + 1e-7
-                    clear, q = clear + 1, end
-                else:
-                    assert 0 <= clearance.blamed() < len(needs)
-                    refused, collides = refused + 1, collides + (least < 0.0)
-    assert clear > 30
-    assert collides > 10
-    assert refused - collides < 0.1 * (clear + refused)
-
-
+MADE_UP = [("RRRR", 0), ("RPRR", 0), ("PRPR", 0)]
 ATTACKS = [("ur5", 0), *((name, seed) for name in ("ur5", "panda", "RRRRR", "RPRRR", "PRPRR")
-                         for seed in range(1000, 1040)), ("PRPRR", 0)]  # fmt: skip
+                         for seed in range(1000, 1040))]  # fmt: skip
 
 
 @sampled
-@pytest.mark.parametrize(("name", "seed"), spread(ATTACKS, 2))
-def test_short_walks_that_are_called_clear_are(name, seed):
-    """Each segment from the end of the last clear one, of steps of 1 mm or mrad to 0.5."""
-    rng, clear, refused = np.random.default_rng(seed), 0, 0
+@pytest.mark.parametrize(("name", "seed"), [*MADE_UP, *spread(ATTACKS, 1)])
+def test_no_segment_with_a_collision_is_called_clear(name, seed):
+    """Walks of made-up arms among triangles, of others among boxes: steps of 1e-3 to 0.5."""
+    rng, clear, refused, collides = np.random.default_rng([11, seed]), 0, 0, 0
     made = among_walls if set(name) <= {"R", "P"} else among_boxes
-    robot, bodies = made(rng, name)
-    clearance, scene, needs = Clearance(robot, bodies), CoalScene(robot, bodies), needed(bodies)
-    low, high = np.maximum(robot.lower, -3.0), np.minimum(robot.upper, 3.0)
-    for _ in range(5):
-        q, size = rng.uniform(low, high), rng.choice([1e-3, 0.01, 0.05, 0.2, 0.5])
+    for size in np.repeat([1e-3, 0.02, 0.1, 0.5], 5 if made is among_walls else 1):
+        robot, bodies = made(rng, name)
+        clearance, scene, needs = Clearance(robot, bodies), CoalScene(robot, bodies), needed(bodies)
+        q = rng.uniform(np.maximum(robot.lower, -2.0), np.minimum(robot.upper, 2.0))
         for _ in range(3):
             end = q + rng.uniform(-1.0, 1.0, robot.n) * size
-            if not clearance.clear(q, end):
-                refused += 1
-                continue
-            clear += 1
-            count = int(np.abs(end - q).max() / FINE) + 2
+            margin = clearance.margin(q, end)
+            count = min(int(np.abs(end - q).max() / FINE) + 2, 8 if seed == 0 else 300)
             rows = q + np.linspace(0.0, 1.0, count)[:, None] * (end - q)
-            assert not any((scene.distances(each) - needs).min() < -1e-9 for each in rows)
-            q = end
-    assert clear + refused == 15
+            least = min((scene.distances(each) - needs).min() for each in rows)
+            if margin > 0.0:
+                assert least >= -1e-9
+                assert margin <= (scene.distances(end) - needs).min() + 1e-7
+                clear, q = clear + 1, end
+            else:
+                assert 0 <= clearance.blamed() < len(needs)
+                refused, collides = refused + 1, collides + (least < 0.0)
+    if (name, seed) in MADE_UP:
+        assert clear > 8
+        assert collides > 8
+        assert refused - collides <= 0.1 * (clear + refused)
 
 
 # by hand
@@ -224,15 +202,6 @@ def test_no_number_is_never_clear():
         assert not clearance.clear(-1.0, bad)
         assert not clearance.clear(bad, -1.0)
         assert clearance.clear(-1.0, -1.0)
-
-
-def test_small_steps_far_from_everything_take_no_distance():
-    clearance = wall_and_stick("hull")
-    for a, b in pairwise(np.linspace(-2.0, -1.0, 201)):
-        assert clearance.clear(a, b)
-    done = counts(clearance.buffer)
-    assert done.segments == 200
-    assert done.swept <= 10
 
 
 def test_what_is_inside_a_closed_body_collides():

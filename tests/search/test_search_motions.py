@@ -8,14 +8,11 @@ import numpy as np
 import pytest
 from arm_urdfs import FREE, joint
 from bounds import holds
-from part_walks import at_parameters, walk
-from part_walks import spread as spread_over
 from plain import tools
-from random_arms import QUESTIONS, finite_limits, planar_arm, question, robot_of
+from random_arms import QUESTIONS, finite_limits, planar_arm, robot_of
 from search_kernels import Motions
 
 from coverable_arrays import unit_along
-from coverable_errors import ArgumentError
 from feasibility import Search, Task, check
 from feasibility.certification import replay
 from feasibility.roadmap import (
@@ -27,14 +24,11 @@ from feasibility.roadmap import (
     edge_motion,
     explore,
 )
-from feasibility.roadmap.graph import (
-    EDGES,
-)
-from feasibility.roll import cosine_and_sine, projected, roll_of
-from feasibility.targets import check_references, target_curves, target_parts
+from feasibility.roadmap.graph import EDGES
+from feasibility.roll import projected
+from feasibility.targets import target_curves
 from feasibility.verdict import Walk
-from robots import load_robot
-from surfaces import cylinder, hyperboloid, plane, sphere
+from surfaces import cylinder, plane, sphere
 
 DOME = sphere(1.0, (10, 90), (10, 180), rpy_deg=(30, 0, 20), position=(1, 2, 3)).cells(4, 5)
 PIPE = cylinder(0.2, (0, 360), (0, 1), side="outside", rpy_deg=(0, 50, 0)).cells(6, 3)
@@ -116,70 +110,12 @@ def test_curves_begin_with_the_targets_of_the_cells_and_an_approach_keeps_them()
     assert not found.deviations[:, 1].any()
 
 
-def test_the_roll_is_that_of_the_least_rotation_and_a_range_a_middle_and_a_half():
-    """Swing x from a to b by Rodrigues' formula, and measure its angle from t."""
-    rng = np.random.default_rng(3)
-    a, b, x, t = rng.normal(size=(4, 200, 3))
-    a, b = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in (a, b))
-    x, t = projected(x / np.linalg.norm(x, axis=1, keepdims=True), a)[0], projected(t, b)[0]
-    axis, cosine = np.cross(a, b), (a * b).sum(axis=1)[:, None]
-    swung = cosine * x + np.cross(axis, x)
-    swung += (axis * x).sum(axis=1)[:, None] * axis / (1.0 + cosine)
-    angle = np.arctan2((np.cross(b, t) * swung).sum(axis=1), (t * swung).sum(axis=1))
-    assert np.allclose(np.cos(roll_of(x, a, t, b) - angle), 1.0)
-    assert np.allclose(np.hypot(*cosine_and_sine(x, a, t, b)), 1.0 + cosine[:, 0])
+def test_a_range_of_roll_is_a_middle_and_a_half():
     assert Task(0.01, 20, roll_deg=(170, 190)).roll == pytest.approx((np.pi, np.radians(10)))
     assert Task(0.01, 120, roll_deg=(-180, 180)).roll is None
     off = Task(0.01, 20, roll_deg=(170, 190)).roll.off(np.radians([-175.0, 175.0, 0.0]))
-    assert np.degrees(np.abs(off)) == pytest.approx([5, 5, 180])
-    assert np.sign(off[:2]).tolist() == [1, -1]
-
-
-@pytest.mark.parametrize(
-    ("wrong", "said"),
-    [
-        ({"roll_deg": (15, -15)}, "empty"),
-        ({"roll_deg": (0, 400)}, "-360 .. 360"),
-        ({"roll_deg": "free"}, "roll_deg must"),
-        ({"cone_deg": 95, "roll_deg": (-15, 15)}, "cone_deg must be 90 or less"),
-        ({"approach": "down"}, "'normal' or a direction"),
-        ({"approach": (0, 0, 0)}, "approach must be three"),
-        ({"roll_reference": (1, 2)}, "roll_reference must be three"),
-    ],
-)
-def test_a_task_that_cannot_be_is_refused(wrong, said):
-    with pytest.raises(ArgumentError, match=said):
-        Task(**{"standoff": 0.01, "cone_deg": 20.0, **wrong})
-
-
-def test_a_reference_along_the_approach_is_refused_with_its_cells():
-    cells = plane((0, 1), (0, 1)).cells(2, 2)
-    upright = Task(0.1, 20, roll_deg=(-1, 1), roll_reference=(0, 0.01, 1))
-    with pytest.raises(ArgumentError, match=r"at cells \[0, 0\], \[0, 1\], \[1, 0\] and 1 more"):
-        check_references(cells, upright)
-    check_references(cells, Task(0.1, 20, roll_reference=(0, 0, 1)))
-
-
-PATCHES = {
-    "dome": DOME.surface,
-    "horn": hyperboloid(0.5, 0.5, (0, 180), (0, 0.5), side="outside"),
-    "pipe": PIPE.surface,
-    "wall": plane((0, 1), (0, 1)),
-}
-
-
-@pytest.mark.parametrize("standoff", [0.0, 0.3])
-@pytest.mark.parametrize("name", PATCHES)
-def test_targets_and_approaches_lie_in_their_parts(name, standoff):
-    surface = PATCHES[name]
-    parts = target_parts(surface, standoff, flat=0.004, straight=0.05)
-    u, v = spread_over(surface, 3000)
-    sign, normal = surface.side_sign, surface.normal(u, v)
-    targets = surface.point(u, v) + sign * standoff * normal
-    x = at_parameters(surface, u, v)[1]
-    used = walk(parts, np.zeros(len(u), dtype=int), x, targets, -sign * normal)
-    assert max(used.points, used.normals) <= 1.0
-    assert (parts.radius[used.finest] <= [0.004, 0.05]).all()
+    assert np.degrees(off[:2]) == pytest.approx([5, -5])
+    assert abs(np.degrees(off[2])) == pytest.approx(180)
 
 
 # configurations
@@ -189,7 +125,7 @@ def test_targets_and_approaches_lie_in_their_parts(name, standoff):
 @pytest.mark.parametrize("cone_deg", [1.0, 120.0])
 def test_configurations_over_a_cell_obey_every_constraint(name, cone_deg):
     """Newton's from random guesses over three cells; Pinocchio says where they are."""
-    robot, cells, task = question(name)
+    robot, cells, task = QUESTIONS[name]
     task = Task(task.standoff, cone_deg, 1e-3)
     motions, targets, rng, found = Motions(robot, cells, task), task.targets(cells), 0, 0
     rng = np.random.default_rng(1)
@@ -222,22 +158,6 @@ def test_a_target_beyond_reach_is_covered_within_the_tolerance_and_no_further(sh
         if short < 1.0:
             (point,), _ = tools(robot, verdict.witness.q[:1])
             assert 0.999 * short * 0.01 <= np.linalg.norm(point - cells.centres[0]) <= 0.01
-
-
-def test_the_cone_of_a_sphere_is_kept_off_the_target_too():
-    """Where the surface bends, the approach direction beside the target is another."""
-    robot, task, feasible = load_robot("puma560"), Task(0.0, 30.0, 0.01), 0
-    ball = sphere(0.2, (80, 100), (170, 190), side="outside", position=(1.0, 0.1, 0.0))
-    for push in np.linspace(0.55, 0.7, 8):
-        cells = ball.moved(np.eye(3), (push, 0.0, 0.0)).cells(1, 1)
-        verdict, targets = check(robot, cells, task), task.targets(cells)
-        if verdict.feasible:
-            feasible += 1
-            (point,), (axis,) = tools(robot, verdict.witness.q[:1])
-            assert np.linalg.norm(point - targets.points[0]) <= 0.01
-            chord = np.linalg.norm(axis - targets.approaches[0])
-            assert chord <= 2.0 * np.sin(np.radians(15.0)) + 1e-12
-    assert feasible > 0
 
 
 @pytest.mark.parametrize(
@@ -283,7 +203,7 @@ def assert_walked(roadmap, walk):
 @pytest.mark.parametrize("name", QUESTIONS)
 def test_every_motion_that_a_search_stores_holds_and_the_walk_takes_them_alone(name):
     """Spread, explored and closed: edges run from node to node, and the judge accepts them."""
-    robot, cells, task = question(name)
+    robot, cells, task = QUESTIONS[name]
     exploration = Exploration(robot, cells, arrays_of(robot, cells, task), 0)
     explore(exploration)
     for cell in range(0, len(cells), 3):

@@ -18,7 +18,7 @@ from random_arms import (
     tilted,
     turn_onto,
 )
-from search_kernels import Motions, ruled
+from search_kernels import ruled
 
 from feasibility import Task
 from feasibility.roadmap import Exploration, Ruling, arrays_of, root_box
@@ -63,24 +63,20 @@ def covered(rng, robot, task):
     return q, point + offset, tilted(axis, 0.9999 * task.cone, rng)
 
 
-@pytest.mark.parametrize("name", MADE)
+@pytest.mark.parametrize("name", [*MADE, "random"])
 def test_what_an_arm_reaches_is_never_proved_out_of_reach(name):
-    """60 targets an arm: 480 in all, from configurations that may be at limits or singular.
-
-    The target is as far off as the tolerance allows and as tilted as the cone allows (0 to 180
-    degrees), so that a bound that is slightly too tight would be found. The joints are held
-    to boxes about the configuration, 1e-3 to 2 rad wide, which branch and bound can finish; the
-    configuration may be at their borders. Boxes beside it are often proved, which shows this.
-    """
-    robot, rng, beside = some_arm(name), np.random.default_rng(sum(name.encode())), []
-    for k in range(60):
+    """40 targets an arm, 120 of random ones; configurations may be at limits or singular."""
+    rng, beside = np.random.default_rng(sum(name.encode())), []
+    for k in range(120 if name == "random" else 40):
+        if k % 4 == 0:
+            robot = random_arm(rng) if name == "random" else some_arm(name)
         task = Task(0.0, (0.0, 0.01, 5.0, 45.0, 120.0, 180.0)[k % 6], (1e-3, 1e-5, 0.02)[k % 3])
         q, point, approach = covered(rng, robot, task)
         cells = one_target(point, approach, rng)
         width = 10.0 ** rng.uniform(-3.0, 0.3)
         low = q - np.clip(rng.uniform(-0.3, 1.3, robot.n), 0.0, 1.0) * width
         box = robot.with_limits(np.column_stack([low, np.maximum(low + width, q)]))
-        outcome, found, _ = ruled(box, cells, task)
+        outcome, found, _ = ruled(box, cells, task, 500 if name == "random" else 2000)
         assert outcome is not Ruling.PROVED, (q.tolist(), box.lower, box.upper, task)
         if outcome is Ruling.REACHED:
             (there,), (held,) = tools(robot, found[None])
@@ -88,42 +84,8 @@ def test_what_an_arm_reaches_is_never_proved_out_of_reach(name):
             assert np.arccos(np.clip(held @ approach, -1, 1)) <= task.cone + 1e-7
         shifted = np.column_stack([low, low + width]) + 1.5 * width + 0.05
         beside.append(ruled(robot.with_limits(shifted), cells, task).ruling)
-    assert beside.count(Ruling.PROVED) >= 20
+    assert beside.count(Ruling.PROVED) >= 12
     assert ruled(robot, cells, task).ruling is not Ruling.PROVED
-
-
-def test_what_random_arms_reach_is_never_proved_out_of_reach():
-    """200 targets of 50 random arms, joints of every kind, 500 boxes each."""
-    rng = np.random.default_rng(4)
-    for number in range(200):
-        if number % 4 == 0:
-            robot = random_arm(rng)
-        task = Task(0.0, float(rng.choice([0.0, 10.0, 90.0])), 10.0 ** rng.uniform(-5, -2))
-        q, point, approach = covered(rng, robot, task)
-        width = 10.0 ** rng.uniform(-3.0, 0.3, robot.n)
-        low = q - rng.random(robot.n) * width
-        box = robot.with_limits(np.column_stack([low, np.maximum(low + width, q)]))
-        outcome = ruled(box, one_target(point, approach, rng), task, 500).ruling
-        assert outcome is not Ruling.PROVED, (robot.lower, robot.upper, q.tolist(), task)
-
-
-@pytest.mark.parametrize("name", ["puma560", "planar", "free joints"])
-def test_newton_finds_nothing_where_there_is_a_proof(name):
-    """60 random targets, near the edge of what the arm can do: both answers come up."""
-    robot, rng, proved = some_arm(name), np.random.default_rng(7), 0
-    for _ in range(60):
-        direction = rng.normal(size=3)
-        if name == "planar":
-            direction[2] = 0.0
-        point = direction / np.linalg.norm(direction) * rng.uniform(0.2, 1.3) * robot.reach
-        task, cells = Task(0.0, 70.0, 1e-3), one_target(point, random_turn(rng)[0], rng)
-        if ruled(robot, cells, task).ruling is not Ruling.PROVED:
-            continue
-        proved += 1
-        low, high = np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi)
-        guesses = rng.uniform(low, high, (25, robot.n))
-        assert not len(Motions(robot, cells, task).landed(0, guesses))
-    assert 5 <= proved < 60
 
 
 @pytest.mark.parametrize(
@@ -202,14 +164,6 @@ def test_what_branch_and_bound_finds_is_seeded_at_its_winding(limits):
         outcome = exploration.rule(0, root_box(exploration.arrays), 2000)
         assert outcome in (Ruling.REACHED, Ruling.UNKNOWN)
         assert exploration.reached[0]
-
-
-def test_a_continuous_joint_turns_all_the_way():
-    """No angle of a free crank is proved out of reach."""
-    rng, robot = np.random.default_rng(9), crank(0, 0, "continuous")
-    for angle in np.linspace(-np.pi, np.pi, 33):
-        cells = one_target(at_angle(angle), UP, rng)
-        assert ruled(robot, cells, Task(0.0, 180, 1e-4)).ruling is Ruling.REACHED
 
 
 @pytest.mark.parametrize("limits", [FREE, (0.0, np.inf), (-np.inf, 1.0)])

@@ -54,9 +54,9 @@ def sag_of(values, s):
 
 
 def test_second_derivatives_bound_the_sag_of_every_segment():
-    """500 segments of 50 arms, steps of 1e-4 to 3 rad in all joints or in a few."""
+    """300 segments of 30 arms, steps of 1e-4 to 3 rad in all joints or in a few."""
     rng, bounds, truths = np.random.default_rng(1), [], []
-    for _ in range(50):
+    for _ in range(30):
         robot = random_arm(rng)
         motions = Motions(robot)
         for _ in range(10):
@@ -74,11 +74,7 @@ def test_second_derivatives_bound_the_sag_of_every_segment():
 
 
 def test_levers_hold_where_they_are_longer_in_the_middle_than_at_the_ends():
-    """Folded, stretched, folded again: the lever of the first joint peaks halfway.
-
-    Ends: the second joint at -+bend, so that the tool is as near to the first axis at both. All
-    terms of the second derivative point to the base where the arm is stretched.
-    """
+    """Folded, stretched, folded again: the lever of the first joint peaks halfway."""
     robot, bounds, truths = planar_arm(2, (-3.1, 3.1)), [], []
     motions, s, h = Motions(robot), np.linspace(0.01, 0.99, 99)[:, None], 1e-4
     for bend in np.linspace(0.05, 3.1, 30):
@@ -116,11 +112,7 @@ def two_cells(surface, parameters):
 
 
 def surface_segment(rng, robot, kind, task, offsets, longest, onto):
-    """A segment that starts near a random target surface, its axis at some share of the cone.
-
-    Its targets run along a curve from the closest point of one end to that of the other. Returns
-    motions, cells, q0, q1, or None where Newton does not bring the second end onto the surface.
-    """
+    """A segment that starts near a random target surface, its axis at some share of the cone."""
     surface = random_surface(rng, kind)
     u, v = (rng.uniform(*span) * 0.9 for span in (surface.u_range, surface.v_range))
     sign, normal = surface.side_sign, surface.normal(u, v)
@@ -158,111 +150,67 @@ def beside_the_curve(robot, cells, task, q):
 
 @sampled
 @pytest.mark.parametrize("seed", seeds(1, all=10))
+@pytest.mark.parametrize("rolled", [False, True], ids=["free", "rolled"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_segment_that_is_accepted_holds_everywhere(kind, seed):
-    """Segments at either side of random surfaces in any pose, 120 of each kind, 40 samples on each.
+def test_a_segment_that_is_accepted_holds_everywhere(kind, rolled, seed):
+    """120 segments at either side of random surfaces in any pose, 30 samples on each.
 
-    It accepts a fair part, and some use at least half of what it allows beyond the ends' errors.
+    Ranges of roll of 0.5 to 300 deg about a random reference, over the curve and the own foot. A
+    fair part is accepted, and some use half of what is allowed beyond the ends' errors.
     """
-    rng, tried, passed, worst = np.random.default_rng([KINDS.index(kind), seed]), 0, 0, 0.0
+    rng, passed, worst = np.random.default_rng([KINDS.index(kind), rolled, seed]), 0, 0.0
     for number in range(120):
         if number % 20 == 0:
             robot = random_arm(rng)
-        cone_deg = float(rng.choice([2.0, 20.0, 60.0, 120.0, 179.0, 180.0]))
-        task = Task(float(rng.choice([0.0, 0.05])), cone_deg, 10.0 ** rng.uniform(-4.5, -2.0))
-        onto = bool(rng.random() < 0.8)
-        made = surface_segment(rng, robot, kind, task, (0.0, 0.02, 0.7), -0.3, onto)
-        if made is None:
-            continue
-        motions, cells, q0, q1 = made
-        held, tried = motions.along_curve(q0, q1), tried + 1
-        if not held.holds:
-            continue
-        passed += 1
-        q = between(q0, q1, 40)[1]
-        off, chord, _ = beside_the_curve(robot, cells, task, q)
-        assert off.max() <= min(held.off + ROUNDING, task.tolerance)
-        if cone_deg < 180.0:
-            assert chord.max() <= held.chord + ROUNDING
-            if held.on_target:
-                own = deviation(cells.surface, task.standoff, *tools(robot, q)).chord
-                assert 2.0 * np.arcsin(np.minimum(0.5 * own, 1.0)).max() <= task.cone + 1e-9
-        ends = max(off[0], off[-1])
-        if held.off - ends > 1e-7:
-            worst = max(worst, (off.max() - ends) / (held.off - ends))
-    assert tried > 54
-    assert passed > 24
-    assert worst > 0.5
-
-
-@sampled
-@pytest.mark.parametrize("seed", seeds(1, all=10))
-@pytest.mark.parametrize("kind", KINDS)
-def test_the_cone_holds_on_long_segments(kind, seed):
-    """The tolerance is 0.15 m, and cones go beyond 90 deg.
-
-    There a normal that bulges between the ends turns away from the axis: the bound covers that.
-    """
-    rng, passed = np.random.default_rng([10 + KINDS.index(kind), seed]), 0
-    for number in range(90):
-        if number % 15 == 0:
-            robot = random_arm(rng)
-        task = Task(0.01, float(rng.choice([45.0, 100.0, 150.0, 178.0])), 0.15)
-        made = surface_segment(rng, robot, kind, task, (0.0, 0.3), 0.1, None)
-        motions, cells, q0, q1 = made
-        held = motions.along_curve(q0, q1)
-        if held.off <= 0.15:
-            passed += 1
-            off, chord, _ = beside_the_curve(robot, cells, task, between(q0, q1, 20)[1])
-            assert off.max() <= held.off + ROUNDING
-            assert chord.max() <= held.chord + ROUNDING
-    assert passed > 25
-
-
-@sampled
-@pytest.mark.parametrize("seed", seeds(1, all=10))
-@pytest.mark.parametrize("kind", KINDS)
-def test_roll_holds_on_a_segment_that_is_accepted(kind, seed):
-    """Ranges of 0.5 to 300 deg about a random reference, over the curve and over the own foot."""
-    rng, passed = np.random.default_rng([20 + KINDS.index(kind), seed]), 0
-    for number in range(128):
-        if number % 16 == 0:
-            robot = random_arm(rng)
-        half = float(rng.choice([0.25, 2.0, 15.0, 150.0]))
-        cone_deg = float(rng.choice([2.0, 20.0, 60.0, 90.0]))
-        task = Task(
-            float(rng.choice([0.0, 0.05])), cone_deg, 10.0 ** rng.uniform(-3.5, -2.0),
-            roll_deg=(-half, half), roll_reference=tuple(rng.normal(size=3).tolist()),
-        )  # fmt: skip
-        made = surface_segment(rng, robot, kind, task, (0.0, 0.02), -0.3, True)
+        cone_deg = float(rng.choice([2, 20, 60, 90] if rolled else [2, 20, 60, 120, 179, 180]))
+        task = Task(float(rng.choice([0.0, 0.05])), cone_deg, 10.0 ** rng.uniform(-4.0, -2.0))
+        if rolled:
+            half, along = float(rng.choice([0.25, 2.0, 15.0, 150.0])), rng.normal(size=3)
+            task = replace(task, roll_deg=(-half, half), roll_reference=tuple(along.tolist()))
+        onto = bool(rolled or rng.random() < 0.8)
+        made = surface_segment(rng, robot, kind, task, (0.0, 0.02, 0.7)[: 3 - rolled], -0.3, onto)
         held = None if made is None else made[0].along_curve(*made[2:])
         if held is None or not held.holds:
             continue
         passed += 1
         motions, cells, q0, q1 = made
-        roll, q = Roll(*motions.arrays.roll.tolist()), between(q0, q1, 20)[1]
-        (points, axes), x = tools(robot, q), references(robot, q)
-        _, _, normals = beside_the_curve(robot, cells, task, q)
-
-        def off_middle(normals, cells=cells, task=task, axes=axes, x=x, roll=roll):
-            b = -cells.surface.side_sign * normals
-            t, sine = projected(np.broadcast_to(task.fixed_reference(cells), b.shape), b)
-            return np.where(sine > 0.02, np.abs(roll.off(roll_of(x, axes, t, b))), 0.0).max()
-
-        assert off_middle(normals) <= min(held.roll + held.roll_off, roll.half)
-        if held.on_target:
-            assert off_middle(cells.surface.closest(points).normal) <= roll.half
+        q = between(q0, q1, 30)[1]
+        points, axes = tools(robot, q)
+        off, chord, normals = beside_the_curve(robot, cells, task, q)
+        assert off.max() <= min(held.off + ROUNDING, task.tolerance)
+        if cone_deg < 180.0:
+            assert chord.max() <= held.chord + ROUNDING
+            if held.on_target:
+                own = deviation(cells.surface, task.standoff, points, axes).chord
+                assert 2.0 * np.arcsin(np.minimum(0.5 * own, 1.0)).max() <= task.cone + 1e-9
+        if rolled:
+            most = Roll(*motions.arrays.roll.tolist())
+            off_middle = roll_off_middles(cells, task, most, axes, references(robot, q))
+            assert off_middle(normals) <= min(held.roll + held.roll_off, most.half)
+            if held.on_target:
+                assert off_middle(cells.surface.closest(points).normal) <= most.half
+        ends = max(off[0], off[-1])
+        if held.off - ends > 1e-7:
+            worst = max(worst, (off.max() - ends) / (held.off - ends))
     assert passed > 20
+    assert worst > 0.5 or rolled
+
+
+def roll_off_middles(cells, task, most, axes, x):
+    """rad, the largest roll off the middle of its range over given normals (k, 3)."""
+
+    def off_middle(normals):
+        b = -cells.surface.side_sign * normals
+        t, sine = projected(np.broadcast_to(task.fixed_reference(cells), b.shape), b)
+        return np.where(sine > 0.02, np.abs(most.off(roll_of(x, axes, t, b))), 0.0).max()
+
+    return off_middle
 
 
 @pytest.mark.parametrize("kind", ["sphere", "cylinder"])
 @pytest.mark.parametrize("half", [0.01, 0.1, 0.3])
 def test_a_normal_that_bulges_away_from_a_fixed_axis(kind, half):
-    """A gantry with its tool turned away: 2 cos(half / 2) at the ends, 2 in the middle.
-
-    The growth is at least 0.2 of what the bound allows for (the most that a bound by the ends'
-    norms alone can do here is 0.43, and as much again is for the normal at the closest point).
-    """
+    """A gantry with its tool turned away: 2 cos(half / 2) at the ends, 2 in the middle."""
     gantry = robot_of([joint(i, "prismatic", axis=np.eye(3)[i - 1]) for i in (1, 2, 3)], (1, 0, 0))
     ball, pipe = sphere(1, (20, 160), (-90, 90), side="outside"), cylinder(1, (-90, 90), (-1, 1))
     surface = ball if kind == "sphere" else replace(pipe, side="outside")
@@ -330,6 +278,7 @@ def test_roll_is_the_angle_left_by_the_least_rotation_onto_the_approach():
         carried = Rotation.from_rotvec(across / np.linalg.norm(across) * angle).apply(x)
         expected = np.arctan2(np.cross(b, t) @ carried, t @ carried)
         off = roll_off_middle(np.array([np.zeros(3), b, t]), a, x, middle)
+        assert abs(wrapped(roll_of(x[None], a[None], t[None], b[None])[0] - expected)) < 1e-10
         assert -np.pi <= off <= np.pi
         assert abs(wrapped(off + middle - expected)) < 1e-10
 
@@ -407,11 +356,7 @@ def test_two_joints_across_the_tool_axis_turn_the_roll_as_fast_as_is_said(size):
 
 @pytest.mark.parametrize("name", ["puma560", "ur5", "panda", "random"])
 def test_second_derivatives_bound_the_sag_of_roll(name):
-    """Steps up to 0.6 rad a joint, tilts to 60 deg, frames at rest or turning.
-
-    Roll stays as near to its chord as the bound allows, some of it by a third of that; and it
-    changes by no more than its rate.
-    """
+    """Steps up to 0.6 rad a joint, tilts to 60 deg, frames at rest or turning."""
     rng, used = np.random.default_rng(sum(name.encode())), []
     task = Task(0.0, 90, roll_deg=(-10, 10), roll_reference=(1, 0, 0))
     for number in range(80):

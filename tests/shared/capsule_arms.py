@@ -3,34 +3,25 @@
 from __future__ import annotations
 
 import numpy as np
-from urdf_texts import check_urdf_text
+from arm_urdfs import joint
+from random_arms import robot_of
 
 from feasibility.collisions import Bodies, HalfSpace, Obstacle, Pair
-from robots.pinocchio_model import robot_from_urdf
 from robots.shapes import Solid, Triangles
 from robots.urdf import Capsule
-
-WIDE = 'lower="-10" upper="10" effort="1" velocity="1"'
 
 
 def planar_arm(lengths, kinds=None, axes=None):
     """Links along x, each turning about z of the one before it (or sliding along its axis)."""
     kinds = kinds or ["revolute"] * len(lengths)
     axes = axes or [(1, 0, 0) if kind == "prismatic" else (0, 0, 1) for kind in kinds]
-    text = '<robot name="arm"><link name="base"/>'
-    before, at = "base", 0.0
-    for k, (length, kind, axis) in enumerate(zip(lengths, kinds, axes, strict=True), start=1):
-        text += (
-            f'<link name="link{k}"/><joint name="joint{k}" type="{kind}"><parent link="{before}"/>'
-            f'<child link="link{k}"/><origin xyz="{at} 0 0"/><axis xyz="{axis[0]} {axis[1]} '
-            f'{axis[2]}"/><limit {WIDE}/></joint>'
-        )
-        before, at = f"link{k}", length
-    text += (
-        f'<link name="tool"/><joint name="mount" type="fixed"><parent link="{before}"/>'
-        f'<child link="tool"/><origin xyz="{at} 0 0"/></joint></robot>'
-    )
-    return robot_from_urdf(check_urdf_text(text), name="arm", tool_frame="tool")
+    starts = [(x, 0.0, 0.0) for x in (0.0, *lengths)]
+    named = zip(kinds, axes, starts, strict=False)
+    joints = [
+        joint(k, kind, start, axis=axis, limits=(-10.0, 10.0))
+        for k, (kind, axis, start) in enumerate(named, start=1)
+    ]
+    return robot_of([*joints, joint(len(lengths) + 1, "fixed", starts[-1])])
 
 
 def along_x(length, start=0.0):
@@ -61,13 +52,8 @@ def at(x=0.0, y=0.0, z=0.0, rotation=None):
 def box_mesh(size, closed=True):
     """A box of 12 triangles about the origin, outward; one is left out where it is not closed."""
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
-    faces = np.array(
-        [
-            *([0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5]),
-            *([0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6]),
-            *([0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]),
-        ]
-    )
+    sides = (0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)
+    faces = np.array([face for a, b, c, d in sides for face in ((a, b, c), (a, c, d))])
     return Triangles(signs * np.array(size) / 2.0, faces if closed else faces[:-1], closed)
 
 

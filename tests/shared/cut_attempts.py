@@ -85,11 +85,7 @@ def prove(robot, cells, task, budget=20_000, attempts=8, seed=0):
 
 
 def proved_wrongly(robot, cells, task, rng, newton=True, budget=4000):
-    """Does one of two attempts on a covering roadmap that is broken in two end in a proof?
-
-    Its parts are a band apart along a random joint, and each misses a cell. None where no cover is
-    found at once.
-    """
+    """Does one of two attempts on a covering roadmap that is broken in two end in a proof?"""
     arrays = arrays_of(robot, cells, task)
     exploration = Exploration(robot, cells, arrays, 0)
     if not seed_middle(exploration):

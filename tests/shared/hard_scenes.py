@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
+import trimesh
 from foreign_clearances import ForeignScene
 
 from feasibility import Search, Task, check
@@ -64,21 +65,16 @@ def a_plate(rng: np.random.Generator, robot: Robot) -> tuple[Cells, Task]:
 
 def random_object(rng: np.random.Generator, name: str, around: np.ndarray) -> Obstacle:
     """A body of a size of 5 to 30 cm near a place."""
-    place = {
-        "position": tuple(around + rng.uniform(-0.15, 0.15, 3)),
-        "rpy_deg": tuple(rng.uniform(-180.0, 180.0, 3)),
-    }
-    size = rng.uniform(0.05, 0.3, 3).tolist()
-    match int(rng.integers(5)):
-        case 0:
-            return Obstacle.box(name, size, **place)
-        case 1:
-            return Obstacle.cylinder(name, size[0] / 2, size[1], **place)
-        case 2:
-            return Obstacle.sphere(name, size[0] / 2, place["position"])
-        case 3:
-            return Obstacle.capsule(name, size[0] / 2, size[1], **place)
-    return Obstacle.halfspace(name, **place)
+    position = tuple(around + rng.uniform(-0.15, 0.15, 3))
+    turn, size = tuple(rng.uniform(-180.0, 180.0, 3)), rng.uniform(0.05, 0.3, 3).tolist()
+    made = (
+        lambda: Obstacle.box(name, size, position, turn),
+        lambda: Obstacle.cylinder(name, size[0] / 2, size[1], position, turn),
+        lambda: Obstacle.sphere(name, size[0] / 2, position),
+        lambda: Obstacle.capsule(name, size[0] / 2, size[1], position, turn),
+        lambda: Obstacle.halfspace(name, position, turn),
+    )
+    return made[int(rng.integers(5))]()
 
 
 # scenes with a known motion
@@ -104,9 +100,7 @@ def built_scene(name: str, seed: int) -> BuiltScene | None:
     if blind is None or known is None:
         return None
     drawn = []
-    for number in range(
-        24
-    ):  # where the blind motion passes with a joint, or (every third) anywhere
+    for number in range(24):  # where the blind motion has a joint, or (every third) anywhere
         joints = Kinematics(robot).joints(blind.q[rng.integers(len(blind.q))][None]).points[0, 2:]
         k = int(rng.integers(len(joints) - 1))
         place = joints[k] + rng.uniform() * (joints[k + 1] - joints[k])
@@ -189,10 +183,7 @@ class Over:
         return never_clear(self.robot, self.bodies, *numbers, self.point, self.approach)
 
     def clear_pose(self, count: int, rng: np.random.Generator) -> bool:
-        """Is one of so many random poses inside cone and tolerance clear of all that is at rest?
-
-        Many are at the border of the cone, where there is most room.
-        """
+        """Is one of so many random poses inside cone and tolerance clear of all that is at rest?"""
         scene = ToolPoses(self.robot, self.bodies)
         frame = self.robot.model.frames[self.robot.tool_frame_id].placement
         axis = frame.rotation @ self.robot.approach_axis
@@ -209,42 +200,38 @@ class Over:
 
 
 class ToolPoses(ForeignScene):
-    """The tool among what is at rest, for fcl."""
+    """The tool among what is at rest, for fcl; only pairs of these are asked for."""
 
     def __init__(self, robot: Robot, bodies: Bodies) -> None:
-        """Only pairs of the last joint and what is at rest are asked for."""
         super().__init__(robot, bodies)
-        joint = {owner: entries[0][0] for owner, entries in self.objects.items()}
-        self.asked = [
-            (k, pair)
-            for k, pair in enumerate(bodies.pairs)
-            if sorted((joint[pair.first], joint[pair.second])) == [0, robot.n]
-        ]
+        joint = {owner: shapes[0][0].link or 0 for owner, shapes in self.bodies.items()}
+        self.pairs = [one for one in self.pairs if {joint[one[0]], joint[one[1]]} == {0, robot.n}]
         self.meshes = {
             one.name: one
             for one in bodies.scene
             if isinstance(one.geometry, Triangles) and one.geometry.closed
         }
 
+    def _frames(self, q: np.ndarray) -> dict:
+        return {self.robot.n: self.pose.homogeneous[None]}
+
     def clear(self, pose: pin.SE3) -> bool:
         """Is no pair too near? Of meshes, fcl knows the triangles: what is inside is asked for."""
-        self.data.oMi[self.robot.n] = pose
-        for k, pair in self.asked:
-            if self._swallowed(pose, pair.first, pair.second):
-                return False
-            if self.touches(k) or self.pair_distance(k) < pair.clearance:
-                return False
-        return True
+        self.pose = pose
+        if any(self._swallowed(pose, *pair[:2]) for pair in self.pairs):
+            return False
+        return all(
+            self.distances(np.zeros(1), [k])[0] >= max(pair[2], 1e-12)
+            for k, pair in enumerate(self.pairs)
+        )
 
     def _swallowed(self, pose: pin.SE3, first: str, second: str) -> bool:
         """Is a corner or the middle of what moves inside a closed mesh of the scene?"""
-        import trimesh
-
         mesh = self.meshes.get(first) or self.meshes.get(second)
         if mesh is None:
             return False
         solid = trimesh.Trimesh(mesh.geometry.vertices, mesh.geometry.faces, process=False)
-        for one in self.bodies.solids:
+        for one in self.asked.solids:
             if one.joint == self.robot.n and one.owner in (first, second):
                 own = np.zeros(3)
                 if isinstance(one.geometry, Triangles):

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from arm_urdfs import FREE, arm, joint
@@ -11,9 +10,9 @@ from numpy.typing import NDArray
 from urdf_texts import check_urdf_text
 
 from feasibility import Task
-from robots import Robot, load_robot
+from robots import Axis, Robot, load_robot
 from robots.pinocchio_model import robot_from_urdf
-from surfaces import Cells, Surface, cylinder, hyperboloid, plane, sphere
+from surfaces import Surface, cylinder, hyperboloid, plane, sphere
 
 Floats = NDArray[np.float64]
 RIGHT_ANGLES = (-np.pi / 2, 0.0, np.pi / 2, np.pi)
@@ -21,34 +20,23 @@ RIGHT_ANGLES = (-np.pi / 2, 0.0, np.pi / 2, np.pi)
 
 def robot_of(joints: list[str], approach_axis: tuple[float, ...] = (0.0, 0.0, 1.0)) -> Robot:
     """The arm of joints written by `arm_urdfs.joint`."""
-    return robot_from_urdf(
-        check_urdf_text(arm(joints)), name="test_arm", approach_axis=approach_axis
-    )
+    text = check_urdf_text(arm(joints))
+    return robot_from_urdf(text, name="test_arm", approach_axis=approach_axis)
 
 
 def random_arm(rng: np.random.Generator, least: int = 3, most: int = 8) -> Robot:
-    """A serial chain of `least` to `most` free joints.
-
-    Joints of every kind anywhere, axes along z, along a coordinate axis or anywhere, neighbouring
-    axes parallel or at right angles half of the time (singularities), a third of the links of no
-    length, and a tool that is offset or not.
-    """
+    """A serial chain of `least` to `most` free joints."""
     n = int(rng.integers(least, most + 1))
     square = rng.random() < 0.5
     joints = []
     for i in range(1, n + 1):
         kind = str(rng.choice(["revolute", "continuous", "prismatic"], p=[0.6, 0.15, 0.25]))
         lower = float(rng.uniform(-4.0, 1.0))
-        joints.append(
-            joint(
-                i,
-                kind,
-                np.zeros(3) if rng.random() < 0.33 else rng.uniform(-0.5, 0.5, 3),
-                rng.choice(RIGHT_ANGLES, 3) if square else rng.uniform(-np.pi, np.pi, 3),
-                (0, 0, 1) if square else rng.normal(size=3),
-                FREE if kind == "continuous" else (lower, lower + float(rng.uniform(1.0, 7.0))),
-            )
-        )
+        place = np.zeros(3) if rng.random() < 0.33 else rng.uniform(-0.5, 0.5, 3)
+        turn = rng.choice(RIGHT_ANGLES, 3) if square else rng.uniform(-np.pi, np.pi, 3)
+        axis = (0, 0, 1) if square else rng.normal(size=3)
+        limits = FREE if kind == "continuous" else (lower, lower + float(rng.uniform(1.0, 7.0)))
+        joints.append(joint(i, kind, place, turn, axis, limits))
     offset = np.zeros(3) if rng.random() < 0.3 else rng.uniform(-0.2, 0.2, 3)
     joints.append(joint(n + 1, "fixed", offset))
     along = (0.0, 0.0, 1.0) if square else tuple(rng.normal(size=3))
@@ -65,28 +53,7 @@ def planar_arm(links: int = 3, limits: tuple[float, float] = (-2.8, 2.8)) -> Rob
 
 def rail_arm(base: str, stroke: tuple[float, float] = (-0.5, 0.8)) -> Robot:
     """A library arm that rides on a rail along y."""
-    from xml.etree import ElementTree
-
-    carried = load_robot(base)
-    tree = ElementTree.parse(carried.urdf or "").getroot()
-    for link in tree.findall("link"):
-        for part in link.findall("visual") + link.findall("collision"):
-            link.remove(part)
-    children = {element.find("child").get("link") for element in tree.findall("joint")}
-    root = next(name for link in tree.findall("link") if (name := link.get("name")) not in children)
-    ElementTree.SubElement(tree, "link", name="ground")
-    rail = ElementTree.SubElement(tree, "joint", name="rail", type="prismatic")
-    ElementTree.SubElement(rail, "parent", link="ground")
-    ElementTree.SubElement(rail, "child", link=root)
-    ElementTree.SubElement(rail, "axis", xyz="0 1 0")
-    low, high = map(repr, stroke)
-    ElementTree.SubElement(rail, "limit", lower=low, upper=high, effort="1", velocity="1")
-    return robot_from_urdf(
-        check_urdf_text(ElementTree.tostring(tree, encoding="unicode")),
-        name=f"{base} on a rail",
-        tool_frame=carried.tool_frame,
-        approach_axis=carried.approach_axis,
-    )
+    return load_robot(base, axes=[Axis("rail", "prismatic", (0, 1, 0), limits=stroke)])
 
 
 def finite_limits(robot: Robot, far: float = 2.0 * np.pi) -> tuple[Floats, Floats]:
@@ -98,10 +65,7 @@ def finite_limits(robot: Robot, far: float = 2.0 * np.pi) -> tuple[Floats, Float
 
 
 def random_configuration(robot: Robot, rng: np.random.Generator) -> Floats:
-    """A configuration inside the limits; in a third of the cases with joints at round values.
-
-    Round values are 0 and right angles, where arms are singular, and the limits themselves.
-    """
+    """A configuration inside the limits; in a third of the cases with joints at round values."""
     low, high = finite_limits(robot)
     q = rng.uniform(low, high)
     if rng.random() < 0.33:
@@ -155,16 +119,12 @@ def random_surface(rng: np.random.Generator, kind: str) -> Surface:
     return plane((-5, 5), (-5, 5), side=side)
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Deviation:
-    """How far a motion deviates from the target surface and from the approach direction."""
+class Deviation(NamedTuple):
+    """How far a motion is from the target surface (m) and from the approach, |a - b|, (k,) each."""
 
     distance: Floats
-    """(k,) m."""
     chord: Floats
-    """(k,) |a - b|."""
     on_patch: NDArray[np.bool_]
-    """(k,) whether the closest point lies on the patch."""
 
 
 def deviation(surface: Surface, standoff: float, points: Floats, axes: Floats) -> Deviation:
@@ -177,39 +137,24 @@ def deviation(surface: Surface, standoff: float, points: Floats, axes: Floats) -
     )
 
 
-PUMA = {"name_or_path": "puma560", "limits": "set-1"}
+PUMA = load_robot("puma560", limits="set-1")
 QUESTIONS = {
-    "puma, dome": lambda: (
-        load_robot(**PUMA),
-        sphere(1.0, (30, 70), (40, 100)).cells(4, 5),
-        Task(0.005, 45),
-    ),
-    "puma, tube": lambda: (
-        load_robot(**PUMA),
-        cylinder(1.0, (20, 60), (0.0, 0.4)).cells(3, 3),
-        Task(0.005, 100),
-    ),
-    "ur5, plate": lambda: (
+    "puma, dome": (PUMA, sphere(1.0, (30, 70), (40, 100)).cells(4, 5), Task(0.005, 45)),
+    "puma, tube": (PUMA, cylinder(1.0, (20, 60), (0.0, 0.4)).cells(3, 3), Task(0.005, 100)),
+    "ur5, plate": (
         load_robot("ur5"),
-        plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside").cells(3, 4),
+        plane((0.4, 0.6), (-0.1, 0.1), "outside", (0, 0, 0.3)).cells(3, 4),
         Task(0.02, 30, 5e-4),
     ),
-    "panda, saddle": lambda: (
+    "panda, saddle": (
         load_robot("panda"),
-        hyperboloid(
-            0.3, 0.5, (160, 200), (-0.1, 0.1), position=(0.8, 0, 0.4), side="outside"
-        ).cells(3, 3),
+        hyperboloid(0.3, 0.5, (160, 200), (-0.1, 0.1), "outside", (0.8, 0, 0.4)).cells(3, 3),
         Task(0.02, 50),
     ),
-    "ur5 on a rail": lambda: (
+    "ur5 on a rail": (
         rail_arm("ur5"),
-        plane((0.4, 0.6), (-0.4, 0.4), position=(0, 0, 0.3), side="outside").cells(2, 5),
+        plane((0.4, 0.6), (-0.4, 0.4), "outside", (0, 0, 0.3)).cells(2, 5),
         Task(0.02, 30),
     ),
 }
-
-
-@cache
-def question(name: str) -> tuple[Robot, Cells, Task]:
-    """Robot, cells and task of a small feasible question."""
-    return QUESTIONS[name]()
+"""Robot, cells and task of small feasible questions."""

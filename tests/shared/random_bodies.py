@@ -5,7 +5,9 @@ from __future__ import annotations
 import coal
 import numpy as np
 import pinocchio as pin
+from arm_urdfs import joint
 from numpy.typing import NDArray
+from random_arms import robot_of
 
 from feasibility.collisions import Bodies, Pair, Soup
 from robots import Robot
@@ -16,40 +18,25 @@ Array = NDArray[np.float64]
 
 def serial_arm(rng: np.random.Generator, kinds: str, length: float = 0.3) -> Robot:
     """A chain of joints, R or P, with axes and placements made up."""
-    model = pin.Model()
-    for index, kind in enumerate(kinds):
-        axis = rng.normal(size=3)
-        axis /= np.linalg.norm(axis)
-        joint = (
-            pin.JointModelRevoluteUnaligned(axis)
-            if kind == "R"
-            else pin.JointModelPrismaticUnaligned(axis)
-        )
-        placement = pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(size=3) * length)
-        model.addJoint(index, joint, placement, f"joint{index + 1}")
-    n = len(kinds)
-    model.addFrame(pin.Frame("tip", n, pin.SE3(np.eye(3), np.zeros(3)), pin.FrameType.BODY))
-    return Robot(
-        name="made up",
-        model=model,
-        tool_frame="tip",
-        approach_axis=np.array([0.0, 0.0, 1.0]),
-        joint_names=tuple(f"joint{i + 1}" for i in range(n)),
-        joint_kinds=tuple("revolute" if kind == "R" else "prismatic" for kind in kinds),
-        lower=np.full(n, -3.0),
-        upper=np.full(n, 3.0),
-    )
+    named = {"R": "revolute", "P": "prismatic"}
+    return robot_of(
+        [
+            joint(k, named[kind], *rng.normal(size=(2, 3)) * [[length], [1.0]], rng.normal(size=3),
+                  (-3.0, 3.0))
+            for k, kind in enumerate(kinds, start=1)
+        ]
+    )  # fmt: skip
 
 
 def hulls(rng: np.random.Generator, n: int, size: float = 0.08, at: float = 0.15) -> list[Polytope]:
     """One to three clouds of vertices around each joint, the root included: owners b0 to bn."""
     bodies = []
-    for joint in range(n + 1):
+    for k in range(n + 1):
         for _ in range(int(rng.integers(1, 4))):
             count = int(rng.integers(4, 30))
             cloud = rng.normal(size=(count, 3)) * size * rng.uniform(0.2, 1.0, 3)
             cloud += rng.normal(size=3) * at
-            bodies.append(Polytope(f"b{joint}", joint, cloud, float(rng.choice([0.0, 0.02]))))
+            bodies.append(Polytope(f"b{k}", k, cloud, float(rng.choice([0.0, 0.02]))))
     return bodies
 
 
@@ -69,7 +56,6 @@ class CoalScene:
     """The same polytopes and soups as coal sees them, placed by Pinocchio."""
 
     def __init__(self, robot: Robot, bodies: Bodies) -> None:
-        """Build hulls and triangle trees."""
         self.robot, self.bodies = robot, bodies
         self.data = robot.model.createData()
         self.shapes: dict[str, list[tuple[int, coal.CollisionGeometry, float]]] = {}
@@ -88,12 +74,10 @@ class CoalScene:
         least = np.inf
         for joint_a, shape_a, radius_a in self.shapes[first]:
             for joint_b, shape_b, radius_b in self.shapes[second]:
-                result = coal.DistanceResult()
-                poses = (self._pose(joint_a), self._pose(joint_b))
-                value = coal.distance(
-                    shape_a, poses[0], shape_b, poses[1], coal.DistanceRequest(True), result
-                )
-                least = min(least, value - radius_a - radius_b)
+                result, asked = coal.DistanceResult(), coal.DistanceRequest(True)
+                a, b = self._pose(joint_a), self._pose(joint_b)
+                apart = coal.distance(shape_a, a, shape_b, b, asked, result)
+                least = min(least, apart - radius_a - radius_b)
         return float(least)
 
     def _pose(self, joint: int) -> coal.Transform3s:
@@ -103,15 +87,14 @@ class CoalScene:
 
 def _convex(vertices: Array) -> coal.CollisionGeometry:
     points = coal.StdVec_Vec3s()
-    for vertex in vertices:
-        points.append(vertex)
+    points.extend(list(vertices))
     return coal.Convex.convexHull(points, False, None)
 
 
 def _tree(triangles: Array) -> coal.BVHModelOBBRSS:
     model = coal.BVHModelOBBRSS()
     model.beginModel(len(triangles), 3 * len(triangles))
-    for a, b, c in triangles:
-        model.addTriangle(a, b, c)
+    for corners in triangles:
+        model.addTriangle(*corners)
     model.endModel()
     return model

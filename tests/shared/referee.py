@@ -614,8 +614,8 @@ class Scene:
                 for other in self.bodies[self.pairs[k][1]]:
                     a, b = (self._placed(*each, frames) for each in (one, other))
                     touch = fcl.collide(a, b, fcl.CollisionRequest(), fcl.CollisionResult())
-                    apart = fcl.distance(a, b, fcl.DistanceRequest(), fcl.DistanceResult())
-                    least = min(least, (TOUCHING if touch else apart) - one[0].off - other[0].off)
+                    apart = TOUCHING if touch else fcl.distance(a, b, fcl.DistanceRequest())
+                    least = min(least, apart - one[0].off - other[0].off)
             found.append(least)
         return np.array(found)
 

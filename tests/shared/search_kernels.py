@@ -71,16 +71,11 @@ class Held(NamedTuple):
     """What is certain of a segment, beside its moving target."""
 
     holds: bool
-    off: float
-    """m, the tool point is never further from its target."""
-    chord: float
-    """|a - b| is never larger."""
-    roll: float
-    """rad, the roll is never further from the middle of its range."""
-    on_target: bool
-    """Is the tool point as near to its targets at the ends as everywhere in a search?"""
-    roll_off: float
-    """rad, what the roll over the target's frame differs by from that over the curve's."""
+    off: float  # m, the tool point is never further from its target
+    chord: float  # |a - b| is never larger
+    roll: float  # rad, the roll is never further from the middle of its range
+    on_target: bool  # is the tool point as near to its targets at the ends as in a search?
+    roll_off: float  # rad, the roll over the target's frame differs by no more from the curve's
 
 
 class Motions:
@@ -105,13 +100,7 @@ class Motions:
         return float(self.work.error[0, 2])
 
     def roll_rates(self, q0: Floats, q1: Floats, frame: Any, chord: float) -> tuple[float, float]:
-        """Bounds on |psi'| and |psi''| of roll (rad) along a segment, s in 0..1.
-
-        Args:
-            q0, q1: its ends.
-            frame: bounds on the speed of the approach direction, of the frame, and its change.
-            chord: the largest |a - b|.
-        """
+        """Bounds on |psi'| and |psi''| of roll (rad) along a segment, s in 0..1."""
         self.sag(q0, q1)
         self.work.derivative_bound[5:8] = frame
         return roll_spread(self.work, chord, 1.0)
@@ -176,8 +165,7 @@ class Ruled(NamedTuple):
     """What branch and bound says of one target."""
 
     ruling: Ruling
-    found: Floats
-    """A configuration, where it was reached."""
+    found: Floats  # a configuration, where it was reached
     boxes: int
 
 

@@ -11,11 +11,10 @@ from itertools import pairwise, permutations, product
 
 import numpy as np
 import pytest
-from cut_verdicts import disconnected_problem
 from jobs import coverable
 from plain import assert_motion
 from random_arms import planar_arm
-from random_cases import built, draw
+from random_cases import built, draw, read
 from samples import sampled, spread
 
 from feasibility import Answer, Search, Task, check
@@ -34,6 +33,12 @@ from surfaces.meshes import TriangleMesh, mesh
 UR5 = load_robot("ur5")
 TASK = Task(0.01, cone_deg=30)
 BEHIND = cylinder(0.6, angle_deg=(150, 210), height=(0.1, 0.5), side="inside")
+
+
+def disconnected_problem(number):
+    """A stored problem that falls apart with every cell in reach."""
+    apart = [p for p, t in read("puma560") if not t.feasible and t.reachable == np.prod(p.cells)]
+    return built(apart[number], load_robot("puma560"))
 
 
 def assert_plan(plan, division):
