@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import plain
 import pytest
-from dense_replay import tools
 from mesh_patches import Mesh, flat_faces, used
+from plain import tools
 from referee import Facets, Form, angles_between, on_triangles
 from samples import EVERYTHING, sampled, seeds
 from scipy.spatial.transform import Rotation
