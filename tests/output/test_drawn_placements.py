@@ -31,7 +31,6 @@ from feasibility.studies import Row, open_workers, run_tasks
 from feasibility.studies.file import read_study
 from feasibility.viewer import poses as pose_layers
 from feasibility.viewer import view_placements, view_study
-from feasibility.viewer.placements import same_frame
 from feasibility.viewer.poses import (
     COLOURS,
     MOST,
@@ -346,10 +345,3 @@ def test_a_study_is_drawn_for_the_arm_of_its_best_row():
     )  # fmt: skip
     verdict = check(*case.build())
     np.testing.assert_array_equal(view.motion.walk, verdict.witness.q)
-
-
-def test_only_the_pose_may_differ_within_a_picture():
-    study, _ = decided()
-    arms = [task.parameters["robot"] for task in study.tasks]
-    for row in (0, 11):
-        assert same_frame(study.tasks, row) == [k for k in range(12) if arms[k] == arms[row]]

@@ -22,8 +22,7 @@ import pytest
 from samples import EVERYTHING
 
 import feasibility.checking
-from feasibility import Answer, notices
-from feasibility.cli import command, console
+from feasibility import notices
 from feasibility.cli import main as cli
 from feasibility.cli.warm_up import COMMANDS
 from feasibility.notices import NOTICE, compiling_notice
@@ -101,22 +100,6 @@ def test_answers_survive_a_narrow_encoding():
     assert (done.returncode, done.stdout) == (2, "")
     assert "there is no robot" in done.stderr
     assert "Traceback" not in done.stderr
-
-
-class Terminal(io.StringIO):
-    def isatty(self):
-        return True
-
-
-@pytest.mark.parametrize("stream", [io.StringIO, Terminal])
-def test_progress_shows_on_a_terminal_and_nowhere_else(monkeypatch, stream):
-    monkeypatch.setenv("TERM", "xterm")
-    monkeypatch.setattr(sys, "stderr", stream())
-    with console.Bar() as bar:
-        bar(1, None, "looking [around]")
-        bar(9, 9, "cells")
-    assert ("9/9" in sys.stderr.getvalue()) == (stream is Terminal)
-    assert sys.stderr.getvalue() == "" or stream is Terminal
 
 
 def test_a_terminal_sees_progress_and_stdout_the_answer_alone():
@@ -197,11 +180,6 @@ def test_what_a_library_says_of_an_interrupt_is_no_error(ask, search):
 
     search(broken)
     assert ask(*SMALL) == (130, "", "coverable: interrupted\n")
-
-
-def test_every_answer_has_its_status():
-    assert command.STATUS == {"feasible": 0, "infeasible": 1, "undecided": 3}
-    assert set(command.STATUS) == set(map(str, Answer))
 
 
 @pytest.mark.parametrize("line", ["check paper/4a --save no/a --html no/b --witness no/c",
