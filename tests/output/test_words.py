@@ -79,9 +79,8 @@ def test_bounds_are_rounded_to_where_they_hold(digits, value):
         assert len(text.split("e")[0].strip("-0.").replace(".", "")) <= digits
 
 
-def test_a_certified_clearance_is_rounded_down_whatever_it_is():
-    case = load_case("paper/4a", ["surface.cells=[2, 2]"])
-    verdict = check(*case.build())
+def test_a_certified_clearance_is_rounded_down_whatever_it_is(plate):
+    case, verdict = plate
     pair = {"measured_clearance": 1.0, "nearest_pair": ("a", "b")}
     for least in (0.0099996, 0.0123456, 0.9999999):
         made = replace(verdict.certificate, min_clearance=least, min_limit_margin=least, **pair)
@@ -279,10 +278,11 @@ def test_trajectories_say_it_in_their_header_and_are_read_back(commands, plate, 
 def test_the_body_that_would_do_does(commands):
     said = " ".join(commands.run("check", "collisions").out.split())
     shape = re.search(r'kind = "capsule", (.*?) would do', said)[1].replace("0.0,", "0,")
-    words = [*commands.words("check", "collisions"), "--json"]
-    assert json.loads(commands.say(words).out)["unchecked_links"] == ["tool0 to TCP"]
-    with_body = [*words, "--set", f'collision.tool=[{{kind="capsule", {shape}}}]']
-    assert json.loads(commands.say(with_body).out)["unchecked_links"] == []
+    bare = json.loads(commands.run("check", "collisions", "--json").out)
+    assert bare["unchecked_links"] == ["tool0 to TCP"]
+    body = f'collision.tool=[{{kind="capsule", {shape}}}]'
+    said = commands.run("check", "collisions", "--json", "--set", body)
+    assert json.loads(said.out)["unchecked_links"] == []
 
 
 # -- lists ----------------------------------------------------------------------------------------
