@@ -186,12 +186,8 @@ def test_the_saved_case_is_what_is_shown(tab, served, tmp_path, monkeypatch):
     assert saved.surface.position == (0.1305, 0.0, 0.1)
     assert saved.surface.rpy_deg == (0.0, 0.0, 12.0)
     assert saved.task.standoff == 0.031
-    verdict = check(*saved.build())
-    assert tab.inner_text("#verdict") == report.as_text(verdict, saved).splitlines()[0]
-    assert f"{verdict.n_covered} of 48 cells · evidence: {verdict.evidence}" in tab.inner_text(
-        "#progress"
-    )
-    assert np.array_equal([colour == GREEN for colour in colours(tab)], verdict.covered)
+    covered = check(*saved.build()).covered
+    assert np.array_equal([colour == GREEN for colour in colours(tab)], covered)
 
 
 def test_a_closed_page_is_forgotten(browser, served, tab):

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pytest
-import umsgpack
 from command_table import FILES
+from page_outline import unpacked
 
 from feasibility import check
 from feasibility.cases import Case, load_case
@@ -158,17 +158,9 @@ def test_a_quick_look_says_so_and_calls_nothing_feasible(client):
     assert 0 < far["paint"]["classes"].count(1) == 6 - far["covered"]
 
 
-def commands(text):
-    data, at = base64.b64decode(text), 0
-    while at < len(data):
-        length = int.from_bytes(data[at : at + 4], "little")
-        yield umsgpack.unpackb(data[at + 4 : at + 4 + length])
-        at += 4 + length
-
-
 def test_a_certified_answer_brings_graph_motion_and_posture(client):
     answer = client.ask(True)
-    drawn = list(commands(answer["commands"]))
+    drawn = unpacked(base64.b64decode(answer["commands"]))
     kinds = [one["type"] for one in drawn]
     assert kinds.count("set_animation") == 1
     assert kinds.count("set_transform") >= 6

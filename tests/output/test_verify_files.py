@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -131,16 +130,6 @@ def test_what_a_tree_was_not_judged_in_is_named_and_does_not_hold(kept, said, de
     assert answer.status == 1
     assert words in answer.out or demanded == "coverage"
     assert "collisions are not checked" in answer.out
-
-
-def test_half_of_a_motion_reaches_half_of_the_cells(commands, ask, tmp_path):
-    commands.run("check", "files")
-    lines = (commands.folder / "walk.csv").read_text().splitlines()
-    (tmp_path / "half.csv").write_text("\n".join(lines[: len(lines) // 2]) + "\n")
-    case = commands.folder / "plate.toml"
-    answer = json.loads(ask("verify", case, tmp_path / "half.csv", "--json").out)
-    assert len(answer["missed"]) == 6 - answer["reached"] > 0
-    assert "never reached" in answer["refusals"][0]["text"]
 
 
 def test_verify_in_python(kept):
