@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "shared")]
 
-from referee import Arm, closely
+from referee import Arm, closely, joints_of
 
 from coverable import Task, check, list_robots, load_robot, plane, poses
 
@@ -91,7 +91,8 @@ def bare_urdf(square: Square, file: Path) -> Arm:
         for end, value in zip(("lower", "upper"), ends or (), strict=ends is not None):
             joint.find("limit").set(end, repr(math.radians(value)))
     file.write_text(ElementTree.tostring(robot, encoding="unicode"))
-    return Arm.from_urdf(file, TIP, [str(j.get("name")) for j in turning], seen_from=BASE)
+    names = [str(j.get("name")) for j in turning]
+    return Arm(joints_of(file), TIP, names, seen_from=BASE)
 
 
 def measured(arm: Arm, q: Floats, square: Square) -> dict[str, object]:

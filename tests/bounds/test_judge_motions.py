@@ -14,16 +14,15 @@ from capsule_arms import bodies_of, pair
 from gantry import (
     SURFACES,
     configurations,
-    dense,
     gantry,
     marks_of,
     places_along,
     raster,
-    serpentine,
     tools_of,
 )  # fmt: skip
 from random_arms import planar_arm, robot_of
 from referee import Facets
+from referee import evenly as dense
 from samples import EVERYTHING, sampled, seeds
 
 from feasibility import Search, Task, check
@@ -33,15 +32,11 @@ from feasibility.verdict import Walk
 from robots import Kinematics, load_robot
 from robots.shapes import Solid
 from robots.urdf import Sphere
-from surfaces import cylinder, mesh, piecewise, plane, poses, sphere
-from surfaces.meshes import TriangleMesh
+from surfaces import cylinder, piecewise, plane, poses, sphere
 
 
 def off_and_tilt(cells, task, q):
-    """(k,) m off the offset surface, and (k,) rad between tool and normal at the closest point.
-
-    Of a mesh those of a reader that shares nothing with `surfaces`; its normals are interpolated.
-    """
+    """(k,) m off the offset surface, and (k,) rad between tool and normal at the closest point."""
     (points, axes), surface = tools_of(q), cells.surface
     sign = surface.side_sign
     if surface.kind == "mesh":
@@ -150,11 +145,6 @@ def surfaced(**changes):
     return lambda made: replace(made.cells, surface=replace(made.cells.surface, **changes))
 
 
-def lowered(made):
-    surface = made.cells.surface.moved(np.eye(3), [0.0, 0.0, 2.5e-3])
-    return replace(made.cells, surface=surface)
-
-
 def wiggle(made):
     k = len(made.q) // 2
     bad = off_by(made, k, 1.5 * made.task.tolerance)[k]
@@ -165,18 +155,12 @@ DAMAGES = {
     "other columns": (replaced(q=lambda made: made.q[:, [1, 0, 2, 3, 4, 5]]), "tool point is"),
     "a limit": (replaced(robot=passing), "j3 passes its limit by 10 mm"),
     "the end": (replaced(q=lambda made: made.q[:-12]), "never reached"),
-    "a third taken out": (replaced(q=lambda made: np.vstack([made.q[: len(made.q) // 3],
-                                                             made.q[2 * len(made.q) // 3 :]])),
-                          "never reached"),
-    "on and on": (replaced(q=lambda made: np.vstack([made.q, made.q[-1] + 0.3])), "tool point is"),
     "other side": (replaced(cells=surfaced(side="inside")), "tilts"),
     "other standoff": (replaced(task=lambda made: replace(made.task, standoff=0.014)),
                        "tool point is"),
-    "shifted": (replaced(cells=lowered), "tool point is"),
     "NaN": (replaced(q=with_nan), "row 8: j4 is not a finite number"),
     "degrees": (replaced(q=lambda made: 60.0 * made.q), "passes its limit"),
     "a joint short": (replaced(q=lambda made: made.q[:, :5]), "no motion of 6 joints"),
-    "one row": (replaced(q=lambda made: made.q[0]), "no motion of 6 joints"),
     "nothing": (replaced(q=lambda made: made.q[:0]), "never reached"),
     "a row that wiggles": (replaced(q=wiggle), "tool point is 1.5 mm"),
 }  # fmt: skip
@@ -251,11 +235,7 @@ def test_no_cells_and_no_rows():
 @pytest.mark.parametrize("factor", [0.9, 0.999, 1.001, 3.0])
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-2])
 def test_a_motion_that_is_bad_only_between_two_rows(factor, tolerance):
-    """UR5's base alone turns: the tool runs on a circle, and both rows lie on the plane x = c.
-
-    The largest deviation is that of the circle's arc from its chord, known in closed form, so both
-    sides of the border can be asked: a tenth of a percent less is accepted, more is refused.
-    """
+    """UR5's base alone turns: the tool runs on a circle, and both rows lie on the plane x = c."""
     robot = load_robot("ur5")
     base = np.array([0.0, -1.2, 1.6, -0.4, -np.pi / 2, 0.0])
     point, _ = Kinematics(robot).tool(base)
@@ -340,25 +320,10 @@ def two_plates(gap):
     return piecewise(pieces, side="outside").cells((4, 5))
 
 
-def scroll(gap):
-    """A mesh like a rolled sheet, flat on top: two sheets above each other, joined far away."""
-    flat, ring = np.linspace(0.3, 0.6, 31), np.linspace(0.0, 1.0, 41)[1:-1]
-    angle, size = np.pi / 2 - 2 * np.pi * ring, 0.25
-    x = np.concatenate([flat, 0.45 + size * np.cos(angle) + 0.15 * (1 - 2 * ring), flat])
-    around = LEVEL - size + size * np.sin(angle) + gap * ring
-    z = np.concatenate([0 * flat + LEVEL, around, 0 * flat + LEVEL + gap])
-    y = np.tile(np.linspace(-0.1, 0.1, 9), (len(x), 1))
-    points = np.stack([x[:, None] + 0 * y, y, z[:, None] + 0 * y], axis=-1).reshape(-1, 3)
-    corner = (np.arange(len(x) - 1)[:, None] * 9 + np.arange(8)).ravel()
-    faces = [np.stack([corner, corner + a, corner + b], 1) for a, b in ((9, 10), (10, 1))]
-    return mesh(TriangleMesh(points, np.concatenate(faces))).cells(count=40)
-
-
-@pytest.mark.parametrize("kind", [two_plates, scroll])
-def test_a_jump_between_two_sheets_is_refused(kind):
+def test_a_jump_between_two_sheets_is_refused():
     """Both are within the tolerance half way, but no path on the surface leads across."""
     gap, made = 1.5e-3, raster("plane")
-    cells, task = kind(gap), Task(standoff=0.0, cone_deg=20, tolerance=1e-3)
+    cells, task = two_plates(gap), Task(standoff=0.0, cone_deg=20, tolerance=1e-3)
     away = off_by(made, len(made.q) - 1, gap)[-1:]
 
     def judged(rows):
@@ -397,21 +362,6 @@ def test_beyond_the_border_the_place_stays_on_it(by, good):
     assert replay_over_surface(made.robot, cells, made.task, made.q, none).accepted == good
 
 
-def test_a_cell_reached_between_rows_counts():
-    """The tool passes a centre between two rows that are both beside it."""
-    made = raster("plane")
-    points = tools_of(made.q)[0]
-    aims = made.task.targets(made.cells).points
-    near = np.linalg.norm(points[:, None] - aims, axis=2).min(axis=1) < 1.5e-3
-    ends = [serpentine(made.cells)[5 * k + e] for k in range(4) for e in (0, -1)]
-    near &= np.linalg.norm(points[:, None] - aims[ends], axis=2).min(axis=1) > 1.5e-3
-    rows = made.q[~near]
-    away = np.linalg.norm(tools_of(rows)[0][:, None] - aims, axis=2).min(axis=0)
-    assert (away > made.task.tolerance).sum() > 6
-    outcome = replay_over_surface(*made[:3], rows)
-    assert outcome.accepted, outcome.refusal
-
-
 def test_a_toolpath_is_run_from_its_first_pose_to_its_last():
     """Along a square and then across it: poses of other passes are nearer than both ends."""
     flat = np.array([(0.4, -0.1), (0.6, -0.1), (0.6, 0.1), (0.4, 0.1), (0.4, -0.1), (0.6, 0.1)])
@@ -446,10 +396,7 @@ BESIDE = 1.0  # rad/m: how much the normal may turn beside the place, for each m
 @pytest.mark.parametrize("seed", seeds(8, all=200))
 @pytest.mark.parametrize("name", RANDOM)
 def test_random_motions_are_accepted_where_dense_samples_say_so(name, seed):
-    """Rows taken out, moved, tilted and joined in other ways, judged at the edge of what they do.
-
-    The tolerance is chosen near to what samples show, just above or just below.
-    """
+    """Rows taken out, moved and joined in other ways, judged just above or below what they do."""
     made, rng = raster(name), np.random.default_rng([seed, len(name)])
     begin, stride = rng.integers(0, len(made.q) - 24), rng.choice([1, 2, 5, 10])
     rows = np.minimum(begin + stride * np.arange(24), len(made.q) - 1)

@@ -103,11 +103,7 @@ def test_what_is_shown_at_once_of_long_segments_is_true(name, seed):
 
 @pytest.mark.parametrize("name", ["elbow", "slide", "wrist"])
 def test_a_single_look_shows_what_the_lemmas_say(name):
-    """|p'| >= (|p'(0)| + |p'(1)| - D) / 2, or the chord less D / 2; and of singular values.
-
-    A column changes by its length times all turns up to it, and by what joints behind move; that of
-    a slide by the turns before it alone.
-    """
+    """|p'| >= (|p'(0)| + |p'(1)| - D) / 2, or the chord less D / 2; and of singular values."""
     rng = np.random.default_rng(3)
     robot = robot_of([*CHAINS[name], joint(4, "fixed", (1.0, 0.2, 0.1))], (0.0, 1.0, 0.0))
     robot, slides = replace(robot, max_velocity=np.ones(3)), robot.prismatic
@@ -182,10 +178,7 @@ def test_what_is_asked_is_decided_and_nothing_more(factor, possible):
 
 
 def line(turn=0.0):
-    """The gantry's tool from the first cell to the second and round a corner to the fifth.
-
-    It may wait at the corner and turn there.
-    """
+    """The gantry's tool from the first cell to the second and round a corner to the fifth."""
     at = PLATE.centres[[0, 1, 4]] + [0.0, 0.0, 0.02]
     share = np.linspace(0.0, 1.0, 30)[:, None]
     points = np.vstack([at[0] + share * (at[1] - at[0]), at[1] + share[1:] * (at[2] - at[1])])

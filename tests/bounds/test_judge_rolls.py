@@ -11,6 +11,7 @@ from arm_urdfs import joint
 from bounds import holds
 from gantry import SURFACES, raster, references_of, tools_of
 from random_arms import random_arm, robot_of
+from referee import roll_about, unit
 from samples import sampled, seeds
 
 from feasibility import Task
@@ -130,10 +131,7 @@ def test_references_bend_no_more_than_is_said(kind):
 
 
 def made_up(approach, along, smooth, share=0.0):
-    """One path of places s = 0 to 1 where approach and u direction are functions of s.
-
-    Bounds on their derivatives are measured. `along` may be one direction, too.
-    """
+    """One path of places s = 0 to 1 where approach and u direction are functions of s."""
     fixed = not callable(along)
     e = (lambda s: np.tile(along, (len(s), 1))) if fixed else along
     s = np.linspace(0.0, 1.0, 2001)
@@ -150,10 +148,6 @@ def made_up(approach, along, smooth, share=0.0):
     x = np.stack([at, 0.0 * at], axis=1)[None]
     none = np.zeros((1, 4), dtype=np.int64)
     return held, PlacePaths(at[None], np.zeros((1, 4, 3)), approach(at)[None], pieces, none, x), e
-
-
-def unit(vectors):
-    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
 def bump(s):
@@ -283,10 +277,7 @@ def rolls(cells, q, reference):
     e = u_directions(cells.surface, points - found.height[:, None] * found.normal)
     if reference is not None:
         e = np.tile(cells.surface.rotation @ unit(np.array(reference)), (len(b), 1))
-    t = unit(e - (e * b).sum(axis=1, keepdims=True) * b)
-    x, u = references_of(q), np.cross(b, t)
-    y = np.cross(axes, x)
-    return np.arctan2((u * x - t * y).sum(axis=1), (t * x + u * y).sum(axis=1))
+    return roll_about(references_of(q), axes, e, b)
 
 
 def limited(name, low=-BESIDE, high=BESIDE):

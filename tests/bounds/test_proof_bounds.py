@@ -52,8 +52,7 @@ class Known(NamedTuple):
     emptiness: Emptiness
     region: JointRegion
     boxes: Boxes
-    places: np.ndarray
-    """(m, n + 2) the configuration and x in the part of each box."""
+    places: np.ndarray  # (m, n + 2) the configuration and x in the part of each box
 
 
 def up_to(rng, most):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from referee import unit
 
 from feasibility import Task
 from feasibility.certification.cut_proofs.linear_models import (
@@ -26,15 +27,8 @@ from surfaces import sphere
 UR5 = load_robot("ur5")
 
 
-def unit(vector):
-    return vector / np.linalg.norm(vector)
-
-
 def tool_model(q, half):
-    """x and y about q (n,) over a box of half widths (n,), and what boxes are made of by hand.
-
-    D = sum_j s_j h_j (h_j + 2 sum of the h before j), with sines of 1; moves by all h together.
-    """
+    """x and y about q (n,) over a box of half widths (n,), and what boxes are made of by hand."""
     _, axis = Kinematics(UR5).tool(q)
     x = reference_axes(UR5, q[None])
     both = np.stack([x, np.cross(axis, x)], axis=1)

@@ -154,40 +154,6 @@ def test_a_cut_outside_the_limits_leaves_an_empty_side():
     assert not verified(case, split(-4.0, case.tree.root, 2)).accepted
 
 
-def value_of_a_motion(case):
-    """Where the cut's joint is while the tool is at some cell's target."""
-    for cell in range(len(case.cells)):
-        q = configuration(verified(case, Leaf(cell)).refusal)
-        if len(q):
-            return float(q[case.tree.root.joint])
-    raise AssertionError("no cell can be reached")
-
-
-def with_root(case, **changes):
-    return case._replace(tree=replace(case.tree, root=replace(case.tree.root, **changes)))
-
-
-DAMAGES = {
-    "sides swapped": lambda c: with_root(c, below=c.tree.root.above, above=c.tree.root.below),
-    "cut into the motions": lambda c: with_root(c, value=value_of_a_motion(c)),
-    "cone of 100 degrees": lambda c: c._replace(task=replace(c.task, cone_deg=100.0)),
-    "tolerance of a metre": lambda c: c._replace(task=replace(c.task, tolerance=1.0)),
-    "limits of all turns": lambda c: c._replace(
-        robot=c.robot.with_limits(np.tile([-3.3, 3.3], (c.robot.n, 1)))
-    ),
-}
-
-
-@pytest.mark.parametrize("damage", DAMAGES)
-@pytest.mark.parametrize("index", QUICK[:3])
-def test_damaged_trees_are_refused_with_the_reason(index, damage):
-    case = DAMAGES[damage](stored_case(index))
-    found = verified(case)
-    assert not found.accepted
-    assert found.refusal.startswith(("the cut joint", "leaf "))
-    assert_points_refute(case, found.refusal)
-
-
 def with_first_leaf(node, leaf):
     """The tree with the leaf below all cuts exchanged."""
     if isinstance(node, Leaf):

@@ -87,10 +87,7 @@ def test_stretches_of_a_motion(name, held, bent):
      ((0, 0.06), 0.02, 30, False), ((0, 0.5), 0.0, 30, True), ((0, 0.53), 0.0, 30, False)],
 )  # fmt: skip
 def test_what_a_surface_deviates_by(off, standoff, cone, accepted):
-    """Off the points, which leaning normals move by the standoff; and off the cone.
-
-    Also a motion that is right to the last digit is refused.
-    """
+    """Off the points, which leaning normals move by the standoff; and off the cone."""
     flat = parametric(lambda u, v: (u, v, 0 * u), (0.4, 0.6), (-0.1, 0.1), side="outside")
     task, cells = Task(standoff, cone), replace(flat, off=off).cells(2, 1)
     points = cells.centres + np.array([0.0, 0.0, standoff])

@@ -115,23 +115,6 @@ def test_between_poses_nothing_can_be_treated():
         check(UR5, cells, Task(**WIDE))
 
 
-BAD = {
-    ("task.footprint=0",): "footprint: must be a finite number > 0",
-    ("task.footprint=[0.1, -0.1]",): "footprint: must be a diameter > 0",
-    ("task.footprint=0.1", "task.coverage=1.2"): "coverage: must be a share above 0",
-    ("task.coverage=0.9",): "needs a footprint",
-    ("surface.cells=auto",): "without a footprint",
-}
-
-
-@pytest.mark.parametrize("settings", BAD)
-def test_bad_numbers_are_named(settings):
-    with pytest.raises(CaseError) as raised:
-        load_case("paper/4a", list(settings)).build()
-    assert BAD[settings] in str(raised.value)
-    assert len(raised.value.faults) == 1
-
-
 def test_visits_are_counted_by_coming_and_going():
     rows = [np.linspace((-0.05, y, 0.0), (0.65, y, 0.0), 200) for y in (0.1, 0.14)]
     normals = np.tile([0.0, 0.0, 1.0], (400, 1))

@@ -17,7 +17,7 @@ COVERED = {"paper 4d": 60, "paper 4f": 6}
 @pytest.mark.parametrize("seed", seeds(2, all=8))
 @pytest.mark.parametrize("name", names("paper"))
 def test_the_truth_is_found(name, seed):
-    verdict = verdict_of(name, seed)
+    verdict = verdict_of(name, seed or None)  # with 0 it is asked elsewhere too
     assert len(verdict.cells.pairs) == 305
     if name in COVERED:
         assert (verdict.answer, verdict.evidence) == (Answer.INFEASIBLE, Evidence.PROOF)

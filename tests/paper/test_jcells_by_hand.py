@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 from arm_urdfs import joint
 from random_arms import robot_of
-from scipy.spatial.transform import Rotation
 
 from feasibility import Answer, CauseKind, Evidence, Search, Task, greedy_check
-from feasibility.paper.algorithm_2 import tree_search
 from feasibility.paper.continuity import JSpace, Outcome
 from feasibility.paper.jcell_steps import Steps
 from robots import load_robot
@@ -66,10 +64,7 @@ def test_planar_arm_covers_the_arc_cell_by_cell():
 
 @pytest.mark.parametrize("last", [44.0, 53.0, 67.0])
 def test_shoulder_limit_cuts_the_arc_where_it_stands(last):
-    """Elbow down, the tool is at shoulder + elbow / 2; elbow up it is at shoulder - |elbow| / 2.
-
-    The lower limit leaves the branch with the elbow up without a start in the middle of the arc.
-    """
+    """Elbow down, the tool is at shoulder + elbow / 2; elbow up it is at shoulder - |elbow| / 2."""
     arm = planar_arm(-1.0, math.radians(last - math.degrees(ELBOW) / 2))
     verdict = greedy_check(arm, ARC, Task(0.0, 60), greedy(step_deg=0.1))
     reached = math.floor(last / 10)
@@ -120,25 +115,6 @@ def test_capped_is_not_exhausted_and_memory_grows_without_changing_the_answer():
     assert (many.outcome, many.checked) == (Outcome.CAPPED, 60_000)
 
 
-def test_rigid_motion_of_arm_and_surface_changes_nothing():
-    """The base moved by a transform, and the patch with it: the same graph and tree."""
-    robot, task = load_robot("puma560", limits="set-2"), Task(0.005, 5)
-    place, angles = (0.3, -0.7, 1.1), (0.4, -0.9, 2.1)
-    arm = load_robot("puma560", limits="set-2", base=(place, tuple(np.degrees(angles))))
-    turn = Rotation.from_euler("xyz", angles).as_matrix()
-    patch = cylinder(0.5, (-60, 60), (0, 0.9), position=(0.01, 0.03, 0.02))
-    search = greedy(moves="all", step_deg=1.0, cap=2000)
-    here = greedy_check(robot, patch.cells(9, 10), task, search)
-    q = here.graph.nodes[here.start]["q"]
-    one, other = (
-        tree_search(JSpace(r, s.cells(9, 10), task, q, search), s.cells(9, 10), here.start)
-        for r, s in ((robot, patch), (arm, patch.moved(turn, place)))
-    )
-    assert 10 < len(one.jcell) < 90
-    assert (one.parent, one.calls) == (other.parent, other.calls)
-    assert {k: len(v) for k, v in one.edges.items()} == {k: len(v) for k, v in other.edges.items()}
-
-
 def test_no_cells_one_cell_and_cells_out_of_reach():
     for shape, count in (((0, 3), 0), ((1, 1), 1)):
         verdict = greedy_check(PUMA, sphere(1.0, (40, 50), (80, 90)).cells(*shape), Task(0.005, 45))
@@ -177,13 +153,3 @@ def test_same_seed_same_search():
     assert nx.utils.edges_equal(one.graph.edges, two.graph.edges)
     for cell in one.tree:
         np.testing.assert_array_equal(one.tree.nodes[cell]["q"], two.tree.nodes[cell]["q"])
-
-
-@pytest.mark.parametrize("name", ["panda", "kinova"])
-def test_library_arms_cover_a_table(name):
-    cells = plane((0.35, 0.5), (-0.1, 0.1), position=(0, 0, 0.22), side="outside").cells(3, 3)
-    search = greedy(moves="all", step_deg=0.5)
-    verdict = greedy_check(load_robot(name), cells, Task(0.02, 20), search)
-    assert verdict.answer is Answer.FEASIBLE, verdict.message
-    assert verdict.certificate.max_angle <= math.radians(20)
-    assert nx.is_arborescence(verdict.tree)

@@ -1,37 +1,27 @@
-"""Problems for the oracles: a patch, a task and limits, with geometry of the oracles' own.
+"""Problems for the oracles: a patch, a task and limits as plain numbers, over the referee's forms.
 
-Nothing here is shared with the packages under test: surfaces are evaluated from their formulas,
-and neighbours are enumerated from the grid. A problem is plain numbers, so that it fits in JSON.
-
-Two domains stand for "the patch". A `net` is the cells' centres and the lines between neighbouring
-centres, straight in the parameters: where a search that goes from centre to centre can be. The
-`patch` is a fine grid over whole cells: wherever a tool could go without leaving the surface. A
-case is trusted only where both give the same answer.
+A `net` is the cells' centres and straight lines between neighbours: where a search from centre to
+centre can be. A `patch` is a fine grid over whole cells: wherever a tool could go on the surface.
 """
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from referee import Floats, Form, turn
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One question: can the arm cover these cells in one motion? Lengths in m, angles in degrees.
+    """One question: can the arm cover these cells in one motion? Lengths in m, angles in deg."""
 
-    `u` and `v` are in degrees where the parameter is an angle, else in m.
-    """
-
-    kind: str
-    """'sphere', 'cylinder', 'hyperboloid' or 'plane'."""
-    size: tuple[float, ...]
-    """Sphere, cylinder: (radius,); hyperboloid: (waist, flare); plane: ()."""
+    kind: str  # 'sphere', 'cylinder', 'hyperboloid' or 'plane'
+    size: tuple[float, ...]  # Sphere, cylinder: (radius,); hyperboloid: (waist, flare); plane: ()
     u: tuple[float, float]
     v: tuple[float, float]
     position: tuple[float, float, float]
@@ -40,28 +30,7 @@ class Problem:
     cells: tuple[int, int]
     standoff: float
     cone_deg: float
-    limits_deg: tuple[tuple[float, float], ...]
-    """(lower, upper) of each joint, base to tip."""
-
-    def varied(self, cone: float = 1.0, limits_deg: float = 0.0, standoff: float = 0.0) -> Problem:
-        """The same problem, a little wider or tighter.
-
-        Args:
-            cone: factor on the cone.
-            limits_deg: by how much every limit moves outwards (negative: inwards).
-            standoff: m, added to the standoff; may take it below zero.
-        """
-        moved = tuple((low - limits_deg, high + limits_deg) for low, high in self.limits_deg)
-        return replace(
-            self,
-            cone_deg=min(self.cone_deg * cone, 180.0),
-            limits_deg=moved,
-            standoff=self.standoff + standoff,
-        )
-
-    def plain(self) -> dict[str, Any]:
-        """The problem as JSON holds it."""
-        return asdict(self)
+    limits_deg: tuple[tuple[float, float], ...]  # (lower, upper) of each joint, base to tip
 
     @staticmethod
     def read(plain: dict[str, Any]) -> Problem:
@@ -86,52 +55,20 @@ class Problem:
             np.radians(v) if self.kind == "sphere" else v,
         )
 
-    def rotation(self) -> Floats:
-        """(3, 3) Rz(yaw) Ry(pitch) Rx(roll)."""
-        (cr, cp, cy), (sr, sp, sy) = (
-            np.cos(np.radians(self.rpy_deg)),
-            np.sin(np.radians(self.rpy_deg)),
-        )
-        about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
-        about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
-        about_z = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
-        return np.asarray(about_z @ about_y @ about_x, dtype=float)
-
     def targets(self, u: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """Target points (..., 3) m and approach directions (..., 3) at parameters (rad or m)."""
-        one, zero = np.ones_like(u * v), np.zeros_like(u * v)
-        if self.kind == "sphere":
-            normal = np.stack(
-                [np.sin(u) * np.cos(v) * one, np.sin(u) * np.sin(v) * one, np.cos(u) * one], -1
-            )
-            point = self.size[0] * normal
-        elif self.kind == "plane":
-            normal = np.stack([zero, zero, one], -1)
-            point = np.stack([u * one, v * one, zero], -1)
-        else:
-            waist = self.size[0]
-            slant = v / self.size[1] if self.kind == "hyperboloid" else 0.0 * v
-            stretch = np.sqrt(1.0 + slant**2)
-            slope = waist * slant / (self.size[-1] * stretch)
-            radius = waist * stretch
-            normal = np.stack([np.cos(u) * one, np.sin(u) * one, -slope * one], -1)
-            normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-            point = np.stack([radius * np.cos(u), radius * np.sin(u), v * one], -1)
-        sign = -1.0 if self.side == "inside" else 1.0
-        turn = self.rotation()
-        placed = (point + sign * self.standoff * normal) @ turn.T + np.array(self.position)
-        return placed, -sign * normal @ turn.T
+        """Target points (k, 3) m and approach directions (k, 3) at parameters (k,)."""
+        turned, outside = turn(np.radians(self.rpy_deg)), self.side == "outside"
+        form = Form(self.kind, self.size, *self.ranges, outside, self.position, turned)
+        there = form.at(u, v)
+        return there.points + form.sign * self.standoff * there.normals, -form.sign * there.normals
 
 
 class Domain(NamedTuple):
     """Samples of the parameters, and which of them are next to each other."""
 
-    uv: Floats
-    """(S, 2) rad or m."""
-    links: Ints
-    """(L, 2) pairs of samples."""
-    centres: Ints
-    """(N,) the sample at each cell's centre, row by row."""
+    uv: Floats  # (S, 2) rad or m
+    links: Ints  # (L, 2) pairs of samples
+    centres: Ints  # (N,) the sample at each cell's centre, row by row
 
 
 def _pairs(nu: int, nv: int) -> Ints:
@@ -184,12 +121,9 @@ def net(problem: Problem, pieces: Ints | int) -> Domain:
 class Answer(NamedTuple):
     """What an oracle says."""
 
-    feasible: bool
-    """One component covers every cell."""
-    covered: int
-    """Cells of the best single component."""
-    reachable: int
-    """Cells that some component covers."""
+    feasible: bool  # One component covers every cell
+    covered: int  # Cells of the best single component
+    reachable: int  # Cells that some component covers
 
 
 def answer(cells: int, cell: Ints, component: Ints) -> Answer:

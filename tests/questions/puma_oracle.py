@@ -1,26 +1,11 @@
 """Whether a PUMA covers a patch, from its closed-form inverse kinematics.
 
-The tool point of this PUMA is its wrist centre, so theta1 to theta3 alone place it: four arm
-branches (shoulder s, elbow e) for a target p, from eq. (8) of the paper:
-
-    K = (|p|^2 - a2^2 - a3^2 - d3^2 - d4^2) / (2 a2) = a3 cos theta3 - d4 sin theta3
-    -sin(theta1) p_x + cos(theta1) p_y = d3
-
-In link frame 3 the tool axis is (-s5 c4, c5, s5 s4): theta5 is a polar angle about the frame's y
-axis, theta4 an azimuth. With m the approach direction in that frame, rho = hypot(m_x, m_z) and
-phi = atan2(m_z, -m_x), the cone asks for
-
-    s5 rho cos(theta4 - phi) + c5 m_y >= cos(alpha),
-
-so at one theta5 the allowed theta4 are intervals about phi (phi + pi where s5 < 0), repeated every
-2 pi and cut by the limits, or the whole range. The wrist is therefore exact in theta4 and sampled
-in theta5 only; theta5 = 0 and +-pi are always among the samples, because there theta4 is free and
-joins what is separate elsewhere. theta6 moves neither point nor axis.
-
-A node is (sample of the surface, arm branch with its turns, theta5 row, theta4 interval). Nodes are
-joined where intervals overlap: in neighbouring rows, and in the same row of neighbouring samples
-with the same branch and continuous joints. Where a line of the patch leaves the arm's reach, its
-last reachable point is added as a sample: two elbows (or shoulders) meet there and are joined.
+Its tool point is the wrist centre: theta1 to theta3 place it, in four branches (shoulder s, elbow
+e; eq. (8) of the paper). In link frame 3 the tool axis is (-s5 c4, c5, s5 s4), so with m the
+approach there, rho = hypot(m_x, m_z) and phi = atan2(m_z, -m_x), the cone asks for
+s5 rho cos(theta4 - phi) + c5 m_y >= cos(alpha): intervals of theta4 at each sampled theta5 (0 and
++-pi among them, where theta4 is free). Nodes are (sample, branch with turns, theta5, interval),
+joined where intervals overlap. Where a line leaves the reach two branches meet at its last point.
 """
 
 from __future__ import annotations
@@ -42,13 +27,11 @@ BRANCHES = np.array([(s, e) for s in (1.0, -1.0) for e in (1.0, -1.0)])
 class Resolution(NamedTuple):
     """How finely the oracle looks."""
 
-    rows: float = 7.0
-    """theta5 rows in one cone angle; the step stays within 0.4 .. 2.5 degrees."""
+    rows: float = 7.0  # theta5 rows in one cone angle; the step stays within 0.4 .. 2.5 degrees
     turn_deg: float = 4.0
     """Largest change of a joint, or of the approach direction in link 3, between samples; never
     more than a third of the cone, so that the cones of neighbouring samples overlap."""
-    samples: int = 6000
-    """Patch: most samples in all, where that leaves three across a cell."""
+    samples: int = 6000  # Patch: most samples in all, where that leaves three across a cell
 
 
 STANDARD = Resolution()
@@ -165,10 +148,7 @@ def _turns(limits: Floats) -> Ints:
 
 
 def _fold_samples(problem: Problem, domain: Domain) -> tuple[Domain, Ints]:
-    """The domain with the last reachable point of every line that leaves the reach.
-
-    Also returns the indices of the samples that were added.
-    """
+    """The domain with the last reachable point of every line that leaves the reach."""
     reached = (slack(problem.targets(*domain.uv.T)[0]) >= 0.0).all(axis=-1)
     a, b = domain.links.T
     cut = reached[a] != reached[b]
@@ -202,20 +182,13 @@ def _pieces(problem: Problem, turn_deg: float) -> Ints:
 class Fibres(NamedTuple):
     """Every arm branch over every sample, with what its wrist may do."""
 
-    sample: Ints
-    """(A,) sample of each arm node."""
-    branch: Ints
-    """(A,) row of `BRANCHES`."""
-    theta: Floats
-    """(A, 3) theta1 to theta3, unwrapped, inside the limits."""
-    arm: Ints
-    """(A,) row of `spans`; nodes that differ in whole turns share one."""
-    links: Ints
-    """(L, 2) pairs of arm nodes that a continuous motion of theta1 to theta3 joins."""
-    rows: Floats
-    """(R,) theta5."""
-    spans: Floats
-    """(P, R, slots, 2) allowed theta4."""
+    sample: Ints  # (A,) sample of each arm node
+    branch: Ints  # (A,) row of `BRANCHES`
+    theta: Floats  # (A, 3) theta1 to theta3, unwrapped, inside the limits
+    arm: Ints  # (A,) row of `spans`; nodes that differ in whole turns share one
+    links: Ints  # (L, 2) pairs of arm nodes that a continuous motion of theta1 to theta3 joins
+    rows: Floats  # (R,) theta5
+    spans: Floats  # (P, R, slots, 2) allowed theta4
 
 
 def fibres(problem: Problem, domain: Domain, folds: Ints, row_step: float) -> Fibres:
@@ -280,14 +253,7 @@ def _rows(limits: Floats, step: float) -> Floats:
 
 
 def solve(problem: Problem, on: str = "patch", resolution: Resolution = STANDARD) -> Answer:
-    """The oracle's answer.
-
-    Args:
-        problem: what is asked.
-        on: the domain, 'patch' or 'net'; see `oracle_cases`. On the net a line that leaves the
-            reach leads nowhere; on the patch two branches may meet at its end.
-        resolution: how finely to look.
-    """
+    """The oracle's answer."""
     n_cells = problem.cells[0] * problem.cells[1]
     if (problem.limits[:, 0] > problem.limits[:, 1]).any():
         return Answer(n_cells == 0, 0, 0)

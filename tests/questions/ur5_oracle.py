@@ -1,25 +1,11 @@
 """Whether a UR5 covers a patch, from closed-form inverse kinematics on a grid of wrist angles.
 
-The tool point of this UR5 (`tool0`) lies on the axis of its last joint, and the tool axis is that
-axis, so theta6 moves neither. Seen from the frame that turns with theta1 (x1 out along the arm, y1
-along the axes of joints 2 to 4, z up), with psi = theta2 + theta3 + theta4,
-
-    tool axis = (s5 cos psi, c5, -s5 sin psi)
-    tool point, y1:  d4 + d6 c5
-    tool point, x1:  l2 c2 + l3 c23 - d5 sin psi + d6 s5 cos psi
-    tool point, z - d1:  -l2 s2 - l3 s23 - d5 cos psi - d6 s5 sin psi
-
-Given the tool point, theta5 and psi therefore fix everything but two signs: theta1 follows from y1
-(shoulder s), theta2 and theta3 from the two-link arm in the x1 z plane (elbow e). Over a point of
-the surface the configurations are, for each pair of signs, a region of the (theta5, psi) torus:
-inside the cone, within the stretch of the two links, and inside the limits of joints 1 to 4. The
-torus is sampled as a grid, theta5 over its real range (0 and +-pi among the rows), psi around the
-circle.
-
-Neighbours in the grid, and equal places of neighbouring samples of the surface, are joined where
-every joint stays continuous. The two elbows meet where the links are stretched out: they are
-joined where a neighbour lies inside the cone but beyond the stretch. The shoulders would meet
-within d4 + d6 of the first axis; patches that come closer than `CLEARANCE` are refused.
+theta6 moves neither tool point nor axis. In the frame that turns with theta1 (x1 out along the arm,
+y1 along the axes of joints 2 to 4), with psi = theta2 + theta3 + theta4, the tool axis is
+(s5 cos psi, c5, -s5 sin psi) and the tool point d4 + d6 c5 along y1,
+l2 c2 + l3 c23 - d5 sin psi + d6 s5 cos psi along x1 and d1 - l2 s2 - l3 s23 - d5 cos psi
+- d6 s5 sin psi up: theta5 and psi fix all but two signs. Neighbours in that grid and over
+neighbouring samples are joined where joints stay continuous; elbows meet where links are stretched.
 """
 
 from __future__ import annotations
@@ -45,10 +31,8 @@ class Resolution(NamedTuple):
 
     steps: float = 8.0
     """Grid steps of theta5 and of psi in one cone angle; they stay within 2 .. 5 degrees."""
-    pieces: int = 6
-    """Net: pieces of a line between centres."""
-    refine: int = 3
-    """Patch: samples across a cell, odd."""
+    pieces: int = 6  # Net: pieces of a line between centres
+    refine: int = 3  # Patch: samples across a cell, odd
 
 
 STANDARD = Resolution()
@@ -58,10 +42,7 @@ STANDARD = Resolution()
 def arm(
     x: float, y: float, z: float, s: float, e: float, theta5: float, psi: float, out: Floats
 ) -> float:
-    """Fill theta1 to theta4 (mod 2 pi) for a tool point; returns cos(theta3), beyond +-1 if none.
-
-    The point must be further than d4 + d6 from the first axis.
-    """
+    """Fill theta1 to theta4 (mod 2 pi) for a point beyond d4 + d6; returns cos(theta3)."""
     c5, s5, cp, sp = np.cos(theta5), np.sin(theta5), np.cos(psi), np.sin(psi)
     aside = D4 + D6 * c5
     along = s * np.sqrt(x * x + y * y - aside * aside)
@@ -87,11 +68,7 @@ def _fill(
     place: NDArray[np.int32],
     theta: Floats,
 ) -> int:
-    """Number the valid places of the grid and keep their joints; returns how many there are.
-
-    `place` is (S, 2, R, C, 2); `theta` is (room, 4). Without room, what the cone lets through is
-    counted, which is never less.
-    """
+    """Number the valid places of the grid and keep their joints; returns how many there are."""
     count, trial = 0, np.zeros(4)
     cosines, sines = np.cos(columns), np.sin(columns)
     for i in range(len(points)):
@@ -199,11 +176,7 @@ def _components(
 
 
 def solve(problem: Problem, on: str = "patch", resolution: Resolution = STANDARD) -> Answer:
-    """The oracle's answer; see `puma_oracle.solve`.
-
-    Raises:
-        ValueError: the patch comes too close to the first axis.
-    """
+    """The oracle's answer; see `puma_oracle.solve`."""
     n_cells = problem.cells[0] * problem.cells[1]
     limits = problem.limits
     domain: Domain = (

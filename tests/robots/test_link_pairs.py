@@ -18,7 +18,6 @@ from robots.shapes import (
     outer_bodies,
     tool_reach,
 )  # fmt: skip
-from robots.shapes.sampling import PairSampling, random_configurations
 from robots.urdf import Sphere
 
 SRDF = '<robot name="x">{}</robot>'
@@ -150,34 +149,6 @@ def test_shapes_of_a_tool_count_as_bodies_on_the_last_joint(tmp_path):
 
 
 # Reference: exact meshes collide in 4.6 %, 5.2 %, 7 % of other random configurations.
-UR5 = {
-    ("base_link", "upper_arm_link"): ((0.30, 0.42), (0.025, 0.09)),
-    ("forearm_link", "wrist_2_link"): ((0.22, 0.32), (0.03, 0.07)),
-    ("forearm_link", "wrist_3_link"): ((0.10, 0.16), (0.06, 0.10)),
-    ("shoulder_link", "wrist_1_link"): ((0.06, 0.10), (0.06, 0.10)),
-    ("upper_arm_link", "wrist_2_link"): ((0.07, 0.11), (0.06, 0.10)),
-}
-
-
-@pytest.mark.parametrize(("fineness", "which"), [("hulls", 0), ("pieces", 1)])
-def test_rates_of_the_ur5_are_the_known_ones(fineness, which):
-    robot = load_robot("ur5")
-    sampling = PairSampling(robot, link_shapes(robot, fineness).polytopes)
-    rates = sampling.collisions(list(UR5), random_configurations(robot)).mean(axis=0)
-    for (pair, bands), rate in zip(UR5.items(), rates, strict=True):
-        low, high = bands[which]
-        assert low <= rate <= high, (pair, rate)
-
-
-@pytest.mark.parametrize("name", ["ur5", "kinova"])
-def test_random_configurations_are_inside_the_limits_and_the_same_each_time(name):
-    robot = load_robot(name)
-    q = random_configurations(robot)
-    assert q.shape == (1000, robot.n)
-    assert np.isfinite(q).all()
-    assert ((q >= robot.lower) & (q <= robot.upper)).all()
-    assert (np.abs(q[:, np.isinf(robot.upper)]) <= np.pi).all()
-    np.testing.assert_array_equal(q, random_configurations(robot))
 
 
 # Arm: link, mm beyond the tool point, mm from the axis.

@@ -7,7 +7,6 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from robots import Kinematics, load_robot
@@ -17,13 +16,6 @@ TOOL = SimpleNamespace(
     **runpy.run_path(str(Path(__file__).parents[2] / "tools" / "puma560.py"), run_name="tool")
 )
 A2, A3, D3, D4 = 0.7, 0.1, 0.1, 0.7  # m, the paper's
-
-
-def transform(row, theta):
-    """Craig, Introduction to Robotics, eq. (3.6)."""
-    ca, sa, ct, st = np.cos(row.alpha), np.sin(row.alpha), np.cos(theta), np.sin(theta)
-    return np.array([[ct, -st, 0, row.a], [st * ca, ct * ca, -sa, -sa * row.d],
-                     [st * sa, ct * sa, ca, ca * row.d], [0, 0, 0, 1]])  # fmt: skip
 
 
 def test_the_shipped_file_is_what_its_rows_give():
@@ -45,32 +37,6 @@ def test_tool_point_and_axis_are_those_of_equations_8_and_10():
         ]
         for found, expected in zip(tool(q), (point, axis), strict=True):
             np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
-
-
-def test_every_link_frame_is_its_dh_frame():
-    model = load_robot("puma560").model
-    data, links = model.createData(), ["base", *(f"link{i}" for i in range(1, 7))]
-    for q in np.random.default_rng(0).uniform(-np.pi, np.pi, (20, 6)):
-        pin.framesForwardKinematics(model, data, q)
-        expected = np.eye(4)
-        for link, row, theta in zip(links, (None, *TOOL.PUMA560_ROWS), (0, *q), strict=True):
-            expected = expected if row is None else expected @ transform(row, theta)
-            frame = model.getFrameId(link, pin.FrameType.BODY)
-            np.testing.assert_allclose(data.oMf[frame].homogeneous, expected, rtol=0, atol=1e-12)
-
-
-def test_a_urdf_of_random_rows_is_the_product_of_their_transforms(tmp_path):
-    rng = np.random.default_rng(1)
-    rows = [TOOL.DHRow(*rng.uniform(-2, 2, 3)) for _ in range(7)]
-    (tmp_path / "random.urdf").write_text(TOOL.dh_urdf("random", rows, [(-170, 170)] * 7))
-    robot = load_robot(tmp_path / "random.urdf")
-    np.testing.assert_array_equal(robot.upper, np.radians([170] * 7))
-    for q in rng.uniform(-2, 2, (20, 7)):
-        whole = np.eye(4)
-        for row, theta in zip(rows, q, strict=True):
-            whole = whole @ transform(row, theta)
-        for found, column in zip(Kinematics(robot).tool(q), (3, 2), strict=True):
-            np.testing.assert_allclose(found, whole[:3, column], rtol=0, atol=1e-12)
 
 
 def test_it_collides_as_drawn_and_its_nozzle_ends_at_the_tool_point():

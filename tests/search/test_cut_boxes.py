@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from dense_replay import tools
+from plain import tools
 from random_arms import rail_arm, random_arm, random_configuration, tilted, turn_onto
 from samples import sampled, seeds
 from search_kernels import contracted

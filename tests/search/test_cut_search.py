@@ -8,8 +8,7 @@ import mesh_patches
 import numpy as np
 import pytest
 from cut_attempts import nothing, prove, proved_wrongly
-from oracle_build import built, surface_of
-from random_cases import read
+from random_cases import built, read, surface_of
 from samples import sampled, seeds, spread
 from scipy.interpolate import make_interp_spline
 

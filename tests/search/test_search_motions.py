@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from arm_urdfs import FREE, joint
 from bounds import holds
-from dense_replay import tools
 from part_walks import at_parameters, walk
 from part_walks import spread as spread_over
+from plain import tools
 from random_arms import QUESTIONS, finite_limits, planar_arm, question, robot_of
 from search_kernels import Motions
 

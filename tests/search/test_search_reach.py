@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 from arm_urdfs import FREE, joint
-from dense_replay import tools
+from plain import tools
 from random_arms import (
     planar_arm,
     rail_arm,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from arm_urdfs import joint
 from bounds import holds
-from dense_replay import tools
+from plain import tools
 from random_arms import (
     between,
     deviation,

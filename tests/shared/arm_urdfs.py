@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
-from robots import Robot, list_robots, load_robot
-from robots.urdf import JointInfo
+from robots import Robot, RobotError, list_robots, load_robot
+
+
+def said(make, *arguments, **named) -> str:
+    """What is said by a refusal, on one line."""
+    with pytest.raises(RobotError) as caught:
+        make(*arguments, **named)
+    return " / ".join(str(caught.value).splitlines())
+
 
 FREE = (-float("inf"), float("inf"))
 
@@ -94,29 +102,3 @@ def random_q(robot: Robot, rng: np.random.Generator, turns: float = 2.0) -> NDAr
     lower = np.where(np.isfinite(robot.lower), robot.lower, -far)
     upper = np.where(np.isfinite(robot.upper), robot.upper, far)
     return rng.uniform(lower, upper)
-
-
-def placement(path: Sequence[JointInfo], values: Mapping[str, float]) -> NDArray[np.float64]:
-    """(4, 4) placement of the last joint's child link in the root frame, by the URDF's rules.
-
-    Written without Pinocchio: origin, then Rodrigues' formula or a shift along the axis.
-    """
-    result = np.eye(4)
-    for info in path:
-        origin = np.eye(4)
-        (sr, sp, sy), (cr, cp, cy) = np.sin(info.rpy), np.cos(info.rpy)
-        roll = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
-        pitch = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
-        yaw = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
-        origin[:3, :3] = yaw @ pitch @ roll
-        origin[:3, 3] = info.xyz
-        motion = np.eye(4)
-        if info.kind == "prismatic":
-            motion[:3, 3] = values[info.name] * np.array(info.axis)
-        elif info.kind != "fixed":
-            x, y, z = info.axis
-            skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-            angle = values[info.name]
-            motion[:3, :3] += np.sin(angle) * skew + (1 - np.cos(angle)) * skew @ skew
-        result = result @ origin @ motion
-    return result

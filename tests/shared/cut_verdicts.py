@@ -5,8 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from oracle_build import built
-from random_cases import read
+from random_cases import built, read
 
 from feasibility.checking import check
 from feasibility.clock import Clock

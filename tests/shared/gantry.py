@@ -133,13 +133,6 @@ def marks_of(made: Raster):
     return np.where(away.min(axis=1) < 0.1 * made.task.effective_tolerance, away.argmin(axis=1), -1)
 
 
-def dense(q, count):
-    """Rows, and `count` places on the way to the next each time."""
-    part = np.arange(count)[:, None] / count
-    between = q[:-1, None] * (1.0 - part) + q[1:, None] * part
-    return np.concatenate([between.reshape(-1, q.shape[1]), q[-1:]])
-
-
 def tools_of(q):
     """Tool points and axes (k, 3) of the gantry, without any library."""
     q = np.asarray(q)

@@ -5,8 +5,10 @@ import struct
 from collections import defaultdict
 
 import numpy as np
+import pytest
 from mesh_patches import grid
 
+from coverable_errors import CoverableError
 from surfaces.meshes import TriangleMesh
 from surfaces.meshes.normals import corner_normals
 
@@ -161,6 +163,13 @@ def glb(content, data, version=2, extra=0):
     length = 28 + len(text) + len(data) + extra
     head = struct.pack("<4sIIII", b"glTF", version, length, len(text), 0x4E4F534A)
     return head + text + struct.pack("<II", len(data), 0x004E4942) + data
+
+
+def refused(make, *arguments, **named):
+    """What is said by a refusal."""
+    with pytest.raises(CoverableError) as caught:
+        make(*arguments, **named)
+    return str(caught.value)
 
 
 def assert_clean(mesh):

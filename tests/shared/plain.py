@@ -7,8 +7,9 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import referee
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from referee import Arm, Asked, Facets, Floats, Form, Pieces, Scene, Shape
 
 from feasibility import Task, Verdict
@@ -34,10 +35,11 @@ def arm_of(robot: Robot) -> Arm:
     for one in axes:
         if one["carries"] == "base":
             base = np.linalg.inv(referee.placement(one["position"], one["rpy"])) @ base
-    made = Arm.from_urdf(
-        robot.urdf, robot.tool_frame, robot.joint_names, locked=dict(robot.locked), tcp=robot.tcp,
+    made = Arm(
+        referee.joints_of(robot.urdf), robot.tool_frame, robot.joint_names, tcp=robot.tcp,
         approach=robot.approach_axis, reference=robot.reference_axis, base=base,
-        seen_from=robot.surface_link, limits=np.column_stack([robot.lower, robot.upper]),
+        locked=dict(robot.locked), seen_from=robot.surface_link,
+        limits=np.column_stack([robot.lower, robot.upper]),
     )  # fmt: skip
     return made.carried(axes) if axes else made
 
@@ -184,15 +186,7 @@ def faults_of(
     surface: Any = None,
     **more: Any,
 ) -> list[str]:
-    """What the referee finds wrong with a verdict's motion, or with another for its question.
-
-    Args:
-        verdict: whose arm, cells and task count.
-        q: (m, n) a motion in place of its witness, with `marks` as in `Walk.cell`.
-        marks: which rows are over which cell; None to look for the cells along it.
-        surface: a `Form` where the referee cannot know it by itself: of points, of poses.
-        more: for `referee.judge`, such as scene=scene_of(robot, cells, task).
-    """
+    """What the referee finds wrong with a verdict's motion, or with another for its question."""
     walk, cells, task = verdict.witness, verdict.cells, verdict.task
     if q is None:
         q, marks = walk.q, walk.cell
@@ -201,3 +195,31 @@ def faults_of(
         arm_of(verdict.robot), surface, asked_of(task, cells), q, targets_of(cells, task), marks,
         **more,
     )  # fmt: skip
+
+
+def assert_motion(verdict: Verdict, q: Floats) -> None:
+    """The straight segments between rows (m, n) keep tolerance, cone, limits and patch."""
+    arm, asked = arm_of(verdict.robot), asked_of(verdict.task, verdict.cells)
+    nothing = np.empty((0, 3)), np.empty((0, 3))
+    assert referee.judge(arm, surface_of(verdict.cells.surface), asked, q, nothing) == []
+
+
+def assert_over(verdict: Verdict, cell: NDArray[np.int64], q: Floats) -> None:
+    """Every q (k, n) holds the tool over the centre of its cell, inside all constraints."""
+    arm, asked = arm_of(verdict.robot), asked_of(verdict.task, verdict.cells)
+    aims, approaches = targets_of(verdict.cells, verdict.task)
+    points, axes, _ = arm.tool(q)
+    assert (np.linalg.norm(points - aims[cell], axis=1) <= asked.tolerance).all()
+    assert (referee.angles_between(axes, approaches[cell]) <= asked.cone + referee.SAME).all()
+    assert ((q >= arm.limits[:, 0]) & (q <= arm.limits[:, 1])).all()
+
+
+def tools(robot: Robot, q: Floats) -> tuple[Floats, Floats]:
+    """Tool points and approach axes (k, 3) by Pinocchio: also of arms without a file."""
+    model, data = robot.model, robot.model.createData()
+    points, axes = np.empty((len(q), 3)), np.empty((len(q), 3))
+    for k, row in enumerate(np.ascontiguousarray(q)):
+        pin.forwardKinematics(model, data, pin.integrate(model, pin.neutral(model), row))
+        placed = pin.updateFramePlacement(model, data, robot.tool_frame_id)
+        points[k], axes[k] = placed.translation, placed.rotation @ robot.approach_axis
+    return points, axes

@@ -102,7 +102,7 @@ def _revolution(rng):
     return revolution(points[:: rng.choice([-1, 1])], _angles(rng), **_pose(rng))
 
 
-def _spline(rng):
+def _bspline(rng):
     degree = tuple(int(d) for d in rng.integers(1, 6, 2))
     m, n = (int(d + rng.integers(1, 5)) for d in degree)
     x, y = np.meshgrid(np.linspace(0, 1, m), np.linspace(0, 1, n), indexing="ij")
@@ -152,18 +152,10 @@ def _mesh(rng):
 
 
 KINDS = {
-    "plane": _plane,
-    "sphere": _sphere,
-    "cylinder": _cylinder,
-    "hyperboloid": _hyperboloid,
-    "cone": _cone,
-    "torus": _torus,
-    "ellipsoid": _ellipsoid,
-    "revolution": _revolution,
-    "bspline": _spline,
-    "piecewise": _piecewise,
-    "mesh": _mesh,
-}
+    make.__name__[1:]: make
+    for make in (_plane, _sphere, _cylinder, _hyperboloid, _cone, _torus, _ellipsoid, _revolution,
+                 _bspline, _piecewise, _mesh)
+}  # fmt: skip
 
 
 def random_surface(kind, rng):

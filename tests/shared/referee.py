@@ -100,25 +100,18 @@ def joints_of(path: str | Path) -> list[Joint]:
 
 @dataclass
 class Arm:
-    """A tree of joints with a tool, as the URDF has it.
-
-    Columns of q are the joints `names`; all others are held at `locked`, or at zero.
-    """
+    """A tree of joints with a tool, as the URDF has it."""
 
     joints: list[Joint]
     tool_link: str
     names: Sequence[str]
     locked: Mapping[str, float] = field(default_factory=dict)
     tcp: Floats = field(default_factory=lambda: np.eye(4))
-    approach: ArrayLike = (0.0, 0.0, 1.0)
-    """Of the tool, in the frame of its TCP."""
+    approach: ArrayLike = (0.0, 0.0, 1.0)  # Of the tool, in the frame of its TCP
     reference: ArrayLike = (1.0, 0.0, 0.0)
-    base: Floats = field(default_factory=lambda: np.eye(4))
-    """Of the root link, in the world."""
-    seen_from: str | None = None
-    """The link in whose frame tools are given; None for the world."""
-    limits: Floats | None = None
-    """(n, 2); by default those of the URDF."""
+    base: Floats = field(default_factory=lambda: np.eye(4))  # Of the root link, in the world
+    seen_from: str | None = None  # The link in whose frame tools are given; None for the world
+    limits: Floats | None = None  # (n, 2); by default those of the URDF
 
     def __post_init__(self) -> None:
         known = {joint.name: joint.limits for joint in self.joints}
@@ -127,16 +120,8 @@ class Arm:
         children = {joint.child for joint in self.joints}
         (self.root,) = {joint.parent for joint in self.joints} - children
 
-    @staticmethod
-    def from_urdf(path: str | Path, tool_link: str, names: Sequence[str], **more: Any) -> Arm:
-        """An arm out of a file."""
-        return Arm(joints_of(path), tool_link, names, **more)
-
     def carried(self, axes: Sequence[Mapping[str, Any]]) -> Arm:
-        """The same with more axes below its base, or beside it for the surface.
-
-        Of each: name, kind, axis, position, rpy (rad), carries ('base' or 'surface').
-        """
+        """The same on more axes (name, kind, axis, position, rpy [rad], carries) below it."""
         ends, made = {"base": "the world", "surface": "the world"}, []
         for one in axes:
             at, below = placement(one["position"], one["rpy"]), ends[one["carries"]]
@@ -196,12 +181,9 @@ class Arm:
 class Places(NamedTuple):
     """Places of a surface."""
 
-    points: Floats
-    """(k, 3) m."""
-    normals: Floats
-    """(k, 3) unit, outward."""
-    along: Floats
-    """(k, 3) unit, where the parameter u grows; NaN where there is none."""
+    points: Floats  # (k, 3) m
+    normals: Floats  # (k, 3) unit, outward
+    along: Floats  # (k, 3) unit, where the parameter u grows; NaN where there is none
 
 
 @dataclass
@@ -209,21 +191,17 @@ class Form:
     """A patch of a surface by its formula. Lengths in m, angles in rad."""
 
     kind: str
+    # Sphere, cylinder (r); cone (r, slope); torus (ring, tube); hyperboloid (waist, flare);
+    # ellipsoid (a, b, c); else ().
     size: Sequence[float]
-    """sphere, cylinder (r); cone (r, slope); torus (ring, tube); hyperboloid (waist, flare);
-    ellipsoid (a, b, c); plane and the others ()."""
     u: tuple[float, float]
     v: tuple[float, float]
     outside: bool
     position: ArrayLike = (0.0, 0.0, 0.0)
     rotation: ArrayLike = field(default_factory=lambda: np.eye(3))
+    # (u, v) to points (k, 3) in its own frame, for other kinds; of a revolution its `spline_curve`.
     formula: Callable[..., Floats] | None = None
-    """(u, v) to points (k, 3) in its own frame, for kinds that are not named above; of a
-    revolution its `spline_curve`."""
-    turned: bool = False
-    """Does a formula's outward normal point against S_u x S_v?"""
-    periods: tuple[float, float] = (0.0, 0.0)
-    """Of u and v where they are angles, else 0; known for named kinds."""
+    periods: tuple[float, float] = (0.0, 0.0)  # of u and v where they are angles, else 0
 
     def __post_init__(self) -> None:
         self.position, self.rotation = np.array(self.position), np.array(self.rotation)
@@ -288,8 +266,7 @@ class Form:
                 for k in (-2, -1, 1, 2)
             ]
             sides.append((at[0] - 8 * at[1] + 8 * at[2] - at[3]) / (12 * h))
-        normal = unit(np.cross(*sides)) * (-1.0 if self.turned else 1.0)
-        return Places(self.formula(u, v), normal, unit(sides[0]))
+        return Places(self.formula(u, v), unit(np.cross(*sides)), unit(sides[0]))
 
     def at(self, u: ArrayLike, v: ArrayLike) -> Places:
         """Places in the root frame."""
@@ -528,15 +505,12 @@ DEEP = 20.0  # m, a box in place of a half space: fcl crashes on a half space be
 class Shape(NamedTuple):
     """One shape of a body."""
 
-    link: str | None
-    """That it moves with; None for the root frame."""
-    placement: Floats
-    """(4, 4) in the link's frame."""
+    link: str | None  # That it moves with; None for the root frame
+    placement: Floats  # (4, 4) in the link's frame
     geometry: Any
     """('box', size), ('sphere', radius), ('capsule' or 'cylinder', radius, length along z),
     ('halfspace',) below z = 0, ('mesh', corners (F, 3, 3))."""
-    off: float = 0.0
-    """m, what the shape may stand out further than this."""
+    off: float = 0.0  # m, what the shape may stand out further than this
 
 
 def fcl_object(geometry: tuple) -> Any:
@@ -620,10 +594,10 @@ class Scene:
             name: [(shape, fcl_object(shape.geometry)) for shape in bodies[name]] for name in asked
         }
 
-    def _placed(self, shape: Shape, model: Any, frames: Mapping[str, Floats], row: int) -> Any:
+    def _placed(self, shape: Shape, model: Any, frames: Mapping[str, Floats]) -> Any:
         import fcl
 
-        at = shape.placement if shape.link is None else frames[shape.link][row] @ shape.placement
+        at = shape.placement if shape.link is None else frames[shape.link][0] @ shape.placement
         if shape.geometry[0] == "halfspace":
             at = at.copy()
             at[:3, 3] -= 0.5 * DEEP * at[:3, 2]
@@ -638,7 +612,7 @@ class Scene:
             least = np.inf
             for one in self.bodies[self.pairs[k][0]]:
                 for other in self.bodies[self.pairs[k][1]]:
-                    a, b = (self._placed(*each, frames, 0) for each in (one, other))
+                    a, b = (self._placed(*each, frames) for each in (one, other))
                     touch = fcl.collide(a, b, fcl.CollisionRequest(), fcl.CollisionResult())
                     apart = fcl.distance(a, b, fcl.DistanceRequest(), fcl.DistanceResult())
                     least = min(least, (TOUCHING if touch else apart) - one[0].off - other[0].off)
@@ -653,11 +627,9 @@ class Scene:
         return {name: back @ frame for name, frame in frames.items()}
 
     def least_excess(self, rows: Floats) -> Floats:
-        """(pairs,) m, the least distance of each over what is asked, at any row (m, n) of a motion.
-
-        No point of the arm moves further than its reach times the joints' turns: where a pair is
-        further apart than that, it is not asked for again.
-        """
+        """(pairs,) m, the least distance of each over what is asked, at any row of a motion."""
+        # No point moves further than its reach times the joints' turns: where a pair is further
+        # apart than that, it is not asked for again.
         sliding = [j.name for j in self.arm.joints if j.kind == "prismatic"]
         reach = sum(np.linalg.norm(joint.origin[:3, 3]) for joint in self.arm.joints)
         reach += sum(np.abs(self.arm.limits[k]).max() for k, name in enumerate(self.arm.names)
@@ -690,15 +662,12 @@ class Asked(NamedTuple):
 
     standoff: float
     tolerance: float
-    cone: float
-    """rad."""
-    roll: tuple[float, float] | None = None
-    """rad, the least and the largest; None where it is free."""
-    reference: Floats | None = None
-    """(3,) in the root frame: where the reference axis is to point at a roll of 0; None for the
-    direction in which u grows."""
-    approach: Floats | None = None
-    """(3,) unit, where the tool is to point all over the surface; None for along the normals."""
+    cone: float  # rad
+    roll: tuple[float, float] | None = None  # rad, the least and the largest; None where it is free
+    reference: Floats | None = (
+        None  # (3,) root frame, the axis at a roll of 0; None for where u grows
+    )
+    approach: Floats | None = None  # (3,) unit, all over the surface; None for along the normals
 
 
 def evenly(rows: ArrayLike, per_segment: int = 20) -> Floats:
@@ -720,10 +689,7 @@ def closely(rows: ArrayLike, step: float) -> Floats:
 
 
 def roll_about(x: Floats, axes: Floats, references: Floats, approaches: Floats) -> Floats:
-    """rad: x carried by the least rotation of axis to approach; its angle from the reference.
-
-    Swing and twist. References need not be square to the approaches.
-    """
+    """rad: x carried by the least rotation of axis to approach; its angle from the reference."""
     b = approaches
     t = unit(references - (references * b).sum(-1, keepdims=True) * b)
     hinge, cosine = np.cross(axes, b), (axes * b).sum(-1, keepdims=True)
@@ -744,12 +710,9 @@ def roll_off(rolls: Floats, ends: tuple[float, float]) -> Floats:
 class Kept(NamedTuple):
     """What a motion keeps at samples; arrays (k,)."""
 
-    off: Floats
-    """m, of the tool point from its target."""
-    tilt: Floats
-    """rad, of the axis from the approach."""
-    roll: Floats
-    """rad beyond the range; -inf where it is free."""
+    off: Floats  # m, of the tool point from its target
+    tilt: Floats  # rad, of the axis from the approach
+    roll: Floats  # rad beyond the range; -inf where it is free
 
 
 def kept_over(arm: Arm, surface: Any, asked: Asked, q: Floats) -> Kept:
@@ -788,19 +751,7 @@ def judge(
     per_segment: int = 20,
     step: float = 0.02,
 ) -> list[str]:
-    """What a motion q (m, n), straight between its rows, does wrong; nothing where it holds.
-
-    Args:
-        arm: with the limits that hold.
-        surface: a `Form`, `Pieces` or `Facets`; None where there are only targets.
-        asked: tolerance, cone and the like.
-        q: rad or m.
-        targets: (N, 3) points and approaches that have to be reached.
-        marks: (m,) the cell over whose target a row is, -1 elsewhere; None to look for it.
-        scene: bodies that have to stay apart; looked at in steps of `step` rad or m.
-        per_segment: samples between rows.
-        step: rad or m of a joint between samples for bodies.
-    """
+    """What a motion q (m, n), straight between its rows, does wrong; nothing where it holds."""
     q, found = np.atleast_2d(np.asarray(q, float)), []
     if not np.isfinite(q).all():
         return ["limits: not finite"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 from feasibility import check
-from feasibility.cases import Case, load_case
+from feasibility.cases import Case
 
 TEXTS = {
     # ur5 above a small plate: feasible; keys can follow
@@ -44,19 +44,6 @@ TEXTS = {
     """,
 }
 
-# A plate whose parameters begin at a corner, for passes; keys can follow.
-PANEL = """
-    robot.name = "ur5"
-    surface.kind = "plane"
-    surface.u = [0.0, 0.2]
-    surface.v = [0.0, 0.2]
-    surface.cells = [2, 2]
-    surface.position = [0.4, -0.1, 0.2]
-    surface.side = "outside"
-    task.standoff = 0.02
-    task.cone_deg = 20
-"""
-
 
 @cache
 def small_case(name):
@@ -68,16 +55,3 @@ def small_case(name):
 def small_verdict(name):
     """Its verdict."""
     return check(*small_case(name).build())
-
-
-@cache
-def empty_verdict():
-    """That of the small plate cut into no cells, which Python alone can ask."""
-    setup = small_case("plate").build()
-    return check(setup.robot, setup.cells.surface.cells(0, 3), setup.task)
-
-
-@cache
-def paper_verdict(name, *settings):
-    """The verdict of a built-in case."""
-    return check(*load_case(f"paper/{name}", settings).build())

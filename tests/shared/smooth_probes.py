@@ -12,17 +12,6 @@ def random_parameters(surface, count, seed=7):
     return rng.uniform(*surface.u_range, count), rng.uniform(*surface.v_range, count)
 
 
-def tangents(surface, u, v, step=1e-5):
-    """Central differences of fourth order."""
-
-    def slope(du, dv):
-        near = surface.point(u + du, v + dv) - surface.point(u - du, v - dv)
-        far = surface.point(u + 2 * du, v + 2 * dv) - surface.point(u - 2 * du, v - 2 * dv)
-        return (8 * near - far) / (12 * step)
-
-    return slope(step, 0.0), slope(0.0, step)
-
-
 def triangle_area(surface, count):
     """Area of the triangles over a grid of parameters."""
     u, v = (np.linspace(*ends, count + 1) for ends in (surface.u_range, surface.v_range))
@@ -87,25 +76,3 @@ def same_surface(one, other, tolerance=0.0):
     ]
     agree = all(np.abs(first - second).max() <= tolerance for first, second in pairs)
     return agree and (a.inside == b.inside).all() and one.side == other.side
-
-
-def triangle_distances(points, triangles):
-    """(k,) m from points (k, 3) to the nearest of triangles (m, 3, 3), by trying all.
-
-    The nearest of a triangle's three sides; and its plane, over its inside.
-    """
-    best = np.full(len(points), np.inf)
-    at = points[:, None]
-    for i in range(3):
-        start, along = triangles[:, i], triangles[:, i - 2] - triangles[:, i]
-        square = np.maximum((along**2).sum(axis=1), 1e-300)
-        share = np.clip(((at - start) * along).sum(axis=2) / square, 0.0, 1.0)
-        off = np.linalg.norm(at - start - share[..., None] * along, axis=2)
-        best = np.minimum(best, off.min(axis=1))
-    one, two = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
-    flat = np.linalg.pinv(np.stack([one, two], axis=2))
-    share = np.einsum("mcd,kmd->kmc", flat, at - triangles[:, 0])
-    above = at - triangles[:, 0] - share[..., :1] * one - share[..., 1:] * two
-    inside = (share >= 0.0).all(axis=2) & (share.sum(axis=2) <= 1.0)
-    height = np.where(inside, np.linalg.norm(above, axis=2), np.inf)
-    return np.minimum(best, height.min(axis=1))

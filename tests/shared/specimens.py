@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from mesh_patches import of_patch
-from scipy.interpolate import BSpline
 from smooth_probes import POSE
 from spline_nets import TURN_KNOTS, full_turn, hood, turned
 
@@ -139,39 +138,3 @@ def cells_of(surface, nu, nv):
     if surface.kind == "piecewise":
         return surface.cells([(nu, nv)] * len(surface.pieces))
     return surface.cells(nu, nv)
-
-
-def formula(s, u, v):
-    """Points (k, 3) in the own frame, None for kinds without a formula of their own."""
-    c, d, r = np.cos(u), np.sin(u), None
-    match s.kind:
-        case "plane":
-            return np.stack([u, v, 0 * u], -1)
-        case "sphere" | "ellipsoid":
-            axes = (s.radius,) * 3 if s.kind == "sphere" else s.semi_axes
-            return np.stack([d * np.cos(v), d * np.sin(v), c], -1) * axes
-        case "torus":
-            ring = s.ring + s.tube * np.cos(v)
-            return np.stack([ring * c, ring * d, s.tube * np.sin(v)], -1)
-        case "cylinder":
-            r = s.radius + 0 * v
-        case "hyperboloid":
-            r = s.waist * np.sqrt(1 + (v / s.flare) ** 2)
-        case "cone":
-            r = s.radius + s.slope * v
-        case "bspline":
-            return _sum_of_basis(s.net, u, v)
-        case _:
-            return None
-    return np.stack([r * c, r * d, v], -1)
-
-
-def _sum_of_basis(net, u, v):
-    m, n = net.points.shape[:2]
-    rows = [
-        np.stack([BSpline(k, np.eye(count)[i], p)(x) for i in range(count)])
-        for k, p, count, x in zip(net.knots, net.degree, (m, n), (u, v), strict=True)
-    ]
-    weights = np.ones((m, n)) if net.weights is None else net.weights
-    share = np.einsum("ik,jk,ij->kij", *rows, weights)
-    return np.einsum("kij,ijc->kc", share, net.points) / share.sum(axis=(1, 2))[:, None]

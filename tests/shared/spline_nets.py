@@ -30,16 +30,6 @@ def turned(profile, profile_weights, turn, turn_weights):
     return points, np.outer(turn_weights, profile_weights)
 
 
-def meridian(radius, low_deg, high_deg):
-    """(points, weights) of the arc of a circle in (r, z) between two latitudes; upwards."""
-    low, high = math.radians(low_deg), math.radians(high_deg)
-    half, middle = (high - low) / 2, (high + low) / 2
-    reach = radius / math.cos(half)
-    corners = [(radius, low), (reach, middle), (radius, high)]
-    points = np.array([[r * math.cos(a), r * math.sin(a)] for r, a in corners])
-    return points, np.array([1.0, math.cos(half), 1.0])
-
-
 def hood(m=6, n=7):
     """A free form like a car's hood, 1.2 m by 1.4 m."""
     x, y = np.meshgrid(np.linspace(-0.6, 0.6, m), np.linspace(-0.7, 0.7, n), indexing="ij")

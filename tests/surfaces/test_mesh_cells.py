@@ -1,7 +1,6 @@
 """Cells of meshes: every face in one connected cell of even area, and figures by brute force."""
 
 import math
-import pickle
 from functools import cached_property
 
 import networkx as nx
@@ -22,9 +21,10 @@ from mesh_patches import (
     sheet,
     used,
 )
+from mesh_writers import refused
 from samples import sampled, spread
 
-from surfaces import SurfaceError, mesh
+from surfaces import mesh
 from surfaces.meshes import FaceTree, TriangleMesh
 from surfaces.meshes.cells import MeshCells, subdivide
 from surfaces.meshes.cells.clustering import cells_for, cluster_faces
@@ -118,7 +118,7 @@ MANY = [(name, count) for count in (20, 200, 77, 500) for name in PATCHES]
 
 
 @sampled
-@pytest.mark.parametrize(("name", "count"), spread(MANY, 8))
+@pytest.mark.parametrize(("name", "count"), spread(MANY, 6))
 def test_few_and_many_cells_are_even_too(name, count):
     assert_even(Cut(PATCHES[name](), count), count)
 
@@ -127,22 +127,12 @@ def test_the_same_cells_again_turned_moved_and_scaled(cut):
     turn = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
     turn *= np.linalg.det(turn)
     vertices, faces = cut.given
-    for scale, rotation, shift in ((1.0, np.eye(3), 0.0), (1.0, turn, 4.0), (1e3, np.eye(3), 0.0)):
+    for scale, rotation, shift in ((1.0, turn, 4.0), (1e3, np.eye(3), 0.0)):
         other = cells_for(scale * vertices @ rotation.T + shift, faces, count=N)
         np.testing.assert_array_equal(other.mesh.faces, cut.faces)
         np.testing.assert_array_equal(other.labels, cut.labels)
         moved = scale * cut.vertices @ rotation.T + shift
         np.testing.assert_allclose(other.mesh.vertices, moved, atol=2e-13 * scale)
-    own, still = (
-        figures(cut.vertices @ turn.T + 4, cut.faces, cut.normals @ turn.T, cut.labels),
-        (cut.figures),
-    )
-    np.testing.assert_array_equal(own.faces, still.faces)
-    np.testing.assert_allclose(own.centres, still.centres @ turn.T + 4.0, atol=1e-11)
-    np.testing.assert_allclose(own.normals, still.normals @ turn.T, atol=1e-9)
-    np.testing.assert_array_equal(own.borders.pairs, still.borders.pairs)
-    np.testing.assert_array_equal(own.neighbours.indices, still.neighbours.indices)
-    np.testing.assert_array_equal(own.outlines.vertices, still.outlines.vertices)
 
 
 # -- figures -------------------------------------------------------------------------------------
@@ -249,21 +239,6 @@ def flat(n, labels):
     return figures(np.column_stack([u, v, 0 * u]), faces, up, np.repeat(np.ravel(labels), 2))
 
 
-def test_four_squares_and_a_cross_by_hand():
-    # 2 3    seen from above; 0 and 3 touch in a point only
-    # 0 1
-    found = flat(2, [0, 2, 1, 3])
-    assert found.borders.pairs.tolist() == [[0, 1], [0, 2], [1, 3], [2, 3]]
-    np.testing.assert_allclose(found.borders.lengths, 0.5)
-    middles = [[0.5, 0.25, 0], [0.25, 0.5, 0], [0.75, 0.5, 0], [0.5, 0.75, 0]]
-    np.testing.assert_allclose(found.borders.midpoints, middles)
-    assert [found.neighbours.of(k).tolist() for k in range(4)] == [[1, 2], [0, 3], [0, 3], [1, 2]]
-    np.testing.assert_allclose(found.centres[2], [0.25, 0.75, 0])
-    np.testing.assert_allclose(found.normals, [[0, 0, 1]] * 4)
-    # The middle cell, from the left, clockwise: left, above, right, below.
-    assert flat(3, [[5, 1, 6], [4, 0, 2], [7, 3, 8]]).neighbours.of(0).tolist() == [1, 2, 3, 4]
-
-
 def signed(found, cell):
     """m^2: outer loops run counter-clockwise and holes clockwise."""
     return sum(np.cross(p[:-1], p[1:])[:, 2].sum() / 2 for p in found.outlines.of(cell))
@@ -358,7 +333,7 @@ def border_length(vertices, faces):
     return np.linalg.norm(np.subtract(*vertices[each[times == 1]].swapaxes(0, 1)), axis=1).sum()
 
 
-@pytest.mark.parametrize("parts", [30, 1000, 20_000])
+@pytest.mark.parametrize("parts", [30, 4000])
 @pytest.mark.parametrize("name", CONNECTED)
 def test_subdivision_keeps_the_surface(name, parts):
     given = CONNECTED[name]()
@@ -400,12 +375,7 @@ def test_what_makes_no_cells_is_refused(approved):
     asked += [lambda k=k: subdivide(*box(), k) for k in (0.0, -1.0, math.nan, math.inf)]
     labels = (np.zeros(3, int), np.zeros(count), np.full(count, -1), np.full(count, 1))
     asked += [lambda k=k: MeshCells.of(surface, k) for k in labels]
-    said = []
-    for ask in asked:
-        with pytest.raises(SurfaceError) as caught:
-            ask()
-        said.append(str(caught.value))
-    approved("what makes no cells", "\n".join(said))
+    approved("what makes no cells", "\n".join(map(refused, asked)))
     assert surface.cells(5).unravel(4) == (4,)
     with pytest.raises(IndexError):
         surface.cells(5).unravel(5)
@@ -423,10 +393,6 @@ def test_cutting_leaves_the_surface_what_it_was(name):
     corners = fine.mesh.vertices @ fine.rotation.T + fine.position
     assert np.abs(surface.closest(corners).height).max() < 1e-12
     np.testing.assert_array_equal(cells.locate(cells.centres), np.arange(N))
-    found = fine.closest(cells.centres)
-    assert np.abs(found.height).max() < 1e-12
-    if name != "blade":  # thin walls: the other side is as near
-        np.testing.assert_allclose(found.normal, cells.normals, atol=1e-9)
     drawn = cells.triangles(np.arange(N))
     assert areas_of(drawn.vertices, drawn.faces).sum() == pytest.approx(surface.mesh.area, rel=1e-9)
     lines = cells.borders()
@@ -436,9 +402,6 @@ def test_cutting_leaves_the_surface_what_it_was(name):
     assert length == pytest.approx(expected, rel=1e-12)
     outlines = cells.unrolled().outlines
     assert len(outlines) == N
-    again = pickle.loads(pickle.dumps(cells))
-    np.testing.assert_array_equal(again.centres, cells.centres)
-    np.testing.assert_array_equal(again.pairs, cells.pairs)
     assert all((loop[0] == loop[-1]).all() for loop in outlines)
 
 

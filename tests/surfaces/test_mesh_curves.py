@@ -9,9 +9,7 @@ from mesh_patches import can, roof
 
 from feasibility import Task
 from feasibility.targets import blocked_curves
-from surfaces.curve_fitting import CurveFit
 from surfaces.meshes import TriangleMesh, mesh
-from surfaces.meshes.cells.reshaped_curves import _shortest
 
 
 def squares(size: float, seed: int, count: int = 674) -> TriangleMesh:
@@ -133,25 +131,6 @@ def test_a_target_far_above_a_bend_runs_forwards(radius):
     assert curves.folds(-2.0 * radius)[some].any()  # on the concave side
 
 
-@pytest.mark.parametrize("angle", [40, 90, 150, -90])
-def test_a_way_crosses_the_crease_where_it_is_shortest(angle):
-    """Against every place of the edge, and from either side alone."""
-    rng, made = np.random.default_rng(abs(angle)), roof(angle)
-    edge, inwards = made.vertices[[0, 1]], made.vertices[[2, 4]]
-    along = edge[0] + np.linspace(0.0, 1.0, 20_001)[:, None] * (edge[1] - edge[0])
-    for _ in range(20):
-        right, left = (
-            share[0] * place + share[1] * edge[1]
-            for place, share in zip(inwards, rng.uniform(0.05, 0.9, (2, 2)), strict=True)
-        )
-        found = _shortest(np.array([right, left]), edge[None], inwards[None])
-        lengths = np.linalg.norm(along - right, axis=1) + np.linalg.norm(along - left, axis=1)
-        at = np.linalg.norm(found - right) + np.linalg.norm(found - left)
-        assert at <= lengths.min() + 1e-12
-        assert at == pytest.approx(lengths.min(), abs=1e-7)
-        assert np.isnan(_shortest(np.array([right, 0.5 * right]), edge[None], inwards[None])).all()
-
-
 @pytest.mark.parametrize("name", CREASED)
 def test_creased_curves_are_smooth_in_time_and_stay_on_the_surface(name):
     """In four parts, at rest between them."""
@@ -173,18 +152,3 @@ def test_creased_curves_are_smooth_in_time_and_stay_on_the_surface(name):
     good = bent < 0.01
     assert good.mean() > 0.7
     assert (turned[good] <= 1.1 * bent[good]).all()
-
-
-@pytest.mark.parametrize("counts", [(1, 8, 4), (8, 4, 16), (4, 64, 1)])
-def test_the_last_fit_of_a_curve_counts(counts):
-    """However many pieces it had before, the others keep theirs."""
-    rng, (before, after, others) = np.random.default_rng(0), counts
-    fits = [
-        (np.array([1, 3]), rng.normal(size=(2, before, 4, 6))),
-        (np.array([0, 2]), rng.normal(size=(2, others, 4, 6))),
-        (np.array([3]), rng.normal(size=(1, after, 4, 6))),
-    ]
-    curves = CurveFit(None, np.zeros((4, 2)), np.zeros((4, 2)), np.zeros(4, bool), fits).joined()
-    expected = [fits[1][1][0], fits[0][1][0], fits[1][1][1], fits[2][1][0]]
-    assert np.diff(curves.first).tolist() == [len(cubics) for cubics in expected]
-    np.testing.assert_array_equal(curves.cubics, np.concatenate(expected))

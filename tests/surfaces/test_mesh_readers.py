@@ -1,6 +1,5 @@
-"""Mesh files with bytes changed anywhere, what trimesh makes of the same files, and their units."""
+"""What trimesh makes of the same mesh files, and their units."""
 
-import tracemalloc
 from types import SimpleNamespace
 
 import mesh_writers as w
@@ -8,58 +7,13 @@ import numpy as np
 import pytest
 import trimesh
 from mesh_files import GOOD
-from samples import sampled, seeds
+from samples import seeds
 from scipy.spatial import cKDTree
 
-from surfaces import SurfaceError
 from surfaces.meshes import TriangleMesh, mesh, read_mesh
 from surfaces.meshes.repair import notes_of
 
 V, F = w.cube()
-GENTLE = b'0123456789 -.\n\0\xff/eaf{}[]",'
-
-
-def damaged(data, rng):
-    """A few bytes replaced, taken out, put in, repeated or cut off; digits more often than not."""
-    data = bytearray(data)
-    for _ in range(rng.integers(1, 5)):
-        k = int(rng.integers(len(data) + 1))
-        byte = GENTLE[rng.integers(len(GENTLE))] if rng.random() < 0.7 else int(rng.integers(256))
-        kind = rng.integers(10)
-        if kind < 6 and k < len(data):
-            data[k] = byte
-        elif kind == 6:
-            del data[k : k + int(rng.integers(1, 9))]
-        elif kind == 7:
-            data.insert(k, byte)
-        elif kind == 8:
-            data[k:k] = data[k : k + int(rng.integers(1, 40))]
-        else:
-            del data[len(data) - int(rng.integers(len(data) // 4 + 1)) :]
-    return bytes(data)
-
-
-@sampled
-@pytest.mark.parametrize("seed", seeds(1, all=20))
-@pytest.mark.parametrize("name", GOOD)
-def test_damaged_files_are_refused_or_give_a_clean_mesh(name, seed, tmp_path):
-    """In bounded memory; and some of both."""
-    rng, path, outcomes = np.random.default_rng([seed, *name.encode()]), tmp_path / name, [0, 0]
-    tracemalloc.start()
-    for _ in range(100):
-        path.write_bytes(damaged(GOOD[name], rng))
-        try:
-            found = read_mesh(path, scale=float(rng.choice([1.0, 1e-3])))
-        except SurfaceError as error:
-            outcomes[1] += repr(name) in str(error)
-        else:
-            w.assert_clean(found)
-            outcomes[0] += 1
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert peak < 32 << 20
-    assert sum(outcomes) == 100
-    assert min(outcomes) >= 1
 
 
 @pytest.mark.parametrize("kind", ["stl", "stl_ascii", "obj", "ply", "off", "glb"])
@@ -118,16 +72,14 @@ def test_the_units_of_a_trimesh_are_honoured(units):
     assert diameter(ball(300, units), scale=0.01) == pytest.approx(6.0)  # comes before them
 
 
-@pytest.mark.parametrize("seed", seeds(15, all=200))
+@pytest.mark.parametrize("seed", seeds(6, all=200))
 def test_what_is_refused_is_taken_with_any_of_the_scales_that_are_offered(seed):
     rng = np.random.default_rng(seed)
     units = rng.choice(["", "mm", "in", "m", "cm"])
     size = 10.0 ** rng.choice([rng.uniform(-9, -4), rng.uniform(1.5, 5)])
     metres = METRES.get(units, 1.0)
     source = ball(size / metres, units or None)
-    with pytest.raises(SurfaceError, match=r"m wide; if .*scale = ") as caught:
-        mesh(source)
-    offers = [word.split()[0].rstrip(",") for word in str(caught.value).split("scale = ")[1:]]
+    offers = [word.split()[0].rstrip(",") for word in w.refused(mesh, source).split("scale = ")[1:]]
     assert float(offers[-1]) == metres  # to insist on the size
     for offer in offers:
         assert diameter(source, scale=float(offer)) > 0.0
@@ -147,13 +99,6 @@ def test_an_object_without_units_is_in_metres(units):
     assert half.mesh.history == clean.history
 
 
-@pytest.mark.parametrize("scale", [1.0, 0.001, 1e-6])
-def test_a_scale_that_is_given_is_believed(scale, tmp_path):
-    path = tmp_path / "part.stl"
-    path.write_bytes(w.stl(V * 1500, F))
-    assert read_mesh(path, scale=scale).extent == pytest.approx([300.0 * scale] * 3)
-
-
 def test_scales_units_and_names_that_are_none_are_refused(tmp_path, approved):
     path = tmp_path / "part.stl"
     path.write_bytes(w.stl(V, F))
@@ -161,9 +106,5 @@ def test_scales_units_and_names_that_are_none_are_refused(tmp_path, approved):
     asked += [(each, {"scale": 0.0}) for each in (ball(1.0), TriangleMesh(V, F))]
     asked += [(ball(1.0, u), {}) for u in ("furlong", "1 * 2 * mm", "x * mm", "parsec", "angstrom")]
     asked += [("part\0.stl", {}), (ball(800), {}), (ball(1.0), {"side": "above"})]
-    said = []
-    for source, options in asked:
-        with pytest.raises(SurfaceError) as caught:
-            mesh(source, **options)
-        said.append(str(caught.value))
+    said = [w.refused(mesh, source, **options) for source, options in asked]
     approved("scales and units refused", "\n".join(said))

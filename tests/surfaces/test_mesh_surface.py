@@ -82,20 +82,6 @@ def test_triangles_that_are_none_have_nearest_places_too(kind, seed):
         assert_nearest(some, 2.0 * rng.normal(size=(20, 3)))
 
 
-@pytest.mark.parametrize("count", [1, 2, 7, 64, 333])
-def test_each_box_holds_its_triangles_and_each_triangle_is_there_once(count):
-    corners = scattered(count, 0.1, np.random.default_rng(count))
-    corners[::3] = corners[0]  # of equal ones there may be any number
-    tree = FaceTree.of(corners)
-    assert sorted(tree.order) == list(range(count))
-    np.testing.assert_array_equal(tree.corners, corners[tree.order])
-    for level in range(tree.depth + 1):
-        for node in range(2**level):
-            some = tree.corners[(node * count) >> level : ((node + 1) * count) >> level]
-            box = np.concatenate([some.min(axis=(0, 1)), some.max(axis=(0, 1))])
-            np.testing.assert_array_equal(tree.boxes[2**level - 1 + node], box)
-
-
 def test_over_an_edge_the_triangle_given_first_counts_whatever_the_rounding():
     """Over the edges of an octahedron two faces are equally near, over its vertices four."""
     rng = np.random.default_rng(0)
@@ -131,16 +117,6 @@ def test_heights_are_distances_from_the_nearest_triangle(name):
         np.testing.assert_array_equal(height < 0.0, within)
 
 
-def test_points_that_are_not_finite_have_no_face():
-    flat = mesh(plain("sheet", n=4))
-    points = np.array([[0.1, 0.1, 1.0], [np.nan, 0.0, 0.0], [0.0, np.inf, 0.0]])
-    faces, weights = flat.face_tree.nearest(points)
-    assert (faces >= 0).tolist() == [True, False, False]
-    assert np.isfinite(weights).all(axis=1).tolist() == [True, False, False]
-    with np.errstate(invalid="ignore"):
-        assert np.isfinite(flat.closest(points).height).tolist() == [True, False, False]
-
-
 # -- normals -------------------------------------------------------------------------------------
 
 
@@ -157,20 +133,6 @@ def test_a_fine_mesh_has_the_normals_of_its_patch(patch):
     facets = surface.mesh.face_normals[surface.nearest(patch.point(u, v))[0]]
     assert np.median(off) < 0.05 * np.median(np.linalg.norm(facets - normal, axis=1))
     assert off.max() < 0.02
-
-
-def test_a_crease_keeps_its_faces_flat():
-    """On a box every corner of a face has the face's normal, before and after it is cut."""
-    cells = meshes()["box"].cells(60)
-    for surface in (meshes()["box"], cells.surface):
-        expected = np.repeat(surface.mesh.face_normals[:, None], 3, axis=1)
-        np.testing.assert_allclose(surface.corner_normals, expected, atol=1e-9)
-    # On the rims both sides have one normal each vertex, to which theirs turn.
-    fine = cells.surface
-    at = np.zeros((len(fine.mesh.vertices), 3))
-    at[fine.mesh.faces.ravel()] = fine.crease_normals.reshape(-1, 3)
-    np.testing.assert_array_equal(at[fine.mesh.faces], fine.crease_normals)
-    assert "crease" in " ".join(cells.notes)
 
 
 CREASED = {"roof": lambda: roof(90), "steep roof": lambda: roof(140), "box": lambda: plain("box"),

@@ -10,11 +10,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from mesh_patches import grid, of_patch, panel_with_hole
+from mesh_patches import grid, panel_with_hole
+from mesh_writers import refused
 from pygeodesic import geodesic
 
-from coverable_errors import CoverableError
-from surfaces import bspline, cylinder, mesh, piecewise, plane, sphere, torus
+from surfaces import cylinder, mesh, piecewise, plane, sphere, torus
 from surfaces.meshes import TriangleMesh
 from surfaces.passes import parallel_passes
 
@@ -70,7 +70,7 @@ def test_the_pitch_holds_on_the_surface(name, direction):
 
     What lies beyond the inner pass's ends is for the test of oblique passes.
     """
-    found = parallel_passes(SURFACES[name], 0.03, direction, step=0.002)
+    found = parallel_passes(SURFACES[name], 0.03, direction, step=0.004)
     assert found.spacing <= 0.03
     checked = 0
     for each, (other, *_) in inwards(found):
@@ -80,7 +80,7 @@ def test_the_pitch_holds_on_the_surface(name, direction):
         beside = distances < 0.9999 * np.minimum(*ends)
         assert np.abs(distances[beside] / found.spacing - 1.0).max() <= 0.02
         checked += int(beside.sum())
-    assert checked > 500
+    assert checked > 250
 
 
 @pytest.mark.parametrize("by", ["planes", "distance"])
@@ -150,7 +150,7 @@ def test_overrun_goes_straight_on_beyond_the_border():
 
 def test_points_lie_on_the_surface_and_evenly():
     surface = torus(0.4, 0.1, (0, 120), (0, 180))
-    found = parallel_passes(surface, 0.02, step=0.005)
+    found = parallel_passes(surface, 0.03, step=0.005)
     for each in found.stretches:
         at = surface.closest(each.points)
         assert np.abs(at.height).max() <= 1e-7
@@ -184,19 +184,6 @@ def test_pieces_are_sewn_along_their_seam():
     assert parallel_passes(surface, 0.03, (0.0, 1.0, 0.0)).count == math.ceil(length / 0.03)
 
 
-def test_a_spline_as_patch_and_as_mesh_gets_the_same_passes():
-    u = np.linspace(0.0, 1.0, 7)
-    x, y = np.meshgrid(0.5 * u, 0.4 * u, indexing="ij")
-    patch = bspline(np.stack([x, y, 0.05 * np.sin(4 * x) * np.cos(5 * y)], axis=2))
-    one, other = (
-        parallel_passes(each, 0.05, (1.0, 0.2, 0.0))
-        for each in (patch, mesh(TriangleMesh(*of_patch(patch, 40, 40))))
-    )
-    assert one.count == other.count > 5
-    assert one.spacing == pytest.approx(other.spacing, rel=2e-3)
-    assert one.length == pytest.approx(other.length, rel=5e-3)
-
-
 def test_over_many_triangles_distances_are_taken_on_a_copy():
     """The passes lie on the surface itself, and keep their pitch within 2 %."""
     rng = np.random.default_rng(0)
@@ -206,7 +193,7 @@ def test_over_many_triangles_distances_are_taken_on_a_copy():
     points = 0.3 * np.stack([np.cos(u), np.sin(u), v / 0.3], axis=-1).reshape(-1, 3)
     own = points @ ARCH.rotation.T + ARCH.position
     fine = mesh(TriangleMesh(own, grid(179, 149)[2]), side="outside")
-    found = parallel_passes(fine, 0.05, 0.5, step=0.004)
+    found = parallel_passes(fine, 0.05, 0.5, step=0.01)
     assert any("a copy of" in note for note in found.notes)
     for each, inner in inwards(found):
         assert np.abs(fine.closest(each.points).height).max() <= 1e-7
@@ -214,14 +201,7 @@ def test_over_many_triangles_distances_are_taken_on_a_copy():
         assert np.abs(np.min(lines, axis=0) / found.spacing - 1.0).max() <= 0.02
 
 
-def test_one_pass_is_enough_for_a_narrow_plate():
-    found = parallel_passes(plane((0.0, 0.3), (0.0, 0.4)), 1.0, HALF)
-    assert (found.count, found.dropped) == (1, 0.0)
-    assert found.length == pytest.approx(0.4)
-    assert np.allclose(found.stretches[0].points[:, 0], 0.15)
-
-
-@pytest.mark.parametrize("degrees", [20, 45, 110, 150])
+@pytest.mark.parametrize("degrees", [20, 150])
 @pytest.mark.parametrize("name", ["plate", "cap"])
 def test_oblique_passes_stay_parallel_beyond_the_ends_of_the_first(name, degrees):
     """Straight on the plate, and on the sphere circles about one great circle, to their ends.
@@ -242,7 +222,7 @@ def test_oblique_passes_stay_parallel_beyond_the_ends_of_the_first(name, degrees
     assert np.abs(gaps / found.spacing - 1.0).max() <= 0.02
 
 
-@pytest.mark.parametrize("source", [7, 10**9, 2**32 - 1])
+@pytest.mark.parametrize("source", [7, 2**32 - 1])
 def test_vertices_that_distances_do_not_reach_take_theirs_from_their_neighbours(
     source, monkeypatch
 ):
@@ -251,7 +231,7 @@ def test_vertices_that_distances_do_not_reach_take_theirs_from_their_neighbours(
     pygeodesic names any source of such vertices, and fails where its array cannot hold that.
     """
     rng, surface = np.random.default_rng(5), panel_with_hole(0.02)
-    exact = by_level(parallel_passes(surface, 0.05, 0.3, step=0.002))
+    exact = by_level(parallel_passes(surface, 0.05, 0.3, step=0.004))
 
     class Forgetful(geodesic.PyGeodesicAlgorithmExact):
         failed = source < 2**31
@@ -267,7 +247,7 @@ def test_vertices_that_distances_do_not_reach_take_theirs_from_their_neighbours(
             return found, nearest
 
     monkeypatch.setattr(geodesic, "PyGeodesicAlgorithmExact", Forgetful)
-    found = parallel_passes(surface, 0.05, 0.3, step=0.002)
+    found = parallel_passes(surface, 0.05, 0.3, step=0.004)
     assert any("the exact distance did not reach" in note for note in found.notes)
     assert found.spacing <= found.widest <= 1.02 * found.spacing
     for each in found.stretches:
@@ -291,10 +271,6 @@ def test_bad_input_is_named(approved):
         (PLATE, {"pitch": 1e-6}), (apart, {"pitch": 0.2}),
         (panel_with_hole(0.05), {"pitch": 0.05, "by": "parameters"}),
     ]  # fmt: skip
-    said = []
-    for surface, arguments in asked:
-        with pytest.raises(CoverableError) as caught:
-            parallel_passes(surface, **arguments)
-        said.append(str(caught.value))
+    said = [refused(parallel_passes, surface, **arguments) for surface, arguments in asked]
     approved("passes refused", "\n".join(said))
     assert parallel_passes(apart, 0.2, by="planes").length > 8.0  # the remedy that is named

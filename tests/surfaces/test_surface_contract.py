@@ -11,9 +11,10 @@ import pickle
 
 import numpy as np
 import pytest
-from smooth_probes import POSE, extrapolated_area, least_distances, same_surface, tangents
-from specimens import ALL, CLOSED, POLES, SMOOTH, cells_of, formula
-from spline_nets import TURN_KNOTS, full_turn, meridian, quarter_turn, turned
+from plain import surface_of
+from referee import Form
+from smooth_probes import POSE, extrapolated_area, least_distances, same_surface
+from specimens import ALL, CLOSED, POLES, SMOOTH, cells_of
 
 from surfaces import (
     bspline,
@@ -38,6 +39,16 @@ def smooth(request):
     return SMOOTH[request.param]
 
 
+def form_of(surface):
+    """By the referee, who has to be told of a user's formula."""
+    if surface.kind != "parametric":
+        return surface_of(surface)
+    return Form(
+        "", (), surface.u_range, surface.v_range, True, surface.position, surface.rotation,
+        lambda u, v: np.stack([u, v, 0.3 * np.sin(2 * u) * v], -1),
+    )  # fmt: skip
+
+
 def some(surface, count=400, seed=7):
     rng = np.random.default_rng(seed)
     return rng.uniform(*surface.u_range, count), rng.uniform(*surface.v_range, count)
@@ -56,48 +67,23 @@ def reach(surface):
 # points, normals
 
 
-def test_points_are_those_of_the_formula(smooth):
+def test_points_normals_and_u_directions_are_those_of_the_formula(smooth):
+    """The referee's, who writes formulas once more and knows nothing of the product's."""
     u, v = some(smooth)
-    expected = formula(smooth, u, v)
-    at = smooth.point(u, v)
-    if smooth.kind == "revolution":  # every section is the first one, turned
-        r, z = (smooth.local_point(u, np.zeros_like(v))[:, k] for k in (0, 2))
-        expected = np.stack([r * np.cos(v), r * np.sin(v), z], -1)
-    if smooth.kind == "parametric":
-        expected = np.stack([u, v, 0.3 * np.sin(2 * u) * v], -1)
-    tolerance = 3e-7 if smooth.kind == "parametric" else 2e-15 * (1 + np.abs(at).max())
-    off = np.linalg.norm(expected @ smooth.rotation.T + smooth.position - at, axis=1)
-    assert off.max() <= 3 * tolerance
-
-
-def test_normals_are_unit_square_to_differences_and_right_handed(smooth):
-    u, v = some(smooth)
-    n = smooth.normal(u, v)
+    form = form_of(smooth)
+    expected, at, n = form.at(u, v), smooth.point(u, v), smooth.normal(u, v)
+    fitted, net = smooth.kind == "parametric", smooth.kind in ("bspline", "parametric")
+    off = np.linalg.norm(expected.points - at, axis=1)
+    assert off.max() <= 9e-7 if fitted else 6e-15 * (1 + np.abs(at).max())
     assert np.abs(np.linalg.norm(n, axis=1) - 1.0).max() < 1e-14
-    du, dv = tangents(smooth, u, v)
-    assert np.einsum("ij,ij->i", np.cross(du, dv), n).min() > 0
-    for way in (du, dv):
-        off = np.abs(np.einsum("ij,ij->i", way, n))
-        assert np.quantile(off, 0.98) < 1e-8  # near knots differences are worse
-        assert off.max() < 1e-6
+    lean = np.linalg.norm(expected.normals - n, axis=1)
+    assert np.quantile(lean, 0.98) < (1e-5 if fitted else 1e-8 if net else 1e-11)
+    assert lean.max() < (1e-5 if net else 1e-11)  # near knots differences are worse
     both = smooth.point_and_normal(u, v)
-    assert np.abs(both[0] - smooth.point(u, v)).max() < 1e-14 * (1 + np.abs(both[0]).max())
+    assert np.abs(both[0] - at).max() < 1e-14 * (1 + np.abs(at).max())
     assert np.abs(both[1] - n).max() < 1e-14
-
-
-def test_outward_is_away_from_the_axis_or_centre(smooth):
-    """Of kinds that have one; right-handed parameters alone would allow both."""
-    u, v = some(smooth)
-    away = (smooth.point(u, v) - smooth.position) @ smooth.rotation
-    n = smooth.normal(u, v) @ smooth.rotation
-    if smooth.kind == "torus":
-        ring = away * [1, 1, 0]
-        away = away - smooth.ring * ring / np.linalg.norm(ring, axis=1, keepdims=True)
-    elif smooth.kind in ("cylinder", "cone", "hyperboloid"):
-        away = away * [1, 1, 0]
-    elif smooth.kind not in ("sphere", "ellipsoid"):
-        away = np.tile([0.0, 0.0, 1.0], (len(u), 1)) if smooth.kind == "plane" else n
-    assert np.einsum("ij,ij->i", away, n).min() > 0
+    cells = smooth.cells(3, 4)
+    np.testing.assert_allclose(cells.tangents, form.at(cells.u, cells.v).along, atol=1e-5)
 
 
 def test_shapes_broadcast(smooth):
@@ -275,10 +261,7 @@ def spheroid(a, c):
 
 BELL = math.pi * (math.sqrt(3) + math.asinh(math.sqrt(2)) / math.sqrt(2))
 AREAS = [
-    (sphere(0.3, (0, 180), (0, 360)), 4 * math.pi * 0.09, 1e-14),
     (sphere(2.0, (0, 60), (0, 360)), 2 * math.pi * 2.0 * 1.0, 1e-14),  # cap of height 1
-    (cylinder(0.5, (0, 360), (1, 4)), 2 * math.pi * 0.5 * 3, 1e-14),
-    (plane((0, 0.6), (0, 0.4)), 0.24, 1e-14),
     (hyperboloid(1.0, 1.0, (0, 360), (0, 1)), BELL, 1e-14),
     (hyperboloid(0.5, 5e5, (0, 360), (0, 2)), 2 * math.pi * (1 + 2 / 3 * 4e-12), 1e-14),
     *((ellipsoid((a, a, c), (0, 180), (0, 360)), spheroid(a, c), 1e-10)
@@ -325,24 +308,6 @@ def test_moved_and_pickled_surfaces_are_the_same(name):
     assert not hasattr(surface, "bounds") or moved.bounds(0.01) == surface.bounds(0.01)
 
 
-def arc_ball():
-    angle = np.radians(np.linspace(-90, 90, 41))
-    profile = np.column_stack([np.cos(angle), np.sin(angle)])
-    profile[[0, -1], 0] = 0.0
-    return revolution(profile, (0, 360), **POSE)
-
-
-def spline_ring():
-    circle, weights = full_turn()
-    points, weights = turned(circle * 0.2 + [0.6, 0.0], weights, *full_turn())
-    return bspline(points, (2, 2), (TURN_KNOTS, TURN_KNOTS), weights, **POSE)
-
-
-def spline_belt():
-    points, weights = turned(*meridian(0.7, -20, 65), *quarter_turn())
-    return bspline(points, (2, 2), None, weights, **POSE)
-
-
 # Made in another way; equal to it; to within, m.
 TWINS = {
     "round ellipsoid": (ellipsoid((0.7,) * 3, (10, 170), (-50, 60), **POSE),
@@ -351,9 +316,6 @@ TWINS = {
                    cylinder(0.7, (-50, 60), (0, 2), **POSE), 1e-13),
     "two points turned": (revolution([(0.5, 0.0), (0.4, 1.0)], (-50, 50)),
                           cone(0.5, -0.1, (-50, 50), (0, 1)), 1e-13),
-    "arc turned": (arc_ball(), sphere(1.0, (0, 180), (0, 360), **POSE), 1e-6),
-    "spline ring": (spline_ring(), torus(0.6, 0.2, (0, 360), (0, 360), **POSE), 1e-13),
-    "spline belt": (spline_belt(), sphere(0.7, (25, 110), (0, 90), **POSE), 1e-13),
     "spline pipe": (SMOOTH["spline pipe"], cylinder(0.5, (0, 360), (-0.2, 0.6), **POSE), 1e-13),
 }  # fmt: skip
 
@@ -386,9 +348,4 @@ def test_a_part_of_a_spline_is_the_whole_within_its_range_and_weights_of_one_cha
     beyond = whole.point(0.05, 0.5) + 0.01 * whole.normal(0.05, 0.5)
     found = part.closest(beyond)
     assert (found.u, bool(found.inside), bool(whole.closest(beyond).inside)) == (0.1, False, True)
-    plain, knots = bspline(net), [0, 0, 0, 0, 0.25, 0.5, 0.75, 1, 1, 1, 1]
-    assert same_surface(plain, bspline(net, weights=np.ones((6, 7))), 1e-12)
-    assert same_surface(plain, bspline(net.tolist(), [3, 3], (None, knots)), 1e-14)
-    for array in (plain.net.points, *plain.net.knots):
-        with pytest.raises(ValueError, match="read-only"):
-            array[0] = 1.0
+    assert same_surface(bspline(net), bspline(net, weights=np.ones((6, 7))), 1e-12)

@@ -10,8 +10,9 @@ from random_surfaces import KINDS, random_surface
 from samples import sampled, seeds
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
-from smooth_probes import POSE, triangle_distances
+from smooth_probes import POSE
 from specimens import EXTREME
+from triangle_probes import least_distances
 
 from coverable_errors import ArgumentError
 from surfaces import SurfaceError, cylinder, plane, poses, sheet_of, sphere
@@ -39,13 +40,13 @@ def distances(surface, wanted, depth, rng, most=600, count=80):
     sheet = sheet_of(surface, wanted, most, depth)
     points, normals = places(surface, rng, count)
     deep = depth * rng.choice([0.0, 1.0, rng.uniform()], (len(points), 1))
-    far = triangle_distances(points - surface.side_sign * deep * normals, sheet.triangles)
+    far = least_distances(sheet.triangles, points - surface.side_sign * deep * normals)
     # Thin triangles lose digits in their distances.
     return far, sheet.deviation + 1e-12 * np.abs(sheet.triangles).max()
 
 
 @sampled
-@pytest.mark.parametrize("seed", seeds(4, all=100))
+@pytest.mark.parametrize("seed", seeds(3, all=100))
 @pytest.mark.parametrize("thick", [False, True])
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_place_is_further_from_its_sheet_than_stated(kind, thick, seed):
@@ -85,7 +86,7 @@ def test_layers_of_a_thick_sheet_leave_no_more_between_them_than_stated():
         sheet = sheet_of(surface, 0.05 / steps, 2 * (steps + 1), 0.1)
         points, normals = places(surface, rng, 100)
         deep = 0.1 * (np.arange(100) % 41)[:, None] / 40.0
-        far = triangle_distances(points - surface.side_sign * deep * normals, sheet.triangles)
+        far = least_distances(sheet.triangles, points - surface.side_sign * deep * normals)
         holds(sheet.deviation, far, used=0.99)
 
 

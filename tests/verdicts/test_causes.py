@@ -9,11 +9,15 @@ from dataclasses import replace
 import numpy as np
 import plain
 import pytest
+from arm_urdfs import joint
 from asked import question, verdict_of
-from dense_replay import tools
+from plain import tools
+from random_arms import robot_of
 
 from feasibility import CauseKind, Search, Task, check
 from feasibility.collisions import Collision, Obstacle, ToolShape
+from feasibility.roadmap import arrays_of, work_for
+from feasibility.roadmap.causes import diagnosis
 from robots import load_robot
 from surfaces import cylinder, plane, sphere
 
@@ -42,6 +46,18 @@ def test_out_of_reach_says_by_how_much(beyond):
         assert cause.proved
         short = number(r"([0-9.]+) mm short", cause.detail)
         assert abs(short - 1e3 * beyond) <= 0.05 * 1e3 * beyond + 1.0
+
+
+def test_of_several_descents_the_nearest_counts():
+    """Two links of 1 m, the target 3 m away: a stretched arm that points away from it stays."""
+    links = [joint(1, limits=(-4, 4)), joint(2, xyz=(1, 0, 0)), joint(3, "fixed", (1, 0, 0))]
+    robot, task = robot_of(links), Task(0.0, 90)
+    cells = plane((-0.1, 0.1), (-0.1, 0.1), position=(-3, 0, 0)).cells(1, 1)
+    guesses = np.array([[3.0, 0.1], [0.0, 0.0]])
+    arrays = arrays_of(robot, cells, task)
+    for some, away in ((guesses[1:], 5.0), (guesses[::-1], 1.0), (guesses, 1.0)):
+        found = diagnosis._nearest_point(arrays, work_for(2), 0, np.ascontiguousarray(some))
+        assert found == pytest.approx(away, abs=1e-3)
 
 
 def test_what_is_beyond_a_plate_in_reach_is_proved_cell_by_cell():

@@ -16,26 +16,16 @@ import pytest
 from asked import case_of, question, verdict_of
 
 from coverable_errors import ArgumentError
-from feasibility import Answer, Evidence, Search, Task, Verdict, check, greedy_check, verify
+from feasibility import Answer, Evidence, Search, Verdict, check, greedy_check, verify
 from feasibility.cases import Case
 from feasibility.collisions import Collision
 from feasibility.reports.verdict import as_json
 from feasibility.results import load_result, save_result
 from feasibility.roadmap import warm_up
 from feasibility.roadmap.exploration import BUDGET
-from surfaces import piecewise, plane
-from surfaces.meshes import TriangleMesh, mesh
 
 GUARD_S = 1800.0  # against hanging alone
-FEW = (
-    "paper 5d",
-    "long plate",
-    "puma560 20",
-    "puma560 190",
-    "ur5 12",
-    "dome of halves",
-    "beside a post",
-)
+FEW = ("paper 5d", "puma560 190", "ur5 12", "dome of halves", "beside a post")
 
 
 def same(one, other):
@@ -90,14 +80,9 @@ print(hashlib.sha256(walk.q.tobytes() + walk.cell.tobytes()).hexdigest())
 def test_another_process_finds_the_same_motion():
     walk = verdict_of("plate").witness
     here = hashlib.sha256(walk.q.tobytes() + walk.cell.tobytes()).hexdigest()
-    other = subprocess.run(
-        [sys.executable, "-c", PRINT_WITNESS],
-        env={**os.environ, "PYTHONHASHSEED": "1"},
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=GUARD_S,
-    )
+    asked = [sys.executable, "-c", PRINT_WITNESS]
+    how = {"capture_output": True, "text": True, "check": True, "timeout": GUARD_S}
+    other = subprocess.run(asked, env={**os.environ, "PYTHONHASHSEED": "1"}, **how)
     assert other.stdout.strip() == here
 
 
@@ -138,7 +123,7 @@ class Clock:
         return 0.0 if self.looks < self.enough else np.inf
 
 
-@pytest.mark.parametrize("looks", [1, 2, 5, 40])
+@pytest.mark.parametrize("looks", [1, 5, 40])
 def test_a_time_limit_is_honoured(looks, hard, monkeypatch):
     warm_up()
     clock = Clock(looks)
@@ -225,26 +210,6 @@ def test_the_graph_is_what_people_draw_and_networkx_writes(name, tmp_path):
     for a, b, motion in verdict.graph.edges(data="motion"):
         rows = [[float(x) for x in row.split()] for row in back.edges[a, b]["motion"].split(";")]
         assert rows == motion.tolist()
-
-
-SQUARE = plane((0, 1), (0, 1))
-
-
-@pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        (SQUARE, "surface.cells(9, 10)"),
-        (mesh(TriangleMesh(np.eye(3), [[0, 1, 2]])), "surface.cells(count=100)"),
-        (piecewise([SQUARE]), "surface.cells([(3, 4)"),
-        (lambda u, v: (u, v, 0.0), "parametric(g, u=(0, 1), v=(0, 1)).cells(9, 10)"),
-        (5, "surface.cells(9, 10)"),
-        (None, "surface.cells(9, 10)"),
-    ],
-)
-def test_what_is_not_cut_into_cells_is_answered_with_how_to_cut_it(given, words):
-    with pytest.raises(TypeError) as caught:
-        check(question("plate").robot, given, Task(standoff=0.0, cone_deg=30))
-    assert words in str(caught.value)
 
 
 @pytest.mark.parametrize("shape", [(0, 0), (0, 5), (5, 0)])

@@ -4,20 +4,13 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-import subprocess
-import sys
 from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
-import pytest
 from numba.core import types
-from numba.core.errors import TypingError
 
 import feasibility
-from coverable_kernels import njit
 from feasibility import Task, check
-from feasibility.compiled import COUNTED, UNCOUNTED
 from feasibility.roadmap import warm_up
 from robots import load_robot
 from surfaces import plane
@@ -55,33 +48,3 @@ def test_no_kernel_that_counts_no_references_returns_an_array() -> None:
             assert not holds_arrays(overload.signature.return_type), name
     assert counting > 5
     assert seen > 5  # those that were called from Python
-
-
-USED = """
-import gc
-from numba.core.dispatcher import Dispatcher
-from feasibility import Task, check
-from robots import load_robot
-from surfaces import plane
-plate = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside")
-assert check(load_robot("ur5"), plate.cells(2, 2), Task(standoff=0.02, cone_deg=30)).feasible
-found = (value for value in gc.get_objects() if isinstance(value, Dispatcher) and value.overloads)
-print(*{value.py_func.__name__ for value in found})
-"""
-
-
-def test_a_covered_surface_needs_no_kernels_of_proofs() -> None:
-    """Which are slow to compile: they wait until they are called."""
-    done = subprocess.run([sys.executable, "-c", USED], capture_output=True, text=True, check=True)
-    used = set(done.stdout.split())
-    assert {"spread_out", "close_pairs", "seed_cell"} <= used
-    assert not {"branch_and_bound", "explore_self_motions", "connect", "_nearest_point"} & used
-
-
-def test_numba_refuses_one_that_makes_arrays() -> None:
-    def made(n: int) -> Any:
-        return np.zeros(n)
-
-    with pytest.raises(TypingError):
-        njit(error_model="numpy", **UNCOUNTED)(made)(3)
-    assert njit(error_model="numpy", **COUNTED)(made)(3).shape == (3,)

@@ -33,10 +33,7 @@ from surfaces import plane
 
 
 def roadmap_of(graph, cells, cell_of=None, rng=None):
-    """A roadmap with the nodes 0 .. n - 1 and edges of a graph, one slot a connected component.
-
-    Every waypoint is a pair of numbers of its own, so that a walk can be read back.
-    """
+    """A roadmap with the nodes 0 .. n - 1 and edges of a graph, one slot a connected component."""
     rng = np.random.default_rng(0) if rng is None else rng
     _, _, robot, one, task, _ = question("one cell")
     arrays = arrays_of(robot, one, task)

@@ -20,20 +20,10 @@ def cut(joint: int, value_deg: float, below: Cut | Leaf, above: Cut | Leaf) -> C
     return Cut(tuple(np.eye(6)[joint]), np.radians(value_deg), below, above)
 
 
-ONE = CutTree(cut(2, -81.96, Leaf(21), Leaf(2)))
 THREE = CutTree(
     cut(2, -82.0, cut(4, 0.04, Leaf(21), Leaf(20)), cut(1, 12.5, Leaf(0), Leaf(21))),
     opened=((5, np.radians(178.0)),),
 )
-
-
-def test_one_cut_is_one_sentence() -> None:
-    said = (
-        "below joint3 = -82 deg cell [4, 1] cannot be covered, above it cell [0, 2] cannot, and "
-        "nowhere on the surface can joint3 be -82 deg"
-    )
-    assert sentence(ONE, PUMA, CELLS) == said
-    assert lines(ONE, PUMA, CELLS) == [f"B{said[1:]}."]
 
 
 def test_a_tree_is_indented_lines() -> None:
@@ -52,11 +42,6 @@ def test_a_tree_is_indented_lines() -> None:
         "(joint3 = -82 deg, joint5 = 0 deg, joint2 = 12.5 deg) leave 4 regions of the joint "
         "space, and in each a cell cannot be covered ([4, 1], [4, 0], [0, 0])"
     )
-
-
-def test_a_single_leaf_names_its_cell() -> None:
-    assert sentence(CutTree(Leaf(7)), PUMA, CELLS) == "cell [1, 2] cannot be covered"
-    assert lines(CutTree(Leaf(7)), PUMA, CELLS) == ["Cell [1, 2] cannot be covered."]
 
 
 def test_slides_are_in_millimetres_and_sums_name_their_joints() -> None:

@@ -10,44 +10,28 @@ import puma_oracle
 import pytest
 import referee
 import ur5_oracle
-from asked import STORED, known, question, stored, verdict_of
-from dense_replay import tools
-from oracle_build import built
+from asked import STORED, known, names, question, stored, tables_of, verdict_of
 from oracle_cases import Answer, Problem, net, patch
-from random_cases import TABLE_1, read
-from roll_oracle import Poses, Question, covered, puma, ur5
-from samples import sampled, seeds, spread
+from plain import tools
+from random_cases import built, read
+from samples import sampled, spread
 
 from feasibility import Answer as Said
-from feasibility import CauseKind, Evidence, Search, Task, check, verify
+from feasibility import CauseKind, Evidence
 from robots import load_robot
-from surfaces import plane
 
-KINDS = {"sphere": ((1.0,), (10, 90), (10, 180)), "cylinder": ((0.5,), (-60, 60), (0, 0.9)),
-         "hyperboloid": ((0.5, 0.5), (130, 220), (0, 0.5))}  # fmt: skip
-O = (0.0, 0.0, 0.0)  # noqa: E741
-PAPER = {  # kind, position, cone, limit set, cells of the best component
-    "4d": ("cylinder", O, 45, 3, 60),
-    "4f": ("hyperboloid", O, 45, 4, 6),
-    "4a": ("sphere", O, 45, 1, 90),
-    "4b": ("sphere", O, 45, 2, 90),
-    "4c": ("cylinder", O, 45, 1, 90),
-    "4e": ("hyperboloid", O, 45, 1, 90),
-    "5a": ("sphere", O, 5, 1, 90),
-    "5b": ("sphere", (0.005, 0.0, 0.0), 10, 1, 90),
-    "5c": ("cylinder", (0.0, 0.055, 0.0), 5, 1, 90),
-    "5d": ("cylinder", (0.0, 0.055, 0.0), 10, 1, 90),
-    "5e": ("hyperboloid", (1.095, 0.0, 0.0), 10, 1, 90),
-    "5f": ("hyperboloid", (1.15, 0.0, 0.0), 20, 1, 90),
-}
 ARMS = ("puma560", "ur5", "panda", "kinova", "xarm7", "z1", "so101", "talos_left")
 
 
 def paper_case(name):
-    kind, position, cone, limits, _ = PAPER[name]
-    return Problem(
-        kind, *KINDS[kind], position, O, "inside", (9, 10), 0.005, cone, TABLE_1[limits - 1]
-    )
+    """A published case as the oracles read it."""
+    asked, made = question(name), tables_of(name)["surface"]
+    size = tuple(made[key] for key in ("radius", "flare") if key in made)
+    u, v = (tuple(made[key] if key in made else made[f"{key}_deg"]) for key in "uv")
+    limits = np.degrees(np.column_stack([asked.robot.lower, asked.robot.upper]))
+    pose = tuple(made.get("position", (0.0, 0.0, 0.0))), (0.0, 0.0, 0.0), "inside"
+    work = (9, 10), asked.task.standoff, asked.task.cone_deg
+    return Problem(made["kind"], size, u, v, *pose, *work, tuple(map(tuple, limits)))
 
 
 # The referee.
@@ -121,9 +105,9 @@ def test_the_referee_says_what_is_wrong():
 
 @sampled
 @pytest.mark.parametrize("on", ["patch", "net"])
-@pytest.mark.parametrize("name", spread(list(PAPER), 1))
+@pytest.mark.parametrize("name", spread(names("paper"), 1))
 def test_the_papers_cases_have_their_known_answers(name, on):
-    best = PAPER[name][-1]
+    best = {"paper 4d": 60, "paper 4f": 6}.get(name, 90)
     assert puma_oracle.solve(paper_case(name), on) == Answer(best == 90, best, best)
 
 
@@ -193,7 +177,7 @@ def test_stored_answers_are_the_oracles(arm, oracle):
 
 
 def test_both_domains_hold_the_centres_and_join_the_neighbours():
-    problem = paper_case("4a")
+    problem = paper_case("paper 4a")
     line, grid = net(problem, 5), patch(problem, 3)
     np.testing.assert_allclose(line.uv[line.centres], grid.uv[grid.centres], atol=1e-12)
     assert (len(line.links), len(grid.uv)) == (305 * 5, 90 * 9)
@@ -226,74 +210,3 @@ def test_no_stored_problem_is_answered_wrongly(file):
     most = {"by_a_hair": 1.0, "panda_apart": 0.5, "puma560": 0.0, "ur5": 0.0}.get(file, 0.05)
     assert len(undecided) <= most * len(asked) + 1
     assert len(unproved) <= (0.0 if file in ("puma560", "ur5") else 0.1) * len(asked) + 1
-
-
-# The roll: limits a little narrower than the oracle's cover no more, wider ones no less.
-
-SLACK = np.radians(2.0)
-FIXED_DEG = 0.5
-
-
-def roll_question(arm, seed):
-    """(robot, cells, task, question) at random: a plane, and a roll that is fixed or in a range."""
-    rng = np.random.default_rng([seed, len(arm)])
-    robot = load_robot(arm)
-    near, far = (0.3, 0.7) if arm == "ur5" else (0.5, 1.0)
-    angle, out = rng.uniform(-np.pi, np.pi), rng.uniform(near, far)
-    size = rng.uniform(0.05, 0.25) * (1.0 if arm == "ur5" else 1.5)
-    place = (out * np.cos(angle), out * np.sin(angle), rng.uniform(-0.1, 0.4))
-    turn = (*rng.uniform(-25, 25, 2), rng.uniform(-180, 180))
-    sheet = plane((-size, size), (-size, size), position=place, rpy_deg=turn, side="outside")
-    middle = rng.uniform(-180, 180)
-    half = FIXED_DEG if rng.random() < 0.6 else rng.uniform(2.0, 12.0)
-    task = Task(0.005, FIXED_DEG, roll_deg=(middle - half, middle + half))
-    limits = {}
-    for j in rng.choice(robot.n, rng.integers(0, 4), replace=False):
-        width, centre = rng.uniform(1.5, 4.5), rng.uniform(-1.5, 1.5)
-        low, high = max(robot.lower[j], centre - width / 2), min(robot.upper[j], centre + width / 2)
-        if low < high:
-            limits[robot.joint_names[j]] = (low, high)
-    robot, cells = robot.with_limits(limits), sheet.cells(4, 4)
-    targets = task.targets(cells)
-    # What the cone allows is not the oracle's; of the range of rolls it looks at all but that.
-    rolls = tuple(np.radians([middle - half + FIXED_DEG, middle + half - FIXED_DEG]))
-    rolls = rolls if half > 1.0 else (np.radians(middle),) * 2
-    found = (targets.points, cells.pairs, targets.approaches[0], targets.references[0], rolls)
-    return robot, cells, task, Question(robot, *found)
-
-
-@pytest.mark.parametrize(("arm", "solve"), [("ur5", ur5), ("puma560", puma)])
-def test_the_roll_oracle_knows_every_configuration(arm, solve):
-    robot = load_robot(arm)
-    foreign = plain.arm_of(robot)
-    for q in np.random.default_rng(1).uniform(-3.0, 3.0, (30, robot.n)):
-        placed = foreign.placed(q)[0]
-        found = solve(robot, Poses(placed[None, :3, 3], placed[None, :3, :3]))
-        apart = np.abs((found - q + np.pi) % (2 * np.pi) - np.pi).max(axis=1)
-        assert apart.min() < 1e-6
-        assert len(found) <= 8
-        np.testing.assert_allclose(
-            foreign.placed(found), np.tile(placed, (len(found), 1, 1)), atol=1e-6
-        )
-
-
-@sampled
-@pytest.mark.parametrize("seed", seeds(2, all=50))
-@pytest.mark.parametrize("arm", ["ur5", "puma560"])
-def test_verdicts_on_rolls_agree_with_closed_form_kinematics(arm, seed):
-    """Next to the wrist's singularity half a degree of cone may join more than the oracle sees."""
-    robot, cells, task, asked = roll_question(arm, seed)
-    verdict = check(robot, cells, task, Search(seed=0))
-    if verdict.feasible:
-        assert verify(verdict).holds
-        assert plain.faults_of(verdict) == []
-        bent = np.abs(np.sin(referee.evenly(verdict.witness.q)[:, 4])).min()
-        if bent > np.sin(np.radians(FIXED_DEG)):
-            assert covered(asked, SLACK) == len(cells), verdict.message
-    if verdict.answer is Said.INFEASIBLE:
-        slack = 0.0 if verdict.evidence is Evidence.PROOF else -SLACK
-        assert covered(asked, slack) < len(cells), verdict.message
-    assert verdict.answer is not Said.UNDECIDED, verdict.message
-    low, high = task.roll_deg
-    wider = check(robot, cells, replace(task, roll_deg=(low - 5.0, high + 5.0)))
-    assert verdict.feasible <= wider.feasible

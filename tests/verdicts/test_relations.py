@@ -9,14 +9,14 @@ import numpy as np
 import pinocchio as pin
 import plain
 import pytest
+import tomli_w
 from asked import question, tables_of, verdict_of
 from samples import sampled, seeds, spread
 
-from feasibility import CauseKind, Task, check
+from feasibility import CauseKind, check
 from feasibility.cases import Case
-from feasibility.certification import replay
 from feasibility.collisions import Obstacle
-from feasibility.verdict import Answer, Walk
+from feasibility.verdict import Answer
 from robots import Robot, load_robot
 from surfaces import rotation_from_rpy
 
@@ -57,7 +57,8 @@ def test_one_question_asked_otherwise_has_one_answer(one, other):
     assert one.covered.tolist() == other.covered.tolist()
 
 
-@pytest.mark.parametrize(("one", "other"), NEARLY)
+@sampled
+@pytest.mark.parametrize(("one", "other"), spread(NEARLY, 3))
 def test_cells_that_lie_elsewhere_cover_as_much(one, other):
     one, other = verdict_of(one), verdict_of(other)
     assert (one.answer, one.evidence) == (other.answer, other.evidence)
@@ -81,10 +82,15 @@ def no_less(narrow, wide):
     assert not reached & {cause.cell for cause in lost if cause.proved}
 
 
-@pytest.mark.parametrize(("narrow", "wide"), LESS)
+@sampled
+@pytest.mark.parametrize(("narrow", "wide"), spread(LESS, 8))
 def test_a_question_that_asks_less_loses_nothing(narrow, wide):
     no_less(verdict_of(narrow), verdict_of(wide))
     assert verdict_of(wide).statistics["fk"] <= 5 * verdict_of(narrow).statistics["fk"] + 2000
+
+
+def built(tables):
+    return Case.from_toml(tomli_w.dumps(tables)).build()
 
 
 def wider(tables, what, rng):
@@ -102,23 +108,17 @@ def wider(tables, what, rng):
     return tables | {"robot": robot, "task": task}
 
 
-def asked(tables):
-    import tomli_w
-
-    return check(*Case.from_toml(tomli_w.dumps(tables)).build())
-
-
 @sampled
 @pytest.mark.parametrize("seed", seeds(1, all=3))
 @pytest.mark.parametrize("what", ["limit", "cone", "tolerance"])
-@pytest.mark.parametrize("name", spread(PROBLEMS, 4))
+@pytest.mark.parametrize("name", spread(PROBLEMS, 2))
 def test_what_is_wider_loses_nothing(name, what, seed):
     rng = np.random.default_rng([len(what), int(name.split()[1]), seed])
-    no_less(verdict_of(name), asked(wider(tables_of(name), what, rng)))
+    no_less(verdict_of(name), check(*built(wider(tables_of(name), what, rng))))
 
 
 @sampled
-@pytest.mark.parametrize("name", spread(PROBLEMS, 3))
+@pytest.mark.parametrize("name", spread(PROBLEMS, 2))
 def test_finer_cells_lose_only_new_ones(name):
     """Three times finer both ways: every centre is one of the finer centres."""
     q, coarse = question(name), verdict_of(name)
@@ -132,14 +132,13 @@ def test_finer_cells_lose_only_new_ones(name):
     assert not lost & {int(old[k]) for k in component}
 
 
-def same(one, other, order=None):
-    """The same answer, for the same cells (other's cell order[k] is one's cell k)."""
-    order = np.arange(len(one.cells)) if order is None else order
+def same(one, other):
+    """The same answer, for the same cells."""
     assert one.answer is other.answer
     assert one.n_covered == other.n_covered
     # Two components may cover as many cells: the same sets have to be there.
     mine = {frozenset(component.tolist()) for component in one.components} or {frozenset()}
-    assert frozenset(np.flatnonzero(other.covered[order]).tolist()) in mine
+    assert frozenset(np.flatnonzero(other.covered).tolist()) in mine
     if other.feasible:
         assert plain.faults_of(other) == []
 
@@ -157,32 +156,7 @@ def arm_moved(robot, change):
 
 
 @sampled
-@pytest.mark.parametrize("factor", [0.1, 20.0])
-@pytest.mark.parametrize("name", spread(PROBLEMS, 3))
-def test_a_larger_world_is_no_other(name, factor):
-    q, surface = question(name), dict(tables_of(name)["surface"])
-
-    def grown(placement, first):
-        return pin.SE3(placement.rotation, factor * placement.translation)
-
-    for key in ("radius", "flare", "u", "v", "position"):
-        if key in surface:
-            surface[key] = (factor * np.array(surface[key])).tolist()
-    cells = Case.from_toml(_toml(tables_of(name) | {"surface": surface})).build().cells
-    task = Task(factor * q.task.standoff, q.task.cone_deg, factor * 1e-3)
-    other = check(arm_moved(q.robot, grown), cells, task)
-    assert verdict_of(name).answer is other.answer
-    assert verdict_of(name).n_covered == other.n_covered
-
-
-def _toml(tables):
-    import tomli_w
-
-    return tomli_w.dumps(tables)
-
-
-@sampled
-@pytest.mark.parametrize("name", [*spread(PROBLEMS, 3), "beside a post", "torus"])
+@pytest.mark.parametrize("name", [*spread(PROBLEMS, 2), "beside a post", "torus"])
 def test_moving_all_by_one_rigid_motion_changes_nothing(name):
     """Arm, surface and scene."""
     q, angles, shift = question(name), (0.4, -0.7, 1.9), np.array([0.5, -1.0, 0.3])
@@ -201,27 +175,8 @@ def test_moving_all_by_one_rigid_motion_changes_nothing(name):
     same(verdict_of(name), check(robot, surface.cells(*q.cells.shape), task))
 
 
-@pytest.mark.parametrize("name", ["torus", "4a in halves", "hood as a mesh"])
-def test_a_turn_about_the_first_axis_turns_the_motion(name):
-    """The limits of the first joint go along: the motion found here, turned, is one there."""
-    q, angle = question(name), math.radians(37.0)
-    turned = q.cells.surface.moved(rotation_from_rpy(0.0, 0.0, angle), np.zeros(3))
-    counts = getattr(q.cells, "counts", None) or getattr(q.cells, "shape", None)
-    there = turned.cells(len(q.cells)) if name.endswith("mesh") else (
-        turned.cells(*counts) if isinstance(counts[0], int) else turned.cells(counts)
-    )  # fmt: skip
-    limits = np.column_stack([q.robot.lower, q.robot.upper])
-    limits[0] += angle
-    walk = verdict_of(name).witness
-    along = walk.q.copy()
-    along[:, 0] += angle
-    every = np.ones(len(there), dtype=bool)
-    again = replay(q.robot.with_limits(limits), there, q.task, Walk(along, walk.cell), every)
-    assert again.accepted, again.refusal
-
-
 @sampled
-@pytest.mark.parametrize("name", spread(PROBLEMS, 4))
+@pytest.mark.parametrize("name", spread(PROBLEMS, 2))
 def test_a_mirror_changes_nothing(name):
     """In the plane y = 0: turns run the other way, and one parameter of the surface does."""
     q, tables = question(name), tables_of(name)
@@ -241,29 +196,13 @@ def test_a_mirror_changes_nothing(name):
     surface |= {"position": [x, -y, z], "rpy_deg": [-roll, pitch, -yaw]}
     key = {"plane": "v", "sphere": "v_deg"}.get(kind, "u_deg")
     surface[key] = [-surface[key][1], -surface[key][0]]
-    cells = Case.from_toml(_toml(tables | {"surface": surface})).build().cells
+    cells = built(tables | {"surface": surface}).cells
     order = np.arange(len(cells)).reshape(cells.shape)
     order = (order[:, ::-1] if kind in ("plane", "sphere") else order[::-1]).ravel()
     np.testing.assert_allclose(cells.centres[order], q.cells.centres @ flip, atol=1e-9)
     one, other = verdict_of(name), check(arm, cells, q.task)
     assert one.answer is other.answer
     assert one.n_covered == other.n_covered
-
-
-@pytest.mark.parametrize("limits", ["set-1", "set-3"])
-def test_the_order_of_cells_does_not_decide(limits):
-    """One patch, parametrised upside down."""
-    q = question("paper 4a")
-    robot, task = q.robot.with_limits(limits), Task(standoff=0.005, cone_deg=25)
-    from surfaces import sphere
-
-    one = sphere(1.0, (20, 80), (-30, 150)).cells(5, 7)
-    other = sphere(1.0, (100, 160), (-150, 30), rpy_deg=(180, 0, 0)).cells(5, 7)
-    order = np.arange(35).reshape(5, 7)[::-1, ::-1].ravel()
-    np.testing.assert_allclose(other.centres[order], one.centres, atol=1e-12)
-    one, other = check(robot, one, task), check(robot, other, task)
-    assert (one.answer, one.evidence, one.n_edges) == (other.answer, other.evidence, other.n_edges)
-    np.testing.assert_array_equal(one.covered, other.covered[order])
 
 
 def test_reference_and_range_of_a_roll_turned_together_are_the_same():

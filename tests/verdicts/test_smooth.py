@@ -11,14 +11,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from dense_replay import dense, tools
 from mesh_patches import bent
 from mesh_writers import stl
-from referee import Facets
+from plain import tools
+from referee import Facets, evenly
 
-from coverable_errors import CoverableError
-from feasibility import Task, check, verify
-from feasibility.cases import Case, load_case
+from feasibility import check, verify
+from feasibility.cases import Case
 from feasibility.cli.main import main
 from feasibility.results import load_result
 from surfaces import mesh
@@ -56,7 +55,7 @@ def panel(tmp_path):
 
 def distances(setup, q) -> np.ndarray:
     """(k,) m, of the tool point from the triangles as given, at many places of a motion."""
-    points, _ = tools(setup.robot, dense(q, 5))
+    points, _ = tools(setup.robot, evenly(q, 5))
     vertices, faces = bent(bead, 60, 40)
     return Facets(vertices + setup.cells.surface.position, faces, True).distance(points)
 
@@ -102,17 +101,3 @@ def test_what_a_copy_is_off_is_taken_off_the_tolerance(panel) -> None:
     assert not verify(
         setup.robot, smoothed(lower, 0.3, 0.008).cells(20), setup.task, verdict.witness.q
     ).holds
-
-
-def test_cells_and_task_have_to_agree(panel) -> None:
-    setup = Case.from_toml(TOML, panel.parent).build()
-    with pytest.raises(CoverableError, match="not smoothed"):
-        check(setup.robot, setup.cells, replace(setup.task, smooth=0.3))
-    surface = smoothed(setup.cells.surface, 0.3, 1e-3)
-    task = Task(standoff=STANDOFF, cone_deg=40, smooth=0.3)
-    with pytest.raises(CoverableError, match="another tolerance"):
-        check(setup.robot, surface.cells(20), replace(task, tolerance=0.1))
-    with pytest.raises(CoverableError, match="that is smoothed"):
-        check(setup.robot, surface.cells(20), replace(task, smooth=None))
-    with pytest.raises(CoverableError, match=r"task\.smooth.*meshes"):
-        load_case("paper/4a", ["task.smooth=0.1"])

@@ -11,7 +11,7 @@ from coverable_errors import ArgumentError
 from feasibility import Search, Task, check, verify
 from feasibility.collisions import Collision, Obstacle
 from feasibility.paths import coverage_path
-from robots import Kinematics, RobotError, load_robot
+from robots import Kinematics, load_robot
 from surfaces import plane
 
 UR5 = load_robot("ur5")
@@ -121,12 +121,3 @@ def test_only_what_the_start_leads_to_counts():
         bound = check(replace(arm, start=posture), cells, task)
         assert np.flatnonzero(bound.covered).tolist() == covered.tolist()
         assert bound.answer == free.answer
-
-
-def test_starts_that_fit_no_arm():
-    with pytest.raises(RobotError, match=r"start has shape \(5,\)"):
-        replace(UR5, start=np.zeros(5))
-    with pytest.raises(RobotError, match="start must be finite"):
-        replace(UR5, start=np.full(6, np.nan))
-    with pytest.raises(RobotError, match="start puts joint 'elbow_joint' at 9, outside its limits"):
-        replace(UR5, start=[0, 0, 9, 0, 0, 0])

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import networkx as nx
 import numpy as np
@@ -24,6 +25,8 @@ from feasibility.results import load_result, save_result
 from feasibility.verdict import Walk
 
 TABLE = [name for name in names() if name not in names("dear walls")]
+KEPT = {*spread(TABLE, 48), *names("paper"), *names("bodies"), *names("rolls")}
+TABLE = [name for name in TABLE if name in KEPT]
 OTHERS = [
     name for file, few in STORED.items() for name in (spread(stored(file), few) if few else ())
 ]
@@ -32,7 +35,7 @@ OTHERS.append("puma560 197")  # two of its components cover as many cells
 ALL = TABLE + OTHERS
 WALKED = [name for name in ALL if name not in names("greedy")]
 WORSE = [name for name in WALKED if name not in names("ends")]
-WORSE = sorted({*spread(WORSE, 36), *names("rolls"), *names("bodies")} - {"4a within 15 degrees"})
+WORSE = sorted({*spread(WORSE, 18), *names("rolls"), *names("bodies")} - {"4a within 15 degrees"})
 ANSWERS = HERE / "answers.json"
 SAMPLES = {"hood": 6}  # between rows, where the referee's formula is slow
 
@@ -47,6 +50,7 @@ def every(verdict):
     return np.ones(len(verdict.cells), dtype=bool)
 
 
+@sampled
 @pytest.mark.parametrize("name", TABLE)
 def test_the_answer_is_the_stored_one(name, request):
     """And costs no more than 1.5 times as many evaluations of the arm as when it was stored."""
@@ -224,20 +228,12 @@ def test_a_motion_a_little_worse_is_refused(name):
         judged = replay(robot, verdict.cells, task, walk, every(verdict))
         assert not judged.accepted, what
         if what not in ("clearance",):
-            told = replace_in(verdict, robot, task)
+            told = SimpleNamespace(
+                robot=robot, task=task, cells=verdict.cells, witness=verdict.witness
+            )
             surface = form_of(name)
             assert plain.faults_of(told, walk.q, walk.cell, surface=surface, per_segment=20), what
     assert len(tried) >= (2 if form_of(name) is None else 4) or len(verdict.cells) == 1, tried
-
-
-def replace_in(verdict, robot, task):
-    """The verdict's question with another arm or task, as the referee wants it."""
-
-    class Told:
-        cells, witness = verdict.cells, verdict.witness
-
-    Told.robot, Told.task = robot, task
-    return Told
 
 
 def test_every_way_to_be_worse_is_tried():
@@ -249,7 +245,7 @@ def test_every_way_to_be_worse_is_tried():
 
 
 @sampled
-@pytest.mark.parametrize("name", spread([n for n in WALKED if n not in names("poses")], 50))
+@pytest.mark.parametrize("name", spread([n for n in WALKED if n not in names("poses")], 24))
 def test_the_edges_of_its_graph_are_motions_that_judge_and_referee_accept(name):
     """The search has certified each; where judge and search differ, one of them is wrong."""
     verdict = verdict_of(name)
@@ -282,7 +278,7 @@ def test_the_edges_of_its_graph_are_motions_that_judge_and_referee_accept(name):
 
 @sampled
 @pytest.mark.parametrize("seed", seeds(1, all=3))
-@pytest.mark.parametrize("name", [n for n in spread(WALKED, 16) if n not in names("undecided")])
+@pytest.mark.parametrize("name", [n for n in spread(WALKED, 8) if n not in names("undecided")])
 def test_the_seed_does_not_decide(name, seed):
     asked, first = question(name), verdict_of(name)
     other = check(asked.robot, asked.cells, asked.task, Search(seed=seed + 1))
@@ -294,8 +290,8 @@ def test_the_seed_does_not_decide(name, seed):
 @sampled
 @pytest.mark.parametrize("name", names("hard"))
 def test_what_was_once_answered_wrongly_is_right_with_any_seed(name):
-    for seed in seeds(2, all=10):
-        assert verdict_of(name, seed).answer == known(name)
+    for seed in seeds(1, all=10):
+        assert verdict_of(name, seed or None).answer == known(name)
 
 
 @sampled

@@ -12,11 +12,10 @@ from itertools import pairwise, permutations, product
 import numpy as np
 import pytest
 from cut_verdicts import disconnected_problem
-from dense_replay import assert_motion
 from jobs import coverable
-from oracle_build import built
+from plain import assert_motion
 from random_arms import planar_arm
-from random_cases import draw, draw_ur5
+from random_cases import built, draw
 from samples import sampled, spread
 
 from feasibility import Answer, Search, Task, check
@@ -147,7 +146,7 @@ def test_the_patch_behind_as_a_mesh():
 
 def drawn(arm, number):
     rng = np.random.default_rng([7, number])
-    return built(draw(rng) if arm == "puma560" else draw_ur5(rng), load_robot(arm))
+    return built(draw(rng, arm), load_robot(arm))
 
 
 DRAWN = [("puma560", number) for number in range(22)] + [("ur5", number) for number in range(8)]

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from dense_replay import dense
 from jobs import PLATE, coverable
+from referee import evenly as dense
 from timed_motions import keeps_to_limits
 
 from feasibility import Task, check

@@ -8,8 +8,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from dense_replay import assert_motion, assert_over, dense
 from jobs import PLATE, verdict_named
+from plain import assert_motion, assert_over
+from referee import evenly as dense
 from samples import EVERYTHING, sampled
 from timed_motions import interpolated, keeps_to_limits
 
