@@ -14,7 +14,6 @@ from page_outline import points_of
 from scipy.spatial.transform import Rotation
 
 from feasibility import Answer, Evidence, Search, Task, check
-from feasibility.cases import Case
 from feasibility.placement import (
     Placements,
     Pose,
@@ -27,11 +26,9 @@ from feasibility.placement import (
 )
 from feasibility.placement.evaluator import Margins
 from feasibility.placement.stations import fewest_stations
-from feasibility.studies import Row, open_workers, run_tasks
-from feasibility.studies.file import read_study
+from feasibility.studies import Row
 from feasibility.viewer import poses as pose_layers
-from feasibility.viewer import view_placements, view_study
-from feasibility.viewer.placements import same_frame
+from feasibility.viewer import view_placements
 from feasibility.viewer.poses import (
     COLOURS,
     MOST,
@@ -154,25 +151,20 @@ def test_every_pose_that_is_not_feasible_is_a_dot_where_the_surface_was_tried():
             assert np.ptp(got, axis=1).max() < 0.05
 
 
-@pytest.mark.parametrize(
-    ("share", "kind"),
-    [(1.0, Class.WHOLE), (1 - 1e-12, Class.WHOLE), (0.999, Class.MOST), (0.75, Class.MOST),
-     (0.7499, Class.HALF), (0.5, Class.HALF), (0.4999, Class.SOME), (0.25, Class.SOME),
-     (0.2499, Class.LITTLE), (0.0, Class.LITTLE)],
-)  # fmt: skip
-def test_the_class_of_a_share(share, kind):
-    assert class_of_share(share) is kind
-
-
 def test_whole_shares_are_feasible_only_where_that_was_said():
     """A row that failed has no share; one that ran out of time keeps the share it found."""
-    row = Row({}, "done", {"verdict": "feasible", "share": 1.0}, 0.1)
-    assert class_of_row(row) is Class.FEASIBLE
-    late = {"verdict": "undecided", "share": 1.0}
-    assert class_of_row(replace(row, result=late)) is Class.WHOLE
-    assert class_of_row(replace(row, result={**late, "share": 0.6})) is Class.HALF
-    died = {"verdict": "undecided", "evidence": "budget", "message": "its worker died"}
-    assert class_of_row(replace(row, status="failed", result=died)) is Class.FAILED
+    for least, below, kind in (
+        (1 - 1e-12, 1.0, Class.WHOLE), (0.75, 0.999, Class.MOST), (0.5, 0.7499, Class.HALF),
+        (0.25, 0.4999, Class.SOME), (0.0, 0.2499, Class.LITTLE),
+    ):  # fmt: skip
+        assert class_of_share(least) is class_of_share(below) is kind
+    for status, result, kind in (
+        ("done", {"verdict": "feasible", "share": 1.0}, Class.FEASIBLE),
+        ("done", {"verdict": "undecided", "share": 1.0}, Class.WHOLE),
+        ("done", {"verdict": "undecided", "share": 0.6}, Class.HALF),
+        ("failed", {"verdict": "undecided", "evidence": "budget", "message": "died"}, Class.FAILED),
+    ):
+        assert class_of_row(Row({}, status, result, 0.1)) is kind
 
 
 def test_of_many_poses_some_are_drawn_and_the_legend_says_so():
@@ -293,63 +285,3 @@ def test_stations_are_drawn_where_they_stand():
     assert shown["station 1 (4 cells)"]
     assert shown["station 2 (2 cells)"]
     assert not shown["the best of them"]
-
-
-# -- studies ----------------------------------------------------------------------------------
-
-STUDY = """
-[base.robot]
-name = "ur5"
-[base.surface]
-kind = "plane"
-u = [-0.15, 0.15]
-v = [-0.1, 0.1]
-cells = [3, 2]
-side = "outside"
-[base.task]
-standoff = 0.02
-cone_deg = 30
-[vary]
-robots = ["ur5", "panda"]
-"surface.position" = { x = [0.45, 0.6, 2.0], y = 0, z = 0.2 }
-"surface.rpy_deg".yaw = [0, 45]
-"""
-
-
-@cache
-def decided():
-    study = read_study(STUDY)
-    with open_workers(0) as workers:
-        return study, run_tasks(study.tasks, workers)
-
-
-def test_a_study_is_drawn_for_the_arm_of_its_best_row():
-    """Against a count by hand of the rows of that arm."""
-    study, rows = decided()
-    view = view_study(study.tasks, rows, "s")
-    mine = [row for row in rows if row.parameters["robot"] == view.robot.name]
-    assert len(mine) == 6
-    assert "6 of 12 cases" in view.legend.text
-    feasible = [row for row in mine if row.result["verdict"] == "feasible"]
-    entries = classes_of(view)
-    assert f"feasible ({len(feasible)})" in entries
-    assert sum(int(re.search(r"\((\d+)\)", label)[1]) for label in entries) == 6
-    low = [r for r in mine if r.result["verdict"] != "feasible" and r.result["share"] < 0.25]
-    assert f"less than 25 % ({len(low)})" in entries
-    assert len(low) >= 2
-    best = max(feasible, key=lambda row: row.result["margins"]["limit_deg"])
-    where = {k: best.parameters[f"surface.{k}"] for k in ("position.x", "rpy_deg.yaw")}
-    case = Case.from_toml(
-        re.sub(r"\[base\.(\w+)\]", r"[\1]", STUDY.split("[vary]")[0]),
-        overrides=[f"robot.name={view.robot.name}", f"surface.rpy_deg=[0,0,{where['rpy_deg.yaw']}]",
-                   f"surface.position=[{where['position.x']}, 0, 0.2]"],
-    )  # fmt: skip
-    verdict = check(*case.build())
-    np.testing.assert_array_equal(view.motion.walk, verdict.witness.q)
-
-
-def test_only_the_pose_may_differ_within_a_picture():
-    study, _ = decided()
-    arms = [task.parameters["robot"] for task in study.tasks]
-    for row in (0, 11):
-        assert same_frame(study.tasks, row) == [k for k in range(12) if arms[k] == arms[row]]

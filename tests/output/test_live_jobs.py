@@ -69,15 +69,6 @@ def test_superseded_questions_are_given_up_and_never_answered(sessions, worker):
     assert (first.answer, second.answer) == (None, None)
 
 
-def test_a_page_that_asks_much_has_one_question_waiting(sessions, worker):
-    page = sessions.open()
-    jobs = [sessions.ask(page, number, False, number) for number in range(1, 200)]
-    worker.let(200)
-    assert answer(jobs[-1]) == {"of": 199}
-    assert all(job.answer is None for job in jobs[:-1])
-    assert len(worker.begun) <= 3
-
-
 def test_the_same_number_is_the_same_question_and_an_older_one_is_too_late(sessions, worker):
     page = sessions.open()
     job = sessions.ask(page, 5, True, "now")

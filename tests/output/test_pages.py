@@ -23,7 +23,8 @@ from feasibility.viewer import view, view_division, view_placements
 from feasibility.viewer.robot import joint_paths
 
 PAGES = [(command, name) for command, name in COMMANDS if "--html" in TABLE[command][name]]
-PAGES = [one for one in PAGES if one[0] != "show" and one != ("path", "infeasible")]
+ALIKE = ("path", "infeasible"), ("check", "no motion to write")  # as within that of `explain`
+PAGES = [one for one in PAGES if one[0] != "show" and one not in ALIKE]
 EVIL = '</script><script>alert(1)</script><img src=x onerror="alert(2)">/__proto__'
 
 

@@ -2,35 +2,16 @@
 
 from __future__ import annotations
 
-import io
-import json
-import zipfile
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from command_table import forged
 
 from feasibility import Answer, Evidence, NothingToVerifyError, check, verify
 from feasibility.cases import load_case
 from feasibility.cut_tree import CutTree, Leaf
 from feasibility.results import ResultError, load_result, save_result
-
-
-def forged(path, text=str, task=None, **arrays):
-    """The same result file with another text of its case, a second statement of it, or arrays."""
-    with zipfile.ZipFile(path) as file:
-        members = {name: file.read(name) for name in file.namelist()}
-    meta = json.loads(members["meta.json"])
-    meta["case"]["toml"] = text(meta["case"]["toml"])
-    members["meta.json"] = json.dumps(meta | ({} if task is None else {"task": task})).encode()
-    for name, change in arrays.items():
-        buffer = io.BytesIO()
-        np.save(buffer, change(np.load(io.BytesIO(members[f"{name}.npy"]))))
-        members[f"{name}.npy"] = buffer.getvalue()
-    with zipfile.ZipFile(f"{path}.forged", "w") as file:
-        for name, data in members.items():
-            file.writestr(name, data)
-    return f"{path}.forged"
 
 
 @pytest.fixture(scope="module")
@@ -149,16 +130,6 @@ def test_what_a_tree_was_not_judged_in_is_named_and_does_not_hold(kept, said, de
     assert answer.status == 1
     assert words in answer.out or demanded == "coverage"
     assert "collisions are not checked" in answer.out
-
-
-def test_half_of_a_motion_reaches_half_of_the_cells(commands, ask, tmp_path):
-    commands.run("check", "files")
-    lines = (commands.folder / "walk.csv").read_text().splitlines()
-    (tmp_path / "half.csv").write_text("\n".join(lines[: len(lines) // 2]) + "\n")
-    case = commands.folder / "plate.toml"
-    answer = json.loads(ask("verify", case, tmp_path / "half.csv", "--json").out)
-    assert len(answer["missed"]) == 6 - answer["reached"] > 0
-    assert "never reached" in answer["refusals"][0]["text"]
 
 
 def test_verify_in_python(kept):

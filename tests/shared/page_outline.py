@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 import umsgpack
 
+READ_OUT = re.compile(r" \| (deg|mm) \|$")
+ALIKE = r"/robot/.*(link |frame of|flange to)|/ground|/root frame"
 SMALL = 1e-4  # [m], so that a box at half a centimetre is rounded the same way everywhere
 
 
@@ -39,6 +41,16 @@ def tracks_of(commands: Any) -> dict[tuple[str, str], tuple[np.ndarray, Any]]:
                     values = np.frombuffer(values.data, "<f4").astype(float)
                 times = np.frombuffer(keys["times"].data, "<f4").astype(float)
                 found[part["path"], keys["name"]] = times, values
+    return found
+
+
+def unpacked(data: bytes) -> list[dict[str, Any]]:
+    """Commands to the viewer, each after its length."""
+    found, at = [], 0
+    while at < len(data):
+        length = int.from_bytes(data[at : at + 4], "little")
+        found.append(umsgpack.unpackb(data[at + 4 : at + 4 + length]))
+        at += 4 + length
     return found
 
 
@@ -97,19 +109,17 @@ class Page(HTMLParser):
     @property
     def commands(self) -> list[dict[str, Any]]:
         """Of the scene, in their order."""
-        data, found, at = self.block("commands"), [], 0
-        while at < len(data):
-            length = int.from_bytes(data[at : at + 4], "little")
-            found.append(umsgpack.unpackb(data[at + 4 : at + 4 + length]))
-            at += 4 + length
-        return found
+        return unpacked(self.block("commands"))
 
     def outline(self) -> str:
         """Texts, tables and legend; of objects their boxes to 1 cm; what moves."""
         self._end()
-        lines = [f"tags: {', '.join(sorted(set(self.tags)))}", *self.lines]
+        lines = [f"tags: {', '.join(sorted(set(self.tags)))}"]
+        for line in self.lines:  # of the read-out in one
+            joined = READ_OUT.search(line) and READ_OUT.search(lines[-1])
+            lines[-1:] = [f"{lines[-1]} {line}"] if joined else [lines[-1], line]
         if 'id="commands"' in self.text:
-            lines += ["", *scene_outline(self.commands)]
+            lines += scene_outline(self.commands)
         for frame in self.frames:
             lines += ["", "in a frame:", frame.outline()]
         return "\n".join(lines)
@@ -118,11 +128,11 @@ class Page(HTMLParser):
 def scene_outline(commands: Any) -> list[str]:
     """A line for each object, those that only differ in a number at the end together.
 
-    The arm itself, which is drawn alike everywhere, is left out.
+    The arm, the ground and frames, which are drawn alike everywhere, are left out.
     """
     boxes: dict[str, list[np.ndarray]] = {}
     for one in commands:
-        if one["type"] == "set_object" and not re.match(r"/robot/.*link ", one["path"]):
+        if one["type"] == "set_object" and not re.match(ALIKE, one["path"]):
             boxes.setdefault(re.sub(r"\d+$", "#", one["path"]), []).append(points_of(one))
     lines = []
     for path, parts in boxes.items():
@@ -133,7 +143,7 @@ def scene_outline(commands: Any) -> list[str]:
         lines.append(f"{_short(path)}: {box}")
     parts = [(p, n) for p, n in tracks_of(commands) if not p.startswith("/robot")]
     moving = dict.fromkeys(f"{_short(re.sub('[0-9]+$', '#', p))} {n}" for p, n in parts)
-    return [*lines, *(f"moves: {one}" for one in moving)]
+    return [*lines, *([f"moves: {'; '.join(moving)}"] if moving else [])]
 
 
 def _short(path: str) -> str:

@@ -116,15 +116,14 @@ CERTIFICATE = {
     "max_angle_deg": of(deg("max_angle"), Maybe(float)),
     "max_roll_deg": of(deg("max_roll"), Perhaps(float)),
     "max_speed_m_per_s": of("max_speed", Perhaps(Maybe(float))),
-    "stops_in_place": of("stops_in_place", Perhaps(int)),
-    "corners": of("corners", Perhaps(int)),
+    "stops_in_place": of("stops_in_place", Perhaps(int)), "corners": of("corners", Perhaps(int)),
     "min_singular_value": of("min_singular_value", Perhaps(float)),
-}
+}  # fmt: skip
 CLEARANCE = {
     "min_clearance_m": of("min_clearance", Perhaps(float)),
     "measured_clearance_m": of("measured_clearance", Perhaps(float)),
     "nearest_pair": of("nearest_pair", Perhaps([str])),
-}
+}  # fmt: skip
 OF_MOTION = {
     **CERTIFICATE, "min_limit_margin_deg": of("limit_margin_deg", Maybe(float)), **CLEARANCE,
 }  # fmt: skip
@@ -139,7 +138,7 @@ CAUSE = {
     "detail": of(lambda one: one[0].detail, str),
     "pair": of(lambda one: one[0].pair, Perhaps([str])),
     "clearance_m": of(lambda one: one[0].clearance, Perhaps(float)),
-}
+}  # fmt: skip
 
 
 def causes(name: str) -> Of:
@@ -153,7 +152,7 @@ PROOF = {
         lambda one: {one[1].robot.joint_names[j]: value for j, value in one[0].opened}, Named(float)
     ),
     "tree": of(lambda one: (one[0].root, one[1]), ProofTree()),
-}
+}  # fmt: skip
 
 
 def proof(of_whom: Any) -> Any:
@@ -162,11 +161,8 @@ def proof(of_whom: Any) -> Any:
 
 
 TREATED = of("treated", Maybe({
-    "lower": of("lower", float),
-    "upper": of("upper", float),
-    "twice": of("twice", float),
-    "area_m2": of("area", float),
-    "footprint_m": of("footprint", [float]),
+    "lower": of("lower", float), "upper": of("upper", float), "twice": of("twice", float),
+    "area_m2": of("area", float), "footprint_m": of("footprint", [float]),
     "untreated": of("untreated", [{
         "centre": of(lambda one: one.centre.tolist(), [float]), "area_m2": of("area", float),
     }]),
@@ -191,29 +187,22 @@ CHECK = {
     "cells": of(lambda one: len(one.cells), int),
     "covered": of(lambda one: int(one.covered.sum()), int),
     "edges": of(lambda one: one.graph.number_of_edges(), int),
-    "uncovered": causes("causes"),
-    "certificate": of(measured, Maybe(OF_MOTION)),
-    "collisions": COLLISIONS,
-    "unchecked_links": of("unchecked_links", [str]),
+    "uncovered": causes("causes"), "certificate": of(measured, Maybe(OF_MOTION)),
+    "collisions": COLLISIONS, "unchecked_links": of("unchecked_links", [str]),
     "pairs_left_out": of("pairs_left_out", [{
         "pair": of(lambda one: [one.first, one.second], [str]),
-        "why": of("why", str),
-        "rate": of("rate", Perhaps(float)),
+        "why": of("why", str), "rate": of("rate", Perhaps(float)),
     }]),
-    "proof": of(proof, Maybe(PROOF)),
-    "treated": TREATED,
-    "timing": SECONDS,
-    "robot": of("robot.name", str),
-    "method": of("method", OneOf("complete", "greedy")),
-    "seed": of("seed", int),
-    "version": str,
+    "proof": of(proof, Maybe(PROOF)), "treated": TREATED, "timing": SECONDS,
+    "robot": of("robot.name", str), "method": of("method", OneOf("complete", "greedy")),
+    "seed": of("seed", int), "version": str,
     "message": str,  # beyond CONTRACT: what was found, in sentences
 }  # fmt: skip
 WITNESS = {
     "joints": of("robot.joint_names", [str]),
     "q": of(lambda one: one.witness.q.tolist(), [[float]]),
     "cell": of(lambda one: [None if k < 0 else int(k) for k in one.witness.cell], [Maybe(int)]),
-}
+}  # fmt: skip
 VERIFY = {
     "verdict": of(
         lambda one: "does not hold" if one.faults else "holds", OneOf("holds", "does not hold")
@@ -230,11 +219,9 @@ VERIFY = {
         "share": of(lambda one: None if one.row < 0 else one.share, Maybe(float)),
         "text": of("text", str),
     }]),
-    "certificate": of(measured, Maybe(OF_MOTION)),
-    "proof": of(proof, Maybe(PROOF)),
+    "certificate": of(measured, Maybe(OF_MOTION)), "proof": of(proof, Maybe(PROOF)),
     "boxes": of(lambda one: None if one.proof is None else one.boxes, Maybe(int)),
-    "treated": TREATED,
-    "not_judged": of("not_judged", [str]),
+    "treated": TREATED, "not_judged": of("not_judged", [str]),
     "in_time": of(lambda one: not one.late, bool),
     "collisions": of(
         lambda one: [] if "collisions" in one.not_judged else checked(one), [str]
@@ -264,19 +251,15 @@ TRAJECTORY = {
         "velocity": by_joint(lambda one: one.limits.velocity),
         "acceleration": by_joint(lambda one: one.limits.acceleration),
     },
-}
+}  # fmt: skip
 LAYOUT = {
     "count": of("count", int),
     "stretches": of(lambda one: len(one.stretches), int),
-    "by": of("by", str),
-    "pitch_m": of("pitch", float),
-    "spacing_m": of("spacing", float),
-    "widest_m": of("widest", float),
-    "length_m": of("length", float),
-    "dropped_m": of("dropped", float),
-    "beyond_border_m": of("beyond_border", float),
+    "by": of("by", str), "pitch_m": of("pitch", float), "spacing_m": of("spacing", float),
+    "widest_m": of("widest", float), "length_m": of("length", float),
+    "dropped_m": of("dropped", float), "beyond_border_m": of("beyond_border", float),
     "notes": [str],
-}
+}  # fmt: skip
 
 
 def travel(one: Any) -> dict[str, dict[str, float]]:
@@ -289,8 +272,7 @@ def travel(one: Any) -> dict[str, dict[str, float]]:
 
 
 PATH = {
-    "verdict": OneOf("feasible"),
-    "order": of("path.order", str),
+    "verdict": OneOf("feasible"), "order": of("path.order", str),
     "cells": of(lambda one: int(one.path.needed.sum()), int),
     "visits": of(lambda one: [int(k) for k in one.path.walk.cell if k >= 0], [int]),
     "length_m": of("path.figures.length", float),
@@ -307,18 +289,14 @@ PATH = {
         "singular_value": of("singular_value", Maybe(float)),
     }),
     "certificate": of("path.certificate", {**CERTIFICATE, **CLEARANCE}),
-    "treated": TREATED,
-    "passes": of("passes", Maybe(LAYOUT)),
-    "trajectory": TRAJECTORY,
+    "treated": TREATED, "passes": of("passes", Maybe(LAYOUT)), "trajectory": TRAJECTORY,
     "rates": of(lambda one: one.rates and one, Perhaps({
-        "holds": of("rates.accepted", bool),
-        "why_not": of("rates.refusals", [str]),
+        "holds": of("rates.accepted", bool), "why_not": of("rates.refusals", [str]),
         "speed_m_per_s": of("path.task.speed", Perhaps(float)),
         "stops": of("rates.stops", [{
             "why": of("why", str), "cell": [int],
         }]),
-        "waiting_s": of("rates.waiting", float),
-        "share_at_speed": float,
+        "waiting_s": of("rates.waiting", float), "share_at_speed": float,
         "min_singular_value": of("rates.sigma", float),
     })),
     "ends": of("ends", Perhaps({
@@ -327,13 +305,11 @@ PATH = {
         "exit": of(lambda one: one.exit.tolist(), [[float]]),
     })),
     "collisions": of(lambda one: checked(one.path), [str]),
-    "robot": of("path.robot.name", str),
-    "version": str,
+    "robot": of("path.robot.name", str), "version": str,
 }  # fmt: skip
 RUNS = {
     "verdict": of("along.verdict.answer", OneOf("infeasible", "undecided")),
-    "evidence": of("along.verdict.evidence", str),
-    "message": of("along.verdict.message", str),
+    "evidence": of("along.verdict.evidence", str), "message": of("along.verdict.message", str),
     "passes": of("along.passes", LAYOUT),
     "runs": of(lambda one: [(run, timed, one.found) for run, timed in
                             zip(one.found.runs, one.timed, strict=True)], [{
@@ -365,11 +341,9 @@ RUNS = {
         "stretches": of(lambda one: [1 + k for k in one.stretches], [int]),
         "length_m": of("length", float), "cause": of("cause", str), "proved": of("proved", bool),
     }]),
-    "refused": of("found.refusals", [str]),
-    "treated": TREATED,
+    "refused": of("found.refusals", [str]), "treated": TREATED,
     "collisions": of(lambda one: checked(one.along), [str]),
-    "robot": of("found.robot.name", str),
-    "version": str,
+    "robot": of("found.robot.name", str), "version": str,
 }  # fmt: skip
 NO_PATH = {**CHECK, "trajectory": Maybe(dict)}
 
@@ -401,8 +375,7 @@ PLAN = {
         "end": of(lambda one: one[2].fewest.patches[one[0] + 1].walk.q[0].tolist(), [float]),
         "waypoints": of(lambda one: one[1].waypoints.tolist(), [[float]]),
         "refusal": of(lambda one: one[1].refusal or None, Maybe(str)),
-        "min_clearance_m": Perhaps(Maybe(float)),
-        "measured_clearance_m": Perhaps(Maybe(float)),
+        "min_clearance_m": Perhaps(Maybe(float)), "measured_clearance_m": Perhaps(Maybe(float)),
         "nearest_pair": Perhaps([str]),
         "joints": of(lambda one: joints_moved(one[1]), [Same()]),
     }]),
@@ -416,23 +389,17 @@ DIVIDE = {
     "covered": of(lambda one: len({k for p in one.fewest.patches for k in p.cells.tolist()}), int),
     "ended": of("ended", bool),
     **PLAN,
-    "proved_at_least": of("at_least", int),
-    "proof": of(proof, Maybe(PROOF)),
+    "proved_at_least": of("at_least", int), "proof": of(proof, Maybe(PROOF)),
     "apart": of(lambda one: [(part, one) for part in one.apart], [{
         "cells": of(lambda one: [index(one[1].cells, one[0].cell),
                                  index(one[1].cells, one[0].other)], [[int]]),
         "proof": of(lambda one: (one[0].proof, one[1]), Maybe(PROOF)),
     }]),
-    "connected": Maybe(dict),
-    "left_out": causes("left_out"),
+    "connected": Maybe(dict), "left_out": causes("left_out"),
     "unsettled": of(lambda one: [index(one.cells, k) for k in one.unsettled], [[int]]),
-    "collisions": COLLISIONS,
-    "lacking": of("lacking", Maybe(str)),
-    "message": of("message", str),
+    "collisions": COLLISIONS, "lacking": of("lacking", Maybe(str)), "message": of("message", str),
     "timing": {"load_s": float, "search_s": float, "divide_s": float, "total_s": float},
-    "robot": of("robot.name", str),
-    "seed": of("seed", int),
-    "version": str,
+    "robot": of("robot.name", str), "seed": of("seed", int), "version": str,
 }  # fmt: skip
 
 
@@ -458,24 +425,17 @@ def finding(get: Callable[[Any], Any]) -> Of:
 
 
 EXPLAIN = {
-    "case": str,
-    "verdict": of("verdict.answer", str),
-    "evidence": of("verdict.evidence", str),
+    "case": str, "verdict": of("verdict.answer", str), "evidence": of("verdict.evidence", str),
     "cells": of(lambda one: len(one.verdict.cells), int),
     "covered": of(lambda one: int(one.verdict.covered.sum()), int),
     "thresholds": of("thresholds", [{
-        "quantity": of("quantity.name", str),
-        "key": str,
-        "kind": of("quantity.kind", str),
+        "quantity": of("quantity.name", str), "key": str, "kind": of("quantity.kind", str),
         "given": Number(lambda one: (one.quantity, one.quantity.given)),
         "furthest": Number(lambda one: (one.quantity, one.quantity.end)),
         "resolution": Number(lambda one: (one.quantity, one.resolution)),
         "feasible": finding(lambda one: one.feasible),
         "other": finding(lambda one: one.other),
-        "until": Maybe(dict),
-        "tried": of("tried", str),
-        "opens": Maybe(str),
-        "sentence": str,
+        "until": Maybe(dict), "tried": of("tried", str), "opens": Maybe(str), "sentence": str,
     }]),
     "useful": {"sentence": str, "set": [str]},
     "pair": Maybe([dict]),
@@ -496,11 +456,8 @@ EXPLAIN = {
         "waypoints": of(lambda one: one[0].waypoints, Maybe(int)),
     })),
     "collisions": of(lambda one: checked(one.verdict), [str]),
-    "evaluations": int,
-    "seconds": float,
-    "robot": of("verdict.robot.name", str),
-    "seed": of("verdict.seed", int),
-    "version": str,
+    "evaluations": int, "seconds": float, "robot": of("verdict.robot.name", str),
+    "seed": of("verdict.seed", int), "version": str,
 }  # fmt: skip
 TRIAL = {
     "position": of(lambda one: list(one.pose.position), [float]),
@@ -511,15 +468,12 @@ TRIAL = {
         "margins", Maybe({name: of(name, float) for name in ("limits", "cone", "reach")})
     ),
     "cells": of(lambda one: one.covers.shape[1], int),
-    "verdict": of("answer", Maybe(str)),
-    "evidence": of("evidence", Maybe(str)),
-    "message": of("message", str),
-    "causes": of("causes", Named(int)),
-}
+    "verdict": of("answer", Maybe(str)), "evidence": of("evidence", Maybe(str)),
+    "message": of("message", str), "causes": of("causes", Named(int)),
+}  # fmt: skip
 SEARCHED = ("search", "check")
 PLACE = {
-    "answer": of("found.answer", str),
-    "evidence": of("found.evidence", str),
+    "answer": of("found.answer", str), "evidence": of("found.evidence", str),
     "message": of("found.message", str),
     "region": of(
         lambda one: dict(zip(("x", "y", "z", "roll_deg", "pitch_deg", "yaw_deg"),
@@ -533,11 +487,9 @@ PLACE = {
                 if one.found.best is not None and one.found.best.stage in SEARCHED else None,
                 Maybe(float)),
     "collisions": of(lambda one: checked(one.found), [str]),
-    "cause": of("found.cause", Maybe(str)),
-    "causes": of("found.causes", Named(int)),
+    "cause": of("found.cause", Maybe(str)), "causes": of("found.causes", Named(int)),
     "stations": of("plan", Maybe({
-        "optimal": of("stations.optimal", bool),
-        "at_least": of("stations.bound", int),
+        "optimal": of("stations.optimal", bool), "at_least": of("stations.bound", int),
         "left_out": of(lambda one: one.stations.left_out.tolist(), [int]),
         "not_judged": of("not_judged", [str]),
         "stations": of(lambda one: list(zip(one.stations.stations, one.trials, one.refusals,
@@ -548,15 +500,11 @@ PLACE = {
             "certified": of(lambda one: not one[2], bool),
         }]),
     })),
-    "map": Maybe(dict),
-    "statistics": of("found.statistics", Named(int)),
-    "timing": Named(float),
-    "robot": of("found.robot.name", str),
-    "version": str,
+    "map": Maybe(dict), "statistics": of("found.statistics", Named(int)), "timing": Named(float),
+    "robot": of("found.robot.name", str), "version": str,
 }  # fmt: skip
 STUDY = {
-    "study": str,
-    "description": str,
+    "study": str, "description": str,
     "parameters": of(lambda one: list(one.study.labels), [str]),
     "collisions": [str],
     "tasks": of(lambda one: len(one.rows), int),
@@ -578,7 +526,7 @@ COMPARE = {
     "robots": of("arms", [{**{name: of(name, Same()) for name in ARM}, "seconds": float}]),
     "ranking": of(lambda one: [arm.robot for arm in one.ranked], [str]),
     "version": str,
-}
+}  # fmt: skip
 
 
 def close(value: Any, source: Any) -> bool:
