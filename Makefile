@@ -76,7 +76,7 @@ wheel: .venv/installed
 
 # Installs nothing: it needs the extra `browser`, and a Chromium on the path or named by CHROMIUM.
 test-browser:
-	$(BIN)/python -m pytest -rP -p no:nbmake tests/browser/test_live_in_browser.py
+	$(BIN)/python -m pytest -rP -p no:nbmake tests/browser
 
 campaign: .venv/installed
 	$(BIN)/python -m pytest -n 2 --dist loadfile -rP -p no:nbmake -m sampled --samples=all -k "$(NAME)" tests
