@@ -206,6 +206,9 @@ class _Schedule:
                 self.suspects.appendleft(index)
             return error if isinstance(error, broken) else None
         except Exception as error:  # what the tasks themselves raise comes as a reply
+            if self.workers.broken:  # Dask stumbles over its own cancelled tasks
+                self.suspects.appendleft(index)
+                return error
             raise WorkersError(
                 f"the workers cannot run the tasks ({one_line(error)}); what was finished is "
                 "kept: see that they have the same coverable installed"
