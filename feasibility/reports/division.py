@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -27,9 +27,6 @@ from feasibility.reports.verdict import causes_listed
 from feasibility.results import plain
 from feasibility.version import version
 from surfaces import Cells
-
-if TYPE_CHECKING:
-    pass
 
 PHASES = {"search_s": "search", "divide_s": "division"}
 STATUS = {"complete": 0, "partial": 1, "undecided": 3}

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from arm_urdfs import FREE, joint
 from bounds import holds
 from plain import tools
 from random_arms import QUESTIONS, finite_limits, planar_arm, robot_of
-from search_kernels import Motions
+from search_kernels import Motions, assert_walked
 
 from coverable_arrays import unit_along
 from feasibility import Search, Task, check
 from feasibility.certification import replay
 from feasibility.roadmap import (
-    NODES,
     Exploration,
     arrays_of,
     close,
@@ -184,20 +181,6 @@ def refusal(robot, cells, task, q, first, last):
     marks = np.full(len(q), -1)
     marks[0], marks[-1] = first, last
     return replay(robot, cells, task, Walk(q, marks), np.zeros(len(cells), dtype=bool)).refusal
-
-
-def assert_walked(roadmap, walk):
-    """Only steps of stored motions, and marks where nodes are; returns the cells in order."""
-    steps = set()
-    for e in range(int(roadmap.counters[EDGES])):
-        motion = [tuple(q) for q in edge_motion(roadmap, e)]
-        steps |= set(pairwise(motion)) | set(pairwise(motion[::-1]))
-    used = int(roadmap.counters[NODES])
-    nodes = {tuple(roadmap.q[x]): int(roadmap.cell[x]) for x in range(used)}
-    rows = [tuple(q) for q in walk.q]
-    assert set(pairwise(rows)) <= steps
-    assert [nodes.get(row, -1) for row in rows] == walk.cell.tolist()
-    return walk.cell[walk.cell >= 0].tolist()
 
 
 @pytest.mark.parametrize("name", QUESTIONS)

@@ -11,22 +11,14 @@ from collections.abc import Iterator
 from functools import cache, partial
 from typing import Any, NamedTuple
 
+from small_cases import TEXTS as SMALL
+
 from feasibility import Verdict, check
 from feasibility.cases import Case
 from feasibility.cli.main import main
 from feasibility.clock import Clock, OutOfTime
 
-PLATE = """
-robot.name = "ur5"
-surface.kind = "plane"
-surface.u = [0.4, 0.6]
-surface.v = [-0.1, 0.1]
-surface.cells = [3, 4]
-surface.position = [0, 0, 0.3]
-surface.side = "outside"
-task.standoff = 0.02
-task.cone_deg = 30
-"""  # feasible; keys can follow
+PLATE = SMALL["plate"]
 TEXTS = {
     "plate": PLATE,
     # begins within reach and ends outside: proved infeasible

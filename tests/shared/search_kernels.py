@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,11 +18,21 @@ from feasibility.collisions import (
     nearest,
     segment_clear,
 )
-from feasibility.roadmap import Ruling, arrays_of, margin_shares, root_box, rule, work_for
+from feasibility.roadmap import (
+    NODES,
+    Ruling,
+    arrays_of,
+    edge_motion,
+    margin_shares,
+    root_box,
+    rule,
+    work_for,
+)
 from feasibility.roadmap.branch_and_bound.box_bounds import static_levers
 from feasibility.roadmap.branch_and_bound.box_contraction import shrink
 from feasibility.roadmap.branch_and_bound.boxes import Slabs, box_work
 from feasibility.roadmap.branch_and_bound.branching import DIRECTIONS
+from feasibility.roadmap.graph import EDGES
 from feasibility.roadmap.motions import project_near_cell, segment_holds
 from feasibility.roadmap.motions.aiming import aim, bounds_between, stand_still
 from feasibility.roadmap.motions.projection import project
@@ -186,3 +197,17 @@ def contracted(
     static_levers(arrays, space.longest)
     code, _ = shrink(arrays, work_for(n), places, part, slabs, DIRECTIONS, space, low, high)
     return code != 1, low, high
+
+
+def assert_walked(roadmap: Any, walk: Any) -> list[int]:
+    """Only steps of stored motions, and marks where nodes are; returns the cells in order."""
+    steps = set()
+    for e in range(int(roadmap.counters[EDGES])):
+        motion = [tuple(q) for q in edge_motion(roadmap, e)]
+        steps |= set(pairwise(motion)) | set(pairwise(motion[::-1]))
+    used = int(roadmap.counters[NODES])
+    nodes = {tuple(roadmap.q[x]): int(roadmap.cell[x]) for x in range(used)}
+    rows = [tuple(q) for q in walk.q]
+    assert set(pairwise(rows)) <= steps
+    assert [nodes.get(row, -1) for row in rows] == walk.cell.tolist()
+    return walk.cell[walk.cell >= 0].tolist()

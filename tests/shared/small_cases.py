@@ -10,16 +10,16 @@ from feasibility.cases import Case
 TEXTS = {
     # ur5 above a small plate: feasible; keys can follow
     "plate": """
-        robot.name = "ur5"
-        surface.kind = "plane"
-        surface.u = [0.4, 0.6]
-        surface.v = [-0.1, 0.1]
-        surface.cells = [3, 4]
-        surface.position = [0, 0, 0.3]
-        surface.side = "outside"
-        task.standoff = 0.02
-        task.cone_deg = 30
-    """,
+robot.name = "ur5"
+surface.kind = "plane"
+surface.u = [0.4, 0.6]
+surface.v = [-0.1, 0.1]
+surface.cells = [3, 4]
+surface.position = [0, 0, 0.3]
+surface.side = "outside"
+task.standoff = 0.02
+task.cone_deg = 30
+""",
     # a plate that begins within reach and ends outside: proved infeasible
     "long plate": """
         robot = { name = "ur5" }

@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import networkx as nx
 import numpy as np
 import pytest
 from asked import question
 from samples import sampled, seeds
+from search_kernels import assert_walked
 
 from feasibility.roadmap import (
-    NODES,
     Exploration,
     arrays_of,
     close,
     covering_walk,
-    edge_motion,
     explore,
     work_for,
 )
 from feasibility.roadmap.graph import (
     COMPONENTS,
-    EDGES,
     WAYPOINTS,
     add_edge,
     add_node,
@@ -58,25 +54,10 @@ def roadmap_of(graph, cells, cell_of=None, rng=None):
     return roadmap, slot_of
 
 
-def check_walk(roadmap, walk):
-    """Only steps of stored motions, and marks where nodes are; returns the cells in order."""
-    steps = set()
-    for e in range(int(roadmap.counters[EDGES])):
-        motion = [tuple(q) for q in edge_motion(roadmap, e)]
-        steps |= set(pairwise(motion)) | set(pairwise(motion[::-1]))
-    used = int(roadmap.counters[NODES])
-    nodes = {tuple(roadmap.q[x]): int(roadmap.cell[x]) for x in range(used)}
-    rows = [tuple(q) for q in walk.q]
-    assert set(pairwise(rows)) <= steps
-    for row, cell in zip(rows, walk.cell, strict=True):
-        assert nodes.get(row, -1) == cell
-    return walk.cell[walk.cell >= 0].tolist()
-
-
 def visits(graph, cells, **options):
     """The cells that the walk of a connected graph visits, in order; all of them."""
     roadmap, _ = roadmap_of(graph, cells, **options)
-    order = check_walk(roadmap, covering_walk(roadmap, 0))
+    order = assert_walked(roadmap, covering_walk(roadmap, 0))
     assert set(order) == set(range(cells))
     return order
 
@@ -127,7 +108,7 @@ def test_several_nodes_over_one_cell(seed):
     cell_of = np.concatenate([np.arange(cells), rng.integers(0, cells, n - cells)])
     tree = nx.Graph([(k, int(rng.integers(max(0, k - 6), k))) for k in range(1, n)])
     roadmap, _ = roadmap_of(tree, cells, cell_of=cell_of, rng=rng)
-    order = check_walk(roadmap, covering_walk(roadmap, 0))
+    order = assert_walked(roadmap, covering_walk(roadmap, 0))
     assert set(order) == set(range(cells))
     assert len(order) <= 2 * (n - 1) + 1
 
@@ -137,7 +118,7 @@ def test_only_the_component_asked_for():
     graph = nx.disjoint_union_all([nx.path_graph(4), nx.path_graph(5), nx.empty_graph(1)])
     roadmap, slot_of = roadmap_of(graph, 10)
     for first, expected in ((0, range(4)), (4, range(4, 9)), (9, range(9, 10))):
-        order = check_walk(roadmap, covering_walk(roadmap, slot_of[first]))
+        order = assert_walked(roadmap, covering_walk(roadmap, slot_of[first]))
         assert sorted(order) == list(expected)
 
 
@@ -147,7 +128,7 @@ def test_a_component_that_is_not_connected_gives_no_covering_walk():
     roadmap, _ = roadmap_of(graph, 6)
     roadmap.component[:6] = 0
     roadmap.cover[0, :6] = 1
-    order = check_walk(roadmap, covering_walk(roadmap, 0))
+    order = assert_walked(roadmap, covering_walk(roadmap, 0))
     assert set(order) != set(range(6))
 
 
@@ -158,6 +139,6 @@ def test_the_walk_of_a_search(name):
     exploration = Exploration(robot, cells, arrays_of(robot, cells, task), 0)
     explore(exploration)
     close(exploration)
-    order = check_walk(exploration.roadmap, covering_walk(exploration.roadmap, exploration.best))
+    order = assert_walked(exploration.roadmap, covering_walk(exploration.roadmap, exploration.best))
     assert set(order) == set(range(len(cells)))
     assert len(order) <= 1.4 * len(cells)

@@ -1,4 +1,4 @@
-"""Pictures of areas: certified, and treated once, more often or not at all."""
+"""Pictures of areas: treated once, more often or not at all."""
 
 from lazy_loader import attach_stub
 
