@@ -1,6 +1,6 @@
 """Any bytes in any file: one error with its faults, or a value that is sound and comes back.
 
-`tests/shared/readers.py` has the readers, their good files, and what a sound value is.
+`tests/shared/files/readers.py` has the readers, their good files, and what a sound value is.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import tomli_w
 from bad_input import GOOD_CASE, changed, goods, lay_out
-from small_cases import TEXTS
+from jobs import TEXTS
 
 from feasibility import Search, Task
 from feasibility.cases import Case, CaseError, builtin_cases, load_case, unit_notes

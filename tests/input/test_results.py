@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 from bad_input import NET_POINTS, sheet
+from jobs import TEXTS, case_named, verdict_named
 from mesh_writers import stl_of
 from readers import TREE, members, packed
-from small_cases import TEXTS, small_case, small_verdict
 
 from feasibility import Evidence, check, verify
 from feasibility.cases import Case, load_case
@@ -66,10 +66,10 @@ def again(verdict: Verdict, case: Case, folder: Path) -> Verdict:
 @pytest.mark.parametrize("name", TEXTS)
 def test_a_result_comes_back_exactly(name: str, tmp_path: Path) -> None:
     """One for each kind of answer: a witness, causes, the tree of the paper's search."""
-    before = small_verdict(name)
+    before = verdict_named(name)
     kinds = (before.witness, before.causes, before.tree)
     assert kinds[list(TEXTS).index(name)]
-    after = again(before, small_case(name), tmp_path)
+    after = again(before, case_named(name), tmp_path)
     for key in SAME:
         assert getattr(after, key) == getattr(before, key), key
     assert dict(after.timing) == dict(before.timing)
@@ -99,15 +99,15 @@ def test_a_result_comes_back_exactly(name: str, tmp_path: Path) -> None:
     "tree", [TREE, CutTree(Leaf(2)), CutTree(Leaf(0), ((1, -0.5), (4, 0.0)))], ids=str
 )
 def test_a_proof_comes_back_as_it_was(tree: CutTree, tmp_path: Path) -> None:
-    verdict = replace(small_verdict("long plate"), proof=tree, evidence=Evidence.PROOF)
-    assert again(verdict, small_case("long plate"), tmp_path).proof == tree
+    verdict = replace(verdict_named("long plate"), proof=tree, evidence=Evidence.PROOF)
+    assert again(verdict, case_named("long plate"), tmp_path).proof == tree
 
 
 def test_a_verdict_is_kept_beside_its_own_case_alone(tmp_path: Path) -> None:
     for setting in ("task.cone_deg=31", "search.seed=1", "search.method=greedy"):
-        other = small_case("plate").with_overrides([setting])
+        other = case_named("plate").with_overrides([setting])
         with pytest.raises(ResultError, match=r"the verdict is not about case 'plate'"):
-            save_result(small_verdict("plate"), other, tmp_path / "a.result")
+            save_result(verdict_named("plate"), other, tmp_path / "a.result")
     assert not list(tmp_path.iterdir())
 
 
@@ -214,7 +214,7 @@ def no_space(*_: object) -> None:
 
 def test_saving_is_all_or_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """No other thread sees another umask either, and no page is left half written."""
-    path, args = tmp_path / "a.result", (small_verdict("plate"), small_case("plate"))
+    path, args = tmp_path / "a.result", (verdict_named("plate"), case_named("plate"))
     path.write_bytes(b"what was there")
     monkeypatch.setattr(os, "umask", None)
     monkeypatch.setattr(os, "fsync", no_space)
@@ -246,7 +246,7 @@ def test_places_that_cannot_be_written_are_named(
         (tmp_path / "file" / "a.result", "there is no folder"),
     ):
         with pytest.raises(ResultError, match=words):
-            save_result(small_verdict("plate"), small_case("plate"), path)
+            save_result(verdict_named("plate"), case_named("plate"), path)
     allowed = os.access  # a folder that takes no files, as /dev is to everyone but root
     monkeypatch.setattr(
         os, "access", lambda path, mode: str(path) != "/dev" and allowed(path, mode)
@@ -257,7 +257,7 @@ def test_places_that_cannot_be_written_are_named(
 
 
 def test_permissions_links_and_pipes_stay_as_they_were(tmp_path: Path) -> None:
-    args = small_verdict("plate"), small_case("plate")
+    args = verdict_named("plate"), case_named("plate")
     save_result(*args, tmp_path / "new")
     (tmp_path / "plain").touch()
     assert (tmp_path / "new").stat().st_mode == (tmp_path / "plain").stat().st_mode

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from jobs import TEXTS
 from jobs import coverable as asked
-from small_cases import TEXTS
 
 from feasibility.cli.main import main
 from feasibility.paths import PathError

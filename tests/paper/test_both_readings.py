@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from meshed_patches import in_cells_of
+from mesh_patches import in_cells_of
 from samples import sampled, spread
 
 from feasibility import Search, Task

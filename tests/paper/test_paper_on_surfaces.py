@@ -7,7 +7,7 @@ from dataclasses import replace
 import mesh_patches
 import numpy as np
 import pytest
-from meshed_patches import in_cells_of
+from mesh_patches import in_cells_of
 
 from feasibility import Answer, Search, Task, greedy_check
 from feasibility.paper import starts, tree_walk

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import study_works
-from jobs import TEXTS, case_named, coverable, verdict_named
+from jobs import case_named, coverable, verdict_named
 
 from feasibility.cases import as_read
 from feasibility.roadmap import warm_up_in_turn
@@ -52,7 +52,7 @@ def pool():
 # -- one task --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", TEXTS)
+@pytest.mark.parametrize("name", ["plate", "long plate"])
 def test_an_outcome_says_what_the_verdict_says(name) -> None:
     verdict, case = verdict_named(name), case_named(name)
     with open_workers(0) as workers:

@@ -14,9 +14,7 @@ import os
 import numpy as np
 import pytest
 from smooth_probes import same_surface
-from specimens import WEIGHTS
-from spline_nets import hood
-from user_formulas import ball, sampled
+from specimens import WEIGHTS, ball, hood, sampled
 
 from surfaces import (
     SurfaceError,

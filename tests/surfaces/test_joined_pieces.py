@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 from smooth_probes import least_distances
-from spline_nets import hood, quarter_turn, turned
+from specimens import hood, quarter_turn, turned
 
 from surfaces import SurfaceError, bspline, cone, cylinder, piecewise, plane, sphere
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import mesh_writers as w
 import numpy as np
 import pytest
-from mesh_files import GOOD, nested_scene
+from mesh_writers import GOOD, nested_scene
 
 from surfaces.meshes import read_mesh
 from surfaces.meshes.repair import notes_of

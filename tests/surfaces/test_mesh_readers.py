@@ -6,7 +6,7 @@ import mesh_writers as w
 import numpy as np
 import pytest
 import trimesh
-from mesh_files import GOOD
+from mesh_writers import GOOD
 from samples import seeds
 from scipy.spatial import cKDTree
 

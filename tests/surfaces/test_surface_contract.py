@@ -1,7 +1,7 @@
 """One contract for every kind of surface: geometry against formulas and brute force.
 
-Each property is written once and asked of all specimens (`tests/shared/specimens.py`). A new kind
-is one row there, and one in `random_surfaces.py`.
+Each property is written once and asked of all specimens (`tests/shared/shapes/specimens.py`). A
+new kind is one row there, and one in `random_surfaces.py`.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from mesh_writers import stl, stl_of
 
-TABLES = Path(__file__).parents[1] / "input" / "bad"
+TABLES = Path(__file__).parents[2] / "input" / "bad"
 TIMES = re.compile(r"«([^»]*)»×(\d+)")
 KEY = re.compile(r"(robot|surface|task|collision|search|serach|tusk)\.([^ ]+)(?: = (.*))?")
 

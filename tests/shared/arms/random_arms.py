@@ -7,11 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from arm_urdfs import FREE, arm, joint
 from numpy.typing import NDArray
-from urdf_texts import check_urdf_text
 
 from feasibility import Task
 from robots import Axis, Robot, load_robot
 from robots.pinocchio_model import robot_from_urdf
+from robots.urdf.checked_urdf import checked_tree
+from robots.urdf.xml import parse_xml
 from surfaces import Surface, cylinder, hyperboloid, plane, sphere
 
 Floats = NDArray[np.float64]
@@ -20,8 +21,9 @@ RIGHT_ANGLES = (-np.pi / 2, 0.0, np.pi / 2, np.pi)
 
 def robot_of(joints: list[str], approach_axis: tuple[float, ...] = (0.0, 0.0, 1.0)) -> Robot:
     """The arm of joints written by `arm_urdfs.joint`."""
-    text = check_urdf_text(arm(joints))
-    return robot_from_urdf(text, name="test_arm", approach_axis=approach_axis)
+    root = parse_xml(arm(joints).encode(), "URDF text", encoding="utf-8")
+    checked = checked_tree(root, "URDF text", "/nowhere", ())
+    return robot_from_urdf(checked, name="test_arm", approach_axis=approach_axis)
 
 
 def random_arm(rng: np.random.Generator, least: int = 3, most: int = 8) -> Robot:
