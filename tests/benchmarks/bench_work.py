@@ -1,4 +1,4 @@
-"""Meshes, and what is built on a verdict: paths, passes, placements, studies, live pages."""
+"""What is built on a verdict: paths, passes, placements, studies, live pages."""
 
 from __future__ import annotations
 
@@ -32,7 +32,6 @@ from coverable import (
     run_tasks,
     trajectory,
 )  # fmt: skip
-from surfaces import MeshSurface, Surface
 from surfaces.meshes import TriangleMesh
 
 PAPER = [f"paper/{figure}{letter}" for figure in "45" for letter in "abcdef"]
@@ -43,26 +42,6 @@ count = 200
 "surface.position" = { x = { range = [-0.1, 0.1] }, z = { range = [-0.1, 0.1] } }
 "surface.rpy_deg" = { yaw = { range = [-20, 20] } }
 """
-
-
-def as_mesh(surface: Surface, count: int) -> MeshSurface:
-    """A patch as 2 (count - 1)^2 triangles."""
-    u, v = np.meshgrid(*(np.linspace(*ends, count) for ends in (surface.u_range, surface.v_range)))
-    u, v = u.T.ravel(), v.T.ravel()
-    first = (count * np.arange(count - 1)[:, None] + np.arange(count - 1)).ravel()[:, None]
-    faces = first + np.array([[[0, count, count + 1]], [[0, count + 1, 1]]])
-    faces = faces.reshape(-1, 3)
-    made = TriangleMesh(surface.point(u, v), faces)
-    outward = (made.face_normals * surface.normal(u[faces[:, 0]], v[faces[:, 0]])).sum() > 0.0
-    return mesh(made if outward else TriangleMesh(made.vertices, faces[:, ::-1]), side=surface.side)
-
-
-@pytest.mark.parametrize("count", [None, 20, 70, 316])
-def bench_mesh(count: int | None, measured: Callable[..., Any]) -> None:
-    """4a's dome as a patch and as meshes of up to 200,000 faces: three times the patch at most."""
-    robot, cells, task, _ = load_case("paper/4a").build()
-    cells = cells if count is None else as_mesh(cells.surface, count).cells(90)
-    measured(lambda: check(robot, cells, task))
 
 
 @pytest.mark.parametrize("name", [name for name in PAPER if name[-1] in "abc"])
