@@ -110,8 +110,8 @@ def test_a_roll_that_is_limited_is_kept_between_jcells():
     task = Task(0.005, 45, roll_deg=(-20, 20), roll_reference=(1, 0, 0))
     verdict = greedy_check(PUMA, cells, task, COARSE)
     assert verdict.feasible, verdict.message
-    walk = tree_walk(verdict)
-    assert plain.faults_of(verdict, walk.q, walk.cell) == []
+    walk, allowed = tree_walk(verdict), Steps.of(PUMA, cells, task, COARSE).tolerance
+    plain.assert_motion(replace(verdict, task=replace(task, tolerance=allowed)), walk.q)
     arm, form = plain.arm_of(PUMA), plain.surface_of(cells.surface)
     kept = referee.kept_over(arm, form, plain.asked_of(task, cells), referee.evenly(walk.q, 5))
     most = kept.roll.max() + np.radians(20.0)
@@ -134,11 +134,17 @@ def test_the_covering_walk_takes_whole_steps_inside_all_constraints_over_every_c
     assert moves == "all" or (steps_of_one.round().sum(axis=1) == 1).all()
     parts = [a + np.arange(k)[:, None] * (b - a) / k
              for a, b, k in zip(walk.q[:-1], walk.q[1:], count, strict=True)]  # fmt: skip
-    told = replace(verdict, witness=walk)
-    assert plain.faults_of(told, per_segment=5) == []
+    allowed = Steps.of(PUMA, DOME, TASK, search).tolerance
+    plain.assert_motion(replace(verdict, task=replace(TASK, tolerance=allowed)), walk.q)
     q = np.concatenate([*parts, walk.q[-1:]])
     near = DOME.surface.closest(plain.arm_of(PUMA).tool(q)[0])
     at = np.column_stack([near.u, near.v])
     assert all(within_cells(DOME, at, [cell] * len(q)).any() for cell in range(len(DOME)))
+    # A row is at a cell only where the tool is at its centre.
+    away = np.linalg.norm(
+        Kinematics(PUMA).tools(walk.q)[0][:, None] - TASK.targets(DOME).points, axis=2
+    )
+    at = np.where(away.min(axis=1) <= 1e-3, away.argmin(axis=1), -1)
+    np.testing.assert_array_equal(walk.cell, at)
     arm = PUMA.with_limits({"joint1": np.radians([-30.0, 20.0])})
     assert not greedy_check(arm, DOME, TASK, replace(search, moves="all")).feasible

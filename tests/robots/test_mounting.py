@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
+import referee
 from arm_urdfs import arm, joint, load_text, random_arm, random_q, said
 from scipy.spatial.transform import Rotation
 
@@ -127,43 +128,6 @@ def cell_text() -> str:
     return text + "\n".join(more) + "</robot>"
 
 
-class Tree:
-    """The whole tree of a URDF, by Pinocchio, with joints by name."""
-
-    def __init__(self, path: str) -> None:
-        self.model = pin.buildModelFromXML(check_urdf(path).text)
-        self.data = self.model.createData()
-
-    def configuration(self, values: dict[str, float]):
-        """Pinocchio's configuration; joints without a value are at zero."""
-        v = np.zeros(self.model.nv)
-        for name, value in values.items():
-            v[self.model.joints[self.model.getJointId(name)].idx_v] = value
-        return pin.integrate(self.model, pin.neutral(self.model), v)
-
-    def relative(self, link: str, tool: str, values: dict[str, float]):
-        """(4, 4) the frame of one link in that of another."""
-        pin.framesForwardKinematics(self.model, self.data, self.configuration(values))
-        first, second = (self.model.getFrameId(n, pin.FrameType.BODY) for n in (link, tool))
-        return self.data.oMf[first].actInv(self.data.oMf[second]).homogeneous
-
-    def relative_jacobian(
-        self, link: str, tool: str, values: dict[str, float], names: tuple[str, ...]
-    ):
-        """(6, n) twist of `tool` against `link`, in the frame of `tool`, for joints by name."""
-        q = self.configuration(values)
-        pin.computeJointJacobians(self.model, self.data, q)
-        pin.framesForwardKinematics(self.model, self.data, q)
-        first, second = (self.model.getFrameId(n, pin.FrameType.BODY) for n in (link, tool))
-        of_link, of_tool = (
-            pin.getFrameJacobian(self.model, self.data, f, pin.ReferenceFrame.LOCAL)
-            for f in (first, second)
-        )
-        across = self.data.oMf[second].actInv(self.data.oMf[first]).toActionMatrix()
-        columns = [self.model.joints[self.model.getJointId(name)].idx_v for name in names]
-        return (of_tool - across @ of_link)[:, columns]
-
-
 ARM = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint",
        "wrist_2_joint", "wrist_3_joint")  # fmt: skip
 CHAINS = {
@@ -185,7 +149,13 @@ def cell(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def tree(cell):
-    return Tree(cell)
+    """tree(link, tool, values): (4, 4) the frame of one link in that of another, by the referee."""
+
+    def relative(link, tool, values):
+        frames = referee.Arm(referee.joints_of(cell), tool, [], values).frames(np.zeros((1, 0)))
+        return np.linalg.inv(frames[link][0]) @ frames[tool][0]
+
+    return relative
 
 
 @pytest.mark.parametrize("name", CHAINS)
@@ -193,29 +163,24 @@ def test_chain_links_and_reach_are_those_of_the_tree(name, cell, tree):
     link, tool, joints = CHAINS[name]
     robot = load_robot(cell, tool_frame=tool, surface_link=link)
     assert robot.joint_names == joints
-    bodies = {f.name for f in tree.model.frames if f.type == pin.FrameType.BODY}
-    assert set(robot.link_names) == bodies
+    joints_there = referee.joints_of(cell)
+    assert set(robot.link_names) == {joint.child for joint in joints_there} | {"hall"}
     kinematics, data = Kinematics(robot), robot.model.createData()
     rng = np.random.default_rng(7)
     points = []
     for k in range(60):
         q = random_q(robot, rng)
         values = {**robot.locked, **dict(zip(joints, q, strict=True))}
-        expected = tree.relative(link, tool, values)
-        pin.computeJointJacobians(robot.model, data, kinematics.configuration(q))
-        pin.framesForwardKinematics(robot.model, data, kinematics.configuration(q))
-        np.testing.assert_allclose(data.oMf[robot.tool_frame_id].homogeneous, expected, **CLOSE)
         points.append(kinematics.tool(q)[0])
-        np.testing.assert_allclose(points[-1], expected[:3, 3], **CLOSE)
-        columns = pin.getFrameJacobian(robot.model, data, robot.tool_frame_id, pin.LOCAL)
-        wanted = tree.relative_jacobian(link, tool, values, joints)
-        np.testing.assert_allclose(columns.reshape(6, -1), wanted, **CLOSE)
+        np.testing.assert_allclose(points[-1], tree(link, tool, values)[:3, 3], **CLOSE)
+        pin.framesForwardKinematics(robot.model, data, kinematics.configuration(q))
         for frame, place in zip(robot.model.frames, data.oMf, strict=True) if k < 5 else ():
             if frame.type == pin.FrameType.BODY:
-                there = tree.relative(link, frame.name, values)
-                np.testing.assert_allclose(place.homogeneous, there, **CLOSE)
+                np.testing.assert_allclose(
+                    place.homogeneous, tree(link, frame.name, values), **CLOSE
+                )
         world = data.oMf[robot.world_frame_id].homogeneous
-        np.testing.assert_allclose(world, tree.relative(link, "hall", values), **CLOSE)
+        np.testing.assert_allclose(world, tree(link, "hall", values), **CLOSE)
     assert robot.chain is not None  # compares itself with Pinocchio
     assert (robot.distance_from_base(np.array(points)) <= robot.reach + 1e-12).all()
 
@@ -235,7 +200,7 @@ def test_limits_velocities_tcp_and_base_stay_with_their_joints(cell, tree):
     np.testing.assert_allclose(robot.base, plain.base, atol=1e-14)
     q = random_q(robot, np.random.default_rng(0))
     values = dict(zip(robot.joint_names, q, strict=True))
-    expected = tree.relative("jig", "tool0", values) @ [*plain.tcp[:3, 3], 1.0]
+    expected = tree("jig", "tool0", values) @ [*plain.tcp[:3, 3], 1.0]
     np.testing.assert_allclose(Kinematics(robot).tool(q)[0], expected[:3], atol=1e-12)
     again = pickle.loads(pickle.dumps(robot))
     assert again.surface_link == "jig"
@@ -291,7 +256,7 @@ def test_a_composed_cell_is_the_cell_that_one_urdf_describes(cell, tree):
     np.testing.assert_allclose(composed.max_velocity[:3], whole.max_velocity[:3])
     q = random_q(composed, np.random.default_rng(0))
     values = dict(zip(composed.joint_names, q, strict=True))
-    expected = tree.relative("turntable", "tool0", values)[:3, 3]
+    expected = tree("turntable", "tool0", values)[:3, 3]
     np.testing.assert_allclose(Kinematics(composed).tool(q)[0], expected, atol=1e-12)
     rail = Rotation.from_euler("xyz", [0, 0.1, 0.2]).as_matrix()
     np.testing.assert_allclose(composed.base[:3, 3], rail @ [0, 0, 0.1] + [0, -1, 0.3], atol=1e-12)
