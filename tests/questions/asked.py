@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import plain
 import tomli_w
+from mesh_writers import stl_of
 
 from feasibility import Search, Task, Verdict, check
 from feasibility.cases import Case, load_case
@@ -163,7 +164,7 @@ def _as_file(tables: dict[str, Any], how: dict[str, Any]) -> dict[str, Any]:
     if kind == "dent":
         corners = _grooved(how["radius"])
         kept = {key: surface[key] for key in ("position", "side", "cells")}
-        _write_stl(path.with_suffix(".stl"), corners)
+        path.with_suffix(".stl").write_bytes(stl_of(corners))
         return tables | {
             "surface": kept | {"kind": "mesh", "file": f"{path.stem}.stl", "scale": 1.0}
         }
@@ -173,7 +174,7 @@ def _as_file(tables: dict[str, Any], how: dict[str, Any]) -> dict[str, Any]:
     made = {key: surface[key] for key in ("side", "position", "rpy_deg") if key in surface}
     made["side"] = surface.get("side", "inside")
     if kind == "mesh":
-        _write_stl(path.with_suffix(".stl"), plain.facets_of(local, *how["pieces"]))
+        path.with_suffix(".stl").write_bytes(stl_of(plain.facets_of(local, *how["pieces"])))
         made |= {"kind": "mesh", "file": f"{path.stem}.stl", "cells": how["cells"], "scale": 1.0}
     elif kind == "grid":
         u, v = (
@@ -213,9 +214,3 @@ def _grooved(radius: float) -> np.ndarray:
     )
     points = np.stack([radius * np.sin(turn), y, -radius * np.cos(turn)], -1)
     return plain.triangles_of_grid(points)
-
-
-def _write_stl(path: Path, corners: np.ndarray) -> None:
-    rows = np.zeros(len(corners), [("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")])
-    rows["v"] = corners
-    path.write_bytes(b"made by a test".ljust(80) + np.uint32(len(rows)).tobytes() + rows.tobytes())

@@ -21,7 +21,6 @@ from samples import sampled, seeds, spread
 
 from feasibility import Answer, CauseKind, Evidence, Search, check, verify
 from feasibility.certification import replay
-from feasibility.results import load_result, save_result
 from feasibility.verdict import Walk
 
 TABLE = [name for name in names() if name not in names("dear walls")]
@@ -306,16 +305,3 @@ def test_walls_that_take_longer(name):
     assert verdict.n_covered >= QUESTIONS[name]["covered"]
     assert {c.kind for c in verdict.causes} <= {CauseKind.COLLISION, CauseKind.DISCONNECTED}
     assert any(c.pair or "would collide" in c.detail for c in verdict.causes)
-
-
-@pytest.mark.parametrize("name", ["paper 4d", "plate", "a square and a fixed tool", "a wall 5e"])
-def test_a_result_comes_back_and_is_judged_anew(name, tmp_path):
-    verdict = verdict_of(name)
-    again = load_result(save_result(verdict, question(name).case, tmp_path / "a.result"))
-    assert verify(again).holds
-    loaded = again.verdict
-    assert (loaded.answer, loaded.evidence, loaded.causes) == (
-        verdict.answer, verdict.evidence, verdict.causes,
-    )  # fmt: skip
-    assert loaded.certificate == verdict.certificate
-    assert loaded.graph.edges == verdict.graph.edges
