@@ -106,14 +106,22 @@ def test_several_nodes_over_one_cell(seed):
 
 
 def test_only_the_component_asked_for():
-    """Two lines and a lone node: each walk keeps to its own, and no motion is invented."""
+    """Two lines and a lone node: each walk keeps to its own."""
     graph = nx.disjoint_union_all([nx.path_graph(4), nx.path_graph(5), nx.empty_graph(1)])
     roadmap, slot_of = roadmap_of(graph, 10)
     for first, expected in ((0, range(4)), (4, range(4, 9)), (9, range(9, 10))):
         order = assert_walked(roadmap, covering_walk(roadmap, slot_of[first]))
         assert sorted(order) == list(expected)
-    roadmap.component[:10], roadmap.cover[0, :10] = 0, 1  # marked as one, with nothing between
-    assert len(set(assert_walked(roadmap, covering_walk(roadmap, 0)))) < 10
+
+
+def test_a_component_that_is_not_connected_gives_no_covering_walk():
+    """Nodes marked as one component without motions between them: no motion is invented."""
+    graph = nx.disjoint_union(nx.path_graph(3), nx.path_graph(3))
+    roadmap, _ = roadmap_of(graph, 6)
+    roadmap.component[:6] = 0
+    roadmap.cover[0, :6] = 1
+    order = assert_walked(roadmap, covering_walk(roadmap, 0))
+    assert set(order) != set(range(6))
 
 
 @pytest.mark.parametrize("name", ["small dome", "plate", "panda over a saddle", "on a rail"])

@@ -9,10 +9,13 @@ from feasibility import Task, check, verify
 from feasibility.certification import replay
 from feasibility.collisions import Collision
 from feasibility.paths import PathError, coverage_path
-from feasibility.roadmap.forward.run import OrderedRun, layers_of
+from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.forward.run import OrderedRun, _follow, layers_of, run_in_order
 from feasibility.roadmap.graph import NODES, WAYPOINTS, add_edge, empty_roadmap
+from feasibility.roadmap.motions import arrays_of
+from feasibility.roadmap.seeding import seed_cell
 from feasibility.roadmap.walk import route_walk
-from feasibility.verdict import Answer, CauseKind, Walk
+from feasibility.verdict import Answer, CauseKind
 from robots import load_robot
 from surfaces import plane, poses
 
@@ -47,8 +50,9 @@ def test_a_toolpath_is_run_in_order_and_never_back(ur5):
     backwards = verify(ur5, cells, TASK, verdict.witness.q[::-1])
     assert "goes back along the toolpath" in backwards.refusal
     walk = verdict.witness  # to and fro it covers all, too
-    twice = Walk(np.vstack([walk.q, walk.q[::-1]]), np.append(walk.cell, walk.cell[::-1]))
-    found = replay(ur5, cells, TASK, twice, np.ones(36, dtype=bool))
+    order = np.concatenate([np.arange(len(walk.q)), np.arange(len(walk.q))[::-1]])
+    again = dataclasses.replace(walk, q=walk.q[order], cell=walk.cell[order])
+    found = replay(ur5, cells, TASK, again, np.ones(36, dtype=bool))
     assert not found.accepted
     assert "goes back from pose 35 to pose 34" in found.refusal
     path = coverage_path(verdict)
@@ -95,6 +99,18 @@ def test_a_run_is_a_path_through_the_layers_that_never_goes_back():
     walk = route_walk(roadmap, run.start, np.array(run.route))
     assert walk.cell.tolist() == [0, 1, 2, 2, 3, 4, 5]
     assert walk.q[:, 0].tolist() == [0, 1, 2, 8, 9, 10, 11]
+
+
+def test_a_configuration_is_followed_ahead_along_certified_motions(ur5):
+    cells = poses(PATCH.centres[SNAKE], PATCH.normals[SNAKE])
+    exploration = Exploration(ur5, cells, arrays_of(ur5, cells, TASK), seed=0)
+    guess = check(ur5, cells, TASK).witness.q[:1]
+    seed_cell(exploration.arrays, exploration.work, exploration.roadmap, 0, guess)
+    assert layers_of(exploration.roadmap).furthest == 0
+    _follow(exploration, 0, len(cells))
+    run = run_in_order(exploration)
+    assert (run.furthest, run.rounds) == (35, 0)
+    assert replay(ur5, cells, TASK, run.walk, np.ones(36, dtype=bool)).accepted
 
 
 def test_what_a_failed_run_says():
