@@ -217,11 +217,6 @@ def test_joints_with_limits_of_no_width_are_joints_that_are_held():
     assert verdict.covered.reshape(4, 3).tolist() == [[False, True, False]] * 4
 
 
-def test_a_finer_tolerance_needs_more_waypoints():
-    fine, plain_one = (verdict_of(n) for n in ("a hundredth of a millimetre", "small dome"))
-    assert fine.certificate.waypoints / 9 > 3 * plain_one.certificate.waypoints / 20
-
-
 def test_what_collides_is_refused_and_nothing_asked_is_no_collision():
     """A motion that was found without a roof leads through it; the greedy search knows none."""
     _, _, robot, cells, task, _ = question("under a roof")

@@ -211,17 +211,6 @@ def test_reference_and_range_of_a_roll_turned_together_are_the_same():
     assert plain.referee.judge(plain.arm_of(q.robot), form, asked_for, found.witness.q, aims) == []
 
 
-def test_all_rolls_are_free_roll():
-    """To the last bit, and to the last evaluation of the arm."""
-    q = question("a square and 15 degrees")
-    free, whole = (
-        check(q.robot, q.cells, replace(q.task, roll_deg=r)) for r in (None, (-170, 190))
-    )
-    np.testing.assert_array_equal(free.witness.q, whole.witness.q)
-    assert free.statistics["fk"] == whole.statistics["fk"]
-    assert free.certificate.max_roll is None
-
-
 def test_a_body_far_away_changes_nothing():
     q = question("clear of itself")
     far = Obstacle.box("cabinet", (0.2, 0.2, 0.2), (0.0, 3.0, 0.0))
