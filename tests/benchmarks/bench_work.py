@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import http.client
-import itertools
-import json
 from collections.abc import Callable
 from typing import Any
 
@@ -13,7 +10,6 @@ import pytest
 
 from coverable import (
     Collision,
-    Live,
     Pose,
     Region,
     Task,
@@ -100,33 +96,3 @@ def bench_study(workers: int, measured: Callable[..., Any]) -> None:
     tasks = read_study(STUDY).tasks
     with open_workers(workers) as crew:
         measured(lambda: run_tasks(tasks, crew), 2, placements=len)
-
-
-@pytest.mark.parametrize("name", ["paper/4a", "paper/5c", "paper/4d"])
-@pytest.mark.parametrize("final", [False, True], ids=["quick look", "certified"])
-def bench_live(name: str, final: bool, measured: Callable[..., Any]) -> None:
-    """What a live page gets over HTTP, the surface a millimetre further each time; goal 100 ms."""
-    case, numbers = load_case(name), itertools.count(1)
-    with Live(case) as live:
-        host, _, there = live.url.removeprefix("http://").partition("/")
-        connection = http.client.HTTPConnection(host, timeout=1800)
-
-        def post(word: str, asked: dict[str, Any]) -> dict[str, Any]:
-            kind = {"Content-Type": "application/json"}
-            connection.request("POST", f"/{there}{word}", json.dumps(asked), kind)
-            found: dict[str, Any] = json.loads(connection.getresponse().read())
-            return found
-
-        session, z = post("open", {})["session"], 1e3 * case.surface.position[2]
-
-        def ask() -> dict[str, Any]:
-            number = next(numbers)
-            asked = {"session": session, "number": number, "final": final,
-                     "values": {"position": [float(number), 0.0, z]}}  # fmt: skip
-            while (reply := post("ask", asked))["status"] == "deciding":
-                pass
-            answer: dict[str, Any] = reply["answer"]
-            return answer
-
-        measured(ask, 5, covered=lambda answer: answer["covered"])
-        connection.close()

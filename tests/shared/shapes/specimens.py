@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from mesh_patches import of_patch
+from mesh_patches import bent, of_patch
 from smooth_probes import POSE
 
 from surfaces import (
@@ -125,24 +125,21 @@ EXTREME = {
 
 def ridge(count, turn_deg):
     """Two flat strips of triangles that meet at an angle."""
-    x, y = np.linspace(-0.5, 0.5, 2 * count + 1), np.linspace(0.0, 0.5, count + 1)
-    x, y = np.meshgrid(x, y, indexing="ij")
-    tilt = np.radians(turn_deg / 2)
-    return _bent(x * np.cos(tilt), y, -np.abs(x) * np.sin(tilt))
+    tilt, half = np.radians(turn_deg / 2), lambda u: u - 0.5
+    return mesh(TriangleMesh(*bent(
+        lambda u, v: (half(u) * np.cos(tilt), 0.5 * v, -np.abs(half(u)) * np.sin(tilt)),
+        2 * count, count,
+    )))  # fmt: skip
 
 
 def bowl(count):
     """A paraboloid of triangles."""
-    x, y = np.meshgrid(*[np.linspace(-0.4, 0.4, count)] * 2, indexing="ij")
-    return _bent(x, y, 0.6 * (x**2 + y**2) + 0.1 * x * y)
 
+    def shape(u, v):
+        x, y = 0.8 * u - 0.4, 0.8 * v - 0.4
+        return x, y, 0.6 * (x**2 + y**2) + 0.1 * x * y
 
-def _bent(x, y, z):
-    rows, columns = x.shape
-    first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
-    quads = np.column_stack([first, first + columns, first + columns + 1, first + 1])
-    faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-    return mesh(TriangleMesh(np.stack([x, y, z], axis=-1).reshape(-1, 3), faces))
+    return mesh(TriangleMesh(*bent(shape, count - 1, count - 1)))
 
 
 def flat(name, count=12):
