@@ -79,6 +79,13 @@ def known(name: str) -> str | None:
     return "not infeasible"
 
 
+def counted(name: str) -> tuple[int, int] | None:
+    """How many cells one motion covers at most, and how many can be reached, where others know."""
+    file, _, number = name.rpartition(" ")
+    one = _stored(file)[int(number)] if file in STORED else {}
+    return (one["covered"], one["reachable"]) if "reachable" in one else None
+
+
 @cache
 def tables_of(name: str) -> dict[str, Any]:
     """The tables of a question's case, as plain numbers."""

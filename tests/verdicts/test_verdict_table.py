@@ -16,7 +16,18 @@ import numpy as np
 import plain
 import pytest
 import referee
-from asked import HERE, QUESTIONS, STORED, form_of, known, names, question, stored, verdict_of
+from asked import (
+    HERE,
+    QUESTIONS,
+    STORED,
+    counted,
+    form_of,
+    known,
+    names,
+    question,
+    stored,
+    verdict_of,
+)
 from samples import sampled, seeds, spread
 
 from feasibility import Answer, CauseKind, Evidence, Search, check, verify
@@ -75,6 +86,10 @@ def test_the_truth_is_found(name):
         assert answer != truth[4:] if truth.startswith("not ") else answer == truth
     covered = QUESTIONS.get(name, {}).get("covered")
     assert covered in (None, verdict_of(name).n_covered)
+    if (most := counted(name)) is not None:
+        lost = [c for c in verdict_of(name).causes if c.kind is not CauseKind.DISCONNECTED]
+        assert verdict_of(name).n_covered <= most[0]
+        assert sum(c.proved for c in lost) <= len(verdict_of(name).cells) - most[1] <= len(lost)
     undecided = "undecided" in QUESTIONS.get(name, {}).get("tags", ())
     assert (answer is Answer.UNDECIDED) == undecided or truth is None or truth.startswith("not ")
 
