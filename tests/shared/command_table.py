@@ -17,7 +17,7 @@ import numpy as np
 from jobs import Said, coverable
 
 TABLE = tomllib.loads(Path(__file__).parents[1].joinpath("output/commands.toml").read_text("utf-8"))
-FILES, NUMBERS, REFUSED = (TABLE.pop(name) for name in ("files", "numbers", "refused"))
+FILES, NUMBERS, REFUSED, WHOLE = map(TABLE.pop, ("files", "numbers", "refused", "whole"))
 COMMANDS = [(command, name) for command in TABLE for name in TABLE[command]]
 NEEDS = {
     "walk.csv": ("check", "files"),
@@ -47,7 +47,7 @@ class Commands:
         self.folder = folder
         self.run = cache(self._run)
         for name, text in FILES.items():
-            (folder / name).write_text(text)
+            (folder / name).write_text(text.replace(" ; ", "\n"))
         for name, content in BROKEN.items():
             (folder / name).write_bytes(content)
         (folder / "sheet.off").write_text(sheet())
