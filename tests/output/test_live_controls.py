@@ -100,7 +100,7 @@ def test_what_makes_no_sense_is_refused_in_words(plate, approved):
     for values in SENSELESS:
         with pytest.raises(CaseError) as refused:
             plate.changed(values)
-        said.append(f"{values}\n  {refused.value}")
+        said.append(f"{values}: {refused.value}")
     assert len(refused.value.faults) == 3, "all faults are told together"
     approved("live/refused", "\n".join(said))
 

@@ -82,7 +82,9 @@ def test_causes_are_grouped_and_the_largest_group_comes_first(plate, approved):
         text = report.as_text(made, case)
         assert text.startswith("infeasible: no single continuous motion")
         missed, tries = text[text.index("Not covered:") :].split("To try next:\n")
-        said = missed.replace("\n\n", "\n") if kind == "collision" else missed.splitlines()[1].strip()
+        said = (
+            missed.replace("\n\n", "\n") if kind == "collision" else missed.splitlines()[1].strip()
+        )
         hints = (" ".join(line.split()[:2]) for line in tries.splitlines())
         texts.append(f"{kind}: {said}\n  to try: {'; '.join(hints)}")
         cells = [row["cell"] for row in report.as_json(made)["uncovered"]]

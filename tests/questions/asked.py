@@ -28,11 +28,11 @@ from surfaces import Cells
 HERE = Path(__file__).parent
 TABLES = ("robot", "surface", "task", "collision", "search")
 TABLE: dict[str, Any] = tomllib.loads((HERE / "questions.toml").read_text("utf-8"))
-QUESTIONS: dict[str, dict[str, Any]] = {
-    name: {**one, "tags": [tag, *one.get("tags", ())]}
-    for tag, rows in TABLE.items()
-    for name, one in rows.items()
-}
+QUESTIONS: dict[str, dict[str, Any]] = {}
+for tag, rows in TABLE.items():
+    for name, row in rows.items():
+        one = row | row.get("is", {})
+        QUESTIONS[name] = one | {"tags": [tag, *one.get("tags", ())]}
 PLAIN = {"robot": {"name": "ur5"}, "task": {"standoff": 0.02, "cone_deg": 40}}
 """Of a question that is like none, where it does not say another."""
 FILES = tempfile.TemporaryDirectory(prefix="questions-")
