@@ -17,7 +17,8 @@ import numpy as np
 from jobs import Said, coverable
 
 TABLE = tomllib.loads(Path(__file__).parents[1].joinpath("output/commands.toml").read_text("utf-8"))
-FILES, NUMBERS, REFUSED, WHOLE = map(TABLE.pop, ("files", "numbers", "refused", "whole"))
+LINES, NUMBERS, REFUSED, WHOLE = map(TABLE.pop, ("files", "numbers", "refused", "whole"))
+FILES = {name: text.replace(" ; ", "\n") + "\n" for name, text in LINES.items()}
 COMMANDS = [(command, name) for command in TABLE for name in TABLE[command]]
 NEEDS = {
     "walk.csv": ("check", "files"),
@@ -47,7 +48,7 @@ class Commands:
         self.folder = folder
         self.run = cache(self._run)
         for name, text in FILES.items():
-            (folder / name).write_text(text.replace(" ; ", "\n"))
+            (folder / name).write_text(text)
         for name, content in BROKEN.items():
             (folder / name).write_bytes(content)
         (folder / "sheet.off").write_text(sheet())
