@@ -153,16 +153,3 @@ def test_an_answer_that_nobody_asks_for_any_more_is_given_up(monkeypatch):
     assert not job.dropped
     clock[0] += 0.2 * ALONE
     assert job.dropped
-
-
-def test_an_end_is_an_end(worker):
-    sessions = Sessions(worker)
-    page = sessions.open()
-    job = sessions.ask(page, 1, False, "last")
-    worker.wait_for()
-    sessions.close_all()
-    assert job.dropped
-    worker.let()
-    for lane in sessions._lanes.values():
-        lane.thread.join(GUARD_S)
-        assert not lane.thread.is_alive()

@@ -236,19 +236,6 @@ def test_a_faulty_answer_leaves_the_page_working(client, monkeypatch):
     assert client.ask(True)["kind"] == "feasible"
 
 
-def test_a_connection_serves_many_questions_and_may_break(page, capfd):
-    host = f"127.0.0.1:{page.port}"
-    path = page.url.split(host)[1]
-    connection = http.client.HTTPConnection(host, timeout=GUARD_S)
-    for _ in range(3):
-        connection.request("POST", f"{path}beat", b"{}", {"Content-Type": "application/json"})
-        assert json.loads(connection.getresponse().read()) == {"status": "gone"}
-    connection.close()
-    with socket.create_connection(("127.0.0.1", page.port), timeout=GUARD_S) as broken:
-        broken.sendall(f"POST {path}ask HTTP/1.1\r\nHost: {host}\r\nContent-Len".encode())
-    assert capfd.readouterr().err == ""
-
-
 def test_a_browser_that_keeps_its_connection_hears_that_all_is_over():
     kind, live = {"Content-Type": "application/json"}, Live(PLATE)
     host, _, path = live.url.removeprefix("http://").partition("/")

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import itertools
-import signal
 import socket
-import subprocess
 import sys
 import urllib.error
 import urllib.request
@@ -24,13 +22,11 @@ from scipy.spatial.transform import Rotation
 from feasibility import Task, check
 from feasibility.cases import load_case
 from feasibility.collisions import Collision, Obstacle, ToolShape
-from feasibility.division import Reconfiguration, divide
 from feasibility.paths import coverage_path
 from feasibility.timing import trajectory
 from feasibility.treated import treated_by_walk
-from feasibility.verdict import Walk
 from feasibility.viewer import playback as motion
-from feasibility.viewer import view, view_division, view_path
+from feasibility.viewer import view, view_path
 from feasibility.viewer.frames.standing_world import GROUP
 from feasibility.viewer.live_server import LiveView
 from feasibility.viewer.robot import joint_paths
@@ -303,27 +299,6 @@ def test_the_slider_shows_the_time_of_a_trajectory(path):
     np.testing.assert_array_equal(view_path(path).motion.walk, path.walk.q)
 
 
-def test_moves_between_patches_are_drawn_where_the_tool_goes():
-    """Made of two walks by hand: the arm goes straight from one to the other."""
-    whole = divide(*load_case("paper/4d", ["surface.cells=[3, 3]"]).build()[:3])
-    patch, robot = whole.fewest.patches[0], whole.robot
-    half = len(patch.walk.q) // 2
-    walks = (Walk(patch.walk.q[:half], patch.walk.cell[:half]),
-             Walk(patch.walk.q[::-1], patch.walk.cell[::-1]))  # fmt: skip
-    parts = tuple(replace(patch, walk=walk) for walk in walks)
-    ends = walks[0].q[-1], walks[1].q[0]
-    move = Reconfiguration(robot.joint_names, robot.prismatic, *ends)
-    two = replace(whole, fewest=replace(whole.fewest, patches=parts, moves=(move,)))
-    drawn = view_division(two)
-    assert any("move from patch 1 to 2" in entry.label for entry in drawn.legend.entries)
-    walk, rest = drawn.motion.walk, len(walks[1].q)
-    np.testing.assert_array_equal(walk[:half], walks[0].q)
-    np.testing.assert_array_equal(walk[-rest:], walks[1].q)
-    between = walk[half - 1 : len(walk) - rest + 1]
-    share = np.linspace(0.0, 1.0, len(between))[:, None]
-    np.testing.assert_allclose(between, ends[0] + share * (ends[1] - ends[0]), atol=1e-12)
-
-
 # -- windows and their server ---------------------------------------------------------------------
 
 
@@ -349,24 +324,6 @@ def test_the_server_answers_its_own_address_on_the_loopback_alone():
     with pytest.raises(ConnectionRefusedError):
         socket.create_connection(("127.0.0.1", live.port), timeout=GUARD_S)
     live.close()
-
-
-def test_the_server_dies_with_its_owner_even_when_that_is_killed():
-    program = (
-        "from feasibility.viewer.live_server import LiveView\n"
-        "live = LiveView('page')\n"
-        "import sys; sys.stdout.write(f'{live.port}\\n'); sys.stdout.flush(); live.wait()\n"
-    )
-    with subprocess.Popen(
-        [sys.executable, "-c", program], stdout=subprocess.PIPE, cwd=ROOT, text=True
-    ) as owner:
-        port = int(owner.stdout.readline())
-        assert psutil.Process(owner.pid).children(recursive=True) == []
-        socket.create_connection(("127.0.0.1", port), timeout=GUARD_S).close()
-        owner.send_signal(signal.SIGKILL)
-        owner.wait(timeout=GUARD_S)
-    with pytest.raises(ConnectionRefusedError):
-        socket.create_connection(("127.0.0.1", port), timeout=GUARD_S)
 
 
 def test_a_browser_that_goes_away_is_no_fault(capfd):

@@ -15,7 +15,7 @@ from PIL import Image
 
 from feasibility import check
 from feasibility.cases import load_case
-from feasibility.viewer import plot_graph, plot_views, threejs, view
+from feasibility.viewer import plot_graph, threejs, view
 from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer.html_page import Camera
 from feasibility.viewer.painter import LENS, painted
@@ -58,12 +58,6 @@ def test_what_is_nearer_hides_what_is_behind(order) -> None:
     assert mask(image, BLUE).sum() > 500
 
 
-def test_what_is_half_transparent_shows_what_is_behind() -> None:
-    glass = square("/near", BLUE, 1.0, x=1.0, opacity=0.5)
-    image = painted([glass, square("/far", RED)], FRONT, *SIZE)
-    assert mask(image, (0.5, 0.0, 0.5)).sum() > 500
-
-
 def test_the_whole_arm_is_in_the_picture_wherever_the_surface_stands() -> None:
     """Of a PUMA in random postures, with planes all around it, painted without anything else."""
     puma, rng = load_robot("puma560"), np.random.default_rng(5)
@@ -78,15 +72,6 @@ def test_the_whole_arm_is_in_the_picture_wherever_the_surface_stands() -> None:
         assert (image < 0.9).all(axis=2).sum() > 100
         for edge in (image[0], image[-1], image[:, 0], image[:, -1]):
             assert (edge == 1.0).all()
-
-
-def test_hidden_parts_and_what_is_behind_the_camera_are_not_painted() -> None:
-    empty = painted([], FRONT, *SIZE)
-    hidden = threejs.set_property("/a", "visible", False)
-    assert np.array_equal(painted([square("/a/b", RED), hidden], FRONT, *SIZE), empty)
-    assert np.array_equal(painted([square("/a", RED, x=5.0)], FRONT, *SIZE), empty)
-    shown = threejs.set_property("/a", "visible", True)
-    assert mask(painted([square("/a/b", RED), hidden, shown], FRONT, *SIZE), RED).any()
 
 
 def test_lines_lie_on_what_they_are_drawn_on_and_are_hidden_behind_it() -> None:
@@ -127,13 +112,6 @@ def test_a_view_leaves_a_picture_beside_the_page(dome) -> None:
     assert ((green > 1.5 * red) & (green > 1.5 * blue)).sum() > 10, "the start"
     assert ((red > 1.5 * green) & (red > 1.5 * blue) & (red > 150)).sum() > 5, "the x axis"
     assert len(bundle["image/png"]) < 150_000, "notebooks keep many"
-
-
-def test_small_pictures_stand_below_their_titles(dome) -> None:
-    drawn = view(dome, play=False)
-    figure = plot_views({"one": drawn, "two: $x$": drawn, "three": drawn}, columns=2)
-    shown = [axes for axes in figure.axes if axes.images]
-    assert [axes.get_title() for axes in shown] == ["one", r"two: \$x\$", "three"]
 
 
 def test_plots_leave_matplotlib_alone_and_need_no_display(dome) -> None:

@@ -68,22 +68,28 @@ def plate(commands):
     return case, check(*case.build())
 
 
-@pytest.mark.parametrize("kind", CauseKind)
-def test_causes_are_grouped_and_the_largest_group_comes_first(plate, approved, kind):
+def test_causes_are_grouped_and_the_largest_group_comes_first(plate, approved):
     case, verdict = plate
-    own = [Cause(k, kind, True, f"detail {k}") for k in range(4)]
-    other = Cause(5, CauseKind.ORIENTATION, False, "detail 5")
-    covered = np.array([False] * 4 + [True, False])
-    made = replace(
-        verdict, answer=Answer.INFEASIBLE, evidence=Evidence.EXHAUSTED, message="Said so.",
-        causes=(other, *own), covered=covered, certificate=None, witness=None,
-    )  # fmt: skip
-    text = report.as_text(made, case)
-    assert text.startswith("infeasible: no single continuous motion")
-    text = text[text.index("Not covered:") :].replace("\n\n", "\n")
-    approved(f"causes/{kind}", text)
-    cells = [row["cell"] for row in report.as_json(made)["uncovered"]]
-    assert cells == [[1, 2], [0, 0], [0, 1], [0, 2], [1, 0]]
+    texts = []
+    for kind in CauseKind:
+        own = [Cause(k, kind, True, f"detail {k}") for k in range(4)]
+        other = Cause(5, CauseKind.ORIENTATION, False, "detail 5")
+        covered = np.array([False] * 4 + [True, False])
+        made = replace(
+            verdict, answer=Answer.INFEASIBLE, evidence=Evidence.EXHAUSTED, message="Said so.",
+            causes=(other, *own), covered=covered, certificate=None, witness=None,
+        )  # fmt: skip
+        text = report.as_text(made, case)
+        assert text.startswith("infeasible: no single continuous motion")
+        missed, tries = text[text.index("Not covered:") :].split("To try next:\n")
+        said = (
+            missed.replace("\n\n", "\n") if kind == "collision" else missed.splitlines()[1].strip()
+        )
+        hints = (" ".join(line.split()[:2]) for line in tries.splitlines())
+        texts.append(f"{kind}: {said}\n  to try: {'; '.join(hints)}")
+        cells = [row["cell"] for row in report.as_json(made)["uncovered"]]
+        assert cells == [[1, 2], [0, 0], [0, 1], [0, 2], [1, 0]]
+    approved("causes", "\n".join(texts))
 
 
 def test_over_no_cells_there_is_nothing_to_cover(plate):

@@ -28,7 +28,14 @@ from surfaces import Cells
 
 HERE = Path(__file__).parent
 TABLES = ("robot", "surface", "task", "collision", "search")
-QUESTIONS: dict[str, dict[str, Any]] = tomllib.loads((HERE / "questions.toml").read_text("utf-8"))
+TABLE: dict[str, Any] = tomllib.loads((HERE / "questions.toml").read_text("utf-8"))
+QUESTIONS: dict[str, dict[str, Any]] = {}
+for tag, rows in TABLE.items():
+    for name, row in rows.items():
+        one = row | row.get("is", {})
+        QUESTIONS[name] = one | {"tags": [tag, *one.get("tags", ())]}
+PLAIN = {"robot": {"name": "ur5"}, "task": {"standoff": 0.02, "cone_deg": 40}}
+"""Of a question that is like none, where it does not say another."""
 FILES = tempfile.TemporaryDirectory(prefix="questions-")
 
 STORED = {
@@ -103,6 +110,7 @@ def _merged(name: str) -> dict[str, Any]:
     """A question's own keys, and those of what it is like."""
     own = deepcopy(QUESTIONS[name])
     made = deepcopy(tables_of(own["like"])) if "like" in own else {}
+    own = own if "like" in own else PLAIN | own
     for key in own.get("drop", ()):
         made["surface"].pop(key, None)
     for title in TABLES:

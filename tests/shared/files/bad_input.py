@@ -97,6 +97,8 @@ def changed(text: str, change: str | list[str]) -> str:
 def goods(reader: str) -> dict[str, str]:
     """The good texts of a reader, by name; those of cases whole."""
     found: dict[str, str] = dict(_tables(reader).get("good", {}))
+    if "head" in found:  # cases, a line each
+        found = {name: text.replace(" ; ", "\n") + "\n" for name, text in found.items()}
     head = found.pop("head", "")
     return {name: text if "[robot]" in text else head + text for name, text in found.items()}
 
