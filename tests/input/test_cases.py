@@ -18,7 +18,6 @@ from feasibility.cases import Case, CaseError, builtin_cases, load_case, unit_no
 from feasibility.cases.robot_table import RobotPart
 from feasibility.cases.surface_table import SurfacePart
 from feasibility.cases.toml import parse_toml, too_much
-from feasibility.cli.main import main
 
 GOOD = Path(__file__).with_name("good")
 # Table II: position and cone; Table I by name; Table III by kind.
@@ -218,13 +217,6 @@ def test_what_looks_like_another_unit_is_asked_and_no_more() -> None:
         assert unit_notes(case.to_tables(), case.robot.build().reach) == ()
     wall = {"surface": {"kind": "plane", "u": (0.0, 600.0)}}  # compared with the reach of the arm
     assert (len(unit_notes(wall, 3.0)), unit_notes(wall, math.inf)) == (1, ())
-
-
-def test_the_command_asks_and_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "case.toml").write_text(TEXTS["plate"])
-    asked = ["check", str(tmp_path / "case.toml"), "--set", "surface.position=[400, 0, 100]"]
-    assert main(asked) == 1
-    assert capsys.readouterr().err.startswith("note: surface.position")
 
 
 # a changed case in the words of its file

@@ -17,7 +17,7 @@ from mesh_writers import stl_of
 from readers import TREE, members, packed
 from small_cases import TEXTS, small_case, small_verdict
 
-from feasibility import Evidence, check, verify
+from feasibility import Evidence, check
 from feasibility.cases import Case, load_case
 from feasibility.cut_tree import CutTree, Leaf
 from feasibility.results import ResultError, load_result, plain, save_result
@@ -166,43 +166,6 @@ def test_a_result_is_not_shown_on_another_surface(
 
 
 # with collisions
-
-BOX = """
-robot.name = "ur5"
-surface = {{ kind = "plane", u = [0.4, 0.6], v = [-0.1, 0.1], cells = [2, 2], side = "outside", \
-position = [0, 0, 0.3] }}
-task = {{ standoff = 0.02, cone_deg = 30 }}
-[collision]
-clearance = {clearance}
-[[collision.scene]]
-name = "box"
-kind = "box"
-size = [0.1, 0.1, 0.6]
-position = {place}
-"""
-
-
-def test_a_result_with_collisions_holds_for_its_own_scene_alone(tmp_path: Path) -> None:
-    def case_of(clearance: float = 0.005, place: str = "[0.75, 0, 0.3]") -> Case:
-        return Case.from_toml(BOX.format(clearance=clearance, place=place), name="box")
-
-    def holds(verdict: Verdict, case: Case) -> Any:
-        return verify(load_result(save_result(verdict, case, tmp_path / "a.result")))
-
-    verdict = check(*case_of().build())
-    after = again(verdict, case_of(), tmp_path)
-    assert after.certificate == verdict.certificate
-    assert after.certificate.nearest_pair is not None
-    assert after.pairs_left_out == verdict.pairs_left_out != ()
-    assert after.task.collision.checked == ("self", "surface", "scene")
-    assert after.task.collision.scene[0].placement[0, 3] == 0.75
-    kept = holds(verdict, case_of())
-    assert kept.holds
-    assert kept.certificate.min_clearance >= 0.0
-    for other, words in ((case_of(place="[0.5, 0, 0.6]"), "box"), (case_of(0.5), "are needed")):
-        found = holds(verdict, other)
-        assert not found.holds
-        assert words in found.refusal
 
 
 # written whole or not at all

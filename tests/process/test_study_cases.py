@@ -7,11 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from jobs import case_named
 
 from feasibility.cases import TABLES, Case, CaseError, load_case, toml_document
 from feasibility.placement import Pose, StudyEvaluator
-from feasibility.studies import Store, StudyTask, arm_of, case_of, cut_of, open_workers, run_tasks
+from feasibility.studies import Store, StudyTask, case_of, cut_of, open_workers, run_tasks
 
 XACRO = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
 BEAM = "elsewhere/beam.obj"
@@ -180,13 +179,3 @@ def test_a_mesh_cut_once_and_placed_is_the_mesh_cut_in_place(tmp_path) -> None:
                 if hasattr(owner(fresh), name):
                     ours, theirs = getattr(owner(placed), name), getattr(owner(fresh), name)
                     assert np.array_equal(ours, theirs), (k, name)
-
-
-def test_cells_as_fine_as_the_footprint_needs_and_arms_loaded_once() -> None:
-    case = case_named("plate").with_overrides(["surface.cells=auto", "task.footprint=0.1"])
-    assert np.array_equal(cut_of(case).centres, case.build().cells.centres)
-    assert cut_of(case).shape == (4, 4)
-    assert arm_of(case) is arm_of(case.with_overrides(["task.cone_deg=5"]))
-    narrow = case.with_overrides(["robot.limits_deg={ shoulder_pan_joint = [-10, 10] }"])
-    assert arm_of(narrow) is not arm_of(case)
-    assert np.degrees(arm_of(narrow).upper[0]) == pytest.approx(10)

@@ -9,7 +9,6 @@ import json
 import math
 import re
 from dataclasses import replace
-from shutil import copyfile
 
 import numpy as np
 import pytest
@@ -20,7 +19,6 @@ from feasibility.cases import Case, CaseError, load_case
 from feasibility.division import divide
 from feasibility.reports.study_plot import charts
 from feasibility.studies import Row, compare, open_workers, read_study
-from robots import list_robots
 
 STRIP = PLATE.replace("[0.4, 0.6]", "[0.3, 0.7]").replace("[3, 4]", "[4, 2]")
 STRIP = STRIP.replace("[0, 0, 0.3]", "[0, 0, 0.2]") + "search.seed = 4\n"
@@ -77,19 +75,6 @@ def test_compare_says_of_each_arm_what_check_and_divide_say(folder) -> None:
     assert order == sorted(order, reverse=True)
 
 
-def test_workers_change_nothing_and_a_file_is_an_arm(folder) -> None:
-    (urdf,) = (info.urdf for info in list_robots() if info.name == "ur5")
-    copyfile(urdf, "my.urdf")
-    case = load_case("strip.toml")
-    found = []
-    for count in (0, 1):
-        with open_workers(count, warm=False) as workers:
-            found += compare(case, ["my.urdf", "ur5"], workers, divide=False).arms
-    plain = [replace(arm, robot="ur5", seconds=0.0) for arm in found]
-    assert plain == [plain[0]] * 4
-    assert [arm.robot for arm in found[:2]] == ["my.urdf", "ur5"]
-
-
 CELL = 'robot.base.position = [0, 0, 0.1]\nrobot.axis = [{ name = "table", type = "revolute", ' + (
     'carries = "surface", limits_deg = [-9, 9] }]\n'
 )
@@ -131,22 +116,6 @@ def test_the_critical_cone_is_where_the_verdict_turns(name, z, turns, given) -> 
     assert check(robot, cells, replace(task, cone_deg=cone), search).feasible
     if cone > 3.0:
         assert not check(robot, cells, replace(task, cone_deg=cone - 0.5), search).feasible
-
-
-def test_arms_that_cannot_be_compared() -> None:
-    said = coverable("compare", "strip.toml", "--robots", "ur55,ur5,ur5,robby,no.urdf")
-    assert said.status == 2
-    for place in ("[0]", "[2]", "[3]", "[4]", "no.urdf"):
-        assert place in said.err
-    assert coverable("compare", "strip.toml", "--robots", " , ").status == 2
-    both = "--workers", 1, "--dask", "tcp://127.0.0.1:1"
-    assert coverable("compare", "strip.toml", "--robots", "ur5", *both).status == 2
-    # A greedy case is compared by the complete search, with the seed and in the time given.
-    greedy = load_case("strip.toml", ["search.method=greedy", "search.step_deg=1", "search.seed=3"])
-    plain = load_case("strip.toml", ["search.seed=3"])
-    with open_workers(0) as workers:
-        found = [compare(case, ["ur3"], workers, divide=False).arms[0] for case in (greedy, plain)]
-    assert replace(found[0], seconds=0.0) == replace(found[1], seconds=0.0)
 
 
 def test_each_row_of_a_study_is_what_check_says_and_is_decided_once(folder) -> None:

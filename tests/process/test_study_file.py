@@ -7,11 +7,9 @@ import json
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from feasibility.cases import Case, CaseError, as_read, load_case, toml_document
-from feasibility.studies import case_of, load_study, read_study
+from feasibility.studies import load_study, read_study
 
 GRID = """
 base.case = "paper/4a"
@@ -195,29 +193,3 @@ def test_every_fault_is_told_with_its_place(approved, tmp_path) -> None:
     for name in ("none.toml", ".", "latin.toml", "large.toml"):
         with pytest.raises(CaseError, match=r"no such file|is a folder|UTF-8|larger than"):
             load_study(tmp_path / name)
-
-
-JUNK = ["1", "-1", "0", "nan", "inf", "''", "'x'", "[]", "{}", "[[]]", "true", "1979-05-27",
-        "[1, 'a']", "{ range = 3 }", "{ from = 'a', to = 1, steps = 2 }", "[[1, 2, 3]]",
-        "{ range = [1, 2], steps = 3 }", "{ x = {} }", "{ x = 1 }", str(10**400)]  # fmt: skip
-PLACES = [
-    "base.robot", "base.task.cone_deg", "vary.robots", 'vary."task.cone_deg"',
-    'vary."surface.position"', "vary.surface.rpy_deg", "vary.count", 'vary."robot.limits_deg"',
-    'vary."surface.position.x"', 'vary."search.seed"', 'vary."surface.u_deg"', 'vary.""',
-    'vary."."', 'vary."robot.lock.a"', "description",
-]  # fmt: skip
-
-
-@settings(max_examples=25)
-@given(st.sampled_from(PLACES), st.sampled_from(JUNK))
-def test_whatever_stands_for_a_value_the_answer_is_a_study_or_places(place, value) -> None:
-    extra = "" if place.startswith("vary") else 'vary."task.cone_deg" = [30]\n'
-    try:
-        study = read_study(f'base.case = "paper/4a"\n{extra}{place} = {value}')
-    except CaseError as error:
-        faults = [fault.message for fault in error.faults]
-    else:
-        faults = ["none"] * len(study.tasks)
-        assert all(np.isfinite(case_of(task.tables).task.cone_deg) for task in study.tasks)
-    assert faults
-    assert all(faults)

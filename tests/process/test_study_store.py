@@ -7,8 +7,6 @@ import os
 import resource
 import signal
 import sqlite3
-import subprocess
-import sys
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 
@@ -77,34 +75,6 @@ def test_many_open_a_new_file_at_the_same_moment(tmp_path) -> None:
     with ThreadPoolExecutor(4) as pool:
         for number in range(30):
             assert list(pool.map(opened, [tmp_path / f"{number}.study"] * 4)) == [{}] * 4
-
-
-KEEP_ON = """
-import sys
-from feasibility.studies.store import Record, Store
-with Store(sys.argv[1]) as store:
-    for k in range(100_000):
-        store.keep([Record(f"key{k}", {"k": k}, "done", {"text": "x" * 2000}, 1.0)])
-        print(k, flush=True)
-"""
-
-
-def test_a_killed_writer_loses_nothing_that_it_had_kept(tmp_path) -> None:
-    path = tmp_path / "a.study"
-    command = [sys.executable, "-c", KEEP_ON, str(path)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        for line in process.stdout:
-            if line == "150\n":
-                process.kill()
-                break
-        last = [150, *map(int, process.stdout.read().split())][-1]
-    with Store(path) as store:
-        keys = {f"key{k}" for k in range(last + 2)}
-        found = store.find(keys)
-        # The one that was being written may be there or not.
-        assert keys - {f"key{last + 1}"} <= set(found)
-        assert all(r.result == {"text": "x" * 2000} for r in found.values())
 
 
 def test_a_full_disk_loses_nothing_that_was_kept(tmp_path) -> None:

@@ -71,14 +71,6 @@ def test_the_clearance_is_the_room_between_wall_and_tool(clearance):
     assert count >= 4
 
 
-def test_the_surface_moves_towards_the_wall_by_the_room_at_most():
-    if EVERYTHING:
-        found = threshold_of(explained(0.01), "shift along +x").feasible
-        assert ROOM - 0.01 - 0.003 < found.value <= ROOM - 0.01 + TOLERANCE
-    away = threshold_of(explained(0.095), "shift along -x").feasible
-    assert 0.095 - ROOM - TOLERANCE <= away.value < 0.095 - ROOM + 0.003
-
-
 def test_the_object_in_the_way_is_named_and_only_that():
     left_out = [t for t in explained(0.095).thresholds if t.quantity.kind is Kind.WITHOUT]
     helps = {t.quantity.name: t.feasible is not None for t in left_out}
@@ -93,17 +85,6 @@ def test_what_is_left_out_takes_its_pairs_along():
     found = explain(FREE, CELLS, Task(0.02, 30, TOLERANCE, collision=asked))
     assert threshold_of(found, "without wall").feasible is not None
     assert threshold_of(found, "without post").feasible is None
-
-
-@sampled
-@pytest.mark.skipif(not EVERYTHING, reason="a campaign asks it: it takes half a minute")
-def test_tool_clearance_ends_at_what_reaches_beyond_the_tool_point():
-    """A nozzle that reaches 5 mm beyond the tool point is 15 mm off a plane 20 mm away."""
-    nozzle = ToolShape.cylinder(0.002, 0.2, position=(0.0, 0.0, -0.095))
-    asked = Collision(self_=False, tool=(nozzle,), tool_links=("wrist_3_link",))
-    found = explain(FREE, CELLS, Task(0.02, 10, TOLERANCE, collision=asked))
-    value = threshold_of(found, "tool clearance").feasible.value
-    assert 0.008 < value <= 0.015 + TOLERANCE
 
 
 # -- `check`, told a motion ------------------------------------------------------------------------

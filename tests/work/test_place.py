@@ -147,21 +147,6 @@ def test_a_region_far_away_is_refused_by_the_bound_alone():
         assert (found.cause, found.found) == (CauseKind.OUT_OF_REACH, ())
 
 
-def test_none_in_a_region_within_reach():
-    """The plate faces the floor below the arm; no bound sees it, and the cause is told."""
-    setup, floor = setup_of("ur5 plate"), Pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    region = Region.around(floor, {"x": (-0.05, 0.05), "y": (-0.05, 0.05)})
-    narrow = Task(standoff=0.02, cone_deg=5)
-    found = place(setup.robot, setup.cells, narrow, region, count=2, around=0)
-    assert (found.answer, found.evidence) == (Answer.INFEASIBLE, Evidence.EXHAUSTED)
-    verdict = check(setup.robot, moved_cells(setup.cells, found.best.pose), narrow)
-    areas = verdict.cells.areas
-    assert found.share == pytest.approx(areas[verdict.covered].sum() / areas.sum())
-    assert found.share < 1.0
-    assert sum(found.causes.values()) == (~verdict.covered).sum()
-    assert found.causes[str(found.cause)] == max(found.causes.values())
-
-
 class Doubting(LocalEvaluator):
     """`check` never agrees."""
 
