@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from jobs import coverable as asked
 
+from feasibility import Search, Task, check
 from feasibility.cli.main import main
-from feasibility.paths import PathError
-from feasibility.timing import motion_limits
 from robots import load_robot
+from surfaces import plane
 
 SMALL = ["--set", "surface.cells=[1, 2]"]
 
@@ -62,7 +62,7 @@ def test_a_working_directory_that_is_gone(
     assert "the working directory has been deleted" in line or "there is no such file" in line
 
 
-def test_arguments_in_another_order_or_of_another_kind():
+def test_arguments_in_another_order_or_of_another_kind() -> None:
     plate = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside")
     good = (load_robot("ur5"), plate.cells(2, 2), Task(standoff=0.02, cone_deg=20), Search())
     names, bad = ("robot", "cells", "task", "search"), ("ur5", plate, {"standoff": 0.02}, "greedy")

@@ -16,12 +16,8 @@ from samples import sampled, spread
 
 from coverable_errors import CoverableError
 from robots.urdf import (
-    Box,
-    Capsule,
     CheckedUrdf,
-    Cylinder,
     MeshFile,
-    Sphere,
     UrdfError,
     check_urdf,
     read_srdf,

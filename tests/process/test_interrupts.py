@@ -114,33 +114,27 @@ def test_a_store_is_closed_wherever_it_is_cut_short(tmp_path):
         gc.enable()
 
 
-def test_in_a_callback_of_the_interpreter():
-    """Python prints it and goes on: it is raised again, without waiting for an output."""
+class Dying:
+    """The interpreter prints what its callback raises, and goes on."""
 
-    class Dying:
-        def __del__(self):
-            signal.raise_signal(signal.SIGINT)
-
-    def work():
-        with interruptible():
-            Dying()
-            while True:  # ended by the second attempt alone
-                pass
-
-    with pytest.raises(KeyboardInterrupt):
-        work()
+    def __del__(self):
+        signal.raise_signal(signal.SIGINT)
 
 
-def test_in_a_compiled_module_that_prints_and_drops_it():
+def printed_and_dropped():
     """As the generated code of Cython does where nothing can be raised."""
+    try:
+        signal.raise_signal(signal.SIGINT)
+    except KeyboardInterrupt as error:
+        sys.excepthook(type(error), error, error.__traceback__)
 
+
+@pytest.mark.parametrize("drop", [Dying, printed_and_dropped])
+def test_what_is_dropped_is_raised_again_without_waiting_for_an_output(drop):
     def work():
         with interruptible():
-            try:
-                signal.raise_signal(signal.SIGINT)
-            except KeyboardInterrupt as error:
-                sys.excepthook(type(error), error, error.__traceback__)
-            while True:
+            drop()
+            while True:  # ended by the second attempt alone
                 pass
 
     with pytest.raises(KeyboardInterrupt):

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bad_input import sheet
+from mesh_writers import stl_of
 
 from feasibility.cases import TABLES, Case, CaseError, load_case, toml_document
 from feasibility.placement import Pose, StudyEvaluator
@@ -88,8 +90,18 @@ def test_a_stored_verdict_is_for_the_files_as_they_were(folder: Path) -> None:
     assert verdict(folder, plain) == ("feasible", False)
 
 
-def test_what_files_include_in_turn_is_part_of_the_key(folder: Path) -> None:
-    case = Case.from_toml(CASE.format("xacro") + COLLISION, folder)
+def test_all_files_of_a_case_and_what_they_include_are_part_of_its_key(folder: Path) -> None:
+    """Surface, scene and tool as meshes; arm and SRDF as xacro files that include others."""
+    meshes = ["surface.stl", "scene.stl", "tool.stl"]
+    for name in meshes:
+        (folder / name).write_bytes(stl_of(sheet()))
+    shape = 'kind = "mesh", file'
+    more = [
+        f'surface={{ {shape} = "surface.stl", scale = 1, cells = 2, side = "outside" }}',
+        f'collision.scene=[{{ name = "a", {shape} = "scene.stl" }}]',
+        f'collision.tool=[{{ {shape} = "tool.stl" }}]',
+    ]
+    case = Case.from_toml(CASE.format("xacro") + COLLISION, folder, overrides=more)
     keys = [StudyTask(case.to_tables(), {}).key]
     none = '<disable_collisions link1="l1" link2="l2" reason="User"/>'
     for file, text in (
@@ -100,9 +112,12 @@ def test_what_files_include_in_turn_is_part_of_the_key(folder: Path) -> None:
         file.write_text(text)
         keys.append(StudyTask(case.to_tables(), {}).key)
         assert StudyTask(case.to_tables(), {}).key == keys[-1]
+    for name in meshes:
+        (folder / name).write_bytes(stl_of(sheet(0.3)))
+        keys.append(StudyTask(case.to_tables(), {}).key)
     (folder / BEAM).unlink()
     keys.append(StudyTask(case.to_tables(), {}).key)
-    assert len(set(keys)) == 5
+    assert len(set(keys)) == 8
 
 
 @pytest.mark.parametrize("kind", ["urdf", "xacro"])

@@ -108,47 +108,6 @@ def test_the_key_says_what_a_task_is_and_nothing_else() -> None:
     assert not set(other) & set(plain)
 
 
-FACET = (
-    "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 0.1 0 0\nvertex 0 {y} 0\n"
-    "endloop\nendfacet\nendsolid a\n"
-)
-COLLISION = """
-base.case = "paper/4a"
-base.collision.scene = [{ name = "part", kind = "mesh", file = "a.stl" }]
-base.collision.srdf = "a.srdf"
-[vary]
-"collision.clearance" = [0.0, 0.01]
-[vary.collision]
-tool = [[], [{ kind = "mesh", file = "b.stl" }]]
-"""
-
-
-def test_files_that_a_case_names_are_part_of_its_key(tmp_path) -> None:
-    files = [tmp_path / name for name in ("a.stl", "a.srdf", "b.stl")]
-
-    def after(changed: int | None = None) -> list[str]:
-        for k, file in enumerate(files):
-            file.write_text("new content" if k == changed else "old")
-        return keys(COLLISION, tmp_path)
-
-    first = after()
-    assert len(set(first)) == 4
-    for changed, same in ((0, []), (1, []), (2, [0, 2])):
-        again = after(changed)
-        assert [k for k in range(4) if again[k] == first[k]] == same, changed
-    assert after() == first
-    mesh = (
-        'base.robot.name = "ur5"\nbase.surface = { kind = "mesh", file = "a.stl", scale = 1.0, '
-        'cells = 2, side = "outside" }\n'
-        'base.task = { standoff = 0.01, cone_deg = 30 }\nvary."task.cone_deg" = [20]'
-    )
-    made = []
-    for y in (0.1, 0.2, 0.1):
-        files[0].write_text(FACET.format(y=y))
-        made += keys(mesh, tmp_path)
-    assert made[0] == made[2] != made[1]
-
-
 WHOLE = "[[-90, 90], [-90, 90], [-90, 90], [-90, 90], [-90, 90], [-90, 90]]"
 VARY = 'base.case = "paper/4a"\n[vary]\n'
 ARMS = 'base.case = "paper/4a"\nbase.robot.name = "puma560"\nvary.robots = ["puma560", "ur5"]\n'

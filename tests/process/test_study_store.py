@@ -246,15 +246,6 @@ def test_every_value_of_a_result_is_judged(good, tmp_path) -> None:
         assert f"{key} must be" in refused(good, path) or key == "components"
 
 
-def test_what_a_store_may_say_is_no_program_on_the_page(good, tmp_path) -> None:
-    path, page = copied(good, tmp_path), tmp_path / "page.html"
-    for key, parameters, status, text, seconds in rows(path):
-        said = json.dumps({**json.loads(text), "message": SCRIPT})
-        put(path, (key, parameters, status, said, seconds))
-    assert ask(good, path, "--html", page).status == 0
-    assert SCRIPT not in page.read_text()
-
-
 def test_what_works_keep_is_what_is_read_again_and_judged(tmp_path) -> None:
     """Outcomes, arms and trials: a second run reads all from the store, and believes no oddity."""
     case = case_named("plate").with_overrides(["surface.cells=[2, 2]"])

@@ -10,11 +10,9 @@ import numpy as np
 import pytest
 from samples import sampled, seeds
 
-from feasibility.division import undominated
 from feasibility.division.connected_labels import count_of
 from feasibility.division.partition import fewest_patches
 from feasibility.placement.stations import fewest_stations
-from surfaces import plane
 
 
 def random_table(seed):
@@ -197,5 +195,3 @@ def test_without_time_there_is_a_gap_and_it_is_honest():
         for seed in (100, 101, 102)
     ]
     assert any(one.connected.bound < len(one.connected) for one in gaps)
-
-

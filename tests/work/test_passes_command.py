@@ -18,7 +18,6 @@ from surfaces.passes import pass_route
 from surfaces.toolpaths import PoseCells
 
 UR5 = load_robot("ur5")
-TASK = Task(standoff=0.02, cone_deg=20)
 PANEL = """
 robot.name = "ur5"
 surface.kind = "plane"
@@ -167,16 +166,3 @@ def test_the_best_direction_has_the_fewest_passes(path, tmp_path):
     assert all(name in page for name in ("4 passes in one motion", "numbers", "treated once"))
     status, found, _ = path("plate", *asked, "0", "--cross")
     assert (status, found["passes"]["count"]) == (0, 4 + 6)
-
-
-def test_stripes_are_said_to_be_left_where_they_are(path):
-    """Where the pitch is wider than the footprint; not where all is treated by crossing passes."""
-    wide = ("--passes", "0", "--pitch", "0.1")
-    status, out, err = path("plate", *wide)
-    assert (status, "stripes up to 50 mm wide are left between" in out) == (3, True)
-    assert "undecided: the path treats" in err
-    status, out, _ = path("plate", *wide, "--set", "task.coverage=")
-    assert (status, "untreated: " in out) == (0, True)
-    crossed = ("--pitch", "0.05", "--cross", "--set", "task.footprint=0.0499")
-    status, out, _ = path("plate", "--passes", "0", *crossed)
-    assert (status, "to 100.00 % of" in out, "stripes" in out) == (0, True, False)

@@ -27,7 +27,6 @@ from feasibility.paths.two_opt import improved, tour_length
 from surfaces import cylinder, mesh, plane, sphere
 from surfaces.meshes import TriangleMesh
 
-
 SHAPES = {(0, 3): [(False, False)], (1, 5): [(False, False)], (5, 1): [(False, False)],
           (4, 6): [(False, False)], (5, 4): [*product((True, False), repeat=2)][1:]}  # fmt: skip
 """Of each which sides may close on themselves."""
