@@ -95,12 +95,11 @@ def test_all_files_of_a_case_and_what_they_include_are_part_of_its_key(folder: P
     meshes = ["surface.stl", "scene.stl", "tool.stl"]
     for name in meshes:
         (folder / name).write_bytes(stl_of(sheet()))
-    shape = 'kind = "mesh", file'
-    more = [
-        f'surface={{ {shape} = "surface.stl", scale = 1, cells = 2, side = "outside" }}',
-        f'collision.scene=[{{ name = "a", {shape} = "scene.stl" }}]',
-        f'collision.tool=[{{ {shape} = "tool.stl" }}]',
-    ]
+    surface, scene, tool = (f'"{folder / name}"' for name in meshes)
+    more = ["surface.u=", "surface.v=", "surface.kind=mesh", f"surface.file={surface}"]
+    more += ["surface.scale=1", "surface.cells=2"]
+    more += [f'collision.scene=[{{ name = "a", kind = "mesh", file = {scene}, scale = 1 }}]']
+    more += [f'collision.tool=[{{ kind = "mesh", file = {tool}, scale = 1 }}]']
     case = Case.from_toml(CASE.format("xacro") + COLLISION, folder, overrides=more)
     keys = [StudyTask(case.to_tables(), {}).key]
     none = '<disable_collisions link1="l1" link2="l2" reason="User"/>'

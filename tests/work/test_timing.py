@@ -219,26 +219,18 @@ def test_a_timed_motion_that_would_collide_is_refused_with_the_pair(what):
 
 
 def test_limits_and_numbers_that_are_none():
-    puma = replace(load_robot("puma560"), max_velocity=np.nan)
+    puma, path = replace(load_robot("puma560"), max_velocity=np.nan), path_of("ur5")
     with pytest.raises(PathError, match=r"joint1, .*give velocity"):
         motion_limits(puma, 0.1)
     assert motion_limits(puma, 0.1, velocity=2.0).acceleration.tolist() == [4.0] * 6
     some = replace(puma, max_velocity=[1.0, np.nan, 1.0, np.inf, 1.0, 1.0])
     with pytest.raises(PathError, match="for joint2, joint4; give"):
         motion_limits(some, 0.1)
-    path = path_of("ur5")
-    for bad in (0.0, -0.1, np.nan, np.inf, "fast", None, True):
-        with pytest.raises(PathError, match="tool speed"):
-            trajectory(path, bad)
-    for bad in (0.0, -1.0, np.nan, np.inf, [1.0, 2.0], "1 rad/s", [1.0] * 5 + [0.0]):
-        for what in ("velocity", "acceleration"):
-            with pytest.raises(PathError, match=f"{what} must be"):
-                trajectory(path, **{what: bad})
-    for bad in (0.0, -1.0, np.nan, 1e-9, 1e9, "often"):
+    for bad in (0.0, -1.0, np.nan, np.inf, "fast", [1.0, 2.0], [1.0] * 5 + [0.0], 1e-320):
+        with pytest.raises(PathError, match=r"(?s)tool speed.*velocity must be.*acceleration must"):
+            motion_limits(UR5, bad, velocity=bad, acceleration=bad)
         with pytest.raises(PathError, match="the period must be"):
             trajectory(path, period=bad)
-    with pytest.raises(PathError, match=r"(?s)tool speed.*velocity must be.*acceleration must be"):
-        motion_limits(UR5, -1, velocity=-1, acceleration=-1)
     off = replace(path, walk=replace(path.walk, q=path.walk.q + 0.1))
     with pytest.raises(PathError, match="no smooth motion was found"):
         trajectory(off)
