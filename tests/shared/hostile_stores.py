@@ -53,5 +53,3 @@ def allowed(key: str, odd: Any) -> bool:
         return odd in ([], [SCRIPT])
     counts = "seed", "edges", "pairs", "examined", "fk", "covered"
     return key in counts and odd == 5 and odd is not True
-
-
