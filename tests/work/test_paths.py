@@ -16,17 +16,16 @@ from samples import sampled, seeds, spread
 
 from feasibility import Answer, Task, check
 from feasibility.certification import replay
-from feasibility.paths import MotionGraph, PathError, coverage_path, motion_graph_of, unwound
+from feasibility.paths import MotionGraph, PathError, coverage_path, unwound
 from feasibility.paths.ladder import joint_route
 from feasibility.paths.metrics import revisiting
-from feasibility.paths.motion_graph import joint_length, rewound, windings
+from feasibility.paths.motion_graph import joint_length
 from feasibility.paths.order import ORDERS, closed_sides, grid_order
 from feasibility.roadmap import arrays_of, work_for
 from feasibility.verdict import Walk
 from robots import Kinematics, load_robot
 from surfaces import cylinder, plane
 
-NAMES = (*FEASIBLE, *PATCHES)
 ASKED = [
     *product(("4a", "4e", "5c", *PATCHES), ORDERS),
     *((name, BEST[name]) for name in FEASIBLE if name not in ("4a", "4e", "5c")),
@@ -95,24 +94,6 @@ def test_a_closed_surface_is_not_gone_over_twice(name, order):
     assert path.figures.revisited_share <= 0.01
     if order != "shortest":
         assert list(dict.fromkeys(path.visits.tolist())) in beginnings(verdict.cells, order)
-
-
-def test_a_motion_in_another_winding_is_the_same_work():
-    verdict = tube("ur5 around")
-    graph = motion_graph_of(verdict)
-    nodes = joint_route(graph, verdict.cells, np.arange(3)).nodes
-    walk, found = graph.walk(nodes), windings(graph, nodes)
-    for joint, times in product(range(6), (-2, -1, 1, 2)):
-        turn = 2 * np.pi * times * np.eye(6)[joint]
-        fits = (walk.q + turn >= UR5.lower).all() and (walk.q + turn <= UR5.upper).all()
-        assert fits == any(np.array_equal(turn, one) for one in found)
-    assert found
-    needed = np.isin(np.arange(len(verdict.cells)), [0, 1, 2])
-    for turn in found:
-        moved = graph.walk(rewound(graph, nodes, turn))
-        assert np.array_equal(moved.cell, walk.cell)
-        assert moved.q == pytest.approx(walk.q + turn, abs=1e-12)
-        accepted(verdict, moved, needed)
 
 
 @pytest.mark.parametrize("name", ["4c", "5c", *PATCHES])
