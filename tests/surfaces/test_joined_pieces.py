@@ -202,26 +202,6 @@ def test_a_twisted_ring_is_refused_and_an_untwisted_one_is_not():
     assert len(piecewise(strip(2)).seams) == 6
 
 
-@pytest.mark.parametrize("angle", [-90.0, 5.0, 60.0, 120.0])
-def test_a_crease_is_told_with_its_angle(angle):
-    surface = hinged(angle)
-    assert len(surface.notes) == 1
-    assert f"crease of up to {abs(angle):g} degrees" in surface.notes[0]
-    cells = surface.cells((3, 4))
-    assert cells.seam_pairs.creases == pytest.approx(math.radians(abs(angle)), abs=1e-9)
-    # Curves across it deviate by at least half of the angle, those along it by nothing.
-    deviations = cells.curves.deviations[:, 1]
-    across = cells.piece[cells.pairs[:, 0]] != cells.piece[cells.pairs[:, 1]]
-    assert (deviations[across] >= 2.0 * math.sin(0.25 * math.radians(abs(angle)))).all()
-    assert deviations[~across].max() < 1e-12
-    pair = np.repeat(np.arange(len(cells.pairs)), 23)
-    points, normals = cells.curves.at(pair, np.tile(np.linspace(0, 1, 23), len(cells.pairs)))
-    on = surface.closest(points)
-    assert on.inside.all()
-    assert (np.abs(on.height) <= cells.curves.deviations[pair, 0] + 1e-12).all()
-    assert (np.linalg.norm(normals - on.normal, axis=1) <= deviations[pair] + 1e-12).all()
-
-
 def test_seams_of_full_and_of_half_turns():
     """Closed borders that begin at different angles; one cell that is half around."""
     stacked = piecewise(

@@ -6,8 +6,6 @@ from functools import cached_property
 import networkx as nx
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from mesh_patches import (
     CONNECTED,
     PATCHES,
@@ -232,38 +230,6 @@ def test_neighbours_go_clockwise(cut):
         assert turns.sum() == pytest.approx(math.tau if len(around) > 1 else 0.0, abs=1e-9)
 
 
-def flat(n, labels):
-    """Figures of the squares of an n x n grid, whose labels are given along v first."""
-    u, v, faces = grid(n, n)
-    up = np.tile([0.0, 0.0, 2.0], (len(u), 1))
-    return figures(np.column_stack([u, v, 0 * u]), faces, up, np.repeat(np.ravel(labels), 2))
-
-
-def signed(found, cell):
-    """m^2: outer loops run counter-clockwise and holes clockwise."""
-    return sum(np.cross(p[:-1], p[1:])[:, 2].sum() / 2 for p in found.outlines.of(cell))
-
-
-def test_rings_and_cells_that_meet_themselves_have_all_their_loops():
-    given = sheet(60)
-    x, y, _ = (given.vertices[given.faces].mean(axis=1) - [0.3, 0.2, 0]).T
-    labels = np.digitize(np.hypot(x, y), [0.1, 0.15])
-    ring = figures(*given, np.tile([0.0, 0, 1], (len(given.vertices), 1)), labels)
-    assert np.hypot(*(ring.centres[1] - [0.3, 0.2, 0])[:2]) == pytest.approx(0.125, abs=0.007)
-    assert np.hypot(*(ring.centres[0] - [0.3, 0.2, 0])[:2]) < 1e-3
-    # Two opposite quarters of a square joined around a third: a loop passes the middle twice.
-    eight = flat(4, [[0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 2, 0], [0, 0, 0, 0]])
-    for found, loops, pairs in (
-        (ring, [1, 2, 2], [[0, 1], [1, 2]]),
-        (eight, [2, 1, 1], [[0, 1], [0, 2]]),
-    ):
-        assert [len(found.outlines.of(k)) for k in range(3)] == loops
-        assert found.borders.pairs.tolist() == pairs
-        np.testing.assert_allclose([signed(found, k) for k in range(3)], found.areas, rtol=1e-9)
-    loop = eight.outlines.of(0)[1]
-    assert (np.linalg.norm(loop[:-1] - [0.5, 0.5, 0], axis=1) < 1e-12).sum() == 2
-
-
 def test_a_closed_cell_has_no_border():
     found = Cut(box(), count=1).figures
     assert found.outlines.of(0) == []
@@ -341,17 +307,6 @@ def test_subdivision_keeps_the_surface(name, parts):
     assert len(fine.faces) < 4 * max(parts, len(given.faces))  # needles become few and even
     if (name, parts) == ("hood", 30):  # fine enough as it is
         np.testing.assert_array_equal(fine.faces, given.faces)
-
-
-@settings(max_examples=25)
-@given(
-    st.lists(st.floats(-1, 1), min_size=4, max_size=4), st.floats(1e-4, 1.0), st.floats(0.3, 3000)
-)
-def test_subdivision_of_any_two_triangles(numbers, height, parts):
-    low = -abs(numbers[3]) - height
-    vertices = [[-1, 0, 0], [1, 0, 0], [numbers[0], height, numbers[1]], [numbers[2], low, 0]]
-    given = Mesh(np.array(vertices, float), np.array([[0, 1, 2], [1, 0, 3]]))
-    assert_subdivided(given, areas_of(*given).sum() / parts)
 
 
 def test_what_makes_no_cells_is_refused(approved):

@@ -1,6 +1,5 @@
 """Repair changes nothing but what it says; triangle meshes hold what they promise."""
 
-import tracemalloc
 from itertools import pairwise
 
 import mesh_writers as w
@@ -103,16 +102,6 @@ def test_a_crowd_of_vertices_is_thinned_and_none_moves_far(dimension):
     assert len(left) <= (2 + 3e-6 / (distance / np.sqrt(12))) ** dimension
 
 
-def test_a_million_points_in_one_place_are_welded_in_bounded_memory():
-    rng = np.random.default_rng(14)
-    points = np.concatenate([rng.uniform(0, 1e-7, (1_000_000, 3)), [[1, 1, 1]]])
-    tracemalloc.start()
-    stands = welded(points, weld_distance(points))
-    assert tracemalloc.get_traced_memory()[1] < 400 << 20
-    tracemalloc.stop()
-    assert len(np.unique(stands)) == 2
-
-
 def slit(rng):
     """A wavy plate with corners put on some edges, each slit closed by a fan of caps."""
     vertices, faces = w.hilly(3, 3)
@@ -179,20 +168,6 @@ def test_fans_are_parted_and_nothing_moves():
     assert sorted(np.bincount(mesh.pieces)) == [6, 6, 6]
 
 
-@pytest.mark.parametrize("count", [3, 4, 7, 24])
-def test_one_sided_and_two_sided_bands(count):
-    flat = w.strip(twisted=False, count=count)
-    mesh = clean(*flat)
-    w.assert_clean(mesh)
-    assert not any("turned over" in note for note in notes_of(mesh))
-    twisted = w.strip(twisted=True, count=max(count, 4))
-    with pytest.raises(SurfaceError, match="only one side"):
-        clean(*twisted)
-    faces = 2 * max(count, 4)
-    with pytest.raises(SurfaceError, match=rf"{faces} faces around \((3|2\.9\d*), "):
-        clean(*w.stacked(flat, (twisted[0] + [3, 0, 0], twisted[1])))
-
-
 def vertex_normals(mesh):
     """(F, 3, 3) at the corners of faces, one for each vertex."""
     alike = np.repeat(mesh.face_normals[:, None], 3, axis=1)
@@ -233,56 +208,7 @@ def test_pieces_are_numbered_by_area():
     assert clean(*w.stacked(*parts)).pieces.tolist() == [2] * 12 + [0] * 12 + [1] * 12
 
 
-def pipe(radii, heights, n=24):
-    """Rings of n points about z, joined from each to the next; outward is away from z."""
-    angle = np.linspace(0, 2 * np.pi, n, endpoint=False)
-    circle = np.column_stack([np.cos(angle), np.sin(angle)])
-    rings = [np.column_stack([r * circle, 0 * angle + z]) for r, z in zip(radii, heights, strict=1)]
-    k, ahead = np.arange(n), (np.arange(n) + 1) % n
-    band = np.concatenate([np.stack([k, ahead, ahead + n], 1), np.stack([k, ahead + n, k + n], 1)])
-    return np.concatenate(rings), np.concatenate([band + b * n for b in range(len(rings) - 1)])
-
-
-def windowed():
-    vertices, faces = pipe([1] * 9, np.linspace(0, 4, 9))
-    middles = vertices[faces].mean(axis=1)
-    return vertices, faces[(np.abs(middles[:, 2] - 2) >= 0.6) | (middles[:, 0] <= 0.8)]
-
-
-def pierced():
-    vertices, faces = w.plate(9, 8, 0.9, 0.8)
-    squares = np.array([18, 36, 53])  # none touches another or the border
-    return vertices, np.delete(faces, np.concatenate([2 * squares, 2 * squares + 1]), axis=0)
-
-
 # Border lines: holes, and open ends where a piece has more than one.
-OPEN = {
-    "pipe": (pipe([1, 1, 1], [0, 1, 2]), 0, 2),
-    "long pipe": (pipe([0.05] * 9, range(9)), 0, 2),
-    "waisted pipe": (pipe([1, 0.5, 1], [0, 1, 2]), 0, 2),
-    "funnel, steep": (pipe([1, 0.8], [0, 2]), 0, 2),
-    "disc with a hole": (pipe([0.2, 1], [0, 0]), 1, 0),
-    "flat ring": (pipe([0.9, 1], [0, 0]), 1, 0),
-    "shallow dish with a hole": (pipe([0.2, 0.6, 1], [0, 0.1, 0.3]), 1, 0),
-    "pipe with a hole in its side": (windowed(), 1, 2),
-    "plate with three": (pierced(), 3, 0),
-}
-
-
-@pytest.mark.parametrize("name", OPEN)
-@pytest.mark.parametrize("flipped", [False, True])
-def test_the_ends_of_a_pipe_are_no_holes(name, flipped):
-    (vertices, faces), holes, ends = OPEN[name]
-    turn, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))
-    mesh = clean(vertices @ turn.T, faces[:, ::-1] if flipped else faces)
-    notes = [note for note in notes_of(mesh) if "hole" in note or "open end" in note]
-    expected = [f"{holes} hole"] * bool(holes) + [f"{ends} open ends"] * bool(ends)
-    assert len(notes) == len(expected)
-    for note, words in zip(notes, expected, strict=True):
-        assert words in note
-    assert name != "plate with three" or "0.4 m around" in notes[0]
-
-
 def knotted(rng):
     """Faces between points of a small grid: many are straight, doubled or meet in bundles."""
     count = int(rng.integers(3, 12))

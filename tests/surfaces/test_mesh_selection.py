@@ -6,7 +6,7 @@ import pytest
 from samples import sampled, seeds
 
 from surfaces import cut_box, cut_plane, faces_within_cone, take_faces
-from surfaces.meshes.repair import clean, notes_of
+from surfaces.meshes.repair import clean
 
 CUBE = clean(*w.cube(0.2))
 HILLY = clean(*w.hilly())
@@ -74,17 +74,6 @@ def test_parts_by_hand(name):
     part = made()
     w.assert_clean(part)
     assert part.area == pytest.approx(area)
-
-
-def test_a_cut_that_leaves_parts_hanging_in_a_point_parts_them():
-    """Two peaks above the plane that share one saddle vertex."""
-    vertices = [[0, 0, 0], [1, 1, 1], [1, -1, 1], [-1, 1, 1], [-1, -1, 1], [2, 0, -1]]
-    vertices += [[0, 2, -1], [-2, 0, -1], [0, -2, -1]]
-    faces = [[0, 2, 1], [0, 3, 4], [0, 1, 6], [0, 6, 3], [0, 4, 8], [0, 8, 2]]
-    part = cut_plane(clean(vertices, faces), (0, 0, 0), (0, 0, 1))
-    w.assert_clean(part)
-    assert len(np.unique(part.pieces)) == 2
-    assert any("2 separate pieces" in note for note in notes_of(part))
 
 
 def test_a_box_is_six_planes():

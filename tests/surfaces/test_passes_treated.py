@@ -17,7 +17,6 @@ from surfaces.passes import (
     visits,
     working_mesh,
 )
-from surfaces.passes.treated import share_below
 
 
 def facing(mesh: WorkingMesh) -> np.ndarray:
@@ -125,29 +124,6 @@ def test_no_face_is_treated_more_or_less_than_is_said_of_it(seed):
     assert ((found.most - truth)[truth > 0.0] < 0.1).any()
 
 
-def test_random_points_agree_and_further_rounds_only_narrow_it():
-    rng = np.random.default_rng(5)
-    mesh = working_mesh(sphere(0.25, (50, 110), (0, 90)), 0.02)
-    rows = [mesh.corners[rng.integers(len(mesh.faces))].mean(axis=0) for _ in range(12)]
-    points = np.array(rows)
-    normals = points / np.linalg.norm(points, axis=1)[:, None]
-    lines = ToolLines(points, normals, np.arange(12))
-    areas = mesh.areas
-    face = rng.choice(len(areas), 40_000, p=areas / areas.sum())
-    weights = rng.dirichlet((1.0, 1.0, 1.0), 40_000)
-    places = np.einsum("kc,kci->ki", weights, mesh.corners[face])
-    near = np.linalg.norm(places[:, None] - points, axis=2).min(axis=1)
-    before = (0.0, 1.0)
-    for rounds in range(4):
-        found = treated_share(mesh, facing(mesh), lines, 0.045, rounds)
-        assert before[0] - 1e-9 <= found.lower <= found.upper <= before[1] + 1e-9
-        before = found.lower, found.upper
-        inside = float((near <= 0.045).mean())
-        spread = 4.0 * math.sqrt(inside * (1.0 - inside) / len(near))
-        assert found.lower - spread <= inside <= found.upper + spread
-    assert found.upper - found.lower < 0.02
-
-
 def test_the_back_of_a_thin_part_is_not_treated_through_it():
     """Two plates 4 mm apart that look away from one another, a footprint of 40 mm."""
     front, back = PLATE, PLATE.vertices - [0.0, 0.0, 0.004]
@@ -195,15 +171,6 @@ def test_a_tool_that_may_be_off_treats_less_for_certain_and_more_perhaps():
     assert (found.lower, found.upper) == pytest.approx((least, most), abs=0.01)
     nothing = treated_share(mesh, facing(mesh), line, radius, off=radius)
     assert (nothing.lower, nothing.upper) == (0.0, 1.0)
-
-
-def test_shares_of_triangles_below_a_level():
-    rng = np.random.default_rng(2)
-    values = rng.normal(size=(50, 3))
-    weights = rng.dirichlet((1.0, 1.0, 1.0), 200_000)
-    for row, share in zip(values, share_below(values, 0.2), strict=True):
-        assert share == pytest.approx((weights @ row <= 0.2).mean(), abs=5e-3)
-    assert share_below(np.array([[0.1, 0.1, 0.1], [0.3, 0.3, 0.3]]), 0.2).tolist() == [1.0, 0.0]
 
 
 def test_a_footprint_far_larger_than_the_surface_is_counted_too():

@@ -16,7 +16,6 @@ from specimens import ALL, SMOOTH, cells_of
 from surfaces import SurfaceError, cylinder, plane, sphere, torus
 from surfaces.adjacency import grid_neighbours
 from surfaces.patches import cell_at, closest_on_patch
-from surfaces.patches.closed_form_kernels import wrap
 
 TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 SHIFT = np.array([0.3, -0.2, 0.1])
@@ -214,15 +213,6 @@ def test_beside_the_patch_there_is_no_cell_and_its_rim_belongs_to_it():
     assert [cell_at(kernel, *at) for at in ((0, 0), (0.6, 0.4), (0.6 + 1e-12, -1e-12))] == [0, 5, 4]
     assert cell_at(plane((0, 1), (0, 1)).cells(0, 3).patch_kernel, 0.5, 0.5) == -1
     assert plane((0, 1), (0, 2)).cells(3, 4).at([-5, 5, 0.5], [-5, 5, 9]).tolist() == [0, 11, 7]
-
-
-@given(st.floats(-50, 50), st.floats(-10, 10), st.floats(1e-3, 2 * math.pi))
-def test_wrap_keeps_the_angle_and_goes_as_near_to_the_range_as_can_be(angle, low, width):
-    wrapped = wrap(angle, low, low + width)
-    assert math.remainder(wrapped - angle, math.tau) == pytest.approx(0, abs=1e-12)
-    gap = [max(low - a, a - low - width, 0.0) for a in (wrapped, wrapped - 7, wrapped + 7)]
-    turns = [max(low - a, a - low - width, 0.0) for a in (wrapped - math.tau, wrapped + math.tau)]
-    assert gap[0] <= min(turns) + 1e-12
 
 
 # curves between centres
