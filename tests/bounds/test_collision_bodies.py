@@ -143,23 +143,6 @@ def test_notes_on_the_standoff_and_a_surface_that_is_thick():
 # a base inside something: no motion changes it
 
 
-def rigid_notes(name, *scene, **asked):
-    notes = bodies_of(load_robot(name), scene=scene, **asked).notes
-    return [note for note in notes if "rigid to each other" in note]
-
-
-def test_a_base_in_a_block_is_noted_and_one_on_its_table_is_not():
-    block = Obstacle.box("block", (1.0, 1.0, 0.1), (0.0, 0.0, 0.0))  # its top is 50 mm high
-    (note,) = rigid_notes("ur5", block, self_=False)  # one hull for each link
-    assert note.startswith("base_link and block are rigid to each other")
-    still = [body for body in bodies_of(self_=False).polytopes if body.joint == 0]
-    lowest = min(body.vertices[:, 2].min() - body.radius for body in still)
-    assert f"overlap by {1e3 * (0.05 - lowest):.1f} mm" in note
-    assert not rigid_notes("ur5", block, allow=(("base_link", "block"),))
-    for name, floor in (("ur5", 0.0), ("panda", 0.0), ("puma560", -0.7)):
-        assert not rigid_notes(name, Obstacle.halfspace("floor", (0.0, 0.0, floor)))
-
-
 # objects on links, and a world that moves
 
 

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from coverable_errors import ArgumentError
 from feasibility.certification import collision_replay
-from feasibility.collisions import Bodies, HalfSpace, Obstacle, Soup
+from feasibility.collisions import Bodies, Obstacle, Soup
 from robots.shapes import Solid, Triangles
 from robots.urdf import Box, Capsule, Cylinder, Sphere
 
@@ -226,15 +226,6 @@ def test_a_hollow_link_is_not_its_hull(thing, off, left):
         assert found.min_clearance <= left + CLOSE or not accepted
 
 
-def test_several_bodies_of_one_owner():
-    solids = [Solid("link1", 1, at(y=y), Sphere(0.1)) for y in (0.0, 0.3)]
-    scene = [Obstacle("ball", Sphere(0.1), at(y=0.7)), Obstacle("floor", HalfSpace(), at(z=-1.0))]
-    pairs = [pair("link1", "floor"), pair("link1", "ball")]
-    found = judged(SLIDE, bodies_of(solids, scene, pairs), [0.0], [0.0])
-    assert found.min_clearance == pytest.approx(0.2, abs=CLOSE)
-    assert found.nearest_pair == ("link1", "ball")
-
-
 # between rows, beside the straight line, and to a hair
 
 
@@ -351,15 +342,3 @@ def test_nothing_asked_is_nothing_measured():
     some = bodies_of(LINKS, [wall_at(2.0)], [pair("link2", "wall")])
     assert collision_replay(ELBOW, some, np.zeros((0, 2))).accepted
     assert isinstance(pickle.loads(pickle.dumps(some)), Bodies)
-
-
-@pytest.mark.parametrize("faces", [1, 2, 12])
-def test_flat_and_thin_meshes_crash_nothing(faces):
-    """Coal and qhull end the process for a hull of flat points."""
-    box = box_mesh((0.0 if faces < 12 else 1e-9, 0.2, 0.2))
-    mesh = Triangles(box.vertices, box.faces[:faces], False)
-    solid = Solid("link2", 2, at(0.2), mesh)
-    bodies = bodies_of([solid], [wall_at(1.0)], [pair("link2", "wall")])
-    assert judged(ELBOW, bodies, [0.3, 0.0], [-0.3, 0.0]).accepted
-    other = bodies_of([solid], [Obstacle("o", mesh, at(0.8, 0.5))], [pair("link2", "o")])
-    assert judged(ELBOW, other, [-0.3, 0.0], [-0.6, 0.0]).accepted

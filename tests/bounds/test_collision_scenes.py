@@ -87,28 +87,6 @@ def test_the_foreign_judge_agrees(name, seed):
     judged_as_by_fcl(robot, replace(bodies, pairs=tuple(alone)), q, 3.0)
 
 
-def test_order_and_place_do_not_matter():
-    """Shapes and pairs in another order; scene and surface turned with the UR5's first joint."""
-    robot, bodies, q = random_scene("ur5", 2, 4, 0.3, 6)
-    pairs = tuple(p for p in bodies.pairs if "base_link" not in (p.first, p.second))
-    bodies = replace(bodies, pairs=pairs)
-    turn = at(rotation=Rotation.from_euler("z", 0.7).as_matrix())
-    turned = replace(
-        bodies,
-        solids=bodies.solids[::-1],
-        scene=tuple(replace(x, placement=turn @ x.placement) for x in bodies.scene[::-1]),
-        soups=tuple(replace(s, triangles=s.triangles @ turn[:3, :3].T) for s in bodies.soups),
-        pairs=tuple(Pair(p.second, p.first, p.clearance) for p in pairs[::-1]),
-    )
-    one, other = (
-        collision_replay(robot, x, y) for x, y in ((bodies, q), (turned, q + 0.7 * np.eye(6)[0]))
-    )
-    assert one.accepted
-    assert other.accepted
-    assert one.min_clearance == pytest.approx(other.min_clearance, abs=1e-6)
-    assert set(one.nearest_pair) == set(other.nearest_pair)
-
-
 # motions that cover cells
 
 
@@ -160,25 +138,6 @@ def test_more_clearance_than_there_is_is_refused(walk, least):
         assert not found.narrowly_refused
     assert f"{pair.first} and {pair.second} are" in found.refusal
     assert not verify(UR5, CELLS, task, walk.q).holds
-
-
-@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
-def test_a_row_nudged_into_a_shelf_is_refused(walk, share):
-    """A shelf beside the motion: one row is turned until the arm is in it."""
-    shelf = Obstacle.box("shelf", (0.4, 0.02, 0.4), (0.5, 0.38, 0.4))
-    _, bodies = asked(self_=False, surface=False, clearance=0.005, scene=(shelf,))
-    assert collision_replay(UR5, bodies, walk.q).accepted
-    foreign, q = ForeignScene(UR5, bodies), walk.q.copy()
-    row = round(share * (len(q) - 1))
-    pan = np.eye(6)[0]
-    turns = np.linspace(0.0, 2.0 * np.pi, 160)
-    q[row, 0] += next(t for t in turns if foreign.distances(q[row] + t * pan).min() <= 0.0)
-    found = collision_replay(UR5, bodies, q)
-    assert not found.accepted
-    assert all(fault.pair[1] == "shelf" for fault in found.faults)
-    assert all(abs(fault.row + fault.share - row) < 1.0 for fault in found.faults)
-    over = replay_over_surface(UR5, CELLS, TASK, q, None, bodies)
-    assert any("shelf" in str(fault) for fault in over.faults)
 
 
 def test_the_foreign_judge_refuses_what_overlaps_where_no_clearance_is_asked(walk):

@@ -101,14 +101,6 @@ def test_a_motion_too_fast_for_its_joints_does_not_verify(factor):
     assert found.holds or "would need" in found.refusal
 
 
-def test_where_nothing_is_asked_nothing_changes():
-    plain, slow = asked(), asked(speed=0.01)
-    assert slow.statistics == plain.statistics
-    assert np.array_equal(slow.witness.q, plain.witness.q)
-    assert slow.message.startswith(plain.message)
-    assert plain.certificate.max_speed is None
-
-
 def test_singular_values_are_kept_above_what_is_asked():
     least = rate_figures(asked(), more=False).witness.sigma
     inside = asked(min_manipulability=0.95 * least)

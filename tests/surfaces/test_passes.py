@@ -16,7 +16,7 @@ from pygeodesic import geodesic
 
 from surfaces import cylinder, mesh, piecewise, plane, sphere, torus
 from surfaces.meshes import TriangleMesh
-from surfaces.passes import parallel_passes
+from surfaces.passes import parallel_passes, pass_route
 
 HALF = math.pi / 2
 SURFACES = {
@@ -146,6 +146,7 @@ def test_overrun_goes_straight_on_beyond_the_border():
         assert own[:, 2].max() == pytest.approx(0.54, abs=1e-6)
         assert np.allclose(np.linalg.norm(own[:, :2], axis=1), 0.3, atol=1e-6)
         assert np.allclose(np.linalg.norm(each.normals, axis=1), 1.0)
+    assert pass_route(parallel_passes(PLATE, 0.05, overrun=0.04)).places.lifts == 0  # nothing is between
 
 
 def test_points_lie_on_the_surface_and_evenly():

@@ -115,6 +115,22 @@ def test_a_motion_in_another_winding_is_the_same_work():
         accepted(verdict, moved, needed)
 
 
+def test_where_no_motion_leads_on_all_until_there_is_run_a_turn_earlier():
+    """By hand: on from the second of three cells it goes a turn further alone."""
+    verdict = verdict_of("ur5")
+    arrays = arrays_of(verdict.robot, verdict.cells, verdict.task)
+    graph = MotionGraph(arrays, work_for(6), {(0, 1): 0, (1, 2): 1}, grows=False)
+    q = np.linspace(-1.0, -0.5, 4)[:, None] * np.ones(6)
+    q[2] = q[1] + 2 * np.pi * np.eye(6)[0]
+    over = [graph.node(cell, row) for cell, row in zip((0, 1, 1, 2), q, strict=True)]
+    for x, y in ((0, 1), (2, 3)):
+        graph.join(over[x], over[y], q[[x, y]])
+    found = joint_route(graph, verdict.cells, np.arange(3))
+    assert found.stuck == []
+    assert found.revisited == 0.0
+    assert graph.walk(found.nodes).q == pytest.approx(np.vstack([q[0] + q[2] - q[1], q[2:]]))
+
+
 @pytest.mark.parametrize("name", ["4c", "5c", *PATCHES])
 def test_the_figures_of_a_path_measured_again(name):
     verdict, path = verdict_of(name), path_of(name)
