@@ -1,7 +1,5 @@
 """Repair changes nothing but what it says; triangle meshes hold what they promise."""
 
-from itertools import pairwise
-
 import mesh_writers as w
 import numpy as np
 import pytest
@@ -100,45 +98,6 @@ def test_a_crowd_of_vertices_is_thinned_and_none_moves_far(dimension):
     assert np.ptp(left, axis=0)[:dimension].min() > 2e-6
     # Every box of a grid keeps one at most.
     assert len(left) <= (2 + 3e-6 / (distance / np.sqrt(12))) ** dimension
-
-
-def slit(rng):
-    """A wavy plate with corners put on some edges, each slit closed by a fan of caps."""
-    vertices, faces = w.hilly(3, 3)
-    whole = clean(vertices, faces)
-    vertices, faces = list(vertices), [list(map(int, face)) for face in faces]
-    for a, b in whole.edges.vertices[:: rng.integers(2, 6)].tolist():
-        owner = next((f for f in faces if (a, b) in pairwise([*f, f[0]])), None)
-        if owner is None:
-            continue
-        apex, chain = next(k for k in owner if k not in (a, b)), [a]
-        for share in np.sort(rng.uniform(0.1, 0.9, rng.integers(1, 4))):
-            vertices.append(vertices[a] + share * (vertices[b] - vertices[a]))
-            chain.append(len(vertices) - 1)
-        chain.append(b)
-        faces.remove(owner)
-        faces += [[p, q, apex] for p, q in pairwise(chain)]
-        faces += [[chain[0], chain[k + 1], chain[k]] for k in range(1, len(chain) - 1)]
-    return whole, np.array(vertices), np.array(faces)
-
-
-@sampled
-@pytest.mark.parametrize("seed", seeds(8, all=100))
-def test_caps_are_flipped_without_moving_the_surface(seed):
-    whole, vertices, faces = slit(np.random.default_rng(seed))
-    assert len(vertices) > len(whole.vertices) + 2
-    mesh = clean(vertices, faces)
-    w.assert_clean(mesh)
-    assert any("flipping" in note for note in notes_of(mesh))
-    assert len(mesh.vertices) == len(vertices)
-    assert len(mesh.edges.border_faces) == len(whole.edges.border_faces)
-    assert mesh.area == pytest.approx(whole.area, rel=1e-9)
-    assert (mesh.pieces == 0).all()
-    # The wavy plate over the place of each face, to where its samples lie apart at most.
-    shares = np.random.default_rng(1).dirichlet((1, 1, 1), 400)
-    samples = (shares @ whole.vertices[whole.faces]).reshape(-1, 3)
-    away = cKDTree(samples).query(mesh.vertices[mesh.faces].mean(axis=1))[0]
-    assert away.max() < 0.01
 
 
 def test_a_flip_never_makes_an_edge_twice():

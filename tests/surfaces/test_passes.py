@@ -14,7 +14,7 @@ from mesh_patches import grid, panel_with_hole
 from mesh_writers import refused
 from pygeodesic import geodesic
 
-from surfaces import cylinder, mesh, piecewise, plane, sphere, torus
+from surfaces import cylinder, mesh, piecewise, plane, sphere
 from surfaces.meshes import TriangleMesh
 from surfaces.passes import parallel_passes, pass_route
 
@@ -146,18 +146,9 @@ def test_overrun_goes_straight_on_beyond_the_border():
         assert own[:, 2].max() == pytest.approx(0.54, abs=1e-6)
         assert np.allclose(np.linalg.norm(own[:, :2], axis=1), 0.3, atol=1e-6)
         assert np.allclose(np.linalg.norm(each.normals, axis=1), 1.0)
-    assert pass_route(parallel_passes(PLATE, 0.05, overrun=0.04)).places.lifts == 0  # nothing is between
-
-
-def test_points_lie_on_the_surface_and_evenly():
-    surface = torus(0.4, 0.1, (0, 120), (0, 180))
-    found = parallel_passes(surface, 0.03, step=0.005)
-    for each in found.stretches:
-        at = surface.closest(each.points)
-        assert np.abs(at.height).max() <= 1e-7
-        assert np.allclose(at.normal, each.normals, atol=1e-9)
-        assert np.linalg.norm(np.diff(each.points, axis=0), axis=1).max() <= 0.0051
-    assert found.length > 0.95 * surface.area(*surface.u_range, *surface.v_range) / found.pitch
+    assert (
+        pass_route(parallel_passes(PLATE, 0.05, overrun=0.04)).places.lifts == 0
+    )
 
 
 def test_round_a_tube_and_along_it():

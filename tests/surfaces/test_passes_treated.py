@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from mesh_patches import grid, panel_with_hole
 
-from surfaces import cylinder, plane, sphere
+from surfaces import cylinder, plane
 from surfaces.passes import (
     ToolLines,
     WorkingMesh,
-    parallel_passes,
     treated_share,
     visits,
     working_mesh,
@@ -66,19 +65,6 @@ def along_cylinder():
     return working_mesh(surface, 0.007), lines, 0.03, truth
 
 
-def sphere_zone():
-    """Parallels of a sphere: cos(t - a) - cos(t + a), a = 2 asin(r / 2R)."""
-    surface = sphere(0.3, (40, 90), (0, 120))
-    found = parallel_passes(surface, 0.09, math.pi / 2, by="parameters", step=0.003, overrun=0.04)
-    a, low, high = 2 * math.asin(0.02 / 0.6), math.radians(40), math.radians(90)
-    polar = [math.acos(each.points[len(each.points) // 2, 2] / 0.3) for each in found.stretches]
-    bands = sum(math.cos(t - a) - math.cos(t + a) for t in polar)
-    points = np.concatenate([each.points for each in found.stretches])
-    stretch = np.repeat(np.arange(len(polar)), [len(each.points) for each in found.stretches])
-    lines = ToolLines(points, points / np.linalg.norm(points, axis=1)[:, None], stretch)
-    return working_mesh(surface, 0.006), lines, 0.02, bands / (math.cos(low) - math.cos(high))
-
-
 def beside_and_across_a_hole():
     """Strips less what the hole takes from them: a segment of its circle, and a slice of it."""
     rows = [straight((-0.04, y, 0), (0.64, y, 0)) for y in (0.1, 0.2, 0.35)]
@@ -89,7 +75,7 @@ def beside_and_across_a_hole():
     return working_mesh(panel_with_hole(), 0.007), lines_of(*rows), 0.03, share
 
 
-BENT = (along_cylinder, sphere_zone, beside_and_across_a_hole)
+BENT = (along_cylinder, beside_and_across_a_hole)
 
 
 @pytest.mark.parametrize("case", [strips, stadium, annulus, *BENT])

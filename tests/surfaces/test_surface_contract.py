@@ -249,22 +249,13 @@ def test_areas_are_those_of_fine_triangles_and_add_up(smooth):
     assert total == pytest.approx(fine, rel=2e-5 if smooth.kind in NETS else 1e-7)
 
 
-def spheroid(a, c):
-    """Thomsen's closed form."""
-    if c < a:
-        e = math.sqrt((a - c) * (a + c)) / a
-        return 2 * math.pi * (a**2 + c**2 / e * math.log((1 + e) * a / c))
-    e = math.sqrt(1 - (a / c) ** 2)
-    return 2 * math.pi * a**2 * (1 + c / (a * e) * math.asin(e))
-
-
 BELL = math.pi * (math.sqrt(3) + math.asinh(math.sqrt(2)) / math.sqrt(2))
 AREAS = [
     (sphere(2.0, (0, 60), (0, 360)), 2 * math.pi * 2.0 * 1.0, 1e-14),  # cap of height 1
     (hyperboloid(1.0, 1.0, (0, 360), (0, 1)), BELL, 1e-14),
     (hyperboloid(0.5, 5e5, (0, 360), (0, 2)), 2 * math.pi * (1 + 2 / 3 * 4e-12), 1e-14),
-    *((ellipsoid((a, a, c), (0, 180), (0, 360)), spheroid(a, c), 1e-10)
-      for a, c in ((1.0, 0.4), (0.3, 1.7), (1.0, 0.001), (1.0, 1e-5), (1e-4, 1.0))),
+    (ellipsoid((1.0, 1.0, 1e-5), (0, 180), (0, 360)), 2 * math.pi, 1e-8),  # a flat disc's two sides
+    (ellipsoid((1e-4, 1e-4, 1.0), (0, 180), (0, 360)), math.pi**2 * 1e-4, 1e-7),  # and a needle
 ]  # fmt: skip
 
 
