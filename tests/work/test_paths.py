@@ -270,19 +270,20 @@ def test_a_detour_is_the_cheapest():
     assert found > 10
 
 
-@pytest.mark.parametrize(("share", "cells_on_the_way"), [(0.8, [0, 1, 2]), (1.2, [0, 1, 0, 1, 2])])
-def test_a_detour_goes_back_where_that_saves_more_travel_than_it_costs(share, cells_on_the_way):
-    """From the second cell on at once, with some travel; or back to the first and on with none."""
-    graph, cells = hand_made(np.random.default_rng(0), cells=3, nodes=0, density=0.0)
-    q = 1e-6 * np.arange(10.0).reshape(5, 2)
-    a, b, again, beside, end = (graph.node(c, x) for c, x in zip((0, 1, 0, 1, 2), q, strict=True))
-    for x, y in ((a, b), (b, again), (again, beside), (beside, end)):
+@pytest.mark.parametrize(("share", "over"), [(0.8, [0, 1, 2, 3]), (1.2, [0, 1, 2, 1, 2, 3])])
+def test_a_detour_goes_back_where_that_saves_more_travel_than_it_costs(share, over):
+    """From the third of four cells on at once, with some travel; or back, and on with none."""
+    graph, cells = hand_made(np.random.default_rng(0), cells=4, nodes=0, density=0.0)
+    row = (0, 1, 2, 1, 2, 3)
+    nodes = [graph.node(cell, 1e-6 * k * np.ones(2)) for k, cell in enumerate(row)]
+    for x, y in pairwise(nodes):
         graph.join(x, y, np.stack([graph.q[x], graph.q[y]]))
-    apart = np.linalg.norm(cells.centres[1] - cells.centres[0])
+    apart = np.linalg.norm(cells.centres[2] - cells.centres[1])
     travel = share * 2.0 * 20.0 * apart / graph.arrays.scale
-    graph.join(b, end, np.stack([graph.q[b], [0.5 * travel, 0.0], graph.q[end]]))
-    found = joint_route(graph, cells, np.array([0, 2]), wind=False)
-    assert [graph.cell[x] for x in found.nodes] == cells_on_the_way
+    turned = np.array([0.5 * travel, 0.0])
+    graph.join(nodes[2], nodes[5], np.stack([graph.q[nodes[2]], turned, graph.q[nodes[5]]]))
+    found = joint_route(graph, cells, np.array([0, 3]), wind=False)
+    assert [graph.cell[x] for x in found.nodes] == over
 
 
 # -- full turns -----------------------------------------------------------------------------------
