@@ -218,23 +218,8 @@ def npy(array, **options):
     return stream.getvalue()
 
 
-NETS_IN_FILES = {
-    "empty.json": "", "cut.json": '{"points": [[[0, 0', "list.json": "[[0, 0, 0]]",
-    "no_points.json": '{"degree": [3, 3]}', "foreign.json": '{"points": [], "__class__": 1}',
-    "nan.json": '{"points": [[[NaN, 0, 0]]]}', "infinite.json": '{"points": [[[-Infinity, 0, 0]]]}',
-    "twice.json": '{"points": [], "points": []}', "digits.json": '{"points": ' + "9" * 5000 + "}",
-    "deep.json": '{"points": ' + "[" * 200_000 + "]" * 200_000 + "}",
-    "binary.json": bytes(range(256)), "large.json": " " * (16 * 2**20 + 1),
-    "net.npy": b"\x93NUMPY", "net.pkl": b"\x80\x04.", "empty.csv": "", "header.csv": "x,y,z\n1,2,3",
-    "few.csv": NET + "0,0,1,2\n", "nan.csv": NET + "0,0,1,2,nan\n",
-    "words.csv": NET + "0,0,1,2,=cmd()\n", "minus.csv": NET + "-1,0,1,2,3\n",
-    "far.csv": NET + "0,9999999,1,2,3\n", "again.csv": NET + "0,0,1,2,3\n" * 2,
-    "gap.csv": NET + "999999,999999,1,2,3\n", "quote.csv": NET + '"0,0,1,2,3\n',
-    "many.csv": NET + "".join(f"{k},0,1,2,3\n" for k in range(40_001)),
-    "field.csv": NET + "0,0,1,2," + "3" * 200_000 + "\n",
-}  # fmt: skip
 FILES = {
-    read_net: NETS_IN_FILES,
+    read_net: {},  # tests/input/bad/net.toml has many
     read_grid: {
         "a.txt": "", "a.npy": "", "flat.npy": npy(np.zeros((3, 3))),
         "object.npy": npy(np.array([{}], dtype=object), allow_pickle=True),

@@ -233,24 +233,6 @@ def test_facets_are_the_mesh_and_their_normals_its_own(surface, straight):
     assert direction / length[:, None] == pytest.approx(found @ surface.rotation, abs=1e-7)
 
 
-def test_parts_are_no_larger_than_they_have_to_be():
-    """Flat sides are flat parts; over one face without a crease points are affine."""
-    box = meshes()["box"].parts(1e-3, 0.05)
-    finest = box.children[:, 0] < 0
-    assert box.radius[finest].max() < 1e-11
-    assert finest.sum() <= 12
-    sheet = meshes()["sheet"].parts(1e-3, 0.05)
-    assert len(sheet) == 1
-    sides = np.linalg.norm(sheet.slopes[0, :, :3], axis=1)
-    assert np.sort(2.0 * sides) == pytest.approx([0.4, 0.6], rel=0.02)
-    dome, parts = meshes()["dome"], meshes()["dome"].parts(1e-12, 1e-12)
-    finest = parts.children[:, 0] < 0
-    assert finest.sum() == len(dome.mesh.faces)
-    assert parts.radius[finest, 0].max() < 1e-11
-    turn = np.linalg.norm(dome.corner_normals - np.roll(dome.corner_normals, 1, 1), axis=2)
-    assert parts.radius[finest, 1].max() < turn.max() ** 2 / 8.0
-
-
 # -- smoothed copies -----------------------------------------------------------------------------
 
 LENGTH = 0.1
