@@ -12,6 +12,7 @@ import pytest
 import trimesh
 from bounds import holds
 from gantry import configurations, gantry
+from mesh_patches import roof
 from referee import Facets
 from referee import evenly as dense
 from samples import sampled, spread
@@ -23,14 +24,6 @@ from surfaces.meshes import TriangleMesh, mesh
 
 UR5 = load_robot("ur5")
 AT = (0.5, -0.15, 0.3)
-
-
-def roof(angle_deg):
-    """Two plates of 300 mm; the normal turns by the angle at their edge."""
-    half = np.radians(angle_deg) / 2
-    x, z = 0.3 * np.cos(half), -0.3 * np.sin(half)
-    vertices = [[0, 0, 0], [0, 0.3, 0], [x, 0, z], [x, 0.3, z], [-x, 0, z], [-x, 0.3, z]]
-    return TriangleMesh(np.array(vertices), [[0, 2, 3], [0, 3, 1], [0, 1, 5], [0, 5, 4]])
 
 
 def without_bottom(body):

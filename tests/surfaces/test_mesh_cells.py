@@ -161,19 +161,6 @@ def test_centres_are_nearest_to_the_centroid_or_deep_inside(cut):
     assert usual >= 55
 
 
-def test_flatness_and_crease(cut):
-    unit = cut.vectors / cut.areas[:, None]
-    one, other = joined(cut.faces).T
-    crease, inner = np.zeros(N), cut.labels[one] == cut.labels[other]
-    np.maximum.at(crease, cut.labels[one[inner]], angle(unit[one], unit[other])[inner])
-    np.testing.assert_allclose(cut.figures.crease, crease, atol=1e-9)
-    for cell in range(N):
-        own = cut.labels == cell
-        mean = cut.vectors[own].sum(axis=0)
-        lean = angle(unit[own], mean / np.linalg.norm(mean)).max()
-        assert cut.figures.flatness[cell] == pytest.approx(lean, abs=1e-9)
-
-
 def test_borders_are_shared_and_outlines_close(cut):
     found, segments, walked = cut.figures.borders, {}, {}
     for edge, (own, other) in cut.border.items():

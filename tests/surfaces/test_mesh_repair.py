@@ -72,17 +72,6 @@ def test_turning_faces_over_at_random_is_undone(seed):
         assert np.abs(mesh.face_normals[piece] - expected).max() < 1e-12
 
 
-def test_vertices_that_lie_together_become_one_and_no_others():
-    """Clusters far smaller than the distance, by brute force."""
-    rng = np.random.default_rng(12)
-    centres = rng.uniform(0, 1, (60, 3))
-    points = np.repeat(centres, 5, axis=0) + rng.uniform(-7e-8, 7e-8, (300, 3))
-    order = rng.permutation(len(points))
-    points, cluster = points[order], np.repeat(np.arange(60), 5)[order]
-    expected = [int(np.flatnonzero(cluster == c)[0]) for c in cluster]
-    assert welded(points, weld_distance(points)).tolist() == expected
-
-
 @pytest.mark.parametrize("dimension", [1, 2, 3])
 def test_a_crowd_of_vertices_is_thinned_and_none_moves_far(dimension):
     """Chains in which each vertex is close to the next do not shrink to a point."""

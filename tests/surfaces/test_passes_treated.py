@@ -171,6 +171,7 @@ def test_a_footprint_far_larger_than_the_surface_is_counted_too():
     line = ToolLines(points, up, np.zeros(len(points), dtype=np.int64))
     places = np.random.default_rng(1).uniform(0.0, [0.6, 0.4, 0.0], (4000, 3))
     for radius in (1.0, 100.0):
+        assert (visits(places, -up[:4000], line, radius) == 0).all()  # seen from behind
         assert (visits(places, up[:4000], line, radius) == 1).all()
     inner = np.abs(places - [0.3, 0.2, 0.0]).max(axis=1) < 0.1
     for radius, passes in ((0.03, 3.0), (0.05, 5.0)):
