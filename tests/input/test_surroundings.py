@@ -8,7 +8,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from jobs import TEXTS
 from jobs import coverable as asked
 
 from feasibility import Search, Task, check

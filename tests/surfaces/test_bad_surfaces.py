@@ -99,37 +99,6 @@ def test_bad_profiles(approved):
     approved("bad_profiles", "\n".join(lines))
 
 
-def test_profiles_cross_themselves_exactly_where_their_chords_do():
-    rng, crossed = np.random.default_rng(4), 0
-    for _ in range(40):
-        points = rng.uniform(0.3, 1.3, (5, 2))
-        try:
-            faults, surface = "", revolution(points, (0, 90))
-        except SurfaceError as error:
-            faults = str(error)
-        if "turn back" in faults or "axis" in faults:
-            continue
-        if not faults:
-            s = np.linspace(*surface.u_range, 300)
-            a = surface.local_point(s, 0 * s)[:, [0, 2]]
-            assert not _crosses(a)
-        crossed += "cross itself" in faults
-    assert 5 < crossed < 35
-
-
-def _crosses(curve):
-    """Whether chords of a curve (k, 2) that are not neighbours cross."""
-    a, b = curve[:-1], curve[1:]
-
-    def turn(p, q, r):
-        one, two = q - p, r - p
-        return one[..., 0] * two[..., 1] - one[..., 1] * two[..., 0]
-
-    sides = np.sign(turn(a[:, None], b[:, None], a)) != np.sign(turn(a[:, None], b[:, None], b))
-    apart = np.abs(np.subtract.outer(np.arange(len(a)), np.arange(len(a)))) > 1
-    return bool((sides & sides.T & apart).any())
-
-
 def changed(place, value):
     points = hood().tolist()
     points[place[0]][place[1]] = value

@@ -122,16 +122,6 @@ def test_a_rigid_motion_moves_the_sheet_along(kind):
     assert len(np.unique(partner)) == len(np.unique(carried.reshape(-1, 9), axis=0))
 
 
-def test_surfaces_of_other_shapes_have_triangles_of_their_own():
-    shapes = [
-        plane((0, 1), (0, 1)), plane((0, 1), (0, 2)), plane((0, 1), (0, 1), side="outside"),
-        sphere(1.0, (10, 90), (0, 90)), sphere(1.1, (10, 90), (0, 90)),
-    ]  # fmt: skip
-    sheets = [sheet_of(shape, 1e-2, 600, 1e-3).triangles for shape in shapes]
-    for k, one in enumerate(sheets):
-        assert not any(np.array_equal(one, other) for other in sheets[:k])
-
-
 def test_a_mesh_gives_its_own_triangles():
     surface = random_surface("mesh", np.random.default_rng(5))
     sheet = sheet_of(surface)
