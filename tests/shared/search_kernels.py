@@ -36,7 +36,7 @@ from feasibility.roadmap.graph import EDGES
 from feasibility.roadmap.motions import project_near_cell, segment_holds
 from feasibility.roadmap.motions.aiming import aim, bounds_between, stand_still
 from feasibility.roadmap.motions.projection import project
-from feasibility.roadmap.motions.segment_bound import roll_spread, spread
+from feasibility.roadmap.motions.segment_bound import roll_derivatives, second_derivatives
 from feasibility.roadmap.motions.working_memory import place
 from robots import Robot
 from surfaces import Cells, plane
@@ -102,7 +102,7 @@ class Motions:
         """Bounds on |p''| (m) and |a''| of tool point and tool axis along a segment, s in 0..1."""
         place(self.arrays, self.work, 0, q0)
         place(self.arrays, self.work, 1, q1)
-        return spread(self.arrays, self.work, q0, q1)
+        return second_derivatives(self.arrays, self.work, q0, q1)
 
     def roll_off(self, q: Floats, t: float = 0.0) -> float:
         """Roll at a configuration over a curve's target at t, off the middle of its range, rad."""
@@ -114,7 +114,7 @@ class Motions:
         """Bounds on |psi'| and |psi''| of roll (rad) along a segment, s in 0..1."""
         self.sag(q0, q1)
         self.work.derivative_bound[5:8] = frame
-        return roll_spread(self.work, chord, 1.0)
+        return roll_derivatives(self.work, chord, 1.0)
 
     def turn_range(self, middle: float, half: float) -> None:
         """Let the roll have another range (rad)."""

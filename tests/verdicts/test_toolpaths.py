@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from feasibility.roadmap.seeding import seed_cell
 
 from feasibility import Task, check, verify
 from feasibility.certification import replay
@@ -13,7 +14,6 @@ from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.forward.run import OrderedRun, _follow, layers_of, run_in_order
 from feasibility.roadmap.graph import NODES, WAYPOINTS, add_edge, empty_roadmap
 from feasibility.roadmap.motions import arrays_of
-from feasibility.roadmap.seeding import seed_cell
 from feasibility.roadmap.walk import route_walk
 from feasibility.verdict import Answer, CauseKind
 from robots import load_robot
