@@ -18,10 +18,8 @@ from feasibility.roadmap import (
     arrays_of,
     close,
     covering_walk,
-    edge_motion,
     explore,
 )
-from feasibility.roadmap.graph import EDGES
 from feasibility.roll import projected
 from feasibility.targets import target_curves
 from feasibility.verdict import Walk
@@ -194,11 +192,9 @@ def test_every_motion_that_a_search_stores_holds_and_the_walk_takes_them_alone(n
         exploration.explore_self_motions(cell)
     close(exploration)
     roadmap = exploration.roadmap
-    count = int(roadmap.counters[EDGES])
-    assert count >= len(cells) - 1
-    for e in range(count):
-        (x, y), motion = roadmap.ends[e], edge_motion(roadmap, e)
-        assert (motion[0] == roadmap.q[x]).all()
+    assert len(roadmap.edges) >= len(cells) - 1
+    for edge, (x, y, _) in enumerate(roadmap.edges):
+        motion = roadmap.motion(edge)
         assert (motion[-1] == roadmap.q[y]).all()
         assert refusal(robot, cells, task, motion, roadmap.cell[x], roadmap.cell[y]) == ""
     order = assert_walked(roadmap, covering_walk(roadmap, exploration.best))

@@ -19,10 +19,8 @@ from feasibility.collisions import (
     segment_clear,
 )
 from feasibility.roadmap import (
-    NODES,
     Ruling,
     arrays_of,
-    edge_motion,
     margin_shares,
     root_box,
     rule,
@@ -32,7 +30,6 @@ from feasibility.roadmap.branch_and_bound.box_bounds import static_levers
 from feasibility.roadmap.branch_and_bound.box_contraction import shrink
 from feasibility.roadmap.branch_and_bound.boxes import Slabs, box_work
 from feasibility.roadmap.branch_and_bound.branching import DIRECTIONS
-from feasibility.roadmap.graph import EDGES
 from feasibility.roadmap.motions import project_near_cell, segment_holds
 from feasibility.roadmap.motions.aiming import aim, bounds_between, stand_still
 from feasibility.roadmap.motions.projection import project
@@ -202,11 +199,10 @@ def contracted(
 def assert_walked(roadmap: Any, walk: Any) -> list[int]:
     """Only steps of stored motions, and marks where nodes are; returns the cells in order."""
     steps = set()
-    for e in range(int(roadmap.counters[EDGES])):
-        motion = [tuple(q) for q in edge_motion(roadmap, e)]
+    for edge in range(len(roadmap.edges)):
+        motion = [tuple(q) for q in roadmap.motion(edge)]
         steps |= set(pairwise(motion)) | set(pairwise(motion[::-1]))
-    used = int(roadmap.counters[NODES])
-    nodes = {tuple(roadmap.q[x]): int(roadmap.cell[x]) for x in range(used)}
+    nodes = {tuple(q): cell for q, cell in zip(roadmap.q, roadmap.cell, strict=True)}
     rows = [tuple(q) for q in walk.q]
     assert set(pairwise(rows)) <= steps
     assert [nodes.get(row, -1) for row in rows] == walk.cell.tolist()
