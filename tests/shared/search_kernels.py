@@ -21,7 +21,6 @@ from feasibility.collisions import (
 from feasibility.roadmap import (
     Ruling,
     arrays_of,
-    margin_shares,
     root_box,
     rule,
     work_for,
@@ -155,12 +154,6 @@ class Motions:
         with np.errstate(invalid="ignore"):
             bounds = position * length, turned * chord, turned * roll
         return Held(good, *bounds, bool(ends <= self.arrays.near), float(off))
-
-    def landed(self, cell: int, guesses: Floats) -> Floats:
-        """(k, n) configurations over a cell's centre that Newton finds from guesses."""
-        found = guesses.copy()
-        margins = margin_shares(self.arrays, self.work, cell, found)
-        return found[margins >= 0.0]
 
     def near(self, cell: int, q: Floats, steps: int = 60) -> Floats | None:
         """A configuration within tolerance and cone of a cell's target, from q; or None."""

@@ -5,11 +5,10 @@ from __future__ import annotations
 import networkx as nx
 import numpy as np
 import pytest
-from asked import question
 from samples import sampled, seeds
 from search_kernels import assert_walked
 
-from feasibility.roadmap import Exploration, Roadmap, arrays_of, close, covering_walk, explore
+from feasibility.roadmap import Roadmap, covering_walk
 from surfaces import plane
 
 
@@ -103,15 +102,3 @@ def test_a_component_that_is_not_connected_gives_no_covering_walk():
     roadmap.component, roadmap.cover = [0] * 6, [np.ones(6, dtype=bool)]
     order = assert_walked(roadmap, covering_walk(roadmap, 0))
     assert set(order) != set(range(6))
-
-
-@pytest.mark.parametrize("name", ["small dome", "plate", "panda over a saddle", "on a rail"])
-def test_the_walk_of_a_search(name):
-    """Every cell, along stored motions alone, with at most 40 per cent more visits than cells."""
-    _, _, robot, cells, task, _ = question(name)
-    exploration = Exploration(robot, cells, arrays_of(robot, cells, task), 0)
-    explore(exploration)
-    close(exploration)
-    order = assert_walked(exploration.roadmap, covering_walk(exploration.roadmap, exploration.best))
-    assert set(order) == set(range(len(cells)))
-    assert len(order) <= 1.4 * len(cells)
