@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
-from feasibility.compiled import allocating, kernel, put
+from coverable_kernels import allocating, allocating_entry, kernel, put
 from feasibility.division import undominated
 from feasibility.roadmap import (
     CONE_SLACK,
@@ -49,7 +49,7 @@ SELF_MOTIONS = 6  # of the border of the best component, in a short search
 MOST_COVERS = 8  # components that are kept of a placement, the largest
 
 
-@allocating
+@allocating_entry
 def _probe(problem, work, cells, guesses, hits):  # type: ignore[no-untyped-def]
     """Newton at each of some cells, from where the last one ended and from guesses."""
     n = guesses.shape[1]
@@ -187,7 +187,7 @@ def _widen_margins(problem, aimed, work, cell, q, best):  # type: ignore[no-unty
             return
 
 
-@allocating
+@allocating_entry
 def _widest_margins(problem, aimed, work, roadmap, component, best):  # type: ignore[no-untyped-def]
     """Limits and cone (N, 2), the widest found over each cell, of one component's nodes."""
     n = roadmap.q.shape[1]

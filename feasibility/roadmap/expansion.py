@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.compiled import allocating, kernel, put
+from coverable_kernels import allocating, allocating_entry, kernel, put
 from feasibility.roadmap.graph import (
     BUDGET,
     COVERED,
@@ -88,7 +88,7 @@ def join(arrays, work, roadmap, cell, q, own, rows, most):
     return -1, 0
 
 
-@allocating
+@allocating_entry
 def spread_out(arrays, work, roadmap, indptr, indices, links, budget):
     """Spread every queued node into the neighbouring cells that its component does not cover yet.
 
@@ -153,7 +153,7 @@ def spread_out(arrays, work, roadmap, indptr, indices, links, budget):
     return DONE
 
 
-@allocating
+@allocating_entry
 def explore_self_motions(arrays, work, roadmap, cell, guesses, most):
     """Explore the self-motion manifold over one cell, and merge the components that it connects.
 
@@ -232,7 +232,7 @@ def _nearest_nodes(roadmap, i, j, component):
     return best_x, best_y
 
 
-@allocating
+@allocating_entry
 def close_pairs(arrays, work, roadmap, pairs, state, component, budget):
     """Try to connect every neighbouring pair of cells inside one component by a motion of its own.
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coverable_arrays import Array, Ints
-from feasibility.compiled import kernel
+from coverable_kernels import entry, kernel
 from feasibility.roadmap.motions import NEXT, effects, place
 
 NODES, EDGES, WAYPOINTS, COMPONENTS, HEAD, TAIL, CURSOR, BEST = range(8)
@@ -125,7 +125,7 @@ def is_full(roadmap):  # type: ignore[no-untyped-def]
     return nodes + 2 > 0 or count[EDGES] + 3 > roadmap.ends.shape[0]
 
 
-@kernel
+@entry
 def root_of(roadmap, slot):  # type: ignore[no-untyped-def]
     """The root component of a slot, with path halving."""
     while roadmap.parent[slot] != slot:
@@ -151,7 +151,7 @@ def nodes_over(roadmap: Roadmap, cell: int) -> list[int]:
     return found
 
 
-@kernel
+@entry
 def unite(roadmap, a, b):  # type: ignore[no-untyped-def]
     """Merge two components and the cells that they cover; returns the root."""
     a = root_of(roadmap, a)
@@ -177,7 +177,7 @@ def unite(roadmap, a, b):  # type: ignore[no-untyped-def]
     return a
 
 
-@kernel
+@entry
 def add_node(arrays, work, roadmap, cell, q, component):  # type: ignore[no-untyped-def]
     """Append a node to a component, and queue it; returns its index."""
     count = roadmap.counters
@@ -201,7 +201,7 @@ def add_node(arrays, work, roadmap, cell, q, component):  # type: ignore[no-unty
     return node
 
 
-@kernel
+@entry
 def add_edge(roadmap, x, y, rows):  # type: ignore[no-untyped-def]
     """Append an edge whose waypoints are the next `rows` rows of `waypoints`."""
     count = roadmap.counters
@@ -225,7 +225,7 @@ def add_motion(roadmap: Roadmap, x: int, y: int, motion: Array) -> None:
     unite(roadmap, roadmap.component[x], roadmap.component[y])
 
 
-@kernel
+@entry
 def joined_pairs(roadmap, pairs, component, state):  # type: ignore[no-untyped-def]
     """Mark the pairs of cells that an edge of the component joins already (state = 1)."""
     for e in range(roadmap.counters[EDGES]):

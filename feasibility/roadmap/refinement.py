@@ -14,8 +14,8 @@ from itertools import combinations
 import numpy as np
 
 from coverable_arrays import Array, Ints
+from coverable_kernels import allocating_entry
 from feasibility.clock import Clock
-from feasibility.compiled import allocating
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import (
     COMPONENTS,
@@ -214,7 +214,7 @@ class _Routes:
         return np.vstack(parts[::-1])
 
 
-@allocating
+@allocating_entry
 def breadth_first(ends, starts, nodes):  # type: ignore[no-untyped-def]
     """Of each node: which of `starts` is nearest in edges, and the node and edge before; or -1."""
     first = np.zeros(nodes + 1, dtype=np.int64)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from coverable_arrays import Array
+from coverable_kernels import allocating_entry, entry, put
 from feasibility.collisions import clearance_gradient, segment_clear
-from feasibility.compiled import allocating, kernel, put
 from feasibility.roadmap.expansion import join
 from feasibility.roadmap.graph import COMPONENTS, add_node, is_full
 from feasibility.roadmap.motions import (
@@ -39,7 +39,7 @@ def moved_clear(arrays: SearchArrays, work: Work, cell: int, q: Array) -> bool:
     return len(arrays.collisions) == 0 or bool(_pushed_clear(arrays, work, cell, q))
 
 
-@kernel
+@entry
 def _pushed_clear(arrays, work, cell, q):  # type: ignore[no-untyped-def]
     """`moved_clear`, where collisions are checked."""
     if segment_clear(arrays.collisions, q, q) > 0.0:
@@ -60,7 +60,7 @@ def _pushed_clear(arrays, work, cell, q):  # type: ignore[no-untyped-def]
     return False
 
 
-@allocating
+@allocating_entry
 def seed_cell(arrays, work, roadmap, cell, guesses):  # type: ignore[no-untyped-def]
     """Project guesses onto the constraints over one cell; new configurations become components.
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
-from feasibility.compiled import allocating, put
+from coverable_kernels import allocating, allocating_entry, put
 from feasibility.roadmap.graph import EDGES, NODES, Roadmap, root_of
 from feasibility.verdict import Walk
 
@@ -29,7 +29,7 @@ class Links(NamedTuple):
     """(2 edges, 2) the node that a step leads to, and its edge + 1, negative if run backwards."""
 
 
-@allocating
+@allocating_entry
 def _adjacency(roadmap, component):  # type: ignore[no-untyped-def]
     """The arrays of `Links`."""
     nodes = roadmap.counters[NODES]
@@ -146,7 +146,7 @@ def _to_nearest(roadmap, links, wanted, here, turn, search, first):  # type: ign
     return path, found
 
 
-@allocating
+@allocating_entry
 def _route(roadmap, links, wanted, start, first):  # type: ignore[no-untyped-def]
     """Signed edges of a walk from a node through the wanted cells, always to the nearest one.
 
@@ -172,7 +172,7 @@ def _route(roadmap, links, wanted, start, first):  # type: ignore[no-untyped-def
     return route[:length]
 
 
-@allocating
+@allocating_entry
 def _string(roadmap, start, route):  # type: ignore[no-untyped-def]
     """Waypoints and cell marks of a route."""
     total = 1

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from coverable_arrays import Array
+from coverable_kernels import entry, kernel, put
 from feasibility.collisions import clearance_gradient
-from feasibility.compiled import kernel, put
 from feasibility.roadmap.motions.aiming import look_at
 from feasibility.roadmap.motions.arrays import OVERFLOW, SearchArrays
 from feasibility.roadmap.motions.off_target import STEPS_FROM_NEAR, project_off_target
@@ -112,7 +112,7 @@ def _step_towards(arrays, work, q, goal, share, slack, off_target):  # type: ign
     return project_off_target(arrays, work, work.trial, STEPS_FROM_NEAR)
 
 
-@kernel
+@entry
 def connect(arrays, work, q, goal, waypoints, first, most):  # type: ignore[no-untyped-def]
     """Self-motion over `work.target`, at rest, from q (in place) towards the configuration `goal`.
 
@@ -180,7 +180,7 @@ def connect(arrays, work, q, goal, waypoints, first, most):  # type: ignore[no-u
     return written, False
 
 
-@kernel
+@entry
 def settle(arrays, work, cell, q, most):  # type: ignore[no-untyped-def]
     """Self-motion over a cell's centre (q in place) away from limits and boundaries."""
     n = q.shape[0]
@@ -229,7 +229,7 @@ def margin_shares(arrays: SearchArrays, work: Work, cell: int, guesses: Array) -
     return margins
 
 
-@kernel
+@entry
 def _measure_margins(arrays, work, cell, guesses, margins):  # type: ignore[no-untyped-def]
     """Write the margins of those guesses that can be projected."""
     for g in range(guesses.shape[0]):

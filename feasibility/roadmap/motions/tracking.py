@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.compiled import kernel, put
+from coverable_kernels import entry, kernel, put
 from feasibility.roadmap.motions.aiming import aim, bounds_between
 from feasibility.roadmap.motions.arrays import FOLD, LONG, OVERFLOW, SINGULAR, STOPPED
 from feasibility.roadmap.motions.off_target import STEPS_FROM_NEAR, project_off_target
@@ -71,7 +71,7 @@ def _starts_inside(arrays, work):
     return inside and (abs(work.error[0, 2]) <= work.allowance[2] or not arrays.roll[1] < np.inf)
 
 
-@kernel
+@entry
 def track(arrays, work, curve, begin, end, q, goal, has_goal, waypoints, first):
     """Follow a curve from `begin` to `end`, from q (in place).
 

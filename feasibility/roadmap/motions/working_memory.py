@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
-from feasibility.compiled import kernel
+from coverable_kernels import kernel
 from feasibility.roadmap.motions.roll import roll_off_middle
 from robots import frames
 
