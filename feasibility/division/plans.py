@@ -17,14 +17,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable_arrays import Array, Mask
 from feasibility.division.between_patches import clear_moves
 from feasibility.division.connected_labels import count_of
 from feasibility.division.division import Plan, SubPatch
 from feasibility.division.partition import TIME_LIMIT, Partition, fewest_patches
 from feasibility.division.reconfiguration import itinerary
 from feasibility.division.set_covering import set_cover
-from feasibility.roadmap import Exploration, Links, improve, links_of, patch_walk
+from feasibility.roadmap import UNTRIED, Exploration, Links, improve, links_of, patch_walk
 from feasibility.speed import replay_at_rates
 from feasibility.task import Task
 from feasibility.verdict import Walk
@@ -48,7 +48,7 @@ class _Option:
     wanted: Mask
     """(N,) cells of the patch."""
     links: Links
-    nodes: Ints
+    nodes: list[int]
     """Nodes of the component over these cells."""
     q: Array
     """Their configurations."""
@@ -123,9 +123,9 @@ def _choices(
     options = []
     for p, (mine, own) in enumerate(zip(wanted, fitting, strict=True)):
         for component in own:
-            nodes = np.flatnonzero(links[component].inside)
-            nodes = nodes[mine[roadmap.cell[nodes]]]
-            options.append(_Option(p, mine, links[component], nodes, roadmap.q[nodes]))
+            nodes = [node for node in links[component] if mine[roadmap.cell[node]]]
+            q = np.array([roadmap.q[node] for node in nodes])
+            options.append(_Option(p, mine, links[component], nodes, q))
     choices: list[list[Walk]] = [[] for _ in wanted]
     for option, starts in zip(options, _starts(options), strict=True):
         choices[option.patch] += [
@@ -145,13 +145,12 @@ def _starts(options: Sequence[_Option]) -> list[list[int]]:
     trees = [cKDTree(option.q) for option in options]
     result = []
     for option in options:
-        degrees = np.diff(option.links.indptr)[option.nodes]
-        starts = [int(option.nodes[np.argmin(degrees)])]
+        starts = [min(option.nodes, key=lambda node: len(option.links[node]))]
         near = []
         for other, tree in zip(options, trees, strict=True):
             if other.patch != option.patch:
                 distance, _ = tree.query(option.q, p=np.inf)
-                near.append((float(distance.min()), int(option.nodes[np.argmin(distance)])))
+                near.append((float(distance.min()), option.nodes[int(np.argmin(distance))]))
         starts += [x for _, x in sorted(near)[:MOST_NEAR]]
         result.append(list(dict.fromkeys(starts)))
     return result
@@ -160,7 +159,7 @@ def _starts(options: Sequence[_Option]) -> list[list[int]]:
 def cover_table(exploration: Exploration) -> tuple[list[int], Mask]:
     """The root components, and (K, N) the cells that each covers."""
     roots = [r for r in exploration.roots() if exploration.roadmap.size[r] > 0]
-    return roots, exploration.roadmap.cover[roots].astype(bool)
+    return roots, exploration.roadmap.covers(roots)
 
 
 def collect_components(exploration: Exploration) -> None:
@@ -175,14 +174,14 @@ def collect_components(exploration: Exploration) -> None:
         left = min(COVER_SECONDS, exploration.clock.left)
         cover = set_cover(covers[:, exploration.reached], left)
         chosen = [roots[row] for row in cover.rows]
-        sizes = sum(int(exploration.roadmap.size[root]) for root in chosen)
+        sizes = sum(exploration.roadmap.size[root] for root in chosen)
         state = (int(exploration.reached.sum()), -len(chosen), sizes)
         dry = dry + 1 if state == before else 0
         before = state
         if len(chosen) < 2 or dry >= DRY_ROUNDS:
             return
         exploration.tick("looking for components that cover more")
-        counts = exploration.roadmap.cover[chosen].sum(axis=0)
+        counts = exploration.roadmap.covers(chosen).sum(axis=0)
         rare = np.flatnonzero(exploration.reached & (counts < len(chosen)))
         exploration.add_seeds(int(rng.choice(rare)), exploration.guesses(SEEDS))
         improve(exploration, rng.permutation(chosen)[:TOP].tolist())
@@ -192,6 +191,5 @@ def collect_components(exploration: Exploration) -> None:
 def connect_pairs(exploration: Exploration, component: int, wanted: Mask) -> None:
     """Look for a motion of a component between every two neighbouring cells that are wanted."""
     pairs = exploration.cells.pairs
-    state = np.zeros(len(pairs) + 1, dtype=np.int64)
-    state[:-1][~wanted[pairs].all(axis=1)] = ELSEWHERE
-    exploration.join(state, component)
+    state = np.where(wanted[pairs].all(axis=1), UNTRIED, ELSEWHERE)
+    exploration.close_pairs(state, component)

@@ -122,7 +122,7 @@ def _never_together(exploration: Exploration, refuted: set[tuple[int, int]]) -> 
     import networkx as nx
 
     roots = exploration.roots()
-    covers = exploration.roadmap.cover[roots].astype(bool)
+    covers = exploration.roadmap.covers(roots)
     reached = np.flatnonzero(exploration.reached)
     kinds, group = np.unique(covers[:, reached], axis=1, return_inverse=True)
     group = group.reshape(-1)

@@ -196,7 +196,7 @@ def _statistics(exploration: Exploration) -> dict[str, int]:
     """Counts of the work done."""
     return {
         "fk": int(exploration.work.counts[0]),
-        "nodes": int(exploration.roadmap.counters[0]),
+        "nodes": len(exploration.roadmap.cell),
         "components": len(exploration.roots()),
         "boxes": exploration.boxes,
         "rounds": exploration.rounds,

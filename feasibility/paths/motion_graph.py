@@ -17,8 +17,6 @@ import numpy as np
 
 from coverable_arrays import Array, Ints
 from feasibility.roadmap import (
-    CONNECT_STEPS,
-    MOST_STEPS,
     SearchArrays,
     Work,
     arrays_of,
@@ -207,28 +205,21 @@ def _head_for(graph: MotionGraph, x: int, y: int) -> bool:
 
 def _follow(graph: MotionGraph, x: int, cell: int, goal: Array | None) -> Array | None:
     """(k, n) waypoints along the surface from x to a neighbouring cell's centre; None if stuck."""
-    q = graph.q[x].copy()
-    rows = np.empty((MOST_STEPS + 1, len(q)))
-    here = graph.cell[x]
+    q, here = graph.q[x], graph.cell[x]
     # The curve between two cells runs from the one of lower index to the other.
-    begin, end = (0.0, 1.0) if here < cell else (1.0, 0.0)
-    count = track(
-        graph.arrays, graph.work, graph.pairs[min(here, cell), max(here, cell)], begin, end, q,
-        q if goal is None else goal, goal is not None, rows, 0,
-    )  # fmt: skip
-    return None if count < 0 else np.vstack([graph.q[x][None], rows[:count]])
+    ends = (0.0, 1.0) if here < cell else (1.0, 0.0)
+    curve = graph.pairs[min(here, cell), max(here, cell)]
+    motion = track(graph.arrays, graph.work, curve, *ends, q, goal)
+    return None if motion is None else np.vstack([q, motion])
 
 
 def _self_motion(graph: MotionGraph, cell: int, start: Array, goal: Array) -> Array | None:
     """(k, n) waypoints over one cell's centre from start to goal; None where none was found."""
     if np.array_equal(start, goal):
         return start[None].copy()
-    q = start.copy()
-    rows = np.empty((CONNECT_STEPS + 1, len(q)))
-    arrays = graph.arrays
-    look_at(arrays, graph.work, cell)
-    count, reached = connect(arrays, graph.work, q, goal, rows, 0, CONNECT_STEPS)
-    return np.vstack([start[None], rows[:count]]) if reached else None
+    look_at(graph.arrays, graph.work, cell)
+    motion, reached = connect(graph.arrays, graph.work, start, goal)
+    return np.vstack([start, motion]) if reached else None
 
 
 def windings(graph: MotionGraph, nodes: list[int]) -> list[Array]:

@@ -16,14 +16,13 @@ from __future__ import annotations
 import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
-from coverable_kernels import allocating, allocating_entry, kernel, put
+from coverable_kernels import allocating_entry, kernel, put
 from feasibility.division import undominated
 from feasibility.roadmap import (
     CONE_SLACK,
     HERE,
-    NEWTON_STEPS,
+    NEWTON_AT_REST,
     NEXT,
-    NODES,
     PROJECTION_STEPS,
     Exploration,
     accept,
@@ -35,7 +34,6 @@ from feasibility.roadmap import (
     place,
     project,
     project_onto_cell,
-    root_of,
     seed_middle,
     segment_holds,
 )
@@ -126,7 +124,7 @@ def spread_cells(cells: Cells) -> list[int]:
 def covers_of(exploration: Exploration) -> Mask:
     """(K, N) the largest components, none inside another, the best first."""
     roots = [root for root in exploration.roots() if exploration.roadmap.size[root] > 0]
-    covers = exploration.roadmap.cover[roots[: 4 * MOST_COVERS]].astype(bool)
+    covers = exploration.roadmap.covers(roots[: 4 * MOST_COVERS])
     return np.asarray(covers[undominated(covers)][:MOST_COVERS])
 
 
@@ -147,7 +145,7 @@ def _margins_at(problem, work, q, out):  # type: ignore[no-untyped-def]
     out[1] = max(0.0, 1.0 - work.error[0, 1] / problem.cone_chord)
 
 
-@allocating
+@allocating_entry
 def _widen_margins(problem, aimed, work, cell, q, best):  # type: ignore[no-untyped-def]
     """Self-motion over a cell away from limits and boundary of the cone; changes q and `best`.
 
@@ -167,7 +165,7 @@ def _widen_margins(problem, aimed, work, cell, q, best):  # type: ignore[no-unty
         for j in range(n):
             work.trial[j] = q[j]
         slack = CONE_SLACK * size / 0.3
-        good = project(aimed, work, work.trial, slack, work.error[1, 1], NEWTON_STEPS)
+        good = project(aimed, work, work.trial, slack, work.error[1, 1], NEWTON_AT_REST)
         if good:
             position, cone = segment_holds(problem, work, q, work.trial)
             good = position <= 1.0 and cone <= 1.0
@@ -187,23 +185,6 @@ def _widen_margins(problem, aimed, work, cell, q, best):  # type: ignore[no-unty
             return
 
 
-@allocating_entry
-def _widest_margins(problem, aimed, work, roadmap, component, best):  # type: ignore[no-untyped-def]
-    """Limits and cone (N, 2), the widest found over each cell, of one component's nodes."""
-    n = roadmap.q.shape[1]
-    q, here = np.empty(n), np.empty(2)
-    settled = np.zeros(best.shape[0], dtype=np.int64)
-    for x in range(roadmap.counters[NODES]):
-        cell = roadmap.cell[x]
-        if root_of(roadmap, roadmap.component[x]) != component or settled[cell] == MOST_SETTLED:
-            continue
-        settled[cell] += 1
-        put(q, roadmap.q[x])
-        _widen_margins(problem, aimed, work, cell, q, here)
-        if min(here[0], here[1]) > min(best[cell, 0], best[cell, 1]):
-            best[cell, 0], best[cell, 1] = here[0], here[1]
-
-
 def least_margins(exploration: Exploration) -> Array:
     """(2,) shares of limits and of cone that the best component leaves over every cell."""
     problem, work = exploration.arrays, exploration.work
@@ -211,6 +192,12 @@ def least_margins(exploration: Exploration) -> Array:
     aimed = problem._replace(
         cone_chord=NARROW * problem.cone_chord if problem.cone_chord < np.inf else np.inf
     )
+    roadmap, component, here = exploration.roadmap, exploration.best, np.empty(2)
     best = np.full((len(exploration.cells), 2), -1.0)
-    _widest_margins(problem, aimed, work, exploration.roadmap, exploration.best, best)
+    for cell, nodes in enumerate(roadmap.over):
+        mine = [node for node in nodes if roadmap.root_of(node) == component]
+        for node in mine[:MOST_SETTLED]:
+            _widen_margins(problem, aimed, work, cell, roadmap.q[node].copy(), here)
+            if here.min() > best[cell].min():
+                best[cell] = here
     return np.clip(best.min(axis=0), 0.0, 1.0)

@@ -207,10 +207,9 @@ def _found(
     """The best component, and the sentences about it; `known` is a motion that covers all cells."""
     total = len(problem.cells)
     complete = exploration.complete and total > 0 and not problem.cells.in_order
-    node = None if exploration.begun is None else exploration.begun[0]
-    walk = covering_walk(exploration.roadmap, exploration.best, node) if complete else known
+    start = exploration.begun
+    walk = covering_walk(exploration.roadmap, exploration.best, start) if complete else known
     proof = None if walk is not None else proof_of(exploration)
-    nodes, motions = (int(count) for count in exploration.roadmap.counters[:2])
     return Found(
         covered=exploration.covered if walk is None else np.ones(total, dtype=bool),
         components=tuple(np.flatnonzero(exploration.covers(r)) for r in exploration.roots()),
@@ -221,8 +220,8 @@ def _found(
         n_edges=exploration.n_edges,
         counts={
             "fk": int(exploration.work.counts[0]),
-            "nodes": nodes,
-            "motions": motions,
+            "nodes": len(exploration.roadmap.cell),
+            "motions": len(exploration.roadmap.edges),
             "boxes": exploration.boxes + proving.boxes,
             "rounds": exploration.rounds,
         },

@@ -1,299 +1,255 @@
-"""How the roadmap grows: spreading over the surface, self-motions, closing pairs.
+"""How the roadmap grows: seeds, spreading over the surface, self-motions, closing pairs, bridges.
 
-Each kernel connects nodes by motions that `feasibility.roadmap.motions.segment_bound` certifies.
+The motions are those of `feasibility.roadmap.motions`, compiled and certified; here is which of
+them are tried, and what comes of them.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
-from coverable_kernels import allocating, allocating_entry, kernel, put
-from feasibility.roadmap.graph import (
-    BUDGET,
-    COVERED,
-    CURSOR,
-    DONE,
-    FULL,
-    HEAD,
-    TAIL,
-    WAYPOINTS,
-    add_edge,
-    add_node,
-    is_full,
-    root_of,
-    unite,
+from coverable_arrays import Array, Ints
+from feasibility.roadmap.graph import Blocked, Roadmap
+from feasibility.roadmap.motions import (
+    NEXT,
+    PROJECTION_STEPS,
+    SETTLE_STEPS,
+    SearchArrays,
+    Work,
+    aim,
+    connect,
+    effects,
+    look_at,
+    place,
+    project_near_cell,
+    settle,
+    stand_still,
+    track,
 )
-from feasibility.roadmap.motions import OVERFLOW, connect, look_at, project_near_cell, track
+from feasibility.roadmap.moving_clear import moved_clear
 
-MOST_FAILURES = np.int64(12)  # failed connections after which a pair of components is left alone
+MOST_FAILURES = 12  # failed connections after which a pair of components is left alone
+PATIENCE = 60  # the same for `explore_self_motions`
 MOST_RIVALS = 6  # other components that a new configuration tries to join, the nearest first
-CONNECT_STEPS = np.int64(60)  # steps of one self-motion
-AIM_STEPS = np.int64(30)  # Newton steps that project a random configuration
-NOBODY, NONE = np.int64(-1), np.int64(0)
-FREE = np.bool_(False)  # a track without a goal
+AIM_STEPS = 30  # Newton steps that project a random configuration
+UNTRIED, JOINED, APART = range(3)
+"""Of a pair of neighbouring cells: no motion was looked for, there is one, none was found."""
 
 
-@kernel
-def _nearest_rival(roadmap, cell, q, own, tried, most):
-    """The node over `cell` nearest to q in a component that is neither `own` nor tried; or -1."""
-    best, nearest = -1, np.inf
-    node = roadmap.first_node[cell]
-    while node >= 0:
-        component = root_of(roadmap, roadmap.component[node])
-        fresh = component != own
-        for k in range(tried.shape[0]):
-            if tried[k] == component:
-                fresh = False
-        if fresh and (own < 0 or roadmap.failures[own, component] < most):
-            distance = 0.0
-            for j in range(q.shape[0]):
-                distance += ((roadmap.q[node, j] - q[j]) * roadmap.effect[node, j]) ** 2
-            if distance < nearest:
-                best, nearest = node, distance
-        node = roadmap.following[node]
-    return best
+@dataclass(frozen=True)
+class Grower:
+    """Adds to a roadmap what certified motions reach."""
 
+    arrays: SearchArrays
+    work: Work
+    roadmap: Roadmap
+    tick: Callable[[str], None]
+    """Called with what is being done, again and again; what it raises ends that."""
 
-@allocating
-def join(arrays, work, roadmap, cell, q, own, rows, most):
-    """Try to reach, by self-motion from q over `cell`, a node of another component.
+    # -- motions -------------------------------------------------------------------------------
 
-    Waypoints go to `roadmap.waypoints` behind the `rows` rows that are pending there.
+    def track(
+        self, curve: int, ends: tuple[float, float], q: Array, goal: Array | None = None
+    ) -> Array | None:
+        """The motion of `motions.track` from one parameter of a curve to another."""
+        return track(self.arrays, self.work, curve, *ends, q, goal)
 
-    Returns:
-        (node, rows written), or (-1, 0); (-1, OVERFLOW) when `waypoints` is full.
-    """
-    tried = np.empty(MOST_RIVALS, dtype=np.int64)
-    here = np.empty(q.shape[0])
-    for k in range(MOST_RIVALS):
-        tried[k] = -1
-    for k in range(MOST_RIVALS):
-        node = _nearest_rival(roadmap, cell, q, own, tried, most)
-        if node < 0:
-            break
-        tried[k] = root_of(roadmap, roadmap.component[node])
-        put(here, q)
-        look_at(arrays, work, cell)
-        written, reached = connect(
-            arrays, work, here, roadmap.q[node], roadmap.waypoints,
-            roadmap.counters[WAYPOINTS] + rows, CONNECT_STEPS,
-        )  # fmt: skip
-        if written == OVERFLOW:
-            return -1, OVERFLOW
-        if reached:
-            return node, written
-        if own >= 0:
-            roadmap.failures[own, tried[k]] += 1
-            roadmap.failures[tried[k], own] += 1
-    return -1, 0
+    def connect(self, cell: int, q: Array, goal: Array) -> tuple[Array, bool]:
+        """The self-motion of `motions.connect` over a cell's centre."""
+        look_at(self.arrays, self.work, cell)
+        return connect(self.arrays, self.work, q, goal)
 
+    def add_node(self, cell: int, q: Array, root: int) -> int:
+        """Add a node to a root component, and queue it; returns its number."""
+        place(self.arrays, self.work, NEXT, q)
+        effect = np.empty(len(q))
+        effects(self.arrays, self.work, NEXT, effect)
+        return self.roadmap.add_node(cell, q.copy(), effect, root)
 
-@allocating_entry
-def spread_out(arrays, work, roadmap, indptr, indices, links, budget):
-    """Spread every queued node into the neighbouring cells that its component does not cover yet.
+    def join(
+        self, cell: int, q: Array, own: int | None = None, most: int = MOST_FAILURES
+    ) -> tuple[int, Array] | None:
+        """Try to reach, by self-motion from q over a cell, a node of another component.
 
-    Args:
-        arrays, work, roadmap: the `SearchArrays`, the `Work` and the `Roadmap`.
-        indptr, indices: (N + 1,) where each cell's neighbours begin in `indices` (k,).
-        links: (k,) the curve to each, see `Neighbours.links`.
-        budget: evaluations of the arm before returning.
+        Args:
+            cell, q: where the self-motion begins.
+            own: the root component of q, None where it has none yet.
+            most: failed connections with `own` after which another component is left alone.
 
-    Returns:
-        DONE when the queue is empty, COVERED when a component covers every cell, BUDGET after
-        `budget` evaluations of the arm, FULL when an array is full; call again to continue.
-    """
-    count = roadmap.counters
-    cells = roadmap.first_node.shape[0]
-    q = np.empty(roadmap.q.shape[1])
-    stop = work.counts[0] + budget
-    while count[HEAD] < count[TAIL]:
-        x = roadmap.queue[count[HEAD]]
-        cell = roadmap.cell[x]
-        first, last = indptr[cell], indptr[cell + 1]
-        while first + count[CURSOR] < last:
-            if work.counts[0] > stop:
-                return BUDGET
-            if is_full(roadmap):
-                return FULL
-            target = indices[first + count[CURSOR]]
-            own = root_of(roadmap, roadmap.component[x])
-            if roadmap.cover[own, target]:
-                count[CURSOR] += 1
-                continue
-            put(q, roadmap.q[x])
-            begin, end = (0.0, 1.0) if cell < target else (1.0, 0.0)
-            rows = track(
-                arrays, work, links[first + count[CURSOR]], begin, end, q, q, FREE,
-                roadmap.waypoints, count[WAYPOINTS],
-            )  # fmt: skip
-            if rows == OVERFLOW:
-                return FULL
-            count[CURSOR] += 1
-            if rows < 0:
-                former = roadmap.blocked[target, 2]
-                if former < 0 or roadmap.size[own] >= roadmap.size[root_of(roadmap, former)]:
-                    roadmap.blocked[target, 0] = work.stop_reason[0]
-                    roadmap.blocked[target, 1] = work.stop_reason[1]
-                    roadmap.blocked[target, 2] = own
-                continue
-            node, more = join(arrays, work, roadmap, target, q, own, rows, MOST_FAILURES)
-            if more == OVERFLOW:
-                count[CURSOR] -= 1
-                return FULL
-            if node >= 0:
-                add_edge(roadmap, x, node, rows + more)
-                own = unite(roadmap, own, roadmap.component[node])
-            else:
-                node = add_node(arrays, work, roadmap, target, q, own)
-                add_edge(roadmap, x, node, rows)
-            if roadmap.size[own] == cells:
-                return COVERED
-        count[HEAD] += 1
-        count[CURSOR] = 0
-    return DONE
-
-
-@allocating_entry
-def explore_self_motions(arrays, work, roadmap, cell, guesses, most):
-    """Explore the self-motion manifold over one cell, and merge the components that it connects.
-
-    A rapidly exploring random tree for each component: the node nearest to a random configuration
-    of the manifold moves towards it as far as it can, and from there tries to join the other
-    components. New nodes are queued, because they may reach a neighbouring cell that the old ones
-    could not.
-
-    Args:
-        arrays, work, roadmap, cell: as in `seed_cell`.
-        guesses: (k, n) random configurations.
-        most: failed connections after which two components are left alone.
-
-    Returns:
-        (status, guesses used, mergers): status is DONE, or FULL when an array is full.
-    """
-    count = roadmap.counters
-    merged = 0
-    q = np.empty(guesses.shape[1])
-    tried = np.empty(MOST_RIVALS, dtype=np.int64)
-    goal = np.empty(guesses.shape[1])
-    for g in range(guesses.shape[0]):
-        for k in range(MOST_RIVALS):
-            tried[k] = -1
-        for k in range(MOST_RIVALS):
-            if is_full(roadmap):
-                return FULL, g, merged
-            if k == 0:
-                # Head for a random configuration of the manifold.
-                put(goal, guesses[g])
-                if not project_near_cell(arrays, work, cell, goal, AIM_STEPS):
-                    break
-            node = _nearest_rival(roadmap, cell, goal, NOBODY, tried, NONE)
-            if node < 0:
+        Returns:
+            The node and the motion (k, n) to it, q left out; None where none is reached.
+        """
+        roadmap, passed = self.roadmap, set[int]()
+        if own is not None:
+            failures = roadmap.failures[own]
+            passed = {own, *(other for other, count in failures.items() if count >= most)}
+        for _ in range(MOST_RIVALS):
+            node = roadmap.nearest(cell, q, passed)
+            if node is None:
                 break
-            own = root_of(roadmap, roadmap.component[node])
-            tried[k] = own
-            put(q, roadmap.q[node])
-            look_at(arrays, work, cell)
-            rows, _ = connect(
-                arrays, work, q, goal, roadmap.waypoints, count[WAYPOINTS], CONNECT_STEPS
-            )
-            if rows == OVERFLOW:
-                return FULL, g, merged
-            if rows < 2:
+            rival = roadmap.root_of(node)
+            passed.add(rival)
+            motion, reached = self.connect(cell, q, roadmap.q[node])
+            if reached:
+                return node, motion
+            if own is not None:
+                roadmap.count_failure(own, rival)
+        return None
+
+    # -- growing -------------------------------------------------------------------------------
+
+    def seed(self, cell: int, guess: Array) -> bool:
+        """Project a guess (n,) onto the constraints over a cell; False where that fails.
+
+        The configuration becomes a component of its own, unless it collides, however it is moved,
+        or a self-motion joins it to a node that is there.
+        """
+        q = guess.copy()
+        if not project_near_cell(self.arrays, self.work, cell, q, PROJECTION_STEPS):
+            return False
+        if moved_clear(self.arrays, self.work, cell, q):
+            settle(self.arrays, self.work, cell, q, SETTLE_STEPS)
+            if self.join(cell, q) is None:
+                self.add_node(cell, q, self.roadmap.add_component())
+        return True
+
+    def spread(
+        self, neighbours: Sequence[Sequence[tuple[int, int]]], enough: Callable[[int], bool]
+    ) -> bool:
+        """Spread every queued node into the neighbouring cells that its component misses.
+
+        Args:
+            neighbours: of each cell: a cell beside it, and the curve between the two.
+            enough: of a root component that has grown: is it all that is wanted?
+
+        Returns:
+            True when a component is enough; nodes may be left in the queue then.
+        """
+        roadmap = self.roadmap
+        while roadmap.queue:
+            x = roadmap.queue[0]
+            cell, q = roadmap.cell[x], roadmap.q[x]
+            for target, curve in neighbours[cell]:
+                own = roadmap.root_of(x)
+                if roadmap.cover[own][target]:
+                    continue
+                self.tick("spreading over the surface")
+                motion = self.track(curve, (0.0, 1.0) if cell < target else (1.0, 0.0), q)
+                if motion is None:
+                    self._note_blocked(target, own)
+                    continue
+                joined = self.join(target, motion[-1], own)
+                if joined is None:
+                    roadmap.add_edge(x, self.add_node(target, motion[-1], own), motion)
+                else:
+                    own = roadmap.add_edge(x, joined[0], np.vstack([motion, joined[1]]))
+                if enough(own):
+                    return True
+            roadmap.queue.popleft()
+        return False
+
+    def _note_blocked(self, cell: int, own: int) -> None:
+        """Keep why the last motion, of a root component into a cell, stopped."""
+        roadmap = self.roadmap
+        former = roadmap.blocked.get(cell)
+        if former is None or roadmap.size[own] >= roadmap.size[roadmap.root(former.component)]:
+            roadmap.blocked[cell] = Blocked(*self.work.stop_reason.tolist(), own)
+
+    def explore_self_motions(self, cell: int, guesses: Array) -> None:
+        """Explore the self-motion manifold over one cell, and join the components it connects.
+
+        A rapidly exploring random tree for each component: the node nearest to a random
+        configuration of the manifold moves towards it as far as it can, and from there tries to
+        join the other components. New nodes are queued, because they may reach a neighbouring cell
+        that the old ones could not.
+        """
+        roadmap = self.roadmap
+        for guess in guesses:
+            goal, passed = guess.copy(), set[int]()
+            if not project_near_cell(self.arrays, self.work, cell, goal, AIM_STEPS):
                 continue
-            new = add_node(arrays, work, roadmap, cell, q, own)
-            add_edge(roadmap, node, new, rows)
-            rival, more = join(arrays, work, roadmap, cell, q, own, NONE, most)
-            if more == OVERFLOW:
-                return FULL, g, merged
-            if rival >= 0:
-                add_edge(roadmap, new, rival, more)
-                unite(roadmap, own, roadmap.component[rival])
-                merged += 1
-    return DONE, guesses.shape[0], merged
+            for _ in range(MOST_RIVALS):
+                node = roadmap.nearest(cell, goal, passed)
+                if node is None:
+                    break
+                own = roadmap.root_of(node)
+                passed.add(own)
+                motion, _ = self.connect(cell, roadmap.q[node], goal)
+                if len(motion) < 2:
+                    continue
+                new = self.add_node(cell, motion[-1], own)
+                roadmap.add_edge(node, new, motion)
+                joined = self.join(cell, motion[-1], own, PATIENCE)
+                if joined is not None:
+                    roadmap.add_edge(new, *joined)
 
+    def close_pairs(self, pairs: Ints, state: Ints, root: int) -> None:
+        """Connect every two neighbouring cells inside one component by a motion of their own.
 
-@kernel
-def _nearest_nodes(roadmap, i, j, component):
-    """The two nodes of a component over cells i and j that are nearest to each other; or -1, -1."""
-    best_x, best_y, nearest = -1, -1, np.inf
-    x = roadmap.first_node[i]
-    while x >= 0:
-        if root_of(roadmap, roadmap.component[x]) == component:
-            y = roadmap.first_node[j]
-            while y >= 0:
-                if root_of(roadmap, roadmap.component[y]) == component:
-                    distance = 0.0
-                    for k in range(roadmap.q.shape[1]):
-                        distance += (roadmap.q[x, k] - roadmap.q[y, k]) ** 2
-                    if distance < nearest:
-                        best_x, best_y, nearest = x, y, distance
-                y = roadmap.following[y]
-        x = roadmap.following[x]
-    return best_x, best_y
+        Args:
+            pairs: (M, 2) the cells, one pair for each curve.
+            state: (M,) of each pair, see UNTRIED; only those are tried. Filled here.
+            root: the root component.
+        """
+        for curve in np.flatnonzero(state == UNTRIED).tolist():
+            self.tick("joining neighbouring cells")
+            state[curve] = JOINED if self._close(curve, pairs[curve].tolist(), root) else APART
 
+    def _close(self, curve: int, pair: Sequence[int], root: int) -> bool:
+        """Look for a motion between the nodes over two cells that are nearest to each other.
 
-@allocating_entry
-def close_pairs(arrays, work, roadmap, pairs, state, component, budget):
-    """Try to connect every neighbouring pair of cells inside one component by a motion of its own.
+        Either way, first heading for the other node, then freely. One that cannot be connected to
+        the other node may end in a new one.
+        """
+        roadmap, nodes = self.roadmap, self.roadmap.nearest_two(pair, root)
+        if nodes is None:
+            return False
+        there, back = (*nodes, (0.0, 1.0)), (*nodes[::-1], (1.0, 0.0))
+        motion = None
+        for (a, b, ends), heading in ((there, True), (back, True), (there, False), (back, False)):
+            goal = roadmap.q[b]
+            motion = self.track(curve, ends, roadmap.q[a], goal if heading else None)
+            if motion is None:
+                continue
+            more, reached = self.connect(roadmap.cell[b], motion[-1], goal)
+            if reached:
+                roadmap.add_edge(a, b, np.vstack([motion, more]))
+                return True
+        if motion is None:
+            return False
+        roadmap.add_edge(a, self.add_node(roadmap.cell[b], motion[-1], root), motion)
+        return True
 
-    Args:
-        arrays, work: the `SearchArrays` and the `Work`.
-        roadmap: the `Roadmap`; a motion that cannot be connected to a node ends in a new one.
-        pairs: (M, 2) neighbouring cells, one for each curve.
-        state: (M + 1,) 1 where the pair has an edge, 2 where none was found; the last entry is
-            the next pair to try. Filled here.
-        component: the root component.
-        budget: evaluations of the arm before returning.
+    def bridge(self, x: int, y: int, curve: int, share: float) -> bool:
+        """Try to connect two nodes over neighbouring cells at a point of the curve between them.
 
-    Returns:
-        DONE, BUDGET or FULL, as `spread_out`.
-    """
-    count = roadmap.counters
-    stop = work.counts[0] + budget
-    q = np.empty(roadmap.q.shape[1])
-    arrival = np.empty(roadmap.q.shape[1])
-    m = pairs.shape[0]
-    while state[m] < m:
-        k = state[m]
-        if state[k] == 0:
-            if work.counts[0] > stop:
-                return BUDGET
-            if is_full(roadmap):
-                return FULL
-            best_x, best_y = _nearest_nodes(roadmap, pairs[k, 0], pairs[k, 1], component)
-            state[k] = 2
-            if best_x >= 0:
-                for attempt in range(4):
-                    a, b = (best_x, best_y) if attempt % 2 == 0 else (best_y, best_x)
-                    begin, end = (0.0, 1.0) if attempt % 2 == 0 else (1.0, 0.0)
-                    j = roadmap.cell[b]
-                    put(q, roadmap.q[a])
-                    rows = track(
-                        arrays, work, k, begin, end, q, roadmap.q[b], attempt < 2,
-                        roadmap.waypoints, count[WAYPOINTS],
-                    )  # fmt: skip
-                    if rows == OVERFLOW:
-                        state[k] = 0
-                        return FULL
-                    if rows < 0:
-                        continue
-                    put(arrival, q)
-                    look_at(arrays, work, j)
-                    more, reached = connect(
-                        arrays, work, q, roadmap.q[b], roadmap.waypoints, count[WAYPOINTS] + rows,
-                        CONNECT_STEPS,
-                    )  # fmt: skip
-                    if more == OVERFLOW:
-                        state[k] = 0
-                        return FULL
-                    if reached:
-                        add_edge(roadmap, a, b, rows + more)
-                        state[k] = 1
-                        break
-                    if attempt == 3:
-                        # The motion reaches the cell, with a configuration of its own.
-                        new = add_node(arrays, work, roadmap, j, arrival, component)
-                        add_edge(roadmap, a, new, rows)
-                        state[k] = 1
-        state[m] += 1
-    return DONE
+        Two sheets of configurations (two flips of a wrist, say) may touch only where the arm passes
+        a singularity, and the target of that singularity may lie between the centres. So both nodes
+        are tracked to that point, and a self-motion is tried there.
+
+        Args:
+            x, y: the nodes.
+            curve: the curve between their cells.
+            share: parameter of the point on it, in [0, 1].
+
+        Returns:
+            True when an edge was added.
+        """
+        roadmap = self.roadmap
+        starts = (0.0, 1.0) if roadmap.cell[x] < roadmap.cell[y] else (1.0, 0.0)
+        there = self.track(curve, (starts[0], share), roadmap.q[x])
+        back = None if there is None else self.track(curve, (starts[1], share), roadmap.q[y])
+        if there is None or back is None:
+            return False
+        aim(self.arrays, self.work, curve, share)
+        stand_still(self.arrays, self.work)
+        between, reached = connect(self.arrays, self.work, there[-1], back[-1])
+        if not reached:
+            between, reached = connect(self.arrays, self.work, back[-1], there[-1])
+            between = np.vstack([between[-2::-1], back[-1]])
+        if reached:
+            roadmap.add_edge(x, y, np.vstack([there, between, back[-2::-1], roadmap.q[y]]))
+        return reached

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property, partial
+from itertools import pairwise
 
 import numpy as np
 
@@ -11,35 +13,17 @@ from coverable_arrays import Array, Ints, Mask
 from feasibility.clock import Clock, OutOfTime
 from feasibility.cut_tree import CutTree
 from feasibility.roadmap.branch_and_bound import Boxes, Ruling, rule
-from feasibility.roadmap.bridging import NARROWEST, WIDEST, bridge, nearest_pairs
-from feasibility.roadmap.expansion import close_pairs, explore_self_motions, spread_out
-from feasibility.roadmap.graph import (
-    BEST,
-    COMPONENTS,
-    COVERED,
-    DONE,
-    FULL,
-    HEAD,
-    TAIL,
-    WAYPOINTS,
-    Roadmap,
-    add_node,
-    empty_roadmap,
-    grown,
-    joined_pairs,
-    nodes_over,
-    root_of,
-)
+from feasibility.roadmap.expansion import JOINED, Grower
+from feasibility.roadmap.graph import Roadmap
 from feasibility.roadmap.joint_boxes import Blockers
 from feasibility.roadmap.motions import SearchArrays, Work, passable, work_for
-from feasibility.roadmap.seeding import seed_cell
 from robots import Robot
 from surfaces import Cells, components
 
 BUDGET = 8_000  # evaluations of the arm between two checks of the clock
 GUESSES = 4  # of one `explore_self_motions`
 BRIDGES = 6  # pairs of nodes that one round tries to bridge
-PATIENCE = 60  # failed connections of two components before `explore_self_motions` gives them up
+NARROWEST, WIDEST = 0.1, 0.9  # [1] of the curve between two centres: where a bridge is tried
 
 
 @dataclass
@@ -68,16 +52,15 @@ class Exploration:
     tried: dict[tuple[int, int], int] = field(default_factory=dict)
     """How often a bridge between two nodes was tried."""
     pairs: Ints = field(init=False)
-    """(M + 1,) state of each neighbouring pair, see `close_pairs`."""
+    """(M,) state of each neighbouring pair, see `Grower.close_pairs`."""
 
-    begun: tuple[int, int] | None = None
-    """Node and component of the arm's start, where it has one: the motion has to begin there."""
+    begun: int | None = None
+    """The node of the arm's start, where it has one: the motion has to begin there."""
 
     def __post_init__(self) -> None:
         """Set up the empty roadmap, the random numbers and the neighbours."""
-        n = self.robot.n
-        self.work = work_for(n)
-        self.roadmap = empty_roadmap(len(self.cells), n)
+        self.work = work_for(self.robot.n)
+        self.roadmap = Roadmap(len(self.cells))
         self.rng = np.random.default_rng(self.seed)
         lower, upper = np.array(self.robot.lower), np.array(self.robot.upper)
         wide = ~(upper - lower <= 2.0 * np.pi) & ~self.robot.prismatic
@@ -93,9 +76,8 @@ class Exploration:
         far = far + ends.sum() - ends
         self.low = np.where(self.robot.prismatic, np.clip(-far, lower, upper), self.low)
         self.high = np.where(self.robot.prismatic, np.clip(far, lower, upper), self.high)
-        self.indptr, self.indices = self.cells.neighbours
-        self.links = self.cells.links
-        self.pairs = np.zeros(len(self.cells.pairs) + 1, dtype=np.int64)
+        self.pairs = np.zeros(len(self.cells.pairs), dtype=np.int64)
+        self._next_look = 0
 
     # -- reading the roadmap -------------------------------------------------------------------
 
@@ -108,28 +90,28 @@ class Exploration:
     def best(self) -> int:
         """Root of the component that covers most cells, or of the start (0 when there is none)."""
         if self.begun is not None:
-            return int(root_of(self.roadmap, self.begun[1]))
-        return int(root_of(self.roadmap, self.roadmap.counters[BEST]))
+            return self.roadmap.root_of(self.begun)
+        return self.roadmap.root(self.roadmap.largest) if self.roadmap.parent else 0
 
     @property
     def covered(self) -> Mask:
         """(N,) cells of the best component."""
-        return self.roadmap.cover[self.best].astype(bool)
+        return self.covers(self.best)
 
     @property
     def n_covered(self) -> int:
         """How many cells the best component covers."""
-        return int(self.roadmap.size[self.best])
+        return self.roadmap.size[self.best] if self.roadmap.parent else 0
 
     @property
     def complete(self) -> bool:
         """Does the best component cover every cell?"""
-        return int(self.roadmap.size[self.best]) == len(self.cells)
+        return self.n_covered == len(self.cells)
 
     @property
     def reached(self) -> Mask:
         """(N,) cells that some component covers."""
-        return self.roadmap.first_node >= 0
+        return self.roadmap.reached.copy()
 
     @property
     def proved(self) -> bool:
@@ -152,36 +134,36 @@ class Exploration:
         reached = self.reached
         if self.parts.max(initial=0) == 0:
             return self.apart
-        cover = self.roadmap.cover[self.roots()].astype(bool)
+        cover = self.roadmap.covers(self.roots())
         parts = [(self.parts == part) & reached for part in range(self.parts.max() + 1)]
         return not all(cover[:, part].all(axis=1).any() for part in parts if part.any())
 
     @property
     def n_edges(self) -> int:
         """Neighbouring pairs of cells with a motion between them, found by `close`."""
-        return int((self.pairs[:-1] == 1).sum())
+        return int((self.pairs == JOINED).sum())
 
     def roots(self) -> list[int]:
         """Root components, the largest first; of several as large `best` is first."""
-        slots = np.arange(self.roadmap.counters[COMPONENTS])
-        roots = slots[self.roadmap.parent[slots] == slots]
-        order = np.lexsort((roots != self.best, -self.roadmap.size[roots]))
-        return [int(r) for r in roots[order]]
+        parent, size, best = self.roadmap.parent, self.roadmap.size, self.best
+        roots = (component for component, whole in enumerate(parent) if whole == component)
+        return sorted(roots, key=lambda root: (-size[root], root != best))
 
     def sizes(self, most: int | None = None) -> tuple[int, ...]:
         """How many cells the components cover, the largest ones first."""
-        return tuple(int(self.roadmap.size[r]) for r in self.roots()[:most])
+        return tuple(self.roadmap.size[root] for root in self.roots()[:most])
 
     def covers(self, component: int) -> Mask:
         """(N,) cells of a component."""
-        return self.roadmap.cover[root_of(self.roadmap, component)].astype(bool)
+        if not self.roadmap.parent:
+            return np.zeros(len(self.cells), dtype=bool)
+        return self.roadmap.cover[self.roadmap.root(component)].copy()
 
     def posture(self, component: int) -> Array:
         """(n,) a configuration of a component."""
-        root = root_of(self.roadmap, component)
-        nodes = nodes_over(self.roadmap, int(self.covers(root).argmax()))
-        mine = (x for x in nodes if root_of(self.roadmap, self.roadmap.component[x]) == root)
-        return np.array(self.roadmap.q[next(mine)])
+        roadmap, root = self.roadmap, self.roadmap.root(component)
+        nodes = reversed(roadmap.over[int(roadmap.cover[root].argmax())])
+        return next(roadmap.q[node].copy() for node in nodes if roadmap.root_of(node) == root)
 
     # -- growing it ----------------------------------------------------------------------------
 
@@ -191,13 +173,35 @@ class Exploration:
         Raises:
             OutOfTime: the deadline has passed, or the clock allows no more evaluations.
         """
-        self.clock.tick(int(self.roadmap.size[self.best]), len(self.cells), text)
+        self._next_look = int(self.work.counts[0]) + self.budget()
+        self.clock.tick(self.n_covered, len(self.cells), text)
         if self.work.counts[0] > self.clock.evaluations:
             raise OutOfTime
 
     def budget(self) -> int:
-        """Evaluations of the arm that compiled loops may use before they return to `tick`."""
+        """Evaluations of the arm between two looks at the clock."""
         return BUDGET
+
+    def tick_at_times(self, text: str) -> None:
+        """`tick`, where the arm has been evaluated often enough since the last time.
+
+        Raises:
+            OutOfTime: see `tick`.
+        """
+        if self.work.counts[0] > self._next_look:
+            self.tick(text)
+
+    @property
+    def grower(self) -> Grower:
+        """What adds to the roadmap."""
+        return Grower(self.arrays, self.work, self.roadmap, self.tick_at_times)
+
+    @cached_property
+    def neighbours(self) -> list[list[tuple[int, int]]]:
+        """Of each cell: those beside it, and the curve between the two."""
+        indptr, indices = self.cells.neighbours
+        beside = list(zip(indices.tolist(), self.cells.links.tolist(), strict=True))
+        return [beside[first:last] for first, last in pairwise(indptr.tolist())]
 
     def guesses(self, k: int) -> Array:
         """(k, n) random configurations inside the limits."""
@@ -205,62 +209,43 @@ class Exploration:
 
     def spread(self) -> bool:
         """Spread all queued nodes; True when one component (of the start) covers every cell."""
-        while True:
-            case = self.arrays, self.work, self.roadmap
-            status = spread_out(*case, self.indptr, self.indices, self.links, self.budget())
-            if status == COVERED and (self.begun is None or self.complete):
-                return True
-            if status == DONE:
-                self.roadmap.counters[HEAD] = self.roadmap.counters[TAIL] = 0
-                return False
-            if status == FULL:
-                self.roadmap = grown(self.roadmap)
-            self.tick("spreading over the surface")
+        return self.grower.spread(self.neighbours, self._enough)
+
+    def _enough(self, root: int) -> bool:
+        """Does a component that may be the best cover every cell?"""
+        full = self.roadmap.size[root] == len(self.cells)
+        return full and (self.begun is None or root == self.best)
 
     def begin_at(self, cell: int, q: Array) -> None:
         """Make the start, a configuration over a cell, the first node, and spread from it."""
-        self.roadmap = grown(self.roadmap)
-        component = int(self.roadmap.counters[COMPONENTS])
-        self.roadmap.counters[COMPONENTS] += 1
-        node = add_node(self.arrays, self.work, self.roadmap, cell, q, component)
-        self.begun = int(node), component
+        self.begun = self.grower.add_node(cell, q, self.roadmap.add_component())
         self.spread()
 
-    def add_seeds(self, cell: int, guesses: Array) -> int:
+    def add_seeds(self, cell: int, guesses: Iterable[Array]) -> int:
         """Seed a cell and spread the new nodes; returns how many guesses could be projected."""
         found = 0
         for guess in guesses:
-            self.roadmap = grown(self.roadmap)
-            hits, made = seed_cell(self.arrays, self.work, self.roadmap, cell, guess[None])
-            found += hits
-            if made and self.spread():
+            found += self.grower.seed(cell, guess)
+            if self.roadmap.queue and self.spread():
                 break
         return found
 
     def explore_self_motions(self, cell: int) -> None:
         """Explore the self-motion manifold over one cell and spread the new nodes."""
-        guesses = self.guesses(GUESSES)
-        while True:
-            status, used, _ = explore_self_motions(
-                self.arrays, self.work, self.roadmap, cell, guesses, PATIENCE
-            )
-            guesses = guesses[used:]
-            if status != FULL:
-                break
-            self.roadmap = grown(self.roadmap)
+        self.grower.explore_self_motions(cell, self.guesses(GUESSES))
         self.spread()
 
     def bridge(self, one: int, other: int, most: int = BRIDGES) -> None:
         """Try to bridge two components between cell centres, the nearest nodes first."""
         tries = 0
-        nodes = nearest_pairs(self.roadmap, self.cells.pairs, one, other)
-        for x, y in nodes[: 2 * most * (1 + self.rounds)].tolist():
+        nodes = self.roadmap.nearest_neighbours(self.cells.pairs, one, other)
+        for x, y in nodes[: 2 * most * (1 + self.rounds)]:
             if self.tried.get((x, y), 0) > self.rounds // 4:
                 continue
             self.tried[x, y] = self.tried.get((x, y), 0) + 1
             share = float(self.rng.uniform(NARROWEST, WIDEST))
-            curve = self.curve(int(self.roadmap.cell[x]), int(self.roadmap.cell[y]))
-            if bridge(self.arrays, self.work, self.reserve, x, y, curve, share):
+            curve = self.curve(self.roadmap.cell[x], self.roadmap.cell[y])
+            if self.grower.bridge(x, y, curve, share):
                 self.spread()
                 return
             tries += 1
@@ -269,39 +254,28 @@ class Exploration:
 
     def curve(self, cell: int, other: int) -> int:
         """The curve between two neighbouring cells."""
-        entries = slice(self.indptr[cell], self.indptr[cell + 1])
-        return int(self.links[entries][self.indices[entries] == other][0])
+        return dict(self.neighbours[cell])[other]
 
-    def join(self, state: Ints, component: int) -> None:
+    def close_pairs(self, state: Ints, root: int) -> None:
         """Search a motion of a component between every two neighbouring cells.
 
         Args:
-            state: (M + 1,) of each pair, see `close_pairs`; filled here.
-            component: its root.
+            state: (M,) of each pair, see `Grower.close_pairs`; filled here.
+            root: the root component.
         """
-        pairs = self.cells.pairs
-        joined_pairs(self.roadmap, pairs, component, state)
-        while True:
-            case = self.arrays, self.work, self.roadmap
-            status = close_pairs(*case, pairs, state, component, self.budget())
-            if status == DONE:
-                return
-            if status == FULL:
-                self.roadmap = grown(self.roadmap)
-            self.tick("joining neighbouring cells")
-
-    def reserve(self, rows: int) -> Roadmap:
-        """The roadmap, grown until an edge and so many rows of `waypoints` fit."""
-        self.roadmap = grown(self.roadmap)
-        while self.roadmap.counters[WAYPOINTS] + rows > len(self.roadmap.waypoints):
-            self.roadmap = grown(self.roadmap)
-        return self.roadmap
+        roadmap = self.roadmap
+        for x, y, _ in roadmap.edges:
+            beside = dict(self.neighbours[roadmap.cell[x]])
+            if roadmap.cell[y] in beside and roadmap.root_of(x) == root:
+                state[beside[roadmap.cell[y]]] = JOINED
+        self.grower.close_pairs(self.cells.pairs, state, root)
 
     def border(self, component: int) -> Ints:
         """Cells of a component with a neighbour that it does not cover."""
         inside = self.covers(component)
-        owners = np.repeat(np.arange(len(self.cells)), np.diff(self.indptr))
-        return np.unique(owners[inside[owners] & ~inside[self.indices]])
+        indptr, indices = self.cells.neighbours
+        owners = np.repeat(np.arange(len(self.cells)), np.diff(indptr))
+        return np.unique(owners[inside[owners] & ~inside[indices]])
 
     def tool_collides(self, cell: int) -> bool:
         """Is it proved that the tool collides in every pose over a cell? Sets its ruling."""

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.graph import EDGES, roots_of_nodes
-from feasibility.roadmap.walk import edge_motion
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -25,11 +23,12 @@ def graph_of(exploration: Exploration) -> nx.Graph:
 
     roadmap, best = exploration.roadmap, exploration.best
     graph = cell_graph(exploration.cells, exploration.covered)
-    for x in np.flatnonzero(roots_of_nodes(roadmap) == best)[::-1]:  # a cell's first node counts
-        graph.nodes[int(roadmap.cell[x])]["q"] = roadmap.q[x].copy()
+    mine = np.flatnonzero(roadmap.roots_of_nodes() == best)
+    for x in mine[::-1].tolist():  # a cell's first node counts
+        graph.nodes[roadmap.cell[x]]["q"] = roadmap.q[x].copy()
     for (i, j), e in pair_edges(exploration).items():
-        motion = edge_motion(roadmap, e)
-        if roadmap.cell[roadmap.ends[e, 0]] != i:
+        motion = roadmap.motion(e)
+        if roadmap.cell[roadmap.edges[e].x] != i:
             motion = motion[::-1]
         graph.add_edge(i, j, motion=motion)
     return graph
@@ -38,10 +37,9 @@ def graph_of(exploration: Exploration) -> nx.Graph:
 def pair_edges(exploration: Exploration) -> dict[tuple[int, int], int]:
     """One edge of the best component for each connected pair of cells."""
     roadmap = exploration.roadmap
-    mine = roots_of_nodes(roadmap) == exploration.best
     edges: dict[tuple[int, int], int] = {}
-    for e, (x, y) in enumerate(roadmap.ends[: roadmap.counters[EDGES]].tolist()):
-        i, j = sorted((int(roadmap.cell[x]), int(roadmap.cell[y])))
-        if i != j and mine[x]:
+    for e, (x, y, _) in enumerate(roadmap.edges):
+        i, j = sorted((roadmap.cell[x], roadmap.cell[y]))
+        if i != j and roadmap.root_of(x) == exploration.best:
             edges.setdefault((i, j), e)
     return edges

@@ -103,7 +103,7 @@ def exhausted_words(problem: Problem, exploration: Exploration, proving: Proving
         tried.append(f"cells cut {exploration.finest} x {exploration.finest}")
     if proving.attempts:
         tried.append(f"{proving.attempts} attempts at a proof, {proving.boxes} boxes")
-    nodes = int(exploration.roadmap.counters[0])
+    nodes = len(exploration.roadmap.cell)
     none, best = "by no single component", "the best"
     if exploration.begun is not None:
         none, best = "not all from the start", "that of the start"

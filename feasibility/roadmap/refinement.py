@@ -9,28 +9,17 @@ an edge of the roadmap itself.
 
 from __future__ import annotations
 
+from collections import deque
 from itertools import combinations
 
 import numpy as np
 
 from coverable_arrays import Array, Ints
-from coverable_kernels import allocating_entry
 from feasibility.clock import Clock
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.graph import (
-    COMPONENTS,
-    EDGES,
-    NODES,
-    Roadmap,
-    add_motion,
-    add_node,
-    grown,
-    root_of,
-    roots_of_nodes,
-)
+from feasibility.roadmap.graph import Roadmap
 from feasibility.roadmap.motions import arrays_of
 from feasibility.roadmap.search import improve
-from feasibility.roadmap.walk import edge_motion
 from feasibility.task import Task
 from surfaces import Finer
 
@@ -115,26 +104,20 @@ def _bridge(fine: Exploration) -> None:
     """Try to bridge each two of the largest components."""
     top = fine.roots()[:MOST]
     for a, b in combinations(top, 2):
-        one, other = (int(root_of(fine.roadmap, root)) for root in (a, b))
+        one, other = (fine.roadmap.root(root) for root in (a, b))
         if one != other:
             fine.tick("bridging components in finer cells")
             fine.bridge(one, other, BRIDGES)
 
 
 def _copy_nodes(exploration: Exploration, fine: Exploration, same: Ints) -> dict[int, int]:
-    """Copy every node to its finer cell, each component to a slot; returns old nodes by new."""
-    old = exploration.roadmap
-    slots = {root: slot for slot, root in enumerate(exploration.roots())}
-    fine.roadmap.counters[COMPONENTS] = len(slots)
-    while len(fine.roadmap.parent) < len(slots) + 2:
-        fine.roadmap = grown(fine.roadmap)
+    """Copy every node to its finer cell, and the components; returns old nodes by new."""
+    old, grower = exploration.roadmap, fine.grower
+    copies = {root: fine.roadmap.add_component() for root in exploration.roots()}
     origin = {}
-    for node, root in enumerate(roots_of_nodes(old).tolist()):
-        fine.roadmap = grown(fine.roadmap)
-        slot = slots[root]
-        cell = int(same[old.cell[node]])
-        new = add_node(fine.arrays, fine.work, fine.roadmap, cell, old.q[node], slot)
-        origin[int(new)] = node
+    for node, cell in enumerate(old.cell):
+        new = grower.add_node(int(same[cell]), old.q[node], copies[old.root_of(node)])
+        origin[new] = node
     return origin
 
 
@@ -142,50 +125,26 @@ def _take_over(
     exploration: Exploration, fine: Exploration, same: Ints, origin: dict[int, int]
 ) -> bool:
     """Take motions between components, and to cells that they miss, as edges; True for any."""
-    routes = _Routes(fine.roadmap, origin)
-    gained = False
-    for edge in _joining(exploration, fine.roadmap, routes).tolist():
-        a, b = fine.roadmap.ends[edge].tolist()
-        x, y = int(routes.old[a]), int(routes.old[b])
-        if _root(exploration, x) != _root(exploration, y):
-            back = routes.to(b)[::-1]
-            motion = np.vstack([routes.to(a), edge_motion(fine.roadmap, edge)[1:], back[1:]])
-            add_motion(exploration.reserve(len(motion)), x, y, motion[1:])
+    roadmap, finer = exploration.roadmap, fine.roadmap
+    routes, gained = _Routes(finer, origin), False
+    for edge, (a, b, _) in enumerate(finer.edges):
+        if a not in routes.old:
+            continue
+        x, y = routes.old[a], routes.old[b]
+        if roadmap.root_of(x) != roadmap.root_of(y):
+            motion = np.vstack([routes.to(a), finer.motion(edge)[1:], routes.to(b)[-2::-1]])
+            roadmap.add_edge(x, y, motion[1:])
             gained = True
-    cell_of = np.full(len(fine.cells), -1)
-    cell_of[same] = np.arange(len(same))
-    for node in _covering(exploration, fine.roadmap, routes, cell_of).tolist():
-        cell, x = int(cell_of[fine.roadmap.cell[node]]), int(routes.old[node])
-        own = _root(exploration, x)
-        if not exploration.roadmap.cover[own, cell]:
+    cell_of = {cell: k for k, cell in enumerate(same.tolist())}
+    for node, x in sorted(routes.old.items()):
+        cell, own = cell_of.get(finer.cell[node]), roadmap.root_of(x)
+        if cell is not None and not roadmap.cover[own][cell]:
             motion = routes.to(node)
-            roadmap = exploration.reserve(0)
-            y = add_node(exploration.arrays, exploration.work, roadmap, cell, motion[-1], own)
-            origin[node] = int(y)
-            add_motion(exploration.reserve(len(motion)), x, int(y), motion[1:])
+            y = exploration.grower.add_node(cell, motion[-1], own)
+            origin[node] = y
+            roadmap.add_edge(x, y, motion[1:])
             gained = True
     return gained
-
-
-def _joining(exploration: Exploration, roadmap: Roadmap, routes: _Routes) -> Ints:
-    """Edges over finer cells that join two components; one joined stays so, so none is missed."""
-    a, b = roadmap.ends[: roadmap.counters[EDGES]].T
-    known = np.flatnonzero((routes.old[a] >= 0) & (routes.old[b] >= 0))
-    root = roots_of_nodes(exploration.roadmap)
-    return known[root[routes.old[a[known]]] != root[routes.old[b[known]]]]
-
-
-def _covering(exploration: Exploration, roadmap: Roadmap, routes: _Routes, cell_of: Ints) -> Ints:
-    """Nodes over the centre of a cell that their component misses."""
-    cells = cell_of[roadmap.cell[: len(routes.old)]]
-    there = np.flatnonzero((routes.old >= 0) & (cells >= 0))
-    root = roots_of_nodes(exploration.roadmap)[routes.old[there]]
-    return there[exploration.roadmap.cover[root, cells[there]] == 0]
-
-
-def _root(exploration: Exploration, node: int) -> int:
-    """The component of a node."""
-    return int(root_of(exploration.roadmap, exploration.roadmap.component[node]))
 
 
 class _Routes:
@@ -193,62 +152,26 @@ class _Routes:
 
     def __init__(self, roadmap: Roadmap, origin: dict[int, int]) -> None:
         self._roadmap = roadmap
-        starts = np.array(sorted(origin), dtype=np.int64)
-        nodes, edges = roadmap.counters[NODES], roadmap.counters[EDGES]
-        source, self._before, self._edge = breadth_first(roadmap.ends[:edges], starts, nodes)
-        known = np.array([origin[start] for start in starts.tolist()], dtype=np.int64)
-        self.old = np.full(nodes, -1)
-        """Of each node that a motion leads to: the old node that it begins at; else -1."""
-        self.old[source >= 0] = known[source[source >= 0]]
+        self.old = dict(sorted(origin.items()))
+        """Of each node that a motion leads to: the old node that it begins at."""
+        self._came: dict[int, tuple[int, int]] = {}
+        links: list[list[tuple[int, int]]] = [[] for _ in roadmap.cell]
+        for edge, (x, y, _) in enumerate(roadmap.edges):
+            links[x].append((y, edge))
+            links[y].append((x, edge))
+        queue = deque(self.old)
+        while queue:
+            node = queue.popleft()
+            for other, edge in links[node]:
+                if other not in self.old:
+                    self.old[other], self._came[other] = self.old[node], (node, edge)
+                    queue.append(other)
 
     def to(self, node: int) -> Array:
         """(k, n) waypoints from the source of a node to it, both included."""
         parts = [self._roadmap.q[node][None]]
-        while self._before[node] >= 0:
-            before, edge = int(self._before[node]), int(self._edge[node])
-            motion = edge_motion(self._roadmap, edge)
-            if int(self._roadmap.ends[edge, 0]) != before:
-                motion = motion[::-1]
-            parts.append(motion[:-1])
-            node = before
+        while node in self._came:
+            node, edge = self._came[node]
+            motion = self._roadmap.motion(edge)
+            parts.append((motion if self._roadmap.edges[edge].x == node else motion[::-1])[:-1])
         return np.vstack(parts[::-1])
-
-
-@allocating_entry
-def breadth_first(ends, starts, nodes):  # type: ignore[no-untyped-def]
-    """Of each node: which of `starts` is nearest in edges, and the node and edge before; or -1."""
-    first = np.zeros(nodes + 1, dtype=np.int64)
-    for edge in range(len(ends)):
-        first[ends[edge, 0] + 1] += 1
-        first[ends[edge, 1] + 1] += 1
-    for node in range(nodes):
-        first[node + 1] += first[node]
-    at = np.empty(2 * len(ends), dtype=np.int64)
-    filled = first[:-1].copy()
-    for edge in range(len(ends)):
-        for end in range(2):
-            node = ends[edge, end]
-            at[filled[node]] = edge
-            filled[node] += 1
-    source = np.full(nodes, -1)
-    before = np.full(nodes, -1)
-    by = np.full(nodes, -1)
-    queue = np.empty(nodes, dtype=np.int64)
-    tail = len(starts)
-    for start in range(tail):
-        queue[start] = starts[start]
-        source[starts[start]] = start
-    for head in range(nodes):
-        if head == tail:
-            break
-        node = queue[head]
-        for k in range(first[node], first[node + 1]):
-            edge = at[k]
-            other = ends[edge, 1] if ends[edge, 0] == node else ends[edge, 0]
-            if source[other] < 0:
-                source[other] = source[node]
-                before[other] = node
-                by[other] = edge
-                queue[tail] = other
-                tail += 1
-    return source, before, by

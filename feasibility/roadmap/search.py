@@ -27,7 +27,6 @@ from coverable_arrays import Ints
 from feasibility.clock import Clock
 from feasibility.roadmap.branch_and_bound import Boxes, Ruling, root_box
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.graph import NODES, root_of
 from feasibility.roadmap.joint_boxes import blockers_of
 from feasibility.roadmap.motions import arrays_of, margin_shares
 from feasibility.task import Task
@@ -246,7 +245,7 @@ def improve(exploration: Exploration, components: list[int]) -> None:
             exploration.explore_self_motions(int(rng.choice(border)))
     for a in range(len(components)):
         for b in range(a):
-            one, other = (int(root_of(exploration.roadmap, components[k])) for k in (a, b))
+            one, other = (exploration.roadmap.root(components[k]) for k in (a, b))
             # Every pair in every round would cost too much where there are many.
             if one == other or (len(components) > 3 and rng.random() > 0.3):
                 continue
@@ -274,6 +273,5 @@ def close(exploration: Exploration) -> None:
     Raises:
         OutOfTime: the deadline passed.
     """
-    if exploration.roadmap.counters[NODES] == 0:
-        return
-    exploration.join(exploration.pairs, exploration.best)
+    if exploration.roadmap.cell:
+        exploration.close_pairs(exploration.pairs, exploration.best)

@@ -34,7 +34,7 @@ from feasibility.certification import verify_proof
 from feasibility.clock import OutOfTime
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from feasibility.division import prove_apart
-from feasibility.roadmap import NODES, Exploration, Ruling, arrays_of
+from feasibility.roadmap import Exploration, Ruling, arrays_of
 from feasibility.runs.fewest import Stations
 from feasibility.task import Task
 from surfaces.toolpaths import PoseCells
@@ -106,10 +106,9 @@ class _Pieces:
         known, task, own = self.exploration, self.task, poses_between(self.cells, first, last)
         arrays = arrays_of(known.robot, own, task)
         exploration = Exploration(known.robot, own, arrays, known.seed, known.clock)
-        over = known.roadmap.cell[: known.roadmap.counters[NODES]]
         for pose in np.unique(np.linspace(first, last, SEEDED).astype(int)).tolist():
-            some = np.flatnonzero(over == pose)[:MOST_SEEDS]
-            exploration.add_seeds(pose - first, known.roadmap.q[some])
+            some = known.roadmap.over[pose][:MOST_SEEDS]
+            exploration.add_seeds(pose - first, [known.roadmap.q[node] for node in some])
         if not exploration.reached.all():
             return None
         return prove_apart(exploration, task).proof

@@ -78,7 +78,7 @@ def _why(
         if not exploration.reached[pose]:
             cause = slow.get(pose) or cause_of(exploration, pose, pairs)
             return f"{place_words(places, pose)}: {cause.detail}", cause.proved
-    node = int(exploration.roadmap.first_node[poses[0]])
+    node = exploration.roadmap.over[poses[0]][-1]
     stop = where_it_stops(exploration, task, poses[0], exploration.roadmap.q[node], pairs)
     if not stop.cause:
         return "", False

@@ -20,8 +20,6 @@ from feasibility.division import (
 from feasibility.paths import CoveragePath, unwound
 from feasibility.problem import Problem
 from feasibility.roadmap import (
-    EDGES,
-    NODES,
     Exploration,
     exploration_of,
     explore,
@@ -149,13 +147,11 @@ def pass_runs(
 def _stations(exploration: Exploration, places: PassPlaces) -> Stations:
     """What a search found, as stations along the toolpath."""
     roadmap = exploration.roadmap
-    over = np.array(roadmap.cell[: roadmap.counters[NODES]])
-    count = int(roadmap.counters[EDGES])
-    ends, rows = roadmap.ends[:count], roadmap.edge_rows[:count, 1]
-    number = np.arange(1, count + 1)
-    there = np.column_stack([ends, number, rows])
-    back = np.column_stack([ends[:, ::-1], -number, rows])
-    steps = np.concatenate([there, back]).astype(np.int64)
+    over = np.array(roadmap.cell, dtype=np.int64)
+    edges = list(enumerate(roadmap.edges, start=1))
+    there = [(x, y, number, len(motion)) for number, (x, y, motion) in edges]
+    back = [(y, x, -number, rows) for x, y, number, rows in there]
+    steps = np.array(there + back, dtype=np.int64).reshape(-1, 4)
     ahead = over[steps[:, 1]] - over[steps[:, 0]]
     same = places.stretch[1:] == places.stretch[:-1]
     inside = same & (places.stretch[1:] >= 0)
@@ -170,7 +166,7 @@ def _replayed(
     robot, cells = exploration.robot, exploration.cells
     runs, refusals = list[CoveragePath](), list[str]()
     for run in found:
-        walk = route_walk(exploration.roadmap, run.nodes[0], np.array(run.route, dtype=np.int64))
+        walk = route_walk(exploration.roadmap, run.nodes[0], run.route)
         walk = unwound(robot, task, walk)
         needed = np.zeros(len(cells), dtype=bool)
         needed[walk.cell[walk.cell >= 0]] = True

@@ -8,7 +8,7 @@ import numpy as np
 
 from coverable_arrays import Array
 from feasibility.collisions import Pair
-from feasibility.roadmap import MOST_STEPS, Exploration, track
+from feasibility.roadmap import Exploration, track
 from feasibility.roadmap.motions import COLLISION, CONE, FOLD, LIMIT, LONG, ROLL, SINGULAR
 from feasibility.speed import motion_rates
 from feasibility.task import Task
@@ -43,16 +43,16 @@ def where_it_stops(
     Speed and singular values count where the task limits them; `pairs` are the bodies that had to
     stay clear of each other.
     """
-    first, q, rows = pose, np.array(q), np.empty((MOST_STEPS + 1, len(q)))
-    cause, motions = "", list[Array]()
+    first, cause, motions = pose, "", list[Array]()
     while pose < len(exploration.cells) - 1:
-        curve, begin = exploration.curve(pose, pose + 1), q.copy()
-        count = track(exploration.arrays, exploration.work, curve, 0.0, 1.0, q, q, False, rows, 0)
-        if count < 0:
+        curve = exploration.curve(pose, pose + 1)
+        motion = track(exploration.arrays, exploration.work, curve, 0.0, 1.0, q)
+        if motion is None:
             code, joint = (int(value) for value in exploration.work.stop_reason)
             cause = _words(exploration, code, joint, pairs)
             break
-        motions.append(np.vstack([begin, rows[:count]]))
+        motions.append(np.vstack([q, motion]))
+        q = motion[-1]
         pose += 1
     if task.requires_rates:
         rates = motion_rates(exploration.robot, exploration.cells, task, motions)

@@ -6,6 +6,7 @@ evaluations a cell.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +21,6 @@ from feasibility.roadmap import (
     Work,
     moved_clear,
     project_onto_cell,
-    roots_of_nodes,
     within,
 )
 from feasibility.roadmap.joint_boxes import Blockers, blockers_of
@@ -57,7 +57,7 @@ class LimitedExploration(Exploration):
         left = self.most - float(self.work.counts[0])
         return int(min(super().budget(), max(left, LEAST)))
 
-    def add_seeds(self, cell: int, guesses: Array) -> int:
+    def add_seeds(self, cell: int, guesses: Iterable[Array]) -> int:
         """Add seeds, unless the limit is reached; see `Exploration.add_seeds`."""
         self.tick("looking for configurations")
         return super().add_seeds(cell, guesses)
@@ -156,8 +156,8 @@ def configurations(exploration: Exploration) -> Array:
     roadmap = exploration.roadmap
     q = np.full((len(exploration.cells), exploration.robot.n), np.nan)
     # The first one over a cell is written last.
-    mine = np.flatnonzero(roots_of_nodes(roadmap) == exploration.best)[::-1]
-    q[roadmap.cell[mine]] = roadmap.q[mine]
+    for node in np.flatnonzero(roadmap.roots_of_nodes() == exploration.best)[::-1].tolist():
+        q[roadmap.cell[node]] = roadmap.q[node]
     return q
 
 

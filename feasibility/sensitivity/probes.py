@@ -345,5 +345,5 @@ class Prober:
         projected = [project_onto_cell(*case, guess, GUESS_STEPS) for guess in guesses]
         if any(projected):
             exploration.add_seeds(cell, guesses[projected])
-        elif exploration.roadmap.first_node[cell] < 0:
+        elif not exploration.roadmap.over[cell]:
             exploration.most = 0.5 * (exploration.most + float(exploration.work.counts[0]))

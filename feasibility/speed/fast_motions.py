@@ -12,7 +12,7 @@ import numpy as np
 
 from feasibility.clock import OutOfTime
 from feasibility.paths import MotionGraph
-from feasibility.roadmap import EDGES, Exploration, Roadmap, edge_motion
+from feasibility.roadmap import Exploration, Roadmap
 from feasibility.speed.rated_graph import Edge, RatedGraph, grow
 from feasibility.task import Task
 from feasibility.verdict import Cause, CauseKind
@@ -34,7 +34,7 @@ def keep_fast_motions(exploration: Exploration, task: Task) -> dict[int, Cause]:
     """
     reached = exploration.reached
     rated = _rated(exploration, task)
-    exploration.roadmap = _roadmap_of(exploration.roadmap, rated.graph, rated.enough)
+    exploration.roadmap = _roadmap_of(rated.graph, rated.enough, len(exploration.cells))
     lost = np.flatnonzero(reached & ~exploration.reached).tolist()
     cell = rated.graph.cell
     best = rated.fastest_to_cells((x, y) for x, y in rated.rated if cell[x] != cell[y])
@@ -46,10 +46,10 @@ def _rated(exploration: Exploration, task: Task) -> RatedGraph:
     """The motions of a search, and more of them, rated."""
     roadmap, cells = exploration.roadmap, exploration.cells
     graph = MotionGraph.of(exploration.arrays, exploration.work, cells)
-    for edge in range(int(roadmap.counters[EDGES])):
-        x, y = (int(roadmap.cell[node]) for node in roadmap.ends[edge])
-        motion = edge_motion(roadmap, edge)
-        graph.join(graph.node(x, motion[0]), graph.node(y, motion[-1]), motion)
+    for edge, (x, y, _) in enumerate(roadmap.edges):
+        motion = roadmap.motion(edge)
+        ends = graph.node(roadmap.cell[x], motion[0]), graph.node(roadmap.cell[y], motion[-1])
+        graph.join(*ends, motion)
     rated = RatedGraph(exploration.robot, cells, task, graph)
     try:
         grow(rated, exploration.clock)
@@ -58,36 +58,25 @@ def _rated(exploration: Exploration, task: Task) -> RatedGraph:
     return rated
 
 
-def _roadmap_of(roadmap: Roadmap, graph: MotionGraph, edges: Sequence[Edge]) -> Roadmap:
+def _roadmap_of(graph: MotionGraph, edges: Sequence[Edge], cells: int) -> Roadmap:
     """A roadmap of some motions, with each connected part of their nodes as a component."""
     ends = np.array(edges, dtype=np.int64).reshape(-1, 2)
     over = np.array(graph.cell, dtype=np.int64)
-    if len(roadmap.first_node) > 1:  # without parts over one cell alone
+    if cells > 1:  # without parts over one cell alone
         part = components(ends, len(over))
         several = np.zeros(int(part.max(initial=-1)) + 1, dtype=bool)
         several[part[ends[over[ends[:, 0]] != over[ends[:, 1]], 0]]] = True
         ends = ends[several[part[ends[:, 0]]]]
     nodes, of = np.unique(ends, return_inverse=True)
-    ends = of.reshape(-1, 2).astype(np.int64)
-    component, cell = components(ends, len(nodes)), over[nodes]
-    motions = [graph.motion(*pair)[1:] for pair in nodes[ends].tolist()]
-    rows = np.array([len(motion) for motion in motions], dtype=np.int64)
-    slots = max(int(component.max(initial=-1)) + 1, 1)
-    cover = np.zeros((slots, len(roadmap.first_node)), dtype=np.uint8)
-    cover[component, cell] = 1
-    size = cover.sum(axis=1, dtype=np.int64)
-    following = np.full(len(nodes), -1, dtype=np.int64)
-    first = np.full(cover.shape[1], -1, dtype=np.int64)
-    for node, where in enumerate(cell.tolist()):
-        following[node], first[where] = first[where], node
-    n = roadmap.q.shape[1]
-    q = np.array([graph.q[node] for node in nodes.tolist()]).reshape(-1, n)
-    best = int(size.argmax())
-    counters = [len(nodes), len(ends), int(rows.sum()), slots, 0, 0, 0, best]
-    return roadmap._replace(
-        cell=cell, q=q, effect=np.zeros_like(q), component=component.astype(np.int64),
-        following=following, first_node=first, queue=np.empty(len(nodes), dtype=np.int64),
-        ends=ends, edge_rows=np.column_stack([np.cumsum(rows) - rows, rows]),
-        waypoints=np.vstack([*motions, np.zeros((0, n))]), parent=np.arange(slots), cover=cover,
-        size=size, failures=np.zeros((slots, slots), dtype=np.int64), counters=np.array(counters),
-    )  # fmt: skip
+    component = components(of.reshape(-1, 2).astype(np.int64), len(nodes)).tolist()
+    roadmap, number = Roadmap(cells), dict[int, int]()
+    for _ in range(max(component, default=-1) + 1):
+        roadmap.add_component()
+    for node, root in zip(nodes.tolist(), component, strict=True):
+        q = graph.q[node]
+        number[node] = roadmap.add_node(graph.cell[node], q, np.zeros_like(q), root)
+    for x, y in ends.tolist():
+        roadmap.add_edge(number[x], number[y], graph.motion(x, y)[1:])
+    roadmap.largest = int(np.argmax([*roadmap.size, 0]))
+    roadmap.queue.clear()
+    return roadmap

@@ -26,7 +26,7 @@ from scipy.spatial.transform import Rotation
 from search_kernels import Motions
 
 from feasibility import Task
-from feasibility.roadmap.motions.roll import frame_rates, roll_off_middle
+from feasibility.roadmap.motions.roll import frame_rates
 from feasibility.roadmap.motions.segment_bound import peak
 from feasibility.roll import Roll, projected, roll_of
 from robots import load_robot
@@ -261,28 +261,6 @@ def test_nothing_that_is_not_a_number_passes():
 # roll
 
 
-def wrapped(angle):
-    return (angle + np.pi) % (2.0 * np.pi) - np.pi
-
-
-def test_roll_is_the_angle_left_by_the_least_rotation_onto_the_approach():
-    """Random frames, tilts up to 170 deg, any middle of the range."""
-    rng = np.random.default_rng(1)
-    for _ in range(300):
-        x, _, a = random_turn(rng).T
-        b = tilted(a, rng.uniform(0.0, 2.97), rng)
-        t = np.cross(b, rng.normal(size=3))
-        t, middle = t / np.linalg.norm(t), rng.uniform(-7.0, 7.0)
-        across = np.cross(a, b)
-        angle = np.arctan2(np.linalg.norm(across), a @ b)
-        carried = Rotation.from_rotvec(across / np.linalg.norm(across) * angle).apply(x)
-        expected = np.arctan2(np.cross(b, t) @ carried, t @ carried)
-        off = roll_off_middle(np.array([np.zeros(3), b, t]), a, x, middle)
-        assert abs(wrapped(roll_of(x[None], a[None], t[None], b[None])[0] - expected)) < 1e-10
-        assert -np.pi <= off <= np.pi
-        assert abs(wrapped(off + middle - expected)) < 1e-10
-
-
 def random_frame(rng, size):
     """A cubic b and t (4, 3) each, near unit vectors at right angles, that turn by about `size`."""
     cubics = np.zeros((2, 4, 3))
@@ -310,24 +288,6 @@ def bounds_of(cubics):
     return np.linalg.norm(b[-1] - b[0]), ends[0], slope, ends[1], off, aside
 
 
-def test_the_turning_of_a_frame_is_bounded():
-    """Random frames, dense differences of their rotations; the bounds are not loose either."""
-    rng, s, used = np.random.default_rng(2), np.linspace(0.0, 1.0, 201), []
-    for _ in range(200):
-        cubics = random_frame(rng, 10.0 ** rng.uniform(-2.5, -0.6))
-        bounds = frame_rates(*bounds_of(cubics))
-        if bounds[0] < np.inf:
-            b, t = frame_along(cubics, s)
-            turns = Rotation.from_matrix(np.stack([t, np.cross(b, t), b], axis=2))
-            om = (turns[1:] * turns[:-1].inv()).as_rotvec() * 200.0
-            speed, change = (np.linalg.norm(np.diff(x, axis=0), axis=1) * 200.0 for x in (b, om))
-            found = np.array([speed.max(), np.linalg.norm(om, axis=1).max(), change.max()])
-            assert (found <= np.array(bounds) * (1.0 + 1e-3) + 1e-6).all()
-            used.append(found / np.maximum(bounds, 1e-9))
-    assert len(used) > 150
-    assert (np.median(used, axis=0) > 0.2).all()
-
-
 @pytest.mark.parametrize("turn", [0.1, 2.0, 2.0 * np.pi, 4.0 * np.pi])
 def test_a_tool_that_turns_all_around_does_not_keep_its_roll(turn):
     """About its own axis: after whole turns the roll is what it was, and was everything between."""
@@ -335,23 +295,6 @@ def test_a_tool_that_turns_all_around_does_not_keep_its_roll(turn):
     task = Task(0.0, 30, roll_deg=(-10, 10), roll_reference=(1, 0, 0))
     held = Motions(robot, None, task).at_rest(np.zeros(1), np.array([turn]), np.zeros(3), (0, 0, 1))
     assert held.holds == (turn < 0.17)
-
-
-@pytest.mark.parametrize("size", [1e-3, 0.01, 0.05])
-def test_two_joints_across_the_tool_axis_turn_the_roll_as_fast_as_is_said(size):
-    """Joints about x and y under a tool axis along z: the second derivative of roll is d1 d2."""
-    robot = robot_of([joint(1, axis=(1, 0, 0)), joint(2, axis=(0, 1, 0)), joint(3, "fixed")])
-    task = Task(0.0, 90, roll_deg=(-10, 10), roll_reference=(1, 0, 0))
-    q0, q1, h = np.zeros(2), size * np.array([1.0, 2.0]), 1e-2
-    s = np.concatenate([np.linspace(h, 1.0 - h, 50) + way * h for way in (-1, 0, 1)])
-    q = q0 + s[:, None] * (q1 - q0)
-    axes, b = tools(robot, q)[1], np.tile([0.0, 0.0, 1.0], (len(q), 1))
-    psi = roll_of(references(robot, q), axes, np.tile([1.0, 0.0, 0.0], (len(q), 1)), b)
-    before, at, behind = psi.reshape(3, -1)
-    second = np.abs(before - 2.0 * at + behind) / h**2
-    chord = np.linalg.norm(axes - b, axis=1).max()
-    _, most = Motions(robot, None, task).roll_rates(q0, q1, (0.0, 0.0, 0.0), chord)
-    holds(most * (1.0 + 1e-6) + 1e-9, second.max(), 0.7)
 
 
 @pytest.mark.parametrize("name", ["puma560", "ur5", "panda", "random"])

@@ -19,11 +19,8 @@ from feasibility.collisions import (
     segment_clear,
 )
 from feasibility.roadmap import (
-    NODES,
     Ruling,
     arrays_of,
-    edge_motion,
-    margin_shares,
     root_box,
     rule,
     work_for,
@@ -32,11 +29,10 @@ from feasibility.roadmap.branch_and_bound.box_bounds import static_levers
 from feasibility.roadmap.branch_and_bound.box_contraction import shrink
 from feasibility.roadmap.branch_and_bound.boxes import Slabs, box_work
 from feasibility.roadmap.branch_and_bound.branching import DIRECTIONS
-from feasibility.roadmap.graph import EDGES
 from feasibility.roadmap.motions import project_near_cell, segment_holds
 from feasibility.roadmap.motions.aiming import aim, bounds_between, stand_still
 from feasibility.roadmap.motions.projection import project
-from feasibility.roadmap.motions.segment_bound import roll_spread, spread
+from feasibility.roadmap.motions.segment_bound import roll_derivatives, second_derivatives
 from feasibility.roadmap.motions.working_memory import place
 from robots import Robot
 from surfaces import Cells, plane
@@ -102,7 +98,7 @@ class Motions:
         """Bounds on |p''| (m) and |a''| of tool point and tool axis along a segment, s in 0..1."""
         place(self.arrays, self.work, 0, q0)
         place(self.arrays, self.work, 1, q1)
-        return spread(self.arrays, self.work, q0, q1)
+        return second_derivatives(self.arrays, self.work, q0, q1)
 
     def roll_off(self, q: Floats, t: float = 0.0) -> float:
         """Roll at a configuration over a curve's target at t, off the middle of its range, rad."""
@@ -114,7 +110,7 @@ class Motions:
         """Bounds on |psi'| and |psi''| of roll (rad) along a segment, s in 0..1."""
         self.sag(q0, q1)
         self.work.derivative_bound[5:8] = frame
-        return roll_spread(self.work, chord, 1.0)
+        return roll_derivatives(self.work, chord, 1.0)
 
     def turn_range(self, middle: float, half: float) -> None:
         """Let the roll have another range (rad)."""
@@ -159,12 +155,6 @@ class Motions:
             bounds = position * length, turned * chord, turned * roll
         return Held(good, *bounds, bool(ends <= self.arrays.near), float(off))
 
-    def landed(self, cell: int, guesses: Floats) -> Floats:
-        """(k, n) configurations over a cell's centre that Newton finds from guesses."""
-        found = guesses.copy()
-        margins = margin_shares(self.arrays, self.work, cell, found)
-        return found[margins >= 0.0]
-
     def near(self, cell: int, q: Floats, steps: int = 60) -> Floats | None:
         """A configuration within tolerance and cone of a cell's target, from q; or None."""
         found = q.copy()
@@ -202,11 +192,10 @@ def contracted(
 def assert_walked(roadmap: Any, walk: Any) -> list[int]:
     """Only steps of stored motions, and marks where nodes are; returns the cells in order."""
     steps = set()
-    for e in range(int(roadmap.counters[EDGES])):
-        motion = [tuple(q) for q in edge_motion(roadmap, e)]
+    for edge in range(len(roadmap.edges)):
+        motion = [tuple(q) for q in roadmap.motion(edge)]
         steps |= set(pairwise(motion)) | set(pairwise(motion[::-1]))
-    used = int(roadmap.counters[NODES])
-    nodes = {tuple(roadmap.q[x]): int(roadmap.cell[x]) for x in range(used)}
+    nodes = {tuple(q): cell for q, cell in zip(roadmap.q, roadmap.cell, strict=True)}
     rows = [tuple(q) for q in walk.q]
     assert set(pairwise(rows)) <= steps
     assert [nodes.get(row, -1) for row in rows] == walk.cell.tolist()

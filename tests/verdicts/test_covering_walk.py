@@ -5,53 +5,26 @@ from __future__ import annotations
 import networkx as nx
 import numpy as np
 import pytest
-from asked import question
 from samples import sampled, seeds
 from search_kernels import assert_walked
 
-from feasibility.roadmap import (
-    Exploration,
-    arrays_of,
-    close,
-    covering_walk,
-    explore,
-    work_for,
-)
-from feasibility.roadmap.graph import (
-    COMPONENTS,
-    WAYPOINTS,
-    add_edge,
-    add_node,
-    empty_roadmap,
-    grown,
-)
+from feasibility.roadmap import Roadmap, covering_walk
 from surfaces import plane
 
 
 def roadmap_of(graph, cells, cell_of=None, rng=None):
-    """A roadmap with the nodes 0 .. n - 1 and edges of a graph, one slot a connected component."""
-    rng = np.random.default_rng(0) if rng is None else rng
-    _, _, robot, one, task, _ = question("one cell")
-    arrays = arrays_of(robot, one, task)
-    work = work_for(6)
-    roadmap = empty_roadmap(cells, 6)
-    slot_of = {}
-    for slot, members in enumerate(nx.connected_components(graph)):
-        roadmap.counters[COMPONENTS] = slot + 1
-        roadmap = grown(roadmap)
-        slot_of |= dict.fromkeys(members, slot)
+    """A roadmap with the nodes 0 .. n - 1 and edges of a graph, and each node's component."""
+    rng, roadmap, of = np.random.default_rng(0) if rng is None else rng, Roadmap(cells), {}
+    for members in nx.connected_components(graph):
+        of |= dict.fromkeys(members, roadmap.add_component())
     for x in range(len(graph)):
-        roadmap = grown(roadmap)
-        cell = x if cell_of is None else cell_of[x]
-        add_node(arrays, work, roadmap, cell, rng.random(6), slot_of[x])
+        cell = x if cell_of is None else int(cell_of[x])
+        roadmap.add_node(cell, rng.random(6), np.zeros(6), of[x])
     for x, y in graph.edges:
-        roadmap = grown(roadmap)
-        rows = int(rng.integers(1, 5))
-        first = int(roadmap.counters[WAYPOINTS])
-        roadmap.waypoints[first : first + rows] = rng.random((rows, 6))
-        roadmap.waypoints[first + rows - 1] = roadmap.q[y]
-        add_edge(roadmap, x, y, rows)
-    return roadmap, slot_of
+        motion = rng.random((int(rng.integers(1, 5)), 6))
+        motion[-1] = roadmap.q[y]
+        roadmap.add_edge(x, y, motion)
+    return roadmap, of
 
 
 def visits(graph, cells, **options):
@@ -116,9 +89,9 @@ def test_several_nodes_over_one_cell(seed):
 def test_only_the_component_asked_for():
     """Two lines and a lone node: each walk keeps to its own."""
     graph = nx.disjoint_union_all([nx.path_graph(4), nx.path_graph(5), nx.empty_graph(1)])
-    roadmap, slot_of = roadmap_of(graph, 10)
+    roadmap, of = roadmap_of(graph, 10)
     for first, expected in ((0, range(4)), (4, range(4, 9)), (9, range(9, 10))):
-        order = assert_walked(roadmap, covering_walk(roadmap, slot_of[first]))
+        order = assert_walked(roadmap, covering_walk(roadmap, of[first]))
         assert sorted(order) == list(expected)
 
 
@@ -126,19 +99,6 @@ def test_a_component_that_is_not_connected_gives_no_covering_walk():
     """Nodes marked as one component without motions between them: no motion is invented."""
     graph = nx.disjoint_union(nx.path_graph(3), nx.path_graph(3))
     roadmap, _ = roadmap_of(graph, 6)
-    roadmap.component[:6] = 0
-    roadmap.cover[0, :6] = 1
+    roadmap.component, roadmap.cover = [0] * 6, [np.ones(6, dtype=bool)]
     order = assert_walked(roadmap, covering_walk(roadmap, 0))
     assert set(order) != set(range(6))
-
-
-@pytest.mark.parametrize("name", ["small dome", "plate", "panda over a saddle", "on a rail"])
-def test_the_walk_of_a_search(name):
-    """Every cell, along stored motions alone, with at most 40 per cent more visits than cells."""
-    _, _, robot, cells, task, _ = question(name)
-    exploration = Exploration(robot, cells, arrays_of(robot, cells, task), 0)
-    explore(exploration)
-    close(exploration)
-    order = assert_walked(exploration.roadmap, covering_walk(exploration.roadmap, exploration.best))
-    assert set(order) == set(range(len(cells)))
-    assert len(order) <= 1.4 * len(cells)

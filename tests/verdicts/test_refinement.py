@@ -8,9 +8,8 @@ import numpy as np
 from asked import question
 
 from feasibility.problem import Problem
-from feasibility.roadmap import Exploration, arrays_of, edge_motion, explore
+from feasibility.roadmap import Exploration, arrays_of, explore
 from feasibility.roadmap.complete import between_rounds
-from feasibility.roadmap.graph import EDGES, NODES, root_of
 from feasibility.roadmap.outcome import unfinished_words
 from feasibility.roadmap.proving import Proving
 from feasibility.roadmap.refinement import COARSE, refine
@@ -29,22 +28,16 @@ def test_what_is_taken_over_is_one_roadmap():
     """Every edge begins and ends at its nodes, and joins nodes of one component."""
     exploration, _, task = searched(0)
     assert not exploration.complete
-    before = int(exploration.roadmap.counters[EDGES])
+    before = len(exploration.roadmap.edges)
     assert refine(exploration, task, COARSE)
     assert exploration.complete
     roadmap = exploration.roadmap
-    assert roadmap.counters[EDGES] > before
-    for edge in range(before, int(roadmap.counters[EDGES])):
-        x, y = roadmap.ends[edge]
-        motion = edge_motion(roadmap, edge)
-        assert (motion[0] == roadmap.q[x]).all()
+    assert len(roadmap.edges) > before
+    for x, y, motion in roadmap.edges[before:]:
         assert (motion[-1] == roadmap.q[y]).all()
-        assert root_of(roadmap, roadmap.component[x]) == root_of(roadmap, roadmap.component[y])
-    cover = np.zeros(len(exploration.cells), dtype=bool)
-    for node in range(int(roadmap.counters[NODES])):
-        if root_of(roadmap, roadmap.component[node]) == exploration.best:
-            cover[roadmap.cell[node]] = True
-    assert cover.all()
+        assert roadmap.root_of(x) == roadmap.root_of(y)
+    mine = np.flatnonzero(roadmap.roots_of_nodes() == exploration.best)
+    assert {roadmap.cell[node] for node in mine} == set(range(len(exploration.cells)))
 
 
 def test_points_of_the_motion_set_on_every_cut_leave_it_undecided():

@@ -11,9 +11,8 @@ from feasibility.collisions import Collision
 from feasibility.paths import PathError, coverage_path
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.forward.run import OrderedRun, _follow, layers_of, run_in_order
-from feasibility.roadmap.graph import NODES, WAYPOINTS, add_edge, empty_roadmap
+from feasibility.roadmap.graph import Roadmap
 from feasibility.roadmap.motions import arrays_of
-from feasibility.roadmap.seeding import seed_cell
 from feasibility.roadmap.walk import route_walk
 from feasibility.verdict import Answer, CauseKind
 from robots import load_robot
@@ -79,13 +78,11 @@ def test_a_motion_that_goes_back_is_refused_though_it_covers_all(ur5):
 
 def _roadmap(nodes, edges):
     """A roadmap of nodes over cells, joined by edges of one waypoint."""
-    roadmap = empty_roadmap(8, 2)
+    roadmap = Roadmap(8)
     for x, cell in enumerate(nodes):
-        roadmap.cell[x], roadmap.q[x] = cell, x
-    roadmap.counters[NODES] = len(nodes)
+        roadmap.add_node(cell, np.full(2, float(x)), np.zeros(2), roadmap.add_component())
     for x, y in edges:
-        roadmap.waypoints[roadmap.counters[WAYPOINTS]] = roadmap.q[y]
-        add_edge(roadmap, x, y, 1)
+        roadmap.add_edge(x, y, roadmap.q[y][None])
     return roadmap
 
 
@@ -100,7 +97,7 @@ def test_a_run_is_a_path_through_the_layers_that_never_goes_back():
     roadmap = _roadmap(nodes, [*turned, (3, 4), (6, 7), (2, 8)])
     run = layers_of(roadmap)
     assert run.furthest == 5
-    walk = route_walk(roadmap, run.start, np.array(run.route))
+    walk = route_walk(roadmap, run.start, run.route)
     assert walk.cell.tolist() == [0, 1, 2, 2, 3, 4, 5]
     assert walk.q[:, 0].tolist() == [0, 1, 2, 8, 9, 10, 11]
 
@@ -108,8 +105,7 @@ def test_a_run_is_a_path_through_the_layers_that_never_goes_back():
 def test_a_configuration_is_followed_ahead_along_certified_motions(ur5):
     cells = poses(PATCH.centres[SNAKE], PATCH.normals[SNAKE])
     exploration = Exploration(ur5, cells, arrays_of(ur5, cells, TASK), seed=0)
-    guess = check(ur5, cells, TASK).witness.q[:1]
-    seed_cell(exploration.arrays, exploration.work, exploration.roadmap, 0, guess)
+    assert exploration.grower.seed(0, check(ur5, cells, TASK).witness.q[0])
     assert layers_of(exploration.roadmap).furthest == 0
     _follow(exploration, 0, len(cells))
     run = run_in_order(exploration)

@@ -13,7 +13,7 @@ from feasibility.roadmap.branch_and_bound import Ruling
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.joint_boxes import ArmBlocked
 from feasibility.roadmap.motions import PROJECTION_STEPS, project_near_cell
-from feasibility.roadmap.seeding import moved_clear
+from feasibility.roadmap.moving_clear import moved_clear
 from feasibility.verdict import Cause, CauseKind
 
 GUESSES = 60  # random configurations that are projected onto the cell

@@ -29,7 +29,6 @@ from feasibility.roadmap.branch_and_bound import Ruling
 from feasibility.roadmap.causes.collision import colliding, proved_collision
 from feasibility.roadmap.causes.disconnection import disconnected
 from feasibility.roadmap.causes.relaxed import STARTS, other_rolls, solutions, with_cone
-from feasibility.roadmap.expansion import CONNECT_STEPS
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions import (
     NEXT,
@@ -121,14 +120,13 @@ def _past_limits(exploration: Exploration, relaxed: SearchArrays, cell: int, fou
     the one that passes them least.
     """
     robot = exploration.robot
-    waypoints = np.empty((64, robot.n))
     best, least = found[0], np.inf
     for q in found:
         here = _wrapped(robot, q)
         goal = np.clip(here, robot.lower, robot.upper)
         look_at(relaxed, exploration.work, cell)
-        connect(relaxed, exploration.work, here, goal, waypoints, 0, CONNECT_STEPS)
-        here = _wrapped(robot, here)
+        motion, _ = connect(relaxed, exploration.work, here, goal)
+        here = _wrapped(robot, motion[-1]) if len(motion) else here
         past = float(np.abs(here - np.clip(here, robot.lower, robot.upper)).sum())
         if past < least:
             best, least = here, past

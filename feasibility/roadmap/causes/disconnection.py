@@ -8,7 +8,7 @@ from feasibility.collisions import Pair
 from feasibility.cut_tree import CutTree
 from feasibility.cut_words import nowhere
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.graph import nodes_over, root_of
+from feasibility.roadmap.graph import Blocked
 from feasibility.roadmap.motions import COLLISION, CONE, FOLD, LIMIT, LONG, ROLL, SINGULAR
 from feasibility.verdict import Cause, CauseKind
 
@@ -21,17 +21,16 @@ def disconnected(
     `proof` is that no motion covers every cell; `pairs` have to stay clear of each other.
     """
     roadmap, robot = exploration.roadmap, exploration.robot
-    slots = roadmap.component[nodes_over(roadmap, cell)]
-    roots = {int(root_of(roadmap, slot)) for slot in slots}
-    other = max(roots, key=lambda root: int(roadmap.size[root]))
+    roots = {roadmap.root_of(node) for node in reversed(roadmap.over[cell])}
+    other = max(roots, key=lambda root: roadmap.size[root])
     detail = (
-        f"reached by another motion only, which covers {int(roadmap.size[other])} of "
+        f"reached by another motion only, which covers {roadmap.size[other]} of "
         f"{len(exploration.cells)} cells"
     )
     parted = "" if proof is None else _parted(exploration, proof, other, roots)
     if parted:
         return Cause(cell, CauseKind.DISCONNECTED, True, f"{detail}; {parted}")
-    code, joint, stopped = (int(v) for v in roadmap.blocked[cell])
+    code, joint, stopped = roadmap.blocked.get(cell, Blocked(-1, -1, -1))
     name = robot.joint_names[joint] if joint < robot.n else ""
     met = pairs[joint] if code == COLLISION and 0 <= joint < len(pairs) else None
     reason = {
@@ -43,7 +42,7 @@ def disconnected(
         LONG: "the motion takes too many steps",
         FOLD: "the surface is creased, or its offset folds",
     }.get(code)
-    if reason and stopped >= 0 and root_of(roadmap, stopped) == exploration.best:
+    if reason and roadmap.root(stopped) == exploration.best:
         detail += f"; on the way there from the covered cells {reason}"
         pair = None if met is None else (met.first, met.second)
         return Cause(cell, CauseKind.DISCONNECTED, False, detail, pair)

@@ -19,7 +19,7 @@ import numpy as np
 
 from coverable_arrays import Array, Mask
 from feasibility.roadmap.cuts.regions import TURN
-from feasibility.roadmap.graph import EDGES, NODES, WAYPOINTS, Roadmap, roots_of_nodes
+from feasibility.roadmap.graph import Roadmap
 
 NARROWEST = 1e-3  # [rad], [m]: gaps that are not worth a try
 KEPT = 8  # gaps kept of those between the same two components
@@ -39,21 +39,12 @@ class Component(NamedTuple):
 
 def components_of(roadmap: Roadmap) -> list[Component]:
     """The components of a roadmap, the largest first: nodes and waypoints, and covered cells."""
-    nodes, edges, rows = roadmap.counters[[NODES, EDGES, WAYPOINTS]]
-    if nodes == 0:
-        return []
-    at_nodes = roots_of_nodes(roadmap)
-    # Waypoints are stored edge by edge.
-    counts = roadmap.edge_rows[:edges, 1]
-    at_rows = np.repeat(at_nodes[roadmap.ends[:edges, 0]], counts)
-    q = np.vstack([roadmap.q[:nodes], roadmap.waypoints[:rows]])
-    label = np.concatenate([at_nodes, at_rows])
-    order = np.argsort(label, kind="stable")
-    kinds, starts = np.unique(label[order], return_index=True)
-    found = [
-        Component(part, roadmap.cover[kind].astype(bool))
-        for kind, part in zip(kinds, np.split(q[order], starts[1:]), strict=True)
-    ]
+    parts: dict[int, list[Array]] = {}
+    for node, q in enumerate(roadmap.q):
+        parts.setdefault(roadmap.root_of(node), []).append(q[None])
+    for x, _, motion in roadmap.edges:
+        parts[roadmap.root_of(x)].append(motion)
+    found = [Component(np.vstack(parts[k]), roadmap.cover[k].copy()) for k in sorted(parts)]
     return sorted(found, key=lambda component: -int(component.cover.sum()))
 
 

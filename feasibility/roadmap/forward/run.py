@@ -13,28 +13,13 @@ it, by self-motions of what a run reaches there, each followed ahead as far as i
 
 from __future__ import annotations
 
-import heapq
 from typing import NamedTuple
 
 import numpy as np
 
 from coverable_arrays import Array, Mask
-from feasibility.roadmap.expansion import CONNECT_STEPS
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.graph import (
-    EDGES,
-    HEAD,
-    NODES,
-    TAIL,
-    WAYPOINTS,
-    Roadmap,
-    add_edge,
-    add_node,
-    nodes_over,
-    root_of,
-    unite,
-)
-from feasibility.roadmap.motions import MOST_STEPS, connect, look_at, track
+from feasibility.roadmap.graph import Roadmap
 from feasibility.roadmap.walk import route_walk
 from feasibility.verdict import Cause, CauseKind, Walk
 from robots import Kinematics, Robot
@@ -109,7 +94,7 @@ def run_in_order(exploration: Exploration) -> OrderedRun:
         best = found
     walk = None
     if best.furthest == last:
-        walk = route_walk(exploration.roadmap, best.start, np.array(best.route, dtype=np.int64))
+        walk = route_walk(exploration.roadmap, best.start, best.route)
     return OrderedRun(walk, best.furthest, rounds)
 
 
@@ -134,8 +119,7 @@ def changes_in_place(robot: Robot, targets: Array, walk: Walk, near: float) -> i
 
 def _layers(exploration: Exploration) -> Layers:
     """How far runs get, from the arm's start where it has one."""
-    begun = exploration.begun
-    return layers_of(exploration.roadmap, None if begun is None else int(begun[0]))
+    return layers_of(exploration.roadmap, exploration.begun)
 
 
 def layers_of(roadmap: Roadmap, begin: int | None = None) -> Layers:
@@ -145,69 +129,52 @@ def layers_of(roadmap: Roadmap, begin: int | None = None) -> Layers:
         roadmap: the roadmap.
         begin: the node that it has to begin at; any over the first pose by default.
     """
-    cell = roadmap.cell[: roadmap.counters[NODES]].tolist()
-    steps = _steps(roadmap, cell)
-    starts = [x for x, over in enumerate(cell) if over == 0] if begin is None else [begin]
-    cost, came = _cheapest(starts, steps)
-    if not cost:
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import dijkstra
+
+    cell, steps = roadmap.cell, _steps(roadmap)
+    starts = roadmap.over[0] if begin is None else [begin]
+    if not starts:
         return Layers(frozenset(), -1, -1, ())
-    end = min(cost, key=lambda x: (-cell[x], cost[x]))
+    ends = np.array(list(steps), dtype=np.int64).reshape(-1, 2).T
+    costs = [cost for cost, _ in steps.values()]
+    graph = coo_array((costs, (ends[0], ends[1])), shape=(len(cell), len(cell))).tocsr()
+    cost, before, _ = dijkstra(graph, indices=starts, return_predecessors=True, min_only=True)
+    ahead = np.flatnonzero(np.isfinite(cost)).tolist()
+    end = min(ahead, key=lambda node: (-cell[node], cost[node]))
     route, here = list[int](), end
-    while here in came:
-        edge, here = came[here]
-        route.append(edge)
+    while before[here] >= 0:
+        there, here = here, int(before[here])
+        route.append(steps[here, there][1])
     return Layers(
-        ahead=frozenset(cost),
+        ahead=frozenset(ahead),
         furthest=cell[end],
         start=here,
         route=tuple(reversed(route)),
     )
 
 
-def _steps(roadmap: Roadmap, cell: list[int]) -> list[list[tuple[int, int, float]]]:
-    """From each node those it leads to: the signed edge + 1, the node, and what it costs."""
-    found: list[list[tuple[int, int, float]]] = [[] for _ in cell]
-    count = roadmap.counters[EDGES]
-    rows = roadmap.edge_rows[:count, 1].tolist()
-    for edge, (x, y) in enumerate(roadmap.ends[:count].tolist()):
-        cost = rows[edge] + (CHANGE_COST if cell[x] == cell[y] else 0.0)
-        if cell[y] - cell[x] in (0, 1):
-            found[x].append((edge + 1, y, cost))
-        if cell[x] - cell[y] in (0, 1):
-            found[y].append((-edge - 1, x, cost))
+def _steps(roadmap: Roadmap) -> dict[tuple[int, int], tuple[float, int]]:
+    """From one node to another, by the cheapest edge: what it costs, and the signed edge + 1."""
+    found: dict[tuple[int, int], tuple[float, int]] = {}
+    cell = roadmap.cell
+    for edge, (x, y, motion) in enumerate(roadmap.edges):
+        cost = len(motion) + (CHANGE_COST if cell[x] == cell[y] else 0.0)
+        for step, signed in (((x, y), edge + 1), ((y, x), -edge - 1)):
+            if cell[step[1]] - cell[step[0]] in (0, 1):
+                found[step] = min(found.get(step, (np.inf, 0)), (cost, signed))
     return found
-
-
-def _cheapest(
-    starts: list[int], steps: list[list[tuple[int, int, float]]]
-) -> tuple[dict[int, float], dict[int, tuple[int, int]]]:
-    """Of all nodes that are reached the least cost, and the last step there."""
-    cost = dict.fromkeys(starts, 0.0)
-    came: dict[int, tuple[int, int]] = {}
-    queue = [(0.0, x) for x in starts]
-    done = np.zeros(len(steps), dtype=bool)
-    while queue:
-        spent, x = heapq.heappop(queue)
-        if done[x]:
-            continue
-        done[x] = True
-        for edge, y, more in steps[x]:
-            if spent + more < cost.get(y, np.inf):
-                cost[y] = spent + more
-                came[y] = edge, x
-                heapq.heappush(queue, (spent + more, y))
-    return cost, came
 
 
 def _try_more(exploration: Exploration, best: Layers) -> None:
     """One round: new configurations over the last poses that a run reaches, followed ahead."""
     exploration.tick("looking for a run in order")
-    known = int(exploration.roadmap.counters[NODES])
+    known = len(exploration.roadmap.cell)
     exploration.add_seeds(0, exploration.guesses(SEEDS))
     for cell in sorted({max(best.furthest - back, 0) for back in BACK}):
         exploration.explore_self_motions(cell)
     ahead = _layers(exploration).ahead
-    for node in range(known, int(exploration.roadmap.counters[NODES])):
+    for node in range(known, len(exploration.roadmap.cell)):
         if node in ahead:
             exploration.tick("looking for a run in order")
             _follow(exploration, node, len(exploration.cells))
@@ -215,39 +182,19 @@ def _try_more(exploration: Exploration, best: Layers) -> None:
 
 def _follow(exploration: Exploration, node: int, poses: int) -> None:
     """Lead a node ahead from pose to pose, as far as it goes or until it joins what is known."""
-    while exploration.roadmap.cell[node] < poses - 1:
-        cell = int(exploration.roadmap.cell[node]) + 1
-        q = exploration.roadmap.q[node].copy()
-        roadmap, curve = exploration.reserve(MOST_STEPS + 1), exploration.curve(cell - 1, cell)
-        rows = track(
-            exploration.arrays, exploration.work, curve, 0.0, 1.0, q, q, False,
-            roadmap.waypoints, roadmap.counters[WAYPOINTS],
-        )  # fmt: skip
-        if rows < 0:
+    roadmap, grower = exploration.roadmap, exploration.grower
+    while roadmap.cell[node] < poses - 1:
+        cell = roadmap.cell[node] + 1
+        motion = grower.track(exploration.curve(cell - 1, cell), (0.0, 1.0), roadmap.q[node])
+        if motion is None:
             return
-        over = nodes_over(roadmap, cell)
-        component = int(root_of(roadmap, roadmap.component[node]))
-        new = int(add_node(exploration.arrays, exploration.work, roadmap, cell, q, component))
-        add_edge(roadmap, node, new, rows)
-        # It need not be spread: it is followed here.
-        roadmap.counters[HEAD] = roadmap.counters[TAIL] = 0
-        _join(exploration, new, over)
+        q = motion[-1]
+        near = sorted(roadmap.over[cell], key=lambda x: float(np.abs(roadmap.q[x] - q).sum()))
+        new = grower.add_node(cell, q, roadmap.root_of(node))
+        roadmap.add_edge(node, new, motion)
+        roadmap.queue.clear()  # it need not be spread: it is followed here
+        for other in near[:JOINED]:
+            motion, reached = grower.connect(cell, q, roadmap.q[other])
+            if reached:
+                roadmap.add_edge(new, other, motion)
         node = new
-
-
-def _join(exploration: Exploration, new: int, over: list[int]) -> None:
-    """Join a new node with the nearest known ones over its pose, where a self-motion does."""
-    q = exploration.roadmap.q[new].copy()
-    over = sorted(over, key=lambda x: float(np.abs(exploration.roadmap.q[x] - q).sum()))
-    for other in over[:JOINED]:
-        roadmap = exploration.reserve(int(CONNECT_STEPS) + 1)
-        arrays, cell = exploration.arrays, roadmap.cell[new]
-        here = q.copy()
-        look_at(arrays, exploration.work, cell)
-        rows, reached = connect(
-            arrays, exploration.work, here, roadmap.q[other], roadmap.waypoints,
-            roadmap.counters[WAYPOINTS], CONNECT_STEPS,
-        )  # fmt: skip
-        if reached:
-            add_edge(roadmap, new, other, rows)
-            unite(roadmap, roadmap.component[new], roadmap.component[other])

@@ -7,7 +7,6 @@ from .arrays import CONE as CONE
 from .arrays import FOLD as FOLD
 from .arrays import LIMIT as LIMIT
 from .arrays import LONG as LONG
-from .arrays import OVERFLOW as OVERFLOW
 from .arrays import ROLL as ROLL
 from .arrays import SINGULAR as SINGULAR
 from .arrays import SearchArrays as SearchArrays
@@ -28,14 +27,13 @@ from .roll import level as level
 from .roll import roll_gradient as roll_gradient
 from .segment_bound import segment_holds as segment_holds
 from .self_motion import CONE_SLACK as CONE_SLACK
-from .self_motion import NEWTON_STEPS as NEWTON_STEPS
+from .self_motion import NEWTON_AT_REST as NEWTON_AT_REST
 from .self_motion import SETTLE_STEPS as SETTLE_STEPS
 from .self_motion import connect as connect
 from .self_motion import effects as effects
 from .self_motion import margin_objective as margin_objective
 from .self_motion import margin_shares as margin_shares
 from .self_motion import settle as settle
-from .tracking import MOST_STEPS as MOST_STEPS
 from .tracking import track as track
 from .working_memory import HERE as HERE
 from .working_memory import NEXT as NEXT

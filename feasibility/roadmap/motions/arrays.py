@@ -27,8 +27,7 @@ MESH_FACTOR = 1.1  # [1] larger deviation of curves over a mesh at the replay's 
 # Why a motion stopped: the constraint that left no margin.
 NOTHING, LIMIT, CONE, SINGULAR, LONG, FOLD, COLLISION, ROLL = 0, 1, 2, 3, 4, 5, 6, 7
 
-# In place of a number of waypoints: the motion stopped short, or the array of waypoints is full.
-STOPPED, OVERFLOW = -1, -2
+STOPPED = -1  # in place of a number of waypoints
 
 
 class SearchArrays(NamedTuple):

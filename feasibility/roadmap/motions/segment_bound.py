@@ -56,7 +56,7 @@ from feasibility.roadmap.motions.working_memory import HERE, NEXT, cone_used, ro
 
 
 @kernel
-def spread(arrays, work, q0, q1):
+def second_derivatives(arrays, work, q0, q1):
     """D and Da of the module's bound for the segment from q0 (slot 0) to q1 (slot 1).
 
     `work.roll_terms` receives turn, A, G and W.
@@ -109,8 +109,8 @@ def peak(a, b, most):
 
 
 @kernel
-def roll_spread(work, chord, longer):
-    """Bounds on |psi'| and |psi''| on a segment, rad; after `spread`.
+def roll_derivatives(work, chord, longer):
+    """Bounds on |psi'| and |psi''| on a segment, rad; after `second_derivatives`.
 
     Args:
         work: as everywhere.
@@ -133,10 +133,10 @@ def roll_bound(arrays, work, chord, longer, lateral):
     """How far off the middle of its range roll may be on a segment, at most, rad.
 
     Args:
-        arrays, work, chord, longer: as in `segment_holds` and `roll_spread`.
+        arrays, work, chord, longer: as in `segment_holds` and `roll_derivatives`.
         lateral: m, second derivative of the tool point off its target.
     """
-    rate, most = roll_spread(work, chord, longer)
+    rate, most = roll_derivatives(work, chord, longer)
     if lateral > 0.0:
         most += work.derivative_bound[8] * lateral
     before, after = work.error[HERE, 2], work.error[NEXT, 2]
@@ -157,7 +157,7 @@ def segment_holds(arrays, work, q0, q1):
     never certifies. The second is inf where roll does not hold, or the arm is not certified clear.
     Where the position holds, `work.stop_reason` receives which one does not.
     """
-    total, total_axis = spread(arrays, work, q0, q1)
+    total, total_axis = second_derivatives(arrays, work, q0, q1)
     # The replay matches the ends to the curve's closest points, up to twice the errors from those
     # aimed at; where the target starts from rest, s grows with the root of that distance.
     longer = 1.0

@@ -13,7 +13,7 @@ from coverable_arrays import Array
 from coverable_kernels import entry, kernel, put
 from feasibility.collisions import clearance_gradient
 from feasibility.roadmap.motions.aiming import look_at
-from feasibility.roadmap.motions.arrays import OVERFLOW, SearchArrays
+from feasibility.roadmap.motions.arrays import SearchArrays
 from feasibility.roadmap.motions.off_target import STEPS_FROM_NEAR, project_off_target
 from feasibility.roadmap.motions.projection import (
     PROJECTION_STEPS,
@@ -34,11 +34,12 @@ from feasibility.roadmap.motions.working_memory import (
 )
 
 CONE_SLACK = 1e-3  # [1] share of cone and roll kept free by a full step; less by a shorter one
-NEWTON_STEPS = np.int64(6)  # of one step of a self-motion
+NEWTON_AT_REST = np.int64(6)  # Newton steps of one step of a self-motion
+CONNECT_STEPS = 60  # of one self-motion towards a goal
 SETTLE_STEPS = np.int64(40)  # of `settle`
 
 
-@kernel
+@entry
 def effects(arrays, work, slot, out):  # type: ignore[no-untyped-def]
     """How much a radian (or metre) of each joint moves the tool: lever over scale, plus sine.
 
@@ -102,7 +103,7 @@ def _step_towards(arrays, work, q, goal, share, slack, off_target):  # type: ign
     for j in range(q.shape[0]):
         work.trial[j] = q[j]
         work.secondary_step[j] = share * (goal[j] - q[j])
-    if project(arrays, work, work.trial, slack, np.inf, NEWTON_STEPS):
+    if project(arrays, work, work.trial, slack, np.inf, NEWTON_AT_REST):
         return True
     if not off_target:
         return False
@@ -112,9 +113,8 @@ def _step_towards(arrays, work, q, goal, share, slack, off_target):  # type: ign
     return project_off_target(arrays, work, work.trial, STEPS_FROM_NEAR)
 
 
-@entry
-def connect(arrays, work, q, goal, waypoints, first, most):  # type: ignore[no-untyped-def]
-    """Self-motion over `work.target`, at rest, from q (in place) towards the configuration `goal`.
+def connect(arrays: SearchArrays, work: Work, q: Array, goal: Array) -> tuple[Array, bool]:
+    """Self-motion over `work.target`, at rest, from a configuration q (n,) towards another one.
 
     Each step heads for the goal and is projected back onto the manifold. The motion ends early when
     it falls behind: a step that brings the goal nearer by only a small part of its length means
@@ -122,9 +122,16 @@ def connect(arrays, work, q, goal, waypoints, first, most):  # type: ignore[no-u
     and is certified.
 
     Returns:
-        (rows, reached): number of waypoints written, OVERFLOW when `waypoints` is full; and whether
-        the last one is `goal`.
+        (k, n) waypoints, the start left out; and whether the last one is `goal`.
     """
+    waypoints = np.empty((CONNECT_STEPS, len(q)))
+    rows, reached = _connect(arrays, work, q.copy(), goal, waypoints)
+    return waypoints[:rows].copy(), bool(reached)
+
+
+@entry
+def _connect(arrays, work, q, goal, waypoints):  # type: ignore[no-untyped-def]
+    """Write the waypoints of `connect` and move q along; returns their number, and `reached`."""
     n = q.shape[0]
     place(arrays, work, HERE, q)
     size, written = 0.3, 0
@@ -134,18 +141,16 @@ def connect(arrays, work, q, goal, waypoints, first, most):  # type: ignore[no-u
     left = np.sqrt(left)
     allowed = 1.5 * left + 0.1
     off_target = work.error[HERE, 0] > arrays.near
-    for _ in range(most):
+    for _ in range(CONNECT_STEPS):
         if left <= size:
             for j in range(n):
                 work.trial[j] = goal[j]
             place(arrays, work, NEXT, work.trial)
             position, cone = segment_holds(arrays, work, q, work.trial)
             if position <= 1.0 and cone <= 1.0:
-                if first + written >= waypoints.shape[0]:
-                    return OVERFLOW, False
                 for j in range(n):
                     q[j] = goal[j]
-                    waypoints[first + written, j] = q[j]
+                    waypoints[written, j] = q[j]
                 return written + 1, True
             size = 0.5 * left
         position, cone = np.inf, np.inf
@@ -164,11 +169,9 @@ def connect(arrays, work, q, goal, waypoints, first, most):  # type: ignore[no-u
             allowed -= moved
             if left - remaining < 0.05 * size or allowed < remaining:
                 return written, False
-            if first + written >= waypoints.shape[0]:
-                return OVERFLOW, False
             for j in range(n):
                 q[j] = work.trial[j]
-                waypoints[first + written, j] = q[j]
+                waypoints[written, j] = q[j]
             written += 1
             left = remaining
             accept(work)
@@ -194,7 +197,7 @@ def settle(arrays, work, cell, q, most):  # type: ignore[no-untyped-def]
         margin_objective(arrays, work, q, size)
         for j in range(n):
             work.trial[j] = q[j]
-        good = project(arrays, work, work.trial, CONE_SLACK, np.inf, NEWTON_STEPS)
+        good = project(arrays, work, work.trial, CONE_SLACK, np.inf, NEWTON_AT_REST)
         if not good and off_target:
             put(work.trial, q)
             place(arrays, work, NEXT, work.trial)

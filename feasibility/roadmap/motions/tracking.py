@@ -14,19 +14,48 @@ from __future__ import annotations
 
 import numpy as np
 
+from coverable_arrays import Array
 from coverable_kernels import entry, kernel, put
 from feasibility.roadmap.motions.aiming import aim, bounds_between
-from feasibility.roadmap.motions.arrays import FOLD, LONG, OVERFLOW, SINGULAR, STOPPED
+from feasibility.roadmap.motions.arrays import FOLD, LONG, SINGULAR, STOPPED, SearchArrays
 from feasibility.roadmap.motions.off_target import STEPS_FROM_NEAR, project_off_target
 from feasibility.roadmap.motions.projection import linearise, project
 from feasibility.roadmap.motions.segment_bound import segment_holds
 from feasibility.roadmap.motions.self_motion import CONE_SLACK, margin_objective
-from feasibility.roadmap.motions.working_memory import HERE, NEXT, accept, copy_slot, place
+from feasibility.roadmap.motions.working_memory import HERE, NEXT, Work, accept, copy_slot, place
 
 SMALLEST_STEP = 2.0**-7  # [1] of the curve between two centres: a shorter step ends the motion
 OFF_TARGET_STEP = 2.0**-4  # [1] of the curve: the first step with the tool point off its target
-MOST_STEPS = 400  # accepted steps of one motion
-NEWTON_STEPS = np.int64(8)  # of one step
+MOST_STEPS = 400  # of one motion
+NEWTON_AHEAD = np.int64(8)  # Newton steps onto the target ahead
+
+
+def track(
+    arrays: SearchArrays,
+    work: Work,
+    curve: int,
+    begin: float,
+    end: float,
+    q: Array,
+    goal: Array | None = None,
+) -> Array | None:
+    """Follow a curve from `begin` to `end`, from a configuration q (n,).
+
+    Args:
+        arrays, work: what the kernels read, and the working memory of this thread.
+        curve: which curve.
+        begin, end: parameters in [0, 1]: where q is, and where to go, in either direction.
+        q: where the motion starts.
+        goal: (n,) configuration to head for, where there is one.
+
+    Returns:
+        (k, n) waypoints, the start left out; None when the motion stopped short
+        (`work.stop_reason` holds the reason).
+    """
+    here, waypoints = q.copy(), np.empty((MOST_STEPS, len(q)))
+    aimed = here if goal is None else goal
+    rows = _track(arrays, work, curve, begin, end, here, aimed, goal is not None, waypoints)
+    return None if rows == STOPPED else waypoints[:rows].copy()
 
 
 @kernel
@@ -46,7 +75,7 @@ def _step_from(arrays, work, q, dt, off_target):
     Returns what `segment_holds` does, inf where the projection failed.
     """
     put(work.trial, q)
-    good = project(arrays, work, work.trial, CONE_SLACK * dt, work.error[0, 1], NEWTON_STEPS)
+    good = project(arrays, work, work.trial, CONE_SLACK * dt, work.error[0, 1], NEWTON_AHEAD)
     if not good and off_target:
         put(work.trial, q)
         copy_slot(arrays, work)
@@ -72,21 +101,8 @@ def _starts_inside(arrays, work):
 
 
 @entry
-def track(arrays, work, curve, begin, end, q, goal, has_goal, waypoints, first):
-    """Follow a curve from `begin` to `end`, from q (in place).
-
-    Args:
-        arrays, work: the `SearchArrays`, and the `Work` of this thread.
-        curve: which curve.
-        begin, end: parameters in [0, 1]: where q is now, and where to go, in either direction.
-        q: (n,) configuration, moved to the end of the motion.
-        goal, has_goal: (n,) configuration to head for, and whether there is one.
-        waypoints, first: (m, n) receives the waypoints after the start, from row `first` on.
-
-    Returns:
-        Number of waypoints written, STOPPED when the motion stopped short (`work.stop_reason` holds
-        the reason), or OVERFLOW when `waypoints` is full.
-    """
+def _track(arrays, work, curve, begin, end, q, goal, has_goal, waypoints):
+    """Write the waypoints of `track` and move q along; returns their number, or STOPPED."""
     n = q.shape[0]
     size = span_of(arrays, work, curve, begin, end)
     aim(arrays, work, curve, begin)
@@ -116,11 +132,9 @@ def track(arrays, work, curve, begin, end, q, goal, has_goal, waypoints, first):
             margin_objective(arrays, work, q, 2.0 * size * dt)
         position, cone = _step_from(arrays, work, q, dt, off_target)
         if position <= 1.0 and cone <= 1.0:
-            if first + written >= waypoints.shape[0]:
-                return OVERFLOW
             for j in range(n):
                 q[j] = work.trial[j]
-                waypoints[first + written, j] = q[j]
+                waypoints[written, j] = q[j]
             written += 1
             t += dt
             if t >= 1.0 - 1e-12:

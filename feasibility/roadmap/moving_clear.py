@@ -1,0 +1,53 @@
+"""Configurations over a cell that collide, moved clear where that is possible."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from coverable_arrays import Array
+from coverable_kernels import entry, put
+from feasibility.collisions import clearance_gradient, segment_clear
+from feasibility.roadmap.motions import (
+    CONE_SLACK,
+    HERE,
+    NEWTON_AT_REST,
+    SearchArrays,
+    Work,
+    copy_slot,
+    look_at,
+    place,
+    project,
+)
+
+PUSHES = 8  # steps that a colliding configuration gets
+PUSH = 0.2  # [rad] or [m] of one step
+
+
+def moved_clear(arrays: SearchArrays, work: Work, cell: int, q: Array) -> bool:
+    """Move q (n,), in place, over its cell until it collides no more; False where it still does.
+
+    Each step goes down the gradient of the penetration, and is projected back onto the target. This
+    is no motion of the arm: q becomes another start.
+    """
+    return len(arrays.collisions) == 0 or bool(_pushed_clear(arrays, work, cell, q))
+
+
+@entry
+def _pushed_clear(arrays, work, cell, q):  # type: ignore[no-untyped-def]
+    """`moved_clear`, where collisions are checked."""
+    if segment_clear(arrays.collisions, q, q) > 0.0:
+        return True
+    look_at(arrays, work, cell)
+    for _ in range(PUSHES):
+        place(arrays, work, HERE, q)
+        copy_slot(arrays, work)
+        for j in range(q.shape[0]):
+            work.secondary_step[j] = 0.0
+        clearance_gradient(arrays.collisions, q, work.secondary_step, PUSH)
+        put(work.trial, q)
+        if not project(arrays, work, work.trial, CONE_SLACK, np.inf, NEWTON_AT_REST):
+            return False
+        put(q, work.trial)
+        if segment_clear(arrays.collisions, q, q) > 0.0:
+            return True
+    return False
