@@ -35,15 +35,20 @@ ROOT = Path(__file__).resolve().parent
 CODE = (
     "coverable_kernels.py",
     "robots/chain.py",
-    "surfaces/*.py",
-    "surfaces/meshes/**/*.py",
+    "surfaces/triangle_kernel.py",
+    "surfaces/meshes/*.py",
+    "surfaces/meshes/cells/*.py",
     "surfaces/patches/closed_form_kernels.py",
     "feasibility/certification/collisions/*_kernels.py",
     "feasibility/collisions/kernels/*.py",
     "feasibility/paper/*.py",
     "feasibility/paths/two_opt.py",
     "feasibility/placement/quick_search.py",
-    "feasibility/roadmap/**/*.py",
+    "feasibility/roadmap/branch_and_bound/*.py",
+    "feasibility/roadmap/causes/diagnosis.py",
+    "feasibility/roadmap/cuts/findings.py",
+    "feasibility/roadmap/motions/*.py",
+    "feasibility/roadmap/moving_clear.py",
     "feasibility/sensitivity/limited_search.py",
     "feasibility/timing/fastest_speeds.py",
     "feasibility/viewer/painter.py",
@@ -117,7 +122,13 @@ class BesideCode(_SafeFolder, InTreeCacheLocator):
 
 
 class InHome(_SafeFolder, UserWideCacheLocator):
-    """In the cache of the home folder."""
+    """In the cache of the home folder, if there is one."""
+
+    def ensure_cache_path(self) -> None:
+        """See above."""
+        if not Path(self.get_cache_path()).is_absolute():
+            raise PermissionError("there is no home folder")
+        super().ensure_cache_path()
 
 
 def _kept(compiling: Callable[..., Any], function: Function) -> Any:

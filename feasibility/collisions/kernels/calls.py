@@ -20,7 +20,7 @@ from numba.core import event
 from numba.extending import intrinsic
 
 from coverable_arrays import Array
-from coverable_kernels import callback, entry
+from coverable_kernels import callback, entry, kernel
 from feasibility.collisions.kernels.measuring import measure
 from feasibility.collisions.kernels.push import push
 from feasibility.collisions.kernels.segments import segment_holds_clear
@@ -45,6 +45,7 @@ def _call(typing: Any, memory: Any, what: Any) -> Any:
     return types.float64(memory, types.int64), generate
 
 
+@kernel
 def _run(memory: Array, what: int) -> float:
     """The C function: the memory is a plain pointer in there."""
     if what == PUSH:

@@ -31,7 +31,7 @@ _WIDTH = np.int64(13)  # bits of a bucket: 1/91 of a cell, less than a face
 _BUCKETS = np.int64(91 * 64)  # what is farther than 60 cells waits in the last one
 
 
-@allocating
+@allocating_entry
 def units(distance):  # type: ignore[no-untyped-def]
     """A distance (in lengths of a cell) as a whole number."""
     return np.int64(math.floor(distance * _FINE + 0.347))
