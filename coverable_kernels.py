@@ -1,228 +1,167 @@
-"""Compiled functions, kept on disk for as long as nothing that they were compiled from changes.
+"""Compiled functions, kept on disk for as long as no code of kernels changes.
 
-numba keeps what it has compiled until the file of that function changes. What a kernel calls, and
-the constants that it reads, are compiled into it, whichever files they stand in: with another
-version of those, a kernel that was kept would run on with the old ones, and give wrong results
-without a word. So a kept kernel holds only where its stamp does: the code of its function, every
-value that this code names, and the same again of every function among those. The stamp is in the
-name of its file (`coverable_kernel_files.py`), with the types of its arguments.
+`entry` is for functions that Python calls, and `kernel` for those that only these call, and each
+other: called from Python, a `kernel` runs as plain, slow Python. What makes arrays is to be
+`allocating_entry` or `allocating`: numba counts references to each array that a kernel reads out of
+a `NamedTuple`, which one that makes no arrays and returns none does not need, because its caller
+holds what it is given. numba refuses to compile one that should count.
 
-Take `njit` and `cfunc` from here, not from numba.
+A division by zero gives inf or NaN, which no comparison in the search accepts, where an exception
+would end it.
+
+numba keeps what it has compiled until the file of that function changes. What the function calls,
+and the constants that it reads, may stand in other files; so kernels are kept here for as long as
+all of `CODE` is as it was. And they are machine code, so that whoever could change one could run
+anything: they are read only where they are as safe as the code beside them.
 """
 
 from __future__ import annotations
 
+import functools
 import hashlib
-import inspect
-from collections.abc import Callable, Iterator
-from enum import Enum
-from functools import cache
+import os
+import stat
+import threading
+from collections.abc import Callable
 from pathlib import Path
-from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
 from typing import Any
 
-import numpy as np
-from numba.core import compiler, types
-from numba.core.ccallback import CFunc
-from numba.core.serialize import dumps
+from numba import cfunc, njit
+from numba.core import config
+from numba.core.caching import InTreeCacheLocator, UserProvidedCacheLocator, UserWideCacheLocator
+from numba.extending import register_jitable
 
-import coverable_inner_kernels
-from coverable_inner_kernels import compiled_for_python, without_bitcode
-from coverable_kernel_files import Kernel, Processor, keep, load
-
-__all__ = ["cfunc", "njit"]
-
-OURS = ("robots", "surfaces", "feasibility", "coverable_")
-PLAIN = (int, float, complex, str, bytes, type(None), type(...), np.generic, np.dtype)
-LIBRARY = (ModuleType, FunctionType, BuiltinFunctionType, np.ufunc, types.Type)
-COMPILED = ("py_func", "_defn", "_pyfunc")  # what compiled functions and intrinsics are made of
-# How kernels are compiled is in these files.
-HOW = b"".join(Path(str(f)).read_bytes() for f in (__file__, coverable_inner_kernels.__file__))
-KEPT_IN: set[Path | None] = set()
-"""Folders in which kernels of this process were kept; None for those that were kept nowhere."""
+ROOT = Path(__file__).resolve().parent
+CODE = (
+    "coverable_kernels.py",
+    "robots/chain.py",
+    "surfaces/triangle_kernel.py",
+    "surfaces/meshes/*.py",
+    "surfaces/meshes/cells/*.py",
+    "surfaces/patches/closed_form_kernels.py",
+    "feasibility/certification/collisions/*_kernels.py",
+    "feasibility/collisions/kernels/*.py",
+    "feasibility/paper/*.py",
+    "feasibility/paths/two_opt.py",
+    "feasibility/placement/quick_search.py",
+    "feasibility/roadmap/branch_and_bound/*.py",
+    "feasibility/roadmap/causes/diagnosis.py",
+    "feasibility/roadmap/cuts/findings.py",
+    "feasibility/roadmap/motions/*.py",
+    "feasibility/roadmap/moving_clear.py",
+    "feasibility/sensitivity/limited_search.py",
+    "feasibility/timing/fastest_speeds.py",
+    "feasibility/viewer/painter.py",
+)
+"""Files of kernels, of all that kernels name, and of the named tuples that they are given."""
 Function = Any
-"""A Python function."""
+KEPT_NOWHERE: set[str] = set()
+"""Modules of this process whose kernels cannot be written to any safe folder."""
+_turn = threading.RLock()
 
 
-def njit(**options: Any) -> Callable[[Function], Any]:
-    """numba's decorator; what it compiles is kept if `cache` is among the options."""
-    kept = options.pop("cache", False)
-
-    def decorate(function: Function) -> Any:
-        compiled = compiled_for_python(function, options)
-        if kept and compiled is not function:  # as it is where the compiler is switched off
-            compiled._cache = KeptKernels(function, options)
-        return compiled
-
-    return decorate
+@functools.cache
+def stamp() -> bytes:
+    """A hash of all that kernels can be compiled from."""
+    files = sorted({path for pattern in CODE for path in ROOT.glob(pattern)})
+    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).digest()
 
 
-def cfunc(signature: Any, **options: Any) -> Callable[[Function], Any]:
-    """numba's decorator for functions that are called by their address; they are kept as above."""
-    kept = options.pop("cache", False)
+def is_safe(found: os.stat_result, code: os.stat_result, user: int) -> bool:
+    """May a file or folder be trusted like the code?
 
-    def decorate(function: Function) -> Any:
-        arguments = signature.args, signature.return_type
-        compiled: Any = CFunc(function, arguments, locals={}, options=options)
-        if kept:
-            compiled._cache = KeptKernels(function, options)
-        compiled.compile()
-        return compiled
-
-    return decorate
-
-
-class KeptKernels:
-    """What was compiled of one function, on disk, in the form in which numba asks for it."""
-
-    def __init__(self, function: Function, options: dict[str, Any]) -> None:
-        """Nothing is read yet."""
-        self._function, self._options = function, options
-        self._source = Path(inspect.getfile(function))
-        self.cache_path = str(self._source.parent)
-
-    def kernel(self, signature: Any, codegen: Any) -> Kernel:
-        """Of the function as it is, for some types of arguments.
-
-        numba asks before it looks for a kernel, and before it keeps one: by then all that the
-        function calls is there, which it need not be where the function is made.
-        """
-        arguments = getattr(signature, "args", signature)
-        return Kernel(
-            f"{self._function.__module__}.{self._function.__qualname__}",
-            stamp(self._function, self._options),
-            repr([str(signature), *map(_layout, arguments)]),
-            Processor(*codegen.magic_tuple()),
-        )
-
-    def load_overload(self, signature: Any, target: Any) -> Any:
-        """The compiled function; None where it has to be compiled."""
-        target.refresh()  # by which numba itself prepares to load one
-        parts = load(self.kernel(signature, target.codegen()), self._source)
-        return None if parts is None else compiler.CompileResult._rebuild(target, *parts)
-
-    def save_overload(self, signature: Any, compiled: Any) -> None:
-        """Keep it, where that is possible."""
-        if not compiled.library.has_dynamic_globals:  # such as addresses
-            without_bitcode(compiled.library)
-            content = dumps(compiled._reduce())
-            KEPT_IN.add(keep(self.kernel(signature, compiled.codegen), self._source, content))
-
-    def flush(self) -> None:
-        """numba would compile anew what has been compiled; names of files see to that here."""
-
-
-def _layout(kind: Any) -> tuple[Any, ...]:
-    """Class and names of the fields of all named tuples in a type of numba's, in their order."""
-    has_parts, has_fields = (isinstance(kind, t) for t in (types.BaseTuple, types.BaseNamedTuple))
-    inside = tuple(map(_layout, kind.types)) if has_parts else ()
-    if not has_fields:
-        return inside
-    return kind.instance_class.__module__, kind.instance_class.__qualname__, kind.fields, *inside
-
-
-def stamp(function: Function, options: dict[str, Any]) -> str:
-    """A hash of a function's code, all values that it names, and the same of functions among them.
+    It belongs to the user, to root, or to whom the code belongs; and nobody else may write there,
+    but for a group that may write to the code as well.
 
     Args:
-        function: a Python function, which is to be compiled.
-        options: how.
-
-    Raises:
-        TypeError: if one of them is of a kind that it is not known how to compare.
+        found: its owner and permissions.
+        code: those of the folder that the code is in.
+        user: who runs it.
 
     Example:
-        >>> def add(x):
-        ...     return x + 1
-        >>> stamp(add, {}) == stamp(add, {"fastmath": True})
-        False
+        >>> here = os.stat(__file__)
+        >>> is_safe(here, here, here.st_uid), is_safe(os.stat("/tmp"), here, here.st_uid)
+        (True, False)
     """
-    found: dict[Function, bytes] = {}
-    waiting = [function]
-    while waiting:
-        reached = waiting.pop()
-        if reached not in found:
-            found[reached], functions = _parts(reached)
-            waiting += functions
-    whole = hashlib.sha256(HOW + repr(sorted(options.items())).encode())
-    for part in sorted(set(found.values())):
-        whole.update(part)
-    return whole.hexdigest()
+    if found.st_uid not in (user, 0, code.st_uid) or found.st_mode & stat.S_IWOTH:
+        return False
+    same_group = code.st_mode & stat.S_IWGRP and found.st_gid == code.st_gid
+    return bool(same_group) or not found.st_mode & stat.S_IWGRP
 
 
-@cache
-def _parts(function: Function) -> tuple[bytes, list[Function]]:
-    """A hash of what a function is by itself, and the functions that it names."""
-    functions: list[Function] = []
-    text = [_code(function)]
-    for name, value in _named(function):
-        text.append(f"{name} = {_described(value, functions)}")
-    return hashlib.sha256("\n".join(text).encode()).digest(), functions
+class _SafeFolder:
+    """One of numba's places for kernels, where it is safe; its stamp is that of all the code."""
+
+    get_cache_path: Callable[[], str]
+    _py_file: str
+
+    def get_source_stamp(self) -> bytes:
+        """What a kept kernel is valid for."""
+        return stamp()
+
+    def ensure_cache_path(self) -> None:
+        """Make the folder, for this user alone, and see who may write there.
+
+        Raises:
+            PermissionError: if that is somebody else; then numba asks the next place.
+        """
+        folder, code = Path(self.get_cache_path()), Path(self._py_file).parent
+        folder.mkdir(parents=True, exist_ok=True, mode=0o755 if folder.parent == code else 0o700)
+        super().ensure_cache_path()  # type: ignore[misc]
+        reached = [folder, *(folder.glob("*.nb[ic]") if folder.stat().st_mode & 0o077 else ())]
+        if not all(is_safe(path.stat(), code.stat(), os.geteuid()) for path in reached):
+            raise PermissionError(f"others may write to kernels in {folder}")
 
 
-@cache
-def _code(function: Function) -> str:
-    """A hash of a function's code, without its place in its file and without its description."""
-
-    def text(code: CodeType) -> str:
-        constants = list(map(constant, code.co_consts))
-        names = code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars
-        return repr((code.co_code, code.co_flags, constants, names))
-
-    def constant(value: object) -> str:
-        if isinstance(value, frozenset):
-            return repr(sorted(map(repr, value)))
-        if isinstance(value, CodeType):
-            return text(value)
-        return repr(value) if value != function.__doc__ else ""
-
-    return hashlib.sha256(text(function.__code__).encode()).hexdigest()
+class Chosen(_SafeFolder, UserProvidedCacheLocator):
+    """In `NUMBA_CACHE_DIR`, where that is set."""
 
 
-def _named(function: Function) -> Iterator[tuple[str, object]]:
-    """What a function's code names, and its defaults; names of attributes are among the names."""
-    yield "defaults", (function.__defaults__, tuple((function.__kwdefaults__ or {}).items()))
-    cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
-    yield from ((name, cell.cell_contents) for name, cell in cells)
-    waiting, names = [function.__code__], set()
-    while waiting:
-        code = waiting.pop()
-        waiting += [inner for inner in code.co_consts if isinstance(inner, CodeType)]
-        names.update(code.co_names)
-    for name in sorted(names & function.__globals__.keys()):
-        yield name, function.__globals__[name]
+class BesideCode(_SafeFolder, InTreeCacheLocator):
+    """In `__pycache__`."""
 
 
-def _described(value: Any, functions: list[Function]) -> str:
-    """A value as text; functions in it are told by names and code, and added to the list."""
-    inner = next((vars(value)[kind] for kind in COMPILED if kind in _held(value)), value)
-    if isinstance(inner, FunctionType) and (inner is not value or _is_ours(value)):
-        functions.append(inner)
-        options = sorted(_held(value).get("targetoptions", {}).items())
-        return f"{inner.__module__}.{inner.__qualname__} {options} {_code(inner)}"
-    if isinstance(value, type):
-        fields = getattr(value, "_fields", ()), getattr(value, "_field_defaults", {})
-        members = [(name, item.value) for name, item in getattr(value, "__members__", {}).items()]
-        return f"{value.__module__}.{value.__qualname__} {fields} {members}"
-    if isinstance(value, Enum):
-        return f"{_described(type(value), functions)} {value.name}"
-    if isinstance(value, tuple):
-        return f"{_described(type(value), functions)} {[_described(v, functions) for v in value]}"
-    if isinstance(value, np.ndarray):
-        return f"{value.dtype} {value.shape} {value.strides} {value.tobytes()!r}"
-    if isinstance(value, PLAIN):
-        return f"{type(value).__name__} {value!r}"
-    if isinstance(value, LIBRARY) and not _is_ours(value):
-        return f"{getattr(value, '__module__', '')}.{getattr(value, '__name__', value)}"
-    raise TypeError(f"a kernel names {value!r}, and it is not known how to tell when that changes")
+class InHome(_SafeFolder, UserWideCacheLocator):
+    """In the cache of the home folder, if there is one."""
+
+    def ensure_cache_path(self) -> None:
+        """See above."""
+        if not Path(self.get_cache_path()).is_absolute():
+            raise PermissionError("there is no home folder")
+        super().ensure_cache_path()
 
 
-def _held(value: Any) -> dict[str, Any]:
-    """What an object holds by itself."""
-    return getattr(value, "__dict__", {})
+def _kept(compiling: Callable[..., Any], function: Function) -> Any:
+    """Let numba compile a function, and keep it in a safe place, unless the user chose others."""
+    with _turn:
+        chosen = config.CACHE_LOCATOR_CLASSES
+        ours = ",".join(f"{__name__}.{place.__name__}" for place in (Chosen, BesideCode, InHome))
+        config.CACHE_LOCATOR_CLASSES = chosen or ours
+        try:
+            return compiling(cache=True)(function)
+        except RuntimeError:  # there is no such place
+            KEPT_NOWHERE.add(function.__module__)
+            return compiling()(function)
+        finally:
+            config.CACHE_LOCATOR_CLASSES = chosen
 
 
-def _is_ours(value: Any) -> bool:
-    """Does a module, class or function belong to this project?"""
-    name = value.__name__ if isinstance(value, ModuleType) else value.__module__
-    return str(name).startswith(OURS)
+_COUNTED: dict[str, Any] = {"error_model": "numpy", "_nrt": True}
+_UNCOUNTED: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
+Decorator = Callable[[Function], Any]
+kernel: Decorator = register_jitable(**_UNCOUNTED)
+allocating: Decorator = register_jitable(**_COUNTED)
+entry: Decorator = functools.partial(_kept, functools.partial(njit, **_UNCOUNTED))
+allocating_entry: Decorator = functools.partial(_kept, functools.partial(njit, **_COUNTED))
+
+
+def callback(signature: Any) -> Decorator:
+    """For functions that kernels call by their address."""
+    return functools.partial(_kept, functools.partial(cfunc, signature, error_model="numpy"))
+
+
+@kernel
+def put(target, source):  # type: ignore[no-untyped-def]
+    """Copy numbers into an array of the same length; numba's `target[:] = source` is far longer."""
+    for j in range(target.shape[0]):
+        target[j] = source[j]

@@ -21,7 +21,7 @@ import numpy as np
 import pinocchio as pin
 
 from coverable_arrays import Array, Mask
-from coverable_kernels import njit
+from coverable_kernels import allocating_entry
 from robots.errors import RobotError
 from robots.mounting import joint_axes
 
@@ -142,7 +142,7 @@ def _rotation_onto(axis: Array) -> Array:
     return np.column_stack([x, np.cross(z, x), z])
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_entry
 def frames(chain, q, origins, axes, point, axis, reference):  # type: ignore[no-untyped-def]
     """Tool point, approach and reference axis, and every joint's axis, in the root frame.
 
@@ -202,7 +202,7 @@ def frames(chain, q, origins, axes, point, axis, reference):  # type: ignore[no-
     reference[2] = xz * t[0] + yz * t[1] + zz * t[2]
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_entry
 def jacobians(chain, origins, axes, point, axis, point_rows, axis_rows):  # type: ignore[no-untyped-def]
     """Derivatives of tool point and approach axis by q, from what `frames` returned.
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
-from coverable_kernels import njit
+from coverable_kernels import allocating
 from surfaces.meshes import WIDTH, FaceTree, nearest_face
 
 _NEWTON = 4  # steps to the place under a point; each squares what is left
@@ -65,7 +65,7 @@ class TriangleKernel(NamedTuple):
     """(3,) those of the place found last."""
 
 
-@njit(cache=True, error_model="numpy")
+@allocating
 def cell_under(kernel, x, y, z):  # type: ignore[no-untyped-def]
     """The cell that a point is over, with height and normal; all in the root frame.
 
@@ -115,7 +115,7 @@ def cell_under(kernel, x, y, z):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True, error_model="numpy")
+@allocating
 def u_direction_under(kernel):  # type: ignore[no-untyped-def]
     """(x, y, z), about the u direction at the place that `cell_under` found last, of any length."""
     x, y, z, f = 0.0, 0.0, 0.0, kernel.last[0]
@@ -126,7 +126,7 @@ def u_direction_under(kernel):  # type: ignore[no-untyped-def]
     return x, y, z
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@allocating
 def _cross(a, b, made):  # type: ignore[no-untyped-def]
     """Write a x b."""
     made[0] = a[1] * b[2] - a[2] * b[1]
@@ -134,7 +134,7 @@ def _cross(a, b, made):  # type: ignore[no-untyped-def]
     made[2] = a[0] * b[1] - a[1] * b[0]
 
 
-@njit(cache=True, error_model="numpy")
+@allocating
 def _cell_of_tile(kernel, f, p, weights, height, normal):  # type: ignore[no-untyped-def]
     """Solve P(w) + h N(w) = p on the tile of a triangle, from the triangle's nearest point.
 

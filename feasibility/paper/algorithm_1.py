@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coverable_arrays import Array, Ints
-from coverable_kernels import njit
+from coverable_kernels import allocating, allocating_entry
 from feasibility.paper.jcell_grid import (
     HAIR,
     cell_of,
@@ -48,7 +48,7 @@ class Memory(NamedTuple):
     """(s, 7) tool point, approach axis, distance from the target point, for each of them."""
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@allocating
 def _mixed(key):
     """Spread the bits of a linear key over the word."""
     key ^= key >> 29
@@ -57,7 +57,7 @@ def _mixed(key):
     return key
 
 
-@njit(cache=True, error_model="numpy")
+@allocating
 def _key(offsets):
     """A linear key of a J-cell: a neighbour's follows by adding one term per moved joint."""
     key = 0
@@ -66,13 +66,13 @@ def _key(offsets):
     return key
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@allocating
 def _weight(i):
     """An odd 64-bit factor for joint i (wraps around on purpose)."""
     return (2 * i + 1) * -7070675565921424023 + 2 * i
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_entry
 def rehash(memory):
     """Enter all nodes of the running call into a new, empty table."""
     counters, table, nodes = memory.counters, memory.table, memory.nodes
@@ -84,7 +84,7 @@ def rehash(memory):
         table[slot] = counters[CALL] << 32 | node
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_entry
 def begin_search(chain, grid, offsets, target, memory):
     """Start a call of Algorithm 1 at the J-cell `offsets` (n,) towards the point `target` (3,)."""
     counters = memory.counters
@@ -99,7 +99,7 @@ def begin_search(chain, grid, offsets, target, memory):
     memory.stack_tool[0, 6] = distance(memory.stack_tool[0], target)
 
 
-@njit(cache=True, error_model="numpy")
+@allocating
 def _first_visit(table, nodes, call, count, offsets, delta, key):
     """Enter the J-cell offsets + delta as nodes[count]; False when it was checked already."""
     n = offsets.shape[0]
@@ -121,7 +121,7 @@ def _first_visit(table, nodes, call, count, offsets, delta, key):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@allocating
 def _inside(lowest, highest, offsets, delta):
     """True when the J-cell offsets + delta obeys the joint limits."""
     inside = True
@@ -130,7 +130,7 @@ def _inside(lowest, highest, offsets, delta):
     return inside
 
 
-@njit(cache=True, error_model="numpy")
+@allocating
 def _placed_for(delta, rotations, translations, prismatic, origin, step, offsets, placed, base):
     """Bring the joint frames in `base` up to date up to the last that moves; how many are."""
     top = delta.shape[0] - 1
@@ -142,7 +142,7 @@ def _placed_for(delta, rotations, translations, prismatic, origin, step, offsets
     return top + 1
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_entry
 def extend_search(chain, patch_kernel, triangles, grid, target, target_cell, budget, cap, memory):
     """Go on with a call of Algorithm 1 for at most `budget` more neighbours.
 
@@ -215,7 +215,7 @@ def extend_search(chain, patch_kernel, triangles, grid, target, target_cell, bud
     counters[STATE], counters[DEPTH], counters[NODES] = state, depth, count
 
 
-@njit(cache=True, error_model="numpy")
+@allocating
 def _expand(nodes, node, tool, offsets, held, partial):
     """Make `node`, with its tool (7,), the present J-cell.
 

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable_arrays import Array, Ints
-from coverable_kernels import njit
+from coverable_kernels import allocating, allocating_entry
 from robots import frames
 from surfaces import cell_under, u_direction_under
 from surfaces.patches import cell_at, closest_on_patch, u_direction
@@ -63,7 +63,7 @@ class Grid(NamedTuple):
     """(3,) the direction that it is measured from; (0,) for the u direction."""
 
 
-@njit(cache=True, error_model="numpy")
+@allocating
 def place_joints(rotations, translations, prismatic, origin, step, offsets, placed, wanted, base):
     """Bring the frames of joints `placed` .. `wanted` up to date, each before its own motion.
 
@@ -96,7 +96,7 @@ def place_joints(rotations, translations, prismatic, origin, step, offsets, plac
             base[i, 9 + k] = base[i - 1, 9 + k] + z * slide + x * t[0] + y * t[1] + z * t[2]
 
 
-@njit(cache=True, error_model="numpy")
+@allocating
 def _turn(x, y, z, vx, vy, vz, sine, cosine):
     """Rotate the vector v about the unit axis (x, y, z)."""
     along = (x * vx + y * vy + z * vz) * (1.0 - cosine)
@@ -107,7 +107,7 @@ def _turn(x, y, z, vx, vy, vz, sine, cosine):
     )
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@allocating
 def _facing(side, approach, nx, ny, nz, tool):
     """a.b over a place with the normal (nx, ny, nz)."""
     if approach.shape[0] == 3:
@@ -115,7 +115,7 @@ def _facing(side, approach, nx, ny, nz, tool):
     return -side * (tool[3] * nx + tool[4] * ny + tool[5] * nz)
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_entry
 def cell_of(patch_kernel, triangles, side, height, tolerance, cosine, approach, tool):
     """E-cell of a tool point and axis (6,) that satisfy the task constraints; -1 where they do not.
 
@@ -149,7 +149,7 @@ def cell_of(patch_kernel, triangles, side, height, tolerance, cosine, approach, 
     return -1
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_entry
 def place_tool(chain, grid, offsets, tool, reference):
     """Tool point and axis (6,) and reference axis (3,) of one J-cell, by forward kinematics."""
     n = offsets.shape[0]
@@ -159,7 +159,7 @@ def place_tool(chain, grid, offsets, tool, reference):
     frames(chain, q, np.empty((n, 3)), np.empty((n, 3)), tool[:3], tool[3:], reference)
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_entry
 def rolls_within(chain, patch_kernel, triangles, grid, offsets, tool):
     """True where a J-cell with its tool (6,) has a roll in the task's range: eq. (6).
 
@@ -194,14 +194,14 @@ def rolls_within(chain, patch_kernel, triangles, grid, offsets, tool):
     return abs(np.arctan2(np.sin(off), np.cos(off))) <= grid.roll[1] - HAIR
 
 
-@njit(cache=True, error_model="numpy")
+@allocating
 def distance(tool, target):
     """|p - p_T|, m."""
     dx, dy, dz = tool[0] - target[0], tool[1] - target[1], tool[2] - target[2]
     return np.sqrt(dx * dx + dy * dy + dz * dz)
 
 
-@njit(cache=True, error_model="numpy")
+@allocating
 def neighbour(number, moves_all, delta):
     """Write neighbour `number` (0, 1, ...) as moves -1, 0, +1 of the joints; False past the last.
 
@@ -224,7 +224,7 @@ def neighbour(number, moves_all, delta):
     return rest == 0
 
 
-@njit(cache=True, error_model="numpy")
+@allocating
 def move_tool(prismatic, step, sine, cosine, base, delta, held, partial):
     """Tool of a neighbour, left in partial[0], given the tool of the J-cell in partial[n].
 

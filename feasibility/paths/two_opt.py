@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from coverable_arrays import Array, Ints
-from feasibility.compiled import kernel, put
+from coverable_kernels import entry, kernel, put
 
 LONGEST_PART = 3  # places that Or-opt moves at once
 GAIN = 1e-9  # [1], share of the whole length that a change must gain
@@ -39,7 +39,7 @@ def improved(distance: Array, tour: Ints) -> Ints:
     return result
 
 
-@kernel
+@entry
 def _improve(distance, tour, former, gain, sweeps):  # type: ignore[no-untyped-def]
     """Sweep over all changes, taking each that gains, until a sweep finds none."""
     n = tour.shape[0]

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
-from feasibility.compiled import allocating, kernel, put
+from coverable_kernels import allocating_entry, kernel, put
 from feasibility.division import undominated
 from feasibility.roadmap import (
     CONE_SLACK,
@@ -47,7 +47,7 @@ SELF_MOTIONS = 6  # of the border of the best component, in a short search
 MOST_COVERS = 8  # components that are kept of a placement, the largest
 
 
-@allocating
+@allocating_entry
 def _probe(problem, work, cells, guesses, hits):  # type: ignore[no-untyped-def]
     """Newton at each of some cells, from where the last one ended and from guesses."""
     n = guesses.shape[1]
@@ -145,7 +145,7 @@ def _margins_at(problem, work, q, out):  # type: ignore[no-untyped-def]
     out[1] = max(0.0, 1.0 - work.error[0, 1] / problem.cone_chord)
 
 
-@allocating
+@allocating_entry
 def _widen_margins(problem, aimed, work, cell, q, best):  # type: ignore[no-untyped-def]
     """Self-motion over a cell away from limits and boundary of the cone; changes q and `best`.
 

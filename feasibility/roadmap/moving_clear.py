@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from coverable_arrays import Array
+from coverable_kernels import entry, put
 from feasibility.collisions import clearance_gradient, segment_clear
-from feasibility.compiled import kernel, put
 from feasibility.roadmap.motions import (
     CONE_SLACK,
     HERE,
@@ -32,7 +32,7 @@ def moved_clear(arrays: SearchArrays, work: Work, cell: int, q: Array) -> bool:
     return len(arrays.collisions) == 0 or bool(_pushed_clear(arrays, work, cell, q))
 
 
-@kernel
+@entry
 def _pushed_clear(arrays, work, cell, q):  # type: ignore[no-untyped-def]
     """`moved_clear`, where collisions are checked."""
     if segment_clear(arrays.collisions, q, q) > 0.0:

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from coverable_arrays import Array, Ints
+from coverable_kernels import entry
 from feasibility.clock import OutOfTime
-from feasibility.compiled import kernel
 from feasibility.demands import BY_REPLAY, TOGETHER, further, unjudged
 from feasibility.roadmap import (
     Exploration,
@@ -189,7 +189,7 @@ def project_all(arrays: SearchArrays, work: Work, order: Ints, q: Array) -> int:
     return len(order)
 
 
-@kernel
+@entry
 def _project_all(arrays, work, order, q):  # type: ignore[no-untyped-def]
     """See `project_all`; collisions are not looked at."""
     for k in range(order.shape[0]):

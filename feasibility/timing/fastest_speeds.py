@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable_arrays import Array
-from feasibility.compiled import kernel
+from coverable_kernels import entry, kernel
 
 CROSSINGS = 100  # per place; with what is left over then, the speed is 0 there
 ROUNDING = 1e-12  # [1]
@@ -72,7 +72,7 @@ def fastest_speeds(most: Array, rows: Rows, limits: Array | float = 1.0) -> Arra
     return x
 
 
-@kernel
+@entry
 def _run_through(x, margin, lean):  # type: ignore[no-untyped-def]
     """Set x (m,), upper bounds before, to the largest values; by two passes."""
     for i in range(x.shape[0] - 2, -1, -1):

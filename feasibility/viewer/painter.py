@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from coverable_arrays import Array, Ints
-from feasibility.compiled import kernel
+from coverable_kernels import entry
 from feasibility.viewer.html_page import Camera
 from feasibility.viewer.threejs import Command, numbers_of
 from surfaces.meshes import doubled_areas
@@ -153,7 +153,7 @@ def _light(normals: Array) -> Array:
     return np.asarray(AMBIENT + np.abs((normals / length) @ toward.T) @ STRENGTHS)
 
 
-@kernel
+@entry
 def _draw_faces(seen, faces, colours, opacity, depth, image):  # type: ignore[no-untyped-def]
     """Paint triangles; half transparent ones hide nothing."""
     height, width = depth.shape
@@ -188,7 +188,7 @@ def _draw_faces(seen, faces, colours, opacity, depth, image):  # type: ignore[no
                     image[y, x, k] += opacity * (colour - image[y, x, k])
 
 
-@kernel
+@entry
 def _draw_lines(seen, colours, depth, image):  # type: ignore[no-untyped-def]
     """Paint segments, as wide as one pixel of the picture."""
     height, width = depth.shape

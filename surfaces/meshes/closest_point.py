@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_kernels import njit
+from coverable_kernels import kernel
 
 THIN = 1e-4  # [1], square of the sine of the first corner's angle
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def on_triangle(corners, f, x, y, z, weights):  # type: ignore[no-untyped-def]
     """m^2, the square of the distance of a point from a triangle; NaN where either is not finite.
 
@@ -66,7 +66,7 @@ def on_triangle(corners, f, x, y, z, weights):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def _square(corners, f, x, y, z, i, wi, j, wj, k, wk):  # type: ignore[no-untyped-def]
     """m^2, the square of the distance from the place with weights wi, wj, wk of corners i, j, k."""
     c = corners
@@ -77,7 +77,7 @@ def _square(corners, f, x, y, z, i, wi, j, wj, k, wk):  # type: ignore[no-untype
     )
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def _on_thin_triangle(corners, f, x, y, z, weights):  # type: ignore[no-untyped-def]
     """`on_triangle` where the sine of an angle is small, or 0: sides and corners may coincide."""
     least, longest, first = np.inf, -1.0, 0

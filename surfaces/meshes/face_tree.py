@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable_arrays import Array, Ints
-from coverable_kernels import njit
+from coverable_kernels import allocating_entry, entry, kernel
 from surfaces.meshes.closest_point import on_triangle
 
 LEAF = 2  # triangles in a leaf, at most
@@ -65,7 +65,7 @@ class FaceTree(NamedTuple):
         return faces, weights
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, inline="always")
+@kernel
 def _beside_box(boxes, node, x, y, z):  # type: ignore[no-untyped-def]
     """m^2, the square of the distance of a point from a box; 0 inside."""
     dx = max(boxes[node, 0] - x, x - boxes[node, 3], 0.0)
@@ -74,7 +74,7 @@ def _beside_box(boxes, node, x, y, z):  # type: ignore[no-untyped-def]
     return dx * dx + dy * dy + dz * dz
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def nearest_face(tree, x, y, z, guess, weights, found):  # type: ignore[no-untyped-def]
     """The row of `tree.corners` nearest to a point, or as near as rounding can tell.
 
@@ -124,7 +124,7 @@ def nearest_face(tree, x, y, z, guess, weights, found):  # type: ignore[no-untyp
     return best
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_entry
 def nearest_faces(tree, points, faces, weights):  # type: ignore[no-untyped-def]
     """`nearest_face` for points (k, 3) m; fills faces (k,), as they were given, and weights."""
     near, found = 0, np.empty(3)
@@ -137,7 +137,7 @@ def nearest_faces(tree, points, faces, weights):  # type: ignore[no-untyped-def]
             faces[i], weights[i] = -1, np.nan
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def _widest_axis(places, order, begin, end):  # type: ignore[no-untyped-def]
     """The axis along which places order[begin:end] spread most."""
     widest, axis = -1.0, 0
@@ -151,7 +151,7 @@ def _widest_axis(places, order, begin, end):  # type: ignore[no-untyped-def]
     return axis
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def _part(places, order, begin, end, middle, axis):  # type: ignore[no-untyped-def]
     """Swap order[begin:end] until none before `middle` is further along the axis than one after.
 
@@ -183,7 +183,7 @@ def _part(places, order, begin, end, middle, axis):  # type: ignore[no-untyped-d
             return
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@entry
 def _sort_by_halves(places, depth, order):  # type: ignore[no-untyped-def]
     """Sort triangles so that the runs of each level are halves of those of the level above.
 
@@ -201,7 +201,7 @@ def _sort_by_halves(places, depth, order):  # type: ignore[no-untyped-def]
             _part(places, order, begin, end, middle, axis)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@entry
 def _boxes_around(corners, depth, boxes):  # type: ignore[no-untyped-def]
     """Write the boxes of all nodes, (2^(d + 1) - 1, 6) m, around sorted triangles (F, 3, 3) m."""
     count = corners.shape[0]

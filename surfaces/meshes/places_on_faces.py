@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_kernels import njit
+from coverable_kernels import entry
 from surfaces.meshes.normals import WIDTH
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@entry
 def normals_on_faces(own, crease, on_crease, faces, weights, normals):  # type: ignore[no-untyped-def]
     """Write unit normals at places of faces.
 
@@ -37,7 +37,7 @@ def normals_on_faces(own, crease, on_crease, faces, weights, normals):  # type: 
             normals[row, k] /= length
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@entry
 def heights_over_faces(corners, points, faces, weights, normals, off, heights):  # type: ignore[no-untyped-def]
     """Write what leads from places of faces to points.
 

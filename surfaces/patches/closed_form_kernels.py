@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_kernels import njit
+from coverable_kernels import allocating, allocating_entry
 
 PLANE, SPHERE, CYLINDER, HYPERBOLOID = 0, 1, 2, 3
 EDGE = 1e-9  # [rad], [m]: a point that misses the patch by no more than this lies on it
@@ -48,7 +48,7 @@ class PatchKernel(NamedTuple):
     """Number of cells along u and v."""
 
 
-@njit(cache=True, error_model="numpy")
+@allocating
 def wrap(angle, low, high):  # type: ignore[no-untyped-def]
     """The value angle + 2 pi k (rad) that lies in low..high, or failing that, nearest to it."""
     a = low + (angle - low) % _TURN
@@ -57,7 +57,7 @@ def wrap(angle, low, high):  # type: ignore[no-untyped-def]
     return a
 
 
-@njit(cache=True, error_model="numpy")
+@allocating
 def _closest_on_sphere(radius, x, y, z, low, high):  # type: ignore[no-untyped-def]
     """Closest point on the sphere about the origin: u, v, height, normal, in its own frame."""
     rho = math.hypot(x, y)
@@ -73,7 +73,7 @@ def _closest_on_sphere(radius, x, y, z, low, high):  # type: ignore[no-untyped-d
     return u, v, distance - radius, x / distance, y / distance, z / distance
 
 
-@njit(cache=True, error_model="numpy")
+@allocating
 def _closest_on_cylinder(radius, x, y, z, low, high):  # type: ignore[no-untyped-def]
     """Closest point on the cylinder about z: u, v, height, normal, in its own frame."""
     rho = math.hypot(x, y)
@@ -83,7 +83,7 @@ def _closest_on_cylinder(radius, x, y, z, low, high):  # type: ignore[no-untyped
     return wrap(math.atan2(y, x), low[0], high[0]), z, rho - radius, x / rho, y / rho, 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@allocating
 def closest_on_hyperbola(waist, slope, rho, z):  # type: ignore[no-untyped-def]
     """Abscissa t of the point of r(t) = sqrt(waist^2 + slope^2 t^2) closest to (z, rho).
 
@@ -109,7 +109,7 @@ def closest_on_hyperbola(waist, slope, rho, z):  # type: ignore[no-untyped-def]
     return math.copysign(t, z)
 
 
-@njit(cache=True, error_model="numpy")
+@allocating
 def _closest_on_hyperboloid(waist, flare, x, y, z, low, high):  # type: ignore[no-untyped-def]
     """Closest point on the hyperboloid about z: u, v, height, normal, in its own frame."""
     rho = math.hypot(x, y)
@@ -128,7 +128,7 @@ def _closest_on_hyperboloid(waist, flare, x, y, z, low, high):  # type: ignore[n
     return u, t, height, cosine / length, sine / length, -rise / length
 
 
-@njit(cache=True, error_model="numpy")
+@allocating
 def closest_on_patch(patch, x, y, z):  # type: ignore[no-untyped-def]
     """The point of the surface closest to (x, y, z), all in the root frame.
 
@@ -168,7 +168,7 @@ def closest_on_patch(patch, x, y, z):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True, error_model="numpy")
+@allocating
 def u_direction(patch, u, v):  # type: ignore[no-untyped-def]
     """(x, y, z), the unit direction in the root frame in which u grows at u, v (rad or m)."""
     a, b, c = -math.sin(u), math.cos(u), 0.0
@@ -184,14 +184,14 @@ def u_direction(patch, u, v):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True, error_model="numpy")
+@allocating
 def on_patch(patch, u, v):  # type: ignore[no-untyped-def]
     """True where u and v (rad or m, as `closest_on_patch` wraps them) lie in the patch's ranges."""
     (u0, v0), (u1, v1) = patch.low, patch.high
     return u0 - EDGE <= u <= u1 + EDGE and v0 - EDGE <= v <= v1 + EDGE
 
 
-@njit(cache=True, error_model="numpy")
+@allocating
 def cell_at(patch, u, v):  # type: ignore[no-untyped-def]
     """Flat row-major index of the cell at u, v (rad or m), or -1 outside the patch.
 
@@ -212,7 +212,7 @@ def cell_at(patch, u, v):  # type: ignore[no-untyped-def]
     return min(max(i, 0), rows - 1) * columns + min(max(j, 0), columns - 1)
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_entry
 def closest_points(patch, points):  # type: ignore[no-untyped-def]
     """`closest_on_patch` (k, 6) and `on_patch` (k,) for many points (k, 3) m."""
     count = points.shape[0]

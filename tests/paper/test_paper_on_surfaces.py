@@ -11,13 +11,17 @@ import pytest
 import referee
 from mesh_patches import in_cells_of
 
+from coverable_kernels import allocating_entry
 from feasibility import Answer, Search, Task, greedy_check
 from feasibility.paper import tree_walk
 from feasibility.paper.jcell_steps import Steps
 from feasibility.paper.tree_replay import Path, replay_stored, replay_tree, within_cells
 from robots import Kinematics, load_robot
-from surfaces import cell_under, mesh, piecewise, plane, sphere, torus, triangulation
+from surfaces import cell_under as cell_under_kernel
+from surfaces import mesh, piecewise, plane, sphere, torus, triangulation
 from surfaces.meshes import TriangleMesh
+
+cell_under = allocating_entry(cell_under_kernel)
 
 PUMA, UR5 = load_robot("puma560", limits="set-1"), load_robot("ur5")
 TASK = Task(0.005, 45)

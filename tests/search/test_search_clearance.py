@@ -14,10 +14,10 @@ from samples import sampled, spread
 from scipy.spatial.transform import Rotation
 from search_kernels import Clearance
 
+from coverable_kernels import entry
 from feasibility.collisions import Bodies, Collision, Obstacle, Pair, Soup, gather
+from feasibility.collisions.kernels import link_frames
 from feasibility.collisions.kernels.box_tree import box_tree, moved
-from feasibility.collisions.kernels.link_frames import chord_deviation, place_bodies
-from feasibility.collisions.kernels.link_frames import spread as place_group
 from feasibility.collisions.kernels.tables import (
     AXES,
     FIRST,
@@ -35,6 +35,8 @@ from robots.shapes import Polytope
 from surfaces import sphere
 
 LENGTH, RADIUS = 0.3, 0.03  # m, of each link, a capsule along x
+chord_deviation, place_bodies = entry(link_frames.chord_deviation), entry(link_frames.place_bodies)
+place_group = entry(link_frames.spread)
 FINE = np.deg2rad(0.1)  # between samples, of the joint that moves most
 
 

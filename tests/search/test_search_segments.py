@@ -25,15 +25,16 @@ from samples import sampled, seeds
 from scipy.spatial.transform import Rotation
 from search_kernels import Motions
 
+from coverable_kernels import entry
 from feasibility import Task
-from feasibility.roadmap.motions.roll import frame_rates
-from feasibility.roadmap.motions.segment_bound import peak
+from feasibility.roadmap.motions import roll, segment_bound
 from feasibility.roll import Roll, projected, roll_of
 from robots import load_robot
 from surfaces import cylinder, sphere
 from surfaces.patches import GridCells
 
 ROUNDING = 1e-12
+frame_rates, peak = entry(roll.frame_rates), entry(segment_bound.peak)
 KINDS = ["sphere", "cylinder", "hyperboloid", "plane"]
 
 

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_kernels import entry
 from feasibility import Task
 from feasibility.collisions import (
     Bodies,
@@ -25,19 +26,23 @@ from feasibility.roadmap import (
     rule,
     work_for,
 )
-from feasibility.roadmap.branch_and_bound.box_bounds import static_levers
-from feasibility.roadmap.branch_and_bound.box_contraction import shrink
+from feasibility.roadmap.branch_and_bound import box_bounds, box_contraction
 from feasibility.roadmap.branch_and_bound.boxes import Slabs, box_work
 from feasibility.roadmap.branch_and_bound.branching import DIRECTIONS
-from feasibility.roadmap.motions import project_near_cell, segment_holds
-from feasibility.roadmap.motions.aiming import aim, bounds_between, stand_still
-from feasibility.roadmap.motions.projection import project
-from feasibility.roadmap.motions.segment_bound import roll_derivatives, second_derivatives
+from feasibility.roadmap.motions import aiming, project_near_cell, projection, segment_bound
+from feasibility.roadmap.motions.aiming import aim, stand_still
 from feasibility.roadmap.motions.working_memory import place
 from robots import Robot
 from surfaces import Cells, plane
 
 Floats = NDArray[np.float64]
+
+# Only other kernels call these in the search.
+bounds_between, project = entry(aiming.bounds_between), entry(projection.project)
+second_derivatives = entry(segment_bound.second_derivatives)
+roll_derivatives = entry(segment_bound.roll_derivatives)
+segment_holds = entry(segment_bound.segment_holds)
+static_levers, shrink = entry(box_bounds.static_levers), entry(box_contraction.shrink)
 
 
 class Clearance:

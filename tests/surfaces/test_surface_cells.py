@@ -13,10 +13,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from specimens import ALL, SMOOTH, cells_of
 
+from coverable_kernels import allocating_entry
 from surfaces import SurfaceError, cylinder, plane, sphere, torus
 from surfaces.adjacency import grid_neighbours
-from surfaces.patches import cell_at, closest_on_patch
+from surfaces.patches import closed_form_kernels
 
+cell_at, closest_on_patch, wrap = map(
+    allocating_entry,
+    (closed_form_kernels.cell_at, closed_form_kernels.closest_on_patch, closed_form_kernels.wrap),
+)
 TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 SHIFT = np.array([0.3, -0.2, 0.1])
 CELLS = {name: cells_of(surface, 4, 5) for name, surface in ALL.items()}

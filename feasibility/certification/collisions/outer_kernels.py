@@ -15,11 +15,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_kernels import njit
+from coverable_kernels import entry, kernel
 
 FAR = 0.05  # [m] between balls, from which on boxes are not looked at
-
-kernel = njit(cache=True, error_model="numpy", _nrt=False)  # makes no arrays: nothing is counted
 
 
 @kernel
@@ -58,7 +56,7 @@ def lever(twist, x, y, z):  # type: ignore[no-untyped-def]
     return np.sqrt(u * u + v * v + w * w)
 
 
-@kernel
+@entry
 def chord_bounds(  # type: ignore[no-untyped-def]
     rotations, points, twists, prismatic, steps, turned, deviations,
     joints, centres, balls, levers, delta, moved, deviation,
@@ -157,7 +155,7 @@ def box_bound(rotations, k, joints, a, b, halves, before, now):  # type: ignore[
     return best
 
 
-@kernel
+@entry
 def outer_bounds(  # type: ignore[no-untyped-def]
     rotations, points, joints, centres, balls, halves, couples, delta, deviation, low
 ):  # fmt: skip

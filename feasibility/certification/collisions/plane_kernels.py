@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_kernels import njit
-
-kernel = njit(cache=True, error_model="numpy", _nrt=False)  # makes no arrays: nothing is counted
+from coverable_kernels import entry, kernel
 
 
 @kernel
@@ -45,7 +43,7 @@ def least_along(corners, circle, turn, at, x, y, z):  # type: ignore[no-untyped-
     return at[0] * x + at[1] * y + at[2] * z - support(corners, circle, -u, -v, -w)
 
 
-@kernel
+@entry
 def part(  # type: ignore[no-untyped-def]
     a_corners, a_circle, b_corners, b_circle, first_turns, first_points, last_turns, last_points,
     directions, less, low,

@@ -20,12 +20,11 @@ from numba.core import event
 from numba.extending import intrinsic
 
 from coverable_arrays import Array
-from coverable_kernels import cfunc
+from coverable_kernels import callback, entry, kernel
 from feasibility.collisions.kernels.measuring import measure
 from feasibility.collisions.kernels.push import push
 from feasibility.collisions.kernels.segments import segment_holds_clear
 from feasibility.collisions.kernels.tables import ADDRESS
-from feasibility.compiled import kernel
 from feasibility.notices import COLLISIONS, compiling_notice
 
 SEGMENT, PUSH, MEASURE = np.int64(0), np.int64(1), np.int64(2)
@@ -46,6 +45,7 @@ def _call(typing: Any, memory: Any, what: Any) -> Any:
     return types.float64(memory, types.int64), generate
 
 
+@kernel
 def _run(memory: Array, what: int) -> float:
     """The C function: the memory is a plain pointer in there."""
     if what == PUSH:
@@ -63,7 +63,7 @@ def _compiled() -> Any:
     signature = types.float64(types.CPointer(types.float64), types.int64)
     whole = _WholeCompilation()
     with compiling_notice(notice=COLLISIONS), event.install_listener("numba:compile", whole):
-        function = cfunc(signature, cache=True, error_model="numpy")(_run)
+        function = callback(signature)(_run)
     whole.end()
     return function
 
@@ -100,7 +100,7 @@ def with_address(memory: Array) -> Array:
     return memory
 
 
-@kernel
+@entry
 def call(memory, what):  # type: ignore[no-untyped-def]
     """Run the clearance on a memory, which must not be empty."""
     return _call(memory, what)  # type: ignore[call-arg]

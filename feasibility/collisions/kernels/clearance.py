@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from coverable_kernels import entry
 from feasibility.collisions import Bodies
 from feasibility.collisions.kernels.calls import MEASURE, PUSH, SEGMENT, call, with_address
 from feasibility.collisions.kernels.packing import packed
@@ -34,7 +35,6 @@ from feasibility.collisions.kernels.tables import (
     row,
     views,
 )
-from feasibility.compiled import kernel
 from robots import Robot
 
 
@@ -55,7 +55,7 @@ def collision_buffer(bodies: Bodies, robot: Robot) -> Array:
     return with_address(memory)
 
 
-@kernel
+@entry
 def segment_clear(buffer, q0, q1):  # type: ignore[no-untyped-def]
     """Is every pair further apart than its clearance all along a straight joint segment?
 
@@ -78,7 +78,7 @@ def segment_clear(buffer, q0, q1):  # type: ignore[no-untyped-def]
     return call(buffer, SEGMENT)
 
 
-@kernel
+@entry
 def clearance_gradient(buffer, q, step, size):  # type: ignore[no-untyped-def]
     """Add a push of at most `size` away from what is within `INFLUENCE` of its clearance.
 
@@ -102,7 +102,7 @@ def clearance_gradient(buffer, q, step, size):  # type: ignore[no-untyped-def]
     return share
 
 
-@kernel
+@entry
 def blamed(buffer):  # type: ignore[no-untyped-def]
     """Which of `Bodies.pairs` the last segment that was not certified failed at; -1 before."""
     return np.int64(buffer[STATE + BLAMED])

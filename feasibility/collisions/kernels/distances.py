@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from coverable_kernels import kernel
 from feasibility.collisions.kernels.inside import inside_tree
 from feasibility.collisions.kernels.link_frames import pose_of, transformed
 from feasibility.collisions.kernels.separation import BEST, MOST_TURNS, remember, separation
@@ -37,7 +38,6 @@ from feasibility.collisions.kernels.tables import (
 )
 from feasibility.collisions.kernels.tree_distances import of_tree
 from feasibility.collisions.kernels.witness import record
-from feasibility.compiled import kernel
 
 
 @kernel

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from coverable_kernels import kernel
 from feasibility.collisions.kernels.tables import (
     AXES,
     FIRST,
@@ -17,7 +18,6 @@ from feasibility.collisions.kernels.tables import (
     RIGHT,
     STACK,
 )
-from feasibility.compiled import kernel
 
 # The ray's direction: no simple fractions, so that no edge of a drawn shape is met but by chance.
 DX, DY, DZ = 0.4361758092437, 0.5814733161593, 0.6868015227371

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from coverable_kernels import kernel
 from feasibility.collisions.kernels.tables import (
     CONFIGURATIONS,
     END_0,
@@ -40,7 +41,6 @@ from feasibility.collisions.kernels.tables import (
     row,
     rows_of,
 )
-from feasibility.compiled import kernel
 
 
 @kernel

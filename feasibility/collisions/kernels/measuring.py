@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from coverable_kernels import kernel
 from feasibility.collisions.kernels.distances import of_item
 from feasibility.collisions.kernels.segments import slot_of_start
 from feasibility.collisions.kernels.tables import (
@@ -18,7 +19,6 @@ from feasibility.collisions.kernels.tables import (
     rows_of,
 )
 from feasibility.collisions.kernels.witness import witness
-from feasibility.compiled import kernel
 
 
 @kernel

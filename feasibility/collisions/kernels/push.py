@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from coverable_kernels import kernel
 from feasibility.collisions.kernels.distances import of_item
 from feasibility.collisions.kernels.link_frames import pose_of
 from feasibility.collisions.kernels.segments import cheap_bound, slot_of_start
@@ -30,7 +31,6 @@ from feasibility.collisions.kernels.tables import (
     rows_of,
 )
 from feasibility.collisions.kernels.witness import NORMAL, ON_SECOND, witness
-from feasibility.compiled import kernel
 
 MOST = 2.0  # times as much as a pair at its clearance may weigh
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from coverable_kernels import kernel
 from feasibility.collisions.kernels.distances import of_item
 from feasibility.collisions.kernels.link_frames import (
     chord_deviation,
@@ -55,7 +56,6 @@ from feasibility.collisions.kernels.tables import (
     row,
     rows_of,
 )
-from feasibility.compiled import kernel
 
 ROUNDING = 1e-8  # m, taken off every bound for what rounding does to poses and levers
 AHEAD = 8.0  # segments of this length that a bound may serve, if it is cheap to have

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from coverable_kernels import kernel
 from feasibility.collisions.kernels.simplex import WEIGHT, WIDTH, reduce
 from feasibility.collisions.kernels.tables import (
     CORNERS,
@@ -28,7 +29,6 @@ from feasibility.collisions.kernels.tables import (
     STATE,
     TRIED,
 )
-from feasibility.compiled import kernel
 
 MOST_TURNS = np.int64(40)
 FEW_TURNS = np.int64(6)  # for a box, which can be opened instead

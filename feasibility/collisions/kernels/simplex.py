@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from coverable_kernels import kernel
 from feasibility.collisions.kernels.tables import SIMPLEX
-from feasibility.compiled import kernel
 
 WEIGHT = 6
 WIDTH = 10  # of a row

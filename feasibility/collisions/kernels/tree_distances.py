@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from coverable_kernels import kernel
 from feasibility.collisions.kernels.link_frames import transformed
 from feasibility.collisions.kernels.separation import (
     BEST,
@@ -36,7 +37,6 @@ from feasibility.collisions.kernels.tables import (
     STATE,
 )
 from feasibility.collisions.kernels.witness import record
-from feasibility.compiled import kernel
 
 OPENED = 6  # nodes that are opened for a bound larger than needed
 SEARCHED = 20  # the same where a nearest triangle is looked for and none is met yet

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from coverable_kernels import kernel
 from feasibility.collisions.kernels.link_frames import pose_of, transformed
 from feasibility.collisions.kernels.separation import BEST, POINTS, TOUCHING, UPPER, support
 from feasibility.collisions.kernels.simplex import WEIGHT, WIDTH
 from feasibility.collisions.kernels.tables import FOUND, INNER, RADIUS, RELATIVE, SIMPLEX
-from feasibility.compiled import kernel
 
 NORMAL, ON_FIRST, ON_SECOND = FOUND + 1, FOUND + 4, FOUND + 7
 

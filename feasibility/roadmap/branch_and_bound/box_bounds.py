@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.compiled import allocating, kernel
+from coverable_kernels import allocating, kernel
 
 
 @kernel

@@ -29,7 +29,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.compiled import kernel
+from coverable_kernels import kernel
 from feasibility.roadmap.branch_and_bound.box_bounds import contract, contract_to_ball, reach_of_box
 from feasibility.roadmap.branch_and_bound.roll_bounds import (
     contract_roll,

@@ -16,7 +16,7 @@ from enum import IntEnum
 import numpy as np
 
 from coverable_arrays import Array
-from feasibility.compiled import allocating, kernel, put
+from coverable_kernels import allocating_entry, kernel, put
 from feasibility.roadmap.branch_and_bound.box_bounds import static_levers
 from feasibility.roadmap.branch_and_bound.box_contraction import THINNEST, shrink
 from feasibility.roadmap.branch_and_bound.boxes import (
@@ -126,7 +126,7 @@ def _push_children(places, boxes, part, weight, n, low, high):  # type: ignore[n
         low[n + axis], high[n + axis] = least, most
 
 
-@allocating
+@allocating_entry
 def branch_and_bound(arrays, work, places, slabs, boxes, most, directions, space, found):  # type: ignore[no-untyped-def]
     """Examine up to `most` boxes; returns the value of a `Ruling`.
 

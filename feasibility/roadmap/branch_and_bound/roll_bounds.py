@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.compiled import kernel
+from coverable_kernels import kernel
 from feasibility.roadmap.branch_and_bound.box_bounds import contract
 from feasibility.roadmap.motions import TURN, level, roll_gradient
 

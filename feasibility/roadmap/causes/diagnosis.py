@@ -21,8 +21,8 @@ from dataclasses import replace
 import numpy as np
 
 from coverable_arrays import Array
+from coverable_kernels import allocating_entry, put
 from feasibility.collisions import Pair
-from feasibility.compiled import allocating, put
 from feasibility.cone import angle_of
 from feasibility.cut_tree import CutTree
 from feasibility.roadmap.branch_and_bound import Ruling
@@ -49,7 +49,7 @@ UNPROVED = "not proved: off its target, within the tolerance, the tool point may
 MOST_DECIMALS = 6
 
 
-@allocating
+@allocating_entry
 def _nearest_point(arrays, work, cell, guesses):  # type: ignore[no-untyped-def]
     """Smallest distance of the tool point from the target, by damped descent from guesses."""
     n = guesses.shape[1]

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable_arrays import Array, Mask
-from feasibility.compiled import kernel
+from coverable_kernels import entry
 from feasibility.roadmap.branch_and_bound import Places, place_at_rest, unturned
 from feasibility.roadmap.cuts.regions import SlabRegion, folded
 from feasibility.roadmap.cuts.statements import Statement
@@ -166,7 +166,7 @@ class Findings:
         return next(proved, None)
 
 
-@kernel
+@entry
 def _project_rows(arrays, work, targets, q, enough, hit):  # type: ignore[no-untyped-def]
     """Project rows of q (k, n), in place, onto the targets (k, 9), until there are enough hits."""
     hits = 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.compiled import kernel
+from coverable_kernels import entry, kernel
 from feasibility.roadmap.motions.arrays import NEAR_COST
 from feasibility.roadmap.motions.roll import frame_rates, level
 
@@ -13,7 +13,7 @@ BESIDE = 0.05
 CENTRE_SHARE = 0.999  # [1] of the tolerance, for self-motions: curves deviate at the centres too
 
 
-@kernel
+@entry
 def stand_still(arrays, work):
     """Let `work.target` be at rest, at a cell's centre or next to it."""
     for part in range(work.derivative_bound.shape[0]):
@@ -25,7 +25,7 @@ def stand_still(arrays, work):
     work.allowance[2] = max(arrays.roll[1] - arrays.roll_lost, 0.0)
 
 
-@kernel
+@entry
 def look_at(arrays, work, cell):
     """Set `work.target` to that of a cell's centre, at rest."""
     for k in range(3):
@@ -36,7 +36,7 @@ def look_at(arrays, work, cell):
     stand_still(arrays, work)
 
 
-@kernel
+@entry
 def aim(arrays, work, curve, t):
     """Set `work.target` to the target of a curve at t in [0, 1]."""
     first = arrays.first_piece[curve]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.compiled import allocating, kernel
+from coverable_kernels import allocating, kernel
 
 
 @kernel

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.compiled import kernel, put
+from coverable_kernels import entry, kernel, put
 from feasibility.roadmap.motions.linear_steps import least_step
 from feasibility.roadmap.motions.projection import (
     POINT,
@@ -110,7 +110,7 @@ def _weighted_rows(arrays, work, goal, roll_goal):
     return m
 
 
-@kernel
+@entry
 def project_near_cell(arrays, work, cell, q, most):
     """`project_onto_cell`, or failing that, to within the tolerance of the cell's centre."""
     if project_onto_cell(arrays, work, cell, q, most):

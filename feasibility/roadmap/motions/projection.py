@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.compiled import kernel
+from coverable_kernels import entry, kernel
 from feasibility.roadmap.motions.aiming import look_at
 from feasibility.roadmap.motions.arrays import CONE, LIMIT, ROLL, SINGULAR
 from feasibility.roadmap.motions.linear_steps import least_step
@@ -288,7 +288,7 @@ def project(arrays, work, q, slack, before, most):
     return inside(arrays, work)
 
 
-@kernel
+@entry
 def project_onto_cell(arrays, work, cell, q, most):
     """Project a guess q (in place) onto the constraints over a cell's centre; True on success."""
     look_at(arrays, work, cell)

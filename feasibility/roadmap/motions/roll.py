@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.compiled import kernel
+from coverable_kernels import kernel
 
 TURN = 2.0 * np.pi
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from coverable_arrays import Array
+from coverable_kernels import entry, kernel, put
 from feasibility.collisions import clearance_gradient
-from feasibility.compiled import kernel, put
 from feasibility.roadmap.motions.aiming import look_at
 from feasibility.roadmap.motions.arrays import SearchArrays
 from feasibility.roadmap.motions.off_target import STEPS_FROM_NEAR, project_off_target
@@ -39,7 +39,7 @@ CONNECT_STEPS = 60  # of one self-motion towards a goal
 SETTLE_STEPS = np.int64(40)  # of `settle`
 
 
-@kernel
+@entry
 def effects(arrays, work, slot, out):  # type: ignore[no-untyped-def]
     """How much a radian (or metre) of each joint moves the tool: lever over scale, plus sine.
 
@@ -129,7 +129,7 @@ def connect(arrays: SearchArrays, work: Work, q: Array, goal: Array) -> tuple[Ar
     return waypoints[:rows].copy(), bool(reached)
 
 
-@kernel
+@entry
 def _connect(arrays, work, q, goal, waypoints):  # type: ignore[no-untyped-def]
     """Write the waypoints of `connect` and move q along; returns their number, and `reached`."""
     n = q.shape[0]
@@ -183,7 +183,7 @@ def _connect(arrays, work, q, goal, waypoints):  # type: ignore[no-untyped-def]
     return written, False
 
 
-@kernel
+@entry
 def settle(arrays, work, cell, q, most):  # type: ignore[no-untyped-def]
     """Self-motion over a cell's centre (q in place) away from limits and boundaries."""
     n = q.shape[0]
@@ -232,7 +232,7 @@ def margin_shares(arrays: SearchArrays, work: Work, cell: int, guesses: Array) -
     return margins
 
 
-@kernel
+@entry
 def _measure_margins(arrays, work, cell, guesses, margins):  # type: ignore[no-untyped-def]
     """Write the margins of those guesses that can be projected."""
     for g in range(guesses.shape[0]):

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from coverable_arrays import Array
-from feasibility.compiled import kernel, put
+from coverable_kernels import entry, kernel, put
 from feasibility.roadmap.motions.aiming import aim, bounds_between
 from feasibility.roadmap.motions.arrays import FOLD, LONG, SINGULAR, STOPPED, SearchArrays
 from feasibility.roadmap.motions.off_target import STEPS_FROM_NEAR, project_off_target
@@ -100,7 +100,7 @@ def _starts_inside(arrays, work):
     return inside and (abs(work.error[0, 2]) <= work.allowance[2] or not arrays.roll[1] < np.inf)
 
 
-@kernel
+@entry
 def _track(arrays, work, curve, begin, end, q, goal, has_goal, waypoints):
     """Write the waypoints of `track` and move q along; returns their number, or STOPPED."""
     n = q.shape[0]

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
-from feasibility.compiled import kernel
+from coverable_kernels import entry, kernel
 from feasibility.roadmap.motions.roll import roll_off_middle
 from robots import frames
 
@@ -119,7 +119,7 @@ def measure(arrays, work, slot):  # type: ignore[no-untyped-def]
         )
 
 
-@kernel
+@entry
 def place(arrays, work, slot, q):  # type: ignore[no-untyped-def]
     """Evaluate the arm at q into a slot, and its errors against `work.target`."""
     frames(

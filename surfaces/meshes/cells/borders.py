@@ -9,12 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable_arrays import Array, Ints, Mask, Protected
-from coverable_kernels import njit
+from coverable_kernels import allocating, allocating_entry
 from surfaces.adjacency import Neighbours
 from surfaces.meshes.closest_point import on_triangle
 from surfaces.meshes.triangle_mesh import edge_partners, sum_by
-
-kernel = njit(cache=True, error_model="numpy")
 
 _INSIDE = 0.25  # of sqrt(area): as far from the border as this is well inside (a disc has 0.56)
 _DEEP = 0.8  # of the greatest distance to the border: as good as the greatest
@@ -83,7 +81,7 @@ def centre_points(mesh: LabelledFaces, areas: Array) -> FacePoints:
     return FacePoints(points, chosen, weights)
 
 
-@kernel
+@allocating
 def _to_segment(p, a, b):  # type: ignore[no-untyped-def]
     """The squared distance of p from the segment a-b, m^2."""
     along, length = 0.0, 0.0
@@ -97,7 +95,7 @@ def _to_segment(p, a, b):  # type: ignore[no-untyped-def]
     return square
 
 
-@kernel
+@allocating
 def _depth(p, corners, border, members):  # type: ignore[no-untyped-def]
     """The squared distance of p from the border of a cell; inf where it has none."""
     least = math.inf
@@ -109,7 +107,7 @@ def _depth(p, corners, border, members):  # type: ignore[no-untyped-def]
     return least
 
 
-@kernel
+@allocating_entry
 def _choose(corners, middles, border, order, indptr, centroids, total, chosen, weights):  # type: ignore[no-untyped-def]
     """Write each cell's face and the place on it; see `centre_points`."""
     here = np.empty(3)
@@ -191,7 +189,7 @@ def outlines(mesh: LabelledFaces) -> Outlines:
     return Outlines(mesh.vertices[chain], chain, starts, cells)
 
 
-@kernel
+@allocating_entry
 def _loops(faces, partner, labels, border, order, total):  # type: ignore[no-untyped-def]
     """Follow each border edge to the next one of the same cell, turning about their vertex."""
     chain = np.empty(total, dtype=np.int64)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_kernels import njit
+from coverable_kernels import allocating, allocating_entry, kernel
 from surfaces.meshes.closest_point import on_triangle
 from surfaces.meshes.face_tree import nearest_face
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def _nearest_of(corners, balls, radii, some, x, y, z, weights, found):  # type: ignore[no-untyped-def]
     """The face nearest to a point among `some`; -1 where there are none.
 
@@ -36,7 +36,7 @@ def _nearest_of(corners, balls, radii, some, x, y, z, weights, found):  # type: 
     return best
 
 
-@njit(cache=True, error_model="numpy")
+@allocating
 def _faces_of(cells, members, indptr):  # type: ignore[no-untyped-def]
     """All faces of some cells."""
     total = 0
@@ -51,7 +51,7 @@ def _faces_of(cells, members, indptr):  # type: ignore[no-untyped-def]
     return some
 
 
-@njit(cache=True, error_model="numpy")
+@allocating
 def _around(pair, near, near_indptr):  # type: ignore[no-untyped-def]
     """Two cells, and those that touch both: the straight line may cut their corners."""
     cells = np.empty(2 + near_indptr[pair[0] + 1] - near_indptr[pair[0]], dtype=np.int64)
@@ -65,7 +65,7 @@ def _around(pair, near, near_indptr):  # type: ignore[no-untyped-def]
     return cells[:count]
 
 
-@njit(cache=True, error_model="numpy")
+@allocating_entry
 def put_on_cells(  # type: ignore[no-untyped-def]
     tree, corners, balls, radii, labels, members, indptr, near, near_indptr, pairs, points, faces,
     weights,

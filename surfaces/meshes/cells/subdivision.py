@@ -13,11 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
-from coverable_kernels import njit
+from coverable_kernels import allocating, allocating_entry
 from surfaces.meshes.triangle_mesh import areas_of, half_edge_ends, half_edges
 from surfaces.surface import SurfaceError
-
-kernel = njit(cache=True, error_model="numpy")
 
 MOST_FACES = 4_000_000
 LONGEST = 8.0  # edge^2 / most_area; 2.3 in an equilateral triangle, 4 in a halved square
@@ -119,7 +117,7 @@ def cut_across(vertices: Array, faces: Ints, edges: EdgeLengths, count: Ints) ->
     return Subdivision(points, new_faces, np.repeat(np.arange(len(faces)), parts))
 
 
-@kernel
+@allocating
 def _place(from_vertex, to_vertex, first, count, k):  # type: ignore[no-untyped-def]
     """Vertex k of 0..count on the edge between two vertices; inner ones run from the lower end."""
     if k == 0:
@@ -129,7 +127,7 @@ def _place(from_vertex, to_vertex, first, count, k):  # type: ignore[no-untyped-
     return first + (k if from_vertex < to_vertex else count - k) - 1
 
 
-@kernel
+@allocating
 def _apart(points, i, j):  # type: ignore[no-untyped-def]
     """The squared distance of two points."""
     total = 0.0
@@ -138,7 +136,7 @@ def _apart(points, i, j):  # type: ignore[no-untyped-def]
     return total
 
 
-@kernel
+@allocating_entry
 def _ladders(points, faces, of_face, longest, first, count, out):  # type: ignore[no-untyped-def]
     """Write the parts of all faces; each next rung is the shorter of the two there could be."""
     written = 0

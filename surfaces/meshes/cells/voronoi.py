@@ -13,9 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable_arrays import Array, Ints
-from coverable_kernels import njit
-
-kernel = njit(cache=True, error_model="numpy")
+from coverable_kernels import allocating, allocating_entry
 
 DETOUR = 1.35
 """Over flat ground, steps from face to face are at most about this much longer than the straight
@@ -33,7 +31,7 @@ _WIDTH = np.int64(13)  # bits of a bucket: 1/91 of a cell, less than a face
 _BUCKETS = np.int64(91 * 64)  # what is farther than 60 cells waits in the last one
 
 
-@kernel
+@allocating_entry
 def units(distance):  # type: ignore[no-untyped-def]
     """A distance (in lengths of a cell) as a whole number."""
     return np.int64(math.floor(distance * _FINE + 0.347))
@@ -44,7 +42,7 @@ def whole_steps(step: Array) -> Ints:
     return np.maximum(np.floor(step * _FINE + 0.347).astype(np.int64), 1)
 
 
-@kernel
+@allocating
 def push(heap, size, entry):  # type: ignore[no-untyped-def]
     """Put an entry on a binary heap of `size` entries, least first."""
     k = size
@@ -58,7 +56,7 @@ def push(heap, size, entry):  # type: ignore[no-untyped-def]
     return size + 1
 
 
-@kernel
+@allocating
 def pop(heap, size):  # type: ignore[no-untyped-def]
     """Take the least entry; returns it and the new size."""
     least = heap[0]
@@ -79,7 +77,7 @@ def pop(heap, size):  # type: ignore[no-untyped-def]
     return least, size
 
 
-@kernel
+@allocating
 def _settle(across, step, distance, heap, size):  # type: ignore[no-untyped-def]
     """Lower distances (whole numbers) to those over the faces on the heap, where these are less."""
     while size > 0:
@@ -142,7 +140,7 @@ def far_seeds(across: Ints, step: Ints, piece: Ints, quota: Ints, border: int) -
     return state.seeds
 
 
-@kernel
+@allocating_entry
 def _begin_seeds(across, step, border, distance, heap, queue):  # type: ignore[no-untyped-def]
     """Fill in the distances from the border, and the queue; returns its size."""
     count = across.shape[0]
@@ -159,7 +157,7 @@ def _begin_seeds(across, step, border, distance, heap, queue):  # type: ignore[n
     return size
 
 
-@kernel
+@allocating_entry
 def _more_seeds(  # type: ignore[no-untyped-def]
     across, step, piece, distance, heap, queue, missing, end, seeds, size, most
 ):
@@ -183,7 +181,7 @@ def _more_seeds(  # type: ignore[no-untyped-def]
     return size
 
 
-@kernel
+@allocating_entry
 def flood(across, step, centre, seeds, anchors, offsets, labels):  # type: ignore[no-untyped-def]
     """Every face gets the label of the seed that reaches it first; lengths in cells.
 
@@ -244,7 +242,7 @@ def flood(across, step, centre, seeds, anchors, offsets, labels):  # type: ignor
                 size += 1
 
 
-@kernel
+@allocating_entry
 def recentre(centre, normal, area, labels, seeds, anchors):  # type: ignore[no-untyped-def]
     """Move each seed to the face nearest to its cell's centroid, and its anchor to the centroid.
 
@@ -285,7 +283,7 @@ def recentre(centre, normal, area, labels, seeds, anchors):  # type: ignore[no-u
             anchors[n, k] += height * normal[face, k]
 
 
-@kernel
+@allocating_entry
 def smooth(across, edge, area, target, labels):  # type: ignore[no-untyped-def]
     """Give away teeth: faces on a border that are held by one edge only, and a short one.
 
@@ -318,7 +316,7 @@ def smooth(across, edge, area, target, labels):  # type: ignore[no-untyped-def]
             moved = True
 
 
-@kernel
+@allocating
 def _tooth_to(across, edge, labels, face):  # type: ignore[no-untyped-def]
     """The cell that a face should go to: the one it shares most border with; or -1."""
     own, held, most = labels[face], 0, np.int64(0)
