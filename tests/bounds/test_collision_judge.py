@@ -313,6 +313,7 @@ def test_what_cannot_be_judged_is_an_error_with_words():
         collision_replay(ELBOW, good, np.zeros((3, 3)))
     with pytest.raises(ArgumentError, match="deviations"):
         collision_replay(ELBOW, good, np.zeros((3, 2)), np.zeros((3, 2)))
+    assert judged(ELBOW, bodies_of(LINKS), [0.0, 0.0], [0.0, 0.0]).min_clearance is None
     with pytest.raises(ArgumentError, match="shelf"):
         judged(ELBOW, replace(good, pairs=(pair("link2", "shelf"),)), [0.0, 0.0])
     gone = Triangles(np.zeros((3, 3)), np.array([[0, 1, 7]]), False)

@@ -30,7 +30,7 @@ from surfaces import plane
 
 PLATE = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0, 0, 0.3)).cells(3, 3)
 TASK = Task(standoff=0.02, cone_deg=30)
-UR5, PUMA = load_robot("ur5"), load_robot("puma560")
+UR5 = load_robot("ur5")
 
 
 def segments(robot, count, seed):
@@ -74,8 +74,6 @@ CHAINS = {
     "elbow": [joint(1), joint(2, xyz=(1, 0, 0)), joint(3, axis=(1, 0, 0))],
     "slide": [joint(1), joint(2, "prismatic", axis=(1, 0, 0)), joint(3, axis=(1, 0, 0))],
     "wrist": [joint(1), joint(2, axis=(0, 1, 0)), joint(3, axis=(1, 0, 0))],
-    "out": [joint(1, axis=(0, 1, 0)), joint(2, xyz=(1, 0, 0), axis=(0, 1, 0)),
-            joint(3, "prismatic", axis=(1, 0, 0))],
 }  # fmt: skip
 
 

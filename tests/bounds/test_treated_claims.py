@@ -18,7 +18,6 @@ from surfaces import plane, poses
 
 UR5 = load_robot("ur5")
 CELLS = plane((0.0, 0.3), (0.0, 0.2), "outside", (0.4, -0.1, 0.2)).cells(3, 2)
-TASK = Task(standoff=0.02, cone_deg=20)
 WIDE = {"standoff": 0.02, "cone_deg": 20, "footprint": 0.08}
 
 

@@ -12,7 +12,6 @@ from specimens import hood, quarter_turn, turned
 
 from surfaces import SurfaceError, bspline, cone, cylinder, piecewise, plane, sphere
 
-PLATE = plane((0.0, 0.2), (0.0, 0.2))
 # A patch, the patches that it is cut into, and how its cells are cut.
 WHOLE = {
     "hood": (bspline(hood()), [bspline(hood(), u=(0, 0.5)), bspline(hood(), u=(0.5, 1))], (6, 7)),
@@ -32,12 +31,6 @@ WHOLE = {
         [plane(u, v) for u in ((0, 0.5), (0.5, 1)) for v in ((0, 0.5), (0.5, 1))], (6, 8),
     ),
 }  # fmt: skip
-
-
-def hinged(*angles_deg, **more):
-    """A plate and others hinged to its side at x = 0, turned about y by angles."""
-    plates = [plane((-0.2, 0.0), (0.0, 0.2), rpy_deg=(0.0, angle, 0.0)) for angle in angles_deg]
-    return piecewise([PLATE, *plates], **more)
 
 
 def strip(half_turns, count=6):

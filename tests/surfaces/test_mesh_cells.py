@@ -40,10 +40,6 @@ def areas_of(vertices, faces):
     return np.linalg.norm(vectors_of(vertices, faces), axis=1)
 
 
-def angle(a, b):
-    return np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), (a * b).sum(axis=-1))
-
-
 def parts_of(pairs, count):
     graph = nx.empty_graph(count)
     graph.add_edges_from(pairs.tolist())
@@ -131,7 +127,7 @@ def to_segments(points, starts, ends):
     return np.linalg.norm(points[:, None] - nearest, axis=2).min(axis=1)
 
 
-def test_centres_are_nearest_to_the_centroid_or_deep_inside(cut):
+def test_centres_are_deep_inside_their_cells(cut):
     found, weights = cut.figures, cut.figures.weights
     np.testing.assert_array_equal(cut.labels[found.faces], np.arange(N))
     assert weights.min() >= -1e-12
@@ -143,22 +139,14 @@ def test_centres_are_nearest_to_the_centroid_or_deep_inside(cut):
     np.testing.assert_allclose(found.centres, points, atol=1e-13)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     np.testing.assert_allclose(found.normals, normals, atol=1e-12)
-    shares = np.random.default_rng(1).dirichlet([0.5, 0.5, 0.5], 200)
-    usual = 0
     for cell in range(N):
-        member = cut.labels == cell
-        corners, area = cut.vertices[cut.faces[member]], cut.areas[member]
-        centroid = np.average(corners.mean(axis=1), axis=0, weights=area)
-        least = np.linalg.norm(shares @ corners - centroid, axis=2).min()
+        corners = cut.vertices[cut.faces[cut.labels == cell]]
         ends = np.array([edge for edge, sides in cut.border.items() if sides[0] == cell])
         segments = cut.vertices[ends[:, 0]], cut.vertices[ends[:, 1]]
         depth = to_segments(found.centres[None, cell], *segments)[0]
         deepest = to_segments(corners.mean(axis=1), *segments).max()
-        assert depth >= min(0.5 * deepest, 0.25 * math.sqrt(area.sum())) - 1e-12
-        near = np.linalg.norm(found.centres[cell] - centroid) <= least + 1e-12
-        usual += near
-        assert near or depth >= 0.8 * deepest - 1e-12
-    assert usual >= 55
+        area = cut.figures.areas[cell]
+        assert depth >= min(0.5 * deepest, 0.25 * math.sqrt(area)) - 1e-12
 
 
 def test_borders_are_shared_and_outlines_close(cut):

@@ -55,23 +55,6 @@ def test_everything_at_once_gives_the_surface_back():
     assert len(notes_of(mesh)) == 5
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(8, all=100))
-def test_turning_faces_over_at_random_is_undone(seed):
-    """Up to the whole; the larger area decides, in each piece by itself."""
-    rng = np.random.default_rng(seed)
-    vertices, faces = w.stacked(UNCLEAN["wavy"], (V + 1.0, F))
-    true = clean(vertices, faces)
-    turned = rng.random(len(faces)) < rng.random()
-    mesh = clean(vertices, np.where(turned[:, None], faces[:, ::-1], faces))
-    w.assert_clean(mesh)
-    assert np.array_equal(np.sort(mesh.faces, axis=1), np.sort(faces, axis=1))
-    for piece in (true.pieces == 0, true.pieces == 1):
-        flipped = true.face_areas[piece & turned].sum() > true.face_areas[piece].sum() / 2
-        expected = true.face_normals[piece] * (-1 if flipped else 1)
-        assert np.abs(mesh.face_normals[piece] - expected).max() < 1e-12
-
-
 @pytest.mark.parametrize("dimension", [1, 2, 3])
 def test_a_crowd_of_vertices_is_thinned_and_none_moves_far(dimension):
     """Chains in which each vertex is close to the next do not shrink to a point."""

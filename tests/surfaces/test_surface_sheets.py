@@ -96,9 +96,6 @@ def test_triangles_are_few_and_stay_near():
     height = np.abs(np.linalg.norm(sheet.triangles.reshape(-1, 3), axis=1) - 1.0)
     assert height.max() <= sheet.deviation <= 2e-4  # so clearances are no larger than they must be
     assert len(sheet.triangles) < 6_000
-    coarse = sheet_of(sphere(1.0, (0, 180), (0, 360)), 1e-6, most=2_000)
-    assert len(coarse.triangles) <= 2_000
-    assert 1e-6 < coarse.deviation < 0.01
     wall = plane((0.0, 0.6), (0.0, 0.4), **POSE)
     flat = sheet_of(wall)
     assert flat.triangles.shape == (2, 3, 3)
