@@ -156,7 +156,8 @@ class Grower:
         roadmap = self.roadmap
         former = roadmap.blocked.get(cell)
         if former is None or roadmap.size[own] >= roadmap.size[roadmap.root(former.component)]:
-            roadmap.blocked[cell] = Blocked(*self.work.stop_reason.tolist(), own)
+            code, joint = self.work.stop_reason.tolist()
+            roadmap.blocked[cell] = Blocked(code, joint, own)
 
     def explore_self_motions(self, cell: int, guesses: Array) -> None:
         """Explore the self-motion manifold over one cell, and join the components it connects.

@@ -148,7 +148,8 @@ class Roadmap:
 
         Near means that a motion there would move the tool little, see `self_motion.effects`.
         """
-        nodes = [node for node in reversed(self.over[cell]) if self.root_of(node) not in passed]
+        root, made = self.root, self.component
+        nodes = [node for node in reversed(self.over[cell]) if root(made[node]) not in passed]
         if len(nodes) < 2:
             return nodes[0] if nodes else None
         off = (np.array([self.q[x] for x in nodes]) - q) * [self.effect[x] for x in nodes]

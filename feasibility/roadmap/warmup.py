@@ -77,7 +77,7 @@ def _explore_two_cells() -> None:
 
 
 def _look_for_reasons() -> None:
-    """Rule cells out, explore their self-motions, cut, and say why they are missed."""
+    """Rule cells out, cut, and say why they are missed."""
     from feasibility.roadmap.branch_and_bound import root_box
     from feasibility.roadmap.causes import diagnose
     from feasibility.roadmap.exploration import Exploration
@@ -88,7 +88,6 @@ def _look_for_reasons() -> None:
     robot, cells, task = _two_cells((0.7, 0.72))
     exploration = Exploration(robot, cells, arrays_of(robot, cells, task), 0)
     explore(exploration)
-    exploration.explore_self_motions(0)
     exploration.rule(0, root_box(exploration.arrays), 1)
     Proving(exploration, task).attempt(1)
     diagnose(exploration, 0)
