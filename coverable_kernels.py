@@ -146,8 +146,8 @@ def _kept(compiling: Callable[..., Any], function: Function) -> Any:
             config.CACHE_LOCATOR_CLASSES = chosen
 
 
-_COUNTED: dict[str, Any] = {"error_model": "numpy", "_nrt": True}
-_UNCOUNTED: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
+_COUNTED: dict[str, Any] = {"error_model": "numpy", "_nrt": True, "no_cfunc_wrapper": True}
+_UNCOUNTED: dict[str, Any] = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
 Decorator = Callable[[Function], Any]
 kernel: Decorator = register_jitable(**_UNCOUNTED)
 allocating: Decorator = register_jitable(**_COUNTED)

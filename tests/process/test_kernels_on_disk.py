@@ -188,8 +188,10 @@ def named(path: Path, compiled: bool) -> Iterator[tuple[Path, str]]:
                 known[a.asname or a.name] = origin(str(node.module), a.name), a.name
     for part in tree.body:
         if bool(made_by(part)) == compiled:
-            for node in ast.walk(part):
-                if isinstance(node, ast.Name) and node.id in known:
+            nodes = list(ast.walk(part))
+            called_back = [a for n in nodes if "callback(" in ast.unparse(n)[:9] for a in n.args]
+            for node in nodes:
+                if isinstance(node, ast.Name) and node.id in known and node not in called_back:
                     yield known[node.id]
 
 

@@ -298,6 +298,23 @@ def test_a_tool_that_turns_all_around_does_not_keep_its_roll(turn):
     assert held.holds == (turn < 0.17)
 
 
+@pytest.mark.parametrize("size", [1e-3, 0.01, 0.05])
+def test_two_joints_across_the_tool_axis_turn_the_roll_as_fast_as_is_said(size):
+    """Joints about x and y under a tool axis along z: the second derivative of roll is d1 d2."""
+    robot = robot_of([joint(1, axis=(1, 0, 0)), joint(2, axis=(0, 1, 0)), joint(3, "fixed")])
+    task = Task(0.0, 90, roll_deg=(-10, 10), roll_reference=(1, 0, 0))
+    q0, q1, h = np.zeros(2), size * np.array([1.0, 2.0]), 1e-2
+    s = np.concatenate([np.linspace(h, 1.0 - h, 50) + way * h for way in (-1, 0, 1)])
+    q = q0 + s[:, None] * (q1 - q0)
+    axes, b = tools(robot, q)[1], np.tile([0.0, 0.0, 1.0], (len(q), 1))
+    psi = roll_of(references(robot, q), axes, np.tile([1.0, 0.0, 0.0], (len(q), 1)), b)
+    before, at, behind = psi.reshape(3, -1)
+    second = np.abs(before - 2.0 * at + behind) / h**2
+    chord = np.linalg.norm(axes - b, axis=1).max()
+    _, most = Motions(robot, None, task).roll_rates(q0, q1, (0.0, 0.0, 0.0), chord)
+    holds(most * (1.0 + 1e-6) + 1e-9, second.max(), 0.7)
+
+
 @pytest.mark.parametrize("name", ["puma560", "ur5", "panda", "random"])
 def test_second_derivatives_bound_the_sag_of_roll(name):
     """Steps up to 0.6 rad a joint, tilts to 60 deg, frames at rest or turning."""

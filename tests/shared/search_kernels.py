@@ -29,8 +29,9 @@ from feasibility.roadmap import (
 from feasibility.roadmap.branch_and_bound import box_bounds, box_contraction
 from feasibility.roadmap.branch_and_bound.boxes import Slabs, box_work
 from feasibility.roadmap.branch_and_bound.branching import DIRECTIONS
-from feasibility.roadmap.motions import aiming, project_near_cell, projection, segment_bound
+from feasibility.roadmap.motions import aiming, project_near_cell, segment_bound, segment_holds
 from feasibility.roadmap.motions.aiming import aim, stand_still
+from feasibility.roadmap.motions.projection import project
 from feasibility.roadmap.motions.working_memory import place
 from robots import Robot
 from surfaces import Cells, plane
@@ -38,10 +39,9 @@ from surfaces import Cells, plane
 Floats = NDArray[np.float64]
 
 # Only other kernels call these in the search.
-bounds_between, project = entry(aiming.bounds_between), entry(projection.project)
+bounds_between = entry(aiming.bounds_between)
 second_derivatives = entry(segment_bound.second_derivatives)
 roll_derivatives = entry(segment_bound.roll_derivatives)
-segment_holds = entry(segment_bound.segment_holds)
 static_levers, shrink = entry(box_bounds.static_levers), entry(box_contraction.shrink)
 
 

@@ -39,7 +39,7 @@ WEIGHT = 10.0  # [1] of the rows of cone and roll beside those of the tool point
 CLOSE = 0.98  # [1] of what they may use: from there on they are rows of a step
 
 
-@kernel
+@entry
 def project_off_target(arrays, work, q, most):
     """Bring the tool point as near to `work.target` as limits and cone allow, from q (in place).
 
