@@ -31,6 +31,7 @@ from numba.core import config
 from numba.core.caching import InTreeCacheLocator, UserProvidedCacheLocator, UserWideCacheLocator
 from numba.extending import register_jitable
 
+HOOK = "CACHE_LOCATOR_CLASSES"  # numba's setting of where compiled functions are kept
 ROOT = Path(__file__).resolve().parent
 CODE = (
     "coverable_kernels.py",
@@ -134,16 +135,16 @@ class InHome(_SafeFolder, UserWideCacheLocator):
 def _kept(compiling: Callable[..., Any], function: Function) -> Any:
     """Let numba compile a function, and keep it in a safe place, unless the user chose others."""
     with _turn:
-        chosen = config.CACHE_LOCATOR_CLASSES
+        chosen: str = getattr(config, HOOK)
         ours = ",".join(f"{__name__}.{place.__name__}" for place in (Chosen, BesideCode, InHome))
-        config.CACHE_LOCATOR_CLASSES = chosen or ours
+        setattr(config, HOOK, chosen or ours)
         try:
             return compiling(cache=True)(function)
         except RuntimeError:  # there is no such place
             KEPT_NOWHERE.add(function.__module__)
             return compiling()(function)
         finally:
-            config.CACHE_LOCATOR_CLASSES = chosen
+            setattr(config, HOOK, chosen)
 
 
 _COUNTED: dict[str, Any] = {"error_model": "numpy", "_nrt": True, "no_cfunc_wrapper": True}
