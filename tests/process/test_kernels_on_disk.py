@@ -189,7 +189,8 @@ def named(path: Path, compiled: bool) -> Iterator[tuple[Path, str]]:
     for part in tree.body:
         if bool(made_by(part)) == compiled:
             nodes = list(ast.walk(part))
-            called_back = [a for n in nodes if "callback(" in ast.unparse(n)[:9] for a in n.args]
+            calls = [node for node in nodes if isinstance(node, ast.Call)]
+            called_back = [a for c in calls if "callback(" in ast.unparse(c.func) for a in c.args]
             for node in nodes:
                 if isinstance(node, ast.Name) and node.id in known and node not in called_back:
                     yield known[node.id]
