@@ -14,7 +14,6 @@ import shutil
 import subprocess
 import sys
 import tomllib
-from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -24,10 +23,7 @@ import pytest
 from PIL import Image
 
 import coverable
-import feasibility
-import robots
-import surfaces
-from feasibility import Search, check
+from feasibility import check
 from feasibility.cases import Case, builtin_cases
 from feasibility.cli.main import main
 
@@ -131,34 +127,19 @@ def table_of_cases() -> dict[str, dict[str, str]]:
     return {row[0]: dict(zip(head, row, strict=True)) for row in body}
 
 
-def test_table_has_the_built_in_cases() -> None:
-    assert [f"paper/{name}" for name in table_of_cases()] == list(builtin_cases())
-
-
-@pytest.mark.parametrize("name", table_of_cases())
+@pytest.mark.parametrize("name", builtin_cases())
 def test_complete_columns_of_the_table(name: str) -> None:
-    row = table_of_cases()[name]
-    verdict = check(*builtin_cases()[f"paper/{name}"].build())
+    row = table_of_cases()[name.removeprefix("paper/")]
+    verdict = check(*builtin_cases()[name].build())
     assert row["complete"].strip("*") == str(verdict.answer)
     assert row["evidence"] == str(verdict.evidence)
     assert int(row["covered"]) == verdict.n_covered
-    assert (verdict.n_edges == 305) is verdict.feasible
     # How much work it is differs a little from machine to machine.
-    assert int(row["evaluations"].replace(",", "")) == pytest.approx(
-        verdict.statistics["fk"], rel=0.5
-    )
+    work = int(row["evaluations"].replace(",", ""))
+    assert work == pytest.approx(verdict.statistics["fk"], rel=0.5)
     # Bold is where the paper sees no connected graph and a motion exists.
     missed = verdict.feasible and row["the paper says"] != "connected"
     assert row["complete"].startswith("**") is missed
-
-
-@pytest.mark.parametrize("name", ["4a", "4d", "5b"])
-def test_greedy_column_of_the_table(name: str) -> None:
-    """The quick ones; `make bench` prints them all."""
-    robot, cells, task, _ = builtin_cases()[f"paper/{name}"].build()
-    verdict = check(robot, cells, task, Search(method="greedy", moves="all", step_deg=0.5))
-    promised = table_of_cases()[name]["greedy, all moves, 0.5°"]
-    assert promised == f"{verdict.n_covered} / {verdict.n_edges}"
 
 
 def test_contributing_names_every_dependency() -> None:
@@ -184,15 +165,17 @@ def test_pages_and_notebooks_use_the_front_door_alone() -> None:
         sources[path.name] = "\n".join(
             "".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"
         )
+    inside = re.compile(r"^\s*(from|import) (robots|surfaces|feasibility)\b", re.M)
     for name, source in sources.items():
-        assert not re.search(r"^\s*(from|import) (robots|surfaces|feasibility)\b", source, re.M), (
-            name
-        )
+        assert not inside.search(source), name
         assert "from coverable import" in source, name
 
 
 def test_the_front_door_is_true() -> None:
-    """Each name is there, what type checkers see is what there is, and nothing else is shown."""
+    """Each name is there, what type checkers see is what there is, and nothing else is shown.
+
+    One `except coverable.CoverableError` is enough for all of its errors.
+    """
     tree = ast.parse((ROOT / "coverable.py").read_text("utf-8"))
     seen = {
         name.asname or name.name
@@ -200,45 +183,13 @@ def test_the_front_door_is_true() -> None:
         for name in node.names if str(node.module).split(".")[0] in (*PACKAGES, "coverable_errors")
     }  # fmt: skip
     assert sorted(seen | {"__version__"}) == coverable.__all__ == dir(coverable)
-    for name in coverable.__all__:
-        assert getattr(coverable, name) is not None, name
-    for package in (robots, surfaces, feasibility):
+    assert None not in [getattr(coverable, name) for name in coverable.__all__]
+    for package in map(import_module, coverable._ROOMS):
         assert dir(package) == sorted(package.__all__)
-        assert not {"Any", "TYPE_CHECKING"} & set(dir(package))
-    assert "check" in dir(feasibility)
-
-
-def test_a_public_name_means_one_thing() -> None:
-    """Where two rooms hand on the same name, it is the same object."""
-    rooms = [import_module(room) for room in coverable._ROOMS]
-    for name in sorted(set(coverable.__all__) - set(coverable._ELSEWHERE) - {"__version__"}):
-        found = [getattr(room, name) for room in rooms if name in room.__all__]
-        assert all(one is found[0] for one in found), name
-
-
-def test_one_except_is_enough(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever is wrong with an input, `coverable.CoverableError` catches it and says what."""
-    monkeypatch.chdir(tmp_path)
-    Path("other.txt").write_text("of another kind")
-    calls = [
-        lambda: coverable.Task(-1.0, 45.0),
-        lambda: coverable.Search(method="lucky"),  # type: ignore[arg-type]
-        lambda: coverable.Collision(clearance=-1.0),
-        lambda: coverable.cylinder(-1.0, (0, 90), (0, 1)),
-        lambda: coverable.load_robot("no such arm"),
-    ]
-    readers = ("load_case", "load_result", "load_robot", "load_study", "load_trajectory", "mesh",
-               "read_grid", "read_net", "read_poses", "step")  # fmt: skip
-    for name in readers:
-        for file in ("missing.toml", "other.txt"):
-            calls.append(partial(getattr(coverable, name), file))
-    for call in calls:
-        with pytest.raises(coverable.CoverableError) as caught:
-            call()
-        assert caught.value.faults
-    for room in map(import_module, coverable._ROOMS):
-        for error in (getattr(room, name) for name in room.__all__ if name.endswith("Error")):
-            assert issubclass(error, coverable.CoverableError)
+        for name in package.__all__:
+            one = getattr(package, name)
+            assert not name.endswith("Error") or issubclass(one, coverable.CoverableError)
+            assert getattr(coverable, name, one) is one or name in coverable._ELSEWHERE
 
 
 def test_make_help_names_every_target() -> None:
@@ -290,12 +241,9 @@ def test_a_wheel_works_outside_the_checkout(tmp_path: Path) -> None:
 def test_citation_and_changelog_name_this_version() -> None:
     citation = (ROOT / "CITATION.cff").read_text("utf-8")
     fields = dict(re.findall(r"^([a-z-]+): *(\S.*)$", citation, re.MULTILINE))
-    assert fields["version"] == PROJECT["version"]
-    assert fields["license"] == PROJECT["license"]
     assert fields["cff-version"] == "1.2.0"
-    assert {"message", "title", "authors"} <= set(re.findall(r"^([a-z-]+):", citation, re.M))
-    changelog = (ROOT / "CHANGELOG.md").read_text("utf-8")
-    assert f"## {PROJECT['version']}" in changelog
+    assert all(fields[name] == PROJECT[name] for name in ("version", "license"))
+    assert f"## {PROJECT['version']}" in (ROOT / "CHANGELOG.md").read_text("utf-8")
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)

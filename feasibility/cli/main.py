@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import gc
 import os
 import sys
 import time
@@ -81,8 +82,7 @@ def main(argv: Sequence[str] | None = None, clock: MakeClock | None = None) -> i
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else 0
     except KeyboardInterrupt:
-        print_err(MESSAGE)
-        return INTERRUPTED
+        pass  # and only when it is let go, what it cut short can be
     except Exception as error:  # noqa: BLE001 - the last line before the user
         if _with_traceback():
             import traceback
@@ -90,6 +90,9 @@ def main(argv: Sequence[str] | None = None, clock: MakeClock | None = None) -> i
             print_err("".join(traceback.format_exception(error)))
         print_err(f"coverable: {_message(error)}")
         return BAD_INPUT
+    gc.collect()  # a store that was cut short is closed: SQLite keeps files beside an open one
+    print_err(MESSAGE)
+    return INTERRUPTED
 
 
 def _too_late(args: argparse.Namespace, late: TooLate) -> int:

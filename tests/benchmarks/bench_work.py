@@ -1,10 +1,7 @@
-"""Meshes, and what is built on a verdict: paths, passes, placements, studies, live pages."""
+"""What is built on a verdict: paths, passes, placements, studies, live pages."""
 
 from __future__ import annotations
 
-import http.client
-import itertools
-import json
 from collections.abc import Callable
 from typing import Any
 
@@ -13,7 +10,6 @@ import pytest
 
 from coverable import (
     Collision,
-    Live,
     Pose,
     Region,
     Task,
@@ -32,7 +28,6 @@ from coverable import (
     run_tasks,
     trajectory,
 )  # fmt: skip
-from surfaces import MeshSurface, Surface
 from surfaces.meshes import TriangleMesh
 
 PAPER = [f"paper/{figure}{letter}" for figure in "45" for letter in "abcdef"]
@@ -43,26 +38,6 @@ count = 200
 "surface.position" = { x = { range = [-0.1, 0.1] }, z = { range = [-0.1, 0.1] } }
 "surface.rpy_deg" = { yaw = { range = [-20, 20] } }
 """
-
-
-def as_mesh(surface: Surface, count: int) -> MeshSurface:
-    """A patch as 2 (count - 1)^2 triangles."""
-    u, v = np.meshgrid(*(np.linspace(*ends, count) for ends in (surface.u_range, surface.v_range)))
-    u, v = u.T.ravel(), v.T.ravel()
-    first = (count * np.arange(count - 1)[:, None] + np.arange(count - 1)).ravel()[:, None]
-    faces = first + np.array([[[0, count, count + 1]], [[0, count + 1, 1]]])
-    faces = faces.reshape(-1, 3)
-    made = TriangleMesh(surface.point(u, v), faces)
-    outward = (made.face_normals * surface.normal(u[faces[:, 0]], v[faces[:, 0]])).sum() > 0.0
-    return mesh(made if outward else TriangleMesh(made.vertices, faces[:, ::-1]), side=surface.side)
-
-
-@pytest.mark.parametrize("count", [None, 20, 70, 316])
-def bench_mesh(count: int | None, measured: Callable[..., Any]) -> None:
-    """4a's dome as a patch and as meshes of up to 200,000 faces: three times the patch at most."""
-    robot, cells, task, _ = load_case("paper/4a").build()
-    cells = cells if count is None else as_mesh(cells.surface, count).cells(90)
-    measured(lambda: check(robot, cells, task))
 
 
 @pytest.mark.parametrize("name", [name for name in PAPER if name[-1] in "abc"])
@@ -121,33 +96,3 @@ def bench_study(workers: int, measured: Callable[..., Any]) -> None:
     tasks = read_study(STUDY).tasks
     with open_workers(workers) as crew:
         measured(lambda: run_tasks(tasks, crew), 2, placements=len)
-
-
-@pytest.mark.parametrize("name", ["paper/4a", "paper/5c", "paper/4d"])
-@pytest.mark.parametrize("final", [False, True], ids=["quick look", "certified"])
-def bench_live(name: str, final: bool, measured: Callable[..., Any]) -> None:
-    """What a live page gets over HTTP, the surface a millimetre further each time; goal 100 ms."""
-    case, numbers = load_case(name), itertools.count(1)
-    with Live(case) as live:
-        host, _, there = live.url.removeprefix("http://").partition("/")
-        connection = http.client.HTTPConnection(host, timeout=1800)
-
-        def post(word: str, asked: dict[str, Any]) -> dict[str, Any]:
-            kind = {"Content-Type": "application/json"}
-            connection.request("POST", f"/{there}{word}", json.dumps(asked), kind)
-            found: dict[str, Any] = json.loads(connection.getresponse().read())
-            return found
-
-        session, z = post("open", {})["session"], 1e3 * case.surface.position[2]
-
-        def ask() -> dict[str, Any]:
-            number = next(numbers)
-            asked = {"session": session, "number": number, "final": final,
-                     "values": {"position": [float(number), 0.0, z]}}  # fmt: skip
-            while (reply := post("ask", asked))["status"] == "deciding":
-                pass
-            answer: dict[str, Any] = reply["answer"]
-            return answer
-
-        measured(ask, 5, covered=lambda answer: answer["covered"])
-        connection.close()

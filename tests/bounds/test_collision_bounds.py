@@ -23,7 +23,6 @@ from feasibility.certification.collisions.pieces import coal_distance
 from feasibility.certification.collisions.plane_search import nearest_of
 from feasibility.certification.collisions.relative_motion import ArmMotion
 from feasibility.certification.collisions.trees import TriangleTree
-from feasibility.collisions import HalfSpace
 from robots import Kinematics, load_robot
 from robots.urdf import Box, Capsule, Cylinder, Sphere
 from surfaces import sphere
@@ -172,14 +171,6 @@ def test_boxes_that_come_nearer_are_as_near_as_at_the_nearer_end(ends):
     motion = ArmMotion(planar_arm([0.1], ["prismatic"]), np.array(ends)[:, None])
     low = FirstLook(motion, CoupledBodies([(Body(0, wall, 0.0), Body(1, box, 0.0))])).low
     assert low[0, 0] == pytest.approx(0.05, abs=1e-9)
-
-
-def test_of_what_has_no_end_nothing_is_told():
-    ground = Body(0, piece_of(HalfSpace(), np.eye(4), at_rest=True), 0.0)
-    thing = Body(3, piece_of(Box((0.1, 0.1, 0.1)), np.eye(4)), 0.0)
-    motion = ArmMotion(UR5, np.array([np.zeros(6), np.full(6, 0.1)]))
-    low = FirstLook(motion, CoupledBodies([(ground, thing)])).low
-    assert (low == -np.inf).all()
 
 
 # planes that part two bodies

@@ -12,26 +12,18 @@ import pytest
 import trimesh
 from bounds import holds
 from gantry import configurations, gantry
+from mesh_patches import roof
 from referee import Facets
 from referee import evenly as dense
 from samples import sampled, spread
 
-from feasibility import Answer, Task, check, verify
+from feasibility import Task, check, verify
 from feasibility.certification import replay_over_surface
 from robots import Kinematics, load_robot
-from surfaces import cylinder, rotation_from_rpy
 from surfaces.meshes import TriangleMesh, mesh
 
 UR5 = load_robot("ur5")
 AT = (0.5, -0.15, 0.3)
-
-
-def roof(angle_deg):
-    """Two plates of 300 mm; the normal turns by the angle at their edge."""
-    half = np.radians(angle_deg) / 2
-    x, z = 0.3 * np.cos(half), -0.3 * np.sin(half)
-    vertices = [[0, 0, 0], [0, 0.3, 0], [x, 0, z], [x, 0.3, z], [-x, 0, z], [-x, 0.3, z]]
-    return TriangleMesh(np.array(vertices), [[0, 2, 3], [0, 3, 1], [0, 1, 5], [0, 5, 4]])
 
 
 def without_bottom(body):
@@ -97,45 +89,3 @@ def test_a_concave_edge_folds_unless_it_is_touched(standoff, answer):
     assert verdict.answer == answer
     said = "concave" in verdict.message or "nearer than the standoff" in verdict.message
     assert said == (answer == "undecided")
-
-
-def test_no_motion_is_certified_through_a_thorn():
-    """The tool point keeps its distance from everything, also from what is thin."""
-    x, y = np.meshgrid(np.linspace(0, 0.4, 41), np.linspace(0, 0.3, 31))
-    points, tip = np.column_stack([x.ravel(), y.ravel()]), np.array([0.0807, 0.22])
-    turns = np.arange(6) * np.pi / 3
-    base = tip + 5e-4 * np.column_stack([np.cos(turns), np.sin(turns)])
-    points = np.concatenate([points[np.linalg.norm(points - tip, axis=1) > 2e-3], base, tip[None]])
-    vertices = np.column_stack([points, np.zeros(len(points))])
-    vertices[-1, 2] = 0.015
-    plate = TriangleMesh(vertices, mesh_patches.flat_faces(points, 1e-12))
-    verdict = check(UR5, mesh(plate, position=(0.35, -0.15, 0.2)).cells(40), Task(0.01, 40))
-    if verdict.feasible:
-        tips, _ = Kinematics(UR5).tools(dense(verdict.witness.q, 8))
-        near = TriangleMesh(vertices, plate.faces[(plate.faces >= len(vertices) - 7).any(axis=1)])
-        assert nearest(near, tips - [0.35, -0.15, 0.2])[1].min() >= 9e-3 - 1e-9
-    else:
-        assert verdict.answer is Answer.UNDECIDED
-
-
-THIN = [
-    ("ur5", 0.0108, 0.194, (10, 70, 80), (0.37, -0.32, 0.18), "outside", 0.0, 2.0),
-    ("panda", 0.0127, 0.318, (-40, 130, 70), (0.44, -0.06, 0.25), "inside", 0.003, 0.5),
-]
-
-
-@pytest.mark.parametrize("case", THIN)
-def test_the_cone_holds_along_a_thin_rod_where_the_tool_point_is(case):
-    """A rod curves across the motion only; a tool point to its side has another normal."""
-    name, radius, length, rpy, position, side, standoff, cone = case
-    rod = cylinder(radius, (-10, 10), (0.0, length), side=side, rpy_deg=rpy, position=position)
-    verdict = check(load_robot(name), rod.cells(1, 3), Task(standoff, cone))
-    if not verdict.feasible:
-        assert verdict.answer is Answer.UNDECIDED
-        return
-    tips, axes = Kinematics(verdict.robot).tools(dense(verdict.witness.q, 8))
-    turn = rotation_from_rpy(*np.radians(rpy))
-    off = (tips - np.asarray(position)) @ turn * [1.0, 1.0, 0.0]
-    approach = -rod.side_sign * (off / np.linalg.norm(off, axis=1, keepdims=True)) @ turn.T
-    tilt = 2.0 * np.arcsin(0.5 * np.linalg.norm(axes - approach, axis=1))
-    assert tilt.max() <= verdict.task.cone + 1e-9

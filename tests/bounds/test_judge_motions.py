@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -20,12 +18,11 @@ from gantry import (
     raster,
     tools_of,
 )  # fmt: skip
-from random_arms import planar_arm, robot_of
+from random_arms import robot_of
 from referee import Facets
 from referee import evenly as dense
-from samples import EVERYTHING, sampled, seeds
 
-from feasibility import Search, Task, check
+from feasibility import Task
 from feasibility.certification import replay, replay_over_surface
 from feasibility.collisions import Obstacle
 from feasibility.verdict import Walk
@@ -206,29 +203,6 @@ def test_a_turn_more_in_one_joint(made):
         assert replay_over_surface(free, made.cells, made.task, q).accepted == (j == 5)
 
 
-def test_one_waypoint_for_one_cell():
-    """A motion of one waypoint covers one cell, and only that cell."""
-    made = raster("ball")
-    row = np.flatnonzero(marks_of(made) == 7)[:1]
-    needed = np.arange(len(made.cells)) == 7
-    for rows in (row, np.repeat(row, 2)):
-        walk = Walk(made.q[rows], np.full(len(rows), 7))
-        outcome = replay(*made[:3], walk, needed)
-        assert outcome.accepted
-        assert outcome.certificate.max_angle < 1e-9
-        assert "never reached" in replay(*made[:3], walk, ~needed).refusal
-
-
-def test_no_cells_and_no_rows():
-    made = raster("plane")
-    none = plane((0.35, 0.55), (-0.1, 0.1), side="outside", position=(0, 0, 0.3)).cells(0, 3)
-    for rows in (made.q[:1], made.q[:0]):
-        assert replay_over_surface(made.robot, none, made.task, rows).accepted
-    alone = replay_over_surface(*made[:3], made.q[:1])
-    assert alone.reached.sum() == 1
-    assert not alone.accepted
-
-
 # -- between rows ---------------------------------------------------------------------------------
 
 
@@ -266,17 +240,6 @@ def test_the_figure_of_one_joint_is_its_sagitta():
     assert outcome.certificate.max_position_error == pytest.approx(sag, rel=0.05)
 
 
-@pytest.mark.parametrize(("beside", "accepted"), [(0.0, True), (9e-4, True), (1.1e-3, False)])
-def test_a_marked_row_is_at_its_centre_within_the_tolerance(beside, accepted):
-    arm = planar_arm(3)
-    q = np.array([[0.0, 0.9, -0.9]])
-    (point,), _ = Kinematics(arm).tools(q)
-    u, v = ((point[k] - 0.1 + by, point[k] + 0.1 + by) for k, by in ((0, beside), (1, 0.0)))
-    cells = plane(u, v, position=(0, 0, point[2]), side="outside").cells(1, 1)
-    outcome = replay(arm, cells, Task(0.0, 180, 1e-3), Walk(q, np.array([0])), np.zeros(1, bool))
-    assert outcome.accepted is accepted
-
-
 @pytest.mark.parametrize("cone", [15.0, 5.0])
 def test_the_figure_of_a_single_cell_is_that_of_the_closest_point_inside_the_cone(cone):
     """Beside the only centre of a small ball the normal turns; 4 mm aside it does by 10 deg."""
@@ -291,20 +254,6 @@ def test_the_figure_of_a_single_cell_is_that_of_the_closest_point_inside_the_con
     turn = np.arctan(4.0 / 22.0)
     assert found.accepted
     assert found.certificate.max_angle == pytest.approx(turn if cone > 10.0 else 0.0, abs=1e-6)
-    verdict = check(load_robot("ur5"), ball, Task(0.002, 0.5, 5e-3), Search(seed=1))
-    assert verdict.feasible
-    assert verdict.certificate.max_angle <= np.radians(0.5)
-
-
-def test_over_a_fold_only_a_single_waypoint_is_certified():
-    """A standoff as large as the radius: no bound on the normals holds, so no motion passes."""
-    arm = robot_of([joint(i, "prismatic", axis=np.eye(3)[i - 1]) for i in (1, 2, 3)])
-    cells = sphere(0.1, (0, 180), (-180, 180), side="inside").cells(4, 4)
-    task, nowhere = Task(0.1, 180, 0.05), np.zeros(16, dtype=bool)
-    q = np.array([[0.0, 0.0, 0.0], [0.01, 0.0, 0.0]])
-    for a, b in cells.pairs:
-        assert not replay(arm, cells, task, Walk(q, np.array([a, b])), nowhere).accepted
-    assert replay(arm, cells, task, Walk(q[:1], np.array([5])), nowhere).accepted
 
 
 # -- places ---------------------------------------------------------------------------------------
@@ -383,83 +332,3 @@ def test_bodies_that_are_too_near_are_a_fault_of_a_motion_over_a_surface():
         post = Obstacle("post", Sphere(0.02), placed(0.45, 0.0, height))
         bodies = bodies_of([ball], [post], [pair("link6", "post", 0.001)])
         assert replay_over_surface(*made, bodies=bodies).accepted == accepted
-
-
-# -- random motions -------------------------------------------------------------------------------
-
-
-RANDOM = ("plane", "ball", "pipe", "ring", "spline", *(("mesh",) if EVERYTHING else ()))
-BESIDE = 1.0  # rad/m: how much the normal may turn beside the place, for each metre off
-
-
-@sampled
-@pytest.mark.parametrize("seed", seeds(8, all=200))
-@pytest.mark.parametrize("name", RANDOM)
-def test_random_motions_are_accepted_where_dense_samples_say_so(name, seed):
-    """Rows taken out, moved and joined in other ways, judged just above or below what they do."""
-    made, rng = raster(name), np.random.default_rng([seed, len(name)])
-    begin, stride = rng.integers(0, len(made.q) - 24), rng.choice([1, 2, 5, 10])
-    rows = np.minimum(begin + stride * np.arange(24), len(made.q) - 1)
-    rows = [rows, np.sort(rng.choice(rows, 12, replace=False)), np.r_[rows, rows[::-1]]][seed % 3]
-    q = made.q[rows] + rng.normal(size=(len(rows), 6)) * 10.0 ** rng.uniform(-7, -3)
-    samples = dense(q, 60)
-    off, tilt = off_and_tilt(made.cells, made.task, samples)
-    place = made.cells.surface.closest(tools_of(samples)[0]).normal
-    steps = np.linalg.norm(np.diff(place, axis=0), axis=1)
-    steady = (steps <= 300.0 * np.linalg.norm(np.diff(samples[:, :3], axis=0), axis=1) + 1e-6).all()
-    inside = made.cells.surface.closest(tools_of(samples)[0]).inside.all()
-    tolerance = off.max() * rng.choice([0.9, 0.99, 0.9999, 1.0001, 1.02, 1.5])
-    cone = tilt.max() * rng.choice([0.99, 1.02, 1.3]) if rng.random() < 0.5 else np.radians(20.0)
-    task = replace(made.task, tolerance=max(tolerance, 1e-9), cone_deg=min(np.degrees(cone), 180.0))
-    outcome = replay_over_surface(
-        made.robot, made.cells, task, q, np.zeros(len(made.cells), dtype=bool)
-    )
-    most = task.tolerance * (1.0 + 1e-9) + 2e-7 * (name == "mesh")
-    if off.max() > most or tilt.max() > task.cone + BESIDE * off.max():
-        assert not outcome.accepted
-    elif (
-        name != "mesh"
-        and steady
-        and inside
-        and off.max() < 0.99 * most
-        and tilt.max() < 0.99 * task.cone
-    ):
-        assert outcome.accepted, outcome.refusal
-
-
-# -- no code of the search ------------------------------------------------------------------------
-
-
-LOADING = """
-import sys
-from dataclasses import replace
-import numpy as np
-import feasibility
-from feasibility import Task, certification
-from feasibility.cut_tree import CutTree, Leaf
-from feasibility.verdict import Walk
-from robots import load_robot
-from surfaces import plane
-cells, arm = plane((5.0, 6.0), (0.0, 1.0)).cells(1, 2), load_robot("puma560")
-none = np.zeros(2, dtype=bool)
-found = certification.replay(arm, cells, Task(0.0, 20.0), Walk(np.zeros((2, 6)), none - 1), none)
-assert "tool point" in found.refusal
-assert certification.verify_proof(arm, cells, Task(0.0, 20.0), CutTree(Leaf(0))).accepted
-print(*sys.modules)
-"""
-SEARCH = (
-    *(f"feasibility.{name}." for name in ("roadmap", "paper", "search", "compiled", "checking")),
-    "robots.chain.",
-)
-
-
-def test_judges_and_verifiers_share_no_code_with_the_search():
-    """Neither with the paper's nor with the complete one, nor their compiled kinematics."""
-    run = subprocess.run(
-        [sys.executable, "-c", LOADING], capture_output=True, text=True, check=False
-    )
-    assert run.returncode == 0, run.stderr
-    loaded = set(run.stdout.split())
-    assert "feasibility.certification.motion_replay" in loaded
-    assert "feasibility.certification.cut_proofs.proof_verification" in loaded
-    assert not [name for name in loaded if f"{name}.".startswith(SEARCH)]

@@ -8,7 +8,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from arm_urdfs import joint
-from bounds import holds
 from gantry import SURFACES, raster, references_of, tools_of
 from random_arms import random_arm, robot_of
 from referee import roll_about, unit
@@ -23,7 +22,7 @@ from feasibility.certification.rolls.bounds import (
     products_of_changes,
     vectors_of,
 )
-from feasibility.roll import Roll, projected
+from feasibility.roll import Roll
 from feasibility.targets import u_directions
 from feasibility.verdict import Walk
 from surfaces import cylinder, sphere
@@ -128,83 +127,6 @@ def test_references_bend_no_more_than_is_said(kind):
             assert (off <= most + 1e-7).all()
             used.append((off / most)[off > 1e-4].max(initial=0.0))
     assert kind != "dome" or min(used) > 0.6
-
-
-def made_up(approach, along, smooth, share=0.0):
-    """One path of places s = 0 to 1 where approach and u direction are functions of s."""
-    fixed = not callable(along)
-    e = (lambda s: np.tile(along, (len(s), 1))) if fixed else along
-    s = np.linspace(0.0, 1.0, 2001)
-    slope = np.linalg.norm(np.diff(e(s), axis=0), axis=1).max() * 2000.0
-    bent = np.linalg.norm(np.diff(approach(s), n=2, axis=0), axis=1).max() * 2000.0**2
-    offset = SimpleNamespace(
-        tangents=lambda places: e(places.x[:, 0]),
-        tangent_slopes=lambda start, end: slope * (end.x - start.x)[:, 0],
-    )
-    roll = Roll(0.0, np.radians(80.0))
-    held = Held(offset, 1.0, None, np.asarray(along) if fixed else None, roll, smooth)
-    at = np.array([0.0, share, share, 1.0])
-    pieces = np.diff(at)[None, :, None] ** 2 * [0.0, bent]
-    x = np.stack([at, 0.0 * at], axis=1)[None]
-    none = np.zeros((1, 4), dtype=np.int64)
-    return held, PlacePaths(at[None], np.zeros((1, 4, 3)), approach(at)[None], pieces, none, x), e
-
-
-def bump(s):
-    """1 in the middle, 0 at both ends."""
-    return (4.0 * s * (1.0 - s))[:, None]
-
-
-def tent(s):
-    return np.minimum(2.0 * s, 2.0 - 2.0 * s)[:, None]
-
-
-def still(s):
-    return np.tile(-Z, (len(s), 1))
-
-
-def swaying(s):
-    return unit(-Z + 2e-3 * bump(s) * Y)
-
-
-NEAR = 0.05  # of a reference to the approach
-MADE_UP = {
-    "u turns out and back": (still, lambda s: unit(X + 5e-3 * tent(s) * Y), 0.97),
-    "u turns out and back, past the approach": (
-        still, lambda s: unit(-Z + NEAR * (X + 0.9 * tent(s) * (0.436 * Y - 0.9 * X))), 0.1,
-    ),
-    "the approach sways, over facets": (swaying, X + Z, 0.2),
-    "the approach sways": (swaying, 0.3 * X - 0.954 * Z, 0.45),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", MADE_UP)
-def test_references_of_directions_that_go_out_and_back(name):
-    """What is as bad as the bounds allow: an arc out, and the same way back."""
-    approach, along, used = MADE_UP[name]
-    along = along if callable(along) else unit(along)
-    held, path, e = made_up(approach, along, smooth="facets" not in name)
-    found = held.references_along(path, path.normals)
-    s = S[:, 0]
-    b = approach(s)
-    t, _ = projected(e(s), b)
-    for here, second, share in (
-        (t, found.second_t, used), (np.cross(b, t), found.second_u, 0.9 * used)
-    ):  # fmt: skip
-        off = np.linalg.norm(here - (1.0 - S) * here[0] - S * here[-1], axis=1)
-        holds(0.5 * s * (1.0 - s) * second[0, 2] + 1e-9, off, share)
-
-
-@pytest.mark.parametrize("share", [0.0, 0.5])
-def test_a_tool_that_turns_out_and_back_is_rolled_by_that(share):
-    """By 0.03 rad off the straight line between its ends, also at a place in its middle."""
-    held, path, _ = made_up(still, X, True, share)
-    s = S[:, 0]
-    angle = 0.4 + 0.03 * bump(s)[:, 0]
-    x = np.cos(angle)[:, None] * X - np.sin(angle)[:, None] * Y
-    second = 2.0 * np.linalg.norm(np.diff(x, n=2, axis=0), axis=1).max(keepdims=True) * 100.0**2
-    ends = [ToolAxes(-Z[None], x[[k]]) for k in (0, -1)]
-    holds(held.rolls_between(*ends, second, path, path.normals), angle.max(), 0.97)
 
 
 @pytest.mark.parametrize("kind", ["fixed", "fixed, over facets", "u"])

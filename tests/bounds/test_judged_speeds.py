@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 
 import networkx as nx
 import numpy as np
@@ -85,35 +84,3 @@ def test_the_verdict_turns_where_timed_motions_do(cells):
     known = float(faster.message.split("covered at ")[1].split()[0])
     assert known == pytest.approx(turn, rel=0.02)
     assert rate_figures(plain).largest == pytest.approx(turn, rel=0.02)
-
-
-@cache
-def asked(**changes):
-    return check(UR5, CELLS, replace(TASK, **changes))
-
-
-@pytest.mark.parametrize("factor", [0.98, 1.02])
-def test_a_motion_too_fast_for_its_joints_does_not_verify(factor):
-    verdict = asked()
-    most = rate_figures(verdict, more=False).witness.speed
-    found = verify(UR5, CELLS, replace(TASK, speed=factor * most), verdict.witness.q)
-    assert found.holds == (factor < 1.0)
-    assert found.holds or "would need" in found.refusal
-
-
-def test_where_nothing_is_asked_nothing_changes():
-    plain, slow = asked(), asked(speed=0.01)
-    assert slow.statistics == plain.statistics
-    assert np.array_equal(slow.witness.q, plain.witness.q)
-    assert slow.message.startswith(plain.message)
-    assert plain.certificate.max_speed is None
-
-
-def test_singular_values_are_kept_above_what_is_asked():
-    least = rate_figures(asked(), more=False).witness.sigma
-    inside = asked(min_manipulability=0.95 * least)
-    assert inside.feasible
-    assert inside.certificate.min_singular_value >= 0.95 * least
-    beyond = asked(min_manipulability=5.0 * least)
-    assert str(beyond.answer) == "undecided"
-    assert "smallest singular value is" in beyond.message

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-import os
 
 import numpy as np
 import pytest
 from capsule_arms import box_mesh
-from mesh_writers import stl_of
 from samples import sampled, seeds
 
-from coverable_errors import CoverableError
 from feasibility.certification import collision_replay
 from feasibility.collisions import (
     Bodies,
@@ -84,17 +81,3 @@ def test_sheets_and_tangles_can_be_used(seed):
             vertices = vertices * [1.0, 1e-4, 1e-4]
     made = Triangles(vertices * rng.choice([1e-3, 1.0, 1e3]), faces, bool(rng.random() < 0.5))
     use(Obstacle("thing", made, np.eye(4)), (ToolShape(made, np.eye(4)),))
-
-
-@pytest.mark.parametrize("what", ["missing", "empty", "pipe", "folder", "noise", "sparse", "cut"])
-def test_files_that_are_no_meshes_are_refused_and_open_nothing(what, tmp_path):
-    path, noise = tmp_path / "part.stl", np.random.default_rng(0).bytes(999)
-    whole = {"empty": b"", "cut": stl_of(np.ones((9, 3, 3)))[:-7], "noise": noise, "sparse": b""}
-    if what in whole:
-        path.write_bytes(whole[what])
-    if what == "sparse":
-        os.truncate(path, 1 << 40)
-    {"pipe": os.mkfifo, "folder": os.mkdir}.get(what, lambda path: None)(path)
-    for make in (lambda: Obstacle.mesh("a", path, 1.0), lambda: ToolShape.mesh(path, 1.0)):
-        with pytest.raises(CoverableError):
-            make()

@@ -11,10 +11,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from arm_urdfs import joint
+from bounds import LARGE, Starved, grown
 from capsule_arms import at, bodies_of, capsule_links, pair, planar_arm
 from gantry import configurations, gantry, raster
 from random_arms import robot_of
-from starving import LARGE, Starved, grown
 
 from feasibility import Task, certification
 from feasibility.certification import rates, rolls

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
+from bounds import LARGE, grown
 from capsule_arms import at, bodies_of, capsule_links, pair, planar_arm
 from proof_cases import elbow_case
-from starving import LARGE, grown
 
 from feasibility import Task
 from feasibility.certification.cut_proofs.box_exclusion import contract, separated

@@ -15,11 +15,9 @@ from feasibility.treated import Decision, treated_by_walk, with_coverage
 from feasibility.verdict import Evidence, Walk
 from robots import load_robot
 from surfaces import plane, poses
-from surfaces.passes import ToolLines, visits
 
 UR5 = load_robot("ur5")
 CELLS = plane((0.0, 0.3), (0.0, 0.2), "outside", (0.4, -0.1, 0.2)).cells(3, 2)
-TASK = Task(standoff=0.02, cone_deg=20)
 WIDE = {"standoff": 0.02, "cone_deg": 20, "footprint": 0.08}
 
 
@@ -66,14 +64,6 @@ def test_the_share_of_a_motion_agrees_with_points_drawn_by_area(footprint):
     assert sizes == sorted(sizes, reverse=True)
 
 
-def test_a_footprint_changes_neither_verdict_nor_search(found):
-    alone = check(UR5, CELLS, TASK)
-    assert (alone.answer, alone.message) == (found.answer, found.message)
-    assert alone.statistics == found.statistics
-    assert np.array_equal(alone.witness.q, found.witness.q)
-    assert alone.treated is None
-
-
 @pytest.mark.parametrize(("beyond", "answer"), [(-1e-6, "feasible"), (1e-6, "undecided")])
 def test_coverage_decides_by_the_lower_end(found, beyond, answer):
     low, high = found.treated.lower, found.treated.upper
@@ -113,15 +103,3 @@ def test_between_poses_nothing_can_be_treated():
     cells = poses([[0.4, 0.0, 0.2], [0.5, 0.0, 0.2]], [[0, 0, 1], [0, 0, 1]])
     with pytest.raises(CoverableError, match="no surface to treat"):
         check(UR5, cells, Task(**WIDE))
-
-
-def test_visits_are_counted_by_coming_and_going():
-    rows = [np.linspace((-0.05, y, 0.0), (0.65, y, 0.0), 200) for y in (0.1, 0.14)]
-    normals = np.tile([0.0, 0.0, 1.0], (400, 1))
-    path = ToolLines(np.concatenate(rows), normals, np.repeat([0, 1], 200))
-    at = np.array([[0.3, 0.08, 0.0], [0.3, 0.12, 0.0], [0.3, 0.2, 0.0], [0.3, 0.15, 0.0]])
-    up = np.tile([0.0, 0.0, 2.0], (4, 1))
-    assert visits(at, up, path, 0.03).tolist() == [1, 2, 0, 1]
-    assert visits(at, -up, path, 0.03).tolist() == [0, 0, 0, 0]
-    back = ToolLines(np.concatenate([rows[0], rows[0][::-1]]), normals, np.zeros(400, dtype=int))
-    assert visits(np.array([[0.6, 0.1, 0.0]]), up[:1], back, 0.03).tolist() == [2]

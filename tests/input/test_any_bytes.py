@@ -1,6 +1,6 @@
 """Any bytes in any file: one error with its faults, or a value that is sound and comes back.
 
-`tests/shared/readers.py` has the readers, their good files, and what a sound value is.
+`tests/shared/files/readers.py` has the readers, their good files, and what a sound value is.
 """
 
 from __future__ import annotations
@@ -162,15 +162,3 @@ def test_no_file_is_read_beyond_its_cap(tmp_path: Path, approved: Approved) -> N
         said[reader.file] = str(caught.value).split(": ", 1)[1]
         path.unlink()
     approved("special/terabyte", "\n".join(f"{name}: {text}" for name, text in said.items()))
-
-
-def test_a_file_without_permission(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "arm.urdf"
-    path.write_bytes(READERS["urdf"].good())
-
-    def refuse(*_: object) -> int:
-        raise PermissionError(13, "Permission denied", str(path))
-
-    monkeypatch.setattr(os, "open", refuse)  # the superuser may read anything
-    with pytest.raises(CoverableError, match=r"arm\.urdf: cannot be opened: permission denied"):
-        READERS["urdf"].read(path)

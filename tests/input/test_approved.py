@@ -67,7 +67,7 @@ def read(reader: str, name: str, folder: Path) -> str:
 def test_what_is_said(reader: str, name: str, folder: Path, approved: Approved) -> None:
     refused = None
     try:
-        said = f"It is read.\n{read(reader, name, folder)}"
+        said = f"It is read. {read(reader, name, folder)}"
     except CoverableError as error:
         said, refused = str(error), error
     if refused is not None:

@@ -11,47 +11,14 @@ import numpy as np
 import pytest
 import tomli_w
 from bad_input import GOOD_CASE, changed, goods, lay_out
-from small_cases import TEXTS
 
 from feasibility import Search, Task
-from feasibility.cases import Case, CaseError, builtin_cases, load_case, unit_notes
+from feasibility.cases import Case, CaseError, load_case
 from feasibility.cases.robot_table import RobotPart
-from feasibility.cases.surface_table import SurfacePart
 from feasibility.cases.toml import parse_toml, too_much
-from feasibility.cli.main import main
 
 GOOD = Path(__file__).with_name("good")
 # Table II: position and cone; Table I by name; Table III by kind.
-PAPER = {
-    "4a": ("sphere", "set-1", (0, 0, 0), 45),
-    "4b": ("sphere", "set-2", (0, 0, 0), 45),
-    "4c": ("cylinder", "set-1", (0, 0, 0), 45),
-    "4d": ("cylinder", "set-3", (0, 0, 0), 45),
-    "4e": ("hyperboloid", "set-1", (0, 0, 0), 45),
-    "4f": ("hyperboloid", "set-4", (0, 0, 0), 45),
-    "5a": ("sphere", "set-1", (0, 0, 0), 5),
-    "5b": ("sphere", "set-1", (0.005, 0, 0), 10),
-    "5c": ("cylinder", "set-1", (0, 0.055, 0), 5),
-    "5d": ("cylinder", "set-1", (0, 0.055, 0), 10),
-    "5e": ("hyperboloid", "set-1", (1.095, 0, 0), 10),
-    "5f": ("hyperboloid", "set-1", (1.15, 0, 0), 20),
-}
-SURFACES = {
-    "sphere": {"radius": 1.0, "u_deg": (10.0, 90.0), "v_deg": (10.0, 180.0)},
-    "cylinder": {"radius": 0.5, "u_deg": (-60.0, 60.0), "v": (0.0, 0.9)},
-    "hyperboloid": {"radius": 0.5, "flare": 0.5, "u_deg": (130.0, 220.0), "v": (0.0, 0.5)},
-}
-
-
-def test_the_twelve_cases_of_the_paper_are_built_in() -> None:
-    assert list(builtin_cases()) == [f"paper/{name}" for name in PAPER]
-    for name, (kind, limits, position, cone) in PAPER.items():
-        case = builtin_cases()[f"paper/{name}"]
-        part = SurfacePart(kind, SURFACES[kind], (9, 10), position=tuple(map(float, position)))
-        robot, task = RobotPart(name="puma560", limits=limits), Task(0.005, float(cone))
-        assert case == Case(robot, part, task, Search())
-        assert case.description
-        assert case.name == f"paper/{name}"
 
 
 def test_settings_replace_add_and_remove_keys_and_tables() -> None:
@@ -191,41 +158,6 @@ def test_a_document_is_read_up_to_its_caps(text: str, excess: str) -> None:
 
 # numbers a thousand times too large, or radians
 
-ASKED = {
-    "surface.u=[350, 650]": "surface.u .* millimetres.*\\[0.35, 0.65\\]",
-    "surface.position=[400, 0, 100]": "surface.position .* millimetres.*\\[0.4, 0.0, 0.1\\]",
-    "task.standoff=20": "task.standoff .* millimetres.* 0.02",
-    "robot.tcp.position=[0, 0, 5]": "robot.tcp.position .* millimetres.* 0.005",
-    "task.cone_deg=0.785": "task.cone_deg .* radians.* 44.98",
-    "surface.rpy_deg=[0, 0, 1.57]": "surface.rpy_deg .* radians.* 89.95",
-    "task.roll_deg=[-0.26, 0.26]": "task.roll_deg .* radians.*-14.9",
-    f"robot.limits_deg={[[-3.1, 3.1]] * 6}": "robot.limits_deg .* radians.* 177.6",
-    "robot.start_deg=[0, -1.5, 1.2, 0, 1.57, 0]": "robot.start_deg .* radians.* 68.75",
-}
-TAKEN = (
-    "surface.position=[12, 0, 0]", "surface.u=[0, 25]", "task.standoff=1.5", "task.cone_deg=3",
-    "task.roll_deg=[-5, 5]", "robot.limits_deg.elbow_joint=[-2, 2]", "surface.rpy_deg=[0, 0, 1]",
-)  # fmt: skip
-
-
-def test_what_looks_like_another_unit_is_asked_and_no_more() -> None:
-    for setting in (*ASKED, *TAKEN):
-        case = Case.from_toml(TEXTS["plate"], overrides=[setting])
-        notes = unit_notes(case.to_tables(), case.robot.build().length_unit)
-        assert len(notes) == (setting in ASKED)
-        assert not notes or re.search(ASKED[setting], notes[0])
-    for case in builtin_cases().values():
-        assert unit_notes(case.to_tables(), case.robot.build().reach) == ()
-    wall = {"surface": {"kind": "plane", "u": (0.0, 600.0)}}  # compared with the reach of the arm
-    assert (len(unit_notes(wall, 3.0)), unit_notes(wall, math.inf)) == (1, ())
-
-
-def test_the_command_asks_and_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "case.toml").write_text(TEXTS["plate"])
-    asked = ["check", str(tmp_path / "case.toml"), "--set", "surface.position=[400, 0, 100]"]
-    assert main(asked) == 1
-    assert capsys.readouterr().err.startswith("note: surface.position")
-
 
 # a changed case in the words of its file
 
@@ -255,22 +187,3 @@ def test_only_what_has_changed_is_changed(
     assert case.as_written() == expected
     assert Case.from_toml(case.as_written(), tmp_path) == case
     assert "\nposition = [0.0, 0.0, 0.0]\n" in load_case("paper/4a").as_written()
-
-
-@pytest.mark.parametrize(
-    "settings",
-    [
-        ("collision=",),
-        ("collision.scene=",),
-        ("robot.urdf=", "robot.name=ur5", "robot.tcp={ position = [0, 0, 0.1] }"),
-        ("surface.position=", "task.roll_deg=[-5, 5]", "task.home_deg=[1, 2]"),
-    ],
-)
-def test_what_is_written_says_the_case(settings: tuple[str, ...], tmp_path: Path) -> None:
-    """However the file is written, or where it alone is no case."""
-    alone_none = TEXTS["plate"].replace("task.cone_deg = 30", "")
-    for text in (FILE, TEXTS["plate"], TEXTS["long plate"], alone_none):
-        more = ["task.cone_deg=9"] if text == alone_none else []
-        case = Case.from_toml(text, tmp_path, overrides=[*settings, *more])
-        assert Case.from_toml(case.as_written(), tmp_path) == case
-        assert str(tmp_path) not in case.as_written()

@@ -16,9 +16,8 @@ import pytest
 from bad_input import changed, goods, lay_out
 
 import surfaces
-from feasibility.cases import OWN_KEYS, Case, CaseError, load_case
+from feasibility.cases import Case, load_case
 from feasibility.collisions import HalfSpace
-from feasibility.problem import Problem
 from robots.urdf import Box, Capsule
 from surfaces import cut_box, cut_plane, faces_within_cone, mesh, take_faces
 from surfaces.meshes import read_mesh
@@ -164,21 +163,6 @@ def test_a_surface_is_what_its_constructor_makes(name: str, folder: Path) -> Non
         assert any("kept" in note or "chosen" in note for note in found.notes)
 
 
-def test_every_kind_has_a_constructor_and_files_give_their_names(folder: Path) -> None:
-    assert all(callable(getattr(surfaces, kind)) for kind in OWN_KEYS)
-    for good, label, counts in (
-        ("sphere", "sphere", [9, 10]), ("mesh", "part.stl", [12]), ("grid", "points.npy", [3, 4]),
-        ("piecewise", "piecewise", []),
-    ):  # fmt: skip
-        part = case_of(folder, good).surface
-        assert (part.label, part.counts) == (label, counts)
-    kinked = [[[x, y, abs(x - 0.1)] for x, y, _ in row] for row in bad_input.NET_POINTS]
-    (folder / "net.json").write_text(json.dumps({"points": kinked, "degree": [1, 2]}))
-    case = case_of(folder, "bspline", *NET_FILE[:2], NET_FILE[2].format("net.json"))
-    with pytest.raises(CaseError, match=r"net\.json: the patch must be smooth, but has a kink"):
-        case.build()
-
-
 def test_poses_are_cells_in_order_or_within_a_radius(folder: Path) -> None:
     cells = case_of(folder, "poses", "surface.position = [0.1, 0, 0]").surface.cut()
     np.testing.assert_allclose(cells.centres[2], [0.5, 0.15, 0.3], atol=1e-15)
@@ -244,10 +228,3 @@ def test_everything_of_a_scene_arrives(folder: Path) -> None:
     fewer = case.with_overrides(["collision.clearance=0.01", "collision.scene="]).collision
     assert fewer is not None
     assert (fewer.clearance, fewer.scene) == (0.01, ())
-
-
-def test_the_search_keeps_to_a_little_less_of_a_range_of_rolls(tmp_path: Path) -> None:
-    case = load_case("paper/4a", ["task.roll_deg=[10, 30]", "surface.cells=[2, 2]"])
-    problem = Problem.of(*case.build()[:3])
-    assert problem.narrowed.searched.roll_deg == pytest.approx((11, 29))
-    assert "at a roll of 10 to 30 deg" in problem.within

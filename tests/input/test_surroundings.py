@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import json
+import itertools
 import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from jobs import coverable as asked
-from small_cases import TEXTS
 
+from feasibility import Search, Task, check
 from feasibility.cli.main import main
-from feasibility.paths import PathError
-from feasibility.timing import motion_limits
 from robots import load_robot
+from surfaces import plane
 
 SMALL = ["--set", "surface.cells=[1, 2]"]
 
@@ -64,33 +62,15 @@ def test_a_working_directory_that_is_gone(
     assert "the working directory has been deleted" in line or "there is no such file" in line
 
 
-def test_counts_and_speeds_beyond_all_use() -> None:
-    place, path = ("place", "paper/4a", *SMALL, "--x", "0", "1"), ("path", "paper/4a", *SMALL)
-    metres = "the tool speed must be a positive number of metres per second in 1e-06"
-    for args, words in (
-        ((*place, "--count", "99999999999"), "count must be a whole number in 1 .. 100,000"),
-        ((*place, "--workers=99999999999"), "number of workers must be in 0 .. 1,000"),
-        ((*path, "--speed", "1e-300"), metres),
-        ((*path, "--velocity", "1e-300"), "velocity must be one positive number in 1e-06"),
-        ((*path, "--acceleration", "1e-300"), "acceleration must be one positive number in 1e-06"),
-        ((*path, "--speed", "1e-6"), "s apart; give a higher speed"),
-        ((*path, "--period", "1e-300"), "the period must be"),
-    ):
-        assert words in said(*args)
-    robot = load_robot("puma560")
-    assert motion_limits(robot, 1e-6, 1e6, 1e-6).tool_speed == 1e-6
-    for given in ((1e-7,), (0.1, 1e7), (0.1, 1.0, 1e-320), (0.1, np.full(6, 1e308))):
-        with pytest.raises(PathError):
-            motion_limits(robot, *given)
-
-
-def test_what_leaves_no_room_is_a_verdict_with_its_cause(tmp_path: Path) -> None:
-    """More clearance than standoff."""
-    (tmp_path / "case.toml").write_text(f"{TEXTS['plate']}\n[collision]\ntool_clearance = 0.05")
-    status, out, err = asked("check", tmp_path / "case.toml", "--json", *SMALL)
-    answer = json.loads(out)
-    assert (status, answer["verdict"]) in ((1, "infeasible"), (3, "undecided"))
-    assert (answer["covered"], len(answer["uncovered"])) == (0, 2)
-    assert {cause["cause"] for cause in answer["uncovered"]} == {"collision"}
-    assert all("wrist_3_link and surface" in cause["detail"] for cause in answer["uncovered"])
-    assert "larger than the standoff (20 mm)" in err
+def test_arguments_in_another_order_or_of_another_kind() -> None:
+    plate = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside")
+    good = (load_robot("ur5"), plate.cells(2, 2), Task(standoff=0.02, cone_deg=20), Search())
+    names, bad = ("robot", "cells", "task", "search"), ("ur5", plate, {"standoff": 0.02}, "greedy")
+    for which in itertools.product((False, True), repeat=4):
+        wrong = [name for name, w in zip(names, which, strict=True) if w]
+        if wrong:
+            with pytest.raises(TypeError) as caught:
+                check(*(b if w else g for w, g, b in zip(which, good, bad, strict=True)))
+            assert [fault.split(":")[0] for fault in str(caught.value).split("; ")] == wrong
+    with pytest.raises(TypeError, match=r"robot: .*cells: .*task: "):
+        check(good[2], good[0], good[1])

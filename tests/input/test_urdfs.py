@@ -16,12 +16,8 @@ from samples import sampled, spread
 
 from coverable_errors import CoverableError
 from robots.urdf import (
-    Box,
-    Capsule,
     CheckedUrdf,
-    Cylinder,
     MeshFile,
-    Sphere,
     UrdfError,
     check_urdf,
     read_srdf,
@@ -130,39 +126,6 @@ def test_nothing_else_of_the_file_reaches_the_native_parser(tmp_path: Path) -> N
                         f'<inertial name="{secret}"/><visual><geometry><mesh filename="{secret}.stl'
                         '"/></geometry></visual></link>')  # fmt: skip
     assert secret not in saved(tmp_path, text.replace("</joint>", f"<{secret}/></joint>")).text
-
-
-def test_shapes_of_visuals_and_collisions(tmp_path: Path) -> None:
-    (tmp_path / "part.stl").write_bytes(b"solid")
-    placement = pin.SE3(pin.rpy.rpyToMatrix(0.4, -0.5, 0.6), np.array([1.0, 2.0, 3.0]))
-    shapes = {
-        '<box size="1 2 3"/>': Box((1, 2, 3)),
-        '<cylinder radius="0.5" length="2"/>': Cylinder(0.5, 2),
-        '<capsule radius="0.5" length="2"/>': Capsule(0.5, 2),
-        '<sphere radius="0.25"/>': Sphere(0.25),
-        '<mesh filename="part.stl" scale="1 1 2"/>': MeshFile(
-            str((tmp_path / "part.stl").resolve()), (1.0, 1.0, 2.0)
-        ),
-    }
-    materials = {
-        '<material name="m"><color rgba="0.1 0.2 0.3 2"/></material>': (0.1, 0.2, 0.3, 1.0),
-        '<material name="red"/>': (1, 0, 0, 1),
-        '<material name="blue"/>': None,
-    }
-    red = '<material name="red"><color rgba="1 0 0 1"/></material>'
-    for xml, expected in shapes.items():
-        inside = f'<origin xyz="1 2 3" rpy="0.4 -0.5 0.6"/><geometry>{xml}</geometry>'
-        for material, rgba in materials.items():
-            text = changed(goods("urdf")["visual"], inside + material)
-            text = text.replace("</visual>", f"</visual><collision>{inside}</collision>")
-            checked = saved(tmp_path, text.replace("</robot>", f"{red}</robot>"))
-            (drawn,), (body,) = checked.visuals, checked.collisions.shapes
-            assert drawn.rgba == rgba
-            assert (drawn.link, body.link) == ("base", "base")
-            for shape in (drawn, body):
-                assert shape.geometry == expected
-                assert np.abs(shape.origin - placement.homogeneous).max() < 1e-15
-                assert not shape.origin.flags.writeable
 
 
 # meshes and packages

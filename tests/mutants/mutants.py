@@ -69,10 +69,17 @@ class Mutant(NamedTuple):
 def mutants() -> list[Mutant]:
     """All of the list, in its order."""
     found = []
-    for part in tomllib.loads(LIST.read_text("utf-8"))["part"]:
-        for old, new, words, *other in part["faults"]:
-            tests = other[0].split() if other else part["tests"]
-            found.append(Mutant(part["room"], part["file"], old, new, words, tuple(tests)))
+    for room, entries in tomllib.loads(LIST.read_text("utf-8")).items():
+        file, tests = "", list[str]()
+        for entry in entries:
+            if isinstance(entry, list):
+                old, new, words, *other = entry
+                own = other[0].split() if other else tests
+                found.append(Mutant(room, file, old, new, words, tuple(own)))
+            elif entry.startswith("tests/"):
+                file, tests = "", [*([] if file else tests), entry]
+            else:
+                file = entry
     return found
 
 

@@ -3,6 +3,7 @@ are, key by key, what Python answers to the same question."""
 
 from __future__ import annotations
 
+import difflib
 import itertools
 import json
 import math
@@ -13,7 +14,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import schema
-from command_table import COMMANDS, NEEDS, NUMBERS, REFUSED, TABLE
+from approved import NUMBER
+from command_table import COMMANDS, NEEDS, NUMBERS, REFUSED, TABLE, WHOLE
 from schema import conforms
 
 from feasibility import check, verify
@@ -54,12 +56,22 @@ def unwrapped(text):
 
 
 def transcript(line, said):
-    """A command with its answer, as on a terminal."""
-    parts = [f"$ coverable {line}".rstrip(), f"exit status {STATUS[said.status]}"]
-    for name, text in (("stdout", said.out), ("stderr", said.err)):
-        if text:
-            parts += [f"-- {name}", unwrapped(text.rstrip())]
+    """A command with its answer, as on a terminal, and its status."""
+    parts = [f"$ coverable {line}".rstrip() + f"  -> {STATUS[said.status]}"]
+    parts += [unwrapped(said.out.rstrip())] if said.out else []
+    parts += ["-- stderr", unwrapped(said.err.rstrip())] if said.err else []
     return "\n".join(parts)
+
+
+def beside(text, other, name):
+    """A text, but for two and more lines at a time that the one called `name` has too."""
+    lines, shown, at = text.splitlines(), [], 0
+    same = difflib.SequenceMatcher(None, other.splitlines(), lines, autojunk=False)
+    for _, first, count in same.get_matching_blocks():
+        end = first + count
+        shown += lines[at:first] + ([f"... as {name}"] if count > 1 else lines[first:end])
+        at = end
+    return "\n".join(shown)
 
 
 def masked(text, commands):
@@ -69,9 +81,13 @@ def masked(text, commands):
 
 @pytest.mark.parametrize(("command", "name"), COMMANDS)
 def test_what_a_command_says(commands, approved, command, name):
-    said = commands.run(command, name)
-    text = transcript(f"{command} {TABLE[command][name]}", said)
-    approved(f"{command}/{name}", masked(text, commands), numbers=False)
+    def said(name):
+        text = transcript(f"{command} {TABLE[command][name]}", commands.run(command, name))
+        return NUMBER.sub("#", approved.masked(masked(text, commands)))
+
+    others = [one for one in WHOLE.get(command, ()) if name not in WHOLE[command]]
+    texts = [said(name), *(beside(said(name), said(one), one) for one in others)]
+    approved(f"{command}/{name}", min(texts, key=lambda text: text.count("\n")))
 
 
 @pytest.mark.parametrize("command", REFUSED)
@@ -87,7 +103,7 @@ def test_what_is_refused_is_one_message_on_stderr_and_status_2(commands, approve
         assert said.err.count("coverable: ") <= 1
         assert "bug" not in said.err
         assert {file.name for file in commands.folder.iterdir()} == before, "no file is written"
-        texts.append(f"$ coverable {line}".rstrip() + "\n" + masked(said.err.rstrip(), commands))
+        texts.append(f"$ coverable {line}  -> {masked(said.err.rstrip(), commands)}")
     approved(f"refused/{command}", "\n".join(texts))
 
 

@@ -13,7 +13,6 @@ from page_outline import faces_of, points_of
 from samples import sampled, spread
 
 from coverable_meshes import MeshError, MeshFiles, robot_files
-from feasibility.viewer.meshes import Mesh, shaded, thinned, tubes
 from feasibility.viewer.robot import TRIANGLES, draw, joint_paths
 from feasibility.viewer.threejs import safe_name
 from robots import load_robot
@@ -136,44 +135,6 @@ def test_an_arm_without_pictures_is_a_chain_of_capsules(tmp_path):
     assert len(drawn(late)) == 2
     (note,) = draw(late).notes
     assert "two.urdf" in note
-
-
-def test_thinning_keeps_the_shape_and_the_budget():
-    ball = trimesh.creation.icosphere(subdivisions=6, radius=0.1)
-    mesh = Mesh(np.asarray(ball.vertices), np.asarray(ball.faces), (0.5, 0.5, 0.5))
-    (thin,) = thinned([mesh], 5_000)
-    assert 500 < len(thin.faces) <= 5_000
-    assert np.abs(np.linalg.norm(thin.vertices, axis=1) - 0.1).max() < 3e-3
-    volume = trimesh.Trimesh(thin.vertices, thin.faces, process=False).volume
-    assert volume == pytest.approx(ball.volume, rel=0.03)
-    (same,) = thinned([mesh], 10**6)
-    assert len(same.faces) == len(ball.faces)
-
-
-def test_edges_stay_sharp_and_round_parts_look_round():
-    box = trimesh.creation.box((1, 1, 1))
-    split, normals = shaded(Mesh(box.vertices, box.faces, (1, 1, 1)))
-    assert len(split.vertices) == 24
-    assert np.allclose(np.sort(np.abs(normals), axis=1), [0, 0, 1])
-    assert np.allclose(split.vertices[split.faces], box.vertices[box.faces])
-    ball = trimesh.creation.icosphere(subdivisions=3)
-    split, normals = shaded(Mesh(ball.vertices, ball.faces, (1, 1, 1)))
-    assert len(split.vertices) == len(ball.vertices)
-    assert (np.einsum("ij,ij->i", normals, split.vertices) > 0.999).all()
-
-
-def test_tubes_run_around_their_lines_at_their_radius():
-    t = np.linspace(0, 1, 40)[:, None]
-    arc = np.hstack([np.cos(t), np.sin(t), t])
-    straight = np.array([[0, 0, 0], [0, 0, 1.0], [0, 0, 1.0]])
-    point = np.zeros((3, 3))
-    vertices, faces = tubes([arc, straight, point], 0.01)
-    assert len(vertices) == 5 * (40 + 2)
-    assert len(faces) == 10 * (39 + 1)
-    assert np.allclose(np.linalg.norm(vertices[-10:, :2], axis=1), 0.01)
-    centre = np.repeat(arc, 5, axis=0)
-    assert np.allclose(np.linalg.norm(vertices[:200] - centre, axis=1), 0.01)
-    assert tubes([], 0.01)[1].shape == (0, 3)
 
 
 # -- traps: counted before they are made, and nothing beside them opened --------------------------

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import defaultdict
 from dataclasses import replace
 
@@ -16,7 +15,6 @@ from mesh_patches import grid
 from page_outline import faces_of, points_of
 
 from feasibility import CauseKind, Task, check
-from feasibility.cases import load_case
 from feasibility.results import load_result
 from feasibility.verdict import Cause
 from feasibility.viewer import cell_meshes as cell_shapes
@@ -37,10 +35,6 @@ def triangles(nu, nv, shape):
     """A unit square bent by (u, v) -> points, as a mesh of 2 nu nv triangles."""
     u, v, faces = grid(nu, nv)
     return trimesh.Trimesh(shape(u, v), faces, process=False)
-
-
-def sheet(u, v):
-    return np.stack([u, 0.7 * v, 0.0 * u], axis=-1)
 
 
 def wave(u, v):
@@ -118,59 +112,11 @@ def test_each_cell_is_filled_by_its_own_triangles(cells):
         np.testing.assert_allclose(np.linalg.norm(drawn.normals, axis=1), 1.0, atol=1e-12)
     whole = cell_shapes.patch(cells, np.arange(COUNT))
     assert len(whole.vertices) == len(cells.surface.mesh.vertices), "triangles share corners"
-    closest_point = cells.surface.closest(whole.vertices)
-    np.testing.assert_allclose(closest_point.height, 0.0, atol=1e-12)
-    np.testing.assert_allclose(closest_point.normal, whole.normals, atol=1e-6)
-
-
-def test_borders_are_the_edges_between_cells_and_the_rim(cells):
-    around = edges_of(cells.surface.mesh.faces, cells.labels)
-    expected = {edge for edge, labels in around.items() if len(labels) == 1 or len(set(labels)) > 1}
-    lines = cell_shapes.borders(cells)
-    numbers = {tuple(p): k for k, p in enumerate(cells.surface.mesh.vertices.tolist())}
-    drawn = [tuple(sorted(numbers[tuple(p)] for p in line)) for line in lines.tolist()]
-    assert len(drawn) == len(expected)
-    assert set(drawn) == expected
-    length = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1).sum()
-    cone_chord = cells.surface.mesh.edges.border_lengths.sum()
-    assert length == pytest.approx(cells.figures.borders.lengths.sum() + cone_chord)
-
-
-def test_creases_stay_sharp():
-    """A box keeps its three normals at a corner, and has no border within one side."""
-    box = mesh(trimesh.creation.box((0.2, 0.3, 0.4)))
-    sides = np.argmax(np.abs(box.mesh.face_normals), axis=1)
-    sides = 2 * sides + (box.mesh.face_normals.max(axis=1) > 0.5)
-    cells = MeshCells.of(box, sides)
-    drawn = cell_shapes.patch(cells, np.arange(6))
-    assert len(drawn.vertices) == 24
-    a, b, c = np.moveaxis(drawn.vertices[drawn.faces], 1, 0)
-    flat = np.cross(b - a, c - a) / np.linalg.norm(np.cross(b - a, c - a), axis=1)[:, None]
-    np.testing.assert_allclose(drawn.normals[drawn.faces], flat[:, None].repeat(3, 1), atol=1e-12)
-    lines = cell_shapes.borders(cells)
-    lengths = np.sort(np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1))
-    np.testing.assert_allclose(lengths, np.repeat([0.2, 0.3, 0.4], 4))
-
-
-def test_shrunk_cells_part_from_their_neighbours():
-    """On a flat sheet a cell that is drawn a fifth smaller has 0.64 of its area."""
-    cells = mesh(triangles(30, 30, sheet)).cells(count=12)
-    drawn = cell_shapes.patch(cells, np.arange(12), inset=0.2)
-    area = np.bincount(cells.labels, areas_of(drawn.vertices, drawn.faces), 12)
-    np.testing.assert_allclose(area, 0.64 * cells.areas, rtol=1e-9)
-    used = [set(drawn.faces[cells.labels == k].ravel().tolist()) for k in range(12)]
-    assert sum(map(len, used)) == len(set().union(*used)), "no corner belongs to two cells"
-    corners = cells.surface.mesh.vertices[cells.surface.mesh.faces]
-    centres = cells.centres[cells.labels][:, None]
-    np.testing.assert_allclose(drawn.vertices[drawn.faces], centres + 0.8 * (corners - centres))
 
 
 def test_a_fine_mesh_is_thinned_and_its_cells_still_meet_as_they_did(fine):
     display = make_display_mesh(fine, budget=4_000)
     assert len(display.faces) <= 4_000 < len(fine.labels)
-    turned = fine.surface.mesh.vertices @ fine.surface.rotation.T + fine.surface.position
-    corners = set(map(tuple, turned.round(12).tolist()))
-    assert set(map(tuple, display.vertices.round(12).tolist())) <= corners
     area = np.bincount(display.labels, areas_of(display.vertices, display.faces), 25)
     np.testing.assert_allclose(area, fine.areas, rtol=0.06)
     assert area.sum() == pytest.approx(fine.areas.sum(), rel=0.005)
@@ -183,10 +129,6 @@ def test_a_fine_mesh_is_thinned_and_its_cells_still_meet_as_they_did(fine):
     length = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1).sum()
     cone_chord = fine.surface.mesh.edges.border_lengths.sum()
     assert length == pytest.approx(fine.figures.borders.lengths.sum() + cone_chord, rel=0.02)
-    assert len(lines) < len(fine.borders()) / 2
-    whole = make_display_mesh(fine, budget=len(fine.labels))
-    np.testing.assert_array_equal(whole.labels, fine.labels)
-    assert len(whole.borders()) == len(fine.borders())
 
 
 def test_small_cells_survive_thinning():
@@ -230,16 +172,11 @@ def test_missed_cells_have_the_colour_of_their_cause(kind, request):
         middles = points_of(shown[path])[faces_of(shown[path])].mean(axis=1)
         own = set(verdict.cells.locate(middles).tolist())
         seen |= dict.fromkeys(own, path)
-        words = {(kinds[k].replace("_", " ") if k in kinds else "") for k in own}
-        assert len(words) == 1
-        assert entries[path].label.replace(": ", " ").split("(")[0].strip() == (
-            f"not covered {words.pop()}".strip()
-        )
-        assert entries[path].label.endswith(f"({len(own)})")
+        (words,) = {(kinds[k].replace("_", " ") if k in kinds else "") for k in own}
+        label = "not covered: " * bool(words) + (words or "not covered")
+        assert entries[path].label == f"{label} ({len(own)})"
     assert set(seen) == set(np.flatnonzero(~verdict.covered).tolist())
     assert len({entries[path].colour for path in seen.values()}) == len(set(seen.values()))
-    area = areas_of(points_of(shown["/surface/patch"]), faces_of(shown["/surface/patch"])).sum()
-    assert area == pytest.approx(verdict.cells.areas.sum(), rel=2e-3)
 
 
 def test_missed_cells_have_the_colour_of_the_pair_in_the_way(on_grid):
@@ -291,34 +228,8 @@ def test_the_two_sides_of_a_cut_are_drawn_and_named(commands):
         assert sides.labels[node.cell] == 1 - side
     marks = points_of(parts[sides.lost_name].commands[0]).reshape(2, 6, 3).mean(axis=1)
     np.testing.assert_allclose(marks, verdict.cells.centres[list(sides.lost)], atol=1e-4)
-    assert next(label for label in parts if label.startswith(("below", "above"))).count("joint")
-    figure = plot_sides(verdict)
-    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    words = [text.get_text() for text in plot_sides(verdict).legends[0].get_texts()]
     assert words[-1] == sides.lost_name
-    with pytest.raises(ValueError, match="proof is a cut"):
-        plot_sides(check(*load_case("paper/4d", ["surface.cells=[3, 3]"]).build()))
-
-
-def test_the_picture_of_a_large_mesh_is_small(puma):
-    """60,000 triangles as a page of less than two million bytes, most of them the viewer's."""
-    cells = blocks(mesh(triangles(200, 150, sheet), side="inside", position=(4, 0.2, -0.3)), 4)
-    page = view(check(puma, cells, Task(0.005, 45))).html()
-    assert len(page) < 2_000_000
-    ball = mesh(trimesh.creation.icosphere(3, 0.2), position=(4.0, 0.0, 0.5))
-    drawn = view(check(puma, MeshCells.of(ball, np.zeros(1280, dtype=int)), Task(0.005, 45)))
-    assert "1 cell" in [entry.label for entry in drawn.legend.entries]
-
-
-def test_patches_are_coloured_by_their_number(cells):
-    labels = np.arange(COUNT) % 4 - 1  # some cells in none
-    layers = scene.patch_layers(cells, labels, ["a <b>", "c/d", "e", "empty"])
-    assert [layer.entry.label for layer in layers] == ["a <b>", "c/d", "e"]
-    assert len({layer.entry.colour for layer in layers}) == 3
-    for k, layer in enumerate(layers):
-        (command,) = layer.commands
-        assert re.fullmatch(r"/patches/[^/<>]+", command["path"])
-        middles = points_of(command)[faces_of(command)].mean(axis=1)
-        assert set(cells.locate(middles).tolist()) == set(np.flatnonzero(labels == k).tolist())
 
 
 # -- flat pictures --------------------------------------------------------------------------------
@@ -342,9 +253,6 @@ def test_the_flat_graph_and_causes_show_every_cell_once(kind, request):
     drawn = {frozenset(map(tuple, np.round(line, 5).tolist())) for line in lines}
     ends = flat.round(5).tolist()
     assert drawn == {frozenset((tuple(ends[a]), tuple(ends[b]))) for a, b in verdict.graph.edges}
-    dots = {d.get_label(): d for d in collections(figure, PathCollection)}
-    missed = dots["not covered"].get_offsets()
-    np.testing.assert_allclose(missed, flat[~verdict.covered], atol=1e-5)
     assert f"{verdict.covered.sum()} of {len(cells)} cells" in figure.axes[0].get_title()
     boxes = defaultdict(int)
     for part in collections(plot_causes(verdict), PolyCollection):
@@ -353,7 +261,6 @@ def test_the_flat_graph_and_causes_show_every_cell_once(kind, request):
     for kind in CauseKind:
         own = sum(cause.kind == kind for cause in verdict.causes)
         assert boxes[to_rgb(scene.CAUSES[kind])] == own
-    assert boxes[to_rgb(scene.MISSED)] == 1
 
 
 def test_edges_over_a_seam_leave_at_one_border_and_come_in_at_the_other(puma):
@@ -374,7 +281,5 @@ def test_a_transition_shows_every_waypoint_over_its_cell(on_grid):
     dots = [d.get_offsets() for d in axes.collections if type(d) is PathCollection]
     shown = {tuple(row) for row in np.concatenate(dots).round(9)}
     assert shown == {tuple(row) for row in np.degrees(walk[:, moving]).round(9)}
-    names = [f"{on_grid.robot.joint_names[joint]} (degrees)" for joint in moving]
-    assert [axes.get_xlabel(), axes.get_ylabel()] == names
     with pytest.raises(ValueError, match="no edge between the cells 0 and 29"):
         plot_transition(on_grid, (0, 29))

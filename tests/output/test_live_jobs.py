@@ -15,9 +15,8 @@ class Worker:
     """Answers with the values once it is let go on, and gives up a job that is dropped by then."""
 
     def __init__(self):
-        self.begun, self.go = [], threading.Semaphore(0)
-        self.started = threading.Semaphore(0)
-        self.given_up = []
+        self.begun, self.given_up = [], []
+        self.go, self.started = threading.Semaphore(0), threading.Semaphore(0)
 
     def __call__(self, job):
         self.begun.append(job.values)
@@ -29,8 +28,7 @@ class Worker:
         return {"of": job.values}
 
     def let(self, count=1):
-        for _ in range(count):
-            self.go.release()
+        self.go.release(count)
 
     def wait_for(self):
         assert self.started.acquire(timeout=GUARD_S)
@@ -96,30 +94,22 @@ def test_two_pages_do_not_mix(sessions, worker):
     assert answer(third) == {"of": "again"}
 
 
-def test_a_quick_look_does_not_wait_for_a_certificate(sessions, worker):
-    slow, hasty = sessions.open(), sessions.open()
-    certified = sessions.ask(slow, 1, True, "slow")
-    worker.wait_for()
-    quick = sessions.ask(hasty, 1, False, "quick")
-    worker.wait_for()  # both are under way
-    assert worker.begun == ["slow", "quick"]
-    worker.let(2)
-    assert answer(quick) == {"of": "quick"}
-    assert answer(certified) == {"of": "slow"}
-
-
-def test_a_page_that_is_closed_frees_its_place_and_its_worker(sessions, worker):
+def test_a_quick_look_does_not_wait_and_a_page_that_is_closed_frees_its_place(sessions, worker):
     pages = [sessions.open() for _ in range(MOST)]
     with pytest.raises(TooManyPages):
         sessions.open()
-    job = sessions.ask(pages[0], 1, True, "left")
+    certified = sessions.ask(pages[0], 1, True, "slow")
     worker.wait_for()
+    quick = sessions.ask(pages[1], 1, False, "quick")
+    worker.wait_for()  # both are under way
+    assert worker.begun == ["slow", "quick"]
     sessions.close(pages[0])
-    assert (job.dropped, job.wait(0)) == (True, True)
+    assert (certified.dropped, certified.wait(0)) == (True, True)
     sessions.close(pages[0])  # twice does no harm
     assert len(sessions) == MOST - 1
     sessions.open()
-    worker.let()
+    worker.let(2)
+    assert answer(quick) == {"of": "quick"}
 
 
 def test_pages_that_say_nothing_any_more_are_forgotten():
@@ -153,16 +143,3 @@ def test_an_answer_that_nobody_asks_for_any_more_is_given_up(monkeypatch):
     assert not job.dropped
     clock[0] += 0.2 * ALONE
     assert job.dropped
-
-
-def test_an_end_is_an_end(worker):
-    sessions = Sessions(worker)
-    page = sessions.open()
-    job = sessions.ask(page, 1, False, "last")
-    worker.wait_for()
-    sessions.close_all()
-    assert job.dropped
-    worker.let()
-    for lane in sessions._lanes.values():
-        lane.thread.join(GUARD_S)
-        assert not lane.thread.is_alive()

@@ -24,7 +24,6 @@ from samples import EVERYTHING
 import feasibility.checking
 from feasibility import notices
 from feasibility.cli import main as cli
-from feasibility.cli.warm_up import COMMANDS
 from feasibility.notices import NOTICE, compiling_notice
 from feasibility.version import version
 from feasibility.viewer.live_server import LiveView
@@ -48,28 +47,26 @@ def run(*args, **options):
 # -- what is loaded -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("args", [["--help"], ["check", "--help"], ["--version"], ["chek"]])
-def test_help_loads_no_heavy_library(args):
-    done = subprocess.run(
-        [sys.executable, "-c", LOADED, *args], capture_output=True, text=True, check=True
-    )
-    loaded = {name.partition(".")[0] for name in done.stderr.splitlines()[-1].split()}
-    assert "feasibility" in loaded
-    heavy = {"numpy", "pinocchio", "scipy", "networkx", "numba", "rich", "robots"}
-    assert not heavy & loaded
+HEAVY = {"numpy", "pinocchio", "scipy", "networkx", "numba", "rich", "robots"}
+LATE = {"networkx", "scipy.spatial", "scipy.optimize", "trimesh", "matplotlib", "urllib.request",
+        "feasibility.collisions.gathering", "feasibility.paper.greedy",
+        "surfaces.passes"}  # fmt: skip
 
 
-def test_a_plain_check_loads_only_what_it_needs():
-    done = subprocess.run(
-        [sys.executable, "-c", LOADED, "check", "paper/4a"],
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    loaded = set(done.stderr.split())
-    assert {"numba", "pinocchio", "feasibility.roadmap.complete"} <= loaded
-    late = {"networkx", "scipy.spatial", "scipy.optimize", "trimesh", "matplotlib",
-            "urllib.request", "feasibility.collisions.gathering", "feasibility.paper.greedy",
-            "surfaces.passes"}  # fmt: skip
-    assert not late & loaded
+@pytest.mark.parametrize(
+    ("line", "needed", "not_needed"),
+    [
+        ("--help", {"feasibility"}, HEAVY), ("check --help", {"feasibility"}, HEAVY),
+        ("chek", {"feasibility"}, HEAVY),
+        ("check paper/4a", {"numba", "pinocchio", "feasibility.roadmap.complete"}, LATE),
+    ],
+)  # fmt: skip
+def test_a_command_loads_only_what_it_needs(line, needed, not_needed):
+    command = [sys.executable, "-c", LOADED, *line.split()]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    loaded = set(done.stderr.splitlines()[-1].split())
+    assert needed <= loaded
+    assert not not_needed & loaded
 
 
 def test_the_installed_command_is_this_one(ask):
@@ -81,15 +78,12 @@ def test_the_installed_command_is_this_one(ask):
 # -- who reads it ---------------------------------------------------------------------------------
 
 
-def test_a_reader_that_leaves_is_no_error():
+def test_a_reader_that_leaves_is_no_error_and_a_full_disk_status_2():
     first, rest = os.pipe()
     os.close(first)
     child = run("cases", stdout=rest)
     os.close(rest)
     assert (child.returncode, child.stderr) == (0, "")
-
-
-def test_a_full_disk_under_stdout_is_status_2():
     with open("/dev/full", "w") as full:
         child = run("cases", stdout=full)
     assert (child.returncode, child.stderr) == (2, "coverable: No space left on device\n")
@@ -238,11 +232,6 @@ def test_who_waits_is_told_for_what_and_how_to_have_it_all_at_once(capsys, monke
     said = capsys.readouterr().err
     assert "what else `coverable check` needs" in said
     assert "`coverable warm-up` compiles all" in said
-
-
-def test_every_command_of_a_warm_up_is_one():
-    for _, arguments in COMMANDS:
-        assert cli._parser().parse_args(arguments).command == arguments[0]
 
 
 @pytest.mark.sampled

@@ -21,7 +21,6 @@ from feasibility.programs import (
     working_places,
     working_times,
 )
-from feasibility.safe_files import FileError
 from robots import Axis, Kinematics, load_robot
 from surfaces import plane
 from surfaces.passes import PassPlaces, parallel_passes
@@ -134,15 +133,6 @@ def test_rounding_leaves_no_joint_outside_its_limits():
 def test_other_arms_are_refused_with_a_sentence(file, robot, said):
     with pytest.raises(ProgramError, match=re.escape(said)):
         check_program(language_of(file), robot)
-
-
-def test_signs_and_endings_are_checked(tmp_path):
-    for signs in ([1, 1, 1, 1, 1, 2], [1] * 5):
-        with pytest.raises(ProgramError, match="signs"):
-            check_program(language_of("a.mod"), replace(UR5, name="arm"), ProgramSettings(signs))
-    with pytest.raises(FileError, match=r"\.script"):
-        save_program(tmp_path / "a.prg", UR5, motion(UR5))
-    assert list(tmp_path.iterdir()) == []
 
 
 # -- tools are switched where they work, and frames stand in the head ------------------------------

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from meshed_patches import in_cells_of
+from mesh_patches import in_cells_of
 from samples import sampled, spread
 
 from feasibility import Search, Task
 from feasibility.paper.algorithm_2 import tree_search
-from feasibility.paper.continuity import JSpace, Outcome
+from feasibility.paper.continuity import JSpace
 from feasibility.paper.literal import LiteralSearch
 from robots import load_robot
 from surfaces import bspline, cylinder, hyperboloid, piecewise, plane, sphere, torus
@@ -103,18 +103,6 @@ def test_both_readings_agree_where_approach_or_roll_are_asked_for(name, asked):
     free = JSpace(PUMA, cells, Task(0.005, 45), literal.start, search)
     other = tree_search(free, cells, at)
     assert other.checked != tree.checked, "the limits did not matter here; take tighter ones"
-
-
-def test_a_single_call_says_the_same():
-    cells, search = PATCHES["dome"](), Search(method="greedy", step_deg=0.5)
-    space, literal, at = both(cells, Task(standoff=0.005, cone_deg=8), search)
-    neighbours = cells.neighbours.of(at).tolist()
-    assert len(neighbours) == 8
-    for neighbour in neighbours:
-        compiled = space.continuity((0,) * PUMA.n, neighbour)
-        path = literal.algorithm_1((0,) * PUMA.n, neighbour)
-        assert (compiled.outcome is Outcome.FOUND) == bool(path)
-        assert [tuple(row) for row in compiled.jcells.tolist()] == list(path)
 
 
 def test_a_start_off_the_manifold_is_refused_and_a_subclass_makes_its_own_searches():

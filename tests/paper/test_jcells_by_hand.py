@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import networkx as nx
 import numpy as np
 import pytest
 from arm_urdfs import joint
@@ -141,15 +140,3 @@ def test_time_limits_coarse_steps_and_bad_starts_are_said():
     for start, said in ((np.zeros(6), "start must satisfy"), ([0.0, math.nan], "6 finite joint")):
         with pytest.raises(ValueError, match=said):
             greedy_check(PUMA, cells, Task(0.005, 45), greedy(), start=start)
-
-
-def test_same_seed_same_search():
-    cells, search = (
-        cylinder(0.5, (-60, 60), (0, 0.9)).cells(5, 5),
-        greedy(moves="all", step_deg=1.0),
-    )
-    one, two = (greedy_check(PUMA, cells, Task(0.005, 20), search) for _ in range(2))
-    assert dict(one.statistics) == dict(two.statistics)
-    assert nx.utils.edges_equal(one.graph.edges, two.graph.edges)
-    for cell in one.tree:
-        np.testing.assert_array_equal(one.tree.nodes[cell]["q"], two.tree.nodes[cell]["q"])

@@ -6,15 +6,16 @@ from dataclasses import replace
 
 import mesh_patches
 import numpy as np
+import plain
 import pytest
-from meshed_patches import in_cells_of
+import referee
+from mesh_patches import in_cells_of
 
 from coverable_kernels import allocating_entry
 from feasibility import Answer, Search, Task, greedy_check
-from feasibility.paper import starts, tree_walk
+from feasibility.paper import tree_walk
 from feasibility.paper.jcell_steps import Steps
 from feasibility.paper.tree_replay import Path, replay_stored, replay_tree, within_cells
-from feasibility.roll import projected, roll_of
 from robots import Kinematics, load_robot
 from surfaces import cell_under as cell_under_kernel
 from surfaces import mesh, piecewise, plane, sphere, torus, triangulation
@@ -27,17 +28,6 @@ TASK = Task(0.005, 45)
 COARSE = Search(method="greedy", step_deg=0.5)
 DOME = sphere(1.0, (10, 90), (10, 180), side="inside").cells(5, 6)
 RING = torus(0.8, 0.3, (20, 60), (-20, 20), side="inside").cells(3, 3)
-
-
-def test_the_mesh_of_a_dome_is_searched_as_the_dome():
-    """From every start over the middle cell the same cells are reached."""
-    cells, (points, approaches, _) = DOME, TASK.targets(DOME)
-    meshed, middle = in_cells_of(cells, 6), 15
-    for q in starts(PUMA, points[middle], approaches[middle], TASK.cone):
-        one = greedy_check(PUMA, cells, TASK, COARSE, start=q)
-        other = greedy_check(PUMA, meshed, TASK, COARSE, start=q)
-        assert (one.start, one.answer, one.evidence) == (other.start, other.answer, other.evidence)
-        np.testing.assert_array_equal(one.covered, other.covered)
 
 
 @pytest.mark.parametrize("cells", [RING, in_cells_of(RING, 6)], ids=["ring", "mesh"])
@@ -78,7 +68,7 @@ def test_the_replay_of_a_tree_judges_between_jcells():
     assert error <= verdict.certificate.max_position_error + 1e-5 <= steps.tolerance
     tight = replace(steps, tolerance=0.95 * error)
     assert "off its surface" in replay_tree(PUMA, RING, TASK, tight, paths).refusal
-    tilt = np.degrees(np.arccos(np.einsum("ki,ki->k", axes, found.normal))).max()
+    tilt = np.degrees(referee.angles_between(axes, found.normal)).max()
     narrow = replace(TASK, cone_deg=0.95 * tilt)
     assert "the tool axis tilts" in replay_tree(PUMA, RING, narrow, steps, paths).refusal
     swapped = paths[:1] + [replace(path, neighbour=path.cell) for path in paths[1:]]
@@ -113,16 +103,12 @@ def test_a_roll_that_is_limited_is_kept_between_jcells():
     task = Task(0.005, 45, roll_deg=(-20, 20), roll_reference=(1, 0, 0))
     verdict = greedy_check(PUMA, cells, task, COARSE)
     assert verdict.feasible, verdict.message
-    walk, kinematics = tree_walk(verdict), Kinematics(PUMA)
-    share = np.linspace(0.0, 1.0, 5)[:-1, None, None]
-    q = (walk.q[:-1] + share * np.diff(walk.q, axis=0)).reshape(-1, PUMA.n)
-    points, axes = kinematics.tools(q)
-    x = np.array([kinematics.rotation(row) @ PUMA.reference_axis for row in q])
-    approaches = -cells.surface.closest(points).normal
-    references, _ = projected(np.array([1.0, 0.0, 0.0]), approaches)
-    rolls = np.degrees(roll_of(x, axes, references, approaches))
-    assert np.abs(rolls).max() <= np.degrees(verdict.certificate.max_roll) <= 20.0
-    assert np.ptp(rolls) > 10.0
+    walk, allowed = tree_walk(verdict), Steps.of(PUMA, cells, task, COARSE).tolerance
+    plain.assert_motion(replace(verdict, task=replace(task, tolerance=allowed)), walk.q)
+    arm, form = plain.arm_of(PUMA), plain.surface_of(cells.surface)
+    kept = referee.kept_over(arm, form, plain.asked_of(task, cells), referee.evenly(walk.q, 5))
+    most = kept.roll.max() + np.radians(20.0)
+    assert np.radians(5.0) < most <= verdict.certificate.max_roll <= np.radians(20.0)
     held = replace(task, roll_deg=(-5, 5))
     assert not greedy_check(PUMA, cells, held, COARSE).feasible
     assert not replay_stored(replace(verdict, task=held), COARSE).accepted
@@ -141,22 +127,17 @@ def test_the_covering_walk_takes_whole_steps_inside_all_constraints_over_every_c
     assert moves == "all" or (steps_of_one.round().sum(axis=1) == 1).all()
     parts = [a + np.arange(k)[:, None] * (b - a) / k
              for a, b, k in zip(walk.q[:-1], walk.q[1:], count, strict=True)]  # fmt: skip
-    q, steps = np.concatenate([*parts, walk.q[-1:]]), Steps.of(PUMA, DOME, TASK, search)
-    assert ((q >= PUMA.lower) & (q <= PUMA.upper)).all()
-    points, axes = Kinematics(PUMA).tools(q)
-    near, sign = DOME.surface.closest(points), DOME.surface.side_sign
-    assert near.inside.all()
-    off = np.abs(near.height - sign * TASK.standoff).max()
-    assert off + steps.sag.max() <= steps.tolerance
-    chord = np.linalg.norm(axes + sign * near.normal, axis=1).max() + steps.turn.max()
-    assert 2.0 * np.arcsin(0.5 * chord) <= TASK.cone
+    allowed = Steps.of(PUMA, DOME, TASK, search).tolerance
+    plain.assert_motion(replace(verdict, task=replace(TASK, tolerance=allowed)), walk.q)
+    q = np.concatenate([*parts, walk.q[-1:]])
+    near = DOME.surface.closest(plain.arm_of(PUMA).tool(q)[0])
     at = np.column_stack([near.u, near.v])
     assert all(within_cells(DOME, at, [cell] * len(q)).any() for cell in range(len(DOME)))
     # A row is at a cell only where the tool is at its centre.
-    points, targets = Kinematics(PUMA).tools(walk.q)[0], TASK.targets(DOME).points
-    away = np.linalg.norm(points[:, None] - targets, axis=2)
-    np.testing.assert_array_equal(walk.cell >= 0, away.min(axis=1) <= 1e-3)
-    rows = np.flatnonzero(walk.cell >= 0)
-    np.testing.assert_array_equal(walk.cell[rows], away[rows].argmin(axis=1))
+    away = np.linalg.norm(
+        Kinematics(PUMA).tools(walk.q)[0][:, None] - TASK.targets(DOME).points, axis=2
+    )
+    at = np.where(away.min(axis=1) <= 1e-3, away.argmin(axis=1), -1)
+    np.testing.assert_array_equal(walk.cell, at)
     arm = PUMA.with_limits({"joint1": np.radians([-30.0, 20.0])})
     assert not greedy_check(arm, DOME, TASK, replace(search, moves="all")).feasible

@@ -52,9 +52,7 @@ def test_loading_the_judge_loads_nothing_of_the_search() -> None:
 
 
 def test_no_folder_holds_more_than_twenty_modules() -> None:
-    """But for helpers that tests share: pytest finds them in one flat folder."""
     folders = {path.parent for path in [*FILES, *(ROOT / "tests").rglob("*.py")]}
-    folders.discard(ROOT / "tests/shared")
     for folder in folders:
         assert len([p for p in folder.glob("*.py") if p.stem != "__init__"]) <= 20, folder
 

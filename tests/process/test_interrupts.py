@@ -7,6 +7,7 @@ on, and at what the interpreter tells of itself (audit events).
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 import signal
 import subprocess
@@ -27,6 +28,7 @@ from feasibility.studies import Store
 INTERRUPTED = "coverable: interrupted\n"
 GUARD_S = 1800.0  # against hanging alone
 OURS = ("coverable", "feasibility.cli", "feasibility.safe_files", "feasibility.results")
+STORE = ("feasibility.studies.store",)
 
 # -- in this process: at the n-th call of a function of ours ---------------------------------------
 
@@ -40,16 +42,17 @@ def check_all(folder: Path):
 
 
 @contextlib.contextmanager
-def interrupted_at(call: int, swallowed: bool):
-    """Ctrl-C at a call or return of our functions that write; a library may swallow it.
+def interrupted_at(call: int, swallowed: bool = False, ours: tuple[str, ...] = OURS):
+    """Ctrl-C at a call or return of functions of these modules; a library may swallow it.
 
     Counted from where a command begins to hear it: what comes before has tests of its own.
     """
     count, empty = [0], contextlib.nullcontext
 
     def profile(frame, event, argument):
-        ours = event in ("call", "return") and frame.f_globals.get("__name__", "").startswith(OURS)
-        if ours and signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        counts = event in ("call", "return")
+        counts = counts and frame.f_globals.get("__name__", "").startswith(ours)
+        if counts and signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
             count[0] += 1
             if count[0] == call + 1:
                 sys.setprofile(None)
@@ -70,7 +73,7 @@ def whole(tmp_path_factory):
     folder = tmp_path_factory.mktemp("whole") / "out"
     folder.mkdir()
     check_all(folder)
-    with interrupted_at(10**9, False) as calls:
+    with interrupted_at(10**9) as calls:
         assert check_all(folder).status == 0
     return {file.name: file.read_bytes() for file in folder.iterdir()}, calls[0]
 
@@ -95,33 +98,42 @@ def test_at_any_call_of_a_command_that_writes_files(swallowed, whole, tmp_path):
     assert left == []
 
 
-def test_in_a_callback_of_the_interpreter():
-    """Python prints it and goes on: it is raised again, without waiting for an output."""
-
-    class Dying:
-        def __del__(self):
-            signal.raise_signal(signal.SIGINT)
-
-    def work():
-        with interruptible():
-            Dying()
-            while True:  # ended by the second attempt alone
-                pass
-
-    with pytest.raises(KeyboardInterrupt):
-        work()
+def test_a_store_is_closed_wherever_it_is_cut_short(tmp_path):
+    """SQLite keeps files beside one that is open, and in a process garbage is collected seldom."""
+    (case := tmp_path / "plate.toml").write_text(PLATE)
+    asked = "place", case, "--workers", 0, "--x", 0.3, 0.5, "--count", 1, "--out"
+    gc.disable()
+    try:
+        assert coverable(*asked, tmp_path / "whole").status == 0  # and all is imported
+        for call in spread(range(30), 8):  # it is open after 26
+            with interrupted_at(call, ours=STORE):
+                assert coverable(*asked, tmp_path / str(call)).status == 130
+            assert list(tmp_path.glob("*-*")) == []
+    finally:
+        gc.enable()
 
 
-def test_in_a_compiled_module_that_prints_and_drops_it():
+class Dying:
+    """The interpreter prints what its callback raises, and goes on."""
+
+    def __del__(self):
+        signal.raise_signal(signal.SIGINT)
+
+
+def printed_and_dropped():
     """As the generated code of Cython does where nothing can be raised."""
+    try:
+        signal.raise_signal(signal.SIGINT)
+    except KeyboardInterrupt as error:
+        sys.excepthook(type(error), error, error.__traceback__)
 
+
+@pytest.mark.parametrize("drop", [Dying, printed_and_dropped])
+def test_what_is_dropped_is_raised_again_without_waiting_for_an_output(drop):
     def work():
         with interruptible():
-            try:
-                signal.raise_signal(signal.SIGINT)
-            except KeyboardInterrupt as error:
-                sys.excepthook(type(error), error, error.__traceback__)
-            while True:
+            drop()
+            while True:  # ended by the second attempt alone
                 pass
 
     with pytest.raises(KeyboardInterrupt):

@@ -9,7 +9,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 from concurrent.futures import BrokenExecutor, CancelledError, Future
 from concurrent.futures.process import BrokenProcessPool
@@ -19,15 +18,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import study_works
-from jobs import TEXTS, case_named, coverable, verdict_named
+from jobs import case_named, coverable, verdict_named
 
 from feasibility.cases import as_read
-from feasibility.roadmap import warm_up_in_turn
 from feasibility.studies import (
     Store,
     StudyTask,
     WorkersError,
-    bits_of,
     cells_of,
     load_study,
     open_workers,
@@ -52,7 +49,7 @@ def pool():
 # -- one task --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", TEXTS)
+@pytest.mark.parametrize("name", ["plate", "long plate"])
 def test_an_outcome_says_what_the_verdict_says(name) -> None:
     verdict, case = verdict_named(name), case_named(name)
     with open_workers(0) as workers:
@@ -75,15 +72,6 @@ def test_an_outcome_says_what_the_verdict_says(name) -> None:
         assert margins["limit_deg"] == pytest.approx(least)
         assert 0.0 <= margins["cone_deg"] <= verdict.task.cone_deg
         assert 0.0 < margins["reach_m"] < robot.reach
-
-
-def test_bits_hold_any_cells() -> None:
-    rng = np.random.default_rng(1)
-    for n in (0, 1, 7, 8, 9, 90):
-        cover = rng.random(n) < 0.5
-        assert np.array_equal(cells_of(bits_of(cover), n), cover)
-    with pytest.raises(ValueError, match="cells"):
-        cells_of("ff", 9)
 
 
 # -- many tasks ------------------------------------------------------------------------------------
@@ -377,49 +365,3 @@ def test_workers_that_die_while_starting_are_not_started_for_ever(tmp_path) -> N
         capture_output=True, text=True, check=False, timeout=1800,
     )  # fmt: skip
     assert "died while starting, 3 times; what was finished is kept" in done.stdout, done.stderr
-
-
-@pytest.mark.parametrize("fails", [False, True])
-def test_the_others_wait_for_the_first_to_compile(fails) -> None:
-    """Threads in the place of processes: nobody else loads while the first one is at it."""
-    gate, entered, may_end = Gate(), [], threading.Event()
-
-    def load(rarely_used: bool) -> None:
-        entered.append(threading.current_thread())
-        if len(entered) == 1:
-            may_end.wait()
-            if fails:
-                raise ValueError("no memory")
-
-    def begin() -> None:
-        with suppress(ValueError):
-            warm_up_in_turn(gate, int, load)
-
-    threads = [threading.Thread(target=begin) for _ in range(4)]
-    for thread in threads:
-        thread.start()
-    for _ in threads[1:]:
-        gate.waiting.acquire()
-    while not entered:
-        time.sleep(0.001)
-    assert len(entered) == 1
-    may_end.set()
-    for thread in threads:
-        thread.join()
-    assert sorted(map(id, entered)) == sorted(map(id, threads))
-    assert gate.acquire(False)
-
-
-class Gate:
-    """A lock that counts those who wait for it."""
-
-    def __init__(self) -> None:
-        self.lock, self.waiting = threading.Lock(), threading.Semaphore(0)
-
-    def acquire(self, block=True):
-        if block:
-            self.waiting.release()
-        return self.lock.acquire(block)
-
-    def release(self):
-        self.lock.release()

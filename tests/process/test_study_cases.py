@@ -7,11 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from jobs import case_named
+from bad_input import sheet
+from mesh_writers import stl_of
 
 from feasibility.cases import TABLES, Case, CaseError, load_case, toml_document
 from feasibility.placement import Pose, StudyEvaluator
-from feasibility.studies import Store, StudyTask, arm_of, case_of, cut_of, open_workers, run_tasks
+from feasibility.studies import Store, StudyTask, case_of, cut_of, open_workers, run_tasks
 
 XACRO = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
 BEAM = "elsewhere/beam.obj"
@@ -89,8 +90,17 @@ def test_a_stored_verdict_is_for_the_files_as_they_were(folder: Path) -> None:
     assert verdict(folder, plain) == ("feasible", False)
 
 
-def test_what_files_include_in_turn_is_part_of_the_key(folder: Path) -> None:
-    case = Case.from_toml(CASE.format("xacro") + COLLISION, folder)
+def test_all_files_of_a_case_and_what_they_include_are_part_of_its_key(folder: Path) -> None:
+    """Surface, scene and tool as meshes; arm and SRDF as xacro files that include others."""
+    meshes = ["surface.stl", "scene.stl", "tool.stl"]
+    for name in meshes:
+        (folder / name).write_bytes(stl_of(sheet()))
+    surface, scene, tool = (f'"{folder / name}"' for name in meshes)
+    more = ["surface.u=", "surface.v=", "surface.kind=mesh", f"surface.file={surface}"]
+    more += ["surface.scale=1", "surface.cells=2"]
+    more += [f'collision.scene=[{{ name = "a", kind = "mesh", file = {scene}, scale = 1 }}]']
+    more += [f'collision.tool=[{{ kind = "mesh", file = {tool}, scale = 1 }}]']
+    case = Case.from_toml(CASE.format("xacro") + COLLISION, folder, overrides=more)
     keys = [StudyTask(case.to_tables(), {}).key]
     none = '<disable_collisions link1="l1" link2="l2" reason="User"/>'
     for file, text in (
@@ -101,9 +111,12 @@ def test_what_files_include_in_turn_is_part_of_the_key(folder: Path) -> None:
         file.write_text(text)
         keys.append(StudyTask(case.to_tables(), {}).key)
         assert StudyTask(case.to_tables(), {}).key == keys[-1]
+    for name in meshes:
+        (folder / name).write_bytes(stl_of(sheet(0.3)))
+        keys.append(StudyTask(case.to_tables(), {}).key)
     (folder / BEAM).unlink()
     keys.append(StudyTask(case.to_tables(), {}).key)
-    assert len(set(keys)) == 5
+    assert len(set(keys)) == 8
 
 
 @pytest.mark.parametrize("kind", ["urdf", "xacro"])
@@ -180,13 +193,3 @@ def test_a_mesh_cut_once_and_placed_is_the_mesh_cut_in_place(tmp_path) -> None:
                 if hasattr(owner(fresh), name):
                     ours, theirs = getattr(owner(placed), name), getattr(owner(fresh), name)
                     assert np.array_equal(ours, theirs), (k, name)
-
-
-def test_cells_as_fine_as_the_footprint_needs_and_arms_loaded_once() -> None:
-    case = case_named("plate").with_overrides(["surface.cells=auto", "task.footprint=0.1"])
-    assert np.array_equal(cut_of(case).centres, case.build().cells.centres)
-    assert cut_of(case).shape == (4, 4)
-    assert arm_of(case) is arm_of(case.with_overrides(["task.cone_deg=5"]))
-    narrow = case.with_overrides(["robot.limits_deg={ shoulder_pan_joint = [-10, 10] }"])
-    assert arm_of(narrow) is not arm_of(case)
-    assert np.degrees(arm_of(narrow).upper[0]) == pytest.approx(10)

@@ -7,8 +7,6 @@ import os
 import resource
 import signal
 import sqlite3
-import subprocess
-import sys
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 
@@ -77,34 +75,6 @@ def test_many_open_a_new_file_at_the_same_moment(tmp_path) -> None:
     with ThreadPoolExecutor(4) as pool:
         for number in range(30):
             assert list(pool.map(opened, [tmp_path / f"{number}.study"] * 4)) == [{}] * 4
-
-
-KEEP_ON = """
-import sys
-from feasibility.studies.store import Record, Store
-with Store(sys.argv[1]) as store:
-    for k in range(100_000):
-        store.keep([Record(f"key{k}", {"k": k}, "done", {"text": "x" * 2000}, 1.0)])
-        print(k, flush=True)
-"""
-
-
-def test_a_killed_writer_loses_nothing_that_it_had_kept(tmp_path) -> None:
-    path = tmp_path / "a.study"
-    command = [sys.executable, "-c", KEEP_ON, str(path)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        for line in process.stdout:
-            if line == "150\n":
-                process.kill()
-                break
-        last = [150, *map(int, process.stdout.read().split())][-1]
-    with Store(path) as store:
-        keys = {f"key{k}" for k in range(last + 2)}
-        found = store.find(keys)
-        # The one that was being written may be there or not.
-        assert keys - {f"key{last + 1}"} <= set(found)
-        assert all(r.result == {"text": "x" * 2000} for r in found.values())
 
 
 def test_a_full_disk_loses_nothing_that_was_kept(tmp_path) -> None:
@@ -194,19 +164,6 @@ def test_places_that_are_no_files(tmp_path) -> None:
             Store(tmp_path / f"{end}.study")
 
 
-def test_rows_that_no_study_has_written(tmp_path) -> None:
-    path = tmp_path / "a.study"
-    results = "{", "[]", "[" * 100_000, '{"a": Infinity}', '{"share": 1e999}'
-    bad = [("{}", "done", result, 1.0) for result in results]
-    bad += [("{}", "done", "{}", seconds) for seconds in ("soon", -1.0, float("inf"))]
-    with Store(path) as store:
-        store.keep([])
-    for row in (*bad, ("3", "done", "{}", 1.0), (b"\xff", "done", "{}", 1.0)):
-        put(path, ("k", *row))
-        with Store(path) as store, pytest.raises(StoreError, match="damaged"):
-            store.find(["k"])
-
-
 PROGRAMS = {
     "a view that never ends": "CREATE VIEW v AS WITH RECURSIVE n(k) AS "
     "(SELECT 1 UNION ALL SELECT k FROM n) SELECT k FROM n",
@@ -217,6 +174,12 @@ PROGRAMS = {
     "text that is none": "UPDATE tasks SET result = CAST(x'7bff7d' AS TEXT)",
     "text without end": "UPDATE tasks SET result = CAST(printf('%.*c', 80000000, 'x') AS TEXT)",
 }
+VALUES = (
+    "result = '{'", "result = '[]'", "result = replace(hex(zeroblob(50000)), '0', '[')",
+    "result = '{\"a\": Infinity}'", "result = '{\"share\": 1e999}'", "parameters = 3",
+    "parameters = x'ff'", "seconds = 'soon'", "seconds = -1.0", "seconds = 9e999",
+)  # fmt: skip
+PROGRAMS |= {value: f"UPDATE tasks SET {value}" for value in VALUES}
 
 
 @pytest.fixture(scope="module")
@@ -248,7 +211,7 @@ def copied(good, tmp_path):
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
-def test_a_store_that_holds_a_program_is_refused(program, good, tmp_path) -> None:
+def test_a_store_that_no_study_has_written_is_refused(program, good, tmp_path) -> None:
     path = copied(good, tmp_path)
     with closing(sqlite3.connect(path)) as base:
         base.executescript(PROGRAMS[program])
@@ -274,15 +237,6 @@ def test_every_value_of_a_result_is_judged(good, tmp_path) -> None:
         row = rows(good / "out.study")[0]
         put(path, (*row[:3], json.dumps({**result, key: odd}), 1.0))
         assert f"{key} must be" in refused(good, path) or key == "components"
-
-
-def test_what_a_store_may_say_is_no_program_on_the_page(good, tmp_path) -> None:
-    path, page = copied(good, tmp_path), tmp_path / "page.html"
-    for key, parameters, status, text, seconds in rows(path):
-        said = json.dumps({**json.loads(text), "message": SCRIPT})
-        put(path, (key, parameters, status, said, seconds))
-    assert ask(good, path, "--html", page).status == 0
-    assert SCRIPT not in page.read_text()
 
 
 def test_what_works_keep_is_what_is_read_again_and_judged(tmp_path) -> None:

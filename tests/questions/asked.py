@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import plain
 import tomli_w
+from mesh_writers import stl_of
 
 from feasibility import Search, Task, Verdict, check
 from feasibility.cases import Case, load_case
@@ -27,7 +28,14 @@ from surfaces import Cells
 
 HERE = Path(__file__).parent
 TABLES = ("robot", "surface", "task", "collision", "search")
-QUESTIONS: dict[str, dict[str, Any]] = tomllib.loads((HERE / "questions.toml").read_text("utf-8"))
+TABLE: dict[str, Any] = tomllib.loads((HERE / "questions.toml").read_text("utf-8"))
+QUESTIONS: dict[str, dict[str, Any]] = {}
+for tag, rows in TABLE.items():
+    for name, row in rows.items():
+        one = row | row.get("is", {})
+        QUESTIONS[name] = one | {"tags": [tag, *one.get("tags", ())]}
+PLAIN = {"robot": {"name": "ur5"}, "task": {"standoff": 0.02, "cone_deg": 40}}
+"""Of a question that is like none, where it does not say another."""
 FILES = tempfile.TemporaryDirectory(prefix="questions-")
 
 STORED = {
@@ -78,6 +86,13 @@ def known(name: str) -> str | None:
     return "not infeasible"
 
 
+def counted(name: str) -> tuple[int, int] | None:
+    """How many cells one motion covers at most, and how many can be reached, where others know."""
+    file, _, number = name.rpartition(" ")
+    one = _stored(file)[int(number)] if file in STORED else {}
+    return (one["covered"], one["reachable"]) if "reachable" in one else None
+
+
 @cache
 def tables_of(name: str) -> dict[str, Any]:
     """The tables of a question's case, as plain numbers."""
@@ -95,6 +110,7 @@ def _merged(name: str) -> dict[str, Any]:
     """A question's own keys, and those of what it is like."""
     own = deepcopy(QUESTIONS[name])
     made = deepcopy(tables_of(own["like"])) if "like" in own else {}
+    own = own if "like" in own else PLAIN | own
     for key in own.get("drop", ()):
         made["surface"].pop(key, None)
     for title in TABLES:
@@ -163,7 +179,7 @@ def _as_file(tables: dict[str, Any], how: dict[str, Any]) -> dict[str, Any]:
     if kind == "dent":
         corners = _grooved(how["radius"])
         kept = {key: surface[key] for key in ("position", "side", "cells")}
-        _write_stl(path.with_suffix(".stl"), corners)
+        path.with_suffix(".stl").write_bytes(stl_of(corners))
         return tables | {
             "surface": kept | {"kind": "mesh", "file": f"{path.stem}.stl", "scale": 1.0}
         }
@@ -173,7 +189,7 @@ def _as_file(tables: dict[str, Any], how: dict[str, Any]) -> dict[str, Any]:
     made = {key: surface[key] for key in ("side", "position", "rpy_deg") if key in surface}
     made["side"] = surface.get("side", "inside")
     if kind == "mesh":
-        _write_stl(path.with_suffix(".stl"), plain.facets_of(local, *how["pieces"]))
+        path.with_suffix(".stl").write_bytes(stl_of(plain.facets_of(local, *how["pieces"])))
         made |= {"kind": "mesh", "file": f"{path.stem}.stl", "cells": how["cells"], "scale": 1.0}
     elif kind == "grid":
         u, v = (
@@ -213,9 +229,3 @@ def _grooved(radius: float) -> np.ndarray:
     )
     points = np.stack([radius * np.sin(turn), y, -radius * np.cos(turn)], -1)
     return plain.triangles_of_grid(points)
-
-
-def _write_stl(path: Path, corners: np.ndarray) -> None:
-    rows = np.zeros(len(corners), [("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")])
-    rows["v"] = corners
-    path.write_bytes(b"made by a test".ljust(80) + np.uint32(len(rows)).tobytes() + rows.tobytes())

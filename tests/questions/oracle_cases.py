@@ -98,24 +98,20 @@ def patch(problem: Problem, refine: int) -> Domain:
     return Domain(uv, _pairs(*at.shape), at[half::refine, half::refine].ravel())
 
 
-def net(problem: Problem, pieces: Ints | int) -> Domain:
-    """Centres, and the lines between neighbours cut into `pieces` (one number, or one a line)."""
+def net(problem: Problem, pieces: int) -> Domain:
+    """Centres, and the lines between neighbours cut into so many pieces."""
     (nu, nv), (u_range, v_range) = problem.cells, problem.ranges
     centres = np.stack(
         np.meshgrid(_middles(u_range, nu), _middles(v_range, nv), indexing="ij"), -1
     ).reshape(-1, 2)
-    ends = _pairs(nu, nv)
-    counts = np.broadcast_to(pieces, len(ends))
-    samples, links = [centres], []
-    first = len(centres)
-    for (a, b), count in zip(ends, counts, strict=True):
-        part = np.arange(1, count)[:, None] / count
-        samples.append(centres[a] * (1.0 - part) + centres[b] * part)
-        chain = np.concatenate([[a], np.arange(first, first + count - 1), [b]])
-        links.append(np.stack([chain[:-1], chain[1:]], 1))
-        first += count - 1
-    joined = np.concatenate(links) if links else np.empty((0, 2), dtype=np.int64)
-    return Domain(np.concatenate(samples), joined, np.arange(len(centres)))
+    a, b = _pairs(nu, nv).T
+    part = np.arange(1, pieces)[:, None] / pieces
+    between = centres[a, None] * (1.0 - part) + centres[b, None] * part
+    inner = len(centres) + np.arange(len(a) * (pieces - 1)).reshape(len(a), -1)
+    chains = np.column_stack([a, inner, b])
+    links = np.stack([chains[:, :-1], chains[:, 1:]], -1).reshape(-1, 2)
+    samples = np.concatenate([centres, between.reshape(-1, 2)])
+    return Domain(samples, links, np.arange(len(centres)))
 
 
 class Answer(NamedTuple):

@@ -15,26 +15,15 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from oracle_cases import Answer, Domain, Floats, Ints, Problem, answer, net, patch
+from oracle_cases import Answer, Domain, Floats, Ints, Problem, answer, patch
 
 A2, A3, D3, D4 = 0.7, 0.1, 0.1, 0.7  # [m]
 TAU = 2.0 * np.pi
 MOST_JUMP = 1.0  # [rad] between neighbouring samples of one branch
 MEETING = 1e-3  # [rad] two branches this close are one configuration
 BRANCHES = np.array([(s, e) for s in (1.0, -1.0) for e in (1.0, -1.0)])
-
-
-class Resolution(NamedTuple):
-    """How finely the oracle looks."""
-
-    rows: float = 7.0  # theta5 rows in one cone angle; the step stays within 0.4 .. 2.5 degrees
-    turn_deg: float = 4.0
-    """Largest change of a joint, or of the approach direction in link 3, between samples; never
-    more than a third of the cone, so that the cones of neighbouring samples overlap."""
-    samples: int = 6000  # Patch: most samples in all, where that leaves three across a cell
-
-
-STANDARD = Resolution()
+ROWS = 7.0  # of theta5 in one cone angle; the step stays within 0.4 .. 2.5 degrees
+SAMPLES = 6000  # in all, where that leaves three across a cell
 
 
 def slack(points: Floats) -> Floats:
@@ -163,22 +152,6 @@ def _fold_samples(problem: Problem, domain: Domain) -> tuple[Domain, Ints]:
     return Domain(np.concatenate([domain.uv, near]), links, domain.centres), added
 
 
-def _pieces(problem: Problem, turn_deg: float) -> Ints:
-    """Pieces of each line between centres in which nothing turns by more than `turn_deg`."""
-    probes = 8
-    coarse = net(problem, probes)
-    points, approaches = problem.targets(*coarse.uv.T)
-    theta = arms(points)
-    seen = in_link3(theta, approaches[:, None, :])
-    a, b = coarse.links.T
-    turned = np.abs((theta[a] - theta[b] + np.pi) % TAU - np.pi).max(axis=-1)
-    turned = np.maximum(turned, np.linalg.norm(seen[a] - seen[b], axis=-1))
-    held = (slack(points) >= 0.0).all(axis=-1)
-    turned = np.where((held[a] & held[b])[:, None], turned, 0.0).max(axis=1)
-    fastest = turned.reshape(-1, probes).max(axis=1) * probes
-    return np.ceil(fastest / np.radians(turn_deg)).astype(int)
-
-
 class Fibres(NamedTuple):
     """Every arm branch over every sample, with what its wrist may do."""
 
@@ -252,27 +225,12 @@ def _rows(limits: Floats, step: float) -> Floats:
     return np.unique(np.concatenate([limits, inner[(inner > limits[0]) & (inner < limits[1])]]))
 
 
-def solve(problem: Problem, on: str = "patch", resolution: Resolution = STANDARD) -> Answer:
+def solve(problem: Problem) -> Answer:
     """The oracle's answer."""
     n_cells = problem.cells[0] * problem.cells[1]
     if (problem.limits[:, 0] > problem.limits[:, 1]).any():
         return Answer(n_cells == 0, 0, 0)
-    domain, folds = domain_of(problem, on, resolution)
-    found = fibres(problem, domain, folds, row_step(problem, resolution))
-    return answer(n_cells, *components(found, domain))
-
-
-def row_step(problem: Problem, resolution: Resolution) -> float:
-    """rad between theta5 rows."""
-    return float(np.radians(np.clip(problem.cone_deg / resolution.rows, 0.4, 2.5)))
-
-
-def domain_of(problem: Problem, on: str, resolution: Resolution) -> tuple[Domain, Ints]:
-    """The samples of a problem, and which of them are points where two branches meet."""
-    pieces = _pieces(problem, min(resolution.turn_deg, problem.cone_deg / 3.0))
-    if on == "net":
-        return net(problem, np.clip(pieces, 6, 120)), np.empty(0, dtype=np.int64)
-    across = np.quantile(pieces, 0.9) if len(pieces) else 3
-    across = int(min(across, np.sqrt(resolution.samples / len(net(problem, 1).centres))))
-    domain = patch(problem, max((across - 1) // 2 * 2 + 1, 3))
-    return _fold_samples(problem, domain)
+    across = int(np.sqrt(SAMPLES / n_cells))
+    domain, folds = _fold_samples(problem, patch(problem, max((across - 1) // 2 * 2 + 1, 3)))
+    row_step = float(np.radians(np.clip(problem.cone_deg / ROWS, 0.4, 2.5)))
+    return answer(n_cells, *components(fibres(problem, domain, folds, row_step), domain))

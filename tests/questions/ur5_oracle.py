@@ -10,12 +10,10 @@ neighbouring samples are joined where joints stay continuous; elbows meet where 
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from oracle_cases import Answer, Domain, Floats, Ints, Problem, answer, net, patch
+from oracle_cases import Answer, Floats, Ints, Problem, answer, net
 from puma_oracle import TAU, _root, _rows
 
 D1, L2, L3 = 0.089159, 0.425, 0.39225  # [m]
@@ -23,19 +21,9 @@ D4, D5, D6 = 0.13585 - 0.1197 + 0.093, 0.09465, 0.0823  # [m]
 CLEARANCE = 0.25  # [m] from the first axis; the shoulders meet at D4 + D6 = 0.19145
 MOST_JUMP = 1.0  # [rad] of a joint between neighbours
 MOST_FLIP = 1.2  # [rad] of a joint between two elbows that meet nearby
+STEPS = 8.0  # of theta5 and of psi in one cone angle; they stay within 2 .. 5 degrees
+PIECES = 6  # of a line between centres
 INVALID, STRETCHED = -1, -2
-
-
-class Resolution(NamedTuple):
-    """How finely the oracle looks."""
-
-    steps: float = 8.0
-    """Grid steps of theta5 and of psi in one cone angle; they stay within 2 .. 5 degrees."""
-    pieces: int = 6  # Net: pieces of a line between centres
-    refine: int = 3  # Patch: samples across a cell, odd
-
-
-STANDARD = Resolution()
 
 
 @njit(cache=True)
@@ -135,9 +123,9 @@ def _join(
 
 @njit(cache=True)
 def _components(
-    place: NDArray[np.int32], theta: Floats, upper: Floats, turns: Ints, links: Ints, flip: bool
+    place: NDArray[np.int32], theta: Floats, upper: Floats, turns: Ints, links: Ints
 ) -> NDArray[np.int32]:
-    """The representative of every (place, turns); `flip` joins elbows between samples too."""
+    """The representative of every (place, turns)."""
     samples, _, rows, columns, _ = place.shape
     parent = np.arange(len(theta) * len(turns)).astype(np.int32)
     for i in range(samples):
@@ -166,26 +154,20 @@ def _components(
                     one, other = place[i, s, r, c], place[j, s, r, c]
                     for e in range(2):
                         _join(parent, theta, upper, turns, one[e], other[e], MOST_JUMP)
-                    if flip and other[0] == STRETCHED:
-                        _join(parent, theta, upper, turns, one[0], one[1], MOST_FLIP)
-                    if flip and one[0] == STRETCHED:
-                        _join(parent, theta, upper, turns, other[0], other[1], MOST_FLIP)
     for node in range(len(parent)):
         parent[node] = _root(parent, node)
     return parent
 
 
-def solve(problem: Problem, on: str = "patch", resolution: Resolution = STANDARD) -> Answer:
-    """The oracle's answer; see `puma_oracle.solve`."""
+def solve(problem: Problem) -> Answer:
+    """The oracle's answer, along the lines between centres."""
     n_cells = problem.cells[0] * problem.cells[1]
     limits = problem.limits
-    domain: Domain = (
-        patch(problem, resolution.refine) if on == "patch" else net(problem, resolution.pieces)
-    )
+    domain = net(problem, PIECES)
     points, approaches = problem.targets(*domain.uv.T)
     if np.hypot(points[:, 0], points[:, 1]).min() < CLEARANCE:
         raise ValueError(f"the patch comes within {CLEARANCE} m of the first axis")
-    step = float(np.radians(np.clip(problem.cone_deg / resolution.steps, 2.0, 5.0)))
+    step = float(np.radians(np.clip(problem.cone_deg / STEPS, 2.0, 5.0)))
     rows = _rows(limits[4], step)
     columns = np.arange(np.ceil(TAU / step)) * TAU / np.ceil(TAU / step)
     counts = np.maximum(np.ceil((limits[:4, 1] - limits[:4, 0]) / TAU - 1e-12), 1).astype(int)
@@ -194,7 +176,7 @@ def solve(problem: Problem, on: str = "patch", resolution: Resolution = STANDARD
     asked = (points, approaches, rows, columns, np.cos(np.radians(problem.cone_deg)), limits, place)
     theta = np.empty((_fill(*asked, np.empty((0, 4))), 4))
     theta = theta[: _fill(*asked, theta)] if len(theta) else theta
-    parent = _components(place, theta, limits[:4, 1], turns, domain.links, on == "patch")
+    parent = _components(place, theta, limits[:4, 1], turns, domain.links)
 
     cell, found = [], []
     for number, centre in enumerate(domain.centres):

@@ -87,9 +87,6 @@ def test_axes_that_are_almost_z_keep_their_tilt(tilt, sign, tmp_path):
     check_arm(load_text(tmp_path, text), np.random.default_rng(7), 10)
 
 
-# by hand
-
-
 # what is refused, and what stays
 
 

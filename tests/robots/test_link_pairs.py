@@ -140,17 +140,6 @@ def test_names_that_do_not_exist_are_one_error(tmp_path, approved):
     approved("bad_pairs", str(caught.value))
 
 
-def test_shapes_of_a_tool_count_as_bodies_on_the_last_joint(tmp_path):
-    robot = arm(tmp_path, ball(), ball(), ball())
-    rod = Polytope("tool", 2, np.array([[0.0, 0, 0.1], [0, 0, 0.7]]), 0.01)
-    pairs = link_pairs(robot, link_shapes(robot), tool=[rod])
-    assert sorted_out(pairs)["l2", "tool"] == "rigid"
-    assert {("l0", "tool"), ("l1", "tool")} <= set(pairs.checked)
-
-
-# Reference: exact meshes collide in 4.6 %, 5.2 %, 7 % of other random configurations.
-
-
 # Arm: link, mm beyond the tool point, mm from the axis.
 REACH = {
     "ur5": ("wrist_3_link", -0.5, 32),

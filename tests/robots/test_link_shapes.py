@@ -7,13 +7,14 @@ from collections import Counter
 from dataclasses import replace
 from itertools import combinations
 
-import coal
 import mesh_patches
 import numpy as np
 import pinocchio as pin
 import pytest
 import trimesh
 from arm_urdfs import random_q
+from capsule_arms import bodies_of, pair
+from foreign_clearances import ForeignScene
 from mesh_writers import stl
 from plain import arm_of
 from samples import sampled, seeds
@@ -31,7 +32,7 @@ from robots.shapes import (
     with_crude_links_cut,
 )  # fmt: skip
 from robots.shapes.sampling import PairSampling, random_configurations
-from robots.urdf import Box, Cylinder, Sphere, check_urdf
+from robots.urdf import Cylinder, check_urdf
 
 opened: list[str] = []
 sys.addaudithook(lambda event, facts: opened.append(str(facts[0])) if event == "open" else None)
@@ -326,50 +327,18 @@ EXACT = ("puma560", "ur5", "panda", "kinova", "xarm7")
 @sampled
 @pytest.mark.parametrize("name", [EXACT[k] for k in seeds(2, all=5)])
 def test_hulls_and_pieces_collide_wherever_the_exact_shapes_do(name):
-    """Of exact shapes, one call of coal for each pair."""
+    """Of exact shapes, by python-fcl."""
     robot = load_robot(name)
     hulls, pieces = link_shapes(robot), link_shapes(robot, "pieces")
     joint = {body.owner: body.joint for body in hulls.polytopes}
     pairs = [(a, b) for a, b in combinations(joint, 2) if joint[a] != joint[b]]
     q = random_configurations(robot)[:40]
-    bodies = [(solid, _coal(solid.geometry)) for solid in hulls.solids]
-    data, exact = robot.model.createData(), np.zeros((len(q), len(pairs)), dtype=bool)
-    for row, configuration in enumerate(q):
-        pin.forwardKinematics(robot.model, data, Kinematics(robot).configuration(configuration))
-        poses = [data.oMi[solid.joint] * pin.SE3(np.array(solid.placement)) for solid, _ in bodies]
-        poses = [coal.Transform3s(pose.rotation, pose.translation) for pose in poses]
-        for i, j in combinations(range(len(bodies)), 2):
-            pair = bodies[i][0].owner, bodies[j][0].owner
-            column = [k for k, each in enumerate(pairs) if set(each) == set(pair)]
-            if column and not exact[row, column[0]]:
-                result = coal.CollisionResult()
-                coal.collide(bodies[i][1], poses[i], bodies[j][1], poses[j],
-                             coal.CollisionRequest(), result)  # fmt: skip
-                exact[row, column[0]] = result.isCollision()
+    scene = ForeignScene(robot, bodies_of(hulls.solids, pairs=[pair(*two) for two in pairs]))
+    exact = np.array([scene.touching(row) for row in q])
     assert exact.any()
     for shapes in (hulls, pieces):
         found = PairSampling(robot, shapes.polytopes).collisions(pairs, q)
         assert not (exact & ~found).any()
-
-
-def _coal(geometry):
-    match geometry:
-        case Triangles(vertices, faces):
-            mesh = coal.BVHModelOBBRSS()
-            points, corners = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
-            points.extend(list(np.array(vertices)))
-            corners.extend([coal.Triangle(*map(int, face)) for face in faces])
-            mesh.beginModel(len(faces), len(vertices))
-            mesh.addSubModel(points, corners)
-            mesh.endModel()
-            return mesh
-        case Box(size):
-            return coal.Box(*size)
-        case Sphere(radius):
-            return coal.Sphere(radius)
-        case Cylinder(radius, length):
-            return coal.Cylinder(radius, length)
-    raise AssertionError(geometry)
 
 
 def test_l_shaped_links_are_cut_from_the_start_and_then_meet_as_rarely_as_they_do():
@@ -382,9 +351,9 @@ def test_l_shaped_links_are_cut_from_the_start_and_then_meet_as_rarely_as_they_d
     assert "ee_link" not in more
     assert cut.solids == hulls.solids
     q = random_configurations(robot)[200:600]  # others than those that were looked at
-    for pair in (("base_link", "upper_arm_link"), ("forearm_link", "wrist_2_link")):
+    for two in (("base_link", "upper_arm_link"), ("forearm_link", "wrist_2_link")):
         crude, fine, exact = (
-            PairSampling(robot, bodies).collisions([pair], q).mean()
+            PairSampling(robot, bodies).collisions([two], q).mean()
             for bodies in (hulls.polytopes, cut.polytopes, cut.solids)
         )
         assert crude > exact + 0.2

@@ -9,13 +9,14 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
+import referee
 from arm_urdfs import arm, joint, load_text, random_arm, random_q, said
 from scipy.spatial.transform import Rotation
-from two_trees import Tree, cell_text, random_values, write
 
-from robots import Axis, Kinematics, load_robot
+from robots import Axis, Kinematics, list_robots, load_robot
 from robots.mounting import about_fixed_axes
 from robots.shapes import link_shapes
+from robots.urdf import check_urdf
 
 POSE = ((0.03, -0.02, 0.12), (20.0, -30.0, 75.0))
 STAND = ((0.4, -0.3, 0.8), (5.0, 10.0, 90.0))
@@ -91,6 +92,42 @@ def test_the_reference_axis_is_across_the_approach_axis(approach, reference, exp
 
 # a cell as one file: the chain between the surface's link and the tool
 
+FIXED = '<joint name="{0}" type="fixed"><parent link="{1}"/><child link="{2}"/>{3}</joint>'
+MOVING = (
+    '<joint name="{0}" type="{1}"><parent link="{2}"/><child link="{3}"/>{4}'
+    '<axis xyz="{5}"/><limit lower="{6}" upper="{7}" effort="1" velocity="{8}"/></joint>'
+)
+
+
+def origin(xyz: str, rpy: str = "0 0 0") -> str:
+    return f'<origin xyz="{xyz}" rpy="{rpy}"/>'
+
+
+def cell_text() -> str:
+    """A UR5 on a rail, beside a table that turns on one that tilts."""
+    path = next(info.urdf for info in list_robots() if info.name == "ur5")
+    checked = check_urdf(path)
+    text = checked.text.rsplit("</robot>", 1)[0]
+    links = ("hall", "carriage", "cradle", "turntable", "jig")
+    more = [f'<link name="{name}"/>' for name in links]
+    more += [
+        MOVING.format(
+            "rail", "prismatic", "hall", "carriage", origin("0 -1 0.3", "0 0.1 0.2"), "1 0 0",
+            -1.0, 1.5, 0.7,
+        ),
+        FIXED.format("on rail", "carriage", checked.root, origin("0 0 0.1", "0 0 1")),
+        MOVING.format(
+            "tilt", "revolute", "hall", "cradle", origin("0.7 0 0.4", "0.2 0 0"), "0 1 0.1",
+            -1.0, 1.2, 1.1,
+        ),
+        MOVING.format(
+            "turn", "continuous", "cradle", "turntable", origin("0 0 0.2"), "0 0 -1", 0, 0, 2.0
+        ),
+        FIXED.format("clamped", "turntable", "jig", origin("0.1 0 0.05", "0.3 0.2 0.1")),
+    ]  # fmt: skip
+    return text + "\n".join(more) + "</robot>"
+
+
 ARM = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint",
        "wrist_2_joint", "wrist_3_joint")  # fmt: skip
 CHAINS = {
@@ -105,12 +142,20 @@ CHAINS = {
 
 @pytest.fixture(scope="module")
 def cell(tmp_path_factory):
-    return write(tmp_path_factory.mktemp("cell"), cell_text())
+    path = tmp_path_factory.mktemp("cell") / "cell.urdf"
+    path.write_text(cell_text(), encoding="utf-8")
+    return str(path)
 
 
 @pytest.fixture(scope="module")
 def tree(cell):
-    return Tree(cell)
+    """tree(link, tool, values): (4, 4) the frame of one link in that of another, by the referee."""
+
+    def relative(link, tool, values):
+        frames = referee.Arm(referee.joints_of(cell), tool, [], values).frames(np.zeros((1, 0)))
+        return np.linalg.inv(frames[link][0]) @ frames[tool][0]
+
+    return relative
 
 
 @pytest.mark.parametrize("name", CHAINS)
@@ -118,29 +163,24 @@ def test_chain_links_and_reach_are_those_of_the_tree(name, cell, tree):
     link, tool, joints = CHAINS[name]
     robot = load_robot(cell, tool_frame=tool, surface_link=link)
     assert robot.joint_names == joints
-    bodies = {f.name for f in tree.model.frames if f.type == pin.FrameType.BODY}
-    assert set(robot.link_names) == bodies
+    joints_there = referee.joints_of(cell)
+    assert set(robot.link_names) == {joint.child for joint in joints_there} | {"hall"}
     kinematics, data = Kinematics(robot), robot.model.createData()
     rng = np.random.default_rng(7)
     points = []
     for k in range(60):
-        q = random_values(robot, rng)
+        q = random_q(robot, rng)
         values = {**robot.locked, **dict(zip(joints, q, strict=True))}
-        expected = tree.relative(link, tool, values)
-        pin.computeJointJacobians(robot.model, data, kinematics.configuration(q))
-        pin.framesForwardKinematics(robot.model, data, kinematics.configuration(q))
-        np.testing.assert_allclose(data.oMf[robot.tool_frame_id].homogeneous, expected, **CLOSE)
         points.append(kinematics.tool(q)[0])
-        np.testing.assert_allclose(points[-1], expected[:3, 3], **CLOSE)
-        columns = pin.getFrameJacobian(robot.model, data, robot.tool_frame_id, pin.LOCAL)
-        wanted = tree.relative_jacobian(link, tool, values, joints)
-        np.testing.assert_allclose(columns.reshape(6, -1), wanted, **CLOSE)
+        np.testing.assert_allclose(points[-1], tree(link, tool, values)[:3, 3], **CLOSE)
+        pin.framesForwardKinematics(robot.model, data, kinematics.configuration(q))
         for frame, place in zip(robot.model.frames, data.oMf, strict=True) if k < 5 else ():
             if frame.type == pin.FrameType.BODY:
-                there = tree.relative(link, frame.name, values)
-                np.testing.assert_allclose(place.homogeneous, there, **CLOSE)
+                np.testing.assert_allclose(
+                    place.homogeneous, tree(link, frame.name, values), **CLOSE
+                )
         world = data.oMf[robot.world_frame_id].homogeneous
-        np.testing.assert_allclose(world, tree.relative(link, "hall", values), **CLOSE)
+        np.testing.assert_allclose(world, tree(link, "hall", values), **CLOSE)
     assert robot.chain is not None  # compares itself with Pinocchio
     assert (robot.distance_from_base(np.array(points)) <= robot.reach + 1e-12).all()
 
@@ -158,9 +198,9 @@ def test_limits_velocities_tcp_and_base_stay_with_their_joints(cell, tree):
     assert (robot.max_velocity[turn], robot.max_velocity[tilt]) == (2.0, 1.1)
     np.testing.assert_allclose(robot.tcp, plain.tcp, atol=1e-14)
     np.testing.assert_allclose(robot.base, plain.base, atol=1e-14)
-    q = random_values(robot, np.random.default_rng(0))
+    q = random_q(robot, np.random.default_rng(0))
     values = dict(zip(robot.joint_names, q, strict=True))
-    expected = tree.relative("jig", "tool0", values) @ [*plain.tcp[:3, 3], 1.0]
+    expected = tree("jig", "tool0", values) @ [*plain.tcp[:3, 3], 1.0]
     np.testing.assert_allclose(Kinematics(robot).tool(q)[0], expected[:3], atol=1e-12)
     again = pickle.loads(pickle.dumps(robot))
     assert again.surface_link == "jig"
@@ -186,13 +226,13 @@ def test_seen_from_two_links_in_turn_and_with_a_locked_table(cell):
     there = load_robot(cell, tool_frame="tool0", surface_link="jig").relative_to("cradle")
     once = load_robot(cell, tool_frame="tool0", surface_link="cradle")
     assert there.joint_names == once.joint_names == ("tilt", "rail", *ARM)
-    q = random_values(there, np.random.default_rng(1))
+    q = random_q(there, np.random.default_rng(1))
     np.testing.assert_allclose(Kinematics(there).tool(q), Kinematics(once).tool(q), atol=1e-12)
     np.testing.assert_allclose(there.base, once.base, atol=1e-12)
     table = {"turn": (0.7, 0.7), "tilt": (0.3, 0.3), "rail": (0.5, 0.5)}
     robot = load_robot(cell, tool_frame="tool0", surface_link="jig", limits=table)
     assert np.isclose(robot.reach, load_robot("ur5").reach)
-    q = np.array([random_values(robot, np.random.default_rng(k)) for k in range(100)])
+    q = np.array([random_q(robot, np.random.default_rng(k)) for k in range(100)])
     points, _ = Kinematics(robot).tools(q)
     assert (robot.distance_from_base(points) <= robot.reach + 1e-12).all()
 
@@ -214,9 +254,9 @@ def test_a_composed_cell_is_the_cell_that_one_urdf_describes(cell, tree):
     for part in ("lower", "upper"):
         np.testing.assert_allclose(getattr(composed, part), getattr(whole, part))
     np.testing.assert_allclose(composed.max_velocity[:3], whole.max_velocity[:3])
-    q = random_values(composed, np.random.default_rng(0))
+    q = random_q(composed, np.random.default_rng(0))
     values = dict(zip(composed.joint_names, q, strict=True))
-    expected = tree.relative("turntable", "tool0", values)[:3, 3]
+    expected = tree("turntable", "tool0", values)[:3, 3]
     np.testing.assert_allclose(Kinematics(composed).tool(q)[0], expected, atol=1e-12)
     rail = Rotation.from_euler("xyz", [0, 0.1, 0.2]).as_matrix()
     np.testing.assert_allclose(composed.base[:3, 3], rail @ [0, 0, 0.1] + [0, -1, 0.3], atol=1e-12)

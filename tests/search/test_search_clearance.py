@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
 import trimesh
-from random_arms import planar_arm
-from random_bodies import CoalScene, all_pairs, hulls, of_polytopes, serial_arm
+from arm_urdfs import joint
+from numpy.typing import NDArray
+from random_arms import planar_arm, robot_of
 from samples import sampled, spread
 from scipy.spatial.transform import Rotation
 from search_kernels import Clearance
 
 from coverable_kernels import entry
-from feasibility.collisions import Collision, Obstacle, Pair, Soup, gather
+from feasibility.collisions import Bodies, Collision, Obstacle, Pair, Soup, gather
 from feasibility.collisions.kernels import link_frames
 from feasibility.collisions.kernels.box_tree import box_tree, moved
 from feasibility.collisions.kernels.tables import (
@@ -28,7 +30,7 @@ from feasibility.collisions.kernels.tables import (
     row,
     views,
 )
-from robots import load_robot
+from robots import Robot, load_robot
 from robots.shapes import Polytope
 from surfaces import sphere
 
@@ -36,6 +38,93 @@ LENGTH, RADIUS = 0.3, 0.03  # m, of each link, a capsule along x
 chord_deviation, place_bodies = entry(link_frames.chord_deviation), entry(link_frames.place_bodies)
 place_group = entry(link_frames.spread)
 FINE = np.deg2rad(0.1)  # between samples, of the joint that moves most
+
+
+# Bodies of made-up shapes on real and made-up arms, and what coal says of them.
+
+
+def serial_arm(rng: np.random.Generator, kinds: str, length: float = 0.3) -> Robot:
+    """A chain of joints, R or P, with axes and placements made up."""
+    named = {"R": "revolute", "P": "prismatic"}
+    return robot_of(
+        [
+            joint(k, named[kind], *rng.normal(size=(2, 3)) * [[length], [1.0]], rng.normal(size=3),
+                  (-3.0, 3.0))
+            for k, kind in enumerate(kinds, start=1)
+        ]
+    )  # fmt: skip
+
+
+def hulls(rng: np.random.Generator, n: int, size: float = 0.08, at: float = 0.15) -> list[Polytope]:
+    """One to three clouds of vertices around each joint, the root included: owners b0 to bn."""
+    bodies = []
+    for k in range(n + 1):
+        for _ in range(int(rng.integers(1, 4))):
+            count = int(rng.integers(4, 30))
+            cloud = rng.normal(size=(count, 3)) * size * rng.uniform(0.2, 1.0, 3)
+            cloud += rng.normal(size=3) * at
+            bodies.append(Polytope(f"b{k}", k, cloud, float(rng.choice([0.0, 0.02]))))
+    return bodies
+
+
+def all_pairs(owners: int, clearance: float) -> tuple[Pair, ...]:
+    """Every pair of b0 to b(owners - 1) that is not adjacent."""
+    return tuple(
+        Pair(f"b{k}", f"b{i}", clearance) for i in range(owners) for k in range(i + 2, owners)
+    )
+
+
+def of_polytopes(bodies: list[Polytope], pairs: tuple[Pair, ...], *soups: Soup) -> Bodies:
+    """Bodies with nothing for the judge."""
+    return Bodies((), tuple(bodies), soups, (), pairs)
+
+
+class CoalScene:
+    """The same polytopes and soups as coal sees them, placed by Pinocchio."""
+
+    def __init__(self, robot: Robot, bodies: Bodies) -> None:
+        self.robot, self.bodies = robot, bodies
+        self.data = robot.model.createData()
+        self.shapes: dict[str, list[tuple[int, coal.CollisionGeometry, float]]] = {}
+        for body in bodies.polytopes:
+            shape = (body.joint, _convex(body.vertices), body.radius)
+            self.shapes.setdefault(body.owner, []).append(shape)
+        for soup in bodies.soups:
+            self.shapes.setdefault(soup.owner, []).append((0, _tree(soup.triangles), 0.0))
+
+    def distances(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(P,) m, of all pairs at q; of hulls negative where they overlap."""
+        pin.forwardKinematics(self.robot.model, self.data, q)
+        return np.array([self._distance(p.first, p.second) for p in self.bodies.pairs])
+
+    def _distance(self, first: str, second: str) -> float:
+        least = np.inf
+        for joint_a, shape_a, radius_a in self.shapes[first]:
+            for joint_b, shape_b, radius_b in self.shapes[second]:
+                result, asked = coal.DistanceResult(), coal.DistanceRequest(True)
+                a, b = self._pose(joint_a), self._pose(joint_b)
+                apart = coal.distance(shape_a, a, shape_b, b, asked, result)
+                least = min(least, apart - radius_a - radius_b)
+        return float(least)
+
+    def _pose(self, joint: int) -> coal.Transform3s:
+        place = self.data.oMi[joint]
+        return coal.Transform3s(place.rotation, place.translation)
+
+
+def _convex(vertices: NDArray[np.float64]) -> coal.CollisionGeometry:
+    points = coal.StdVec_Vec3s()
+    points.extend(list(vertices))
+    return coal.Convex.convexHull(points, False, None)
+
+
+def _tree(triangles: NDArray[np.float64]) -> coal.BVHModelOBBRSS:
+    model = coal.BVHModelOBBRSS()
+    model.beginModel(len(triangles), 3 * len(triangles))
+    for corners in triangles:
+        model.addTriangle(*corners)
+    model.endModel()
+    return model
 
 
 def needed(bodies):

@@ -182,7 +182,7 @@ def test_a_segment_that_is_accepted_holds_everywhere(kind, rolled, seed):
         if cone_deg < 180.0:
             assert chord.max() <= held.chord + ROUNDING
             if held.on_target:
-                own = deviation(cells.surface, task.standoff, points, axes).chord
+                own = deviation(cells.surface, points, axes)
                 assert 2.0 * np.arcsin(np.minimum(0.5 * own, 1.0)).max() <= task.cone + 1e-9
         if rolled:
             most = Roll(*motions.arrays.roll.tolist())
@@ -240,7 +240,7 @@ def test_the_cone_holds_at_the_tool_point_s_own_place_on_the_surface():
     motions = Motions(robot, two_cells(ball, np.column_stack([at.u, at.v])), Task(0.0, 30.0, 0.2))
     held = motions.along_curve(np.array([turn]), np.array([-turn]))
     assert held.on_target
-    own = deviation(ball, 0.0, *tools(robot, np.linspace(turn, -turn, 41)[:, None])).chord
+    own = deviation(ball, *tools(robot, np.linspace(turn, -turn, 41)[:, None]))
     assert own.max() <= held.chord
     assert own.max() - own[0] > 0.35 * (held.chord - own[0])
 

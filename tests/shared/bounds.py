@@ -1,4 +1,4 @@
-"""Bounds against what is really there: never below it, and nearly met somewhere."""
+"""Bounds against what is really there, never below it and nearly met; judges that are starved."""
 
 from __future__ import annotations
 
@@ -29,3 +29,26 @@ def holds(bound: ArrayLike, truth: ArrayLike, used: float = 0.97, tiny: float = 
     some = np.isfinite(bound) & (bound > tiny)
     share = (truth[some] / bound[some]).max(initial=0.0)
     assert share >= used, f"no more than {share:.4f} of the bound is ever used"
+
+
+# One quantity made absurdly large, for judges that have to refuse then.
+
+LARGE = 1e3  # m, rad, [1]
+
+
+class Starved:
+    """A value one of whose methods has its answer changed."""
+
+    def __init__(self, value, name, change):
+        self._value, self._name, self._change = value, name, change
+
+    def __getattr__(self, name):
+        own = getattr(self._value, name)
+        return (lambda *args: self._change(own(*args))) if name == self._name else own
+
+
+def grown(values, column=slice(None)):
+    """A copy, absurdly large in one of the last axis' columns, or all over."""
+    found = np.array(values, dtype=float)
+    found[..., column] = LARGE
+    return found

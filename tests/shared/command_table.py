@@ -17,7 +17,8 @@ import numpy as np
 from jobs import Said, coverable
 
 TABLE = tomllib.loads(Path(__file__).parents[1].joinpath("output/commands.toml").read_text("utf-8"))
-FILES, NUMBERS, REFUSED = (TABLE.pop(name) for name in ("files", "numbers", "refused"))
+LINES, NUMBERS, REFUSED, WHOLE = map(TABLE.pop, ("files", "numbers", "refused", "whole"))
+FILES = {name: text.replace(" ; ", "\n") + "\n" for name, text in LINES.items()}
 COMMANDS = [(command, name) for command in TABLE for name in TABLE[command]]
 NEEDS = {
     "walk.csv": ("check", "files"),

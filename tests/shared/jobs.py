@@ -11,19 +11,38 @@ from collections.abc import Iterator
 from functools import cache, partial
 from typing import Any, NamedTuple
 
-from small_cases import TEXTS as SMALL
-
 from feasibility import Verdict, check
 from feasibility.cases import Case
 from feasibility.cli.main import main
 from feasibility.clock import Clock, OutOfTime
 
-PLATE = SMALL["plate"]
+PLATE = """
+robot.name = "ur5"
+surface.kind = "plane"
+surface.u = [0.4, 0.6]
+surface.v = [-0.1, 0.1]
+surface.cells = [3, 4]
+surface.position = [0, 0, 0.3]
+surface.side = "outside"
+task.standoff = 0.02
+task.cone_deg = 30
+"""
 TEXTS = {
-    "plate": PLATE,
+    "plate": PLATE,  # feasible
     # begins within reach and ends outside: proved infeasible
     "long plate": PLATE.replace("0.6]", "2.4]").replace("[3, 4]", "[4, 2]"),
+    "greedy dome": """
+robot = { name = "puma560", limits = "set-1" }
+surface.kind = "sphere"
+surface.radius = 1
+surface.u_deg = [40, 60]
+surface.v_deg = [60, 90]
+surface.cells = [2, 3]
+task = { standoff = 0.005, cone_deg = 45 }
+search = { method = "greedy", step_deg = 0.05 }
+""",
 }
+"""One for each kind of answer."""
 
 
 @cache

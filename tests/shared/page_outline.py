@@ -119,31 +119,37 @@ class Page(HTMLParser):
             joined = READ_OUT.search(line) and READ_OUT.search(lines[-1])
             lines[-1:] = [f"{lines[-1]} {line}"] if joined else [lines[-1], line]
         if 'id="commands"' in self.text:
-            lines += scene_outline(self.commands)
+            boxes = scene_outline(self.commands)
+            for k, line in enumerate(lines):  # of objects in the legend beside it
+                if line.startswith("["):
+                    path = line[4:].partition(": ")[0]
+                    box = boxes.pop(re.sub(r"\d+$", "#", path), "")
+                    lines[k] = f"{line} {box}".rstrip()
+            lines += [f"{path}: {box}" for path, box in boxes.items()]
         for frame in self.frames:
             lines += ["", "in a frame:", frame.outline()]
         return "\n".join(lines)
 
 
-def scene_outline(commands: Any) -> list[str]:
-    """A line for each object, those that only differ in a number at the end together.
+def scene_outline(commands: Any) -> dict[str, str]:
+    """The box of each object by path, those that only differ in a number at the end together.
 
     The arm, the ground and frames, which are drawn alike everywhere, are left out.
     """
-    boxes: dict[str, list[np.ndarray]] = {}
+    corners: dict[str, list[np.ndarray]] = {}
     for one in commands:
         if one["type"] == "set_object" and not re.match(ALIKE, one["path"]):
-            boxes.setdefault(re.sub(r"\d+$", "#", one["path"]), []).append(points_of(one))
-    lines = []
-    for path, parts in boxes.items():
+            corners.setdefault(re.sub(r"\d+$", "#", one["path"]), []).append(points_of(one))
+    boxes = {}
+    for path, parts in corners.items():
         ends = np.concatenate(parts)
         low, high = (np.floor((end + SMALL) * 100 + 0.5) / 100 + 0.0
                      for end in (ends.min(axis=0), ends.max(axis=0)))  # fmt: skip
         box = " ".join(f"{a:.2f}..{b:.2f}" for a, b in zip(low, high, strict=True))
-        lines.append(f"{_short(path)}: {box}")
-    parts = [(p, n) for p, n in tracks_of(commands) if not p.startswith("/robot")]
-    moving = dict.fromkeys(f"{_short(re.sub('[0-9]+$', '#', p))} {n}" for p, n in parts)
-    return [*lines, *([f"moves: {'; '.join(moving)}"] if moving else [])]
+        boxes[_short(path)] = box
+    tracks = [(p, n) for p, n in tracks_of(commands) if not p.startswith("/robot")]
+    moving = dict.fromkeys(f"{_short(re.sub('[0-9]+$', '#', p))} {n}" for p, n in tracks)
+    return boxes | ({"moves": "; ".join(moving)} if moving else {})
 
 
 def _short(path: str) -> str:

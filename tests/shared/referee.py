@@ -8,10 +8,10 @@ samples a motion densely and lists what it does wrong. All inputs are plain numb
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
@@ -186,6 +186,28 @@ class Places(NamedTuple):
     along: Floats  # (k, 3) unit, where the parameter u grows; NaN where there is none
 
 
+def turned_curve(kind: str, size: Sequence[float]) -> Callable[..., Floats]:
+    """(r, z) of what a surface of revolution is turned from, as curve(s, order of derivative)."""
+
+    def curve(s: Floats, order: int = 0) -> Floats:
+        phase, none = s + 0.5 * np.pi * order, np.zeros_like(s)
+        if kind == "sphere":
+            return size[0] * np.stack([np.sin(phase), np.cos(phase)], -1)
+        if kind == "torus":
+            ring = size[0] if order == 0 else 0.0
+            return np.stack([ring + size[1] * np.cos(phase), size[1] * np.sin(phase)], -1)
+        if kind == "hyperboloid":
+            waist, flare = size
+            r = waist * np.sqrt(1.0 + (s / flare) ** 2)
+            r = (r, waist**2 * s / (flare**2 * r), waist**4 / (flare**2 * r**3))[order]
+        else:
+            slope = size[1] if kind == "cone" else 0.0
+            r = (size[0] + slope * s, slope + none, none)[order]
+        return np.stack([r, (s, none + 1.0, none)[order]], -1)
+
+    return curve
+
+
 @dataclass
 class Form:
     """A patch of a surface by its formula. Lengths in m, angles in rad."""
@@ -201,59 +223,44 @@ class Form:
     rotation: ArrayLike = field(default_factory=lambda: np.eye(3))
     # (u, v) to points (k, 3) in its own frame, for other kinds; of a revolution its `spline_curve`.
     formula: Callable[..., Floats] | None = None
-    periods: tuple[float, float] = (0.0, 0.0)  # of u and v where they are angles, else 0
 
     def __post_init__(self) -> None:
         self.position, self.rotation = np.array(self.position), np.array(self.rotation)
-        of_kind = {"sphere": (0, TAU), "ellipsoid": (0, TAU), "torus": (TAU, TAU),
-                   "cylinder": (TAU, 0), "cone": (TAU, 0), "hyperboloid": (TAU, 0),
-                   "revolution": (0, TAU)}  # fmt: skip
-        self.periods = of_kind.get(self.kind, self.periods)
+        if self.kind in ("sphere", "torus", "cylinder", "cone", "hyperboloid"):
+            self.formula = turned_curve(self.kind, self.size)
 
     @property
     def sign(self) -> float:
         """+1 where the tool works on the outer side."""
         return 1.0 if self.outside else -1.0
 
+    @property
+    def along_curve(self) -> int | None:
+        """Which parameter runs along the curve that is turned about z (the other is the angle)."""
+        return {"sphere": 0, "revolution": 0, "torus": 1, "cylinder": 1, "cone": 1,
+                "hyperboloid": 1}.get(self.kind)  # fmt: skip
+
     def local(self, u: Floats, v: Floats) -> Places:
         """Places in the own frame."""
-        c, s, zero = np.cos(u), np.sin(u), np.zeros_like(u + v)
-        one = zero + 1.0
-        match self.kind:
-            case "plane":
-                normal = np.stack([zero, zero, one], -1)
-                return Places(
-                    np.stack([u + zero, v + zero, zero], -1), normal, normal[:, [2, 0, 1]]
-                )
-            case "sphere" | "ellipsoid":
-                axes = np.array([self.size[0]] * 3 if self.kind == "sphere" else self.size)
-                ball = np.stack([s * np.cos(v), s * np.sin(v), c * one], -1)
-                along = np.stack([c * np.cos(v), c * np.sin(v), -s * one], -1)
-                return Places(ball * axes, unit(ball / axes), unit(along * axes))
-            case "torus":
-                ring, tube = self.size
-                out = np.stack([c * one, s * one, zero], -1)
-                normal = np.cos(v)[:, None] * out + np.sin(v)[:, None] * np.array([0, 0, 1.0])
-                return Places(ring * out + tube * normal, normal, np.stack([-s, c, zero], -1))
-            case "cylinder" | "cone" | "hyperboloid":
-                if self.kind == "hyperboloid":
-                    r = self.size[0] * np.sqrt(1.0 + (v / self.size[1]) ** 2)
-                    rise = (self.size[0] / self.size[1]) ** 2 * v / r
-                else:
-                    rise = np.full_like(v, self.size[1] if self.kind == "cone" else 0.0)
-                    r = self.size[0] + rise * v
-                out = np.stack([c, s, zero], -1)
-                normal = unit(out - rise[:, None] * np.array([0, 0, 1.0]))
-                point = r[:, None] * out + np.stack([zero, zero, v], -1)
-                return Places(point, normal, np.stack([-s, c, zero], -1))
-            case "revolution":
-                (r, z), (dr, dz) = (self.formula(u, order).T for order in (0, 1))
-                out = np.stack([np.cos(v), np.sin(v), zero], -1)
-                up = np.array([0.0, 0.0, 1.0])
-                along = unit(dr[:, None] * out + dz[:, None] * up)
-                normal = unit(-dz[:, None] * out + dr[:, None] * up)
-                return Places(r[:, None] * out + z[:, None] * up, normal, along)
-        return self._by_differences(u, v)
+        u, v = np.broadcast_arrays(u, v)
+        zero = np.zeros_like(u)
+        if self.kind == "plane":
+            normal = np.stack([zero, zero, zero + 1.0], -1)
+            return Places(np.stack([u, v, zero], -1), normal, normal[:, [2, 0, 1]])
+        if self.kind == "ellipsoid":
+            ball = np.stack([np.sin(u) * np.cos(v), np.sin(u) * np.sin(v), np.cos(u)], -1)
+            along = np.stack([np.cos(u) * np.cos(v), np.cos(u) * np.sin(v), -np.sin(u)], -1)
+            return Places(ball * self.size, unit(ball / self.size), unit(along * self.size))
+        if self.along_curve is None:
+            return self._by_differences(u, v)
+        s, angle = (u, v) if self.along_curve == 0 else (v, u)
+        (r, z), (dr, dz) = (self.formula(s, order).T[:, :, None] for order in (0, 1))
+        out = np.stack([np.cos(angle), np.sin(angle), zero], -1)
+        up, side = np.array([0.0, 0.0, 1.0]), np.stack([-np.sin(angle), np.cos(angle), zero], -1)
+        normal, along = unit(dz * out - dr * up), unit(dr * out + dz * up)
+        if self.along_curve == 0:
+            return Places(r * out + z * up, -normal, along)
+        return Places(r * out + z * up, normal, side)
 
     def _by_differences(self, u: Floats, v: Floats) -> Places:
         """Of a formula: five-point differences for its tangents, inside the ranges."""
@@ -284,58 +291,26 @@ class Form:
     def nearest(self, points: Floats) -> tuple[Floats, Floats]:
         """Parameters (k,) of the patch's places nearest to points (k, 3) of the root frame."""
         x, y, z = ((points - self.position) @ self.rotation).T
-        across, turned = np.hypot(x, y), np.arctan2(y, x)
-        match self.kind:
-            case "plane":
-                found = x, y
-            case "sphere":
-                found = np.arctan2(across, z), turned
-            case "torus":
-                found = turned, np.arctan2(z, across - self.size[0])
-            case "cylinder":
-                found = turned, z
-            case "cone":
-                radius, slope = self.size
-                found = turned, (z + slope * (across - radius)) / (1.0 + slope**2)
-            case "hyperboloid":
-                found = turned, self._up_the_waist(across, z)
-            case "revolution":
-                found = self._along_the_curve(across, z), turned
-            case _:
-                return self._looked_for(points)
-        return tuple(
-            self._into(value, ends, period)
-            for value, ends, period in zip(found, (self.u, self.v), self.periods, strict=True)
-        )
+        if self.kind == "plane":
+            return np.clip(x, *self.u), np.clip(y, *self.v)
+        if self.along_curve is None:
+            return self._looked_for(points)
+        turns, ends = (self.v, self.u) if self.along_curve == 0 else (self.u, self.v)
+        middle = 0.5 * (turns[0] + turns[1])
+        angle = middle + (np.arctan2(y, x) - middle + np.pi) % TAU - np.pi
+        found = self._along_the_curve(np.hypot(x, y), z, ends), np.clip(angle, *turns)
+        return found if self.along_curve == 0 else found[::-1]
 
-    def _up_the_waist(self, across: Floats, z: Floats) -> Floats:
-        """v nearest to (across, z) in the half plane, by Newton on the squared distance."""
-        (waist, flare), v = self.size, z.copy()
-        for _ in range(50):
-            radius = waist * np.sqrt(1.0 + (v / flare) ** 2)
-            rise = waist**2 * v / (flare**2 * radius)
-            bend = waist**4 / (flare**2 * radius**3)
-            v -= ((radius - across) * rise + v - z) / (1.0 + rise**2 + (radius - across) * bend)
-        return v
-
-    def _along_the_curve(self, across: Floats, z: Floats) -> Floats:
-        """u nearest to (across, z) in the half plane: the best of many, bettered by Newton."""
-        some, point = np.linspace(*self.u, 2001), np.stack([across, z], -1)
-        u = some[cKDTree(self.formula(some)).query(point)[1]]
+    def _along_the_curve(self, across: Floats, z: Floats, ends: tuple[float, float]) -> Floats:
+        """Nearest to (across, z) in the half plane: the best of many, bettered by Newton."""
+        some, point = np.linspace(*ends, 2001), np.stack([across, z], -1)
+        s = some[cKDTree(self.formula(some)).query(point)[1]]
         for _ in range(8):
-            at, d1, d2 = (self.formula(u, order) for order in range(3))
+            at, d1, d2 = (self.formula(s, order) for order in range(3))
             off = at - point
             bend = (d1 * d1).sum(1) + (off * d2).sum(1)
-            u = np.clip(u - (off * d1).sum(1) / np.where(bend > 0.0, bend, np.inf), *self.u)
-        return u
-
-    @staticmethod
-    def _into(value: Floats, ends: tuple[float, float], period: float) -> Floats:
-        """Brought into the range; an angle first to the turn nearest to its middle."""
-        if period:
-            middle = 0.5 * (ends[0] + ends[1])
-            value = middle + (value - middle + 0.5 * period) % period - 0.5 * period
-        return np.clip(value, *ends)
+            s = np.clip(s - (off * d1).sum(1) / np.where(bend > 0.0, bend, np.inf), *ends)
+        return s
 
     @cached_property
     def _samples(self) -> tuple[cKDTree, Floats, Floats]:
@@ -610,14 +585,27 @@ class Scene:
         frames, found = self._frames(np.atleast_2d(q)), []
         for k in range(len(self.pairs)) if asked is None else asked:
             least = np.inf
-            for one in self.bodies[self.pairs[k][0]]:
-                for other in self.bodies[self.pairs[k][1]]:
-                    a, b = (self._placed(*each, frames) for each in (one, other))
-                    touch = fcl.collide(a, b, fcl.CollisionRequest(), fcl.CollisionResult())
-                    apart = TOUCHING if touch else fcl.distance(a, b, fcl.DistanceRequest())
-                    least = min(least, apart - one[0].off - other[0].off)
+            for a, b, off in self._shapes(k, frames):
+                touch = fcl.collide(a, b, fcl.CollisionRequest(), fcl.CollisionResult())
+                apart = TOUCHING if touch else fcl.distance(a, b, fcl.DistanceRequest())
+                least = min(least, apart - off)
             found.append(least)
         return np.array(found)
+
+    def touching(self, q: ArrayLike) -> NDArray[np.bool_]:
+        """(pairs,) which bodies share a point at one configuration."""
+        import fcl
+
+        frames, asked = self._frames(np.atleast_2d(q)), fcl.CollisionRequest()
+        touch = lambda a, b, _: fcl.collide(a, b, asked, fcl.CollisionResult())  # noqa: E731
+        pairs = range(len(self.pairs))
+        return np.array([any(touch(*two) for two in self._shapes(k, frames)) for k in pairs])
+
+    def _shapes(self, k: int, frames: Mapping[str, Floats]) -> Iterator[tuple[Any, Any, float]]:
+        """Each shape of a pair's first body with each of its second; how far they stand out."""
+        for one, other in product(*(self.bodies[name] for name in self.pairs[k][:2])):
+            off = one[0].off + other[0].off
+            yield self._placed(*one, frames), self._placed(*other, frames), off
 
     def _frames(self, q: Floats) -> dict[str, Floats]:
         frames = self.arm.frames(q)

@@ -14,9 +14,7 @@ import os
 import numpy as np
 import pytest
 from smooth_probes import same_surface
-from specimens import WEIGHTS
-from spline_nets import hood
-from user_formulas import ball, sampled
+from specimens import WEIGHTS, ball, hood, sampled
 
 from surfaces import (
     SurfaceError,
@@ -99,37 +97,6 @@ def test_bad_profiles(approved):
     lines = [f"{name}: {said(revolution, p, (0, 90))}" for name, p in PROFILES.items()]
     lines.append("all: " + said(revolution, PROFILES["NaN"], (0, 400), side=1, rpy_deg=None))
     approved("bad_profiles", "\n".join(lines))
-
-
-def test_profiles_cross_themselves_exactly_where_their_chords_do():
-    rng, crossed = np.random.default_rng(4), 0
-    for _ in range(40):
-        points = rng.uniform(0.3, 1.3, (5, 2))
-        try:
-            faults, surface = "", revolution(points, (0, 90))
-        except SurfaceError as error:
-            faults = str(error)
-        if "turn back" in faults or "axis" in faults:
-            continue
-        if not faults:
-            s = np.linspace(*surface.u_range, 300)
-            a = surface.local_point(s, 0 * s)[:, [0, 2]]
-            assert not _crosses(a)
-        crossed += "cross itself" in faults
-    assert 5 < crossed < 35
-
-
-def _crosses(curve):
-    """Whether chords of a curve (k, 2) that are not neighbours cross."""
-    a, b = curve[:-1], curve[1:]
-
-    def turn(p, q, r):
-        one, two = q - p, r - p
-        return one[..., 0] * two[..., 1] - one[..., 1] * two[..., 0]
-
-    sides = np.sign(turn(a[:, None], b[:, None], a)) != np.sign(turn(a[:, None], b[:, None], b))
-    apart = np.abs(np.subtract.outer(np.arange(len(a)), np.arange(len(a)))) > 1
-    return bool((sides & sides.T & apart).any())
 
 
 def changed(place, value):
@@ -249,23 +216,8 @@ def npy(array, **options):
     return stream.getvalue()
 
 
-NETS_IN_FILES = {
-    "empty.json": "", "cut.json": '{"points": [[[0, 0', "list.json": "[[0, 0, 0]]",
-    "no_points.json": '{"degree": [3, 3]}', "foreign.json": '{"points": [], "__class__": 1}',
-    "nan.json": '{"points": [[[NaN, 0, 0]]]}', "infinite.json": '{"points": [[[-Infinity, 0, 0]]]}',
-    "twice.json": '{"points": [], "points": []}', "digits.json": '{"points": ' + "9" * 5000 + "}",
-    "deep.json": '{"points": ' + "[" * 200_000 + "]" * 200_000 + "}",
-    "binary.json": bytes(range(256)), "large.json": " " * (16 * 2**20 + 1),
-    "net.npy": b"\x93NUMPY", "net.pkl": b"\x80\x04.", "empty.csv": "", "header.csv": "x,y,z\n1,2,3",
-    "few.csv": NET + "0,0,1,2\n", "nan.csv": NET + "0,0,1,2,nan\n",
-    "words.csv": NET + "0,0,1,2,=cmd()\n", "minus.csv": NET + "-1,0,1,2,3\n",
-    "far.csv": NET + "0,9999999,1,2,3\n", "again.csv": NET + "0,0,1,2,3\n" * 2,
-    "gap.csv": NET + "999999,999999,1,2,3\n", "quote.csv": NET + '"0,0,1,2,3\n',
-    "many.csv": NET + "".join(f"{k},0,1,2,3\n" for k in range(40_001)),
-    "field.csv": NET + "0,0,1,2," + "3" * 200_000 + "\n",
-}  # fmt: skip
 FILES = {
-    read_net: NETS_IN_FILES,
+    read_net: {},  # of contents see tests/input/bad/net.toml
     read_grid: {
         "a.txt": "", "a.npy": "", "flat.npy": npy(np.zeros((3, 3))),
         "object.npy": npy(np.array([{}], dtype=object), allow_pickle=True),

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bounds import holds
-from user_formulas import EQUAL, ball, ring, sampled
+from specimens import EQUAL, ball, ring, sampled
 
 from surfaces import SurfaceError, bspline, grid, parametric, piecewise, sheet_of
 from surfaces.places import Places, offset_surface

@@ -8,11 +8,10 @@ import math
 import numpy as np
 import pytest
 from smooth_probes import least_distances
-from spline_nets import hood, quarter_turn, turned
+from specimens import hood, quarter_turn, turned
 
 from surfaces import SurfaceError, bspline, cone, cylinder, piecewise, plane, sphere
 
-PLATE = plane((0.0, 0.2), (0.0, 0.2))
 # A patch, the patches that it is cut into, and how its cells are cut.
 WHOLE = {
     "hood": (bspline(hood()), [bspline(hood(), u=(0, 0.5)), bspline(hood(), u=(0.5, 1))], (6, 7)),
@@ -32,12 +31,6 @@ WHOLE = {
         [plane(u, v) for u in ((0, 0.5), (0.5, 1)) for v in ((0, 0.5), (0.5, 1))], (6, 8),
     ),
 }  # fmt: skip
-
-
-def hinged(*angles_deg, **more):
-    """A plate and others hinged to its side at x = 0, turned about y by angles."""
-    plates = [plane((-0.2, 0.0), (0.0, 0.2), rpy_deg=(0.0, angle, 0.0)) for angle in angles_deg]
-    return piecewise([PLATE, *plates], **more)
 
 
 def strip(half_turns, count=6):
@@ -136,6 +129,9 @@ def test_long_sides_against_short_ones():
     counts = [(2, 5), (2, 3), (3, 4)]
     cells = surface.cells(counts)
     assert (surface.notes, len(surface.seams)) == ((), 3)
+    assert all(cells.index(*cells.unravel(k)) == k for k in range(len(cells)))
+    with pytest.raises(IndexError):
+        cells.unravel(len(cells))
     edges = [np.linspace(0, 1, 6), np.linspace(0, 0.37, 4), np.linspace(0.37, 1, 5)]
     expected = set()
     for other, j in itertools.product((1, 2), range(5)):
@@ -202,28 +198,8 @@ def test_a_twisted_ring_is_refused_and_an_untwisted_one_is_not():
     assert len(piecewise(strip(2)).seams) == 6
 
 
-@pytest.mark.parametrize("angle", [-90.0, 5.0, 60.0, 120.0])
-def test_a_crease_is_told_with_its_angle(angle):
-    surface = hinged(angle)
-    assert len(surface.notes) == 1
-    assert f"crease of up to {abs(angle):g} degrees" in surface.notes[0]
-    cells = surface.cells((3, 4))
-    assert cells.seam_pairs.creases == pytest.approx(math.radians(abs(angle)), abs=1e-9)
-    # Curves across it deviate by at least half of the angle, those along it by nothing.
-    deviations = cells.curves.deviations[:, 1]
-    across = cells.piece[cells.pairs[:, 0]] != cells.piece[cells.pairs[:, 1]]
-    assert (deviations[across] >= 2.0 * math.sin(0.25 * math.radians(abs(angle)))).all()
-    assert deviations[~across].max() < 1e-12
-    pair = np.repeat(np.arange(len(cells.pairs)), 23)
-    points, normals = cells.curves.at(pair, np.tile(np.linspace(0, 1, 23), len(cells.pairs)))
-    on = surface.closest(points)
-    assert on.inside.all()
-    assert (np.abs(on.height) <= cells.curves.deviations[pair, 0] + 1e-12).all()
-    assert (np.linalg.norm(normals - on.normal, axis=1) <= deviations[pair] + 1e-12).all()
-
-
-def test_seams_of_full_and_of_half_turns():
-    """Closed borders that begin at different angles; one cell that is half around."""
+def test_seams_of_full_turns():
+    """Closed borders that begin at different angles."""
     stacked = piecewise(
         [cylinder(0.3, (0, 360), (0, 0.4)),
          cylinder(0.3, (-77, 283), (0, 0.4), position=(0, 0, 0.4))]
@@ -232,26 +208,3 @@ def test_seams_of_full_and_of_half_turns():
     met = np.bincount(cells.seam_pairs.pairs.ravel(), minlength=len(cells))
     assert (stacked.notes, sorted(set(met.tolist())), (met > 0).sum()) == ((), [0, 2], 18)
     assert cells.curves.deviations.max() < 1e-5
-    shells = piecewise([cylinder(0.3, ends, (0, 0.4)) for ends in ((0, 180), (180, 360))])
-    assert len(shells.seams) == 2
-    cells = shells.cells((1, 2))
-    assert cells.curves.deviations.max() < 1e-3
-    middles, _ = cells.curves.at(np.arange(len(cells.pairs)), np.full(len(cells.pairs), 0.5))
-    assert np.hypot(middles[:, 0], middles[:, 1]) == pytest.approx(0.3, abs=1e-3)
-
-
-def test_cells_count_piece_by_piece():
-    cells = hinged(30.0).cells([(2, 3), (4, 5)])
-    assert cells.shape == (26,)
-    expected = [(0, 0, 0), (0, 1, 2), (1, 0, 0), (1, 3, 4)]
-    assert [cells.unravel(k) for k in (0, 5, 6, 25)] == expected
-    assert all(cells.index(*cells.unravel(k)) == k for k in range(26))
-    for ask in (lambda: cells.unravel(-1), lambda: cells.unravel(26), lambda: cells.index(2, 0, 0)):
-        with pytest.raises(IndexError):
-            ask()
-    flat = cells.unrolled()
-    for centre, line in zip(flat.centres, flat.outlines, strict=True):
-        assert line.mean(axis=0) == pytest.approx(centre, abs=0.05)
-    alone = piecewise([plane((0, 1), (0, 1))])
-    assert [len(alone.cells(shape).pairs) for shape in ((3, 3), (0, 3))] == [20, 0]
-    assert len(hinged(30.0).cells([(0, 3), (2, 3)]).seam_pairs.pairs) == 0

@@ -6,8 +6,6 @@ from functools import cached_property
 import networkx as nx
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from mesh_patches import (
     CONNECTED,
     PATCHES,
@@ -15,7 +13,6 @@ from mesh_patches import (
     bent,
     box,
     grid,
-    hood,
     islands,
     joined,
     sheet,
@@ -41,10 +38,6 @@ def vectors_of(vertices, faces):
 
 def areas_of(vertices, faces):
     return np.linalg.norm(vectors_of(vertices, faces), axis=1)
-
-
-def angle(a, b):
-    return np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), (a * b).sum(axis=-1))
 
 
 def parts_of(pairs, count):
@@ -123,18 +116,6 @@ def test_few_and_many_cells_are_even_too(name, count):
     assert_even(Cut(PATCHES[name](), count), count)
 
 
-def test_the_same_cells_again_turned_moved_and_scaled(cut):
-    turn = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
-    turn *= np.linalg.det(turn)
-    vertices, faces = cut.given
-    for scale, rotation, shift in ((1.0, turn, 4.0), (1e3, np.eye(3), 0.0)):
-        other = cells_for(scale * vertices @ rotation.T + shift, faces, count=N)
-        np.testing.assert_array_equal(other.mesh.faces, cut.faces)
-        np.testing.assert_array_equal(other.labels, cut.labels)
-        moved = scale * cut.vertices @ rotation.T + shift
-        np.testing.assert_allclose(other.mesh.vertices, moved, atol=2e-13 * scale)
-
-
 # -- figures -------------------------------------------------------------------------------------
 
 
@@ -146,7 +127,7 @@ def to_segments(points, starts, ends):
     return np.linalg.norm(points[:, None] - nearest, axis=2).min(axis=1)
 
 
-def test_centres_are_nearest_to_the_centroid_or_deep_inside(cut):
+def test_centres_are_deep_inside_their_cells(cut):
     found, weights = cut.figures, cut.figures.weights
     np.testing.assert_array_equal(cut.labels[found.faces], np.arange(N))
     assert weights.min() >= -1e-12
@@ -158,35 +139,14 @@ def test_centres_are_nearest_to_the_centroid_or_deep_inside(cut):
     np.testing.assert_allclose(found.centres, points, atol=1e-13)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     np.testing.assert_allclose(found.normals, normals, atol=1e-12)
-    shares = np.random.default_rng(1).dirichlet([0.5, 0.5, 0.5], 200)
-    usual = 0
     for cell in range(N):
-        member = cut.labels == cell
-        corners, area = cut.vertices[cut.faces[member]], cut.areas[member]
-        centroid = np.average(corners.mean(axis=1), axis=0, weights=area)
-        least = np.linalg.norm(shares @ corners - centroid, axis=2).min()
+        corners = cut.vertices[cut.faces[cut.labels == cell]]
         ends = np.array([edge for edge, sides in cut.border.items() if sides[0] == cell])
         segments = cut.vertices[ends[:, 0]], cut.vertices[ends[:, 1]]
         depth = to_segments(found.centres[None, cell], *segments)[0]
         deepest = to_segments(corners.mean(axis=1), *segments).max()
-        assert depth >= min(0.5 * deepest, 0.25 * math.sqrt(area.sum())) - 1e-12
-        near = np.linalg.norm(found.centres[cell] - centroid) <= least + 1e-12
-        usual += near
-        assert near or depth >= 0.8 * deepest - 1e-12
-    assert usual >= 55
-
-
-def test_flatness_and_crease(cut):
-    unit = cut.vectors / cut.areas[:, None]
-    one, other = joined(cut.faces).T
-    crease, inner = np.zeros(N), cut.labels[one] == cut.labels[other]
-    np.maximum.at(crease, cut.labels[one[inner]], angle(unit[one], unit[other])[inner])
-    np.testing.assert_allclose(cut.figures.crease, crease, atol=1e-9)
-    for cell in range(N):
-        own = cut.labels == cell
-        mean = cut.vectors[own].sum(axis=0)
-        lean = angle(unit[own], mean / np.linalg.norm(mean)).max()
-        assert cut.figures.flatness[cell] == pytest.approx(lean, abs=1e-9)
+        area = cut.figures.areas[cell]
+        assert depth >= min(0.5 * deepest, 0.25 * math.sqrt(area)) - 1e-12
 
 
 def test_borders_are_shared_and_outlines_close(cut):
@@ -232,38 +192,6 @@ def test_neighbours_go_clockwise(cut):
         assert turns.sum() == pytest.approx(math.tau if len(around) > 1 else 0.0, abs=1e-9)
 
 
-def flat(n, labels):
-    """Figures of the squares of an n x n grid, whose labels are given along v first."""
-    u, v, faces = grid(n, n)
-    up = np.tile([0.0, 0.0, 2.0], (len(u), 1))
-    return figures(np.column_stack([u, v, 0 * u]), faces, up, np.repeat(np.ravel(labels), 2))
-
-
-def signed(found, cell):
-    """m^2: outer loops run counter-clockwise and holes clockwise."""
-    return sum(np.cross(p[:-1], p[1:])[:, 2].sum() / 2 for p in found.outlines.of(cell))
-
-
-def test_rings_and_cells_that_meet_themselves_have_all_their_loops():
-    given = sheet(60)
-    x, y, _ = (given.vertices[given.faces].mean(axis=1) - [0.3, 0.2, 0]).T
-    labels = np.digitize(np.hypot(x, y), [0.1, 0.15])
-    ring = figures(*given, np.tile([0.0, 0, 1], (len(given.vertices), 1)), labels)
-    assert np.hypot(*(ring.centres[1] - [0.3, 0.2, 0])[:2]) == pytest.approx(0.125, abs=0.007)
-    assert np.hypot(*(ring.centres[0] - [0.3, 0.2, 0])[:2]) < 1e-3
-    # Two opposite quarters of a square joined around a third: a loop passes the middle twice.
-    eight = flat(4, [[0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 2, 0], [0, 0, 0, 0]])
-    for found, loops, pairs in (
-        (ring, [1, 2, 2], [[0, 1], [1, 2]]),
-        (eight, [2, 1, 1], [[0, 1], [0, 2]]),
-    ):
-        assert [len(found.outlines.of(k)) for k in range(3)] == loops
-        assert found.borders.pairs.tolist() == pairs
-        np.testing.assert_allclose([signed(found, k) for k in range(3)], found.areas, rtol=1e-9)
-    loop = eight.outlines.of(0)[1]
-    assert (np.linalg.norm(loop[:-1] - [0.5, 0.5, 0], axis=1) < 1e-12).sum() == 2
-
-
 def test_a_closed_cell_has_no_border():
     found = Cut(box(), count=1).figures
     assert found.outlines.of(0) == []
@@ -281,9 +209,6 @@ def test_advice_on_coarse_cells_does_help():
     count = int(text.split("about ")[1].split(" cells")[0].replace(",", ""))
     assert 8 < count < 200
     assert coarse(Cut(half_pipe, count=count).figures) == ""
-    size = float(text.split("size = ")[1].split(" m")[0])
-    assert coarse(Cut(half_pipe, count=round(0.3 * 0.5 / size**2)).figures) == ""
-    assert coarse(Cut(hood(), count=200).figures) == ""
     creased = coarse(Cut(box(), count=100).figures)
     assert "folded over a crease of up to 90 degrees" in creased
     assert "size" not in creased
@@ -343,17 +268,6 @@ def test_subdivision_keeps_the_surface(name, parts):
         np.testing.assert_array_equal(fine.faces, given.faces)
 
 
-@settings(max_examples=25)
-@given(
-    st.lists(st.floats(-1, 1), min_size=4, max_size=4), st.floats(1e-4, 1.0), st.floats(0.3, 3000)
-)
-def test_subdivision_of_any_two_triangles(numbers, height, parts):
-    low = -abs(numbers[3]) - height
-    vertices = [[-1, 0, 0], [1, 0, 0], [numbers[0], height, numbers[1]], [numbers[2], low, 0]]
-    given = Mesh(np.array(vertices, float), np.array([[0, 1, 2], [1, 0, 3]]))
-    assert_subdivided(given, areas_of(*given).sum() / parts)
-
-
 def test_what_makes_no_cells_is_refused(approved):
     numbers = [{}, {"count": 5, "size": 0.1}]
     numbers += [{"count": k} for k in (0, 20_001, 2.5, True, 10**5000)]
@@ -382,27 +296,6 @@ def test_what_makes_no_cells_is_refused(approved):
 
 
 # -- as cells of a surface ------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", [name for name in CONNECTED if name != "wedge"])
-def test_cutting_leaves_the_surface_what_it_was(name):
-    """Every new vertex on the old mesh, cells found by their centres, drawn whole."""
-    surface = mesh(TriangleMesh(*PATCHES[name]()), position=(0.1, 0.2, 0.3), rpy_deg=(0, 30, 0))
-    cells = surface.cells(N)
-    fine = cells.surface
-    corners = fine.mesh.vertices @ fine.rotation.T + fine.position
-    assert np.abs(surface.closest(corners).height).max() < 1e-12
-    np.testing.assert_array_equal(cells.locate(cells.centres), np.arange(N))
-    drawn = cells.triangles(np.arange(N))
-    assert areas_of(drawn.vertices, drawn.faces).sum() == pytest.approx(surface.mesh.area, rel=1e-9)
-    lines = cells.borders()
-    assert np.abs(fine.closest(lines).height).max() < 1e-12
-    length = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1).sum()
-    expected = cells.figures.borders.lengths.sum() + fine.mesh.edges.border_lengths.sum()
-    assert length == pytest.approx(expected, rel=1e-12)
-    outlines = cells.unrolled().outlines
-    assert len(outlines) == N
-    assert all((loop[0] == loop[-1]).all() for loop in outlines)
 
 
 @pytest.mark.parametrize("name", ["blade", "box", "scattered"])

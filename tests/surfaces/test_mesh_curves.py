@@ -47,10 +47,6 @@ def plain(name):
     return lambda: TriangleMesh(*mesh_patches.PATCHES[name]())
 
 
-def folded(radius, facets):
-    return lambda: TriangleMesh(*mesh_patches.folded_sheet(radius, facets))
-
-
 # Meshes and how many cells; then by how much their curves say that they deviate at most, m.
 SMOOTH = {name: (plain(name), 60, 0.05) for name in ("sheet", "dome", "shell", "horn", "hood")}
 SMOOTH |= {
@@ -58,7 +54,6 @@ SMOOTH |= {
     "squares": (lambda: squares(0.02, 3), 20, 0.025), "corner": (corner, 20, 0.05),
 }  # fmt: skip
 ROUGH = {name: (plain(name), 60, np.inf) for name in ("blade", "scattered")}  # not all are usable
-BENT = {"6 mm, fine": (0.006, 20, 0.02), "6 mm": (0.006, 5, 0.015), "20 mm": (0.02, 5, 0.006)}
 CREASED = {"roof 40": lambda: roof(40), "roof 90": lambda: roof(90), "roof 140": lambda: roof(140),
            "box": box, "can": can}  # fmt: skip
 
@@ -100,35 +95,6 @@ def test_curves_deviate_by_no_more_than_they_say(name):
 def test_an_exactly_flat_mesh_is_neither_creased_nor_rough(seed, size, count):
     cells = mesh(squares(size, seed), position=(0.5, 0, 0.2)).cells(count)
     assert blocked_curves(cells, Task(standoff=0.005, cone_deg=1)) == ""
-
-
-def over_the_bend(cells):
-    """Curves that turn by more than 30 degrees."""
-    normals = cells.normals[cells.pairs]
-    return np.flatnonzero((normals[:, 0] * normals[:, 1]).sum(axis=1) < np.cos(np.radians(30)))
-
-
-@pytest.mark.parametrize("name", BENT)
-def test_ways_over_a_bend_stay_as_near_to_the_surface_as_they_say(name):
-    radius, facets, deviation = BENT[name]
-    cells = mesh(folded(radius, facets)()).cells(60)
-    which = over_the_bend(cells)
-    assert len(which) >= 5
-    away, turned, said, bent = off(cells, which, 300)
-    assert (away <= said + 1e-9).all()
-    assert (turned <= bent).all()
-    # At an even pace over the surface: 0.24, 0.07 and 0.025.
-    assert np.median(cells.curves.deviations[which, 1]) < deviation
-
-
-@pytest.mark.parametrize("radius", [0.006, 0.02])
-def test_a_target_far_above_a_bend_runs_forwards(radius):
-    cells = mesh(folded(radius, 20)()).cells(60)
-    curves, which = cells.curves, over_the_bend(cells)
-    some = which[curves.deviations[which, 1] < 0.03]
-    assert len(some) > 0.8 * len(which)
-    assert not curves.folds(0.15)[some].any()
-    assert curves.folds(-2.0 * radius)[some].any()  # on the concave side
 
 
 @pytest.mark.parametrize("name", CREASED)

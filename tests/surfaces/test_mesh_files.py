@@ -15,7 +15,7 @@ from pathlib import Path
 import mesh_writers as w
 import numpy as np
 import pytest
-from mesh_files import GOOD, nested_scene
+from mesh_writers import GOOD, nested_scene
 
 from surfaces.meshes import read_mesh
 from surfaces.meshes.repair import notes_of
@@ -28,6 +28,7 @@ WING = np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0, -0.1, 0], [0, 0, 0.1]]
 NEAR = V[F].reshape(-1, 3) + np.random.default_rng(5).uniform(-2e-8, 2e-8, (36, 3))
 SOUP = np.arange(36).reshape(-1, 3)
 SECOND = V + np.array([0.5, 0, 0])
+LIDS = np.flatnonzero(np.ptp(V[F][..., 2], axis=1) == 0.0)
 TRAY = np.delete(F, [4, 5], axis=0)
 WALL = V[[0, 1, 7, 6]], np.array([[0, 1, 2], [0, 2, 3]])
 STAR = [(1, 0, 0), (-4, 1, 0), (0, 0.1, 0), (-4, 4, 0), (0, 2, 0), (2, 9, 0), (1.2, 2, 0),
@@ -230,6 +231,7 @@ OTHERS = {
     "pieces.stl": (w.stl(*w.stacked((V, F), (SECOND, TRAY))), CUBE * 11 / 6, 22, 16),
     "ring.stl": (w.stl(*w.strip(twisted=False)), 0.864 * np.sin(np.pi / 12), 48, 48),
     "wide.stl": (w.stl(V * 32, F), CUBE * 32**2, 12, 8),
+    "tube.off": (w.off(V, np.delete(F, LIDS, axis=0)), CUBE * 2 / 3, 8, 8),
 }
 TAKEN = {name: (content, CUBE, 12, 8) for name, content in CUBES.items()} | OTHERS
 CONTENTS = REFUSED | {name: each[0] for name, each in TAKEN.items()}

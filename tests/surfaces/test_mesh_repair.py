@@ -1,8 +1,5 @@
 """Repair changes nothing but what it says; triangle meshes hold what they promise."""
 
-import tracemalloc
-from itertools import pairwise
-
 import mesh_writers as w
 import numpy as np
 import pytest
@@ -58,34 +55,6 @@ def test_everything_at_once_gives_the_surface_back():
     assert len(notes_of(mesh)) == 5
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(8, all=100))
-def test_turning_faces_over_at_random_is_undone(seed):
-    """Up to the whole; the larger area decides, in each piece by itself."""
-    rng = np.random.default_rng(seed)
-    vertices, faces = w.stacked(UNCLEAN["wavy"], (V + 1.0, F))
-    true = clean(vertices, faces)
-    turned = rng.random(len(faces)) < rng.random()
-    mesh = clean(vertices, np.where(turned[:, None], faces[:, ::-1], faces))
-    w.assert_clean(mesh)
-    assert np.array_equal(np.sort(mesh.faces, axis=1), np.sort(faces, axis=1))
-    for piece in (true.pieces == 0, true.pieces == 1):
-        flipped = true.face_areas[piece & turned].sum() > true.face_areas[piece].sum() / 2
-        expected = true.face_normals[piece] * (-1 if flipped else 1)
-        assert np.abs(mesh.face_normals[piece] - expected).max() < 1e-12
-
-
-def test_vertices_that_lie_together_become_one_and_no_others():
-    """Clusters far smaller than the distance, by brute force."""
-    rng = np.random.default_rng(12)
-    centres = rng.uniform(0, 1, (60, 3))
-    points = np.repeat(centres, 5, axis=0) + rng.uniform(-7e-8, 7e-8, (300, 3))
-    order = rng.permutation(len(points))
-    points, cluster = points[order], np.repeat(np.arange(60), 5)[order]
-    expected = [int(np.flatnonzero(cluster == c)[0]) for c in cluster]
-    assert welded(points, weld_distance(points)).tolist() == expected
-
-
 @pytest.mark.parametrize("dimension", [1, 2, 3])
 def test_a_crowd_of_vertices_is_thinned_and_none_moves_far(dimension):
     """Chains in which each vertex is close to the next do not shrink to a point."""
@@ -101,55 +70,6 @@ def test_a_crowd_of_vertices_is_thinned_and_none_moves_far(dimension):
     assert np.ptp(left, axis=0)[:dimension].min() > 2e-6
     # Every box of a grid keeps one at most.
     assert len(left) <= (2 + 3e-6 / (distance / np.sqrt(12))) ** dimension
-
-
-def test_a_million_points_in_one_place_are_welded_in_bounded_memory():
-    rng = np.random.default_rng(14)
-    points = np.concatenate([rng.uniform(0, 1e-7, (1_000_000, 3)), [[1, 1, 1]]])
-    tracemalloc.start()
-    stands = welded(points, weld_distance(points))
-    assert tracemalloc.get_traced_memory()[1] < 400 << 20
-    tracemalloc.stop()
-    assert len(np.unique(stands)) == 2
-
-
-def slit(rng):
-    """A wavy plate with corners put on some edges, each slit closed by a fan of caps."""
-    vertices, faces = w.hilly(3, 3)
-    whole = clean(vertices, faces)
-    vertices, faces = list(vertices), [list(map(int, face)) for face in faces]
-    for a, b in whole.edges.vertices[:: rng.integers(2, 6)].tolist():
-        owner = next((f for f in faces if (a, b) in pairwise([*f, f[0]])), None)
-        if owner is None:
-            continue
-        apex, chain = next(k for k in owner if k not in (a, b)), [a]
-        for share in np.sort(rng.uniform(0.1, 0.9, rng.integers(1, 4))):
-            vertices.append(vertices[a] + share * (vertices[b] - vertices[a]))
-            chain.append(len(vertices) - 1)
-        chain.append(b)
-        faces.remove(owner)
-        faces += [[p, q, apex] for p, q in pairwise(chain)]
-        faces += [[chain[0], chain[k + 1], chain[k]] for k in range(1, len(chain) - 1)]
-    return whole, np.array(vertices), np.array(faces)
-
-
-@sampled
-@pytest.mark.parametrize("seed", seeds(8, all=100))
-def test_caps_are_flipped_without_moving_the_surface(seed):
-    whole, vertices, faces = slit(np.random.default_rng(seed))
-    assert len(vertices) > len(whole.vertices) + 2
-    mesh = clean(vertices, faces)
-    w.assert_clean(mesh)
-    assert any("flipping" in note for note in notes_of(mesh))
-    assert len(mesh.vertices) == len(vertices)
-    assert len(mesh.edges.border_faces) == len(whole.edges.border_faces)
-    assert mesh.area == pytest.approx(whole.area, rel=1e-9)
-    assert (mesh.pieces == 0).all()
-    # The wavy plate over the place of each face, to where its samples lie apart at most.
-    shares = np.random.default_rng(1).dirichlet((1, 1, 1), 400)
-    samples = (shares @ whole.vertices[whole.faces]).reshape(-1, 3)
-    away = cKDTree(samples).query(mesh.vertices[mesh.faces].mean(axis=1))[0]
-    assert away.max() < 0.01
 
 
 def test_a_flip_never_makes_an_edge_twice():
@@ -177,20 +97,6 @@ def test_fans_are_parted_and_nothing_moves():
     mesh = clean(vertices, faces)
     w.assert_clean(mesh)
     assert sorted(np.bincount(mesh.pieces)) == [6, 6, 6]
-
-
-@pytest.mark.parametrize("count", [3, 4, 7, 24])
-def test_one_sided_and_two_sided_bands(count):
-    flat = w.strip(twisted=False, count=count)
-    mesh = clean(*flat)
-    w.assert_clean(mesh)
-    assert not any("turned over" in note for note in notes_of(mesh))
-    twisted = w.strip(twisted=True, count=max(count, 4))
-    with pytest.raises(SurfaceError, match="only one side"):
-        clean(*twisted)
-    faces = 2 * max(count, 4)
-    with pytest.raises(SurfaceError, match=rf"{faces} faces around \((3|2\.9\d*), "):
-        clean(*w.stacked(flat, (twisted[0] + [3, 0, 0], twisted[1])))
 
 
 def vertex_normals(mesh):
@@ -233,56 +139,7 @@ def test_pieces_are_numbered_by_area():
     assert clean(*w.stacked(*parts)).pieces.tolist() == [2] * 12 + [0] * 12 + [1] * 12
 
 
-def pipe(radii, heights, n=24):
-    """Rings of n points about z, joined from each to the next; outward is away from z."""
-    angle = np.linspace(0, 2 * np.pi, n, endpoint=False)
-    circle = np.column_stack([np.cos(angle), np.sin(angle)])
-    rings = [np.column_stack([r * circle, 0 * angle + z]) for r, z in zip(radii, heights, strict=1)]
-    k, ahead = np.arange(n), (np.arange(n) + 1) % n
-    band = np.concatenate([np.stack([k, ahead, ahead + n], 1), np.stack([k, ahead + n, k + n], 1)])
-    return np.concatenate(rings), np.concatenate([band + b * n for b in range(len(rings) - 1)])
-
-
-def windowed():
-    vertices, faces = pipe([1] * 9, np.linspace(0, 4, 9))
-    middles = vertices[faces].mean(axis=1)
-    return vertices, faces[(np.abs(middles[:, 2] - 2) >= 0.6) | (middles[:, 0] <= 0.8)]
-
-
-def pierced():
-    vertices, faces = w.plate(9, 8, 0.9, 0.8)
-    squares = np.array([18, 36, 53])  # none touches another or the border
-    return vertices, np.delete(faces, np.concatenate([2 * squares, 2 * squares + 1]), axis=0)
-
-
 # Border lines: holes, and open ends where a piece has more than one.
-OPEN = {
-    "pipe": (pipe([1, 1, 1], [0, 1, 2]), 0, 2),
-    "long pipe": (pipe([0.05] * 9, range(9)), 0, 2),
-    "waisted pipe": (pipe([1, 0.5, 1], [0, 1, 2]), 0, 2),
-    "funnel, steep": (pipe([1, 0.8], [0, 2]), 0, 2),
-    "disc with a hole": (pipe([0.2, 1], [0, 0]), 1, 0),
-    "flat ring": (pipe([0.9, 1], [0, 0]), 1, 0),
-    "shallow dish with a hole": (pipe([0.2, 0.6, 1], [0, 0.1, 0.3]), 1, 0),
-    "pipe with a hole in its side": (windowed(), 1, 2),
-    "plate with three": (pierced(), 3, 0),
-}
-
-
-@pytest.mark.parametrize("name", OPEN)
-@pytest.mark.parametrize("flipped", [False, True])
-def test_the_ends_of_a_pipe_are_no_holes(name, flipped):
-    (vertices, faces), holes, ends = OPEN[name]
-    turn, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))
-    mesh = clean(vertices @ turn.T, faces[:, ::-1] if flipped else faces)
-    notes = [note for note in notes_of(mesh) if "hole" in note or "open end" in note]
-    expected = [f"{holes} hole"] * bool(holes) + [f"{ends} open ends"] * bool(ends)
-    assert len(notes) == len(expected)
-    for note, words in zip(notes, expected, strict=True):
-        assert words in note
-    assert name != "plate with three" or "0.4 m around" in notes[0]
-
-
 def knotted(rng):
     """Faces between points of a small grid: many are straight, doubled or meet in bundles."""
     count = int(rng.integers(3, 12))

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 from bounds import holds
 
-from surfaces import SurfaceError, poses, read_poses
+from surfaces import SurfaceError, poses
 from surfaces.places import Places, offset_surface
 
 LINE = np.array([[0.4, 0.0, 0.3], [0.4, 0.1, 0.3], [0.4, 0.2, 0.3], [0.4, 0.2, 0.3]])
@@ -147,13 +145,3 @@ def test_poses_without_bounds_say_so():
         own.surface.parts(1e-3, 0.01)
     with pytest.raises(SurfaceError, match="24 curves; bounds are made for 1 to 20"):
         drawn(3).surface.parts(1e-3, 0.01, most=20)
-
-
-def test_a_file_of_poses_is_read_in_its_units(tmp_path):
-    file = tmp_path / "path.csv"
-    file.write_text("tx,ty,tz,x,y,z,nx,ny,nz\n1,0,0, 400,0,300,0,0,1\n1,0,0,400,100,300,0,0,1\n")
-    found = read_poses(file, "mm")
-    np.testing.assert_allclose(found.points, LINE[:2], atol=1e-15)
-    assert found.approaches is None
-    assert poses(**found._asdict()).tangents.tolist() == [[1.0, 0.0, 0.0]] * 2
-    assert math.isclose(read_poses(file).points[0, 0], 400.0)

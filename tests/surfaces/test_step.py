@@ -27,7 +27,7 @@ CORNER = ROUND**2 * (1.0 - np.pi / 4.0)  # m^2, what the round edge takes off to
 TOP = SIZE[0] * SIZE[1] - CORNER
 AREAS = [(SIZE[1] - ROUND) * SIZE[2], TOP, np.pi / 2.0 * ROUND * SIZE[2], SIZE[0] * SIZE[2],
          TOP, (SIZE[0] - ROUND) * SIZE[2], SIZE[1] * SIZE[2]]  # fmt: skip
-PARTS = Path(__file__).parents[1] / "shared" / "step_parts.py"
+PARTS = Path(__file__).parents[1] / "shared" / "files" / "step_parts.py"
 CASE = """
 robot.name = "ur5"
 task = {{ standoff = 0.02, cone_deg = 30 }}

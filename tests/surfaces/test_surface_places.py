@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from bounds import holds
 from random_surfaces import random_surface
-from specimens import EGG, FACETED, SMOOTH, VASE
-from spline_nets import quarter_turn, turned
+from specimens import EGG, FACETED, SMOOTH, VASE, quarter_turn, turned
 
 from surfaces import (
     bspline,

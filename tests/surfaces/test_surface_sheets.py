@@ -96,9 +96,6 @@ def test_triangles_are_few_and_stay_near():
     height = np.abs(np.linalg.norm(sheet.triangles.reshape(-1, 3), axis=1) - 1.0)
     assert height.max() <= sheet.deviation <= 2e-4  # so clearances are no larger than they must be
     assert len(sheet.triangles) < 6_000
-    coarse = sheet_of(sphere(1.0, (0, 180), (0, 360)), 1e-6, most=2_000)
-    assert len(coarse.triangles) <= 2_000
-    assert 1e-6 < coarse.deviation < 0.01
     wall = plane((0.0, 0.6), (0.0, 0.4), **POSE)
     flat = sheet_of(wall)
     assert flat.triangles.shape == (2, 3, 3)
@@ -120,16 +117,6 @@ def test_a_rigid_motion_moves_the_sheet_along(kind):
     apart, partner = cKDTree(carried.reshape(-1, 9)).query(there.triangles.reshape(-1, 9))
     assert apart.max() < 1e-9 * max(1.0, np.abs(carried).max())
     assert len(np.unique(partner)) == len(np.unique(carried.reshape(-1, 9), axis=0))
-
-
-def test_surfaces_of_other_shapes_have_triangles_of_their_own():
-    shapes = [
-        plane((0, 1), (0, 1)), plane((0, 1), (0, 2)), plane((0, 1), (0, 1), side="outside"),
-        sphere(1.0, (10, 90), (0, 90)), sphere(1.1, (10, 90), (0, 90)),
-    ]  # fmt: skip
-    sheets = [sheet_of(shape, 1e-2, 600, 1e-3).triangles for shape in shapes]
-    for k, one in enumerate(sheets):
-        assert not any(np.array_equal(one, other) for other in sheets[:k])
 
 
 def test_a_mesh_gives_its_own_triangles():

@@ -60,17 +60,6 @@ def test_of_several_descents_the_nearest_counts():
         assert found == pytest.approx(away, abs=1e-3)
 
 
-def test_what_is_beyond_a_plate_in_reach_is_proved_cell_by_cell():
-    for name in ("panda out of reach", "kinova out of reach"):
-        verdict = verdict_of(name)
-        first = verdict.robot.model.jointPlacements[1].translation
-        points = verdict.task.targets(verdict.cells).points
-        far = np.linalg.norm(points - first, axis=1) > verdict.robot.reach + 1e-3
-        assert 0 < far.sum() < len(points)
-        there = {cause.cell: (cause.kind, cause.proved) for cause in verdict.causes}
-        assert {there[int(k)] for k in np.flatnonzero(far)} == {(CauseKind.OUT_OF_REACH, True)}
-
-
 @pytest.mark.parametrize("name", ["folds over a bend", "paper 4d"])
 def test_a_joint_limit_says_which_joint_and_where_it_would_have_to_be(name):
     """A tube about the first axis: joint1 follows the azimuth, less what the forearm is beside."""
@@ -170,13 +159,6 @@ def test_what_is_in_the_way_is_named_with_its_distance(gap):
     assert cause.pair == ("tool", "wall")
     assert cause.clearance == pytest.approx(gap, abs=0.0012)
     assert asked_beside(wall, 0.0).feasible == (gap > 0.0)
-
-
-def test_a_box_that_swallows_the_target_is_named():
-    box = Obstacle.box("crate", (0.4, 0.4, 0.4), position=(0.5, 0.0, 0.3))
-    (cause,) = asked_beside(box, 0.0).causes
-    assert cause.pair == ("tool", "crate")
-    assert cause.clearance < -BALL
 
 
 def test_all_that_is_under_a_roof_names_it():

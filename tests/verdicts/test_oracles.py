@@ -10,14 +10,14 @@ import puma_oracle
 import pytest
 import referee
 import ur5_oracle
-from asked import STORED, known, names, question, stored, tables_of, verdict_of
-from oracle_cases import Answer, Problem, net, patch
+from asked import STORED, names, question, stored, tables_of, verdict_of
+from oracle_cases import Answer, Problem, net
 from plain import tools
 from random_cases import built, read
 from samples import sampled, spread
 
 from feasibility import Answer as Said
-from feasibility import CauseKind, Evidence
+from feasibility import Evidence
 from robots import load_robot
 
 ARMS = ("puma560", "ur5", "panda", "kinova", "xarm7", "z1", "so101", "talos_left")
@@ -104,11 +104,10 @@ def test_the_referee_says_what_is_wrong():
 
 
 @sampled
-@pytest.mark.parametrize("on", ["patch", "net"])
 @pytest.mark.parametrize("name", spread(names("paper"), 1))
-def test_the_papers_cases_have_their_known_answers(name, on):
+def test_the_papers_cases_have_their_known_answers(name):
     best = {"paper 4d": 60, "paper 4f": 6}.get(name, 90)
-    assert puma_oracle.solve(paper_case(name), on) == Answer(best == 90, best, best)
+    assert puma_oracle.solve(paper_case(name)) == Answer(best == 90, best, best)
 
 
 def test_every_branch_places_the_tool_where_pinocchio_says_and_all_are_branches():
@@ -145,42 +144,17 @@ def test_every_ur5_configuration_is_found_from_its_tool_and_two_wrist_angles():
         assert np.abs(off).max(axis=-1).min() < 1e-6
 
 
-@pytest.mark.parametrize("cone", [3.0, 60.0, 130.0])
-def test_the_wrists_intervals_are_the_wrists_mask(cone):
-    rng = np.random.default_rng(3)
-    seen = rng.normal(size=(40, 3))
-    seen[0] = (0.0, 1.0, 0.0)  # the approach direction along the axis of joint 4
-    seen /= np.linalg.norm(seen, axis=1, keepdims=True)
-    low, high = np.radians((-200.0, 230.0))
-    rows, theta4 = np.radians(np.linspace(-200.0, 200.0, 81)), np.linspace(low, high, 1441)
-    spans = puma_oracle._intervals(seen, rows, np.cos(np.radians(cone)), low, high, 3)
-    c5, s5 = np.cos(rows)[:, None], np.sin(rows)[:, None]
-    axis = np.stack(np.broadcast_arrays(-s5 * np.cos(theta4), c5, s5 * np.sin(theta4)), -1)
-    over = np.einsum("rtk,pk->prt", axis, seen) - np.cos(np.radians(cone))
-    inside = ((theta4 >= spans[..., :1]) & (theta4 <= spans[..., 1:])).any(axis=2)
-    clear = np.abs(over) > 1e-9
-    assert (inside == (over > 0.0))[clear].all()
-    assert inside.any()
-
-
 @sampled
 @pytest.mark.parametrize(("arm", "oracle"), [("puma560", puma_oracle), ("ur5", ur5_oracle)])
 def test_stored_answers_are_the_oracles(arm, oracle):
     problems, robot = read(arm), load_robot(arm)
     for number in spread(range(len(problems)), 2):
         problem, said = problems[number]
-        assert oracle.solve(problem, "patch" if arm == "puma560" else "net") == said
+        assert oracle.solve(problem) == said
         _, cells, task = built(problem, robot)
         aims = problem.targets(*net(problem, 4).uv[: len(cells)].T)
         for mine, theirs in zip(aims, task.targets(cells)[:2], strict=True):
             np.testing.assert_allclose(mine, theirs, atol=1e-12)
-
-
-def test_both_domains_hold_the_centres_and_join_the_neighbours():
-    problem = paper_case("paper 4a")
-    line, grid = net(problem, 5), patch(problem, 3)
-    np.testing.assert_allclose(line.uv[line.centres], grid.uv[grid.centres], atol=1e-12)
-    assert (len(line.links), len(grid.uv)) == (305 * 5, 90 * 9)
 
 
 # All stored problems.
@@ -188,25 +162,12 @@ def test_both_domains_hold_the_centres_and_join_the_neighbours():
 
 @sampled
 @pytest.mark.parametrize("file", STORED)
-def test_no_stored_problem_is_answered_wrongly(file):
-    """Nor more cells called covered, or proved uncoverable, than there are."""
-    both = ((arm, enumerate(read(arm))) for arm in ("puma560", "ur5"))
-    truths = {f"{arm} {k}": truth for arm, cases in both for k, (_, truth) in cases}
-    asked, undecided, unproved = spread(stored(file), STORED[file]), [], []
-    for name in asked:
-        verdict, truth = verdict_of(name), known(name)
-        if truth is not None and truth.startswith("not "):
-            assert verdict.answer != truth[4:], name
-        elif truth is not None:
-            assert verdict.answer in (truth, Said.UNDECIDED), name
-        undecided += [name] if verdict.answer is Said.UNDECIDED else []
-        unproved += [name] if verdict.evidence is Evidence.EXHAUSTED else []
-        if name in truths:
-            lost = [c for c in verdict.causes if c.kind is not CauseKind.DISCONNECTED]
-            assert verdict.n_covered <= truths[name].covered, name
-            assert sum(c.proved for c in lost) <= len(verdict.cells) - truths[name].reachable
-            assert len(lost) >= len(verdict.cells) - truths[name].reachable
+def test_few_stored_problems_are_left_undecided_or_unproved(file):
+    """That no answer is wrong, and no more cells are covered than there are, the table holds."""
+    found = [verdict_of(name) for name in spread(stored(file), STORED[file])]
+    undecided = sum(verdict.answer is Said.UNDECIDED for verdict in found)
+    unproved = sum(verdict.evidence is Evidence.EXHAUSTED for verdict in found)
     # "Not infeasible" and "not feasible" problems hang by a hair, or nobody knows.
     most = {"by_a_hair": 1.0, "panda_apart": 0.5, "puma560": 0.0, "ur5": 0.0}.get(file, 0.05)
-    assert len(undecided) <= most * len(asked) + 1
-    assert len(unproved) <= (0.0 if file in ("puma560", "ur5") else 0.1) * len(asked) + 1
+    assert undecided <= most * len(found) + 1
+    assert unproved <= (0.0 if file in ("puma560", "ur5") else 0.1) * len(found) + 1

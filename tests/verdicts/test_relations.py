@@ -143,18 +143,6 @@ def same(one, other):
         assert plain.faults_of(other) == []
 
 
-def arm_moved(robot, change):
-    """The arm with every fixed placement of its tree changed: another world, the same joints."""
-    model = robot.model.copy()
-    for k in range(1, model.njoints):
-        model.jointPlacements[k] = change(model.jointPlacements[k], k == 1)
-    frames = [f.placement for f in model.frames]
-    for k, frame in enumerate(model.frames):
-        frame.placement = change(frames[k], frame.parentJoint == 0)
-    kept = {name: getattr(robot, name) for name in Robot.__dataclass_fields__}
-    return Robot(**(kept | {"model": model, "urdf": None}))
-
-
 @sampled
 @pytest.mark.parametrize("name", [*spread(PROBLEMS, 2), "beside a post", "torus"])
 def test_moving_all_by_one_rigid_motion_changes_nothing(name):
@@ -182,14 +170,18 @@ def test_a_mirror_changes_nothing(name):
     q, tables = question(name), tables_of(name)
     flip = np.diag([1.0, -1.0, 1.0])
 
-    def image(placement, first):
-        return pin.SE3(flip @ placement.rotation @ flip, flip @ placement.translation)
-
+    model = q.robot.model.copy()  # another world, the same joints
+    for k, placed in enumerate(model.jointPlacements):
+        model.jointPlacements[k] = pin.SE3(flip @ placed.rotation @ flip, flip @ placed.translation)
+    for frame in model.frames:
+        placed = frame.placement.copy()
+        frame.placement = pin.SE3(flip @ placed.rotation @ flip, flip @ placed.translation)
+    kept = {name: getattr(q.robot, name) for name in Robot.__dataclass_fields__}
     # Joints about y turn as before, others the other way round: q becomes -q.
     about_y = np.array(["RY" in joint.shortname() for joint in q.robot.model.joints[1:]])
     limits = np.column_stack([q.robot.lower, q.robot.upper])
     limits = np.where(about_y[:, None], limits, -limits[:, ::-1])
-    arm = arm_moved(q.robot, image).with_limits(limits)
+    arm = Robot(**(kept | {"model": model, "urdf": None})).with_limits(limits)
     surface, kind = dict(tables["surface"]), tables["surface"]["kind"]
     x, y, z = surface["position"]
     roll, pitch, yaw = surface["rpy_deg"]
@@ -217,17 +209,6 @@ def test_reference_and_range_of_a_roll_turned_together_are_the_same():
     form = plain.surface_of(q.cells.surface)
     aims = plain.targets_of(q.cells, q.task)
     assert plain.referee.judge(plain.arm_of(q.robot), form, asked_for, found.witness.q, aims) == []
-
-
-def test_all_rolls_are_free_roll():
-    """To the last bit, and to the last evaluation of the arm."""
-    q = question("a square and 15 degrees")
-    free, whole = (
-        check(q.robot, q.cells, replace(q.task, roll_deg=r)) for r in (None, (-170, 190))
-    )
-    np.testing.assert_array_equal(free.witness.q, whole.witness.q)
-    assert free.statistics["fk"] == whole.statistics["fk"]
-    assert free.certificate.max_roll is None
 
 
 def test_a_body_far_away_changes_nothing():

@@ -28,7 +28,6 @@ from feasibility.division.reconfiguration import itinerary
 from feasibility.verdict import CauseKind, Walk
 from robots import load_robot
 from surfaces import cylinder, plane, sphere
-from surfaces.meshes import TriangleMesh, mesh
 
 UR5 = load_robot("ur5")
 TASK = Task(0.01, cone_deg=30)
@@ -127,22 +126,6 @@ def test_the_seam_of_joint_1_costs_a_patch_and_a_full_turn_removes_it():
     u = np.degrees(cut.cells.u)
     one, other = (u[patch.cells] for patch in cut.patches)
     assert max(one.min(), other.min()) > min(one.max(), other.max())
-
-
-def test_the_patch_behind_as_a_mesh():
-    """The same two patches, over triangles."""
-    u, v = np.meshgrid(np.linspace(*BEHIND.u_range, 60), np.linspace(0.1, 0.5, 40), indexing="ij")
-    k = np.arange(u.size).reshape(u.shape)
-    corners = [side.ravel() for side in (k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:])]
-    ways = ((0, 1, 2), (0, 2, 3))
-    faces = np.vstack([np.stack([corners[i] for i in way], axis=1) for way in ways])
-    cells = mesh(TriangleMesh(BEHIND.point(u, v).reshape(-1, 3), faces), side="inside").cells(48)
-    division = divide(posed((-180, 180)), cells, TASK)
-    assert_division(division)
-    assert (len(division.patches), division.optimal, division.whole) == (2, True, True)
-    # Cells near the seam may go to either patch; together they are the cylinder's.
-    area = sum(patch.area for patch in division.patches)
-    assert area == pytest.approx(0.6 * np.radians(60) * 0.4, rel=1e-3)
 
 
 def drawn(arm, number):
@@ -298,41 +281,3 @@ def test_turns_along_a_chain_of_patches():
     choices = [[Walk(np.array(pair)[:, None], np.zeros(2, dtype=np.int64))] for pair in angles]
     moves = [abs(math.degrees(float(m.moves[0]))) for m in itinerary(robot, choices).moves]
     assert moves == pytest.approx([10.0] * 3)
-
-
-# -- the report ------------------------------------------------------------------------------------
-
-
-BEHIND_CASE = """
-robot.name = "ur5"
-surface = { kind = "cylinder", radius = 0.6, u_deg = [150, 210], v = [0.1, 0.5], side = "inside", \
-cells = [12, 4] }
-task = { standoff = 0.01, cone_deg = 30 }
-[robot.limits_deg]
-"""
-
-
-def test_the_numbers_of_the_command_are_those_of_the_division(tmp_path):
-    division = behind(-180, 180)
-    arm = division.robot
-    ends = np.degrees(np.column_stack([arm.lower, arm.upper])).round(9).tolist()
-    limits = zip(arm.joint_names, ends, strict=True)
-    (tmp_path / "behind.toml").write_text(
-        BEHIND_CASE + "".join(f"{name} = {pair}\n" for name, pair in limits)
-    )
-    said = coverable("divide", tmp_path / "behind.toml", "--json")
-    found = json.loads(said.out)
-    assert (said.status, found["answer"]) == (0, "complete")
-    assert (found["optimal"], found["at_least"]) == (True, 2)
-    assert (found["cells"], found["covered"], found["connected"]) == (48, 48, None)
-    assert found["left_out"] == found["unsettled"] == []
-    for k, (row, patch) in enumerate(zip(found["patches"], division.patches, strict=True)):
-        flat = [division.cells.index(*cell) for cell in row["cells"]]
-        assert flat == [cell for cell in range(48) if found["patch_of_cell"][cell] == k]
-        assert len(flat) == len(patch.cells)
-        assert row["certificate"]["max_position_error_m"] <= 0.001
-    (move,) = found["moves"]
-    assert (move["from"], move["to"]) == (0, 1)
-    for start, end, joint in zip(move["start"], move["end"], move["joints"], strict=True):
-        assert math.radians(joint["by_deg"]) == pytest.approx(end - start)
-    assert [joint["joint"] for joint in move["joints"]] == list(division.robot.joint_names)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from jobs import PLATE, coverable
 from referee import evenly as dense
 from timed_motions import keeps_to_limits
 
@@ -16,7 +14,6 @@ from feasibility.certification import collision_replay
 from feasibility.collisions import Collision, Obstacle, gather
 from feasibility.entry import ends_of, entered
 from feasibility.paths import PathError, coverage_path
-from feasibility.results import load_trajectory
 from feasibility.timing import motion_limits, trajectory
 from robots import Kinematics, load_robot
 from surfaces import plane
@@ -96,15 +93,3 @@ def test_what_cannot_be_had_is_said(path):
             check(UR5, CELLS, replace(TASK, home_deg=home))
     with pytest.raises(ValueError, match="finite"):
         replace(TASK, home_deg=(0.0, np.nan))
-
-
-def test_the_command_goes_from_home_to_home_at_the_speed_of_the_task(tmp_path):
-    case, out = tmp_path / "panel.toml", tmp_path / "run.csv"
-    case.write_text(PLATE + "task.speed = 0.15\ntask.home_deg = [0, -90, 90, -90, -90, 0]\n")
-    said = coverable("path", case, "--json", "--approach", "0.03", "--out", out)
-    told = json.loads(said.out)
-    assert (said.status, told["ends"]["approach_m"]) == (0, 0.03)
-    assert told["trajectory"]["limits"]["tool_speed"] == 0.15
-    assert (told["rates"]["speed_m_per_s"], told["rates"]["holds"]) == (0.15, True)
-    run = load_trajectory(out)
-    assert np.allclose(run.q[[0, -1]], np.radians(HOME))

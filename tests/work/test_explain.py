@@ -129,33 +129,6 @@ def test_margins_run_from_the_case_as_it_stands_inwards(name):
     assert decided > len(explanation.thresholds) // 4
 
 
-def test_what_is_varied_and_how_far():
-    """Cone to 3 and 180 degrees, limits by a full turn, standoff and shifts by half a metre."""
-    names = [t.quantity.name for t in explained("4d").thresholds]
-    assert len(set(names)) == len(names) == 1 + 12 + 2 + 6
-    robot, _, task = given_case("4d")
-    for t in explained("4d").thresholds:  # infeasible: towards more freedom
-        q = t.quantity
-        ends = {Kind.CONE: math.pi, Kind.SHIFT: 0.5}.get(q.kind, 0.0)
-        if q.kind is Kind.STANDOFF:
-            ends = task.standoff + 0.5 if q.name == "larger standoff" else 0.0
-        if q.joint >= 0:
-            ends = q.given + (2 * math.pi if q.kind is Kind.UPPER else -2 * math.pi)
-            assert q.given == (robot.upper if q.kind is Kind.UPPER else robot.lower)[q.joint]
-            low, high = (robot.model.lowerPositionLimit, robot.model.upperPositionLimit)
-            ends = np.clip(ends, low[q.joint] - 2 * math.pi, high[q.joint] + 2 * math.pi)
-        assert q.end == pytest.approx(ends, abs=1e-9)
-    for t in explained("plate").thresholds:  # feasible: towards less, limits of 0.1 degree at last
-        q = t.quantity
-        if q.kind is Kind.CONE:
-            assert q.end == pytest.approx(math.radians(3))
-        if q.joint >= 0:
-            other = (UR5.lower if q.kind is Kind.UPPER else UR5.upper)[q.joint]
-            assert abs(q.end - other) == pytest.approx(math.radians(0.1))
-    nothing = {t.quantity.name for t in explain(UR5, PLATE.cells(1, 1), Task(0.0, 3)).thresholds}
-    assert not nothing & {"cone", "smaller standoff"}
-
-
 # -- thresholds in closed form ---------------------------------------------------------------------
 
 
@@ -228,19 +201,6 @@ def test_a_ring_that_a_stop_cuts_in_two_needs_joint1_to_pass_it():
     assert explanation.dropped.waypoints is not None
 
 
-def test_4a_may_lose_as_much_of_joint1_as_the_azimuth_leaves():
-    """Arm forwards, joint1 stands at the azimuth less an offset; backwards, half a turn further."""
-    _, cells, task = given_case("4a")
-    radii = np.linalg.norm(task.targets(cells).points[:, :2], axis=1)
-    azimuth, offset = np.degrees(cells.v), np.degrees(np.arcsin(0.1 / radii))
-    lower, upper = (
-        threshold_of(explained("4a"), f"joint1 {end} limit") for end in ("lower", "upper")
-    )
-    assert math.degrees(lower.feasible.value) == pytest.approx((azimuth - offset).min(), abs=1.0)
-    backwards = azimuth - 180.0 + offset
-    assert math.degrees(upper.feasible.value) == pytest.approx(backwards.max(), abs=1.0)
-
-
 def test_a_standoff_that_lifts_the_tool_has_two_ends():
     found = threshold_of(explained("deep plate"), "larger standoff")
     assert not explained("deep plate").verdict.feasible
@@ -301,26 +261,6 @@ def test_the_change_that_is_named_first_makes_the_case_feasible(name, tmp_path):
         assert coverable("verify", tmp_path / "case.toml", motion, *options).status == 0
 
 
-def test_every_threshold_and_joint_is_told_with_its_numbers(tmp_path):
-    case = case_named("plate").with_overrides(["surface.cells=[1, 2]"])
-    (tmp_path / "case.toml").write_text(case.to_toml())
-    told = json.loads(coverable("explain", tmp_path / "case.toml", "--json").out)
-    found = explain(*case.build()[:3])
-    for row, threshold in zip(told["thresholds"], found.thresholds, strict=True):
-        q = threshold.quantity
-        unit, scale = ("deg", 180.0 / math.pi) if q.unit == "rad" else ("m", 1.0)
-        assert row[f"given_{unit}"] == pytest.approx(scale * q.given, abs=1e-5)
-        for key, side in (("feasible", threshold.feasible), ("other", threshold.other)):
-            assert (row[key] is None) == (side is None)
-            if side is not None:
-                assert row[key][f"value_{unit}"] == pytest.approx(scale * side.value, abs=1e-5)
-                assert row[key]["verdict"] == str(side.answer)
-    q = found.verdict.witness.q
-    for row, low, high in zip(told["joints"], *np.degrees([q.min(0), q.max(0)]), strict=True):
-        ends = [float(x) for x in row["used"].replace("deg", "").split("..")]
-        np.testing.assert_allclose(ends, [low, high], atol=0.051)
-
-
 # -- the search, asked from outside ----------------------------------------------------------------
 
 
@@ -375,22 +315,3 @@ def test_edges():
     assert late.verdict.answer is Answer.UNDECIDED
     assert not any(t.feasible for t in late.thresholds)
     assert len(late.left_out) == 21 - len(late.thresholds) > 0
-
-
-class Enough(Exception):
-    pass
-
-
-def test_progress_counts_the_thresholds_and_may_end_the_work():
-    seen = []
-
-    def report(done, total, text):
-        seen.append((done, total))
-        if done == 3:
-            raise Enough
-
-    with pytest.raises(Enough):
-        explain(*given_case("long plate"), progress=report)
-    assert [done for done, _ in seen] == sorted(done for done, _ in seen)
-    assert {total for _, total in seen} <= {None, 21}
-    assert seen[-1] == (3, 21)

@@ -10,11 +10,9 @@ import numpy as np
 import pytest
 from samples import sampled, seeds
 
-from feasibility.division import set_cover, undominated
 from feasibility.division.connected_labels import count_of
 from feasibility.division.partition import fewest_patches
 from feasibility.placement.stations import fewest_stations
-from surfaces import plane
 
 
 def random_table(seed):
@@ -167,21 +165,6 @@ def grid(nu, nv):
     return np.vstack([down, np.stack([k[:, :-1].ravel(), k[:, 1:].ravel()], axis=1)])
 
 
-@pytest.mark.parametrize("half", [1, 2])
-def test_two_bars_that_cross(half):
-    """Two motions, but three patches: one bar cuts the other."""
-    i, j = np.divmod(np.arange(121), 11)
-    bars = np.array([abs(i - 5) < half, abs(j - 5) < half])
-    everywhere = np.ones(121, dtype=bool)
-    cover = fewest_patches(bars, everywhere, grid(11, 11))
-    assert_cover(cover, bars, everywhere, grid(11, 11))
-    assert (len(cover.fewest), cover.fewest.pieces) == (2, 3)
-    assert (len(cover.connected), cover.connected.bound) == (3, 3)
-    # Where corners count as touching, wide bars can pass through each other.
-    corners = plane((0, 1), (0, 1)).cells(11, 11).pairs
-    assert len(fewest_patches(bars, everywhere, corners).connected) == (3 if half == 1 else 2)
-
-
 def blobs(nu, nv, count, level, seed):
     """(count, nu * nv) smooth random regions: where a random wave pattern is above a level."""
     rng = np.random.default_rng(seed)
@@ -192,18 +175,6 @@ def blobs(nu, nv, count, level, seed):
             a, b, phase = rng.normal(0, 4), rng.normal(0, 4), rng.uniform(0, 2 * np.pi)
             waves[k] += np.sin(a * u + b * v + phase)
     return (waves > level).reshape(count, -1)
-
-
-@pytest.mark.parametrize(
-    ("nu", "nv", "count", "level"), [(9, 10, 12, 0.5), (30, 30, 3, -0.5), (50, 50, 50, 1.2)]
-)
-def test_tables_of_real_sizes_are_solved_to_the_optimum(nu, nv, count, level):
-    everywhere, pairs = np.ones(nu * nv, dtype=bool), plane((0, 1), (0, 1)).cells(nu, nv).pairs
-    covers = blobs(nu, nv, count, level, 0)
-    cover = fewest_patches(covers, everywhere, pairs)
-    assert_cover(cover, covers, everywhere, pairs)
-    assert cover.fewest.optimal
-    assert cover.connected.optimal
 
 
 def test_without_time_there_is_a_gap_and_it_is_honest():
@@ -224,25 +195,3 @@ def test_without_time_there_is_a_gap_and_it_is_honest():
         for seed in (100, 101, 102)
     ]
     assert any(one.connected.bound < len(one.connected) for one in gaps)
-
-
-def test_undominated_sets():
-    """Against the definition; of equal sets the first stays, empty ones go."""
-    for seed in range(60):
-        covers = random_table(seed)[0][:, : 1 + seed % 5]
-        sets = [frozenset(np.flatnonzero(row).tolist()) for row in covers]
-        kept = [
-            k for k, own in enumerate(sets)
-            if own and not any(own < other for other in sets) and own not in sets[:k]
-        ]  # fmt: skip
-        assert undominated(covers).tolist() == kept
-
-
-def test_bad_input():
-    three = np.ones(3, dtype=bool)
-    with pytest.raises(ValueError, match=r"got \(2, 4\) and \(3,\)"):
-        fewest_patches(np.ones((2, 4), dtype=bool), three, np.zeros((0, 2)))
-    with pytest.raises(ValueError, match=r"cells 0 \.\. 2"):
-        fewest_patches(np.ones((2, 3), dtype=bool), three, np.array([[0, 3]]))
-    with pytest.raises(ValueError, match=r"element 1 .* is in no set"):
-        set_cover(np.array([[True, False]]), 1.0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import replace
 from functools import cache
@@ -10,7 +9,6 @@ from functools import cache
 import numpy as np
 import pytest
 from foreign_clearances import ForeignScene, samples
-from jobs import coverable
 
 from feasibility import Task, check
 from feasibility.certification import collision_replay
@@ -108,31 +106,6 @@ def test_a_move_that_is_not_found_is_refused_and_said():
     (same,) = clear_moves(division.robot, division.cells, free, np.zeros(0), moves)
     assert (same is moves[0], same.refusal) == (True, "")
     np.testing.assert_array_equal(same.waypoints, [[0.0], [1.0]])
-
-
-CASE = """
-robot.name = "ur5"
-robot.limits_deg = { shoulder_pan_joint = [-180, 180], shoulder_lift_joint = [-90, 0], \
-elbow_joint = [0, 150], wrist_1_joint = [-120, 120] }
-surface = { kind = "plane", u = [-0.1, 0.1], v = [-0.2, 0.2], position = [-0.6, 0, 0.3], \
-rpy_deg = [0, -90, 0], side = "inside", cells = [1, 5] }
-task = { standoff = 0.05, cone_deg = 30 }
-collision = { clearance = 0.005, scene = [{ kind = "box", name = "post", size = [0.1, 0.1, 1.2], \
-position = [0.45, 0, 0.6] }] }
-"""
-
-
-def test_the_command_tells_the_way(tmp_path):
-    (tmp_path / "behind.toml").write_text(CASE)
-    said = coverable("divide", tmp_path / "behind.toml", "--json")
-    assert said.status == 0
-    (told,) = json.loads(said.out)["moves"]
-    rows = np.array(told["waypoints"])
-    assert (told["refusal"], len(rows) > 2) == (None, True)
-    judged = collision_replay(POSED, bodies_of(behind()), rows)
-    assert judged.accepted
-    assert told["min_clearance_m"] == pytest.approx(judged.min_clearance, abs=1e-6)
-    assert told["nearest_pair"] == list(judged.nearest_pair)
 
 
 # -- a tool that touches the surface ---------------------------------------------------------------

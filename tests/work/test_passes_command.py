@@ -18,7 +18,6 @@ from surfaces.passes import pass_route
 from surfaces.toolpaths import PoseCells
 
 UR5 = load_robot("ur5")
-TASK = Task(standoff=0.02, cone_deg=20)
 PANEL = """
 robot.name = "ur5"
 surface.kind = "plane"
@@ -65,20 +64,6 @@ def path(tmp_path, capsys):
     return asked
 
 
-def test_passes_in_one_motion(path, tmp_path):
-    out = tmp_path / "run.csv"
-    asked = ("--passes", "0", "--pitch", "0.05", "--json", "--out", out)
-    status, found, _ = path("panel", *asked)
-    laid = found["passes"]
-    assert (status, found["verdict"], found["order"], laid["count"]) == (0, "feasible", "given", 4)
-    assert laid["spacing_m"] == pytest.approx(0.05)
-    assert laid["length_m"] == pytest.approx(0.8, rel=1e-3)
-    assert found["length_m"] == pytest.approx(0.8 + 3 * 0.05, rel=1e-2)
-    assert len(out.read_text().splitlines()) > 100
-    status, said, _ = path("panel", "--passes", "0,1,0", "--pitch", "0.07", "--one-way")
-    assert (status, "along 3 passes" in said) == (0, True)
-
-
 def test_between_stretches_that_are_apart_the_tool_is_lifted():
     laid = parallel_passes(plane((0.0, 0.2), (0.0, 0.2), "outside"), 0.1, one_way=True)
     cells = pass_toolpath(laid, retract=0.03)
@@ -104,16 +89,6 @@ def test_the_surface_under_the_passes_is_no_less_a_wall():
     assert verdict.feasible
     assert "surface" in verdict.certificate.nearest_pair
     assert 0.005 <= verdict.certificate.min_clearance <= 0.031
-
-
-def test_bad_arguments_are_said(path, approved):
-    along = ("--passes", "0", "--pitch", "0.05")
-    asked = [along[:2], along[2:], (*along, "--order", "rows"), ("--passes", "north", *along[2:])]
-    asked += [("--passes", "0,0,1", *along[2:]), ("--passes", "0", "--pitch", "1e-6")]
-    asked += [("--passes", "1,0,0", "--pitch", "0.1", "--cross")]
-    found = [path("panel", *arguments) for arguments in asked]
-    assert {status for status, _, _ in found} == {2}
-    approved("bad passes", "\n".join(err for _, _, err in found))
 
 
 @pytest.mark.parametrize(
@@ -191,16 +166,3 @@ def test_the_best_direction_has_the_fewest_passes(path, tmp_path):
     assert all(name in page for name in ("4 passes in one motion", "numbers", "treated once"))
     status, found, _ = path("plate", *asked, "0", "--cross")
     assert (status, found["passes"]["count"]) == (0, 4 + 6)
-
-
-def test_stripes_are_said_to_be_left_where_they_are(path):
-    """Where the pitch is wider than the footprint; not where all is treated by crossing passes."""
-    wide = ("--passes", "0", "--pitch", "0.1")
-    status, out, err = path("plate", *wide)
-    assert (status, "stripes up to 50 mm wide are left between" in out) == (3, True)
-    assert "undecided: the path treats" in err
-    status, out, _ = path("plate", *wide, "--set", "task.coverage=")
-    assert (status, "untreated: " in out) == (0, True)
-    crossed = ("--pitch", "0.05", "--cross", "--set", "task.footprint=0.0499")
-    status, out, _ = path("plate", "--passes", "0", *crossed)
-    assert (status, "to 100.00 % of" in out, "stripes" in out) == (0, True, False)

@@ -16,17 +16,16 @@ from samples import sampled, seeds, spread
 
 from feasibility import Answer, Task, check
 from feasibility.certification import replay
-from feasibility.paths import MotionGraph, PathError, coverage_path, motion_graph_of, unwound
+from feasibility.paths import MotionGraph, PathError, coverage_path, unwound
 from feasibility.paths.ladder import joint_route
 from feasibility.paths.metrics import revisiting
-from feasibility.paths.motion_graph import joint_length, rewound, windings
+from feasibility.paths.motion_graph import joint_length
 from feasibility.paths.order import ORDERS, closed_sides, grid_order
 from feasibility.roadmap import arrays_of, work_for
 from feasibility.verdict import Walk
 from robots import Kinematics, load_robot
 from surfaces import cylinder, plane
 
-NAMES = (*FEASIBLE, *PATCHES)
 ASKED = [
     *product(("4a", "4e", "5c", *PATCHES), ORDERS),
     *((name, BEST[name]) for name in FEASIBLE if name not in ("4a", "4e", "5c")),
@@ -97,22 +96,20 @@ def test_a_closed_surface_is_not_gone_over_twice(name, order):
         assert list(dict.fromkeys(path.visits.tolist())) in beginnings(verdict.cells, order)
 
 
-def test_a_motion_in_another_winding_is_the_same_work():
-    verdict = tube("ur5 around")
-    graph = motion_graph_of(verdict)
-    nodes = joint_route(graph, verdict.cells, np.arange(3)).nodes
-    walk, found = graph.walk(nodes), windings(graph, nodes)
-    for joint, times in product(range(6), (-2, -1, 1, 2)):
-        turn = 2 * np.pi * times * np.eye(6)[joint]
-        fits = (walk.q + turn >= UR5.lower).all() and (walk.q + turn <= UR5.upper).all()
-        assert fits == any(np.array_equal(turn, one) for one in found)
-    assert found
-    needed = np.isin(np.arange(len(verdict.cells)), [0, 1, 2])
-    for turn in found:
-        moved = graph.walk(rewound(graph, nodes, turn))
-        assert np.array_equal(moved.cell, walk.cell)
-        assert moved.q == pytest.approx(walk.q + turn, abs=1e-12)
-        accepted(verdict, moved, needed)
+def test_where_no_motion_leads_on_all_until_there_is_run_a_turn_earlier():
+    """By hand: on from the second of three cells it goes a turn further alone."""
+    verdict = verdict_of("ur5")
+    arrays = arrays_of(verdict.robot, verdict.cells, verdict.task)
+    graph = MotionGraph(arrays, work_for(6), {(0, 1): 0, (1, 2): 1}, grows=False)
+    q = np.linspace(-1.0, -0.5, 4)[:, None] * np.ones(6)
+    q[2] = q[1] + 2 * np.pi * np.eye(6)[0]
+    over = [graph.node(cell, row) for cell, row in zip((0, 1, 1, 2), q, strict=True)]
+    for x, y in ((0, 1), (2, 3)):
+        graph.join(over[x], over[y], q[[x, y]])
+    found = joint_route(graph, verdict.cells, np.arange(3))
+    assert found.stuck == []
+    assert found.revisited == 0.0
+    assert graph.walk(found.nodes).q == pytest.approx(np.vstack([q[0] + q[2] - q[1], q[2:]]))
 
 
 @pytest.mark.parametrize("name", ["4c", "5c", *PATCHES])
@@ -252,6 +249,22 @@ def test_a_detour_is_the_cheapest():
             assert length == pytest.approx(min(lengths), rel=1e-12)
             found += 1
     assert found > 10
+
+
+@pytest.mark.parametrize(("share", "over"), [(0.8, [0, 1, 2, 3]), (1.2, [0, 1, 2, 1, 2, 3])])
+def test_a_detour_goes_back_where_that_saves_more_travel_than_it_costs(share, over):
+    """From the third of four cells on at once, with some travel; or back, and on with none."""
+    graph, cells = hand_made(np.random.default_rng(0), cells=4, nodes=0, density=0.0)
+    row = (0, 1, 2, 1, 2, 3)
+    nodes = [graph.node(cell, 1e-6 * k * np.ones(2)) for k, cell in enumerate(row)]
+    for x, y in pairwise(nodes):
+        graph.join(x, y, np.stack([graph.q[x], graph.q[y]]))
+    apart = np.linalg.norm(cells.centres[2] - cells.centres[1])
+    travel = share * 2.0 * 20.0 * apart / graph.arrays.scale
+    turned = np.array([0.5 * travel, 0.0])
+    graph.join(nodes[2], nodes[5], np.stack([graph.q[nodes[2]], turned, graph.q[nodes[5]]]))
+    found = joint_route(graph, cells, np.array([0, 3]), wind=False)
+    assert [graph.cell[x] for x in found.nodes] == over
 
 
 # -- full turns -----------------------------------------------------------------------------------

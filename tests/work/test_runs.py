@@ -18,9 +18,7 @@ from feasibility import Task, verify
 from feasibility.certification import replay, verify_proof
 from feasibility.certification.rates import replay_rates
 from feasibility.clock import Clock
-from feasibility.reports import pass_runs as report
 from feasibility.runs import Stations, fewest_runs, pass_runs, plan_passes, poses_between
-from feasibility.viewer.passes import view_passes
 from robots import load_robot
 from surfaces import plane, poses
 from surfaces.passes import PassPlaces, parallel_passes
@@ -198,16 +196,6 @@ def test_what_is_left_out_is_named_with_its_cause():
     assert 0.0 < runs.left_out < along.passes.length
     assert runs.left_out + sum(lengths) == pytest.approx(along.passes.length, abs=0.2)
     assert all(f"along stretch {1 + gap.stretches[0]}: " in gap.cause for gap in runs.gaps)
-    labels = [entry.label for entry in view_passes(along, runs.runs).legend.entries]
-    assert "left out" in labels
-    told = report.as_json(along, replace(runs, runs=()), [], None)
-    assert sum(gap["length_m"] for gap in told["left_out"]) == pytest.approx(told["left_out_m"])
-    assert told["at_least"]["interruptions"] == len(runs.parted) == 1
-    (proof,) = told["at_least"]["proofs"]
-    first, last = proof["poses"]
-    assert first < first + proof["tree"]["cell"][0] < last
-    text = " ".join(report.as_text(along, replace(runs, runs=()), [], None).split())
-    assert f"{runs.left_out:.4g} m of {along.passes.length:.4g} m of passes; of stretch" in text
 
 
 def test_runs_hold_the_speed_of_the_task():

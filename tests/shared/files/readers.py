@@ -22,8 +22,8 @@ import bad_input
 import hostile_visuals as hostile
 import numpy as np
 import pinocchio as pin
-from mesh_files import GOOD
-from small_cases import small_case, small_verdict
+from jobs import case_named, verdict_named
+from mesh_writers import GOOD
 
 from coverable_errors import CoverableError
 from coverable_meshes import MeshFiles
@@ -208,15 +208,15 @@ def sound_srdf(pairs: Any, _: Path) -> None:
 @cache
 def members(which: str) -> dict[str, bytes]:
     """What is in the result file of a small verdict: "plate", "proof" or "deep"."""
-    verdict, case = small_verdict("plate"), small_case("plate")
+    verdict, case = verdict_named("plate"), case_named("plate")
     if which != "plate":
-        tree, case = TREE, small_case("long plate")
+        tree, case = TREE, case_named("long plate")
         if which == "deep":
             node: Cut | Leaf = Leaf(0)
             for k in range(201):
                 node = Cut((1.0, 0, 0, 0, 0, 0), 0.01 * k, Leaf(1), node)
             tree = CutTree(node)
-        verdict = replace(small_verdict("long plate"), proof=tree, evidence=Evidence.PROOF)
+        verdict = replace(verdict_named("long plate"), proof=tree, evidence=Evidence.PROOF)
     with tempfile.TemporaryDirectory() as folder:
         saved = save_result(verdict, case, Path(folder) / "good")
         with zipfile.ZipFile(saved) as file:

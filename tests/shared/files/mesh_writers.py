@@ -165,6 +165,40 @@ def glb(content, data, version=2, extra=0):
     return head + text + struct.pack("<II", len(data), 0x004E4942) + data
 
 
+# One good file of each format, and of each way to write it: the cube in metres (in nodes.glb three
+# times).
+
+V, F = cube()
+QUADS = [(0, 1, 3, 2), *F[2:]]  # one side as a square
+
+
+def nested_scene() -> bytes:
+    """The cube by three nodes: as it is, turned and shifted inside another, and mirrored."""
+    half = np.sqrt(0.5)
+    nodes = [
+        {"mesh": 0},
+        {"translation": [1, 0, 0], "children": [2]},
+        {"mesh": 0, "rotation": [0, 0, half, half], "scale": [2, 2, 2]},
+        {"mesh": 0, "matrix": [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -1, 0, 0, 1]},
+        {"mesh": 0, "translation": [9, 9, 9]},  # of no scene
+    ]
+    return glb(*scene(V, F, nodes=nodes, scenes=[{"nodes": [0, 1, 3]}]))
+
+
+GOOD: dict[str, bytes] = {
+    "binary.stl": stl(V, F),
+    "text.stl": text_stl(V, F),
+    "cube.obj": obj(V, QUADS, more="mtllib a\no b\n"),
+    "text.ply": ply(V, F, ""),
+    "little.ply": ply(V, QUADS, "<"),
+    "big.ply": ply(V, F, ">"),
+    "cube.off": off(V, F),
+    "cube.glb": glb(*scene(V, F)),
+    "nodes.glb": nested_scene(),
+}
+"""File name -> its bytes."""
+
+
 def refused(make, *arguments, **named):
     """What is said by a refusal."""
     with pytest.raises(CoverableError) as caught:

@@ -16,7 +16,7 @@ from feasibility.cut_tree import Cut, CutTree, Leaf
 from robots import Robot, load_robot
 from surfaces import Cells, cylinder, hyperboloid, plane, sphere
 
-STORED = json.loads((Path(__file__).parents[1] / "bounds" / "cut_trees.json").read_text("utf-8"))
+STORED = json.loads((Path(__file__).parents[2] / "bounds" / "cut_trees.json").read_text("utf-8"))
 """Problems of an oracle; the last one is feasible and has no tree."""
 QUICK = [number for number, row in enumerate(STORED) if row["quick"]]
 KINDS = {"plane": plane, "sphere": sphere, "cylinder": cylinder, "hyperboloid": hyperboloid}

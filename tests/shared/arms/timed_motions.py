@@ -1,6 +1,7 @@
 """Timed motions: one in closed form, and what a controller makes of any between its samples."""
 
 import numpy as np
+from scipy.interpolate import BPoly
 
 from feasibility.timing import Trajectory
 from robots import Kinematics, load_robot
@@ -27,35 +28,16 @@ def motion(robot):
 def interpolated(run, degree, places):
     """q, dq and ddq (m, n) between samples as a controller goes, at so many places of each.
 
-    Quintics go through q, dq and ddq of both ends, cubics through q and dq. Polynomials by solving
-    for their coefficients, so that nothing is shared with what made them.
+    Quintics go through q, dq and ddq of both ends, cubics through q and dq: by scipy.
     """
-    t, powers = np.linspace(0.0, 1.0, places, endpoint=False), np.arange(degree + 1)
-
-    def falling(order):
-        """Factors of the derivatives of the powers."""
-        return np.prod([powers - k for k in range(order)], axis=0) if order else powers**0
-
-    sides = [run.q, run.dq, run.ddq][: (degree + 1) // 2]
-    rows = [
-        np.where(where, falling(order), 0)
-        for order in range(len(sides))
-        for where in (powers == order, powers >= order)  # at 0, at 1
+    sides = run.q, run.dq, run.ddq
+    curve = BPoly.from_derivatives(run.time, np.stack(sides[: (degree + 1) // 2], axis=1))
+    share = np.linspace(0.0, 1.0, places, endpoint=False)
+    at = (run.time[:-1, None] + np.diff(run.time)[:, None] * share).ravel()
+    return [
+        np.vstack([(curve.derivative(order) if order else curve)(at), side[-1:]])
+        for order, side in enumerate(sides)
     ]
-    h = np.diff(run.time)[:, None]
-    ends = np.stack(
-        [side[k : len(run) - 1 + k] * h**order for order, side in enumerate(sides) for k in (0, 1)]
-    )
-    solved = np.linalg.solve(np.vstack(rows).astype(float), ends.reshape(degree + 1, -1))
-    coefficients = solved.reshape(ends.shape)
-    found = []
-    for order, side in enumerate((run.q, run.dq, run.ddq)):
-        values = np.where(powers >= order, falling(order), 0) * t[:, None] ** np.maximum(
-            powers - order, 0
-        )
-        between = np.einsum("tp,pin->itn", values, coefficients) / h[:, None] ** order
-        found.append(np.vstack([between.reshape(-1, run.q.shape[1]), side[-1:]]))
-    return found
 
 
 def keeps_to_limits(robot, run, limits):

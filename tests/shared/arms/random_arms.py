@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from arm_urdfs import FREE, arm, joint
+from asked import question
 from numpy.typing import NDArray
-from urdf_texts import check_urdf_text
 
 from feasibility import Task
 from robots import Axis, Robot, load_robot
 from robots.pinocchio_model import robot_from_urdf
+from robots.urdf.checked_urdf import checked_tree
+from robots.urdf.xml import parse_xml
 from surfaces import Surface, cylinder, hyperboloid, plane, sphere
 
 Floats = NDArray[np.float64]
@@ -20,8 +20,9 @@ RIGHT_ANGLES = (-np.pi / 2, 0.0, np.pi / 2, np.pi)
 
 def robot_of(joints: list[str], approach_axis: tuple[float, ...] = (0.0, 0.0, 1.0)) -> Robot:
     """The arm of joints written by `arm_urdfs.joint`."""
-    text = check_urdf_text(arm(joints))
-    return robot_from_urdf(text, name="test_arm", approach_axis=approach_axis)
+    root = parse_xml(arm(joints).encode(), "URDF text", encoding="utf-8")
+    checked = checked_tree(root, "URDF text", "/nowhere", ())
+    return robot_from_urdf(checked, name="test_arm", approach_axis=approach_axis)
 
 
 def random_arm(rng: np.random.Generator, least: int = 3, most: int = 8) -> Robot:
@@ -119,42 +120,14 @@ def random_surface(rng: np.random.Generator, kind: str) -> Surface:
     return plane((-5, 5), (-5, 5), side=side)
 
 
-class Deviation(NamedTuple):
-    """How far a motion is from the target surface (m) and from the approach, |a - b|, (k,) each."""
-
-    distance: Floats
-    chord: Floats
-    on_patch: NDArray[np.bool_]
+def deviation(surface: Surface, points: Floats, axes: Floats) -> Floats:
+    """(k,) |a - b| of the tool axis from the approach, at tool points and axes (k, 3)."""
+    return np.linalg.norm(axes + surface.side_sign * surface.closest(points).normal, axis=1)
 
 
-def deviation(surface: Surface, standoff: float, points: Floats, axes: Floats) -> Deviation:
-    """Distance from the target surface, and |a - b|, at tool points and axes (k, 3)."""
-    closest_point = surface.closest(points)
-    return Deviation(
-        np.abs(closest_point.height - surface.side_sign * standoff),
-        np.linalg.norm(axes + surface.side_sign * closest_point.normal, axis=1),
-        closest_point.inside,
-    )
-
-
-PUMA = load_robot("puma560", limits="set-1")
-QUESTIONS = {
-    "puma, dome": (PUMA, sphere(1.0, (30, 70), (40, 100)).cells(4, 5), Task(0.005, 45)),
-    "puma, tube": (PUMA, cylinder(1.0, (20, 60), (0.0, 0.4)).cells(3, 3), Task(0.005, 100)),
-    "ur5, plate": (
-        load_robot("ur5"),
-        plane((0.4, 0.6), (-0.1, 0.1), "outside", (0, 0, 0.3)).cells(3, 4),
-        Task(0.02, 30, 5e-4),
-    ),
-    "panda, saddle": (
-        load_robot("panda"),
-        hyperboloid(0.3, 0.5, (160, 200), (-0.1, 0.1), "outside", (0.8, 0, 0.4)).cells(3, 3),
-        Task(0.02, 50),
-    ),
-    "ur5 on a rail": (
-        rail_arm("ur5"),
-        plane((0.4, 0.6), (-0.4, 0.4), "outside", (0, 0, 0.3)).cells(2, 5),
-        Task(0.02, 30),
-    ),
-}
+SMALL = "small dome", "plate", "panda over a saddle", "on a rail"
+QUESTIONS = {name: question(name)[2:5] for name in SMALL} | {
+    "tube": (question("small dome").robot, cylinder(1.0, (20, 60), (0.0, 0.4)).cells(3, 3),
+             Task(0.005, 100)),
+}  # fmt: skip
 """Robot, cells and task of small feasible questions."""

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 from arm_urdfs import joint
+from mesh_patches import bent
 from numpy.typing import NDArray
 from random_arms import robot_of
 
@@ -52,15 +53,14 @@ class Raster(NamedTuple):
     q: NDArray[np.float64]
 
 
-def sheet(count=25):
+def sheet():
     """A bumpy mesh."""
-    x, y = np.meshgrid(np.linspace(-0.12, 0.12, count), np.linspace(-0.1, 0.1, count))
-    z = 0.02 * np.sin(12 * x) * np.cos(9 * y) - 0.8 * x**2
-    corner = (np.arange(count - 1)[:, None] * count + np.arange(count - 1)).ravel()
-    right, up = corner + 1, corner + count
-    faces = np.vstack([np.stack([corner, right, up + 1], 1), np.stack([corner, up + 1, up], 1)])
-    points = np.stack([x + 0.45, y + 0.05, z + 0.25], axis=-1).reshape(-1, 3)
-    return mesh(TriangleMesh(points, faces))
+
+    def shape(u, v):
+        x, y = 0.24 * u - 0.12, 0.2 * v - 0.1
+        return x + 0.45, y + 0.05, 0.25 + 0.02 * np.sin(12 * x) * np.cos(9 * y) - 0.8 * x**2
+
+    return mesh(TriangleMesh(*bent(shape, 24, 24)))
 
 
 def net():

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
-from mesh_patches import of_patch
+from mesh_patches import bent, of_patch
 from smooth_probes import POSE
-from spline_nets import TURN_KNOTS, full_turn, hood, turned
 
 from surfaces import (
     bspline,
@@ -22,6 +23,43 @@ from surfaces import (
     torus,
 )  # fmt: skip
 from surfaces.meshes import TriangleMesh
+
+# Control nets of exact quadrics, and of a free form.
+
+ROOT = math.sqrt(0.5)
+TURN_KNOTS = np.array([0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4]) / 4.0
+
+
+def quarter_turn():
+    """(points, weights) of a quarter of the unit circle: degree 2, exact."""
+    return np.array([[1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), np.array([1.0, ROOT, 1.0])
+
+
+def full_turn():
+    """(points, weights) of the unit circle from nine points, with `TURN_KNOTS`."""
+    x = np.array([1, 1, 0, -1, -1, -1, 0, 1, 1.0])
+    y = np.array([0, 1, 1, 1, 0, -1, -1, -1, 0.0])
+    return np.column_stack([x, y]), np.where(np.arange(9) % 2 == 1, ROOT, 1.0)
+
+
+def turned(profile, profile_weights, turn, turn_weights):
+    """(points, weights) of a profile (r, z) turned about z; u around, v along the profile."""
+    r, z = np.asarray(profile, float).T
+    around, along = np.broadcast_arrays(np.arange(len(turn))[:, None], np.arange(len(r)))
+    points = np.stack(
+        [turn[around, 0] * r[along], turn[around, 1] * r[along], z[along]], axis=-1
+    )  # fmt: skip
+    return points, np.outer(turn_weights, profile_weights)
+
+
+def hood(m=6, n=7):
+    """A free form like a car's hood, 1.2 m by 1.4 m."""
+    x, y = np.meshgrid(np.linspace(-0.6, 0.6, m), np.linspace(-0.7, 0.7, n), indexing="ij")
+    z = 0.15 * np.cos(1.4 * x) * np.cos(1.2 * y) + 0.03 * np.sin(4 * x) * y + 0.02 * x
+    return np.stack([x, y, z], axis=-1)
+
+
+# Specimens.
 
 OUT = {"side": "outside"}
 VASE = [(0.3, 0.0), (0.5, 0.2), (0.35, 0.5), (0.4, 0.8), (0.2, 1.0)]
@@ -87,24 +125,21 @@ EXTREME = {
 
 def ridge(count, turn_deg):
     """Two flat strips of triangles that meet at an angle."""
-    x, y = np.linspace(-0.5, 0.5, 2 * count + 1), np.linspace(0.0, 0.5, count + 1)
-    x, y = np.meshgrid(x, y, indexing="ij")
-    tilt = np.radians(turn_deg / 2)
-    return _bent(x * np.cos(tilt), y, -np.abs(x) * np.sin(tilt))
+    tilt, half = np.radians(turn_deg / 2), lambda u: u - 0.5
+    return mesh(TriangleMesh(*bent(
+        lambda u, v: (half(u) * np.cos(tilt), 0.5 * v, -np.abs(half(u)) * np.sin(tilt)),
+        2 * count, count,
+    )))  # fmt: skip
 
 
 def bowl(count):
     """A paraboloid of triangles."""
-    x, y = np.meshgrid(*[np.linspace(-0.4, 0.4, count)] * 2, indexing="ij")
-    return _bent(x, y, 0.6 * (x**2 + y**2) + 0.1 * x * y)
 
+    def shape(u, v):
+        x, y = 0.8 * u - 0.4, 0.8 * v - 0.4
+        return x, y, 0.6 * (x**2 + y**2) + 0.1 * x * y
 
-def _bent(x, y, z):
-    rows, columns = x.shape
-    first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
-    quads = np.column_stack([first, first + columns, first + columns + 1, first + 1])
-    faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-    return mesh(TriangleMesh(np.stack([x, y, z], axis=-1).reshape(-1, 3), faces))
+    return mesh(TriangleMesh(*bent(shape, count - 1, count - 1)))
 
 
 def flat(name, count=12):
@@ -138,3 +173,43 @@ def cells_of(surface, nu, nv):
     if surface.kind == "piecewise":
         return surface.cells([(nu, nv)] * len(surface.pieces))
     return surface.cells(nu, nv)
+
+
+# Formulas of spheres, tori and hyperboloids, beside the patches they are equal to.
+
+
+def ball(u, v):
+    return np.sin(u) * np.cos(v), np.sin(u) * np.sin(v), np.cos(u)
+
+
+def ring(u, v):
+    r = 0.5 + 0.125 * np.cos(v)
+    return np.array([r * np.cos(u), r * np.sin(u), 0.125 * np.sin(v)])
+
+
+def waist(u, v):
+    r = 0.5 * np.sqrt(1.0 + (v / 0.5) ** 2)
+    return np.stack([r * np.cos(u), r * np.sin(u), v], axis=-1)
+
+
+def _deg(*pair):
+    return tuple(np.radians(pair).tolist())
+
+
+EQUAL = {
+    "sphere": (ball, _deg(10, 90), _deg(10, 180), sphere(1.0, (10, 90), (10, 180))),
+    "torus": (ring, _deg(0, 90), _deg(-80, 100), torus(0.5, 0.125, (0, 90), (-80, 100))),
+    "hyperboloid": (
+        waist, _deg(130, 220), (0.0, 0.5), hyperboloid(0.5, 0.5, (130, 220), (0.0, 0.5)),
+    ),
+}  # fmt: skip
+
+
+def sampled(formula, u, v, counts):
+    """(m, n, 3) points of a formula at equal steps."""
+    lines = [np.linspace(*ends, count) for ends, count in zip((u, v), counts, strict=True)]
+    x, y = (part.reshape(-1) for part in np.meshgrid(*lines, indexing="ij"))
+    points = formula(x, y)
+    points = np.stack(points, axis=-1) if isinstance(points, tuple) else np.asarray(points)
+    points = points.T if points.shape[0] == 3 else points
+    return points.reshape(*counts, 3)

@@ -21,9 +21,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from mesh_patches import grid
 from mesh_writers import stl, stl_of
 
-TABLES = Path(__file__).parents[1] / "input" / "bad"
+TABLES = Path(__file__).parents[2] / "input" / "bad"
 TIMES = re.compile(r"«([^»]*)»×(\d+)")
 KEY = re.compile(r"(robot|surface|task|collision|search|serach|tusk)\.([^ ]+)(?: = (.*))?")
 
@@ -96,6 +97,8 @@ def changed(text: str, change: str | list[str]) -> str:
 def goods(reader: str) -> dict[str, str]:
     """The good texts of a reader, by name; those of cases whole."""
     found: dict[str, str] = dict(_tables(reader).get("good", {}))
+    if "head" in found:  # cases, a line each
+        found = {name: text.replace(" ; ", "\n") + "\n" for name, text in found.items()}
     head = found.pop("head", "")
     return {name: text if "[robot]" in text else head + text for name, text in found.items()}
 
@@ -143,11 +146,8 @@ def net_csv() -> bytes:
 
 def sheet(width: float = 0.2, count: int = 5) -> np.ndarray:
     """Triangles (F, 3, 3) m of a flat square that looks up, from the origin on."""
-    x, y = np.meshgrid(*[np.linspace(0.0, width, count + 1)] * 2, indexing="ij")
-    at = np.stack([x, y, 0 * x], axis=2)
-    a, b, c, d = at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]
-    halves = np.stack([np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)], axis=2)
-    return halves.reshape(-1, 3, 3)
+    u, v, faces = grid(count, count)
+    return width * np.stack([u, v, 0 * u], axis=1)[faces]
 
 
 def lay_out(folder: Path) -> Path:

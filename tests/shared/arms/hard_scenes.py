@@ -1,13 +1,8 @@
-"""Arms among random objects, with what python-fcl says of them: known motions, poses, walls.
-
-A built scene has a known motion: obstacles stand where another motion passes, and elsewhere, as
-long as the judge of collisions (coal) finds the known one further from them than is asked.
-"""
+"""Arms among random objects, with what python-fcl says of them: poses, walls, clear boxes."""
 
 from __future__ import annotations
 
-import zlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from typing import NamedTuple
 
@@ -16,8 +11,7 @@ import pinocchio as pin
 import trimesh
 from foreign_clearances import ForeignScene
 
-from feasibility import Search, Task, check
-from feasibility.certification import collision_replay
+from feasibility import Task
 from feasibility.certification.tool_alone import PoseCheck, never_clear
 from feasibility.collisions import Bodies, Collision, Obstacle, ToolShape, gather
 from feasibility.roadmap.tool_alone import ToolAlone, ToolBlocked
@@ -27,7 +21,6 @@ from surfaces import Cells, Surface, plane
 
 ARMS = ("ur5", "panda", "kinova", "xarm7", "puma560", "puma560 on a rail")
 CLEARANCE = 0.005  # m, that is asked for
-ROOM = 0.02  # m, that the known motion keeps from every obstacle
 UR5 = load_robot("ur5")
 PLATE = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0.0, 0.0, 0.3))
 CELLS = PLATE.cells(1, 1)
@@ -75,67 +68,6 @@ def random_object(rng: np.random.Generator, name: str, around: np.ndarray) -> Ob
         lambda: Obstacle.halfspace(name, position, turn),
     )
     return made[int(rng.integers(5))]()
-
-
-# scenes with a known motion
-
-
-class BuiltScene(NamedTuple):
-    """A question whose answer is known: feasible."""
-
-    robot: Robot
-    cells: Cells
-    task: Task
-    blind_collides: bool
-    """Does the motion that is found without collisions collide?"""
-
-
-def built_scene(name: str, seed: int) -> BuiltScene | None:
-    """The scene of that number; None where the plate cannot be covered without obstacles either."""
-    rng, robot = np.random.default_rng([seed, zlib.crc32(name.encode())]), arm(name)
-    cells, task = a_plate(rng, robot)
-    blind = check(robot, cells, task).witness
-    alone = replace(task, collision=Collision(clearance=CLEARANCE))
-    known = None if blind is None else _another_motion(rng, robot, cells, alone, blind.q)
-    if blind is None or known is None:
-        return None
-    drawn = []
-    for number in range(24):  # where the blind motion has a joint, or (every third) anywhere
-        joints = Kinematics(robot).joints(blind.q[rng.integers(len(blind.q))][None]).points[0, 2:]
-        k = int(rng.integers(len(joints) - 1))
-        place = joints[k] + rng.uniform() * (joints[k + 1] - joints[k])
-        if number % 3 == 2:
-            place = robot.base_point + rng.uniform(-0.8, 0.8, 3) * min(robot.reach, 1.0)
-        drawn.append(random_object(rng, f"object{number}", place))
-    apart = Collision(self_=False, surface=False, clearance=ROOM, scene=tuple(drawn))
-    bodies = gather(robot, cells.surface, apart, task.standoff)
-    hit = {fault.pair[1] for fault in collision_replay(robot, bodies, known).faults}
-    scene = tuple(one for one in drawn if one.name not in hit)[:6]
-    task = replace(task, collision=Collision(clearance=CLEARANCE, scene=scene))
-    bodies = gather(robot, cells.surface, task.collision, task.standoff)
-    assert collision_replay(robot, bodies, known).accepted
-    collides = not collision_replay(robot, bodies, blind.q).accepted
-    return BuiltScene(robot, cells, task, collides)
-
-
-def _another_motion(
-    rng: np.random.Generator, robot: Robot, cells: Cells, task: Task, blind: np.ndarray
-) -> np.ndarray | None:
-    """A motion that has a joint where the blind one never has it; or any other; or none."""
-    for joint in rng.permutation(robot.n)[:3].tolist():
-        low, high = float(robot.lower[joint]), float(robot.upper[joint])
-        below, above = blind[:, joint].min() - 0.3, blind[:, joint].max() + 0.3
-        ranges = [(low, below), (above, high)]
-        if not np.isfinite(low + high):  # a joint that turns freely
-            ranges = [(below - np.pi, below), (above, above + np.pi)]
-        ranges = [(lower, upper) for lower, upper in ranges if lower < upper]
-        if ranges:
-            chosen = {robot.joint_names[joint]: ranges[int(rng.integers(len(ranges)))]}
-            found = check(robot.with_limits(chosen), cells, task)
-            if found.witness is not None:
-                return found.witness.q
-    found = check(robot, cells, task, Search(seed=1))
-    return None if found.witness is None else found.witness.q
 
 
 # a tool over one target

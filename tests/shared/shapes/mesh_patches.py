@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from surfaces import Patch
 from surfaces.meshes import MeshSurface, TriangleMesh
 from surfaces.meshes import mesh as surface_of
+from surfaces.meshes.cells import MeshCells
+from surfaces.patches import GridCells
 
 Floats = NDArray[np.float64]
 
@@ -48,6 +50,15 @@ def of_patch(patch: Patch, nu: int, nv: int) -> Mesh:
     a, b, c = points[faces].swapaxes(0, 1)
     outwards = (np.cross(b - a, c - a) * normals[faces[:, 0]]).sum() > 0.0
     return Mesh(points, faces if outwards else faces[:, ::-1])
+
+
+def in_cells_of(cells: GridCells, parts: int) -> MeshCells:
+    """The patch of some cells as triangles, `parts` x `parts` rectangles of two in each cell."""
+    patch, (nu, nv) = cells.surface, (parts * count for count in cells.shape)
+    i, j = np.indices((nu, nv)) // parts
+    label = (i * cells.shape[1] + j).ravel()
+    surface = surface_of(TriangleMesh(*of_patch(patch, nu, nv)), side=patch.side)
+    return MeshCells.of(surface, np.repeat(label, 2))
 
 
 def sheet(n: int = 40) -> Mesh:

@@ -9,7 +9,6 @@ import pinocchio as pin
 from plain import geometry_of
 from referee import Joint, Scene, Shape, closely, fcl_object
 
-from feasibility.collisions import gather
 from robots.shapes import Triangles
 
 cached_model = lru_cache(maxsize=256)(lambda geometry: fcl_object(geometry_of(geometry)))
@@ -64,13 +63,3 @@ class ForeignScene(Scene):
         """Is no pair too near? What touches is, whatever is asked."""
         found = self.distances(q)
         return bool(((found >= [pair[2] for pair in self.pairs]) & (found > 0.0)).all())
-
-
-def assert_clear(verdict, step_deg):
-    """No pair is too near for fcl at places at most `step_deg` apart along a verdict's motion."""
-    task, surface = verdict.task, verdict.cells.surface
-    bodies = gather(verdict.robot, surface, task.collision, task.standoff)
-    rows = samples(verdict.witness.q, np.radians(step_deg))
-    excess = ForeignScene(verdict.robot, bodies).least_excess(rows).min()
-    assert excess >= -1e-6, f"{-excess:.3g} m nearer than the clearance"
-    assert verdict.certificate.min_clearance is not None
