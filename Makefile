@@ -6,7 +6,6 @@
 # make bench-compare OLD=old.json NEW=new.json   two such files side by side
 # make mutants ONLY=stretches   small faults put into the code: which of them no test finds; all without ONLY
 # make test-browser   the live page, by mouse and keyboard, in a Chromium
-# make wheel  a wheel in dist/ that brings compiled kernels, for this platform, Python and numba
 # PYTHON=/path/to/python chooses the interpreter (CPython 3.11 or later).
 
 BIN := .venv/bin
@@ -17,7 +16,7 @@ IS_RECENT := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
 unexport PYTHONDONTWRITEBYTECODE
 
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-browser lint kernels greedy collected wheel bench bench-compare campaign mutants clean distclean
+.PHONY: help demo test test-browser lint kernels greedy collected bench bench-compare campaign mutants clean distclean
 
 help:
 	@sed -n '/^#/!q; s/^# //p' Makefile
@@ -70,9 +69,6 @@ collected: .venv/installed
 test: .venv/installed
 	@$(MAKE) --no-print-directory --jobs=2 kernels lint greedy collected
 	COVERABLE_FEW=1 $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder --nbmake --nbmake-timeout=900
-
-wheel: .venv/installed
-	$(BIN)/python tools/make_wheel.py
 
 # Installs nothing: it needs the extra `browser`, and a Chromium on the path or named by CHROMIUM.
 test-browser:

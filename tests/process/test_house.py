@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -67,9 +68,8 @@ def test_no_function_has_more_than_seventy_lines() -> None:
 def test_kernels_are_made_by_our_decorators_alone() -> None:
     """Numba's own would keep a kernel by its own file, and not by what it calls."""
     for path in FILES:
-        text = path.read_text("utf-8").replace("from coverable_kernels import njit", "")
-        assert path.name.startswith("coverable_") or "import njit" not in text, path
-        assert path.name.startswith("coverable_") or "numba import cfunc" not in text, path
+        text = path.read_text("utf-8")
+        assert path.name.startswith("coverable_") or not re.search("njit|jitable|cfunc", text), path
 
 
 def test_contributing_names_every_room() -> None:

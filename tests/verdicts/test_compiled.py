@@ -1,15 +1,18 @@
-"""How the search kernels are compiled: without counting references to arrays."""
+"""How the search kernels are compiled: without counting references, and from what."""
 
 from __future__ import annotations
 
 import importlib
+import inspect
 import pkgutil
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from numba.core import types
 
 import feasibility
+from coverable_kernels import CODE, ROOT
 from feasibility import Task, check
 from feasibility.roadmap import warm_up
 from robots import load_robot
@@ -33,13 +36,28 @@ def holds_arrays(kind: types.Type) -> bool:
     return isinstance(kind, types.Array) or any(map(holds_arrays, inner))
 
 
+def tuples_in(kind: types.Type) -> Iterator[type]:
+    """The classes of all named tuples in a type."""
+    if isinstance(kind, types.BaseNamedTuple):
+        yield kind.instance_class
+    for inner in kind.types if isinstance(kind, types.BaseTuple) else ():
+        yield from tuples_in(inner)
+
+
 def test_no_kernel_that_counts_no_references_returns_an_array() -> None:
-    """Its caller would free an array that it was not given."""
+    """Its caller would free an array that it was not given.
+
+    And the named tuples that kernels are given are among the code that they are kept by.
+    """
+    code = {path for pattern in CODE for path in ROOT.glob(pattern)}
     plate = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside")
     assert check(load_robot("ur5"), plate.cells(2, 2), Task(standoff=0.02, cone_deg=30)).feasible
     warm_up(rarely_used=True)
     counting, seen = 0, 0
     for name, found in dispatchers():
+        kinds = [kind for one in found.overloads.values() for kind in one.signature.args]
+        given = {Path(inspect.getfile(k)) for kind in kinds for k in tuples_in(kind)}
+        assert given <= code, name
         if found.targetoptions.get("_nrt", True):
             counting += 1
             continue
