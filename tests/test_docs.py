@@ -270,7 +270,7 @@ def test_notebooks_stay_small() -> None:
     assert sum(path.stat().st_size for path in NOTEBOOKS) <= 6e6
 
 
-@pytest.mark.parametrize("name", ["search", "collisions", "work", "process"])
+@pytest.mark.parametrize("name", ["search", "work", "process"])
 def test_benchmarks_load(name: str) -> None:
     found = runpy.run_path(str(ROOT / f"tests/benchmarks/bench_{name}.py"))
     assert any(word.startswith("bench_") for word in found)
