@@ -160,7 +160,6 @@ def in_runs(args: argparse.Namespace, opened: OpenCase, along: PlannedPasses) ->
     opened.progress(0, None, "cutting passes into runs")
     found = pass_runs(
         verdict.robot, along.cells, verdict.task, along.places, verdict.seed, opened.clock,
-        verdict.proof,
     )  # fmt: skip
     timed = [
         trajectory(

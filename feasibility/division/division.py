@@ -90,11 +90,8 @@ class Division(Protected):
     cells: Cells
     task: Task
     seed: int
-    fewest: Plan
+    plan: Plan
     """The fewest continuous motions; a patch may be in several pieces on the surface."""
-    connected: Plan
-    """The fewest patches that are each connected on the surface; the same object as `fewest`
-    where that costs no patch."""
     left_out: tuple[Cause, ...]
     """Cells that are in no patch, in order of index, and why."""
     unsettled: Ints
@@ -122,18 +119,18 @@ class Division(Protected):
 
     @property
     def patches(self) -> tuple[SubPatch, ...]:
-        """The patches of the plan with the fewest motions."""
-        return self.fewest.patches
+        """The patches of the plan, in the order of work."""
+        return self.plan.patches
 
     @property
     def moves(self) -> tuple[Reconfiguration, ...]:
         """The moves between these patches."""
-        return self.fewest.moves
+        return self.plan.moves
 
     @property
     def optimal(self) -> bool:
         """Fewest of all that the search can find: it ended, and the optimum is proved."""
-        return (self.ended and self.fewest.optimal) or self.proved_fewest
+        return (self.ended and self.plan.optimal) or self.proved_fewest
 
     @property
     def proved_fewest(self) -> bool:
@@ -143,7 +140,7 @@ class Division(Protected):
     @property
     def decided(self) -> bool:
         """Did the search end, and is every walk accepted by the replay?"""
-        return self.ended and self.fewest.accepted and self.connected.accepted
+        return self.ended and self.plan.accepted
 
     @property
     def n_covered(self) -> int:

@@ -1,4 +1,4 @@
-"""From components to plans: cells shared out, walks for every patch, the moves between them.
+"""From components to a plan: cells shared out, walks for every patch, the moves between them.
 
 A verdict's search works on its largest components. A division goes on with the components that the
 best cover of all reached cells uses: cells that only some of them reach are seeded, and each two of
@@ -19,11 +19,10 @@ import numpy as np
 
 from coverable_arrays import Array, Mask
 from feasibility.division.between_patches import clear_moves
-from feasibility.division.connected_labels import count_of
 from feasibility.division.division import Plan, SubPatch
-from feasibility.division.partition import TIME_LIMIT, Partition, fewest_patches
 from feasibility.division.reconfiguration import itinerary
 from feasibility.division.set_covering import set_cover
+from feasibility.division.sharing import TIME_LIMIT, fewest_patches, pieces_in
 from feasibility.roadmap import UNTRIED, Exploration, Links, improve, links_of, patch_walk
 from feasibility.speed import replay_at_rates
 from feasibility.task import Task
@@ -54,33 +53,14 @@ class _Option:
     """Their configurations."""
 
 
-def plans(exploration: Exploration, task: Task, left: float = np.inf) -> tuple[Plan, Plan]:
-    """The plan with the fewest motions, and the one with connected patches (maybe the same).
+def plan_of(exploration: Exploration, task: Task, left: float = np.inf) -> Plan:
+    """Walks for the fewest patches, in the best order, each replayed, and moves between them.
 
     `left` are seconds for the proof that they are the fewest.
     """
-    roots, covers = cover_table(exploration)
-    everywhere = np.ones(len(exploration.cells), dtype=bool)
-    limit = min(TIME_LIMIT, max(left, LEAST_SECONDS))
-    cover = fewest_patches(covers, everywhere, exploration.cells.pairs, limit)
-    fewest = plan_of(exploration, task, cover.fewest, roots, covers)
-    if cover.connected is cover.fewest:
-        return fewest, fewest
-    return fewest, plan_of(exploration, task, cover.connected, roots, covers)
-
-
-def plan_of(
-    exploration: Exploration,
-    task: Task,
-    partition: Partition,
-    roots: list[int],
-    covers: Mask,
-) -> Plan:
-    """Walks for every patch, in the best order, each replayed, and moves between them.
-
-    `partition.rows` counts the K `roots`, each of which covers a row of `covers` (K, N).
-    """
     robot, cells = exploration.robot, exploration.cells
+    roots, covers = cover_table(exploration)
+    partition = fewest_patches(covers, cells.pairs, min(TIME_LIMIT, max(left, LEAST_SECONDS)))
     if len(partition) == 0:
         return Plan((), (), partition.bound)
     wanted = [partition.patch == p for p in range(len(partition))]
@@ -93,7 +73,7 @@ def plan_of(
             SubPatch(
                 cells=np.flatnonzero(mine),
                 area=float(cells.areas[mine].sum()),
-                pieces=count_of(np.where(mine, 0, -1), cells.pairs),
+                pieces=pieces_in(mine, cells.pairs),
                 walk=walk,
                 certificate=certificate,
                 refusal=refusal,

@@ -13,7 +13,7 @@ from feasibility.clock import Clock, OutOfTime
 from feasibility.collisions import Pair
 from feasibility.demands import OF_EACH, further, unjudged
 from feasibility.division.division import Division, Plan
-from feasibility.division.plans import collect_components, plans
+from feasibility.division.plans import collect_components, plan_of
 from feasibility.division.proved_bound import ProvedBound, prove_apart
 from feasibility.notices import compiling_notice
 from feasibility.problem import Problem
@@ -96,22 +96,21 @@ def divide(
     folded = bool(np.isinf(exploration.arrays.derivative_bounds).any())
     blocked = blocked_curves(cells, task) if len(cells) and _no_motion(exploration.arrays) else ""
     shared = _shared(exploration, task, clock, blocked, ended, slow)
-    fewest, ended = shared.fewest, ended and not shared.late
+    plan, ended = shared.plan, ended and not shared.late
     found = _message(shared, task, apart.number, len(cells), ended, folded)
     return Division(
         robot=robot,
         cells=cells,
         task=task,
         seed=search.seed,
-        fewest=fewest,
-        connected=shared.connected,
+        plan=plan,
         left_out=shared.causes,
         unsettled=np.setdiff1d(shared.missing, [cause.cell for cause in shared.causes]),
         ended=ended and not blocked and not folded,
         message=blocked or found,
-        at_least=min(apart.number, len(fewest.patches)),
-        proof=apart.proof if fewest.patches else None,
-        apart=apart.apart if fewest.patches else (),
+        at_least=min(apart.number, len(plan.patches)),
+        proof=apart.proof if plan.patches else None,
+        apart=apart.apart if plan.patches else (),
         lacking=shared.lacking,
         timing=_timing(called, began, searched),
         statistics=_statistics(exploration),
@@ -121,8 +120,7 @@ def divide(
 class _Shared(NamedTuple):
     """The cells shared out among patches."""
 
-    fewest: Plan
-    connected: Plan
+    plan: Plan
     missing: Ints
     """Cells in no patch."""
     causes: tuple[Cause, ...]
@@ -153,15 +151,15 @@ def _shared(
     ended: bool,
     slow: dict[int, Cause],
 ) -> _Shared:
-    """Plans for what the search found, and why cells are in none, as far as there is time."""
-    total, nothing = len(exploration.cells), Plan((), (), 0)
-    shared = _Shared(nothing, nothing, np.arange(total), (), False)
+    """A plan for what the search found, and why cells are in none, as far as there is time."""
+    total = len(exploration.cells)
+    shared = _Shared(Plan((), (), 0), np.arange(total), (), False)
     try:
         with clock.enforced():
             if not blocked:
-                fewest, connected = plans(exploration, task, clock.left)
-                missing = np.flatnonzero(fewest.patch_of(total) < 0)
-                shared = shared._replace(fewest=fewest, connected=connected, missing=missing)
+                plan = plan_of(exploration, task, clock.left)
+                missing = np.flatnonzero(plan.patch_of(total) < 0)
+                shared = shared._replace(plan=plan, missing=missing)
             causes = _causes(exploration, task, shared.missing, ended, slow)
             return shared._replace(causes=causes, lacking=_lacking(exploration, task, shared))
     except OutOfTime:
@@ -169,16 +167,15 @@ def _shared(
 
 
 def _lacking(exploration: Exploration, task: Task, shared: _Shared) -> str:
-    """What the case demands that the motions of a plan do not hold together; see `Division`."""
+    """What the case demands that the motions do not hold together; see `Division`."""
     robot, cells = exploration.robot, exploration.cells
     left = unjudged(robot, task, OF_EACH)
     if not left or not len(cells):
         return ""
-    if len(shared.missing) or not (shared.fewest.accepted and shared.connected.accepted):
+    if len(shared.missing) or not shared.plan.accepted:
         return f"not judged, since not every cell is in a patch: {', '.join(left)}"
-    walks = [[patch.walk for patch in plan.patches] for plan in (shared.fewest, shared.connected)]
-    found = [further(robot, cells, task, some, OF_EACH).refusal for some in walks]
-    return found[0] or found[1]
+    walks = [patch.walk for patch in shared.plan.patches]
+    return further(robot, cells, task, walks, OF_EACH).refusal
 
 
 def _timing(called: float, began: float, searched: float) -> dict[str, float]:
@@ -268,15 +265,14 @@ def _message(
     shared: _Shared, task: Task, at_least: int, cells: int, ended: bool, folded: bool
 ) -> str:
     """One or two sentences: what was found, and on what it rests."""
-    fewest, connected = shared.fewest, shared.connected
-    total = cells - len(shared.missing), cells
-    refused = [p.refusal for p in (*fewest.patches, *connected.patches) if not p.accepted]
+    plan, total = shared.plan, (cells - len(shared.missing), cells)
+    refused = [patch.refusal for patch in plan.patches if not patch.accepted]
     if refused:
         return (
             f"{len(refused)} patch{'es have' if len(refused) > 1 else ' has'} a walk that the "
             f"independent replay refuses: {refused[0]}."
         )
-    number, how = len(fewest.patches), f" {required_words(task)}" * task.requires_rates
+    number, how = len(plan.patches), f" {required_words(task)}" * task.requires_rates
     if total[1] == 0:
         return "There are no cells to cover."
     if number == 0:
@@ -291,16 +287,12 @@ def _message(
         )
     what = counted(number, "continuous motion")
     proof = f"; at least {at_least}, proved" if min(number, at_least) > 1 else ""
-    if fewest.bound > max(at_least, 1):
-        proof += f"; at least {fewest.bound} among the motions found"
+    if plan.bound > max(at_least, 1):
+        proof += f"; at least {plan.bound} among the motions found"
     sentence = (
         f"{what} cover{'' if number > 1 else 's'} {total[0]} of {total[1]} cells{how}{proof}."
     )
-    if connected is not fewest:
-        most = len(connected.patches)
-        least = "" if connected.optimal else f" (at least {connected.bound})"
-        sentence += f" Patches that are each connected on the surface: {most}{least}."
-    blocked = [k for k, move in enumerate(fewest.moves, start=1) if move.refusal]
+    blocked = [k for k, move in enumerate(plan.moves, start=1) if move.refusal]
     if blocked:
         named = ", ".join(f"{k} to {k + 1}" for k in blocked)
         sentence += f" No move clear of collisions was found from patch {named}."

@@ -11,7 +11,7 @@ import numpy as np
 from coverable_errors import counted
 from feasibility.collisions import checked, said_of
 from feasibility.cut_words import lines as proof_lines
-from feasibility.division import Apart, Division, Plan, Reconfiguration, SubPatch
+from feasibility.division import Apart, Division, Reconfiguration, SubPatch
 from feasibility.reports.parts import (
     causes_json,
     certificate_json,
@@ -62,17 +62,20 @@ def as_json(division: Division, before_s: float = 0.0) -> dict[str, Any]:
         division: the division.
         before_s: seconds of imports and files before it began; they count as loading.
     """
-    cells, fewest, connected = division.cells, division.fewest, division.connected
+    cells, plan = division.cells, division.plan
     return {
         "answer": answer_of(division),
         "cells": len(cells),
         "covered": division.n_covered,
         "ended": division.ended,
-        **_plan_json(fewest, division),
+        "optimal": division.ended and plan.optimal,
+        "at_least": plan.bound,
+        "patches": [_patch_json(patch, cells) for patch in plan.patches],
+        "moves": [_move_json(move, k) for k, move in enumerate(plan.moves)],
+        "patch_of_cell": plan.patch_of(len(cells)).tolist(),
         "proved_at_least": division.at_least,
         "proof": proof_json(division.proof, division.robot, cells),
         "apart": [_apart_json(apart, division) for apart in division.apart],
-        "connected": None if connected is fewest else _plan_json(connected, division),
         "left_out": causes_json(division.left_out, cells),
         "unsettled": [list(cells.unravel(k)) for k in division.unsettled.tolist()],
         "collisions": checked(division.task.collision),
@@ -91,17 +94,6 @@ def _apart_json(apart: Apart, division: Division) -> dict[str, Any]:
     return {
         "cells": [list(cells.unravel(apart.cell)), list(cells.unravel(apart.other))],
         "proof": proof_json(apart.proof, division.robot, cells),
-    }
-
-
-def _plan_json(plan: Plan, division: Division) -> dict[str, Any]:
-    """Patches in the order of work, the moves between them, and how good their number is."""
-    return {
-        "optimal": division.ended and plan.optimal,
-        "at_least": plan.bound,
-        "patches": [_patch_json(patch, division.cells) for patch in plan.patches],
-        "moves": [_move_json(move, k) for k, move in enumerate(plan.moves)],
-        "patch_of_cell": plan.patch_of(len(division.cells)).tolist(),
     }
 
 
@@ -159,10 +151,7 @@ def as_text(division: Division, title: str, before_s: float = 0.0) -> str:
     ]
     lines = summary(head, rows, said_of(division.robot, division.task.collision))
     if division.patches:
-        lines += ["", "In this order:", *_steps(division.fewest, division)]
-    if division.connected is not division.fewest:
-        lines += ["", "With patches that are each connected on the surface:"]
-        lines += _steps(division.connected, division)
+        lines += ["", "In this order:", *_steps(division)]
     if division.proof is not None:
         lines += ["", "Why one motion is not enough:"]
         steps = proof_lines(division.proof, division.robot, division.cells)
@@ -202,9 +191,9 @@ def _motions(division: Division) -> str:
     return motions if proved else f"{motions} (the fewest found)"
 
 
-def _steps(plan: Plan, division: Division) -> Iterator[str]:
+def _steps(division: Division) -> Iterator[str]:
     """Patches and the moves between them, a line each."""
-    for k, patch in enumerate(plan.patches):
+    for k, patch in enumerate(division.patches):
         pieces = f", in {patch.pieces} pieces" if patch.pieces > 1 else ""
         replayed = f"refused: {patch.refusal}" if patch.refusal else "accepted by the replay"
         text = (
@@ -213,8 +202,8 @@ def _steps(plan: Plan, division: Division) -> Iterator[str]:
             f"{counted(patch.certificate.waypoints, 'waypoint')}, {replayed}"
         )
         yield filled(f"  {f'patch {k + 1}':<12}", text)
-        if k < len(plan.moves):
-            yield filled(f"  {'move':<12}", _move_text(plan.moves[k]))
+        if k < len(division.moves):
+            yield filled(f"  {'move':<12}", _move_text(division.moves[k]))
 
 
 def _move_text(move: Reconfiguration) -> str:

@@ -16,7 +16,6 @@ from feasibility.reports.parts import (
     smooth_text,
     summary,
 )
-from feasibility.reports.proof import tree_json
 from feasibility.runs import Interruption, PassRuns, PlannedPasses
 from feasibility.timing import Trajectory
 from feasibility.treated import TreatedArea, treated_json, treated_words
@@ -57,7 +56,6 @@ def as_json(
             for run, trajectory in zip(found.runs, timed, strict=True)
         ],
         "cuts": [_cut_json(cut, found) for cut in found.cuts],
-        "at_least": _bound_json(along, found),
         "left_out_m": found.left_out,
         "left_out": [
             {
@@ -120,20 +118,6 @@ def _stripes(passes: Passes, treated: TreatedArea | None) -> tuple[str, ...]:
     )
 
 
-def _bound_json(along: PlannedPasses, found: PassRuns) -> dict[str, Any]:
-    """How many interruptions there are at least, and the proofs, each with the poses it is about.
-
-    A proof numbers its poses from the first one of its piece on.
-    """
-    return {
-        "interruptions": len(found.parted),
-        "proofs": [
-            {"poses": [one.first, one.last], **tree_json(one.proof, found.robot, along.cells)}
-            for one in found.parted
-        ],
-    }
-
-
 def _cut_json(cut: Interruption, found: PassRuns) -> dict[str, Any]:
     """One interruption."""
     return {
@@ -168,7 +152,7 @@ def as_text(
     rows = [
         ("passes", passes_text(along.passes, treated)),
         ("one motion", along.verdict.message),
-        ("runs", _fewest_words(found)),
+        ("runs", f"{count}, {FEWEST}" if count > 1 else str(count) * count),
         ("left out", _left_words(along, found)),
         ("refused", "; ".join(found.refusals)),
         ("smoothed", smooth_text(along.passes.surface)),
@@ -182,17 +166,6 @@ def as_text(
         lines += [f"    move {cut.move.described()}"]
         lines += [f"    {cut.move.refusal}"] * bool(cut.move.refusal)
     return "\n".join(lines)
-
-
-def _fewest_words(found: PassRuns) -> str:
-    """How many runs there are, and what is known of fewer."""
-    count, least = len(found.runs), len(found.parted)
-    if count < 2:
-        return str(count) if count else ""
-    if least >= count - 1:
-        return f"{count}, proved: no fewer work on as much in this order"
-    proved = f"; at least {1 + least}, proved" if least else "; nothing is proved"
-    return f"{count}, {FEWEST}{proved}"
 
 
 def _left_words(along: PlannedPasses, found: PassRuns) -> str:

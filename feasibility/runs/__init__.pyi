@@ -1,5 +1,3 @@
-from .at_least import Parted as Parted
-from .at_least import poses_between as poses_between
 from .fewest import Run as Run
 from .fewest import Stations as Stations
 from .fewest import fewest_runs as fewest_runs

@@ -10,7 +10,6 @@ import numpy as np
 
 from feasibility.clock import Clock, OutOfTime
 from feasibility.collisions import Pair
-from feasibility.cut_tree import CutTree
 from feasibility.division import (
     Reconfiguration,
     clear_moves,
@@ -26,7 +25,6 @@ from feasibility.roadmap import (
     route_walk,
     warm_up,
 )
-from feasibility.runs.at_least import Parted, parted_pieces
 from feasibility.runs.fewest import Run, Stations, fewest_runs
 from feasibility.runs.gaps import Gap, along_stretch, gaps_of, place_words
 from feasibility.runs.stopping import RunStop, where_it_stops
@@ -68,10 +66,6 @@ class PassRuns:
     """Between one run and the next."""
     gaps: tuple[Gap, ...]
     """What no run works on, and why."""
-    parted: tuple[Parted, ...]
-    """Pieces of the toolpath, one behind the other, none of which a single motion runs: proved, by
-    cut trees that the independent verifier accepts. Whatever the search found, as many
-    interruptions are needed at least, see `feasibility.runs.at_least`."""
     refusals: tuple[str, ...]
     """Why the independent replay refuses runs that were left out for it."""
 
@@ -93,7 +87,6 @@ def pass_runs(
     places: PassPlaces,
     seed: int = 0,
     clock: Clock | None = None,
-    proof: CutTree | None = None,
 ) -> PassRuns:
     """Run passes in the fewest motions that the configurations found allow.
 
@@ -105,7 +98,6 @@ def pass_runs(
         robot, cells, task: the question; cells are the poses of `surfaces.passes.pass_toolpath`.
         places: the same poses, with their stretches.
         seed, clock: of the search.
-        proof: that no single motion runs all of them, where a verdict has one.
 
     Raises:
         OutOfTime: the time ran out before the search began.
@@ -124,12 +116,10 @@ def pass_runs(
     slow = keep_fast_motions(exploration, task) if task.requires_rates else {}
     stations = _stations(exploration, places)
     runs, refusals = _replayed(exploration, task, fewest_runs(stations))
-    worked, passed = np.zeros(len(stations.pieces), dtype=bool), np.zeros(len(cells), dtype=bool)
+    worked = np.zeros(len(stations.pieces), dtype=bool)
     for path in runs:
         own = np.flatnonzero(path.needed)
         worked[own[0] : own[-1]] = True
-        passed[own[0] : own[-1] + 1] = True
-    parted = parted_pieces(exploration, cells, task, stations, passed, proof)
     exploration.clock = Clock()
     pairs = Problem.of(robot, cells, task).pairs
     return PassRuns(
@@ -139,7 +129,6 @@ def pass_runs(
         runs=tuple(runs),
         cuts=_cuts(exploration, task, places, runs, pairs),
         gaps=gaps_of(exploration, task, places, stations.pieces, worked, pairs, slow),
-        parted=parted,
         refusals=tuple(refusals),
     )
 

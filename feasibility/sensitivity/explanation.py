@@ -328,7 +328,7 @@ def drop(prober: Prober, verdict: Verdict, q: Array) -> Dropped:
             division = divide(
                 *prober.given, Search(seed=verdict.seed), clock=prober.clock.part(1.0)
             )
-            patches = [patch for patch in division.fewest.patches if patch.accepted]
+            patches = [patch for patch in division.patches if patch.accepted]
         if patches:
             largest = max(patches, key=lambda patch: patch.area)
             walk, covered = largest.walk, np.zeros(len(covered), dtype=bool)

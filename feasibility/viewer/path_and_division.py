@@ -101,13 +101,13 @@ def view_path(
 
 
 def view_division(division: Division, case: str | None = None) -> View:
-    """The patches of the plan with the fewest motions, and the moves between them in red.
+    """The patches, and the moves between them in red.
 
     Args:
         division: the division.
         case: name of the case, for the title.
     """
-    robot, cells, plan = division.robot, division.cells, division.fewest
+    robot, cells, plan = division.robot, division.cells, division.plan
     names = [
         f"patch {k + 1} ({counted(len(patch.cells), 'cell')})"
         for k, patch in enumerate(plan.patches)

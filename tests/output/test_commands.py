@@ -213,9 +213,7 @@ def of_path(args):
         along = plan_passes(setup.robot, passes, setup.task, search=setup.search)
         verdict = along.verdict
     if along is not None and not verdict.feasible:
-        found = pass_runs(
-            setup.robot, along.cells, verdict.task, along.places, verdict.seed, proof=verdict.proof
-        )
+        found = pass_runs(setup.robot, along.cells, verdict.task, along.places, verdict.seed)
         timed = [trajectory(run, speed, period=0.02, **timing) for run in found.runs]
         treated = along.treated(*(run.walk for run in found.runs)) if found.runs else None
         return SimpleNamespace(along=along, found=found, timed=timed, treated=treated), schema.RUNS

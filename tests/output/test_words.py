@@ -118,7 +118,7 @@ def test_the_motion_as_a_table_is_the_motion(commands):
 
 def test_a_number_of_motions_is_the_least_only_where_the_search_has_ended(plate):
     found = divide(*plate[0].build()[:3])
-    assert (found.fewest.optimal, division.as_json(found)["optimal"]) == (True, True)
+    assert (found.plan.optimal, division.as_json(found)["optimal"]) == (True, True)
     assert division.as_json(replace(found, ended=False))["optimal"] is False
 
 

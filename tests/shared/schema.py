@@ -329,13 +329,6 @@ RUNS = {
         "clear": of(lambda one: not one[0].move.refusal, bool),
         "refusal": of(lambda one: one[0].move.refusal, str),
     }]),
-    "at_least": {
-        "interruptions": of(lambda one: len(one.found.parted), int),
-        "proofs": of(lambda one: [(part, one) for part in one.found.parted], [{
-            "poses": of(lambda one: [one[0].first, one[0].last], [int]),
-            "kind": OneOf("cell", "cut"), "opened": Named(float), "tree": ProofTree(),
-        }]),
-    },
     "left_out_m": of(lambda one: sum(gap.length for gap in one.found.gaps), float),
     "left_out": of("found.gaps", [{
         "stretches": of(lambda one: [1 + k for k in one.stretches], [int]),
@@ -355,10 +348,14 @@ def joints_moved(move: Any) -> list[dict[str, Any]]:
             for name, slides, d in by]  # fmt: skip
 
 
-PLAN = {
-    "optimal": of(lambda one: one.ended and one.fewest.optimal, bool),
-    "at_least": of("fewest.bound", int),
-    "patches": of(lambda one: [(patch, one) for patch in one.fewest.patches], [{
+DIVIDE = {
+    "answer": OneOf("complete", "partial", "undecided"),
+    "cells": of(lambda one: len(one.cells), int),
+    "covered": of(lambda one: len({k for p in one.plan.patches for k in p.cells.tolist()}), int),
+    "ended": of("ended", bool),
+    "optimal": of(lambda one: one.ended and one.plan.optimal, bool),
+    "at_least": of("plan.bound", int),
+    "patches": of(lambda one: [(patch, one) for patch in one.plan.patches], [{
         "cells": of(lambda one: [index(one[1].cells, k) for k in one[0].cells], [[int]]),
         "area_m2": of(lambda one: float(one[1].cells.areas[one[0].cells].sum()), float),
         "pieces": of(lambda one: one[0].pieces, int),
@@ -368,11 +365,11 @@ PLAN = {
             **CERTIFICATE, "min_limit_margin": of("min_limit_margin", Maybe(float)), **CLEARANCE,
         }),
     }]),
-    "moves": of(lambda one: [(k, move, one) for k, move in enumerate(one.fewest.moves)], [{
+    "moves": of(lambda one: [(k, move, one) for k, move in enumerate(one.plan.moves)], [{
         "from": of(lambda one: one[0], int),
         "to": of(lambda one: one[0] + 1, int),
-        "start": of(lambda one: one[2].fewest.patches[one[0]].walk.q[-1].tolist(), [float]),
-        "end": of(lambda one: one[2].fewest.patches[one[0] + 1].walk.q[0].tolist(), [float]),
+        "start": of(lambda one: one[2].patches[one[0]].walk.q[-1].tolist(), [float]),
+        "end": of(lambda one: one[2].patches[one[0] + 1].walk.q[0].tolist(), [float]),
         "waypoints": of(lambda one: one[1].waypoints.tolist(), [[float]]),
         "refusal": of(lambda one: one[1].refusal or None, Maybe(str)),
         "min_clearance_m": Perhaps(Maybe(float)), "measured_clearance_m": Perhaps(Maybe(float)),
@@ -380,22 +377,15 @@ PLAN = {
         "joints": of(lambda one: joints_moved(one[1]), [Same()]),
     }]),
     "patch_of_cell": of(lambda one: [
-        next((k for k, patch in enumerate(one.fewest.patches) if cell in patch.cells), -1)
+        next((k for k, patch in enumerate(one.plan.patches) if cell in patch.cells), -1)
         for cell in range(len(one.cells))], [int]),
-}  # fmt: skip
-DIVIDE = {
-    "answer": OneOf("complete", "partial", "undecided"),
-    "cells": of(lambda one: len(one.cells), int),
-    "covered": of(lambda one: len({k for p in one.fewest.patches for k in p.cells.tolist()}), int),
-    "ended": of("ended", bool),
-    **PLAN,
     "proved_at_least": of("at_least", int), "proof": of(proof, Maybe(PROOF)),
     "apart": of(lambda one: [(part, one) for part in one.apart], [{
         "cells": of(lambda one: [index(one[1].cells, one[0].cell),
                                  index(one[1].cells, one[0].other)], [[int]]),
         "proof": of(lambda one: (one[0].proof, one[1]), Maybe(PROOF)),
     }]),
-    "connected": Maybe(dict), "left_out": causes("left_out"),
+    "left_out": causes("left_out"),
     "unsettled": of(lambda one: [index(one.cells, k) for k in one.unsettled], [[int]]),
     "collisions": COLLISIONS, "lacking": of("lacking", Maybe(str)), "message": of("message", str),
     "timing": {"load_s": float, "search_s": float, "divide_s": float, "total_s": float},

@@ -72,4 +72,4 @@ def test_paths_and_patches_keep_to_the_roll():
     walk = coverage_path(verdict, "columns").walk
     assert plain.faults_of(verdict, walk.q, walk.cell) == []
     division = divide(verdict.robot, verdict.cells, verdict.task)
-    assert [p.certificate.max_roll <= np.radians(15) for p in division.fewest.patches] == [True]
+    assert [p.certificate.max_roll <= np.radians(15) for p in division.patches] == [True]

@@ -9,6 +9,7 @@ from dataclasses import replace
 from functools import cache
 from itertools import pairwise, permutations, product
 
+import networkx as nx
 import numpy as np
 import pytest
 from jobs import coverable
@@ -23,7 +24,6 @@ from feasibility.certification import replay, verify_proof
 from feasibility.certification.rates import replay_rates
 from feasibility.cut_tree import Leaf
 from feasibility.division import divide
-from feasibility.division.connected_labels import count_of
 from feasibility.division.reconfiguration import itinerary
 from feasibility.verdict import CauseKind, Walk
 from robots import load_robot
@@ -40,10 +40,14 @@ def disconnected_problem(number):
     return built(apart[number], load_robot("puma560"))
 
 
-def assert_plan(plan, division):
-    """Disjoint patches, walks that a replay accepts, moves that lead from one to the next."""
-    robot, cells, task = division.robot, division.cells, division.task
-    taken = np.zeros(len(cells), dtype=int)
+def assert_division(division):
+    """Disjoint patches, walks that a replay accepts, moves that lead from one to the next.
+
+    Every other cell has a cause.
+    """
+    robot, cells, task, plan = division.robot, division.cells, division.task, division.plan
+    taken, touching = np.zeros(len(cells), dtype=int), nx.Graph(cells.pairs.tolist())
+    touching.add_nodes_from(range(len(cells)))
     for patch in plan.patches:
         taken[patch.cells] += 1
         mine = np.isin(np.arange(len(cells)), patch.cells)
@@ -52,7 +56,8 @@ def assert_plan(plan, division):
         assert again.accepted
         assert again.certificate == patch.certificate
         assert patch.area == pytest.approx(cells.areas[mine].sum())
-        assert patch.pieces == count_of(np.where(mine, 0, -1), cells.pairs)
+        parts = nx.connected_components(touching.subgraph(patch.cells.tolist()))
+        assert patch.pieces == len(list(parts))
     assert taken.max(initial=0) <= 1
     assert len(plan.moves) == max(0, len(plan.patches) - 1)
     for move, (one, other) in zip(plan.moves, pairwise(plan.patches), strict=True):
@@ -62,18 +67,7 @@ def assert_plan(plan, division):
     for k, patch in enumerate(plan.patches):
         assert (np.flatnonzero(owner == k) == patch.cells).all()
     assert plan.bound <= len(plan.patches)
-
-
-def assert_division(division):
-    """Both plans hold, paint the same cells, and every other cell has a cause."""
-    assert_plan(division.fewest, division)
-    n = len(division.cells)
-    inside = division.fewest.patch_of(n) >= 0
-    if division.connected is not division.fewest:
-        assert_plan(division.connected, division)
-        assert len(division.connected.patches) > len(division.patches)
-        assert ((division.connected.patch_of(n) >= 0) == inside).all()
-    assert all(patch.pieces == 1 for patch in division.connected.patches)
+    inside = owner >= 0
     causes = [cause.cell for cause in division.left_out]
     assert causes == sorted(set(causes))
     assert sorted([*causes, *division.unsettled.tolist()]) == np.flatnonzero(~inside).tolist()
@@ -151,7 +145,7 @@ def test_divisions_agree_with_verdicts(arm, number):
     reached = np.zeros(len(verdict.cells), dtype=bool)
     for component in verdict.components:
         reached[component] = True
-    assert (division.fewest.patch_of(len(reached)) >= 0)[reached].all()
+    assert (division.plan.patch_of(len(reached)) >= 0)[reached].all()
     for patch in division.patches[:2] if arm != "paper" else ():
         assert_motion(division, patch.walk.q)
 
@@ -173,7 +167,7 @@ def test_how_many_it_takes_at_least_is_proved(number, motions):
     cells = sorted({cell for pair in pairs for cell in pair})
     assert len(cells) == (motions if motions > 2 else 0)
     assert pairs == set(itertools.combinations(cells, 2))
-    patch = division.fewest.patch_of(len(division.cells))
+    patch = division.plan.patch_of(len(division.cells))
     assert len(set(patch[cells].tolist())) == len(cells)  # no motion found has two of them
     hasty = divide(*setup, Search(time_limit=1e-6))
     assert (hasty.ended, hasty.proof, len(hasty.apart)) == (False, None, 0)

@@ -1,4 +1,4 @@
-"""Passes that no single motion runs: the fewest interruptions, where they are, and what is proved.
+"""Passes that no single motion runs: the fewest interruptions, and where they are.
 
 The fewest against all choices, and against reaching as far as one can; then a ring about an arm
 whose first joint stops, and plates beyond its reach.
@@ -15,10 +15,10 @@ import pytest
 from samples import sampled, seeds
 
 from feasibility import Task, verify
-from feasibility.certification import replay, verify_proof
+from feasibility.certification import replay
 from feasibility.certification.rates import replay_rates
 from feasibility.clock import Clock
-from feasibility.runs import Stations, fewest_runs, pass_runs, plan_passes, poses_between
+from feasibility.runs import Stations, fewest_runs, pass_runs, plan_passes
 from robots import load_robot
 from surfaces import plane, poses
 from surfaces.passes import PassPlaces, parallel_passes
@@ -164,33 +164,17 @@ def test_runs_work_on_all_of_it_and_are_replayed(found):
         assert (cut.move.end == b.walk.q[0]).all()
 
 
-def test_no_fewer_runs_are_proved_and_the_proofs_hold(found):
-    """Each piece by the independent verifier; where a lemma's assumption fails, so does this."""
-    runs, cells = found
-    assert 1 <= len(runs.parted) <= len(runs.cuts)
-    last = 0
-    for one in runs.parted:
-        assert last <= one.first < one.last < len(cells)
-        last = one.last
-        own = poses_between(cells, one.first, one.last)
-        assert np.allclose(own.centres, cells.centres[one.first : one.last + 1])
-        assert verify_proof(SHORT, own, TASK, one.proof).accepted
-        # Every run ends, or begins, strictly inside.
-        assert not any(
-            run.visits[0] <= one.first and run.visits[-1] >= one.last for run in runs.runs
-        )
-        # The arm with its own limits runs the piece: the same tree is refused.
-        assert not verify_proof(UR5, own, TASK, one.proof).accepted
-    whole_cells, places = ring(20)
-    whole = pass_runs(UR5, whole_cells, TASK, places)
+def test_one_motion_is_one_run_without_cuts_and_gaps():
+    cells, places = ring(20)
+    whole = pass_runs(UR5, cells, TASK, places)
     assert len(whole.runs) == 1
-    assert whole.parted == whole.cuts == whole.gaps == ()
+    assert whole.cuts == whole.gaps == ()
 
 
 def test_what_is_left_out_is_named_with_its_cause():
     plate = plane((0.6, 1.0), (-0.1, 0.1), "outside", (0.0, 0.0, 0.2))
     along = plan_passes(UR5, parallel_passes(plate, 0.1), replace(TASK, cone_deg=20))
-    runs = pass_runs(UR5, along.cells, along.task, along.places, proof=along.verdict.proof)
+    runs = pass_runs(UR5, along.cells, along.task, along.places)
     assert runs.gaps
     lengths = [float(run.figures.length) for run in runs.runs]
     assert 0.0 < runs.left_out < along.passes.length
