@@ -97,7 +97,7 @@ def check(
 
         method = partial(complete_search, seeds=seeds)
     clock = Clock(search.time_limit, progress) if clock is None else clock
-    verdict = _decided(problem, search, clock, method)
+    verdict = _decided(problem, search, clock.allow(search.evaluations), method)
     return _all_judged(_measured(_at_rates(verdict, clock), clock))
 
 

@@ -15,10 +15,11 @@ from feasibility.search import Progress
 
 GRACE = 0.4  # [s] past the limit that is left to what looks at the clock itself ...
 GRACE_SHARE = 0.05  # [1] ... and this share of the limit; starting and answering take some too
+LEAST = 100  # evaluations between two looks, however few are left
 
 
 class OutOfTime(Exception):
-    """The time limit has run out."""
+    """The time limit has run out, or the limit of evaluations."""
 
 
 class _Compiling:
@@ -78,7 +79,8 @@ class Clock:
         began: `time.monotonic()` at which the work began; NaN before that.
         loaded: the same, at which the search itself did, its kernels loaded.
         limit: seconds; inf for no limit.
-        evaluations: of the arm, after which a search stops as at the deadline; inf for no limit.
+        evaluations: of the arm, which may still be spent before a search stops as at the deadline;
+            a box of a proof counts as one. inf for no limit, negative where more were spent.
     """
 
     def __init__(self, limit: float | None = None, progress: Progress | None = None) -> None:
@@ -106,6 +108,15 @@ class Clock:
         if math.isnan(self.began):
             self.began, self._compiled = self.loaded, compiling.seconds()
         return self
+
+    def allow(self, evaluations: int | None) -> Clock:
+        """A search begins that may evaluate the arm so often; None for no limit."""
+        self.evaluations = math.inf if evaluations is None else evaluations
+        return self
+
+    def affordable(self, most: int) -> int:
+        """How many evaluations of `most` there may be before the next look at the clock."""
+        return int(min(most, max(self.evaluations, LEAST)))
 
     def part(self, share: float, progress: Progress | None = None) -> Clock:
         """A clock that runs now, for a share of the time that is left."""
@@ -135,8 +146,14 @@ class Clock:
 
     @property
     def out_of_time(self) -> bool:
-        """Has the deadline passed?"""
-        return not math.isinf(self.limit) and time.monotonic() > self.deadline
+        """Has the deadline passed, or was more evaluated than is allowed?"""
+        late = not math.isinf(self.limit) and time.monotonic() > self.deadline
+        return late or self.evaluations < 0
+
+    @property
+    def limits(self) -> str:
+        """Which limit has run out, in words."""
+        return "limit of evaluations" if self.evaluations < 0 else "time limit"
 
     @property
     def left(self) -> float:
@@ -148,12 +165,17 @@ class Clock:
         if self._progress is not None:
             self._progress(done, total, text)
 
-    def tick(self, done: int, total: int | None, text: str) -> None:
+    def tick(self, done: int, total: int | None, text: str, spent: int = 0) -> None:
         """Report progress, and stop when the time is up.
 
+        Args:
+            done, total, text: for the progress callback.
+            spent: evaluations of the arm since the last time.
+
         Raises:
-            OutOfTime: the deadline has passed.
+            OutOfTime: the deadline has passed, or the evaluations are used up.
         """
+        self.evaluations -= spent
         self.report(done, total, text)
         if self.out_of_time:
             raise OutOfTime

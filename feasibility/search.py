@@ -30,6 +30,9 @@ class Search:
     """Seed of every random choice; the same seed gives the same verdict and the same motion."""
     time_limit: float | None = None
     """Seconds after which the verdict is "undecided"."""
+    evaluations: int | None = None
+    """Complete: evaluations of the arm after which the verdict is "undecided": an effort that is
+    the same on every machine. A box of a proof counts as one."""
     step_deg: float = 0.01
     """Greedy: delta q of revolute joints, degrees. A prismatic joint steps by the length that the
     same angle sweeps at the arm's reach."""
@@ -48,6 +51,8 @@ class Search:
         kept: dict[str, Any] = {"seed": checks.whole("seed", self.seed, 0)}
         if self.time_limit is not None:
             kept["time_limit"] = checks.positive("time_limit", self.time_limit, "seconds")
+        if self.evaluations is not None:
+            kept["evaluations"] = checks.whole("evaluations", self.evaluations, 1)
         kept["step_deg"] = checks.number(
             "step_deg", self.step_deg, "must lie in 0.0001 .. 30 (degrees)", 1e-4, 30.0
         )

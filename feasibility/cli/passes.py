@@ -158,8 +158,9 @@ def in_runs(args: argparse.Namespace, opened: OpenCase, along: PlannedPasses) ->
 
     verdict = along.verdict
     opened.progress(0, None, "cutting passes into runs")
+    clock = opened.clock.allow(opened.setup.search.evaluations)
     found = pass_runs(
-        verdict.robot, along.cells, verdict.task, along.places, verdict.seed, opened.clock,
+        verdict.robot, along.cells, verdict.task, along.places, verdict.seed, clock,
     )  # fmt: skip
     timed = [
         trajectory(

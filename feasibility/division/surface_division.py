@@ -90,6 +90,7 @@ def divide(
     with compiling_notice():
         warm_up()
     clock = (Clock(search.time_limit, progress) if clock is None else clock).start()
+    clock.allow(search.evaluations)
     began = time.monotonic()
     exploration, apart, ended, slow = _searched(robot, cells, task, search.seed, clock)
     searched = time.monotonic()

@@ -50,7 +50,7 @@ class Watch(Clock):
         cells = f"{done} of {total} cells" if total else f"{done} cells"
         self._job.said = f"{cells} so far; {text}"
 
-    def tick(self, done: int, total: int | None, text: str) -> None:
+    def tick(self, done: int, total: int | None, text: str, spent: int = 0) -> None:
         """Report, and stop where nobody waits or enough has been tried.
 
         Raises:
@@ -62,7 +62,7 @@ class Watch(Clock):
         self._left -= 1
         if self._left < 0:
             raise OutOfTime
-        super().tick(done, total, text)
+        super().tick(done, total, text, spent)
 
     @contextmanager
     def enforced(self) -> Iterator[None]:

@@ -224,6 +224,8 @@ def _hints(verdict: Verdict, case: Case) -> list[str]:
         hints.append("--set task.cone_deg=1 gives the tool axis a tolerance")
     elif verdict.answer is Answer.UNDECIDED and "time limit" in verdict.message:
         hints.append("--set search.time_limit=... gives the search more time")
+    elif verdict.answer is Answer.UNDECIDED and "limit of evaluations" in verdict.message:
+        hints.append("--set search.evaluations=... lets the search try more")
     elif verdict.method == "greedy":
         hints.append("--set search.method=complete searches all postures of the arm")
         hints.append("--set search.moves=all lets several joints move at once")

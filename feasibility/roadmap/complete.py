@@ -77,7 +77,7 @@ def _search(
         problem.robot, problem.cells, problem.task, search.seed, clock, problem.searched
     )
     proving = Proving(exploration, problem.task)
-    in_time, known, run = True, None, None
+    late, known, run = "", None, None
     try:
         if seeds is not None:
             with clock.enforced():
@@ -92,9 +92,9 @@ def _search(
         if problem.cells.in_order and exploration.complete and known is None:
             run = run_in_order(exploration)
     except OutOfTime:
-        in_time = False
+        late = clock.limits
     exploration.clock = Clock()  # graph and causes are made later, when somebody reads them
-    found = _found(problem, exploration, proving, in_time, known)
+    found = _found(problem, exploration, proving, late, known)
     return found if run is None else _in_order(found, run, problem, exploration)
 
 
@@ -201,10 +201,13 @@ def _found(
     problem: Problem,
     exploration: Exploration,
     proving: Proving,
-    in_time: bool,
+    late: str,
     known: Walk | None = None,
 ) -> Found:
-    """The best component, and the sentences about it; `known` is a motion that covers all cells."""
+    """The best component, and the sentences about it.
+
+    `late` says which limit ran out, if one did; `known` is a motion that covers all cells.
+    """
     total = len(problem.cells)
     complete = exploration.complete and total > 0 and not problem.cells.in_order
     start = exploration.begun
@@ -234,7 +237,7 @@ def _found(
         "{refusal}.",
         proof=proof,
         proved="" if proof is None else proved_words(problem, proving, proof),
-        unfinished="" if walk is not None else unfinished_words(problem, proving, in_time),
+        unfinished="" if walk is not None else unfinished_words(problem, proving, late),
         exhausted=exhausted_words(problem, exploration, proving),
         make_graph=lambda: graph_of(exploration),
         make_causes=lambda: _causes(problem, exploration),

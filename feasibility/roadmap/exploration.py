@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
-from feasibility.clock import Clock, OutOfTime
+from feasibility.clock import Clock
 from feasibility.cut_tree import CutTree
 from feasibility.roadmap.branch_and_bound import Boxes, Ruling, rule
 from feasibility.roadmap.expansion import JOINED, Grower
@@ -77,7 +77,7 @@ class Exploration:
         self.low = np.where(self.robot.prismatic, np.clip(-far, lower, upper), self.low)
         self.high = np.where(self.robot.prismatic, np.clip(far, lower, upper), self.high)
         self.pairs = np.zeros(len(self.cells.pairs), dtype=np.int64)
-        self._next_look = 0
+        self._told = self._next_look = 0
 
     # -- reading the roadmap -------------------------------------------------------------------
 
@@ -167,20 +167,25 @@ class Exploration:
 
     # -- growing it ----------------------------------------------------------------------------
 
-    def tick(self, text: str) -> None:
+    def tick(self, text: str, more: int = 0) -> None:
         """Report progress, and stop when the time is up.
+
+        Args:
+            text: what is being done.
+            more: evaluations since the last time that `work` has not counted.
 
         Raises:
             OutOfTime: the deadline has passed, or the clock allows no more evaluations.
         """
-        self._next_look = int(self.work.counts[0]) + self.budget()
-        self.clock.tick(self.n_covered, len(self.cells), text)
-        if self.work.counts[0] > self.clock.evaluations:
-            raise OutOfTime
+        count = int(self.work.counts[0])
+        spent, self._told = count - self._told + more, count
+        self._next_look = count + self.clock.affordable(BUDGET)
+        self.clock.tick(self.n_covered, len(self.cells), text, spent)
 
-    def budget(self) -> int:
-        """Evaluations of the arm between two looks at the clock."""
-        return BUDGET
+    def take_over(self, counted: int) -> None:
+        """Count evaluations of another search, of which the clock has been told."""
+        self.work.counts[0] += counted
+        self._told += counted
 
     def tick_at_times(self, text: str) -> None:
         """`tick`, where the arm has been evaluated often enough since the last time.
@@ -225,6 +230,7 @@ class Exploration:
         """Seed a cell and spread the new nodes; returns how many guesses could be projected."""
         found = 0
         for guess in guesses:
+            self.tick_at_times("looking for configurations")
             found += self.grower.seed(cell, guess)
             if self.roadmap.queue and self.spread():
                 break
@@ -286,15 +292,23 @@ class Exploration:
 
     def prove_collisions(self, cell: int) -> None:
         """Try to prove that something of the arm collides wherever the tool is over a cell."""
-        tick = partial(self.tick, "proving that the arm collides")
-        if self.blockers and self.blockers.arm_collides(self.arrays, self.work, cell, tick):
+        if self.blockers is None:
+            return
+        blockers, left = self.blockers, self.blockers.left
+
+        def tick() -> None:
+            nonlocal left
+            more, left = left - blockers.left, blockers.left
+            self.tick("proving that the arm collides", more)
+
+        if blockers.arm_collides(self.arrays, self.work, cell, tick):
             self.rulings[cell] = Ruling.PROVED
 
     def rule(self, cell: int, boxes: Boxes, most: int) -> Ruling:
         """Branch and bound on one cell; a configuration that it finds becomes a seed."""
         ruling, examined = Ruling.OPEN, int(boxes.counts[1])
         while ruling is Ruling.OPEN and boxes.counts[1] < most:
-            budget = min(most, self.budget())
+            budget = self.clock.affordable(min(most, BUDGET))
             ruling, q = rule(self.arrays, self.work, cell, boxes, budget)
             self.tick("proving cells out of reach")
         self.boxes += int(boxes.counts[1]) - examined

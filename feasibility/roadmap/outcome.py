@@ -50,12 +50,12 @@ def proved_words(problem: Problem, proving: Proving, proof: CutTree) -> str:
     )
 
 
-def unfinished_words(problem: Problem, proving: Proving, in_time: bool) -> str:
-    """What is known to be left untried; empty where nothing is."""
+def unfinished_words(problem: Problem, proving: Proving, late: str) -> str:
+    """What is known to be left untried; empty where nothing is. `late`: the limit that ran out."""
     exploration, total = proving.exploration, len(problem.cells)
-    if not in_time:
+    if late:
         return (
-            f"The time limit ran out; the best single motion so far covers "
+            f"The {late} ran out; the best single motion so far covers "
             f"{exploration.n_covered} of {total} cells."
         )
     blocked = blocked_curves(problem.cells, problem.task)

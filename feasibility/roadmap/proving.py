@@ -70,8 +70,12 @@ class Proving:
         if prover is None:
             return False
 
+        work, told = prover.findings.work, int(prover.findings.work.counts[0])
+
         def tick() -> None:
-            exploration.tick("proving that no motion joins the parts")
+            nonlocal told
+            more, told = int(work.counts[0]) - told, int(work.counts[0])
+            exploration.tick("proving that no motion joins the parts", more)
 
         made = prover.attempt(components_of(exploration.roadmap), budget, tick)
         self.attempts += 1

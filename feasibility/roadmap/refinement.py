@@ -77,7 +77,7 @@ def _search_over(exploration: Exploration, task: Task, finer: Finer) -> None:
     except _BudgetSpentError:
         _take_over(exploration, fine, finer.same, origin)
     finally:
-        exploration.work.counts[0] += fine.work.counts[0]
+        exploration.take_over(int(fine.work.counts[0]))
     exploration.spread()
 
 
@@ -93,9 +93,13 @@ class _Budget(Clock):
         super().__init__()
         self._exploration, self._fine = exploration, fine
 
-    def tick(self, done: int, total: int | None, text: str) -> None:
+    def affordable(self, most: int) -> int:
+        """As the clock of the search itself says."""
+        return self._exploration.clock.affordable(most)
+
+    def tick(self, done: int, total: int | None, text: str, spent: int = 0) -> None:
         """See `Clock.tick`; the cells reported are those of the search itself."""
-        self._exploration.tick(f"finer cells: {text}")
+        self._exploration.tick(f"finer cells: {text}", spent)
         if self._fine.work.counts[0] > MOST_EVALUATIONS:
             raise _BudgetSpentError
 

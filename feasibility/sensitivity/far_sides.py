@@ -112,9 +112,8 @@ class FarSides:
         """What `check` says after k steps, with a limited effort."""
         prober = made.prober
         clock = prober.clock.part(1.0, lambda *_: prober.tick())
-        clock.evaluations = self.most
         case = made.quantity.applied(prober.given, k)
-        verdict = check(*case, Search(seed=prober.seed), clock=clock)
+        verdict = check(*case, Search(seed=prober.seed, evaluations=self.most), clock=clock)
         prober.spent_before += int(verdict.statistics["fk"])
         return verdict
 

@@ -27,7 +27,6 @@ from feasibility.roadmap.joint_boxes import Blockers, blockers_of
 from feasibility.sensitivity.quantities import Quantity, Variant
 from feasibility.verdict import Answer, Evidence, Verdict, Walk
 
-LEAST = 100  # evaluations between two checks of the limit
 MOST_BOXES = 10_000  # of joint values, for all proofs with collisions of one explanation
 NEARBY_STEPS = np.int64(15)  # Newton steps from the configuration of a case nearby
 NO_CELL = -1
@@ -42,20 +41,16 @@ class LimitedExploration(Exploration):
 
     most: float = np.inf
 
-    def tick(self, text: str) -> None:
+    def tick(self, text: str, more: int = 0) -> None:
         """Stop at the limit.
 
         Raises:
             OutOfTime: it is reached, or the deadline has passed.
         """
-        super().tick(text)
-        if self.work.counts[0] > self.most:
+        super().tick(text, more)
+        self.clock.evaluations = self.most - float(self.work.counts[0])
+        if self.clock.evaluations < 0:
             raise OutOfTime
-
-    def budget(self) -> int:
-        """No more than is left; see `Exploration.budget`."""
-        left = self.most - float(self.work.counts[0])
-        return int(min(super().budget(), max(left, LEAST)))
 
     def add_seeds(self, cell: int, guesses: Iterable[Array]) -> int:
         """Add seeds, unless the limit is reached; see `Exploration.add_seeds`."""

@@ -118,6 +118,30 @@ def test_a_time_limit_is_honoured(looks, hard):
     assert (np.linalg.norm(points - aims[covered], axis=1) <= 1e-3).all()
 
 
+@pytest.mark.parametrize("most", [300, 5_000, 60_000])
+def test_a_limit_of_evaluations_is_kept_and_the_same_every_time(most, hard):
+    warm_up()
+    looks = [0]
+    tick = lambda *_: looks.__setitem__(0, looks[0] + 1)  # noqa: E731
+    first, second = (check(*hard, Search(evaluations=most), tick) for _ in range(2))
+    same(first, second)
+    assert (first.answer, first.evidence) == (Answer.UNDECIDED, Evidence.BUDGET)
+    assert "limit of evaluations" in first.message
+    assert most < first.statistics["fk"] <= most + BUDGET
+    assert looks[0] <= 2 * (most // BUDGET + 12)
+
+
+@pytest.mark.parametrize("name", FEW)
+def test_an_effort_that_is_enough_changes_nothing(name):
+    """Nor is more spent than what a limit allows, over finer cells and on proofs too."""
+    asked = question(name)
+    fk = int(verdict_of(name).statistics["fk"])
+    same(verdict_of(name), ask(name, search=replace(asked.search, evaluations=50 * fk + 10**6)))
+    less = ask(name, search=replace(asked.search, evaluations=max(fk // 2, 1)))
+    assert less.statistics["fk"] <= fk
+    assert less.answer in (verdict_of(name).answer, Answer.UNDECIDED)
+
+
 def test_an_interrupt_in_the_progress_report_gets_through_at_once(hard):
     calls = 0
 
