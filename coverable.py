@@ -97,7 +97,7 @@ if TYPE_CHECKING:
         view_study,
     )
     from feasibility.viewer.passes import view_passes
-    from robots import Axis, Robot, RobotError, list_robots, load_robot
+    from robots import Axis, Robot, RobotError, as_yourdfpy, list_robots, load_robot
     from surfaces import (
         Cells,
         MeshSurface,
@@ -144,7 +144,7 @@ __all__ = [
     "ProgramSettings",
     "Region", "Robot", "RobotError", "Search", "Store", "Study", "Surface", "SurfaceError",
     "Task", "ToolShape", "Trajectory", "TreatedArea", "Verdict", "Verification", "View",
-    "__version__", "bspline", "builtin_cases", "check", "compare",
+    "__version__", "as_yourdfpy", "bspline", "builtin_cases", "check", "compare",
     "comparison_chart", "comparison_text", "cone", "coverage_path", "cut_box", "cut_plane",
     "cylinder", "divide", "division_text", "ellipsoid", "explain", "explanation_text",
     "faces_within_cone", "greedy_check", "grid", "hyperboloid", "list_robots", "live",

@@ -1,4 +1,5 @@
 from .arguments import check_arguments as check_arguments
+from .as_yourdfpy import as_yourdfpy as as_yourdfpy
 from .chain import Chain as Chain
 from .chain import frames as frames
 from .chain import jacobians as jacobians

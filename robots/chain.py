@@ -23,7 +23,7 @@ import pinocchio as pin
 from coverable_arrays import Array, Mask
 from coverable_kernels import allocating_entry
 from robots.errors import RobotError
-from robots.mounting import joint_axes
+from robots.pinocchio_model import joint_axes
 
 AGREEMENT = 1e-9  # [m], [1]: largest difference from Pinocchio that is accepted
 SAMPLES = 20  # configurations at which the two are compared
@@ -73,14 +73,14 @@ def checked_chain(
             f"one-dof joints that ends at {frame.name!r}; lock the joints not on that chain"
         )
     chain = _constants(model, tool_frame, approach_axis, reference_axis)
-    data, neutral = model.createData(), pin.neutral(model)
+    data = model.createData()
     rng = np.random.default_rng(0)
     low = np.where(np.isfinite(lower), lower, -np.pi)
     high = np.where(np.isfinite(upper), upper, np.pi)
     for _ in range(SAMPLES):
         q = low + (high - low) * rng.random(n)
         point, axis = tool(chain, q)
-        pin.forwardKinematics(model, data, pin.integrate(model, neutral, q))
+        pin.forwardKinematics(model, data, q)
         expected = pin.updateFramePlacement(model, data, tool_frame)
         error = max(
             np.abs(point - expected.translation).max(),

@@ -48,7 +48,7 @@ def select_joints(
     """Choose the free joints, those from the root link to the tool frame, and hold all others.
 
     Where a link carries the surface, they are those between it and the tool frame. Arguments are
-    those of `robots.pinocchio_model.robot_from_urdf`; nothing is raised, so that all that is wrong
+    those of `robots.from_urdf.robot_from_urdf`; nothing is raised, so that all that is wrong
     can be said at once.
     """
     tool, words = _tool_frame(checked, tool_frame)

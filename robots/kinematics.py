@@ -40,9 +40,6 @@ class Kinematics:
         self.robot = robot
         self._model = robot.model
         self._data = robot.model.createData()
-        self._neutral = pin.neutral(robot.model)
-        # A continuous joint is (cos, sin) to Pinocchio and has no plain coordinate.
-        self._plain = robot.model.nq == robot.model.nv
         self._frame = robot.tool_frame_id
         self._approach = robot.approach_axis
         placement = self._data.oMf[self._frame]
@@ -59,7 +56,7 @@ class Kinematics:
         values = np.ascontiguousarray(q, dtype=float)
         if values.shape != (self.robot.n,):
             raise ArgumentError(f"q must have shape ({self.robot.n},), got {values.shape}")
-        return values if self._plain else pin.integrate(self._model, self._neutral, values)
+        return values
 
     def tool(self, q: ArrayLike) -> tuple[Array, Array]:
         """Tool point (3,) m and unit approach axis (3,) in the root frame, see `Robot`."""
@@ -145,10 +142,7 @@ class Kinematics:
         rows = np.ascontiguousarray(q, dtype=float)
         if rows.ndim != 2 or rows.shape[1] != self.robot.n:
             raise ArgumentError(f"q must have shape (m, {self.robot.n}), got {rows.shape}")
-        if self._plain:
-            return rows
-        placed = [pin.integrate(self._model, self._neutral, row) for row in rows]
-        return np.array(placed).reshape(len(rows), self._model.nq)
+        return rows
 
     def jacobians(self, q: ArrayLike) -> tuple[Array, Array]:
         """Derivatives (3, n) of tool point and of approach axis by q."""

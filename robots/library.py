@@ -186,7 +186,7 @@ def _read(
         xacro_args: of a .xacro file.
         options: limits and axes of the tool, as in `load_robot`.
     """
-    from robots.pinocchio_model import robot_from_urdf
+    from robots.from_urdf import robot_from_urdf
     from robots.urdf import carrier_of_surface, check_urdf
 
     link = mounting.surface_link or carrier_of_surface(mounting.axes)

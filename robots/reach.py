@@ -50,8 +50,7 @@ def reach_bound(
     """
     n, data = len(prismatic), model.createData()
     fixed = lower == upper
-    q = pin.integrate(model, pin.neutral(model), np.where(fixed, lower, 0.0))
-    columns = pin.computeJointJacobians(model, data, q)
+    columns = pin.computeJointJacobians(model, data, np.where(fixed, lower, 0.0))
     columns = columns.reshape(6, n)  # in the root frame; Pinocchio flattens a single column
     pin.updateFramePlacements(model, data)
     free = np.flatnonzero(~fixed)

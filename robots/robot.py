@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike
 
 from coverable_arrays import Array, Mask
 from robots.errors import RobotError
-from robots.joint_checks import joint_faults, moves_both, no_limit_set, numbers
-from robots.mounting import TCP_FRAME, made_orthogonal, seen_from, unit_axis, world_frame
+from robots.joint_checks import joint_faults, no_limit_set, numbers
+from robots.mounting import made_orthogonal, unit_axis
+from robots.pinocchio_model import TCP_FRAME, world_frame
 
 if TYPE_CHECKING:
     from robots.chain import Chain
@@ -115,6 +116,11 @@ class Robot:
             object.__setattr__(self, name, value)
         names, kinds = self.joint_names, self.joint_kinds
         faults = joint_faults(names, kinds, self.lower, self.upper, self.start)
+        if self.model.nq != self.model.nv:
+            faults.append(
+                "a joint of the model has no plain value, as Pinocchio's continuous joints, which "
+                "are (cos, sin); make it a JointModelRevoluteUnaligned, or use load_robot"
+            )
         if faults:
             raise RobotError(faults, source)
 
@@ -250,49 +256,6 @@ class Robot:
             self.reference_axis,
             self.lower,
             self.upper,
-        )
-
-    def relative_to(self, link: str) -> Robot:
-        """The same arm as it is seen from one of its links, which carries the surface.
-
-        Its joints are those between the link and the tool, the link's own first: those that
-        carry the link are reversed. Their names, values, limits and velocities are the same;
-        joints that move both are held at zero, or at the limit next to it, and a note says so.
-        Joints that the arm holds stay held: `load_robot(..., surface_link=link)` frees them.
-
-        Raises:
-            RobotError: there is no such link, or no free joint lies between it and the tool.
-
-        Example:
-            >>> from robots import load_robot
-            >>> load_robot("ur5").relative_to("forearm_link").joint_names
-            ('wrist_1_joint', 'wrist_2_joint', 'wrist_3_joint')
-        """
-        rest = np.clip(np.zeros(self.n), self.lower, self.upper)
-        try:
-            found = seen_from(self.model, link, self.tool_frame_id, rest)
-        except RobotError as error:
-            raise RobotError(error.faults, f"robot {self.name!r}") from error
-        order, values = list(found.order), rest.tolist()
-        return replace(
-            self,
-            model=found.model,
-            joint_names=tuple(self.joint_names[j] for j in order),
-            joint_kinds=tuple(self.joint_kinds[j] for j in order),
-            lower=self.lower[order],
-            upper=self.upper[order],
-            max_velocity=self.max_velocity[order],
-            limit_sets={name: table[order] for name, table in self.limit_sets.items()},
-            locked={**self.locked, **{self.joint_names[j]: values[j] for j in found.held}},
-            notes=(
-                *self.notes,
-                *(
-                    moves_both(self.joint_names[j], link, values[j], bool(self.prismatic[j]))
-                    for j in found.held
-                ),
-            ),
-            start=None if self.start is None else self.start[order],
-            surface_link=link,
         )
 
     def with_limits(self, limits: str | Mapping[str, ArrayLike] | ArrayLike) -> Robot:

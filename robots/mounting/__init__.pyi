@@ -1,12 +1,5 @@
 from .directions import made_orthogonal as made_orthogonal
 from .directions import unit_axis as unit_axis
-from .models import TCP_FRAME as TCP_FRAME
-from .models import joint_axes as joint_axes
-from .models import place_base as place_base
-from .models import place_tcp as place_tcp
-from .models import rerooted as rerooted
-from .models import seen_from as seen_from
-from .models import world_frame as world_frame
 from .poses import FURTHEST_BASE as FURTHEST_BASE
 from .poses import FURTHEST_TCP as FURTHEST_TCP
 from .poses import about_fixed_axes as about_fixed_axes

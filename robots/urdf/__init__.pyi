@@ -1,11 +1,13 @@
 from .axes import Axis as Axis
 from .axes import carrier_of_surface as carrier_of_surface
+from .axes import free_name as free_name
 from .checked_urdf import CheckedUrdf as CheckedUrdf
 from .checked_urdf import check_urdf as check_urdf
 from .files import files_named_by as files_named_by
 from .geometry import Box as Box
 from .geometry import Capsule as Capsule
 from .geometry import Cylinder as Cylinder
+from .geometry import Geometry as Geometry
 from .geometry import MeshFile as MeshFile
 from .geometry import Sphere as Sphere
 from .joints import JointInfo as JointInfo

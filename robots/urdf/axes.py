@@ -1,4 +1,4 @@
-"""Axes that an arm or a surface is mounted on, inserted into a URDF's tree before it is checked.
+"""Axes that an arm or a surface is mounted on, as joints before those of a URDF.
 
 Few users have a URDF of their arm on its rail, or of the arm and a turntable. So an axis is given
 by itself, and becomes a joint and a link of the tree like any other:
@@ -20,7 +20,8 @@ from coverable_arrays import Array
 from coverable_errors import MISSING, Checks, Fault, shown
 from robots.errors import RobotError
 from robots.mounting import FURTHEST_BASE, matrix_of
-from robots.urdf.xml import MAX_LENGTH, MAX_NAME, Node, UrdfError
+from robots.urdf.joints import JointInfo
+from robots.urdf.xml import MAX_LENGTH, MAX_NAME, UrdfError
 
 CARRIES = ("base", "surface")
 KINDS = ("revolute", "prismatic")
@@ -109,32 +110,23 @@ def _ordered(checks: Checks, key: str, value: Any, unit: str) -> tuple[float, fl
     return low, high
 
 
-def insert_axes(robot: Node, axes: Sequence[Axis], base: Array | None, path: str) -> str:
-    """Add the axes to a URDF's tree, as links and joints; changes the tree.
+def axis_joints(
+    axes: Sequence[Axis], base: Array | None, joints: Sequence[JointInfo], root: str, path: str
+) -> tuple[JointInfo, ...]:
+    """The joints of the axes, and the one that fixes a URDF's root link, before its own.
 
     Args:
-        robot: the <robot> element.
         axes: from the world outwards.
         base: (4, 4) m, the URDF's root link in the world, or on the last axis that carries it.
+        joints: of the URDF, from its root outwards.
+        root: its root link.
         path: of the URDF, for messages.
 
-    Returns:
-        The root link of the URDF itself.
-
     Raises:
-        UrdfError: a name is taken already, or the URDF has no one root link.
+        UrdfError: a name is taken already, or there are too many axes.
     """
-    links = [link.attributes.get("name", "") for link in robot.all("link")]
-    joints = {joint.attributes.get("name", "") for joint in robot.all("joint")}
-    children = {
-        child.attributes.get("link", "")
-        for joint in robot.all("joint")
-        for child in joint.all("child")
-    }
-    roots = [link for link in links if link not in children]
-    if len(roots) != 1:
-        raise UrdfError(f"has {len(roots)} root links; axes can be added to a tree only", path)
-    taken = {**dict.fromkeys(joints, "joint"), **dict.fromkeys(links, "link")}
+    taken = dict.fromkeys((joint.name for joint in joints), "joint")
+    taken |= dict.fromkeys((root, *(joint.child for joint in joints)), "link")
     faults = [
         Fault("axis", f"{axis.name!r} is the name of a {taken[axis.name]} already; choose another")
         for axis in axes
@@ -150,15 +142,29 @@ def insert_axes(robot: Node, axes: Sequence[Axis], base: Array | None, path: str
         faults.append(Fault("axis", f"got {len(axes)} axes; at most {MOST_AXES} can be composed"))
     if faults:
         raise UrdfError(faults, path)
-    world = free_name(WORLD, {*links, *names})
-    robot.children.append(_link(world, robot.line))
-    tips = {"base": world, "surface": world}
+    world = free_name(WORLD, {*taken, *names})
+    tips, found = {"base": world, "surface": world}, []
     for axis in axes:
-        robot.children += [_link(axis.name, robot.line), _joint(axis, tips[axis.carries], robot)]
+        low, high = axis.limits or (-math.inf, math.inf)
+        kind = "continuous" if axis.limits is None else axis.kind
+        roll, pitch, yaw = map(math.radians, axis.rpy_deg)
+        found.append(JointInfo(
+            axis.name, kind, tips[axis.carries], axis.name, axis.position,
+            (roll, pitch, yaw), axis.axis, low, high, axis.max_velocity, None, None, 0,
+        ))  # fmt: skip
         tips[axis.carries] = axis.name
-    mount = free_name("mount", {*joints, *names})
-    robot.children.append(_fixed(mount, tips["base"], roots[0], base, robot.line))
-    return roots[0]
+    place = np.eye(4) if base is None else base
+    xyz, rpy = tuple(place[:3, 3].tolist()), rpy_of(place[:3, :3])
+    mount = free_name("mount", {*taken, *names})
+    found.append(JointInfo(
+        mount, "fixed", tips["base"], root, xyz, rpy, (1.0, 0.0, 0.0), 0.0, 0.0, None, None, None, 0
+    ))  # fmt: skip
+    # Parents before children: what hangs on the surface's axes is last.
+    return tuple(sorted(found, key=lambda j: j.child in _carried(axes))) + tuple(joints)
+
+
+def _carried(axes: Sequence[Axis]) -> set[str]:
+    return {axis.name for axis in axes if axis.carries == "surface"}
 
 
 def free_name(wanted: str, taken: set[str]) -> str:
@@ -173,42 +179,6 @@ def free_name(wanted: str, taken: set[str]) -> str:
 def carrier_of_surface(axes: Sequence[Axis]) -> str | None:
     """The link of the last axis that carries the surface; None where there is none."""
     return next((axis.name for axis in reversed(axes) if axis.carries == "surface"), None)
-
-
-def _link(name: str, line: int) -> Node:
-    return Node("link", {"name": name}, line)
-
-
-def _joint(axis: Axis, parent: str, robot: Node) -> Node:
-    """The joint that moves the link of an axis."""
-    rpy = " ".join(repr(math.radians(angle)) for angle in axis.rpy_deg)
-    kind = "continuous" if axis.limits is None else axis.kind
-    joint = Node("joint", {"name": axis.name, "type": kind}, robot.line)
-    joint.children = [
-        Node("parent", {"link": parent}, robot.line),
-        Node("child", {"link": axis.name}, robot.line),
-        Node("origin", {"xyz": _text(axis.position), "rpy": rpy}, robot.line),
-        Node("axis", {"xyz": _text(axis.axis)}, robot.line),
-    ]
-    limit = {"velocity": repr(axis.max_velocity or 0.0), "effort": "0"}
-    if axis.limits is not None:
-        limit |= {"lower": repr(axis.limits[0]), "upper": repr(axis.limits[1])}
-    joint.children.append(Node("limit", limit, robot.line))
-    return joint
-
-
-def _fixed(name: str, parent: str, child: str, place: Array | None, line: int) -> Node:
-    """The joint that fixes the URDF's root link."""
-    joint = Node("joint", {"name": name, "type": "fixed"}, line)
-    joint.children = [Node("parent", {"link": parent}, line), Node("child", {"link": child}, line)]
-    if place is not None:
-        origin = {"xyz": _text(place[:3, 3]), "rpy": _text(rpy_of(place[:3, :3]))}
-        joint.children.append(Node("origin", origin, line))
-    return joint
-
-
-def _text(values: Any) -> str:
-    return " ".join(repr(float(value)) for value in values)
 
 
 def rpy_of(rotation: Array) -> tuple[float, float, float]:

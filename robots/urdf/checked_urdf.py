@@ -2,20 +2,18 @@
 
 Native URDF readers accept axes of length zero, limits that lock a joint, NaN and mesh names that
 climb out of their folder, and a long enough chain crashes the process. Here each of these is either
-one clear error or a correct robot. The native parser is then given a text of our own that holds the
-links and joints and nothing else of the file.
+one clear error or a correct robot, and no native parser sees the file.
 """
 
 from __future__ import annotations
 
-import html
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from coverable_arrays import Array
-from robots.urdf.axes import Axis, insert_axes
+from robots.urdf.axes import Axis, axis_joints
 from robots.urdf.expansion import expanded, is_xacro
 from robots.urdf.joints import JointInfo
 from robots.urdf.link_shapes import (
@@ -27,7 +25,7 @@ from robots.urdf.link_shapes import (
 )
 from robots.urdf.mesh_folders import MeshFolders
 from robots.urdf.tree import read_links, read_tree, refuse_other_formats
-from robots.urdf.xml import MAX_LENGTH, Faults, Node, UrdfError, parse_xml, read_bytes, shown
+from robots.urdf.xml import Faults, Node, UrdfError, parse_xml, read_bytes, shown
 
 MAX_WARNINGS = 100
 
@@ -39,12 +37,6 @@ class CheckedUrdf:
     path: str
     """Where it came from, for messages."""
     name: str
-    text: str
-    """The same tree as URDF, written anew, for a native parser.
-
-    Only names, joint kinds, origins, axes and limits; mimic joints are free in it, and a joint
-    without usable limits (`JointInfo.fault`) has very wide ones, so that it is not locked.
-    """
     root: str
     """The link that no joint moves; with composed axes the world."""
     mounted: str
@@ -110,13 +102,12 @@ def check_urdf(
     """
     name = os.fsdecode(path)
     root = _root_of(name, package_dirs, xacro_args)
-    mounted = insert_axes(root, axes, base, name) if axes else None
     checked = checked_tree(root, name, os.path.dirname(os.path.abspath(name)), package_dirs)
-    if mounted is None:
+    if not axes:
         return checked
-    composed = {axis.name for axis in axes}
-    leaves = tuple(leaf for leaf in checked.leaves if leaf not in composed)
-    return replace(checked, mounted=mounted, leaves=leaves)
+    joints = axis_joints(axes, base, checked.joints, checked.root, name)
+    links = (joints[0].parent, *(joint.child for joint in joints))
+    return replace(checked, root=links[0], links=links, joints=joints)
 
 
 def _root_of(
@@ -169,7 +160,6 @@ def checked_tree(
     return CheckedUrdf(
         path=path,
         name=title,
-        text=_written(title, names, joints),
         root=root,
         mounted=root,
         links=names,
@@ -182,36 +172,3 @@ def checked_tree(
         package_dirs=folders,
         mesh_paths=tuple(mesh_folders.tried),
     )
-
-
-def _quoted(name: str) -> str:
-    """A name as the value of an attribute; xml.sax.saxutils would import a web client for it."""
-    escaped = html.escape(name, quote=False).replace('"', "&quot;")
-    for character in "\n\r\t":
-        escaped = escaped.replace(character, f"&#{ord(character)};")
-    return f'"{escaped}"'
-
-
-def _written(title: str, links: tuple[str, ...], joints: tuple[JointInfo, ...]) -> str:
-    """Write the tree as URDF; repr keeps every digit of a number."""
-    lines = [f"<robot name={_quoted(title)}>"]
-    lines += [f"  <link name={_quoted(link)}/>" for link in links]
-    for joint in joints:
-        poses = (joint.xyz, joint.rpy, joint.axis)
-        xyz, rpy, axis = (" ".join(map(repr, values)) for values in poses)
-        lines += [
-            f'  <joint name={_quoted(joint.name)} type="{joint.kind}">',
-            f"    <parent link={_quoted(joint.parent)}/>",
-            f"    <child link={_quoted(joint.child)}/>",
-            f'    <origin xyz="{xyz}" rpy="{rpy}"/>',
-        ]
-        if joint.moves:
-            lines.append(f'    <axis xyz="{axis}"/>')
-        if joint.kind in ("revolute", "prismatic"):
-            lower = -MAX_LENGTH if joint.lower is None else joint.lower
-            upper = MAX_LENGTH if joint.upper is None else joint.upper
-            lines.append(
-                f'    <limit lower="{lower!r}" upper="{upper!r}" effort="0" velocity="0"/>'
-            )
-        lines.append("  </joint>")
-    return "\n".join([*lines, "</robot>", ""])

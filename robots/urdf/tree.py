@@ -128,12 +128,6 @@ def _joints(robot: Node, links: dict[str, Node], faults: Faults) -> dict[str, Jo
         if joint is None:
             continue
         joints[joint.name] = joint
-        if "universe" in (joint.name, joint.child):
-            faults.error(
-                node,
-                f"joint {shown(joint.name)} to link {shown(joint.child)}: the name 'universe' is "
-                "Pinocchio's for the world; rename it",
-            )
         for role, link in (("parent", joint.parent), ("child", joint.child)):
             if links and link not in links:
                 faults.error(

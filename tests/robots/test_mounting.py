@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import pickle
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -106,8 +107,7 @@ def origin(xyz: str, rpy: str = "0 0 0") -> str:
 def cell_text() -> str:
     """A UR5 on a rail, beside a table that turns on one that tilts."""
     path = next(info.urdf for info in list_robots() if info.name == "ur5")
-    checked = check_urdf(path)
-    text = checked.text.rsplit("</robot>", 1)[0]
+    text = Path(path).read_text("utf-8").rsplit("</robot>", 1)[0]
     links = ("hall", "carriage", "cradle", "turntable", "jig")
     more = [f'<link name="{name}"/>' for name in links]
     more += [
@@ -115,7 +115,7 @@ def cell_text() -> str:
             "rail", "prismatic", "hall", "carriage", origin("0 -1 0.3", "0 0.1 0.2"), "1 0 0",
             -1.0, 1.5, 0.7,
         ),
-        FIXED.format("on rail", "carriage", checked.root, origin("0 0 0.1", "0 0 1")),
+        FIXED.format("on rail", "carriage", check_urdf(path).root, origin("0 0 0.1", "0 0 1")),
         MOVING.format(
             "tilt", "revolute", "hall", "cradle", origin("0.7 0 0.4", "0.2 0 0"), "0 1 0.1",
             -1.0, 1.2, 1.1,
@@ -214,21 +214,11 @@ def test_a_joint_that_moves_both_is_held_and_a_note_says_so(cell):
     assert [note.split("'")[1] for note in held] == ["rail", *ARM[:2]]
     assert "held at 0 m" in held[0]
     assert "held at 0 rad" in held[1]
-    by_hand = load_robot(cell, tool_frame="tool0").relative_to("upper_arm_link")
-    assert [note for note in by_hand.notes if "moves both" in note] == held
-    for one, other in zip(robot.chain, by_hand.chain, strict=True):
-        np.testing.assert_allclose(one, other, atol=1e-12)
     asked_for = load_robot(cell, **asked, lock={"rail": 0.2})
     assert not [note for note in asked_for.notes if "'rail'" in note]
 
 
-def test_seen_from_two_links_in_turn_and_with_a_locked_table(cell):
-    there = load_robot(cell, tool_frame="tool0", surface_link="jig").relative_to("cradle")
-    once = load_robot(cell, tool_frame="tool0", surface_link="cradle")
-    assert there.joint_names == once.joint_names == ("tilt", "rail", *ARM)
-    q = random_q(there, np.random.default_rng(1))
-    np.testing.assert_allclose(Kinematics(there).tool(q), Kinematics(once).tool(q), atol=1e-12)
-    np.testing.assert_allclose(there.base, once.base, atol=1e-12)
+def test_a_locked_table_leaves_the_reach_of_the_arm(cell):
     table = {"turn": (0.7, 0.7), "tilt": (0.3, 0.3), "rail": (0.5, 0.5)}
     robot = load_robot(cell, tool_frame="tool0", surface_link="jig", limits=table)
     assert np.isclose(robot.reach, load_robot("ur5").reach)
@@ -309,7 +299,7 @@ def test_what_makes_no_sense(approved, cell):
     many = [Axis(f"a{k}", "revolute") for k in range(21)]
     lines += [f"axes {name}: {said(load_robot, 'ur5', axes=axes)}" for name, axes in {
         "twice": [RAIL, RAIL], "a joint": [Axis("elbow_joint", "revolute")],
-        "a link": [Axis("tool0", "revolute")], "universe": [Axis("universe", "revolute")],
+        "a link": [Axis("tool0", "revolute")],
         "many": many, "a word": "rail",
     }.items()]  # fmt: skip
     lines += [f"{name}: {said(load_robot, 'ur5', **asked)}" for name, asked in {
@@ -327,8 +317,6 @@ def test_what_makes_no_sense(approved, cell):
             {"surface_link": "jig", "tool_frame": "cradle", "lock": {"turn": 1.0}},
         )
     ]  # fmt: skip
-    robot = load_robot(cell, tool_frame="tool0")
-    lines += [f"from {link}: {said(robot.relative_to, link)}" for link in ("jib", "ee_link")]
     lines.append("alike: " + said(replace, load_robot("ur5"), reference_axis=(0, 0, 1)))
     text = "\n".join(lines).replace(cell, "CELL").replace(load_robot("ur5").urdf, "UR5")
     approved("bad_mounting", text)

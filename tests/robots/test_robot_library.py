@@ -256,11 +256,3 @@ def test_a_file_is_a_robot_named_after_it_with_its_path_kept_absolute(tmp_path, 
     for found in (robot, load_robot(str(tmp_path / "test_arm.urdf")), load_robot("test_arm.urdf")):
         assert (found.name, found.joint_names) == ("test_arm", ("j1",))
         assert found.urdf == str(tmp_path / "test_arm.urdf")
-
-
-def test_what_pinocchio_prints_is_in_the_error(capfd):
-    from robots.pinocchio_model import parse
-
-    with pytest.raises(RobotError, match=r"x\.urdf: Pinocchio refuses this URDF: .*\w+"):
-        parse("<robot name='x'><link name='a'/><link name='b'/></robot>", "x.urdf")
-    assert capfd.readouterr().err == ""

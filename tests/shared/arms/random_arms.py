@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from feasibility import Task
 from robots import Axis, Robot, load_robot
-from robots.pinocchio_model import robot_from_urdf
+from robots.from_urdf import robot_from_urdf
 from robots.urdf.checked_urdf import checked_tree
 from robots.urdf.xml import parse_xml
 from surfaces import Surface, cylinder, hyperboloid, plane, sphere
