@@ -185,6 +185,19 @@ def test_chain_links_and_reach_are_those_of_the_tree(name, cell, tree):
     assert (robot.distance_from_base(np.array(points)) <= robot.reach + 1e-12).all()
 
 
+@pytest.mark.parametrize(("link", "tool"), [("jig", "tool0"), ("tool0", "jig"), ("hall", "tool0")])
+def test_held_joints_stand_where_they_are_held(link, tool, cell, tree):
+    held = {"rail": 0.4, "tilt": -0.5, "elbow_joint": 0.7}
+    robot = load_robot(cell, tool_frame=tool, surface_link=link, lock=held)
+    assert not set(held) & set(robot.joint_names)
+    q = random_q(robot, np.random.default_rng(3))
+    values = {**robot.locked, **dict(zip(robot.joint_names, q, strict=True))}
+    np.testing.assert_allclose(
+        Kinematics(robot).tool(q)[0], tree(link, tool, values)[:3, 3], **CLOSE
+    )
+    assert {name: robot.locked[name] for name in held} == held
+
+
 def test_limits_velocities_tcp_and_base_stay_with_their_joints(cell, tree):
     pose = {"tcp": ((0.01, 0.02, 0.1), (10, 20, 30)), "base": ((1, 2, 3), (20, 0, 45))}
     plain = load_robot(cell, tool_frame="tool0", **pose)
