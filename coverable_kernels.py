@@ -43,7 +43,6 @@ CODE = (
     "feasibility/certification/collisions/*_kernels.py",
     "feasibility/collisions/kernels/*.py",
     "feasibility/paper/*.py",
-    "feasibility/paths/two_opt.py",
     "feasibility/placement/quick_search.py",
     "feasibility/roadmap/branch_and_bound/*.py",
     "feasibility/roadmap/causes/diagnosis.py",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +9,6 @@ import numpy as np
 from coverable_arrays import Array, Ints, Mask, Protected
 from feasibility.certification import placements
 from feasibility.certification.rates import smallest_singular_values
-from feasibility.paths.order import least_length
 from feasibility.task import Task
 from feasibility.verdict import Certificate, Walk
 from robots import Robot
@@ -27,8 +25,6 @@ class PathFigures(Protected):
     """m, length of the tool point's path, projected onto the surface."""
     revisited: float
     """m, the part of it that leads to cells visited before."""
-    least_length: float
-    """m, no path through all the centres is shorter; see `order.least_length`."""
     travel: Array
     """(n,) rad or m, travel of each joint, back and forth."""
     turn_margin: float
@@ -52,11 +48,6 @@ class PathFigures(Protected):
         """Revisited length over covered length; 0 where there is neither."""
         return self.revisited / self.covered if self.covered > 0.0 else 0.0
 
-    @property
-    def ratio(self) -> float:
-        """Length over the least that there could be; nan for a single cell."""
-        return self.length / self.least_length if self.least_length > 0.0 else math.nan
-
 
 def figures_of(
     robot: Robot,
@@ -77,7 +68,6 @@ def figures_of(
     return PathFigures(
         length=float(steps.sum()),
         revisited=float(steps[revisiting(walk)[owner]].sum()),
-        least_length=least_length(cells.centres[needed]),
         travel=np.abs(np.diff(walk.q, axis=0)).sum(axis=0),
         turn_margin=float(turns.min(initial=np.inf)),
         slide_margin=float(slides.min(initial=np.inf)),

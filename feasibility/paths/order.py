@@ -12,11 +12,9 @@ from typing import Literal, get_args
 
 import numpy as np
 from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
-from scipy.spatial import cKDTree
-from scipy.spatial.distance import pdist, squareform
+from scipy.sparse.csgraph import dijkstra
 
-from coverable_arrays import Array, Ints, Mask
+from coverable_arrays import Ints, Mask
 from coverable_errors import CoverableError
 from feasibility.paths.two_opt import improved, tour_length
 from surfaces import Cells
@@ -28,7 +26,6 @@ GRID_ORDERS: tuple[Order, ...] = ("rows", "columns", "spiral")
 
 MOST_IMPROVED = 600  # cells up to which an order is improved; it takes their cube
 MOST_CANDIDATES = 2  # orders that are improved, the shortest first
-MOST_SPANNED = 3000  # cells whose smallest spanning tree is found; beyond, the nearest are summed
 TIE = 1e-9  # [1], share of a length below which two lengths are alike
 
 
@@ -237,28 +234,3 @@ def _greedy(steps: csr_array, wanted: Mask) -> Ints:
         found.append(here)
         left[here] = False
     return np.array(found, dtype=np.int64)
-
-
-def least_length(centres: Array, most_spanned: int = MOST_SPANNED) -> float:
-    """m, no path through all of these points is shorter.
-
-    A path through all points is a tree that spans them, so it is at least as long as the smallest
-    such tree, with straight lines between the points. For very many points a smaller bound is
-    taken: each step of a path is at least as long as from where it begins to the nearest
-    other point, and all points but the last begin one.
-
-    Args:
-        centres: (N, 3) m.
-        most_spanned: of more points the smaller bound is taken.
-
-    Example:
-        >>> least_length(np.array([[0.0, 0, 0], [1, 0, 0], [3, 0, 0], [1, 1, 0]]))
-        4.0
-    """
-    if len(centres) < 2:
-        return 0.0
-    if len(centres) <= most_spanned:
-        apart = np.maximum(pdist(centres), np.finfo(float).tiny)
-        return float(minimum_spanning_tree(squareform(apart)).sum())
-    nearest = cKDTree(centres).query(centres, k=2)[0][:, 1]
-    return float(nearest.sum() - nearest.max())

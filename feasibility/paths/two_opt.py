@@ -9,11 +9,10 @@ from __future__ import annotations
 import numpy as np
 
 from coverable_arrays import Array, Ints
-from coverable_kernels import entry, kernel, put
 
 LONGEST_PART = 3  # places that Or-opt moves at once
 GAIN = 1e-9  # [1], share of the whole length that a change must gain
-MOST_SWEEPS = np.int64(200)
+MOST_SWEEPS = 200
 
 
 def tour_length(distance: Array, tour: Ints) -> float:
@@ -33,91 +32,46 @@ def improved(distance: Array, tour: Ints) -> Ints:
         >>> improved(np.abs(x[:, None] - x), np.array([0, 2, 1, 3])).tolist()
         [0, 1, 2, 3]
     """
-    result = np.array(tour, dtype=np.int64)
-    gain = GAIN * max(tour_length(distance, result), np.finfo(float).tiny)
-    _improve(np.ascontiguousarray(distance), result, np.empty_like(result), gain, MOST_SWEEPS)
-    return result
+    count = len(tour)
+    gain = GAIN * max(tour_length(distance, tour), np.finfo(float).tiny)
+    # Before the first place and behind the last one is a place that nothing is away from.
+    away = np.pad(distance, (0, 1))
+    path = np.pad(np.asarray(tour, dtype=np.int64), 1, constant_values=count)
+    for _ in range(MOST_SWEEPS):
+        before = path.copy()
+        for i in range(1, count):
+            _turn(away, path, i, gain)
+        for size in range(1, min(LONGEST_PART, count - 2) + 1):
+            for i in range(1, count - size + 2):
+                path = _moved(away, path, i, size, gain)
+        if (path == before).all():
+            break
+    return path[1:-1]
 
 
-@entry
-def _improve(distance, tour, former, gain, sweeps):  # type: ignore[no-untyped-def]
-    """Sweep over all changes, taking each that gains, until a sweep finds none."""
-    n = tour.shape[0]
-    for _ in range(sweeps):
-        found = False
-        for i in range(n - 1):
-            for j in range(i + 1, n):
-                if _turn_cost(distance, tour, i, j) < -gain:
-                    _turn(tour, i, j)
-                    found = True
-        for size in range(1, min(LONGEST_PART, n - 2) + 1):
-            for i in range(n - size + 1):
-                if _move(distance, tour, former, i, size, gain):
-                    found = True
-        if not found:
+def _turn(away: Array, path: Ints, i: int, gain: float) -> None:
+    """Turn round the places i .. j of a path for each j in turn that gains."""
+    j = i
+    while True:
+        last, behind = path[j + 1 : -1], path[j + 2 :]
+        more = away[path[i - 1], last] + away[path[i], behind]
+        more -= away[path[i - 1], path[i]] + away[last, behind]
+        gains = np.flatnonzero(more < -gain)
+        if not len(gains):
             return
+        j += 1 + int(gains[0])
+        path[i : j + 1] = path[i : j + 1][::-1].copy()
 
 
-@kernel
-def _step(distance, tour, a, b):  # type: ignore[no-untyped-def]
-    """Distance between the places a and b of a tour; nothing beyond its ends."""
-    if a < 0 or b < 0 or a >= tour.shape[0] or b >= tour.shape[0]:
-        return 0.0
-    return distance[tour[a], tour[b]]
-
-
-@kernel
-def _turn_cost(distance, tour, i, j):  # type: ignore[no-untyped-def]
-    """What turning the places i .. j round would add."""
-    new = _step(distance, tour, i - 1, j) + _step(distance, tour, i, j + 1)
-    return new - _step(distance, tour, i - 1, i) - _step(distance, tour, j, j + 1)
-
-
-@kernel
-def _turn(tour, i, j):  # type: ignore[no-untyped-def]
-    """Turn the places i .. j of a tour round."""
-    while i < j:
-        tour[i], tour[j] = tour[j], tour[i]
-        i += 1
-        j -= 1
-
-
-@kernel
-def _move(distance, tour, former, i, size, gain):  # type: ignore[no-untyped-def]
-    """Put the places i .. i + size - 1 where that gains most, either way round."""
-    n = tour.shape[0]
-    last = i + size - 1
-    saved = _step(distance, tour, i - 1, i) + _step(distance, tour, last, last + 1)
-    if i > 0 and last < n - 1:
-        saved -= _step(distance, tour, i - 1, last + 1)
-    best, before, around = -gain, -1, False
-    # Before place k of what is left; its neighbours there are `left` and `right`.
-    for k in range(n - size + 1):
-        if k == i:
-            continue
-        right = k if k < i else k + size
-        left = right - 1
-        closed = 0.0
-        if left >= 0 and right < n:
-            closed = _step(distance, tour, left, right)
-        straight = _step(distance, tour, left, i) + _step(distance, tour, last, right) - closed
-        turned = _step(distance, tour, left, last) + _step(distance, tour, i, right) - closed
-        if straight - saved < best:
-            best, before, around = straight - saved, k, False
-        if turned - saved < best:
-            best, before, around = turned - saved, k, True
-    if before < 0:
-        return False
-    if around:
-        _turn(tour, i, last)
-    put(former, tour)
-    row = 0
-    for k in range(n - size + 1):
-        if k == before:
-            for part in range(size):
-                tour[row] = former[i + part]
-                row += 1
-        if k < n - size:
-            tour[row] = former[k if k < i else k + size]
-            row += 1
-    return True
+def _moved(away: Array, path: Ints, i: int, size: int, gain: float) -> Ints:
+    """The places i .. i + size - 1 put where that gains most, either way round."""
+    part, rest = path[i : i + size], np.concatenate([path[:i], path[i + size :]])
+    left, right = rest[:-1], rest[1:]
+    ways = np.stack(
+        [away[left, a] + away[b, right] for a, b in ((part[0], part[-1]), (part[-1], part[0]))]
+    )
+    ways -= away[left, right]
+    turned, k = divmod(int(np.argmin(ways)), len(left))
+    if ways[turned, k] >= ways[0, i - 1] - gain:
+        return path
+    return np.concatenate([rest[: k + 1], part[:: 1 - 2 * turned], rest[k + 1 :]])

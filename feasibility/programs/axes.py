@@ -25,7 +25,7 @@ import numpy as np
 
 from coverable_arrays import Array
 from coverable_errors import Checks, CoverableError, Fault
-from feasibility.programs.controllers import INFORM, TP, Language, maker_of
+from feasibility.programs.controllers import INFORM, TP, Language
 from robots import Kinematics, Robot
 
 JOINTS = 6  # of the arm itself, in every language
@@ -131,15 +131,11 @@ def check_program(
     """The joints of an arm as the axes of a controller.
 
     Raises:
-        ProgramError: the arm is of another maker, its joints are no such axes, or the settings make
+        ProgramError: the joints are no such axes, or the settings make
             no program.
     """
     settings = ProgramSettings() if settings is None else settings
     where = f"{language.name} for {robot.name!r}"
-    maker = maker_of(robot.name)
-    if maker not in ("", language.maker):
-        fault = f"{language.name} is for arms of {language.maker}; {robot.name!r} is of {maker}"
-        raise ProgramError(fault)
     checks = Checks("", ProgramError)
     arm, outside = _axes(checks, language, robot)
     expected = f"must be {JOINTS} numbers, one for each axis of the arm"

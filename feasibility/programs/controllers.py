@@ -1,9 +1,8 @@
-"""Languages of robot controllers, which arms speak them, and by which names of files."""
+"""Languages of robot controllers, and by which names of files they are chosen."""
 
 from __future__ import annotations
 
 import os
-import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -50,28 +49,6 @@ TP = Language("TP", "ls", "FANUC", (), _numbered("J{}"), time_digits=3)
 INFORM = Language("INFORM", "jbi", "Yaskawa", (), tuple("SLURBT"), "pulses", 0)
 LANGUAGES = (URSCRIPT, RAPID, KRL, TP, INFORM)
 
-MAKERS = (
-    ("Universal Robots", r"ur\d+e?|universal"),
-    ("ABB", r"abb|irb.*|crb.*"),
-    ("KUKA (Sunrise, in Java)", r"iiwa.*|lbr.*"),
-    ("KUKA", r"kuka|kr\d.*|agilus|quantec"),
-    ("Unimation", r"puma.*"),
-    ("Franka", r"panda|franka|fr3|fer"),
-    ("Kinova", r"kinova|jaco.*|j2[sn]\d.*|gen3.*"),
-    ("UFACTORY", r"xarm.*|lite6|uf850"),
-    ("Unitree", r"z1|b1"),
-    ("the SO-ARM project", r"so10\d"),
-    ("PAL Robotics", r"talos.*|tiago.*"),
-    ("Rethink", r"baxter|sawyer"),
-    ("Willow Garage", r"pr2"),
-    ("IIT", r"centauro"),
-    ("ANYbotics", r"anymal"),
-    ("FANUC", r"fanuc|lrmate.*|crx.*|m\d+i[a-d].*"),
-    ("Staubli", r"staubli|tx2?\d.*"),
-    ("Yaskawa", r"yaskawa|motoman|gp\d+[a-z]*|hc\d+[a-z]*"),
-)
-"""Makers, and the words in the names of their arms."""
-
 
 def language_of(path: str | os.PathLike[str]) -> Language:
     """The language of a file's ending.
@@ -89,17 +66,3 @@ def language_of(path: str | os.PathLike[str]) -> Language:
             return language
     named = alternatives([f".{each.ending} ({each.maker} {each.name})" for each in LANGUAGES])
     raise FileError(f"expected the name of a program, which ends in {named}", shown_path(path))
-
-
-def maker_of(name: str) -> str:
-    """Who makes an arm of this name; empty where that is not known.
-
-    Example:
-        >>> maker_of("ur10_limited"), maker_of("my_irb1200_5_90"), maker_of("paint arm")
-        ('Universal Robots', 'ABB', '')
-    """
-    words = re.split(r"[^a-z0-9]+", name.lower())
-    for maker, pattern in MAKERS:
-        if any(re.fullmatch(pattern, word) for word in words):
-            return maker
-    return ""

@@ -68,8 +68,6 @@ def as_json(
         "covered_m": figures.covered,
         "revisited_m": figures.revisited,
         "revisited_share": figures.revisited_share,
-        "least_length_m": figures.least_length,
-        "length_ratio": plain(figures.ratio),
         "joint_travel": {
             name: {"travel_m": travel} if slides else {"travel_deg": math.degrees(travel)}
             for name, travel, slides in zip(
@@ -191,16 +189,11 @@ def as_text(
 
 
 def _length_text(figures: PathFigures) -> str:
-    """Length, the part that is covered again, and the lower bound."""
+    """Length, and the part that is covered again."""
     text = f"{figures.length:.4g} m on the surface"
     if figures.revisited > 0.0:
         share = f"{100 * figures.revisited_share:.2g} % of the rest"
         text += f", {figures.revisited:.3g} m of it revisited ({share})"
-    if figures.least_length > 0.0:
-        text += (
-            f"; no path through all centres is shorter than {at_least(figures.least_length, 4)} m "
-            f"(ratio {figures.ratio:.3f})"
-        )
     return text
 
 

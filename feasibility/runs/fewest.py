@@ -9,9 +9,10 @@ runs are a shortest path by (undone length, runs, cuts inside a pass, waypoints)
 
 from __future__ import annotations
 
-import heapq
+from itertools import pairwise
 from typing import NamedTuple
 
+import networkx as nx
 import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
@@ -19,9 +20,6 @@ from coverable_arrays import Array, Ints, Mask
 RESOLUTION = 1e-12  # [m] lengths are counted in this, so that equal sums are equal
 # What one step costs, as digits of one number; none of them has more than 32 bits in all.
 CUT, RUN, UNDONE = 1 << 32, 1 << 64, 1 << 96
-
-Step = tuple[int, int, int]
-"""Where to, the signed number of the motion or 0 for none, and the cost."""
 
 
 class Stations(NamedTuple):
@@ -56,51 +54,36 @@ def fewest_runs(stations: Stations) -> tuple[Run, ...]:
 
     Numbers of nodes are rows of `stations.over`.
     """
-    cost, before = _cheapest(_steps(stations), -1)
+    steps = _steps(stations)
+    before, cost = nx.dijkstra_predecessor_and_distance(steps, -1)
     last = stations.number - 1
     ends = [k for k in cost if k == -1 - last or (k >= 0 and stations.over[k] == last)]
-    here = min(ends, key=lambda k: cost[k])
-    path = list[tuple[int, int]]()
-    while here in before:
-        there, number = before[here]
-        path.append((here, number))
-        here = there
+    path = [min(ends, key=lambda k: cost[k])]
+    while before[path[-1]]:
+        path.append(before[path[-1]][0])
     runs = list[tuple[list[int], list[int]]]()
-    for state, number in reversed(path):
-        if number:
-            runs[-1][0].append(state)
+    for here, there in pairwise(reversed(path)):
+        if number := steps[here][there]["number"]:
+            runs[-1][0].append(there)
             runs[-1][1].append(number)
-        elif state >= 0:  # the tool is set down here
-            runs.append(([state], []))
+        elif there >= 0:  # the tool is set down here
+            runs.append(([there], []))
     return tuple(Run(tuple(nodes), tuple(route)) for nodes, route in runs if route)
 
 
-def _steps(stations: Stations) -> dict[int, list[Step]]:
-    """The steps from each state: a node, or -1 - i for the tool lifted over station i."""
-    over, inside = stations.over.tolist(), [*stations.inside.tolist(), False]
-    steps: dict[int, list[Step]] = {k: [] for k in range(-stations.number, len(over))}
-    for x, y, number, rows in stations.steps.tolist():
-        steps[x].append((y, number, rows))
-    for node, station in enumerate(over):
-        steps[node].append((-1 - station, 0, CUT * inside[station]))
-        steps[-1 - station].append((node, 0, RUN))
+def _steps(stations: Stations) -> nx.DiGraph:
+    """The steps from each state: a node, or -1 - i for the tool lifted over station i.
+
+    Each has a `weight`, and the signed `number` of the motion, or 0 for none.
+    """
+    inside = [*stations.inside.tolist(), False]
+    steps = nx.DiGraph()
+    steps.add_node(-1)
+    for x, y, number, rows in sorted(stations.steps.tolist(), key=lambda row: -row[3]):
+        steps.add_edge(x, y, number=number, weight=rows)  # of several the shortest stays
+    for node, station in enumerate(stations.over.tolist()):
+        steps.add_edge(node, -1 - station, number=0, weight=CUT * inside[station])
+        steps.add_edge(-1 - station, node, number=0, weight=RUN)
     for station, undone in enumerate(np.round(stations.pieces / RESOLUTION).tolist()):
-        steps[-1 - station].append((-2 - station, 0, UNDONE * int(undone)))
+        steps.add_edge(-1 - station, -2 - station, number=0, weight=UNDONE * int(undone))
     return steps
-
-
-def _cheapest(
-    steps: dict[int, list[Step]], start: int
-) -> tuple[dict[int, int], dict[int, tuple[int, int]]]:
-    """The least cost of each state, and the state and the motion before it (Dijkstra)."""
-    cost, before = {start: 0}, dict[int, tuple[int, int]]()
-    queue = [(0, start)]
-    while queue:
-        spent, here = heapq.heappop(queue)
-        if spent > cost[here]:
-            continue
-        for there, number, more in steps[here]:
-            if there not in cost or spent + more < cost[there]:
-                cost[there], before[there] = spent + more, (here, number)
-                heapq.heappush(queue, (spent + more, there))
-    return cost, before

@@ -179,7 +179,7 @@ def test_what_a_library_says_of_an_interrupt_is_no_error(ask, search):
 
 @pytest.mark.parametrize("line", ["check paper/4a --save no/a --html no/b --witness no/c",
                                   "path paper/4a --order spiral --passes 0 --pitch 0.1",
-                                  "path paper/4a --program a.mod", "divide paper/4a --html no/b",
+                                  "path paper/4a --program a.jbi", "divide paper/4a --html no/b",
                                   "verify paper/4a no.csv"])  # fmt: skip
 def test_what_cannot_be_done_is_refused_before_any_search(ask, search, line):
     search(AssertionError("the search must not run"))

@@ -279,8 +279,6 @@ PATH = {
     "covered_m": of(lambda one: one.path.figures.length - one.path.figures.revisited, float),
     "revisited_m": of("path.figures.revisited", float),
     "revisited_share": of("path.figures.revisited_share", float),
-    "least_length_m": of("path.figures.least_length", float),
-    "length_ratio": of("path.figures.ratio", Maybe(float)),
     "joint_travel": of(travel, Named(Named(float))),
     "margins": of("path.figures", {
         "limit_deg": of(deg("turn_margin"), Maybe(float)),
