@@ -8,14 +8,9 @@ import pytest
 import samples
 from approved import approved  # noqa: F401
 from hypothesis import HealthCheck, settings
-from hypothesis.internal.conjecture import providers
 
-# Hypothesis mixes numbers out of the project's source into its examples, of those modules that
-# happen to be loaded; tests that are meant to be the same each time would differ with what ran
-# before them in the process. No module counts as the project's own.
-providers.is_local_module_file = lambda path: False
-
-# The same examples each time, however long a busy machine takes over one, or over making them up.
+# However long a busy machine takes over an example, or over making them up; drawn from the same
+# numbers each time. (Hypothesis adds some out of those of our modules that are loaded by then.)
 settings.register_profile(
     "suite", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )

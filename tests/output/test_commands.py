@@ -11,19 +11,18 @@ import re
 import shlex
 from types import SimpleNamespace
 
+import json_of
 import numpy as np
 import pytest
-import schema
 from approved import NUMBER
 from command_table import COMMANDS, NEEDS, NUMBERS, REFUSED, TABLE, WHOLE
-from schema import conforms
 
 from feasibility import check, verify
 from feasibility.cases import load_case
 from feasibility.cli.main import _parser
 from feasibility.collisions import UNCHECKED
 from feasibility.division import divide
-from feasibility.entry import ends_of
+from feasibility.entry import ends_of, entered
 from feasibility.paths import coverage_path
 from feasibility.placement import Pose, Region, StudyEvaluator, place, station_plan
 from feasibility.results import load_motion, load_result
@@ -181,29 +180,18 @@ def inside(commands, monkeypatch):
 
 
 def of_check(args):
-    case = load_case(args.case, args.settings)
-    setup, seeds = case.build(), None
+    setup, seeds = load_case(args.case, args.settings).build(), None
     if args.seeds:
         q = load_motion(args.seeds, setup.robot).q
         seeds = Walk(q, np.full(len(q), -1))
-    found = check(*setup, seeds=seeds)
-    given = {} if args.witness != "-" else {"witness": schema.of(lambda one: one, schema.WITNESS)}
-    return SimpleNamespace(**_fields(found)), {**schema.CHECK, **given}
-
-
-def _fields(one):
-    """A verdict's fields; those that are made late, too."""
-    names = ("answer", "evidence", "cells", "covered", "graph", "causes", "certificate", "task",
-             "unchecked_links", "pairs_left_out", "proof", "treated", "robot", "method", "seed",
-             "witness")  # fmt: skip
-    return {name: getattr(one, name) for name in names}
+    return json_of.of_check(check(*setup, seeds=seeds), args.witness == "-")
 
 
 def of_path(args):
     setup = load_case(args.case, args.settings).build()
     speed = args.speed or setup.task.speed or 0.1
     limits = motion_limits(setup.robot, speed, args.velocity, args.acceleration)
-    timing = {"velocity": args.velocity, "acceleration": args.acceleration}
+    timing = {"velocity": args.velocity, "acceleration": args.acceleration, "period": 0.02}
     along = passes = None
     if args.passes is None:
         verdict = check(*setup)
@@ -214,25 +202,24 @@ def of_path(args):
         verdict = along.verdict
     if along is not None and not verdict.feasible:
         found = pass_runs(setup.robot, along.cells, verdict.task, along.places, verdict.seed)
-        timed = [trajectory(run, speed, period=0.02, **timing) for run in found.runs]
+        timed = [trajectory(run, speed, **timing) for run in found.runs]
         treated = along.treated(*(run.walk for run in found.runs)) if found.runs else None
-        return SimpleNamespace(along=along, found=found, timed=timed, treated=treated), schema.RUNS
+        asked = SimpleNamespace(along=along, found=found, timed=timed, treated=treated)
+        return json_of.of_runs(asked)
     if not verdict.feasible:
-        return SimpleNamespace(**_fields(verdict)), schema.NO_PATH
+        return json_of.of_check(verdict) | {"trajectory": None}
     path = coverage_path(verdict, args.order)
     treated = treated_by_walk(setup.robot, path.cells, setup.task, path.walk)
     if along is not None:
         treated = along.treated(path.walk)
-    run = trajectory(path, speed, period=0.02, **timing)
+    run = trajectory(path, speed, **timing)
     ends = None if args.approach is None else ends_of(path, args.approach)
     if ends is not None:
-        from feasibility.entry import entered
-
         run = entered(path, run, ends, limits, 0.02)
-    return SimpleNamespace(
+    return json_of.of_path(SimpleNamespace(
         path=path, run=run, limits=limits, most=used(setup.robot, run, limits), passes=passes,
         treated=treated, rates=path_rates(path), ends=ends,
-    ), schema.PATH  # fmt: skip
+    ))  # fmt: skip
 
 
 def of_place(args):
@@ -247,35 +234,36 @@ def of_place(args):
         found = place(*setup[:3], region, setup.search, evaluator=evaluator, **count)
         wanted = args.stations and found.answer != "feasible"
         plan = station_plan(found, evaluator, setup.search, **count) if wanted else None
-    return SimpleNamespace(found=found, plan=plan), schema.PLACE
+    return json_of.of_place(SimpleNamespace(found=found, plan=plan))
 
 
 def of_study(args):
     study = load_study(args.file)
     with open_workers(0) as workers:
-        return SimpleNamespace(study=study, rows=run_tasks(study.tasks, workers)), schema.STUDY
+        rows = run_tasks(study.tasks, workers)
+    return json_of.of_study(SimpleNamespace(study=study, rows=rows))
 
 
 def of_compare(args):
     with open_workers(0) as workers:
         case, arms = load_case(args.case, args.settings), args.robots.split(",")
-        return compare(case, arms, workers, critical=args.critical), schema.COMPARE
+        return json_of.of_compare(compare(case, arms, workers, critical=args.critical))
 
 
 def of_verify(args):
     if args.motion is None:
-        return verify(load_result(args.case)), schema.VERIFY
+        return json_of.of_verify(verify(load_result(args.case)))
     setup = load_case(args.case, args.settings).build()
     motion = load_motion(args.motion, setup.robot)
-    return verify(*setup[:3], motion.q, marks=motion.marks), schema.VERIFY
+    return json_of.of_verify(verify(*setup[:3], motion.q, marks=motion.marks))
 
 
-PYTHON = {
-    "check": of_check, "path": of_path, "place": of_place, "study": of_study,
-    "compare": of_compare, "verify": of_verify,
-    "divide": lambda args: (divide(*load_case(args.case, args.settings).build()), schema.DIVIDE),
-    "explain": lambda args: (explain(*load_case(args.case, args.settings).build()), schema.EXPLAIN),
-}  # fmt: skip
+def of_divide(args):
+    return json_of.of_divide(divide(*load_case(args.case, args.settings).build()))
+
+
+def of_explain(args):
+    return json_of.of_explain(explain(*load_case(args.case, args.settings).build()))
 
 
 def refuse(word):
@@ -291,8 +279,7 @@ def test_the_numbers_are_those_of_python(commands, command, name):
         words = [command, *shlex.split(name)]
         said = commands.say([*words, "--json"])
     found = json.loads(said.out, parse_constant=refuse)
-    source, wanted = PYTHON[command](_parser().parse_args(words))
-    conforms(found, wanted, source)
+    json_of.agree(found, globals()[f"of_{command}"](_parser().parse_args(words)))
     word = found.get("verdict") or found.get("answer")
     known = {"feasible": 0, "complete": 0, "holds": 0, "infeasible": 1, "partial": 1,
              "does not hold": 1, "undecided": 3, None: 0}  # fmt: skip

@@ -9,8 +9,7 @@ import pytest
 from command_table import forged
 from jobs import coverable as asked
 
-from coverable_errors import ArgumentError
-from feasibility import Search, greedy_check, verify
+from feasibility import Search, verify
 from feasibility.cases import all_keys, load_case
 from feasibility.cli.main import _parser
 from feasibility.demands import DEMANDS, further
@@ -183,9 +182,3 @@ def test_what_is_not_held_is_named_as_the_cause(ask, known):
     found = place(*setup[:3], region, count=1, around=0, keep=1)
     assert "none was found that does so at 3 m/s" in found.message
     assert found.cause is None
-
-
-def test_the_greedy_search_refuses_what_it_does_not_judge():
-    setup = load_case("paper/4a", ["task.speed=0.1"]).build()
-    with pytest.raises(ArgumentError, match="needs the complete search"):
-        greedy_check(*setup[:3])

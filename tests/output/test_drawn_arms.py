@@ -83,23 +83,6 @@ def extent(visual):
     return body.apply_transform(visual.origin).bounds
 
 
-@pytest.mark.parametrize(
-    ("shape", "size"),
-    [
-        ('<box size="0.2 0.4 0.6"/>', (0.2, 0.4, 0.6)),
-        ('<cylinder radius="0.1" length="0.6"/>', (0.2, 0.2, 0.6)),
-        ('<capsule radius="0.1" length="0.4"/>', (0.2, 0.2, 0.6)),
-        ('<sphere radius="0.1"/>', (0.2, 0.2, 0.2)),
-    ],
-)
-def test_simple_shapes_have_their_size_and_their_middle(tmp_path, shape, size):
-    robot = two_links(tmp_path, arm=SHAPE.format(shape))
-    ((path, (points, _)),) = drawn(robot).items()
-    assert path == "/robot/joint turn/link arm/part 0"
-    assert np.allclose(np.ptp(points, axis=0), size, atol=2e-3)
-    assert np.allclose(points.min(axis=0) + points.max(axis=0), [0, 0, 0.2], atol=2e-3)
-
-
 def test_a_mesh_is_scaled_and_placed(tmp_path):
     trimesh.creation.box((1, 2, 3)).export(tmp_path / "box.stl")
     mesh = '<mesh filename="box.stl" scale="0.1 0.1 -0.1"/>'
@@ -109,7 +92,7 @@ def test_a_mesh_is_scaled_and_placed(tmp_path):
     assert np.allclose(points.max(axis=0), [0.05, 0.1, 0.25], atol=1e-4)
 
 
-@pytest.mark.parametrize("content", [None, b"solid nothing", b"\0" * 84, b"\xff" * 200])
+@pytest.mark.parametrize("content", [None, b"\0" * 84])
 def test_a_mesh_that_cannot_be_had_becomes_a_capsule_and_a_note(tmp_path, content):
     if content is not None:
         (tmp_path / "lost.stl").write_bytes(content)

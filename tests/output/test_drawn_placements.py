@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from functools import cache
 
@@ -13,19 +12,15 @@ from mesh_writers import cube, plate
 from page_outline import points_of
 from scipy.spatial.transform import Rotation
 
-from feasibility import Answer, Evidence, Search, Task, check
+from feasibility import Answer, Evidence, Task
 from feasibility.placement import (
     Placements,
     Pose,
     Region,
     Stage,
-    StationPlan,
     Trial,
-    moved_cells,
-    place,
 )
 from feasibility.placement.evaluator import Margins
-from feasibility.placement.stations import fewest_stations
 from feasibility.studies import Row
 from feasibility.viewer import poses as pose_layers
 from feasibility.viewer import view_placements
@@ -201,45 +196,3 @@ def test_an_outline_is_the_rim_or_three_sections(cells, expected):
 
 
 # -- the best one -----------------------------------------------------------------------------
-
-
-def test_the_best_placement_plays_the_motion_that_check_finds():
-    region = Region.around(Pose.of_surface(PLATE), {"x": (0.3, 0.7), "yaw_deg": (0, 60)})
-    found = place(ur5(), CELLS, TASK, region, count=8, around=1, keep=2)
-    assert found.answer is Answer.FEASIBLE
-    view = view_placements(found, case="plate")
-    verdict = check(ur5(), moved_cells(CELLS, found.best.pose), TASK, Search())
-    np.testing.assert_array_equal(view.motion.walk, verdict.witness.q)
-    number = f"{len(found.found)} of {len(found.trials)}"
-    assert view.legend.title == f"plate: feasible (witness), {number} placements feasible"
-    counted = sum(int(re.search(r"\((\d+)\)", label)[1]) for label in classes_of(view))
-    assert counted == len(found.trials)
-    # Thick: every point of the tubes lies near the outline, drawn where one was found.
-    drawn = objects(view.commands)["/poses/feasible"].reshape(len(found.found), -1, 3)
-    for part, trial in zip(drawn, found.found, strict=True):
-        want = turned(outline(CELLS), trial.pose)
-        assert np.linalg.norm(part[:, None] - want[None], axis=2).min(axis=1).max() < 3e-3
-
-
-def test_stations_are_drawn_where_they_stand():
-    where = poses(2)
-    masks = np.array([[1, 1, 1, 1, 0, 0], [0, 0, 0, 1, 1, 1]], dtype=bool)
-    trials = tuple(
-        Trial(pose, Stage.SEARCH, 1.0, 1.0, 0.5, covers=mask[None])
-        for pose, mask in zip(where, masks, strict=True)
-    )
-    stations = fewest_stations([mask[None] for mask in masks], 6)
-    plan = StationPlan(stations, tuple(trials[s.placement] for s in stations.stations), ("", ""))
-    asked = fabricated(*trials)
-    view = view_placements(asked, plan=plan)
-    assert "2 stations cover 6 of 6 cells" in view.legend.text
-    drawn = objects(view.commands)
-    for k, (station, trial) in enumerate(zip(stations.stations, plan.trials, strict=True)):
-        centres = moved_cells(CELLS, trial.pose).centres[station.cells]
-        points = drawn[f"/stations/station {k + 1}/cells"]
-        away = np.linalg.norm(points[:, None] - centres[None], axis=2).min(axis=1)
-        assert away.max() < 0.5 * np.hypot(0.1, 0.1) + 1e-6
-        cone_chord = drawn[f"/stations/station {k + 1}/outline"]
-        np.testing.assert_allclose(cone_chord, turned(outline(CELLS), trial.pose), atol=2e-5)
-    shown = {entry.label: entry.shown for entry in view.legend.entries}
-    assert shown["station 1 (4 cells)"] > shown["the best of them"]

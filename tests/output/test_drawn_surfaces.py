@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import replace
 
 import numpy as np
 import pytest
 import trimesh
 from made_up import missing
-from matplotlib.collections import LineCollection, PathCollection, PolyCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
 from mesh_patches import grid
 from page_outline import faces_of, points_of
 
 from feasibility import CauseKind, Task, check
 from feasibility.results import load_result
-from feasibility.verdict import Cause
 from feasibility.viewer import cell_meshes as cell_shapes
 from feasibility.viewer import plot_sides, scene, view
 from feasibility.viewer.cell_meshes import make_display_mesh
 from feasibility.viewer.cut_sides import sides_of
-from feasibility.viewer.figures import plot_causes, plot_graph, plot_transition, unrolled_edges
+from feasibility.viewer.figures import plot_causes, plot_graph
 from robots import load_robot
-from surfaces import cylinder, mesh, sphere
+from surfaces import mesh, sphere
 from surfaces.meshes.cells import MeshCells
 
 COUNT = 24
@@ -131,19 +129,6 @@ def test_a_fine_mesh_is_thinned_and_its_cells_still_meet_as_they_did(fine):
     assert length == pytest.approx(fine.figures.borders.lengths.sum() + cone_chord, rel=0.02)
 
 
-def test_small_cells_survive_thinning():
-    """Single faces among large cells are drawn, however coarse the picture."""
-    surface = mesh(triangles(60, 60, wave))
-    labels = blocks(surface, 2).labels.copy()
-    labels[[100, 2000, 5000]] = [4, 5, 6]
-    cells = MeshCells.of(surface, labels)
-    display = make_display_mesh(cells, budget=500)
-    assert len(display.faces) < 1_500
-    assert set(display.labels.tolist()) == set(range(7))
-    area = np.bincount(display.labels, areas_of(display.vertices, display.faces), 7)
-    assert (area[4:] > 0.0).all()
-
-
 @pytest.mark.parametrize("kind", ["on_mesh", "on_grid"])
 def test_edges_run_from_target_to_target_at_the_standoff(kind, request):
     verdict = request.getfixturevalue(kind)
@@ -177,40 +162,6 @@ def test_missed_cells_have_the_colour_of_their_cause(kind, request):
         assert entries[path].label == f"{label} ({len(own)})"
     assert set(seen) == set(np.flatnonzero(~verdict.covered).tolist())
     assert len({entries[path].colour for path in seen.values()}) == len(set(seen.values()))
-
-
-def test_missed_cells_have_the_colour_of_the_pair_in_the_way(on_grid):
-    pairs = {1: ("forearm", "shelf"), 2: ("forearm", "shelf"), 5: ("link6", "wall")}
-    causes = [Cause(k, CauseKind.COLLISION, False, "", pair) for k, pair in pairs.items()]
-    causes += [Cause(7, CauseKind.DISCONNECTED, False, "", ("forearm", "shelf"))]
-    drawn = view(missing(on_grid, {1, 2, 5, 7, 8}, causes))
-    labels = {entry.label: entry for entry in drawn.legend.entries}
-    wanted = ("collision: forearm and shelf (2 cells)", "collision: link6 and wall (1 cell)",
-              "disconnected: forearm and shelf (1 cell)")  # fmt: skip
-    found = [labels[f"not covered: {words}"] for words in wanted]
-    assert len({entry.colour for entry in found}) == 3
-    centres, shown = on_grid.cells.centres, objects(drawn.commands)
-    for entry, own in zip(found, ({1, 2}, {5}, {7}), strict=True):
-        away = np.linalg.norm(points_of(shown[entry.path])[:, None] - centres, axis=2)
-        assert own <= set(away.argmin(axis=1).tolist())
-
-
-def test_frames_show_approach_and_reference_at_the_targets(on_grid):
-    task = replace(on_grid.task, roll_deg=(-15, 30), approach=(0, 0.5, -1))
-    shown = {layer.entry.label: layer for layer in scene.layers(replace(on_grid, task=task))}
-    targets = task.targets(on_grid.cells)
-    approach, reference = (
-        points_of(shown[name].commands[0]).reshape(-1, 2, 3)
-        for name in ("approach directions", "roll 0 (allowed -15 to 30 deg)")
-    )
-    assert np.allclose(approach[:, 1], targets.points, atol=2e-5)
-    assert np.allclose(reference[:, 0], targets.points, atol=2e-5)
-    for found, right in ((approach, targets.approaches), (reference, targets.references)):
-        along = np.diff(found, axis=1)[:, 0]
-        along /= np.linalg.norm(along, axis=1, keepdims=True)
-        assert np.allclose(along, right, atol=1e-3)
-    names = {layer.entry.label for layer in scene.layers(on_grid)}
-    assert not any("roll" in name or "approach" in name for name in names)
 
 
 def test_the_two_sides_of_a_cut_are_drawn_and_named(commands):
@@ -261,25 +212,3 @@ def test_the_flat_graph_and_causes_show_every_cell_once(kind, request):
     for kind in CauseKind:
         own = sum(cause.kind == kind for cause in verdict.causes)
         assert boxes[to_rgb(scene.CAUSES[kind])] == own
-
-
-def test_edges_over_a_seam_leave_at_one_border_and_come_in_at_the_other(puma):
-    tube = cylinder(0.5, angle_deg=(0, 360), height=(0.0, 0.4), position=(4, 0, 0))
-    verdict = check(puma, tube.cells(4, 1), Task(0.005, 45))
-    graph = verdict.graph.copy()
-    graph.add_edges_from([(0, 1), (1, 2), (2, 3), (3, 0)])
-    lines = unrolled_edges(replace(verdict, graph=graph))
-    angles = [sorted(line[:, 1].round(6).tolist()) for line in lines]
-    assert sorted(angles) == [[0, 45], [45, 135], [135, 225], [225, 315], [315, 360]]
-
-
-def test_a_transition_shows_every_waypoint_over_its_cell(on_grid):
-    a, b = max(on_grid.graph.edges)
-    axes = plot_transition(on_grid, (b, a)).axes[0]
-    walk = on_grid.graph.edges[a, b]["motion"]
-    moving = np.sort(np.argsort(-np.ptp(walk, axis=0))[:2])
-    dots = [d.get_offsets() for d in axes.collections if type(d) is PathCollection]
-    shown = {tuple(row) for row in np.concatenate(dots).round(9)}
-    assert shown == {tuple(row) for row in np.degrees(walk[:, moving]).round(9)}
-    with pytest.raises(ValueError, match="no edge between the cells 0 and 29"):
-        plot_transition(on_grid, (0, 29))

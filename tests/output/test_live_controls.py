@@ -100,17 +100,6 @@ def test_a_workbench_builds_what_the_case_builds_and_keeps_what_has_not_changed(
     assert np.array_equal(bench.build(narrow).robot.upper, narrow.build().robot.upper)
 
 
-def test_for_a_quick_look_the_curves_are_moved_and_as_they_would_be_fitted(plate):
-    bench = Workbench(plate.case)
-    turned = plate.changed({"position": [10, 0, 310], "rpy_deg": [5, 10, 30]})
-    rough, plain = (bench.build(turned, roughly).cells for roughly in (True, False))
-    assert bench.build(turned, roughly=True).cells is rough is not plain
-    assert np.array_equal(rough.centres, plain.centres)
-    assert np.allclose(rough.curves.cubics, plain.curves.cubics, atol=1e-12)
-    assert np.array_equal(rough.curves.first, plain.curves.first)
-    assert not np.array_equal(rough.curves.cubics, bench.setup.cells.curves.cubics)
-
-
 def test_a_workbench_says_what_does_not_go_together():
     case = PLATE.with_overrides(["robot.start_deg=[0, -90, 90, 0, 90, 0]"])
     narrow = controls_of(case).changed({"limits": {"elbow_joint": [-10, 10]}})

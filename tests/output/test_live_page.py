@@ -21,7 +21,6 @@ from feasibility.live.answers import Answers
 from feasibility.live.controls import Controls
 from feasibility.live.jobs import Job, Superseded
 from feasibility.live.server import LARGEST_REQUEST
-from feasibility.live.sessions import MOST
 from feasibility.live.workbench import Workbench
 from feasibility.reports import verdict as report
 from feasibility.viewer import View
@@ -177,21 +176,6 @@ def test_what_is_saved_is_what_is_shown_and_nothing_is_written(client, tmp_path,
     again = Controls(saved, saved.robot.build()).values
     assert again == {**values, "limits": {**again["limits"], **values["limits"]}}
     assert client.post("save", values={"cone_deg": -1})["error"].startswith("plate: task.cone_deg")
-
-
-def test_two_pages_have_answers_of_their_own(page, client):
-    other = Client(page)
-    mine, theirs = client.ask(False, cone_deg=5), other.ask(True, position=[900.0, 0.0, 300.0])
-    assert (mine["kind"], theirs["kind"]) == ("quick", "infeasible")
-    assert client.number == other.number == 1
-    rest = [Client(page) for _ in range(MOST - 2)]
-    assert "close one of them" in other.post("open")["refused"]
-    for one in (other, *rest):
-        assert one.post("close", session=one.session) == {"status": "closed"}
-    assert other.post("ask", session=other.session, number=9, values={}) == {"status": "gone"}
-    assert client.ask(True)["kind"] == "feasible"
-    late = client.post("ask", session=client.session, number=client.number - 1, values={})
-    assert late == {"status": "superseded"}, "a slow page never gets an old answer"
 
 
 def test_the_page_is_whole_and_fetches_nothing_from_elsewhere(page):

@@ -12,20 +12,15 @@ from dataclasses import replace
 import networkx as nx
 import numpy as np
 import pinocchio as pin
-import psutil
 import pytest
 from page_outline import points_of, tracks_of
-from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from feasibility import Task, check
 from feasibility.cases import load_case
 from feasibility.collisions import Collision, Obstacle, ToolShape
-from feasibility.paths import coverage_path
-from feasibility.timing import trajectory
-from feasibility.treated import treated_by_walk
 from feasibility.viewer import playback as motion
-from feasibility.viewer import view, view_path
+from feasibility.viewer import view
 from feasibility.viewer.frames.standing_world import GROUP
 from feasibility.viewer.live_server import LiveView
 from feasibility.viewer.robot import joint_paths
@@ -243,55 +238,7 @@ def test_bodies_move_with_the_arm_and_the_nearest_pair_has_its_distance(verdict)
 # -- paths and divisions --------------------------------------------------------------------------
 
 
-def test_at_any_time_what_is_painted_is_what_the_tool_has_come_by(verdict):
-    path = coverage_path(verdict, "rows")
-    radius, height = 0.08, path.task.standoff
-    run = trajectory(path, 0.05)
-    readout = view_path(path, run).readout  # the view shows long ones in a minute
-    assert readout.duration == run.duration > 60.0 >= readout.times[-1] - 1e-9
-    task = replace(path.task, footprint=2.0 * radius)
-    drawn = view_path(path, treated=treated_by_walk(path.robot, path.cells, task, path.walk))
-    tracks = tracks_of(drawn.commands)
-    when = {p: keys[0][1] for (p, kind), keys in tracks.items() if kind == ".visible"}
-    strokes = [p for p in when if "painted trail/" in p]
-    assert np.all(np.diff([when[p] for p in sorted(strokes)]) > 0.0)
-    parts = [c for c in drawn.commands if c.get("path", "").startswith("/treated/")
-             and c["type"] == "set_object" and c["path"] in when]  # fmt: skip
-    middles = [points_of(c).reshape(-1, 3, 3).mean(axis=1) for c in parts]
-    shown = np.repeat([when[c["path"]] for c in parts], list(map(len, middles)))
-    end = drawn.motion.seconds[-1]
-    for now in (0.2 * end, 0.5 * end, 0.8 * end):
-        behind = drawn.motion.tool_at(np.linspace(0.0, now, 4_000))
-        away, _ = KDTree(behind).query(np.concatenate(middles))
-        assert (shown[away < np.hypot(0.8 * radius, height)] <= now + 0.01 * end).all()
-        assert (shown[away > np.hypot(2.0 * radius, height)] >= now - 0.01 * end).all()
-
-
 # -- windows and their server ---------------------------------------------------------------------
-
-
-def test_the_server_answers_its_own_address_on_the_loopback_alone():
-    with LiveView("<p>caf\u00e9</p>") as live:
-        listening = [c.laddr.ip for c in psutil.Process().net_connections("tcp")
-                     if c.status == psutil.CONN_LISTEN and c.laddr.port == live.port]  # fmt: skip
-        assert listening == ["127.0.0.1"]
-        with urllib.request.urlopen(live.url, timeout=GUARD_S) as answer:
-            assert answer.read().decode() == "<p>caf\u00e9</p>"
-            assert answer.headers["Content-Type"] == "text/html; charset=utf-8"
-        for url, headers in [
-            (f"http://127.0.0.1:{live.port}/", {}),
-            (live.url + "../../etc/passwd", {}),
-            (live.url, {"Host": "evil.example"}),
-            (live.url, {"Host": "127.0.0.1.evil.example:80"}),
-            (live.url, {"Origin": "http://evil.example"}),
-        ]:
-            request = urllib.request.Request(url, headers=headers)
-            with pytest.raises(urllib.error.HTTPError, match="404") as refused:
-                urllib.request.urlopen(request, timeout=GUARD_S)
-            refused.value.close()
-    with pytest.raises(ConnectionRefusedError):
-        socket.create_connection(("127.0.0.1", live.port), timeout=GUARD_S)
-    live.close()
 
 
 def test_a_browser_that_goes_away_is_no_fault(capfd):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import io
-import math
 import sys
 
 import matplotlib as mpl
@@ -81,20 +80,6 @@ def test_the_whole_arm_is_in_the_picture_wherever_the_surface_stands() -> None:
         assert (image < 0.9).all(axis=2).sum() > 100
         for edge in (image[0], image[-1], image[:, 0], image[:, -1]):
             assert (edge == 1.0).all()
-
-
-def test_joints_carry_what_comes_after_them() -> None:
-    """Two turns of 45 degrees about x bring the square from +y, to the right, up to +z."""
-    turn = np.eye(4)
-    c = math.sqrt(0.5)
-    turn[1:3, 1:3] = [[c, -c], [c, c]]
-    part = threejs.mesh_object("/j/k/p", 0.1 * SQUARE + [0, 0.6, 0], HALVES, RED, lit=False)
-    turns = [threejs.transform("/j", turn), threejs.transform("/j/k", turn)]
-    off = 60 * 0.6 / 4.0 / (math.tan(math.radians(75 / 2)) / 2.0)  # a lens of 75 degrees, zoom 2
-    for moves, where in (([], (59.5, 79.5 + off)), (turns, (59.5 - off, 79.5))):
-        image = painted([part, *moves], FRONT, *SIZE)
-        found = np.argwhere(mask(image, RED)).mean(axis=0)
-        assert np.abs(found - where).max() < 1.0
 
 
 def test_a_view_leaves_a_picture_beside_the_page() -> None:

@@ -1,4 +1,4 @@
-"""The command as a process: what it loads, who reads it, bugs and trouble, waiting, Ctrl-C."""
+"""The command as a process: who reads it, bugs and trouble, waiting, Ctrl-C."""
 
 from __future__ import annotations
 
@@ -32,41 +32,12 @@ ROOT = Path(__file__).parents[2]
 COMMAND = [sys.executable, "-m", "feasibility.cli"]
 GUARD_S = 1800.0
 SMALL = ("check", "paper/4a", "--set", "surface.cells=[2, 2]")
-LOADED = (
-    "import sys; from feasibility.cli.main import main; status = main(sys.argv[1:])\n"
-    "print(*sys.modules, file=sys.stderr)"
-)
 
 
 def run(*args, **options):
     """Run the command as a process of its own."""
     given = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True} | options
     return subprocess.run([*COMMAND, *args], timeout=GUARD_S, check=False, cwd=ROOT, **given)
-
-
-# -- what is loaded -------------------------------------------------------------------------------
-
-
-HEAVY = {"numpy", "pinocchio", "scipy", "networkx", "numba", "rich", "robots"}
-LATE = {"networkx", "scipy.spatial", "scipy.optimize", "trimesh", "matplotlib", "urllib.request",
-        "feasibility.collisions.gathering", "feasibility.paper.greedy",
-        "surfaces.passes"}  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("line", "needed", "not_needed"),
-    [
-        ("--help", {"feasibility"}, HEAVY), ("check --help", {"feasibility"}, HEAVY),
-        ("chek", {"feasibility"}, HEAVY),
-        ("check paper/4a", {"numba", "pinocchio", "feasibility.roadmap.complete"}, LATE),
-    ],
-)  # fmt: skip
-def test_a_command_loads_only_what_it_needs(line, needed, not_needed):
-    command = [sys.executable, "-c", LOADED, *line.split()]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    loaded = set(done.stderr.splitlines()[-1].split())
-    assert needed <= loaded
-    assert not not_needed & loaded
 
 
 def test_the_installed_command_is_this_one(ask):
@@ -167,16 +138,6 @@ def test_trouble_of_the_machine_is_status_2_and_no_bug(ask, search, error, words
     assert "bug" not in said.err
 
 
-def test_what_a_library_says_of_an_interrupt_is_no_error(ask, search):
-    def broken():
-        with contextlib.suppress(KeyboardInterrupt):
-            signal.raise_signal(signal.SIGINT)
-        raise ImportError("some part of it failed to import")
-
-    search(broken)
-    assert ask(*SMALL) == (130, "", "coverable: interrupted\n")
-
-
 @pytest.mark.parametrize("line", ["check paper/4a --save no/a --html no/b --witness no/c",
                                   "path paper/4a --order spiral --passes 0 --pitch 0.1",
                                   "path paper/4a --program a.jbi", "divide paper/4a --html no/b",
@@ -217,21 +178,6 @@ def test_a_long_wait_for_kernels_is_explained_once_for_each_purpose(monkeypatch)
         compiled()
     assert sys.stderr.getvalue() == notices.COLLISIONS + "\n" + NOTICE + "\n"
     assert len({notices.CUTTING, notices.GREEDY, notices.COLLISIONS, NOTICE}) == 4
-
-
-def test_who_waits_is_told_for_what_and_how_to_have_it_all_at_once(capsys, monkeypatch):
-    real = feasibility.checking.check
-
-    def slow(*args, **more):
-        compiled()
-        return real(*args, **more)
-
-    monkeypatch.setattr(feasibility.checking, "check", slow)
-    monkeypatch.setattr(notices, "PATIENCE", 0.0)
-    assert cli.main(list(SMALL)) == 0
-    said = capsys.readouterr().err
-    assert "what else `coverable check` needs" in said
-    assert "`coverable warm-up` compiles all" in said
 
 
 @pytest.mark.sampled

@@ -18,9 +18,9 @@ from feasibility import Answer, Evidence, check
 from feasibility.cases import all_keys, builtin_cases, load_case
 from feasibility.collisions import CHECKABLE, UNCHECKED
 from feasibility.cut_words import place_of
-from feasibility.division import Reconfiguration, divide
+from feasibility.division import divide
 from feasibility.paths import coverage_path
-from feasibility.reports import comparison, division, path, study, too_late
+from feasibility.reports import changes, comparison, division, path, study, too_late
 from feasibility.reports import explanation as explained
 from feasibility.reports import verdict as report
 from feasibility.results import load_motion, load_result
@@ -55,6 +55,21 @@ def test_a_certified_clearance_is_rounded_down_whatever_it_is(plate):
         text = " ".join(report.as_text(replace(verdict, certificate=made), case).split())
         assert float(re.search(r"bodies at least (\S+) mm", text)[1]) <= 1e3 * least
         assert float(re.search(r"joints at least (\S+) deg", text)[1]) <= math.degrees(least)
+
+
+MORE_IS_LESS = (Kind.LOWER, Kind.CLEARANCE, Kind.TOOL_CLEARANCE)
+
+
+@pytest.mark.parametrize("kind", [Kind.CONE, Kind.UPPER, *MORE_IS_LESS])
+@pytest.mark.parametrize("value", [0.1234567, 0.7654321])
+def test_feasible_values_allow_more_and_others_less_by_a_digit_at_most(kind, value):
+    turns = kind not in (Kind.CLEARANCE, Kind.TOOL_CLEARANCE)
+    asked = Quantity(kind, "it", "rad" if turns else "m", 0.0, 1.0, 0.5, True)
+    exact, digit = (math.degrees(value), 0.01) if turns else (value, 1e-5)
+    for feasible in (True, False):
+        more = float(changes.number(asked, value, feasible)) - exact
+        more *= -1 if (kind in MORE_IS_LESS) == feasible else 1
+        assert 0.0 < more < digit
 
 
 # -- verdicts -------------------------------------------------------------------------------------
@@ -131,18 +146,6 @@ def test_what_a_path_goes_over_again_is_not_covered_twice(plate):
 
 
 # -- other sentences ------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("n", "most"), [(1, 1), (3, 2), (4, 2), (7, 3)])
-def test_a_long_move_names_its_largest_parts_and_counts_the_rest(n, most):
-    rng = np.random.default_rng(10 * n + most)
-    end = rng.permutation(np.arange(1, n + 1)) * np.where(rng.random(n) < 0.5, -0.3, 0.3)
-    names = tuple(f"j{k}" for k in range(n))
-    move = Reconfiguration(names, np.zeros(n, dtype=bool), np.zeros(n), end)
-    whole = move.described().split(", ")
-    assert [part.split()[0] for part in whole] == [names[k] for k in np.argsort(-np.abs(end))]
-    told = move.described(most).split(", ")
-    assert told == (whole if n <= most + 1 else [*whole[:most], f"{n - most} more"])
 
 
 @pytest.mark.parametrize("side", [-1, 0, 1])

@@ -22,7 +22,6 @@ from feasibility.clock import Clock, OutOfTime, compiling
 from feasibility.division import divide
 from feasibility.interrupts import interruptible
 from feasibility.results import save_result
-from feasibility.sensitivity import explain
 from feasibility.studies import StudyTask, compare, open_workers, run_tasks
 
 LIMIT = ("--set", "search.time_limit=3600")
@@ -111,27 +110,6 @@ def test_a_division_in_no_time_leaves_cells_unsettled():
         assert found.ended or all(cause.proved for cause in found.left_out)
         assert found.n_covered <= whole.n_covered
     assert 1 <= ended < clock.looks[0]
-
-
-def test_an_explanation_names_what_was_not_looked_for():
-    case, clock = case_named("long plate").build()[:3], EndingClock()
-    whole = explain(*case, clock=clock)
-    for look in sorted({2, 3, *spread(range(clock.looks[0]), 3)}):
-        try:
-            found = explain(*case, clock=EndingClock(at=look))
-        except OutOfTime:  # before the search began
-            continue
-        names = [threshold.quantity.name for threshold in found.thresholds]
-        if found.verdict.answer is Answer.UNDECIDED:
-            assert not any(threshold.feasible for threshold in found.thresholds)
-        else:
-            assert found.verdict.answer is whole.verdict.answer
-            names += found.left_out
-            assert names == [threshold.quantity.name for threshold in whole.thresholds]
-        for threshold in found.thresholds:  # nothing helps this plate, and nothing may be said to
-            assert threshold.feasible is None
-            proved = threshold.other and threshold.other.evidence is Evidence.PROOF
-            assert proved or not threshold.ruled_out
 
 
 def test_files_that_are_not_written_are_named(folder, tmp_path):

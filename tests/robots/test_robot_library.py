@@ -153,12 +153,6 @@ def test_any_link_can_be_the_tool_and_the_chain_ends_there(tmp_path):
     np.testing.assert_allclose(Kinematics(ee_link).tool(q), Kinematics(flange).tool(q), atol=1e-11)
 
 
-def test_the_librarys_axis_goes_with_the_librarys_tool_frame():
-    for options, axis in (({}, [1, 0, 0]), ({"tool_frame": "j2s6s200_link_6"}, [0, 0, 1]),
-                          ({"approach_axis": (0, -2, 0)}, [0, -1, 0])):  # fmt: skip
-        np.testing.assert_array_equal(load_robot("kinova", **options).approach_axis, axis)
-
-
 # limits and held joints
 
 

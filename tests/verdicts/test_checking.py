@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
-import os
 import pickle
-import subprocess
-import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -25,7 +21,6 @@ from feasibility.results import load_result, save_result
 from feasibility.roadmap import warm_up
 from feasibility.roadmap.exploration import BUDGET
 
-GUARD_S = 1800.0  # against hanging alone
 FEW = ("paper 5d", "puma560 190", "ur5 12", "dome of halves", "beside a post")
 
 
@@ -67,26 +62,6 @@ def test_threads_do_not_disturb_each_other():
             same(verdict_of(name), verdict)
 
 
-PRINT_WITNESS = """
-import hashlib
-from feasibility import Task, check
-from robots import load_robot
-from surfaces import plane
-patch = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside")
-walk = check(load_robot("ur5"), patch.cells(3, 4), Task(standoff=0.02, cone_deg=30)).witness
-print(hashlib.sha256(walk.q.tobytes() + walk.cell.tobytes()).hexdigest())
-"""
-
-
-def test_another_process_finds_the_same_motion():
-    walk = verdict_of("plate").witness
-    here = hashlib.sha256(walk.q.tobytes() + walk.cell.tobytes()).hexdigest()
-    asked = [sys.executable, "-c", PRINT_WITNESS]
-    how = {"capture_output": True, "text": True, "check": True, "timeout": GUARD_S}
-    other = subprocess.run(asked, env={**os.environ, "PYTHONHASHSEED": "1"}, **how)
-    assert other.stdout.strip() == here
-
-
 # Budgets and interruption: all cells are reached, in several components that nothing joins, and
 # there are too many of them to end soon.
 
@@ -97,7 +72,7 @@ def hard():
     return robot, cells.surface.cells(240, 200), task
 
 
-@pytest.mark.parametrize("looks", [1, 5, 40])
+@pytest.mark.parametrize("looks", [1, 5, 12])
 def test_a_time_limit_is_honoured(looks, hard):
     warm_up()
     clock = EndingClock(at=looks)
@@ -106,7 +81,7 @@ def test_a_time_limit_is_honoured(looks, hard):
     assert "time limit" in verdict.message
     assert (verdict.witness, verdict.certificate) == (None, None)
     # The compiled loops come back soon, and nothing goes on once the time is up.
-    assert clock.looks[0] <= looks + 8
+    assert clock.looks[0] <= looks + 2
     assert verdict.statistics["fk"] <= 1.1 * BUDGET * looks
     # What was found until then stands.
     assert (verdict.n_covered > 0) == (looks > 1)

@@ -9,12 +9,10 @@ from feasibility import Task, check, verify
 from feasibility.certification import replay
 from feasibility.collisions import Collision
 from feasibility.paths import PathError, coverage_path
-from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.forward.run import OrderedRun, _follow, layers_of, run_in_order
+from feasibility.roadmap.forward.run import layers_of
 from feasibility.roadmap.graph import Roadmap
-from feasibility.roadmap.motions import arrays_of
 from feasibility.roadmap.walk import route_walk
-from feasibility.verdict import Answer, CauseKind
+from feasibility.verdict import Answer
 from robots import load_robot
 from surfaces import plane, poses
 
@@ -88,26 +86,6 @@ def test_a_run_is_a_path_through_the_layers_that_never_goes_back():
     walk = route_walk(roadmap, run.start, run.route)
     assert walk.cell.tolist() == [0, 1, 2, 2, 3, 4, 5]
     assert walk.q[:, 0].tolist() == [0, 1, 2, 8, 9, 10, 11]
-
-
-def test_a_configuration_is_followed_ahead_along_certified_motions(ur5):
-    cells = poses(PATCH.centres[SNAKE], PATCH.normals[SNAKE])
-    exploration = Exploration(ur5, cells, arrays_of(ur5, cells, TASK), seed=0)
-    assert exploration.grower.seed(0, check(ur5, cells, TASK).witness.q[0])
-    assert layers_of(exploration.roadmap).furthest == 0
-    _follow(exploration, 0, len(cells))
-    run = run_in_order(exploration)
-    assert (run.furthest, run.rounds) == (35, 0)
-    assert replay(ur5, cells, TASK, run.walk, np.ones(36, dtype=bool)).accepted
-
-
-def test_what_a_failed_run_says():
-    run = OrderedRun(walk=None, furthest=3, rounds=8)
-    assert run.covered(6).tolist() == [True] * 4 + [False] * 2
-    assert "ends over pose 3" in run.failed_words(6)
-    assert [(cause.cell, cause.kind) for cause in run.causes(6)] == [
-        (4, CauseKind.DISCONNECTED), (5, CauseKind.DISCONNECTED)
-    ]  # fmt: skip
 
 
 def test_collisions_with_a_surface_are_left_out_where_there_is_none(ur5):

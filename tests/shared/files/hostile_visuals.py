@@ -195,7 +195,7 @@ RED = "vt 0 0\nusemtl red\nf 1/1 2/1 3/1\n"
 COUNTED, NOTHING_ELSE = "with each instance counted", r"mesh\.\w+: \w"
 CORNERS_LISTED, DEEP = "more corners than are listed", "XML elements|deep inside each other"
 LEVELS = [{"children": [k + 1, k + 1]} for k in range(60)] + [{"mesh": 0}]
-AWAY = "<input semantic='{}' source='#two-v' offset='99999'/>"
+AWAY = "<input semantic='VERTEX' source='#two-v' offset='99999'/>"
 
 # Name -> how the file ends, what it holds, and the words of the note (a pattern).
 TRAPS: dict[str, tuple[str, str | bytes, str]] = {
@@ -212,15 +212,11 @@ TRAPS: dict[str, tuple[str, str | bytes, str]] = {
     "entities": ("dae", entities(f"<!ENTITY e0 'x'>{BOMB}"), "DOCTYPE"),
     "entity beside it": ("dae", entities(f"<!ENTITY e11 SYSTEM '{BESIDE}'>"), "DOCTYPE"),
     **{f"polygons of {sizes[:9]}": ("dae", polygons(sizes), CORNERS_LISTED)
-       for sizes in ("1000000000", "-3", "9" * 5000, "3 3 3 99999999", "1e9")},
-    "false width": ("dae", false_width(AWAY.format("NORMAL")), COUNTED),
-    "false width further in": (
-        "dae", false_width(f"<extra>{AWAY.format('VERTEX')}</extra>"), COUNTED
-    ),
+       for sizes in ("1000000000", "-3", "9" * 5000)},
+    "false width": ("dae", false_width(f"<extra>{AWAY}</extra>"), COUNTED),
     "deep": ("dae", collada(scene="<node>" * 100 + shown() + "</node>" * 100), DEEP),
     "many elements": ("dae", collada(scene="<node/>" * 400_000), DEEP),
     "painted": ("dae", painted_dae(BESIDE), DRAWN),
-    "painted from outside": ("dae", painted_dae("../../../../../../dev/zero"), DRAWN),
     "cut short": ("dae", GOOD[: len(GOOD) // 2], NOTHING_ELSE),
     "encoding": ("dae", GOOD.replace("0\"?", '0" encoding="utf-7"?'), NOTHING_ELSE),
     "no numbers": ("dae", GOOD.replace(TRIANGLE, "nan inf 1e99 1 0 0 0 1 0"), NOTHING_ELSE),
