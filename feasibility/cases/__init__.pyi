@@ -13,9 +13,9 @@ from .robot_table import RobotPart as RobotPart
 from .robot_table import in_robot_table as in_robot_table
 from .robot_table import is_urdf as is_urdf
 from .robot_table import read_robot as read_robot
-from .surface_keys import OWN_KEYS as OWN_KEYS
-from .surface_table import faults_of_building as faults_of_building
-from .surface_table import read_surface as read_surface
+from .surface_reading import OWN_KEYS as OWN_KEYS
+from .surface_reading import faults_of_building as faults_of_building
+from .surface_reading import read_surface as read_surface
 from .table_reader import CaseError as CaseError
 from .table_reader import Section as Section
 from .table_reader import absolute as absolute

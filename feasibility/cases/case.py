@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from coverable_errors import MISSING, ArgumentError, Fault, close, printable
 from feasibility.cases.collision_table import CollisionPart, faults_of_meshes, read_collision
 from feasibility.cases.robot_table import RobotPart, faults_of_loading, in_robot_table, read_robot
-from feasibility.cases.surface_table import (
+from feasibility.cases.surface_reading import (
     AUTO,
     MESHES,
     SurfacePart,

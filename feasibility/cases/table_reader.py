@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from coverable_errors import (
@@ -19,7 +18,6 @@ from coverable_errors import (
     shown,
 )
 from feasibility.cases.keys import Key, all_keys, keys_of
-from feasibility.safe_files import shown_path
 
 MOST_GUESSES = 20  # unknown keys for which a known one is looked up
 DEG = "degrees"
@@ -30,14 +28,6 @@ Triple = tuple[float, float, float]
 Made = TypeVar("Made")
 
 ORIGIN: Triple = (0.0, 0.0, 0.0)
-SURFACE_NAMES = {
-    "low": "box[0]",
-    "high": "box[1]",
-    "half_angle_deg": "within_deg",
-    "count": "cells",
-    "size": "cell_size",
-}
-"""Keys of a surface that are called otherwise in Python."""
 
 
 class CaseError(CoverableError):
@@ -210,27 +200,3 @@ def frozen(value: Any, exact: bool = False) -> Any:
     if isinstance(value, (list, tuple)):
         return tuple(frozen(item, exact) for item in value)
     return float(value) if is_number(value) and not exact else value
-
-
-@contextmanager
-def surface_faults(key: str = "") -> Iterator[None]:
-    """Turn faults of a surface into faults of the case; `key` is whose those without one are.
-
-    Raises:
-        CaseError: what happens inside is a fault.
-    """
-    from surfaces import SurfaceError
-
-    try:
-        yield
-    except SurfaceError as error:
-        faults = (fault._replace(key=fault.key or key) for fault in error.faults)
-        raise CaseError([fault.renamed(SURFACE_NAMES, "surface") for fault in faults]) from error
-
-
-def in_file(error: CoverableError, file: str, table: str) -> list[Fault]:
-    """The faults of a file that a table of the case names."""
-    return [
-        Fault(f"{table}.file", f"{fault.key} {fault.message}".strip(), shown_path(file))
-        for fault in error.faults
-    ]
