@@ -11,8 +11,18 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
-from feasibility.cases.toml import STRINGS_AND_COMMENTS, toml_key
+from feasibility.cases.toml import toml_key
 
+# What may hold brackets, dots and equals signs that mean nothing. A string that never ends goes to
+# the end of its line or of the text; the parser refuses it there.
+STRINGS_AND_COMMENTS = re.compile(
+    r'"""(?:[^\\"]|\\.|"{1,2}(?!"))*+"{0,5}'
+    r"|'''(?:[^']|'{1,2}(?!'))*+'{0,5}"
+    r'|"(?:[^\\"\n]|\\.)*+"?'
+    r"|'[^'\n]*+'?"
+    r"|#[^\n]*+",
+    re.DOTALL,
+)
 Path = tuple[str, ...]
 _NAME = r"([\w-]+(?:[ \t]*\.[ \t]*[\w-]+)*)"
 _HEADER = re.compile(rf"[ \t]*\[(\[?)[ \t]*{_NAME}[ \t]*\]")

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-import tomli_w
 from bad_input import GOOD_CASE, changed, goods, lay_out
 
 from feasibility import Search, Task
 from feasibility.cases import Case, CaseError, load_case
 from feasibility.cases.robot_table import RobotPart
-from feasibility.cases.toml import parse_toml, too_much
 
 GOOD = Path(__file__).with_name("good")
 # Table II: position and cone; Table I by name; Table III by kind.
@@ -119,41 +116,14 @@ def test_limits_frames_and_axes_come_through(tmp_path: Path) -> None:
 # the edges of TOML that is read: 16 brackets, keys of 8 parts, 50,000 keys
 
 
-@pytest.mark.parametrize(
-    ("text", "excess"),
-    [
-        (f"x = {'[' * 16}{']' * 16}", ""),
-        (f"x = {'[' * 17}{']' * 17}", "17 brackets are open at once, more than 16"),
-        ("x = [[" + "{a = [" * 7 + "1" + "]}" * 7 + "]]", ""),
-        ("x = [[[" + "{a = [" * 7 + "1" + "]}" * 7 + "]]]", "17 brackets are open at once"),
-        ('a . "b\\"".\'c\'.d.e.f.g.h = 1', ""),
-        ('a . "b\\"".\'c\'.d.e.f.g.h.i = 1', "a key has 9 parts, more than 8"),
-        ("[[a.b.c.d.e.f.g.h.i]]", "a key has 9 parts"),
-        ("x = {a.b.c.d.e.f.g.h.i = 1}", "a key has 9 parts"),
-        ("\n".join(f"k{k} = {k}.5" for k in range(50_000)), ""),
-        ("\n".join(f"k{k} = {k}.5" for k in range(50_001)), "has 50,001 keys, more than 50,000"),
-        ("\n".join(f"[a.b.k{k}]" for k in range(16_667)), "has 50,001 keys"),
-        ("[a.b.c.d]\ne.f.g.h = 1", ""),
-        ("[a.b.c.d]\ne.f.g.h.i = 1", "at most 8 tables inside each other"),
-        ("a.b.c.d = [[{e.f.g.h.i = [1]}]]", "at most 8 tables inside each other"),
-        *[
-            (form.format(inside), "")
-            for inside in ("[" * 99, "a." * 99 + "a", "a = 1, " * 50_001)
-            for form in ('a = "{}"', "a = '{}'", 'a = """\n{}"\\""" """', "#{}", "'#' = 1\n#{}")
-        ],
-    ],
-    ids=lambda text: text[:12],
-)
-def test_a_document_is_read_up_to_its_caps(text: str, excess: str) -> None:
-    """What strings and comments hold does not count, and what is read comes back."""
-    assert excess in too_much(text) or excess.startswith("at most")
-    if excess:
-        with pytest.raises(CaseError, match=re.escape(excess)):
-            Case.from_toml(text)
-    else:
-        assert too_much(text) == ""
-        tables = parse_toml(text)
-        assert len(text) > 100_000 or parse_toml(tomli_w.dumps(tables)) == tables
+@pytest.mark.parametrize("text", [
+    f"x = {'[' * 20_000}", "x = " + "{a = " * 20_000, f"{'a.' * 60_000}a = 1", f"[{'a.' * 100}a]",
+    f"x = {'[' * 100}{']' * 100}",
+])  # fmt: skip
+def test_a_document_that_is_nested_too_deeply_is_refused(text: str) -> None:
+    """So deep that Python would not get through it."""
+    with pytest.raises(CaseError, match="is nested too deeply"):
+        Case.from_toml(text)
 
 
 # numbers a thousand times too large, or radians
