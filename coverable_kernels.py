@@ -40,7 +40,6 @@ CODE = (
     "surfaces/meshes/*.py",
     "surfaces/meshes/cells/*.py",
     "surfaces/patches/closed_form_kernels.py",
-    "feasibility/certification/collisions/*_kernels.py",
     "feasibility/collisions/kernels/*.py",
     "feasibility/paper/*.py",
     "feasibility/placement/quick_search.py",

@@ -18,12 +18,11 @@ from feasibility.collisions.scene import Obstacle, ToolShape
 from feasibility.collisions.shapes import HalfSpace
 from feasibility.collisions.words import TOOL
 from robots import Robot
-from robots.shapes import Polytope, Solid, Triangles, hull_of
+from robots.shapes import Polytope, Solid, Triangles, hull_of, is_convex
 
 Points = Array
 
 MOST_VERTICES = 64  # of a convex mesh: its hull would be thinned, so one with more stays triangles
-_CONVEX = 1e-9  # [1], of the widest side: a vertex may stand out of a face's plane as far
 _CUBE = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
 
@@ -45,7 +44,7 @@ def polytopes_of(obstacle: Obstacle, reach: float) -> tuple[Polytope, ...] | Non
         middle, size = below(placement, reach)
         vertices = _moved(placement, middle + _CUBE * (0.5 * size))
         return (Polytope(obstacle.name, 0, vertices, 0.0),)
-    if isinstance(geometry, Triangles) and not is_convex(geometry):
+    if isinstance(geometry, Triangles) and not _is_convex(geometry):
         return None
     vertices, radius = hull_of(geometry)
     return (Polytope(obstacle.name, 0, _moved(placement, vertices), radius),)
@@ -54,7 +53,7 @@ def polytopes_of(obstacle: Obstacle, reach: float) -> tuple[Polytope, ...] | Non
 def soup_of(obstacle: Obstacle) -> Soup | None:
     """The triangles of an object that is a mesh and not convex; None for any other."""
     geometry = obstacle.geometry
-    if not isinstance(geometry, Triangles) or is_convex(geometry):
+    if not isinstance(geometry, Triangles) or _is_convex(geometry):
         return None
     corners = _moved(obstacle.placement, geometry.vertices)[geometry.faces]
     return Soup(obstacle.name, corners, 0.0, geometry.closed)
@@ -79,21 +78,9 @@ def tool_polytopes(tool: Sequence[ToolShape], robot: Robot) -> tuple[Polytope, .
     return tuple(found)
 
 
-def is_convex(mesh: Triangles) -> bool:
-    """Do the triangles bound a convex solid? False for one of more than 64 vertices.
-
-    They do where they are closed, in one piece, and no vertex is above the plane of a face.
-    """
-    vertices, faces = mesh.vertices, mesh.faces
-    if not mesh.closed or len(vertices) > MOST_VERTICES:
-        return False
-    corner = vertices[faces]
-    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    normals = across / np.linalg.norm(across, axis=1, keepdims=True)
-    heights = normals @ vertices.T - np.einsum("ki,ki->k", normals, corner[:, 0])[:, None]
-    wide = np.ptp(vertices, axis=0).max()
-    # Euler's formula: one piece without handles has 2 vertices more than half its faces.
-    return bool(heights.max() <= _CONVEX * wide and 2 * len(vertices) == len(faces) + 4)
+def _is_convex(shape: Triangles) -> bool:
+    """Is it a convex solid whose hull needs no thinning?"""
+    return len(shape.vertices) <= MOST_VERTICES and is_convex(shape)
 
 
 def below(placement: Points, reach: float) -> tuple[Points, Points]:

@@ -2,8 +2,12 @@ from .bodies import Fineness as Fineness
 from .bodies import Polytope as Polytope
 from .bodies import Solid as Solid
 from .bodies import Triangles as Triangles
+from .coal_shapes import coal_hull as coal_hull
+from .coal_shapes import coal_shape as coal_shape
+from .coal_shapes import with_contacts as with_contacts
 from .hulls import Hull as Hull
 from .hulls import hull_of as hull_of
+from .hulls import is_convex as is_convex
 from .hulls import outer_hull as outer_hull
 from .links import LinkShapes as LinkShapes
 from .links import link_shapes as link_shapes
@@ -12,7 +16,6 @@ from .pairs import LeftOut as LeftOut
 from .pairs import LinkPairs as LinkPairs
 from .pairs import faults_of_srdf as faults_of_srdf
 from .pairs import link_pairs as link_pairs
-from .sampling import with_contacts as with_contacts
 from .sampling import with_crude_links_cut as with_crude_links_cut
 from .tool import BARE as BARE
 from .tool import Reach as Reach

@@ -25,6 +25,7 @@ PRISM_EXCESS = 3e-4  # [m] the corners of a prism around a cylinder stand out by
 FACETS = 3  # of a hull, that a distance is taken from at first; four is the least a hull has
 CHUNK = 256  # points whose distances from all facets are taken at a time
 MOST_SIDES = 32  # ... where so many sides are enough
+ROUNDED = 1e-9  # [1] of a hull's volume: what a convex body may miss of it by rounding
 
 
 class Hull(NamedTuple):
@@ -111,6 +112,19 @@ def hull_volume(points: Array) -> float:
         return float(ConvexHull(points).volume)
     except QhullError:
         return 0.0
+
+
+def is_convex(mesh: Triangles, allowed: float = ROUNDED) -> bool:
+    """Do triangles bound a solid, in one piece, that fills all of its convex hull but a share?
+
+    One piece without handles has 2 vertices more than half its faces (Euler).
+    """
+    vertices, faces = mesh.vertices, mesh.faces
+    if not mesh.closed or 2 * len(vertices) != len(faces) + 4:
+        return False
+    a, b, c = (vertices[faces[:, k]] - vertices[0] for k in range(3))
+    volume = float(np.einsum("ij,ij->", np.cross(a, b), c)) / 6.0
+    return abs(volume) >= (1.0 - allowed) * hull_volume(vertices) > 0.0
 
 
 def _box_corners(low: Array, high: Array) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 
 from coverable_arrays import Array
 from robots.shapes.bodies import Geometry, Triangles
-from robots.shapes.hulls import Hull, hull_of, hull_volume, outer_hull
+from robots.shapes.hulls import Hull, hull_of, hull_volume, is_convex, outer_hull
 
 MOST_PIECES = 8
 BINS = 16  # planes may lie between any two of them
@@ -41,7 +41,7 @@ def pieces_of(shape: Geometry) -> list[Hull]:
 
 @lru_cache(maxsize=256)
 def _pieces_of_mesh(mesh: Triangles) -> tuple[Hull, ...]:
-    if _fills_its_hull(mesh):
+    if is_convex(mesh, WORTH):
         return (hull_of(mesh),)
     points = _on_surface(mesh)
     cut = min((_best_cut(points, axis) for axis in range(3)), key=lambda cut: cut.volume)
@@ -50,13 +50,6 @@ def _pieces_of_mesh(mesh: Triangles) -> tuple[Hull, ...]:
     ends = np.concatenate([[-np.inf], cut.places, [np.inf]])
     slabs = (_clipped(mesh, cut.axis, *ends[k : k + 2]) for k in range(len(ends) - 1))
     return tuple(outer_hull(slab) for slab in slabs if len(slab))
-
-
-def _fills_its_hull(mesh: Triangles) -> bool:
-    """Is a solid all but convex?"""
-    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
-    volume = abs(float(np.einsum("ij,ij->", np.cross(a, b), c))) / 6.0
-    return mesh.closed and volume > (1.0 - WORTH) * hull_volume(mesh.vertices)
 
 
 def _on_surface(mesh: Triangles) -> Array:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -17,10 +16,9 @@ import pinocchio as pin
 from coverable_arrays import Array, Mask
 from robots.kinematics import Kinematics
 from robots.robot import Robot
-from robots.shapes.bodies import Polytope, Solid, Triangles
-from robots.shapes.hulls import thickened
+from robots.shapes.bodies import Polytope, Solid
+from robots.shapes.coal_shapes import coal_body, coal_shape, with_contacts
 from robots.shapes.links import LinkShapes, outer_bodies
-from robots.urdf import Box, Capsule, Cylinder, Sphere
 
 SAMPLES = 1000
 SEED = 0
@@ -59,11 +57,11 @@ class PairSampling:
         self._of_owner: dict[str, list[int]] = {}
         for number, body in enumerate(bodies):
             if isinstance(body, Solid):
-                shape, placement = _exact_shape(body)
+                shape, placement = coal_shape(body.geometry), np.array(body.placement)
             else:
-                shape, placement = _coal_shape(body)
+                shape, placement = coal_body(body)
             title = f"{number} {body.owner}"
-            entry = pin.GeometryObject(title, body.joint, 0, placement, shape)
+            entry = pin.GeometryObject(title, body.joint, 0, pin.SE3(placement), shape)
             index = int(self._geometry.addGeometryObject(entry))
             self._of_owner.setdefault(body.owner, []).append(index)
 
@@ -87,64 +85,6 @@ class PairSampling:
             hits = [k for k, result in enumerate(scratch.collisionResults) if result.isCollision()]
             found[row, [pair_of[k] for k in hits]] = True
         return found
-
-
-def with_contacts(request: Any) -> Any:
-    """A request of coal's that also finds deep penetrations.
-
-    Without contacts coal 3.0 takes many of those of hulls for a distance of 1e-7 m, so for none.
-    """
-    request.enable_contact = True
-    return request
-
-
-def _coal_shape(body: Polytope) -> tuple[Any, pin.SE3]:
-    """A body as a shape of coal, and where it is in the frame of its joint."""
-    import coal
-    from scipy.spatial import ConvexHull
-
-    vertices, place = body.vertices, pin.SE3.Identity()
-    if len(vertices) == 1:
-        place.translation = np.array(vertices[0])
-        return coal.Sphere(max(body.radius, 1e-9)), place
-    if len(vertices) == 2:
-        along = vertices[1] - vertices[0]
-        place.translation = vertices.mean(axis=0)
-        place.rotation = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), along).matrix()
-        return coal.Capsule(max(body.radius, 1e-9), float(np.linalg.norm(along))), place
-    # Not coal's own hull: it crashes where points are flat; Qhull raises.
-    hull = ConvexHull(thickened(np.array(vertices)))
-    points, faces = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
-    points.extend(list(hull.points))
-    faces.extend([coal.Triangle(*map(int, face)) for face in hull.simplices])
-    shape = coal.Convex(points, faces)
-    shape.setSweptSphereRadius(body.radius)
-    return shape, place
-
-
-def _exact_shape(solid: Solid) -> tuple[Any, pin.SE3]:
-    """The same of an exact shape of the URDF."""
-    import coal
-
-    place, shape = pin.SE3(np.array(solid.placement)), solid.geometry
-    match shape:
-        case Box(size):
-            return coal.Box(*size), place
-        case Sphere(radius):
-            return coal.Sphere(radius), place
-        case Capsule(radius, length):
-            return coal.Capsule(radius, length), place
-        case Cylinder(radius, length):
-            return coal.Cylinder(radius, length), place
-        case Triangles(vertices, faces):
-            points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
-            points.extend(list(np.ascontiguousarray(vertices)))
-            triangles.extend([coal.Triangle(*face) for face in faces.tolist()])
-            model = coal.BVHModelOBBRSS()
-            model.beginModel(len(faces), len(vertices))
-            model.addSubModel(points, triangles)
-            model.endModel()
-            return model, place
 
 
 def with_crude_links_cut(robot: Robot, shapes: LinkShapes, pairs: Sequence[Pair]) -> LinkShapes:

@@ -12,31 +12,29 @@ import numpy as np
 import pytest
 from arm_urdfs import joint
 from bounds import LARGE, Starved, grown
-from capsule_arms import at, bodies_of, capsule_links, pair, planar_arm
+from capsule_arms import at, bodies_of, box_mesh, capsule_links, pair, planar_arm
 from gantry import configurations, gantry, raster
 from random_arms import robot_of
 
 from feasibility import Task, certification
 from feasibility.certification import rates, rolls
-from feasibility.certification.collisions import collision_replay, piece_of
-from feasibility.certification.collisions.budgets import Budget, TooNear
-from feasibility.certification.collisions.descent import Descent, rough_bounds
-from feasibility.certification.collisions.mesh_pieces import MeshPart
-from feasibility.certification.collisions.pairing import Pairing
-from feasibility.certification.collisions.parting import by_balls, guesses, parted
-from feasibility.certification.collisions.relative_motion import ArmMotion
+from feasibility.certification.collisions import collision_replay
+from feasibility.certification.collisions.collision_replay import Couples
+from feasibility.certification.collisions.motion import ArmMotion
 from feasibility.certification.stretches import Judge
-from feasibility.collisions import Soup
+from feasibility.collisions import Obstacle, Soup
 from feasibility.roll import Roll
 from feasibility.treated import treated_by_walk
 from feasibility.verdict import Walk
 from robots import Kinematics
-from robots.urdf import Box
+from robots.shapes import Solid, Triangles
+from robots.urdf import Box, Sphere
 from surfaces import parametric, plane
 from surfaces.places import offset_surface
 
 FAR = 9e3  # m, of an axis: as far as a URDF may put it
 PLANAR, LINKS = planar_arm((0.5, 0.4)), capsule_links((0.5, 0.4), 0.03)
+SLIDE = planar_arm([0.1], ["prismatic"])
 ROWS = np.array([[0.3, 0.0], [0.2, 0.1], [0.1, 0.2]])  # of the planar arm
 CORNERS = np.array([[0.3, 0.8, -0.1], [0.3, 0.8, 0.1], [0.5, 0.9, 0], [0.5, 1, 0.1]])  # of a sheet
 FACES = np.array([[0, 1, 2], [1, 2, 3]])
@@ -141,50 +139,44 @@ def test_rates_of_an_arm_with_an_axis_far_away(turn, asked, far, accepted):
     assert rates.in_place(robot, spot, Task(0.02, 30), rests)[0] == accepted
 
 
+def fed(bodies, arm, rows, name):
+    """The first two bodies of a scene along a motion, as they are and starved of `name`."""
+    motion = ArmMotion(arm, rows)
+
+    def worse(chords):
+        hungry = [name, "delta"] if name == "moved" else [name]  # either bounds the way of points
+        return chords._replace(**{one: 1e3 * grown(getattr(chords, one)) for one in hungry})
+
+    for one in (motion, Starved(motion, "chords", worse)):
+        yield Couples(bodies).along(one)[0]
+
+
 @pytest.mark.parametrize("name", ["delta", "deviation"])
-def test_bodies_along_a_stretch(name):
-    """How far their points may leave the chord, and be moved by joints off the line besides."""
-    motion, link = ArmMotion(PLANAR, ROWS), LINKS[1]
-    b = piece_of(link.geometry, link.placement)
-    box = piece_of(Box((0.2, 0.2, 0.2)), at(0.3, 0.8))
-    mesh = MeshPart(CORNERS, FACES, False)
-    fed = motion.stretches(0, 2, b.centre, b.ball)
-    hungry = replace(fed, **{name: np.full(2, 1e30)})
-
-    def least(s):
-        planes = [parted(box, b, s, n) for n in guesses(box, b, s)]
-        return np.concatenate([by_balls(box, b, s), *planes, rough_bounds(mesh.tree, b, s)])
-
-    def left(s):
-        return len(Descent(mesh.tree, b, 0.01, 0.02).parted(s).at)
-
-    def refused(s):
-        pairing = Pairing(box, b, (0, 2), motion, s)
-        pairing.certify(0.01, 0.02)
-        return pairing.place is not None
-
-    assert (least(fed) > 0.01).all()
-    assert not (least(hungry) > 0.01).any()
-    assert left(fed) == 0
-    assert left(hungry) == 2 * len(FACES)
-    assert not refused(fed)
-    assert refused(hungry)
-    balls = np.array([0, 2]), np.array([[0.4, 0.8, 0], b.centre]), np.array([0.1, b.ball])
-    moving, boxes = motion.body_motions(*balls), (np.full((2, 3), 0.1), np.array([[0, 1]]))
-    assert (motion.outer_bounds(moving, *balls, *boxes) > 0.01).all()
-    worse = replace(moving, **{name: grown(getattr(moving, name))})
-    assert not (motion.outer_bounds(worse, *balls, *boxes) > 0.01).any()
+@pytest.mark.parametrize("thing", [Box((0.2, 0.2, 0.2)), Triangles(CORNERS, FACES, False)])
+def test_balls_and_planes_that_part_bodies(name, thing):
+    """How far points may leave the chord, and be moved by joints off the line besides."""
+    wall = Obstacle("wall", thing, at() if isinstance(thing, Triangles) else at(0.3, 0.8))
+    found, n = [], np.array([[0.4, -0.7, 0.0]])
+    for one in fed(bodies_of(LINKS, [wall], [pair("link2", "wall")]), PLANAR, ROWS, name):
+        ends = np.array([[0.0, 1.0], [1.0, 2.0], [0.5, 0.6]])
+        found.append([*one.low, *one.parted(ends, np.tile(n, (3, 1)))])
+    assert (np.array(found[0]) > 0.1).all()
+    assert (np.array(found[1]) < 0.0).all()
 
 
-def test_distances_along_a_motion():
-    def bound(moved):
-        return Budget(lambda row, share: 0.5, np.full(2, moved), 100).certify(
-            np.arange(2), np.full(2, 0.1), 0.2
-        )
-
-    assert bound(0.0) == 0.5
-    with pytest.raises(TooNear):
-        bound(LARGE)
+@pytest.mark.parametrize("name", ["moved", "deviation"])
+def test_steps_of_a_hollow_body(name):
+    """A post between the arms of a fork that slides along it, which no plane parts."""
+    arms = box_mesh((1.0, 0.1, 0.1))
+    aside = np.array([0.0, 0.35, 0.0])
+    beside = arms.vertices + aside, arms.vertices - aside
+    fork = Triangles(np.vstack(beside), np.vstack([arms.faces, arms.faces + 8]), True)
+    bodies = bodies_of([Solid("link1", 1, at(), fork)], [Obstacle("post", Sphere(0.1), at())],
+                       [pair("link1", "post", 0.1)])  # fmt: skip
+    rows = np.array([[-0.3], [0.3]])
+    for one, accepted in zip(fed(bodies, SLIDE, rows, name), (True, False), strict=True):
+        one.certify(0.2)
+        assert (one.refused is None) == accepted
 
 
 def test_a_motion_among_bodies():

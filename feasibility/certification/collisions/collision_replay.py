@@ -6,7 +6,6 @@ and shares no code with the search (`feasibility.collisions` holds its kernels).
 
 from __future__ import annotations
 
-import heapq
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -15,13 +14,9 @@ import numpy as np
 
 from coverable_arrays import Array
 from coverable_errors import ArgumentError
-from feasibility.certification.collisions.first_look import Body, CoupledBodies, FirstLook
-from feasibility.certification.collisions.measured import least_measured
-from feasibility.certification.collisions.pairing import ROUNDING, Pairing, Place
-from feasibility.certification.collisions.pieces import Below
-from feasibility.certification.collisions.plane_search import NEAR
-from feasibility.certification.collisions.relative_motion import ArmMotion
-from feasibility.certification.collisions.shape_pieces import piece_of, sheet_piece
+from feasibility.certification.collisions.motion import ArmMotion
+from feasibility.certification.collisions.pairing import ROUNDING, Pairing
+from feasibility.certification.collisions.shapes import Body, body_of_soup
 from feasibility.certification.faults import Judged, MotionFault
 from feasibility.collisions import Bodies, Pair
 from feasibility.verdict import Certificate
@@ -29,6 +24,7 @@ from robots import Robot
 
 TOUCHING = 5e-7  # [m] overlap that is called touching
 MEASURED = 8  # couples, with the lowest certified distances, of which coal measures the least
+FINEST = 1.0 / 16.0  # [1] share of a segment, within which no nearer place is looked for
 KEPT = 8  # bodies of so many problems are kept ready, for motions replayed one after another
 
 
@@ -68,71 +64,85 @@ class CollisionReplay(Judged):
         )
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Couple:
-    """Two bodies of a pair, the one nearer to the root first."""
-
-    pair: Pair
-    a: Body
-    b: Body
-    deviation: float
-    """m, how far they may stand out from what is known of them."""
-
-
-class BodiesOfOwners:
-    """The bodies of one problem, ready for coal; not to be pickled."""
+class Couples:
+    """All couples of bodies of all pairs of one problem; not to be pickled."""
 
     def __init__(self, bodies: Bodies) -> None:
-        """Build what coal needs of every owner that a pair names.
+        """Make a body of whatever a pair names.
 
         Raises:
             ArgumentError: a pair names what has no body, or a body is malformed.
         """
         named = {name for pair in bodies.pairs for name in (pair.first, pair.second)}
-        self._of: dict[str, list[Body]] = {name: [] for name in named}
-        for solid in bodies.solids:
-            if solid.owner in named:
-                piece = piece_of(solid.geometry, solid.placement)
-                self._of[solid.owner].append(Body(solid.joint, piece, 0.0))
+        of: dict[str, list[Body]] = {name: [] for name in named}
+        for solid in (one for one in bodies.solids if one.owner in named):
+            of[solid.owner].append(Body(solid.joint, solid.geometry, solid.placement))
         scene = {thing.name for thing in bodies.scene}
-        for thing in bodies.scene:
-            if thing.name in named:
-                piece = piece_of(thing.geometry, thing.placement, at_rest=True)
-                self._of[thing.name].append(Body(0, piece, 0.0))
-        for soup in bodies.soups:
-            if soup.owner in named and soup.owner not in scene:
-                piece = sheet_piece(soup.triangles, soup.closed)
-                self._of[soup.owner].append(Body(0, piece, soup.deviation))
-        empty = sorted(name for name, parts in self._of.items() if not parts)
+        for thing in (one for one in bodies.scene if one.name in named):
+            of[thing.name].append(Body(0, thing.geometry, thing.placement))
+        for soup in (one for one in bodies.soups if one.owner in named - scene):
+            of[soup.owner].append(body_of_soup(soup))
+        empty = sorted(name for name, parts in of.items() if not parts)
         if empty:
             raise ArgumentError(f"pairs name what has no body: {', '.join(empty)}")
-        checked = [
-            Couple(pair, a, b, a.deviation + b.deviation)
-            for pair in bodies.pairs
-            for a, b in self.couples(pair)
+        couples = [
+            (number, *((b, a) if b.joint < a.joint or b.half_space else (a, b)))
+            for number, pair in enumerate(bodies.pairs)
+            for a in of[pair.first]
+            for b in of[pair.second]
         ]
-        self.ordered = tuple(sorted(checked, key=_outermost))
-        """All couples of all pairs, what is furthest from the base first."""
-        self.known = CoupledBodies([(one.a, one.b) for one in self.ordered])
+        couples.sort(key=lambda one: _outermost(bodies.pairs[one[0]], *one[1:]))
+        self.pairs = [bodies.pairs[number] for number, _, _ in couples]
+        self.numbers = np.array([number for number, _, _ in couples], dtype=np.intp)
+        """(c,) index of each couple's pair in those of the problem."""
+        self.couples = [(a, b) for _, a, b in couples]
+        """The one nearer to the root first, or a half space."""
+        self.bodies = list(dict.fromkeys(body for couple in self.couples for body in couple))
+        index = {body: k for k, body in enumerate(self.bodies)}
+        self.which = [index[b] for _, b in self.couples]
+        """Index of the second of each couple in `bodies`."""
 
-    def couples(self, pair: Pair) -> list[tuple[Body, Body]]:
-        """Each body of one owner with each of the other, the one nearer to the root first."""
-        found = []
-        for one in self._of[pair.first]:
-            for other in self._of[pair.second]:
-                swapped = other.joint < one.joint or isinstance(other.piece, Below)
-                found.append((other, one) if swapped else (one, other))
+    def along(self, motion: ArmMotion, raised: Array | None = None) -> list[Pairing]:
+        """Every couple along a motion, with what balls around both say of it.
+
+        The centre of b keeps to its chords but for delta; see `motion`.
+
+        Args:
+            motion: of the arm.
+            raised: (pairs, m - 1) m, what each pair of the problem needs besides its clearance.
+        """
+        joints = np.array([body.joint for body in self.bodies], dtype=np.intp)
+        centres, balls = np.stack([b.centre for b in self.bodies]), [b.ball for b in self.bodies]
+        # A half space, whose ball has no end, is at rest.
+        chords = motion.chords(joints, centres, np.where(np.isfinite(balls), balls, 0.0))
+        found = list[Pairing]()
+        known = zip(self.pairs, self.numbers, self.couples, self.which, strict=True)
+        for pair, number, (a, b), j in known:
+            delta, moved, off = (one[a.joint, :, j] for one in chords)
+            seen = a.joint, b.joint
+            straight = motion.chord_lengths(*seen, b.centre, b.ball) + 4.0 * delta
+            off = off if raised is None else off + raised[number]
+            rotations, points = motion.poses(*seen)
+            ahead = rotations @ b.centre + points - a.centre
+            away = _least_norms(ahead[:-1], ahead[1:]) - a.ball - b.ball - a.deviation
+            low = away - b.deviation - delta - off - ROUNDING
+            bends = delta, np.minimum(moved, straight), off
+            found.append(Pairing((a, b), motion, pair.clearance, low, bends))
         return found
 
 
 @lru_cache(maxsize=KEPT)
-def ready_bodies(bodies: Bodies) -> BodiesOfOwners:
+def couples_of(bodies: Bodies) -> Couples:
     """The bodies of a problem, kept for the next motion among them."""
-    return BodiesOfOwners(bodies)
+    return Couples(bodies)
 
 
 def collision_replay(
-    robot: Robot, bodies: Bodies, q: Array, deviations: Array | None = None
+    robot: Robot,
+    bodies: Bodies,
+    q: Array,
+    deviations: Array | None = None,
+    raised: Array | None = None,
 ) -> CollisionReplay:
     """Judge a motion that is straight in joint space between its rows.
 
@@ -142,138 +152,117 @@ def collision_replay(
         q: (m, n) rows, rad or m, unwrapped. Values that are not finite refuse.
         deviations: (m - 1, n) bounds on how far each joint is from the straight lines, for motions
             that are curved between rows; none by default.
+        raised: (p, m - 1) m, by which each of `bodies.pairs` has to be further apart than its
+            clearance along each segment; it is taken off what is certified. Nothing by default.
 
     Raises:
-        ArgumentError: the bodies are malformed, or q or deviations do not have that shape.
+        ArgumentError: the bodies are malformed, or q, deviations or raised have other shapes.
     """
     rows = np.ascontiguousarray(q, dtype=float)
     if rows.ndim != 2 or rows.shape[1] != robot.n:
         raise ArgumentError(f"q must have shape (m, {robot.n}), got {rows.shape}")
-    if deviations is not None and np.shape(deviations) != (max(len(rows) - 1, 0), robot.n):
+    segments = max(len(rows) - 1, 0)
+    if deviations is not None and np.shape(deviations) != (segments, robot.n):
         raise ArgumentError(
             f"deviations must have a row for each segment, got {np.shape(deviations)}"
         )
+    if raised is not None and np.shape(raised) != (len(bodies.pairs), segments):
+        raise ArgumentError(f"raised must have shape (pairs, m - 1), got {np.shape(raised)}")
     finite = np.isfinite(rows).all(axis=1)
-    if deviations is not None:
-        finite[:-1] &= np.isfinite(deviations).all(axis=1)
+    for more in (deviations, None if raised is None else raised.T):
+        if more is not None:
+            finite[:-1] &= np.isfinite(more).all(axis=1)
     if not finite.all():
         row = int(np.argmin(finite))
         fault = CollisionFault(row, 0.0, "a joint value is not finite", ("", ""), np.nan)
         return CollisionReplay(None, None, None, (fault,), 0)
-    ready = ready_bodies(bodies)
+    couples = couples_of(bodies)
     if not len(rows) or not bodies.pairs:
         return CollisionReplay(None, None, None, (), 0)
     if len(rows) == 1:  # an arm at rest: a motion that goes nowhere
-        rows, deviations = np.repeat(rows, 2, axis=0), None
-    motion = ArmMotion(robot, rows, None if deviations is None else np.abs(deviations))
-    return _judged(ready, motion)
+        rows, deviations, raised = np.repeat(rows, 2, axis=0), None, None
+    motion = ArmMotion(robot, rows, deviations)
+    return _judged(couples.pairs, couples.along(motion, raised))
 
 
-class _Checked:
-    """Two bodies of a pair."""
-
-    def __init__(self, couple: Couple) -> None:
-        """Nothing is known of them yet."""
-        self.pair, self.a, self.b = couple.pair, couple.a, couple.b
-        self.deviation = couple.deviation
-        self.needed = self.pair.clearance + self.deviation
-        """m, of what is known of them."""
-        self.low = -np.inf
-        """m, certified by balls and boxes."""
-        self.pairing: Pairing | None = None
-        """Made where these do not tell enough."""
-
-    @property
-    def distance(self) -> float:
-        """m, certified, or measured where they are refused."""
-        if self.pairing is None:
-            return self.low - ROUNDING - self.deviation
-        place, bound = self.pairing.place, self.pairing.bound
-        return (bound - ROUNDING if place is None else place.distance) - self.deviation
-
-
-def _judged(ready: BodiesOfOwners, motion: ArmMotion) -> CollisionReplay:
-    """All pairs, the nearest first: how near they come sets what is aimed at."""
-    checked = [_Checked(couple) for couple in ready.ordered]
-    look = FirstLook(motion, ready.known)
-    for one, low in zip(checked, look.low.min(axis=1).tolist(), strict=True):
-        one.low = low
-
-    def paired(number: int) -> Pairing:
-        one = checked[number]
-        if one.pairing is None:
-            joints, stretches = (one.a.joint, one.b.joint), look.stretches(number)
-            one.pairing = Pairing(one.a.piece, one.b.piece, joints, motion, stretches)
-        return one.pairing
-
-    nearest, heap = np.inf, [(one.low - one.deviation, k, False) for k, one in enumerate(checked)]
-    heapq.heapify(heap)
-    while heap and heap[0][0] < nearest:
-        low, number, guessed = heapq.heappop(heap)
-        if guessed:
-            nearest = min(nearest, paired(number).meet() - checked[number].deviation)
-        else:
-            seems = paired(number).guess() - checked[number].deviation
-            heapq.heappush(heap, (max(low, seems), number, True))
-    for number, one in enumerate(checked):
-        aim = max(one.needed, NEAR * nearest + one.deviation)
-        if one.pairing is not None or one.low < aim + ROUNDING:
-            paired(number).certify(one.needed, aim)
-    return _outcome(checked)
-
-
-def _outcome(checked: list[_Checked]) -> CollisionReplay:
-    """What was found, in words."""
-    faults: dict[tuple[str, str], CollisionFault] = {}
-    pairings = [one.pairing for one in checked if one.pairing is not None]
-    for one in checked:
-        if one.pairing is not None and one.pairing.place is not None:
-            fault = _fault(one.pair, one.pairing.place, one.distance)
+def _judged(pairs: list[Pair], pairings: list[Pairing]) -> CollisionReplay:
+    """All couples, the nearest first: how near they come sets what is aimed at."""
+    nearest = math.inf
+    for one in sorted(pairings, key=lambda one: one.bound):
+        if not one.bound < nearest:
+            break
+        nearest = min(nearest, float(one.measured(np.array([np.argmin(one.low)], float))[0]))
+    for one in pairings:
+        one.certify(nearest)
+    faults = dict[tuple[str, str], CollisionFault]()
+    for pair, one in zip(pairs, pairings, strict=True):
+        if one.refused is not None:
+            fault = _fault(pair, one, one.refused)
             known = faults.get(fault.pair)
             if known is None or not fault.distance >= known.distance:
                 faults[fault.pair] = fault
-    least = min(checked, key=_decided)
-    measured = math.inf
-    if not faults:
-        for one in sorted(checked, key=_decided)[:MEASURED]:
-            if one.pairing is not None and one.distance < measured:
-                measured = min(measured, least_measured(one.pairing) + one.deviation)
-    ordered = sorted(faults.values(), key=_decided)
+    order = sorted(range(len(pairings)), key=lambda k: _decided(pairings[k].bound))
+    calls = sum(one.calls for one in pairings)
+    least, pair = pairings[order[0]], pairs[order[0]]
+    measured = None if faults else _measured([pairings[k] for k in order[:MEASURED]])
     return CollisionReplay(
-        min_clearance=float(least.distance),
-        nearest_pair=(least.pair.first, least.pair.second),
-        measured_clearance=None if faults else max(measured, float(least.distance)),
-        faults=tuple(ordered),
-        calls=sum(pairing.calls for pairing in pairings),
+        min_clearance=least.bound,
+        nearest_pair=(pair.first, pair.second),
+        measured_clearance=measured,
+        faults=tuple(sorted(faults.values(), key=lambda fault: _decided(fault.distance))),
+        calls=calls,
     )
 
 
-def _outermost(one: Couple) -> tuple[object, ...]:
+def _measured(pairings: list[Pairing]) -> float:
+    """m, the least distance that is met, of exact bodies; no less than what is certified.
+
+    Bodies may stand back from what is known of them as far as they may stand out. Of a motion that
+    deviates from straight lines only rows are looked at.
+    """
+    finest = 1.0 if pairings[0].motion.deviations.any() else FINEST
+    found = math.inf
+    for one in pairings:
+        if one.bound < found:
+            off = one.a.deviation + one.b.deviation
+            found = min(found, one.least_measured(finest)[1] + 2.0 * off)
+    return max(found, pairings[0].bound)
+
+
+def _least_norms(start: Array, end: Array) -> Array:
+    """(k,) the least distances of straight lines between points (k, 3) from the origin."""
+    way = end - start
+    square = np.maximum((way * way).sum(axis=1), 1e-300)
+    share = np.clip(-(start * way).sum(axis=1) / square, 0.0, 1.0)
+    return np.asarray(np.linalg.norm(start + share[:, None] * way, axis=1))
+
+
+def _outermost(pair: Pair, a: Body, b: Body) -> tuple[object, ...]:
     """Brings what is furthest from the base, and often the nearest, to the front.
 
     So the answer does not depend on the order in which bodies and pairs are given.
     """
-    names, a, b = sorted((one.pair.first, one.pair.second)), one.a.piece, one.b.piece
-    return (-one.b.joint, *names, *a.centre, *b.centre)
+    return (-b.joint, *sorted((pair.first, pair.second)), *a.centre, *b.centre)
 
 
-def _decided(one: _Checked | CollisionFault) -> float:
-    """m, its distance; infinite where that was not decided."""
-    return math.inf if math.isnan(one.distance) else one.distance
+def _decided(distance: float) -> float:
+    """m; infinite where it was not decided."""
+    return math.inf if math.isnan(distance) else distance
 
 
-def _fault(pair: Pair, place: Place, distance: float) -> CollisionFault:
+def _fault(pair: Pair, found: Pairing, time: float) -> CollisionFault:
     """A pair that is refused, in words."""
+    row, distance = int(time), found.distance
     names = f"{pair.first} and {pair.second}"
     wanted = f"{1e3 * pair.clearance:g} mm are needed"
-    if np.isnan(distance) or distance >= pair.clearance + TOUCHING:
+    if not distance < pair.clearance + TOUCHING:
         text = f"not certified: {names} may come nearer than {1e3 * pair.clearance:g} mm"
-    elif place.inside:
+    elif found.inside:
         text = f"{names} overlap, one is inside the other"
-    elif distance <= ROUNDING and distance > -TOUCHING:
+    elif -TOUCHING < distance <= ROUNDING:
         text = f"{names} touch, {wanted}"
     elif distance <= 0.0:
         text = f"{names} overlap by {-1e3 * distance:.3g} mm"
     else:
         text = f"{names} are {1e3 * distance:.4g} mm apart, {wanted}"
-    return CollisionFault(place.row, place.share, text, (pair.first, pair.second), distance)
+    return CollisionFault(row, time - row, text, (pair.first, pair.second), distance)

@@ -2,38 +2,32 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-from typing import TypeGuard
-
 import numpy as np
 
 from coverable_arrays import Array
-from feasibility.certification.collisions.mesh_pieces import MeshPart
-from feasibility.certification.collisions.pieces import Piece
-
-KEPT = 64  # meshes whose answers are remembered
+from feasibility.certification.collisions.shapes import Body
+from robots.shapes import Triangles
 
 
-def one_inside_other(a: Piece, b: Piece, rotation: Array, point: Array) -> bool:
+def one_inside_other(a: Body, b: Body, rotation: Array, point: Array) -> bool:
     """Is a shell of one body inside the other, b at a pose (3, 3), (3,) m in the frame of a?
 
     Their boundaries must not touch. Only closed meshes are tested; coal knows of the inside of
-    primitives.
+    primitives and convex hulls.
     """
-    if _is_closed(a) and _any_inside(a, _points(b) @ rotation.T + point):
-        return True
-    return _is_closed(b) and _any_inside(b, (_points(a) - point) @ rotation)
+    return _any_inside(a, _points(b) @ rotation.T + point) or _any_inside(
+        b, (_points(a) - point) @ rotation
+    )
 
 
-def _is_closed(body: Piece) -> TypeGuard[MeshPart]:
-    """Is it a closed mesh?"""
-    return isinstance(body, MeshPart) and body.closed
-
-
-def _any_inside(body: MeshPart, points: Array) -> bool:
-    """Is one of the points (k, 3) inside the mesh, whose shells are oriented as it is closed?"""
-    triangles = body.vertices[body.faces]
-    return any(abs(winding(triangles, point)) > 0.5 for point in points)
+def _any_inside(body: Body, points: Array) -> bool:
+    """Is one of the points (k, 3) inside a mesh, whose shells are oriented as it is closed?"""
+    mesh = body.solid_mesh
+    if mesh is None:
+        return False
+    corners, own = mesh.vertices[mesh.faces], body.placement
+    seen = (points - own[:3, 3]) @ own[:3, :3]
+    return any(abs(winding(corners, point)) > 0.5 for point in seen)
 
 
 def winding(triangles: Array, point: Array) -> float:
@@ -49,16 +43,17 @@ def winding(triangles: Array, point: Array) -> float:
     return float(2.0 * np.arctan2(above, below).sum() / (4.0 * np.pi))
 
 
-@lru_cache(maxsize=KEPT)
-def _points(body: Piece) -> Array:
-    """(k, 3) a point of each shell of a mesh; of a primitive its centre."""
-    if not isinstance(body, MeshPart):
+def _points(body: Body) -> Array:
+    """(k, 3) m, a point of each shell of a mesh; of a primitive its centre."""
+    if not isinstance(body.shape, Triangles):
         return body.centre[None]
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    faces, count = body.faces, len(body.vertices)
+    faces, count = body.shape.faces, len(body.shape.vertices)
     links = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
     graph = coo_array((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=(count, count))
     shells = connected_components(graph, directed=False)[1]
-    return body.vertices[np.unique(shells, return_index=True)[1]]
+    first = np.unique(shells, return_index=True)[1]
+    used = np.intersect1d(first, faces)  # a vertex without a triangle is no shell
+    return body.shape.vertices[used] @ body.placement[:3, :3].T + body.placement[:3, 3]

@@ -1,8 +1,8 @@
 """Which two bodies come nearest at each row of a motion, and where: for pictures, no evidence.
 
 Coal is called only where two bodies may be the nearest. From row to row their distance changes by
-at most the way M that a point of one moves as seen from the other (`relative_motion`), so what was
-measured at one row bounds the distance at all others.
+at most the way M that a point of one moves as seen from the other (`motion`), so what was measured
+at one row bounds the distance at all others.
 """
 
 from __future__ import annotations
@@ -14,12 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coverable_arrays import Array, Mask
-from feasibility.certification.collisions.collision_replay import ready_bodies
-from feasibility.certification.collisions.first_look import Body, CoupledBodies, FirstLook
-from feasibility.certification.collisions.pieces import Below, coal_distance
-from feasibility.certification.collisions.relative_motion import ArmMotion, Stretches
+from feasibility.certification.collisions.collision_replay import couples_of
+from feasibility.certification.collisions.motion import ArmMotion
+from feasibility.certification.collisions.pairing import Pairing
 from feasibility.collisions import Bodies
-from robots import Kinematics, Robot
+from robots import Robot
 
 Names = tuple[str, str]
 
@@ -63,102 +62,61 @@ def nearest_along(robot: Robot, bodies: Bodies, q: Array) -> NearestAlong | None
     if not bodies.pairs:
         return None
     motion = ArmMotion(robot, np.repeat(q, 2, axis=0) if len(q) == 1 else q)
-    ready = ready_bodies(bodies)
-    named = [
-        ((pair.first, pair.second), couple)
-        for pair in bodies.pairs
-        for couple in ready.couples(pair)
-    ]
-    look = FirstLook(motion, CoupledBodies([couple for _, couple in named]))
-    couples = [
-        _Couple(names, *couple, motion, look.stretches(k))
-        for k, (names, couple) in enumerate(named)
-    ]
-    distances, found = _searched(couples, len(q))
-    names = list(dict.fromkeys(couples[k].names for k in found))
-    which = np.array([names.index(couples[k].names) for k in found], dtype=np.intp)
-    frames = Kinematics(robot).joints(q)
-    return NearestAlong(
-        distances,
-        which,
-        tuple(
-            _lines(name, couples, found, which == k, frames.rotations, frames.points)
-            for k, name in enumerate(names)
-        ),
-    )
+    couples = couples_of(bodies)
+    named = [(pair.first, pair.second) for pair in couples.pairs]
+    pairings = couples.along(motion)
+    distances, found = _searched(pairings, len(q))
+    names = list(dict.fromkeys(named[k] for k in found))
+    which = np.array([names.index(named[k]) for k in found], dtype=np.intp)
+    lines = (_lines(name, pairings, found, which == k) for k, name in enumerate(names))
+    return NearestAlong(distances, which, tuple(lines))
 
 
-class _Couple:
-    """One body of each owner of a pair, along one motion."""
-
-    def __init__(
-        self, names: Names, first: Body, second: Body, motion: ArmMotion, s: Stretches
-    ) -> None:
-        """Bodies a and b, carried by `joints` (i, j), i <= j, and the segments of the motion."""
-        self.names, self.motion = names, motion
-        self.a, self.b = a, b = first.piece, second.piece
-        self.deviation = deviation = first.deviation + second.deviation
-        self.joints = first.joint, second.joint
-        self.exact = isinstance(a, Below) or (a.exact and b.exact)
-        self.way = np.concatenate([[0.0], np.cumsum(s.moved)])
-        centres = np.concatenate([s.first.moved(b.centre), s.last.moved(b.centre)[-1:]])
-        apart = np.linalg.norm(centres - a.centre, axis=1) - a.ball - b.ball - deviation
-        self.low = apart
-        """(m,) m, the distance at each row is at least this."""
-
-    def measure(self, row: int, exactly: bool) -> float:
-        """The distance (m) at a row, of the bodies or of the hulls of meshes; improves `low`."""
-        distance = self.line(row, exactly)[0] - self.deviation
-        self.low = np.maximum(self.low, distance - np.abs(self.way - self.way[row]))
-        return distance
-
-    def line(self, row: int, exactly: bool = True) -> tuple[float, Array]:
-        """The distance (m) at a row, and the ends (2, 3) m of the line in the frame of a."""
-        pose = self.motion.pose(*self.joints, row, 0.0)
-        rotation, point = pose.rotations[0], pose.points[0]
-        if isinstance(self.a, Below):
-            n = self.a.thin
-            own = self.b.farthest(-(rotation.T @ n)[None])[0]
-            end = rotation @ own - self.b.radius * n + point
-            height = float((end - self.a.centre) @ n)
-            return height, np.stack([end - height * n, end])
-        a, b = (self.a.truth, self.b.truth) if exactly else (self.a, self.b)
-        distance, near_a, near_b = coal_distance(a, b, rotation, point)
-        ends = np.stack([near_a, near_b])
-        if not (distance > 0.0 and np.isfinite(ends).all()):  # meshes that overlap have no points
-            middle = ends.mean(axis=0)
-            middle = middle if np.isfinite(middle).all() else rotation @ b.centre + point
-            ends = np.stack([middle, middle])
-        return distance, ends
-
-
-def _searched(couples: list[_Couple], count: int) -> tuple[Array, NDArray[np.intp]]:
-    """(m,) the least distance at each row, m, and the couple that it is of."""
+def _searched(pairings: list[Pairing], count: int) -> tuple[Array, NDArray[np.intp]]:
+    """(m,) the least distance at each row, m, and the pairing that it is of."""
     distances, found = np.full(count, np.inf), np.zeros(count, dtype=np.intp)
-    low = np.stack([couple.low for couple in couples])
+    low = np.stack([np.append(one.low, one.low[-1])[:count] for one in pairings])
     for row in range(count):
-        hulls: set[int] = set()
+        known = set[int]()
         while True:
             k = int(np.argmin(low[:, row]))
             if low[k, row] >= distances[row]:
                 break
-            exactly = couples[k].exact or k in hulls
-            distance = couples[k].measure(row, exactly)
-            low[k] = couples[k].low
-            hulls.add(k)
+            one = pairings[k]  # of meshes the hulls, first
+            exactly = one.convex or k in known
+            distance = _line(one, row, exactly)[0]
+            low[k] = np.maximum(low[k], distance - np.abs(one.way - one.way[row])[:count])
+            known.add(k)
             if exactly and distance < distances[row]:
                 distances[row], found[row] = distance, k
     return distances, found
 
 
-def _lines(
-    names: Names,
-    couples: list[_Couple],
-    found: NDArray[np.intp],
-    here: Mask,
-    rotations: Array,
-    points: Array,
-) -> NearPair:
+def _line(one: Pairing, row: int, exactly: bool = True) -> tuple[float, Array]:
+    """The distance (m) at a row, or that of hulls, and the ends (2, 3) m of the line, seen from a.
+
+    What bodies stand out by is taken off.
+    """
+    a, b = one.a, one.b
+    rotation, point = (poses[row] for poses in one.motion.poses(a.joint, b.joint))
+    if a.half_space:
+        n = rotation.T @ a.axis
+        across = n - (n @ b.axis) * b.axis
+        own = b.corners[np.argmin(b.corners @ n)] - b.radius * n
+        own = own - b.circle * across / max(float(np.linalg.norm(across)), 1e-300)
+        end = rotation @ own + point
+        distance = float((end - a.centre) @ a.axis)
+        ends = np.stack([end - distance * a.axis, end])
+    else:
+        (place,) = b.placed(rotation[None], point[None])
+        distance, *near = a.distance(b, place, hulls=not exactly)
+        ends = np.stack(near)
+        if not (distance > 0.0 and np.isfinite(ends).all()):  # what overlaps has no nearest points
+            ends[:] = rotation @ b.centre + point
+    return distance - a.deviation - b.deviation, ends
+
+
+def _lines(names: Names, pairings: list[Pairing], found: NDArray[np.intp], here: Mask) -> NearPair:
     """The lines of one pair, with one more behind each run of its rows."""
     of = {int(row): int(found[row]) for row in np.flatnonzero(here)}
     for row, behind in pairwise(range(len(here))):
@@ -166,8 +124,8 @@ def _lines(
             of[behind] = int(found[row])
     rows = np.array(sorted(of), dtype=np.intp)
     lines = []
-    for row in rows:
-        couple = couples[of[row]]
-        joint = couple.joints[0]
-        lines.append(couple.line(row)[1] @ rotations[row, joint].T + points[row, joint])
+    for row in rows.tolist():
+        one = pairings[of[row]]
+        turn = one.motion.frames.rotations[row, one.a.joint]
+        lines.append(_line(one, row)[1] @ turn.T + one.motion.frames.points[row, one.a.joint])
     return NearPair(names, rows, np.array(lines))

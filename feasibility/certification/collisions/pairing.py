@@ -1,343 +1,314 @@
 """Certified clearance of two bodies along a motion.
 
-First, planes between the whole bodies are tried (`parting`): across the line between the centres,
-then across that of coal's nearest points at the stretch with the lowest bound, each on all
-stretches at once. Many triangles are looked at box by box instead (`descent`). What is left is cut:
-meshes into ever smaller parts, and last the stretch in time. Where the hull of a link's mesh is too
-large, the distances of the mesh itself decide (`budgets`).
+Seen from body a, no point of body b moves further than M along a stretch of the motion (`motion`).
+So where the two are further apart than c + M / 2 in its middle, they are nowhere nearer than c
+(Schwarzer, Saha and Latombe 2005). And as points of b keep to their chords but for delta, a plane
+across n parts the bodies all along a stretch by
 
-A plane certifies bodies with all that is inside them. Triangles of a closed mesh have no inside:
-where they are used, neither body may begin inside the other. As their distance never vanishes,
-neither gets there.
+    min(low(0), low(1)) - h_a(n) - delta,    low(s) = n . t(s) - h_b(-R(s)^T n),
+
+with h the supports of `shapes`, and R, t the pose of b at an end. What joints deviate from straight
+lines by, and what bodies stand out by, is taken off both.
+
+Planes are tried on all segments at once, across the line between the centres, then across that of
+the nearest points of hulls. What is left is cut in halves, and asked for in its middle: of convex
+bodies, how far a plane parts them there; of others, coal, which says yes or no of a margin in a
+twentieth of the time that it takes for a distance. A half space has its own plane alone.
+
+A plane certifies bodies with all that is inside them. Triangles have no inside for coal, so of
+solid meshes neither body may begin inside the other; as their distance never vanishes, neither
+gets there.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import math
+from typing import Any
 
 import numpy as np
 
-from coverable_arrays import Array, Mask
-from feasibility.certification.collisions.budgets import Budget, TooNear
-from feasibility.certification.collisions.descent import Descent, rough_bounds
+from coverable_arrays import Array, Ints, Mask
 from feasibility.certification.collisions.inside import one_inside_other
-from feasibility.certification.collisions.mesh_pieces import MeshPart
-from feasibility.certification.collisions.parting import by_balls, guesses, lows, parted
-from feasibility.certification.collisions.pieces import (
-    COAL,
-    FEW,
-    Below,
-    Piece,
-    can_be_cut,
-    coal_distance,
-    cut,
-    is_exact,
-)
-from feasibility.certification.collisions.plane_search import NEAR, Couples
-from feasibility.certification.collisions.relative_motion import ArmMotion, Stretches
+from feasibility.certification.collisions.motion import ArmMotion
+from feasibility.certification.collisions.shapes import COAL, Body
 
 ROUNDING = 1e-9  # [m] of placements, and what keeps distances from vanishing
-FAILURES = 3  # of coal's directions in a row, after which something else is tried
-PATIENCE, TIRED = 4, 0.92  # stretches measured, after which that share is aimed at
-ENOUGH = 0.75  # [1] share of what is aimed at, which will do of the hulls of meshes
-HALVINGS = 3  # of stretches that no plane parts from a triangle, before coal is called
-LOOKS = 3  # at stretches that no plane parts from triangles: are they too near?
-SHORTEST = 2.0**-24  # [1] share of a segment, below which a stretch is not halved again
-CALLS = (500, 20)  # most coal calls for two bodies: so many, and so many for each segment
-
-Task = tuple[Piece, Piece, Stretches]
-"""Two pieces, and stretches along which they are not certified yet."""
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """An instant at which two bodies are too near, or where that was not decided."""
-
-    row: int
-    share: float
-    """How far the motion has come from that row to the next, 0..1."""
-    distance: float
-    """m, between them; as deep as they overlap where it is negative; NaN where not decided."""
-    inside: bool = False
-    """Is one of them wholly within the other?"""
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Measured:
-    """What coal says of two pieces at an end of a stretch."""
-
-    stretch: int
-    end: bool
-    distance: float
-    """m, negative where they overlap."""
-    n: Array | None
-    """(3,) from the first piece to the other; None where they touch."""
+ENOUGH = 0.82  # [1] share of the least distance met, that will do where less is needed
+EASY = (1_000, 4)  # coal calls for two bodies, and for each row, after which ...
+LITTLE = 0.6  # [1] ... that share of the least distance will do
+NEAR = 0.95  # [1] share of the least distance met that planes are to show
+COSTLY = 1 << 19  # corners of a hull times segments, from which on one plane is tried for all
+FAILURES = 3  # of planes in a row, after which none are tried on whole segments any more
+MOST_PARTS = 16  # of a stretch, looked at next
+PARTS = 32  # of a motion, in each of which its least distance is looked for
+DEEPEST = 2.0**-10  # [1] share of a segment, to which what is refused is looked at
+CALLS = (20_000, 1_000)  # most coal calls for two bodies: so many, and so many for each row
 
 
 class Pairing:
-    """Two bodies, the stretches of one motion, and what is known of their distance."""
+    """Two bodies along one motion, and what is known of their distance."""
 
     def __init__(
-        self, a: Piece, b: Piece, joints: tuple[int, int], motion: ArmMotion, stretches: Stretches
-    ) -> None:
-        """Bodies a and b, carried by `joints` (i, j), i <= j, and the segments of the motion."""
-        self.a, self.b, self.joints, self.motion = a, b, joints, motion
+        self, bodies: tuple[Body, Body], motion: ArmMotion, needed: float, low: Array,
+        bends: tuple[Array, Array, Array],
+    ) -> None:  # fmt: skip
+        """Begin with what balls say.
+
+        Args:
+            bodies: a and b; b is on the same joint or one behind, but for a half space.
+            motion: of the arm.
+            needed: m, their clearance.
+            low: (m - 1,) m, lower bounds of their distance along each segment.
+            bends: `Chords` of b seen from a, (m - 1,) each; the last one with all else that their
+                distance may be less by along each segment.
+        """
+        (self.a, self.b), self.motion, self.needed, self.low = bodies, motion, needed, low
+        self._delta, moved, self._off = bends
+        self._rows, self.way = np.arange(len(low) + 1.0), np.append(0.0, np.cumsum(moved))
+        """(m,) m, that no point has moved further since the first row."""
+        self.convex = self.a.half_space or (self.a.convex and self.b.convex)
+        """Do planes decide? They do for a half space, whatever is above it."""
         self.calls = 0
-        self.bound = np.inf
-        """m, certified lower bound of their distance along what is accepted so far."""
-        self.place: Place | None = None
-        """Why it is refused."""
-        self._most = CALLS[0] + CALLS[1] * len(motion.q)
-        self.stretches = stretches
-        self.hints = stretches.bound
-        """(m - 1,) m, about how near they come along each segment, or nearer."""
+        self.refused: float | None = None
+        """At which instant, in rows, they are too near."""
+        self.distance = math.inf
+        """m, measured there; NaN where that was not decided."""
+        self.inside = False
+        """Is one wholly within the other there?"""
+        self._aim, self._hulls_part, self._met = needed, True, 0.0
 
-    def guess(self) -> float:
-        """Improve the bounds without coal; how near (m) the bodies seem to come, at least."""
-        s = self.stretches
-        if isinstance(self.a, MeshPart) and self.a.triangles > FEW:
-            self.hints = rough_bounds(self.a.tree, self.b, s)
-            if not self.a.closed:
-                self.stretches = replace(s, bound=np.maximum(s.bound, self.hints))
-        else:
-            for n in guesses(self.a, self.b, s):
-                s = _raised(self.a, self.b, s, n)
-            self.stretches, self.hints = s, s.bound
-        return float(self.hints.min())
+    @property
+    def bound(self) -> float:
+        """m, certified along the whole motion, or measured where they are refused."""
+        return float(self.low.min()) if self.refused is None else self.distance
 
-    def meet(self) -> float:
-        """The distance (m) at the row that seemed worst when it was guessed, by coal.
+    def measured(self, times: Array) -> Array:
+        """(k,) m, the distances at instants (k,), in rows, on the straight lines between them."""
+        rotations, points = self.motion.poses(self.a.joint, self.b.joint, times)
+        if self.a.half_space:
+            heights = self._low(self.a.axis[None], rotations, points) - self.a.axis @ self.a.centre
+            return heights - self.b.deviation
+        off = self.a.deviation + self.b.deviation
+        found = []
+        for place in self.b.placed(rotations, points):
+            self.calls += 1
+            distance = self.a.distance(self.b, place)[0]
+            if distance <= 0.0 and not self.convex:  # of triangles that overlap coal knows no depth
+                distance = min(0.0, self.a.distance(self.b, place, hulls=True)[0])
+            found.append(distance - off)
+        return np.array(found)
 
-        That of the bodies themselves: their hulls may be much nearer.
+    def least_measured(self, finest: float, also: float | None = None) -> tuple[float, float]:
+        """An instant, in rows, and the distance (m) there: the least that is met on the motion.
+
+        Looked for at the row with the lowest bound in each of several parts of the motion, and from
+        the best of them in ever shorter steps to both sides, down to `finest` rows.
+
+        Args:
+            finest: [1] share of a segment, within which no other place is looked for.
+            also: an instant to begin with, too; where the least was met by default.
         """
-        s = self.stretches
-        measured = self._measured(self.a, self.b, s, int(np.argmin(self.hints)))
-        if not (isinstance(self.a, MeshPart) and self.a.triangles > FEW):
-            self.stretches = _raised_along(self.a, self.b, s, measured, np.inf)
-        if is_exact(self.a, self.b):
-            return measured.distance
-        pose = s.first.of(np.array([measured.stretch]))
-        self.calls += 1
-        return coal_distance(self.a.truth, self.b.truth, pose.rotations[0], pose.points[0])[0]
+        last = len(self.low)
+        parts = np.array_split(self.low, min(PARTS, last))
+        begin = np.cumsum([0, *map(len, parts)])[:-1]
+        rows = [float(k + np.argmin(part)) for k, part in zip(begin, parts, strict=True)]
+        also = self._met if also is None else also
+        times = np.append(rows, also if finest < 1.0 else np.floor(also))
+        step = 2.0 ** math.ceil(math.log2(last / len(parts)))
+        found = self.measured(times)
+        while True:
+            least, time = float(found.min()), float(times[np.argmin(found)])
+            if step < finest:
+                return time, least
+            times = np.array([time - step, time, time + step]).clip(0.0, last)
+            found = np.append(self.measured(times[::2]), least)[[0, 2, 1]]
+            step *= 0.5
 
-    def certify(self, needed: float, aim: float) -> None:
-        """Certify `needed` (m) everywhere, and `aim` >= needed where that takes little.
+    def certify(self, nearest: float) -> None:
+        """Certify what is needed, and most of what is over it: raise `low`, or refuse.
 
-        Sets `bound` and, where it is refused, `place`.
+        Args:
+            nearest: m, the least distance of any two bodies that was met.
         """
-        self.bound, self.place = np.inf, None
-        needed, aim = needed + ROUNDING, aim + ROUNDING
-        tasks = [(self.a, self.b, self._accepted(self.stretches, aim))]
-        while tasks and self.place is None:
-            a, b, s = tasks.pop()
-            if len(s.row):
-                tasks += self._looked_at(a, b, s, needed, aim)
+        self._aim = max(self.needed, ENOUGH * nearest)
+        wanted = max(self.needed, NEAR * nearest)
+        if (self.low >= wanted).all():
+            return
+        if not np.isfinite(self.way[-1] + self._delta.sum() + self._off.sum()):
+            return self._refuse(0.0, math.nan)
+        self._part(wanted)
+        open_ = np.flatnonzero(~(self.low >= self._aim))
+        if not len(open_) or self._begins_inside():
+            return
+        runs = np.arange(1, len(open_)) if self.convex else np.flatnonzero(np.diff(open_) > 1) + 1
+        ends = np.array([(run[0], run[-1] + 1.0) for run in np.split(open_, runs)])
+        while len(ends) and self.refused is None:
+            ends = self._cut(ends)
+            if self.calls > EASY[0] + EASY[1] * len(self._rows):
+                self._aim = min(self._aim, max(self.needed, LITTLE * nearest))
+            if self.calls > CALLS[0] + CALLS[1] * len(self._rows) and len(ends):
+                self._refuse(float(ends[0].mean()), math.nan)
+        self.low[open_] = np.maximum(self.low[open_], self._aim)
 
-    def _looked_at(self, a: Piece, b: Piece, s: Stretches, needed: float, aim: float) -> list[Task]:
-        """Certify stretches as far as it goes; what is left to do. May set `place`."""
-        whole = a is self.a and b is self.b
-        if isinstance(a, MeshPart) and a.triangles > FEW:
-            inside = whole and self._begins_inside(s, needed)
-            return [] if inside else self._box_by_box(a, b, s, needed, aim)
-        if not whole or (s.length < 1.0).any():
-            s = self._cheaply(a, b, s, aim)
-        s = self._by_coal(a, b, s, needed, aim)
-        if self.place is not None or not len(s.row):
-            return []
-        if whole and self._begins_inside(s, needed):
-            return []
-        if can_be_cut(a, b):
-            return [(*pieces, s) for pieces in cut(a, b)]
-        if is_exact(a, b):
-            s = self._accepted(s, needed, (s.length <= 0.25) & (s.bound >= needed))
-            if len(s.row) and (s.length.min() < SHORTEST or self.calls > self._most):
-                self.place = _middle(s)
-                return []
-        else:  # hulls may be near where the bodies are not
-            enough = max(needed, ENOUGH * aim)
-            s = self._accepted(s, enough, (s.length <= 0.25) & (s.bound >= enough))
-            curved = (s.length > 0.25) & (s.bound + s.delta >= enough)
-            if not curved.all():
-                self._by_budget(a.truth, b.truth, s.of(~curved), needed, aim)
-            s = s.of(curved)
-        return [(a, b, self.motion.halves(s, *self.joints))] if len(s.row) else []
+    def _part(self, wanted: float) -> None:
+        """Raise the bounds of segments by planes between the hulls, up to what is wanted (m).
 
-    def _accepted(self, s: Stretches, wanted: float, also: Mask | None = None) -> Stretches:
-        """Keep the lowest of the bounds that will do; the stretches that are left."""
-        good = s.bound >= wanted if also is None else also
-        self.bound = min(self.bound, float(np.min(s.bound[good], initial=np.inf)))
-        return s.of(~good)
+        A plane is tried on all of them. It stays with a, or turns with b: as a link swings about
+        the base, so does the plane between them.
+        """
+        rotations, points = self.motion.poses(self.a.joint, self.b.joint)
+        ahead = rotations @ self.b.centre + points - self.a.centre
+        turns = len(self.a.corners) * len(self.low) < COSTLY
+        tried = self._raised(wanted, ahead[:-1] + ahead[1:] if turns else ahead[:1])
+        failures = FAILURES if self.a.half_space else 0
+        while failures < FAILURES and not tried.all():
+            worst = int(np.argmin(np.where(tried, np.inf, self.low)))
+            (apart,), n = self._gaps(rotations[[worst]], points[[worst]])
+            if apart > 0.0:
+                tried |= self._raised(wanted, n)
+                if turns:
+                    tried |= self._raised(wanted, rotations[:-1] @ (rotations[worst].T @ n[0]))
+            failures = 0 if tried[worst] else failures + 1
+            tried[worst] = True
 
-    def _cheaply(self, a: Piece, b: Piece, s: Stretches, aim: float) -> Stretches:
-        """Certify by balls, the planes of longer stretches, and guessed directions."""
-        s = self._accepted(replace(s, bound=np.maximum(s.bound, by_balls(a, b, s))), aim)
-        for n in (s.across, *guesses(a, b, s)) if len(s.row) else ():
-            s = _raised(a, b, s, n)
-        return self._accepted(s, aim)
+    def _raised(self, wanted: float, n: Array) -> Mask:
+        """(m - 1,) which segments have what is wanted (m), with planes across n (m - 1 or 1, 3)."""
+        some = np.flatnonzero(~(self.low >= wanted))
+        ends = np.column_stack([some, some + 1.0])
+        found = self.parted(ends, n if len(n) == 1 else n[some])
+        self.low[some] = np.maximum(self.low[some], found)
+        return np.asarray(self.low >= wanted)
 
-    def _by_coal(self, a: Piece, b: Piece, s: Stretches, needed: float, aim: float) -> Stretches:
-        """Certify by directions from coal; what is left, with its bounds. May set `place`."""
-        exact, whole = is_exact(a, b), a is self.a and b is self.b
-        left, failures, asked = [s.of(np.zeros(len(s.row), dtype=bool))], 0, 0
-        while len(s.row) and not (failures >= FAILURES and (can_be_cut(a, b) or not exact)):
-            if not can_be_cut(a, b):  # a plane is there, and shorter stretches are less curved
-                curved = (s.bound < aim) & (s.bound + s.delta >= aim) & (s.delta > ROUNDING)
-                left.append(s.of(curved))
-                s = s.of(~curved)
-                if not len(s.row):
+    def _cut(self, ends: Array) -> Array:
+        """What is left to certify of stretches from row to row (k, 2), in parts; may refuse."""
+        way = np.interp(ends, self._rows, self.way)
+        half, off = 0.5 * (way[:, 1] - way[:, 0]), self._most_off(ends)
+        within = np.floor(ends[:, 0]) + 1.0 >= ends[:, 1]
+
+        def at(share: Array, some: Any) -> Array:
+            straight = ends[some, 0] + share * (ends[some, 1] - ends[some, 0])
+            along = np.interp(way[some, 0] + share * 2.0 * half[some], self.way, self._rows)
+            return np.where(within[some], straight, np.clip(along, *ends[some].T))
+
+        middle = at(np.full(len(ends), 0.5), slice(None))
+        poses = self.motion.poses(self.a.joint, self.b.joint, middle)
+        parts = np.full(len(ends), 2)
+        if not self.convex:
+            parts = self._parts_by_coal(self.b.placed(*poses), middle, half, off)
+        some = (parts > 0) & within & self._hulls_part
+        if some.any() and self.refused is None:
+            apart, n = self._gaps(*(one[some] for one in poses))
+            apart -= off[some] + ROUNDING
+            if not (self.convex and self._near(apart, middle[some])):
+                self._hulls_part = self.convex or bool((apart >= self._aim).any())
+                clear = self.parted(ends[some], n) >= self._aim
+                clear |= apart - half[some] >= self._aim
+                parts[some] = np.where(clear, 0, parts[some])
+        cut = np.repeat(np.arange(len(ends)), parts)
+        number = np.arange(len(cut)) - np.repeat(np.cumsum(parts) - parts, parts)
+        return np.column_stack([at((number + k) / parts[cut], cut) for k in (0, 1)])
+
+    def _parts_by_coal(self, places: list[Any], middle: Array, half: Array, off: Array) -> Ints:
+        """(k,) in how many parts to look at stretches again, by places in their middles.
+
+        None of those that coal calls far enough apart; of others at least as many as will be
+        needed, by the distance that it met.
+        """
+        parts = np.zeros(len(places), dtype=np.int64)
+        bodies = off + self.a.deviation + self.b.deviation
+        meets = self.a.meets(self.b)
+        for k, place in enumerate(places):
+            self.calls += 1
+            found = meets(place, self._aim + float(half[k] + bodies[k]))
+            if found is not None:
+                spare = found - float(bodies[k])
+                if self._near(np.array([spare - 2.0 * COAL]), middle[[k]]):
                     break
-            asked += 1
-            if asked == PATIENCE:
-                aim = max(needed, TIRED * aim)
-            worst = int(np.argmin(s.bound))
-            for end in (False, True):
-                measured = self._measured(a, b, s, worst, end)
-                if whole and exact:  # no higher bound can be found than what was measured
-                    aim = max(needed, min(aim, NEAR * measured.distance))
-                if exact and self._too_near(a, b, s, measured, needed):
-                    return s
-                s = _raised_along(a, b, s, measured, aim)
-                if measured.n is None or s.bound[worst] >= aim or s.delta[worst] < ROUNDING:
-                    break
-            if s.bound[worst] < aim:
-                failures += 1
-                left.append(s.of(np.array([worst])))
-                s = s.of(np.arange(len(s.row)) != worst)
-            else:
-                failures = 0
-            s = self._accepted(s, aim)
-        return Stretches.join(*left, s)
+                room = max(spare - self._aim, half[k] / MOST_PARTS)
+                parts[k] = max(2, math.ceil(half[k] / room)) if room > 0.0 else 2
+        return parts
 
-    def _box_by_box(
-        self, a: MeshPart, b: Piece, s: Stretches, needed: float, aim: float
-    ) -> list[Task]:
-        """Certify many triangles; which of them are left to do. May set `place`."""
-        descent = Descent(a.tree, b, needed, aim)
-        couples = descent.parted(s)
-        exact = is_exact(a, b)
-        if exact and self._measured_too_near(a, b, s, couples, needed):
-            return []
-        for _ in range(HALVINGS if exact and len(couples.at) else 0):
-            used, at = np.unique(couples.at, return_inverse=True)
-            s = self.motion.halves(s.of(used), *self.joints)
-            boxes, low = np.tile(couples.boxes, 2), np.tile(couples.low, 2)
-            halves = Couples(np.concatenate([at, at + len(used)]), boxes, low)
-            couples = descent.again(s, halves)
-        good = couples.low >= (needed if exact else aim)
-        descent.keep(couples, good)
-        self.bound = min(self.bound, descent.bound)
-        left = couples.of(~good)
-        if exact:
-            return [
-                (a.of(a.tree.last[[box]]), b, s.of(left.at[left.boxes == box]))
-                for box in np.unique(left.boxes)
-            ]
-        if len(left.at):
-            triangles, rest = a.of(a.tree.last[np.unique(left.boxes)]), s.of(np.unique(left.at))
-            self._by_budget(triangles, b.truth, rest, needed, aim)
-        return []
+    def _near(self, spare: Array, times: Array) -> bool:
+        """Look at distances (k,) m at instants: refuse the least, or let it limit what is aimed at.
 
-    def _measured_too_near(
-        self, a: Piece, b: Piece, s: Stretches, couples: Couples, needed: float
-    ) -> bool:
-        """Are they nearer than needed at the worst of what no plane parts? Sets `place` if so."""
-        worst = couples.of(couples.low < needed)
-        at = worst.at[np.argsort(worst.low)]
-        for k in at[np.sort(np.unique(at, return_index=True)[1])][:LOOKS]:
-            for end in (False, True):
-                if self._too_near(a, b, s, self._measured(a, b, s, int(k), end), needed):
-                    return True
+        They are less all that is taken off.
+        """
+        worst = int(np.argmin(spare))
+        if not spare[worst] >= self.needed:
+            self._refuse(*self.least_measured(DEEPEST, float(times[worst])))
+            return True
+        limit = max(self.needed, ENOUGH * float(spare[worst]))
+        if limit < self._aim:
+            self._aim, self._met = limit, float(times[worst])
         return False
 
-    def _measured(self, a: Piece, b: Piece, s: Stretches, k: int, end: bool = False) -> Measured:
-        """Ask coal at an end of stretch k."""
-        poses = (s.last if end else s.first).of(np.array([k]))
-        if isinstance(a, Below):
-            n = a.thin[None]
-            return Measured(k, end, float(lows(b, poses, n)[0] - a.support(n)[0]), n[0])
-        self.calls += 1
-        distance, near_a, near_b = coal_distance(a, b, poses.rotations[0], poses.points[0])
-        apart = near_b - near_a
-        length = float(np.linalg.norm(apart))
-        clear = distance > 0.0 and length > 0.0
-        return Measured(k, end, distance, apart / length if clear else None)
+    def _gaps(self, rotations: Array, points: Array) -> tuple[Array, Array]:
+        """(k,) m, how far planes part the hulls with b at poses, and their normals (k, 3).
 
-    def _too_near(
-        self, a: Piece, b: Piece, s: Stretches, measured: Measured, needed: float
-    ) -> bool:
-        """Are exact pieces nearer than `needed` where they were measured? Sets `place` if so.
-
-        What coal calls far enough, but no plane of its own shows, is at the edge to rounding.
+        From a to b, less what bodies stand out by. Where they overlap, as deep as that, and any
+        normal.
         """
-        k, deviation = measured.stretch, float(s.deviation[measured.stretch])
-        near = measured.distance - deviation < needed
-        if not near and measured.n is not None and not can_be_cut(a, b):
-            poses, n = (s.last if measured.end else s.first).of(np.array([k])), measured.n[None]
-            near = float(lows(b, poses, n)[0] - a.support(n)[0]) - deviation < needed
-        if near:
-            row, share = int(s.row[k]), float(s.share[k] + (s.length[k] if measured.end else 0.0))
-            over = share == 1.0
-            self.place = Place(row + over, 0.0 if over else share, measured.distance)
-        return near
+        n = np.tile(self.a.axis, (len(points), 1))
+        found = np.ones(len(points))
+        if not self.a.half_space:
+            self.calls += len(points)
+            for k, place in enumerate(self.b.placed(rotations, points)):
+                found[k], here, there = self.a.distance(self.b, place, hulls=True)
+                length = float(np.linalg.norm(there - here))
+                if length > 0.0:
+                    n[k] = (there - here) / length
+                else:
+                    found[k] = min(found[k], 0.0)
+        apart = self._low(n, rotations, points) - self.a.highest(n)
+        apart = np.where(found > 0.0, apart, found)
+        return apart - self.a.deviation - self.b.deviation, n
 
-    def _by_budget(self, a: Piece, b: Piece, s: Stretches, needed: float, aim: float) -> None:
-        """Certify meshes by their distances alone; sets `bound`, or `place`."""
-        whole = self.stretches
+    def parted(self, ends: Array, n: Array) -> Array:
+        """(k,) m, how far planes across n (k, 3) part them along stretches (k, 2).
 
-        def distance(row: int, share: float) -> float:
-            self.calls += 1
-            pose = self.motion.pose(*self.joints, row, share)
-            return coal_distance(a, b, pose.rotations[0], pose.points[0])[0] - COAL
+        Each stretch lies within one segment; n has any length, and may be the same (1, 3) for all.
+        """
+        if not len(ends):
+            return np.empty(0)
+        length = np.linalg.norm(n, axis=1, keepdims=True)
+        n = np.where(length > 0.0, n / np.where(length > 0.0, length, 1.0), [0.0, 0.0, 1.0])
+        n = self.a.axis[None] if self.a.half_space else n
+        lows = [self._low(n, *self._placed(times)) for times in ends.T]
+        row = ends[:, 0].astype(np.intp)
+        bent = self._delta[row] * (ends[:, 1] - ends[:, 0]) ** 2
+        least = np.minimum(*lows) - self.a.highest(n) - bent - self._off[row]
+        return np.asarray(least - self.a.deviation - self.b.deviation - ROUNDING)
 
-        moved = np.zeros(len(self.motion.q) - 1)
-        moved[whole.row] = whole.moved
-        budget = Budget(distance, moved, self._most - self.calls)
-        rows, first = np.unique(s.row, return_index=True)
-        try:
-            bound = budget.certify(rows, needed + s.deviation[first], aim)
-            self.bound = min(self.bound, bound - float(s.deviation.max()))
-        except TooNear as near:
-            pose = self.motion.pose(*self.joints, near.row, near.share)
-            depth = coal_distance(self.a, self.b, pose.rotations[0], pose.points[0])[0]
-            overlap = near.distance <= 0.0
-            self.place = Place(near.row, near.share, min(depth, 0.0) if overlap else near.distance)
+    def _placed(self, times: Array) -> tuple[Array, Array]:
+        """Poses of b at instants, in rows."""
+        rows = times.astype(np.intp)
+        if (rows != times).any():
+            return self.motion.poses(self.a.joint, self.b.joint, times)
+        rotations, points = self.motion.poses(self.a.joint, self.b.joint)
+        return rotations[rows], points[rows]
 
-    def _begins_inside(self, s: Stretches, needed: float) -> bool:
-        """Is one body inside the other at the first row? Sets `place` if so."""
-        at = np.flatnonzero((s.row == 0) & (s.share == 0.0) & (s.bound < needed))
-        if not len(at):
+    def _low(self, n: Array, rotations: Array, points: Array) -> Array:
+        """(k,) m, the least that b reaches along n (k, 3) at poses."""
+        turned = np.einsum("ki,kij->kj", np.broadcast_to(n, points.shape), rotations)
+        return np.asarray((points * n).sum(axis=1) - self.b.highest(-turned))
+
+    def _most_off(self, ends: Array) -> Array:
+        """(k,) m, the most of `_off` on stretches (k, 2)."""
+        first, last = np.floor(ends[:, 0]).astype(np.intp), np.ceil(ends[:, 1]).astype(np.intp)
+        borders = np.column_stack([first, np.maximum(last, first + 1)]).ravel()
+        return np.asarray(np.maximum.reduceat(np.append(self._off, 0.0), borders)[::2])
+
+    def _begins_inside(self) -> bool:
+        """Is one body inside the other at the first row? Refuses then."""
+        if self.low[0] > 0.0 or self.a.half_space:
             return False
-        pose = s.first.of(at[:1])
-        if one_inside_other(self.a.truth, self.b.truth, pose.rotations[0], pose.points[0]):
-            distance = coal_distance(self.a, self.b, pose.rotations[0], pose.points[0])[0]
-            self.place = Place(0, 0.0, min(distance, 0.0), inside=True)
-        return self.place is not None
+        rotations, points = self.motion.poses(self.a.joint, self.b.joint)
+        if one_inside_other(self.a, self.b, rotations[0], points[0]):
+            self.inside = True
+            (place,) = self.b.placed(rotations[:1], points[:1])
+            depth = self.a.distance(self.b, place, hulls=True)[0]
+            self._refuse(0.0, min(depth, 0.0))
+        return self.inside
 
-
-def _raised_along(a: Piece, b: Piece, s: Stretches, measured: Measured, aim: float) -> Stretches:
-    """Stretches with the bounds that the plane where bodies were measured gives, below `aim`.
-
-    It stays with the first body on all of them, or turns with the other: as a link swings about
-    the base, so does the plane between them.
-    """
-    if measured.n is None:
-        return s
-    there = (s.last if measured.end else s.first).rotations[measured.stretch]
-    s = _raised(a, b, s, measured.n)
-    if (s.bound >= aim).all():
-        return s
-    return _raised(a, b, s, s.first.rotations @ (there.T @ measured.n))
-
-
-def _raised(a: Piece, b: Piece, s: Stretches, n: Array) -> Stretches:
-    """Stretches with the bounds that planes across n, (3,) or (k, 3), give."""
-    found = parted(a, b, s, n)
-    better = (found > s.bound)[:, None]
-    across = np.where(better, n, s.across)
-    return replace(s, bound=np.maximum(s.bound, found), across=across)
-
-
-def _middle(s: Stretches) -> Place:
-    """Where the shortest of stretches is, which could not be certified."""
-    k = int(np.argmin(s.length))
-    return Place(int(s.row[k]), float(s.share[k] + 0.5 * s.length[k]), np.nan)
+    def _refuse(self, time: float, distance: float) -> None:
+        self.refused, self.distance = time, distance

@@ -1,0 +1,186 @@
+"""Bodies as the judge of collisions sees them: coal's shapes, and how far they reach.
+
+What a plane certifies rests on the support of a body alone, h(n) = max n . x over its points x,
+which is computed here from corners, circles and radii; coal only says which n to try.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property, lru_cache
+from typing import Any
+
+import coal
+import numpy as np
+
+from coverable_arrays import Array
+from coverable_errors import ArgumentError
+from feasibility.collisions import HalfSpace, Soup
+from robots.shapes import Triangles, coal_hull, coal_shape, is_convex, with_contacts
+from robots.urdf import Box, Capsule, Cylinder, Sphere
+
+COAL = 1e-7  # [m] more than coal's distances are off, which stops at GJK
+GJK = 1e-8  # [m]
+FLAT = 1e-6  # [1] of its length, how thick a hull has to be: qhull and coal fail on flat ones
+MERGED = 1e-12  # [1] of its size, how far what qhull leaves out may stand out of its hull
+MOST_NUMBERS = 1 << 22  # of corners times directions, looked at at a time
+KEPT = 256  # meshes whose hulls are kept
+
+Shape = Box | Sphere | Capsule | Cylinder | Triangles | HalfSpace
+_asked = coal.DistanceRequest()
+_asked.enable_signed_distance, _asked.gjk_tolerance = True, GJK
+
+
+class Body:
+    """One body, in the frame of the joint that carries it."""
+
+    def __init__(self, joint: int, shape: Shape, placement: Array, deviation: float = 0.0) -> None:
+        """See the attributes.
+
+        Args:
+            joint: Pinocchio's number, 0 where it is at rest.
+            shape: a primitive, `Triangles` or a `HalfSpace`.
+            placement: (4, 4) its frame in the joint's, m.
+            deviation: m, how far the body may stand out from the shape.
+
+        Raises:
+            ArgumentError: it is none of these, empty, or not finite.
+        """
+        self.joint, self.shape, self.placement, self.deviation = joint, shape, placement, deviation
+        corners, self.radius = _corners(shape)
+        self.circle = shape.radius if isinstance(shape, Cylinder) else 0.0
+        """m, about the axis of a cylinder."""
+        sizes = np.ravel(placement), np.ravel(corners), [self.radius, self.circle]
+        if not np.isfinite(np.concatenate(sizes)).all():
+            raise ArgumentError(f"a shape for the replay is not finite: {shape!r:.80}")
+        self.corners: Array = corners @ placement[:3, :3].T + placement[:3, 3]
+        """(k, 3) m; the body lies within `radius` (m) of their hull, and of circles about them."""
+        self.axis: Array = placement[:3, 2]
+        """(3,) of a cylinder, or what a half space is below of."""
+        self.half_space = isinstance(shape, HalfSpace)
+        self.convex = not isinstance(shape, Triangles) or is_convex(shape)
+        """Is there nothing else in its hull?"""
+        self.centre: Array = 0.5 * (self.corners.min(axis=0) + self.corners.max(axis=0))
+        reach = float(np.linalg.norm(self.corners - self.centre, axis=1).max())
+        self.ball = np.inf if self.half_space else np.hypot(reach, self.circle) + self.radius
+        """m, radius of a ball about `centre` around it."""
+
+    @property
+    def solid_mesh(self) -> Triangles | None:
+        """Its triangles, where they bound a solid: for coal they have no inside."""
+        is_solid = isinstance(self.shape, Triangles) and self.shape.closed
+        return self.shape if is_solid else None  # type: ignore[return-value]
+
+    @cached_property
+    def _geometry(self) -> Any:
+        """Coal's; of a convex mesh its hull, which has an inside."""
+        return self._hull if self.convex else coal_shape(self.shape)  # type: ignore[arg-type]
+
+    @cached_property
+    def _hull(self) -> Any:
+        """Coal's, of something convex that holds the body."""
+        if isinstance(self.shape, Triangles):
+            return _hull_of(self.shape)[0] or coal_shape(self.shape)
+        return coal_shape(self.shape)  # type: ignore[arg-type]
+
+    @cached_property
+    def place(self) -> Any:
+        """Coal's placement."""
+        return coal.Transform3s(self.placement[:3, :3], self.placement[:3, 3])
+
+    def placed(self, rotations: Array, points: Array) -> list[Any]:
+        """Coal's placements with the joint at poses (k, 3, 3), (k, 3) m."""
+        turned, moved = rotations @ self.placement[:3, :3], rotations @ self.placement[:3, 3]
+        return [coal.Transform3s(*pose) for pose in zip(turned, moved + points, strict=True)]
+
+    def highest(self, n: Array) -> Array:
+        """(k,) m, h(n) for unit vectors n (k, 3), which are not along a half space."""
+        parts = -(-n.size * len(self.corners) // MOST_NUMBERS)
+        found = [(part @ self.corners.T).max(axis=1) for part in np.array_split(n, max(parts, 1))]
+        along = n @ self.axis
+        across = np.sqrt(np.maximum((n * n).sum(axis=1) - along * along, 0.0))
+        return np.concatenate(found) + self.circle * across + self.radius
+
+    def meets(self, other: Body) -> Callable[[Any, float], float | None]:
+        """Ask coal: does a body, placed in this one's frame, come nearer than a margin (m)?
+
+        None where it does not, else a distance (m) of some of their triangles that is less.
+        """
+        request, found = with_contacts(coal.CollisionRequest()), coal.CollisionResult()
+        request.gjk_tolerance = GJK
+        one, place, two = self._geometry, self.place, other._geometry
+
+        def nearer(there: Any, margin: float) -> float | None:
+            request.security_margin = margin + COAL
+            found.clear()
+            if not coal.collide(one, place, two, there, request, found):
+                return None
+            return float(found.getContact(0).penetration_depth)
+
+        return nearer
+
+    def distance(self, other: Body, place: Any, hulls: bool = False) -> tuple[float, Array, Array]:
+        """Coal's distance (m) to a body at a place in this one's frame, and nearest points (3,) m.
+
+        Below 0 as deep as they overlap. Of meshes that are not convex it is that of their
+        triangles, at least 0; with `hulls` that of what is around them.
+        """
+        one, two = (self._hull, other._hull) if hulls else (self._geometry, other._geometry)
+        result = coal.DistanceResult()
+        found = coal.distance(one, self.place, two, place, _asked, result)
+        return float(found), result.getNearestPoint1(), result.getNearestPoint2()
+
+
+def body_of_soup(soup: Soup) -> Body:
+    """Triangles at rest.
+
+    Raises:
+        ArgumentError: there are none, or they are not finite.
+    """
+    vertices, faces = np.unique(soup.triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    mesh = Triangles(vertices, faces.reshape(-1, 3), soup.closed)
+    return Body(0, mesh, np.eye(4), soup.deviation)
+
+
+def _corners(shape: Shape) -> tuple[Array, float]:
+    """(k, 3) m in the shape's own frame, and a radius (m) about their hull."""
+    match shape:
+        case Box(size):
+            signs = np.array(np.meshgrid(*[(-0.5, 0.5)] * 3)).reshape(3, 8).T
+            return signs * np.array(size), 0.0
+        case Sphere(radius):
+            return np.zeros((1, 3)), radius
+        case Capsule(radius, length):
+            return np.array([[0.0, 0.0, -0.5 * length], [0.0, 0.0, 0.5 * length]]), radius
+        case Cylinder(_, length):
+            return np.array([[0.0, 0.0, -0.5 * length], [0.0, 0.0, 0.5 * length]]), 0.0
+        case HalfSpace():
+            return np.zeros((1, 3)), 0.0
+        case Triangles(vertices, faces) if len(faces):
+            if faces.min() < 0 or faces.max() >= len(vertices) or not np.isfinite(vertices).all():
+                raise ArgumentError("a mesh for the replay is not finite, or lacks vertices")
+            return _hull_of(shape)[1:]
+    raise ArgumentError(f"the replay knows no shape like {shape!r:.80}")
+
+
+@lru_cache(maxsize=KEPT)
+def _hull_of(mesh: Triangles) -> tuple[Any, Array, float]:
+    """Coal's hull of a mesh, or None, its corners (k, 3) m, and a radius (m) about them.
+
+    Of what is flat, a box along the directions in which it spreads.
+    """
+    from scipy.spatial import QhullError
+
+    points = mesh.vertices[np.unique(mesh.faces)]
+    hair = MERGED * (1.0 + float(np.abs(points).max()))
+    middle = points.mean(axis=0)
+    _, spread, axes = np.linalg.svd(points - middle, full_matrices=False)
+    if spread[-1] > FLAT * spread[0]:
+        try:
+            return (*coal_hull(points), hair)
+        except (QhullError, RuntimeError):  # coal takes at most 255 edges at a corner
+            pass
+    along = (points - middle) @ axes.T
+    ends = np.stack([along.min(axis=0), along.max(axis=0)])
+    box = np.stack(np.meshgrid(*ends.T), axis=-1).reshape(-1, len(axes)) @ axes + middle
+    return None, box, hair
