@@ -2,6 +2,7 @@ from .bodies import Fineness as Fineness
 from .bodies import Polytope as Polytope
 from .bodies import Solid as Solid
 from .bodies import Triangles as Triangles
+from .coal_shapes import coal_distance as coal_distance
 from .coal_shapes import coal_hull as coal_hull
 from .coal_shapes import coal_shape as coal_shape
 from .coal_shapes import with_contacts as with_contacts

@@ -75,6 +75,23 @@ def coal_body(body: Polytope) -> tuple[Any, Array]:
     return coal.Capsule(radius, length), place
 
 
+def coal_distance(a: Polytope, b: Polytope) -> float:
+    """m, between two bodies in the same frame; below 0 about as deep as they overlap.
+
+    Example:
+        >>> a, b = (Polytope("", 0, np.array([[x, 0.0, 0.0]]), 0.1) for x in (0.0, 0.15))
+        >>> round(coal_distance(a, b), 9)
+        -0.05
+    """
+    placed = []
+    for body in (a, b):
+        shape, place = coal_body(body)
+        placed += [shape, coal.Transform3s(place[:3, :3], place[:3, 3])]
+    request = coal.DistanceRequest()
+    request.enable_signed_distance = True
+    return float(coal.distance(*placed, request, coal.DistanceResult()))
+
+
 def _turn_to(z: Array) -> Array:
     """(3, 3) a rotation whose third column is a unit vector."""
     x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)

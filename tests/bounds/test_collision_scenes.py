@@ -71,10 +71,11 @@ def judged_as_by_fcl(robot, bodies, q, step_deg):
             assert distance < pair.clearance + 2e-4, (pair, distance)
     if found.accepted:
         assert found.min_clearance <= least.min() + 1e-5
-    return found
+        off = 2.0 * max(soup.deviation for soup in bodies.soups)
+        assert found.min_clearance >= 0.6 * (found.measured_clearance - off)
 
 
-SCENES = [("ur5", 1), *((name, [500, k]) for k in range(25) for name in ARMS[:5]), ("puma560", 0)]
+SCENES = [("ur5", 1), *((name, [500, k]) for k in range(133) for name in ARMS[:3]), ("puma560", 0)]
 
 
 @sampled

@@ -52,7 +52,7 @@ class CollisionReplay(Judged):
     faults: tuple[CollisionFault, ...]
     """One for each pair that comes too near, the nearest first; none when it is accepted."""
     calls: int
-    """How often coal was called for what is certified."""
+    """How often it was asked how far apart two bodies are, for what is certified."""
 
     def added_to(self, certificate: Certificate) -> Certificate:
         """The certificate of the same motion, with what was found."""

@@ -186,9 +186,11 @@ class Pairing:
         within = np.floor(ends[:, 0]) + 1.0 >= ends[:, 1]
 
         def at(share: Array, some: Any) -> Array:
-            straight = ends[some, 0] + share * (ends[some, 1] - ends[some, 0])
+            first, last = ends[some].T
             along = np.interp(way[some, 0] + share * 2.0 * half[some], self.way, self._rows)
-            return np.where(within[some], straight, np.clip(along, *ends[some].T))
+            straight = first + share * (last - first)
+            inner = np.where(within[some], straight, along).clip(first, last)
+            return np.where(share <= 0.0, first, np.where(share >= 1.0, last, inner))
 
         middle = at(np.full(len(ends), 0.5), slice(None))
         poses = self.motion.poses(self.a.joint, self.b.joint, middle)
@@ -250,8 +252,8 @@ class Pairing:
         """
         n = np.tile(self.a.axis, (len(points), 1))
         found = np.ones(len(points))
+        self.calls += len(points)
         if not self.a.half_space:
-            self.calls += len(points)
             for k, place in enumerate(self.b.placed(rotations, points)):
                 found[k], here, there = self.a.distance(self.b, place, hulls=True)
                 length = float(np.linalg.norm(there - here))
