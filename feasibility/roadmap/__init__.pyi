@@ -44,4 +44,3 @@ from .walk import links_of as links_of
 from .walk import patch_walk as patch_walk
 from .walk import route_walk as route_walk
 from .warmup import warm_up as warm_up
-from .warmup import warm_up_in_turn as warm_up_in_turn

@@ -2,35 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from multiprocessing.synchronize import Lock
-
-from feasibility.notices import compiling_notice
 from feasibility.task import Task
 from robots import Robot
 from surfaces import Cells
-
-
-def warm_up_in_turn(
-    lock: Lock, say: Callable[[], None], load: Callable[[bool], None] | None = None
-) -> None:
-    """`warm_up` in one of several new processes: one of them compiles, the others load the result.
-
-    Args:
-        lock: shared by these processes.
-        say: called in the process that compiles, if that takes long.
-        load: in place of `warm_up`.
-    """
-    first = lock.acquire(False)
-    if not first:
-        lock.acquire()  # waits until the first process is done
-        lock.release()
-    try:
-        with compiling_notice(say=say):
-            (load or warm_up)(True)
-    finally:
-        if first:
-            lock.release()
 
 
 def warm_up(rarely_used: bool = False) -> None:

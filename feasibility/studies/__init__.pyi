@@ -10,14 +10,14 @@ from .outcome import cause_counts as cause_counts
 from .outcome import cells_of as cells_of
 from .outcome import component_covers as component_covers
 from .outcome import merit as merit
+from .pool import Workers as Workers
+from .pool import WorkersError as WorkersError
 from .robot_comparison import Arm as Arm
 from .robot_comparison import Comparison as Comparison
 from .robot_comparison import compare as compare
 from .run import Row as Row
 from .run import StudyTask as StudyTask
 from .run import run_tasks as run_tasks
-from .scheduling import Workers as Workers
-from .scheduling import WorkersError as WorkersError
 from .store import Store as Store
 from .stored import trial_fault as trial_fault
 from .workers import open_workers as open_workers

@@ -16,7 +16,7 @@ from coverable_files import stamps
 from feasibility.cases import TABLES, Case, parse_toml, read_robot, read_surface, toml_document
 from feasibility.clock import Clock
 from feasibility.studies.case_files import files_of_arm
-from feasibility.studies.scheduling import Tables
+from feasibility.studies.pool import Tables
 from robots import Robot, flange_axis
 from surfaces import Cells, SurfaceError, check_pose, rotation_from_rpy
 

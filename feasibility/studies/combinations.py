@@ -29,8 +29,8 @@ from feasibility.studies.built_cases import (
     mounting_fault,
     surface_at_home,
 )
+from feasibility.studies.pool import Tables
 from feasibility.studies.run import StudyTask
-from feasibility.studies.scheduling import Tables
 
 ORIGIN = (0.0, 0.0, 0.0)
 POSED = [[key] for key in POSES]

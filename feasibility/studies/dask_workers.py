@@ -1,54 +1,49 @@
-"""Tasks of a study on a Dask cluster, as any other workers."""
+"""Tasks of a study on a Dask cluster. Each worker needs coverable; one thread each is best."""
 
 from __future__ import annotations
 
 import gc
-import time
-from collections.abc import Callable
-from concurrent.futures import Executor, Future, wait
+from collections import deque
+from collections.abc import Sequence
+from concurrent.futures import CancelledError
 from contextlib import suppress
-from typing import Any
+from functools import partial
+
+from distributed import Client, Future, KilledWorker, wait
+from distributed.comm import get_address_host
 
 from feasibility.notices import slow_notice
 from feasibility.roadmap import warm_up
-from feasibility.studies.scheduling import BREAKS, WorkersError
+from feasibility.studies.pool import (
+    LOOK,
+    Receive,
+    Reply,
+    Tables,
+    Work,
+    WorkersError,
+    run_one,
+    untold,
+)
 
-FIRST_WORKER = 60.0  # [s] for its first worker to be there
-ASK = 2.0  # [s] between two looks at how many workers there are
+AHEAD = 2  # tasks in flight for each thread: one at work, one waiting
+FIRST_WORKER = 60.0  # [s] for the first worker to be there
 
 
 class DaskWorkers:
-    """The workers of a Dask cluster. Each needs coverable installed; one thread each is best."""
-
-    patience = 1  # Dask has tried several workers before it gives a task up
-    breaks: tuple[type[BaseException], ...] = BREAKS
+    """The workers of a Dask cluster; Dask itself does again what dies with one of them."""
 
     def __init__(self, address: str, warm: bool, connect: float) -> None:
-        """Connect; see `open_workers`.
+        """Connect, and wait for the first worker; see `open_workers`.
 
         Raises:
-            WorkersError: Dask is not installed, or nothing useful answers there.
+            WorkersError: nothing useful answers there.
         """
-        try:
-            from distributed import KilledWorker
-        except ImportError as error:
-            raise WorkersError(
-                "--dask needs the library distributed: pip install 'coverable[dask]'"
-            ) from error
-        self.deaths: tuple[type[BaseException], ...] = (KilledWorker,)
-        self._address, self._warm, self._patience = address, warm, connect
-        self._connect()
-
-    def _connect(self) -> None:
-        """Find the scheduler, and wait for its first worker."""
-        from distributed import Client
-
-        address = self._address
+        self._warm = warm
         # A client that could not connect lives on in its own traceback. Where the garbage collector
         # closes it while another starts a thread, both wait for one lock for ever; so it goes now.
         gc.collect()
         try:
-            self._client = Client(address, timeout=self._patience, set_as_default=False)
+            self._client = Client(address, timeout=connect, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:  # a timeout is an OSError
             raise WorkersError(
                 f"no Dask scheduler answers at {address!r} ({error}); expected an address such as "
@@ -61,62 +56,69 @@ class DaskWorkers:
             raise WorkersError(
                 f"the Dask scheduler at {address!r} has no workers; start some with `dask worker`"
             ) from error
-        self._width, self._queried = 1, -ASK
-        # Not pure: a task that is submitted again is run again.
-        self._pool: Executor = self._client.get_executor(pure=False)
 
     @property
     def width(self) -> int:
-        """Threads of all workers, as of late; at least 1, for while they are replaced."""
-        now = time.monotonic()
-        if now > self._queried + ASK:
-            self._width = max(sum(self._client.nthreads().values()), 1)
-            self._queried = now
-        return self._width
+        """Threads of all workers now; at least 1, for while they are replaced."""
+        return max(sum(self._client.nthreads().values()), 1)
 
-    @property
-    def broken(self) -> bool:
-        """Is the connection closed?"""
-        return self._client.status in ("closing", "closed")
+    def run(self, work: Work, tables: Sequence[Tables], receive: Receive) -> None:
+        """See `Workers`."""
+        waiting, flying = deque(range(len(tables))), dict[Future, int]()
+        try:
+            if self._warm:
+                self._load()
+            while waiting or flying:
+                receive(self._step(work, tables, waiting, flying))
+        finally:
+            with suppress(OSError, RuntimeError):  # perhaps nobody is there any more
+                self._client.cancel(list(flying))
 
-    def submit(self, work: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Run it on the cluster."""
-        if self._warm:
-            self._load()
-            self._warm = False
-        return self._pool.submit(work, *arguments)
-
-    def _load(self) -> None:
-        """Have one worker of each machine load the kernels, so that the others need not compile."""
-        from distributed.comm import get_address_host
-
-        machines = {get_address_host(name): name for name in self._client.nthreads()}
-        with slow_notice():
-            # Another one will do, should the one that is named die meanwhile.
-            pools = [
-                self._client.get_executor(pure=False, workers=[name], allow_other_workers=True)
-                for name in machines.values()
-            ]
-            wait([pool.submit(warm_up, True) for pool in pools])
-
-    def renew(self) -> None:
-        """Connect again; Dask replaces workers by itself.
+    def _step(
+        self, work: Work, tables: Sequence[Tables], waiting: deque[int], flying: dict[Future, int]
+    ) -> list[Reply]:
+        """Keep enough tasks in flight, and wait a moment for replies.
 
         Raises:
-            WorkersError: the scheduler is gone.
+            WorkersError: the scheduler is gone, or workers do not know such work.
         """
-        self.close()
         try:
-            self._connect()
-        except WorkersError as error:
+            most = AHEAD * self.width if waiting else 0
+            while waiting and len(flying) < most:
+                # Not pure: a task that is submitted again is run again.
+                sent = self._client.submit(run_one, work, tables[waiting[0]], pure=False)
+                flying[sent] = waiting.popleft()
+            with suppress(TimeoutError), self._client.as_current():
+                wait(list(flying), timeout=LOOK, return_when="FIRST_COMPLETED")
+            done = [future for future in flying if future.done()]
+            return [self._reply(flying.pop(future), future) for future in done]
+        except (OSError, RuntimeError, CancelledError) as error:
             raise WorkersError(
                 "the connection to the workers was lost; what was finished is kept, run again to "
                 "continue"
             ) from error
 
+    def _reply(self, index: int, future: Future) -> Reply:
+        """The reply to a task that has come to an end."""
+        try:
+            return Reply.of(index, future.result())
+        except KilledWorker:
+            return Reply(index, None, "its worker died, several times", 0.0)
+        except (OSError, CancelledError):
+            raise
+        except Exception as error:  # what the tasks themselves raise comes as a reply
+            raise untold(error) from error
+
+    def _load(self) -> None:
+        """Have one worker of each machine load the kernels, so that the others need not compile."""
+        machines = {get_address_host(name): name for name in self._client.nthreads()}
+        with slow_notice(), self._client.as_current():
+            # Another one will do, should the one that is named die meanwhile.
+            submit = partial(self._client.submit, pure=False, allow_other_workers=True)
+            wait([submit(warm_up, True, workers=[name]) for name in machines.values()])
+        self._warm = False
+
     def close(self) -> None:
         """Leave the cluster; it goes on without us."""
-        with suppress(*self.breaks):  # perhaps nobody is there any more
-            self._pool.shutdown(wait=False)
-        with suppress(*self.breaks):
+        with suppress(OSError, RuntimeError):
             self._client.close()

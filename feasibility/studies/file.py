@@ -43,8 +43,8 @@ from feasibility.cases import (
 from feasibility.safe_files import shown_path
 from feasibility.studies.axes import Range, Variation, VariedKey, read_variation
 from feasibility.studies.combinations import cause_of, faults_of, put, tasks_of
+from feasibility.studies.pool import Tables
 from feasibility.studies.run import StudyTask
-from feasibility.studies.scheduling import Tables
 
 MOST_TASKS = 1_000_000
 MOST_ALIKE = 3  # values of one key, wrong for the same cause, that are reported one by one

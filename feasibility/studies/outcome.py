@@ -13,7 +13,7 @@ from coverable_arrays import Mask
 from feasibility.collisions import gather
 from feasibility.division import undominated
 from feasibility.studies.built_cases import arm_of, case_of, clock_of, cut_of
-from feasibility.studies.scheduling import Tables
+from feasibility.studies.pool import Tables
 from feasibility.verdict import CauseKind, Verdict
 
 EXAMINED = 6  # missed cells whose causes are determined; the others take that of the nearest one

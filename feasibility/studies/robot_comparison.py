@@ -21,8 +21,8 @@ from feasibility.studies.built_cases import (
     mounting_fault,
 )
 from feasibility.studies.outcome import finite, merit, outcome_of
+from feasibility.studies.pool import Tables, Workers
 from feasibility.studies.run import StudyTask, run_tasks
-from feasibility.studies.scheduling import Tables, Workers
 from feasibility.studies.stored import arm_fault
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from coverable_files import FileFault, open_regular, stamps
 from feasibility.search import Progress
 from feasibility.studies.case_files import files_of
 from feasibility.studies.outcome import evaluate
-from feasibility.studies.scheduling import Reply, Tables, Work, Workers, schedule
+from feasibility.studies.pool import Reply, Tables, Work, Workers
 from feasibility.studies.store import Record, Status, Store
 from feasibility.studies.stored import outcome_fault
 from feasibility.version import version
@@ -114,7 +114,7 @@ def run_tasks(
         for work in dict.fromkeys(task.work for task in missing):
             part = [task for task in missing if task.work is work]
             receive = partial(keeper.receive, part)
-            schedule(work, [task.tables for task in part], workers, receive)
+            workers.run(work, [task.tables for task in part], receive)
     finally:
         keeper.flush()
     rows = [(task, found[task.key]) for task in tasks]

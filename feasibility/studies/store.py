@@ -1,7 +1,8 @@
 """Where the outcomes of a study are kept: one SQLite file, written as they come.
 
 The file has a write-ahead log, and every batch of outcomes is one transaction. So whatever kills
-the process, what was kept before stays, and the file is never half written.
+the process, what was kept before stays. A file that no study has written is refused unread: a view
+or a trigger in it would be a program that runs when rows are read.
 """
 
 from __future__ import annotations
@@ -11,7 +12,6 @@ import math
 import os
 import sqlite3
 import stat
-import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
@@ -21,42 +21,33 @@ from coverable_files import FileFault, open_regular
 from feasibility.safe_files import FileError, check_writable, shown_path
 from feasibility.studies.stored import json_object
 
-APPLICATION = 0x434F5642  # "COVB", in the header of every store
-FORMAT = 2  # of the file and of its keys; those of format 1 held the names of modules
 MAGIC = b"SQLite format 3\0"
 LARGEST = 2**62  # [byte] no limit
 LARGEST_ROW = 64 << 20  # [byte]
 BESIDE = ("-wal", "-shm", "-journal")  # files that SQLite keeps with a store
 PATIENCE = 5.0  # [s] that another process may hold the file
-RETRY = 0.01  # [s] between two tries to open a file that is busy
 
-TABLE = """
-CREATE TABLE tasks (
+TABLE = """CREATE TABLE tasks (
     key TEXT PRIMARY KEY,
     parameters TEXT NOT NULL,
     status TEXT NOT NULL CHECK (status IN ('done', 'failed')),
     result TEXT NOT NULL,
     seconds REAL NOT NULL
-) WITHOUT ROWID
-"""
+) WITHOUT ROWID"""
+FIND = "SELECT key, parameters, status, result, seconds FROM tasks WHERE key = ?"
 
-FOREIGN = "is not a study file; give another name, or remove the file"
-DAMAGED_RECORD = "the record {!r} is damaged: {}; remove the file to start anew"
+FOREIGN = "is not a study file of this version; give another name, or remove the file"
 DAMAGED = "is damaged ({}); remove it to start anew"
-HELD = "is held by another process; wait until that ends, or give another name"
-NO_PLACE = "cannot be written: {}; choose another place"
-NOT_WRITTEN = "cannot be written: {}; what was kept before stays: free some space and run again"
+DAMAGED_RECORD = "the record {!r} is damaged: {}; remove the file to start anew"
+STAYS = "what was kept before stays: free some space and run again"
 FAULTS = {
-    sqlite3.SQLITE_FULL: "the disk is full; what was kept before stays: free some space and run "
-    "again",
+    sqlite3.SQLITE_FULL: f"the disk is full; {STAYS}",
+    sqlite3.SQLITE_IOERR: f"cannot be written: {{}}; {STAYS}",
     sqlite3.SQLITE_NOTADB: FOREIGN,
     sqlite3.SQLITE_CORRUPT: DAMAGED,
-    sqlite3.SQLITE_BUSY: HELD,
-    sqlite3.SQLITE_LOCKED: HELD,
-    sqlite3.SQLITE_READONLY: NO_PLACE,
-    sqlite3.SQLITE_PERM: NO_PLACE,
-    sqlite3.SQLITE_CANTOPEN: NO_PLACE,
-    sqlite3.SQLITE_IOERR: NOT_WRITTEN,
+    sqlite3.SQLITE_BUSY: "is held by another process; wait until that ends, or give another name",
+    sqlite3.SQLITE_READONLY: "cannot be written: {}; choose another place",
+    sqlite3.SQLITE_CANTOPEN: "cannot be written: {}; choose another place",
 }  # what to do about an error of SQLite, by its primary code
 
 Status = Literal["done", "failed"]
@@ -103,10 +94,8 @@ class Store(AbstractContextManager["Store"]):
             StoreError: the file is something else, damaged, of a later version, or cannot be
                 written.
         """
-        self.path = os.fspath(path)
-        self._name, self._patience = shown_path(path), patience
+        self.path, self._name = os.fspath(path), shown_path(path)
         in_memory = self.path == ":memory:"
-        fresh = in_memory or self._is_new()
         if not in_memory:
             self._refuse_special_files()
         with self._reported():
@@ -117,17 +106,18 @@ class Store(AbstractContextManager["Store"]):
             )
         try:
             with self._reported():
-                self._base.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_ROW)
-                self._prepare(fresh)
+                self._prepare()
         except StoreError:
             self._base.close()
             raise
 
-    def _is_new(self) -> bool:
-        """Is there no file yet, or an empty one? Anything but a regular file is refused."""
+    def _refuse_special_files(self) -> None:
+        """See that the file can be a store; a pipe beside it would be waited for without end."""
         try:
             with open_regular(self.path, LARGEST, "a study file") as stream:
                 head = stream.read(len(MAGIC))
+            if head not in (b"", MAGIC):  # SQLite would take a shorter file for an empty one
+                raise self._refused(FOREIGN)
         except (FileFault, OSError) as error:
             if not isinstance(error.__cause__, FileNotFoundError):
                 raise self._refused(str(error)) from error
@@ -135,89 +125,35 @@ class Store(AbstractContextManager["Store"]):
                 check_writable(self.path)
             except FileError as fault:
                 raise StoreError(fault.faults, fault.source) from fault
-            return True
-        if head not in (b"", MAGIC):  # SQLite would take a shorter file for an empty one
-            raise self._refused(FOREIGN)
-        return not head
-
-    def _refuse_special_files(self) -> None:
-        """A pipe where SQLite expects a file of its own would be waited for without end."""
         for end in BESIDE:
             beside = os.path.realpath(self.path) + end
-            try:
-                mode = os.lstat(beside).st_mode
-            except FileNotFoundError:
-                continue
-            if not stat.S_ISREG(mode):
+            if os.path.lexists(beside) and not stat.S_ISREG(os.lstat(beside).st_mode):
                 raise self._refused(f"{shown_path(beside)} is not a regular file; remove it")
 
-    def _prepare(self, fresh: bool) -> None:
-        """Make the table, or see that it is there and undamaged."""
-        if not fresh:
-            # In one transaction: another run may be making the table right now.
-            with self._transaction("DEFERRED"):
-                self._refuse_strangers()
-        self._write_ahead()
-        self._base.execute("PRAGMA synchronous = NORMAL")
-        # Two runs may open a new file at the same time: one of them makes the table.
-        with self._transaction():
-            if not self._tables():
-                self._base.execute(TABLE)
-                self._base.execute(f"PRAGMA application_id = {APPLICATION}")
-                self._base.execute(f"PRAGMA user_version = {FORMAT}")
-
-    def _refuse_strangers(self) -> None:
-        """See that the file is an undamaged study file; another program's file is not changed."""
-        (application,) = self._base.execute("PRAGMA application_id").fetchone()
-        (written,) = self._base.execute("PRAGMA user_version").fetchone()
-        empty = application == 0 and written == 0 and not self._tables()
-        if application != APPLICATION and not empty:
-            raise self._refused(
-                "is an SQLite file of another program; give another name for the study, or "
-                "remove the file"
-            )
-        if application == APPLICATION and written != FORMAT:
-            raise self._refused(
-                f"is a study of format {written}, and this program writes format {FORMAT}; "
-                "give another name, and its cases are decided anew"
-            )
+    def _prepare(self) -> None:
+        """Make the table, or see that it is there, undamaged and alone."""
+        self._base.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_ROW)
+        made = self._made()
+        if made not in ([], [TABLE]):
+            raise self._refused(FOREIGN)
         (state,) = self._base.execute("PRAGMA quick_check(1)").fetchone()
         if state != "ok":
             raise self._refused(DAMAGED.format(" ".join(str(state).split())))
-        self._refuse_other_contents()
+        self._base.execute("PRAGMA journal_mode = WAL")
+        self._base.execute("PRAGMA synchronous = NORMAL")
+        with self._transaction():
+            if not self._made():
+                self._base.execute(TABLE)
 
-    def _write_ahead(self) -> None:
-        """Let readers and a writer work side by side.
-
-        SQLite does not wait for another process that opens the file at the same moment: it says at
-        once that the file is busy, whatever its patience.
-        """
-        end = time.monotonic() + self._patience
-        while True:
-            try:
-                self._base.execute("PRAGMA journal_mode = WAL").fetchone()
-                return
-            except sqlite3.OperationalError as error:
-                busy = error.sqlite_errorcode & 0xFF == sqlite3.SQLITE_BUSY
-                if not busy or time.monotonic() > end:
-                    raise
-            time.sleep(RETRY)
-
-    def _refuse_other_contents(self) -> None:
-        """A view or a trigger in the file would be a program that runs when rows are read."""
-        made = self._base.execute("SELECT sql FROM sqlite_master WHERE sql IS NOT NULL").fetchall()
-        if [" ".join(str(sql).split()) for (sql,) in made] not in ([], [" ".join(TABLE.split())]):
-            raise self._refused(DAMAGED.format("it holds more than one table of results"))
-
-    def _tables(self) -> list[str]:
-        """Names of the tables in the file."""
-        rows = self._base.execute("SELECT name FROM sqlite_master WHERE type = 'table'")
-        return [str(name) for (name,) in rows]
+    def _made(self) -> list[str]:
+        """How all that is in the file was made."""
+        rows = self._base.execute("SELECT sql FROM sqlite_master WHERE sql IS NOT NULL")
+        return [str(sql) for (sql,) in rows]
 
     @contextmanager
-    def _transaction(self, kind: str = "IMMEDIATE") -> Iterator[None]:
-        """All or nothing of what is written inside; what is read is of one moment."""
-        self._base.execute(f"BEGIN {kind}")
+    def _transaction(self) -> Iterator[None]:
+        """All or nothing of what is written inside."""
+        self._base.execute("BEGIN IMMEDIATE")
         try:
             yield
             self._base.execute("COMMIT")
@@ -267,10 +203,9 @@ class Store(AbstractContextManager["Store"]):
         Raises:
             StoreError: the file cannot be read, or holds rows that no study has written.
         """
-        wanted = set(keys)
         with self._reported():
-            rows = self._base.execute("SELECT key, parameters, status, result, seconds FROM tasks")
-            return {row[0]: self._record(row) for row in rows if row[0] in wanted}
+            rows = (row for key in set(keys) for row in self._base.execute(FIND, [key]))
+            return {row[0]: self._record(row) for row in rows}
 
     def _record(self, row: tuple[Any, ...]) -> Record:
         """A row read back."""

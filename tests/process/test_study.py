@@ -1,4 +1,4 @@
-"""Studies: the table is the same whoever works, however a pool breaks and everyone is killed."""
+"""Studies: the table is the same whoever works, and whoever is killed meanwhile."""
 
 from __future__ import annotations
 
@@ -10,8 +10,6 @@ import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import BrokenExecutor, CancelledError, Future
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from pathlib import Path
 
@@ -19,6 +17,7 @@ import numpy as np
 import pytest
 import study_works
 from jobs import case_named, coverable, verdict_named
+from samples import sampled, spread
 
 from feasibility.cases import as_read
 from feasibility.studies import (
@@ -129,75 +128,6 @@ def test_work_that_no_worker_can_be_told(pool) -> None:
         pass
 
 
-# -- a pool that breaks ----------------------------------------------------------------------------
-
-BREAKS = [
-    BrokenProcessPool("a child process terminated abruptly"),
-    BrokenExecutor("broken"),
-    CancelledError(),
-    OSError("handle is closed"),
-    ValueError("I/O operation on closed file"),
-    RuntimeError("cannot schedule new futures after shutdown"),
-    EOFError(),
-    BrokenPipeError(32, "Broken pipe"),
-    ConnectionResetError(104, "Connection reset by peer"),
-    TimeoutError("timed out"),
-]
-
-
-class StandIn:
-    """Workers that do a task here and now, and break at the n-th one, as real ones may."""
-
-    breaks = deaths = (BrokenExecutor, CancelledError, EOFError, OSError, RuntimeError, ValueError)
-    patience, width = 3, 2
-
-    def __init__(self, where, error, at) -> None:
-        self.where, self.error, self.at = where, error, at
-        self.submitted, self.renewed, self.broken = 0, 0, False
-
-    def submit(self, work, *arguments):
-        if self.broken and self.where == "submit":
-            raise self.error
-        self.submitted += 1
-        future = Future()
-        if self.submitted in self.at:
-            self.broken = True
-            if self.where == "submit":
-                raise self.error
-        if not self.broken:
-            future.set_result(work(*arguments))
-        elif self.where == "result":
-            future.set_exception(self.error)
-        return future  # or one that never ends
-
-    def renew(self):
-        self.renewed, self.broken = self.renewed + 1, False
-
-    def close(self):
-        pass
-
-
-@pytest.mark.parametrize("where", ["submit", "result", "never"])
-@pytest.mark.parametrize("error", BREAKS, ids=repr)
-def test_a_break_of_any_kind_starts_a_new_pool_and_loses_nothing(where, error) -> None:
-    """Python 3.11 forgets tasks that are submitted when a worker dies: they never end."""
-    workers = StandIn(where, error, at=(1, 7, 12))
-    rows = run_tasks(numbers(12), workers)
-    assert [(row.status, row.result["double"]) for row in rows] == [
-        ("done", 2 * k) for k in range(12)
-    ]
-    assert workers.renewed == 3
-
-
-def test_pools_that_break_at_every_task_end_the_study_and_lose_nothing() -> None:
-    workers = StandIn("submit", OSError("handle is closed"), at=range(5, 10_000))
-    with Store(":memory:") as store:
-        with pytest.raises(WorkersError, match="what was finished is kept"):
-            run_tasks(numbers(12), workers, store)
-        assert len(store) == 4
-    assert workers.renewed < 50
-
-
 # -- killing ---------------------------------------------------------------------------------------
 
 
@@ -223,6 +153,30 @@ def test_a_worker_that_dies_costs_its_own_task_alone(tmp_path) -> None:
         else:
             assert (row.status, row.result["double"]) == ("done", 2 * k)
     assert killed
+
+
+@sampled
+@pytest.mark.parametrize("count", spread([60, 2000], 1))
+def test_workers_that_are_killed_at_random(count, tmp_path) -> None:
+    """Each task has one row, the one that it should have."""
+    rng, seen, killed = np.random.default_rng(count), [], []
+    tasks = numbers(count, study_works.double_slowly)
+
+    def kill(done, total, text) -> None:
+        seen.append(done)
+        children = multiprocessing.active_children()
+        if children and done < 0.8 * total and len(killed) < count // 20 and rng.random() < 0.3:
+            killed.append(children[int(rng.integers(len(children)))].pid)
+            os.kill(killed[-1], signal.SIGKILL)
+
+    with Store(tmp_path / "a.study") as store, open_workers(2, warm=False) as workers:
+        rows = run_tasks(tasks, workers, store, kill)
+        kept = store.find(task.key for task in tasks)
+        assert len(store) == len(kept) == count
+    assert len(set(killed)) > 1
+    assert (seen == sorted(seen), seen[-1]) == (True, count)
+    for k, (task, row) in enumerate(zip(tasks, rows, strict=True)):
+        assert row.result["double"] == kept[task.key].result["double"] == 2 * k
 
 
 COMMAND = """

@@ -4,54 +4,84 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
+from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 import study_works
 from jobs import coverable
+from samples import sampled, spread
 
-from feasibility.studies import Store, StudyTask, open_workers, run_tasks
-from feasibility.studies.scheduling import WorkersError
+from feasibility.studies import Store, StudyTask, WorkersError, open_workers, run_tasks
 
 distributed = pytest.importorskip("distributed")
 
 pytestmark = pytest.mark.filterwarnings("ignore")  # what Dask says of its own threads and ports
+SHARED = Path(study_works.__file__).parent
 
 
-def cluster(workers):
-    """A cluster of workers of one thread each, heard on this machine alone."""
-    return distributed.LocalCluster(
-        n_workers=workers, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
-    )
+@contextmanager
+def cluster(folder, workers):
+    """A scheduler and workers of one thread each, processes of their own, as people start them."""
+    file = folder / "scheduler.json"
+    common = "--scheduler-file", file, "--no-dashboard"
+    path = os.pathsep.join([str(SHARED), *filter(None, sys.path)])
+
+    def start(command, *arguments):
+        module = f"distributed.cli.dask_{command}"
+        return subprocess.Popen(
+            [sys.executable, "-m", module, *map(str, arguments)],
+            env={**os.environ, "PYTHONPATH": path},
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+
+    made = [start("scheduler", *common, "--host", "127.0.0.1", "--port", 0)]
+    own = "--nthreads", 1, "--no-nanny", "--host", "127.0.0.1", "--local-directory", folder
+    made += [start("worker", *common, *own) for _ in range(workers)]
+    try:
+        with distributed.Client(scheduler_file=str(file), set_as_default=False) as client:
+            client.wait_for_workers(workers, timeout=60)
+            address = client.scheduler.address
+        yield address, made
+    finally:
+        for process in made:
+            process.kill()
+            process.wait()
 
 
-def test_a_worker_killed_under_the_command(tmp_path) -> None:
-    """Real verdicts, and the table that is written is that of this process alone, byte by byte."""
+@sampled
+@pytest.mark.parametrize("count", spread([60, 2000], 1))
+def test_a_worker_killed_while_it_works(count, tmp_path) -> None:
+    """Each task has one row; and real verdicts are those of this process alone, byte by byte."""
     study = tmp_path / "plates.toml"
     study.write_text(study_works.STUDY, encoding="utf-8")
-    killed = []
-
-    def kill(done, total, text) -> None:
-        if done > 10 and not killed:
-            killed.append(next(iter(made.workers.values())).pid)
-            os.kill(killed[0], signal.SIGKILL)
-
-    with cluster(2) as made:
+    with cluster(tmp_path, 2) as (address, made):
         failing = [StudyTask({"number": k}, {}, study_works.fail_odd) for k in range(4)]
-        numbers = [StudyTask({"number": k}, {"k": k}, study_works.double) for k in range(40)]
-        with open_workers(address=made.scheduler_address) as there:
+        tasks = [StudyTask({"number": k}, {}, study_works.double_slowly) for k in range(count)]
+        killed = []
+
+        def kill(done, total, text) -> None:
+            if done > count // 4 and not killed:
+                killed.append(made[1].pid)
+                os.kill(made[1].pid, signal.SIGKILL)
+
+        with Store(tmp_path / "a.study") as store, open_workers(address=address) as there:
             assert there.width == 2
             assert [row.status for row in run_tasks(failing, there)] == ["done", "failed"] * 2
-            rows = run_tasks(numbers, there, progress=kill)
-        assert killed
-        assert [row.result["double"] for row in rows] == [2 * k for k in range(40)]
-        for stem, how in (("dask", ("--dask", made.scheduler_address)), ("0", ("--workers", 0))):
+            rows = run_tasks(tasks, there, store, kill)
+            assert len(store) == count
+            assert there.width == len(killed) == 1
+        assert [row.result["double"] for row in rows] == list(range(0, 2 * count, 2))
+        for stem, how in (("dask", ("--dask", address)), ("0", ("--workers", 0))):
             files = "--out", tmp_path / f"{stem}.study", "--csv", tmp_path / f"{stem}.csv"
             assert coverable("study", study, *files, *how).status == 0
     assert (tmp_path / "dask.csv").read_bytes() == (tmp_path / "0.csv").read_bytes()
     assert len((tmp_path / "0.csv").read_text(encoding="utf-8").splitlines()) == 25
 
 
-def test_a_scheduler_that_is_lost_or_was_never_there() -> None:
+def test_a_scheduler_that_is_lost_or_was_never_there(tmp_path) -> None:
     """One clear message, and what was finished is kept."""
     for address in ("nonsense://x", "", "127.0.0.1:1"):
         with (
@@ -59,17 +89,14 @@ def test_a_scheduler_that_is_lost_or_was_never_there() -> None:
             open_workers(address=address, connect=0.3),
         ):
             pass
-    tasks = [StudyTask({"number": k}, {"k": k}, study_works.double) for k in range(40)]
-    made = cluster(1)
+    tasks = [StudyTask({"number": k}, {"k": k}, study_works.double_slowly) for k in range(400)]
+    with cluster(tmp_path, 1) as (address, made), Store(":memory:") as store:
 
-    def lose(done, total, text) -> None:
-        if 5 < done < total:
-            made.close()
+        def lose(done, total, text) -> None:
+            if done > 5:
+                made[0].kill()
 
-    with (
-        Store(":memory:") as store,
-        open_workers(address=made.scheduler_address, connect=0.3) as there,
-    ):
-        with pytest.raises(WorkersError, match="what was finished is kept"):
-            run_tasks(tasks, there, store, lose)
-        assert 5 < len(store) < 40
+        with open_workers(address=address, warm=False) as there:
+            with pytest.raises(WorkersError, match="what was finished is kept"):
+                run_tasks(tasks, there, store, lose)
+            assert 5 < len(store) < 400

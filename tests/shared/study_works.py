@@ -13,6 +13,12 @@ def double(tables):
     return {"verdict": "feasible", "double": 2 * tables["number"]}
 
 
+def double_slowly(tables):
+    """Twice a number, after a while."""
+    time.sleep(0.01)
+    return double(tables)
+
+
 def double_but_the_first_is_last(tables):
     """Twice a number; number 0 waits until the last number is done by another worker."""
     mark = Path(tables["mark"])
