@@ -110,12 +110,12 @@ def path(args: argparse.Namespace, began: float) -> int:
     with open_case(args, began, outputs, WHY_COMPLETE, check_case) as opened:
         from feasibility.checking import check
         from feasibility.clock import OutOfTime
-        from feasibility.entry import ends_of, entered
+        from feasibility.entry import ends_of
         from feasibility.paths import coverage_path
         from feasibility.reports import path as report
         from feasibility.speed import path_rates
         from feasibility.timing import motion_limits, trajectory
-        from feasibility.verdict import Answer
+        from feasibility.verdict import Answer, Walk
 
         robot, loaded = opened.setup.robot, opened.so_far()
         period = period_of(args)
@@ -137,10 +137,9 @@ def path(args: argparse.Namespace, began: float) -> int:
                 opened.progress(0, None, "timing the path")
                 run = trajectory(
                     found, speed, velocity=args.velocity, acceleration=args.acceleration,
-                    period=period,
+                    period=period, entry=ends and ends.entry, leave=ends and ends.exit,
                 )  # fmt: skip
-                path_rates(found, run.walk)
-                run = run if ends is None else entered(found, run, ends, limits, period)
+                path_rates(found, Walk(run.q[run.over], run.cell[run.over]))
         except OutOfTime:
             late = f"The time limit of {opened.clock.limit:g} s ran out before the path was timed."
             verdict = replace(verdict, answer=Answer.UNDECIDED, message=f"{verdict.message} {late}")

@@ -1,3 +1,2 @@
 from .ends import Ends as Ends
 from .ends import ends_of as ends_of
-from .timed_ends import entered as entered

@@ -18,7 +18,7 @@ from feasibility.programs.listings import inform, tp
 from feasibility.programs.motions import SERVO, Points, krl, rapid, urscript
 from feasibility.programs.working import working_times
 from feasibility.safe_files import write_whole
-from feasibility.timing import Trajectory, at_times
+from feasibility.timing import Trajectory
 from robots import Robot
 from surfaces import Surface
 
@@ -79,7 +79,7 @@ def _servoed(run: Trajectory) -> tuple[Array, Array]:
     """Times (m,) and positions (m, n) every `SERVO` seconds, the last one at or behind the end."""
     count = int(np.ceil(round(run.duration / SERVO, 6))) + 1
     time = np.arange(count, dtype=np.float64) * SERVO
-    return time, at_times(run, run.time[0] + time)
+    return time, run.at(run.time[0] + time)
 
 
 def _points(

@@ -1,31 +1,24 @@
-"""A trajectory: what each joint does at sampled times, and what a controller makes of that.
+"""A trajectory: what each joint does at sampled times, and in between.
 
-A ROS `joint_trajectory_controller` runs quintics through positions, velocities and accelerations,
-or cubics where no accelerations are given. Both are written by Bernstein coefficients here: a
-polynomial nowhere leaves the range of its coefficients, so these bound it everywhere.
+Between samples the joints move on the cubic spline through them that is at rest at both ends and
+twice continuously differentiable. A ROS `joint_trajectory_controller` makes quintics of positions,
+velocities and accelerations, or cubics of positions and velocities: both are this spline again,
+since its pieces have these very values at their ends, and no other cubic or quintic has.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from coverable_arrays import Array, Ints, Mask
 from coverable_errors import ArgumentError
-from feasibility.timing.speed_limits import MotionLimits, tool_slopes
+from feasibility.timing.between_samples import deviations
+from feasibility.timing.speed_limits import tool_slopes
 from feasibility.verdict import Walk
 from robots import Robot
-
-Kind = Literal["quintic", "cubic"]
-KINDS: tuple[Kind, ...] = get_args(Kind)
-
-PLACES = 4  # at which each polynomial is evaluated, its first end among them
-ROUNDING = 1e-12  # [rad] or [m] that is left free inside a joint's limits
-HALVINGS = 3  # times that each polynomial is halved, so that its coefficients bound it closely
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -46,7 +39,7 @@ class Trajectory:
     dq: Array
     """(k, n) rad/s or m/s."""
     ddq: Array
-    """(k, n) rad/s^2 or m/s^2; from the sample on, where it jumps."""
+    """(k, n) rad/s^2 or m/s^2."""
     tool_speed: Array
     """(k,) m/s."""
     cell: Ints
@@ -98,6 +91,14 @@ class Trajectory:
             faults.append("cells must be flat indices, or -1 in between")
         return faults
 
+    @staticmethod
+    def through(robot: Robot, time: Array, q: Array, cell: Ints) -> Trajectory:
+        """The motion through joints q (k, n) at times (k,) s, k at least 2."""
+        motion = CubicSpline(time, q, bc_type="clamped")
+        dq, ddq = motion(time, 1) + 0.0, motion(time, 2) + 0.0
+        dq[[0, -1]] = 0.0
+        return Trajectory(robot.joint_names, time, q, dq, ddq, tool_slopes(robot, q, dq), cell)
+
     def __len__(self) -> int:
         """Number of samples."""
         return len(self.time)
@@ -117,180 +118,46 @@ class Trajectory:
         """The samples as a motion of straight lines, which a replay can check."""
         return Walk(q=self.q, cell=self.cell)
 
+    @property
+    def over(self) -> slice:
+        """The samples from the first passage of a cell's centre to the last."""
+        marks = np.flatnonzero(self.cell >= 0)
+        return slice(int(marks[0]), int(marks[-1]) + 1) if len(marks) else slice(0)
+
+    def at(self, time: Array, order: int = 0) -> Array:
+        """(k, n) joints at times (k,) s, or a derivative of them; at rest outside the motion."""
+        if len(self) == 1:
+            return np.tile(0.0 if order else self.q, (len(time), self.q.shape[1] if order else 1))
+        inside = np.clip(time, self.time[0], self.time[-1])
+        return np.asarray(CubicHermiteSpline(self.time, self.q, self.dq)(inside, order))
+
+    def between(self, places: int) -> Walk:
+        """The motion at so many places of each piece, as straight lines that a replay can check."""
+        share = np.arange(places) / places
+        inner = (self.time[:-1, None] + share * np.diff(self.time)[:, None]).ravel()
+        q = np.vstack([self.at(inner), self.q[-1:]])
+        q[::places] = self.q
+        cell = np.full(len(q), -1, dtype=np.int64)
+        cell[::places] = self.cell
+        return Walk(q=q, cell=cell)
+
+    def off_lines(self, places: int) -> Array:
+        """(m, n) how far each joint may be from the straight lines of `between`."""
+        first, last = bends(self)
+        share = (np.arange(places + 1) / places)[:, None]
+        ends = first[:, None] + share * (last - first)[:, None]
+        stretch = (np.diff(self.time) / places)[:, None, None] ** 2
+        seconds = np.stack([ends[:, :-1] * stretch, ends[:, 1:] * stretch])
+        return deviations(self.between(places).q, seconds.reshape(2, -1, self.q.shape[1]))
+
     def __repr__(self) -> str:
         """One line: joints, samples and seconds."""
         n = len(self.joint_names)
         return f"Trajectory({n} joints, {len(self)} samples, {self.duration:.2f} s)"
 
 
-def coefficients(run: Trajectory, kind: Kind) -> Array:
-    """(degree + 1, m, n) Bernstein coefficients of the m polynomials between m + 1 samples."""
+def bends(run: Trajectory) -> tuple[Array, Array]:
+    """(k - 1, n) accelerations at the beginning and at the end of each piece, straight between."""
     h = np.diff(run.time)[:, None]
-    q, last, slope, end_slope = run.q[:-1], run.q[1:], h * run.dq[:-1], h * run.dq[1:]
-    if kind == "cubic":
-        return np.stack([q, q + slope / 3.0, last - end_slope / 3.0, last])
-    second, end_second = h**2 * run.ddq[:-1], h**2 * run.ddq[1:]
-    return np.stack(
-        [
-            q,
-            q + slope / 5.0,
-            q + 2.0 * slope / 5.0 + second / 20.0,
-            last - 2.0 * end_slope / 5.0 + end_second / 20.0,
-            last - end_slope / 5.0,
-            last,
-        ]
-    )
-
-
-def derivative(run: Trajectory, points: Array) -> Array:
-    """Bernstein coefficients of the derivative by time."""
-    h = np.diff(run.time)[:, None]
-    return np.asarray((len(points) - 1) * np.diff(points, axis=0) / h)
-
-
-def accelerations(run: Trajectory, kind: Kind) -> Array:
-    """Bernstein coefficients of the second derivatives by time, as `derivative` twice; quicker."""
-    h = np.diff(run.time)[:, None]
-    start, end = run.dq[:-1], run.dq[1:]
-    ahead = np.diff(run.q, axis=0) / h
-    if kind == "cubic":
-        first = (6.0 * ahead - 4.0 * start - 2.0 * end) / h
-        return np.stack([first, (2.0 * start + 4.0 * end - 6.0 * ahead) / h])
-    first, last = run.ddq[:-1], run.ddq[1:]
-    inner = (20.0 * ahead - 12.0 * start - 8.0 * end) / h - 2.0 * first + last
-    other = (12.0 * end + 8.0 * start - 20.0 * ahead) / h + first - 2.0 * last
-    return np.stack([first, inner, other, last])
-
-
-def halved(points: Array) -> Array:
-    """Bernstein coefficients of both halves of each polynomial (de Casteljau), halves in a row."""
-    left, right, row = [points[0]], [points[-1]], points
-    while len(row) > 1:
-        row = 0.5 * (row[:-1] + row[1:])
-        left.append(row[0])
-        right.append(row[-1])
-    return np.concatenate([np.stack(left), np.stack(right[::-1])], axis=1)
-
-
-def closely(points: Array) -> Array:
-    """Coefficients after some halvings: their range is hardly wider than that of the values."""
-    for _ in range(HALVINGS):
-        points = halved(points)
-    return points
-
-
-def largest(points: Array, of: Callable[[Array], Array] = np.asarray) -> Array:
-    """(n,) the largest value `of` polynomials, such as `np.abs` of them; a close bound.
-
-    Only what may exceed the values at all ends is halved.
-    """
-    reached = of(points[[0, -1]]).max(axis=(0, 1))
-    more = (of(points).max(axis=0) > reached).any(axis=1)
-    if not more.any():
-        return np.asarray(reached)
-    return np.maximum(reached, of(closely(points[:, more])).max(axis=(0, 1)))
-
-
-def values(points: Array, places: int) -> Array:
-    """(m * places, n) values of the m polynomials at 0, 1/places, ... of each, in order."""
-    degree = len(points) - 1
-    t = np.arange(places)[:, None] / places
-    k = np.arange(degree + 1)
-    basis = np.array([math.comb(degree, i) for i in k]) * t**k * (1.0 - t) ** (degree - k)
-    return np.einsum("tk,kin->itn", basis, points).reshape(-1, points.shape[2])
-
-
-def at_times(run: Trajectory, time: Array) -> Array:
-    """(k, n) joints at times (k,) s, on the quintics through the samples; at rest outside them."""
-    if len(run) == 1:
-        return np.tile(run.q, (len(time), 1))
-    inside = np.clip(time, run.time[0], run.time[-1])
-    piece = np.clip(np.searchsorted(run.time, inside, side="right") - 1, 0, len(run) - 2)
-    points = coefficients(run, "quintic")[:, piece]
-    share = ((inside - run.time[piece]) / np.diff(run.time)[piece])[:, None]
-    while len(points) > 1:  # de Casteljau
-        points = (1.0 - share) * points[:-1] + share * points[1:]
-    return np.asarray(points[0])
-
-
-def motion_between(run: Trajectory, kind: Kind, places: int) -> Walk:
-    """The polynomials evaluated at some places each, as a motion that a replay can check."""
-    q = np.vstack([values(coefficients(run, kind), places), run.q[-1:]])
-    cell = np.full(len(q), -1, dtype=np.int64)
-    cell[::places] = run.cell
-    return Walk(q=q, cell=cell)
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Used:
-    """How much of its limits a controller uses that interpolates samples; 1 is all."""
-
-    velocity: Array
-    """(n,) share of each joint's velocity, a bound that holds between samples too."""
-    acceleration: Array
-    """(n,) the same for accelerations."""
-    tool_speed: float
-    """Share of the tool's speed, from `PLACES` between any two samples; 0 where joints alone are
-    looked at."""
-
-    @property
-    def too_fast(self) -> float:
-        """How many times slower all must run to keep to the limits."""
-        root = float(np.sqrt(self.acceleration.max(initial=0.0)))
-        return max(float(self.velocity.max(initial=0.0)), root, self.tool_speed)
-
-
-def used_by_joints(run: Trajectory, limits: MotionLimits) -> Used:
-    """`used` without the tool, which takes far less time."""
-    velocity, acceleration = np.zeros((2, run.q.shape[1]))
-    for kind in KINDS if len(run) > 1 else ():
-        velocity = np.maximum(velocity, largest(derivative(run, coefficients(run, kind)), np.abs))
-        acceleration = np.maximum(acceleration, largest(accelerations(run, kind), np.abs))
-    return Used(velocity / limits.velocity, acceleration / limits.acceleration, 0.0)
-
-
-def accelerations_each(run: Trajectory, limits: MotionLimits) -> Array:
-    """(k - 1, n) the same between any two samples; where it is at most 1 perhaps too large."""
-    most = np.zeros((len(run) - 1, run.q.shape[1]))
-    for kind in KINDS:
-        shares = accelerations(run, kind) / limits.acceleration
-        share = np.abs(shares).max(axis=0)
-        over = np.flatnonzero(share.max(axis=1) > 1.0)
-        if len(over):
-            halves = np.abs(closely(shares[:, over])).max(axis=0)
-            share[over] = halves.reshape(-1, len(over), share.shape[1]).max(axis=0)
-        most = np.maximum(most, share)
-    return most
-
-
-def past_limits(robot: Robot, run: Trajectory) -> Array:
-    """(n,) rad or m, how far each joint may go past its limits, however samples are interpolated.
-
-    A bound; negative where the joint keeps that far away from both.
-    """
-    past = np.full(robot.n, -np.inf)
-    for kind in KINDS:
-        q = coefficients(run, kind) if len(run) > 1 else run.q[None]
-        past = np.maximum.reduce([past, largest(q) - robot.upper, largest(-q) + robot.lower])
-    return past
-
-
-def held_inside(robot: Robot, run: Trajectory) -> Trajectory:
-    """The same motion, drawn in by what joints may pass their limits by between samples.
-
-    Each of them is scaled about the middle of its limits (or moved, where it has one limit only),
-    its velocities and accelerations too: the polynomials between samples are linear in all three,
-    so they are scaled alike.
-    """
-    past = past_limits(robot, run) + ROUNDING
-    if not (past > 0.0).any():
-        return run
-    past = np.maximum(past, 0.0)
-    both = np.isfinite(robot.lower) & np.isfinite(robot.upper)
-    lower, upper = np.where(both, robot.lower, -1.0), np.where(both, robot.upper, 1.0)
-    middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
-    share = np.where(both & (past > 0.0), np.maximum(half - ROUNDING, 0.0) / (half + past), 1.0)
-    moved = np.where(both, 0.0, np.where(np.isfinite(robot.lower), past, -past))
-    q = np.where(past > 0.0, middle + share * (run.q - middle) + moved, run.q)
-    dq, ddq = share * run.dq, share * run.ddq
-    return replace(run, q=q, dq=dq, ddq=ddq, tool_speed=tool_slopes(robot, q, dq))
+    start, end, ahead = run.dq[:-1], run.dq[1:], np.diff(run.q, axis=0) / h
+    return (6.0 * ahead - 4.0 * start - 2.0 * end) / h, (2.0 * start + 4.0 * end - 6.0 * ahead) / h

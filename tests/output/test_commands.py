@@ -22,7 +22,7 @@ from feasibility.cases import load_case
 from feasibility.cli.main import _parser
 from feasibility.collisions import UNCHECKED
 from feasibility.division import divide
-from feasibility.entry import ends_of, entered
+from feasibility.entry import ends_of
 from feasibility.paths import coverage_path
 from feasibility.placement import Pose, Region, StudyEvaluator, place, station_plan
 from feasibility.results import load_motion, load_result
@@ -212,10 +212,9 @@ def of_path(args):
     treated = treated_by_walk(setup.robot, path.cells, setup.task, path.walk)
     if along is not None:
         treated = along.treated(path.walk)
-    run = trajectory(path, speed, **timing)
     ends = None if args.approach is None else ends_of(path, args.approach)
-    if ends is not None:
-        run = entered(path, run, ends, limits, 0.02)
+    moves = {"entry": ends and ends.entry, "leave": ends and ends.exit}
+    run = trajectory(path, speed, **moves, **timing)
     return json_of.of_path(SimpleNamespace(
         path=path, run=run, limits=limits, most=used(setup.robot, run, limits), passes=passes,
         treated=treated, rates=path_rates(path), ends=ends,

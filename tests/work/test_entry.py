@@ -10,11 +10,12 @@ from referee import evenly as dense
 from timed_motions import keeps_to_limits
 
 from feasibility import Task, check
-from feasibility.certification import collision_replay
+from feasibility.certification import collision_replay, replay
 from feasibility.collisions import Collision, Obstacle, gather
-from feasibility.entry import ends_of, entered
+from feasibility.entry import ends_of
 from feasibility.paths import PathError, coverage_path
 from feasibility.timing import motion_limits, trajectory
+from feasibility.verdict import Walk
 from robots import Kinematics, load_robot
 from surfaces import plane
 
@@ -48,20 +49,22 @@ def test_the_tool_comes_and_goes_straight_along_the_approach(path):
         assert points[-1, 2] == pytest.approx(0.3 + 0.02 + 0.08, abs=2e-3)
 
 
-def test_the_whole_motion_keeps_to_all_limits_and_the_path_stays_as_it_is(path):
-    limits, run = motion_limits(UR5, 0.2), trajectory(path, 0.2)
-    whole = entered(path, run, ends_of(path, 0.05), limits, 0.02)
+def test_the_whole_motion_keeps_to_all_limits_and_goes_along_the_path(path):
+    limits, ends = motion_limits(UR5, 0.2), ends_of(path, 0.05)
+    whole = trajectory(path, 0.2, entry=ends.entry, leave=ends.exit)
     assert np.allclose(whole.q[[0, -1]], np.radians(HOME))
     assert np.abs(whole.dq[[0, -1]]).max() <= 1e-9
     keeps_to_limits(UR5, whole, limits)
-    begin = int(np.flatnonzero(whole.cell >= 0)[0])
-    middle = slice(begin, begin + len(run))
-    for name in ("q", "dq", "ddq", "cell"):
-        assert np.array_equal(getattr(whole, name)[middle], getattr(run, name))
-    assert np.allclose(np.diff(whole.time[middle]), np.diff(run.time), atol=2e-9)
-    assert (whole.cell[:begin] == -1).all()
-    assert not whole.working[: begin - 1].any()
-    assert whole.working[middle].all()
+    over, visits = whole.over, whole.cell[whole.cell >= 0]
+    assert np.array_equal(visits, path.visits)
+    walk = Walk(whole.q[over], whole.cell[over])
+    assert replay(UR5, CELLS, TASK, walk, path.needed).accepted
+    assert whole.working[over].all()
+    assert whole.working.sum() == over.stop - over.start
+    for rows, end in ((ends.entry, over.start), (ends.exit, over.stop - 1)):  # all of them passed
+        part = whole.q[: end + 1] if rows is ends.entry else whole.q[end:]
+        away = np.abs(dense(part)[:, None] - rows).max(axis=2).min(axis=0)
+        assert away.max() <= 0.02
 
 
 def test_the_way_home_leads_around_what_is_in_its_way():

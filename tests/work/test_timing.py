@@ -21,7 +21,9 @@ from feasibility.collisions import Collision, Obstacle, gather
 from feasibility.paths import PathError, coverage_path
 from feasibility.timing import motion_limits, trajectory, used
 from feasibility.timing.fastest_speeds import Rows, fastest_speeds
-from feasibility.timing.path_timing import timed_moves
+from feasibility.timing.path_timing import within_limits
+from feasibility.timing.smoothing import control_points
+from feasibility.verdict import Walk
 from robots import Kinematics, load_robot
 from surfaces import plane
 
@@ -155,7 +157,8 @@ def test_a_motion_takes_hardly_longer_than_toppra_says():
         from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
     rows = np.random.default_rng(0).uniform(-1.0, 1.0, (5, 6))
     limits = motion_limits(UR5, 1e3)  # of the joints alone
-    run = timed_moves(UR5, rows, 0.3, limits, 0.01, 1.0)
+    curve = control_points(Walk(rows, np.array([0, -1, -1, -1, 1])), np.full(5, 0.3))
+    run = within_limits(UR5, [curve], limits, 0.01)
     keeps_to_limits(UR5, run, limits)
     assert np.allclose(run.q[[0, -1]], rows[[0, -1]])
     for name, given in (("velocity", run.dq), ("acceleration", run.ddq)):

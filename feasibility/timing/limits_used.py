@@ -1,0 +1,103 @@
+"""How much of its limits a motion uses, between samples too; and what it passes joint limits by.
+
+Between samples accelerations run straight, so their largest values are at the ends; velocities are
+parabolas and places are cubics, largest at the ends or where they turn. The tool is looked at in
+`PLACES` of each piece, and twice what a parabola through them may be higher is allowed for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from coverable_arrays import Array
+from feasibility.timing.sampled_trajectory import Trajectory, bends
+from feasibility.timing.speed_limits import MotionLimits, tool_slopes, tool_speeds
+from robots import Robot
+
+PLACES = 4  # at which the tool is looked at on each piece, its first end among them
+ROUNDING = 1e-12  # [rad] or [m] that is left free inside a joint's limits
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Used:
+    """How much of its limits a motion uses; 1 is all."""
+
+    velocity: Array
+    """(n,) share of each joint's velocity."""
+    acceleration: Array
+    """(n,) the same for accelerations."""
+    tool_speed: float
+    """Share of the tool's speed."""
+
+    @property
+    def too_fast(self) -> float:
+        """How many times slower all must run to keep to the limits."""
+        root = float(np.sqrt(self.acceleration.max(initial=0.0)))
+        return max(float(self.velocity.max(initial=0.0)), root, self.tool_speed)
+
+
+def used(robot: Robot, run: Trajectory, limits: MotionLimits) -> Used:
+    """How much of its limits a motion uses, as the spline that it is; of one sample, nothing."""
+    most = used_each(robot, run, limits).max(axis=0, initial=0.0)
+    return Used(most[: robot.n], most[robot.n : -1], float(most[-1]))
+
+
+def used_each(robot: Robot, run: Trajectory, limits: MotionLimits) -> Array:
+    """(k - 1, 2 n + 1) the same between any two of k samples: velocities, accelerations, tool."""
+    if len(run) < 2:
+        return np.zeros((0, 2 * robot.n + 1))
+    first, last = bends(run)
+    steps = np.diff(run.time)[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        turn = np.clip(np.nan_to_num(first / (first - last), posinf=0.0, neginf=0.0), 0.0, 1.0)
+    peaks = run.dq[:-1] + turn * steps * (first + 0.5 * turn * (last - first))
+    velocity = np.max(np.abs([run.dq[:-1], peaks, run.dq[1:]]), axis=0)
+    acceleration = np.max(np.abs([first, last, run.ddq[:-1], run.ddq[1:]]), axis=0)
+    inner = (run.time[:-1, None] + np.arange(PLACES) / PLACES * steps).ravel()
+    tool = tool_speeds(robot, run.at(inner), run.at(inner, 1)).reshape(-1, PLACES)
+    rows = np.column_stack([tool, np.append(tool[1:, 0], run.tool_speed[-1])])
+    # Between two places a parabola is higher by up to 1/8 of its second difference.
+    most = rows.max(axis=1) + 0.25 * np.abs(np.diff(rows, n=2, axis=1)).max(axis=1)
+    return np.column_stack(
+        [velocity / limits.velocity, acceleration / limits.acceleration, most / limits.tool_speed]
+    )
+
+
+def past_limits(robot: Robot, run: Trajectory) -> Array:
+    """(n,) rad or m, how far each joint goes past its limits; negative where it keeps away."""
+    low, high = run.q.min(axis=0), run.q.max(axis=0)
+    if len(run) > 1:
+        first, last = bends(run)
+        h = np.diff(run.time)[:, None]
+        # By the share t of a piece dq = a + b t + c t^2; its roots, so that nothing cancels.
+        a, b, c = h * run.dq[:-1], h**2 * first, 0.5 * h**2 * (last - first)
+        root = np.sqrt(np.maximum(b**2 - 4.0 * a * c, 0.0))
+        q = -0.5 * (b + np.where(b >= 0.0, root, -root))
+        for over, under in ((q, c), (a, q)):
+            with np.errstate(divide="ignore", invalid="ignore"):
+                t = np.clip(np.nan_to_num(over / under, posinf=0.0, neginf=0.0), 0.0, 1.0)
+            turning = run.q[:-1] + t * (a + t * (b / 2.0 + t * c / 3.0))
+            low, high = np.minimum(low, turning.min(axis=0)), np.maximum(high, turning.max(axis=0))
+    return np.asarray(np.maximum(robot.lower - low, high - robot.upper))
+
+
+def held_inside(robot: Robot, run: Trajectory) -> Trajectory:
+    """The same motion, drawn in by what joints pass their limits by between samples.
+
+    Each of them is scaled about the middle of its limits (or moved, where it has one limit only),
+    its velocities and accelerations too: a spline is linear in its samples.
+    """
+    past = past_limits(robot, run) + ROUNDING
+    if not (past > 0.0).any():
+        return run
+    past = np.maximum(past, 0.0)
+    both = np.isfinite(robot.lower) & np.isfinite(robot.upper)
+    lower, upper = np.where(both, robot.lower, -1.0), np.where(both, robot.upper, 1.0)
+    middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
+    share = np.where(both & (past > 0.0), np.maximum(half - ROUNDING, 0.0) / (half + past), 1.0)
+    moved = np.where(both, 0.0, np.where(np.isfinite(robot.lower), past, -past))
+    q = np.where(past > 0.0, middle + share * (run.q - middle) + moved, run.q)
+    dq, ddq = share * run.dq, share * run.ddq
+    return replace(run, q=q, dq=dq, ddq=ddq, tool_speed=tool_slopes(robot, q, dq))
