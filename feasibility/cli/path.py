@@ -134,10 +134,11 @@ def path(args: argparse.Namespace, began: float) -> int:
                 treated = _treated(opened, along, found)
                 approach, rates = _approach(args, found.task), path_rates(found)
                 ends = None if approach is None else ends_of(found, approach)
+                entry, leave = (None, None) if ends is None else (ends.entry, ends.exit)
                 opened.progress(0, None, "timing the path")
                 run = trajectory(
                     found, speed, velocity=args.velocity, acceleration=args.acceleration,
-                    period=period, entry=ends and ends.entry, leave=ends and ends.exit,
+                    period=period, entry=entry, leave=leave,
                 )  # fmt: skip
                 path_rates(found, Walk(run.q[run.over], run.cell[run.over]))
         except OutOfTime:
