@@ -1,13 +1,13 @@
 """Cut trees: proofs that no single motion covers every cell.
 
 Every node of the tree has a region of the joint space; that of the root is given by the joint
-limits. An inner node, a `Cut`, says that inside its region the weighted sum of joint values w . q
-is nowhere t while the tool is on the surface, within tolerance and cone. So no motion crosses
-there, and the two sides, w . q <= t and w . q >= t, are the regions of its children. A `Leaf` says
-that inside its region one cell cannot be covered.
+limits. An inner node, a `Cut`, says that inside its region one joint is nowhere at t while the tool
+is on the surface, within tolerance and cone. So no motion crosses there, and the two sides,
+q_j <= t and q_j >= t, are the regions of its children. A `Leaf` says that inside its region one
+cell cannot be covered.
 
 **Theorem.** If there is such a tree, no motion covers every cell. *Proof.* Along a motion inside
-the region of a cut, w . q - t is continuous and never zero: its sign stays, and the motion lies in
+the region of a cut, q_j - t is continuous and never zero: its sign stays, and the motion lies in
 the region of one child. By induction it lies in the region of a leaf, whose cell it does not cover.
 QED
 
@@ -34,23 +34,16 @@ class Leaf:
 
 @dataclass(frozen=True, slots=True)
 class Cut:
-    """A region that no motion crosses at w . q = t."""
+    """A region that no motion crosses at q_j = t."""
 
-    weights: tuple[float, ...]
-    """(n,) w; a single 1.0 among zeros for a cut q_j = t."""
+    joint: int
+    """j"""
     value: float
-    """t, rad (m where the joints slide)."""
+    """t, rad (m where the joint slides)."""
     below: Cut | Leaf
-    """The side w . q <= t."""
+    """The side q_j <= t."""
     above: Cut | Leaf
-    """The side w . q >= t."""
-
-    @property
-    def joint(self) -> int | None:
-        """The joint j of a cut q_j = t; None where several joints have a weight."""
-        weighted = np.flatnonzero(self.weights)
-        single = len(weighted) == 1 and self.weights[weighted[0]] == 1.0
-        return int(weighted[0]) if single else None
+    """The side q_j >= t."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +86,7 @@ class CutTree:
         """
         found, node, q = [], self.root, self.folded(q)
         while isinstance(node, Cut):
-            above = bool(q @ np.asarray(node.weights) > node.value)
+            above = bool(q[node.joint] > node.value)
             found.append((node, above))
             node = node.above if above else node.below
         return tuple(found)
@@ -113,7 +106,7 @@ class CutTree:
                 return joint, value
         node, q = self.root, self.folded(walk)
         while isinstance(node, Cut):
-            above = q @ np.asarray(node.weights) > node.value
+            above = q[:, node.joint] > node.value
             if above.any() and not above.all():
                 return node
             node = node.above if above.all() else node.below

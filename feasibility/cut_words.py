@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import ArrayLike
-
 from coverable_arrays import Array
 from coverable_errors import listed
 from feasibility.cut_tree import Cut, CutTree, Leaf
@@ -31,19 +28,14 @@ def joint_value(robot: Robot, joint: int, value: float) -> str:
 
 
 def place_of(cut: Cut, robot: Robot) -> str:
-    """Where a cut is: "joint3 = -82 deg", or a sum of joints."""
-    return hyperplane(cut.weights, cut.value, robot)
-
-
-def hyperplane(weights: ArrayLike, value: float, robot: Robot) -> str:
-    """Where w . q = t: "joint3 = -82 deg", or a sum of joints."""
-    return f"{sum_of(weights, robot)} = {sum_value(weights, value, robot)}"
+    """Where a cut is: "joint3 = -82 deg"."""
+    return f"{robot.joint_names[cut.joint]} = {joint_value(robot, cut.joint, cut.value)}"
 
 
 def nowhere(cut: Cut, robot: Robot, where: str = "on the surface") -> str:
     """What a cut says: "nowhere on the surface can joint3 be -82 deg"."""
-    value = sum_value(cut.weights, cut.value, robot)
-    return f"nowhere {where} can {sum_of(cut.weights, robot)} be {value}"
+    value = joint_value(robot, cut.joint, cut.value)
+    return f"nowhere {where} can {robot.joint_names[cut.joint]} be {value}"
 
 
 def opened(tree: CutTree, robot: Robot) -> list[str]:
@@ -61,7 +53,7 @@ def sentence(tree: CutTree, robot: Robot, cells: Cells) -> str:
     Example:
         >>> from robots import load_robot
         >>> from surfaces import plane
-        >>> tree = CutTree(Cut((0, 0, 1.0, 0, 0, 0), -1.4312, Leaf(13), Leaf(2)))
+        >>> tree = CutTree(Cut(2, -1.4312, Leaf(13), Leaf(2)))
         >>> sentence(tree, load_robot("ur5"), plane((0, 1), (0, 1)).cells(5, 3))
         ... # doctest: +NORMALIZE_WHITESPACE
         'below elbow_joint = -82 deg cell [4, 1] cannot be covered, above it cell [0, 2] cannot,
@@ -132,26 +124,6 @@ def _of_many(tree: CutTree, robot: Robot, cells: Cells) -> str:
 def _cell(leaf: Leaf, cells: Cells) -> list[int]:
     """The cell of a leaf, as reports name it."""
     return list(cells.unravel(leaf.cell))
-
-
-def sum_of(weights: ArrayLike, robot: Robot) -> str:
-    """A joint's name, or a weighted sum of joints: "0.6 joint2 - 0.8 joint3"."""
-    text, weights = "", np.asarray(weights, dtype=float)
-    for j in np.flatnonzero(weights):
-        weight, name = weights[j], robot.joint_names[j]
-        sign = ("-" if weight < 0.0 else "") if not text else (" - " if weight < 0.0 else " + ")
-        times = "" if abs(weight) == 1.0 else f"{abs(weight):.3g} "
-        text += f"{sign}{times}{name}"
-    return text
-
-
-def sum_value(weights: ArrayLike, value: float, robot: Robot) -> str:
-    """The value of a weighted sum of joints, with the unit that they share."""
-    joints = np.flatnonzero(np.asarray(weights, dtype=float))
-    slides = robot.prismatic[joints]
-    if slides.all() or not slides.any():
-        return joint_value(robot, int(joints[0]), value)
-    return f"{value:.4g} (joints in radians and metres)"
 
 
 def _number(value: float) -> str:

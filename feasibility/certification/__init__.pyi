@@ -1,6 +1,8 @@
 from .collisions import CollisionFault as CollisionFault
 from .collisions import CollisionReplay as CollisionReplay
 from .collisions import collision_replay as collision_replay
+from .cut_proofs import ArmCheck as ArmCheck
+from .cut_proofs import ArmCollisions as ArmCollisions
 from .cut_proofs import ProofCheck as ProofCheck
 from .cut_proofs import verify_proof as verify_proof
 from .faults import Judged as Judged
@@ -9,6 +11,8 @@ from .jacobians import placements as placements
 from .lever_bounds import second_derivatives as second_derivatives
 from .motion_replay import Replay as Replay
 from .motion_replay import replay as replay
+from .overlaps import PoseCheck as PoseCheck
+from .overlaps import never_clear as never_clear
 from .surface_replay import MotionReplay as MotionReplay
 from .surface_replay import less_deviations as less_deviations
 from .surface_replay import replay_over_surface as replay_over_surface

@@ -145,13 +145,17 @@ class Judge:
         self, places: Places, row: Ints, share: Array, points: Array, axes: Array, x: Array
     ) -> Samples:
         """`compared`, over given places."""
-        target, normal = self.offset.at(places)
+        target, approaches = self.targets(places)
         error = np.linalg.norm(points - target, axis=1)
-        approaches = self._held.approaches(normal)
         chord = np.linalg.norm(axes - approaches, axis=1)
         facets = self.offset.facets(points)
         roll = self._held.rolls(x, axes, approaches, places)
         return Samples(row, share, points, axes, places, error, chord, facets, x, roll)
+
+    def targets(self, places: Places) -> tuple[Array, Array]:
+        """(k, 3) m, targets over places, and (k, 3) the approach directions there."""
+        target, normal = self.offset.at(places)
+        return target, self._held.approaches(normal)
 
     def middles(self, rows: Array, stretches: Stretches) -> Samples:
         """Samples in the middle of stretches of the motion `rows` (m, n)."""

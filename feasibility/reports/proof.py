@@ -13,9 +13,8 @@ from surfaces import Cells
 def proof_json(tree: CutTree | None, robot: Robot, cells: Cells) -> dict[str, Any] | None:
     """The tree as JSON; null where there is none.
 
-    A cut has its joint and `value_deg` (`value_m` of one that slides), or `weights` of several
-    joints and the `value` of their weighted sum, rad or m; and what is below and above it. A leaf
-    names its cell.
+    A cut has its joint and `value_deg` (`value_m` of one that slides), and what is below and above
+    it. A leaf names its cell.
     """
     return None if tree is None else tree_json(tree, robot, cells)
 
@@ -37,10 +36,6 @@ def _node(node: Cut | Leaf, robot: Robot, cells: Cells) -> dict[str, Any]:
         "below": _node(node.below, robot, cells),
         "above": _node(node.above, robot, cells),
     }
-    if node.joint is None:
-        weighted = zip(robot.joint_names, node.weights, strict=True)
-        weights = {name: float(weight) for name, weight in weighted if weight}
-        return {"weights": weights, "value": float(node.value), **sides}
     slides = bool(robot.prismatic[node.joint])
     key, value = ("value_m", node.value) if slides else ("value_deg", math.degrees(node.value))
     return {"joint": robot.joint_names[node.joint], key: float(value), **sides}

@@ -109,6 +109,10 @@ class Archive:
                 f"{size(LARGEST_CONTENT)} and {size(LARGEST_TEXT)} are read"
             )
 
+    def __contains__(self, name: str) -> bool:
+        """Is there an array of that name?"""
+        return f"{name}.npy" in self._file
+
     def error(self, message: str) -> ArchiveError:
         """An error that names the file."""
         return ArchiveError(message, self.name)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from coverable_arrays import Array, Ints
+from coverable_arrays import Ints
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from feasibility.results.archive import Archive
 
@@ -18,27 +18,27 @@ DEEPEST = 200  # cuts from the root to a leaf
 NONE = -1
 
 
-def pack_proof(tree: CutTree, n: int) -> dict[str, NDArray]:
-    """The arrays of a tree over n joints.
+def pack_proof(tree: CutTree) -> dict[str, NDArray]:
+    """The arrays of a tree.
 
     Returns:
-        For k nodes `proof_weights` (k, n) and `proof_value` (k,), zero for a leaf; `proof_sides`
+        For k nodes `proof_joint` and `proof_value` (k,), -1 and zero for a leaf; `proof_sides`
         (k, 2), the nodes below and above; `proof_cell` (k,), of a leaf; and for the opened joints
         `proof_opened` (o,) and `proof_opened_at` (o,) rad.
     """
     nodes = list(tree.nodes())
     number = {id(node): k for k, node in enumerate(nodes)}
-    weights, value = np.zeros((len(nodes), n)), np.zeros(len(nodes))
+    joint, value = np.full(len(nodes), NONE, dtype=np.int64), np.zeros(len(nodes))
     sides = np.full((len(nodes), 2), NONE, dtype=np.int64)
     cell = np.full(len(nodes), NONE, dtype=np.int64)
     for k, node in enumerate(nodes):
         if isinstance(node, Leaf):
             cell[k] = node.cell
             continue
-        weights[k], value[k] = node.weights, node.value
+        joint[k], value[k] = node.joint, node.value
         sides[k] = number[id(node.below)], number[id(node.above)]
     return {
-        "proof_weights": weights,
+        "proof_joint": joint,
         "proof_value": value,
         "proof_sides": sides,
         "proof_cell": cell,
@@ -60,12 +60,12 @@ def unpack_proof(archive: Archive, count: int, n: int) -> CutTree:
     """
     cell = archive.array("proof_cell", np.int64, (None,))
     k = len(cell)
-    weights = archive.array("proof_weights", np.float64, (k, n))
+    joint = _joints(archive, k, n)
     value = archive.array("proof_value", np.float64, (k,))
     sides = archive.array("proof_sides", np.int64, (k, 2))
-    joints = archive.array("proof_opened", np.int64, (None,))
-    at = archive.array("proof_opened_at", np.float64, (len(joints),))
-    fault = _fault(cell, weights, sides, joints, count, n)
+    opened = archive.array("proof_opened", np.int64, (None,))
+    at = archive.array("proof_opened_at", np.float64, (len(opened),))
+    fault = _fault(cell, joint, sides, opened, count, n)
     if fault:
         raise archive.error(f"its proof is damaged: {fault}")
     nodes: list[Cut | Leaf] = [Leaf(0)] * k
@@ -74,15 +74,33 @@ def unpack_proof(archive: Archive, count: int, n: int) -> CutTree:
         if below == NONE:
             nodes[i] = Leaf(int(cell[i]))
         else:
-            nodes[i] = Cut(tuple(weights[i].tolist()), float(value[i]), nodes[below], nodes[above])
-    return CutTree(nodes[0], tuple(zip(joints.tolist(), at.tolist(), strict=True)))
+            nodes[i] = Cut(int(joint[i]), float(value[i]), nodes[below], nodes[above])
+    return CutTree(nodes[0], tuple(zip(opened.tolist(), at.tolist(), strict=True)))
+
+
+def _joints(archive: Archive, k: int, n: int) -> Ints:
+    """(k,) the joint of each cut; -1 of leaves. Up to format 4 a cut had a weight for each joint.
+
+    Raises:
+        ArchiveError: there are none, or a cut goes along several joints.
+    """
+    if "proof_joint" in archive:
+        return archive.array("proof_joint", np.int64, (k,))
+    weights = archive.array("proof_weights", np.float64, (k, n))
+    weighed = (weights != 0.0).any(axis=1)
+    if (weights[weighed].max(axis=1) != 1.0).any() or (weights != 0.0).sum(axis=1).max() > 1:
+        raise archive.error(
+            "its proof cuts along sums of several joints, which are read no more; run the check "
+            "again"
+        )
+    return np.where(weighed, weights.argmax(axis=1), NONE)
 
 
 def _fault(
     cell: Ints,
-    weights: Array,
+    joint: Ints,
     sides: Ints,
-    joints: Ints,
+    opened: Ints,
     count: int,
     n: int,
 ) -> str:
@@ -101,13 +119,13 @@ def _fault(
     used = np.bincount(sides[cuts].ravel(), minlength=k)
     if used[0] != 0 or (used[1:] != 1).any():
         return "a node is not the side of exactly one cut"
-    if not weights[cuts].any(axis=1).all() or weights[leaf].any():
-        return "a cut has no weight, or a leaf has one"
+    if ((joint[cuts] < 0) | (joint[cuts] >= n)).any() or (joint[leaf] != NONE).any():
+        return f"a cut goes through none of {n} joints, or a leaf through one"
     depth = np.zeros(k, dtype=np.int64)
     for i in cuts.tolist():
         depth[sides[i]] = depth[i] + 1
     if depth.max() > DEEPEST:
         return f"it is {depth.max()} cuts deep, more than {DEEPEST}"
-    if ((joints < 0) | (joints >= n)).any() or len(set(joints.tolist())) < len(joints):
+    if ((opened < 0) | (opened >= n)).any() or len(set(opened.tolist())) < len(opened):
         return f"it opens what are no joints of {n}, or one of them twice"
     return ""

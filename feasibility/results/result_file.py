@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from surfaces import Cells
 
 FORMAT = "coverable-result"
-FORMAT_VERSION = 4
+FORMAT_VERSION = 5  # 4 had weights of all joints in each cut of a proof
 OLDEST = 3  # states task, method and seed a second time, which is not read
 SAID = {
     Answer.FEASIBLE: (Evidence.WITNESS,),
@@ -133,7 +133,7 @@ def save_result(verdict: Verdict, case: Case, path: str | os.PathLike[str]) -> P
     if verdict.witness is not None:
         arrays |= {"witness_q": verdict.witness.q, "witness_cell": verdict.witness.cell}
     if verdict.proof is not None:
-        arrays |= pack_proof(verdict.proof, n)
+        arrays |= pack_proof(verdict.proof)
     if verdict.postures is not None:
         arrays["postures"] = verdict.postures
     try:
@@ -225,7 +225,7 @@ def _check_format(fields: Fields) -> None:
     if not OLDEST <= found <= FORMAT_VERSION:
         raise fields.archive.error(
             f"is of format {found}, written by coverable {shown(fields.entries.get('version'))}; "
-            f"coverable {version()} reads formats {OLDEST} and {FORMAT_VERSION}"
+            f"coverable {version()} reads formats {OLDEST} to {FORMAT_VERSION}"
         )
 
 

@@ -12,10 +12,10 @@ import numpy as np
 from coverable_arrays import Array, Ints, Mask
 from feasibility.clock import Clock
 from feasibility.cut_tree import CutTree
+from feasibility.roadmap.blockers import Blockers
 from feasibility.roadmap.branch_and_bound import Boxes, Ruling, rule
 from feasibility.roadmap.expansion import JOINED, Grower
 from feasibility.roadmap.graph import Roadmap
-from feasibility.roadmap.joint_boxes import Blockers
 from feasibility.roadmap.motions import SearchArrays, Work, passable, work_for
 from robots import Robot
 from surfaces import Cells, components

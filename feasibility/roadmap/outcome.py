@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from feasibility.cut_tree import CutTree, Leaf
-from feasibility.cut_words import sentence, sum_of, sum_value
+from feasibility.cut_words import joint_value, sentence
 from feasibility.problem import Problem
 from feasibility.roadmap.branch_and_bound import Ruling
 from feasibility.roadmap.exploration import Exploration
@@ -37,7 +37,7 @@ def proved_words(problem: Problem, proving: Proving, proof: CutTree) -> str:
             (blockers.tool, "the tool collides {} in every pose, {} boxes of tilt and roll"),
             (blockers.arm, "something collides {} wherever the tool is, {} boxes of the joints"),
         ):
-            boxes = [one.boxes for one in found.values() if one is not None]
+            boxes = [one.boxes for one in found.values() if one.confirmed]
             if boxes:
                 over = "there" if proved == len(boxes) else f"over {len(boxes)} of them"
                 how.append(what.format(over, sum(boxes)))
@@ -83,11 +83,9 @@ def unfinished_words(problem: Problem, proving: Proving, late: str) -> str:
     where = ""
     if kept:
         widest = max(kept, key=lambda gap: gap.high - gap.low)
-        low, high = (
-            sum_value(widest.weights, value, problem.robot) for value in (widest.low, widest.high)
-        )
-        name = sum_of(widest.weights, problem.robot)
-        where = f", such as with {name} between {low} and {high}"
+        robot, joint = problem.robot, widest.joint
+        low, high = (joint_value(robot, joint, value) for value in (widest.low, widest.high))
+        where = f", such as with {robot.joint_names[joint]} between {low} and {high}"
     return (
         f"Every cell is reached, but by no single motion that was found (the best covers "
         f"{exploration.n_covered} of {total}); nor is there a proof, because the arm has "

@@ -25,9 +25,9 @@ import numpy as np
 
 from coverable_arrays import Ints
 from feasibility.clock import Clock
+from feasibility.roadmap.blockers import blockers_of
 from feasibility.roadmap.branch_and_bound import Boxes, Ruling, root_box
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.joint_boxes import blockers_of
 from feasibility.roadmap.motions import arrays_of, margin_shares
 from feasibility.task import Task
 from robots import Robot
@@ -74,7 +74,7 @@ def exploration_of(
     clock = Clock() if clock is None else clock
     with clock.enforced():
         arrays = arrays_of(robot, cells, task if searched is None else searched)
-    return Exploration(robot, cells, arrays, seed, clock, blockers_of(robot, cells.surface, task))
+    return Exploration(robot, cells, arrays, seed, clock, blockers_of(robot, cells, task))
 
 
 def explore(exploration: Exploration, between: Between | None = None) -> None:

@@ -23,7 +23,7 @@ from feasibility.roadmap import (
     project_onto_cell,
     within,
 )
-from feasibility.roadmap.joint_boxes import Blockers, blockers_of
+from feasibility.roadmap.blockers import Blockers, blockers_of
 from feasibility.sensitivity.quantities import Quantity, Variant
 from feasibility.verdict import Answer, Evidence, Verdict, Walk
 
@@ -140,9 +140,9 @@ class CollisionProofs:
             variant = self._given if steps is None else steps[0].applied(self._given, steps[1])
             robot, cells, task = variant
             if self._latest is not None:
-                self._left = self._latest.left
+                self._left = max(self._latest.left, 0)
             self._key = key
-            self._latest = blockers_of(robot, cells.surface, task, self._left)
+            self._latest = blockers_of(robot, cells, task, self._left)
         return self._latest
 
 

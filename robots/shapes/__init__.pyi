@@ -10,6 +10,7 @@ from .hulls import Hull as Hull
 from .hulls import hull_of as hull_of
 from .hulls import is_convex as is_convex
 from .hulls import outer_hull as outer_hull
+from .hulls import rims as rims
 from .links import LinkShapes as LinkShapes
 from .links import link_shapes as link_shapes
 from .links import outer_bodies as outer_bodies

@@ -1,4 +1,4 @@
-"""Boxes of joints: bounds that hold, contraction that loses nothing, proofs that are confirmed."""
+"""Boxes of joints in which bodies overlap: bounds that hold, and proofs that landings bear out."""
 
 from __future__ import annotations
 
@@ -6,21 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bounds import holds
 from capsule_arms import at, bodies_of, box_mesh, pair, planar_arm
 from foreign_clearances import ForeignScene
-from hard_scenes import ARMS, arm, behind_a_wall, bracket, clear_box, within_a_turn
+from hard_scenes import ARMS, behind_a_wall, bracket, clear_box, within_a_turn
 from samples import sampled, seeds, spread
 from search_kernels import Motions
 
 from feasibility import Answer, CauseKind, Evidence, check
 from feasibility.certification import verify_proof
-from feasibility.certification.joint_boxes import Overlapping
+from feasibility.certification.overlaps import Overlapping
 from feasibility.collisions import HalfSpace, Obstacle, gather
 from feasibility.cut_tree import CutTree, Leaf
-from feasibility.roadmap.joint_boxes import JointBoxes
-from feasibility.roadmap.joint_boxes.at_target import at_target
-from feasibility.roadmap.joint_boxes.frames import Boxes, frames_at, moves, moves_from_tool
 from robots import Kinematics
 from robots.shapes import Solid
 from robots.urdf import Box, Capsule, Cylinder, Sphere
@@ -37,7 +33,9 @@ def everywhere(robot, bodies, half, q=None, target=None, off=ANYWHERE):
     half = np.broadcast_to(half, q.shape)
     target = np.zeros(3) if target is None else np.array(target, float)
     box = (q - half)[None], (q + half)[None], target[None], np.array([off])
-    return bool(Overlapping(robot, bodies).everywhere(*box)[0])
+    found = Overlapping(robot, bodies).deepest(*box)
+    assert (found.ratio[0] < np.inf) == (found.pair[0] >= 0)
+    return bool(found.ratio[0] < 1.0)
 
 
 def slide(axis):
@@ -176,64 +174,6 @@ def test_all_over_what_is_confirmed_fcl_finds_collisions(seed):
         assert largest == 0.0 or (foreign.distances(each) < 0.01 + 1e-6).any()
 
 
-# the search's own bounds
-
-
-def random_boxes(name):
-    """40 boxes of all sizes."""
-    rng, robot = np.random.default_rng(5), arm(name)
-    middle = rng.uniform(-2.5, 2.5, (40, robot.n))
-    half = 10.0 ** rng.uniform(-3.0, 0.0, (40, 1)) * rng.uniform(0.0, 1.0, middle.shape)
-    return Boxes(middle - half, middle + half)
-
-
-@pytest.mark.parametrize("name", FEW)
-def test_no_point_moves_further_than_the_bounds(name):
-    """At configurations of boxes, most of them at corners; where the middles are says Pinocchio."""
-    robot, boxes, place = arm(name), random_boxes(name), np.array([[0.2, -0.1, 0.3]])
-    chain, n, rng = robot.chain, robot.n, np.random.default_rng(6)
-    middles, expected = frames_at(chain, boxes.centre), Kinematics(robot).joints(boxes.centre)
-    assert np.abs(middles.points - expected.points).max() < ROUNDING
-    tips = middles.carried(n, chain.translations[-1:])[:, 0]
-    assert np.abs(tips - Kinematics(robot).tools(boxes.centre)[0]).max() < ROUNDING
-    shares = np.clip(1.2 * rng.uniform(-1.0, 1.0, (20, *boxes.low.shape)), -1.0, 1.0)
-    others = [frames_at(chain, q) for q in boxes.centre + shares * boxes.half]
-    for joint in range(1, n + 1):
-        x, inner = middles.carried(joint, place), joint // 2
-        bound = moves(chain, middles, boxes.half, x, joint).by_joint
-        tool, from_tool = moves_from_tool(chain, middles, boxes.half, x, joint)
-        moved, seen, changed = [], [], []
-        for frames in others:
-            y = frames.carried(joint, place)
-            moved.append(np.linalg.norm(y - x, axis=2))
-            own = [
-                np.einsum("mki,mij->mkj", z - f.points[:, inner, None], f.rotations[:, inner])
-                for z, f in ((x, middles), (y, frames))
-            ]
-            seen.append(np.linalg.norm(own[1] - own[0], axis=2))
-            tip = frames.carried(n, chain.translations[-1:])
-            changed.append(np.linalg.norm((y - tip) - (x - tool[:, None]), axis=2))
-        holds(bound.sum(axis=2) + ROUNDING, moved, 0.2)
-        holds(bound[..., inner:].sum(axis=2) + ROUNDING, seen, 0.1)
-        holds(from_tool.sum(axis=2) + ROUNDING, changed, 0.1)
-
-
-@pytest.mark.parametrize("name", FEW)
-def test_contraction_loses_no_configuration_at_the_target(name):
-    cut = 0
-    for seed in range(20):
-        found = clear_box(name, seed, asked_for=False)
-        target = JointBoxes(found.robot, found.bodies, found.task)
-        target = target.target(found.point, found.approach)
-        boxes, chain = Boxes(found.low[None], found.high[None]), found.robot.chain
-        left = at_target(chain, frames_at(chain, boxes.centre), boxes, target, 0.2)
-        assert left.kept[0]
-        assert (left.boxes.low[0] <= found.q + ROUNDING).all()
-        assert (left.boxes.high[0] >= found.q - ROUNDING).all()
-        cut += (left.boxes.high - left.boxes.low).sum() < 0.9 * (found.high - found.low).sum()
-    assert cut > 1
-
-
 # scenes
 
 
@@ -246,10 +186,6 @@ def test_nothing_is_claimed_around_clear_configurations(name):
         if found is None:
             continue
         asked += 1
-        case = JointBoxes(found.robot, found.bodies, found.task)
-        target = case.target(found.point, found.approach)
-        assert case.any_clear(found.q[None]), seed
-        assert case.blocking(target, found.low, found.high, most=200) is None, seed
         middle, half = 0.5 * (found.low + found.high), 0.5 * (found.high - found.low)
         around = {"q": middle, "target": found.point, "off": 0.001}
         assert not everywhere(found.robot, found.bodies, half, **around), seed

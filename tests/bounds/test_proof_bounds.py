@@ -29,6 +29,7 @@ from feasibility.certification.cut_proofs.parts_agreement import (
     places,
 )
 from feasibility.certification.cut_proofs.region import JointRegion
+from feasibility.certification.overlaps.everywhere import Deepest
 from feasibility.certification.rolls import reference_axes
 from feasibility.roll import projected, roll_of
 from robots import Kinematics, load_robot
@@ -50,7 +51,6 @@ class Known(NamedTuple):
     """A configuration, boxes that hold it, and how it lies in them."""
 
     emptiness: Emptiness
-    region: JointRegion
     boxes: Boxes
     places: np.ndarray  # (m, n + 2) the configuration and x in the part of each box
 
@@ -91,7 +91,7 @@ def known(rng, boxes=50):
     emptiness = Emptiness(arm, parts, lambda cell: 0, allowed, lambda: None)
     part, x = at_parameters(patch, u, v)
     made, within = boxes_around(rng, robot, q, parts, int(part[0]), x[0], boxes)
-    return Known(emptiness, region_around(rng, robot, q), made, within)
+    return Known(emptiness, made, within)
 
 
 def rolled_task(rng, robot, q, patch, place, standoff):
@@ -133,21 +133,9 @@ def within(parts, part, place):
         part = int(parts.children[part, side])
 
 
-def region_around(rng, robot, q):
-    """All limits, and up to two weighted sums of q inside intervals, at an end of them or equal."""
-    region = JointRegion.box(robot.lower, robot.upper)
-    for _ in range(rng.integers(3)):
-        weights = rng.normal(size=robot.n) * (rng.random(robot.n) < 0.6)
-        below, above = (rng.choice([0.0, 1e-6, 1.0, np.inf]) for _ in range(2))
-        if np.count_nonzero(weights) > 1:
-            value = float(weights @ q)
-            region = region.within(weights, value - below, value + above)
-    return region
-
-
 def lost(case):
     """(m,) boxes that the verifier drops, or contracts or cuts so that the place is outside."""
-    left, models, _ = case.emptiness.examine(case.boxes, case.region)
+    left, models, _ = case.emptiness.examine(case.boxes)
     parts = case.emptiness.parts
     made = smaller(left, models, parts, case.emptiness.allowed.length)
     missed = np.ones(len(case.boxes), dtype=bool)
@@ -190,8 +178,7 @@ def test_no_region_around_a_known_place_is_said_to_be_empty(seed):
             size = np.exp(rng.uniform(np.log(1e-6), np.log(8.0), (2, arm.n)))
             size[:, rng.random(arm.n) < 0.2] = 0.0
             turns = np.where(arm.prismatic, 0, 2.0 * np.pi * rng.integers(-1, 2, arm.n))
-            turns = turns if len(case.region.weights) == 0 else 0.0
-            region = replace(case.region, low=q - size[0] + turns, high=q + size[1] + turns)
+            region = JointRegion(q - size[0] + turns, q + size[1] + turns)
             claims = [Claim("a region", region, None)]
             assert case.emptiness.test(claims, NoRefutation(), 600).failed is not None
 
@@ -250,9 +237,9 @@ def test_bodies_are_asked_to_overlap_wherever_the_target_of_a_box_may_be():
     class Asked:
         """Takes note of what it is asked, and knows nothing."""
 
-        def everywhere(self, low, high, target, off):
+        def deepest(self, low, high, target, off):
             asked.append((target, off))
-            return np.zeros(len(low), dtype=bool)
+            return Deepest(np.full(len(low), np.inf), np.zeros(low.shape), np.full(len(low), -1))
 
     parts = target_parts(dome.parts(0.01, 0.05), dome.cells(1, 1), Task(0.02, 20))
     arm, part = ArmModel(UR5, UR5.lower, UR5.upper), int(np.argmax(parts.radius[:, 0]))
@@ -262,7 +249,7 @@ def test_bodies_are_asked_to_overlap_wherever_the_target_of_a_box_may_be():
     half = np.append(np.full(6, 1e-3), [0.5, 0.25])
     centre = np.append(q, x)
     box = Boxes((centre - half)[None], (centre + half)[None], *np.array([[part], [0]]))
-    search.examine(box, JointRegion.box(q - 1.0, q + 1.0))
+    search.examine(box)
     ((target, off),) = asked
     slopes = parts.slopes[part][:, :3]
     assert target[0] == pytest.approx(parts.centre[part, :3] + x @ slopes)
@@ -272,18 +259,6 @@ def test_bodies_are_asked_to_overlap_wherever_the_target_of_a_box_may_be():
 
 
 # -- boxes and regions ----------------------------------------------------------------------------
-
-
-def test_parts_of_regions_hold_what_is_between_two_values_of_a_sum():
-    rng = np.random.default_rng(1)
-    for _ in range(100):
-        weights = rng.normal(size=3) * (np.arange(3) == rng.integers(3))
-        least, most = np.sort(rng.normal(size=2))
-        least = -np.inf if rng.random() < 0.2 else least
-        part = JointRegion.box(-np.ones(3), np.ones(3)).within(weights, least, most)
-        q = rng.uniform(-1.0, 1.0, (100, 3))
-        inside = ((q >= part.low) & (q <= part.high)).all(axis=1)
-        assert (inside == ((q @ weights >= least) & (q @ weights <= most))).all()
 
 
 @pytest.mark.parametrize("axis", [-1, 0, 1])

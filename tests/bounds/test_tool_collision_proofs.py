@@ -1,6 +1,6 @@
-"""Cells over which the tool collides in every pose: claimed, confirmed, refuted by no pose.
+"""Cells over which the tool collides in every pose: proved, and refuted by no pose.
 
-And the bounds behind it: balls inside shapes, distances, what an erosion leaves, how far poses go.
+And the bounds behind it: points inside shapes, how deep they are, how far poses move them.
 """
 
 from __future__ import annotations
@@ -19,14 +19,11 @@ from samples import sampled, seeds, spread
 from scipy.spatial.transform import Rotation
 
 from feasibility import Answer, CauseKind, Evidence, Task, check
-from feasibility.certification import verify_proof
+from feasibility.certification import never_clear, verify_proof
 from feasibility.certification.collisions import piece_of
-from feasibility.certification.tool_alone import never_clear, planes_around
-from feasibility.certification.tool_alone.couples import Body, Couple, couples_of
-from feasibility.certification.tool_alone.erosion import eroded
-from feasibility.collisions import Bodies, Collision, HalfSpace, Obstacle, Pair, Soup, ToolShape
+from feasibility.certification.overlaps.depths import depths, planes_around, points_inside
+from feasibility.collisions import Bodies, Collision, HalfSpace, Obstacle, Pair, ToolShape
 from feasibility.cut_tree import CutTree, Leaf
-from feasibility.roadmap.tool_alone import balls_inside, distance_from
 from robots.shapes import Solid, Triangles, checked_triangles
 from robots.urdf import Box, Capsule, Cylinder, Sphere
 from surfaces import cylinder
@@ -55,17 +52,14 @@ SCENES = [*range(20, 42, 2), *range(1000, 1500)]
 
 @sampled
 @pytest.mark.parametrize("seed", SCENES[: len(seeds(11, 511))])
-def test_what_is_claimed_is_confirmed_and_no_pose_is_clear(seed):
+def test_no_pose_is_clear_where_it_is_proved(seed):
     scene, rng = random_over(seed), np.random.default_rng(seed)
-    claimed, clear = scene.claimed(), scene.clear_pose(30 if seed < 1000 else 2000, rng)
-    assert claimed is None or not clear
-    if claimed is not None or clear:
-        assert scene.confirmed().confirmed == (claimed is not None)
+    assert not (scene.proved().confirmed and scene.clear_pose(30 if seed < 1000 else 2000, rng))
 
 
 def test_random_scenes_hold_both_answers():
-    claims = [random_over(seed).claimed() is not None for seed in SCENES[:11]]
-    assert 2 <= sum(claims) <= 9
+    proved = [random_over(seed).proved().confirmed for seed in SCENES[:11]]
+    assert 2 <= sum(proved) <= 9
 
 
 @sampled
@@ -75,8 +69,7 @@ def test_a_cell_with_a_known_pose_is_never_proved(name):
     known = [one for one in scenes if one is not None]
     assert len(known) >= 2
     for one in known:
-        assert one.claimed() is None
-        assert not one.confirmed().confirmed
+        assert not one.proved().confirmed
 
 
 OVER_A_CELL = [(name, seed) for name in ARMS[::-1] for seed in range(1000, 1004)]
@@ -116,12 +109,11 @@ def test_a_ball_beside_a_wall_is_proved_up_to_the_tolerance(gap, clearance):
     far = 0.5 + 0.05 + clearance + gap
     wall = Obstacle.halfspace("wall", position=(far, 0.0, 0.0), rpy_deg=(0.0, -90.0, 0.0))
     scene = over(wall, cone_deg=180.0, tool=ToolShape.sphere(0.05), clearance=clearance)
-    claimed = scene.claimed()
-    assert (claimed is not None) == (gap < -0.001)
-    assert scene.confirmed().confirmed == (gap < -0.001)
-    if claimed is not None:
-        assert claimed.pairs == (("tool", "wall"),)
-        assert claimed.distance == pytest.approx(clearance + gap)
+    found = scene.proved()
+    assert found.confirmed == (gap < -0.001)
+    if found.confirmed:
+        assert found.pairs == (("tool", "wall"),)
+        assert found.distance == pytest.approx(clearance + gap, abs=1e-6)
 
 
 @pytest.mark.parametrize("lean", [12.0, 44.0, 46.0, 60.0])
@@ -132,7 +124,7 @@ def test_a_tool_may_lean_as_far_as_the_cone_and_no_further(lean, turn):
     wide = 2.0 * (0.2 * np.sin(np.radians(45.0)) - 0.02)  # free from there, but for the tolerance
     slab = Obstacle.box("slab", (wide, 9.0, 9.0), tuple(TARGET), (0.0, 0.0, turn))
     scene = over(slab, cone_deg=lean, tool=ball)
-    assert scene.confirmed().confirmed == (lean < 45.0)
+    assert scene.proved(100_000).confirmed == (lean < 45.0)
     assert scene.clear_pose(3000, np.random.default_rng(0)) == (lean > 45.0)
 
 
@@ -154,7 +146,7 @@ def test_a_hole_at_the_border_of_the_cone_is_found(angle, wide):
         blocks.append(Obstacle(f"block {len(blocks)}", Box(tuple(size.tolist())), stands))
     ball = ToolShape.sphere(0.004, position=(0.0, 0.0, -0.2))
     scene = over(*blocks, cone_deg=np.degrees(0.5), tool=ball)
-    assert scene.confirmed().confirmed == (wide < 0.003)
+    assert scene.proved(100_000).confirmed == (wide < 0.003)
 
 
 def test_meshes_are_solids_with_dents_or_sheets():
@@ -164,9 +156,8 @@ def test_meshes_are_solids_with_dents_or_sheets():
     convex = Obstacle("part", block, at(*TARGET))
     for obstacle, swallows in ((solid, True), (hollow, False), (convex, True)):
         scene = over(obstacle, cone_deg=5.0)
-        assert (scene.claimed() is not None) == swallows
+        assert scene.proved().confirmed == swallows
         assert scene.clear_pose(100, np.random.default_rng(1)) != swallows
-    assert over(convex, cone_deg=5.0).confirmed().confirmed
 
 
 def test_a_tool_wider_than_a_pipe_is_cut_by_it():
@@ -176,19 +167,17 @@ def test_a_tool_wider_than_a_pipe_is_cut_by_it():
         disc = ToolShape.cylinder(radius, 0.03, position=(0.0, 0.0, -0.03))
         asked = Collision(False, tool=(disc,), allow=tuple((n, "surface") for n in UR5.link_names))
         scene = Over.cell(UR5, cells, Task(0.01, 2.0, 0.001, collision=asked))
-        assert (scene.claimed() is not None) == blocked
-        assert scene.confirmed().confirmed == blocked
+        assert scene.proved().confirmed == blocked
         assert scene.clear_pose(100, np.random.default_rng(2)) != blocked
 
 
 def test_what_is_left_out_proves_nothing():
     scene = over(CRATE)
-    assert scene.claimed() is not None
+    assert scene.proved().confirmed
     allow = (*scene.task.collision.allow, ("tool", "crate"))
     asked = replace(scene.task.collision, allow=allow)
     other = replace(scene, task=replace(scene.task, collision=asked))
-    assert other.claimed() is None
-    assert other.confirmed() == (False, 0)
+    assert other.proved()[:2] == (False, 0)
 
 
 def test_a_crate_that_swallows_the_target_is_a_proof():
@@ -209,53 +198,6 @@ def test_a_crate_that_swallows_the_target_is_a_proof():
         assert not verify_proof(UR5, CELLS, freed, CutTree(Leaf(0))).accepted
 
 
-# couples of bodies, and poses
-
-
-TIP, AXIS = np.array([0.3, 0.1, 0.0]), np.array([0.0, 0.0, 1.0])
-
-
-@pytest.mark.parametrize("moved", [0.0, 0.01, 0.03])
-@pytest.mark.parametrize("wanted", [-0.005, 0.0, 0.02])
-@pytest.mark.parametrize("still", ["ball", "half space"])
-def test_what_may_be_moved_collides_up_to_what_is_left_of_the_clearance(moved, wanted, still):
-    ball = Body(Sphere(0.1), np.eye(4))
-    turn = Rotation.from_euler("x", -90, degrees=True).as_matrix()  # its z is y
-    rest = Body(Sphere(0.2), np.eye(4)) if still == "ball" else Body(HalfSpace(), at(rotation=turn))
-    couple = Couple(ball, rest, wanted, TIP, AXIS)
-    edge = (0.3 if still == "ball" else 0.1) + wanted - moved
-    for beyond, said in ((3e-5, False), (-3e-5, True)):
-        pose = pin.SE3(np.eye(3), np.array([0.0, edge + beyond, 0.0]))
-        assert couple.collides(pose, moved) == said
-
-
-def test_a_ball_that_is_eroded_away_meets_what_it_is_deep_inside():
-    """The tool is eroded, or what is at rest, whichever has something left."""
-    small, large = Body(Sphere(0.01), np.eye(4)), Body(Box((1.0, 1.0, 1.0)), np.eye(4))
-    for couple in (Couple(small, large, 0.0, TIP, AXIS), Couple(large, small, 0.0, TIP, AXIS)):
-        for x, said in ((0.0, True), (0.39, True), (0.42, False)):
-            assert couple.collides(pin.SE3(np.eye(3), np.array([x, 0.0, 0.0])), 0.1) == said
-
-
-def test_no_point_of_the_tool_is_further_from_tip_and_axis_than_is_said():
-    place = pin.SE3(pin.exp3(np.array([0.3, -0.5, 0.2])), np.array([0.1, 0.2, -0.1]))
-    sides = np.array([0.2, 0.06, 0.4])
-    body, rest = Body(Box(tuple(sides)), place.homogeneous), Body(Sphere(0.1), np.eye(4))
-    couple = Couple(body, rest, 0.0, TIP, AXIS)
-    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-    away = (0.5 * signs * sides) @ place.rotation.T + place.translation - TIP
-    assert couple.reach == pytest.approx(np.linalg.norm(away, axis=1).max())
-    assert couple.lateral == pytest.approx(np.hypot(away[:, 0], away[:, 1]).max())
-
-
-def test_of_a_surface_s_triangles_what_they_may_be_off_is_lost():
-    triangle = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], dtype=float)
-    tool, soup = Solid("tool", 2, np.eye(4), Sphere(0.1)), Soup("surface", triangle, 0.004, False)
-    bodies = Bodies((tool,), (), (soup,), (), (Pair("tool", "surface", 0.01),))
-    (couple,) = couples_of(planar_arm(2), bodies, AXIS)
-    assert couple.wanted == pytest.approx(0.006)
-
-
 @pytest.mark.parametrize("gap", [None, *np.linspace(-np.pi, np.pi, 9)])
 def test_one_gap_at_any_roll_is_enough(gap):
     """A ball goes round the tool axis, through a wall that leaves out one direction."""
@@ -270,35 +212,7 @@ def test_one_gap_at_any_roll_is_enough(gap):
     assert not never_clear(*asked, most=1).confirmed
 
 
-# what an erosion leaves has the whole ball around it inside the shape
-
-
-@pytest.mark.parametrize(
-    ("shape", "left"),
-    [
-        (Box((0.2, 0.3, 0.05)), Box((0.16, 0.26, 0.01))),
-        (Sphere(0.1), Sphere(0.08)),
-        (Capsule(0.05, 0.2), Capsule(0.03, 0.2)),
-        (Cylinder(0.08, 0.1), Cylinder(0.06, 0.06)),
-        *((gone, None) for gone in (Box((0.2, 0.3, 0.03)), Sphere(0.02), Capsule(0.01, 1.0))),
-        *((gone, None) for gone in (Cylinder(0.1, 0.04), Cylinder(0.01, 1.0))),
-    ],
-)
-def test_primitives_are_eroded_in_closed_form(shape, left):
-    found = eroded(shape, 0.02)
-    assert type(found) is type(left)
-    if left is not None:
-        sizes = [np.hstack([getattr(x, name) for name in x.__slots__]) for x in (found, left)]
-        np.testing.assert_allclose(*sizes)
-
-
-@pytest.mark.parametrize("mesh", [BLOCK, ROUND, CONE], ids=["box", "ball", "cone"])
-def test_a_convex_mesh_keeps_what_is_deep_enough_and_no_less(mesh):
-    found, body = eroded(mesh, 0.02), trimesh.Trimesh(mesh.vertices, mesh.faces)
-    faces = list(zip(body.triangles[:, 0], body.face_normals, strict=True))
-    depths = [min((a - x) @ normal for a, normal in faces) for x in found.vertices]
-    assert 0.02 - 1e-9 <= min(depths) <= 0.02 + 1e-6
-    assert eroded(mesh, 0.2) is None
+# points inside shapes, and how deep they are
 
 
 def test_open_hollow_dented_and_doubled_meshes_are_told_from_solids():
@@ -321,11 +235,8 @@ def test_open_hollow_dented_and_doubled_meshes_are_told_from_solids():
     wrong += [checked_triangles(corners, hair.faces), bracket()]
     for mesh in wrong:
         assert planes_around(mesh) is None
-        assert eroded(mesh, 0.001) is None
-    assert (balls_inside(wrong[0])[:, 3] == 0.0).all()
-
-
-# the search's own: balls inside shapes, and distances that are never less than they are
+        assert depths(mesh, np.zeros(3)) is None
+    assert (points_inside(wrong[0])[1] == 0.0).all()
 
 
 def inside(shape, x):
@@ -353,38 +264,38 @@ def around(rng, ball, count=15):
 
 
 @pytest.mark.parametrize("shape", [*PRIMITIVES, *MESHES], ids=lambda one: type(one).__name__)
-def test_balls_are_inside(shape):
-    rng, balls = np.random.default_rng(0), balls_inside(shape)
-    assert (balls[:, 3] >= 0.0).all()
-    assert balls[:, 3].max() > 0.02
-    for ball in balls[balls[:, 3] > 0.0]:
-        assert inside(shape, around(rng, ball)).all()
-    points = balls[balls[:, 3] == 0.0, :3]
+def test_balls_around_points_are_inside(shape):
+    rng, (points, deep) = np.random.default_rng(0), points_inside(shape)
+    assert (deep >= 0.0).all()
+    assert deep.max() > 0.02
+    for point, radius in zip(points[deep > 0.0], deep[deep > 0.0], strict=True):
+        assert inside(shape, around(rng, np.append(point, radius))).all()
     if isinstance(shape, Triangles):
-        assert {tuple(point) for point in points} <= {tuple(one) for one in shape.vertices}
+        away = trimesh.Trimesh(shape.vertices, shape.faces).nearest.on_surface(points[deep == 0.0])
+        assert away[1].max() < 1e-9
     else:
         assert inside(shape, points).all()
 
 
 @pytest.mark.parametrize(
-    "shape", [*PRIMITIVES, HalfSpace(), *MESHES], ids=lambda one: type(one).__name__
+    "shape", [*PRIMITIVES, HalfSpace(), BLOCK, ROUND], ids=lambda one: type(one).__name__
 )
-def test_distances_are_no_less_than_they_are(shape):
+def test_no_point_is_said_to_be_deeper_than_it_is(shape):
     """All of a ball as large as the depth is inside; coal finds the body as near as is said."""
     rng = np.random.default_rng(1)
-    place = at(0.3, -0.2, 0.1, Rotation.random(random_state=2).as_matrix())
     corners = shape.vertices if isinstance(shape, Triangles) else np.array([[0.15], [-0.15]])
-    own = rng.uniform(corners.min(axis=0) - 0.02, corners.max(axis=0) + 0.02, (150, 3))
-    points = own @ place[:3, :3].T + place[:3, 3]
-    found = distance_from(shape, place)(points)
-    deep, outside = found < 0.0, (found >= 0.0) & ~inside(shape, own)
+    x = rng.uniform(corners.min(axis=0) - 0.02, corners.max(axis=0) + 0.02, (150, 3))
+    found = depths(shape, x)
+    deep, outside = found > 0.0, ~inside(shape, x)
     assert min(deep.sum(), outside.sum()) >= 3
-    for point, distance in zip(own[deep], found[deep], strict=True):
-        assert inside(shape, around(rng, np.array([*point, -distance]))).all()
-    away = np.array([_by_coal(shape, place, point) for point in points[outside]])
-    np.testing.assert_array_less(away - 1e-6, found[outside])
-    if not isinstance(shape, Triangles) or shape is BLOCK:  # else some triangles are asked only
-        np.testing.assert_allclose(found[outside], away, atol=1e-5)
+    assert not found[outside].max() > 0.0
+    for point, depth in zip(x[deep], found[deep], strict=True):
+        assert inside(shape, around(rng, np.append(point, depth))).all()
+    if isinstance(shape, Triangles):
+        assert np.isinf(found[outside]).all()
+        return
+    away = np.array([_by_coal(shape, np.eye(4), point) for point in x[outside]])
+    np.testing.assert_allclose(-found[outside], away, atol=1e-5)
 
 
 def _by_coal(shape, place, point):

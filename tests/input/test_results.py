@@ -123,6 +123,24 @@ def test_an_earlier_format_and_as_many_members_as_may_be(tmp_path: Path) -> None
     assert loaded.postures is None
 
 
+@pytest.mark.parametrize("slanted", [False, True])
+def test_cuts_of_earlier_formats_are_read_along_one_joint_alone(
+    slanted: bool, tmp_path: Path
+) -> None:
+    content, file = dict(members("proof")), io.BytesIO()
+    weights = np.zeros((5, 6))
+    weights[[0, 1], [2, 3]] = 1.0
+    weights[1, 0] = 0.5 * slanted
+    np.save(file, weights)
+    del content["proof_joint.npy"]
+    (tmp_path / "a.result").write_bytes(packed(content | {"proof_weights.npy": file.getvalue()}))
+    if slanted:
+        with pytest.raises(ResultError, match="sums of several joints"):
+            load_result(tmp_path / "a.result")
+    else:
+        assert load_result(tmp_path / "a.result").verdict.proof == TREE
+
+
 @pytest.mark.parametrize("kind", ["mesh", "bspline"])
 def test_a_result_is_not_shown_on_another_surface(
     kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

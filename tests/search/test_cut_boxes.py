@@ -14,7 +14,7 @@ from search_kernels import contracted
 
 from feasibility import Task
 from feasibility.roadmap import arrays_of
-from feasibility.roadmap.branch_and_bound.boxes import Slabs, place_at_rest
+from feasibility.roadmap.branch_and_bound.boxes import place_at_rest
 from feasibility.roadmap.cuts import places_on
 from feasibility.roll import projected, roll_of
 from robots import load_robot
@@ -103,16 +103,6 @@ def explained(places, point, approach):
     return parts, x[parts]
 
 
-def random_slabs(q, rng):
-    """Up to two slabs that hold q, some of no width."""
-    m = int(rng.integers(3))
-    weights = np.where(rng.random((m, len(q))) < 0.5, rng.normal(size=(m, len(q))), 0.0)
-    along = weights @ q
-    width = np.where(rng.random((2, m)) < 0.4, 0.0, 10.0 ** rng.uniform(-4, 0, (2, m)))
-    width[rng.random((2, m)) < 0.3] = np.inf
-    return Slabs(weights, along - width[0], along + width[1])
-
-
 def loses(known, rng):
     """Is a known point lost, or its box discarded, by one random box around it?"""
     k, n = int(rng.integers(len(known.parts))), len(known.q)
@@ -126,8 +116,7 @@ def loses(known, rng):
     places, part = known.places, int(known.parts[k])
     if rng.random() < 0.3:
         places, part, low, high, y = known.at_rest, 0, low[:n], high[:n], y[:n]
-    slabs = random_slabs(known.q, rng)
-    kept, low, high = contracted(known.arrays, places, part, slabs, low, high)
+    kept, low, high = contracted(known.arrays, places, part, low, high)
     return not (kept and (low - 1e-9 <= y).all() and (y <= high + 1e-9).all())
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import count
 
 import numpy as np
@@ -57,8 +58,7 @@ def test_a_cut_through_the_motion_set_and_a_leaf_of_a_covered_cell_are_refuted(p
         for region, node in proving.statements():
             if isinstance(node, Cut):
                 for q in samples[region.inside(samples)][:5]:
-                    value = float(np.array(node.weights) @ q)
-                    moved = Cut(node.weights, value, node.below, node.above)
+                    moved = replace(node, value=float(q[node.joint]))
                     assert proving.ruling(region, moved, 3000) is not Ruling.PROVED
                     refuted += 1
                 continue

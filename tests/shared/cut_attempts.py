@@ -42,14 +42,14 @@ class Proving(NamedTuple):
             region, node = waiting.pop()
             yield region, node
             if isinstance(node, Cut):
-                sides = region.sides(np.array(node.weights), node.value)
+                sides = region.sides(node.joint, node.value)
                 waiting += zip(sides, (node.below, node.above), strict=True)
 
     def ruling(self, region, node, most=200_000):
         """Is the tool nowhere there: over a leaf's cell, or on a cut anywhere on the surface?"""
         if isinstance(node, Leaf):
             return self.ruled(region, place_at_rest(self.prover.arrays, node.cell), 0, most)
-        on = region.on(np.array(node.weights), node.value)
+        on = region.on(node.joint, node.value)
         return self.ruled(on, self.prover.places, 2, most)
 
     def ruled(self, region, places, dimension, most=200_000):

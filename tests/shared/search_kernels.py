@@ -27,7 +27,7 @@ from feasibility.roadmap import (
     work_for,
 )
 from feasibility.roadmap.branch_and_bound import box_bounds, box_contraction
-from feasibility.roadmap.branch_and_bound.boxes import Slabs, box_work
+from feasibility.roadmap.branch_and_bound.boxes import box_work
 from feasibility.roadmap.branch_and_bound.branching import DIRECTIONS
 from feasibility.roadmap.motions import aiming, project_near_cell, segment_bound, segment_holds
 from feasibility.roadmap.motions.aiming import aim, stand_still
@@ -184,13 +184,13 @@ def ruled(robot: Robot, cells: Cells, task: Task, boxes: int = 2000, cell: int =
 
 
 def contracted(
-    arrays: Any, places: Any, part: int, slabs: Slabs, low: Floats, high: Floats
+    arrays: Any, places: Any, part: int, low: Floats, high: Floats
 ) -> tuple[bool, Floats, Floats]:
     """Is something left of a box of joints and x in a part of the surface, and what?"""
     n = len(arrays.lower)
     low, high, space = low.copy(), high.copy(), box_work(n, len(low) - n)
     static_levers(arrays, space.longest)
-    code, _ = shrink(arrays, work_for(n), places, part, slabs, DIRECTIONS, space, low, high)
+    code, _ = shrink(arrays, work_for(n), places, part, DIRECTIONS, space, low, high)
     return code != 1, low, high
 
 

@@ -233,7 +233,7 @@ def test_what_a_cut_parts_is_proved_and_named():
         posture = next(q for q, c in zip(verdict.postures, verdict.components, strict=True)
                        if cause.cell in c.tolist())  # fmt: skip
         cut = tree.parting(tree.folded(best[None])[0], tree.folded(posture[None])[0])
-        above = tree.folded(best[None])[0] @ np.asarray(cut.weights) > cut.value
+        above = tree.folded(best[None])[0, cut.joint] > cut.value
         assert cause.detail.endswith("above" if above else "below")
 
 

@@ -17,7 +17,7 @@ CELLS = plane((0, 1), (0, 1)).cells(5, 5)
 
 
 def cut(joint: int, value_deg: float, below: Cut | Leaf, above: Cut | Leaf) -> Cut:
-    return Cut(tuple(np.eye(6)[joint]), np.radians(value_deg), below, above)
+    return Cut(joint, np.radians(value_deg), below, above)
 
 
 THREE = CutTree(
@@ -44,19 +44,14 @@ OPENED = (
 
 
 def test_trees_and_their_cuts_in_words(approved) -> None:
-    """A tree, indented and as a sentence; slides in millimetres; sums that name their joints."""
+    """A tree, indented and as a sentence; slides in millimetres."""
     robot = question("on a rail").robot
     (slide,) = np.flatnonzero(robot.prismatic)
-    on_rail, sum_of_two = np.zeros((2, robot.n))
-    on_rail[slide] = sum_of_two[slide] = 1.0
-    sum_of_two[slide + 1] = -0.5
-    turning = Cut((0.6, 0.0, 0.8, 0, 0, 0), np.radians(-40.0), Leaf(0), Leaf(1))
     approved("cut_words", "\n".join([
         *lines(THREE, PUMA, CELLS),
         sentence(THREE, PUMA, CELLS),
-        place_of(Cut(tuple(on_rail), 0.1234, Leaf(0), Leaf(1)), robot),
-        place_of(Cut(tuple(sum_of_two), 0.1, Leaf(0), Leaf(1)), robot),
-        nowhere(turning, PUMA),
+        place_of(Cut(int(slide), 0.1234, Leaf(0), Leaf(1)), robot),
+        nowhere(cut(0, -40.0, Leaf(0), Leaf(1)), PUMA),
         *(f"{rows}: {what_opens(THREE, walk_of(*rows), PUMA, CELLS)}" for rows in OPENED),
     ]))  # fmt: skip
 

@@ -4,8 +4,8 @@ A model says that every place of a box where the constraints hold is c + d with
 
     |v_g + (C d)_g| <= R_g  for each group g of coordinates,    low <= d <= high:         (1)
 
-the three of the tool point, the three of its axis, and one for each cut along several joints, whose
-w . q is to be in an interval. **Lemma.** For every vector w, split into the same groups, (1) gives
+the three of the tool point, the three of its axis, and one for each end of a limited range of the
+roll. **Lemma.** For every vector w, split into the same groups, (1) gives
 |w . (v + C d)| <= sum_g |w_g| R_g. *Proof.* Cauchy and Schwarz in every group. QED
 
 *Contraction:* that is an interval for a sum of intervals, so each d_j lies in the interval that the

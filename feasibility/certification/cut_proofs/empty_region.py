@@ -7,7 +7,8 @@ dropped is proved empty: when no box is left, every claim holds. Of the boxes th
 give starts for a search for a configuration that refutes its claim.
 
 Where bodies are to stay clear of each other, a box in which some overlap everywhere is empty too
-(`joint_boxes`), and only a configuration that is clear refutes a claim.
+(`overlaps`), and only a configuration that is clear refutes a claim. Boxes in which some nearly do
+are cut along what moves the point that shows it.
 """
 
 from __future__ import annotations
@@ -35,11 +36,13 @@ from feasibility.certification.cut_proofs.linear_models import (
 )
 from feasibility.certification.cut_proofs.refutation import Refuter
 from feasibility.certification.cut_proofs.region import JointRegion
-from feasibility.certification.joint_boxes import Overlapping
+from feasibility.certification.overlaps import Overlapping
 
 BATCH = 2048  # boxes at a time
 FIRST_TRY = 300  # boxes after which a refutation is first tried
 RARER = 4  # times as many boxes until the next try
+NEARLY = 8.0  # [1] times as far as it may that a point moves in a box that nearly is ruled out
+DEEP = 0.05  # [1] of the typical lever, that bodies overlap by there
 STARTS = 24  # of a search for a configuration that refutes a claim, shared by all
 
 
@@ -88,6 +91,8 @@ class Emptiness:
             overlapping: finds boxes in which bodies overlap; None where they may.
         """
         self.overlapping = overlapping
+        self.blamed = set[int]()
+        """Indices of the pairs that were found to overlap all over some box."""
         self.arm = arm
         self.parts = parts
         self.roots = roots
@@ -96,23 +101,12 @@ class Emptiness:
 
     def test(self, claims: list[Claim], refuter: Refuter, most: int) -> Outcome:
         """Confirm all claims, refute one, or give up after `most` boxes."""
-        done = 0
-        plain = [k for k, claim in enumerate(claims) if not len(claim.region.weights)]
-        summed = [k for k in range(len(claims)) if len(claims[k].region.weights)]
-        for group in ([plain] if plain else []) + [[k] for k in summed]:
-            found = self._test_together(claims, group, refuter, most - done)
-            done += found.boxes
-            if found.failed is not None:
-                return replace(found, boxes=done)
-        return Outcome(done)
-
-    def _test_together(
-        self, claims: list[Claim], group: list[int], refuter: Refuter, most: int
-    ) -> Outcome:
-        """The same for claims without weighted sums, or for a single one."""
-        regions = {k: claims[k].region.folded(self.arm.prismatic) for k in group}
-        shared = regions[group[0]]
-        waiting = [self._first(regions[k], claims[k], k) for k in group if not regions[k].empty]
+        regions = [claim.region.folded(self.arm.prismatic) for claim in claims]
+        waiting = [
+            self._first(region, claims[k], k)
+            for k, region in enumerate(regions)
+            if not region.empty
+        ]
         done, next_try, n = 0, FIRST_TRY, self.arm.n
         while waiting:
             if done >= most:
@@ -120,7 +114,7 @@ class Emptiness:
             self.tick()
             boxes = _next(waiting)
             done += len(boxes)
-            left, models, place = self.examine(boxes, shared)
+            left, models, place = self.examine(boxes)
             if not len(left):
                 continue
             if done >= next_try:
@@ -128,7 +122,7 @@ class Emptiness:
                 some = _spread(left)
                 starts = (left.centre[some] + place[some])[:, :n]
                 at = [(regions[k], claims[k].cell) for k in left.claim[some]]
-                found = refuter.find(starts, at, shared)
+                found = refuter.find(starts, at)
                 if found is not None and self._clear(found.q):
                     failed = int(left.claim[some[found.start]])
                     return Outcome(done, failed, found.q)
@@ -145,16 +139,9 @@ class Emptiness:
             np.array([index]),
         )
 
-    def examine(self, boxes: Boxes, region: JointRegion) -> tuple[Boxes, Models, Array]:
-        """The boxes that are not proved empty, their models, and where these come nearest.
-
-        Args:
-            boxes: the boxes.
-            region: the one whose weighted sums bound all of them.
-        """
-        models = region.with_sums(
-            self.arm.models(boxes, self.parts, self.allowed), boxes.centre[:, : self.arm.n]
-        )
+    def examine(self, boxes: Boxes) -> tuple[Boxes, Models, Array]:
+        """The boxes that are not proved empty, their models, and where these come nearest."""
+        models = self.arm.models(boxes, self.parts, self.allowed)
         normals = self.parts.centre[boxes.part, 3:]
         low, high = contract(models, directions_for(models, normals))
         kept = np.asarray(~(low > high).any(axis=1))
@@ -165,11 +152,17 @@ class Emptiness:
         boxes, models, place = boxes.of(kept), models.of(kept), place[kept]
         if self.overlapping is None:
             return boxes, models, place
-        kept = ~self._overlap(self.overlapping, boxes, models)
+        kept, reach = self._overlap(self.overlapping, boxes, models)
+        models = replace(models, reach=reach)
         return boxes.of(kept), models.of(kept), place[kept]
 
-    def _overlap(self, overlapping: Overlapping, boxes: Boxes, models: Models) -> Mask:
-        """(m,) boxes, as far as their models leave them, in which bodies overlap everywhere."""
+    def _overlap(
+        self, overlapping: Overlapping, boxes: Boxes, models: Models
+    ) -> tuple[Mask, Array]:
+        """(m,) boxes, as far as their models leave them, in which no bodies overlap everywhere.
+
+        And along what they are cut, (m, n + 2) m.
+        """
         n, parts, part = self.arm.n, self.parts, boxes.part
         low, high = boxes.centre + models.low, boxes.centre + models.high
         at, half = 0.5 * (low + high)[:, n:], 0.5 * (high - low)[:, n:]
@@ -177,7 +170,16 @@ class Emptiness:
         target = parts.centre[part, :3] + (at[..., None] * slopes).sum(axis=1)
         off = self.allowed.position + parts.radius[part, 0]
         off = off + (half * np.linalg.norm(slopes, axis=2)).sum(axis=1)
-        return overlapping.everywhere(low[:, :n], high[:, :n], target, off)
+        found = overlapping.deepest(low[:, :n], high[:, :n], target, off)
+        ruled_out = found.ratio < 1.0
+        self.blamed |= set(found.pair[ruled_out].tolist())
+        # (Around shallow overlaps there would be no end of ever smaller boxes.)
+        deep = found.effect.sum(axis=1) > found.ratio * DEEP * self.allowed.length
+        reach = models.reach.copy()
+        reach[:, :n] = np.where(
+            ((found.ratio < NEARLY) & deep)[:, None], found.effect, reach[:, :n]
+        )
+        return ~ruled_out, reach
 
     def _clear(self, q: Array) -> bool:
         """Is a configuration one in which no pair is too near?"""

@@ -39,6 +39,8 @@ from feasibility.task import Targets, Task
 from robots import Kinematics, Robot
 from surfaces import Cells, SurfaceParts
 
+TYPICAL = 0.2  # of the longest lever: what a difference of axes is weighed by; found by trying
+ANY_AXIS = 4.0  # a chord that two unit vectors never have
 GUARD = 1e-9  # [m], [1] added to every radius; rounding of double arithmetic is about 1e-15
 
 
@@ -80,24 +82,28 @@ def target_parts(parts: SurfaceParts, cells: Cells, task: Task) -> Parts:
     return Parts(centre, slopes, radius, parts.children, parts.axis, held)
 
 
-def with_cells(parts: Parts, targets: Targets) -> Parts:
-    """The parts, and after them one that is a point for each cell's target."""
+def cell_parts(targets: Targets) -> Parts:
+    """A part that is a point for each cell's target."""
     points, approaches, references = targets
     count = len(points)
-    finest = np.full((count, 2), -1)
     known = np.zeros_like(points) if references is None else references
-    held = ReferenceParts(
-        np.concatenate([parts.references.centre, known]),
-        np.concatenate([parts.references.slopes, np.zeros((count, 2, 3))]),
-        np.concatenate([parts.references.radius, np.zeros(count)]),
-    )
     return Parts(
-        np.concatenate([parts.centre, np.concatenate([points, approaches], axis=1)]),
-        np.concatenate([parts.slopes, np.zeros((count, 2, 6))]),
-        np.concatenate([parts.radius, np.zeros((count, 2))]),
-        np.concatenate([parts.children, finest]),
-        np.concatenate([parts.axis, finest[:, 0]]),
-        held,
+        np.concatenate([points, approaches], axis=1),
+        np.zeros((count, 2, 6)),
+        np.zeros((count, 2)),
+        np.full((count, 2), -1),
+        np.full(count, -1),
+        ReferenceParts(known, np.zeros((count, 2, 3)), np.zeros(count)),
+    )
+
+
+def with_cells(parts: Parts, targets: Targets) -> Parts:
+    """The parts, and after them those of `cell_parts`."""
+    cells = cell_parts(targets)
+    held = zip(parts.references, cells.references, strict=True)
+    return Parts(
+        *(np.concatenate(both) for both in zip(parts[:-1], cells[:-1], strict=True)),
+        ReferenceParts(*(np.concatenate(both) for both in held)),
     )
 
 
@@ -112,6 +118,14 @@ class Allowed(NamedTuple):
     """m, which differences of axes are multiplied by: a typical lever."""
     roll: Roll | None = None
     """The range of the roll, at most 180 deg; None where the roll is not looked at."""
+
+    @staticmethod
+    def by(task: Task, arm: ArmModel) -> Allowed:
+        """What a task allows an arm."""
+        length = max(TYPICAL * float(arm.caps.max()), 1e-3)
+        # A wider range leaves out too little for boxes to show it; so does what is proved without.
+        roll = task.roll if task.roll is not None and task.roll.half <= 0.5 * np.pi else None
+        return Allowed(task.effective_tolerance, min(task.cone_chord, ANY_AXIS), length, roll)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -7,18 +7,15 @@ closest points to random points near it. This finds mistakes; it proves nothing.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
-from surfaces import Cells, Surface, SurfaceParts
-from surfaces.toolpaths import PoseSurface, arc_at
+from surfaces import Cells, SurfaceParts
+from surfaces.places import offset_surface
 
 SAMPLES = 300
 AT_ONCE = 60  # curves between poses that are looked at
 ROUNDING = 1e-9  # [m], [1] that a radius is taken larger by
-ON_SURFACE = 1e-8  # [m], [1] by which a place and its own closest place may differ
 WITHIN = 2.0  # of (|df| / r_f)^2 + (|dn| / r_n)^2; a common x makes each at most 1
 
 
@@ -48,54 +45,14 @@ def places(cells: Cells, samples: int) -> tuple[Array, Array]:
     chosen = rng.integers(len(cells), size=samples)
     size = np.sqrt(cells.areas[chosen])[:, None]
     near = cells.centres[chosen] + size * rng.uniform(-1.0, 1.0, (samples, 3))
-    found = closest_places(cells.surface, near)
+    surface = offset_surface(cells.surface, 0.0)
+    found = surface.nearest(near, near, np.inf)
+    points, normals = surface.at(found.of(found.chart >= 0))
     some = np.linspace(0, len(cells) - 1, min(len(cells), samples)).astype(int)
-    points = np.concatenate([cells.centres[some], found.points[found.on_patch]])
-    return points, np.concatenate([cells.normals[some], found.normals[found.on_patch]])
-
-
-class ClosestPlaces(NamedTuple):
-    """Places of a surface below given points."""
-
-    points: Array
-    """(m, 3) m"""
-    normals: Array
-    """(m, 3) outward unit normals."""
-    on_patch: Mask
-    """(m,) False where there is no such place."""
-
-
-def closest_places(surface: Surface, points: Array) -> ClosestPlaces:
-    """The places whose normals lead to points (m, 3).
-
-    Beyond the border of a mesh or a seam the normal that `closest` gives leads elsewhere; so each
-    place is compared with its own closest place. Of poses it is the nearest place of a curve.
-    """
-    if isinstance(surface, PoseSurface):
-        return _on_curves(surface, points)
-    found = surface.closest(points)
-    closest = points - found.height[:, None] * found.normal
-    again = surface.closest(closest)
-    alike = np.linalg.norm(again.normal - found.normal, axis=1) <= ON_SURFACE
-    alike &= np.abs(again.height) <= ON_SURFACE
-    return ClosestPlaces(closest, found.normal, np.asarray(found.inside & alike))
-
-
-def _on_curves(surface: PoseSurface, points: Array) -> ClosestPlaces:
-    """The places of the straight lines between poses that are nearest to points (m, 3)."""
-    start, end = (surface.placed_points[of] for of in surface.pairs.T)
-    line = end - start
-    off = points[:, None] - start
-    share = (off * line).sum(axis=2) / np.maximum((line**2).sum(axis=1), 1e-300)
-    share = np.clip(share, 0.0, 1.0)
-    away = np.linalg.norm(off - share[..., None] * line, axis=2)
-    nearest = np.argmin(np.nan_to_num(away, nan=np.inf), axis=1)
-    t = share[np.arange(len(points)), nearest]
-    closest = start[nearest] + t[:, None] * line[nearest]
-    i, j = surface.pairs[nearest].T
-    outward = surface.turned(surface.outward)
-    normals, _ = arc_at(outward[i], outward[j], t)
-    return ClosestPlaces(closest, normals, np.asarray(np.isfinite(points).all(axis=1)))
+    return (
+        np.concatenate([cells.centres[some], points]),
+        np.concatenate([cells.normals[some], normals]),
+    )
 
 
 def on_a_finest_part(places: Array, parts: SurfaceParts) -> Mask:

@@ -1,14 +1,15 @@
 """The verifier of cut trees: what must accept a proof that no single motion covers every cell.
 
-It shares no code with the search that guessed the tree; kinematics are Pinocchio's. A tree (see
+It shares no code with the search that guessed the tree, nor with its proofs of cells and cuts;
+kinematics are Pinocchio's. A tree (see
 `feasibility.cut_tree`) proves its claim if, with M the configurations inside the limits with the
 tool on the surface, within tolerance and cone, and its roll in the range,
 
-    no q in M and in the region of a cut has w . q = t, and
+    no q in M and in the region of a cut has q_j = t, and
     no q in the region of a leaf has the tool at its cell's target, and held likewise.
 
 A tree of one leaf proves its claim too where the tool collides in every pose within tolerance and
-cone of the cell's target, whatever the arm does (`feasibility.certification.tool_alone`). And where
+cone of the cell's target, whatever the arm does (`feasibility.certification.overlaps`). And where
 bodies are to stay clear of each other, M and leaves hold only what is clear.
 
 Both say that a region is empty, which `empty_region` proves by bounds (`linear_models`,
@@ -38,12 +39,11 @@ from feasibility.certification.cut_proofs.parts_agreement import disagreement
 from feasibility.certification.cut_proofs.refutation import Refuter
 from feasibility.certification.cut_proofs.region import TURN, JointRegion
 from feasibility.certification.cut_proofs.tree_shape import malformed
-from feasibility.certification.joint_boxes import Overlapping
 from feasibility.certification.lever_bounds import out_of_line, stretched_length
-from feasibility.certification.tool_alone import PoseCheck, never_clear
+from feasibility.certification.overlaps import Overlapping, PoseCheck, never_clear
 from feasibility.collisions import gather
 from feasibility.cut_tree import Cut, CutTree, Leaf
-from feasibility.cut_words import hyperplane
+from feasibility.cut_words import joint_value
 from feasibility.task import Task
 from robots import Robot
 from surfaces import Cells, SurfaceError, SurfaceParts
@@ -51,9 +51,7 @@ from surfaces import Cells, SurfaceError, SurfaceParts
 MOST_BOXES = 2_000_000
 WITHOUT_BODIES = 20_000  # boxes after which it is looked into whether bodies overlap
 FINE = 0.25  # of tolerance and cone, that the finest parts of the surface may be off by
-TYPICAL = 0.2  # of the longest lever: what a difference of axes is weighed by; found by trying
 NARROWEST = 1e-6  # a chord that parts of the surface are made for, at least
-ANY_AXIS = 4.0  # a chord that two unit vectors never have
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,16 +134,15 @@ def verify_on(
     if fault:
         return ProofCheck(fault, 0)
     arm = ArmModel(robot, limits.low, limits.high)
-    length = max(TYPICAL * float(arm.caps.max()), 1e-3)
-    # A wider range leaves out too little for boxes to show it; so does what is proved without.
-    roll = task.roll if task.roll is not None and task.roll.half <= 0.5 * np.pi else None
-    allowed = Allowed(task.effective_tolerance, min(task.cone_chord, ANY_AXIS), length, roll)
-    targets = task.targets(cells)
+    allowed, targets = Allowed.by(task, arm), task.targets(cells)
 
     def root_of(cell: int | None) -> int:
         return 0 if cell is None else len(parts) + cell
 
-    claims, refuter = list(_claims(robot, cells, tree, limits)), Refuter(arm, cells, task, length)
+    claims, refuter = (
+        list(_claims(robot, cells, tree, limits)),
+        Refuter(robot, cells, task, allowed.length),
+    )
     bodies = gather(robot, cells.surface, task.collision, task.standoff)
 
     def tested(boxes: int, overlapping: Overlapping | None = None) -> Outcome:
@@ -167,14 +164,14 @@ def _finite_slides(robot: Robot, surface: Parts, tolerance: float) -> tuple[Join
     (free,) = np.nonzero(robot.prismatic & ~np.isfinite(high - low))
     if len(free) > 1:
         names = " and ".join(robot.joint_names[j] for j in free)
-        return JointRegion.box(low, high), f"{names} slide without limits, which no bound covers"
+        return JointRegion(low, high), f"{names} slide without limits, which no bound covers"
     for j in free:
         # p is the sum of the links' vectors and of the slides', so |q_j| <= |p| + all the others.
         root = np.linalg.norm(surface.slopes[0, :, :3], axis=1).sum() + surface.radius[0, 0]
         furthest = float(np.linalg.norm(surface.centre[0, :3]) + root) + tolerance
         reach = 1.001 * (furthest + stretched_length(robot, without=int(j))) + 1e-6
         low[j], high[j] = max(low[j], -reach), min(high[j], reach)
-    return JointRegion.box(low, high), ""
+    return JointRegion(low, high), ""
 
 
 def _claims(robot: Robot, cells: Cells, tree: CutTree, limits: JointRegion) -> Iterator[Claim]:
@@ -183,10 +180,9 @@ def _claims(robot: Robot, cells: Cells, tree: CutTree, limits: JointRegion) -> I
     for joint, value in tree.opened:
         at = limits.low.copy(), limits.high.copy()
         at[0][joint] = at[1][joint] = value
-        opened = np.eye(robot.n)[joint]
-        yield Claim(f"the opening {hyperplane(opened, value, robot)}", JointRegion.box(*at), None)
+        yield Claim(f"the opening {_at(joint, value, robot)}", JointRegion(*at), None)
         low[joint], high[joint] = value, value + TURN
-    waiting: list[tuple[Cut | Leaf, JointRegion]] = [(tree.root, JointRegion.box(low, high))]
+    waiting: list[tuple[Cut | Leaf, JointRegion]] = [(tree.root, JointRegion(low, high))]
     leaves = 0
     while waiting:
         node, region = waiting.pop()
@@ -195,11 +191,16 @@ def _claims(robot: Robot, cells: Cells, tree: CutTree, limits: JointRegion) -> I
             name = list(cells.unravel(node.cell))
             yield Claim(f"leaf {leaves} (cell {name})", region, node.cell)
             continue
-        weights = np.array(node.weights)
-        what = f"the cut {hyperplane(weights, node.value, robot)}"
-        yield Claim(what, region.within(weights, node.value, node.value), None)
-        waiting.append((node.above, region.within(weights, node.value, np.inf)))
-        waiting.append((node.below, region.within(weights, -np.inf, node.value)))
+        joint, value = node.joint, node.value
+        what = f"the cut {_at(joint, value, robot)}"
+        yield Claim(what, region.within(joint, value, value), None)
+        waiting.append((node.above, region.within(joint, value, np.inf)))
+        waiting.append((node.below, region.within(joint, -np.inf, value)))
+
+
+def _at(joint: int, value: float, robot: Robot) -> str:
+    """Where a joint is, in words."""
+    return f"{robot.joint_names[joint]} = {joint_value(robot, joint, value)}"
 
 
 def _refusal(claim: Claim, found: Outcome) -> str:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from coverable_errors import is_number, is_whole, shown
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from robots import Robot
@@ -43,7 +41,6 @@ def _fault_of_opened(robot: Robot, opened: object) -> str:
 def _fault_of_nodes(robot: Robot, n_cells: int, tree: CutTree) -> str:
     """Why the nodes form no tree for this robot and so many cells; empty when they do."""
     waiting: list[tuple[object, int]] = [(tree.root, 0)]
-    opened = {joint for joint, _ in tree.opened}
     count = 0
     while waiting:
         node, depth = waiting.pop()
@@ -56,7 +53,7 @@ def _fault_of_nodes(robot: Robot, n_cells: int, tree: CutTree) -> str:
             if not is_whole(node.cell, 0, n_cells - 1):
                 return f"a leaf names cell {shown(node.cell)}; there are {n_cells}, counted from 0"
         elif isinstance(node, Cut):
-            fault = _fault_of_cut(robot, node, opened)
+            fault = _fault_of_cut(robot, node)
             if fault:
                 return fault
             waiting += [(node.above, depth + 1), (node.below, depth + 1)]
@@ -65,22 +62,10 @@ def _fault_of_nodes(robot: Robot, n_cells: int, tree: CutTree) -> str:
     return ""
 
 
-def _fault_of_cut(robot: Robot, cut: Cut, opened: set[int]) -> str:
+def _fault_of_cut(robot: Robot, cut: Cut) -> str:
     """Why a cut does not fit the robot; empty when it does."""
-    weights = cut.weights
-    if not isinstance(weights, tuple) or len(weights) != robot.n:
-        length = len(weights) if isinstance(weights, tuple) else "no"
-        return f"a cut has {length} weights for {robot.n} joints"
-    if not all(map(is_number, weights)) or not is_number(cut.value):
-        value = shown(cut.value)
-        return f"a cut has weights {shown(weights)} and value {value}, not all of them numbers"
-    weighed = [j for j in range(robot.n) if weights[j] != 0.0]
-    if not weighed:
-        return "a cut weighs no joint"
-    turning = ~np.isfinite(robot.upper - robot.lower) & ~robot.prismatic
-    free = [j for j in weighed if turning[j] and j not in opened]
-    if len(weighed) > 1 and free:
-        return (
-            f"a cut weighs {robot.joint_names[free[0]]}, which has no limits, together with others"
-        )
+    if not is_whole(cut.joint, 0, robot.n - 1):
+        return f"a cut goes through joint {shown(cut.joint)}, which is none of the {robot.n} joints"
+    if not is_number(cut.value):
+        return f"a cut has the value {shown(cut.value)}, which is no number"
     return ""

@@ -1,4 +1,3 @@
-from .boxes import Slabs as Slabs
 from .boxes import place_at_rest as place_at_rest
 from .boxes import toward_middle as toward_middle
 from .branching import DIRECTIONS as DIRECTIONS
@@ -7,7 +6,6 @@ from .branching import Places as Places
 from .branching import Ruling as Ruling
 from .branching import box_of as box_of
 from .branching import examine as examine
-from .branching import no_slabs as no_slabs
 from .branching import root_box as root_box
 from .branching import rule as rule
 from .roll_bounds import unturned as unturned

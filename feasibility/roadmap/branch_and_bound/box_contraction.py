@@ -21,8 +21,6 @@ is within D/2 of p(c) + J dq, the target within r of T(c) + e dx, and a projecti
 So a box holds nothing when its target is further off than tolerance, r and first-order bounds
 allow, or when no (dq, dx) in it satisfies these inequalities for a few w; and every interval can be
 contracted to what the others leave open.
-
-Boxes may have slabs, low <= w . q <= high for some weights w: those of cuts.
 """
 
 from __future__ import annotations
@@ -30,7 +28,7 @@ from __future__ import annotations
 import numpy as np
 
 from coverable_kernels import kernel
-from feasibility.roadmap.branch_and_bound.box_bounds import contract, contract_to_ball, reach_of_box
+from feasibility.roadmap.branch_and_bound.box_bounds import contract_to_ball, reach_of_box
 from feasibility.roadmap.branch_and_bound.roll_bounds import (
     contract_roll,
     length_of,
@@ -168,19 +166,7 @@ def _is_solution(arrays, work, places, part):
 
 
 @kernel
-def _inside_slabs(slabs, q):
-    """Do the slabs hold a configuration, but for what no box is cut to?"""
-    inside = True
-    for i in range(slabs.weights.shape[0]):
-        at = 0.0
-        for j in range(q.shape[0]):
-            at += slabs.weights[i, j] * q[j]
-        inside &= slabs.low[i] - THINNEST <= at and at <= slabs.high[i] + THINNEST
-    return inside
-
-
-@kernel
-def shrink(arrays, work, places, part, slabs, directions, space, low, high):
+def shrink(arrays, work, places, part, directions, space, low, high):
     """Cut one box (in place) to what may still hold a solution.
 
     Returns:
@@ -190,15 +176,11 @@ def shrink(arrays, work, places, part, slabs, directions, space, low, high):
     driver = 0
     rolls, rolled, off_roll = rolls_over(arrays, places, part), np.inf, 0.0
     for _ in range(PASSES):
-        for i in range(slabs.weights.shape[0]):
-            least, most = slabs.low[i] - ROUNDING, slabs.high[i] + ROUNDING
-            if not contract(slabs.weights[i], least, most, low, high):
-                return 1, driver
         _place_centre(arrays, work, places, part, low, high, space)
         distance, chord = work.error[1, 0], work.error[1, 1]
         if not (distance < np.inf and chord < np.inf):
             return 3, driver
-        if _is_solution(arrays, work, places, part) and _inside_slabs(slabs, space.q):
+        if _is_solution(arrays, work, places, part):
             return 2, driver
         first, second, first_axis, second_axis = _first_and_second(
             arrays, work, places, part, space

@@ -54,22 +54,6 @@ def toward_middle(approach: Array, reference: Array, middle: float) -> Array:
     return np.asarray(turned, dtype=np.float64)
 
 
-class Slabs(NamedTuple):
-    """Bounds low <= w . q <= high that every box has in addition to its own."""
-
-    weights: Array
-    """(m, n)"""
-    low: Array
-    """(m,) may be -inf."""
-    high: Array
-    """(m,) may be inf."""
-
-
-def no_slabs(n: int) -> Slabs:
-    """Boxes of n joints that nothing else bounds."""
-    return Slabs(np.empty((0, n)), np.empty(0), np.empty(0))
-
-
 class Boxes(NamedTuple):
     """A stack of boxes to be examined; m is n joints, or n + 2 with the parameters of a part."""
 

@@ -22,10 +22,8 @@ from feasibility.roadmap.branch_and_bound.box_contraction import THINNEST, shrin
 from feasibility.roadmap.branch_and_bound.boxes import (
     Boxes,
     Places,
-    Slabs,
     box_of,
     box_work,
-    no_slabs,
     place_at_rest,
 )
 from feasibility.roadmap.motions import SearchArrays, Work
@@ -127,13 +125,12 @@ def _push_children(places, boxes, part, weight, n, low, high):  # type: ignore[n
 
 
 @allocating_entry
-def branch_and_bound(arrays, work, places, slabs, boxes, most, directions, space, found):  # type: ignore[no-untyped-def]
+def branch_and_bound(arrays, work, places, boxes, most, directions, space, found):  # type: ignore[no-untyped-def]
     """Examine up to `most` boxes; returns the value of a `Ruling`.
 
     Args:
         arrays, work: the `SearchArrays` and the `Work`.
         places: the `Places` of the target.
-        slabs: the `Slabs` that also bound every box.
         boxes: the `Boxes` on the stack; start from `box_of` or `root_box`.
         most: boxes to examine before returning OPEN.
         directions: (k, 3) unit directions for the cuts.
@@ -153,7 +150,7 @@ def branch_and_bound(arrays, work, places, slabs, boxes, most, directions, space
         put(low, boxes.low[top])
         put(high, boxes.high[top])
         part, weight = boxes.part[top], boxes.weight[top]
-        code, driver = shrink(arrays, work, places, part, slabs, directions, space, low, high)
+        code, driver = shrink(arrays, work, places, part, directions, space, low, high)
         if code == 1:
             continue
         if code == 2:
@@ -184,16 +181,15 @@ def rule(
         The ruling, and a configuration (n,) that covers the cell when it is REACHED, or may nearly
         do so when it is UNKNOWN.
     """
-    places = place_at_rest(arrays, cell)
-    return examine(arrays, work, places, no_slabs(len(arrays.lower)), boxes, most)
+    return examine(arrays, work, place_at_rest(arrays, cell), boxes, most)
 
 
 def examine(
-    arrays: SearchArrays, work: Work, places: Places, slabs: Slabs, boxes: Boxes, most: int
+    arrays: SearchArrays, work: Work, places: Places, boxes: Boxes, most: int
 ) -> tuple[Ruling, Array]:
     """Examine up to `most` more boxes; as `rule`, wherever the tool may be."""
     n = len(arrays.lower)
     found = np.empty(n)
     space = box_work(n, boxes.low.shape[1] - n)
-    code = branch_and_bound(arrays, work, places, slabs, boxes, most, DIRECTIONS, space, found)
+    code = branch_and_bound(arrays, work, places, boxes, most, DIRECTIONS, space, found)
     return Ruling(code), found

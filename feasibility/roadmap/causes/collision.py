@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from coverable_arrays import Array
+from feasibility.certification import ArmCheck
 from feasibility.collisions import Pair, configuration_bounds
 from feasibility.roadmap.branch_and_bound import Ruling
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.joint_boxes import ArmBlocked
 from feasibility.roadmap.motions import PROJECTION_STEPS, project_near_cell
 from feasibility.roadmap.moving_clear import moved_clear
 from feasibility.verdict import Cause, CauseKind
@@ -27,7 +27,7 @@ def colliding(exploration: Exploration, cell: int, pairs: tuple[Pair, ...]) -> C
     Pairs are those that have to stay clear, in the order of the search's arrays.
     """
     arrays, work = exploration.arrays, exploration.work
-    proof = None if exploration.blockers is None else exploration.blockers.arm.get(cell)
+    proof = _of_the_arm(exploration, cell)
     proved = exploration.rulings.get(cell) is Ruling.PROVED
     if not len(arrays.collisions) or (proved and proof is None):
         return None
@@ -53,11 +53,10 @@ def colliding(exploration: Exploration, cell: int, pairs: tuple[Pair, ...]) -> C
 
 def proved_collision(exploration: Exploration, cell: int) -> Cause | None:
     """The cause of a cell over which the tool, or the arm, is proved to collide; or None."""
-    if exploration.blockers is None:
-        return None
-    found = exploration.blockers.tool.get(cell)
-    if found is None:
-        arm = exploration.blockers.arm.get(cell)
+    blockers = exploration.blockers
+    found = None if blockers is None else blockers.tool.get(cell)
+    if found is None or not found.confirmed:
+        arm = _of_the_arm(exploration, cell)
         return None if arm is None else _proved(cell, arm)
     pairs = [f"{first} and {second}" for first, second in found.pairs]
     one = f"{pairs[0]} collide"
@@ -72,7 +71,13 @@ def proved_collision(exploration: Exploration, cell: int) -> Cause | None:
     return Cause(cell, CauseKind.COLLISION, True, detail, found.pairs[0], found.distance)
 
 
-def _proved(cell: int, proof: ArmBlocked, found: Cause | None = None) -> Cause:
+def _of_the_arm(exploration: Exploration, cell: int) -> ArmCheck | None:
+    """The proof that something of the arm collides wherever the tool is over a cell; or None."""
+    found = None if exploration.blockers is None else exploration.blockers.arm.get(cell)
+    return found if found is not None and found.confirmed else None
+
+
+def _proved(cell: int, proof: ArmCheck, found: Cause | None = None) -> Cause:
     """The cause of a cell from which collisions are proved to keep the arm.
 
     `found` is what was seen of some configurations over it.

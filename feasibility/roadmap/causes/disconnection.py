@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from feasibility.collisions import Pair
 from feasibility.cut_tree import CutTree
 from feasibility.cut_words import nowhere
@@ -70,6 +68,6 @@ def _parted(exploration: Exploration, proof: CutTree, other: int, roots: set[int
     if cut is None or None in cuts.values():
         return ""
     where = "on the surface" if cut is proof.root else "in that part of the joint space"
-    above = float(proof.folded(best) @ np.asarray(cut.weights)) > cut.value
+    above = proof.folded(best)[cut.joint] > cut.value
     side = "above" if above else "below"
     return f"{nowhere(cut, exploration.robot, where)}, and the best motion is {side}"

@@ -15,7 +15,7 @@ import numpy as np
 from coverable_arrays import Array, Mask
 from coverable_kernels import entry
 from feasibility.roadmap.branch_and_bound import Places, place_at_rest, unturned
-from feasibility.roadmap.cuts.regions import SlabRegion, folded
+from feasibility.roadmap.cuts.regions import Region, folded
 from feasibility.roadmap.cuts.statements import Statement
 from feasibility.roadmap.motions import (
     NEXT,
@@ -40,11 +40,11 @@ NEWTON_STEPS = np.int64(16)  # of a try: most that succeed need fewer, and the r
 
 
 class ProvedCut(NamedTuple):
-    """In the region the tool is nowhere on the surface with w . q = t."""
+    """In the region the tool is nowhere on the surface with q_j = t."""
 
-    region: SlabRegion
-    weights: Array
-    """(n,) w"""
+    region: Region
+    joint: int
+    """j"""
     value: float
     """t"""
 
@@ -52,7 +52,7 @@ class ProvedCut(NamedTuple):
 class ProvedLeaf(NamedTuple):
     """In the region the cell cannot be covered."""
 
-    region: SlabRegion
+    region: Region
     cell: int
 
 
@@ -89,24 +89,23 @@ class Findings:
 
     # -- points of the motion set --------------------------------------------------------------
 
-    def look_around(self, limits: SlabRegion) -> None:
+    def look_around(self, limits: Region) -> None:
         """More points of the motion set inside the limits, unless there are enough."""
         if self.newton and len(self.samples) < MOST_SAMPLES:
             targets = random_targets(self.places, SAMPLES, self.rng)
             q = projected(self.over_places, self.work, limits, targets, SAMPLES, self.rng)
             self.samples = np.vstack([self.samples, q])
 
-    def on_cut(self, on: SlabRegion) -> bool:
+    def on_cut(self, on: Region) -> bool:
         """Is the tool found on the surface in the region of a cut? It is kept, and a seed."""
-        slanted = (on.slabs.low == on.slabs.high).any()  # Newton would have to hit it by chance
-        if not self.newton or slanted:
+        if not self.newton:
             return False
         targets = random_targets(self.places, CUT_TRIES, self.rng)
         q = projected(self.over_places, self.work, on, targets, ENOUGH, self.rng)
         self.keep(q)
         return len(q) > 0
 
-    def covers(self, region: SlabRegion, cell: int) -> bool:
+    def covers(self, region: Region, cell: int) -> bool:
         """Is a configuration of the region found that covers a cell? It is kept, and a seed."""
         if not self.newton:
             return False
@@ -135,7 +134,7 @@ class Findings:
         self.uncovered.clear()
         self.on_cuts.clear()
 
-    def samples_in(self, region: SlabRegion, opened: dict[int, float]) -> Array:
+    def samples_in(self, region: Region, opened: dict[int, float]) -> Array:
         """(k, n) those in a region, with opened joints inside their turn."""
         q = folded(self.samples, opened)
         return q[region.inside(q)]
@@ -147,9 +146,9 @@ class Findings:
 
     # -- statements ----------------------------------------------------------------------------
 
-    def statement(self, region: SlabRegion, cell: int = -1) -> Statement:
+    def statement(self, region: Region, cell: int = -1) -> Statement:
         """'In the region the tool is nowhere on the surface', or not over a cell, as left."""
-        key = (*(array.tobytes() for array in (region.low, region.high, *region.slabs)), cell)
+        key = (region.low.tobytes(), region.high.tobytes(), cell)
         if key not in self.unfinished:
             if len(self.unfinished) >= MOST_KEPT:
                 del self.unfinished[next(iter(self.unfinished))]
@@ -160,7 +159,7 @@ class Findings:
             self.unfinished[key] = Statement(region, places, parameters)
         return self.unfinished[key]
 
-    def known_leaf(self, region: SlabRegion, missed: Mask) -> int | None:
+    def known_leaf(self, region: Region, missed: Mask) -> int | None:
         """A cell of `missed` (N,) that is proved already for the region."""
         proved = (f.cell for f in self.leaves if missed[f.cell] and f.region.holds(region))
         return next(proved, None)
@@ -188,7 +187,7 @@ def _project_rows(arrays, work, targets, q, enough, hit):  # type: ignore[no-unt
 def projected(
     arrays: SearchArrays,
     work: Work,
-    region: SlabRegion,
+    region: Region,
     targets: Array,
     enough: int,
     rng: np.random.Generator,
@@ -197,7 +196,7 @@ def projected(
 
     Args:
         arrays, work: of the search.
-        region: one turn of it takes the place of the limits; what its slabs leave out is dropped.
+        region: one turn of it takes the place of the limits.
         targets: (k, 9) as `Places.centre`.
         enough: hits after which no more are tried.
         rng: draws the guesses.

@@ -1,9 +1,7 @@
 """Where a cut may be: the gaps between the components' intervals of each joint.
 
 Components are seen by their intervals; points of the motion set that belong to none of them cut a
-gap into smaller ones. The widest are the likeliest to hold a cut, in their middle. Where the
-intervals of every joint overlap, several joints together may still have a gap, along the line
-between the nearest points of two components' convex hulls.
+gap into smaller ones. The widest are the likeliest to hold a cut, in their middle.
 
 A joint that turns freely, or through more than a turn, has gaps on its circle: all its windings
 place the tool alike. Where it can nowhere be at t + 2 pi k, one turn from t is enough for all
@@ -23,9 +21,6 @@ from feasibility.roadmap.graph import Roadmap
 
 NARROWEST = 1e-3  # [rad], [m]: gaps that are not worth a try
 KEPT = 8  # gaps kept of those between the same two components
-PAIRED = 4  # components whose hulls are compared, each two of them
-HULL_POINTS = 400  # samples of a component that its hull is made of
-STEPS = 200  # towards the nearest points of two hulls
 
 
 class Component(NamedTuple):
@@ -49,10 +44,9 @@ def components_of(roadmap: Roadmap) -> list[Component]:
 
 
 class JointGap(NamedTuple):
-    """An interval of w . q without a known point of the motion set, between two components."""
+    """An interval of a joint without a known point of the motion set, between two components."""
 
-    weights: Array
-    """(n,) w"""
+    joint: int
     low: float
     high: float
     between: tuple[float, float]
@@ -71,52 +65,17 @@ def gaps(joints: tuple[int, ...], components: list[Component], samples: Array) -
 
     Components are those inside a region, samples (k, n) other points of the motion set inside it.
     """
-    found: list[JointGap] = []
-    for joint in joints:
-        found += gaps_along(np.eye(samples.shape[1])[joint], components, samples)
+    found = [gap for joint in joints for gap in gaps_of(joint, components, samples)]
     return sorted(found, key=lambda gap: -gap.promise)
 
 
-def slanted_gaps(
-    joints: tuple[int, ...], components: list[Component], samples: Array
-) -> list[JointGap]:
-    """The gaps along several joints together, the most promising first; as `gaps`."""
-    found: list[JointGap] = []
-    for k, one in enumerate(components[:PAIRED]):
-        for other in components[:k]:
-            weights = np.zeros(samples.shape[1])
-            weights[list(joints)] = _between_hulls(one.q[:, joints], other.q[:, joints])
-            if weights.any():
-                found += gaps_along(weights, components, samples)
-    return sorted(found, key=lambda gap: -gap.promise)
-
-
-def _between_hulls(one: Array, other: Array) -> Array:
-    """The unit vector (m,) between the nearest points of two hulls of points (k, m).
-
-    Gilbert's algorithm on their difference: a point of it moves towards the corner that is furthest
-    along the way to the origin. All 0 where they seem to overlap.
-    """
-    one, other = (q[:: 1 + len(q) // HULL_POINTS] for q in (one, other))
-    near = one.mean(axis=0) - other.mean(axis=0)
-    for _ in range(STEPS):
-        corner = one[np.argmin(one @ near)] - other[np.argmax(other @ near)]
-        step = near - corner
-        length = float(step @ step)
-        if length <= 0.0 or near @ step <= 1e-6 * (near @ near):
-            break
-        near = near - min(float(near @ step) / length, 1.0) * step
-    size = float(np.linalg.norm(near))
-    return near / size if size > NARROWEST else np.zeros_like(near)
-
-
-def gaps_along(weights: Array, components: list[Component], samples: Array) -> list[JointGap]:
-    """The gaps of w . q between components, each cut at the samples, the widest `KEPT` of each."""
-    along = [component.q @ weights for component in components]
+def gaps_of(joint: int, components: list[Component], samples: Array) -> list[JointGap]:
+    """The gaps of one joint, each cut at the samples, the widest `KEPT` of each."""
+    along = [component.q[:, joint] for component in components]
     low = np.array([values.min() for values in along])
     order = np.argsort(low, kind="stable")
     reached = np.maximum.accumulate(np.array([along[k].max() for k in order]))
-    others = np.sort(samples @ weights)
+    others = np.sort(samples[:, joint])
     found: list[JointGap] = []
     for k in range(len(order) - 1):
         start, end = float(reached[k]), float(low[order[k + 1]])
@@ -129,7 +88,7 @@ def gaps_along(weights: Array, components: list[Component], samples: Array) -> l
         settled = sum(not np.any(side, axis=0).all() for side in sides)
         found += [
             JointGap(
-                weights=weights,
+                joint=joint,
                 low=float(ends[i]),
                 high=float(ends[i + 1]),
                 between=(start, end),

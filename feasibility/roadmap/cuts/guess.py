@@ -17,8 +17,8 @@ from coverable_arrays import Array, Mask
 from feasibility.cut_tree import Cut, Leaf
 from feasibility.roadmap.branch_and_bound import Ruling
 from feasibility.roadmap.cuts.findings import Findings, ProvedCut, ProvedLeaf
-from feasibility.roadmap.cuts.gaps import Component, JointGap, gaps, slanted_gaps
-from feasibility.roadmap.cuts.regions import SlabRegion
+from feasibility.roadmap.cuts.gaps import Component, JointGap, gaps
+from feasibility.roadmap.cuts.regions import Region
 from feasibility.roadmap.cuts.statements import Budget, Statement
 
 CANDIDATES = 8  # cuts proved in turns
@@ -27,18 +27,17 @@ DEEPEST = 12  # cuts above each other
 CELLS = 4  # of a leaf that are examined
 TURNS = (2000, 4000, 16_000, 64_000, 256_000, 1_000_000)  # boxes of one leaf in its turns
 
-Line = tuple[Array, float]
-"""Weights w (n,) and value t of a cut w . q = t."""
+Split = tuple[int, float]
+"""Joint j and value t of a cut q_j = t."""
 
 
 class OpenGap(NamedTuple):
     """A gap between components through which no cut was proved."""
 
-    weights: Array
-    """(n,) w"""
+    joint: int
     low: float
     high: float
-    """Between w . q = low and high no component is known."""
+    """Between these values of the joint no component is known."""
     points: int
     """Points of the motion set found there."""
 
@@ -47,7 +46,7 @@ class OpenGap(NamedTuple):
 class _GuessedLeaf:
     """A region in which all known components miss the same cells."""
 
-    region: SlabRegion
+    region: Region
     statements: dict[int, Statement] = field(default_factory=dict)
     """By cell."""
     cell: int | None = None
@@ -68,7 +67,7 @@ class _GuessedLeaf:
 class _Guess(NamedTuple):
     """A cut that is proved, above two guesses."""
 
-    line: Line
+    split: Split
     below: _Guess | _GuessedLeaf
     above: _Guess | _GuessedLeaf
 
@@ -87,7 +86,7 @@ class Guessing:
     boxes_left: float = np.inf
     """An estimate of what the proof still needs, where only boxes are missing."""
 
-    def tree(self, region: SlabRegion, components: list[Component]) -> Cut | Leaf | None:
+    def tree(self, region: Region, components: list[Component]) -> Cut | Leaf | None:
         """The tree of a region, proved; None where none was found."""
         guess = self._node(region, components, DEEPEST)
         if guess is None:
@@ -97,7 +96,7 @@ class Guessing:
         return _proved(guess) if proved else None
 
     def _node(
-        self, region: SlabRegion, components: list[Component], depth: int
+        self, region: Region, components: list[Component], depth: int
     ) -> _Guess | _GuessedLeaf | None:
         """The cuts of a region, proved, above leaves that are not; None where there are none."""
         inside = [c for c in components if region.inside(c.q).any()]
@@ -108,82 +107,78 @@ class Guessing:
             leaf = _guessed_leaf(self.findings, region, cover)
             self.leaves.append(leaf)
             return leaf if leaf.cell is not None or leaf.open else None
-        line = self._cut(region, inside) if depth > 0 and len(inside) > 1 else None
-        if line is None:
+        split = self._cut(region, inside) if depth > 0 and len(inside) > 1 else None
+        if split is None:
             return None
-        one, other = (self._node(side, inside, depth - 1) for side in region.sides(*line))
-        return None if one is None or other is None else _Guess(line, one, other)
+        one, other = (self._node(side, inside, depth - 1) for side in region.sides(*split))
+        return None if one is None or other is None else _Guess(split, one, other)
 
-    def _cut(self, region: SlabRegion, inside: list[Component]) -> Line | None:
+    def _cut(self, region: Region, inside: list[Component]) -> Split | None:
         """A cut between components inside the region."""
         known = self._known(region, inside)
         if known is not None:
             return known
-        for kind in (gaps, slanted_gaps):
-            for _ in range(REFINED):
-                before = len(self.findings.samples)
-                line = self._through(region, kind(self.joints, inside, self._samples(region)))
-                if line is not None:
-                    self.findings.cuts.append(ProvedCut(region, *line))
-                    return line
-                if len(self.findings.samples) == before or self.budget.left <= 0:
-                    break  # no point has made the gaps smaller: they would be the same
+        for _ in range(REFINED):
+            before = len(self.findings.samples)
+            split = self._through(region, gaps(self.joints, inside, self._samples(region)))
+            if split is not None:
+                self.findings.cuts.append(ProvedCut(region, *split))
+                return split
+            if len(self.findings.samples) == before or self.budget.left <= 0:
+                break  # no point has made the gaps smaller: they would be the same
         self._note_open_gaps(region, inside)
         return None
 
-    def _through(self, region: SlabRegion, found: list[JointGap]) -> Line | None:
+    def _through(self, region: Region, found: list[JointGap]) -> Split | None:
         """The first proved cut through the middles of some gaps."""
-        candidates = (
-            (gap.weights, gap.middle, region.on(gap.weights, gap.middle)) for gap in found
-        )
+        candidates = ((gap.joint, gap.middle, region.on(gap.joint, gap.middle)) for gap in found)
         return first_proved(self.findings, self.budget, candidates)
 
-    def _samples(self, region: SlabRegion) -> Array:
+    def _samples(self, region: Region) -> Array:
         return self.findings.samples_in(region, self.opened)
 
-    def _known(self, region: SlabRegion, inside: list[Component]) -> Line | None:
+    def _known(self, region: Region, inside: list[Component]) -> Split | None:
         """A cut proved earlier that parts the components here."""
         for known in self.findings.cuts:
             if known.region.holds(region):
-                below = [bool((c.q @ known.weights < known.value).any()) for c in inside]
+                below = [bool((c.q[:, known.joint] < known.value).any()) for c in inside]
                 if any(below) and not all(below):
-                    return known.weights, known.value
+                    return known.joint, known.value
         return None
 
-    def _note_open_gaps(self, region: SlabRegion, inside: list[Component]) -> None:
+    def _note_open_gaps(self, region: Region, inside: list[Component]) -> None:
         """Keep the gaps of a region through which no cut was proved."""
         samples = self._samples(region)
         seen = set()
         for gap in gaps(self.joints, inside, samples):
-            along = samples @ gap.weights
+            along = samples[:, gap.joint]
             low, high = gap.between
-            key = (*gap.weights.tolist(), low)
-            if key not in seen:
+            if (gap.joint, low) not in seen:
                 points = int(((along > low) & (along < high)).sum())
-                self.open_gaps.append(OpenGap(gap.weights, low, high, points))
-            seen.add(key)
+                self.open_gaps.append(OpenGap(gap.joint, low, high, points))
+            seen.add((gap.joint, low))
 
 
 def first_proved(
-    findings: Findings, budget: Budget, candidates: Iterable[tuple[Array, float, SlabRegion]]
-) -> Line | None:
+    findings: Findings, budget: Budget, candidates: Iterable[tuple[int, float, Region]]
+) -> Split | None:
     """The first of some cuts on which the tool is proved to be nowhere.
 
     Branch and bound works on those without a known point of the motion set.
 
-    Candidates are w, t, and the region where w . q = t.
+    Candidates are j, t, and the region where q_j = t.
     """
-    statements: list[tuple[Line, Statement]] = []
-    for weights, value, on in candidates:
+    statements: list[tuple[Split, Statement]] = []
+    for joint, value, on in candidates:
         if not findings.on_cut(on):
-            statements.append(((weights, value), findings.statement(on)))
+            statements.append(((joint, value), findings.statement(on)))
         if len(statements) == CANDIDATES:
             break
     while True:
-        proved = (line for line, s in statements if s.ruling is Ruling.PROVED)
-        line = next(proved, None)
-        if line is not None:
-            return line
+        proved = (split for split, s in statements if s.ruling is Ruling.PROVED)
+        split = next(proved, None)
+        if split is not None:
+            return split
         settled = budget.settle_one([s for _, s in statements], budget.left)
         if settled is None:
             return None
@@ -191,7 +186,7 @@ def first_proved(
             findings.keep(settled.found[None])  # or nearly so, where the ruling is UNKNOWN
 
 
-def _guessed_leaf(findings: Findings, region: SlabRegion, cover: Mask) -> _GuessedLeaf:
+def _guessed_leaf(findings: Findings, region: Region, cover: Mask) -> _GuessedLeaf:
     """The leaf of a region whose components cover `cover` (N,) and no more.
 
     Its cells are those that Newton does not reach either, the furthest from `cover` first.
@@ -244,5 +239,4 @@ def _proved(guess: _Guess | _GuessedLeaf) -> Cut | Leaf:
     """A guess as a tree; every leaf of it is proved."""
     if isinstance(guess, _GuessedLeaf):
         return Leaf(-1 if guess.cell is None else guess.cell)
-    weights, value = guess.line
-    return Cut(tuple(weights.tolist()), value, _proved(guess.below), _proved(guess.above))
+    return Cut(*guess.split, _proved(guess.below), _proved(guess.above))

@@ -18,7 +18,7 @@ from feasibility.roadmap.branch_and_bound import Places
 from feasibility.roadmap.cuts.findings import Findings
 from feasibility.roadmap.cuts.gaps import Component, openings
 from feasibility.roadmap.cuts.guess import Guessing, OpenGap, first_proved
-from feasibility.roadmap.cuts.regions import SlabRegion, folded, limits_of, turn_from, wide_joints
+from feasibility.roadmap.cuts.regions import Region, folded, limits_of, turn_from, wide_joints
 from feasibility.roadmap.cuts.statements import Budget
 from feasibility.roadmap.motions import SearchArrays
 
@@ -93,7 +93,7 @@ class Prover:
         return ProofAttempt(None, budget.spent, seeds, tuple(open_gaps), float(boxes_left))
 
     def _root(
-        self, guess: Guessing, limits: SlabRegion, components: list[Component]
+        self, guess: Guessing, limits: Region, components: list[Component]
     ) -> Cut | Leaf | None:
         """The root of a tree, with one turn of each joint that is opened."""
         region = limits
@@ -102,7 +102,7 @@ class Prover:
         return guess.tree(region, [c._replace(q=folded(c.q, guess.opened)) for c in components])
 
     def _plans(
-        self, budget: Budget, limits: SlabRegion, components: list[Component]
+        self, budget: Budget, limits: Region, components: list[Component]
     ) -> Iterator[tuple[dict[int, float], tuple[int, ...]]]:
         """Which joints to open, at which t, and which ones cuts may go through.
 
@@ -127,20 +127,19 @@ class Prover:
             yield free, (*narrow, *bounded, *free)
 
     def _open(
-        self, budget: Budget, limits: SlabRegion, components: list[Component], wide: list[int]
+        self, budget: Budget, limits: Region, components: list[Component], wide: list[int]
     ) -> None:
         """Open wide joints where that is possible."""
         for joint in wide:
             if joint in self.opened:
                 continue
-            weights = np.eye(len(limits.low))[joint]
-            line = first_proved(
+            split = first_proved(
                 self.findings,
                 budget,
                 (
-                    (weights, t, turn_from(limits, joint, t).on(weights, t))
+                    (joint, t, turn_from(limits, joint, t).on(joint, t))
                     for t in openings(joint, components, self.findings.samples)
                 ),
             )
-            if line is not None:
-                self.opened[joint] = line[1]
+            if split is not None:
+                self.opened[joint] = split[1]

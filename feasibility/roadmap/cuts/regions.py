@@ -1,4 +1,4 @@
-"""Regions of the joint space: an interval for each joint, and what cuts along several joints leave.
+"""Regions of the joint space: an interval for each joint.
 
 The region of a tree's root has the limits (see `feasibility.cut_tree`), and for an opened joint one
 turn from t, for all windings alike. A slide without ends is bounded by what it can reach:
@@ -16,15 +16,15 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable_arrays import Array, Mask
-from feasibility.roadmap.branch_and_bound import Boxes, Places, Slabs, box_of, no_slabs
+from feasibility.roadmap.branch_and_bound import Boxes, Places, box_of
 from feasibility.roadmap.motions import SearchArrays
 
 TURN = 2.0 * np.pi
 WIDE = 1.5 * TURN  # [rad] range from which on windings cost more than they gain
 
 
-class SlabRegion(NamedTuple):
-    """Configurations low <= q <= high inside some slabs."""
+class Region(NamedTuple):
+    """Configurations low <= q <= high."""
 
     low: Array
     """(n,) rad or m"""
@@ -32,55 +32,34 @@ class SlabRegion(NamedTuple):
     """(n,) rad or m"""
     revolute: Mask
     """(n,) joints that turn, rather than slide."""
-    slabs: Slabs
 
-    def sides(self, weights: Array, value: float) -> tuple[SlabRegion, SlabRegion]:
-        """What a cut weights . q = value leaves on either side: w . q <= t, and w . q >= t."""
-        weighted = np.flatnonzero(weights)
-        if len(weighted) == 1 and weights[weighted[0]] == 1.0:
-            j = weighted[0]
-            high, low = self.high.copy(), self.low.copy()
-            high[j], low[j] = min(high[j], value), max(low[j], value)
-            return self._replace(high=high), self._replace(low=low)
-        return self._bounded(weights, -np.inf, value), self._bounded(weights, value, np.inf)
+    def sides(self, joint: int, value: float) -> tuple[Region, Region]:
+        """What a cut q_j = value leaves on either side: q_j <= value, and q_j >= value."""
+        high, low = self.high.copy(), self.low.copy()
+        high[joint], low[joint] = min(high[joint], value), max(low[joint], value)
+        return self._replace(high=high), self._replace(low=low)
 
-    def on(self, weights: Array, value: float) -> SlabRegion:
-        """The part of the region with weights . q = value."""
-        below, above = self.sides(weights, value)
-        if below.slabs is self.slabs:
-            return above._replace(high=below.high)
-        return self._bounded(weights, value, value)
-
-    def _bounded(self, weights: Array, low: float, high: float) -> SlabRegion:
-        slabs = Slabs(
-            np.vstack([self.slabs.weights, weights]),
-            np.append(self.slabs.low, low),
-            np.append(self.slabs.high, high),
-        )
-        return self._replace(slabs=slabs)
+    def on(self, joint: int, value: float) -> Region:
+        """The part of the region with q_j = value."""
+        below, above = self.sides(joint, value)
+        return above._replace(high=below.high)
 
     def inside(self, q: Array) -> Mask:
         """(k,) which configurations (k, n) lie in the region."""
-        along = q @ self.slabs.weights.T
-        apart = np.maximum(self.slabs.low - along, along - self.slabs.high)
-        return np.hstack([self.low - q, q - self.high, apart]).max(axis=1) <= 0.0
+        return np.asarray(((self.low <= q) & (q <= self.high)).all(axis=1))
 
-    def holds(self, other: SlabRegion) -> bool:
-        """Does this region, of no slabs, hold another?"""
-        return (
-            len(self.slabs.low) == 0
-            and bool((self.low <= other.low).all())
-            and bool((self.high >= other.high).all())
-        )
+    def holds(self, other: Region) -> bool:
+        """Does this region hold another?"""
+        return bool((self.low <= other.low).all() and (self.high >= other.high).all())
 
     @property
     def empty(self) -> bool:
         """Is nothing left of an interval?"""
         return not bool((self.low <= self.high).all())
 
-    def over_one_turn(self) -> SlabRegion:
+    def over_one_turn(self) -> Region:
         """The region with no more than one turn of any joint: what the tool can do is the same."""
-        wide = self.revolute & (self.high - self.low >= TURN) & ~self.slabs.weights.any(axis=0)
+        wide = self.revolute & (self.high - self.low >= TURN)
         start = np.where(np.isfinite(self.low), self.low, -np.pi)
         low = np.where(wide, start, self.low)
         return self._replace(low=low, high=np.where(wide, start + TURN, self.high))
@@ -96,7 +75,7 @@ class SlabRegion(NamedTuple):
         return box_of(box.low, box.high, parameters)
 
 
-def limits_of(arrays: SearchArrays, places: Places) -> SlabRegion:
+def limits_of(arrays: SearchArrays, places: Places) -> Region:
     """The region inside the limits; slides without ends are bounded where that is simple."""
     low, high = arrays.lower.copy(), arrays.upper.copy()
     slides = np.flatnonzero(arrays.chain.prismatic & ~(np.isfinite(low) & np.isfinite(high)))
@@ -111,7 +90,7 @@ def limits_of(arrays: SearchArrays, places: Places) -> SlabRegion:
             + ends[np.isfinite(ends)].sum()
         ) * (1.0 + 1e-9)
         low[slides], high[slides] = np.maximum(low[slides], -far), np.minimum(high[slides], far)
-    return SlabRegion(low, high, ~arrays.chain.prismatic, no_slabs(len(low)))
+    return Region(low, high, ~arrays.chain.prismatic)
 
 
 def wide_joints(arrays: SearchArrays) -> list[int]:
@@ -120,7 +99,7 @@ def wide_joints(arrays: SearchArrays) -> list[int]:
     return [int(j) for j in np.flatnonzero(wide)]
 
 
-def turn_from(region: SlabRegion, joint: int, t: float) -> SlabRegion:
+def turn_from(region: Region, joint: int, t: float) -> Region:
     """The region with one turn of a joint, from t."""
     low, high = region.low.copy(), region.high.copy()
     low[joint], high[joint] = t, t + TURN

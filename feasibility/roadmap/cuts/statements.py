@@ -12,7 +12,7 @@ import numpy as np
 
 from coverable_arrays import Array
 from feasibility.roadmap.branch_and_bound import Boxes, Places, Ruling, examine
-from feasibility.roadmap.cuts.regions import SlabRegion
+from feasibility.roadmap.cuts.regions import Region
 from feasibility.roadmap.motions import SearchArrays, Work
 
 BATCH = 4000  # boxes between two ticks
@@ -39,7 +39,7 @@ class Budget:
             before = int(boxes.counts[1])
             batch = min(most, self.left, BATCH)
             statement.ruling, statement.found = examine(
-                self.arrays, self.work, statement.places, statement.region.slabs, boxes, batch
+                self.arrays, self.work, statement.places, boxes, batch
             )
             used = int(boxes.counts[1]) - before
             self.spent += used
@@ -74,7 +74,7 @@ class Budget:
 class Statement:
     """'In this region the tool is at none of these places', and how far its proof has come."""
 
-    region: SlabRegion
+    region: Region
     places: Places
     parameters: int
     """2 on a surface, 0 at a target at rest."""

@@ -12,9 +12,8 @@ import trimesh
 from foreign_clearances import ForeignScene
 
 from feasibility import Task
-from feasibility.certification.tool_alone import PoseCheck, never_clear
+from feasibility.certification import PoseCheck, never_clear
 from feasibility.collisions import Bodies, Collision, Obstacle, ToolShape, gather
-from feasibility.roadmap.tool_alone import ToolAlone, ToolBlocked
 from robots import Axis, Kinematics, Robot, load_robot
 from robots.shapes import Triangles, checked_triangles
 from surfaces import Cells, Surface, plane
@@ -103,16 +102,10 @@ class Over:
     def bodies(self) -> Bodies:
         return gather(self.robot, self.surface, self.task.collision, self.task.standoff)
 
-    def claimed(self) -> ToolBlocked | None:
-        """What the search says."""
-        task = self.task
-        alone = ToolAlone(self.robot, self.bodies, task.cone, task.effective_tolerance)
-        return alone.blocking(self.point, self.approach)
-
-    def confirmed(self) -> PoseCheck:
-        """What the verifier says."""
+    def proved(self, most: int = 4000) -> PoseCheck:
+        """Does the tool collide in every pose? With as many boxes as the search has for a cell."""
         numbers = self.task.cone, self.task.effective_tolerance
-        return never_clear(self.robot, self.bodies, *numbers, self.point, self.approach)
+        return never_clear(self.robot, self.bodies, *numbers, self.point, self.approach, most=most)
 
     def clear_pose(self, count: int, rng: np.random.Generator) -> bool:
         """Is one of so many random poses inside cone and tolerance clear of all that is at rest?"""

@@ -45,10 +45,10 @@ def strip() -> Cells:
     return plane((0.99, 1.01), (-0.25, 0.25), side="inside").cells(1, 5)
 
 
-def split(value: float, below: Cut | int, above: Cut | int, weights=(0.0, 1.0)) -> Cut:
-    """A cut of the second joint, with cuts or the cells of leaves at its sides."""
+def split(value: float, below: Cut | int, above: Cut | int, joint: int = 1) -> Cut:
+    """A cut, of the second joint by default, with cuts or the cells of leaves at its sides."""
     sides = (Leaf(side) if isinstance(side, int) else side for side in (below, above))
-    return Cut(weights, value, *sides)
+    return Cut(joint, value, *sides)
 
 
 def elbow_case() -> Proved:
@@ -69,16 +69,16 @@ def rail_case(limit: float = 0.42, y: float = 0.3) -> Proved:
          joint(2, limits=(0.0, 3.1)), joint(3, "fixed", (0.5, 0.0, 0.0))]
     )  # fmt: skip
     cells = plane((-0.05, 0.05), (y - 0.01, y + 0.01), side="inside").cells(5, 1)
-    tree = CutTree(split(0.0, 0, 4, (1.0, 0.0)))
+    tree = CutTree(split(0.0, 0, 4, 0))
     return Proved(robot.with_limits({"j1": (-limit, limit)}), cells, FLAT, tree)
 
 
 def tree_of(plain: list) -> Cut | Leaf:
-    """A tree from lists: [cell], or [weights, value, below, above]."""
+    """A tree from lists: [cell], or [joint, value, below, above]."""
     if len(plain) == 1:
         return Leaf(plain[0])
-    weights, value, below, above = plain
-    return Cut(tuple(weights), value, tree_of(below), tree_of(above))
+    joint, value, below, above = plain
+    return Cut(joint, value, tree_of(below), tree_of(above))
 
 
 @cache

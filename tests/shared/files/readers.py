@@ -56,12 +56,7 @@ XACRO = (
 )
 STUDY = 'base.case = "paper/4a"\nvary."task.cone_deg" = [30, 45]\n'
 TREE = CutTree(
-    Cut(
-        (0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
-        -1.43,
-        Cut((0.5, 0.0, 0.0, 1.0, 0.0, 0.0), 0.25, Leaf(3), Leaf(0)),
-        Leaf(7),
-    ),
+    Cut(2, -1.43, Cut(3, 0.25, Leaf(3), Leaf(0)), Leaf(7)),
     ((5, 3.1),),
 )
 """Proves nothing; whether it does is not asked of a reader."""
@@ -210,7 +205,7 @@ def members(which: str) -> dict[str, bytes]:
         if which == "deep":
             node: Cut | Leaf = Leaf(0)
             for k in range(201):
-                node = Cut((1.0, 0, 0, 0, 0, 0), 0.01 * k, Leaf(1), node)
+                node = Cut(0, 0.01 * k, Leaf(1), node)
             tree = CutTree(node)
         verdict = replace(verdict_named("long plate"), proof=tree, evidence=Evidence.PROOF)
     with tempfile.TemporaryDirectory() as folder:

@@ -1,6 +1,6 @@
-"""Boxes of joint values in which two bodies overlap everywhere: what must confirm such proofs.
+"""Boxes of joint values in which two bodies overlap everywhere.
 
-No code is shared with the search. A point of body i that is r deep in it and s deep in another one
+A point of body i that is r deep in it and s deep in another one
 at the middle of a box shows that they come nearer than the clearance c all over the box if
 
     r + s + c > M,
@@ -20,9 +20,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Mask
+from coverable_arrays import Array, Ints
 from feasibility.certification.collisions import collision_replay
-from feasibility.certification.joint_boxes.depths import depths, points_inside
+from feasibility.certification.overlaps.depths import depths, points_inside
 from feasibility.certification.rows import Rows
 from feasibility.collisions import Bodies
 from robots import Kinematics, Robot
@@ -54,8 +54,20 @@ class _Couples(NamedTuple):
     """Points, and the bodies that they may be inside."""
 
     points: _Points
-    bodies: list[tuple[_Inside, float]]
-    """Each with the clearance that the pair has to have, m."""
+    bodies: list[tuple[_Inside, int]]
+    """Each with the index of the pair, whose clearance it has to have."""
+
+
+class Deepest(NamedTuple):
+    """Of m boxes, the point that is nearest to ruling each out."""
+
+    ratio: Array
+    """(m,) how far it moves in the box by how far it may; below 1 the box is ruled out, inf where
+    nothing overlaps at its middle."""
+    effect: Array
+    """(m, n) m, how far each joint moves it."""
+    pair: Ints
+    """(m,) which pair it is; -1 for none."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -88,16 +100,18 @@ class Overlapping:
         self._robot, self._bodies, self._kinematics = robot, bodies, Kinematics(robot)
         self._couples = _couples(bodies)
 
-    def everywhere(self, low: Array, high: Array, target: Array, off: Array) -> Mask:
-        """(m,) boxes in which some pair is too near all over, wherever the tool is at its target.
+    def deepest(self, low: Array, high: Array, target: Array, off: Array) -> Deepest:
+        """What of m boxes is nearest to being too near all over, with the tool at its target.
 
         Args:
             low, high: (m, n) rad or m.
             target: (m, 3) m, where the tool point is to be in each.
             off: (m,) m, how far it may be from there.
         """
-        if not len(low):
-            return np.zeros(0, dtype=bool)
+        m, n = low.shape
+        found = Deepest(np.full(m, np.inf), np.zeros((m, n)), np.full(m, -1))
+        if not m:
+            return found
         q = 0.5 * (low + high)
         frames, twists = self._kinematics.joints(q), self._kinematics.twists(q).transpose(0, 2, 1)
         tool, _ = self._kinematics.tools(q)
@@ -105,15 +119,16 @@ class Overlapping:
             0.5 * (high - low), frames.rotations, frames.points, twists[..., :3], twists[..., 3:],
             tool, target, off,
         )  # fmt: skip
-        found = np.zeros(len(low), dtype=bool)
         hits = np.zeros(len(self._couples), dtype=int)
         for k, couples in enumerate(self._couples):
-            left = np.flatnonzero(~found)
+            left = np.flatnonzero(found.ratio >= 1.0)
             if not len(left):
                 break
-            blocked = self._overlap(couples, boxes.of(left))
-            found[left] = blocked
-            hits[k] = blocked.sum()
+            one = self._overlap(couples, boxes.of(left))
+            nearer = one.ratio < found.ratio[left]
+            for mine, other in zip(found, one, strict=True):
+                mine[left[nearer]] = other[nearer]
+            hits[k] = (one.ratio < 1.0).sum()
         order = np.argsort(-hits, kind="stable")
         self._couples = [self._couples[k] for k in order]
         return found
@@ -122,42 +137,57 @@ class Overlapping:
         """Does the judge of collisions find all pairs apart at a configuration (n,)?"""
         return collision_replay(self._robot, self._bodies, np.array([q, q])).accepted
 
-    def _overlap(self, couples: _Couples, boxes: _Middles) -> Mask:
-        """(m,) boxes in which some points are inside a body everywhere."""
-        points = couples.points
+    def _overlap(self, couples: _Couples, boxes: _Middles) -> Deepest:
+        """What points of one body say of m boxes."""
+        points, n = couples.points, self._robot.n
         turned = points.places @ boxes.rotations[:, points.joint].transpose(0, 2, 1)
         x = turned + boxes.origins[:, points.joint, None]
-        moved = self._moved(boxes, x, points.joint)
-        from_tool = self._moved_from_tool(boxes, x, points.joint) + boxes.off[:, None]
+        steps = self._steps(boxes, x, points.joint)
+        from_tool = self._steps_from_tool(boxes, x, points.joint)
         shifted = x + (boxes.target - boxes.tool)[:, None]
-        found = np.zeros(len(x), dtype=bool)
-        for body, clearance in couples.bodies:
-            kept = points.deep + clearance - GUARD
-            over = kept + _depths(body, boxes, x) > moved[body.joint]
+        rows = np.arange(len(x))
+        found = Deepest(np.full(len(x), np.inf), np.zeros((len(x), n)), np.full(len(x), -1))
+        for body, pair in couples.bodies:
+            kept = points.deep + self._bodies.pairs[pair].clearance - GUARD
+            seen = [(x, steps, body.joint, 0.0)]
             if body.joint == 0:
-                over |= kept + _depths(body, boxes, shifted) > from_tool
-            found |= over.any(axis=1)
+                seen.append((shifted, from_tool, 0, boxes.off[:, None]))
+            for places, moves, first, off in seen:
+                over = kept + _depths(body, boxes, places) - off
+                ratio = np.full(over.shape, np.inf)
+                np.divide(sum(moves[first:]), over, out=ratio, where=over > 0.0)
+                best = ratio.argmin(axis=1)
+                (nearer,) = np.nonzero(ratio[rows, best] < found.ratio)
+                best = best[nearer]
+                found.ratio[nearer], found.pair[nearer] = ratio[nearer, best], pair
+                found.effect[nearer] = 0.0
+                for j in range(first, len(moves)):
+                    found.effect[nearer, j] = moves[j][nearer, best]
         return found
 
-    def _moved(self, boxes: _Middles, x: Array, joint: int) -> list[Array]:
-        """M of points of a joint, (m, k), as seen from each joint up to it."""
-        seen = [np.zeros(x.shape[:2])]
+    def _steps(self, boxes: _Middles, x: Array, joint: int) -> list[Array]:
+        """By how much (m, k) each joint up to one moves points of that one, seen from before it."""
+        steps, moved = list[Array](), np.zeros(x.shape[:2])
         for k in range(joint - 1, -1, -1):
-            seen.append(seen[-1] + self._step(boxes, k, x, seen[-1]))
-        return seen[::-1]
+            steps.append(self._step(boxes, k, x, moved))
+            moved = moved + steps[-1]
+        return steps[::-1]
 
-    def _moved_from_tool(self, boxes: _Middles, x: Array, joint: int) -> Array:
-        """(m, k) how far the difference of points (m, k, 3) and the tool point changes."""
-        tool = boxes.tool[:, None]
-        moved = np.zeros((len(x), 1))
-        for k in range(self._robot.n - 1, joint - 1, -1):
-            moved = moved + self._step(boxes, k, tool, moved)
-        moved = np.broadcast_to(moved, x.shape[:2])
-        for k in range(joint - 1, -1, -1):
-            if not self._robot.prismatic[k]:
+    def _steps_from_tool(self, boxes: _Middles, x: Array, joint: int) -> list[Array]:
+        """By how much (m, k) each joint changes the difference of points and the tool point."""
+        tool, steps = boxes.tool[:, None], list[Array]()
+        moved = np.zeros(x.shape[:2])
+        for k in range(self._robot.n - 1, -1, -1):
+            if k >= joint:
+                step = self._step(boxes, k, tool, moved)
+            elif self._robot.prismatic[k]:
+                step = np.zeros(x.shape[:2])
+            else:
                 turning = _length_of_cross(boxes.angular[:, k, None], x - tool)
-                moved = moved + np.minimum(boxes.half[:, k, None], 2.0) * (turning + moved)
-        return moved
+                step = np.minimum(boxes.half[:, k, None], 2.0) * (turning + moved)
+            steps.append(step)
+            moved = moved + step
+        return steps[::-1]
 
     def _step(self, boxes: _Middles, k: int, x: Array, moved: Array) -> Array:
         """m_k of points that the joints behind k have moved so far."""
@@ -178,11 +208,11 @@ def _length_of_cross(a: Array, b: Array, more: Array | None = None) -> Array:
 
 
 def _depths(body: _Inside, boxes: _Middles, x: Array) -> Array:
-    """(m, k) m, how deep points (m, k, 3) are inside a body; -inf outside."""
+    """(m, k) m, how deep points (m, k, 3) are in a body at least."""
     own = (x - boxes.origins[:, body.joint, None]) @ boxes.rotations[:, body.joint]
     own = (own - body.placement[:3, 3]) @ body.placement[:3, :3]
     deep = depths(body.shape, own)
-    return np.full(x.shape[:2], -np.inf) if deep is None else np.where(deep >= 0.0, deep, -np.inf)
+    return np.full(x.shape[:2], -np.inf) if deep is None else deep
 
 
 def _couples(bodies: Bodies) -> list[_Couples]:
@@ -197,8 +227,8 @@ def _couples(bodies: Bodies) -> list[_Couples]:
     found = []
     for solid in bodies.solids:
         inside_of = [
-            (body, pair.clearance)
-            for pair in bodies.pairs
+            (body, k)
+            for k, pair in enumerate(bodies.pairs)
             for one, other in ((pair.first, pair.second), (pair.second, pair.first))
             for body in (inside.get(other, ()) if one == solid.owner else ())
             if solid.joint > body.joint

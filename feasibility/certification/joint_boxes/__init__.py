@@ -1,5 +1,0 @@
-"""The check of proofs that bodies collide all over boxes of joint values."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,1 +1,0 @@
-from .everywhere import Overlapping as Overlapping

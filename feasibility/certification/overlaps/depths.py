@@ -1,0 +1,179 @@
+"""Points inside bodies, and how deep they are: how far it is to the nearest point outside.
+
+A point that is r deep in one body and s deep in another keeps them together: the two are moved
+apart by no motion of less than r + s. Outside a body a depth is less than 0: a point s away from
+it is -s deep. A mesh that is not a convex solid has points, and no depth.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from coverable_arrays import Array
+from feasibility.certification.collisions.inside import winding
+from feasibility.collisions import HalfSpace
+from robots.shapes import Triangles, rims
+from robots.urdf import Box, Capsule, Cylinder, Sphere
+
+ALONG, ACROSS = 9, 5  # points along the longest side of a body, and along the others
+AROUND = 24  # points on each rim of a cylinder
+FINEST = 10  # parts of the widest side of a mesh that no edge is longer than
+MOST_CORNERS = 64  # of a mesh
+FLUSH = 1e-9  # [1] of the widest side, that a convex mesh may be off its hull
+FULL = 1e-6  # [1] of the hull's volume, that it may be off
+MOST_FACES = 4_000  # of a mesh that has an inside
+ROUNDING = 1e-9  # [m] that a point of a mesh is less deep than its triangles are away
+
+
+def depths(shape: object, points: Array) -> Array | None:
+    """(...) m, how deep points (..., 3) are, or less; None for what has no known inside.
+
+    Args:
+        shape: a primitive, `Triangles` or a `HalfSpace`. Outside a convex mesh it is -inf.
+        points: m, in its own frame.
+    """
+    x = np.abs(points)
+    match shape:
+        case Sphere(radius):
+            return np.asarray(radius - np.linalg.norm(points, axis=-1))
+        case Capsule(radius, length):
+            past = np.maximum(x[..., 2] - 0.5 * length, 0.0)
+            return np.asarray(radius - np.sqrt(x[..., 0] ** 2 + x[..., 1] ** 2 + past**2))
+        case Cylinder(radius, length):
+            around = np.hypot(x[..., 0], x[..., 1]) - radius
+            return _within_sides(np.stack([around, x[..., 2] - 0.5 * length], axis=-1))
+        case Box(size):
+            return _within_sides(x - 0.5 * np.array(size))
+        case HalfSpace():
+            return -points[..., 2]
+        case Triangles():
+            planes = planes_around(shape)
+            if planes is None:
+                return None
+            deep = -(points @ planes[:, :3].T + planes[:, 3]).max(axis=-1)
+            return np.where(deep >= 0.0, deep, -np.inf)
+    return None
+
+
+def _within_sides(past: Array) -> Array:
+    """(...) m, how deep points are that are past sides at right angles by (..., k) m."""
+    outside = np.sqrt((np.maximum(past, 0.0) ** 2).sum(axis=-1))
+    return np.asarray(-outside - np.minimum(past.max(axis=-1), 0.0))
+
+
+def points_inside(shape: object) -> tuple[Array, Array]:
+    """(k, 3) m, points of a body in its own frame, and (k,) m, how deep they are at least."""
+    if isinstance(shape, Triangles):
+        return _points_of_mesh(shape)
+    half = _half_sizes(shape)
+    grid = _grid(-half, half)
+    if isinstance(shape, Cylinder):
+        grid = np.concatenate([grid, rims(shape.radius, shape.length, AROUND)])
+    if isinstance(shape, Capsule):
+        axis = np.outer(np.linspace(-0.5, 0.5, ALONG) * shape.length, [0.0, 0.0, 1.0])
+        grid = np.concatenate([grid, axis])
+    # A little less than the body, for rounding.
+    grid *= 1.0 - 1e-9
+    found = depths(shape, grid)
+    if found is None:
+        return np.empty((0, 3)), np.empty(0)
+    inside = found >= 0.0
+    return grid[inside], found[inside]
+
+
+@lru_cache(maxsize=64)
+def _points_of_mesh(mesh: Triangles) -> tuple[Array, Array]:
+    """Corners that are far from each other, and places inside a solid."""
+    grid = _grid(mesh.vertices.min(axis=0), mesh.vertices.max(axis=0))
+    found, corners = depths(mesh, grid), mesh.vertices[np.unique(mesh.faces)]
+    if found is None:
+        found, corners = _depths_by_triangles(mesh, grid), _all_over(mesh)
+    inside, corners = found > 0.0, _apart(corners)
+    points = np.concatenate([corners, grid[inside]])
+    return points, np.append(np.zeros(len(corners)), found[inside])
+
+
+def _depths_by_triangles(mesh: Triangles, points: Array) -> Array:
+    """(k,) m, how far points (k, 3) are from the triangles that wind around them; else -inf."""
+    from trimesh.triangles import closest_point
+
+    deep = np.full(len(points), -np.inf)
+    if not mesh.closed or len(mesh.faces) > MOST_FACES:
+        return deep
+    triangles = mesh.vertices[mesh.faces]
+    for k, point in enumerate(points):
+        if abs(winding(triangles, point)) > 0.5:
+            near = closest_point(triangles, np.broadcast_to(point, (len(triangles), 3)))
+            deep[k] = np.linalg.norm(near - point, axis=1).min() - ROUNDING
+    return deep
+
+
+def _all_over(mesh: Triangles) -> Array:
+    """(k, 3) m, corners of a mesh whose wide triangles are cut."""
+    from trimesh.remesh import subdivide_to_size
+
+    widest = float(np.ptp(mesh.vertices, axis=0).max())
+    vertices, _ = subdivide_to_size(mesh.vertices, mesh.faces, widest / FINEST, max_iter=20)
+    return np.asarray(vertices, dtype=np.float64)
+
+
+def _half_sizes(shape: object) -> Array:
+    """(3,) m, half the sides of the box around a primitive."""
+    match shape:
+        case Sphere(radius):
+            return np.full(3, radius)
+        case Capsule(radius, length):
+            return np.array([radius, radius, radius + 0.5 * length])
+        case Cylinder(radius, length):
+            return np.array([radius, radius, 0.5 * length])
+        case Box(size):
+            return 0.5 * np.array(size)
+    return np.zeros(3)
+
+
+def _grid(low: Array, high: Array) -> Array:
+    """(k, 3) points all over a box, its corners too."""
+    counts = np.full(3, ACROSS)
+    counts[int(np.argmax(high - low))] = ALONG
+    sides = [np.linspace(a, b, int(k)) for a, b, k in zip(low, high, counts, strict=True)]
+    return np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def _apart(corners: Array) -> Array:
+    """Some of the corners, far from each other."""
+    chosen, away = [0], np.full(len(corners), np.inf)
+    while len(chosen) < min(MOST_CORNERS, len(corners)):
+        away = np.minimum(away, ((corners - corners[chosen[-1]]) ** 2).sum(axis=1))
+        chosen.append(int(away.argmax()))
+    return corners[chosen]
+
+
+@lru_cache(maxsize=64)
+def planes_around(mesh: Triangles) -> Array | None:
+    """(k, 4) unit normals n and d with n . x + d <= 0 in a convex solid; None where it is none.
+
+    All corners and middles of faces have to lie on the convex hull. The depth beneath the hull is
+    concave over a face, so no point of it is then deeper than three times that of its middle; and
+    a closed surface that stays at the hull and encloses its volume is the hull.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    if not mesh.closed or len(mesh.faces) > MOST_FACES:
+        return None
+    corners = mesh.vertices[mesh.faces]
+    try:
+        hull = ConvexHull(corners.reshape(-1, 3))
+    except QhullError:
+        return None
+    wide = float(np.ptp(hull.points, axis=0).max())
+    points = np.concatenate([corners.reshape(-1, 3), corners.mean(axis=1)])
+    depths = -(points @ hull.equations[:, :3].T + hull.equations[:, 3]).max(axis=1)
+    a, b, c = (corners[:, k] - corners[0, 0] for k in range(3))
+    volume = abs(float(np.einsum("ki,ki->", np.cross(a, b), c))) / 6.0
+    if depths.max() > FLUSH * wide or abs(volume - hull.volume) > FULL * hull.volume:
+        return None
+    planes = np.array(hull.equations)
+    planes[:, 3] += 3.0 * FLUSH * wide
+    return planes

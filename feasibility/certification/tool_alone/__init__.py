@@ -1,5 +1,0 @@
-"""Confirms that the tool collides in every pose over a cell, without the code of the search."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
