@@ -91,7 +91,7 @@ def test_an_object_over_a_cell_is_a_proof_that_landings_bear_out(name, seed):
     assert cell in [one.cell for one in proved]
     for one in proved:
         over = Over.cell(robot, cells, task, one.cell)
-        assert over.confirmed().confirmed
+        assert over.proved(100_000).confirmed
         assert not over.clear_pose(100, rng)
 
 
