@@ -102,7 +102,11 @@ def with_cells(parts: Parts, targets: Targets) -> Parts:
     cells = cell_parts(targets)
     held = zip(parts.references, cells.references, strict=True)
     return Parts(
-        *(np.concatenate(both) for both in zip(parts[:-1], cells[:-1], strict=True)),
+        np.concatenate([parts.centre, cells.centre]),
+        np.concatenate([parts.slopes, cells.slopes]),
+        np.concatenate([parts.radius, cells.radius]),
+        np.concatenate([parts.children, cells.children]),
+        np.concatenate([parts.axis, cells.axis]),
         ReferenceParts(*(np.concatenate(both) for both in held)),
     )
 

@@ -102,9 +102,9 @@ def never_clear(
     some = tool.measured(_all_over(cone), pairs)
     k = int(some.over.argmin())
     first = pairs[int(some.nearest[k])].pair
-    named = [first, *(pairs[i].pair for i in sorted(used))]
+    blamed = [first, *(pairs[i].pair for i in sorted(used))]
     distance = first.clearance - float(some.over[k]) - tolerance
-    named = dict.fromkeys((pair.first, pair.second) for pair in named)
+    named = dict.fromkeys((pair.first, pair.second) for pair in blamed)
     return PoseCheck(True, looked, tuple(named), distance)
 
 

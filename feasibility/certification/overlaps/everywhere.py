@@ -149,7 +149,7 @@ class Overlapping:
         found = Deepest(np.full(len(x), np.inf), np.zeros((len(x), n)), np.full(len(x), -1))
         for body, pair in couples.bodies:
             kept = points.deep + self._bodies.pairs[pair].clearance - GUARD
-            seen = [(x, steps, body.joint, 0.0)]
+            seen = [(x, steps, body.joint, np.zeros((len(x), 1)))]
             if body.joint == 0:
                 seen.append((shifted, from_tool, 0, boxes.off[:, None]))
             for places, moves, first, off in seen:
