@@ -138,10 +138,7 @@ def node(one: Any, owner: Any) -> Json:
     if hasattr(one, "cell"):
         return {"cell": index(owner.cells, one.cell)}
     names = owner.robot.joint_names
-    if one.joint is None:
-        weights = {name: w for name, w in zip(names, one.weights, strict=True) if w}
-        cut = {"weights": weights, "value": one.value}
-    elif owner.robot.prismatic[one.joint]:
+    if owner.robot.prismatic[one.joint]:
         cut = {"joint": names[one.joint], "value_m": one.value}
     else:
         cut = {"joint": names[one.joint], "value_deg": degrees(one.value)}
