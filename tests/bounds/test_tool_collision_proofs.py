@@ -20,11 +20,10 @@ from scipy.spatial.transform import Rotation
 
 from feasibility import Answer, CauseKind, Evidence, Task, check
 from feasibility.certification import never_clear, verify_proof
-from feasibility.certification.collisions import piece_of
 from feasibility.certification.overlaps.depths import depths, planes_around, points_inside
 from feasibility.collisions import Bodies, Collision, HalfSpace, Obstacle, Pair, ToolShape
 from feasibility.cut_tree import CutTree, Leaf
-from robots.shapes import Solid, Triangles, checked_triangles
+from robots.shapes import Solid, Triangles, checked_triangles, coal_shape
 from robots.urdf import Box, Capsule, Cylinder, Sphere
 from surfaces import cylinder
 
@@ -294,16 +293,17 @@ def test_no_point_is_said_to_be_deeper_than_it_is(shape):
     if isinstance(shape, Triangles):
         assert np.isinf(found[outside]).all()
         return
-    away = np.array([_by_coal(shape, np.eye(4), point) for point in x[outside]])
+    away = np.array([_by_coal(shape, point) for point in x[outside]])
     np.testing.assert_allclose(-found[outside], away, atol=1e-5)
 
 
-def _by_coal(shape, place, point):
+def _by_coal(shape, point):
     """m, of a point from a body that it is not in."""
     if isinstance(shape, HalfSpace):
-        return float((point - place[:3, 3]) @ place[:3, 2])
-    body, pose = piece_of(shape, place).truth, coal.Transform3s(np.eye(3), point)
-    seat = coal.Transform3s(body.placement[:3, :3], body.placement[:3, 3])
-    request = coal.DistanceRequest(True, True)
-    ball = coal.Sphere(1e-4)
-    return coal.distance(ball, pose, body.geometry, seat, request, coal.DistanceResult()) + 1e-4
+        return float(point[2])
+    asked, ball = (
+        coal.DistanceRequest(True, True),
+        (coal.Sphere(1e-4), coal.Transform3s(np.eye(3), point)),
+    )
+    body = coal_shape(shape), coal.Transform3s.Identity()
+    return coal.distance(*ball, *body, asked, coal.DistanceResult()) + 1e-4

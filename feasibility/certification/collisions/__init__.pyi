@@ -4,6 +4,3 @@ from .collision_replay import collision_replay as collision_replay
 from .nearest import NearestAlong as NearestAlong
 from .nearest import NearPair as NearPair
 from .nearest import nearest_along as nearest_along
-from .pieces import Piece as Piece
-from .shape_pieces import piece_of as piece_of
-from .shape_pieces import sheet_piece as sheet_piece

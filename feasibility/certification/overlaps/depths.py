@@ -2,12 +2,13 @@
 
 A point that is r deep in one body and s deep in another keeps them together: the two are moved
 apart by no motion of less than r + s. Outside a body a depth is less than 0: a point s away from
-it is -s deep. A mesh that is not a convex solid has points, and no depth.
+it is -s deep. A mesh that is not a convex solid is only known to be deep in balls inside it.
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,17 +22,39 @@ ALONG, ACROSS = 9, 5  # points along the longest side of a body, and along the o
 AROUND = 24  # points on each rim of a cylinder
 FINEST = 10  # parts of the widest side of a mesh that no edge is longer than
 MOST_CORNERS = 64  # of a mesh
+MOST_BALLS = 40  # inside one
 FLUSH = 1e-9  # [1] of the widest side, that a convex mesh may be off its hull
 FULL = 1e-6  # [1] of the hull's volume, that it may be off
 MOST_FACES = 4_000  # of a mesh that has an inside
 ROUNDING = 1e-9  # [m] that a point of a mesh is less deep than its triangles are away
 
 
+class Balls(NamedTuple):
+    """Balls inside a mesh, some of them points of it: what is known to be deep in one."""
+
+    centres: Array
+    """(k, 3) m"""
+    radii: Array
+    """(k,) m"""
+
+    @staticmethod
+    def among(points: Array, deep: Array) -> Balls:
+        """The deepest of some points, then those that reach furthest from what is taken."""
+        out, chosen = np.full(len(points), np.inf), [int(deep.argmax())]
+        while len(chosen) < min(MOST_BALLS, len(points)):
+            last = chosen[-1]
+            away = np.linalg.norm(points - points[last], axis=1) + deep - deep[last]
+            out = np.minimum(out, away)
+            out[chosen] = -np.inf
+            chosen.append(int(out.argmax()))
+        return Balls(points[chosen], deep[chosen])
+
+
 def depths(shape: object, points: Array) -> Array | None:
     """(...) m, how deep points (..., 3) are, or less; None for what has no known inside.
 
     Args:
-        shape: a primitive, `Triangles` or a `HalfSpace`. Outside a convex mesh it is -inf.
+        shape: a primitive, `Triangles`, `Balls` or a `HalfSpace`. Outside a convex mesh it is -inf.
         points: m, in its own frame.
     """
     x = np.abs(points)
@@ -48,6 +71,11 @@ def depths(shape: object, points: Array) -> Array | None:
             return _within_sides(x - 0.5 * np.array(size))
         case HalfSpace():
             return -points[..., 2]
+        case Balls(centres, radii):
+            found = np.full(points.shape[:-1], -np.inf)
+            for centre, radius in zip(centres, radii, strict=True):
+                found = np.maximum(found, radius - np.linalg.norm(points - centre, axis=-1))
+            return found
         case Triangles():
             planes = planes_around(shape)
             if planes is None:

@@ -22,10 +22,11 @@ import numpy as np
 
 from coverable_arrays import Array, Ints
 from feasibility.certification.collisions import collision_replay
-from feasibility.certification.overlaps.depths import depths, points_inside
+from feasibility.certification.overlaps.depths import Balls, depths, points_inside
 from feasibility.certification.rows import Rows
 from feasibility.collisions import Bodies
 from robots import Kinematics, Robot
+from robots.shapes import Triangles
 
 GUARD = 1e-7  # [m] that an overlap has to be larger by
 
@@ -153,7 +154,7 @@ class Overlapping:
             if body.joint == 0:
                 seen.append((shifted, from_tool, 0, boxes.off[:, None]))
             for places, moves, first, off in seen:
-                over = kept + _depths(body, boxes, places) - off
+                over = kept + _depths(body, boxes, places, kept.max(initial=0.0)) - off
                 ratio = np.full(over.shape, np.inf)
                 np.divide(sum(moves[first:]), over, out=ratio, where=over > 0.0)
                 best = ratio.argmin(axis=1)
@@ -207,12 +208,19 @@ def _length_of_cross(a: Array, b: Array, more: Array | None = None) -> Array:
     return np.asarray(np.sqrt(x * x + y * y + z * z))
 
 
-def _depths(body: _Inside, boxes: _Middles, x: Array) -> Array:
-    """(m, k) m, how deep points (m, k, 3) are in a body at least."""
+def _depths(body: _Inside, boxes: _Middles, x: Array, near: float) -> Array:
+    """(m, k) m, how deep points (m, k, 3) are in a body at least; further out than `near`, -inf."""
     own = (x - boxes.origins[:, body.joint, None]) @ boxes.rotations[:, body.joint]
     own = (own - body.placement[:3, 3]) @ body.placement[:3, :3]
-    deep = depths(body.shape, own)
-    return np.full(x.shape[:2], -np.inf) if deep is None else deep
+    found, rows = np.full(x.shape[:2], -np.inf), np.ones(len(x), dtype=bool)
+    if isinstance(body.shape, Balls):  # these take long
+        centre = body.shape.centres[0]
+        wide = (np.linalg.norm(body.shape.centres - centre, axis=1) + body.shape.radii).max()
+        rows = np.linalg.norm(own - centre, axis=2).min(axis=1) <= wide + near
+    deep = depths(body.shape, own[rows])
+    if deep is not None:
+        found[rows] = deep
+    return found
 
 
 def _couples(bodies: Bodies) -> list[_Couples]:
@@ -222,8 +230,12 @@ def _couples(bodies: Bodies) -> list[_Couples]:
     held += [(one.name, 0, one.geometry, one.placement) for one in bodies.scene]
     inside = dict[str, list[_Inside]]()
     for owner, joint, shape, placement in held:
-        if depths(shape, np.zeros(3)) is not None:
-            inside.setdefault(owner, []).append(_Inside(joint, shape, np.asarray(placement)))
+        shapes = [shape] if depths(shape, np.zeros(3)) is not None else []
+        if isinstance(shape, Triangles) and joint > 0:
+            shapes.append(Balls.among(*points_inside(shape)))
+        inside.setdefault(owner, []).extend(
+            _Inside(joint, one, np.asarray(placement)) for one in shapes
+        )
     found = []
     for solid in bodies.solids:
         inside_of = [

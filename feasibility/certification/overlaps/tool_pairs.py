@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable_arrays import Array
-from feasibility.certification.overlaps.depths import depths, points_inside
+from feasibility.certification.overlaps.depths import Balls, depths, points_inside
 from feasibility.collisions import Bodies, Obstacle, Pair
 from robots import Robot
 from robots.shapes import Solid, Triangles
@@ -21,7 +21,6 @@ from robots.shapes import Solid, Triangles
 GUARD = 1e-7  # [m] that an overlap has to be larger by
 FINEST = 40  # parts of the tool's reach that triangles of a sheet are cut to
 CUTS = 20  # of a triangle, at most
-BALLS = 32  # inside a mesh that is not convex
 KEPT = 64  # bodies that are remembered
 
 Depth = Callable[[Array], Array]
@@ -115,32 +114,14 @@ def _body(thing: Solid | Obstacle) -> _Body:
     """Points in a body and their depths."""
     rotation, place = thing.placement[:3, :3], thing.placement[:3, 3]
     points, deep = points_inside(thing.geometry)
-    points = points @ rotation.T + place
+    known = depths(thing.geometry, np.zeros(3)) is not None
+    shape = thing.geometry if known or not len(points) else Balls.among(points, deep)
 
     def depth(x: Array) -> Array:
-        found = depths(thing.geometry, (x - place) @ rotation)
+        found = depths(shape, (x - place) @ rotation)
         return np.full(x.shape[:-1], -np.inf) if found is None else found
 
-    if depths(thing.geometry, np.zeros(3)) is not None:
-        return _Body(points, deep, depth)
-    return _Body(points, deep, _in_balls(points, deep) if (deep > 0.0).any() else None)
-
-
-def _in_balls(centres: Array, radii: Array) -> Depth:
-    """How deep points are in some of the balls, the largest of those that are not in others."""
-    kept = list[int]()
-    for k in np.argsort(-radii, kind="stable").tolist():
-        away = np.linalg.norm(centres[kept] - centres[k], axis=1)
-        if radii[k] > 0.0 and not (away < 0.5 * radii[kept]).any():
-            kept.append(k)
-
-    def depth(x: Array) -> Array:
-        found = np.full(x.shape[:-1], -np.inf)
-        for k in kept[:BALLS]:
-            np.maximum(found, radii[k] - np.linalg.norm(x - centres[k], axis=-1), out=found)
-        return found
-
-    return depth
+    return _Body(points @ rotation.T + place, deep, depth)
 
 
 def _sheet(triangles: Array, deviation: float, target: Array, reach: float) -> _Body:
