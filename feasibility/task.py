@@ -35,6 +35,15 @@ class Targets(NamedTuple):
 Direction = tuple[float, float, float]
 
 
+class PlacementError(NamedTuple):
+    """How far off the surface may stand from where the case says."""
+
+    position: float
+    """m."""
+    angle_deg: float
+    """deg, about the middle of the cells."""
+
+
 @dataclass(frozen=True, slots=True)
 class Task:
     """Hold the tool point at a standoff from the surface, the axis within a cone, the arm clear.
@@ -92,6 +101,9 @@ class Task:
     over this length (`surfaces.meshes.smoothed`). How far the copy is off the surface is stated,
     and taken off the tolerance; where it is more than that, the tolerance holds from the copy. None
     for the surface itself."""
+    placement_error: PlacementError | tuple[float, float] | None = None
+    """m, degrees: "feasible" then says that a continuous motion exists wherever the surface stands
+    within that of where the case says; a pair is taken as a `PlacementError`. None for there."""
     home_deg: tuple[float, ...] | None = None
     """(n,) degrees, where a path comes from and goes back to; None where it begins and ends over
     the surface. For arms whose joints all turn."""
@@ -126,6 +138,7 @@ class Task:
             kept["roll_reference"] = tuple(reference)
         kept["footprint"] = self._checked_footprint(checks)
         kept["coverage"] = self._checked_coverage(checks)
+        kept["placement_error"] = self._checked_placement_error(checks)
         kept["home_deg"] = self._checked_home(checks)
         checks.done()
         if roll is not None and roll[0] == roll[1]:
@@ -160,6 +173,19 @@ class Task:
             expected = "give task.footprint, in metres, or leave coverage out"
             checks.keep(Fault("coverage", "needs a footprint to measure", expected=expected))
         return share
+
+    def _checked_placement_error(self, checks: Checks) -> PlacementError | None:
+        """Shift and turn, neither below zero."""
+        given = self.placement_error
+        if given is None:
+            return None
+        expected = "must be a shift and a turn >= 0, such as (0.003, 0.2) (metres, degrees)"
+        found = checks.numbers("placement_error", given, 2, expected)
+        if found is None:
+            return None
+        if min(found) < 0.0 or found[1] > 180.0:
+            checks.wrong("placement_error", given, expected)
+        return PlacementError(*found)
 
     def _checked_approach(self, checks: Checks) -> Any:
         """The approach as a word or three numbers."""

@@ -6,13 +6,14 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import cached_property
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from coverable_arrays import Array, Ints, Mask
 from feasibility.collisions import said_of
 from feasibility.cut_tree import CutTree
-from feasibility.task import Task
+from feasibility.task import PlacementError, Task
 from robots import Robot
 from robots.shapes import LeftOut
 from surfaces import Cells
@@ -79,7 +80,48 @@ class Walk:
     """(m,) flat index of the cell whose centre target the tool point is at; -1 between centres."""
 
 
-@dataclass(frozen=True, slots=True)
+class Bound(StrEnum):
+    """What leaves least room to displace the surface."""
+
+    LIMIT = "limit"
+    CONE = "cone"
+    ROLL = "roll"
+    SINGULAR = "singular"
+    CLEARANCE = "clearance"
+    START = "start"
+    """The motion has to begin there, wherever the surface stands."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class PlacementMargin:
+    """Where the surface may stand, as displaced against the arm, so that a motion still exists.
+
+    Anywhere with shift / position + turn / angle <= 1; see `certification.placement_margin`.
+    """
+
+    position: float
+    """m, how far it may be shifted; 0 where there is no margin."""
+    angle: float
+    """rad, how far it may be turned about `pivot`."""
+    pivot: tuple[float, ...]
+    """(3,) m, in the root frame: the middle of the cells."""
+    bound_by: Bound
+    """What leaves least room to shift it."""
+    cell: tuple[int, ...]
+    """The index of the cell next to where that is."""
+    what: str = ""
+    """The joint whose limit that is, or the two bodies."""
+    along: Array | None = None
+    """(m - 1,) m, how far the surface may be shifted for each segment of the motion, bodies left
+    aside; None of a verdict that was loaded."""
+
+    def share(self, error: PlacementError) -> float:
+        """The share of the margin that an error of the placement uses: up to 1 it is certified."""
+        parts = (error.position, self.position), (math.radians(error.angle_deg), self.angle)
+        return sum(0.0 if not a else a / b if b else math.inf for a, b in parts)
+
+
+@dataclass(frozen=True)  # no slots: the margin is kept in its __dict__
 class Certificate:
     """What an independent replay of the witness measured, between waypoints too."""
 
@@ -110,6 +152,19 @@ class Certificate:
     """How often the tool waits while the arm changes its posture; None as for the speed."""
     corners: int | None = None
     """At how many rows the tool's path turns sharply; None as for the speed."""
+    margin: Callable[[], PlacementMargin | None] | PlacementMargin | None = field(
+        default=None, compare=False, repr=False
+    )
+    """The placement margin, or what finds it."""
+
+    @cached_property
+    def placement_margin(self) -> PlacementMargin | None:
+        """Where the surface may stand; found when first read. None where that is not known."""
+        return self.margin() if callable(self.margin) else self.margin
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What is pickled: the margin as it is found."""
+        return {**vars(self), "margin": self.placement_margin}
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,8 @@ no sample reaches are looked for between samples, where the tool passes nearest.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,6 +23,35 @@ TRIES = np.linspace(0.0, 1.0, 9)  # of the part of a stretch that passes within 
 NAMED = 5  # cells that are listed
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Reached:
+    """The N cells, and for each that is reached one configuration that does."""
+
+    row: Ints
+    """(N,) the row of the motion, or the row before; -1 where none is known."""
+    chord: Array
+    """(N,) |a - b| there, b the approach direction of the cell's centre; inf where none is."""
+    roll: Array
+    """(N,) rad, how far the roll is off the middle of its range there; 0 where it is free."""
+
+    @staticmethod
+    def none(count: int) -> Reached:
+        """Of so many cells none is reached."""
+        return Reached(np.full(count, -1, dtype=np.int64), np.full(count, np.inf), np.zeros(count))
+
+    @property
+    def cells(self) -> Mask:
+        """(N,) which of them are."""
+        return self.row >= 0
+
+    def add(self, cell: Ints, row: Ints, chord: Array, roll: Array) -> None:
+        """Keep what holds a cell's tool best, of configurations (k,) as from `at_targets`."""
+        order = np.argsort(-chord, kind="stable")  # of several over one cell the last is kept
+        best = order[chord[order] < self.chord[cell[order]]]
+        self.row[cell[best]], self.chord[cell[best]] = row[best], chord[best]
+        self.roll[cell[best]] = roll[best]
+
+
 def in_order(samples: Samples) -> Samples:
     """The same samples as the motion passes them."""
     return samples.of(np.lexsort((samples.share, samples.row)))
@@ -33,8 +64,8 @@ def cells_reached(
     rows: Array,
     samples: Samples,
     marks: Ints | None = None,
-) -> Mask:
-    """(N,) cells that a motion reaches.
+) -> Reached:
+    """Which cells a motion reaches.
 
     Args:
         robot: the arm.
@@ -44,26 +75,24 @@ def cells_reached(
         samples: of it, in the order of `in_order`, all rows among them.
         marks: (m,) the cell that each row is said to be at, -1 for none: looked at first.
     """
-    reached = np.zeros(len(cells), dtype=bool)
+    reached = Reached.none(len(cells))
     if not len(cells) or not len(samples.row):
         return reached
     aims, tolerance = task.targets(cells), task.effective_tolerance
     if marks is not None:
         at = samples.of((samples.share == 0.0) & (marks[samples.row] >= 0))
         cell = marks[at.row]
-        reached[cell[at_targets(task, aims, cell, at.points, at.axes, at.x)]] = True
-        if reached.all():
+        reached.add(cell, at.row, *at_targets(task, aims, cell, at.points, at.axes, at.x))
+        if reached.cells.all():
             return reached
     from scipy.spatial import cKDTree  # takes a while to load
 
     tree = cKDTree(samples.points)
     near = tree.query_ball_point(aims.points, tolerance)
     cell, sample = _flat(near)
-    good = at_targets(
-        task, aims, cell, samples.points[sample], samples.axes[sample], samples.x[sample]
-    )
-    reached[cell[good]] = True
-    left = np.flatnonzero(~reached)
+    at = samples.of(sample)
+    reached.add(cell, at.row, *at_targets(task, aims, cell, at.points, at.axes, at.x))
+    left = np.flatnonzero(~reached.cells)
     starts, ends = samples.points[:-1], samples.points[1:]
     if not len(left) or not len(starts):
         return reached
@@ -85,8 +114,8 @@ def cells_reached(
     points, axes = Kinematics(robot).tools(flat)
     x = axes if task.roll is None else reference_axes(robot, flat)
     cell = np.repeat(some, len(TRIES))
-    good = at_targets(task, aims, cell, points, axes, x)
-    reached[cell[good]] = True
+    held = at_targets(task, aims, cell, points, axes, x)
+    reached.add(cell, np.repeat(row, len(TRIES)), *held)
     return reached
 
 
@@ -97,8 +126,12 @@ def _flat(lists: NDArray[np.object_]) -> tuple[Ints, Ints]:
     return owner, np.array([k for found in lists for k in found], dtype=np.int64)
 
 
-def at_targets(task: Task, aims: Targets, cell: Ints, points: Array, axes: Array, x: Array) -> Mask:
-    """(k,) which tools are within the tolerance of a cell's target, and the cone and roll there.
+def at_targets(
+    task: Task, aims: Targets, cell: Ints, points: Array, axes: Array, x: Array
+) -> tuple[Array, Array]:
+    """|a - b| and the roll (k,) of tools over cells: inf where one is not as it has to be there.
+
+    That is within the tolerance of the cell's target, and the cone and the range of the roll.
 
     Args:
         task: its tolerance, cone and roll are used exactly.
@@ -110,10 +143,12 @@ def at_targets(task: Task, aims: Targets, cell: Ints, points: Array, axes: Array
     approaches = aims.approaches[cell]
     chord = np.linalg.norm(axes - approaches, axis=1)
     inside = np.asarray(chord <= task.cone_chord + CLOSE_TO_ZERO)
+    roll = np.zeros(len(cell))
     if task.roll is not None and aims.references is not None:
         z = roll_vectors(x, axes, aims.references[cell], approaches, task.roll)
-        inside &= off_middle(z) <= task.roll.half + ROLL_CLOSE
-    return np.asarray((off <= task.effective_tolerance) & inside)
+        roll = off_middle(z)
+        inside &= roll <= task.roll.half + ROLL_CLOSE
+    return np.where((off <= task.effective_tolerance) & inside, chord, np.inf), roll
 
 
 def _passing(aims: Array, starts: Array, ends: Array, within: float) -> tuple[Array, Array]:

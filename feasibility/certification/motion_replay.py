@@ -6,6 +6,8 @@ judges it over the surface itself, `collisions` whether bodies stay clear.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from coverable_arrays import Array, Mask
@@ -50,11 +52,14 @@ def replay(
     found = replay_over_surface(robot, cells, task, walk.q, needed, marks=walk.cell)
     refusal = found.refusal or _misplaced(robot, cells, task, walk)
     bodies = gather(robot, cells.surface, task.collision, task.standoff)
-    if bodies is None or refusal:
-        return Replay(found.certificate, refusal)
-    clear = collision_replay(robot, bodies, walk.q, deviations)
-    certificate = clear.added_to(found.certificate)
-    return Replay(certificate, clear.refusal, collides=not clear.accepted)
+    certificate, collides = found.certificate, False
+    if bodies is not None and not refusal:
+        clear = collision_replay(robot, bodies, walk.q, deviations)
+        certificate, refusal = clear.added_to(certificate), clear.refusal
+        collides = not clear.accepted
+    if refusal or deviations is not None:  # the margin is of motions that are straight
+        certificate = replace(certificate, margin=None)
+    return Replay(certificate, refusal, collides)
 
 
 def _malformed(cells: Cells, walk: Walk) -> str:
@@ -72,7 +77,7 @@ def _misplaced(robot: Robot, cells: Cells, task: Task, walk: Walk) -> str:
     q, cell = walk.q[at], walk.cell[at]
     points, axes = Kinematics(robot).tools(q)
     x = axes if task.roll is None else reference_axes(robot, q)
-    right = at_targets(task, task.targets(cells), cell, points, axes, x)
+    right = at_targets(task, task.targets(cells), cell, points, axes, x)[0] < np.inf
     if right.all():
         return ""
     row = int(at[np.argmin(right)])

@@ -24,12 +24,18 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
-from feasibility.certification.cells_reached import cells_reached, in_order, missed_text
+from feasibility.certification.cells_reached import (
+    Reached,
+    cells_reached,
+    in_order,
+    missed_text,
+)
 from feasibility.certification.collisions import collision_replay
 from feasibility.certification.faults import Judged, MotionFault
 from feasibility.certification.followed import followed_parts, lifted_faults, off_surface
 from feasibility.certification.jacobians import placements
 from feasibility.certification.order import curves_of_marks, order_of_places
+from feasibility.certification.placement_margin import margin_of
 from feasibility.certification.refusals import exact_faults, limits, open_fault
 from feasibility.certification.stretches import Bounds, Judge, Samples, Stretches
 from feasibility.collisions import Bodies
@@ -103,13 +109,15 @@ def replay_over_surface(
         found, reached = _tool_at_work(judge, rows, cells, surface, working)
         needed = _at_work(cells) if needed is None else needed
     faults += found.faults
-    missed = np.flatnonzero(~reached if needed is None else needed & ~reached)
+    at = reached.cells
+    missed = np.flatnonzero(~at if needed is None else needed & ~at)
     if len(missed):
         faults.append(MotionFault(-1, 0.0, missed_text(cells, task, missed, found.samples)))
     faults += order_of_places(offset, found.samples, task.effective_tolerance)
     if isinstance(surface, PoseSurface) and not faults:
         found = _with_what_follows(found, judge, rows, cells, surface)
         faults += found.faults
+    _less_room(found.room, task, reached.row[at], reached.chord[at], reached.roll[at])
     error, chord, roll = found.most.tolist()
     certificate = Certificate(
         len(rows), error, angle_of(chord), margin, max_roll=None if task.roll is None else roll
@@ -118,7 +126,19 @@ def replay_over_surface(
         clear = collision_replay(robot, bodies, rows)
         faults += clear.faults
         certificate = clear.added_to(certificate)
-    return MotionReplay(certificate, tuple(faults), reached)
+    if len(cells) and not faults:
+        found_later = margin_of(robot, cells, task, rows, found.room)
+        certificate = replace(certificate, margin=found_later)
+    return MotionReplay(certificate, tuple(faults), at)
+
+
+def _less_room(room: Array, task: Task, row: Ints, chord: Array, roll: Array) -> None:
+    """Take what is left of cone and roll behind rows (k,), where it is less, into `room` (m, 2)."""
+    if task.cone < np.pi:
+        angle = 2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0))
+        np.minimum.at(room[:, 0], row, np.maximum(task.cone - angle, 0.0))
+    if task.roll is not None:
+        np.minimum.at(room[:, 1], row, np.maximum(task.roll.half - roll, 0.0))
 
 
 def _surface_of(cells: Cells, task: Task, working: Mask | None) -> Surface:
@@ -139,13 +159,13 @@ def _at_work(cells: Cells) -> Mask | None:
 
 def _tool_at_work(
     judge: Judge, rows: Array, cells: Cells, surface: Surface, working: Mask
-) -> tuple[_Along, Mask]:
-    """What is found where the tool works, and (N,) the cells that are reached there.
+) -> tuple[_Along, Reached]:
+    """What is found where the tool works, and the cells that are reached there.
 
     Where it does not, it must not go through the surface.
     """
     most, faults, samples = np.zeros(3), list[MotionFault](), list[Samples]()
-    reached = np.zeros(len(cells), dtype=bool)
+    reached, room = Reached.none(len(cells)), np.full((len(rows), 2), np.inf)
     turns = np.flatnonzero(np.diff(working)) + 1
     for part in np.split(np.arange(len(rows)), turns):
         if len(part) and working[part[0]]:
@@ -153,12 +173,16 @@ def _tool_at_work(
             most = np.maximum(most, found.most)
             faults += [replace(each, row=each.row + part[0]) for each in found.faults]
             samples.append(replace(found.samples, row=found.samples.row + part[0]))
-            reached |= cells_reached(judge.robot, cells, judge.task, rows[part], found.samples)
+            room[part] = found.room
+            some = cells_reached(judge.robot, cells, judge.task, rows[part], found.samples)
+            new = some.cells & (some.chord < reached.chord)
+            reached.row[new] = some.row[new] + part[0]
+            reached.chord[new], reached.roll[new] = some.chord[new], some.roll[new]
     lifted = np.flatnonzero(~(working[:-1] & working[1:])).astype(float)
     kinematics, tolerance = Kinematics(judge.robot), judge.task.effective_tolerance
     faults += lifted_faults(surface.wall, rows, (lifted, lifted + 1.0), kinematics, tolerance)
     none = judge.sampled(np.zeros(0, dtype=np.int64), np.zeros(0), rows[:0])
-    return _Along(most, faults, Samples.join(none, *samples)), reached
+    return _Along(most, faults, Samples.join(none, *samples), room), reached
 
 
 class _Along(NamedTuple):
@@ -169,6 +193,9 @@ class _Along(NamedTuple):
     faults: list[MotionFault]
     samples: Samples
     """In the order of the motion, all rows among them."""
+    room: Array
+    """(m, 2) rad, how much of cone and roll is left at least from each row to the next; inf where
+    they are free, or the tool does not work."""
 
 
 def _tool_along(
@@ -187,7 +214,10 @@ def _tool_along(
     samples = in_order(Samples.join(at_rows, *looked.samples))
     each = (_off(judge, samples), samples.chord, samples.roll)
     most = np.maximum(looked.most, [np.max(one, initial=0.0) for one in each])
-    return _Along(most, faults + looked.faults, samples)
+    room = np.full((len(rows), 2), np.inf)
+    for one in ((samples.row, samples.chord, samples.roll), *looked.held):
+        _less_room(room, judge.task, *one)
+    return _Along(most, faults + looked.faults, samples, room)
 
 
 def _with_what_follows(
@@ -201,7 +231,7 @@ def _with_what_follows(
         return found
     task = less_deviations(judge.task, surface.under)
     over = Judge(judge.robot, task, offset_surface(surface.under, judge.offset.height), cells)
-    followed, most = surface.followed, found.most
+    followed, most, room = surface.followed, found.most, found.room
     at = off_surface(followed, found.samples)
     kinematics, tolerance = Kinematics(judge.robot), judge.task.effective_tolerance
     faults = lifted_faults(surface.under.wall, rows, at, kinematics, tolerance)
@@ -210,7 +240,8 @@ def _with_what_follows(
         one = _tool_along(over, part.q)
         most = np.maximum(most, one.most)
         faults += [part.placed(fault) for fault in one.faults]
-    return _Along(most, faults, found.samples)
+        np.minimum.at(room, part.row, one.room)
+    return _Along(most, faults, found.samples, room)
 
 
 def _at_marks(judge: Judge, cells: Cells, marks: Ints, at: Samples) -> Samples:
@@ -265,6 +296,8 @@ class _Between(NamedTuple):
     """(3,) see `_Along`, where stretches are right."""
     faults: list[MotionFault]
     samples: list[Samples]
+    held: list[tuple[Ints, Array, Array]]
+    """Row, |a - b| and roll (k,) of stretches that are right."""
 
 
 def _off(judge: Judge, one: Samples | Bounds) -> Array:
@@ -278,12 +311,13 @@ def _off(judge: Judge, one: Samples | Bounds) -> Array:
 def _between(judge: Judge, rows: Array, stretches: Stretches) -> _Between:
     """Judge stretches whose ends are good, halved as needed."""
     most, samples, wrong = np.zeros(3), list[Samples](), list[Samples]()
-    left, seen = stretches, 0
+    left, seen, held = stretches, 0, list[tuple[Ints, Array, Array]]()
     for level in range(LEVELS + 1):
         bounds = judge.bounds(left)
         good = judge.within(bounds)
         each = (_off(judge, bounds), bounds.chord, bounds.roll)
         most = np.maximum(most, [np.max(one[good], initial=0.0) for one in each])
+        held.append((left.start.row[good], bounds.chord[good], bounds.roll[good]))
         left, bounds = left.of(~good), bounds.of(~good)
         seen += len(left.length)
         enough = sum(len(part.row) for part in wrong) > ENOUGH
@@ -300,7 +334,7 @@ def _between(judge: Judge, rows: Array, stretches: Stretches) -> _Between:
         faults = exact_faults(judge, Samples.join(*wrong), "place")
     elif len(left.length):
         faults = [open_fault(judge, left, bounds)]
-    return _Between(most, faults, samples)
+    return _Between(most, faults, samples, held)
 
 
 def _malformed(robot: Robot, rows: Array) -> MotionFault | None:

@@ -16,6 +16,7 @@ from feasibility.reports.parts import (
     certificate_json,
     clearance_json,
     clearance_text,
+    placement_text,
     roll_text,
     smooth_json,
     smooth_text,
@@ -169,6 +170,7 @@ def as_text(
         ),
         ("roll", roll_text(path.certificate, path.task)),
         ("clearance", clearance_text(path.certificate)),
+        ("placement", placement_text(path.certificate)),
         ("smoothed", smooth_text(path.cells.surface if passes is None else passes.surface)),
         ("treated", "" if treated is None else treated_words(treated)),
     ]

@@ -16,6 +16,7 @@ from feasibility.reports.parts import (
     left_out_json,
     left_out_text,
     measured_json,
+    placement_text,
     seconds,
     seconds_text,
     smooth_json,
@@ -152,6 +153,7 @@ def rows_of(verdict: Verdict) -> list[tuple[str, str]]:
         ("evidence", f"{verdict.evidence}: {_evidence(verdict)}"),
         ("found", _message(verdict)),
         ("certificate", _certificate_text(verdict)),
+        ("placement", placement_text(verdict.certificate)),
         ("smoothed", smooth_text(verdict.cells.surface)),
         ("treated", _treated_text(verdict)),
     ]

@@ -13,6 +13,7 @@ from feasibility.collisions import checked, checked_words, said_of
 from feasibility.reports.parts import (
     certificate_text,
     measured_json,
+    placement_text,
     smooth_json,
     smooth_text,
     summary,
@@ -99,6 +100,7 @@ def as_text(found: Verification, case: str, source: str, notes: Sequence[str] = 
     rows.append(("smoothed", smooth_text(found.cells.surface)))
     if found.proof is not None and found.holds:
         rows.append(("checked", counted(found.boxes, "box", "boxes")))
+    rows.append(("placement", placement_text(found.certificate)))
     rows.append(("treated", "" if found.treated is None else treated_words(found.treated)))
     rows.append(("not judged", _not_judged(found)))
     rows += [("note", note) for note in notes]

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -41,7 +41,9 @@ from feasibility.results.result_rows import (
 from feasibility.safe_files import FileError
 from feasibility.verdict import (
     Answer,
+    Certificate,
     Evidence,
+    PlacementMargin,
     Verdict,
     Walk,
     deferred,
@@ -111,7 +113,7 @@ def save_result(verdict: Verdict, case: Case, path: str | os.PathLike[str]) -> P
         "message": verdict.message,
         "start": None if verdict.start is None else int(verdict.start),
         "causes": [cause_row(cause) for cause in verdict.causes],
-        "certificate": None if verdict.certificate is None else plain(asdict(verdict.certificate)),
+        "certificate": _certificate_row(verdict.certificate),
         "unchecked_links": list(verdict.unchecked_links),
         "pairs_left_out": [plain(asdict(pair)) for pair in verdict.pairs_left_out],
         "timing": plain(verdict.timing),
@@ -271,7 +273,7 @@ def _verdict(fields: Fields, archive: Archive, setup: Setup) -> Verdict:
         else None,
         start=start,
         witness=witness,
-        certificate=read_certificate(fields),
+        certificate=_with_margin(read_certificate(fields), robot, cells, task, witness),
         proof=proof,
         unchecked_links=read_names(fields, "unchecked_links"),
         pairs_left_out=read_left_out(fields),
@@ -281,6 +283,29 @@ def _verdict(fields: Fields, archive: Archive, setup: Setup) -> Verdict:
         timing={key: timing.number(key) for key in timing.entries},
         statistics=dict(fields.table("statistics").entries),
     )
+
+
+def _certificate_row(certificate: Certificate | None) -> dict[str, Any] | None:
+    """The certificate as JSON holds it, but for the margin, which the motion tells."""
+    if certificate is None:
+        return None
+    return {key: value for key, value in plain(asdict(certificate)).items() if key != "margin"}
+
+
+def _with_margin(
+    certificate: Certificate | None, robot: Robot, cells: Cells, task: Task, witness: Walk | None
+) -> Certificate | None:
+    """The certificate, with a placement margin that is found of the motion when it is read."""
+    if certificate is None or witness is None:
+        return certificate
+
+    def found() -> PlacementMargin | None:
+        from feasibility.certification import replay
+
+        needed = np.ones(len(cells), dtype=bool)
+        return replay(robot, cells, task, witness, needed).certificate.placement_margin
+
+    return replace(certificate, margin=found)
 
 
 def _postures(fields: Fields, archive: Archive, count: int, n: int) -> Array | None:

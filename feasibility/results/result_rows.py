@@ -71,7 +71,7 @@ def read_certificate(fields: Fields) -> Certificate | None:
         max_angle=row.number("max_angle"),
         min_limit_margin=np.inf if margin is None else margin,
         nearest_pair=_pair(row, "nearest_pair"),
-        **{key: _maybe(row, key) for key in maybe},
+        **{key: _maybe(row, key) for key in maybe},  # type: ignore[arg-type]
         stops_in_place=_count(row, "stops_in_place"),
         corners=_count(row, "corners"),
     )

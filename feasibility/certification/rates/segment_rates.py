@@ -29,6 +29,7 @@ import numpy as np
 from coverable_arrays import Array, Ints, Mask
 from feasibility.certification.jacobians import Jacobians, jacobians
 from feasibility.certification.lever_bounds import (
+    column_changes,
     levers_along,
     longest_levers,
     second_derivative_bound,
@@ -204,18 +205,13 @@ def _way_bounds(robot: Robot, ways: Array, width: Array, p: _Pieces) -> tuple[Ar
 def _sigma_bounds(robot: Robot, steps: Array, p: _Pieces) -> tuple[Array, Array, Array]:
     """Lower bound of the singular value, and its values at both ends, (k,)."""
     scale = robot.length_unit
-    turns = np.where(robot.prismatic, 0.0, steps)
     square = np.zeros(len(steps))
     for first, last, cap, unit in (
         (p.first.levers, p.last.levers, np.inf, scale),
         (p.first.sines, p.last.sines, 1.0, 1.0),
     ):
         most = levers_along(steps, robot.prismatic, first, last, cap)
-        own = np.cumsum(turns, axis=1)
-        moved = most * steps
-        behind = np.cumsum(moved[:, ::-1], axis=1)[:, ::-1] - moved
-        # A joint that slides keeps its direction unless joints before it turn.
-        change = np.where(robot.prismatic, own * (cap > 1.0), most * own + behind)
+        change = column_changes(most, steps, robot.prismatic)
         square += ((change / unit) ** 2).sum(axis=1)
     first, last = p.sigmas.T
     return 0.5 * (first + last - np.sqrt(square)), first, last
