@@ -5,7 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,8 @@ from feasibility.clock import Clock, OutOfTime
 from feasibility.found import Found
 from feasibility.problem import Problem
 from feasibility.search import Search
-from feasibility.verdict import Replay
+from feasibility.task import PlacementError
+from feasibility.verdict import Replay, Walk
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -34,6 +36,9 @@ START_IN_PIECES = (
 )
 NOT_IN_PIECES = " (With the links cut into convex pieces no more was found: {} of {} cells.)"
 
+HELD_BACK = ((0.2, 0.0), (0.2, 1.5), (0.4, 1.5), (0.6, 3.0))
+"""Shares of the cone, and multiples of the error of the placement, that are held back in turn."""
+
 Method = Callable[[Problem, Search, Clock], Found]
 
 
@@ -50,6 +55,11 @@ class Attempt(NamedTuple):
     def accepted(self) -> bool:
         """Was a motion over all cells accepted?"""
         return self.replayed is not None and self.replayed.accepted
+
+    def left(self, error: PlacementError) -> float:
+        """The share of its margin that an error of the placement uses; inf where there is none."""
+        margin = None if self.replayed is None else self.replayed.certificate.placement_margin
+        return np.inf if margin is None else margin.share(error)
 
     @property
     def decided(self) -> bool:
@@ -89,19 +99,44 @@ def _with_these_shapes(
     first = _attempt(problem, search, clock, method)
     if first.replayed is None or not first.replayed.narrowly_refused:
         return [first]
+    if first.replayed.certificate.placement_margin is not None:
+        return _with_room(first, search, clock, method)
     # The replay measures the deviation between its samples, and may find a little more.
     narrower = _attempt(problem.narrowed, search, clock, method)
     return [narrower, first] if narrower.accepted else [first, narrower]
 
 
-def _attempt(problem: Problem, search: Search, clock: Clock, method: Method) -> Attempt:
-    """Search, and have the motion certified, both within the time limit."""
+def _with_room(first: Attempt, search: Search, clock: Clock, method: Method) -> list[Attempt]:
+    """Attempts at a motion that leaves room for the task's error of the placement, best first."""
+    problem, tried = first.problem, [first]
+    error = PlacementError(*(problem.task.placement_error or (0.0, 0.0)))
+    for cone, times in HELD_BACK:
+        found = _attempt(problem.held_back(cone, error, times), search, clock, method, problem)
+        if found.accepted or found.left(error) < tried[0].left(error):
+            tried.insert(0, found)
+        if found.accepted or clock.out_of_time:
+            break
+    return tried
+
+
+def _attempt(
+    problem: Problem, search: Search, clock: Clock, method: Method, asked: Problem | None = None
+) -> Attempt:
+    """Search, and have the motion certified, both within the time limit.
+
+    Args:
+        problem, search, clock, method: of the search.
+        asked: what the motion is certified for, where that is another problem.
+    """
     called = time.monotonic()
     replayed = None
     try:
         found = method(problem, search, clock)
     except OutOfTime:
         found = _nothing(problem, clock)
+    if asked is not None:
+        found = replace(found, proof=None, replay=found.replay and partial(_replayed, asked, found))
+        problem = asked
     searched = time.monotonic()
     try:
         if found.replay is not None:
@@ -111,6 +146,14 @@ def _attempt(problem: Problem, search: Search, clock: Clock, method: Method) -> 
         found = replace(found, unfinished=NOT_REPLAYED.format(clock.limit))
     search_s = searched - float(np.fmax(called, clock.loaded))
     return Attempt(problem, found, replayed, search_s, time.monotonic() - searched)
+
+
+def _replayed(problem: Problem, found: Found) -> Replay:
+    """The replay of a motion over all cells that was found for another problem."""
+    from feasibility.certification import replay
+
+    needed, walk = np.ones(len(problem.cells), dtype=bool), found.motion
+    return replay(problem.robot, problem.cells, problem.task, cast("Walk", walk), needed)
 
 
 def _in_pieces(problem: Problem, clock: Clock) -> Problem | None:

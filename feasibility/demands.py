@@ -102,6 +102,10 @@ DEMANDS = (
         lambda robot, task: task.min_manipulability is not None, _at_rates,
     ),
     Demand(
+        "placement error", ("task.placement_error",),
+        lambda robot, task: task.placement_error is not None,
+    ),
+    Demand(
         "coverage", ("task.coverage",), lambda robot, task: task.coverage is not None,
         _treating, together=True,
     ),

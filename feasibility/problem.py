@@ -5,15 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from feasibility.collisions import gather
 from feasibility.targets import check_references
-from feasibility.task import Task, check_footprint, check_smooth
+from feasibility.task import PlacementError, Task, check_footprint, check_smooth
 from robots import Robot
 from surfaces import Cells, Surface
 
 if TYPE_CHECKING:
     from feasibility.collisions import Bodies, Pair
 
+HELD = 0.3  # [m] lever by which a shift of the tool turns a joint, about
 NARROWER = 0.9  # [1] of tolerance, cone and roll, when the replay refuses what just kept to them
 
 Given = tuple[object, str, type, str]
@@ -83,6 +86,33 @@ class Problem:
             roll_deg = roll_deg[0] + less, roll_deg[1] - less
         searched = replace(self.task, tolerance=tolerance, cone_deg=cone_deg, roll_deg=roll_deg)
         return replace(self, searched=searched)
+
+    def held_back(self, cone: float, error: PlacementError, times: float) -> Problem:
+        """The same problem, searched with room for an error of the placement.
+
+        Nothing is proved by it: the answer counts where the motion keeps what is asked for.
+
+        Args:
+            cone: which share of cone and range of the roll the search leaves.
+            error: of the placement.
+            times: how much of it, about, limits and clearances are held back for.
+        """
+        cells, robot, task = self.cells, self.robot, self.searched
+        size = np.linalg.norm(cells.centres - cells.centres.mean(axis=0), axis=1).max(initial=0.0)
+        shift = times * (error.position + np.radians(error.angle_deg) * float(size))
+        turn = shift * np.where(robot.prismatic, 1.0, 1.0 / HELD)
+        lower, upper = robot.lower + turn, robot.upper - turn
+        limits = np.where(lower < upper, [lower, upper], [robot.lower, robot.upper]).T
+        collision, roll_deg = task.collision, task.roll_deg
+        if collision is not None:
+            collision = collision.raised(shift)
+        if task.roll is not None and roll_deg is not None:
+            less = 0.5 * cone * (roll_deg[1] - roll_deg[0])
+            roll_deg = roll_deg[0] + less, roll_deg[1] - less
+        searched = replace(
+            task, cone_deg=(1.0 - cone) * task.cone_deg, roll_deg=roll_deg, collision=collision
+        )
+        return replace(self, robot=robot.with_limits(limits), searched=searched)
 
     @property
     def in_pieces(self) -> Problem | None:

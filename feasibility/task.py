@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
@@ -176,10 +177,13 @@ class Task:
 
     def _checked_placement_error(self, checks: Checks) -> PlacementError | None:
         """Shift and turn, neither below zero."""
-        given = self.placement_error
+        given: Any = self.placement_error
         if given is None:
             return None
-        expected = "must be a shift and a turn >= 0, such as (0.003, 0.2) (metres, degrees)"
+        expected = "must be a shift and a turn >= 0, such as { position = 0.003, angle_deg = 0.2 }"
+        if isinstance(given, Mapping):
+            known = dict.fromkeys(PlacementError._fields, 0.0)
+            given = list({**known, **given}.values())
         found = checks.numbers("placement_error", given, 2, expected)
         if found is None:
             return None

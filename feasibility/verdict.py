@@ -11,6 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from coverable_arrays import Array, Ints, Mask
+from coverable_errors import at_least
 from feasibility.collisions import said_of
 from feasibility.cut_tree import CutTree
 from feasibility.task import PlacementError, Task
@@ -119,6 +120,21 @@ class PlacementMargin:
         """The share of the margin that an error of the placement uses: up to 1 it is certified."""
         parts = (error.position, self.position), (math.radians(error.angle_deg), self.angle)
         return sum(0.0 if not a else a / b if b else math.inf for a, b in parts)
+
+    def __str__(self) -> str:
+        """What is certified, and what leaves least room."""
+        if self.bound_by is Bound.START:
+            return "no margin: the motion begins at the start, wherever the part stands"
+        least = {
+            Bound.LIMIT: f"{self.what}'s limit",
+            Bound.CONE: "the cone",
+            Bound.ROLL: "the range of the roll",
+            Bound.SINGULAR: "the arm is near a singularity",
+            Bound.CLEARANCE: f"the clearance of {self.what}",
+        }[self.bound_by]
+        shift, turn = at_least(1e3 * self.position, 3), at_least(math.degrees(self.angle), 3)
+        held = f"within {shift} mm, or turned by up to {turn} deg about its middle"
+        return f"{held}; least room: {least} at cell {list(self.cell)}"
 
 
 @dataclass(frozen=True)  # no slots: the margin is kept in its __dict__

@@ -35,7 +35,7 @@ from feasibility.cases.toml_edits import differences, edited
 from feasibility.safe_files import FileError, read_text, shown_path
 from feasibility.search import Search
 from feasibility.targets import check_references
-from feasibility.task import Task, check_footprint
+from feasibility.task import PlacementError, Task, check_footprint
 
 if TYPE_CHECKING:
     from robots import Robot
@@ -148,6 +148,8 @@ class Case:
     def to_tables(self) -> Tables:
         """The case as the tables of its TOML; what is None is left out."""
         task = {name: as_read(getattr(self.task, name)) for name in TASK}
+        error = self.task.placement_error
+        task["placement_error"] = None if error is None else PlacementError(*error)._asdict()
         search = {name: getattr(self.search, name) for name in Search.__dataclass_fields__}
         tables = {
             "robot": self.robot.table(),

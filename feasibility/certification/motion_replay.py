@@ -14,6 +14,7 @@ from coverable_arrays import Array, Mask
 from feasibility.certification.cells_reached import at_targets
 from feasibility.certification.collisions import collision_replay
 from feasibility.certification.order import order_of_marks
+from feasibility.certification.placement_margin import margin_fault
 from feasibility.certification.rolls import reference_axes
 from feasibility.certification.surface_replay import replay_over_surface
 from feasibility.collisions import gather
@@ -49,7 +50,8 @@ def replay(
     disorder = _malformed(cells, walk) or order_of_marks(cells, walk)
     if disorder:
         return Replay(Certificate(len(walk.q), np.nan, np.nan, np.nan), disorder)
-    found = replay_over_surface(robot, cells, task, walk.q, needed, marks=walk.cell)
+    here = replace(task, placement_error=None)  # its margin is judged last
+    found = replay_over_surface(robot, cells, here, walk.q, needed, marks=walk.cell)
     refusal = found.refusal or _misplaced(robot, cells, task, walk)
     bodies = gather(robot, cells.surface, task.collision, task.standoff)
     certificate, collides = found.certificate, False
@@ -59,6 +61,7 @@ def replay(
         collides = not clear.accepted
     if refusal or deviations is not None:  # the margin is of motions that are straight
         certificate = replace(certificate, margin=None)
+    refusal = refusal or margin_fault(task, certificate)
     return Replay(certificate, refusal, collides)
 
 

@@ -56,8 +56,8 @@ from feasibility.certification.lever_bounds import (
 from feasibility.certification.rates.segment_rates import smallest_singular
 from feasibility.certification.rows import Rows
 from feasibility.collisions import gather
-from feasibility.task import Task
-from feasibility.verdict import Bound, PlacementMargin
+from feasibility.task import PlacementError, Task
+from feasibility.verdict import Bound, Certificate, PlacementMargin
 from robots import Kinematics, Robot
 from surfaces import Cells
 
@@ -312,6 +312,17 @@ def _cell(case: _Case, cells: Cells, q: Array) -> tuple[int, ...]:
     """The cell whose target is nearest to the tool at q (n,)."""
     off = case.task.targets(cells).points - Kinematics(case.robot).tool(q)[0]
     return cells.unravel(int(np.linalg.norm(off, axis=1).argmin()))
+
+
+def margin_fault(task: Task, certificate: Certificate) -> str:
+    """Why the margin is less than what the task asks for; empty where it is not, or not known."""
+    if task.placement_error is None or certificate.placement_margin is None:
+        return ""
+    error, margin = PlacementError(*task.placement_error), certificate.placement_margin
+    if margin.share(error) <= 1.0:
+        return ""
+    asked = f"{1e3 * error.position:g} mm and {error.angle_deg:g} deg off its place"
+    return f"the part may stand {asked}; certified is {margin}"
 
 
 def margin_of(

@@ -35,7 +35,7 @@ from feasibility.certification.faults import Judged, MotionFault
 from feasibility.certification.followed import followed_parts, lifted_faults, off_surface
 from feasibility.certification.jacobians import placements
 from feasibility.certification.order import curves_of_marks, order_of_places
-from feasibility.certification.placement_margin import margin_of
+from feasibility.certification.placement_margin import margin_fault, margin_of
 from feasibility.certification.refusals import exact_faults, limits, open_fault
 from feasibility.certification.stretches import Bounds, Judge, Samples, Stretches
 from feasibility.collisions import Bodies
@@ -127,8 +127,9 @@ def replay_over_surface(
         faults += clear.faults
         certificate = clear.added_to(certificate)
     if len(cells) and not faults:
-        found_later = margin_of(robot, cells, task, rows, found.room)
-        certificate = replace(certificate, margin=found_later)
+        certificate = replace(certificate, margin=margin_of(robot, cells, task, rows, found.room))
+        short = margin_fault(task, certificate)
+        faults += [MotionFault(-1, 0.0, short)] if short else []
     return MotionReplay(certificate, tuple(faults), at)
 
 

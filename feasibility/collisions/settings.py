@@ -109,6 +109,15 @@ class Collision:
             clearances=tuple(row for row in self.clearances if SURFACE not in row[:2]),
         )
 
+    def raised(self, more: float) -> Collision:
+        """The same with clearances larger by `more` (m), but for the tool over the surface."""
+        rows = tuple((first, second, value + more) for first, second, value in self.clearances)
+        scene = tuple(
+            one if one.clearance is None else replace(one, clearance=one.clearance + more)
+            for one in self.scene
+        )
+        return replace(self, clearance=self.clearance + more, clearances=rows, scene=scene)
+
     def unknown_names(self, links: Sequence[str]) -> list[Fault]:
         """Faults of names that are neither links of the arm nor objects, to be raised with others.
 

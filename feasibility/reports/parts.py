@@ -17,7 +17,7 @@ from coverable_arrays import Array
 from coverable_errors import at_least, at_most, counted, listed
 from feasibility.results import plain
 from feasibility.task import Task
-from feasibility.verdict import Cause, Certificate, PlacementMargin, Walk
+from feasibility.verdict import Bound, Cause, Certificate, PlacementMargin, Walk
 from robots import Robot
 from robots.shapes import LeftOut
 from surfaces import Cells, Surface
@@ -169,27 +169,8 @@ def placement_text(certificate: Certificate | None) -> str:
     margin = None if certificate is None else certificate.placement_margin
     if margin is None:
         return ""
-    if margin.bound_by == "start":
-        return "no margin: the motion begins at the start, wherever the part stands"
-    least = f"least room: {least_room(margin)} at cell {list(margin.cell)}"
-    shift, turn = (at_least(one, 3) for one in (1e3 * margin.position, math.degrees(margin.angle)))
-    if not margin.position > 0.0:
-        return f"holds where the part stands, and no margin is certified; {least}"
-    return (
-        f"a motion exists wherever the part stands within {shift} mm, or turned by up to {turn} "
-        f"deg about its middle; {least}"
-    )
-
-
-def least_room(margin: PlacementMargin) -> str:
-    """What leaves least room to shift the surface."""
-    return {
-        "limit": f"{margin.what}'s limit",
-        "cone": "the cone",
-        "roll": "the range of the roll",
-        "singular": "the arm is near a singularity",
-        "clearance": f"the clearance of {margin.what}",
-    }[margin.bound_by]
+    some = margin.bound_by is not Bound.START
+    return f"a motion exists wherever the part stands {margin}" if some else str(margin)
 
 
 def measured_json(

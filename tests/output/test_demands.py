@@ -50,6 +50,7 @@ IMPOSSIBLE = {
     "start": ["robot.start_deg=[0, -90, 90, 90, 90, -160]"],
     "speed": ["task.speed=3.0"],
     "distance from singularities": ["task.min_manipulability=0.9"],
+    "placement error": ["task.placement_error={ position = 0.5, angle_deg = 0 }"],
     "coverage": ["task.footprint=0.005", "task.coverage=0.99"],
 }
 """Of each demand, what no motion of this arm holds."""
