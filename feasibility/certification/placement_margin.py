@@ -39,7 +39,7 @@ pairs with the surface, or what is at rest beside it (which may go with it, or n
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import NamedTuple
 
@@ -118,6 +118,8 @@ class _Stretches(Rows):
     """k parts of segments between rows."""
 
     row: Ints
+    share: Array
+    """(k, 2) from where to where on the way to the next row, 0..1."""
     first: _Ends
     last: _Ends
     room: Array
@@ -129,6 +131,8 @@ class _Balls(Rows):
     """What holds along k stretches for |v| <= y."""
 
     row: Ints
+    share: Array
+    """(k, 2) see `_Stretches`."""
     slope: Array
     """(k,) 1 - kappa."""
     second: Array
@@ -238,7 +242,7 @@ def _balls_of(case: _Case, s: _Stretches, size: Array, most: Array) -> _Balls:
     limits = _ratio(_left(robot, a.q, b.q), moves)
     far = np.maximum(*(np.linalg.norm(end.points - case.pivot, axis=1) for end in (a, b)))
     return _Balls(
-        s.row, slope, second, np.column_stack([turned + 0.5 * norm * changes[1], bend]), moves,
+        s.row, s.share, slope, second, np.column_stack([turned + 0.5 * norm * changes[1], bend]), moves,
         np.where(slides, 0.0, moves).sum(axis=1), np.column_stack([limits.min(axis=1), singular]),
         s.room * [1.0, np.cos(0.5 * min(case.task.cone, 0.5 * np.pi))],
         far + 0.5 * (along[0] * steps).sum(axis=1),
@@ -248,15 +252,18 @@ def _balls_of(case: _Case, s: _Stretches, size: Array, most: Array) -> _Balls:
 def _balls_along(case: _Case, q: Array, room: Array) -> Iterator[_Balls]:
     """Of stretches that are halved until configurations themselves have little more room."""
     ends, row = _ends(case, q), np.arange(len(q) - 1)
-    left = _Stretches(row, ends.of(row), ends.of(row + 1), room[row])
+    whole = np.tile([0.0, 1.0], (len(row), 1))
+    left = _Stretches(row, whole, ends.of(row), ends.of(row + 1), room[row])
     middle, most = left.first, np.full(2, np.inf)
     for level in range(LEVELS + 1):
-        at = _balls(case, _Stretches(left.row, middle, middle, left.room))
+        at = _balls(case, replace(left, first=middle, last=middle))
         most = np.minimum(most, [at.positions.min(), at.angles.min()])
         if level:
+            low, high = left.share.T
+            half = 0.5 * (low + high)
             left = _Stretches.join(
-                _Stretches(left.row, left.first, middle, left.room),
-                _Stretches(left.row, middle, left.last, left.room),
+                replace(left, share=np.column_stack([low, half]), last=middle),
+                replace(left, share=np.column_stack([half, high]), first=middle),
             )
         made = _balls(case, left)
         good = (made.positions >= CLOSE * most[0]) & (made.angles >= CLOSE * most[1])
