@@ -29,6 +29,7 @@ from feasibility import Search, Task, check, verify
 from feasibility.certification import displaced_bodies, replay, surface_replay
 from feasibility.certification import placement_margin as lemma
 from feasibility.collisions import Collision, Obstacle, gather
+from feasibility.task import PlacementError
 from feasibility.verdict import Bound, Walk
 from robots import Axis, load_robot
 from surfaces import (
@@ -497,18 +498,20 @@ def test_there_is_none_without_a_way_to_follow():
 @pytest.mark.parametrize("name", ["plate", "small dome"])
 def test_what_is_asked_for_is_found_or_said_to_be_missing(name):
     robot, cells, task = question(name)[2:5]
-    nominal = check(robot, cells, replace(task, cone_deg=5.0))
-    assert nominal.feasible
-    reached = nominal.certificate.placement_margin
-    asked_for = (max(2.0 * reached.position, 1e-3), 0.05)
-    wider = check(robot, cells, replace(task, cone_deg=5.0, placement_error=asked_for))
-    assert wider.feasible
-    margin = wider.certificate.placement_margin
-    assert asked_for[0] / margin.position + np.radians(0.05) / margin.angle <= 1.0
-    assert verify(wider).holds
-    too_much = replace(wider.task, placement_error=(0.4, 0.0))
+    task = replace(task, cone_deg=5.0)
+    asked_for = PlacementError(0.006, 0.2)
+    nominal = check(robot, cells, task).certificate.placement_margin
+    verdict = check(robot, cells, replace(task, placement_error=asked_for))
+    assert verdict.feasible
+    margin = verdict.certificate.placement_margin
+    assert nominal.share(asked_for) > 1.0 >= margin.share(asked_for)
+    assert margin.share(asked_for) == pytest.approx(
+        0.006 / margin.position + np.radians(0.2) / margin.angle
+    )
+    assert verify(verdict).holds
+    too_much = replace(task, placement_error=(0.4, 0.0))
     assert check(robot, cells, too_much).answer == "undecided"
-    refusal = verify(robot, cells, too_much, wider.witness.q).refusal
+    refusal = verify(robot, cells, too_much, verdict.witness.q).refusal
     assert "400 mm" in refusal
     assert str(margin) in refusal
     away = replace(robot, lower=robot.lower * 0.01, upper=robot.upper * 0.01)
