@@ -26,8 +26,8 @@ from samples import sampled, seeds
 
 from coverable_errors import ArgumentError
 from feasibility import Search, Task, check, verify
-from feasibility.certification import displaced_bodies, replay, surface_replay
-from feasibility.certification import placement_margin as lemma
+from feasibility.certification import displaced_bodies, placement_margin, replay, surface_replay
+from feasibility.certification import displacement_balls as lemma
 from feasibility.collisions import Collision, Obstacle, gather
 from feasibility.task import PlacementError
 from feasibility.verdict import Bound, Walk
@@ -171,8 +171,8 @@ def margin_and_balls(robot, cells, task, walk):
         surface_replay.margin_of = real
     assert found.accepted, found.refusal
     *_, q, room = asked[0]
-    case = lemma._Case(robot, task, cells.centres.mean(axis=0))
-    balls = lemma._Balls.join(*lemma._balls_along(case, q, room))
+    case = lemma.Given(robot, task, cells.centres.mean(axis=0))
+    balls = lemma.Balls.join(*lemma.balls_along(case, q, room))
     return found.certificate.placement_margin, balls
 
 
@@ -359,10 +359,10 @@ def test_bounds_along_stretches(name, seed):
         way = 0.35 * rng.random() ** 3 * referee.unit(rng.normal(size=robot.n))
         q, size = np.stack([start, start + way]), np.array([rng.uniform(0.0, 0.05)])
         least = singular(robot, arm, q).min()
-        case = lemma._Case(robot, Task(0.0, 30.0, min_manipulability=0.9 * least), np.ones(3))
-        ends, whole = lemma._ends(case, q), np.array([[0.0, 1.0]])
-        s = lemma._Stretches(one, whole, ends.of(one), ends.of(one + 1), np.full((1, 2), 9.0))
-        ball = lemma._balls_of(case, s, size, size)
+        case = lemma.Given(robot, Task(0.0, 30.0, min_manipulability=0.9 * least), np.ones(3))
+        ends, whole = lemma.ends_of(case, q), np.array([[0.0, 1.0]])
+        s = lemma.Parts(one, whole, ends.of(one), ends.of(one + 1), np.full((1, 2), 9.0))
+        ball = lemma.balls_of(case, s, size, size)
         if not ball.slope > 0.2:
             continue
         share = np.linspace(0.0, 1.0, 9)[:, None, None]
@@ -419,7 +419,7 @@ def test_what_a_ball_allows_is_solved_for():
     tilts, caps = rng.uniform(0.1, 3.0, (k, 2)), rng.uniform(0.01, 0.3, (k, 2))
     room, slope, second, turns = rng.uniform(0.05, 1.0, (k, 2)), *rng.uniform(0.5, 0.9, (3, k))
     moves, far = rng.uniform(0.0, 2.0, (k, 6)), rng.uniform(0.1, 1.0, k)
-    ball = lemma._Balls(np.arange(k), room, slope, second, tilts, moves, turns, caps, room, far)
+    ball = lemma.Balls(np.arange(k), room, slope, second, tilts, moves, turns, caps, room, far)
     theta = 0.04 * rng.random(k)
     limit, cone, roll, other = ball.allowed(theta).T
     np.testing.assert_array_equal([limit, other], caps.T)
@@ -584,5 +584,5 @@ def test_the_last_row_counts_for_the_last_segment():
     """And a cell's own approach direction where its target is passed."""
     q, room = PLATE.centres[[0, 1, 3, 2]], np.full((4, 2), 0.5)
     room[3, 0] = 0.01
-    margin = lemma.placement_margin(slides(), PLATE, Task(0.0, 30.0), q, room)
+    margin = placement_margin.placement_margin(slides(), PLATE, Task(0.0, 30.0), q, room)
     assert margin.angle == pytest.approx(0.01, rel=1e-6)
