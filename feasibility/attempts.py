@@ -110,7 +110,7 @@ def _with_room(first: Attempt, search: Search, clock: Clock, method: Method) -> 
     """Attempts at a motion that leaves room for the task's error of the placement, best first."""
     problem, tried = first.problem, [first]
     error = PlacementError(*(problem.task.placement_error or (0.0, 0.0)))
-    for cone, times in HELD_BACK:
+    for cone, times in () if problem.robot.start is not None else HELD_BACK:
         found = _attempt(problem.held_back(cone, error, times), search, clock, method, problem)
         if found.accepted or found.left(error) < tried[0].left(error):
             tried.insert(0, found)

@@ -169,6 +169,7 @@ def margins_of(verdict: Verdict) -> dict[str, float | None] | None:
             where no such joint has one.
         cone_deg: by how much the tool axis stays inside the cone.
         reach_m: by how much the furthest target is nearer than the arm's reach; None without one.
+        placement_m: how far the surface may be shifted; None where that is not known.
     """
     certificate, robot, task = verdict.certificate, verdict.robot, verdict.task
     if certificate is None or not verdict.feasible or len(verdict.cells) == 0:
@@ -179,13 +180,14 @@ def margins_of(verdict: Verdict) -> dict[str, float | None] | None:
         least = np.minimum(q - robot.lower, robot.upper - q).min(axis=0, initial=np.inf)
         revolute = math.degrees(float(least[~robot.prismatic].min(initial=np.inf)))
         prismatic = float(least[robot.prismatic].min(initial=np.inf))
-    points = task.targets(verdict.cells).points
+    points, margin = task.targets(verdict.cells).points, certificate.placement_margin
     away = float(robot.distance_from_base(points).max())
     return {
         "limit_deg": finite(revolute),
         "limit_m": finite(prismatic),
         "cone_deg": task.cone_deg - math.degrees(float(certificate.max_angle)),
         "reach_m": finite(robot.reach - away),
+        "placement_m": None if margin is None else float(margin.position),
     }
 
 

@@ -63,7 +63,7 @@ class Arm:
     """The smallest cone with a covering motion, to `CONE_STEP_DEG`; narrower ones than
     `LEAST_CONE_DEG` are not tested. None where there is none, or it was not requested."""
     margins: dict[str, float | None] | None = None
-    """What the covering motion leaves: limit_deg, limit_m, cone_deg, reach_m."""
+    """What the covering motion leaves: limit_deg, limit_m, cone_deg, reach_m, placement_m."""
     unchecked_links: Sequence[str] = ()
     """What has no body, where collisions are checked; see `Verdict`."""
     seconds: float = 0.0

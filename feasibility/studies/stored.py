@@ -78,7 +78,12 @@ BITS = Part(
     "a list of hexadecimal bits",
 )
 MARGINS = optional(
-    table({key: optional(number()) for key in ("limit_deg", "limit_m", "cone_deg", "reach_m")})
+    table(
+        {
+            key: optional(number())
+            for key in ("limit_deg", "limit_m", "cone_deg", "reach_m", "placement_m")
+        }
+    )
 )
 
 POSE = Part(

@@ -28,7 +28,7 @@ from feasibility.task import Task
 from feasibility.verdict import Verdict
 from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer import threejs
-from feasibility.viewer.areas import area_layers
+from feasibility.viewer.areas import area_layers, margin_layers
 from feasibility.viewer.frames import carried, root_in_world, triads, world_tracks
 from feasibility.viewer.html_page import Camera, Entry, Legend, Readout, page
 from feasibility.viewer.live_server import LiveView
@@ -133,6 +133,7 @@ def view(verdict: Verdict, case: str | None = None, *, play: bool = True, at: fl
         parts += area_layers(verdict.treated, verdict.cells.surface.side_sign)
     if motion is not None:
         parts.append(trail(verdict.cells, motion))
+    parts += margin_layers(verdict)
     covered = f"{verdict.n_covered} of {counted(len(verdict.cells), 'cell')}"
     text = f"{verdict.robot.name}: {covered} in one continuous motion ({verdict.method} search)"
     if verdict.proof is not None:
