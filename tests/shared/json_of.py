@@ -87,6 +87,12 @@ def bounds(one: Any) -> Json:
         **there(max_roll_deg=degrees(one.max_roll), max_speed_m_per_s=one.max_speed,
                 stops_in_place=one.stops_in_place, corners=one.corners,
                 min_singular_value=one.min_singular_value),
+        "placement_margin": one.placement_margin and {
+            "position_m": one.placement_margin.position,
+            "angle_deg": degrees(one.placement_margin.angle),
+            "pivot": list(one.placement_margin.pivot), "cell": list(one.placement_margin.cell),
+            "bound_by": str(one.placement_margin.bound_by),
+        },
     }  # fmt: skip
 
 
