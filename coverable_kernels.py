@@ -42,13 +42,11 @@ CODE = (
     "surfaces/patches/closed_form_kernels.py",
     "feasibility/collisions/kernels/*.py",
     "feasibility/paper/*.py",
-    "feasibility/placement/quick_search.py",
     "feasibility/roadmap/branch_and_bound/*.py",
     "feasibility/roadmap/causes/diagnosis.py",
     "feasibility/roadmap/cuts/findings.py",
     "feasibility/roadmap/motions/*.py",
     "feasibility/roadmap/moving_clear.py",
-    "feasibility/sensitivity/limited_search.py",
     "feasibility/timing/fastest_speeds.py",
     "feasibility/viewer/painter.py",
 )

@@ -33,6 +33,9 @@ class Search:
     evaluations: int | None = None
     """Complete: evaluations of the arm after which the verdict is "undecided": an effort that is
     the same on every machine. A box of a proof counts as one."""
+    early: bool = False
+    """Complete: end where the answer is known: no further cells are looked for where one is proved
+    uncoverable, nor motions between neighbouring cells, besides those that the answer needs."""
     step_deg: float = 0.01
     """Greedy: delta q of revolute joints, degrees. A prismatic joint steps by the length that the
     same angle sweeps at the arm's reach."""
@@ -53,6 +56,8 @@ class Search:
             kept["time_limit"] = checks.positive("time_limit", self.time_limit, "seconds")
         if self.evaluations is not None:
             kept["evaluations"] = checks.whole("evaluations", self.evaluations, 1)
+        if not isinstance(self.early, bool):
+            checks.wrong("early", self.early, "must be True or False")
         kept["step_deg"] = checks.number(
             "step_deg", self.step_deg, "must lie in 0.0001 .. 30 (degrees)", 1e-4, 30.0
         )

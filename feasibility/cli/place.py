@@ -89,7 +89,7 @@ def run_place(args: argparse.Namespace, began: float) -> int:
     drawn = chart = plan = None
     opening = open_case(args, began, files, time_limit=args.time_limit)
     with opening as opened, contextlib.ExitStack() as stack:
-        from feasibility.placement import COUNT, Pose, Region, StudyEvaluator, place
+        from feasibility.placement import COUNT, Pose, Region, evaluator_of_study, place
         from feasibility.studies import Store, open_workers
 
         case, setup, clock = opened.case, opened.setup, opened.clock
@@ -98,7 +98,8 @@ def run_place(args: argparse.Namespace, began: float) -> int:
         count = COUNT if args.count is None else args.count
         store = None if args.out is None else stack.enter_context(Store(args.out))
         workers = stack.enter_context(open_workers(args.workers, args.dask))
-        evaluator: Evaluator = StudyEvaluator(case, workers, store, lambda *_: settle())
+        number = len(setup.cells)
+        evaluator = evaluator_of_study(case, number, workers, store, lambda *_: settle())
         placements = place(
             *setup[:3], region, setup.search, evaluator=evaluator, count=count, clock=clock,
             progress=with_rate(opened.progress), interruptible=True,

@@ -6,6 +6,7 @@ from .division import Plan as Plan
 from .division import SubPatch as SubPatch
 from .free_motion import FreeSpace as FreeSpace
 from .free_motion import free_motion as free_motion
+from .one_motion import motion_over as motion_over
 from .plans import collect_components as collect_components
 from .plans import connect_pairs as connect_pairs
 from .proved_bound import ProvedBound as ProvedBound

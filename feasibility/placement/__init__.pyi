@@ -1,13 +1,9 @@
-from .evaluator import LocalEvaluator as LocalEvaluator
-from .evaluator import Stage as Stage
-from .evaluator import Trial as Trial
 from .map import PlacementMap as PlacementMap
 from .map import map_around_best as map_around_best
 from .map import placement_map as placement_map
 from .placements import COUNT as COUNT
 from .placements import Placements as Placements
 from .placements import place as place
-from .refinement import Evaluator as Evaluator
 from .region import AXES as AXES
 from .region import PlacementError as PlacementError
 from .region import Pose as Pose
@@ -15,5 +11,7 @@ from .region import Region as Region
 from .region import moved_cells as moved_cells
 from .stations import StationPlan as StationPlan
 from .stations import station_plan as station_plan
-from .study_tasks import StudyEvaluator as StudyEvaluator
-from .study_tasks import trial_table as trial_table
+from .trials import Evaluator as Evaluator
+from .trials import Trial as Trial
+from .trials import evaluator_here as evaluator_here
+from .trials import evaluator_of_study as evaluator_of_study

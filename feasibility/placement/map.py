@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from coverable_arrays import Array, Mask
-from feasibility.placement.evaluator import Stage
 from feasibility.placement.placements import Placements
-from feasibility.placement.refinement import Evaluator, search_all
 from feasibility.placement.region import AXES, PlacementError, Pose, Region
+from feasibility.placement.trials import Evaluator, search_all
 from feasibility.search import Progress
 
 SIDE = 15  # places along each of the first two axes
@@ -30,9 +29,9 @@ class PlacementMap:
     share: Array
     """(a, b) or (a, b, c) largest share of the area that one motion was found to cover."""
     margin: Array
-    """Likewise the margin, see `placement.quick_search`; 0 where not every cell is covered."""
+    """Likewise the margin, see `Trial.margin`; 0 where none is feasible."""
     known: Mask
-    """Likewise, where a search was run; elsewhere share and margin are NaN."""
+    """Likewise, where it could be tried; elsewhere share and margin are NaN."""
 
     def __post_init__(self) -> None:
         """Write-protect the arrays."""
@@ -56,7 +55,7 @@ def placement_map(
     shape: Sequence[int] | None = None,
     progress: Progress | None = None,
 ) -> PlacementMap:
-    """Search every placement of a raster.
+    """A quick look at every placement of a raster.
 
     Args:
         evaluator: tries placements.
@@ -92,8 +91,9 @@ def placement_map(
     grid = np.meshgrid(*ticks, indexing="ij")
     for k, places in zip(where, grid, strict=True):
         values[:, k] = places.ravel()
-    trials = search_all(evaluator, values, progress, "searching the map")
-    known = np.array([trial.stage is not Stage.FAILED for trial in trials])
+    poses = [Pose.of_values(row) for row in values]
+    trials = search_all(evaluator, poses, progress, "searching the map")
+    known = np.array([not trial.failed for trial in trials])
     share = np.where(known, [trial.share for trial in trials], np.nan)
     margin = np.where(known, [trial.margin for trial in trials], np.nan)
     raster = (array.reshape(counts) for array in (share, margin, known))

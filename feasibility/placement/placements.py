@@ -1,14 +1,12 @@
-"""Where may the surface stand? A search over the poses of a region, coarse to fine.
+"""Where may the surface stand? A search over the poses of a region.
 
 1. The reach bound is evaluated over the region; where it shows that every placement has a target
    out of reach, that is the answer, and no search is run.
-2. Poses are spread evenly over the region (Sobol). The same bound discards most of those that are
-   out of reach; of the others, Newton's method is tried at a few cells that differ most. A short
-   search is run only where it succeeds at all of them.
-3. Around the best few, more poses are tried in ever smaller boxes: larger covered share first, then
-   larger margin (see `feasibility.placement.quick_search`).
-4. The best placements are decided as any other case: `feasibility.check` searches and replays.
-   Only what it calls feasible is an answer.
+2. Poses are spread evenly over the region (Sobol) and improved by differential evolution (Storn and
+   Price, 1997): larger covered share first, then larger margin. A pose with a target out of reach
+   costs nothing, and is the worse the further out it is; at the others `check` has a quick look.
+   Where that finds a motion it is replayed, and feasible like any other.
+3. Where none is found, the best placements are checked with all effort.
 
 The poses tried depend on the region, the counts and the seed alone, not on the evaluator.
 """
@@ -16,8 +14,7 @@ The poses tried depend on the region, the counts and the seed alone, not on the 
 from __future__ import annotations
 
 import time
-from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -27,10 +24,10 @@ from feasibility.clock import Clock
 from feasibility.collisions import said_of
 from feasibility.demands import refuse_start
 from feasibility.notices import compiling_notice
-from feasibility.placement.evaluator import LocalEvaluator, Stage, Trial
+from feasibility.placement.evolution import INTERRUPTED, Evolution, distinct
 from feasibility.placement.reach_bound import Beyond, Reach
-from feasibility.placement.refinement import INTERRUPTED, Evaluator, Refinement
-from feasibility.placement.region import PlacementError, Pose, Region
+from feasibility.placement.region import PlacementError, Region
+from feasibility.placement.trials import Evaluator, Trial, evaluator_here
 from feasibility.roadmap import warm_up
 from feasibility.search import Progress, Search
 from feasibility.targets import blocked_curves, smoothing_offer
@@ -46,11 +43,8 @@ MISSED = {
     CauseKind.COLLISION: "missed for collision",
     CauseKind.DISCONNECTED: "reachable by another motion only",
 }
-
-COUNTS = ("fk", "drawn", "bound", "probe", "search", "check", "boxes")  # see `statistics`
-
-COUNT = 256  # poses spread over the region
-AROUND = 8  # poses tried around each of the best, a round
+COUNT = 64  # poses spread over the region, and tried again in each round
+ROUNDS = 6
 KEEP = 5
 MOST = 100_000  # of any of these
 
@@ -80,8 +74,8 @@ class Placements:
     timing: dict[str, float] = field(default_factory=dict)
     """Seconds: total_s."""
     statistics: dict[str, Any] = field(default_factory=dict)
-    """fk: evaluations of the arm; drawn, bound, probe, search, check: placements by the stage that
-    they came to; boxes: of the region's bound."""
+    """fk: evaluations of the arm; drawn, bound: placements, and those that the reach bound
+    discards; tried: with `check`; boxes: of the region's bound."""
     stopped: str = ""
     """Why the search did not go on to its end, in words; empty where it did."""
 
@@ -115,9 +109,8 @@ def place(
     search: Search | None = None,
     *,
     count: int = COUNT,
-    around: int = AROUND,
+    rounds: int = ROUNDS,
     keep: int = KEEP,
-    early: bool = True,
     time_limit: float | None = None,
     evaluator: Evaluator | None = None,
     progress: Progress | None = None,
@@ -132,11 +125,10 @@ def place(
         task: standoff, cone and tolerance.
         region: the poses of the surface's frame to search.
         search: of each verdict; its seed also spreads the poses.
-        count: poses spread over the region; refinement comes on top.
-        around: poses tried around each of the best, a round; 0 for no refinement.
-        keep: feasible placements to verify, at most.
-        early: whether bounds and probes may discard placements before a search is run.
-        time_limit: s, for all of it; looked at between batches, and in a command within them.
+        count: poses spread over the region (five at least), and tried again in each round.
+        rounds: of better ones.
+        keep: feasible placements that are given, at most.
+        time_limit: s, for all of it; looked at between placements, and in a command within them.
         evaluator: tries placements; default in this process.
         progress: called as progress(done, total, text); what it raises ends the search.
         clock: of the command that this is a part of; its limit counts instead of `time_limit`.
@@ -160,21 +152,22 @@ def place(
         (<Answer.FEASIBLE: 'feasible'>, True)
     """
     search = Search() if search is None else search
-    _check_settings(cells, search, count, around, keep, time_limit)
+    _check_settings(cells, search, count, rounds, keep, time_limit)
     refuse_start(robot, "but where the surface stands elsewhere it is not over it")
     began = time.monotonic()
     clock = clock or Clock(time_limit).start()
     reach = Reach.of(robot, cells, task)
     answered = partial(Placements, robot, cells, task, region)
     if (beyond := reach.beyond(region)) is not None:
-        return _timed(_ruled_out(answered, region, reach, beyond), began)
+        return _timed(_ruled_out(answered, beyond), began)
     if evaluator is None:
         with compiling_notice():
             warm_up()
-        evaluator = LocalEvaluator(robot, cells, task, search)
-    refinement = Refinement(evaluator, reach, region, search.seed, early, clock, progress)
-    found = refinement.searched(count, around, keep, interruptible)
-    return _timed(_with_blocked(_searched(answered, refinement, found), clock), began)
+        evaluator = evaluator_here(robot, cells, task, search)
+    tried = Evolution(evaluator, reach, region, clock, progress)
+    tried.run(count, rounds, search.seed, interruptible)
+    found = distinct((trial for trial in tried.ranked if trial.feasible), region, keep)
+    return _timed(_with_blocked(_searched(answered, tried, found), clock), began)
 
 
 def _with_blocked(placements: Placements, clock: Clock) -> Placements:
@@ -195,7 +188,7 @@ def _timed(placements: Placements, began: float) -> Placements:
 
 
 def _check_settings(
-    cells: Cells, search: Search, count: int, around: int, keep: int, time_limit: float | None
+    cells: Cells, search: Search, count: int, rounds: int, keep: int, time_limit: float | None
 ) -> None:
     """Refuse what makes no question."""
     checks = Checks("place", PlacementError)
@@ -203,86 +196,67 @@ def _check_settings(
         checks.keep(Fault("", "there are no cells to cover; cut the surface into some"))
     checks.choice("method", search.method, ("complete",))
     checks.whole("count", count, 1, MOST)
-    checks.whole("around", around, 0, MOST)
+    checks.whole("rounds", rounds, 0, MOST)
     checks.whole("keep", keep, 1, MOST)
     if time_limit is not None:
         checks.positive("time_limit", time_limit, "seconds")
     checks.done()
 
 
-def _ruled_out(
-    answered: Callable[..., Placements], region: Region, reach: Reach, beyond: Beyond
-) -> Placements:
+def _ruled_out(answered: Callable[..., Placements], beyond: Beyond) -> Placements:
     """The answer where the reach bound leaves no placement."""
-    middle = region.samples(0, 0)
-    trial = Trial(Pose.of_values(middle[0]), Stage.BOUND, float(reach.share(middle)[0]))
     message = (
         f"No placement in the region: wherever the surface stands in it, some target is at least "
         f"{beyond.distance:.3f} m from the first joint, and the arm reaches at most "
         f"{beyond.reach:.3f} m (proved for the whole region, "
         f"{counted(beyond.boxes, 'box', 'boxes')})."
     )
+    none = dict.fromkeys(("fk", "drawn", "bound", "tried"), 0)
     return answered(
-        answer=Answer.INFEASIBLE,
-        evidence=Evidence.PROOF,
-        message=message,
-        found=(),
-        trials=(trial,),
-        cause=CauseKind.OUT_OF_REACH,
-        statistics={**dict.fromkeys(COUNTS, 0), "boxes": beyond.boxes},
-    )
+        answer=Answer.INFEASIBLE, evidence=Evidence.PROOF, message=message, found=(), trials=(),
+        cause=CauseKind.OUT_OF_REACH, statistics={**none, "boxes": beyond.boxes},
+    )  # fmt: skip
 
 
 def _searched(
-    answered: Callable[..., Placements], refinement: Refinement, found: list[Trial]
+    answered: Callable[..., Placements], search: Evolution, found: Sequence[Trial]
 ) -> Placements:
     """The answer of a search."""
-    trials = sorted(refinement.trials, key=lambda trial: trial.rank, reverse=True)
-    failed = [trial for trial in trials if trial.stage is Stage.FAILED]
-    stages = Counter(trial.stage for trial in trials)
-    searched = stages[Stage.SEARCH] + stages[Stage.CHECK]
+    trials = search.ranked
+    failed = [trial for trial in trials if trial.failed]
     tried = (
-        f"{refinement.drawn} placements were drawn: {refinement.bound} have a target out of reach, "
-        f"{stages[Stage.PROBE]} failed a few Newton starts, {searched} were searched"
+        f"{counted(search.drawn, 'placement')} drawn: {search.bound} have a target out of reach, "
+        f"{len(trials) - len(failed)} were tried"
     ) + (f", {len(failed)} could not be tried ({failed[0].message})" if failed else "")
-    causes: dict[str, int] = {}
-    cause = None
+    answered = partial(
+        answered, found=tuple(found), trials=tuple(trials), stopped=search.stopped,
+        statistics={
+            "fk": sum(int(trial.result.get("fk", 0)) for trial in trials), "drawn": search.drawn,
+            "bound": search.bound, "tried": len(trials), "boxes": 0,
+        },
+    )  # fmt: skip
     if found:
-        answer, evidence = Answer.FEASIBLE, Evidence.WITNESS
         message = (
             f"{counted(len(found), 'feasible placement')}, each with a replayed motion; "
             f"the best leaves a margin of {found[0].margin:.3f}. {tried}"
-            + (f"; this is the best so far: {refinement.stopped}." if refinement.stopped else ".")
+            + (f"; this is the best so far: {search.stopped}." if search.stopped else ".")
         )
-    else:
-        undecided = bool(refinement.stopped or failed)
-        undecided |= any(trial.answer is Answer.UNDECIDED for trial in trials)
-        answer = Answer.UNDECIDED if undecided else Answer.INFEASIBLE
-        evidence = Evidence.BUDGET if undecided else Evidence.EXHAUSTED
-        causes = next((dict(t.causes) for t in trials if t.causes), {})
-        cause = CauseKind(max(causes, key=lambda kind: causes[kind])) if causes else None
-        best = trials[0].share if trials else 0.0
-        message = (
-            f"None found in the region: {tried}; the best covers {100.0 * best:.1f} % of the area"
-            + (f", and most of the rest is {MISSED[cause]}" if cause else "")
-            + (f"; {refinement.stopped}." if refinement.stopped else ". This is no proof.")
-        )
-        checked = [trial for trial in trials if trial.answer is Answer.UNDECIDED][:1]
-        message += "".join(f" Of the best, `check` says: {trial.message}" for trial in checked)
-    return answered(
-        answer=answer,
-        evidence=evidence,
-        message=message,
-        found=tuple(found),
-        trials=tuple(trials),
-        cause=cause,
-        causes=causes,
-        stopped=refinement.stopped,
-        statistics={
-            "fk": sum(trial.fk for trial in trials),
-            "drawn": refinement.drawn,
-            "bound": refinement.bound,
-            **{str(stage): stages[stage] for stage in (Stage.PROBE, Stage.SEARCH, Stage.CHECK)},
-            "boxes": 0,
-        },
+        feasible = {"answer": Answer.FEASIBLE, "evidence": Evidence.WITNESS}
+        return answered(**feasible, message=message, cause=None)
+    closely = [trial for trial in trials if trial.fully and not trial.failed]
+    doubtful = [trial for trial in closely if trial.answer is Answer.UNDECIDED]
+    undecided = bool(search.stopped or failed or doubtful or not closely)
+    causes = next((dict(t.result["causes"]) for t in closely if t.result["causes"]), {})
+    cause = CauseKind(max(causes, key=lambda kind: causes[kind])) if causes else None
+    best = trials[0].share if trials else 0.0
+    message = (
+        f"None found in the region: {tried}; the best covers {100.0 * best:.1f} % of the area"
+        + (f", and most of the rest is {MISSED[cause]}" if cause else "")
+        + (f"; {search.stopped}." if search.stopped else ". This is no proof.")
+        + "".join(f" Of the best, `check` says: {trial.message}" for trial in doubtful[:1])
     )
+    return answered(
+        answer=Answer.UNDECIDED if undecided else Answer.INFEASIBLE,
+        evidence=Evidence.BUDGET if undecided else Evidence.EXHAUSTED,
+        message=message, cause=cause, causes=causes,
+    )  # fmt: skip

@@ -82,10 +82,6 @@ class Reach:
         share = self.within(values) @ self.areas / self.areas.sum()
         return np.minimum(share, 1.0)  # sums in another order may round to a little more
 
-    def slack(self, values: Array) -> float:
-        """Share of the reach that the furthest target leaves, at one pose (6,); 1 for any reach."""
-        return float(1.0 - self.distances(values[None]).max() / self.reach)
-
     def beyond(self, region: Region) -> Beyond | None:
         """Whether every placement in a region has a target out of reach; None where not shown."""
         some = np.unique(np.linspace(0, len(self.targets) - 1, MOST_TARGETS).astype(np.int64))

@@ -156,16 +156,9 @@ class Region:
 
     def samples(self, count: int, seed: int) -> Array:
         """(k, 6) poses, the middle first, then spread evenly by a Sobol sequence; k >= count."""
-        return self._rounded(np.vstack([0.5 * (self.low + self.high), self._spread(count, seed)]))
+        return self.rounded(np.vstack([0.5 * (self.low + self.high), self._spread(count, seed)]))
 
-    def near(self, values: Array, share: float, count: int, seed: int) -> Array:
-        """(k, 6) poses within `share` of the region's widths of a pose (6,); k >= count."""
-        half = 0.5 * share * (self.high - self.low)
-        centre = np.clip(values, self.low + half, self.high - half)
-        inner = Region(tuple(zip((centre - half).tolist(), (centre + half).tolist(), strict=True)))
-        return self._rounded(inner._spread(count, seed))
-
-    def _rounded(self, values: Array) -> Array:
+    def rounded(self, values: Array) -> Array:
         """Poses that people can write down, inside the region still."""
         return np.clip(np.round(values, DIGITS), self.low, self.high)
 

@@ -16,11 +16,11 @@ import numpy as np
 from coverable_arrays import Ints, Mask, Protected
 from feasibility.clock import Clock
 from feasibility.demands import OF_EACH, unjudged
-from feasibility.division import set_cover
-from feasibility.placement.evaluator import LocalEvaluator, Trial
+from feasibility.division import motion_over, set_cover
 from feasibility.placement.placements import COUNT, Placements
 from feasibility.placement.reach_bound import Reach
-from feasibility.placement.refinement import Evaluator, search_all
+from feasibility.placement.region import Pose, moved_cells
+from feasibility.placement.trials import Evaluator, Trial, effort, search_all
 from feasibility.search import Progress, Search
 
 TIME_LIMIT = 60.0  # [s] for the optimum; tables of thousands of rows take far less
@@ -106,16 +106,24 @@ def station_plan(
     search = Search() if search is None else search
     values = placements.region.samples(count, search.seed)[:count]
     reach = Reach.of(placements.robot, placements.cells, placements.task)
-    values = values[reach.share(values) > 0.0]
+    poses = [Pose.of_values(row) for row in values[reach.share(values) > 0.0]]
     trials = [trial for trial in placements.trials if len(trial.covers)]
-    trials += search_all(evaluator, values, progress, "searching for stations")
+    trials += search_all(evaluator, poses, progress, "searching for stations")
     limit = TIME_LIMIT if clock is None else min(TIME_LIMIT, max(clock.left, 0.0))
     stations = fewest_stations([trial.covers for trial in trials], len(placements.cells), limit)
-    local = LocalEvaluator(placements.robot, placements.cells, placements.task, search)
-    chosen = [(trials[station.placement], station.component) for station in stations.stations]
-    refusals = tuple(local.replayed(*motion) for motion in chosen)
+    chosen = tuple(trials[station.placement] for station in stations.stations)
+    refusals = tuple(
+        motion_over(
+            placements.robot,
+            moved_cells(placements.cells, trial.pose),
+            placements.task,
+            effort(search, len(placements.cells), trial.fully),
+            station.covers,
+        ).refusal
+        for trial, station in zip(chosen, stations.stations, strict=True)
+    )
     left = unjudged(placements.robot, placements.task, OF_EACH)
-    return StationPlan(stations, tuple(trial for trial, _ in chosen), refusals, left)
+    return StationPlan(stations, chosen, refusals, left)
 
 
 def fewest_stations(covers: Sequence[Mask], n: int, time_limit: float = TIME_LIMIT) -> Stations:

@@ -273,7 +273,7 @@ def _rates(explanation: Explanation) -> dict[str, Any] | None:
 
 def _threshold(threshold: Threshold, verdict: Verdict) -> dict[str, Any]:
     """One threshold as an object; keys say the unit."""
-    quantity, span = threshold.quantity, threshold.span
+    quantity = threshold.quantity
     found = _number(quantity, "given", quantity.given)
     found |= _number(quantity, "furthest", quantity.end)
     if threshold.resolution is not None:
@@ -285,11 +285,6 @@ def _threshold(threshold: Threshold, verdict: Verdict) -> dict[str, Any]:
         **found,
         "feasible": _finding(quantity, threshold.feasible),
         "other": _finding(quantity, threshold.other),
-        "until": span
-        and {
-            "feasible": _finding(quantity, span.feasible),
-            "other": _finding(quantity, span.other),
-        },
         "tried": threshold.tried,
         "opens": what_it_opens(threshold, verdict) or None,
         "sentence": sentence(threshold, verdict),

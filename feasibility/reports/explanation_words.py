@@ -39,7 +39,7 @@ def helpful(explanation: Explanation) -> list[Threshold]:
     Of a feasible case those with the least to spare; of another those that ask for the least.
     """
     found = [t for t in explanation.thresholds if t.feasible is not None and t.quantity.unit]
-    return sorted((t for t in found if matters(t, explanation.verdict)), key=effort)
+    return sorted((t for t in found if matters(t, explanation.verdict)), key=lambda t: t.effort)
 
 
 def matters(threshold: Threshold, verdict: Verdict) -> bool:
@@ -50,13 +50,6 @@ def matters(threshold: Threshold, verdict: Verdict) -> bool:
     robot = verdict.robot
     width = float(robot.upper[quantity.joint] - robot.lower[quantity.joint])
     return bool(threshold.other is not None and threshold.margin <= SPARE * width)
-
-
-def effort(threshold: Threshold) -> float:
-    """The share of its range that a change needs, or that a margin leaves, 0..1."""
-    quantity, found = threshold.quantity, threshold.feasible
-    span = abs(quantity.end - quantity.given)
-    return abs(found.value - quantity.given) / span if found is not None and span > 0.0 else 1.0
 
 
 def best_changes(explanation: Explanation) -> tuple[Change, ...]:
@@ -113,8 +106,6 @@ def row_of(threshold: Threshold) -> ThresholdRow:
             label(quantity), now, "-", "" if other is None else _against(quantity, other)
         )
     value = shown(quantity, found.value, True)
-    if threshold.span is not None:
-        value += f" .. {shown(quantity, threshold.span.feasible.value)}"
     beyond = FURTHEST if other is None and found.value == quantity.end else ""
     if other is not None:
         beyond = _against(quantity, other)
@@ -265,10 +256,6 @@ def sentence(threshold: Threshold, verdict: Verdict) -> str:
         return _helpless(threshold)
     value, now = shown(quantity, found.value, True), shown(quantity, quantity.given)
     text = (_margin if verdict.feasible else _remedy)(quantity, value, now)
-    if threshold.span is not None:
-        text += f", and on to {shown(quantity, threshold.span.feasible.value)}"
-        if threshold.span.other is not None:
-            text += f" ({_against(quantity, threshold.span.other)})"
     if threshold.other is not None and quantity.kind is not Kind.WITHOUT:
         text += f"; {_against(quantity, threshold.other)}"
     elif verdict.feasible and found.value == quantity.end:

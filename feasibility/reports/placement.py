@@ -13,10 +13,8 @@ from feasibility.placement import (
     PlacementMap,
     Placements,
     Pose,
-    Stage,
     StationPlan,
     Trial,
-    trial_table,
 )
 from feasibility.reports.parts import aligned, csv_text, summary
 from feasibility.reports.verdict import CAUSES, EVIDENCE
@@ -29,9 +27,7 @@ SENTENCES = {
     Answer.UNDECIDED: "undecided: no placement was shown to be feasible, nor that there is none.",
 }
 PROVED = "none in the region: no placement there is feasible."
-MARGINS = ("margin", "limits", "cone", "reach")
-COLUMNS = ("x_m", "y_m", "z_m", *AXES[3:], "stage", "in_reach", "probed", "share", *MARGINS,
-           "verdict")  # fmt: skip
+COLUMNS = ("x_m", "y_m", "z_m", *AXES[3:], "tried", "share", "margin", "verdict")
 
 
 def settings_of(pose: Pose) -> list[str]:
@@ -69,8 +65,23 @@ def as_json(
 
 def _found_json(trial: Trial) -> dict[str, Any]:
     """One placement, without its components."""
-    inner = ("components", "early", "fk")
-    return {key: value for key, value in trial_table(trial).items() if key not in inner}
+    return {
+        "position": list(trial.pose.position),
+        "rpy_deg": list(trial.pose.rpy_deg),
+        "tried": _tried(trial),
+        "share": trial.share,
+        "margin": trial.margin,
+        "cells": int(trial.result.get("cells", 0)),
+        "verdict": str(trial.answer),
+        "evidence": str(trial.evidence),
+        "message": trial.message,
+        "causes": dict(trial.result.get("causes", {})),
+    }
+
+
+def _tried(trial: Trial) -> str:
+    """How a placement was tried, in a word."""
+    return "failed" if trial.failed else "fully" if trial.fully else "quickly"
 
 
 def _stations_json(plan: StationPlan) -> dict[str, Any]:
@@ -138,7 +149,7 @@ def as_text(placements: Placements, case: str = "", plan: StationPlan | None = N
         ("case", case),
         ("region", ", ".join(ranges)),
         ("evidence", f"{placements.evidence}: {evidence}"),
-        ("found", _found_text(placements)),
+        ("found", placements.message),
         ("cause", "" if placements.cause is None else CAUSES[placements.cause]),
         ("missed", "; ".join(f"{counted(n, 'cell')}: {CAUSES[k]}" for k, n in missed)),
         ("share", "" if _searched(placements.best) else f"not known: {why}"),
@@ -167,33 +178,18 @@ def _time_text(placements: Placements) -> str:
 
 def _searched(trial: Trial | None) -> bool:
     """Was a covering motion looked for at a placement? Else its share is unknown, not 0."""
-    return trial is not None and trial.stage in (Stage.SEARCH, Stage.CHECK)
-
-
-def _found_text(placements: Placements) -> str:
-    """What was found; no share is given for placements that were not searched."""
-    if _searched(placements.best) or placements.evidence is Evidence.PROOF:
-        return placements.message
-    number = placements.statistics
-    return (
-        f"None found in the region: of {number['drawn']} placements {number['bound']} have a "
-        f"target out of reach, {number['probe']} failed a few Newton starts, and none was searched"
-        + (f"; {placements.stopped} first." if placements.stopped else ".")
-    )
+    return trial is not None and not trial.failed
 
 
 def _table(trials: Sequence[Trial]) -> list[str]:
-    """Placements as aligned lines; the margins only where there are some."""
+    """Placements as aligned lines; the margin only where there is one."""
     heads = [f"{name} (m)" for name in AXES[:3]]
     heads += [f"{name.removesuffix('_deg')} (deg)" for name in AXES[3:]] + ["share (%)"]
-    with_margins = any(trial.margins is not None for trial in trials)
-    rows = [heads + ([f"{name} (0..1)" for name in MARGINS] if with_margins else [])]
+    feasible = any(trial.feasible for trial in trials)
+    rows = [heads + ["margin (0..1)"] * feasible]
     for trial in trials:
         row = [f"{v:.3f}" for v in trial.pose.position] + [f"{v:.2f}" for v in trial.pose.rpy_deg]
-        row.append(f"{100.0 * trial.share:.1f}")
-        if (m := trial.margins) is not None:
-            row += [f"{v:.3f}" for v in (m.least, m.limits, m.cone, m.reach)]
-        rows.append(row + ["-"] * (len(rows[0]) - len(row)))
+        rows.append([*row, f"{100.0 * trial.share:.1f}", *[f"{trial.margin:.3f}"] * feasible])
     return [f"  {line}" for line in aligned(rows, ">")]
 
 
@@ -226,8 +222,6 @@ def as_csv(placements: Placements) -> str:
     """All placements tried, the best first; m and degrees."""
     rows: list[tuple[Any, ...]] = [COLUMNS]
     for trial in placements.trials:
-        margins = trial.margins
-        shares = ("", "", "") if margins is None else (margins.limits, margins.cone, margins.reach)
-        tried = (trial.stage, trial.in_reach, trial.probed, trial.share, trial.margin)
-        rows.append((*trial.pose.values.tolist(), *tried, *shares, trial.answer or ""))
+        row = _tried(trial), trial.share, trial.margin, trial.answer
+        rows.append((*trial.pose.values.tolist(), *row))
     return csv_text(rows)

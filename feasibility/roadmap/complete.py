@@ -76,6 +76,7 @@ def _search(
     exploration = exploration_of(
         problem.robot, problem.cells, problem.task, search.seed, clock, problem.searched
     )
+    exploration.early = search.early
     proving = Proving(exploration, problem.task)
     late, known, run = "", None, None
     try:
@@ -84,17 +85,19 @@ def _search(
                 known = _known(problem, seeds)
         if begin is not None and known is None:
             _begin(exploration, begin, problem.bodies)
-        if seeds is not None:
+        if seeds is not None and not (search.early and known is not None):
             _seed_cells(exploration, seeds)
         if known is None:
             explore(exploration, partial(between_rounds, exploration, proving, problem.searched))
-        close(exploration)
+        if not search.early or problem.cells.in_order:
+            close(exploration)
         if problem.cells.in_order and exploration.complete and known is None:
             run = run_in_order(exploration)
     except OutOfTime:
         late = clock.limits
     exploration.clock = Clock()  # graph and causes are made later, when somebody reads them
-    found = _found(problem, exploration, proving, late, known)
+    judged = None if seeds is None or known is None else (seeds, known)
+    found = _found(problem, exploration, proving, late, judged)
     return found if run is None else _in_order(found, run, problem, exploration)
 
 
@@ -142,13 +145,14 @@ def _check_seeds(problem: Problem, seeds: Walk) -> None:
     checks.done()
 
 
-def _known(problem: Problem, seeds: Walk) -> Walk | None:
-    """The seeds where they cover all cells already, marked and replayed; None otherwise."""
+def _known(problem: Problem, seeds: Walk) -> Replay | None:
+    """The replay of the seeds, where they cover all cells already, marked and accepted."""
     marked = np.isin(np.arange(len(problem.cells)), seeds.cell)
     start = problem.robot.start
     if start is not None and not (len(seeds.q) and np.array_equal(seeds.q[0], start)):
         return None
-    return seeds if marked.all() and _replayed(problem, seeds).accepted else None
+    found = _replayed(problem, seeds) if marked.all() else None
+    return found if found is not None and found.accepted else None
 
 
 def _begin(exploration: Exploration, cell: int, bodies: Bodies | None) -> None:
@@ -202,16 +206,18 @@ def _found(
     exploration: Exploration,
     proving: Proving,
     late: str,
-    known: Walk | None = None,
+    judged: tuple[Walk, Replay] | None = None,
 ) -> Found:
     """The best component, and the sentences about it.
 
-    `late` says which limit ran out, if one did; `known` is a motion that covers all cells.
+    `late` says which limit ran out, if one did; `judged` is a known motion that covers all cells.
     """
     total = len(problem.cells)
     complete = exploration.complete and total > 0 and not problem.cells.in_order
     start = exploration.begun
-    walk = covering_walk(exploration.roadmap, exploration.best, start) if complete else known
+    walk, known = (None, None) if judged is None else judged
+    if complete:
+        walk, known = covering_walk(exploration.roadmap, exploration.best, start), None
     proof = None if walk is not None else proof_of(exploration)
     return Found(
         covered=exploration.covered if walk is None else np.ones(total, dtype=bool),
@@ -230,7 +236,7 @@ def _found(
         },
         motion=walk,
         hindered=_hindered(exploration),
-        replay=None if walk is None else partial(_replayed, problem, walk),
+        replay=None if walk is None else lambda: known or _replayed(problem, walk),
         accepted="One continuous motion of {waypoints} waypoints visits every cell centre; "
         f"Pinocchio's replay holds it {problem.within}, between waypoints too.",
         refused="A motion over every cell was found, but the independent replay refuses it: "

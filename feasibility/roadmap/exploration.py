@@ -43,6 +43,8 @@ class Exploration:
     """Outcomes of branch and bound, by cell."""
     boxes: int = 0
     rounds: int = 0
+    early: bool = False
+    """Does it end with the first proof that a cell is uncoverable?"""
     stopped: bool = False
     """Were there as many rounds as there may be, while they still gained something?"""
     cut_tree: CutTree | None = None

@@ -114,6 +114,8 @@ def _unreached(exploration: Exploration) -> None:
     beyond = distance > exploration.robot.reach + exploration.arrays.tolerance
     for cell in np.flatnonzero(beyond).tolist():
         exploration.rulings[cell] = Ruling.PROVED
+    if exploration.early and exploration.proved:
+        return
     open_boxes: dict[int, Boxes] = {}
     in_vain = 0
     for cell in evenly(np.flatnonzero(~exploration.reached & ~beyond)).tolist():
@@ -123,6 +125,8 @@ def _unreached(exploration: Exploration) -> None:
         in_vain += 1
         if in_vain > MOST_RULED:
             break
+        if exploration.early and exploration.proved:
+            return
         if exploration.tool_collides(cell):
             continue
         boxes = root_box(exploration.arrays)
@@ -198,6 +202,8 @@ def _rounds(exploration: Exploration, between: Between | None) -> None:
     another, and is found again is no gain, or there would be no end.
     """
     idle, most = 0, exploration.sizes(TOP)
+    if exploration.early and exploration.proved:
+        return
     for _ in range(MOST_ROUNDS):
         roots = exploration.roots()
         if not roots or not exploration.apart:

@@ -1,5 +1,5 @@
-from .explanation import apart as apart
 from .explanation import explain as explain
+from .probes import last_true as last_true
 from .quantities import LEAST_CONE_DEG as LEAST_CONE_DEG
 from .quantities import Kind as Kind
 from .quantities import Quantity as Quantity
@@ -11,4 +11,3 @@ from .thresholds import Dropped as Dropped
 from .thresholds import Explanation as Explanation
 from .thresholds import Finding as Finding
 from .thresholds import Threshold as Threshold
-from .warm_start import last_true as last_true

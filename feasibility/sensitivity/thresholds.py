@@ -6,7 +6,6 @@ with its evidence.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from coverable_arrays import Ints, Protected
@@ -33,22 +32,13 @@ class Finding:
     """The covering motion; None unless feasible."""
     unaided: bool | None = None
     """Does the search of `check`, with the seed given and no motion known, find a covering motion
-    too? None where that was not tried. With `witness` as its `seeds`, `check` finds it."""
+    too? None where that was not tried, which it is of the change that asks for the least. With
+    `witness` as its `seeds`, `check` finds it."""
 
     @property
     def feasible(self) -> bool:
         """True when a covering motion is known that the replay accepted."""
         return self.answer is Answer.FEASIBLE
-
-
-@dataclass(frozen=True, slots=True)
-class Span:
-    """Where a range of feasible values that begins at a threshold ends."""
-
-    feasible: Finding
-    """The last value found to be feasible."""
-    other: Finding | None
-    """The value nearest to it at which the case is not; None where the range goes on to the cap."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,8 +57,6 @@ class Threshold:
     other: Finding | None
     """The value nearest to the threshold at which it is not: proved, exhausted, or not found.
     Without a feasible value: what is known at the far end."""
-    span: Span | None = None
-    """The far end of the feasible range, for the standoff of a case that is not feasible."""
     tried: str = ""
     """What was tried, where no value helps or not every value was tried."""
     each_proved: bool = False
@@ -83,17 +71,15 @@ class Threshold:
         return abs(self.feasible.value - self.other.value)
 
     @property
-    def steps_apart(self) -> int:
-        """How many of the quantity's steps lie between the two sides; 0 with one side only."""
-        apart = self.resolution or 0.0
-        return round(
-            (math.degrees(apart) if self.quantity.unit == "rad" else apart) / self.quantity.step
-        )
-
-    @property
     def margin(self) -> float:
         """How far (rad or m, >= 0) the feasible value is from the one given; -1 without one."""
         return -1.0 if self.feasible is None else abs(self.feasible.value - self.quantity.given)
+
+    @property
+    def effort(self) -> float:
+        """The share of its range that a change needs, or that a margin leaves, 0..1."""
+        span = abs(self.quantity.end - self.quantity.given)
+        return self.margin / span if self.feasible is not None and span > 0.0 else 1.0
 
     @property
     def ruled_out(self) -> bool:
@@ -149,7 +135,7 @@ class Explanation:
     dropped: Dropped | None
     """None for a feasible case."""
     evaluations: int
-    """Evaluations of the arm that the thresholds took, a box of a proof counting as one."""
+    """Evaluations of the arm that the thresholds took."""
     seconds: float
     """Time that they took."""
     pair: ChangePair | None = None

@@ -10,6 +10,7 @@ from .outcome import cause_counts as cause_counts
 from .outcome import cells_of as cells_of
 from .outcome import component_covers as component_covers
 from .outcome import merit as merit
+from .outcome import outcome_of as outcome_of
 from .pool import Workers as Workers
 from .pool import WorkersError as WorkersError
 from .robot_comparison import Arm as Arm
@@ -19,5 +20,4 @@ from .run import Row as Row
 from .run import StudyTask as StudyTask
 from .run import run_tasks as run_tasks
 from .store import Store as Store
-from .stored import trial_fault as trial_fault
 from .workers import open_workers as open_workers

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from coverable_errors import LARGEST_WHOLE, Fault, alternatives, close, is_number, printable, shown
-from feasibility.cases import TABLES, Section, is_text
+from feasibility.cases import TABLES, Section, is_text, is_urdf
 
 POSES = {"position": ("x", "y", "z"), "rpy_deg": ("roll", "pitch", "yaw")}
 SAMPLERS = ("sobol",)
@@ -145,7 +145,7 @@ def _merged(section: Section, found: list[tuple[str, str, Any]]) -> list[tuple[s
 
 
 def _read_robots(section: Section, keys: list[VariedKey | Range]) -> None:
-    """The arms: names, or tables as under [robot]."""
+    """The arms: names, paths of URDF or xacro files, or tables as under [robot]."""
     expected = 'an array of robots, such as ["ur5", { name = "puma560", limits = "set-1" }]'
     value = section.table["robots"]
     if not isinstance(value, list) or not value or len(value) > MOST_VALUES:
@@ -154,7 +154,7 @@ def _read_robots(section: Section, keys: list[VariedKey | Range]) -> None:
     tables: list[Any] = []
     for k, robot in enumerate(value):
         if is_text(robot):
-            tables.append({"name": robot})
+            tables.append({"urdf": robot} if is_urdf(robot) else {"name": robot})
         elif isinstance(robot, Mapping):
             tables.append(dict(robot))
         else:

@@ -66,7 +66,7 @@ def tasks_of(base: Tables, varied: Variation, faults: list[Fault]) -> tuple[Stud
         others = [(entry, value) for entry, value in row if not entry.is_pose]
         name = json.dumps([value for _, value in others], sort_keys=True)
         if name not in checked:
-            made, found = _case_with(base, others)
+            made, found = case_with(base, others)
             checked[name] = None if found else made
             texts = {k: shown(v) for k, v in parameters.items() if k.split(".")[1:2] not in POSED}
             for fault in found:
@@ -85,7 +85,7 @@ def tasks_of(base: Tables, varied: Variation, faults: list[Fault]) -> tuple[Stud
     return tuple(tasks)
 
 
-def _case_with(base: Tables, values: Sequence[tuple[Key, Any]]) -> tuple[Tables, list[Fault]]:
+def case_with(base: Tables, values: Sequence[tuple[Key, Any]]) -> tuple[Tables, list[Fault]]:
     """The base with some values and all defaults filled in, or what is wrong with it."""
     tables, faults = copy.deepcopy(base), []
     given = base.get("robot", {})

@@ -76,7 +76,9 @@ def evaluate(tables: Tables) -> Outcome:
     counts from here on, for loading and cutting too.
 
     Args:
-        tables: a case, as `Case.to_tables` gives it.
+        tables: a case, as `Case.to_tables` gives it; and `wanted`, where it is there: whether to
+            look for `causes` of missed cells, and also for `patches` and the `critical` cone, see
+            `further_figures`.
 
     Returns:
         See `outcome_of`.
@@ -87,14 +89,22 @@ def evaluate(tables: Tables) -> Outcome:
     from feasibility.checking import check
 
     case = case_of(tables)
-    clock = clock_of(case)
-    return outcome_of(
-        check(arm_of(case), cut_of(case), case.built_task(), case.search, clock=clock)
-    )
+    clock, wanted = clock_of(case), tables.get("wanted", {})
+    verdict = check(arm_of(case), cut_of(case), case.built_task(), case.search, clock=clock)
+    found = outcome_of(verdict, wanted.get("causes", True))
+    if "patches" not in wanted:
+        return found
+    from feasibility.studies.further_figures import further_figures
+
+    return found | further_figures(verdict, case, clock, wanted["patches"], wanted["critical"])
 
 
-def outcome_of(verdict: Verdict) -> Outcome:
+def outcome_of(verdict: Verdict, causes: bool = True) -> Outcome:
     """A verdict as JSON values; no timing, so that the same case always has the same outcome.
+
+    Args:
+        verdict: of a case.
+        causes: whether to look for the causes of missed cells, which takes some time.
 
     Returns:
         verdict, evidence, message: as in `Verdict`; method, seed.
@@ -111,7 +121,7 @@ def outcome_of(verdict: Verdict) -> Outcome:
     """
     areas = np.asarray(verdict.cells.areas)
     total = float(areas.sum())
-    causes, examined = cause_counts(verdict)
+    counts = cause_counts(verdict) if causes else CauseCounts({}, 0)
     measured = verdict.certificate
     return {
         "verdict": str(verdict.answer),
@@ -124,8 +134,8 @@ def outcome_of(verdict: Verdict) -> Outcome:
         "share": float(areas[verdict.covered].sum()) / total if total > 0.0 else 1.0,
         "edges": int(verdict.n_edges),
         "pairs": len(verdict.cells.pairs),
-        "causes": causes,
-        "examined": examined,
+        "causes": counts.cells,
+        "examined": counts.examined,
         "components": [bits_of(cover) for cover in component_covers(verdict)],
         "margins": margins_of(verdict),
         "certificate": None

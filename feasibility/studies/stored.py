@@ -54,7 +54,6 @@ def table(shape: Shape) -> Part:
 COUNT = Part(lambda value: is_whole(value, 0, MOST), f"a whole number in 0 .. {MOST:,}")
 WHOLE = Part(lambda value: is_whole(value, 0), "a whole number >= 0")
 SHARE = Part(number(0.0, 1.0 + 1e-9).holds, "a number in 0 .. 1")  # sums of areas are rounded
-TRUTH = Part(lambda value: isinstance(value, bool), "true or false")
 TEXT = Part(
     lambda v: isinstance(v, str) and len(v) <= LONGEST_TEXT and not _CONTROL.search(v),
     "a text that can be printed",
@@ -86,11 +85,6 @@ MARGINS = optional(
     )
 )
 
-POSE = Part(
-    lambda value: isinstance(value, list) and len(value) == 3 and all(map(is_number, value)),
-    "three finite numbers",
-)
-
 OUTCOME: Shape = {
     "verdict": VERDICT,
     "evidence": EVIDENCE,
@@ -120,52 +114,17 @@ OUTCOME: Shape = {
 }
 """Of one case: see `outcome_of`."""
 
-ARM: Shape = {
-    "robot": TEXT,
-    "joints": COUNT,
-    "reach_m": optional(number(0.0)),
-    **{key: OUTCOME[key] for key in ("verdict", "evidence", "message", "share")},
-    **{key: OUTCOME[key] for key in ("covered", "cells", "margins", "unchecked_links")},
-    "cause": optional(CAUSE),
+FURTHER: Shape = {
     "patches": optional(COUNT),
     "patches_share": optional(SHARE),
     "critical_cone_deg": optional(number(0.0, 180.0)),
 }
-"""Of one arm among several: see `robot_comparison.assess`."""
-
-STAGES = ("bound", "probe", "search", "check", "failed")
-TRIAL: Shape = {
-    "position": POSE,
-    "rpy_deg": POSE,
-    "stage": word(STAGES),
-    **dict.fromkeys(("in_reach", "probed", "share"), SHARE),
-    "margin": number(),
-    "margins": optional(table(dict.fromkeys(("limits", "cone", "reach"), number()))),
-    "cells": COUNT,
-    "components": BITS,
-    "verdict": optional(VERDICT),
-    "evidence": optional(EVIDENCE),
-    "message": TEXT,
-    "causes": CAUSES,
-    "early": TRUTH,
-    "fk": WHOLE,
-}
-"""Of one placement: see `placement.study_tasks.trial_table`."""
+"""Where it is wanted: see `further_figures`."""
 
 
 def outcome_fault(result: Mapping[str, Any]) -> str:
     """What is wrong with the result of a case; empty where nothing is."""
-    return fault_in(result, OUTCOME)
-
-
-def arm_fault(result: Mapping[str, Any]) -> str:
-    """What is wrong with the result of an arm; empty where nothing is."""
-    return fault_in(result, ARM)
-
-
-def trial_fault(result: Mapping[str, Any]) -> str:
-    """What is wrong with the result of a placement; empty where nothing is."""
-    return fault_in(result, TRIAL)
+    return fault_in(result, {**OUTCOME, **FURTHER} if "patches" in result else OUTCOME)
 
 
 def fault_in(result: Mapping[str, Any], shape: Shape) -> str:

@@ -15,8 +15,9 @@ import numpy as np
 from coverable_arrays import Array
 from coverable_errors import ArgumentError, counted
 from feasibility.cases import Setup
-from feasibility.placement import Pose, Stage, Trial, moved_cells
+from feasibility.placement import Pose, Trial, moved_cells
 from feasibility.search import Progress, Search
+from feasibility.verdict import Evidence
 from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer.playback import Playback, motion_of
 from feasibility.viewer.poses import (
@@ -153,10 +154,10 @@ def _best_first(placements: Placements) -> list[Trial]:
 
 def _found_text(placements: Placements, trials: Sequence[Trial]) -> str:
     """How many placements were tried, and the outcome of the best one."""
+    if placements.evidence is Evidence.PROOF:
+        return "a part of the surface is out of reach everywhere in the region"
     if not trials:
         return "no placement was tried; the surface is drawn at its pose in the case"
-    if all(trial.stage is Stage.BOUND for trial in trials):
-        return "a part of the surface is out of reach everywhere in the region"
     text = f"{len(trials)} placements tried"
     beyond = int(placements.statistics.get("bound", 0))
     if beyond:

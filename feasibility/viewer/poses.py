@@ -14,7 +14,7 @@ import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
 from coverable_errors import counted
-from feasibility.placement import Pose, Stage, Trial, moved_cells
+from feasibility.placement import Pose, Trial, moved_cells
 from feasibility.viewer import threejs
 from feasibility.viewer.cell_meshes import marks, patch
 from feasibility.viewer.meshes import tubes
@@ -57,7 +57,6 @@ class Class(StrEnum):
     HALF = "50 to 75 %"
     SOME = "25 to 50 %"
     LITTLE = "less than 25 %"
-    UNSEARCHED = "ruled out without a search"
     FAILED = "could not be tried"
 
 
@@ -69,12 +68,8 @@ COLOURS: dict[Class, Colour] = {
     Class.HALF: (0.70, 0.10, 0.50),
     Class.SOME: (0.90, 0.42, 0.25),
     Class.LITTLE: (0.95, 0.74, 0.20),
-    Class.UNSEARCHED: (0.62, 0.62, 0.62),
     Class.FAILED: (0.15, 0.15, 0.15),
 }
-
-
-UNKNOWN = (Class.UNSEARCHED, Class.FAILED)  # the share covered there is not known
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -102,11 +97,9 @@ def class_of_share(share: float) -> Class:
 
 def class_of_trial(trial: Trial) -> Class:
     """The class of a placement."""
-    if trial.feasible:
-        return Class.FEASIBLE
-    never = {Stage.FAILED: Class.FAILED, Stage.BOUND: Class.UNSEARCHED}
-    never[Stage.PROBE] = Class.UNSEARCHED
-    return never.get(trial.stage) or class_of_share(trial.share)
+    if trial.failed:
+        return Class.FAILED
+    return Class.FEASIBLE if trial.feasible else class_of_share(trial.share)
 
 
 def class_of_row(row: Row) -> Class:
@@ -123,7 +116,7 @@ def best_layers(cells: Cells, best: Tried, motion: Playback | None) -> list[Laye
     if len(cells) == 0:
         return []
     surface, *marks = cells_layers(cells)
-    label = "the surface at one of the poses" if best.kind in UNKNOWN else "the best of them"
+    label = "the surface at one of the poses" if best.kind is Class.FAILED else "the best of them"
     parts = [replace(surface, entry=replace(surface.entry, label=label)), *marks]
     if best.cover is not None and not best.cover.all() and best.kind is not Class.FEASIBLE:
         for words, colour, which in (

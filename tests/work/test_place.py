@@ -10,6 +10,7 @@ import json
 import math
 from dataclasses import replace
 from functools import cache
+from itertools import count
 
 import numpy as np
 import pytest
@@ -21,21 +22,20 @@ from samples import sampled, spread
 from feasibility import Answer, CauseKind, Evidence, Search, Task, check
 from feasibility.cases import Case
 from feasibility.collisions import Collision, Obstacle, ToolShape
+from feasibility.division import motion_over
 from feasibility.placement import (
     AXES,
-    LocalEvaluator,
     PlacementError,
     Pose,
     Region,
-    Stage,
-    StudyEvaluator,
-    Trial,
+    evaluator_here,
+    evaluator_of_study,
     moved_cells,
     place,
     placement_map,
-    trial_table,
 )
 from feasibility.placement.reach_bound import Reach
+from feasibility.placement.trials import effort
 from feasibility.studies import open_workers
 from robots import load_robot
 from surfaces import plane, rotation_from_rpy
@@ -112,28 +112,21 @@ def test_a_surface_moved_away_is_put_back(name, seed):
     moved = case_at(name, away)
     assert check(*moved).answer is Answer.INFEASIBLE
     region = region_about(away)
-    found = place(*moved[:3], region, moved.search, count=32, around=2, keep=2)
+    found = place(*moved[:3], region, moved.search, count=32, rounds=4, keep=2)
     assert (found.answer, found.evidence) == (Answer.FEASIBLE, Evidence.WITNESS)
     for trial in found.found:
         assert region.holds(trial.pose)
         assert check(*case_at(name, trial.pose)).feasible
-        assert (trial.complete, trial.share) == (True, 1.0)
-        three = trial.margins.limits, trial.margins.cone, trial.margins.reach
-        assert 0.0 <= trial.margin == min(three) <= 1.0
+        assert (trial.feasible, trial.share) == (True, 1.0)
+        assert 0.0 <= trial.margin <= 1.0
     margins = [trial.margin for trial in found.found]
     assert margins == sorted(margins, reverse=True)
     assert found.best is found.found[0]
 
 
-class Nobody:
+def nobody(poses, fully):
     """An evaluator that must not be asked."""
-
-    batch = 1
-
-    def try_all(self, poses, early):
-        raise AssertionError("no search should be run")
-
-    check_all = try_all
+    raise AssertionError("no search should be run")
 
 
 def test_a_region_far_away_is_refused_by_the_bound_alone():
@@ -141,47 +134,46 @@ def test_a_region_far_away_is_refused_by_the_bound_alone():
         setup = setup_of(name)
         far = Pose.of_surface(setup.cells.surface).values + np.array([3.0, 0, 0, 0, 0, 0])
         region = region_about(Pose.of_values(far))
-        found = place(*setup[:3], region, setup.search, evaluator=Nobody())
+        found = place(*setup[:3], region, setup.search, evaluator=nobody)
         assert (found.answer, found.evidence) == (Answer.INFEASIBLE, Evidence.PROOF)
         assert (found.cause, found.found) == (CauseKind.OUT_OF_REACH, ())
-
-
-class Doubting(LocalEvaluator):
-    """`check` never agrees."""
-
-    def check_all(self, poses, causes):
-        undecided = {"answer": Answer.UNDECIDED, "evidence": Evidence.BUDGET}
-        return [Trial(pose, Stage.CHECK, 1.0, **undecided) for pose in poses]
 
 
 def test_what_check_does_not_say_is_no_answer():
     setup = setup_of("panda plate")
     region = region_about(Pose.of_surface(setup.cells.surface))
-    doubted = place(*setup[:3], region, evaluator=Doubting(*setup), count=8, around=1, keep=1)
-    assert any(trial.complete for trial in doubted.trials)
+    setup = setup._replace(search=Search(evaluations=1))  # with which `check` decides nothing
+    doubted = place(*setup[:3], region, setup.search, count=8, rounds=1, keep=1)
+    assert {trial.answer for trial in doubted.trials} == {Answer.UNDECIDED}
     assert (doubted.answer, doubted.found) == (Answer.UNDECIDED, ())
 
 
+def stopping(setup, after, error):
+    """An evaluator that raises an error in place of the trial after so many."""
+    here, tried = evaluator_here(*setup), count()
+
+    def evaluator(poses, fully):
+        for trial in here(poses, fully):
+            if next(tried) == after:
+                raise error
+            yield trial
+
+    return evaluator
+
+
 def test_a_ctrl_c_ends_it_with_the_best_so_far():
-    class Stopping(LocalEvaluator):
-        """Tries some placements; then there is a Ctrl-C."""
-
-        tried = 0
-
-        def try_at(self, pose, early=True):
-            self.tried += 1
-            if self.tried > 20:
-                raise KeyboardInterrupt
-            return super().try_at(pose, early)
-
     setup = setup_of("ur5 plate")
     region = Region.around(Pose.of_surface(setup.cells.surface), {"x": (0.0, 0.3)})
-    found = place(*setup[:3], region, setup.search, evaluator=Stopping(*setup), interruptible=True)
+    ended = stopping(setup, 20, KeyboardInterrupt)
+    found = place(*setup[:3], region, setup.search, evaluator=ended, interruptible=True)
     assert (found.answer, found.interrupted) == (Answer.FEASIBLE, True)
+    assert len(found.trials) == 20
     assert found.best.margin == max(trial.margin for trial in found.trials) > 0.0
     assert check(*case_at("ur5 plate", found.best.pose)).feasible
-    with pytest.raises(KeyboardInterrupt):
-        place(*setup[:3], region, setup.search, evaluator=Stopping(*setup))
+    for error in (KeyboardInterrupt, ValueError("of an evaluator")):
+        with pytest.raises(type(error) if error is not KeyboardInterrupt else error) as told:
+            place(*setup[:3], region, setup.search, evaluator=stopping(setup, 3, error))
+        assert error is KeyboardInterrupt or told.value is error
 
 
 WALL_AT, RADIUS, CLEARANCE = 0.8, 0.05, 0.01  # m
@@ -198,11 +190,12 @@ def test_no_place_is_feasible_whose_motion_would_not_stay_clear():
     )  # fmt: skip
     region = Region.around(Pose.of_surface(cells.surface), {"x": (0.0, 2.0 * ROOM)})
     beside = Task(0.02, 30, 0.001, collision=asked)
-    found = place(load_robot("ur5"), cells, beside, region, count=6, around=0, keep=3)
+    found = place(load_robot("ur5"), cells, beside, region, count=6, rounds=0, keep=3)
     assert max(trial.pose.position[0] for trial in found.trials) > ROOM + 0.001
     assert max(trial.pose.position[0] for trial in found.found) <= ROOM + 0.001
-    free = LocalEvaluator(load_robot("ur5"), cells, replace(beside, collision=None), Search())
-    assert free.try_at(Pose((ROOM + 0.05, 0.0, 0.3), (0.0, 0.0, 0.0))).complete
+    free = evaluator_here(load_robot("ur5"), cells, replace(beside, collision=None), Search())
+    (trial,) = free([Pose((ROOM + 0.05, 0.0, 0.3), (0.0, 0.0, 0.0))], False)
+    assert trial.feasible
 
 
 # -- bounds ----------------------------------------------------------------------------------------
@@ -239,7 +232,7 @@ def test_the_bound_on_a_region_holds_for_its_placements():
 def test_distances_are_those_of_the_targets_and_what_is_discarded_is_infeasible():
     setup = setup_of("ur5 plate")
     robot, cells, task, _ = setup[:4]
-    reach, placer = Reach.of(robot, cells, task), LocalEvaluator(*setup)
+    reach = Reach.of(robot, cells, task)
     origin = robot.model.jointPlacements[1].translation
     region = Region.around(Pose.of_surface(cells.surface), {"x": (0.5, 1.4), "z": (0, 0.5)})
     discarded = 0
@@ -247,15 +240,14 @@ def test_distances_are_those_of_the_targets_and_what_is_discarded_is_infeasible(
         moved = moved_cells(cells, Pose.of_values(row))
         away = np.linalg.norm(task.targets(moved).points - origin, axis=1)
         assert reach.distances(row[None])[0] == pytest.approx(away, abs=1e-12)
-        trial = placer.try_at(Pose.of_values(row))
         out = away > robot.reach + 0.001
-        assert (trial.stage is Stage.BOUND) == out.any()
+        assert (reach.within(row[None])[0] == ~out).all()
         if out.any():
-            areas = moved.areas
-            assert trial.in_reach == pytest.approx(areas[~out].sum() / areas.sum())
+            areas, share = moved.areas, float(reach.share(row[None])[0])
+            assert share == pytest.approx(areas[~out].sum() / areas.sum())
             verdict = check(robot, moved, task)
             assert (verdict.answer, verdict.evidence) == (Answer.INFEASIBLE, Evidence.PROOF)
-            assert areas[verdict.covered].sum() <= trial.in_reach * areas.sum() + 1e-12
+            assert areas[verdict.covered].sum() <= share * areas.sum() + 1e-12
             discarded += 1
     assert 3 < discarded < 17
 
@@ -277,14 +269,16 @@ def test_moved_cells_are_those_of_the_case():
 def test_what_a_place_is_said_to_cover_one_motion_covers(name, seed):
     """Each component is replayed over the moved cells; what no search found is not."""
     setup = setup_of(name)
-    placer, areas = LocalEvaluator(*setup), setup.cells.areas
-    trial = placer.try_at(moved_away(name, seed), early=False)
+    pose, areas = moved_away(name, seed), setup.cells.areas
+    (trial,) = evaluator_here(*setup)([pose], False)
+    quick = effort(setup.search, len(setup.cells), False)
+    moved = setup.robot, moved_cells(setup.cells, pose), setup.task
     assert len(trial.covers)
     assert trial.share == pytest.approx(areas[trial.covers[0]].sum() / areas.sum())
-    for component in range(min(len(trial.covers), 3)):
-        assert placer.replayed(trial, component) == ""
-    more = replace(trial, covers=np.ones((1, len(setup.cells)), dtype=bool))
-    assert trial.complete or "did not find" in placer.replayed(more, 0)
+    for cover in trial.covers[:3]:
+        assert motion_over(*moved, quick, cover).refusal == ""
+    more = np.ones(len(setup.cells), dtype=bool)
+    assert trial.feasible or "did not find" in motion_over(*moved, quick, more).refusal
 
 
 def test_stations_share_out_what_no_placement_covers_alone(tmp_path):
@@ -308,25 +302,30 @@ def test_stations_share_out_what_no_placement_covers_alone(tmp_path):
 # -- workers, stores, maps, the command ------------------------------------------------------------
 
 
+def told(trials):
+    """All that trials say."""
+    return [(trial.pose, trial.fully, dict(trial.result)) for trial in trials]
+
+
 def test_who_tries_placements_changes_nothing_and_what_fails_is_undecided():
     case, setup = case_of("ur5 plate"), setup_of("ur5 plate")
     region = region_about(moved_away("ur5 plate", 3))
-    ask = {"count": 8, "around": 1, "keep": 1}
+    ask, number = {"count": 8, "rounds": 1, "keep": 1}, len(setup.cells)
     here = place(*setup[:3], region, setup.search, **ask)
-    assert {trial.stage for trial in here.trials} >= {Stage.SEARCH, Stage.CHECK}
     with open_workers(1) as workers:
-        there = StudyEvaluator(case, workers)
+        there = evaluator_of_study(case, number, workers)
         found = place(*setup[:3], region, setup.search, evaluator=there, **ask)
-        assert list(map(trial_table, found.trials)) == list(map(trial_table, here.trials))
-        there.tables = {**there.tables, "robot": {"name": "no such arm"}}
-        nothing = place(*setup[:3], region, evaluator=there, count=4, around=1)
+        assert told(found.trials) == told(here.trials)
+        arm = replace(case.robot, name="no such arm")
+        lost = evaluator_of_study(replace(case, robot=arm), number, workers)
+        nothing = place(*setup[:3], region, evaluator=lost, count=8, rounds=0)
     assert nothing.answer is Answer.UNDECIDED
     assert "could not be tried" in nothing.message
 
 
 def test_a_map_tells_what_single_placements_tell():
     setup = setup_of("panda plate")
-    evaluator, own = LocalEvaluator(*setup), Pose.of_surface(setup.cells.surface)
+    evaluator, own = evaluator_here(*setup), Pose.of_surface(setup.cells.surface)
     region = Region.around(own, {"x": (0.3, 1.2), "y": (-0.3, 0.3), "yaw_deg": (-40, 40)})
     chart = placement_map(evaluator, region, own, shape=(3, 2, 2))
     assert chart.axes == ("x", "y", "yaw_deg")
@@ -334,7 +333,7 @@ def test_a_map_tells_what_single_placements_tell():
         values = chart.held.values
         for axis, ticks, k in zip(chart.axes, chart.ticks, index, strict=True):
             values[list(AXES).index(axis)] = ticks[k]
-        trial = evaluator.try_at(Pose.of_values(values), early=False)
+        (trial,) = evaluator([Pose.of_values(values)], False)
         assert (chart.share[index], chart.margin[index]) == (trial.share, trial.margin)
     assert chart.share.max() == 1.0 > chart.share.min()
     with pytest.raises(PlacementError, match="z: does not vary"):
@@ -403,7 +402,7 @@ def test_questions_that_make_no_sense_are_refused_with_all_that_is_wrong():
     with pytest.raises(PlacementError) as told:
         place(
             setup.robot, empty, setup.task, region_about(pose), Search(method="greedy"), count=0,
-            around=-1, keep=0, time_limit=0.0,
+            rounds=-1, keep=0, time_limit=0.0,
         )  # fmt: skip
-    for words in ("no cells", "greedy", "count", "around", "keep", "time_limit"):
+    for words in ("no cells", "greedy", "count", "rounds", "keep", "time_limit"):
         assert words in str(told.value)

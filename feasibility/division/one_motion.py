@@ -1,0 +1,50 @@
+"""The motion behind a component that a search found, found again and replayed."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import NamedTuple
+
+from coverable_arrays import Mask
+from feasibility.clock import Clock, OutOfTime
+from feasibility.roadmap import covering_walk, exploration_of, explore
+from feasibility.search import Search
+from feasibility.speed import replay_at_rates
+from feasibility.task import Task
+from feasibility.verdict import Walk
+from robots import Robot
+from surfaces import Cells
+
+
+class OneMotion(NamedTuple):
+    """A motion over some cells, or why there is none."""
+
+    walk: Walk | None
+    """None where it is refused."""
+    refusal: str
+    """Empty where the independent replay accepts it."""
+
+
+def motion_over(
+    robot: Robot, cells: Cells, task: Task, search: Search, cover: Mask, clock: Clock | None = None
+) -> OneMotion:
+    """One continuous motion over what a component covers.
+
+    Args:
+        robot, cells, task, search: those of the verdict that the component is of.
+        cover: (N,) its cells.
+        clock: whose time limit counts.
+    """
+    clock = (Clock() if clock is None else clock).allow(search.evaluations)
+    exploration = exploration_of(robot, cells, task, search.seed, clock)
+    exploration.early = search.early
+    with suppress(OutOfTime):
+        explore(exploration)
+    exploration.clock = Clock()
+    for root in exploration.roots():
+        found = exploration.covers(root)
+        if (found >= cover).all():
+            walk = covering_walk(exploration.roadmap, root)
+            refusal = replay_at_rates(robot, cells, task, walk, found)[1]
+            return OneMotion(None if refusal else walk, refusal)
+    return OneMotion(None, "the search did not find this motion again")

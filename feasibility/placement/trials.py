@@ -1,0 +1,172 @@
+"""One placement of a surface tried: `check` with the surface there, in full or with less effort."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from coverable_arrays import Mask
+from feasibility.cases import Case
+from feasibility.checking import check
+from feasibility.placement.region import Pose, moved_cells
+from feasibility.search import Progress, Search
+from feasibility.studies import (
+    Store,
+    StudyTask,
+    Workers,
+    cells_of,
+    outcome_of,
+    run_tasks,
+)
+from feasibility.task import Task
+from feasibility.verdict import Answer, Evidence
+from robots import Robot
+from surfaces import Cells
+
+FEW, EACH = 2_000, 40  # evaluations of a quick look, in all and for each cell
+AHEAD = 4  # placements for each worker in one batch
+AT_EASE_DEG, AT_EASE_M = 90.0, 0.5  # from limits: further away is no better
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Trial:
+    """What `check` says of one placement, with all its effort or with little."""
+
+    pose: Pose
+    result: Mapping[str, Any]
+    """See `studies.outcome_of`; the message alone of one that could not be tried."""
+    fully: bool = False
+    """With all effort, and with the causes of missed cells? A feasible one is as good without."""
+
+    @property
+    def failed(self) -> bool:
+        """Did no worker come to an end with it? The message says why."""
+        return "share" not in self.result
+
+    @property
+    def answer(self) -> Answer:
+        """Of `check`."""
+        return Answer(self.result.get("verdict", "undecided"))
+
+    @property
+    def evidence(self) -> Evidence:
+        """What it rests on; of a quick look that is undecided, its small budget."""
+        return Evidence(self.result.get("evidence", "budget"))
+
+    @property
+    def feasible(self) -> bool:
+        """Is there a motion that the replay accepted?"""
+        return self.answer is Answer.FEASIBLE
+
+    @property
+    def message(self) -> str:
+        """Of `check`."""
+        return str(self.result["message"])
+
+    @property
+    def share(self) -> float:
+        """Share of the area, 0..1, that the best single motion found covers."""
+        return float(self.result.get("share", 0.0))
+
+    @property
+    def margin(self) -> float:
+        """What the certified motion leaves, 0..1, by which feasible placements are compared.
+
+        The least of: the distance from the joints' limits, as far as more is better; and the share
+        of the cone that the tool axis does not use.
+        """
+        left = self.result.get("margins")
+        if not self.feasible or left is None:
+            return 0.0
+        angle = self.result["certificate"]["max_angle_deg"] + left["cone_deg"]
+        shares = [left["cone_deg"] / angle if angle > 0.0 else 1.0]
+        for name, ease in (("limit_deg", AT_EASE_DEG), ("limit_m", AT_EASE_M)):
+            shares += [] if left[name] is None else [left[name] / ease]
+        return float(np.clip(min(shares), 0.0, 1.0))
+
+    @property
+    def covers(self) -> Mask:
+        """(K, N) cells of the components found, none inside another, the best first."""
+        n, parts = int(self.result.get("cells", 0)), self.result.get("components", ())
+        return np.array([cells_of(bits, n) for bits in parts], dtype=bool).reshape(len(parts), n)
+
+    @property
+    def rank(self) -> tuple[float, ...]:
+        """Larger is better."""
+        return float(self.feasible), round(self.share, 9), self.margin, float(self.fully)
+
+
+Evaluator = Callable[[Sequence[Pose], bool], Iterator[Trial]]
+"""Tries poses, fully or not; the trials come in their order, as they are finished."""
+
+
+def effort(search: Search, cells: int, fully: bool) -> Search:
+    """The settings of a trial: those given, or with few evaluations."""
+    few = FEW + EACH * cells
+    most = few if search.evaluations is None else min(few, search.evaluations)
+    return search if fully else replace(search, evaluations=most, early=True)
+
+
+def evaluator_here(robot: Robot, cells: Cells, task: Task, search: Search) -> Evaluator:
+    """Tries placements of a surface in this process."""
+
+    def tried(poses: Sequence[Pose], fully: bool) -> Iterator[Trial]:
+        chosen = effort(search, len(cells), fully)
+        for pose in poses:
+            verdict = check(robot, moved_cells(cells, pose), task, chosen)
+            yield Trial(pose, outcome_of(verdict, causes=fully), fully)
+
+    return tried
+
+
+def evaluator_of_study(
+    case: Case,
+    cells: int,
+    workers: Workers,
+    store: Store | None = None,
+    progress: Progress | None = None,
+) -> Evaluator:
+    """Tries placements of a case's surface as tasks of a study: by many workers, and kept.
+
+    Args:
+        case: the robot, the surface, the task and the search.
+        cells: how many the surface has.
+        workers: where they are tried.
+        store: where what was tried is kept and found again.
+        progress: called as progress(done, total, text) several times a second, with the tasks of
+            the present batch; what it raises ends the run.
+    """
+    batch = AHEAD * workers.width
+
+    def tried(poses: Sequence[Pose], fully: bool) -> Iterator[Trial]:
+        tables = replace(case, search=effort(case.search, cells, fully)).to_tables()
+        for start in range(0, len(poses), batch):
+            some = poses[start : start + batch]
+            tasks = [_task(tables, pose, fully) for pose in some]
+            rows = run_tasks(tasks, workers, store, progress)
+            for pose, row in zip(some, rows, strict=True):
+                yield Trial(pose, row.result, fully)
+
+    return tried
+
+
+def _task(tables: Mapping[str, Any], pose: Pose, fully: bool) -> StudyTask:
+    """A case with the surface at a pose."""
+    where = {"position": list(pose.position), "rpy_deg": list(pose.rpy_deg)}
+    surface = {**tables["surface"], **where}
+    return StudyTask({**tables, "surface": surface, "wanted": {"causes": fully}}, where)
+
+
+def search_all(
+    evaluator: Evaluator, poses: Sequence[Pose], progress: Progress | None, text: str
+) -> list[Trial]:
+    """A quick look at each of some poses."""
+    trials = list[Trial]()
+    for trial in evaluator(poses, False):
+        trials.append(trial)
+        if progress is not None:
+            progress(len(trials), len(poses), text)
+    return trials
