@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from feasibility.paths import CoveragePath, PathError, coverage_path
     from feasibility.paths import coverage_path as path
     from feasibility.placement import (
-        LocalEvaluator,
         Placements,
         Pose,
         Region,
@@ -139,7 +138,7 @@ __all__ = [
     "Answer", "ArgumentError", "Axis", "Case", "CaseError", "Cause", "CauseKind", "Cells",
     "Collision", "Comparison", "CoverableError", "CoveragePath", "Division",
     "Evidence", "Explanation",
-    "LiteralSearch", "Live", "LocalEvaluator", "MeshSurface", "Obstacle", "PassRuns",
+    "LiteralSearch", "Live", "MeshSurface", "Obstacle", "PassRuns",
     "Patch", "PathError", "Piecewise", "Placements", "PlannedPasses", "Plot", "Pose",
     "ProgramSettings",
     "Region", "Robot", "RobotError", "Search", "Store", "Study", "Surface", "SurfaceError",

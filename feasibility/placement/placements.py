@@ -167,7 +167,9 @@ def place(
     tried = Evolution(evaluator, reach, region, clock, progress)
     tried.run(count, rounds, search.seed, interruptible)
     found = distinct((trial for trial in tried.ranked if trial.feasible), region, keep)
-    return _timed(_with_blocked(_searched(answered, tried, found), clock), began)
+    return _timed(
+        _with_blocked(_searched(answered, tried, found, task.requires_rates), clock), began
+    )
 
 
 def _with_blocked(placements: Placements, clock: Clock) -> Placements:
@@ -219,9 +221,9 @@ def _ruled_out(answered: Callable[..., Placements], beyond: Beyond) -> Placement
 
 
 def _searched(
-    answered: Callable[..., Placements], search: Evolution, found: Sequence[Trial]
+    answered: Callable[..., Placements], search: Evolution, found: Sequence[Trial], rated: bool
 ) -> Placements:
-    """The answer of a search."""
+    """The answer of a search; of an undecided one at a speed (`rated`) its message is the cause."""
     trials = search.ranked
     failed = [trial for trial in trials if trial.failed]
     tried = (
@@ -246,7 +248,8 @@ def _searched(
     closely = [trial for trial in trials if trial.fully and not trial.failed]
     doubtful = [trial for trial in closely if trial.answer is Answer.UNDECIDED]
     undecided = bool(search.stopped or failed or doubtful or not closely)
-    causes = next((dict(t.result["causes"]) for t in closely if t.result["causes"]), {})
+    told = [trial for trial in closely if not (rated and trial in doubtful)]
+    causes = next((dict(t.result["causes"]) for t in told if t.result["causes"]), {})
     cause = CauseKind(max(causes, key=lambda kind: causes[kind])) if causes else None
     best = trials[0].share if trials else 0.0
     message = (

@@ -19,7 +19,8 @@ from feasibility.sensitivity.quantities import Kind, Quantity, Variant
 from feasibility.sensitivity.thresholds import Finding, Threshold
 from feasibility.verdict import Evidence, Verdict, Walk
 
-VALUES = 4  # of a quantity that is not monotone, on the way to its end
+NEARBY = (1 / 8, 1 / 4, 1 / 2, 1)  # [1] of the way to its end: values of what is not monotone
+ALL_ALONG = (1 / 32, 1 / 16, 1 / 8, 3 / 16, 1 / 4, 3 / 8, 1 / 2, 5 / 8, 3 / 4, 7 / 8, 1)
 MARGINS, REMEDIES = 4, 8  # halvings, at most, towards what is not feasible, or no longer is
 SEEDED = 0.5  # [1] of the effort of a verdict without a known motion
 
@@ -197,12 +198,12 @@ def _stops(quantity: Quantity, feasible: bool) -> list[int]:
     """Numbers of steps at which a verdict is made on the way to the end.
 
     The end alone where there can be one threshold at most. Otherwise values that double from a
-    feasible one, so that what is found is the stretch around it, or evenly spread ones.
+    feasible one, so that what is found is the stretch around it, or more of them all along.
     """
     last = quantity.last
     if quantity.monotone:
         return [last]
-    shares = [2.0 ** (k + 1 - VALUES) if feasible else (k + 1) / VALUES for k in range(VALUES)]
+    shares = NEARBY if feasible else ALL_ALONG
     return sorted({max(1, round(last * share)) for share in shares})
 
 

@@ -24,7 +24,7 @@ from feasibility.collisions import UNCHECKED
 from feasibility.division import divide
 from feasibility.entry import ends_of
 from feasibility.paths import coverage_path
-from feasibility.placement import Pose, Region, StudyEvaluator, place, station_plan
+from feasibility.placement import Pose, Region, evaluator_of_study, place, station_plan
 from feasibility.results import load_motion, load_result
 from feasibility.runs import pass_runs, plan_passes
 from feasibility.sensitivity import explain
@@ -227,7 +227,7 @@ def of_place(args):
     held = Pose.of_values([*case.surface.position, *case.surface.rpy_deg])
     ranges = {"x": args.x} | ({} if args.yaw is None else {"yaw_deg": args.yaw})
     with open_workers(0) as workers:
-        evaluator = StudyEvaluator(case, workers, None, lambda *_: None)
+        evaluator = evaluator_of_study(case, len(setup.cells), workers)
         count = {} if args.count is None else {"count": args.count}
         region = Region.around(held, ranges)
         found = place(*setup[:3], region, setup.search, evaluator=evaluator, **count)

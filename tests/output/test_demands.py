@@ -13,7 +13,7 @@ from feasibility import Search, verify
 from feasibility.cases import all_keys, load_case
 from feasibility.cli.main import _parser
 from feasibility.demands import DEMANDS, further
-from feasibility.placement import LocalEvaluator, Pose, Region, place, station_plan
+from feasibility.placement import Pose, Region, evaluator_here, place, station_plan
 from feasibility.results import load_motion, load_result
 from feasibility.verdict import Walk
 
@@ -130,12 +130,12 @@ def says_yes(ask, known, settings):
     here = Pose.of_surface(setup.cells.surface)
     region = Region.around(here, {"x": (here.position[0] - 1e-3, here.position[0] + 1e-3)})
     try:
-        placed = place(*setup[:3], region, count=1, around=0, keep=1)
+        placed = place(*setup[:3], region, count=1, rounds=0, keep=1)
     except ValueError:  # refused
         return said
     if placed.answer == "feasible":
         said.add("place")
-    plan = station_plan(placed, LocalEvaluator(*setup[:3], Search()), count=1)
+    plan = station_plan(placed, evaluator_here(*setup[:3], Search()), count=1)
     whole = len(plan.stations) > 0 and not len(plan.stations.left_out)
     return said | {"stations"} if whole and plan.certified and not plan.not_judged else said
 
@@ -180,6 +180,6 @@ def test_what_is_not_held_is_named_as_the_cause(ask, known):
         assert "at 3 m/s" in " ".join(ask(name, known[0], *speed, *FEWER).out.split())
     setup = load_case(known[0], IMPOSSIBLE["speed"]).build()
     region = Region.around(Pose.of_surface(setup.cells.surface), {"x": (0.0, 0.01)})
-    found = place(*setup[:3], region, count=1, around=0, keep=1)
+    found = place(*setup[:3], region, count=1, rounds=0, keep=1)
     assert "none was found that does so at 3 m/s" in found.message
     assert found.cause is None

@@ -11,7 +11,7 @@ from bad_input import sheet
 from mesh_writers import stl_of
 
 from feasibility.cases import TABLES, Case, CaseError, load_case, toml_document
-from feasibility.placement import Pose, StudyEvaluator
+from feasibility.placement import Pose, evaluator_of_study
 from feasibility.studies import Store, StudyTask, case_of, cut_of, open_workers, run_tasks
 
 XACRO = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
@@ -80,8 +80,8 @@ def test_a_stored_verdict_is_for_the_files_as_they_were(folder: Path) -> None:
         beam(folder / BEAM, length)
         assert verdict(folder, case) == (answer, anew)
         with Store(folder / "place.study") as store, open_workers(0) as workers:
-            evaluator = StudyEvaluator(case, workers, store)
-            (trial,) = evaluator.check_all([Pose((0.0, 0.0, 0.1), (0.0, 0.0, 0.0))], causes=False)
+            evaluator = evaluator_of_study(case, 4, workers, store)
+            (trial,) = evaluator([Pose((0.0, 0.0, 0.1), (0.0, 0.0, 0.0))], True)
             assert str(trial.answer) == answer
     # Without collisions the mesh does not matter.
     plain = Case.from_toml(CASE.format("urdf"), folder)

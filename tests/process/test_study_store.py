@@ -14,7 +14,7 @@ from hostile_stores import ODD, SCRIPT, allowed, put, rows, study_with_store
 from jobs import case_named, coverable
 
 from feasibility.cases import load_case
-from feasibility.placement import Pose, StudyEvaluator
+from feasibility.placement import Pose, evaluator_of_study
 from feasibility.safe_files import FileError
 from feasibility.studies import Store, StudyTask, compare, open_workers, run_tasks
 from feasibility.studies.store import FIND, Record, StoreError
@@ -242,9 +242,9 @@ def test_what_works_keep_is_what_is_read_again_and_judged(tmp_path) -> None:
     def run(store) -> None:
         with open_workers(0) as workers:
             compare(case, ["ur3", "ur5"], workers, store=store)
-            evaluator = StudyEvaluator(case, workers, store)
-            evaluator.try_all(poses, early=True)
-            evaluator.check_all(poses, causes=True)
+            evaluator = evaluator_of_study(case, 4, workers, store)
+            for fully in (False, True):
+                assert not any(trial.failed for trial in evaluator(poses, fully))
             run_tasks([StudyTask(case.to_tables(), {})], workers, store)
 
     for _ in range(2):
@@ -253,8 +253,8 @@ def test_what_works_keep_is_what_is_read_again_and_judged(tmp_path) -> None:
             assert len(store) == 2 + 3 + 3 + 1
     for key, *between, text, seconds in rows(path):
         result = json.loads(text)
-        name = "verdict" if "verdict" in result else "answer"
-        put(path, (key, *between, json.dumps({**result, name: 5}), seconds))
+        name = "patches" if "patches" in result else "verdict"
+        put(path, (key, *between, json.dumps({**result, name: "five"}), seconds))
         with Store(path) as store, pytest.raises(StoreError, match=f"{name} must be"):
             run(store)
         put(path, (key, *between, text, seconds))

@@ -403,7 +403,7 @@ def of_explain(one: Any) -> Json:
                 **with_unit(limit.quantity, "resolution", limit.resolution),
                 "feasible": finding(limit.quantity, limit.feasible),
                 "other": finding(limit.quantity, limit.other),
-                "until": OBJECT_OR_NULL, "tried": limit.tried, "opens": (str, NoneType),
+                "tried": limit.tried, "opens": (str, NoneType),
                 "sentence": str,
             } for limit in one.thresholds
         ],
@@ -430,26 +430,22 @@ def trial(one: Any) -> Json | None:
     """A placement that was tried."""
     return None if one is None else {
         "position": list(one.pose.position), "rpy_deg": list(one.pose.rpy_deg),
-        "stage": one.stage,
-        **{name: float(getattr(one, name)) for name in ("in_reach", "probed", "share", "margin")},
-        "margins": one.margins and {
-            name: getattr(one.margins, name) for name in ("limits", "cone", "reach")
-        },
+        "tried": "fully" if one.fully else "quickly",
+        "share": one.share, "margin": one.margin,
         "cells": one.covers.shape[1], "verdict": one.answer, "evidence": one.evidence,
-        "message": one.message, "causes": dict(one.causes),
+        "message": one.message, "causes": dict(one.result["causes"]),
     }  # fmt: skip
 
 
 def of_place(one: Any) -> Json:
     """Where a surface may stand."""
     found, plan, best = one.found, one.plan, one.found.best
-    searched = best is not None and best.stage in ("search", "check")
     axes = ("x", "y", "z", "roll_deg", "pitch_deg", "yaw_deg")
     return {
         "answer": found.answer, "evidence": found.evidence, "message": found.message,
         "region": dict(zip(axes, map(list, found.region.ranges), strict=True)),
-        "placements": [trial(t) for t in found.trials if t.answer == "feasible"],
-        "best": trial(best), "share": float(best.share) if searched else None,
+        "placements": list(map(trial, found.found)),
+        "best": trial(best), "share": best and best.share,
         "collisions": checked(found.task.collision), "cause": found.cause,
         "causes": dict(found.causes),
         "stations": plan and {

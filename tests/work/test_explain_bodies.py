@@ -12,7 +12,6 @@ from samples import EVERYTHING, sampled
 from feasibility import Answer, Search, Task, check
 from feasibility.cases import load_case
 from feasibility.certification import replay
-from feasibility.clock import Clock
 from feasibility.collisions import Collision, Obstacle, ToolShape
 from feasibility.sensitivity import Kind, explain
 from feasibility.verdict import Walk
@@ -165,9 +164,7 @@ def test_a_motion_found_beside_a_case_is_tried_on_the_case_itself(tmp_path):
 def test_a_search_ends_after_so_many_evaluations_on_any_machine():
     """As at the deadline: undecided, and why cells are missed can still be read."""
     robot, cells, task, _ = load_case("paper/5f").with_overrides(["task.standoff=0.505"]).build()
-    clock = Clock()
-    clock.evaluations = 30_000
-    verdict = check(robot, cells, task, clock=clock)
+    verdict = check(robot, cells, task, Search(evaluations=30_000))
     assert verdict.answer is Answer.UNDECIDED
     assert 30_000 < verdict.statistics["fk"] < 100_000
     assert len(verdict.causes) == len(cells) - verdict.n_covered
