@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from coverable_arrays import Array
-from surfaces.patches import SpaceModel
+from surfaces.parts import PartModels
 from surfaces.patches.nurbs import SplineMap, SplinePatch
 
 Flags = tuple[bool, bool]
@@ -41,13 +41,12 @@ class FittedPatch(SplinePatch):
         """See `Surface.deviations`."""
         return self.off
 
-    def part_models(self, low: Array, high: Array) -> tuple[SpaceModel, SpaceModel]:
+    def local_models(
+        self, low: Array, high: Array, twisted: bool = False
+    ) -> tuple[PartModels, Array]:
         """Of the surface meant: those of the spline, wider by what it may deviate."""
-        points, normals = SplinePatch.part_models(self, low, high)
-        return (
-            points._replace(error=points.error + self.off[0]),
-            normals._replace(error=normals.error + self.off[1]),
-        )
+        found, twist = SplinePatch.local_models(self, low, high, twisted)
+        return found._replace(radius=found.radius + np.array(self.off)), twist
 
 
 def spline_through(

@@ -1,5 +1,4 @@
-from .affine_models import SpaceModel as SpaceModel
-from .affine_models import arc as arc
+from .box_models import over_boxes as over_boxes
 from .closed_form_kernels import PatchKernel as PatchKernel
 from .closed_form_kernels import cell_at as cell_at
 from .closed_form_kernels import closest_on_patch as closest_on_patch
@@ -7,6 +6,7 @@ from .closed_form_kernels import u_direction as u_direction
 from .cone import cone as cone
 from .cylinder import cylinder as cylinder
 from .ellipsoid import ellipsoid as ellipsoid
+from .enclosures import Enclosure as Enclosure
 from .grid_cells import GridCells as GridCells
 from .grid_cells import grid_counts as grid_counts
 from .hyperboloid import hyperboloid as hyperboloid

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 from coverable_arrays import Array
 from coverable_errors import Fault
 from surfaces.arguments import LARGEST_RATIO, ORIGIN, Checks
-from surfaces.patches.affine_models import SpaceModel, straight, turned
 from surfaces.patches.patch import LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.surface import Side
 
@@ -63,18 +62,6 @@ class Cone(SmoothPatch):
         u = azimuth(x, y, *self.u_range, size=self.radius)
         height = (rho - self.radius - self.slope * z) / length
         return LocalClosestPoints(u, v, height, self.local_normal(u, v), ~past)
-
-    def part_models(self, low: Array, high: Array) -> tuple[SpaceModel, SpaceModel]:
-        """A straight line turned about z, and its normal."""
-        ends = (
-            np.stack([self.radius + self.slope * z, z], axis=1) for z in (low[:, 1], high[:, 1])
-        )
-        out = np.array([1.0, -self.slope]) / math.hypot(1.0, self.slope)
-        normal = np.tile(out, (len(low), 1))
-        around = low[:, 0], high[:, 0], 0
-        return turned(straight(*ends), *around).model(), turned(
-            straight(normal, normal), *around
-        ).model()
 
 
 def cone(

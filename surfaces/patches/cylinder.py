@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 from coverable_arrays import Array
 from surfaces.arguments import ORIGIN, Checks
-from surfaces.patches.affine_models import SpaceModel, straight, turned
 from surfaces.patches.normal_bounds import CurvatureSlices
 from surfaces.patches.patch import ClosedFormPatch
 from surfaces.surface import Side
@@ -44,14 +43,6 @@ class Cylinder(ClosedFormPatch):
     def curvature_slices(self, margin: float) -> CurvatureSlices:
         """Straight along z, 1/R around it."""
         return CurvatureSlices.constant(0.0, 1.0 / self.radius)
-
-    def part_models(self, low: Array, high: Array) -> tuple[SpaceModel, SpaceModel]:
-        """A straight line turned about z, and its normal."""
-        one, zero = np.ones(len(low)), np.zeros(len(low))
-        ends = (np.stack([self.radius * one, z], axis=1) for z in (low[:, 1], high[:, 1]))
-        out = np.stack([one, zero], axis=1)
-        around = low[:, 0], high[:, 0], 0
-        return turned(straight(*ends), *around).model(), turned(straight(out, out), *around).model()
 
 
 def cylinder(

@@ -11,10 +11,9 @@ from numpy.typing import ArrayLike
 
 from coverable_arrays import Array
 from surfaces.arguments import ORIGIN, Checks
-from surfaces.patches.affine_models import SpaceModel
 from surfaces.patches.patch import LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.patches.quadrature import rectangle_areas
-from surfaces.patches.sphere import turned_sphere, unit_sphere
+from surfaces.patches.sphere import unit_sphere
 from surfaces.surface import Side
 
 _MOST_STEPS = 200
@@ -43,12 +42,12 @@ class Ellipsoid(SmoothPatch):
 
     def local_point(self, u: Array, v: Array) -> Array:
         """The unit sphere's point, stretched."""
-        return np.asarray(unit_sphere(u, v) * np.array(self.semi_axes))
+        return unit_sphere(u, v) * np.array(self.semi_axes)
 
     def local_normal(self, u: Array, v: Array) -> Array:
         """The gradient of (x/a)^2 + (y/b)^2 + (z/c)^2 over its length."""
         gradient = unit_sphere(u, v) / np.array(self.semi_axes)
-        return np.asarray(gradient / np.linalg.norm(gradient, axis=-1, keepdims=True))
+        return gradient / np.linalg.norm(gradient, axis=-1, keepdims=True)
 
     def area(self, u0: ArrayLike, u1: ArrayLike, v0: ArrayLike, v1: ArrayLike) -> Array:
         """By quadrature of sin u |(b c x, c a y, a b z)|, (x, y, z) on the unit sphere."""
@@ -86,12 +85,6 @@ class Ellipsoid(SmoothPatch):
     def _parameters(self, closest_point: Array) -> tuple[Array, Array]:
         x, y, z = (closest_point / np.array(self.semi_axes)).T
         return np.arctan2(np.hypot(x, y), z), azimuth(x, y, *self.v_range, size=1.0)
-
-    def part_models(self, low: Array, high: Array) -> tuple[SpaceModel, SpaceModel]:
-        """The unit sphere, stretched both ways; the normal is along the gradient."""
-        axes = np.array(self.semi_axes)
-        points, gradients = (turned_sphere(low, high, s) for s in (axes, axes.min() / axes))
-        return points.model(), gradients.unit()
 
 
 def nearest_on_ellipsoid(axes: Array, points: Array, toward: Array) -> Array:

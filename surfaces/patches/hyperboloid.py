@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike
 
 from coverable_arrays import Array
 from surfaces.arguments import ORIGIN, Checks
-from surfaces.patches.affine_models import CurveModel, SpaceModel, turned, unit_curve
 from surfaces.patches.normal_bounds import CurvatureSlices
 from surfaces.patches.patch import ClosedFormPatch
 from surfaces.surface import Side
@@ -101,36 +100,6 @@ class Hyperboloid(ClosedFormPatch):
             parallel_slope=lever / g_near**4,
             reach=g_near / square,
         )
-
-    def part_models(self, low: Array, high: Array) -> tuple[SpaceModel, SpaceModel]:
-        """The meridian turned about z, and its normal.
-
-        r is convex in z, r'' = s^2 waist^2 / r^3 falls with |z|. Between two ends r lies under
-        their chord by at most r'' (2 h)^2 / 8; and, since it lies over both ends' tangents, by at
-        most (r'_1 - r'_0) 2 h / 4: the one for short pieces, the other for long ones. Half of
-        that is left of the chord moved down by it. The normal is along (r, -s^2 z), which is affine
-        but for the same r.
-        """
-        z0, z1 = low[:, 1], high[:, 1]
-        square = (self.waist / self.flare) ** 2
-        near = np.where(z0 * z1 <= 0.0, 0.0, np.minimum(np.abs(z0), np.abs(z1)))
-        r0, r1, least = (self._radius(z) for z in (z0, z1, near))
-        width = z1 - z0
-        turn = square * (z1 / r1 - z0 / r0)
-        sag = np.minimum(
-            square * self.waist**2 / least**3 * width**2 / 8.0, np.maximum(turn, 0.0) * width / 4.0
-        )
-        lowered, zero = (r0 + r1 - sag) / 2.0, np.zeros_like(sag)
-        error = np.stack([sag / 2.0, zero], axis=1)
-        middle = (z0 + z1) / 2.0
-        meridian = CurveModel(
-            np.stack([lowered, middle], axis=1),
-            np.stack([(r1 - r0) / 2.0, width / 2.0], axis=1),
-            error,
-        )
-        gradient = CurveModel(meridian.centre * [1, -square], meridian.slope * [1, -square], error)
-        around = low[:, 0], high[:, 0], 0
-        return turned(meridian, *around).model(), turned(unit_curve(gradient), *around).model()
 
 
 def hyperboloid(

@@ -17,11 +17,12 @@ from numpy.typing import ArrayLike
 from coverable_arrays import Array, Ints, Mask
 from surfaces.part_growth import Boxes, grown
 from surfaces.parts import MOST_PARTS, PartModels, SurfaceParts
+from surfaces.patches.box_models import Pieces, over_boxes
+from surfaces.patches.enclosures import Enclosure, enclosed
 from surfaces.patches.normal_bounds import CurvatureSlices, NormalBounds, normal_bounds
 from surfaces.surface import TURN_TOLERANCE, ClosestPoint, Surface, SurfaceError, points_of
 
 if TYPE_CHECKING:
-    from surfaces.patches.affine_models import SpaceModel
     from surfaces.patches.closed_form_kernels import PatchKernel
     from surfaces.patches.grid_cells import GridCells
 
@@ -86,17 +87,47 @@ class Patch(Surface):
     def area(self, u0: ArrayLike, u1: ArrayLike, v0: ArrayLike, v1: ArrayLike) -> Array:
         """Area (m^2) of the part u0..u1 by v0..v1; exact, vectorised."""
 
-    def part_models(self, low: Array, high: Array) -> tuple[SpaceModel, SpaceModel]:
-        """Bounds on points and normals, in the own frame, over boxes of parameters (k, 2).
+    @property
+    def breaks(self) -> tuple[Array, Array]:
+        """Rising values of u and of v across which the formulas are not smooth."""
+        return np.empty(0), np.empty(0)
+
+    def local_enclosures(self, u: Enclosure, v: Enclosure) -> tuple[Enclosure, Enclosure]:
+        """Points and normals in the own frame over boxes between `breaks`: the same formulas.
 
         Raises:
-            SurfaceError: the kind has none.
+            SurfaceError: they take u and v to something that is not known over boxes.
         """
+        try:
+            points, normals = (
+                enclosed(formula(u, v))  # type: ignore[arg-type]
+                for formula in (self.local_point, self.local_normal)
+            )
+            if points.shape == normals.shape == (*u.shape, 3):
+                return points, normals
+            fault = f"they are {points.shape} and {normals.shape} in shape, not {(*u.shape, 3)}"
+        except (TypeError, ValueError, IndexError, AttributeError) as error:
+            fault = str(error)
         raise SurfaceError(
-            "no bounds are known between places of this kind, so nothing can be proved of the "
-            "whole surface",
+            f"no bounds are known between places of this kind, as its formulas for points and "
+            f"normals cannot be followed over boxes of u and v ({fault}), so nothing can be "
+            "proved of the whole surface; NumPy's own functions of u and v, combined by "
+            "np.stack(..., axis=-1), can",
             self.kind,
         )
+
+    def local_models(
+        self, low: Array, high: Array, twisted: bool = False
+    ) -> tuple[PartModels, Array]:
+        """Models over boxes of parameters (k, 2) in the own frame, and t; see `twisted_models`."""
+        pieces = Pieces.of(self.breaks, low, high)
+        cut = len(pieces.box) > len(low)
+        found, twist = over_boxes(
+            self.local_enclosures, pieces.low, pieces.high, twisted and not cut
+        )
+        if cut:
+            return pieces.merged(found.guarded(), low, high), np.zeros((len(low), 3))
+        return found, twist
 
     @property
     def part_roots(self) -> tuple[Array, Array]:
@@ -109,26 +140,17 @@ class Patch(Surface):
 
     def placed_models(self, low: Array, high: Array, sign: float = 1.0) -> PartModels:
         """Models over boxes of parameters in the root frame; sign -1.0 turns normals over."""
-        from surfaces.patches.affine_models import part_models
-
-        found = part_models(*self.part_models(low, high))
+        found, _ = self.local_models(low, high)
         return found.placed(self.rotation, self.position, sign)
 
     def twisted_models(self, low: Array, high: Array) -> tuple[PartModels, Array]:
-        """The same with closer points, where they are known: + x_1 x_2 t; see `Twisted`.
+        """The same with closer points, + x_1 x_2 t; see `VectorModel`.
 
         Returns:
             The models, and t (k, 3) m in the root frame; zero where there is no closer model.
         """
-        from surfaces.patches.affine_models import part_models
-
-        points, normals = self.part_models(low, high)
-        twist = np.zeros_like(points.centre)
-        if points.twisted is not None:
-            closer = points.twisted()
-            points, twist = points._replace(error=closer.error, along=closer.along), closer.twist
-        found = part_models(points, normals).placed(self.rotation, self.position)
-        return found, twist @ self.rotation.T
+        found, twist = self.local_models(low, high, twisted=True)
+        return found.placed(self.rotation, self.position), twist @ self.rotation.T
 
     def parts(self, flat: float, straight: float, most: int = MOST_PARTS) -> SurfaceParts:
         """See `Surface.parts`."""

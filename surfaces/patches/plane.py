@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 from coverable_arrays import Array
 from surfaces.arguments import ORIGIN, Checks
-from surfaces.patches.affine_models import SpaceModel
 from surfaces.patches.normal_bounds import CurvatureSlices
 from surfaces.patches.patch import ClosedFormPatch
 from surfaces.surface import Side
@@ -42,14 +41,6 @@ class Plane(ClosedFormPatch):
     def curvature_slices(self, margin: float) -> CurvatureSlices:
         """Flat both ways."""
         return CurvatureSlices.constant(0.0, 0.0)
-
-    def part_models(self, low: Array, high: Array) -> tuple[SpaceModel, SpaceModel]:
-        """Exact."""
-        middle, half = (low + high) / 2.0, (high - low) / 2.0
-        centre = self.local_point(*middle.T)
-        sides = half[:, :, None] * np.eye(2, 3)
-        normal = self.local_normal(*middle.T)
-        return SpaceModel.exact(centre, sides), SpaceModel.exact(normal, np.zeros_like(sides))
 
 
 def plane(

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask, Protected
+from coverable_arrays import Array, Mask, Protected
 from coverable_errors import Fault
 from surfaces.patches.closest_point import ClosestPointSearch, Jet
+from surfaces.patches.enclosures import Enclosure
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -69,24 +70,20 @@ class Profile(Protected):
         inner = self.knots[:-1, None] + steps * np.diff(self.knots)[:, None]
         return np.append(inner.reshape(-1), self.knots[-1])
 
-    def derivative_bounds(self, low: Array, high: Array) -> tuple[Array, Array]:
-        """(k, 2) the largest second and third derivatives of r and z over low..high (k,)."""
-        last = len(self.knots) - 2
-        first = np.clip(np.searchsorted(self.knots, low, side="right") - 1, 0, last)
-        end = np.clip(np.searchsorted(self.knots, high, side="left") - 1, first, last)
-        seconds, thirds = self._largest
-        ends = np.maximum(np.abs(self.at(low, 2)), np.abs(self.at(high, 2)))
-        inner = largest_between(seconds, first + 1, end + 1)
-        return np.maximum(ends, inner), largest_between(thirds, first, end + 1)
-
-    @cached_property
-    def _largest(self) -> tuple[list[Array], list[Array]]:
-        """Of |second derivatives| at the knots, and of the third ones of the pieces."""
-        middles = (self.knots[:-1] + self.knots[1:]) / 2.0
-        return (
-            running_largest(np.abs(self.at(self.knots, 2))),
-            running_largest(np.abs(self.at(middles, 3))),
-        )
+    def curve(self, s: Any, order: int = 0) -> tuple[Any, Any]:
+        """r and z, or their derivatives of an order up to 1, of numbers or over single cubics."""
+        if not isinstance(s, Enclosure):
+            r, z = np.moveaxis(self.at(s, order), -1, 0)
+            return r, z
+        low, high = s.net[:, 0]
+        left = 3 - order  # the degree, and Bernstein's coefficients by slopes at both ends
+        step = ((high - low) / left)[:, None]
+        first, last = self.at(low, order), self.at(high, order)
+        inner = [first + step * self.at(low, order + 1)]
+        if left == 3:
+            inner.append(last - step * self.at(high, order + 1))
+        r, z = np.moveaxis(np.stack([first, *inner, last])[:, None], -1, 0)
+        return Enclosure(r), Enclosure(z)
 
     @cached_property
     def search(self) -> ClosestPointSearch:
@@ -198,22 +195,3 @@ def _straddles(a: Array, b: Array, c: Array, d: Array) -> Mask:
     along = b - a
     first, second = (along[:, 0] * (e - a)[:, 1] - along[:, 1] * (e - a)[:, 0] for e in (c, d))
     return np.asarray(np.sign(first) * np.sign(second) <= 0.0)
-
-
-def running_largest(values: Array) -> list[Array]:
-    """For each k the largest (n - 2^k + 1, d) of every 2^k neighbours of values (n, d)."""
-    levels = [values]
-    while len(levels[-1]) > 2 ** (len(levels) - 1):
-        width = 2 ** (len(levels) - 1)
-        levels.append(np.maximum(levels[-1][:-width], levels[-1][width:]))
-    return levels
-
-
-def largest_between(levels: list[Array], begin: Ints, end: Ints) -> Array:
-    """(k, d) the largest of the values begin..end - 1 (k,); 0 where there are none."""
-    found = np.zeros((len(begin), levels[0].shape[1]))
-    count = end - begin
-    for k, level in enumerate(levels):
-        some = np.flatnonzero((count >= 2**k) & (count < 2 ** (k + 1)))
-        found[some] = np.maximum(level[begin[some]], level[end[some] - 2**k])
-    return found

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 from coverable_arrays import Array
 from coverable_errors import Fault
 from surfaces.arguments import ORIGIN, Checks, metres
-from surfaces.patches.affine_models import SpaceModel, bounded_curve, turned, unit_curve
 from surfaces.patches.patch import EDGE, LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.patches.profile import Profile
 from surfaces.patches.quadrature import rectangle_areas
@@ -50,7 +49,7 @@ class Revolution(SmoothPatch):
 
     def local_point(self, u: Array, v: Array) -> Array:
         """(r cos v, r sin v, z)."""
-        r, z = np.moveaxis(self.profile.at(u), -1, 0)
+        r, z = self.profile.curve(u)
         return np.stack([r * np.cos(v), r * np.sin(v), z], axis=-1)
 
     def local_normal(self, u: Array, v: Array) -> Array:
@@ -68,27 +67,16 @@ class Revolution(SmoothPatch):
         return np.asarray((np.asarray(v1, float) - np.asarray(v0, float)) * around)
 
     @property
+    def breaks(self) -> tuple[Array, Array]:
+        """The knots of the profile."""
+        return self.profile.knots[1:-1], np.empty(0)
+
+    @property
     def part_roots(self) -> tuple[Array, Array]:
         """Closest points never lie beyond the profile's ends."""
         low, high = super(Revolution, self).part_roots
         low[:, 0], high[:, 0] = self.u_range
         return low, high
-
-    def part_models(self, low: Array, high: Array) -> tuple[SpaceModel, SpaceModel]:
-        """The profile turned about z, and its normal, along (-z', r').
-
-        r'' and z'' are linear on each piece of the spline, so the largest are at its ends, and the
-        third derivatives, which are the second ones of the normal's direction, are constant there.
-        """
-        u0, u1 = low[:, 0], high[:, 0]
-        half = (u1 - u0) / 2.0
-        second, third = self.profile.derivative_bounds(u0, u1)
-        at = np.stack([u0, u0 + half, u1])
-        curve = bounded_curve(self.profile.at(at), second, half)
-        leftward = self.profile.at(at, 1)[..., ::-1] * np.array([-1.0, 1.0])
-        normal = unit_curve(bounded_curve(leftward, third[:, ::-1], half))
-        around = low[:, 1], high[:, 1], 1
-        return turned(curve, *around).model(), turned(normal, *around).model()
 
     def local_closest_points(self, points: Array) -> LocalClosestPoints:
         """The nearest point of the profile, turned to the point's azimuth."""
@@ -105,7 +93,7 @@ class Revolution(SmoothPatch):
 
 def _normal(profile: Profile, u: Array) -> tuple[Array, Array]:
     """The part of the unit normal away from the axis, and along it."""
-    dr, dz = np.moveaxis(profile.at(u, 1), -1, 0)
+    dr, dz = profile.curve(u, 1)
     speed = np.hypot(dr, dz)
     return -dz / speed, dr / speed
 

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 from coverable_arrays import Array
 from surfaces.arguments import ORIGIN, Checks
-from surfaces.patches.affine_models import NO_STRETCH, SpaceModel, Turned, circle, turned
 from surfaces.patches.normal_bounds import CurvatureSlices
 from surfaces.patches.patch import ClosedFormPatch
 from surfaces.surface import Side
@@ -51,18 +50,6 @@ class Sphere(ClosedFormPatch):
     def curvature_slices(self, margin: float) -> CurvatureSlices:
         """1/R both ways."""
         return CurvatureSlices.constant(1.0 / self.radius, 1.0 / self.radius)
-
-    def part_models(self, low: Array, high: Array) -> tuple[SpaceModel, SpaceModel]:
-        """Arcs of circles, turned; the normal is the point without its radius."""
-        normals = turned_sphere(low, high)
-        return normals.model(self.radius), normals.model()
-
-
-def turned_sphere(low: Array, high: Array, stretch: Array = NO_STRETCH) -> Turned:
-    """The unit sphere over boxes of polar angle and azimuth (k, 2) rad, and then stretched."""
-    middle, half = (low[:, 0] + high[:, 0]) / 2.0, (high[:, 0] - low[:, 0]) / 2.0
-    meridian = circle(np.pi / 2.0 - middle, half, 1.0, inward=True)
-    return turned(meridian, low[:, 1], high[:, 1], angle=1, stretch=stretch)
 
 
 def unit_sphere(u: Array, v: Array) -> Array:

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 from coverable_arrays import Array
 from surfaces.arguments import ORIGIN, Checks
-from surfaces.patches.affine_models import SpaceModel, circle, turned
 from surfaces.patches.patch import LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.surface import Side
 
@@ -58,14 +57,6 @@ class Torus(SmoothPatch):
         return LocalClosestPoints(
             u, v, height, self.local_normal(u, v), np.ones(len(u), dtype=bool)
         )
-
-    def part_models(self, low: Array, high: Array) -> tuple[SpaceModel, SpaceModel]:
-        """Arcs of the tube's circle, turned; without the ring and the radius they are normals."""
-        middle, half = (low[:, 1] + high[:, 1]) / 2.0, (high[:, 1] - low[:, 1]) / 2.0
-        normal, tube = (circle(middle, half, radius) for radius in (1.0, self.tube))
-        tube = tube._replace(centre=tube.centre + np.array([self.ring, 0.0]))
-        around = low[:, 0], high[:, 0], 0
-        return turned(tube, *around).model(), turned(normal, *around).model()
 
 
 def torus(

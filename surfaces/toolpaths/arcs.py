@@ -3,10 +3,8 @@
 As cubics: a straight line is one, and of a great arc cubics with its directions and slopes at both
 ends of pieces of at most 15 degrees are within angle^4 / 384 (1.2e-5).
 
-As parts with rigorous bounds, like those of surfaces: the point's straight line is its own affine
-model. Over half an angle h about a direction m, towards w square to it, the normal is
-cos(t) m + sin(t) w, |t| <= h, and so within the arc's errors of C m + S (t / h) w
-(`surfaces.patches.affine_models`). The second parameter of these parts changes nothing.
+As parts with rigorous bounds, they are formulas over boxes, like those of surfaces. The second
+parameter of these parts changes nothing.
 """
 
 from __future__ import annotations
@@ -20,7 +18,7 @@ from coverable_arrays import Array, Ints
 from surfaces.cell_curves import CellCurves
 from surfaces.part_growth import Boxes, grown
 from surfaces.parts import PartModels, SurfaceParts
-from surfaces.patches import arc
+from surfaces.patches import Enclosure, over_boxes
 
 PIECE = math.radians(15.0)
 ROUNDING = 1.0 + 1e-12  # covers the rounding of the few operations on derivative bounds
@@ -110,21 +108,15 @@ def curve_parts(
 
 def _models(points: Array, normals: Array, which: Ints, low: Array, high: Array) -> PartModels:
     """Models of pieces of curves between points and normals (M, 2, 3): low to high of each."""
-    middle, half = 0.5 * (low + high)[:, 0], 0.5 * (high - low)[:, 0]
     start, end = points[which, 0], points[which, 1]
-    along = end - start
-    ends = normals[which, 0], normals[which, 1]
-    angle = arc_angles(*ends)
-    mean, slope = arc_at(*ends, middle)
-    ahead = slope / np.maximum(angle, 1e-300)[:, None]
-    turned = arc(half * angle)
-    count = len(which)
-    slopes = np.zeros((count, 2, 6))
-    slopes[:, 0, :3] = half[:, None] * along
-    slopes[:, 0, 3:] = turned.slope[:, None] * ahead
-    error = turned.bow + turned.sway
-    radius = np.column_stack([np.zeros(count), error])
-    radii = np.zeros((count, 2, 2))
-    radii[:, 0] = radius
-    centre = np.hstack([start + middle[:, None] * along, turned.mean[:, None] * mean])
-    return PartModels(centre, slopes, radius, radii)
+    first, last = normals[which, 0], normals[which, 1]
+    angle = arc_angles(first, last)
+    _, ahead = arc_at(first, last, np.zeros(len(which)))
+    ahead = ahead / np.maximum(angle, 1e-300)[:, None]
+
+    def formula(t: Enclosure, _: Enclosure) -> tuple[Enclosure, Enclosure]:
+        turned = (angle * t)[..., None]
+        return start + t[..., None] * (end - start), np.cos(turned) * first + np.sin(turned) * ahead
+
+    models, _ = over_boxes(formula, low, high)
+    return models

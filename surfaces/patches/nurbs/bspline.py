@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from coverable_arrays import Array
 from coverable_errors import Fault, shown
 from surfaces.arguments import ORIGIN, Checks, table
-from surfaces.patches.affine_models import SpaceModel
+from surfaces.patches.enclosures import Enclosure
 from surfaces.patches.nurbs.nurbs import SplineMap
 from surfaces.patches.nurbs.nurbs_checks import (
     MOST_DEGREE,
@@ -22,7 +22,6 @@ from surfaces.patches.nurbs.nurbs_checks import (
     checked_weights,
     regularity_faults,
 )
-from surfaces.patches.nurbs.spline_parts import spline_models
 from surfaces.patches.patch import EDGE, LocalClosestPoints, SmoothPatch
 from surfaces.patches.quadrature import rectangle_areas
 from surfaces.surface import Side, SurfaceError
@@ -75,9 +74,14 @@ class SplinePatch(SmoothPatch):
         ends = np.array([self.u_range, self.v_range])
         return ends[None, :, 0], ends[None, :, 1]
 
-    def part_models(self, low: Array, high: Array) -> tuple[SpaceModel, SpaceModel]:
-        """See `surfaces.patches.nurbs.spline_parts`."""
-        return spline_models(self.net.spans, low, high)
+    @property
+    def breaks(self) -> tuple[Array, Array]:
+        """The knots, and where a closed patch begins again."""
+        return self.net.lines(0), self.net.lines(1)
+
+    def local_enclosures(self, u: Enclosure, v: Enclosure) -> tuple[Enclosure, Enclosure]:
+        """See `SpanNets`."""
+        return self.net.spans.over(*(self.net.turned_in(x, axis) for axis, x in enumerate((u, v))))
 
     def local_closest_points(self, points: Array) -> LocalClosestPoints:
         """By search; see `surfaces.patches.closest_point`."""

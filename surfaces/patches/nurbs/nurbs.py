@@ -10,7 +10,8 @@ import numpy as np
 
 from coverable_arrays import Array, Protected
 from surfaces.patches.closest_point import ClosestPointSearch, Jet
-from surfaces.patches.nurbs.spline_parts import SpanNets, span_nets
+from surfaces.patches.enclosures import Enclosure
+from surfaces.patches.nurbs.spline_enclosures import SpanNets
 
 if TYPE_CHECKING:
     from scipy.interpolate import NdBSpline
@@ -154,7 +155,23 @@ class SplineMap(Protected):
     def spans(self) -> SpanNets:
         """The same as polynomials."""
         breaks = self.breaks(0), self.breaks(1)
-        return span_nets(self.points, self.weights, self.knots, self.degree, breaks)
+        return SpanNets(self.points, self.weights, self.knots, self.degree, breaks)
+
+    def lines(self, axis: int) -> Array:
+        """Values of u (axis 0) or v (axis 1) where it is not smooth, beyond closed ends, too."""
+        breaks = self.breaks(axis)
+        if not self.closed[axis]:
+            return breaks[1:-1]
+        period = breaks[-1] - breaks[0]
+        return np.unique(np.concatenate([breaks - period, breaks, breaks + period]))
+
+    def turned_in(self, x: Enclosure, axis: int) -> Enclosure:
+        """u or v over intervals that each lie in one span, brought into a closed range."""
+        if not self.closed[axis]:
+            return x
+        low, period = self.low[axis], self.high[axis] - self.low[axis]
+        turns = np.floor((x.net.mean(axis=(0, 1)) - low) / period)
+        return x - turns * period
 
     @cached_property
     def search(self) -> ClosestPointSearch:
