@@ -18,7 +18,7 @@ import numpy as np
 from coverable_arrays import Array, Ints, Mask, Protected
 
 MOST_PARTS = 8192
-_RELATIVE, _ABSOLUTE = 1e-9, 1e-12  # what is added to a radius for rounding
+RELATIVE, ABSOLUTE = 1e-9, 1e-12  # what is added to a radius for rounding
 _COORDINATE = 1e-14  # of the largest coordinate, likewise
 
 
@@ -75,7 +75,7 @@ class PartModels(NamedTuple):
         A unit vector lies within 1 of zero, so r_n is never more than that.
         """
         size = np.abs(self.centre[:, :3]).max(axis=1, initial=0.0)
-        radius = self.radius * (1.0 + _RELATIVE) + _ABSOLUTE
+        radius = self.radius * (1.0 + RELATIVE) + ABSOLUTE
         radius[:, 0] += _COORDINATE * size
         centre, slopes = self.centre.copy(), self.slopes.copy()
         for column, some in ((0, slice(0, 3)), (1, slice(3, 6))):
@@ -85,7 +85,7 @@ class PartModels(NamedTuple):
                 known &= radius[:, 1] < 1.0
             if not known.all():
                 centre[~known, some], slopes[~known, :, some] = 0.0, 0.0
-                radius[~known, column] = 1.0 + _ABSOLUTE if column else np.inf
+                radius[~known, column] = 1.0 + ABSOLUTE if column else np.inf
         return PartModels(centre, slopes, radius, np.nan_to_num(self.along, posinf=0.0))
 
     def rows(self, some: Ints | Mask) -> PartModels:

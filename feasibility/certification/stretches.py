@@ -2,13 +2,14 @@
 
 Take a part of the segment between two rows, with its own parameter s in 0..1, whose ends are over
 the places x0 and x1: found for their tool points, though any would do. `surfaces.places` gives a
-continuous path from x0 to x1 of straight pieces, and for each piece numbers D_T and D_b such that
-T and b differ from straight lines by at most t (1 - t) / 2 of them, t the piece's own parameter.
+continuous path from x0 to x1 of straight pieces, and for each piece numbers D_T and D_b, d_T and
+d_b, such that T and b differ from straight lines by at most t (1 - t) / 2 of the first two, and by
+the other two on top, t the piece's own parameter.
 Tool point and axis differ likewise from straight lines, by D_p and D_a of the stretch
 (`lever_bounds`), and by w^2 D_p and w^2 D_a on a part of it that is w of the whole. So on the
 part that goes with a piece
 
-    |p - T| <= (1 - t) e0 + t e1 + t (1 - t) / 2 (w^2 D_p + D_T)
+    |p - T| <= (1 - t) e0 + t e1 + t (1 - t) / 2 (w^2 D_p + D_T) + d_T
 
 with e0 and e1 bounds of |p - T| at its ends: there p is known to s (1 - s) / 2 D_p. The same holds
 for |a - b|, and for the roll what `certification.rolls` says. Nothing else is assumed of the
@@ -182,24 +183,24 @@ class Judge:
     def bounds(self, s: Stretches) -> Bounds:
         """See the module's text."""
         path = self.offset.paths(s.start.places, s.end.places)
-        share, bounds = path.share[..., None], path.derivative_bounds
+        share, bounds = path.share[..., None], path.derivative_bounds[..., 0]
+        off_line = path.deviations[..., 0]
         width = np.diff(path.share, axis=1) ** 2
         found = []
         approaches = self._held.approaches(path.normals)
-        of_axes = self._held.second_derivatives(path)
-        for start, end, aims, own, of_targets in (
-            (s.start.points, s.end.points, path.points, s.second[:, :1], bounds[..., 0]),
-            (s.start.axes, s.end.axes, approaches, s.second[:, 1:2], of_axes),
+        of_axes, off_axes = self._held.bends(path)
+        for start, end, aims, own, of_targets, beside in (
+            (s.start.points, s.end.points, path.points, s.second[:, :1], bounds, off_line),
+            (s.start.axes, s.end.axes, approaches, s.second[:, 1:2], of_axes, off_axes),
         ):  # fmt: skip
             line = (1.0 - share) * start[:, None] + share * end[:, None]
             sag = 0.5 * path.share * (1.0 - path.share) * own
             off = np.linalg.norm(line - aims, axis=2) + sag
-            peak = peaks(off[:, :-1], off[:, 1:], width * own + of_targets)
+            peak = peaks(off[:, :-1], off[:, 1:], width * own + of_targets) + beside
             found.append(peak.max(axis=1, initial=0.0))
-        joined = np.asarray(np.isfinite(bounds).all(axis=(1, 2)))
         first, last = ToolAxes(s.start.axes, s.start.x), ToolAxes(s.end.axes, s.end.x)
         roll = self._held.rolls_between(first, last, s.second[:, 2], path, approaches)
-        return Bounds(found[0], found[1], _apart(s), joined, roll)
+        return Bounds(found[0], found[1], _apart(s), path.known, roll)
 
     def within(self, one: Samples | Bounds) -> Mask:
         """(k,) inside tolerance, cone and roll, apart from a mesh's triangles; NaN is not."""

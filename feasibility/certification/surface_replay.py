@@ -96,12 +96,14 @@ def replay_over_surface(
         unknown = Certificate(len(rows) if rows.ndim else 0, np.nan, np.nan, np.nan)
         return MotionReplay(unknown, (fault,), nowhere)
     surface, curves = _surface_of(cells, task, working), None
+    vague = _too_vague(task, surface)
+    if vague:
+        return MotionReplay(Certificate(len(rows), np.nan, np.nan, np.nan), tuple(vague), nowhere)
     if working is None and marks is not None:
         curves = curves_of_marks(cells, marks)
     offset = offset_surface(surface, surface.side_sign * task.standoff)
     judge = Judge(robot, less_deviations(task, surface), offset, cells, curves)
     margin, faults = limits(robot, rows)
-    faults += _too_vague(task, surface)
     if working is None:
         found = _tool_along(judge, rows, cells, marks)
         reached = cells_reached(robot, cells, task, rows, found.samples, marks)

@@ -41,11 +41,14 @@ class FittedPatch(SplinePatch):
         """See `Surface.deviations`."""
         return self.off
 
-    def local_models(
-        self, low: Array, high: Array, twisted: bool = False
-    ) -> tuple[PartModels, Array]:
+    def placed_models(self, low: Array, high: Array, sign: float = 1.0) -> PartModels:
         """Of the surface meant: those of the spline, wider by what it may deviate."""
-        found, twist = SplinePatch.local_models(self, low, high, twisted)
+        found = SplinePatch.placed_models(self, low, high, sign)
+        return found._replace(radius=found.radius + np.array(self.off))
+
+    def twisted_models(self, low: Array, high: Array) -> tuple[PartModels, Array]:
+        """Likewise."""
+        found, twist = SplinePatch.twisted_models(self, low, high)
         return found._replace(radius=found.radius + np.array(self.off)), twist
 
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable_arrays import Array, Ints
-from surfaces.parts import PartModels
+from surfaces.parts import ABSOLUTE, RELATIVE, PartModels
 from surfaces.patches import bernstein
 from surfaces.patches.enclosure_functions import Enclosure
 
@@ -75,6 +75,16 @@ class VectorModel(NamedTuple):
         by_axis = [each[:, 0].sum(axis=0) + mixed, each[0].sum(axis=0) + mixed]
         return VectorModel(centre + shift, slopes, radius, np.stack(by_axis, axis=1), twist)
 
+    def guarded(self) -> VectorModel:
+        """The same with room for rounding; see `PartModels.guarded`."""
+        known = np.isfinite(self.radius) & np.isfinite(self.centre).all(axis=1)
+        known &= np.isfinite(self.slopes).all(axis=(1, 2))
+        radius = np.where(known, self.radius * (1.0 + RELATIVE) + ABSOLUTE, np.inf)
+        centre = np.where(known[:, None], self.centre, 0.0)
+        return self._replace(
+            centre=centre, slopes=np.where(known[:, None, None], self.slopes, 0.0), radius=radius
+        )
+
 
 def _lengths(vectors: Array) -> Array:
     return np.asarray(np.sqrt(np.einsum("...d,...d->...", vectors, vectors)))
@@ -124,6 +134,15 @@ def over_boxes(
         return models_of(of_points, VectorModel.of(normals)), of_points.twist
 
 
+def vectors_over(
+    formula: Callable[[Enclosure, Enclosure], Enclosure], low: Array, high: Array
+) -> VectorModel:
+    """Models of vectors over boxes of parameters (k, 2), likewise."""
+    with np.errstate(all="ignore"):
+        variables = (Enclosure.variable(low[:, axis], high[:, axis], axis) for axis in (0, 1))
+        return VectorModel.of(formula(*variables))
+
+
 class Pieces(NamedTuple):
     """What of k boxes lies between the lines at which a patch is not smooth, box by box."""
 
@@ -142,8 +161,13 @@ class Pieces(NamedTuple):
         first, count = np.empty((2, 2, len(low)), dtype=np.int64)
         lines = [np.concatenate([[-np.inf], line, [np.inf]]) for line in breaks]
         for axis, line in enumerate(lines):
-            first[axis] = np.searchsorted(line, low[:, axis], "right") - 1
-            last = np.searchsorted(line, high[:, axis], "left") - 1
+            first[axis], last = (
+                np.clip(found - 1, 0, len(line) - 2)  # NaN lies anywhere
+                for found in (
+                    np.searchsorted(line, low[:, axis], "right"),
+                    np.searchsorted(line, high[:, axis], "left"),
+                )
+            )
             count[axis] = np.maximum(last - first[axis], 0) + 1
         total = count.prod(axis=0)
         starts = np.cumsum(total) - total

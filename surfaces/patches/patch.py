@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,9 +18,16 @@ from numpy.typing import ArrayLike
 from coverable_arrays import Array, Ints, Mask
 from surfaces.part_growth import Boxes, grown
 from surfaces.parts import MOST_PARTS, PartModels, SurfaceParts
-from surfaces.patches.box_models import Pieces, over_boxes
+from surfaces.patches.box_models import (
+    Pieces,
+    VectorModel,
+    models_of,
+    over_boxes,
+    vectors_over,
+)
 from surfaces.patches.enclosures import Enclosure, enclosed
 from surfaces.patches.normal_bounds import CurvatureSlices, NormalBounds, normal_bounds
+from surfaces.patches.slopes import Slope
 from surfaces.surface import TURN_TOLERANCE, ClosestPoint, Surface, SurfaceError, points_of
 
 if TYPE_CHECKING:
@@ -98,14 +106,29 @@ class Patch(Surface):
         Raises:
             SurfaceError: they take u and v to something that is not known over boxes.
         """
+        return self._enclosed(self.local_point, u, v), self._enclosed(self.local_normal, u, v)
+
+    def local_tangents(self, u: Enclosure, v: Enclosure) -> Enclosure:
+        """Unit directions in which u grows, likewise.
+
+        Raises:
+            SurfaceError: see `local_enclosures`.
+        """
+
+        def ahead(u: Enclosure, v: Enclosure) -> Any:
+            zero = np.zeros(u.shape)
+            point: Any = self.local_point(Slope(u, zero + 1.0), Slope(v, zero))  # type: ignore[arg-type]
+            return point.by / np.linalg.norm(point.by, axis=-1, keepdims=True)
+
+        return self._enclosed(ahead, u, v)
+
+    def _enclosed(self, formula: Callable[..., Any], u: Enclosure, v: Enclosure) -> Enclosure:
+        """(k, 3) of a formula."""
         try:
-            points, normals = (
-                enclosed(formula(u, v))  # type: ignore[arg-type]
-                for formula in (self.local_point, self.local_normal)
-            )
-            if points.shape == normals.shape == (*u.shape, 3):
-                return points, normals
-            fault = f"they are {points.shape} and {normals.shape} in shape, not {(*u.shape, 3)}"
+            found = enclosed(formula(u, v))
+            if found.shape == (*u.shape, 3):
+                return found
+            fault = f"{found.shape} in shape, not {(*u.shape, 3)}"
         except (TypeError, ValueError, IndexError, AttributeError) as error:
             fault = str(error)
         raise SurfaceError(
@@ -126,7 +149,7 @@ class Patch(Surface):
             self.local_enclosures, pieces.low, pieces.high, twisted and not cut
         )
         if cut:
-            return pieces.merged(found.guarded(), low, high), np.zeros((len(low), 3))
+            return pieces.merged(found, low, high), np.zeros((len(low), 3))
         return found, twist
 
     @property
@@ -151,6 +174,19 @@ class Patch(Surface):
         """
         found, twist = self.local_models(low, high, twisted=True)
         return found.placed(self.rotation, self.position), twist @ self.rotation.T
+
+    def tangent_models(self, low: Array, high: Array) -> VectorModel:
+        """Models of the unit directions in which u grows, over boxes (k, 2), in the root frame."""
+        pieces = Pieces.of(self.breaks, low, high)
+        found = vectors_over(self.local_tangents, pieces.low, pieces.high)
+        if len(pieces.box) > len(low):
+            both = pieces.merged(models_of(found, found), low, high)
+            found = VectorModel(
+                both.centre[:, 3:], both.slopes[..., 3:], both.radius[:, 1], both.along[..., 1],
+                np.zeros((len(low), 3)),
+            )  # fmt: skip
+        turned = self.rotation.T
+        return found._replace(centre=found.centre @ turned, slopes=found.slopes @ turned)
 
     def parts(self, flat: float, straight: float, most: int = MOST_PARTS) -> SurfaceParts:
         """See `Surface.parts`."""

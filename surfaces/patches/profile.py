@@ -12,6 +12,7 @@ from coverable_arrays import Array, Mask, Protected
 from coverable_errors import Fault
 from surfaces.patches.closest_point import ClosestPointSearch, Jet
 from surfaces.patches.enclosures import Enclosure
+from surfaces.patches.slopes import Slope
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -71,7 +72,11 @@ class Profile(Protected):
         return np.append(inner.reshape(-1), self.knots[-1])
 
     def curve(self, s: Any, order: int = 0) -> tuple[Any, Any]:
-        """r and z, or their derivatives of an order up to 1, of numbers or over single cubics."""
+        """r and z, or derivatives of an order up to 2, of numbers or over single cubics."""
+        if isinstance(s, Slope):
+            both = zip(self.curve(s.value, order), self.curve(s.value, order + 1), strict=True)
+            r, z = (Slope(value, rate * s.by) for value, rate in both)
+            return r, z
         if not isinstance(s, Enclosure):
             r, z = np.moveaxis(self.at(s, order), -1, 0)
             return r, z
@@ -79,7 +84,7 @@ class Profile(Protected):
         left = 3 - order  # the degree, and Bernstein's coefficients by slopes at both ends
         step = ((high - low) / left)[:, None]
         first, last = self.at(low, order), self.at(high, order)
-        inner = [first + step * self.at(low, order + 1)]
+        inner = [first + step * self.at(low, order + 1)] if left > 1 else []
         if left == 3:
             inner.append(last - step * self.at(high, order + 1))
         r, z = np.moveaxis(np.stack([first, *inner, last])[:, None], -1, 0)

@@ -74,22 +74,21 @@ class PiecePlaces(OffsetSurface):
         joined = apart <= BORDERS * self.surface.gap
         first = a.paths(start, Places(start.chart, before))
         last = b.paths(Places(end.chart, after), end)
-        # Each side's path must be one straight piece: one over a kink or a pole is cut up first.
-        single = [(path.share[:, 2] == 0.0) & joined for path in (first, last)]
-        bounds = [path.derivative_bounds[:, 2] for path in (first, last)]
         to, fro = (
             np.linalg.norm(path.points[:, 3] - path.points[:, 0], axis=1) for path in (first, last)
         )
         ends = ((first, 0), (first, 3), (last, 0), (last, 3))
-        return PlacePaths.over(
+        none = np.zeros((len(to), 2))
+        made = PlacePaths.over(
             [path.place(k) for path, k in ends],
             [(path.points[:, k], path.normals[:, k]) for path, k in ends],
             share_of(to, fro),
-            (
-                np.where(single[0][:, None], bounds[0], np.inf),
-                np.where(single[1][:, None], bounds[1], np.inf),
-            ),
+            (none, none),
         )
+        for piece, path in ((0, first), (2, last)):
+            own = np.where(joined[:, None], path.deviations[:, 2], np.inf)
+            made.deviations[:, piece] = own
+        return made
 
     def tangents(self, places: Places) -> Array:
         """See `OffsetSurface.tangents`."""
@@ -99,12 +98,12 @@ class PiecePlaces(OffsetSurface):
             found[some] = self.pieces[k].tangents(places.of(some))
         return found
 
-    def tangent_slopes(self, start: Places, end: Places) -> Array:
-        """See `OffsetSurface.tangent_slopes`."""
+    def tangent_deviations(self, start: Places, end: Places) -> Array:
+        """See `OffsetSurface.tangent_deviations`."""
         found = np.full(len(start.chart), np.inf)
         for k in np.unique(start.chart[start.chart >= 0]):
             some = np.flatnonzero((start.chart == k) & (end.chart == k))
-            found[some] = self.pieces[k].tangent_slopes(start.of(some), end.of(some))
+            found[some] = self.pieces[k].tangent_deviations(start.of(some), end.of(some))
         return found
 
 

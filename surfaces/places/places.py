@@ -4,8 +4,8 @@ A place is a point of the surface by its parameters: u and v on a patch, weights
 mesh. Over a place x with the point f(x) and the outward unit normal n(x), the offset surface at a
 signed height h has the point T(x) = f(x) + h n(x). A path of places runs straight in the parameters
 between up to four of them. Along each straight piece, with its own parameter s in 0..1, T and n
-differ from straight lines by at most s (1 - s) / 2 times a bound; so whoever knows both at the ends
-of a piece knows them along it.
+differ from straight lines by at most s (1 - s) / 2 times one bound, and another one; so whoever
+knows both at the ends of a piece knows them along it.
 """
 
 from __future__ import annotations
@@ -58,6 +58,8 @@ class PlacePaths(NamedTuple):
     """(k, 3, 2) of second derivatives: along each piece offset point (m) and normal differ from the
     straight line between its ends by at most s (1 - s) / 2 times this; inf where nothing is known.
     """
+    deviations: Array
+    """(k, 3, 2) by how much they may be further off, anywhere along a piece; inf likewise."""
     chart: Ints
     """(k, 4) patch or face of the four places."""
     x: Array
@@ -109,15 +111,22 @@ class PlacePaths(NamedTuple):
             points,
             normals,
             np.stack([bounds[0], np.zeros_like(bounds[0]), bounds[1]], axis=1),
+            np.zeros((len(share), 3, 2)),
             chart,
             x,
         )
+
+    @property
+    def known(self) -> Mask:
+        """(k,) whether something is known of all pieces."""
+        both = self.derivative_bounds + self.deviations
+        return np.asarray(np.isfinite(both).all(axis=(1, 2)))
 
     def of(self, rows: Ints | Mask) -> PlacePaths:
         """Some of the paths."""
         return PlacePaths(
             self.share[rows], self.points[rows], self.normals[rows],
-            self.derivative_bounds[rows], self.chart[rows], self.x[rows],
+            self.derivative_bounds[rows], self.deviations[rows], self.chart[rows], self.x[rows],
         )  # fmt: skip
 
     def put(self, rows: Ints | Mask, others: PlacePaths) -> None:
@@ -161,10 +170,15 @@ class OffsetSurface(ABC):
         """Unit u directions (k, 3) of the surface at places; NaN where it has none."""
         return np.full((len(places.chart), 3), np.nan)
 
-    def tangent_slopes(self, start: Places, end: Places) -> Array:
-        """(k,) the largest slope of the u direction on straight pieces of paths.
+    @property
+    def square(self) -> bool:
+        """Whether u directions are square to normals everywhere."""
+        return True
 
-        By the piece's own parameter in 0..1; inf where nothing is known.
+    def tangent_deviations(self, start: Places, end: Places) -> Array:
+        """(k,) how far the u direction may be from a straight line along straight pieces of paths.
+
+        That is the line between its ends; inf where nothing is known.
         """
         return np.full(len(start.chart), np.inf)
 
@@ -219,22 +233,6 @@ def by_closest_points(
 def share_of(to: Array, fro: Array) -> Array:
     """(k,) the share of `to` in two lengths; 0 where both are 0."""
     return np.divide(to, to + fro, out=np.zeros_like(to), where=to + fro > 0.0)
-
-
-def second_derivatives_of_unit(length: Array, by_u: Array, by_v: Array, second: Array) -> Array:
-    """(k, 3) bounds for g / |g| from those for g: its length, and its derivatives.
-
-    Along (u', v') they bound the derivative as coefficients of u'^2, 2 |u' v'| and v'^2: |g'|^2 is
-    at most (|g_u| |u'| + |g_v| |v'|)^2, see `second_derivative_of_unit`.
-
-    Args:
-        length: (k,) lower bounds of |g|.
-        by_u, by_v: (k,) bounds of |g_u| and |g_v|.
-        second: (k, 3) bounds of |g_uu|, |g_uv| and |g_vv|.
-    """
-    firsts = (by_u, np.sqrt(by_u * by_v), by_v)
-    found = [second_derivative_of_unit(length, firsts[k], second[:, k]) for k in range(3)]
-    return np.stack(found, axis=1)
 
 
 def second_derivative_of_unit(length: Array, first: Array, second: Array) -> Array:

@@ -228,15 +228,21 @@ class PosePlaces(OffsetSurface):
         found[known], _ = arc_at(along[i], along[j], places.x[known, 0])
         return found
 
-    def tangent_slopes(self, start: Places, end: Places) -> Array:
-        """See `OffsetSurface.tangent_slopes`."""
+    @property
+    def square(self) -> bool:
+        """Only at the poses."""
+        return False
+
+    def tangent_deviations(self, start: Places, end: Places) -> Array:
+        """See `OffsetSurface.tangent_deviations`: of an arc that is run at an even speed."""
         if self.poses.along is None:
-            return super().tangent_slopes(start, end)
+            return super().tangent_deviations(start, end)
         along = self.poses.turned(self.poses.along)
         i, j = self._ends(start.chart)
         angle = arc_angles(along[i], along[j])
         turn = np.abs(end.x[:, 0] - start.x[:, 0]) * angle * ROUNDING
-        return np.where((start.chart >= 0) & (start.chart == end.chart), turn, np.inf)
+        same = (start.chart >= 0) & (start.chart == end.chart)
+        return np.where(same, turn**2 / 8.0, np.inf)
 
     def _length(self, chart: Ints, share: Array) -> Array:
         """(k,) m, of parts of curves."""

@@ -14,6 +14,7 @@ from feasibility.certification.cut_proofs.linear_models import (
     target_parts,
 )
 from feasibility.certification.rolls import (
+    Directions,
     TargetModel,
     ToolModel,
     reference_axes,
@@ -47,7 +48,8 @@ def test_models_of_the_roll_hold_over_their_boxes():
         slopes = 0.05 * rng.normal(size=(1, 2, 3))
         # The model of b, not made a unit vector, is off one by this at most.
         radius = np.array([np.linalg.norm(slopes, axis=2).sum() ** 2])
-        held = reference_parts(b[None], slopes, radius, r)
+        model = Directions(b[None], slopes, radius)
+        held = reference_parts(model, Directions.fixed(r, 1))
         q = rng.uniform(-2, 2, UR5.n)
         target = TargetModel(
             np.stack([b, held.centre[0]])[None], np.stack([slopes, held.slopes], axis=2),
@@ -96,17 +98,22 @@ def lengths(vectors):
 def test_radii_are_those_of_the_lemma():
     """A second reading of `rolls.box_models`, term by term: also of terms that others outweigh."""
     rng, root = np.random.default_rng(7), np.sqrt(3.0)
-    for _ in range(10):
+    for number in range(10):
         r, b = unit(rng.normal(size=3)), 1.02 * unit(rng.normal(size=3))
         slopes, r_b = 0.02 * rng.normal(size=(2, 3)), rng.uniform(1e-3, 1e-2)
-        held = reference_parts(b[None], slopes[None], np.array([r_b]), r)
+        e = r + 0.02 * (number % 2) * rng.normal(size=3)
+        de, r_e = (number % 2) * 0.02 * rng.normal(size=(2, 3)), (number % 2) * 0.01
+        model = Directions(b[None], slopes[None], np.array([r_b]))
+        held = reference_parts(model, Directions(e[None], de[None], np.array([r_e])))
         shortest = np.linalg.norm(b) - lengths(slopes) - r_b
         beta, off = lengths(slopes) / shortest, r_b / shortest
-        h = np.linalg.norm(np.cross(r, unit(b))) - beta - off
+        own, most = lengths(de), max(np.linalg.norm(e), 1.0) + lengths(de) + r_e
+        h = np.linalg.norm(np.cross(e, unit(b))) - most * (beta + off) - own - r_e
         if h < 0.1:
             continue
-        bent = (2.0 * 2.0 / root * beta**2 + 2.0 * beta**2) / h + 2.0 / root * (beta / h) ** 2
-        assert held.radius[0] == pytest.approx(0.5 * bent + off / h)
+        curved = most * (2.0 * 2.0 / root * beta**2 + 2.0 * beta**2) + 4.0 * own * beta
+        bent = curved / h + 2.0 / root * ((most * beta + own) / h) ** 2
+        assert held.radius[0] == pytest.approx(0.5 * bent + (most * off + r_e) / h)
 
         t, k, r_t = held.centre[0], held.slopes[0], float(held.radius[0])
         half = rng.uniform(0.2, 1.0, 2)

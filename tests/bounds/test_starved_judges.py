@@ -68,12 +68,15 @@ def test_stretches_of_a_motion(name, held, bent):
     facets = judge.bounds(away).facets
     assert not (np.isfinite(facets) & (facets > judge.least_distance)).any()
 
-    def unknown(column):
-        return lambda path: path._replace(derivative_bounds=grown(path.derivative_bounds, column))
+    def unknown(name, column):
+        return lambda path: path._replace(**{name: grown(getattr(path, name), column)})
 
-    starved = [Starved(offset, "paths", unknown(column)) for column in (0, 1)]
+    starved = [
+        Starved(offset, "paths", unknown(*what))
+        for what in itertools.product(("derivative_bounds", "deviations"), (0, 1))
+    ]
     if held and "roll_reference" not in held:
-        starved.append(Starved(offset, "tangent_slopes", grown))
+        starved.append(Starved(offset, "tangent_deviations", grown))
     for one in starved:
         blind = Judge(robot, task, one, cells)
         assert not blind.within(blind.bounds(parts)).any()

@@ -91,7 +91,7 @@ def test_paths_of_places_bend_no_more_than_is_said(height):
     paths = offset.paths(Places(chart, x[0]), Places(after, x[1]))
     assert np.isfinite(paths.derivative_bounds).all()
     weight = (0.5 * DENSE * (1.0 - DENSE))[1:-1, None]
-    stated, found, slopes, turned = [], [], [], []
+    stated, found, aside, turned = [], [], [], []
     for piece in (0, 2):
         some = paths.share[:, piece + 1] > paths.share[:, piece]
         one, other = (paths.place(piece + k).of(some) for k in (0, 1))
@@ -103,13 +103,14 @@ def test_paths_of_places_bend_no_more_than_is_said(height):
         off = np.linalg.norm(values - ends, axis=3)[1:-1]
         found.append((off / weight[..., None]).max(axis=0))
         stated.append(paths.derivative_bounds[some, piece])
-        slopes.append(offset.tangent_slopes(one, other))
+        aside.append(offset.tangent_deviations(one, other))
         ways = offset.tangents(dense).reshape(41, -1, 3)
-        turned.append(40.0 * np.linalg.norm(np.diff(ways, axis=0), axis=2).max(axis=0))
+        line = ways[[0]] + DENSE[:, None, None] * (ways[[-1]] - ways[[0]])
+        turned.append(np.linalg.norm(ways - line, axis=2).max(axis=0))
     stated, found = np.concatenate(stated), np.concatenate(found)
     holds(stated[:, 1], found[:, 1], used=0.95, tiny=1e-9)
     holds(stated[:, 0], found[:, 0], used=0.0, tiny=1e-9)  # offset points run straight
-    holds(np.concatenate(slopes), np.concatenate(turned), used=0.95, tiny=1e-9)
+    holds(np.concatenate(aside), np.concatenate(turned), used=0.95, tiny=1e-9)
     far = offset.paths(Places(chart[:1], x[0, :1]), Places((chart[:1] + 12) % 24, x[0, :1]))
     assert np.isinf(far.derivative_bounds).any()
 

@@ -26,7 +26,7 @@ from coverable_arrays import Array, Ints
 from feasibility.certification.jacobians import Jacobians, cross, jacobians, lengths
 from feasibility.certification.lever_bounds import lever_bounds, longest_levers
 from feasibility.certification.rolls import (
-    ReferenceParts,
+    Directions,
     TargetModel,
     ToolModel,
     reference_axes,
@@ -57,7 +57,7 @@ class Parts(NamedTuple):
     """(K, 2) the parts that each is cut into; -1, -1 for the finest."""
     axis: Ints
     """(K,) the parameter that the cut halves; -1 where the children are any two parts."""
-    references: ReferenceParts
+    references: Directions
     """Reference directions over the same parts; those of no use where the roll is free."""
 
 
@@ -78,7 +78,9 @@ def target_parts(parts: SurfaceParts, cells: Cells, task: Task) -> Parts:
     if fixed is not None:
         centre[:, 3:], slopes[..., 3:], radius[:, 1] = fixed, 0.0, 0.0
     reference = None if task.roll is None else task.fixed_reference(cells)
-    held = reference_parts(centre[:, 3:], slopes[..., 3:], radius[:, 1], reference)
+    along_u = Directions.unknown(len(parts))
+    e = along_u if reference is None else Directions.fixed(reference, len(parts))
+    held = reference_parts(Directions(centre[:, 3:], slopes[..., 3:], radius[:, 1]), e)
     return Parts(centre, slopes, radius, parts.children, parts.axis, held)
 
 
@@ -93,7 +95,7 @@ def cell_parts(targets: Targets) -> Parts:
         np.zeros((count, 2)),
         np.full((count, 2), -1),
         np.full(count, -1),
-        ReferenceParts(known, np.zeros((count, 2, 3)), np.zeros(count)),
+        Directions(known, np.zeros((count, 2, 3)), np.zeros(count)),
     )
 
 
@@ -107,7 +109,7 @@ def with_cells(parts: Parts, targets: Targets) -> Parts:
         np.concatenate([parts.radius, cells.radius]),
         np.concatenate([parts.children, cells.children]),
         np.concatenate([parts.axis, cells.axis]),
-        ReferenceParts(*(np.concatenate(both) for both in held)),
+        Directions(*(np.concatenate(both) for both in held)),
     )
 
 

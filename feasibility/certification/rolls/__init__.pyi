@@ -7,7 +7,7 @@ from .bounds import products_of_changes as products_of_changes
 from .bounds import reference_axes as reference_axes
 from .bounds import roll_vectors as roll_vectors
 from .bounds import tool_frames as tool_frames
-from .box_models import ReferenceParts as ReferenceParts
+from .box_models import Directions as Directions
 from .box_models import TargetModel as TargetModel
 from .box_models import ToolModel as ToolModel
 from .box_models import reference_parts as reference_parts

@@ -14,12 +14,12 @@ and r_t; then u = b x t has the slopes g_i x t0 + b0 x k_i, within
 and p and b x p, which are t and u turned by an angle, follow theirs within r_p = |cos| r_t +
 |sin| r_u, and so on, and move by at most M_p. The products leave M_x M_p + M_y M_q, and the radii.
 
-**t over a part.** With one reference r and b followed on a straight line of length V = sum_i |g_i|
-whose points are at least m long, b / |b| has |b'| <= beta = V / m and |b''| <= (2 / sqrt 3) beta^2,
-so g = r - (r . b) b has |g'| <= beta and |g''| <= 2 |b''| + 2 beta^2. That bounds |t''| of
-t = g / |g|, by `second_derivative_of_unit`, and half of it how far t is from its tangent. Off the
-model of b by r_b, t is by r_b / (m h) more, h the least |g|. Of the u direction nothing is known:
-r_t = inf.
+**t over a part.** Let b and the reference e both be followed on straight lines, of lengths V and E,
+and b be at least m long there. Then b / |b| has |b'| <= beta = V / m and |b''| <= (2 / sqrt 3)
+beta^2, so g = e - (e . b) b has |g'| <= |e| beta + E and |g''| <= |e| (2 |b''| + 2 beta^2) +
+4 E beta. That bounds |t''| of t = g / |g|, by `second_derivative_of_unit`, and half of it how far t
+is from its tangent. Off the models of b by r_b and of e by r_e, t is by (|e| r_b / m + r_e) / h
+more, h the least |g|. Where e is square to b everywhere, as the u direction is to normals, t is e.
 """
 
 from __future__ import annotations
@@ -37,56 +37,74 @@ NEVER = 4.0  # [1] of |F - 1|, which says nothing
 LEAST = 0.02  # [1] of h: nearer to a reference along b nothing is said
 
 
-class ReferenceParts(NamedTuple):
-    """t over K parts of a surface."""
+class Directions(NamedTuple):
+    """Unit vectors over K parts: within a radius of affine models, or on them at their ends."""
 
     centre: Array
     """(K, 3)"""
     slopes: Array
     """(K, 2, 3)"""
     radius: Array
-    """(K,) r_t; inf where nothing is known."""
+    """(K,) inf where nothing is known."""
+
+    @staticmethod
+    def between(start: Array, end: Array, radius: Array) -> Directions:
+        """From one (K, 3) to the other, by the first parameter."""
+        slopes = np.stack([0.5 * (end - start), np.zeros_like(start)], axis=1)
+        return Directions(0.5 * (start + end), slopes, radius)
+
+    @staticmethod
+    def fixed(one: Array, count: int) -> Directions:
+        """The same (3,) everywhere."""
+        return Directions(np.tile(one, (count, 1)), np.zeros((count, 2, 3)), np.zeros(count))
+
+    @staticmethod
+    def unknown(count: int) -> Directions:
+        """Of which nothing is known."""
+        return Directions.fixed(np.zeros(3), count)._replace(radius=np.full(count, np.inf))
 
 
-def reference_parts(
-    centre: Array, slopes: Array, radius: Array, reference: Array | None
-) -> ReferenceParts:
-    """t from models of b: centre (K, 3), slopes (K, 2, 3), radius (K,), and one direction r (3,).
+@np.errstate(invalid="ignore", divide="ignore", over="ignore")  # what is not known is inf or NaN
+def reference_parts(b: Directions, e: Directions, square: bool = False) -> Directions:
+    """t from models of b and of the reference e; `square` says that e is square to b everywhere.
 
     Example:
-        >>> flat = np.array([[0.0, 0.0, -1.0]]), np.zeros((1, 2, 3)), np.zeros(1)
-        >>> found = reference_parts(*flat, np.array([0.6, 0.0, 0.8]))
+        >>> flat = Directions.fixed(np.array([0.0, 0.0, -1.0]), 1)
+        >>> found = reference_parts(flat, Directions.fixed(np.array([0.6, 0.0, 0.8]), 1))
         >>> found.centre.round(6).tolist(), found.radius.tolist()
         ([[1.0, 0.0, 0.0]], [0.0])
     """
-    count = len(centre)
-    if reference is None:
-        nothing = np.zeros((count, 3)), np.zeros((count, 2, 3)), np.full(count, np.inf)
-        return ReferenceParts(*nothing)
-    length = np.linalg.norm(centre, axis=1)
-    b = centre / np.maximum(length, 1e-300)[:, None]
-    along = np.broadcast_to(reference, b.shape)
-    t, sine = projected(along, b)
-    moved = np.linalg.norm(slopes, axis=2).sum(axis=1)
-    shortest = length - moved - radius
-    beta = np.where(shortest > 0.0, moved / np.maximum(shortest, 1e-300), np.inf)
-    deviation = np.where(shortest > 0.0, radius / np.maximum(shortest, 1e-300), np.inf)
-    h = sine - beta - deviation
-    with np.errstate(invalid="ignore"):
-        second = 2.0 * (2.0 / np.sqrt(3.0)) * beta**2 + 2.0 * beta**2
-        reached = 0.5 * second_derivative_of_unit(h, beta, second)
-        reached += deviation / np.maximum(h, 1e-300)
-    # dt along db: what db does to g = r - (r . b) b, square to t, over its length.
-    db = slopes / np.maximum(length, 1e-300)[:, None, None]
-    db = db - (db * b[:, None]).sum(axis=2, keepdims=True) * b[:, None]
-    r_b = (along * b).sum(axis=1)[:, None, None]
-    dg = -(db * along[:, None]).sum(axis=2, keepdims=True) * b[:, None] - r_b * db
+    if square:
+        return _where_known(*e)
+    length = np.linalg.norm(b.centre, axis=1)
+    ahead = b.centre / length[:, None]
+    t, sine = projected(e.centre, ahead)
+    moved, own = (np.linalg.norm(x.slopes, axis=2).sum(axis=1) for x in (b, e))
+    most = np.maximum(np.linalg.norm(e.centre, axis=1), 1.0) + own + e.radius
+    shortest = length - moved - b.radius
+    shortest = np.where(shortest > 0.0, shortest, np.nan)
+    beta, deviation = moved / shortest, b.radius / shortest
+    h = sine - most * (beta + deviation) - own - e.radius
+    second = most * (2.0 * (2.0 / np.sqrt(3.0)) * beta**2 + 2.0 * beta**2) + 4.0 * own * beta
+    reached = 0.5 * second_derivative_of_unit(h, most * beta + own, second)
+    reached += (most * deviation + e.radius) / np.where(h > LEAST, h, np.nan)
+    # dt along db and de: what they do to g = e - (e . b) b, square to t, over its length.
+    db, de = (x.slopes for x in (b, e))
+    db = db / length[:, None, None]
+    db = db - (db * ahead[:, None]).sum(axis=2, keepdims=True) * ahead[:, None]
+    of_b = ((db * e.centre[:, None]) + (de * ahead[:, None])).sum(axis=2, keepdims=True)
+    dg = de - of_b * ahead[:, None] - (e.centre * ahead).sum(axis=1)[:, None, None] * db
     dt = dg - (dg * t[:, None]).sum(axis=2, keepdims=True) * t[:, None]
-    known = (h > LEAST) & np.isfinite(reached)
-    return ReferenceParts(
-        np.where(known[:, None], t, 0.0),
-        np.where(known[:, None, None], dt / np.maximum(sine, 1e-300)[:, None, None], 0.0),
-        np.where(known, reached, np.inf),
+    return _where_known(t, dt / sine[:, None, None], reached)
+
+
+def _where_known(centre: Array, slopes: Array, radius: Array) -> Directions:
+    known = np.isfinite(radius) & np.isfinite(centre).all(axis=1)
+    known &= np.isfinite(slopes).all(axis=(1, 2))
+    return Directions(
+        np.where(known[:, None], centre, 0.0),
+        np.where(known[:, None, None], slopes, 0.0),
+        np.where(known, radius, np.inf),
     )
 
 

@@ -1,15 +1,11 @@
 """How a task wants the tool held over places of a surface: approach and reference direction.
 
-Along a straight piece of a path of places let b differ from a straight line by at most
-s (1 - s) / 2 times D_b, and turn by at most beta = |db| + D_b / 2 in all. The reference e is fixed,
-or the u direction, of slope L_e at most (`OffsetSurface.tangent_slopes`). Its part square to b has
-the length h, at least that at the ends less (beta + L_e) / 2, so
-
-    |t'| <= L_t = (beta + L_e) / h
-
-and a curve of that slope differs from a straight line by at most 2 s (1 - s) L_t: D_t = 4 L_t. Of
-second order, with e fixed and b smooth, |b''| <= D_b: there g = e - (e . b) b has |g'| <= beta and
-|g''| <= 2 D_b + 2 beta^2. The product u = b x t has D_u = D_b + D_t + 2 |db| |dt|.
+Along a straight piece of a path of places b differs from a straight line by at most
+s (1 - s) / 2 D_b + d_b (`PlacePaths`), and so by no more than D_b / 8 + d_b. The reference e is
+fixed, or the u direction, which differs from a straight line by a known amount, too
+(`OffsetSurface.tangent_deviations`). What that says of t, `box_models.reference_parts` knows, as
+over boxes: t is within a radius r_t of a straight line, and within d_t = 2 r_t of that between its
+ends. The product u = b x t has D_u = 2 |db| |dt|, and d_u = D_b / 8 + d_b + d_t on top.
 """
 
 from __future__ import annotations
@@ -28,10 +24,11 @@ from feasibility.certification.rolls.bounds import (
     roll_vectors,
     vectors_of,
 )
+from feasibility.certification.rolls.box_models import Directions, reference_parts
 from feasibility.roll import Roll, projected
 from feasibility.task import Task
 from surfaces import Cells
-from surfaces.places import OffsetSurface, PlacePaths, Places, second_derivative_of_unit
+from surfaces.places import OffsetSurface, PlacePaths, Places
 
 FIRST, LAST = 0, 2  # pieces of a path; in the middle one the place changes sides, on the spot
 
@@ -50,10 +47,10 @@ class ReferencesAlong(NamedTuple):
 
     t: Array
     """(k, 4, 3) at the four places."""
-    second_t: Array
-    """(k, 3) D_t of the pieces."""
     second_u: Array
-    """(k, 3) D_u."""
+    """(k, 3) D_u of the pieces."""
+    beside: Array
+    """(k, 3) d_t + d_u."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -69,20 +66,16 @@ class Held:
     """(3,) where it is one direction; else the u direction."""
     roll: Roll | None
     """None where it is free."""
-    smooth: bool
-    """Whether normals are differentiable twice along the pieces of paths."""
 
     @staticmethod
     def of(task: Task, cells: Cells, offset: OffsetSurface) -> Held:
         """What `task` wants over the surface of `cells`, or that under them, by its `offset`."""
-        wall = cells.surface.wall
         return Held(
             offset,
             -cells.surface.side_sign,
             task.fixed_approach(cells),
             task.fixed_reference(cells),
             task.roll,
-            wall is None or wall.mean_edge_length == 0.0,
         )
 
     def approaches(self, normals: Array) -> Array:
@@ -91,10 +84,12 @@ class Held:
             return self.sign * normals
         return np.where(np.isnan(normals), np.nan, self.approach)
 
-    def second_derivatives(self, path: PlacePaths) -> Array:
-        """(k, 3) D_b of the pieces of paths."""
-        bounds = path.derivative_bounds[..., 1]
-        return bounds if self.approach is None else np.zeros_like(bounds)
+    def bends(self, path: PlacePaths) -> tuple[Array, Array]:
+        """D_b and d_b (k, 3) of the pieces of paths."""
+        none = np.zeros_like(path.deviations[..., 1])
+        if self.approach is not None:
+            return none, none
+        return path.derivative_bounds[..., 1], path.deviations[..., 1]
 
     def _references(self, places: Places, approaches: Array) -> tuple[Array, Array]:
         """t (k, 3) and h (k,) at places."""
@@ -129,7 +124,7 @@ class Held:
         count = len(second)
         if self.roll is None:
             return np.zeros(count)
-        references, second_t, second_u = self.references_along(path, approaches)
+        references, second_u, beside = self.references_along(path, approaches)
         share = path.share[..., None]
         ends = (start.x, end.x), (np.cross(start.axes, start.x), np.cross(end.axes, end.x))
         x, y = ((1.0 - share) * one[:, None] + share * other[:, None] for one, other in ends)
@@ -138,13 +133,13 @@ class Held:
         dt, du = np.diff(references, axis=1), np.diff(np.cross(approaches, references), axis=1)
         width = np.diff(path.share, axis=1)
         with np.errstate(invalid="ignore"):  # inf * 0 is NaN, and refused
-            most = width**2 * second[:, None] + ROOT * (second_t + second_u)
+            most = width**2 * second[:, None] + ROOT * second_u
             most += products_of_changes(np.diff(x, axis=1), np.diff(y, axis=1), dt, du)
         most[:, 1] = 0.0  # on the spot: right on both sides is enough
-        found = [
-            largest_off(z[:, k], z[:, k + 1], most[:, k], unknown[:, k : k + 2], self.roll.half)
-            for k in range(3)
-        ]
+        found = []
+        for k in range(3):
+            less = unknown[:, k : k + 2] + ROOT * beside[:, k, None]
+            found.append(largest_off(z[:, k], z[:, k + 1], most[:, k], less, self.roll.half))
         return np.asarray(np.max(found, axis=0))
 
     def references_along(self, path: PlacePaths, approaches: Array) -> ReferencesAlong:
@@ -154,30 +149,27 @@ class Held:
             path: of places.
             approaches: (k, 4, 3) at its four places.
         """
-        known = [self._references(path.place(k), approaches[:, k]) for k in range(4)]
-        references = np.stack([t for t, _ in known], axis=1)
-        sines = np.stack([h for _, h in known], axis=1)
-        db, dt = np.diff(approaches, axis=1), np.diff(references, axis=1)
-        second_t = self._second_of_references(path, db, sines)
+        ends = [self._references(path.place(k), approaches[:, k])[0] for k in range(4)]
+        references = np.stack(ends, axis=1)
+        turned, aside = self.bends(path)
+        d_b = turned / 8.0 + aside
+        db, dt = (np.linalg.norm(np.diff(a, axis=1), axis=2) for a in (approaches, references))
+        beside = np.zeros_like(d_b)
+        for piece in (FIRST, LAST):
+            two = approaches[:, piece : piece + 2]
+            d_t = 2.0 * self._along_piece(path, piece, two, d_b[:, piece]).radius
+            beside[:, piece] = 2.0 * d_t + d_b[:, piece]
         with np.errstate(invalid="ignore"):  # inf * 0 is NaN, and refused
-            second_u = self.second_derivatives(path) + second_t
-            second_u += 2.0 * np.linalg.norm(db, axis=2) * np.linalg.norm(dt, axis=2)
-        return ReferencesAlong(references, second_t, second_u)
+            return ReferencesAlong(references, 2.0 * db * dt, beside)
 
-    def _second_of_references(self, path: PlacePaths, db: Array, sines: Array) -> Array:
-        """(k, 3) D_t of the pieces; 0 where the place changes sides on the spot."""
-        second_b = self.second_derivatives(path)
-        beta = np.linalg.norm(db, axis=2) + 0.5 * second_b
-        own = np.zeros_like(beta)
-        for piece in (FIRST, LAST) if self.reference is None else ():
-            own[:, piece] = self.offset.tangent_slopes(path.place(piece), path.place(piece + 1))
-        with np.errstate(invalid="ignore"):
-            least = np.minimum(sines[:, :-1], sines[:, 1:]) - 0.5 * (beta + own)
-            known = least > 0.0
-            first = np.divide(beta + own, least, out=np.full_like(beta, np.inf), where=known)
-            second = 4.0 * first
-            if self.reference is not None and self.smooth:
-                smooth = second_derivative_of_unit(least, beta, 2.0 * second_b + 2.0 * beta**2)
-                second = np.minimum(second, smooth)
-        second[:, 1] = 0.0
-        return np.asarray(np.where(np.isnan(second), np.inf, second))
+    def _along_piece(
+        self, path: PlacePaths, piece: int, approaches: Array, beside: Array
+    ) -> Directions:
+        """t along one piece of paths, from b at its two ends (k, 2, 3) and d_b (k,)."""
+        b = Directions.between(approaches[:, 0], approaches[:, 1], beside)
+        if self.reference is not None:
+            return reference_parts(b, Directions.fixed(self.reference, len(beside)))
+        start, end = path.place(piece), path.place(piece + 1)
+        ends = self.offset.tangents(start), self.offset.tangents(end)
+        e = Directions.between(*ends, 0.5 * self.offset.tangent_deviations(start, end))
+        return reference_parts(b, e, self.approach is None and self.offset.square)

@@ -83,6 +83,11 @@ class SplinePatch(SmoothPatch):
         """See `SpanNets`."""
         return self.net.spans.over(*(self.net.turned_in(x, axis) for axis, x in enumerate((u, v))))
 
+    def local_tangents(self, u: Enclosure, v: Enclosure) -> Enclosure:
+        """See `SpanNets`."""
+        turned = (self.net.turned_in(x, axis) for axis, x in enumerate((u, v)))
+        return self.net.spans.tangents_over(*turned)
+
     def local_closest_points(self, points: Array) -> LocalClosestPoints:
         """By search; see `surfaces.patches.closest_point`."""
         x = self.net.search.nearest(points)

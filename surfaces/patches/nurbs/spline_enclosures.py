@@ -63,6 +63,24 @@ class SpanNets:
 
     def over(self, u: Enclosure, v: Enclosure) -> tuple[Enclosure, Enclosure]:
         """Points and normals over boxes that each lie in one span."""
+        made = self._made(u, v)
+        if made[0].shape[1] == 3:
+            points, along, across = made
+            return points + self.middle, unit(np.cross(along, across))
+        origin, (a, w), (a_u, w_u), (a_v, w_v) = _seen_from_inside(made)
+        normal = w * np.cross(a_u, a_v) + w_v * np.cross(a, a_u) + w_u * np.cross(a_v, a)
+        return a / w + (origin + self.middle), unit(normal)
+
+    def tangents_over(self, u: Enclosure, v: Enclosure) -> Enclosure:
+        """Unit vectors along S_u; or w A_u - A w_u."""
+        made = self._made(u, v)
+        if made[0].shape[1] == 3:
+            return unit(made[1])
+        _, (a, w), (a_u, w_u), _ = _seen_from_inside(made)
+        return unit(a_u * w - a * w_u)
+
+    def _made(self, u: Enclosure, v: Enclosure) -> list[Enclosure]:
+        """S, S_u and S_v, or A with w and their derivatives."""
         spans, shares = [], []
         for axis, x in enumerate((u, v)):
             line = self.breaks[axis]
@@ -81,18 +99,16 @@ class SpanNets:
             )
             net = by_v[:, None] @ (by_u @ net.reshape(k, m, n * d)).reshape(k, m, n, d)
             made.append(Enclosure(net.transpose(1, 2, 0, 3)))
-        if made[0].shape[1] == 3:
-            points, along, across = made
-            return points + self.middle, _unit(np.cross(along, across))
-        points, w = made[0][:, :3], made[0][:, 3:]
-        origin = 0.5 * sum(points.ends) / (0.5 * sum(w.ends))
-        (a, w), (a_u, w_u), (a_v, w_v) = (
-            (part[:, :3] - part[:, 3:] * origin, part[:, 3:]) for part in made
-        )
-        normal = w * np.cross(a_u, a_v) + w_v * np.cross(a, a_u) + w_u * np.cross(a_v, a)
-        return a / w + (origin + self.middle), _unit(normal)
+        return made
 
 
-def _unit(vectors: Any) -> Any:
+def _seen_from_inside(made: list[Enclosure]) -> tuple[Any, ...]:
+    """An origin (k, 3) in each box, and A from there beside w, and their derivatives."""
+    low, high = made[0].ends
+    origin = (low + high)[:, :3] / (low + high)[:, 3:]
+    return origin, *((part[:, :3] - part[:, 3:] * origin, part[:, 3:]) for part in made)
+
+
+def unit(vectors: Any) -> Any:
     """At length 1."""
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
