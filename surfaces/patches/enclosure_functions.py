@@ -306,7 +306,8 @@ def _stack(parts: Any, axis: int = 0) -> Enclosure:
 
 
 def _with_axis(part: Any) -> Enclosure:
-    return enclosed(part)[..., None] if np.ndim(part) else enclosed(np.asarray(part)[None])
+    part = enclosed(part)
+    return part[..., None] if part.ndim else enclosed(part.net[0, 0][None])
 
 
 def _joined(parts: list[Enclosure]) -> Enclosure:
@@ -350,9 +351,5 @@ FUNCTIONS |= {
     np.zeros_like: lambda a: enclosed(np.zeros(a.shape)),
     np.ones_like: lambda a: enclosed(np.ones(a.shape)),
     np.full_like: lambda a, value: enclosed(np.full(a.shape, value)),
-    np.broadcast_arrays: lambda *parts: [
-        _add(p, sum(np.zeros(np.shape(q)) for q in parts)) for p in parts
-    ],
-    np.ndim: lambda a: a.ndim,
-    np.shape: lambda a: a.shape,
+    np.broadcast_arrays: lambda *parts: [_both(part, sum(parts))[0] for part in parts],
 }

@@ -114,6 +114,32 @@ def test_random_surfaces_lie_in_their_parts(kind, seed):
     assert not lost(surface, rng), surface
 
 
+@sampled
+@pytest.mark.parametrize("seed", seeds(1, all=100))
+def test_models_over_any_boxes_hold_their_places_and_hardly_less_would(patch, seed):
+    """Points, normals and u directions: 10^6 places of each patch, of all sizes of boxes."""
+    rng, ends = np.random.default_rng(seed), np.array([patch.u_range, patch.v_range])
+    half = 0.5 * np.ptp(ends, axis=1) * 10.0 ** rng.uniform(-3, 0, (250, 2))
+    middle = rng.uniform(ends[:, 0] + half, ends[:, 1] - half)
+    x = np.concatenate([rng.uniform(-1, 1, (250, 31, 2)), np.tile(GRID[::10], (250, 1, 1))], axis=1)
+    u, v = np.moveaxis(middle[:, None] + x * half[:, None], 2, 0)
+    low, high = middle - half, middle + half
+    both, along = patch.placed_models(low, high).guarded(), patch.tangent_models(low, high)
+    small, tiny = (half <= 0.02 * np.ptp(ends, axis=1)).all(axis=1), np.abs(ends).max() * 1e-14
+    inner = (np.abs(x) < 0.99).all(axis=2)  # u directions are differences
+    for k, values in enumerate((patch.point(u, v), patch.normal(u, v), patch.tangent(u, v))):
+        some, model = slice(3 * k, 3 * k + 3), both if k < 2 else along
+        centre, slopes = (a[..., some] if k < 2 else a for a in (model.centre, model.slopes))
+        radius = model.radius[:, k] if k < 2 else model.radius
+        off = values - centre[:, None] - np.einsum("kgc,kcd->kgd", x, slopes)
+        off = np.linalg.norm(off, axis=2) * (inner if k == 2 else 1.0)
+        off[~np.isfinite(radius)] = 0.0
+        holds(radius[:, None], off, used=0.0, tiny=(tiny, tiny, 1e-7)[k])
+        large = small & (radius > (1e-9, 1e-9, 1e-5)[k]) & np.isfinite(radius)
+        if large.sum() > 5:
+            holds(radius[large, None], off[large], used=0.9)
+
+
 @pytest.mark.parametrize("limits", [(0.0, 1.0), (1.0, -1.0), (np.nan, 1.0), (1.0, np.nan)])
 def test_limits_that_no_part_keeps_are_refused(limits):
     with pytest.raises(ArgumentError, match="above 0"):
