@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from bounds import holds
+from part_walks import lost
 from specimens import EQUAL, ball, ring, sampled
 
+from feasibility import Task, check
+from feasibility.certification import replay_over_surface
+from feasibility.viewer import view
+from robots import load_robot
 from surfaces import SurfaceError, bspline, grid, parametric, piecewise, sheet_of
+from surfaces.passes import parallel_passes
 from surfaces.places import Places, offset_surface
 
 PAGE = Path(__file__).parents[2] / "docs" / "own_surfaces.md"
@@ -105,28 +112,63 @@ def names():
 
 
 def test_the_class_of_the_page_is_the_surface_of_its_formula(names):
-    formula, own = names["cells"], names["same"]
-    np.testing.assert_allclose(own.centres, formula.centres, atol=1e-12)
-    np.testing.assert_allclose(own.normals, formula.normals, atol=1e-12)
-    np.testing.assert_allclose(own.areas, formula.areas, rtol=1e-9)
-    points = np.random.default_rng(0).uniform([-0.1, 0.1, 0.0], [0.1, 0.5, 0.2], (200, 3))
-    mine, spline = names["own"].closest(points), names["formula"].closest(points)
-    np.testing.assert_allclose(mine.height, spline.height, atol=1e-12)
-    assert mine.inside.all()
+    screw, rise = names["screw"], names["screw"].rise
+    spline = parametric(
+        lambda u, v: (v * np.cos(u), v * np.sin(u), rise * u), screw.u_range, screw.v_range,
+        side="inside", position=screw.position,
+    ).cells(6, 4)  # fmt: skip
+    own = names["flank"]
+    np.testing.assert_allclose(own.centres, spline.centres, atol=1e-8)
+    np.testing.assert_allclose(own.normals, -spline.normals, atol=1e-6)
+    np.testing.assert_allclose(own.areas, spline.areas, rtol=1e-6)
+    rng = np.random.default_rng(0)
+    u, v, height = rng.uniform(-0.9, 0.9, 200), rng.uniform(0.12, 0.28, 200), 0.03
+    found = screw.closest(screw.point(u, v) + height * screw.normal(u, v))
+    np.testing.assert_allclose(np.stack([found.u, found.v]), [u, v], atol=1e-9)
+    np.testing.assert_allclose(found.height, height, atol=1e-12)
+    assert found.inside.all()
 
 
-def test_a_kind_that_says_no_more_of_itself_is_followed_but_not_bounded(names):
-    own = names["own"]
-    assert np.abs(own.cells(6, 8).curves.deviations[:, 0]).max() < 1e-6
-    with pytest.raises(SurfaceError, match="no bounds are known"):
+def test_the_class_of_the_page_needs_no_more_than_its_formulas(names):
+    """Parts for proofs, sheets, paths for the replay with u directions, motions, and their page."""
+    screw, cells = names["screw"], names["flank"]
+    rng = np.random.default_rng(0)
+    assert not lost(screw, rng)
+    assert 0.0 < sheet_of(screw).deviation < 1e-3
+    offset = offset_surface(screw, 0.02)
+    x = np.array([[0.0, 0.2], [0.1, 0.21]])
+    start, end = (Places(np.zeros(1, dtype=int), x[k : k + 1]) for k in (0, 1))
+    t = np.linspace(0.0, 1.0, 41)[:, None]
+    dense = Places(np.zeros(41, dtype=int), x[0] + t * (x[1] - x[0]))
+    stated = offset.paths(start, end).deviations[0, 2]
+    for values, bound in zip(
+        (*offset.at(dense), offset.tangents(dense)),
+        (*stated, offset.tangent_deviations(start, end)[0]), strict=True,
+    ):  # fmt: skip
+        off = np.linalg.norm(values - values[0] - t * (values[-1] - values[0]), axis=1).max()
+        assert 0.4 * bound < off < bound
+    task, robot = Task(0.02, 60, roll_deg=(-175, 175)), load_robot("puma560")
+    verdict = check(robot, cells, task)
+    assert verdict.feasible
+    assert replay_over_surface(robot, cells, task, verdict.witness.q).accepted
+    assert len(view(verdict).html()) > 10_000
+    far = replace(screw, position=np.array([3.0, 0.0, 0.0])).cells(2, 2)
+    assert str(check(robot, far, task).evidence) == "proof"
+    assert parallel_passes(screw, 0.05).count > 3
+
+
+def test_a_kind_that_cannot_be_followed_is_measured(names):
+    class Unknown(names["Helicoid"]):
+        def local_point(self, u, v):
+            return super().local_point(np.where(u > 2.0, 0.0, u), v)
+
+    own = Unknown(**{f.name: getattr(names["screw"], f.name) for f in fields(names["screw"])})
+    with pytest.raises(SurfaceError, match=r"np\.greater is not known"):
         sheet_of(own)
-    offset = offset_surface(own, 0.01)
-    points = own.point([0.0, 0.01], [0.3, 0.3])
-    places = offset.nearest(points, points, 1e-3)
-    # The bounds along a path are measured: twice the second differences, which is no proof.
-    measured = offset.paths(places.of([0]), places.of([1])).derivative_bounds[0, 2]
-    t = np.linspace(0.0, 0.01, 41)
-    line = offset.at(Places(np.zeros(41, dtype=int), np.column_stack([t, np.full(41, 0.3)])))
-    for some, bound in zip(line, measured.tolist(), strict=True):
-        second = np.linalg.norm(np.diff(some, 2, axis=0), axis=1).max() * 40**2
-        assert 1.5 * second < bound < 3.0 * second
+    places = [Places(np.zeros(1, dtype=int), np.array([[u, 0.2]])) for u in (0.0, 0.1)]
+    known, measured = (
+        [*offset_surface(one, 0.02).paths(*places).deviations[0, 2],
+         *offset_surface(one, 0.02).tangent_deviations(*places)]
+        for one in (names["screw"], own)
+    )  # fmt: skip
+    np.testing.assert_allclose(measured, 2.0 * np.array(known), rtol=0.1)
