@@ -114,11 +114,10 @@ class Prover:
         if not wide:
             yield {}, narrow
             return
-        if not self.opened:  # else the next ones have all of these cuts, too
-            saved = budget.left // 2
-            budget.left -= saved
-            yield {}, narrow
-            budget.left += saved
+        saved = budget.left // 2
+        budget.left -= saved
+        yield {}, narrow
+        budget.left += saved
         self._open(budget, limits, components, wide)
         if self.opened:
             yield dict(self.opened), (*narrow, *self.opened)
