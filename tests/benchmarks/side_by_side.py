@@ -25,7 +25,6 @@ from numpy.typing import NDArray
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "shared")]
-
 from referee import Arm, closely, joints_of
 
 from coverable import Task, check, list_robots, load_robot, plane, poses
@@ -36,7 +35,7 @@ ROWS, COLUMNS, REPEATS, PATIENCE = 9, 10, 5, 600.0  # cells, answers, [s] for on
 ROLLS = 24  # that a tool tries where the roll is free and it has to be told some
 TIP, BASE, GROUP = "tool0", "base_link", "manipulator"
 LINE = 1e-3  # [m] that the tool point may leave the straight lines by, for tools that ask
-TILT_DEG, FIXED_DEG = 1.0, 0.1  # of the tool, where its roll is free, and where nothing is
+TILT_DEG = 1.0  # of the tool, where its roll is free
 WIDE, LIFT = (-180.0, 180.0), (-120.0, 0.0)
 BEHIND = (WIDE, LIFT, None, WIDE, WIDE, WIDE)  # limits of the six joints; None as in the URDF
 

@@ -103,16 +103,3 @@ def test_both_readings_agree_where_approach_or_roll_are_asked_for(name, asked):
     free = JSpace(PUMA, cells, Task(0.005, 45), literal.start, search)
     other = tree_search(free, cells, at)
     assert other.checked != tree.checked, "the limits did not matter here; take tighter ones"
-
-
-def test_a_start_off_the_manifold_is_refused_and_a_subclass_makes_its_own_searches():
-    class Turned(LiteralSearch):
-        """Looks at the J-cells in another order: that is to be measured, not the base class."""
-
-    cells, task, search = PATCHES["dome"](), Task(0.005, 45), Search(method="greedy", step_deg=1.0)
-    with pytest.raises(ValueError, match="no feasible J-cell"):
-        LiteralSearch.of(PUMA, cells, task, search, start=np.zeros(6)).algorithm_2()
-    far = sphere(1.0, (50, 75), (40, 85), position=(9, 0, 0)).cells(2, 2)
-    with pytest.raises(ValueError, match="no start was found"):
-        LiteralSearch.of(PUMA, far, task, search)
-    assert type(Turned.of(PUMA, cells, task, search)) is Turned

@@ -9,9 +9,6 @@ from feasibility import Task, check, verify
 from feasibility.certification import replay
 from feasibility.collisions import Collision
 from feasibility.paths import PathError, coverage_path
-from feasibility.roadmap.forward.run import layers_of
-from feasibility.roadmap.graph import Roadmap
-from feasibility.roadmap.walk import route_walk
 from feasibility.verdict import Answer
 from robots import load_robot
 from surfaces import plane, poses
@@ -60,32 +57,6 @@ def test_the_tool_may_turn_on_the_spot_and_a_pose_may_come_twice(ur5, standoff):
     verdict = check(ur5, cells, dataclasses.replace(TASK, standoff=standoff))
     assert verdict.feasible
     assert verify(ur5, cells, verdict.task, verdict.witness.q).holds
-
-
-def _roadmap(nodes, edges):
-    """A roadmap of nodes over cells, joined by edges of one waypoint."""
-    roadmap = Roadmap(8)
-    for x, cell in enumerate(nodes):
-        roadmap.add_node(cell, np.full(2, float(x)), np.zeros(2), roadmap.add_component())
-    for x, y in edges:
-        roadmap.add_edge(x, y, roadmap.q[y][None])
-    return roadmap
-
-
-def test_a_run_is_a_path_through_the_layers_that_never_goes_back():
-    # One sheet over poses 0 to 3, one back from 3 to 1, one on from 1 to 5: all are joined.
-    nodes = [0, 1, 2, 3, 3, 2, 1, 1, 2, 3, 4, 5]
-    sheets = [(0, 1), (1, 2), (2, 3), (4, 5), (5, 6), (7, 8), (8, 9), (9, 10), (10, 11)]
-    folded = layers_of(_roadmap(nodes, [*sheets, (3, 4), (6, 7)]))
-    assert (folded.furthest, folded.start) == (3, 0)
-    # With a change of posture over pose 2 there is a run; edges may be known from their ends.
-    turned = [(y, x) for x, y in sheets]
-    roadmap = _roadmap(nodes, [*turned, (3, 4), (6, 7), (2, 8)])
-    run = layers_of(roadmap)
-    assert run.furthest == 5
-    walk = route_walk(roadmap, run.start, run.route)
-    assert walk.cell.tolist() == [0, 1, 2, 2, 3, 4, 5]
-    assert walk.q[:, 0].tolist() == [0, 1, 2, 8, 9, 10, 11]
 
 
 def test_collisions_with_a_surface_are_left_out_where_there_is_none(ur5):
