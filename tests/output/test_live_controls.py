@@ -8,7 +8,6 @@ from command_table import FILES
 
 from feasibility.cases import Case, CaseError, load_case
 from feasibility.live.controls import Controls
-from feasibility.live.workbench import Workbench
 
 PLATE = Case.from_toml(FILES["plate.toml"], name="plate")
 RAIL = Case.from_toml(FILES["rail.toml"])
@@ -83,25 +82,3 @@ def test_what_makes_no_sense_is_refused_in_words(plate, approved):
         said.append(f"{values}: {refused.value}")
     assert len(refused.value.faults) == 3, "all faults are told together"
     approved("live/refused", "\n".join(said))
-
-
-def test_a_workbench_builds_what_the_case_builds_and_keeps_what_has_not_changed(plate):
-    bench = Workbench(plate.case)
-    assert bench.build(plate.changed({})) is bench.setup
-    turned = plate.changed({"position": [10, 0, 310], "rpy_deg": [0, 0, 30]})
-    built, plain = bench.build(turned), turned.build()
-    assert built.robot is bench.setup.robot  # neither a name nor a limit has changed
-    assert np.array_equal(built.cells.centres, plain.cells.centres)
-    assert np.array_equal(built.cells.normals, plain.cells.normals)
-    assert (built.task, built.search) == (plain.task, plain.search)
-    assert bench.build(turned).cells is built.cells
-    narrow = plate.changed({"limits": {"elbow_joint": [-90, 90]}})
-    assert bench.build(narrow).cells is bench.setup.cells
-    assert np.array_equal(bench.build(narrow).robot.upper, narrow.build().robot.upper)
-
-
-def test_a_workbench_says_what_does_not_go_together():
-    case = PLATE.with_overrides(["robot.start_deg=[0, -90, 90, 0, 90, 0]"])
-    narrow = controls_of(case).changed({"limits": {"elbow_joint": [-10, 10]}})
-    with pytest.raises(CaseError, match="start"):
-        Workbench(case).build(narrow)

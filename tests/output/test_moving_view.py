@@ -113,20 +113,6 @@ def test_the_readout_is_what_pinocchio_says(verdict, drawn):
         assert np.allclose(columns[6:, k], [1e3 * distance, angle], atol=0.1)
 
 
-def test_what_plays_is_the_witness_at_an_even_pace(verdict, drawn):
-    played = drawn.motion
-    assert not played.there_and_back
-    np.testing.assert_array_equal(played.walk, verdict.witness.q)
-    assert 6.0 <= played.seconds[-1] <= 60.0
-    points = drawn.motion.tool_at(np.linspace(0, played.seconds[-1], 200))
-    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    assert lengths.max() < 1.5 * lengths.mean()
-    wrist = np.zeros((3, 6))
-    wrist[1:, 5] = [1.0, 3.0]  # the tool point stays where it is
-    still = motion.paced(verdict.robot, wrist, False, "test").seconds
-    assert np.allclose(still / still[-1], [0.0, 1 / 3, 1.0])
-
-
 def test_without_a_witness_the_longest_path_of_the_tree_is_one_motion():
     case = load_case("paper/4a", ["search.method=greedy", "surface.cells=[2, 2]",
                                   "search.step_deg=1"])  # fmt: skip

@@ -15,12 +15,8 @@ from PIL import Image
 from feasibility import check
 from feasibility.cases import load_case
 from feasibility.viewer import plot_graph, plot_views, threejs, view
-from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer.html_page import Camera
 from feasibility.viewer.painter import LENS, painted
-from feasibility.viewer.stage import camera_on
-from robots import load_robot
-from surfaces import plane
 
 SIZE = (160, 120)
 EYE = (4.0, 0.0, 0.0)
@@ -64,22 +60,6 @@ def test_what_is_nearer_hides_what_is_behind(order) -> None:
     line = threejs.segments("/line", np.array([[0, -0.4, 0.0], [0, 0.4, 0.0]]), GREEN)
     assert mask(painted([square("/a", RED), line], FRONT, *SIZE), GREEN).sum() > 20
     assert not mask(painted([square("/a", RED, x=1.0), line], FRONT, *SIZE), GREEN).any()
-
-
-def test_the_whole_arm_is_in_the_picture_wherever_the_surface_stands() -> None:
-    """Of a PUMA in random postures, with planes all around it, painted without anything else."""
-    puma, rng = load_robot("puma560"), np.random.default_rng(5)
-    drawing = robot_visuals.draw(puma)
-    for _ in range(8):
-        x, y, z = rng.uniform([-0.8, -0.6, -0.2], [0.6, 0.2, 0.6])
-        cells = plane((x, x + 0.3), (y, y + 0.4), position=(0, 0, z), side="outside").cells(2, 2)
-        q = rng.uniform(puma.lower, puma.upper)
-        camera = camera_on(puma, cells, q, drawing.lowest)
-        arm = [*drawing.commands, *robot_visuals.pose(puma, q, robot_visuals.ROBOT)]
-        image = painted(arm, camera, 180, 112)
-        assert (image < 0.9).all(axis=2).sum() > 100
-        for edge in (image[0], image[-1], image[:, 0], image[:, -1]):
-            assert (edge == 1.0).all()
 
 
 def test_a_view_leaves_a_picture_beside_the_page() -> None:

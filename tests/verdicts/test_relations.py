@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -161,26 +160,3 @@ def test_moving_all_by_one_rigid_motion_changes_nothing(name):
         )
         task = replace(task, collision=replace(task.collision, scene=scene))
     same(verdict_of(name), check(robot, surface.cells(*q.cells.shape), task))
-
-
-def test_reference_and_range_of_a_roll_turned_together_are_the_same():
-    """Roll is measured about the approach direction, here down."""
-    q = question("a square and 15 degrees")
-    turn = math.radians(-70.0)
-    reference = (math.cos(turn), math.sin(turn), 0.0)
-    other = replace(q.task, roll_reference=reference, roll_deg=(-85.0, -55.0))
-    found = check(q.robot, q.cells, other)
-    assert found.feasible
-    asked_for = plain.asked_of(q.task, q.cells)
-    form = plain.surface_of(q.cells.surface)
-    aims = plain.targets_of(q.cells, q.task)
-    assert plain.referee.judge(plain.arm_of(q.robot), form, asked_for, found.witness.q, aims) == []
-
-
-def test_a_body_far_away_changes_nothing():
-    q = question("clear of itself")
-    far = Obstacle.box("cabinet", (0.2, 0.2, 0.2), (0.0, 3.0, 0.0))
-    task = replace(q.task, collision=replace(q.task.collision, scene=(far,)))
-    with_cabinet, without = check(q.robot, q.cells, task), verdict_of("clear of itself")
-    assert with_cabinet.statistics["fk"] == without.statistics["fk"]
-    np.testing.assert_array_equal(with_cabinet.witness.q, without.witness.q)
