@@ -1,164 +1,130 @@
 """Compiled functions, kept on disk for as long as no code of kernels changes.
 
 `entry` is for functions that Python calls, and `kernel` for those that only these call, and each
-other: called from Python, a `kernel` runs as plain, slow Python. What makes arrays is to be
-`allocating_entry` or `allocating`: numba counts references to each array that a kernel reads out of
-a `NamedTuple`, which one that makes no arrays and returns none does not need, because its caller
-holds what it is given. numba refuses to compile one that should count.
-
-A division by zero gives inf or NaN, which no comparison in the search accepts, where an exception
-would end it.
+other: called from Python, one runs as plain, slow Python. What makes arrays is `allocating_entry`
+or `allocating`: numba counts references to the arrays in a `NamedTuple`, which others do not need,
+whose callers hold what they are given; it refuses to compile one that should count. A division by
+zero gives inf or NaN, which no comparison in the search accepts: an exception would end it.
 
 numba keeps what it has compiled until the file of that function changes. What the function calls,
 and the constants that it reads, may stand in other files; so kernels are kept here for as long as
 all of `CODE` is as it was. And they are machine code, so that whoever could change one could run
-anything: they are read only where they are as safe as the code beside them.
+anything: their folder is this user's alone, and nobody else can put another in its place.
 """
 
 from __future__ import annotations
 
-import functools
 import hashlib
 import os
 import stat
-import threading
 from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from numba import cfunc, njit
-from numba.core import config
-from numba.core.caching import InTreeCacheLocator, UserProvidedCacheLocator, UserWideCacheLocator
+from numba import cfunc, config, njit
+from numba.core.caching import InTreeCacheLocator
+from numba.core.compiler_lock import global_compiler_lock
 from numba.extending import register_jitable
 
-HOOK = "CACHE_LOCATOR_CLASSES"  # numba's setting of where compiled functions are kept
 ROOT = Path(__file__).resolve().parent
-CODE = (
-    "coverable_kernels.py",
-    "robots/chain.py",
-    "surfaces/triangle_kernel.py",
-    "surfaces/meshes/*.py",
-    "surfaces/meshes/cells/*.py",
-    "surfaces/patches/closed_form_kernels.py",
-    "feasibility/collisions/kernels/*.py",
-    "feasibility/paper/*.py",
-    "feasibility/roadmap/branch_and_bound/*.py",
-    "feasibility/roadmap/causes/diagnosis.py",
-    "feasibility/roadmap/cuts/findings.py",
-    "feasibility/roadmap/motions/*.py",
-    "feasibility/roadmap/moving_clear.py",
-    "feasibility/timing/fastest_speeds.py",
+CODE = (  # files of kernels, of all that they name, and of the named tuples that they are given
+    "coverable_kernels.py", "robots/chain.py", "surfaces/triangle_kernel.py",
+    "surfaces/meshes/*.py", "surfaces/meshes/cells/*.py", "surfaces/patches/closed_form_kernels.py",
+    "feasibility/paper/*.py", "feasibility/collisions/kernels/*.py",
+    "feasibility/roadmap/branch_and_bound/*.py", "feasibility/roadmap/causes/diagnosis.py",
+    "feasibility/roadmap/moving_clear.py", "feasibility/roadmap/cuts/findings.py",
+    "feasibility/roadmap/motions/*.py", "feasibility/timing/fastest_speeds.py",
     "feasibility/viewer/painter.py",
-)
-"""Files of kernels, of all that kernels name, and of the named tuples that they are given."""
-Function = Any
-KEPT_NOWHERE: set[str] = set()
-"""Modules of this process whose kernels cannot be written to any safe folder."""
-_turn = threading.RLock()
-
-
-@functools.cache
-def stamp() -> bytes:
-    """A hash of all that kernels can be compiled from."""
-    files = sorted({path for pattern in CODE for path in ROOT.glob(pattern)})
-    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).digest()
+)  # fmt: skip
+HOOK, _SETTINGS = "CACHE_LOCATOR_CLASSES", vars(config)  # of numba, from 0.62 on
 
 
 def is_safe(found: os.stat_result, code: os.stat_result, user: int) -> bool:
-    """May a file or folder be trusted like the code?
+    """Can only those who can change the code put something else in the place of a folder's files?
 
-    It belongs to the user, to root, or to whom the code belongs; and nobody else may write there,
-    but for a group that may write to the code as well.
+    It belongs to the user, to root, or to whom the code belongs; nobody else may write there, but
+    for a group that may write to the code too; or nobody may change what is another's, as in /tmp.
 
     Args:
-        found: its owner and permissions.
-        code: those of the folder that the code is in.
+        found, code: owner and permissions of the folder, and of that of the code.
         user: who runs it.
 
     Example:
-        >>> here = os.stat(__file__)
-        >>> is_safe(here, here, here.st_uid), is_safe(os.stat("/tmp"), here, here.st_uid)
-        (True, False)
+        >>> is_safe(os.stat("/"), os.stat("/"), os.geteuid())
+        True
     """
-    if found.st_uid not in (user, 0, code.st_uid) or found.st_mode & stat.S_IWOTH:
-        return False
     same_group = code.st_mode & stat.S_IWGRP and found.st_gid == code.st_gid
-    return bool(same_group) or not found.st_mode & stat.S_IWGRP
+    others = stat.S_IWOTH if same_group else stat.S_IWOTH | stat.S_IWGRP
+    written = found.st_mode & others and not found.st_mode & stat.S_ISVTX
+    return found.st_uid in (user, 0, code.st_uid) and not written
 
 
-class _SafeFolder:
-    """One of numba's places for kernels, where it is safe; its stamp is that of all the code."""
+def _made(place: str) -> Path | None:
+    """The folder of kernels in a place, made if it is missing; None where it is not safe."""
+    folder, user = Path(place).resolve() / "coverable-kernels", os.geteuid()
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(mode=0o700, exist_ok=True)
+        own, code = folder.lstat(), ROOT.stat()
+        safe = all(is_safe(parent.stat(), code, user) for parent in folder.parents)
+    except OSError:
+        return None
+    alone = stat.S_ISDIR(own.st_mode) and own.st_uid == user and not own.st_mode & 0o077
+    return folder if safe and alone and os.access(folder, os.W_OK) else None
 
-    get_cache_path: Callable[[], str]
-    _py_file: str
+
+_HOME = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+_PLACES = _SETTINGS["CACHE_DIR"], f"{ROOT}/__pycache__", _HOME if os.path.isabs(_HOME) else ""
+FOLDER = next(filter(None, (_made(place) for place in _PLACES if place)), None)
+"""Of all kernels: in `NUMBA_CACHE_DIR`, beside the code, or in the home folder's cache; or none."""
+_STAMP = b"".join(path.read_bytes() for code in CODE for path in sorted(ROOT.glob(code)))
+
+
+class Kept(InTreeCacheLocator):
+    """Where numba keeps a function, and for how long."""
+
+    def get_cache_path(self) -> str:
+        """A folder for each folder of code, wherever that is."""
+        inside = os.path.relpath(os.path.dirname(self._py_file), ROOT)
+        return f"{FOLDER}/{inside.replace(os.sep, '-').replace('..', 'up')}"
 
     def get_source_stamp(self) -> bytes:
-        """What a kept kernel is valid for."""
-        return stamp()
-
-    def ensure_cache_path(self) -> None:
-        """Make the folder, for this user alone, and see who may write there.
-
-        Raises:
-            PermissionError: if that is somebody else; then numba asks the next place.
-        """
-        folder, code = Path(self.get_cache_path()), Path(self._py_file).parent
-        folder.mkdir(parents=True, exist_ok=True, mode=0o755 if folder.parent == code else 0o700)
-        super().ensure_cache_path()  # type: ignore[misc]
-        reached = [folder, *(folder.glob("*.nb[ic]") if folder.stat().st_mode & 0o077 else ())]
-        if not all(is_safe(path.stat(), code.stat(), os.geteuid()) for path in reached):
-            raise PermissionError(f"others may write to kernels in {folder}")
+        """All that the function can be compiled from."""
+        return hashlib.sha256(_STAMP + Path(self._py_file).read_bytes()).digest()
 
 
-class Chosen(_SafeFolder, UserProvidedCacheLocator):
-    """In `NUMBA_CACHE_DIR`, where that is set."""
+@global_compiler_lock
+def _kept(compiling: Callable[..., Any], function: Any) -> Any:
+    """Let numba compile a function, and keep it where it can: a disk may be full by then."""
+    usual = _SETTINGS[HOOK]
+    _SETTINGS[HOOK] = f"{__name__}.{Kept.__name__}"
+    try:
+        kept = compiling(cache=FOLDER is not None)(function)
+    except (OSError, RuntimeError):
+        return compiling()(function)
+    finally:
+        _SETTINGS[HOOK] = usual
+    compile_and_keep = kept.compile
 
+    def compile_or_load(signature: Any) -> Any:
+        with suppress(OSError):
+            return compile_and_keep(signature)
+        return compile_and_keep(signature)  # it was compiled, and could not be kept
 
-class BesideCode(_SafeFolder, InTreeCacheLocator):
-    """In `__pycache__`."""
-
-
-class InHome(_SafeFolder, UserWideCacheLocator):
-    """In the cache of the home folder, if there is one."""
-
-    def ensure_cache_path(self) -> None:
-        """See above."""
-        if not Path(self.get_cache_path()).is_absolute():
-            raise PermissionError("there is no home folder")
-        super().ensure_cache_path()
-
-
-def _kept(compiling: Callable[..., Any], function: Function) -> Any:
-    """Let numba compile a function, and keep it in a safe place, unless the user chose others."""
-    with _turn:
-        chosen: str = getattr(config, HOOK)
-        ours = ",".join(f"{__name__}.{place.__name__}" for place in (Chosen, BesideCode, InHome))
-        setattr(config, HOOK, chosen or ours)
-        try:
-            return compiling(cache=True)(function)
-        except RuntimeError:  # there is no such place
-            KEPT_NOWHERE.add(function.__module__)
-            return compiling()(function)
-        finally:
-            setattr(config, HOOK, chosen)
+    kept.compile = compile_or_load
+    return kept
 
 
 _COUNTED: dict[str, Any] = {"error_model": "numpy", "_nrt": True, "no_cfunc_wrapper": True}
-_UNCOUNTED: dict[str, Any] = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
-Decorator = Callable[[Function], Any]
-kernel: Decorator = register_jitable(**_UNCOUNTED)
-allocating: Decorator = register_jitable(**_COUNTED)
-entry: Decorator = functools.partial(_kept, functools.partial(njit, **_UNCOUNTED))
-allocating_entry: Decorator = functools.partial(_kept, functools.partial(njit, **_COUNTED))
+_UNCOUNTED = _COUNTED | {"_nrt": False}
+kernel: Callable[[Any], Any] = register_jitable(**_UNCOUNTED)
+allocating: Callable[[Any], Any] = register_jitable(**_COUNTED)
+entry: Callable[[Any], Any] = partial(_kept, partial(njit, **_UNCOUNTED))
+allocating_entry: Callable[[Any], Any] = partial(_kept, partial(njit, **_COUNTED))
 
 
-def callback(signature: Any) -> Decorator:
+def callback(signature: Any) -> Callable[[Any], Any]:
     """For functions that kernels call by their address."""
-    return functools.partial(_kept, functools.partial(cfunc, signature, error_model="numpy"))
-
-
-@kernel
-def put(target, source):  # type: ignore[no-untyped-def]
-    """Copy numbers into an array of the same length; numba's `target[:] = source` is far longer."""
-    for j in range(target.shape[0]):
-        target[j] = source[j]
+    return partial(_kept, partial(cfunc, signature, error_model="numpy"))

@@ -18,7 +18,6 @@ NOTICE = COMPILING.format("the search kernels")
 CUTTING = COMPILING.format("the kernels that cut a surface into cells")
 COLLISIONS = COMPILING.format("the kernels that keep clear of collisions")
 MORE = COMPILING.format("what else `coverable {}` needs")
-AREAS = COMPILING.format("the kernels that certify areas")
 REASONS = COMPILING.format("the kernels that say why cells are missed")
 GREEDY = COMPILING.format("the kernels of the greedy search")
 WAITING = (

@@ -107,9 +107,9 @@ def warm_up(
 
 def _say_where_nothing_is_kept() -> None:
     """That this was in vain, because kernels cannot be written anywhere."""
-    from coverable_kernels import KEPT_NOWHERE
+    from coverable_kernels import FOLDER
 
-    if KEPT_NOWHERE:
+    if FOLDER is None:
         print_err(
             "note: kernels can be kept safely neither beside the code nor in the cache of the home "
             "folder, so each process compiles them; set NUMBA_CACHE_DIR to a folder of your own"

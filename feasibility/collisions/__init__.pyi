@@ -5,14 +5,10 @@ from .bodies import Pair as Pair
 from .bodies import Seat as Seat
 from .bodies import Soup as Soup
 from .kernels import INFLUENCE as INFLUENCE
-from .kernels import Counts as Counts
-from .kernels import Nearest as Nearest
 from .kernels import blamed as blamed
 from .kernels import clearance_gradient as clearance_gradient
 from .kernels import collision_buffer as collision_buffer
 from .kernels import configuration_bounds as configuration_bounds
-from .kernels import counts as counts
-from .kernels import nearest as nearest
 from .kernels import segment_clear as segment_clear
 from .outer_bodies import polytopes_of as polytopes_of
 from .outer_bodies import soup_of as soup_of

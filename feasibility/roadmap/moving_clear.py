@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from coverable_arrays import Array
-from coverable_kernels import entry, put
+from coverable_kernels import entry
 from feasibility.collisions import clearance_gradient, segment_clear
 from feasibility.roadmap.motions import (
     CONE_SLACK,
@@ -17,6 +17,7 @@ from feasibility.roadmap.motions import (
     look_at,
     place,
     project,
+    put,
 )
 
 PUSHES = 8  # steps that a colliding configuration gets

@@ -307,15 +307,6 @@ def test_what_is_inside_a_closed_body_collides():
         assert one_pair(stick("l1", 1), soup=aside).clear(0.0, 0.0)
 
 
-def test_the_nearest_points_are_where_they_are():
-    ball = Polytope("ball", 0, np.array([[0.0, 1.0, 0.0]]), 0.2)
-    found = one_pair(stick("l1", 1), ball).nearest(np.array([np.pi / 2]))
-    assert found.pair == 0
-    assert found.distance == pytest.approx(1.0 - LENGTH - RADIUS - 0.2, abs=1e-9)
-    points = sorted([found.point_first[1], found.point_second[1]])
-    assert points == pytest.approx([LENGTH + RADIUS, 0.8], abs=1e-6)
-
-
 def test_the_push_is_the_gradient_of_the_nearest_distance():
     rng, checked = np.random.default_rng(5), 0
     while checked < 6:

@@ -16,7 +16,6 @@ from feasibility.collisions import (
     clearance_gradient,
     collision_buffer,
     configuration_bounds,
-    nearest,
     segment_clear,
 )
 from feasibility.roadmap import (
@@ -29,9 +28,8 @@ from feasibility.roadmap import (
 from feasibility.roadmap.branch_and_bound import box_bounds, box_contraction
 from feasibility.roadmap.branch_and_bound.boxes import box_work
 from feasibility.roadmap.branch_and_bound.branching import DIRECTIONS
-from feasibility.roadmap.motions import aiming, project_near_cell, segment_bound, segment_holds
+from feasibility.roadmap.motions import aiming, project_near_cell, projection, segment_bound
 from feasibility.roadmap.motions.aiming import aim, stand_still
-from feasibility.roadmap.motions.projection import project
 from feasibility.roadmap.motions.working_memory import place
 from robots import Robot
 from surfaces import Cells, plane
@@ -39,7 +37,8 @@ from surfaces import Cells, plane
 Floats = NDArray[np.float64]
 
 # Only other kernels call these in the search.
-bounds_between = entry(aiming.bounds_between)
+bounds_between, project = entry(aiming.bounds_between), entry(projection.project)
+segment_holds = entry(segment_bound.segment_holds)
 second_derivatives = entry(segment_bound.second_derivatives)
 roll_derivatives = entry(segment_bound.roll_derivatives)
 static_levers, shrink = entry(box_bounds.static_levers), entry(box_contraction.shrink)
@@ -69,10 +68,6 @@ class Clearance:
         """How much something presses (0: nothing is near), and a step away from it."""
         step = np.zeros(self.n)
         return clearance_gradient(self.buffer, q, step, length), step
-
-    def nearest(self, q: Floats) -> Any:
-        """The nearest pair and its points."""
-        return nearest(self.buffer, q)
 
     def blamed(self) -> int:
         """The pair for which the last segment was refused."""

@@ -11,14 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable_arrays import Array, Ints
-from feasibility.collisions.kernels.tables import (
-    FIRST,
-    LAST,
-    LEFT,
-    MIDDLE,
-    NODE_COLUMNS,
-    RIGHT,
-)
+from feasibility.collisions.kernels import tables as T
 
 Whole = Ints
 CORNERS = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
@@ -61,11 +54,11 @@ def box_tree(triangles: Array) -> BoxTree:
     boxes = np.vstack([level[0] for level in levels])
     counts = np.concatenate([level[2] for level in levels])
     cloud = np.vstack([level[1] for level in levels])
-    nodes = np.zeros((len(boxes), NODE_COLUMNS))
-    nodes[:, MIDDLE:] = boxes
-    nodes[:, [LEFT, RIGHT]] = np.vstack(children)
-    nodes[:, LAST] = np.cumsum(counts)
-    nodes[:, FIRST] = nodes[:, LAST] - counts
+    nodes = np.zeros((len(boxes), T.NODE_COLUMNS))
+    nodes[:, T.MIDDLE :] = boxes
+    nodes[:, [T.LEFT, T.RIGHT]] = np.vstack(children)
+    nodes[:, T.LAST] = np.cumsum(counts)
+    nodes[:, T.FIRST] = nodes[:, T.LAST] - counts
     return BoxTree(nodes, cloud[np.arange(8) < counts[:, None]])
 
 
@@ -80,11 +73,11 @@ def moved(tree: BoxTree, rotation: Array, position: Array) -> BoxTree:
     if np.array_equal(rotation, np.eye(3)) and not position.any():
         return tree
     nodes, corners = tree.nodes.copy(), np.empty_like(tree.corners)
-    boxes = nodes[:, MIDDLE:]
+    boxes = nodes[:, T.MIDDLE :]
     boxes[:, :3] = np.einsum("mk,ik->mi", boxes[:, :3], rotation) + position
     boxes[:, 3:12] = (boxes[:, 3:12].reshape(-1, 3, 3) @ rotation.T).reshape(-1, 9)
     boxes[:, 12:] += OUTWARD * (np.abs(boxes[0, :3]).max() + np.linalg.norm(boxes[0, 12:]))
-    first, inner = nodes[:, FIRST].astype(np.int64)[:, None], nodes[:, LEFT] >= 0
+    first, inner = nodes[:, T.FIRST].astype(np.int64)[:, None], nodes[:, T.LEFT] >= 0
     own = first[~inner] + np.arange(3)  # of triangles
     corners[own] = tree.corners[own] @ rotation.T + position
     corners[first[inner] + np.arange(8)] = _corners(boxes[inner])

@@ -6,35 +6,15 @@ segment is certified: `segments.py`.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from coverable_kernels import entry
 from feasibility.collisions import Bodies
+from feasibility.collisions.kernels import tables as T
 from feasibility.collisions.kernels.calls import MEASURE, PUSH, SEGMENT, call, with_address
 from feasibility.collisions.kernels.packing import packed
-from feasibility.collisions.kernels.tables import (
-    ASKED,
-    BLAMED,
-    BOUND,
-    BOUNDS,
-    BY_BUDGET,
-    CALLS,
-    DECIDED,
-    FRAMES,
-    NODES,
-    PAIR,
-    SIZE,
-    STATE,
-    SWEPT,
-    TRIED,
-    Array,
-    Tables,
-    row,
-    views,
-)
+from feasibility.collisions.kernels.tables import Array, row, views
 from robots import Robot
 
 
@@ -51,7 +31,7 @@ def collision_buffer(bodies: Bodies, robot: Robot) -> Array:
         RobotError: the arm is no serial chain.
     """
     memory = packed(bodies, robot).copy()
-    views(memory).state[0, BLAMED] = -1.0
+    views(memory).state[0, T.BLAMED] = -1.0
     return with_address(memory)
 
 
@@ -70,7 +50,7 @@ def segment_clear(buffer, q0, q1):  # type: ignore[no-untyped-def]
         m, positive where that is certain, end points included: at q1 no pair is nearer to its
         clearance than this. 0 or less where it is not, as for NaN.
     """
-    at = row(buffer, ASKED, np.int64(0))
+    at = row(buffer, T.ASKED, np.int64(0))
     n = q0.shape[0]
     for j in range(n):
         buffer[at + j] = q0[j]
@@ -91,11 +71,11 @@ def clearance_gradient(buffer, q, step, size):  # type: ignore[no-untyped-def]
     Returns:
         0 where nothing is near; 1 where the nearest pair is at its clearance; more below it.
     """
-    at = row(buffer, ASKED, np.int64(0))
+    at = row(buffer, T.ASKED, np.int64(0))
     n = q.shape[0]
     for j in range(n):
         buffer[at + j] = q[j]
-    buffer[STATE + SIZE] = size
+    buffer[T.STATE + T.SIZE] = size
     share = call(buffer, PUSH)
     for j in range(n):
         step[j] += buffer[at + 2 * n + j]
@@ -105,48 +85,7 @@ def clearance_gradient(buffer, q, step, size):  # type: ignore[no-untyped-def]
 @entry
 def blamed(buffer):  # type: ignore[no-untyped-def]
     """Which of `Bodies.pairs` the last segment that was not certified failed at; -1 before."""
-    return np.int64(buffer[STATE + BLAMED])
-
-
-class Counts(NamedTuple):
-    """What a buffer has done since it was made."""
-
-    segments: int
-    items: int
-    """Pairs of groups asked for, over all segments."""
-    by_budget: int
-    """Those decided by the bounds that were there already."""
-    swept: int
-    """Swept tests."""
-    bounds: int
-    """Bounds of single configurations."""
-    iterations: int
-    """Directions tried."""
-    frames: int
-    """Configurations evaluated."""
-    nodes: int
-    """Boxes and triangles asked for."""
-
-
-def counts(buffer: Array) -> Counts:
-    """What a buffer has done since it was made."""
-    state = views(buffer).state[0]
-    return Counts(
-        *map(int, state[[CALLS, DECIDED, BY_BUDGET, SWEPT, BOUNDS, TRIED, FRAMES, NODES]])
-    )
-
-
-class Nearest(NamedTuple):
-    """The pair that is nearest to its clearance, or furthest below it."""
-
-    pair: int
-    """Row of `Bodies.pairs`."""
-    distance: float
-    """m, between the bodies of the search; where they overlap, negative: a depth."""
-    point_first: Array
-    """(3,) m in the root frame, on one of the two bodies."""
-    point_second: Array
-    """(3,) m, on the other."""
+    return np.int64(buffer[T.STATE + T.BLAMED])
 
 
 def configuration_bounds(buffer: Array, q: ArrayLike) -> Array:
@@ -155,24 +94,10 @@ def configuration_bounds(buffer: Array, q: ArrayLike) -> Array:
     They are sharp to about 1e-6 of the distance. Where two bodies overlap a bound is negative, by
     at least the depth. What may stand out from a surface's triangles is taken off.
     """
-    t, slot = _measured(buffer, q)
-    pairs = t.items[:, PAIR].astype(int)
-    result = np.full(int(pairs.max(initial=-1)) + 1, np.inf)
-    np.minimum.at(result, pairs, t.items[:, BOUND + slot])
-    return result
-
-
-def nearest(buffer: Array, q: ArrayLike) -> Nearest | None:
-    """Which pair is nearest to its clearance at q, and where; None where there are no pairs."""
-    t, _ = _measured(buffer, q)
-    if not len(t.items):
-        return None
-    found = t.found[0]
-    return Nearest(int(t.state[0, BLAMED]), float(found[0]), found[4:7].copy(), found[7:10].copy())
-
-
-def _measured(buffer: Array, q: ArrayLike) -> tuple[Tables, int]:
-    """The tables after measuring all items at q, and the slot with the bounds."""
     t = views(buffer)
     t.asked[0] = q
-    return t, int(call(buffer, MEASURE)) if len(t.items) else 0
+    slot = int(call(buffer, MEASURE)) if len(t.items) else 0
+    pairs = t.items[:, T.PAIR].astype(int)
+    result = np.full(int(pairs.max(initial=-1)) + 1, np.inf)
+    np.minimum.at(result, pairs, t.items[:, T.BOUND + slot])
+    return result

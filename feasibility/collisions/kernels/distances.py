@@ -15,27 +15,10 @@ from __future__ import annotations
 import numpy as np
 
 from coverable_kernels import kernel
+from feasibility.collisions.kernels import tables as T
 from feasibility.collisions.kernels.inside import inside_tree
 from feasibility.collisions.kernels.link_frames import pose_of, transformed
 from feasibility.collisions.kernels.separation import BEST, MOST_TURNS, remember, separation
-from feasibility.collisions.kernels.tables import (
-    BALL,
-    CENTRE,
-    CLOSED,
-    DIRECTION,
-    DIRECTION_COLUMNS,
-    FIRST,
-    INNER,
-    ITEM_A,
-    ITEM_B,
-    LAST,
-    NEAREST,
-    OUTER,
-    POLYTOPE_COLUMNS,
-    RADIUS,
-    RELATIVE,
-    TREE,
-)
 from feasibility.collisions.kernels.tree_distances import of_tree
 from feasibility.collisions.kernels.witness import record
 
@@ -45,9 +28,9 @@ def set_relative(m, item, here, there):  # type: ignore[no-untyped-def]
     """Write the poses of an item's second body, seen from its first, in two slots."""
     for end in range(2):
         slot = there if end == 1 else here
-        a = pose_of(m, slot, np.int64(m[item + INNER]))
-        b = pose_of(m, slot, np.int64(m[item + OUTER]))
-        out = RELATIVE + 12 * end
+        a = pose_of(m, slot, np.int64(m[item + T.INNER]))
+        b = pose_of(m, slot, np.int64(m[item + T.OUTER]))
+        out = T.RELATIVE + 12 * end
         x, y, z = m[b + 9] - m[a + 9], m[b + 10] - m[a + 10], m[b + 11] - m[a + 11]
         for i in range(3):
             ax, ay, az = m[a + i], m[a + 3 + i], m[a + 6 + i]
@@ -59,10 +42,10 @@ def set_relative(m, item, here, there):  # type: ignore[no-untyped-def]
 @kernel
 def swept_ball(m, b, ends):  # type: ignore[no-untyped-def]
     """Centre and radius of a ball around a polytope in its relative poses."""
-    x, y, z = transformed(m, RELATIVE, b + CENTRE)
-    radius = m[b + BALL]
+    x, y, z = transformed(m, T.RELATIVE, b + T.CENTRE)
+    radius = m[b + T.BALL]
     if ends == 2:
-        x1, y1, z1 = transformed(m, RELATIVE + 12, b + CENTRE)
+        x1, y1, z1 = transformed(m, T.RELATIVE + 12, b + T.CENTRE)
         radius += 0.5 * np.sqrt((x1 - x) ** 2 + (y1 - y) ** 2 + (z1 - z) ** 2)
         x, y, z = 0.5 * (x + x1), 0.5 * (y + y1), 0.5 * (z + z1)
     return x, y, z, radius
@@ -75,15 +58,15 @@ def of_polytopes(m, a, b, direction, ends, need, want, least):  # type: ignore[n
     `direction` is the row of the one that separated them the last time.
     """
     x, y, z, radius = swept_ball(m, b, ends)
-    x, y, z = x - m[a + CENTRE], y - m[a + CENTRE + 1], z - m[a + CENTRE + 2]
-    lower = np.sqrt(x * x + y * y + z * z) - radius - m[a + BALL]
+    x, y, z = x - m[a + T.CENTRE], y - m[a + T.CENTRE + 1], z - m[a + T.CENTRE + 2]
+    lower = np.sqrt(x * x + y * y + z * z) - radius - m[a + T.BALL]
     if lower >= want:
         return lower
     d = direction
     if m[d] == 0.0 and m[d + 1] == 0.0 and m[d + 2] == 0.0:
         m[d], m[d + 1], m[d + 2] = x, y, z
     m[BEST], m[BEST + 1], m[BEST + 2] = m[d], m[d + 1], m[d + 2]
-    radii = m[a + RADIUS] + m[b + RADIUS]
+    radii = m[a + T.RADIUS] + m[b + T.RADIUS]
     bound = separation(m, a, b, ends, need + radii, want + radii, least + radii, MOST_TURNS, d)
     remember(m, d, bound)
     m[d], m[d + 1], m[d + 2] = m[BEST], m[BEST + 1], m[BEST + 2]
@@ -93,16 +76,16 @@ def of_polytopes(m, a, b, direction, ends, need, want, least):  # type: ignore[n
 @kernel
 def of_groups(m, item, ends, need, want, least):  # type: ignore[no-untyped-def]
     """Lower bound of the distance of two groups in the relative poses."""
-    a, b = np.int64(m[item + ITEM_A]), np.int64(m[item + ITEM_B])
-    direction, result = np.int64(m[item + DIRECTION]), np.inf
-    for i in range(np.int64(m[a + FIRST]), np.int64(m[a + LAST]), POLYTOPE_COLUMNS):
-        for k in range(np.int64(m[b + FIRST]), np.int64(m[b + LAST]), POLYTOPE_COLUMNS):
+    a, b = np.int64(m[item + T.ITEM_A]), np.int64(m[item + T.ITEM_B])
+    direction, result = np.int64(m[item + T.DIRECTION]), np.inf
+    for i in range(np.int64(m[a + T.FIRST]), np.int64(m[a + T.LAST]), T.POLYTOPE_COLUMNS):
+        for k in range(np.int64(m[b + T.FIRST]), np.int64(m[b + T.LAST]), T.POLYTOPE_COLUMNS):
             goal = min(want, result)
             bound = of_polytopes(m, i, k, direction, ends, need, goal, least)
             if least == -np.inf and bound < goal:
-                record(m, m[i + RADIUS], k, bound)
+                record(m, m[i + T.RADIUS], k, bound)
             result = min(result, bound)
-            direction += DIRECTION_COLUMNS
+            direction += T.DIRECTION_COLUMNS
             if result < least:
                 return result
     return result
@@ -120,24 +103,24 @@ def of_item(m, item, here, there, need, want, least):  # type: ignore[no-untyped
     """
     set_relative(m, item, here, there)
     ends = 1 if here == there else 2
-    if m[item + TREE] < 0.0:
+    if m[item + T.TREE] < 0.0:
         return of_groups(m, item, ends, need, want, least)
-    group, root, result = np.int64(m[item + ITEM_B]), np.int64(m[item + TREE]), np.inf
-    first, last = np.int64(m[group + FIRST]), np.int64(m[group + LAST])
-    known = np.int64(m[item + DIRECTION])  # a row for each polytope; the first has the nearest
-    nearest = first + np.int64(m[known + NEAREST])
-    for k in range(first - POLYTOPE_COLUMNS, last, POLYTOPE_COLUMNS):
+    group, root, result = np.int64(m[item + T.ITEM_B]), np.int64(m[item + T.TREE]), np.inf
+    first, last = np.int64(m[group + T.FIRST]), np.int64(m[group + T.LAST])
+    known = np.int64(m[item + T.DIRECTION])  # a row for each polytope; the first has the nearest
+    nearest = first + np.int64(m[known + T.NEAREST])
+    for k in range(first - T.POLYTOPE_COLUMNS, last, T.POLYTOPE_COLUMNS):
         if k == nearest:
             continue
         b = k if k >= first else nearest
-        place = known + DIRECTION_COLUMNS * ((b - first) // POLYTOPE_COLUMNS)
+        place = known + T.DIRECTION_COLUMNS * ((b - first) // T.POLYTOPE_COLUMNS)
         bound = of_tree(m, root, b, place, result, ends, need, want, least)
         if bound < result:
-            m[known + NEAREST], result = b - first, bound
+            m[known + T.NEAREST], result = b - first, bound
         if result < least:
             return result
-        if ends == 1 and m[item + CLOSED] > 0.0:
-            x, y, z = transformed(m, RELATIVE, np.int64(m[b + FIRST]))
+        if ends == 1 and m[item + T.CLOSED] > 0.0:
+            x, y, z = transformed(m, T.RELATIVE, np.int64(m[b + T.FIRST]))
             if inside_tree(m, root, x, y, z):
                 return -abs(result)
     return result

@@ -9,15 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from coverable_kernels import kernel
-from feasibility.collisions.kernels.tables import (
-    AXES,
-    FIRST,
-    HALF,
-    LEFT,
-    MIDDLE,
-    RIGHT,
-    STACK,
-)
+from feasibility.collisions.kernels import tables as T
 
 # The ray's direction: no simple fractions, so that no edge of a drawn shape is met but by chance.
 DX, DY, DZ = 0.4361758092437, 0.5814733161593, 0.6868015227371
@@ -28,9 +20,9 @@ NEXT_TO = 1e-12  # m, added to boxes for rounding
 def ray_meets_box(m, node, x, y, z):  # type: ignore[no-untyped-def]
     """Does the ray from a point meet a node's box?"""
     low, high = 0.0, np.inf
-    x, y, z = x - m[node + MIDDLE], y - m[node + MIDDLE + 1], z - m[node + MIDDLE + 2]
+    x, y, z = x - m[node + T.MIDDLE], y - m[node + T.MIDDLE + 1], z - m[node + T.MIDDLE + 2]
     for i in range(3):
-        k, half = node + AXES + 3 * i, m[node + HALF + i] + NEXT_TO
+        k, half = node + T.AXES + 3 * i, m[node + T.HALF + i] + NEXT_TO
         at = x * m[k] + y * m[k + 1] + z * m[k + 2]
         rate = DX * m[k] + DY * m[k + 1] + DZ * m[k + 2]
         if rate == 0.0:
@@ -63,15 +55,15 @@ def ray_meets_triangle(m, a, x, y, z):  # type: ignore[no-untyped-def]
 def inside_tree(m, root, x, y, z):  # type: ignore[no-untyped-def]
     """Is a point (root frame) inside the closed body whose tree begins at a node?"""
     top, crossed = 1, False
-    m[STACK] = root
+    m[T.STACK] = root
     while top > 0:
         top -= 1
-        node = np.int64(m[STACK + top])
+        node = np.int64(m[T.STACK + top])
         if not ray_meets_box(m, node, x, y, z):
             continue
-        if m[node + LEFT] >= 0.0:
-            m[STACK + top], m[STACK + top + 1] = m[node + LEFT], m[node + RIGHT]
+        if m[node + T.LEFT] >= 0.0:
+            m[T.STACK + top], m[T.STACK + top + 1] = m[node + T.LEFT], m[node + T.RIGHT]
             top += 2
-        elif ray_meets_triangle(m, np.int64(m[node + FIRST]), x, y, z):
+        elif ray_meets_triangle(m, np.int64(m[node + T.FIRST]), x, y, z):
             crossed = not crossed
     return crossed

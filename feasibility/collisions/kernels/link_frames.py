@@ -19,34 +19,14 @@ from __future__ import annotations
 import numpy as np
 
 from coverable_kernels import kernel
-from feasibility.collisions.kernels.tables import (
-    CONFIGURATIONS,
-    END_0,
-    END_1,
-    FRAMES,
-    GROUPS,
-    JOINT,
-    JOINTS,
-    LARGEST,
-    LEVERS,
-    NUMBER,
-    OWN_LEVER,
-    POSES,
-    REACH,
-    ROTATION,
-    SLIDES,
-    STATE,
-    THICKNESS,
-    TRANSLATION,
-    row,
-    rows_of,
-)
+from feasibility.collisions.kernels import tables as T
+from feasibility.collisions.kernels.tables import row, rows_of
 
 
 @kernel
 def pose_of(m, slot, joint):  # type: ignore[no-untyped-def]
     """The place of a joint's pose in a slot; joint 0 is the root."""
-    return row(m, POSES, slot * (rows_of(m, JOINTS) + 1) + joint)
+    return row(m, T.POSES, slot * (rows_of(m, T.JOINTS) + 1) + joint)
 
 
 @kernel
@@ -60,10 +40,10 @@ def link_frames(m, q, root):  # type: ignore[no-untyped-def]
     """
     for k in range(12):
         m[root + k] = 1.0 if k == 0 or k == 4 or k == 8 else 0.0
-    for i in range(rows_of(m, JOINTS)):
-        before, c = root + 12 * i, row(m, JOINTS, i)
-        now, turn, shift = before + 12, c + ROTATION, c + TRANSLATION
-        slides = m[c + SLIDES] > 0.0
+    for i in range(rows_of(m, T.JOINTS)):
+        before, c = root + 12 * i, row(m, T.JOINTS, i)
+        now, turn, shift = before + 12, c + T.ROTATION, c + T.TRANSLATION
+        slides = m[c + T.SLIDES] > 0.0
         cos, sin = (1.0, 0.0) if slides else (np.cos(m[q + i]), np.sin(m[q + i]))
         along = m[q + i] if slides else 0.0
         for axis in range(3):
@@ -98,38 +78,37 @@ def from_axis(m, pose, x, y, z):  # type: ignore[no-untyped-def]
 @kernel
 def place_bodies(m, slot):  # type: ignore[no-untyped-def]
     """Evaluate the configuration of a slot: poses of joints, and levers of all groups."""
-    root, groups = pose_of(m, slot, np.int64(0)), rows_of(m, GROUPS)
-    link_frames(m, row(m, CONFIGURATIONS, slot), root)
-    m[STATE + FRAMES] += 1.0
+    root, groups = pose_of(m, slot, np.int64(0)), rows_of(m, T.GROUPS)
+    link_frames(m, row(m, T.CONFIGURATIONS, slot), root)
     for b in range(groups):
-        group, levers = row(m, GROUPS, b), row(m, LEVERS, slot * groups + b)
-        joint = np.int64(m[group + JOINT])
+        group, levers = row(m, T.GROUPS, b), row(m, T.LEVERS, slot * groups + b)
+        joint = np.int64(m[group + T.JOINT])
         pose = root + 12 * joint
-        x0, y0, z0 = transformed(m, pose, group + END_0)
-        x1, y1, z1 = transformed(m, pose, group + END_1)
+        x0, y0, z0 = transformed(m, pose, group + T.END_0)
+        x1, y1, z1 = transformed(m, pose, group + T.END_1)
         for j in range(joint):
             axis = root + 12 * (j + 1)
-            if m[row(m, JOINTS, j) + SLIDES] > 0.0:
+            if m[row(m, T.JOINTS, j) + T.SLIDES] > 0.0:
                 m[levers + j] = 1.0
             elif j == joint - 1:
-                m[levers + j] = m[group + OWN_LEVER]
+                m[levers + j] = m[group + T.OWN_LEVER]
             else:
                 far = max(from_axis(m, axis, x0, y0, z0), from_axis(m, axis, x1, y1, z1))
-                m[levers + j] = np.sqrt(far) + m[group + THICKNESS]
+                m[levers + j] = np.sqrt(far) + m[group + T.THICKNESS]
 
 
 @kernel
-def spread(m, group, here, there):  # type: ignore[no-untyped-def]
+def bound_levers(m, group, here, there):  # type: ignore[no-untyped-def]
     """Set r_j and M of a group for the segment between the configurations of two slots."""
-    b, groups = np.int64(m[group + NUMBER]), rows_of(m, GROUPS)
-    q0, q1 = row(m, CONFIGURATIONS, here), row(m, CONFIGURATIONS, there)
-    r0, r1 = row(m, LEVERS, here * groups + b), row(m, LEVERS, there * groups + b)
-    largest, reach = row(m, LARGEST, b), row(m, REACH, b)
-    joint, behind = np.int64(m[group + JOINT]), 0.0
+    b, groups = np.int64(m[group + T.NUMBER]), rows_of(m, T.GROUPS)
+    q0, q1 = row(m, T.CONFIGURATIONS, here), row(m, T.CONFIGURATIONS, there)
+    r0, r1 = row(m, T.LEVERS, here * groups + b), row(m, T.LEVERS, there * groups + b)
+    largest, reach = row(m, T.LARGEST, b), row(m, T.REACH, b)
+    joint, behind = np.int64(m[group + T.JOINT]), 0.0
     m[reach + joint] = 0.0
     for j in range(joint - 1, -1, -1):
         lever = 0.5 * (m[r0 + j] + m[r1 + j])
-        if not m[row(m, JOINTS, j) + SLIDES] > 0.0:
+        if not m[row(m, T.JOINTS, j) + T.SLIDES] > 0.0:
             lever += 0.5 * behind
         m[largest + j] = lever
         behind += lever * abs(m[q1 + j] - m[q0 + j])
@@ -139,12 +118,12 @@ def spread(m, group, here, there):  # type: ignore[no-untyped-def]
 @kernel
 def chord_deviation(m, group, inner, here, there):  # type: ignore[no-untyped-def]
     """delta of a group, seen from joint `inner`, between the configurations of two slots."""
-    q0, q1 = row(m, CONFIGURATIONS, here), row(m, CONFIGURATIONS, there)
-    largest = row(m, LARGEST, np.int64(m[group + NUMBER]))
+    q0, q1 = row(m, T.CONFIGURATIONS, here), row(m, T.CONFIGURATIONS, there)
+    largest = row(m, T.LARGEST, np.int64(m[group + T.NUMBER]))
     total, before = 0.0, 0.0
-    for j in range(inner, np.int64(m[group + JOINT])):
+    for j in range(inner, np.int64(m[group + T.JOINT])):
         d = abs(m[q1 + j] - m[q0 + j])
-        if m[row(m, JOINTS, j) + SLIDES] > 0.0:
+        if m[row(m, T.JOINTS, j) + T.SLIDES] > 0.0:
             total += 2.0 * d * before
         else:
             total += m[largest + j] * d * (d + 2.0 * before)

@@ -8,30 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from feasibility.collisions import Bodies, Soup
+from feasibility.collisions.kernels import tables as T
 from feasibility.collisions.kernels.box_tree import BoxTree, box_tree, moved
-from feasibility.collisions.kernels.tables import (
-    DIRECTION,
-    DIRECTION_COLUMNS,
-    FIRST,
-    GROUP_COLUMNS,
-    ITEM_A,
-    ITEM_B,
-    ITEM_COLUMNS,
-    JOINT_COLUMNS,
-    LAST,
-    LEFT,
-    NAMES,
-    NODE_COLUMNS,
-    POLYTOPE_COLUMNS,
-    RIGHT,
-    SLOTS,
-    STATE_COLUMNS,
-    TREE,
-    Array,
-    Tables,
-    flat,
-    views,
-)
+from feasibility.collisions.kernels.tables import Array, Tables, flat, views
 from feasibility.collisions.words import SURFACE
 from robots import Robot, joint_alignments
 from robots.shapes import Polytope
@@ -71,23 +50,23 @@ def packed(bodies: Bodies, robot: Robot) -> Array:
     items, directions = _items(bodies, list(owners), groups, roots, n)
     count = len(groups)
     tables = Tables(
-        state=np.zeros((1, STATE_COLUMNS)),
+        state=np.zeros((1, T.STATE_COLUMNS)),
         relative=np.zeros((2, 12)),
         simplex=np.zeros((7, 10)),
         found=np.zeros((1, 10)),
         placed=np.zeros((2, 12)),
         stack=np.zeros((1, 128)),
         joints=_joints(robot),
-        groups=_table(groups, GROUP_COLUMNS),
-        polytopes=_table(polytopes, POLYTOPE_COLUMNS),
+        groups=_table(groups, T.GROUP_COLUMNS),
+        polytopes=_table(polytopes, T.POLYTOPE_COLUMNS),
         vertices=np.vstack([*vertices, corners]),
         nodes=nodes,
-        items=_table(items, ITEM_COLUMNS),
-        directions=np.zeros((directions, DIRECTION_COLUMNS)),
+        items=_table(items, T.ITEM_COLUMNS),
+        directions=np.zeros((directions, T.DIRECTION_COLUMNS)),
         asked=np.zeros((3, n)),
-        configurations=np.zeros((SLOTS, n)),
-        poses=np.zeros((SLOTS * (n + 1), 12)),
-        levers=np.zeros((SLOTS * count, n)),
+        configurations=np.zeros((T.SLOTS, n)),
+        poses=np.zeros((T.SLOTS * (n + 1), 12)),
+        levers=np.zeros((T.SLOTS * count, n)),
         largest=np.zeros((count, n)),
         reach=np.zeros((count, n + 1)),
     )
@@ -133,19 +112,19 @@ def _rows_into_places(memory: Array) -> None:
     t = views(memory)
 
     def places(column: Array, name: str) -> None:
-        start, _, width = memory[1 + 3 * NAMES.index(name) :][:3]
+        start, _, width = memory[1 + 3 * T.NAMES.index(name) :][:3]
         column[column >= 0] = start + width * column[column >= 0]
 
-    for column in (FIRST, LAST):
+    for column in (T.FIRST, T.LAST):
         places(t.groups[:, column], "polytopes")
         places(t.polytopes[:, column], "vertices")
         places(t.nodes[:, column], "vertices")
-    for column in (LEFT, RIGHT):
+    for column in (T.LEFT, T.RIGHT):
         places(t.nodes[:, column], "nodes")
-    for column in (ITEM_A, ITEM_B):
+    for column in (T.ITEM_A, T.ITEM_B):
         places(t.items[:, column], "groups")
-    places(t.items[:, TREE], "nodes")
-    places(t.items[:, DIRECTION], "directions")
+    places(t.items[:, T.TREE], "nodes")
+    places(t.items[:, T.DIRECTION], "directions")
 
 
 def _table(rows: list[list[float]], columns: int) -> Array:
@@ -156,7 +135,7 @@ def _table(rows: list[list[float]], columns: int) -> Array:
 def _joints(robot: Robot) -> Array:
     """(n, JOINT_COLUMNS) constants of the chain."""
     chain, n = robot.chain, robot.n
-    table = np.empty((n, JOINT_COLUMNS))
+    table = np.empty((n, T.JOINT_COLUMNS))
     table[:, :9] = chain.rotations.reshape(n, 9)
     table[:, 9:12] = chain.translations[:n]
     table[:, 12] = chain.prismatic
@@ -213,7 +192,7 @@ def _tree_of(soup: Soup) -> BoxTree:
 
 def _trees(bodies: Bodies, above: int) -> tuple[list[int], Array, Array]:
     """The root of each soup's tree, all nodes, and all corners (their rows begin at `above`)."""
-    roots, nodes, corners = [], [np.empty((0, NODE_COLUMNS))], [np.empty((0, 3))]
+    roots, nodes, corners = [], [np.empty((0, T.NODE_COLUMNS))], [np.empty((0, 3))]
     for soup in bodies.soups:
         tree = _tree_of(soup)
         root = sum(map(len, nodes))

@@ -10,26 +10,11 @@ from __future__ import annotations
 import numpy as np
 
 from coverable_kernels import kernel
+from feasibility.collisions.kernels import tables as T
 from feasibility.collisions.kernels.distances import of_item
 from feasibility.collisions.kernels.link_frames import pose_of
 from feasibility.collisions.kernels.segments import cheap_bound, slot_of_start
-from feasibility.collisions.kernels.tables import (
-    ASKED,
-    BOUND,
-    BOUNDS,
-    CLEARANCE,
-    FOUND,
-    INNER,
-    ITEMS,
-    JOINTS,
-    OUTER,
-    SIZE,
-    SLIDES,
-    STATE,
-    WISH,
-    row,
-    rows_of,
-)
+from feasibility.collisions.kernels.tables import row, rows_of
 from feasibility.collisions.kernels.witness import NORMAL, ON_SECOND, witness
 
 MOST = 2.0  # times as much as a pair at its clearance may weigh
@@ -39,11 +24,11 @@ MOST = 2.0  # times as much as a pair at its clearance may weigh
 def add_rates(m, item, slot, share):  # type: ignore[no-untyped-def]
     """Add d distance / dq of an item, times its share, to the push."""
     witness(m, item, slot)
-    out, n, p = row(m, ASKED, np.int64(2)), NORMAL, ON_SECOND
-    for j in range(np.int64(m[item + INNER]), np.int64(m[item + OUTER])):
+    out, n, p = row(m, T.ASKED, np.int64(2)), NORMAL, ON_SECOND
+    for j in range(np.int64(m[item + T.INNER]), np.int64(m[item + T.OUTER])):
         axis = pose_of(m, slot, j + 1)
         x, y, z = m[axis + 2], m[axis + 5], m[axis + 8]
-        if not m[row(m, JOINTS, j) + SLIDES] > 0.0:
+        if not m[row(m, T.JOINTS, j) + T.SLIDES] > 0.0:
             u, v, w = m[p] - m[axis + 9], m[p + 1] - m[axis + 10], m[p + 2] - m[axis + 11]
             x, y, z = y * w - z * v, z * u - x * w, x * v - y * u
         m[out + j] += share * (m[n] * x + m[n + 1] * y + m[n + 2] * z)
@@ -55,7 +40,7 @@ def push(m):  # type: ignore[no-untyped-def]
 
     Returns how much nearer than that the nearest pair is, as a share; 0 where none is.
     """
-    q, out, n = row(m, ASKED, np.int64(0)), row(m, ASKED, np.int64(2)), rows_of(m, JOINTS)
+    q, out, n = row(m, T.ASKED, np.int64(0)), row(m, T.ASKED, np.int64(2)), rows_of(m, T.JOINTS)
     finite = True
     for j in range(n):
         m[out + j] = 0.0
@@ -63,18 +48,17 @@ def push(m):  # type: ignore[no-untyped-def]
     if not finite:
         return 0.0
     here, strongest = slot_of_start(m), 0.0
-    for k in range(rows_of(m, ITEMS)):
-        item = row(m, ITEMS, k)
-        wish = m[item + WISH]
-        bound, enough = item + BOUND + here, m[item + CLEARANCE] + wish
+    for k in range(rows_of(m, T.ITEMS)):
+        item = row(m, T.ITEMS, k)
+        wish = m[item + T.WISH]
+        bound, enough = item + T.BOUND + here, m[item + T.CLEARANCE] + wish
         if m[bound] < enough:
             cheap_bound(m, item, here)
         if m[bound] >= enough:
             continue
-        m[STATE + BOUNDS] += 1.0
-        m[FOUND] = np.inf
+        m[T.FOUND] = np.inf
         m[bound] = max(m[bound], of_item(m, item, here, here, -np.inf, enough, -np.inf))
-        found = m[FOUND]  # of what was met, where the bound is of boxes that were not opened
+        found = m[T.FOUND]  # of what was met, where the bound is of boxes that were not opened
         if found < enough:
             share = min((enough - found) / wish, MOST)
             strongest = max(strongest, share)
@@ -83,7 +67,7 @@ def push(m):  # type: ignore[no-untyped-def]
     for j in range(n):
         length += m[out + j] ** 2
     if length > 0.0:
-        factor = min(strongest, 1.0) * m[STATE + SIZE] / np.sqrt(length)
+        factor = min(strongest, 1.0) * m[T.STATE + T.SIZE] / np.sqrt(length)
         for j in range(n):
             m[out + j] *= factor
     return strongest

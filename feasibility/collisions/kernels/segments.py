@@ -17,45 +17,16 @@ from __future__ import annotations
 import numpy as np
 
 from coverable_kernels import kernel
+from feasibility.collisions.kernels import tables as T
 from feasibility.collisions.kernels.distances import of_item
 from feasibility.collisions.kernels.link_frames import (
+    bound_levers,
     chord_deviation,
     place_bodies,
     pose_of,
-    spread,
     transformed,
 )
-from feasibility.collisions.kernels.tables import (
-    ASKED,
-    BLAMED,
-    BOUND,
-    BOUNDS,
-    BY_BUDGET,
-    CALLS,
-    CLEARANCE,
-    CONFIGURATIONS,
-    DECIDED,
-    END_0,
-    END_1,
-    FIRST_ASKED,
-    GROUPS,
-    INNER,
-    ITEM_A,
-    ITEM_B,
-    ITEMS,
-    JOINT,
-    JOINTS,
-    NUMBER,
-    PAIR,
-    REACH,
-    STATE,
-    SWEPT,
-    THICKNESS,
-    TREE,
-    VALID,
-    row,
-    rows_of,
-)
+from feasibility.collisions.kernels.tables import row, rows_of
 
 ROUNDING = 1e-8  # m, taken off every bound for what rounding does to poses and levers
 AHEAD = 8.0  # segments of this length that a bound may serve, if it is cheap to have
@@ -69,9 +40,9 @@ START, END = np.int64(0), np.int64(1)
 @kernel
 def same(m, slot, end):  # type: ignore[no-untyped-def]
     """Does a slot hold a configuration that is asked for, bit by bit?"""
-    held, asked = row(m, CONFIGURATIONS, slot), row(m, ASKED, end)
-    equal = m[STATE + VALID + slot] > 0.0
-    for j in range(rows_of(m, JOINTS)):
+    held, asked = row(m, T.CONFIGURATIONS, slot), row(m, T.ASKED, end)
+    equal = m[T.STATE + T.VALID + slot] > 0.0
+    for j in range(rows_of(m, T.JOINTS)):
         equal &= m[held + j] == m[asked + j]
     return equal
 
@@ -79,12 +50,12 @@ def same(m, slot, end):  # type: ignore[no-untyped-def]
 @kernel
 def settle_in(m, slot, end):  # type: ignore[no-untyped-def]
     """Let slot 0 or 1 hold a configuration that is asked for; nothing is known of it yet."""
-    held, asked = row(m, CONFIGURATIONS, slot), row(m, ASKED, end)
-    for j in range(rows_of(m, JOINTS)):
+    held, asked = row(m, T.CONFIGURATIONS, slot), row(m, T.ASKED, end)
+    for j in range(rows_of(m, T.JOINTS)):
         m[held + j] = m[asked + j]
-    for k in range(rows_of(m, ITEMS)):
-        m[row(m, ITEMS, k) + BOUND + slot] = -np.inf
-    m[STATE + VALID + slot] = 1.0
+    for k in range(rows_of(m, T.ITEMS)):
+        m[row(m, T.ITEMS, k) + T.BOUND + slot] = -np.inf
+    m[T.STATE + T.VALID + slot] = 1.0
     place_bodies(m, slot)
 
 
@@ -107,12 +78,12 @@ def between_capsules(m, a, b, slot):  # type: ignore[no-untyped-def]
     The closest points of both axes (Ericson 2005, 5.1.9) propose a direction; it is the ends
     of the axes that certify it.
     """
-    pose_a = pose_of(m, slot, np.int64(m[a + JOINT]))
-    pose_b = pose_of(m, slot, np.int64(m[b + JOINT]))
-    px, py, pz = transformed(m, pose_a, a + END_0)
-    ux, uy, uz = transformed(m, pose_a, a + END_1)
-    qx, qy, qz = transformed(m, pose_b, b + END_0)
-    vx, vy, vz = transformed(m, pose_b, b + END_1)
+    pose_a = pose_of(m, slot, np.int64(m[a + T.JOINT]))
+    pose_b = pose_of(m, slot, np.int64(m[b + T.JOINT]))
+    px, py, pz = transformed(m, pose_a, a + T.END_0)
+    ux, uy, uz = transformed(m, pose_a, a + T.END_1)
+    qx, qy, qz = transformed(m, pose_b, b + T.END_0)
+    vx, vy, vz = transformed(m, pose_b, b + T.END_1)
     ux, uy, uz = ux - px, uy - py, uz - pz
     vx, vy, vz = vx - qx, vy - qy, vz - qz
     wx, wy, wz = px - qx, py - qy, pz - qz
@@ -131,21 +102,23 @@ def between_capsules(m, a, b, slot):  # type: ignore[no-untyped-def]
     along = -(nx * wx + ny * wy + nz * wz)
     along -= max(nx * ux + ny * uy + nz * uz, 0.0)
     along += min(nx * vx + ny * vy + nz * vz, 0.0)
-    return along / length - m[a + THICKNESS] - m[b + THICKNESS]
+    return along / length - m[a + T.THICKNESS] - m[b + T.THICKNESS]
 
 
 @kernel
 def cheap_bound(m, item, slot):  # type: ignore[no-untyped-def]
     """Raise an item's bound in a slot by capsules, where both are groups."""
-    if m[item + TREE] < 0.0:
-        bound = between_capsules(m, np.int64(m[item + ITEM_A]), np.int64(m[item + ITEM_B]), slot)
-        m[item + BOUND + slot] = max(m[item + BOUND + slot], bound)
+    if m[item + T.TREE] < 0.0:
+        bound = between_capsules(
+            m, np.int64(m[item + T.ITEM_A]), np.int64(m[item + T.ITEM_B]), slot
+        )
+        m[item + T.BOUND + slot] = max(m[item + T.BOUND + slot], bound)
 
 
 @kernel
 def by_budget(m, item, here, there, most, need):  # type: ignore[no-untyped-def]
     """Do the bounds of both ends decide? Raises that of the further end."""
-    start, end = item + BOUND + here, item + BOUND + there
+    start, end = item + T.BOUND + here, item + T.BOUND + there
     m[end] = max(m[end], m[start] - most)
     return m[start] - most >= need or m[start] + m[end] - most >= 2.0 * need
 
@@ -153,13 +126,12 @@ def by_budget(m, item, here, there, most, need):  # type: ignore[no-untyped-def]
 @kernel
 def swept(m, item, here, there, most, need):  # type: ignore[no-untyped-def]
     """Bound of the swept hull between two slots, less delta; -inf where it is less than needed."""
-    group, inner = np.int64(m[item + ITEM_B]), np.int64(m[item + INNER])
+    group, inner = np.int64(m[item + T.ITEM_B]), np.int64(m[item + T.INNER])
     less = need + chord_deviation(m, group, inner, here, there)
     ahead = max(AHEAD * most, LEAST_AHEAD)
-    if m[item + TREE] >= 0.0 and here < PART_START and m[item + BOUND + here] > -np.inf:
-        spare = m[item + BOUND + here] - need
+    if m[item + T.TREE] >= 0.0 and here < PART_START and m[item + T.BOUND + here] > -np.inf:
+        spare = m[item + T.BOUND + here] - need
         ahead = min(ahead, 2.0 * spare) if spare > 0.5 * most else 0.0
-    m[STATE + SWEPT] += 1.0
     bound = of_item(m, item, here, there, less, less + ahead, less)
     return bound - (less - need) if bound >= less else -np.inf
 
@@ -171,21 +143,20 @@ def holds_in_parts(m, item, here, there, need):  # type: ignore[no-untyped-def]
     The last part is first: a segment that runs into something does so at its end. Slots 2 and 3
     hold the ends of a part.
     """
-    group = np.int64(m[item + ITEM_B])
-    m[STATE + BOUNDS] += 1.0
+    group = np.int64(m[item + T.ITEM_B])
     if here == there or not of_item(m, item, there, there, need, need, need) >= need:
         return False
-    q0, q1 = row(m, CONFIGURATIONS, here), row(m, CONFIGURATIONS, there)
-    low_q, high_q = row(m, CONFIGURATIONS, PART_START), row(m, CONFIGURATIONS, PART_END)
+    q0, q1 = row(m, T.CONFIGURATIONS, here), row(m, T.CONFIGURATIONS, there)
+    low_q, high_q = row(m, T.CONFIGURATIONS, PART_START), row(m, T.CONFIGURATIONS, PART_END)
     high, size = PARTS, PARTS // 2
     while high > 0:
-        for j in range(rows_of(m, JOINTS)):
+        for j in range(rows_of(m, T.JOINTS)):
             whole = m[q1 + j] - m[q0 + j]
             m[low_q + j] = m[q0 + j] + whole * (high - size) / PARTS
             m[high_q + j] = m[q0 + j] + whole * high / PARTS
         place_bodies(m, PART_START)
         place_bodies(m, PART_END)
-        spread(m, group, PART_START, PART_END)
+        bound_levers(m, group, PART_START, PART_END)
         if swept(m, item, PART_START, PART_END, 0.0, need) >= need:
             high -= size
             size = 2 if high % 2 == 0 else 1
@@ -193,18 +164,16 @@ def holds_in_parts(m, item, here, there, need):  # type: ignore[no-untyped-def]
             return False
         else:
             size //= 2
-    spread(m, group, here, there)
+    bound_levers(m, group, here, there)
     return True
 
 
 @kernel
 def item_holds(m, item, here, there):  # type: ignore[no-untyped-def]
     """Is an item clear on the segment between slots `here` and `there` (0 and 1, or one twice)?"""
-    m[STATE + DECIDED] += 1.0
-    need, group = m[item + CLEARANCE] + ROUNDING, np.int64(m[item + ITEM_B])
-    most = m[row(m, REACH, np.int64(m[group + NUMBER])) + np.int64(m[item + INNER])]
+    need, group = m[item + T.CLEARANCE] + ROUNDING, np.int64(m[item + T.ITEM_B])
+    most = m[row(m, T.REACH, np.int64(m[group + T.NUMBER])) + np.int64(m[item + T.INNER])]
     if by_budget(m, item, here, there, most, need):
-        m[STATE + BY_BUDGET] += 1.0
         return True
     cheap_bound(m, item, here)
     cheap_bound(m, item, there)
@@ -213,7 +182,7 @@ def item_holds(m, item, here, there):  # type: ignore[no-untyped-def]
     bound = swept(m, item, here, there, most, need)
     if not (bound >= need or holds_in_parts(m, item, here, there, need)):
         return False
-    start, end = item + BOUND + here, item + BOUND + there
+    start, end = item + T.BOUND + here, item + T.BOUND + there
     m[start], m[end] = max(m[start], bound), max(m[end], bound, need)
     return True
 
@@ -225,10 +194,9 @@ def segment_holds_clear(m):  # type: ignore[no-untyped-def]
     At most 0 where the segment is not certified. The item that was to blame the last time is asked
     first: a step that was refused is tried again, shorter.
     """
-    m[STATE + CALLS] += 1.0
-    start, end = row(m, ASKED, START), row(m, ASKED, END)
+    start, end = row(m, T.ASKED, START), row(m, T.ASKED, END)
     finite, moves = True, False
-    for j in range(rows_of(m, JOINTS)):
+    for j in range(rows_of(m, T.JOINTS)):
         finite &= abs(m[start + j]) + abs(m[end + j]) < np.inf
         moves |= m[start + j] != m[end + j]
     if not finite:
@@ -237,13 +205,16 @@ def segment_holds_clear(m):  # type: ignore[no-untyped-def]
     there = 1 - here if moves else here
     if moves and not same(m, there, END):
         settle_in(m, there, END)
-    for b in range(rows_of(m, GROUPS)):
-        spread(m, row(m, GROUPS, b), here, there)
-    items, first, least = rows_of(m, ITEMS), np.int64(m[STATE + FIRST_ASKED]), np.inf
+    for b in range(rows_of(m, T.GROUPS)):
+        bound_levers(m, row(m, T.GROUPS, b), here, there)
+    items, first, least = rows_of(m, T.ITEMS), np.int64(m[T.STATE + T.FIRST_ASKED]), np.inf
     for k in range(items):
-        item = row(m, ITEMS, (first + k) % items)
+        item = row(m, T.ITEMS, (first + k) % items)
         if not item_holds(m, item, here, there):
-            m[STATE + FIRST_ASKED], m[STATE + BLAMED] = (first + k) % items, m[item + PAIR]
+            m[T.STATE + T.FIRST_ASKED], m[T.STATE + T.BLAMED] = (
+                (first + k) % items,
+                m[item + T.PAIR],
+            )
             return -1.0
-        least = min(least, m[item + BOUND + there] - m[item + CLEARANCE])
+        least = min(least, m[item + T.BOUND + there] - m[item + T.CLEARANCE])
     return max(least, ROUNDING)

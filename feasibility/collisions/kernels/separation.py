@@ -18,17 +18,8 @@ from __future__ import annotations
 import numpy as np
 
 from coverable_kernels import kernel
+from feasibility.collisions.kernels import tables as T
 from feasibility.collisions.kernels.simplex import WEIGHT, WIDTH, reduce
-from feasibility.collisions.kernels.tables import (
-    CORNERS,
-    FIRST,
-    KNOWN,
-    LAST,
-    RELATIVE,
-    SIMPLEX,
-    STATE,
-    TRIED,
-)
 
 MOST_TURNS = np.int64(40)
 FEW_TURNS = np.int64(6)  # for a box, which can be opened instead
@@ -38,8 +29,8 @@ FARTHEST = 1e300  # m, above any distance
 TOUCHING = 1e-10  # m, nearer than this there is no direction to be had
 # Places in the working memory, after the simplex: the best direction (before: the first to try),
 # the shortest difference, its length, and how many points the simplex has.
-BEST, SHORTEST = SIMPLEX + 4 * WIDTH, SIMPLEX + 5 * WIDTH
-UPPER, POINTS = SIMPLEX + 6 * WIDTH, SIMPLEX + 6 * WIDTH + 1
+BEST, SHORTEST = T.SIMPLEX + 4 * WIDTH, T.SIMPLEX + 5 * WIDTH
+UPPER, POINTS = T.SIMPLEX + 6 * WIDTH, T.SIMPLEX + 6 * WIDTH + 1
 # Columns of a point of the simplex, behind its weight: places of both vertices, and the pose.
 ON_A, ON_B, IN_POSE = WEIGHT + 1, WEIGHT + 2, WEIGHT + 3
 NOT_KNOWN = np.int64(0)  # instead of a row of `directions`
@@ -52,7 +43,7 @@ def support(m, body, x, y, z):  # type: ignore[no-untyped-def]
     Every other vertex is compared with a most of its own, which the processor does side by side;
     and without branches, since nobody can guess which is the next most.
     """
-    first, last = int(m[body + FIRST]), int(m[body + LAST])
+    first, last = int(m[body + T.FIRST]), int(m[body + T.LAST])
     best, most, other, more = first, -np.inf, first, -np.inf
     for k in range(first, last - 3, 6):
         along, beside = m[k] * x + m[k + 1] * y, m[k + 3] * x + m[k + 4] * y
@@ -74,15 +65,15 @@ def add_point(m, a, b, pose, size):  # type: ignore[no-untyped-def]
 
     Returns False where it is in there already.
     """
-    new = SIMPLEX + WIDTH * size
+    new = T.SIMPLEX + WIDTH * size
     x, y, z = m[b], m[b + 1], m[b + 2]
     for k in range(3):
         turn = pose + 3 * k
         place = m[turn] * x + m[turn + 1] * y + m[turn + 2] * z + m[pose + 9 + k]
         m[new + k] = place - m[a + k]
         m[new + 3 + k] = m[a + k]
-    m[new + ON_A], m[new + ON_B], m[new + IN_POSE] = a, b, 0.0 if pose == RELATIVE else 1.0
-    for old in range(SIMPLEX, new, WIDTH):
+    m[new + ON_A], m[new + ON_B], m[new + IN_POSE] = a, b, 0.0 if pose == T.RELATIVE else 1.0
+    for old in range(T.SIMPLEX, new, WIDTH):
         if m[old] == m[new] and m[old + 1] == m[new + 1] and m[old + 2] == m[new + 2]:
             return False
     return True
@@ -94,7 +85,7 @@ def shortest(m, size):  # type: ignore[no-untyped-def]
     square = 0.0
     for k in range(3):
         value = 0.0
-        for i in range(SIMPLEX, SIMPLEX + WIDTH * size, WIDTH):
+        for i in range(T.SIMPLEX, T.SIMPLEX + WIDTH * size, WIDTH):
             value += m[i + WEIGHT] * m[i + k]
         m[SHORTEST + k] = value
         square += value * value
@@ -108,9 +99,9 @@ def recall(m, known, ends):  # type: ignore[no-untyped-def]
     0 where none are known, or the bodies overlap in them.
     """
     size = 0
-    for point in range(np.int64(m[known + KNOWN])):
-        at = known + CORNERS + 3 * point
-        pose = RELATIVE + 12 if ends == 2 and m[at + 2] > 0.0 else RELATIVE
+    for point in range(np.int64(m[known + T.KNOWN])):
+        at = known + T.CORNERS + 3 * point
+        pose = T.RELATIVE + 12 if ends == 2 and m[at + 2] > 0.0 else T.RELATIVE
         if add_point(m, np.int64(m[at]), np.int64(m[at + 1]), pose, size):
             size += 1
     return reduce(m, size) if size > 0 else 0
@@ -121,11 +112,11 @@ def remember(m, known, bound):  # type: ignore[no-untyped-def]
     """Keep at which vertices two bodies are nearest, where the last `separation` found that."""
     points = np.int64(m[POINTS])
     found = points < 4 and m[UPPER] - bound <= COARSE * m[UPPER]
-    m[known + KNOWN] = points if found else 0.0
+    m[known + T.KNOWN] = points if found else 0.0
     for point in range(points if found else 0):
         for column in range(3):
-            row = SIMPLEX + WIDTH * point
-            m[known + CORNERS + 3 * point + column] = m[row + ON_A + column]
+            row = T.SIMPLEX + WIDTH * point
+            m[known + T.CORNERS + 3 * point + column] = m[row + ON_A + column]
 
 
 @kernel
@@ -157,10 +148,9 @@ def separation(m, a, b, ends, need, want, least, turns, known):  # type: ignore[
         else:
             upper, size = FARTHEST, 0
     for turn in range(turns):
-        m[STATE + TRIED] += 1.0
         i, top = support(m, a, nx, ny, nz)
-        j, bottom, pose = i, np.inf, int(RELATIVE)
-        for p in range(RELATIVE, RELATIVE + 12 * ends, 12):
+        j, bottom, pose = i, np.inf, int(T.RELATIVE)
+        for p in range(T.RELATIVE, T.RELATIVE + 12 * ends, 12):
             x = -(m[p] * nx + m[p + 3] * ny + m[p + 6] * nz)
             y = -(m[p + 1] * nx + m[p + 4] * ny + m[p + 7] * nz)
             z = -(m[p + 2] * nx + m[p + 5] * ny + m[p + 8] * nz)

@@ -46,10 +46,9 @@ ITEM_COLUMNS = 12
 # first and the second body's vertex, and the pose, 0 or 1.
 NEAREST, KNOWN, CORNERS = 1, 3, 4
 DIRECTION_COLUMNS = 13
-# Columns of `state`: counters, what was found, and what is asked for.
-CALLS, BOUNDS, SWEPT, DECIDED, BY_BUDGET, FRAMES, TRIED = range(7)
-BLAMED, FIRST_ASKED, SIZE, NODES, VALID = 7, 8, 9, 10, 11  # VALID: of slot 0, then of slot 1
-STATE_COLUMNS = 16
+# Columns of `state`: what was found, and what is asked for.
+BLAMED, FIRST_ASKED, SIZE, VALID = 0, 1, 2, 3  # VALID: of slot 0, then of slot 1
+STATE_COLUMNS = 8
 
 SLOTS = 4  # 0 and 1: the ends of the last segment; 2 and 3: those of a part of it
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from coverable_kernels import kernel
+from feasibility.collisions.kernels import tables as T
 from feasibility.collisions.kernels.link_frames import transformed
 from feasibility.collisions.kernels.separation import (
     BEST,
@@ -19,22 +20,6 @@ from feasibility.collisions.kernels.separation import (
     NOT_KNOWN,
     remember,
     separation,
-)
-from feasibility.collisions.kernels.tables import (
-    AXES,
-    BALL,
-    CENTRE,
-    HALF,
-    LEFT,
-    MIDDLE,
-    NODES,
-    PLACED,
-    RADIUS,
-    RELATIVE,
-    RIGHT,
-    SIDES,
-    STACK,
-    STATE,
 )
 from feasibility.collisions.kernels.witness import record
 
@@ -48,10 +33,10 @@ ONE_TURN = np.int64(1)
 def place_box(m, b, ends):  # type: ignore[no-untyped-def]
     """Write the box around a polytope in its relative poses: centre, and halves of its sides."""
     for end in range(ends):
-        p, out = RELATIVE + 12 * end, PLACED + 12 * end
-        m[out], m[out + 1], m[out + 2] = transformed(m, p, b + CENTRE)
+        p, out = T.RELATIVE + 12 * end, T.PLACED + 12 * end
+        m[out], m[out + 1], m[out + 2] = transformed(m, p, b + T.CENTRE)
         for side in range(out + 3, out + 12, 3):
-            v = b + SIDES + side - out - 3
+            v = b + T.SIDES + side - out - 3
             x, y, z = transformed(m, p, v)
             m[side], m[side + 1], m[side + 2] = x - m[p + 9], y - m[p + 10], z - m[p + 11]
 
@@ -61,13 +46,13 @@ def between_boxes(m, node, ends):  # type: ignore[no-untyped-def]
     """Lower bound of the distance of a node's box from the placed boxes and all between them."""
     square = 0.0
     for i in range(3):
-        k = node + AXES + 3 * i
+        k = node + T.AXES + 3 * i
         x, y, z = m[k], m[k + 1], m[k + 2]
-        at = x * m[node + MIDDLE] + y * m[node + MIDDLE + 1] + z * m[node + MIDDLE + 2]
+        at = x * m[node + T.MIDDLE] + y * m[node + T.MIDDLE + 1] + z * m[node + T.MIDDLE + 2]
         beyond, below = np.inf, np.inf
-        for p in range(PLACED, PLACED + 12 * ends, 12):
+        for p in range(T.PLACED, T.PLACED + 12 * ends, 12):
             middle = x * m[p] + y * m[p + 1] + z * m[p + 2] - at
-            half = m[node + HALF + i]
+            half = m[node + T.HALF + i]
             for side in range(p + 3, p + 12, 3):
                 half += abs(x * m[side] + y * m[side + 1] + z * m[side + 2])
             beyond, below = min(beyond, middle - half), min(below, -middle - half)
@@ -81,21 +66,20 @@ def of_node(m, node, b, ends, bound, need, goal, least, known):  # type: ignore[
 
     The first direction is across its thinnest side, unless more is `known`, see `separation`.
     """
-    axis, side, beyond, around = node + AXES + 6, 0.0, 0.0, m[b + RADIUS]
-    last = PLACED + 12 * (ends - 1)
+    axis, side, beyond, around = node + T.AXES + 6, 0.0, 0.0, m[b + T.RADIUS]
+    last = T.PLACED + 12 * (ends - 1)
     for k in range(3):
-        side += m[axis + k] * (m[PLACED + k] - m[node + MIDDLE + k])
-        beyond += m[axis + k] * (m[last + k] - m[node + MIDDLE + k])
+        side += m[axis + k] * (m[T.PLACED + k] - m[node + T.MIDDLE + k])
+        beyond += m[axis + k] * (m[last + k] - m[node + T.MIDDLE + k])
     for k in range(3):
         m[BEST + k] = m[axis + k] if side >= 0.0 else -m[axis + k]
     turns, given_up = MOST_TURNS, least
-    if m[node + LEFT] >= 0.0:
-        small = m[node + HALF] < 0.5 * m[b + BALL]
+    if m[node + T.LEFT] >= 0.0:
+        small = m[node + T.HALF] < 0.5 * m[b + T.BALL]
         turns, given_up = FEW_TURNS if small and bound < need else ONE_TURN, goal
         beyond = min(abs(side), beyond if side >= 0.0 else -beyond)
-        if turns == ONE_TURN and beyond - m[node + HALF + 2] - around < goal:
+        if turns == ONE_TURN and beyond - m[node + T.HALF + 2] - around < goal:
             return bound  # even its middle is too near for that
-    m[STATE + NODES] += 1.0
     enough = min(need, goal) + around
     goal, given_up = goal + around, given_up + around
     found = separation(m, node, b, ends, enough, goal, given_up, turns, known) - around
@@ -111,17 +95,17 @@ def of_tree(m, root, b, known, best, ends, need, want, least):  # type: ignore[n
     was nearest the last time.
     """
     place_box(m, b, ends)
-    around, result, nearest = m[b + RADIUS], best, best
+    around, result, nearest = m[b + T.RADIUS], best, best
     floor, share = (need, ENOUGH) if need < np.inf else (-np.inf, 1.0)
     before, asked = np.int64(m[known]), False
-    m[STACK], m[STACK + 1] = root, between_boxes(m, root, ends) - around
+    m[T.STACK], m[T.STACK + 1] = root, between_boxes(m, root, ends) - around
     top, opened = 1, 0
     if before > 0:
-        m[STACK + 2], m[STACK + 3] = before, between_boxes(m, before, ends) - around
+        m[T.STACK + 2], m[T.STACK + 3] = before, between_boxes(m, before, ends) - around
         top = 2
     while top > 0:
         top -= 1
-        node, bound = np.int64(m[STACK + 2 * top]), m[STACK + 2 * top + 1]
+        node, bound = np.int64(m[T.STACK + 2 * top]), m[T.STACK + 2 * top + 1]
         if node == before:
             if asked:
                 continue
@@ -132,7 +116,7 @@ def of_tree(m, root, b, known, best, ends, need, want, least):  # type: ignore[n
         if not bound >= goal:
             points = known if node == before else NOT_KNOWN
             bound = of_node(m, node, b, ends, bound, need, goal, least, points)
-        left, right = np.int64(m[node + LEFT]), np.int64(m[node + RIGHT])
+        left, right = np.int64(m[node + T.LEFT]), np.int64(m[node + T.RIGHT])
         if left < 0 or bound >= goal:
             result = min(result, bound)
             if left < 0 and bound < goal:
@@ -147,7 +131,7 @@ def of_tree(m, root, b, known, best, ends, need, want, least):  # type: ignore[n
         one, other = between_boxes(m, left, ends), between_boxes(m, right, ends)
         if one > other:
             left, right, one, other = right, left, other, one
-        place = STACK + 2 * top
+        place = T.STACK + 2 * top
         m[place], m[place + 1] = right, max(other - around, bound)
         m[place + 2], m[place + 3] = left, max(one - around, bound)
         top += 2

@@ -16,7 +16,7 @@ from enum import IntEnum
 import numpy as np
 
 from coverable_arrays import Array
-from coverable_kernels import allocating_entry, kernel, put
+from coverable_kernels import allocating_entry, kernel
 from feasibility.roadmap.branch_and_bound.box_bounds import static_levers
 from feasibility.roadmap.branch_and_bound.box_contraction import THINNEST, shrink
 from feasibility.roadmap.branch_and_bound.boxes import (
@@ -26,7 +26,7 @@ from feasibility.roadmap.branch_and_bound.boxes import (
     box_work,
     place_at_rest,
 )
-from feasibility.roadmap.motions import SearchArrays, Work
+from feasibility.roadmap.motions import SearchArrays, Work, put
 
 DIRECTIONS = np.array(
     [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1], [1, 1, -1], [1, -1, 1], [-1, 1, 1]], dtype=float

@@ -21,7 +21,7 @@ from dataclasses import replace
 import numpy as np
 
 from coverable_arrays import Array
-from coverable_kernels import allocating_entry, put
+from coverable_kernels import allocating_entry
 from feasibility.collisions import Pair
 from feasibility.cone import angle_of
 from feasibility.cut_tree import CutTree
@@ -37,6 +37,7 @@ from feasibility.roadmap.motions import (
     connect,
     look_at,
     place,
+    put,
     with_free_roll,
 )
 from feasibility.roadmap.search import evenly

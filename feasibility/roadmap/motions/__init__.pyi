@@ -41,4 +41,5 @@ from .working_memory import Work as Work
 from .working_memory import accept as accept
 from .working_memory import copy_slot as copy_slot
 from .working_memory import place as place
+from .working_memory import put as put
 from .working_memory import work_for as work_for

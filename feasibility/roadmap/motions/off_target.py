@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_kernels import entry, kernel, put
+from coverable_kernels import entry, kernel
 from feasibility.roadmap.motions.linear_steps import least_step
 from feasibility.roadmap.motions.projection import (
     POINT,
@@ -26,6 +26,7 @@ from feasibility.roadmap.motions.working_memory import (
     cone_used,
     off_target,
     place,
+    put,
     roll_lost,
     roll_used,
 )
@@ -39,7 +40,7 @@ WEIGHT = 10.0  # [1] of the rows of cone and roll beside those of the tool point
 CLOSE = 0.98  # [1] of what they may use: from there on they are rows of a step
 
 
-@entry
+@kernel
 def project_off_target(arrays, work, q, most):
     """Bring the tool point as near to `work.target` as limits and cone allow, from q (in place).
 

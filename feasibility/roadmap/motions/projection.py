@@ -236,7 +236,7 @@ def move(arrays, work, q):
     place(arrays, work, NEXT, q)
 
 
-@entry
+@kernel
 def project(arrays, work, q, slack, before, most):
     """Project q (in place) onto the constraints over `work.target`; slot 1 holds the result.
 

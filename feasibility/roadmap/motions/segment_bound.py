@@ -48,7 +48,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_kernels import entry, kernel
+from coverable_kernels import kernel
 from feasibility.collisions import blamed, segment_clear
 from feasibility.roadmap.motions.arrays import COLLISION, CONE, ROLL
 from feasibility.roadmap.motions.roll import TURN
@@ -146,7 +146,7 @@ def roll_bound(arrays, work, chord, longer, lateral):
     return max(peak(before + lost, after + left, most), peak(lost - before, left - after, most))
 
 
-@entry
+@kernel
 def segment_holds(arrays, work, q0, q1):
     """Do the constraints hold everywhere on the straight segment from q0 (slot 0) to q1 (slot 1)?
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from coverable_arrays import Array
-from coverable_kernels import entry, kernel, put
+from coverable_kernels import entry, kernel
 from feasibility.collisions import clearance_gradient
 from feasibility.roadmap.motions.aiming import look_at
 from feasibility.roadmap.motions.arrays import SearchArrays
@@ -31,6 +31,7 @@ from feasibility.roadmap.motions.working_memory import (
     accept,
     copy_slot,
     place,
+    put,
 )
 
 CONE_SLACK = 1e-3  # [1] share of cone and roll kept free by a full step; less by a shorter one
@@ -228,24 +229,17 @@ def margin_shares(arrays: SearchArrays, work: Work, cell: int, guesses: Array) -
         projection failed.
     """
     margins = np.full(len(guesses), -1.0)
-    _measure_margins(arrays, work, cell, guesses, margins)
+    for g, q in enumerate(guesses):
+        if project_onto_cell(arrays, work, cell, q, PROJECTION_STEPS):
+            settle(arrays, work, cell, q, SETTLE_STEPS)
+            margins[g] = _margin(arrays, work, q)
     return margins
 
 
-@entry
-def _measure_margins(arrays, work, cell, guesses, margins):  # type: ignore[no-untyped-def]
-    """Write the margins of those guesses that can be projected."""
-    for g in range(guesses.shape[0]):
-        q = guesses[g]
-        if not project_onto_cell(arrays, work, cell, q, PROJECTION_STEPS):
-            continue
-        settle(arrays, work, cell, q, SETTLE_STEPS)
-        margin = min(
-            max(0.0, 1.0 - work.error[0, 1] / arrays.cone_chord),
-            max(0.0, 1.0 - abs(work.error[0, 2]) / arrays.roll[1]),
-        )
-        for j in range(q.shape[0]):
-            half = 0.5 * (arrays.upper[j] - arrays.lower[j])
-            if 0.0 < half < np.inf:
-                margin = min(margin, 1.0 - abs((q[j] - arrays.lower[j]) / half - 1.0))
-        margins[g] = margin
+def _margin(arrays: SearchArrays, work: Work, q: Array) -> float:
+    """What the tightest constraint leaves free where `settle` has ended."""
+    half = 0.5 * (arrays.upper - arrays.lower)
+    limited = (half > 0.0) & (half < np.inf)
+    off = np.abs((q - arrays.lower)[limited] / half[limited] - 1.0)
+    chord, turn = work.error[HERE, 1] / arrays.cone_chord, abs(work.error[HERE, 2]) / arrays.roll[1]
+    return float(min(max(0.0, 1.0 - chord), max(0.0, 1.0 - turn), *(1.0 - off)))

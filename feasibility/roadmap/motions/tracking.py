@@ -15,14 +15,22 @@ from __future__ import annotations
 import numpy as np
 
 from coverable_arrays import Array
-from coverable_kernels import entry, kernel, put
+from coverable_kernels import entry, kernel
 from feasibility.roadmap.motions.aiming import aim, bounds_between
 from feasibility.roadmap.motions.arrays import FOLD, LONG, SINGULAR, STOPPED, SearchArrays
 from feasibility.roadmap.motions.off_target import STEPS_FROM_NEAR, project_off_target
 from feasibility.roadmap.motions.projection import linearise, project
 from feasibility.roadmap.motions.segment_bound import segment_holds
 from feasibility.roadmap.motions.self_motion import CONE_SLACK, margin_objective
-from feasibility.roadmap.motions.working_memory import HERE, NEXT, Work, accept, copy_slot, place
+from feasibility.roadmap.motions.working_memory import (
+    HERE,
+    NEXT,
+    Work,
+    accept,
+    copy_slot,
+    place,
+    put,
+)
 
 SMALLEST_STEP = 2.0**-7  # [1] of the curve between two centres: a shorter step ends the motion
 OFF_TARGET_STEP = 2.0**-4  # [1] of the curve: the first step with the tool point off its target

@@ -187,3 +187,10 @@ def roll_lost(arrays, work, slot):  # type: ignore[no-untyped-def]
 def roll_used(arrays, work, slot):  # type: ignore[no-untyped-def]
     """rad of the roll's half range that a slot uses, as `cone_used`."""
     return abs(work.error[slot, 2]) + roll_lost(arrays, work, slot)
+
+
+@kernel
+def put(target, source):  # type: ignore[no-untyped-def]
+    """Copy numbers into an array of the same length; numba's `target[:] = source` is far longer."""
+    for j in range(target.shape[0]):
+        target[j] = source[j]
