@@ -13,9 +13,7 @@ from numpy.typing import ArrayLike
 from coverable_errors import ArgumentError
 from feasibility.attempts import Method, attempts_at
 from feasibility.clock import Clock, OutOfTime
-from feasibility.collisions import Collision
 from feasibility.demands import OF_TREE, RATES, further, unjudged
-from feasibility.found import Found
 from feasibility.problem import Problem
 from feasibility.search import Progress, Search
 from feasibility.task import Task
@@ -25,6 +23,8 @@ from robots import Robot
 from surfaces import Cells
 
 if TYPE_CHECKING:
+    from feasibility.collisions import Collision
+    from feasibility.found import Found
     from feasibility.treated import TreatedArea
 
 NO_CELLS = "There are no cells, so there is nothing to cover; the arm was not looked at."

@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from coverable_arrays import Array, Ints, Mask
-from feasibility.cut_tree import CutTree
 from feasibility.verdict import Cause, Replay, Walk
 
 if TYPE_CHECKING:
     import networkx as nx
+
+    from feasibility.cut_tree import CutTree
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -5,16 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
 from coverable_arrays import Array, unit_along
 from coverable_errors import ArgumentError, Checks, Fault
-from feasibility.collisions import Collision
+from feasibility import collisions
 from feasibility.cone import chord_of
 from feasibility.roll import Roll, projected, roll_of_range
 from surfaces import Cells
+
+if TYPE_CHECKING:
+    from feasibility.collisions import Collision
 
 DEFAULT_TOLERANCE = 1e-3  # [m]
 FIXED_DEG = 0.1  # [deg] to either side: a range that counts as "fixed"
@@ -129,7 +132,8 @@ class Task:
         for name, unit in units.items():
             if getattr(self, name) is not None:
                 kept[name] = checks.positive(name, getattr(self, name), unit)
-        if not isinstance(self.collision, Collision | None):
+        asked = self.collision
+        if asked is not None and not isinstance(asked, collisions.Collision):
             expected = "must be a Collision, such as Collision(clearance=0.005), or None"
             checks.wrong("collision", self.collision, expected)
         kept["approach"] = self._checked_approach(checks)

@@ -13,14 +13,15 @@ from typing import TYPE_CHECKING, Any
 from coverable_arrays import Array, Ints, Mask
 from coverable_errors import at_least
 from feasibility.collisions import said_of
-from feasibility.cut_tree import CutTree
 from feasibility.task import PlacementError, Task
 from robots import Robot
-from robots.shapes import LeftOut
 from surfaces import Cells
 
 if TYPE_CHECKING:
     import networkx as nx
+
+    from feasibility.cut_tree import CutTree
+    from robots.shapes import LeftOut
 
 
 class Answer(StrEnum):

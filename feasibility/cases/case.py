@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from coverable_errors import MISSING, ArgumentError, Fault, close, printable
-from feasibility.cases.collision_table import CollisionPart, faults_of_meshes, read_collision
 from feasibility.cases.robot_table import RobotPart, faults_of_loading, in_robot_table, read_robot
 from feasibility.cases.surface_reading import (
     AUTO,
@@ -31,13 +30,13 @@ from feasibility.cases.toml import (
     parse_toml,
     toml_document,
 )
-from feasibility.cases.toml_edits import differences, edited
 from feasibility.safe_files import FileError, read_text, shown_path
 from feasibility.search import Search
 from feasibility.targets import check_references
 from feasibility.task import PlacementError, Task, check_footprint
 
 if TYPE_CHECKING:
+    from feasibility.cases.collision_table import CollisionPart
     from robots import Robot
     from surfaces import Cells
 
@@ -176,6 +175,8 @@ class Case:
         """
         if self.source is None:
             return self.to_toml()
+        from feasibility.cases.toml_edits import differences, edited
+
         text, folder = self.source
         with suppress(CaseError):  # the file alone may be no case
             tables = [as_read(case.to_tables()) for case in (Case.from_toml(text, folder), self)]
@@ -298,7 +299,7 @@ def _from_tables(
     robot = read_robot(tables["robot"], faults) if "robot" in tables else None
     surface = read_surface(tables["surface"], faults) if "surface" in tables else None
     task = _read_task(tables["task"], faults) if "task" in tables else None
-    collision = read_collision(tables["collision"], faults) if "collision" in tables else None
+    collision = _read_collision(tables["collision"], faults) if "collision" in tables else None
     if surface is not None and task is not None and surface.automatic and task.disc is None:
         wanted = "give task.footprint, in metres, from which their size follows"
         faults.append(Fault("surface.cells", f"is {AUTO!r}, without a footprint", expected=wanted))
@@ -312,12 +313,28 @@ def _from_tables(
         part = surface or named_file(tables["surface"])
         faults += faults_of_building(part) if part is not None else []
     if faults:
-        faults += faults_of_meshes(tables.get("collision"))
+        faults += _faults_of_meshes(tables.get("collision"))
     if faults or robot is None or surface is None or task is None or search is None:
         raise CaseError(faults, name)
     changed = f"changed: {', '.join(overrides)}" if overrides else ""
     description = "; ".join(filter(None, (description, changed)))
     return Case(robot, surface, task, search, name, description, collision)
+
+
+def _read_collision(table: Any, faults: list[Fault]) -> CollisionPart | None:
+    """Read the [collision] table; None where it has faults."""
+    from feasibility.cases.collision_table import read_collision
+
+    return read_collision(table, faults)
+
+
+def _faults_of_meshes(table: Any) -> list[Fault]:
+    """What is wrong with the mesh files of a [collision] table, if there is one."""
+    if table is None:
+        return []
+    from feasibility.cases.collision_table import faults_of_meshes
+
+    return faults_of_meshes(table)
 
 
 def _read_task(table: Any, faults: list[Fault]) -> Task | None:

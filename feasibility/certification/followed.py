@@ -17,8 +17,7 @@ from coverable_arrays import Array, Ints, Mask
 from feasibility.certification.faults import MotionFault
 from feasibility.certification.stretches import Judge, Samples
 from robots import Kinematics
-from surfaces import Surface
-from surfaces.meshes import MeshSurface
+from surfaces import Surface, meshes
 
 HALVINGS = 30  # to where a motion leaves what it follows
 LEVELS = 20  # halvings of what is lifted, until it is clear of the surface
@@ -159,6 +158,6 @@ def _heights(surface: Surface, points: Array) -> Array:
     """(k,) m, on the tool's side of a surface; NaN beyond its border."""
     at = surface.closest(points)
     over = at.inside
-    if isinstance(surface, MeshSurface):
+    if isinstance(surface, meshes.MeshSurface):
         over = ~surface.beyond_border(*surface.nearest(points))
     return np.where(over, surface.side_sign * at.height, np.nan)

@@ -11,11 +11,10 @@ from dataclasses import replace
 import numpy as np
 
 from coverable_arrays import Array, Mask
+from feasibility.certification import collisions, rolls
 from feasibility.certification.cells_reached import at_targets
-from feasibility.certification.collisions import collision_replay
 from feasibility.certification.order import order_of_marks
 from feasibility.certification.placement_margin import margin_fault
-from feasibility.certification.rolls import reference_axes
 from feasibility.certification.surface_replay import replay_over_surface
 from feasibility.collisions import gather
 from feasibility.task import Task
@@ -56,7 +55,7 @@ def replay(
     bodies = gather(robot, cells.surface, task.collision, task.standoff)
     certificate, collides = found.certificate, False
     if bodies is not None and not refusal:
-        clear = collision_replay(robot, bodies, walk.q, deviations)
+        clear = collisions.collision_replay(robot, bodies, walk.q, deviations)
         certificate, refusal = clear.added_to(certificate), clear.refusal
         collides = not clear.accepted
     if refusal or deviations is not None:  # the margin is of motions that are straight
@@ -79,7 +78,7 @@ def _misplaced(robot: Robot, cells: Cells, task: Task, walk: Walk) -> str:
     at = np.flatnonzero(walk.cell >= 0)
     q, cell = walk.q[at], walk.cell[at]
     points, axes = Kinematics(robot).tools(q)
-    x = axes if task.roll is None else reference_axes(robot, q)
+    x = axes if task.roll is None else rolls.reference_axes(robot, q)
     right = at_targets(task, task.targets(cells), cell, points, axes, x)[0] < np.inf
     if right.all():
         return ""

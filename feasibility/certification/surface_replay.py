@@ -19,26 +19,24 @@ Where bodies are given, they have to stay clear of each other too (`collisions`)
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
+from feasibility.certification import collisions
 from feasibility.certification.cells_reached import (
     Reached,
     cells_reached,
     in_order,
     missed_text,
 )
-from feasibility.certification.collisions import collision_replay
 from feasibility.certification.faults import Judged, MotionFault
-from feasibility.certification.followed import followed_parts, lifted_faults, off_surface
 from feasibility.certification.jacobians import placements
 from feasibility.certification.order import curves_of_marks, order_of_places
 from feasibility.certification.placement_margin import margin_fault, margin_of
 from feasibility.certification.refusals import exact_faults, limits, open_fault
 from feasibility.certification.stretches import Bounds, Judge, Samples, Stretches
-from feasibility.collisions import Bodies
 from feasibility.cone import angle_of
 from feasibility.task import Task
 from feasibility.verdict import Certificate
@@ -46,6 +44,9 @@ from robots import Kinematics, Robot
 from surfaces import Cells, Surface
 from surfaces.places import offset_surface
 from surfaces.toolpaths import PoseSurface
+
+if TYPE_CHECKING:
+    from feasibility.collisions import Bodies
 
 LEVELS = 26  # halvings of a segment between two rows
 MOST_SAMPLES = 1_000_000  # configurations looked at between rows
@@ -125,7 +126,7 @@ def replay_over_surface(
         len(rows), error, angle_of(chord), margin, max_roll=None if task.roll is None else roll
     )
     if bodies is not None:
-        clear = collision_replay(robot, bodies, rows)
+        clear = collisions.collision_replay(robot, bodies, rows)
         faults += clear.faults
         certificate = clear.added_to(certificate)
     if len(cells) and not faults:
@@ -167,6 +168,8 @@ def _tool_at_work(
 
     Where it does not, it must not go through the surface.
     """
+    from feasibility.certification.followed import lifted_faults
+
     most, faults, samples = np.zeros(3), list[MotionFault](), list[Samples]()
     reached, room = Reached.none(len(cells)), np.full((len(rows), 2), np.inf)
     turns = np.flatnonzero(np.diff(working)) + 1
@@ -232,6 +235,8 @@ def _with_what_follows(
     """
     if surface.under is None or surface.working is None:
         return found
+    from feasibility.certification.followed import followed_parts, lifted_faults, off_surface
+
     task = less_deviations(judge.task, surface.under)
     over = Judge(judge.robot, task, offset_surface(surface.under, judge.offset.height), cells)
     followed, most, room = surface.followed, found.most, found.room

@@ -12,15 +12,25 @@ import os
 import sys
 import time
 from collections.abc import Sequence
+from importlib import import_module
 from typing import NoReturn
 
 from coverable_errors import CoverableError
-from feasibility.cli import case_commands, listing, path, place, study_compare, verify, warm_up
 from feasibility.cli.command import BAD_INPUT, STATUS, MakeClock, TooLate, json_text
 from feasibility.cli.console import prepare, print_err, print_out
 from feasibility.interrupts import INTERRUPTED, MESSAGE, interruptible, leave_at_once
 
 TRACEBACK = "COVERABLE_TRACEBACK"
+MODULES = {
+    "case_commands": ("check", "show", "live", "divide", "explain"),
+    "path": ("path",),
+    "verify": ("verify",),
+    "study_compare": ("study", "compare"),
+    "place": ("place",),
+    "listing": ("cases", "robots", "keys"),
+    "warm_up": (),  # which runs the others
+}
+"""The commands of each module; only that of the command that is asked for is loaded."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -43,8 +53,8 @@ class _Version(argparse.Action):
         raise SystemExit(0)
 
 
-def _parser() -> argparse.ArgumentParser:
-    """The arguments of the command line."""
+def _parser(command: str = "") -> argparse.ArgumentParser:
+    """The arguments of the command line: of a command and those beside it, or of all."""
     parser = _Parser(
         prog="coverable",
         description="Can this arm move its tool continuously over this whole surface, holding the "
@@ -54,8 +64,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     subcommands = parser.add_subparsers(metavar="COMMAND", required=True)
-    for commands in (case_commands, path, verify, study_compare, place, listing, warm_up):
-        commands.add(subcommands)
+    for module in [name for name, words in MODULES.items() if command in words] or MODULES:
+        import_module(f"feasibility.cli.{module}").add(subcommands)
     return parser
 
 
@@ -73,7 +83,8 @@ def main(argv: Sequence[str] | None = None, clock: MakeClock | None = None) -> i
     try:
         with interruptible():
             prepare()
-            args = _parser().parse_args(argv)
+            words = sys.argv[1:] if argv is None else argv
+            args = _parser(next(iter(words), "")).parse_args(words)
             args.clock = clock
             try:
                 return int(args.run(args, began))

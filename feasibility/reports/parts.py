@@ -19,11 +19,11 @@ from feasibility.results import plain
 from feasibility.task import Task
 from feasibility.verdict import Bound, Cause, Certificate, PlacementMargin, Walk
 from robots import Robot
-from robots.shapes import LeftOut
 from surfaces import Cells, Surface
 
 if TYPE_CHECKING:
     from feasibility.certification.collisions import CollisionReplay
+    from robots.shapes import LeftOut
 
 WIDTH = 100  # columns
 MARGINS = ("limit_deg", "limit_m", "cone_deg", "reach_m", "placement_m")

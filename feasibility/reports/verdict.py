@@ -6,10 +6,9 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 
 from coverable_errors import counted
+from feasibility import paper
 from feasibility.cases import OWN_KEYS, Case
 from feasibility.collisions import checked, said_of
-from feasibility.cut_words import lines as proof_lines
-from feasibility.paper import tree_walk
 from feasibility.reports.parts import (
     causes_json,
     certificate_text,
@@ -24,7 +23,6 @@ from feasibility.reports.parts import (
     summary,
     walk_csv,
 )
-from feasibility.reports.proof import proof_json
 from feasibility.treated import share_words, treated_json, treated_words
 from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict, Walk
 from feasibility.version import version
@@ -79,7 +77,7 @@ def as_json(verdict: Verdict, before_s: float = 0.0) -> dict[str, Any]:
         "collisions": checked(verdict.task.collision),
         "unchecked_links": list(verdict.unchecked_links),
         "pairs_left_out": [left_out_json(one) for one in verdict.pairs_left_out],
-        "proof": proof_json(verdict.proof, verdict.robot, verdict.cells),
+        "proof": _proof(verdict),
         "treated": treated_json(verdict.treated),
         **smooth_json(verdict.cells.surface),
         "timing": seconds(verdict.timing, PHASES, before_s),
@@ -89,6 +87,15 @@ def as_json(verdict: Verdict, before_s: float = 0.0) -> dict[str, Any]:
         "version": version(),
         "message": _message(verdict),
     }
+
+
+def _proof(verdict: Verdict) -> dict[str, Any] | None:
+    """The proof as JSON, where there is one."""
+    if verdict.proof is None:
+        return None
+    from feasibility.reports.proof import tree_json
+
+    return tree_json(verdict.proof, verdict.robot, verdict.cells)
 
 
 def _message(verdict: Verdict) -> str:
@@ -122,6 +129,8 @@ def as_text(verdict: Verdict, case: Case, before_s: float = 0.0) -> str:
     lines = summary(head, rows, said)
     if verdict.proof is not None and verdict.proof.n_cuts > 1:
         lines += ["", "Why no single motion covers every cell:"]
+        from feasibility.cut_words import lines as proof_lines
+
         lines += [f"  {line}" for line in proof_lines(verdict.proof, verdict.robot, verdict.cells)]
     groups = list(causes_listed(verdict.causes, verdict.cells))
     if groups:
@@ -312,7 +321,7 @@ def _walk(verdict: Verdict) -> Walk | None:
     """The covering motion, also of the greedy search; None where there is none."""
     if verdict.answer is not Answer.FEASIBLE:
         return None
-    return tree_walk(verdict) if verdict.method == "greedy" else verdict.witness
+    return paper.tree_walk(verdict) if verdict.method == "greedy" else verdict.witness
 
 
 def as_csv(verdict: Verdict) -> str | None:

@@ -1,11 +1,11 @@
 from .motion_file import Motion as Motion
 from .motion_file import load_motion as load_motion
+from .plain import plain as plain
 from .result_file import Result as Result
 from .result_file import ResultError as ResultError
 from .result_file import case_of_result as case_of_result
 from .result_file import load_result as load_result
 from .result_file import save_result as save_result
-from .result_rows import plain as plain
 from .trajectory_files import check_ending as check_ending
 from .trajectory_files import load_trajectory as load_trajectory
 from .trajectory_files import save_trajectory as save_trajectory

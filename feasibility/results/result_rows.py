@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from coverable_errors import shown
 from feasibility.results.archive import Fields
+from feasibility.results.plain import plain
 from feasibility.verdict import Cause, CauseKind, Certificate
-from robots.shapes import LeftOut
+from robots import shapes
 
 
 def cause_row(cause: Cause) -> dict[str, Any]:
@@ -23,23 +23,6 @@ def cause_row(cause: Cause) -> dict[str, Any]:
         "pair": plain(cause.pair),
         "clearance": plain(cause.clearance),
     }
-
-
-def plain(value: Any) -> Any:
-    """A value as JSON can hold it; what is not finite becomes null."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, (list, tuple, set, frozenset)):
-        return [plain(item) for item in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    if value is None or isinstance(value, (bool, int, float, str)):
-        return value
-    return str(value)
 
 
 def read_causes(fields: Fields, count: int) -> tuple[Cause, ...]:
@@ -77,7 +60,7 @@ def read_certificate(fields: Fields) -> Certificate | None:
     )
 
 
-def read_left_out(fields: Fields) -> tuple[LeftOut, ...]:
+def read_left_out(fields: Fields) -> tuple[shapes.LeftOut, ...]:
     """The pairs that were left out."""
     found = []
     given = fields.entries.get("pairs_left_out")
@@ -86,7 +69,7 @@ def read_left_out(fields: Fields) -> tuple[LeftOut, ...]:
             raise fields.archive.error(f"meta.json: pairs_left_out[{k}] is not an object")
         row = Fields(fields.archive, entry, f"pairs_left_out[{k}].")
         first, second, why = (row.text(key) for key in ("first", "second", "why"))
-        found.append(LeftOut(first, second, why, _maybe(row, "rate")))
+        found.append(shapes.LeftOut(first, second, why, _maybe(row, "rate")))
     return tuple(found)
 
 

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError, Checks, Fault
-from feasibility.certification import collision_replay, replay
+from feasibility import certification
 from feasibility.clock import Clock, OutOfTime
-from feasibility.collisions import Bodies, blamed, segment_clear
+from feasibility.collisions import blamed, segment_clear
 from feasibility.found import Found
 from feasibility.notices import REASONS, compiling_notice
 from feasibility.problem import Problem
-from feasibility.roadmap.causes import causes_of
+from feasibility.roadmap import causes, forward
 from feasibility.roadmap.exploration import Exploration, wound
-from feasibility.roadmap.forward import OrderedRun, changes_in_place, run_in_order
-from feasibility.roadmap.graph_g import graph_of
 from feasibility.roadmap.outcome import (
     exhausted_words,
     proof_of,
@@ -26,7 +25,6 @@ from feasibility.roadmap.outcome import (
     unfinished_words,
 )
 from feasibility.roadmap.proving import Proving
-from feasibility.roadmap.refinement import COARSE, FINE, refine
 from feasibility.roadmap.search import close, exploration_of, explore, restart
 from feasibility.roadmap.walk import covering_walk
 from feasibility.roadmap.warmup import warm_up
@@ -35,6 +33,12 @@ from feasibility.targets import start_cell
 from feasibility.task import Task
 from feasibility.verdict import Cause, Replay, Walk
 from robots import Kinematics
+
+if TYPE_CHECKING:
+    import networkx as nx
+
+    from feasibility.collisions import Bodies
+    from feasibility.roadmap.forward import OrderedRun
 
 FIRST, SECOND, THIRD, LAST = 1, 4, 8, 16  # rounds without gain
 FEW_CUT_BOXES, MORE_CUT_BOXES = 20_000, 200_000
@@ -92,7 +96,7 @@ def _search(
         if not search.early or problem.cells.in_order:
             close(exploration)
         if problem.cells.in_order and exploration.complete and known is None:
-            run = run_in_order(exploration)
+            run = forward.run_in_order(exploration)
     except OutOfTime:
         late = clock.limits
     exploration.clock = Clock()  # graph and causes are made later, when somebody reads them
@@ -110,6 +114,8 @@ def between_rounds(exploration: Exploration, proving: Proving, task: Task, idle:
 
     `task` is the one that the search keeps to; `idle` rounds in a row have gained nothing.
     """
+
+    from feasibility.roadmap.refinement import COARSE, FINE, refine
 
     def proved(budget: int) -> bool:
         # Where a cell is proved uncoverable already, only more cells can be gained.
@@ -173,7 +179,7 @@ def _begin(exploration: Exploration, cell: int, bodies: Bodies | None) -> None:
 
 def _collides(exploration: Exploration, bodies: Bodies, start: NDArray[np.float64]) -> str:
     """Why a start (n,) is refused: for the shapes, or for the bodies around them alone."""
-    judged = collision_replay(exploration.robot, bodies, start[None])
+    judged = certification.collision_replay(exploration.robot, bodies, start[None])
     if not judged.accepted:
         found = "; ".join(fault.text for fault in judged.faults)
         return f"collides, or is too near ({found}); choose another start"
@@ -245,9 +251,16 @@ def _found(
         proved="" if proof is None else proved_words(problem, proving, proof),
         unfinished="" if walk is not None else unfinished_words(problem, proving, late),
         exhausted=exhausted_words(problem, exploration, proving),
-        make_graph=lambda: graph_of(exploration),
+        make_graph=partial(_graph, exploration),
         make_causes=lambda: _causes(problem, exploration),
     )
+
+
+def _graph(exploration: Exploration) -> nx.Graph:
+    """Graph G, made when it is first read."""
+    from feasibility.roadmap.graph_g import graph_of
+
+    return graph_of(exploration)
 
 
 def _hindered(exploration: Exploration) -> bool:
@@ -258,8 +271,10 @@ def _hindered(exploration: Exploration) -> bool:
 
 def _causes(problem: Problem, exploration: Exploration) -> tuple[Cause, ...]:
     """Why cells are missed."""
+    if exploration.complete:
+        return ()
     with compiling_notice(notice=REASONS):
-        return causes_of(exploration, proof_of(exploration), problem.pairs)
+        return causes.causes_of(exploration, proof_of(exploration), problem.pairs)
 
 
 def _in_order(found: Found, run: OrderedRun, problem: Problem, exploration: Exploration) -> Found:
@@ -272,7 +287,9 @@ def _in_order(found: Found, run: OrderedRun, problem: Problem, exploration: Expl
             exhausted=run.failed_words(total), make_causes=lambda: run.causes(total),
         )  # fmt: skip
     near = IN_PLACE * problem.task.effective_tolerance
-    counts["in_place"] = changes_in_place(problem.robot, exploration.arrays.points, walk, near)
+    counts["in_place"] = forward.changes_in_place(
+        problem.robot, exploration.arrays.points, walk, near
+    )
     return replace(
         found, counts=counts, start=0, motion=walk, replay=partial(_replayed, problem, walk),
         accepted=f"One motion of {{waypoints}} waypoints runs the {total} poses in order, without "
@@ -284,4 +301,4 @@ def _in_order(found: Found, run: OrderedRun, problem: Problem, exploration: Expl
 def _replayed(problem: Problem, walk: Walk) -> Replay:
     """Replay the walk: it must visit every cell, whatever the search recorded as covered."""
     needed = np.ones(len(problem.cells), dtype=bool)
-    return replay(problem.robot, problem.cells, problem.task, walk, needed)
+    return certification.replay(problem.robot, problem.cells, problem.task, walk, needed)

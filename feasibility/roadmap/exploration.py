@@ -6,19 +6,24 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
 from feasibility.clock import Clock
-from feasibility.cut_tree import CutTree
-from feasibility.roadmap.blockers import Blockers
-from feasibility.roadmap.branch_and_bound import Boxes, Ruling, rule
+from feasibility.roadmap import branch_and_bound
+from feasibility.roadmap.branch_and_bound import Ruling
 from feasibility.roadmap.expansion import JOINED, Grower
 from feasibility.roadmap.graph import Roadmap
 from feasibility.roadmap.motions import SearchArrays, Work, passable, work_for
 from robots import Robot
 from surfaces import Cells, components
+
+if TYPE_CHECKING:
+    from feasibility.cut_tree import CutTree
+    from feasibility.roadmap.blockers import Blockers
+    from feasibility.roadmap.branch_and_bound import Boxes
 
 BUDGET = 8_000  # evaluations of the arm between two checks of the clock
 GUESSES = 4  # of one `explore_self_motions`
@@ -311,7 +316,7 @@ class Exploration:
         ruling, examined = Ruling.OPEN, int(boxes.counts[1])
         while ruling is Ruling.OPEN and boxes.counts[1] < most:
             budget = self.clock.affordable(min(most, BUDGET))
-            ruling, q = rule(self.arrays, self.work, cell, boxes, budget)
+            ruling, q = branch_and_bound.rule(self.arrays, self.work, cell, boxes, budget)
             self.tick("proving cells out of reach")
         self.boxes += int(boxes.counts[1]) - examined
         self.rulings[cell] = ruling

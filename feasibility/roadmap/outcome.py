@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from feasibility.cut_tree import CutTree, Leaf
-from feasibility.cut_words import joint_value, sentence
+from feasibility import targets
 from feasibility.problem import Problem
 from feasibility.roadmap.branch_and_bound import Ruling
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.proving import Proving
-from feasibility.targets import blocked_curves, smoothing_offer
+
+if TYPE_CHECKING:
+    from feasibility.cut_tree import CutTree
 
 
 def proof_of(exploration: Exploration) -> CutTree | None:
     """The first cell that is proved uncoverable, or the cut tree; None where there is neither."""
+    from feasibility.cut_tree import CutTree, Leaf
+
     rulings = exploration.rulings.items()
     cell = next((cell for cell, ruling in rulings if ruling is Ruling.PROVED), None)
     return exploration.cut_tree if cell is None else CutTree(Leaf(cell))
@@ -22,6 +27,8 @@ def proof_of(exploration: Exploration) -> CutTree | None:
 
 def proved_words(problem: Problem, proving: Proving, proof: CutTree) -> str:
     """What is proved: which cells cannot be covered, or which cuts part them."""
+    from feasibility.cut_words import sentence
+
     exploration = proving.exploration
     best = f"the best single motion covers {exploration.n_covered} of {len(problem.cells)}"
     if proof.kind == "cut":
@@ -58,11 +65,10 @@ def unfinished_words(problem: Problem, proving: Proving, late: str) -> str:
             f"The {late} ran out; the best single motion so far covers "
             f"{exploration.n_covered} of {total} cells."
         )
-    blocked = blocked_curves(problem.cells, problem.task)
+    blocked = targets.blocked_curves(problem.cells, problem.task)
     if blocked:
-        return (
-            f"{blocked} {smoothing_offer(problem.cells, problem.task, exploration.clock)}".rstrip()
-        )
+        offer = targets.smoothing_offer(problem.cells, problem.task, exploration.clock)
+        return f"{blocked} {offer}".rstrip()
     missed = np.flatnonzero(~exploration.reached)
     if len(missed):
         named = problem.cells.named(missed, 3)
@@ -79,6 +85,8 @@ def unfinished_words(problem: Problem, proving: Proving, late: str) -> str:
         )
     if proving.unable or proving.attempts == 0 or (proving.starved and not proving.alarmed):
         return ""
+    from feasibility.cut_words import joint_value
+
     kept = [gap for gap in proving.open_gaps if gap.points > 0]
     where = ""
     if kept:

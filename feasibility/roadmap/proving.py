@@ -9,14 +9,18 @@ found: the verdict says so, and such a search does not count as exhausted.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from feasibility.roadmap.cuts import OpenGap, Prover, components_of, places_on
+from feasibility import targets
+from feasibility.roadmap import cuts
 from feasibility.roadmap.exploration import Exploration, wound
-from feasibility.targets import blocked_curves
 from feasibility.task import Task
 from surfaces import SurfaceError
+
+if TYPE_CHECKING:
+    from feasibility.roadmap.cuts import OpenGap, Prover
 
 MOST_BOXES = 1_000_000  # of one attempt
 ATTEMPTS = 6  # in a row, as long as each finds seeds that gain something
@@ -77,7 +81,7 @@ class Proving:
             more, told = int(work.counts[0]) - told, int(work.counts[0])
             exploration.tick("proving that no motion joins the parts", more)
 
-        made = prover.attempt(components_of(exploration.roadmap), budget, tick)
+        made = prover.attempt(cuts.components_of(exploration.roadmap), budget, tick)
         self.attempts += 1
         self.boxes += made.boxes
         exploration.cut_tree, self.open_gaps = made.tree, made.open_gaps
@@ -95,15 +99,15 @@ class Proving:
         is not certified, nor ruled out: that nothing is on the surface in between proves nothing.
         """
         if self._prover is None and not self.unable:
-            self.unable = blocked_curves(self.exploration.cells, self.task)
+            self.unable = targets.blocked_curves(self.exploration.cells, self.task)
             if self.unable:
                 return None
             try:
-                places = places_on(self.exploration.cells.surface, self.task)
+                places = cuts.places_on(self.exploration.cells.surface, self.task)
             except SurfaceError as error:
                 self.unable = str(error)
                 return None
             # Random numbers of its own: whether it is tried does not change the search.
             rng = np.random.default_rng([self.exploration.seed, 1])
-            self._prover = Prover(self.exploration.arrays, places, rng)
+            self._prover = cuts.Prover(self.exploration.arrays, places, rng)
         return self._prover

@@ -1,14 +1,14 @@
 """The complete search: does one component of the roadmap cover every cell?
 
-In this order, because each step is much cheaper than the next:
+In this order, because each step (of the list in `feasibility`) is much cheaper than the next:
 
-1. Seed a pivot cell in the middle, and spread each seed at once into the cells that its component
+6. Seed a pivot cell in the middle, and spread each seed at once into the cells that its component
    does not cover yet. Most feasible cases end here.
-2. Branch and bound over every cell that no component has reached: it either proves that no
+7. Branch and bound over every cell that no component has reached: it either proves that no
    configuration covers the cell, or finds one (which becomes a seed). Before that, whether the tool
    collides over the cell in every pose, whatever the arm does; and after it, over a few cells,
    whether something collides wherever the tool is there.
-3. Rounds: seed cells that the best component misses; explore self-motions at the border of the
+8. Rounds: seed cells that the best component misses; explore self-motions at the border of the
    largest components, to find configurations that reach further; bridge two components, and explore
    self-motions over cells that both cover. The search is exhausted when some rounds in a row have
    gained nothing.
@@ -20,18 +20,22 @@ verdict is "exhausted", and its message says what was tried.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from coverable_arrays import Ints
 from feasibility.clock import Clock
-from feasibility.roadmap.blockers import blockers_of
-from feasibility.roadmap.branch_and_bound import Boxes, Ruling, root_box
+from feasibility.roadmap import branch_and_bound
+from feasibility.roadmap.branch_and_bound import Ruling
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions import arrays_of, margin_shares
 from feasibility.task import Task
 from robots import Robot
 from surfaces import Cells
+
+if TYPE_CHECKING:
+    from feasibility.roadmap.branch_and_bound import Boxes
 
 PIVOT_SEEDS = 8
 TOP = 5  # components that a round works on
@@ -74,7 +78,12 @@ def exploration_of(
     clock = Clock() if clock is None else clock
     with clock.enforced():
         arrays = arrays_of(robot, cells, task if searched is None else searched)
-    return Exploration(robot, cells, arrays, seed, clock, blockers_of(robot, cells, task))
+    blockers = None
+    if len(arrays.collisions):
+        from feasibility.roadmap.blockers import blockers_of
+
+        blockers = blockers_of(robot, cells, task)
+    return Exploration(robot, cells, arrays, seed, clock, blockers)
 
 
 def explore(exploration: Exploration, between: Between | None = None) -> None:
@@ -94,7 +103,7 @@ def explore(exploration: Exploration, between: Between | None = None) -> None:
 
 
 def seed_middle(exploration: Exploration) -> bool:
-    """Step 1; True when one component covers every cell."""
+    """Step 6; True when one component covers every cell."""
     pivot = exploration.cells.middle
     exploration.tick("looking for configurations")
     guesses = exploration.guesses(PIVOT_SEEDS)
@@ -109,7 +118,7 @@ def seed_middle(exploration: Exploration) -> bool:
 
 
 def _unreached(exploration: Exploration) -> None:
-    """Step 2: a ruling on every cell that no component has reached."""
+    """Step 7: a ruling on every cell that no component has reached."""
     distance = exploration.robot.distance_from_base(exploration.arrays.points)
     beyond = distance > exploration.robot.reach + exploration.arrays.tolerance
     for cell in np.flatnonzero(beyond).tolist():
@@ -129,7 +138,7 @@ def _unreached(exploration: Exploration) -> None:
             return
         if exploration.tool_collides(cell):
             continue
-        boxes = root_box(exploration.arrays)
+        boxes = branch_and_bound.root_box(exploration.arrays)
         if exploration.rule(cell, boxes, FIRST_BOXES) is Ruling.OPEN:
             if exploration.add_seeds(cell, exploration.guesses(NEWTON_STARTS)) == 0:
                 open_boxes[cell] = boxes
@@ -170,7 +179,7 @@ def _at_the_target(exploration: Exploration) -> None:
         if not exploration.reached[cell]:
             exploration.add_seeds(cell, exploration.guesses(NEWTON_STARTS))
         if not exploration.reached[cell]:
-            exploration.rule(cell, root_box(exploration.arrays), MORE_BOXES)
+            exploration.rule(cell, branch_and_bound.root_box(exploration.arrays), MORE_BOXES)
 
 
 def _where_the_arm_collides(exploration: Exploration) -> None:
@@ -196,7 +205,7 @@ def evenly(cells: Ints) -> Ints:
 
 
 def _rounds(exploration: Exploration, between: Between | None) -> None:
-    """Step 3: rounds of seeding and exploring, until some in a row have gained nothing.
+    """Step 8: rounds of seeding and exploring, until some in a row have gained nothing.
 
     What is gained are cells of the largest components. A small component that is found, joins
     another, and is found again is no gain, or there would be no end.

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
 from feasibility.targets.directions import approach_curves
-from feasibility.targets.frames import FrameCurves, frame_curves
 from feasibility.task import Task
 from surfaces import Cells
 from surfaces.places import offset_surface
 from surfaces.toolpaths import PoseSurface, straight
+
+if TYPE_CHECKING:
+    from feasibility.targets.frames import FrameCurves
 
 RELIABLE = 0.03  # [1] a curve whose normal deviates no further shows the curvature of the surface
 LATERAL = 1.1  # [1] the normal may turn that much faster between the places looked at
@@ -160,7 +162,11 @@ def _target_curves(cells: Cells, task: Task) -> TargetCurves:
     if len(cells.pairs) and others is None:
         ends = np.concatenate([curves.first[:-1][~folded], curves.first[1:][~folded] - 1])
         at_centre = float(curvature[ends].max(initial=0.0))
-    frames = None if task.roll is None else frame_curves(cells, task, cubics, curvature)
+    frames = None
+    if task.roll is not None:
+        from feasibility.targets.frames import frame_curves
+
+        frames = frame_curves(cells, task, cubics, curvature)
     for array in (cubics, derivative_bounds, curvature, deviations, folded):
         array.flags.writeable = False
     return TargetCurves(

@@ -6,12 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+import surfaces
 from coverable_arrays import Array, Ints
 from feasibility.roll import ALONG, projected
 from feasibility.targets.directions import DirectionCurves, fitted
 from feasibility.targets.references import on_patches, reference_directions
 from feasibility.task import Task
-from surfaces import Cells, Patch, Piecewise, max_principal_curvature
+from surfaces import Cells, Patch, max_principal_curvature
 
 PLACES = (0.0, 0.5, 1.0)  # along a piece, where the frame's turning to the side is measured
 STEP = 1e-4  # [1] of a range of parameters: of differences
@@ -85,7 +86,7 @@ def _curvature(
     """(P,) see `FrameCurves.curvature`; `least` (P,) is the sine of the reference's angle to b."""
     if task.fixed_reference(cells) is not None:
         return np.divide(curvature, least, out=np.full(len(least), np.inf), where=least > 0.0)
-    if not isinstance(cells.surface, (Patch, Piecewise)):
+    if not isinstance(cells.surface, (Patch, surfaces.Piecewise)):
         return np.zeros(len(curvature))
     return np.maximum(_sideways(cells, task), curvature)
 

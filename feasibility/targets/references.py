@@ -11,11 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+import surfaces
 from coverable_arrays import Array, Ints
 from coverable_errors import ArgumentError, Fault
 from feasibility.roll import ALONG, projected
 from feasibility.task import Task
-from surfaces import Cells, Patch, Piecewise, Surface
+from surfaces import Cells, Patch, Surface
 from surfaces.toolpaths import arc_at
 
 
@@ -36,7 +37,7 @@ def on_patches(surface: Surface, points: Array) -> Iterator[OnPatch]:
     if isinstance(surface, Patch):
         found = surface.closest(points)
         yield OnPatch(np.arange(len(points)), surface, found.u, found.v)
-    elif isinstance(surface, Piecewise):
+    elif isinstance(surface, surfaces.Piecewise):
         nearest = surface.nearest(points)
         for k, patch in enumerate(surface.placed):
             rows = np.flatnonzero(nearest.piece == k)
@@ -45,7 +46,8 @@ def on_patches(surface: Surface, points: Array) -> Iterator[OnPatch]:
 
 def u_directions(surface: Surface, points: Array) -> Array | None:
     """(k, 3) unit, in which u grows under points (k, 3) m; None where there is no u."""
-    if not isinstance(surface, (Patch, Piecewise)):
+    one = isinstance(surface, Patch)
+    if not one and not isinstance(surface, surfaces.Piecewise):
         return None
     directions = np.full(points.shape, np.nan)
     for rows, patch, u, v in on_patches(surface, points):

@@ -3,9 +3,9 @@ from .boxes import toward_middle as toward_middle
 from .branching import DIRECTIONS as DIRECTIONS
 from .branching import Boxes as Boxes
 from .branching import Places as Places
-from .branching import Ruling as Ruling
 from .branching import box_of as box_of
 from .branching import examine as examine
 from .branching import root_box as root_box
 from .branching import rule as rule
 from .roll_bounds import unturned as unturned
+from .ruling import Ruling as Ruling

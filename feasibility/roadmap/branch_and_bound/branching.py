@@ -11,8 +11,6 @@ the tool alike. Proofs concern the centre of a cell, with its tolerance and its 
 
 from __future__ import annotations
 
-from enum import IntEnum
-
 import numpy as np
 
 from coverable_arrays import Array
@@ -26,25 +24,13 @@ from feasibility.roadmap.branch_and_bound.boxes import (
     box_work,
     place_at_rest,
 )
+from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.motions import SearchArrays, Work, put
 
 DIRECTIONS = np.array(
     [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1], [1, 1, -1], [1, -1, 1], [-1, 1, 1]], dtype=float
 )
 DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1)[:, None]
-
-
-class Ruling(IntEnum):
-    """The outcome of branch and bound."""
-
-    OPEN = 0
-    """Boxes are left: call again to go on."""
-    PROVED = 1
-    """No configuration holds the tool there."""
-    REACHED = 2
-    """A box's centre does."""
-    UNKNOWN = 3
-    """A box too thin to split could not be discarded."""
 
 
 def root_box(arrays: SearchArrays) -> Boxes:

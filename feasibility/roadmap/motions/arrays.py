@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coverable_arrays import Array, Ints, Mask
-from feasibility.collisions import collision_buffer, gather
-from feasibility.targets import FrameCurves, target_curves
+from feasibility import collisions
+from feasibility.targets import target_curves
 from feasibility.task import Task
 from robots import Chain, Robot
 from surfaces import Cells, Surface
+
+if TYPE_CHECKING:
+    from feasibility.targets import FrameCurves
 
 NEWTON = 0.02  # [1] share of the tolerance that the Newton iteration leaves at a waypoint
 # [1] share of the cone chord, and of the roll's half range, that this may cost, by how the
@@ -183,8 +186,8 @@ def _frames(curves: FrameCurves | None, tilts: Array, cone_chord: float) -> _Fra
 
 def collisions_of(robot: Robot, surface: Surface, task: Task) -> Array:
     """Bodies and pairs as the compiled search reads them; empty where they are not checked."""
-    bodies = gather(robot, surface, task.collision, task.standoff)
-    return np.zeros(0) if bodies is None else collision_buffer(bodies, robot)
+    bodies = collisions.gather(robot, surface, task.collision, task.standoff)
+    return np.zeros(0) if bodies is None else collisions.collision_buffer(bodies, robot)
 
 
 def with_free_roll(arrays: SearchArrays) -> SearchArrays:
