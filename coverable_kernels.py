@@ -106,7 +106,7 @@ def _kept(compiling: Callable[..., Any], function: Any) -> Any:
         return compiling()(function)
     finally:
         _SETTINGS[HOOK] = usual
-    compile_and_keep = kept.compile
+    compile_and_keep = getattr(kept, "compile", None)  # none where NUMBA_DISABLE_JIT is set
 
     def compile_or_load(signature: Any) -> Any:
         with suppress(OSError):
