@@ -36,7 +36,7 @@ from surfaces import sphere
 
 LENGTH, RADIUS = 0.3, 0.03  # m, of each link, a capsule along x
 chord_deviation, place_bodies = entry(link_frames.chord_deviation), entry(link_frames.place_bodies)
-place_group = entry(link_frames.spread)
+place_group = entry(link_frames.bound_levers)
 FINE = np.deg2rad(0.1)  # between samples, of the joint that moves most
 
 
