@@ -98,15 +98,14 @@ class Kept(InTreeCacheLocator):
 @global_compiler_lock
 def _kept(compiling: Callable[..., Any], function: Any) -> Any:
     """Let numba compile a function, and keep it where it can: a disk may be full by then."""
-    usual = _SETTINGS[HOOK]
-    _SETTINGS[HOOK] = f"{__name__}.{Kept.__name__}"
+    usual, _SETTINGS[HOOK] = _SETTINGS[HOOK], f"{__name__}.{Kept.__name__}"
     try:
         kept = compiling(cache=FOLDER is not None)(function)
     except (OSError, RuntimeError):
         return compiling()(function)
     finally:
         _SETTINGS[HOOK] = usual
-    compile_and_keep = getattr(kept, "compile", None)  # none where NUMBA_DISABLE_JIT is set
+    compile_and_keep: Any = getattr(kept, "compile", None)  # none with NUMBA_DISABLE_JIT
 
     def compile_or_load(signature: Any) -> Any:
         with suppress(OSError):

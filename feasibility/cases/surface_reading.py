@@ -240,8 +240,8 @@ def _kind(section: Section, known: tuple[str, ...]) -> str | None:
 
 def _check(section: Section, kind: str, key: str, values: dict[str, Any]) -> None:
     """Check what no constructor checks before a file is read."""
-    from surfaces import checked_choice
-    from surfaces.meshes import checked_box, checked_cone, checked_plane, metres_per_unit
+    import surfaces  # a patch needs none of what is named here
+    from surfaces import meshes
 
     value = values.get(key)
     make: Callable[..., object]
@@ -260,9 +260,9 @@ def _check(section: Section, kind: str, key: str, values: dict[str, Any]) -> Non
     elif key == "neighbours" and value != "order":
         section.positive(key, value)
     elif key == "scale":
-        section.make(metres_per_unit, {"scale": value})
+        section.make(meshes.metres_per_unit, {"scale": value})
     elif kind == "step" and key in ("faces", "colour", "deviation"):
-        section.make(checked_choice, {key: value})
+        section.make(surfaces.checked_choice, {key: value})
     elif key == "faces" and (not isinstance(value, list) or not value):
         section.wrong_type(key, value)
     elif isinstance(value, list) and key == "faces":
@@ -270,14 +270,15 @@ def _check(section: Section, kind: str, key: str, values: dict[str, Any]) -> Non
         k = next(bad, len(value) - 1)
         section.whole(f"faces[{k}]", value[k], 0)
     elif key == "box" and isinstance(value, list) and len(value) == 2:
-        section.make(checked_box, dict(zip(("low", "high"), value, strict=True)), SURFACE_NAMES)
+        ends = dict(zip(("low", "high"), value, strict=True))
+        section.make(meshes.checked_box, ends, SURFACE_NAMES)
     elif key == "box":
         section.wrong_type(key, value)
     elif key in ("cut", "facing"):
         part = Section(f"{section.name}.{key}", value, section.faults)
         names = dict.fromkeys(part.keys) | {"within_deg": "half_angle_deg"}
         given = {names[k] or k: part.table.get(k, MISSING) for k in part.keys}
-        make = checked_plane if key == "cut" else checked_cone
+        make = meshes.checked_plane if key == "cut" else meshes.checked_cone
         part.make(make, given, SURFACE_NAMES)
         part.refuse_others()
     elif key == "pieces":
