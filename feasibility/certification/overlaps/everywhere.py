@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable_arrays import Array, Ints
-from feasibility.certification.collisions import collision_replay
+from feasibility.certification.collisions.collision_replay import collision_replay
 from feasibility.certification.overlaps.depths import Balls, depths, points_inside
 from feasibility.certification.rows import Rows
 from feasibility.collisions import Bodies
