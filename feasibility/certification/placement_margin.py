@@ -26,7 +26,6 @@ from functools import cache
 import numpy as np
 
 from coverable_arrays import Array
-from feasibility.certification.displaced_bodies import clear_share
 from feasibility.certification.displacement_balls import (
     BELOW,
     BOUNDS,
@@ -71,6 +70,7 @@ def placement_margin(
         what = robot.joint_names[int(np.argmin(ratio(left, worst.moves[0])))]
     bodies = gather(robot, cells.surface, task.collision, task.standoff)
     if bodies is not None and bodies.pairs and most[0] > 0.0:
+        from feasibility.certification.displaced_bodies import clear_share
 
         def moved(share: float) -> Array:
             found = np.zeros((len(along), robot.n))
