@@ -8,7 +8,7 @@ from bounds import holds
 from samples import sampled, seeds
 
 from surfaces import Patch, SurfaceError
-from surfaces.patches import over_boxes
+from surfaces.patches import bernstein, over_boxes
 from surfaces.patches.box_models import VectorModel
 from surfaces.patches.enclosure_functions import FUNCTIONS, UFUNCS, Enclosure
 from surfaces.patches.slopes import Slope
@@ -91,6 +91,38 @@ def test_formulas_over_boxes_hold_their_values(function, seed):
         if widest < 1.0:
             assert np.isfinite(stated).all()
             assert not bent.any() or (off / stated)[bent].max() > 0.9
+
+
+def at(net, x):
+    """(len(x), k) values of a net at places (k', 2)."""
+    by_u, by_v = (bernstein.values_at(x[:, k], net.shape[k]) for k in (0, 1))
+    return np.einsum("gm,gn,mnk->gk", by_u, by_v, net)
+
+
+def test_what_is_left_out_of_a_polynomial_counts_as_radius():
+    whole = Enclosure(np.random.default_rng(3).normal(size=(9, 10, 200)))
+    fewer = whole.lower()
+    assert fewer.net.shape[:2] == (4, 4)
+    holds(fewer.radius[None], np.abs(at(whole.net, X) - at(fewer.net, X)), used=0.2)
+
+
+RADIUS = 0.05
+
+
+@pytest.mark.parametrize("formula", [
+    np.sqrt, np.sin, np.cos, np.exp, np.log, np.arctan, np.reciprocal, np.square, np.absolute,
+    lambda t: t * (t + 1.0), lambda t: 2.0 / (t + 0.5), lambda t: t / 3.0, lambda t: t**0.7,
+    lambda t: np.arctan2(t, t + 1.0), lambda t: (1.0 - t) / t,
+])  # fmt: skip
+def test_what_is_known_within_a_radius_stays_so(formula):
+    low, high = boxes(np.random.default_rng(4), 100, 0.3)
+    u = Enclosure.variable(low[:, 0], high[:, 0], 0)
+    with np.errstate(all="ignore"):
+        found = formula(Enclosure(u.net, RADIUS))
+    for off in (-1.0, -0.5, 0.0, 0.5, 1.0):
+        values = formula(at(u.net, X) + RADIUS * off)
+        holds(found.radius[None], np.abs(values - at(found.net, X)), used=0.0)
+    holds(found.radius[None], np.abs(values - at(found.net, X)), used=0.6)
 
 
 @pytest.mark.parametrize("function", [f for f in FORMULAS if f not in (

@@ -72,7 +72,8 @@ class Refuter:
         """(m,) samples that have the tool on the surface, or at a cell's target, and held right."""
         kept, over = self._judge.within(here), cell >= 0
         held = here.points[over], here.axes[over], here.x[over]
-        kept[over] = at_targets(self._task, self._targets, cell[over], *held)
+        chord, _ = at_targets(self._task, self._targets, cell[over], *held)
+        kept[over] = np.isfinite(chord)
         return kept
 
     def _step(self, q: Array, here: Samples, cell: Ints, free: Mask) -> Array:
