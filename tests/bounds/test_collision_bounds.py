@@ -136,6 +136,21 @@ def pairings(robot, rows, solid, others, deviations=None, needed=0.0, soups=()):
     return Couples(bodies_of([solid], others, pairs, soups)).along(motion)
 
 
+@pytest.mark.parametrize(
+    ("end", "place", "size", "used"),
+    [((0.0, 0.1), 0.0, 0.3, 0.8), ((0.1, -0.1), 0.4, 0.01, 0.8), ((6.28, 0.0), 0.4, 0.01, 0.3)],
+    ids=["about its middle", "without a turn", "there and back"],
+)
+def test_no_point_of_a_body_moves_further_than_its_way(end, place, size, used):
+    robot, rows = planar_arm([0.5, 0.4]), np.array([[0.0, 0.0], end])
+    solid = Solid("link2", 2, at(place), Box((size, size, size)))
+    wall = Obstacle("wall", Sphere(0.1), at(2.0))
+    (one,) = pairings(robot, rows, solid, [wall])
+    corners = one.b.corners
+    moved = how_far(robot, rows, np.zeros((1, 2)), 0, 2, corners, np.random.default_rng(0))[1]
+    holds(one.way[-1], moved, used)
+
+
 @pytest.mark.parametrize("step", [0.01, 0.2])
 def test_no_bound_is_above_a_distance(step):
     """By balls, and by planes on whole segments and on parts of them, of bodies on any joints."""
