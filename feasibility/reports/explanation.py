@@ -26,7 +26,7 @@ from feasibility.reports.explanation_words import (
     what_it_opens,
 )
 from feasibility.reports.pages import framed, page, table
-from feasibility.reports.parts import aligned, filled, walk_csv
+from feasibility.reports.parts import aligned, filled, walk_csv, widening
 from feasibility.results import plain
 from feasibility.sensitivity import (
     Change,
@@ -127,6 +127,7 @@ def _remarks(explanation: Explanation) -> list[str]:
     texts = [f"{change}: {text}." for change, text in opens if text]
     texts.append(idle_limits(explanation))
     texts.append(rates_sentence(explanation))
+    texts.append(widening(verdict.certificate))
     texts += in_the_way(explanation)
     if not helps and not best_changes(explanation) and explanation.thresholds:
         texts.append("None of the single changes that were tried makes it feasible.")

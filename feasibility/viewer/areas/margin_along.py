@@ -39,4 +39,4 @@ def margin_layers(verdict: Verdict) -> Iterator[Layer]:
         low = high
     least = ends[[int(np.argmin(margin.along))]].mean(axis=1)
     dot = marks(least, MARK * cell_size(verdict.cells))
-    yield mesh_layer(f"least room for the part: {margin}", LEAST, "/margin/least", *dot, lit=False)
+    yield mesh_layer("least room for the part", LEAST, "/margin/least", *dot, lit=False)
