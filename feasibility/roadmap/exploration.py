@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -301,15 +301,10 @@ class Exploration:
         """Try to prove that something of the arm collides wherever the tool is over a cell."""
         if self.blockers is None:
             return
-        blockers, left = self.blockers, self.blockers.left
-
-        def tick() -> None:
-            nonlocal left
-            more, left = left - blockers.left, blockers.left
-            self.tick("proving that the arm collides", more)
-
-        if blockers.arm_collides(self.arrays, self.work, cell, tick):
+        text, left = "proving that the arm collides", self.blockers.left
+        if self.blockers.arm_collides(self.arrays, self.work, cell, partial(self.tick, text)):
             self.rulings[cell] = Ruling.PROVED
+        self.tick(text, left - self.blockers.left)
 
     def rule(self, cell: int, boxes: Boxes, most: int) -> Ruling:
         """Branch and bound on one cell; a configuration that it finds becomes a seed."""
