@@ -28,7 +28,7 @@ from feasibility.roadmap import warm_up
 
 LOOK = 0.1  # [s] between two calls of `receive`
 PATIENCE = 3  # workers that may die with a task before it is given up
-STARTS = 3  # workers in a row that may die before they are ready
+STARTS = 3  # workers that may die before they are ready, one after the other
 COMPILING, READY = b"!", b"."  # from a worker, ahead of its first reply
 
 Tables = dict[str, Any]
@@ -147,7 +147,7 @@ class Processes:
         self._loading, self._idle = set[Connection](), list[Connection]()
         self._busy = dict[Connection, int]()
         self._loaded = not warm
-        self._lost = 0  # in a row, before they were ready
+        self._lost = 0  # before they were ready, since anything was done
         self._waiting, self._deaths = deque[int](), Counter[int]()
 
     def run(self, work: Work, tables: Sequence[Tables], receive: Receive) -> None:
@@ -226,6 +226,7 @@ class Processes:
             raise untold(said)
         else:
             self._idle.append(pipe)
+            self._lost = 0
             return [Reply.of(self._busy.pop(pipe), said)]
         return []
 
