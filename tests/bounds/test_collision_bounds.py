@@ -21,7 +21,7 @@ from feasibility.certification.collisions.motion import ArmMotion
 from feasibility.certification.collisions.shapes import Body
 from feasibility.collisions import HalfSpace, Obstacle, Soup
 from robots import Kinematics, load_robot
-from robots.shapes import Solid
+from robots.shapes import Solid, Triangles
 from robots.urdf import Box, Capsule, Cylinder, Sphere
 from surfaces import sphere
 
@@ -253,3 +253,15 @@ def test_pairs_may_be_asked_for_more_along_a_segment(which, more):
     assert not found.accepted or 0.016 <= found.min_clearance <= 0.02
     raised[which] = raised[which, ::-1]
     assert collision_replay(slide, bodies, rows, None, raised).accepted
+
+
+@pytest.mark.parametrize("more", [0.05, 0.15])
+def test_the_most_of_what_is_asked_for_along_a_stretch_counts(more):
+    """A post between the arms of a fork, 0.2 m from both; the last segment is very short."""
+    arms, aside = box_mesh((1.0, 0.1, 0.1)), np.array([0.0, 0.35, 0.0])
+    both = np.vstack([arms.vertices + aside, arms.vertices - aside])
+    solid = Solid("link1", 1, at(), Triangles(both, np.vstack([arms.faces, arms.faces + 8]), True))
+    bodies = bodies_of([solid], [Obstacle("a", Sphere(0.1), at())], [pair("link1", "a", 0.1)])
+    slide, rows = planar_arm([0.1], ["prismatic"]), np.array([[-0.3], [0.2999], [0.3]])
+    found = collision_replay(slide, bodies, rows, None, np.array([[0.0, more]]))
+    assert found.accepted == (more < 0.1)
