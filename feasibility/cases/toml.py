@@ -64,8 +64,10 @@ def parse_toml(text: str) -> dict[str, Any]:
     try:
         return rtoml.loads(text)
     except rtoml.TomlParsingError as error:
-        what = "is nested too deeply" if "recur" in str(error) else "is not valid TOML"
-        raise TomlError(f"{what}: {error}") from error
+        said = str(error)
+    # Raised by itself: rtoml's own error cannot be sent to another process.
+    what = "is nested too deeply" if "recur" in said else "is not valid TOML"
+    raise TomlError(f"{what}: {said}")
 
 
 def parse_setting(text: str) -> tuple[tuple[str, ...], Any]:

@@ -121,9 +121,12 @@ def test_limits_frames_and_axes_come_through(tmp_path: Path) -> None:
     f"x = {'[' * 100}{']' * 100}",
 ])  # fmt: skip
 def test_a_document_that_is_nested_too_deeply_is_refused(text: str) -> None:
-    """So deep that Python would not get through it."""
-    with pytest.raises(CaseError, match="is nested too deeply"):
+    """So deep that Python would not get through it; rtoml's own error cannot be pickled."""
+    with pytest.raises(CaseError, match="is nested too deeply") as caught:
         Case.from_toml(text)
+    behind = caught.value.__cause__
+    assert behind is not None
+    assert behind.__cause__ is behind.__context__ is None
 
 
 # numbers a thousand times too large, or radians
