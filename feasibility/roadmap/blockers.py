@@ -37,12 +37,15 @@ class Blockers:
     arm: dict[int, ArmCheck] = field(default_factory=dict)
     """By cell: whether something collides wherever the tool is over it."""
 
-    def tool_collides(self, arrays: SearchArrays, cell: int) -> bool:
-        """Is it proved that the tool collides in every pose over a cell, whatever the arm does?"""
+    def tool_collides(self, arrays: SearchArrays, cell: int, tick: Callable[[], object]) -> bool:
+        """Is it proved that the tool collides in every pose over a cell, whatever the arm does?
+
+        `tick` is called now and then; it may raise.
+        """
         if cell not in self.tool:
             self.tool[cell] = never_clear(
                 self.robot, self.bodies, self.task.cone, self.task.effective_tolerance,
-                arrays.points[cell], arrays.approaches[cell],
+                arrays.points[cell], arrays.approaches[cell], tick,
                 most=min(POSE_BOXES, max(self.poses_left, 0)),
             )  # fmt: skip
             self.poses_left -= self.tool[cell].boxes

@@ -292,7 +292,8 @@ class Exploration:
 
     def tool_collides(self, cell: int) -> bool:
         """Is it proved that the tool collides in every pose over a cell? Sets its ruling."""
-        if self.blockers is None or not self.blockers.tool_collides(self.arrays, cell):
+        tick = partial(self.tick, "proving that the tool collides")
+        if self.blockers is None or not self.blockers.tool_collides(self.arrays, cell, tick):
             return False
         self.rulings[cell] = Ruling.PROVED
         return True

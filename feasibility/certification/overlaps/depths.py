@@ -73,8 +73,10 @@ def depths(shape: object, points: Array) -> Array | None:
             return -points[..., 2]
         case Balls(centres, radii):
             found = np.full(points.shape[:-1], -np.inf)
+            along = [np.ascontiguousarray(points[..., k]) for k in range(3)]  # numpy's norm is slow
             for centre, radius in zip(centres, radii, strict=True):
-                found = np.maximum(found, radius - np.linalg.norm(points - centre, axis=-1))
+                square = sum((one - place) ** 2 for one, place in zip(along, centre, strict=True))
+                np.maximum(found, radius - np.sqrt(square), out=found)
             return found
         case Triangles():
             planes = planes_around(shape)
