@@ -142,6 +142,7 @@ def place(
         ArgumentError: the arm has a start.
 
     Example:
+        >>> from feasibility.placement import Pose
         >>> from robots import load_robot
         >>> from surfaces import plane
         >>> plate = plane((-0.1, 0.1), (-0.1, 0.1), position=(1.2, 0, 0.3), side="outside")

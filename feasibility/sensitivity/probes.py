@@ -45,7 +45,7 @@ def last_true(holds: Callable[[int], bool], good: int, bad: int, most: int = 64)
         >>> last_true(lambda k: k <= 37, 0, 100)
         (37, 38)
         >>> last_true(lambda k: k >= -5, 10, -90, most=3)
-        (-2, -15)
+        (-3, -15)
     """
     for _ in range(most):
         if abs(bad - good) <= 1:

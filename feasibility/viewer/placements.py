@@ -73,7 +73,8 @@ def view_placements(
         for trial in trials
     ]
     answer = f"{placements.answer} ({placements.evidence})"
-    title = titled(f"{answer}, {len(placements.found)} of {len(trials)} placements feasible", case)
+    feasible = sum(trial.feasible for trial in trials)
+    title = titled(f"{answer}, {feasible} of {len(trials)} placements feasible", case)
     text, stations = _found_text(placements, trials), []
     if plan is not None:
         layers = station_layers(placements.cells, plan)

@@ -90,8 +90,8 @@ def bounds(one: Any) -> Json:
         "placement_margin": one.placement_margin and {
             "position_m": one.placement_margin.position,
             "angle_deg": degrees(one.placement_margin.angle),
-            "pivot": list(one.placement_margin.pivot), "cell": list(one.placement_margin.cell),
-            "bound_by": str(one.placement_margin.bound_by),
+            "pivot": list(one.placement_margin.pivot),
+            "bound_by": str(one.placement_margin.bound_by), "cell": list(one.placement_margin.cell),
         },
     }  # fmt: skip
 

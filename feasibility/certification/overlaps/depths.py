@@ -115,12 +115,12 @@ def points_inside(shape: object) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=64)
 def _points_of_mesh(mesh: Triangles) -> tuple[Array, Array]:
-    """Corners that are far from each other, and places inside a solid."""
+    """Corners that are far from each other, on wide triangles too, and places inside a solid."""
     grid = _grid(mesh.vertices.min(axis=0), mesh.vertices.max(axis=0))
-    found, corners = depths(mesh, grid), mesh.vertices[np.unique(mesh.faces)]
+    found, corners = depths(mesh, grid), _apart(_all_over(mesh))
     if found is None:
-        found, corners = _depths_by_triangles(mesh, grid), _all_over(mesh)
-    inside, corners = found > 0.0, _apart(corners)
+        found = _depths_by_triangles(mesh, grid)
+    inside = found > 0.0
     points = np.concatenate([corners, grid[inside]])
     return points, np.append(np.zeros(len(corners)), found[inside])
 
