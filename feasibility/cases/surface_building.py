@@ -16,6 +16,7 @@ from feasibility.safe_files import shown_path
 
 AUTO: Final = "auto"
 FILES = ("bspline", "grid", "poses", "mesh", "step")  # kinds of surface that may be a file
+CHOICE = ("faces", "colour", "deviation")  # keys of STEP files that say what of them is read
 MOST_CELLS = 1_000_000  # the graph of a verdict takes some kilobytes a cell
 MOST_MESH_CELLS = 20_000  # as `surfaces.meshes.cells` has it
 WIDTH = 0.65  # [1] of the footprint: the corners of a square are 0.46 of it from its centre
@@ -41,7 +42,8 @@ def faults_of(
         place: the table.
         key: whose those without one are.
         kind: of surface, whose arguments have other names.
-        file: where faults lie that are of none of the keys `own`.
+        file: where faults lie that are of none of the keys `own`; without a kind those of these
+            keys name it, too, since it says what they may be.
 
     Raises:
         CaseError: what happens inside is a fault.
@@ -61,7 +63,8 @@ def faults_of(
                 what = f"{fault.key} {fault.message}".strip()
                 faults.append(Fault(f"{place}.file", what, shown_path(file)))
             else:
-                faults.append(renamed.renamed({}, place))
+                at = shown_path(file) if file is not None and not kind else ""
+                faults.append(renamed._replace(place=at or renamed.place).renamed({}, place))
         raise CaseError(faults) from error
 
 
@@ -135,11 +138,10 @@ def _mesh(kind: str, values: Values, pose: Values, place: str) -> Any:
 def _step(kind: str, values: Values, pose: Values, place: str) -> Any:
     from surfaces import step_triangles
 
-    keys = ("faces", "colour", "deviation")
-    choice = {key: values[key] for key in keys if key in values}
+    choice = {key: values[key] for key in CHOICE if key in values}
     if "facing" in values and not {"faces", "colour"} & set(choice):
         choice["faces"] = "all"
-    with faults_of(place, file=values["file"], own=keys):
+    with faults_of(place, file=values["file"], own=CHOICE):
         triangles = step_triangles(values["file"], **choice)
     return _part(triangles, values, pose, place)
 

@@ -14,6 +14,7 @@ from coverable_errors import MISSING, Fault, alternatives, close, shown
 from feasibility.cases.keys import kinds, own_keys
 from feasibility.cases.surface_building import (
     AUTO,
+    CHOICE,
     FILES,
     MOST_CELLS,
     MOST_MESH_CELLS,
@@ -261,8 +262,10 @@ def _check(section: Section, kind: str, key: str, values: dict[str, Any]) -> Non
         section.positive(key, value)
     elif key == "scale":
         section.make(meshes.metres_per_unit, {"scale": value})
-    elif kind == "step" and key in ("faces", "colour", "deviation"):
-        section.make(surfaces.checked_choice, {key: value})
+    elif kind == "step" and key in CHOICE:
+        chosen = {one: values[one] for one in CHOICE if one in values}
+        if key == next(iter(chosen)):  # all at once: they may contradict each other
+            section.make(surfaces.checked_choice, chosen)
     elif key == "faces" and (not isinstance(value, list) or not value):
         section.wrong_type(key, value)
     elif isinstance(value, list) and key == "faces":
