@@ -14,11 +14,12 @@ from surfaces.patches import GridCells
 from surfaces.piecewise import PieceCells
 from surfaces.sheet import tiles_of
 from surfaces.surface import SurfaceError, max_principal_curvature
-from surfaces.tiles import FlatTiles
+from surfaces.tiles import CORNERS, FlatTiles
 from surfaces.triangle_kernel import TriangleKernel
 
 SHARE = 0.01  # [1] of the tolerance: how far triangles may be off, if so many will do
 MOST_TILES = 16_384
+REACH = 4.0  # [1] of e: how far a place may be beyond its tile; places differ by 2 e at an edge
 
 
 class Triangulation(NamedTuple):
@@ -26,8 +27,8 @@ class Triangulation(NamedTuple):
 
     kernel: TriangleKernel
     off: Array
-    """(N,) m, how far the height may be from that over the parallel surface f + h n: e of the
-    module's text; on a mesh, whose normals lean from its faces by a chord c, h c^2 / 2."""
+    """(N,) m, how far the height may be from that over the parallel surface f + h n: e + s d of
+    the kernel's text; on a mesh, whose normals lean from its faces by a chord c, h c^2 / 2."""
     turn: float
     """How far the unit normals may be off."""
     curvature: Array
@@ -106,6 +107,7 @@ def _of_mesh(cells: MeshCells, height: float) -> Triangulation:
         counts=np.zeros((1, 3), dtype=np.int64),
         total=len(cells),
         deviation=0.0,
+        reach=0.0,
         gap=0.0,
         last=np.zeros(1, dtype=np.int64),
         weights=np.zeros(3),
@@ -129,7 +131,16 @@ def _of_tiles(
     ends = np.array([(grid.surface.u_range, grid.surface.v_range) for grid in grids])
     shapes = np.array([grid.shape for grid in grids], dtype=np.int64)
     sizes = shapes.prod(axis=1)
-    deviation = float(found.deviations(abs(height) + tolerance).max())
+    within = float(found.deviations(abs(height) + tolerance).max())
+    gap = float(getattr(cells.surface, "gap", 0.0))
+    reach = REACH * within + gap
+    steps, turns = found.models.slopes[..., :3], found.models.slopes[..., 3:]
+    bent, lean = np.zeros(len(grids)), 0.0
+    for h in (0.0, height - tolerance, height + tolerance):
+        np.maximum.at(bent, found.piece, max_principal_curvature(steps + h * turns, turns))
+        lean = max(lean, _lean(found, h))
+    lean += float(found.models.radius[:, 1].max()) + float(bent.max()) * (within + reach)
+    deviation = within + lean * reach
     kernel = TriangleKernel(
         tree=tree,
         rotation=np.eye(3),
@@ -147,14 +158,22 @@ def _of_tiles(
         counts=np.column_stack([shapes, np.cumsum(sizes) - sizes]),
         total=len(cells),
         deviation=deviation,
-        gap=getattr(cells.surface, "gap", 0.0),
+        reach=reach,
+        gap=gap,
         last=np.zeros(1, dtype=np.int64),
         weights=np.zeros(3),
     )
-    steps, turns = found.models.slopes[..., :3], found.models.slopes[..., 3:]
-    bent = np.zeros(len(grids))
-    for h in (0.0, height - tolerance, height + tolerance):
-        np.maximum.at(bent, found.piece, max_principal_curvature(steps + h * turns, turns))
     turn = 2.0 * float(found.models.radius[:, 1].max()) + float(bent.max()) * deviation
     off = np.full(len(cells), deviation)
     return Triangulation(kernel, off, turn, np.repeat(bent, sizes), 0.0)
+
+
+def _lean(found: FlatTiles, height: float) -> float:
+    """How far normals of tiles lean at most into the tangents of their parallel at a height (m)."""
+    slopes, turns = found.models.slopes[..., :3], found.models.slopes[..., 3:]
+    across = np.cross(*np.moveaxis(slopes + height * turns, 1, 0))
+    size = np.linalg.norm(across, axis=1, keepdims=True)
+    across = across / np.where(size > 0.0, size, 1.0)
+    normals = found.models.centre[:, None, 3:] + CORNERS @ turns
+    inside = normals - (normals @ across[..., None]) * across[:, None]
+    return float(np.linalg.norm(inside, axis=-1).max(initial=0.0))

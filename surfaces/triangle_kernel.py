@@ -4,8 +4,11 @@ A mesh is its own triangles: the closest point, its normal and its cell are thos
 `Surface.closest` and `Cells.locate`. A smooth surface is cut into tiles, on each of which points
 and normals follow an affine model of u and v (`surfaces.tiles`): P and N with |f - P| <= r_f and
 |n - N| <= r_n. Under a point p lies the place w with P(w) + h N(w) = p, which is found from the
-nearest triangle. With e the largest r_f + |h| r_n, the height is right within e; so are the places
-on the parallel surface, and a point that is within that of a border between cells is in neither.
+nearest triangle. Over the edges of tiles that may be one beside it, where its model is no longer
+one of the surface: then the triangle nearest to P(w) follows, until w is at most d beyond its tile.
+With e the largest r_f + |h| r_n, and tangents of the tiles that lean by at most s from the tangents
+of the surface, the height is right within e + s d; so are the places on the parallel surface, and a
+point that is within that of a border between cells is in neither.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ from coverable_kernels import allocating
 from surfaces.meshes import WIDTH, FaceTree, nearest_face
 
 _NEWTON = 4  # steps to the place under a point; each squares what is left
+_TILES = 4  # that are tried one after the other
 _FAR = 8.0  # [1] of a triangle: a place so far off it is not on its tile
 
 
@@ -56,7 +60,9 @@ class TriangleKernel(NamedTuple):
     total: int
     """N; as the number of a cell: on the border of several."""
     deviation: float
-    """m, e of the module's text; 0 for a mesh."""
+    """m, e + s d of the module's text; 0 for a mesh."""
+    reach: float
+    """m, d of the module's text."""
     gap: float
     """m, between patches that are joined."""
     last: Ints
@@ -103,7 +109,17 @@ def cell_under(kernel, x, y, z):  # type: ignore[no-untyped-def]
         if (side and weights[c] == 0.0) or (corner and weights[c] == 1.0):
             return -1, height, 0.0, 0.0, 0.0
     if cell < 0:
-        cell, height, length = _cell_of_tile(kernel, f, p, weights, height, normal)
+        for number in range(_TILES):
+            cell, height, length, beyond = _cell_of_tile(kernel, f, p, weights, height, normal)
+            if not kernel.reach < beyond < np.inf or number == _TILES - 1:
+                break
+            x, y, z = p - height / length * normal
+            before, f = f, nearest_face(kernel.tree, x, y, z, f, weights, off)
+            if f == before:
+                break
+            kernel.last[0] = f
+        if cell >= 0 and not beyond <= kernel.reach:
+            cell = kernel.total
     for k in range(3):
         normal[k] /= length
     return (
@@ -135,6 +151,29 @@ def _cross(a, b, made):  # type: ignore[no-untyped-def]
 
 
 @allocating
+def _beyond_tile(uv, w1, w2, ahead):  # type: ignore[no-untyped-def]
+    """How far (m) a place of weights w_1 and w_2 is beyond the tile of a triangle.
+
+    Args:
+        uv: (3, 2) parameters at the corners.
+        w1, w2: of the place.
+        ahead: (3, 3) rows: m, the derivatives by w_1 and w_2.
+    """
+    first, second, over = uv[1] - uv[0], uv[2] - uv[0], np.empty(2)
+    for axis in range(2):
+        value = w1 * first[axis] + w2 * second[axis]
+        low = min(0.0, first[axis], second[axis])
+        over[axis] = value - min(max(value, low), max(0.0, first[axis], second[axis]))
+    area = first[0] * second[1] - first[1] * second[0]
+    by1 = (over[0] * second[1] - over[1] * second[0]) / area
+    by2 = (first[0] * over[1] - first[1] * over[0]) / area
+    away = 0.0
+    for k in range(3):
+        away += (by1 * ahead[0, k] + by2 * ahead[1, k]) ** 2
+    return np.sqrt(away)
+
+
+@allocating
 def _cell_of_tile(kernel, f, p, weights, height, normal):  # type: ignore[no-untyped-def]
     """Solve P(w) + h N(w) = p on the tile of a triangle, from the triangle's nearest point.
 
@@ -147,7 +186,7 @@ def _cell_of_tile(kernel, f, p, weights, height, normal):  # type: ignore[no-unt
         normal: (3,) receives N.
 
     Returns:
-        (cell, height, |N|), see `cell_under`.
+        (cell, height, |N|, m by which the place is beyond the tile), see `cell_under`.
     """
     corners, normals, uv = kernel.tree.corners, kernel.normals, kernel.parameters
     # Columns of the derivative by w_1, w_2 and h, and the rows of its inverse times `volume`.
@@ -171,7 +210,8 @@ def _cell_of_tile(kernel, f, p, weights, height, normal):  # type: ignore[no-unt
     weights[0], weights[1], weights[2] = 1.0 - w1 - w2, w1, w2
     length = np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
     if not (abs(w1) <= _FAR and abs(w2) <= _FAR and volume != 0.0):
-        return -1, h * length, length
+        return -1, h * length, length, np.inf
+    away = _beyond_tile(uv[f], w1, w2, ahead)
     piece, number, border = kernel.piece[f], 0, False
     for axis in range(2):
         first, second = uv[f, 1, axis] - uv[f, 0, axis], uv[f, 2, axis] - uv[f, 0, axis]
@@ -185,11 +225,11 @@ def _cell_of_tile(kernel, f, p, weights, height, normal):  # type: ignore[no-unt
         if kernel.closed[piece, axis]:
             share -= np.floor(share)
         elif share < -beyond or share > 1.0 + beyond:
-            return -1, h * length, length
+            return -1, h * length, length, away
         count = kernel.counts[piece, axis]
         place = min(max(share, 0.0), 1.0) * count
         border |= abs(place - np.round(place)) <= band * count
         number = number * count + min(int(place), count - 1)
     if border or kernel.counts[piece, 0] * kernel.counts[piece, 1] == 0:
-        return kernel.total, h * length, length
-    return kernel.counts[piece, 2] + number, h * length, length
+        return kernel.total, h * length, length, away
+    return kernel.counts[piece, 2] + number, h * length, length, away
