@@ -22,7 +22,7 @@ SHORTEST = 1e-3  # [rad], no line is halved below this
 LONGEST = 1.0  # [rad] towards a random place at once
 PUSHES, PUSH = 12, 0.1  # from what an end is near, and the length [rad] of one
 NEAR = 0.9  # how near what pushes may be: 1 at its clearance, 0 where it pushes no more
-SHORTCUTS = 150  # random places between which a straight line is tried
+SHORTCUTS = 300  # pairs of random places between which a straight line is tried
 TURN = 2.0 * np.pi
 
 
@@ -161,9 +161,12 @@ def free_motion(space: FreeSpace, start: Array, end: Array, seed: int) -> Array 
 
 
 def _shortened(space: FreeSpace, rows: Array, rng: np.random.Generator) -> Array:
-    """The same motion with straight lines between random places of it where these are clear."""
+    """The same motion, straight between random places of it where that is clear.
+
+    All joints are tried, and one of them alone in turn: what one has to go around, others need not.
+    """
     space.left = MOST_LINES
-    for _ in range(SHORTCUTS):
+    for number in range(SHORTCUTS):
         lengths = [space.length(a, b) for a, b in pairwise(rows)]
         at = np.concatenate([[0.0], np.cumsum(lengths)])
         first, last = np.sort(rng.uniform(0.0, at[-1], 2))
@@ -173,8 +176,13 @@ def _shortened(space: FreeSpace, rows: Array, rng: np.random.Generator) -> Array
         a, b = (
             np.array([np.interp(place, at, column) for column in rows.T]) for place in (first, last)
         )
-        if space.clear(a, b) and space.clear(rows[i - 1], a) and space.clear(b, rows[j]):
-            rows = np.vstack([rows[:i], a, b, rows[j:]])
+        between = rows[i:j].copy() if number % 2 else rows[:0]
+        if number % 2:
+            joint, share = rng.integers(rows.shape[1]), (at[i:j] - first) / (last - first)
+            between[:, joint] = a[joint] + share * (b[joint] - a[joint])
+        new = np.vstack([a, between, b])
+        if all(space.clear(*ends) for ends in pairwise([rows[i - 1], *new, rows[j]])):
+            rows = np.vstack([rows[:i], new, rows[j:]])
     return _without_needless(space, rows)
 
 
