@@ -27,6 +27,7 @@ from robots import Robot
 
 MOST_BOXES = 100_000
 BATCH = 512  # boxes at a time
+MOST_POINTS = 20_000  # of bodies at once, each compared with all planes of another: 0.1 GB
 POSES = 12  # directions of tilt, and rolls, among which the best is told
 
 
@@ -121,7 +122,16 @@ class _Tool:
         self._plane = pin.Quaternion.FromTwoVectors(up, approach).toRotationMatrix()[:, :2]
 
     def measured(self, boxes: Array, pairs: list[ToolPair]) -> _Measured:
-        """What is known of boxes (k, 5)."""
+        """What is known of boxes (k, 5), a few at a time where pairs have many points."""
+        some = max(1, MOST_POINTS // max(len(pair.points) for pair in pairs))
+        parts = [
+            self._measured(boxes[first : first + some], pairs)
+            for first in range(0, len(boxes), some)
+        ]
+        return _Measured(*map(np.concatenate, zip(*parts, strict=True)))
+
+    def _measured(self, boxes: Array, pairs: list[ToolPair]) -> _Measured:
+        """`measured` of all at once."""
         rotations = np.array([self._rotation(*box[[0, 1, 3]]) for box in boxes])
         rows, over, ratio, by_tilt = np.arange(len(boxes)), [], [], []
         for pair in pairs:

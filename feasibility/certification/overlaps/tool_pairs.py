@@ -20,7 +20,7 @@ from robots.shapes import Solid, Triangles
 
 GUARD = 1e-7  # [m] that an overlap has to be larger by
 FINEST = 40  # parts of the tool's reach that triangles of a sheet are cut to
-CUTS = 20  # of a triangle, at most
+CUTS = 40  # of a triangle, at most
 KEPT = 64  # bodies that are remembered
 
 Depth = Callable[[Array], Array]
@@ -133,9 +133,11 @@ def _sheet(triangles: Array, deviation: float, target: Array, reach: float) -> _
         triangles, large = triangles[near], wide[near] > reach / FINEST
         if not large.any():
             break
-        a, b, c = triangles[large].transpose(1, 0, 2)
-        x, y, z = 0.5 * (b + c), 0.5 * (c + a), 0.5 * (a + b)
-        parts = [np.stack(some, axis=1) for some in ((a, z, y), (z, b, x), (y, x, c), (x, y, z))]
+        some = triangles[large]  # halved at their longest sides: narrow ones do not stay narrow
+        sides = np.linalg.norm(some - np.roll(some, -1, axis=1), axis=2)
+        order = (sides.argmax(axis=1)[:, None] + np.arange(3)) % 3
+        a, b, c = np.take_along_axis(some, order[:, :, None], axis=1).transpose(1, 0, 2)
+        parts = [np.stack(half, axis=1) for half in ((a, 0.5 * (a + b), c), (0.5 * (a + b), b, c))]
         triangles = np.concatenate([triangles[~large], *parts])
     points = triangles.mean(axis=1)
     return _Body(points, np.full(len(points), -deviation), None)
