@@ -19,7 +19,6 @@ from surfaces.meshes.facets import Facets
 from surfaces.part_growth import Pieces, Rows
 from surfaces.parts import PartModels
 
-_ALIKE = 0.25  # [1] of what r_n is to be
 _BINS = 8  # of a coordinate of the normals
 _EMPTY = 0.03  # [1] of the area: where less of it is in one of these, they are of several sorts
 _TURNS = 8  # of a right angle, by which rectangles are tried
