@@ -9,6 +9,10 @@ from samples import sampled, seeds
 
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from feasibility.cut_words import lines, nowhere, place_of, sentence, what_opens
+from feasibility.problem import Problem
+from feasibility.roadmap import Exploration, arrays_of, explore
+from feasibility.roadmap.outcome import unfinished_words
+from feasibility.roadmap.proving import Proving
 from robots import load_robot
 from surfaces import plane
 
@@ -90,3 +94,17 @@ def test_opened_joints_are_wound_into_one_turn() -> None:
     folded = THREE.folded(q)
     assert np.degrees(folded[:, 5]) == pytest.approx([530.0, 530.0, 530.0])
     assert (folded[:, :5] == 0.0).all()
+
+
+def test_points_of_the_motion_set_on_every_cut_leave_it_undecided() -> None:
+    """Along the curves alone no motion is found; the proof fails, and says where the arm can be."""
+    _, _, robot, cells, task, _ = question("between the curves")
+    exploration = Exploration(robot, cells, arrays_of(robot, cells, task), 0)
+    explore(exploration, None)
+    proving = Proving(exploration, task)
+    proving.attempt(200_000)
+    assert not exploration.complete
+    assert exploration.cut_tree is None
+    words = unfinished_words(Problem.of(robot, cells, task), proving, "")
+    assert "has configurations on the surface between the parts" in words
+    assert " deg" in words

@@ -16,7 +16,8 @@ from feasibility import CauseKind, check
 from feasibility.cases import Case
 from feasibility.collisions import Obstacle
 from feasibility.verdict import Answer
-from robots import load_robot
+from robots import Robot, load_robot
+from robots.pinocchio_model import joint_axes
 from surfaces import rotation_from_rpy
 
 ALIKE = (
@@ -160,3 +161,38 @@ def test_moving_all_by_one_rigid_motion_changes_nothing(name):
         )
         task = replace(task, collision=replace(task.collision, scene=scene))
     same(verdict_of(name), check(robot, surface.cells(*q.cells.shape), task))
+
+
+@sampled
+@pytest.mark.parametrize("name", spread(PROBLEMS, 2))
+def test_a_mirror_changes_nothing(name):
+    """In the plane y = 0: turns run the other way, and one parameter of the surface does."""
+    q, tables = question(name), tables_of(name)
+    flip = np.diag([1.0, -1.0, 1.0])
+    model = q.robot.model.copy()  # another world, the same joints
+    for k, placed in enumerate(model.jointPlacements):
+        model.jointPlacements[k] = pin.SE3(flip @ placed.rotation @ flip, flip @ placed.translation)
+    for frame in model.frames:
+        placed = frame.placement.copy()
+        frame.placement = pin.SE3(flip @ placed.rotation @ flip, flip @ placed.translation)
+    slides, axes = joint_axes(model)
+    assert not slides.any()
+    # A joint about y turns as before, one about x or z the other way round: q becomes -q.
+    about_y = np.abs(axes[:, 1]) == 1.0
+    assert (about_y | (axes[:, 1] == 0.0)).all()
+    limits = np.column_stack([q.robot.lower, q.robot.upper])
+    limits = np.where(about_y[:, None], limits, -limits[:, ::-1])
+    kept = {name: getattr(q.robot, name) for name in Robot.__dataclass_fields__}
+    arm = Robot(**(kept | {"model": model, "urdf": None})).with_limits(limits)
+    surface, kind = dict(tables["surface"]), tables["surface"]["kind"]
+    x, y, z = surface["position"]
+    roll, pitch, yaw = surface["rpy_deg"]
+    surface |= {"position": [x, -y, z], "rpy_deg": [-roll, pitch, -yaw]}
+    key = {"plane": "v", "sphere": "v_deg"}.get(kind, "u_deg")
+    surface[key] = [-surface[key][1], -surface[key][0]]
+    cells = built(tables | {"surface": surface}).cells
+    order = np.arange(len(cells)).reshape(cells.shape)
+    order = (order[:, ::-1] if kind in ("plane", "sphere") else order[::-1]).ravel()
+    np.testing.assert_allclose(cells.centres[order], q.cells.centres @ flip, atol=1e-9)
+    one, other = verdict_of(name), check(arm, cells, q.task)
+    assert (one.answer, one.n_covered) == (other.answer, other.n_covered)
