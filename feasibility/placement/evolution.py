@@ -137,8 +137,8 @@ class Evolution:
         text = "trying placements"
         if self.trials:
             best = max(self.trials.values(), key=lambda trial: trial.rank)
-            covers = f"all, margin {best.margin:.2f}" if best.feasible else f"{best.share:.1%}"
-            text += f"; best covers {covers.replace('%', ' %')}"
+            margin, share = f"all, margin {1e3 * best.margin:.3g} mm", f"{100.0 * best.share:.1f} %"
+            text += f"; best covers {margin if best.feasible else share}"
         self.progress(self.bound + len(self.trials), max(self.expected, self.drawn), text)
 
 

@@ -29,7 +29,7 @@ class PlacementMap:
     share: Array
     """(a, b) or (a, b, c) largest share of the area that one motion was found to cover."""
     margin: Array
-    """Likewise the margin, see `Trial.margin`; 0 where none is feasible."""
+    """Likewise the margin in m, see `Trial.margin`; 0 where none is feasible."""
     known: Mask
     """Likewise, where it could be tried; elsewhere share and margin are NaN."""
 

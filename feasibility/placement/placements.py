@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
-from coverable_errors import Checks, Fault, counted
+from coverable_errors import Checks, Fault, at_least, counted
 from feasibility.clock import Clock
 from feasibility.collisions import said_of
 from feasibility.demands import refuse_start
@@ -241,7 +241,7 @@ def _searched(
     if found:
         message = (
             f"{counted(len(found), 'feasible placement')}, each with a replayed motion; "
-            f"the best leaves a margin of {found[0].margin:.3f}. {tried}"
+            f"the best leaves a margin of {at_least(1e3 * found[0].margin, 3)} mm. {tried}"
             + (f"; this is the best so far: {search.stopped}." if search.stopped else ".")
         )
         feasible = {"answer": Answer.FEASIBLE, "evidence": Evidence.WITNESS}

@@ -28,7 +28,6 @@ from surfaces import Cells
 
 FEW, EACH = 2_000, 40  # evaluations of a quick look, in all and for each cell
 AHEAD = 4  # placements for each worker in one batch
-AT_EASE_DEG, AT_EASE_M = 90.0, 0.5  # from limits: further away is no better
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -73,19 +72,9 @@ class Trial:
 
     @property
     def margin(self) -> float:
-        """What the certified motion leaves, 0..1, by which feasible placements are compared.
-
-        The least of: the distance from the joints' limits, as far as more is better; and the share
-        of the cone that the tool axis does not use.
-        """
-        left = self.result.get("margins")
-        if not self.feasible or left is None:
-            return 0.0
-        angle = self.result["certificate"]["max_angle_deg"] + left["cone_deg"]
-        shares = [left["cone_deg"] / angle if angle > 0.0 else 1.0]
-        for name, ease in (("limit_deg", AT_EASE_DEG), ("limit_m", AT_EASE_M)):
-            shares += [] if left[name] is None else [left[name] / ease]
-        return float(np.clip(min(shares), 0.0, 1.0))
+        """m, how far the surface may be shifted from there, by which feasible ones are compared."""
+        left = self.result.get("margins") or {}
+        return float(left.get("placement_m") or 0.0) if self.feasible else 0.0
 
     @property
     def covers(self) -> Mask:

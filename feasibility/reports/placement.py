@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from coverable_arrays import Array, Mask
-from coverable_errors import counted
+from coverable_errors import at_least, counted
 from feasibility.collisions import checked, said_of
 from feasibility.placement import (
     AXES,
@@ -27,7 +27,7 @@ SENTENCES = {
     Answer.UNDECIDED: "undecided: no placement was shown to be feasible, nor that there is none.",
 }
 PROVED = "none in the region: no placement there is feasible."
-COLUMNS = ("x_m", "y_m", "z_m", *AXES[3:], "tried", "share", "margin", "verdict")
+COLUMNS = ("x_m", "y_m", "z_m", *AXES[3:], "tried", "share", "margin_m", "verdict")
 
 
 def settings_of(pose: Pose) -> list[str]:
@@ -70,7 +70,7 @@ def _found_json(trial: Trial) -> dict[str, Any]:
         "rpy_deg": list(trial.pose.rpy_deg),
         "tried": _tried(trial),
         "share": trial.share,
-        "margin": trial.margin,
+        "margin_m": trial.margin,
         "cells": int(trial.result.get("cells", 0)),
         "verdict": str(trial.answer),
         "evidence": str(trial.evidence),
@@ -113,7 +113,7 @@ def _map_json(chart: PlacementMap) -> dict[str, Any]:
         "ticks": [ticks.tolist() for ticks in chart.ticks],
         "held": dict(zip(AXES, chart.held.values.tolist(), strict=True)),
         "share": _nulled(chart.share, ~chart.known),
-        "margin": _nulled(chart.margin, ~chart.known),
+        "margin_m": _nulled(chart.margin, ~chart.known),
     }
 
 
@@ -186,10 +186,11 @@ def _table(trials: Sequence[Trial]) -> list[str]:
     heads = [f"{name} (m)" for name in AXES[:3]]
     heads += [f"{name.removesuffix('_deg')} (deg)" for name in AXES[3:]] + ["share (%)"]
     feasible = any(trial.feasible for trial in trials)
-    rows = [heads + ["margin (0..1)"] * feasible]
+    rows = [heads + ["margin (mm)"] * feasible]
     for trial in trials:
         row = [f"{v:.3f}" for v in trial.pose.position] + [f"{v:.2f}" for v in trial.pose.rpy_deg]
-        rows.append([*row, f"{100.0 * trial.share:.1f}", *[f"{trial.margin:.3f}"] * feasible])
+        row.append(f"{100.0 * trial.share:.1f}")
+        rows.append(row + [at_least(1e3 * trial.margin, 3)] * feasible)
     return [f"  {line}" for line in aligned(rows, ">")]
 
 

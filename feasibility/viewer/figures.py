@@ -307,7 +307,7 @@ def plot_map(
     grid[0].set_ylabel(_label(charted.axes[1]))
     if placements is not None:
         _mark(grid, charted, placements)
-    what = "share of the area in one motion" if value == "share" else "margin"
+    what = "share of the area in one motion" if value == "share" else "margin (m)"
     figure.colorbar(drawn, ax=list(grid), label=what)
     if title:
         figure.suptitle(title)

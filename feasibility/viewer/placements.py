@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from coverable_arrays import Array
-from coverable_errors import ArgumentError, counted
+from coverable_errors import ArgumentError, at_least, counted
 from feasibility.cases import Setup
 from feasibility.placement import Pose, Trial, moved_cells
 from feasibility.search import Progress, Search
@@ -164,7 +164,8 @@ def _found_text(placements: Placements, trials: Sequence[Trial]) -> str:
     if beyond:
         text += f", {beyond} more discarded as out of reach and not drawn"
     if placements.found:
-        return f"{text}; the best leaves a margin of {placements.found[0].margin:.3f}"
+        best = at_least(1e3 * placements.found[0].margin, 3)
+        return f"{text}; the best leaves a margin of {best} mm"
     return f"{text}; the best covers {100.0 * placements.share:.1f} % of the area"
 
 
