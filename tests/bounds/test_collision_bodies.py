@@ -57,9 +57,6 @@ def both(*names):
     return {frozenset(pair) for pair in names}
 
 
-# pairs
-
-
 def test_every_pair_is_asked_for_or_left_out_with_a_reason():
     bodies = bodies_of(scene=(SHELF, POST))
     owners = sorted({solid.owner for solid in bodies.solids})
@@ -129,9 +126,6 @@ def test_what_is_allowed_is_left_out_and_names_that_are_nothing_are_refused_at_o
 # a base inside something: no motion changes it
 
 
-# objects on links, and a world that moves
-
-
 @pytest.mark.parametrize("angle", [0.7, -2.0])
 def test_a_moving_world_is_as_near_as_one_at_rest(angle):
     """The judge, on the arm with its table, and on the arm alone beside the turned part."""
@@ -194,8 +188,6 @@ def test_the_tool_of_an_arm_that_holds_the_part_is_what_stands_on_the_tool_frame
     with pytest.raises(ArgumentError, match=r"scene\[0\].frame must be a link .* 'turntabel'"):
         bodies_of(load_robot("ur5", axes=[TABLE]), 0.1, part, scene=(lost,))
 
-
-# the convex bodies of the search hold objects and tools, and are no larger than they must be
 
 POSE = {"position": (0.3, -1.2, 0.7), "rpy_deg": (25.0, -40.0, 110.0)}
 
@@ -281,9 +273,6 @@ def test_tool_shapes_move_with_the_last_joint():
     ends = (np.array([[0.0, 0.06, -0.05, 1.0], [0.0, -0.04, -0.05, 1.0]]) @ flange.T)[:, :3]
     assert np.allclose(body.vertices, ends) or np.allclose(body.vertices, ends[::-1])
     assert body.radius == 0.02
-
-
-# what objects are, and what is refused
 
 
 def keys_of(make):

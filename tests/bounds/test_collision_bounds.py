@@ -106,8 +106,6 @@ def test_joints_that_deviate_move_a_point_by_their_levers():
     holds(found, np.linalg.norm(ends[1] - ends[0]), 0.95)
 
 
-# bodies, and planes that part them
-
 SHAPES = [Box((0.1, 0.06, 0.3)), Sphere(0.05), Capsule(0.03, 0.2), Cylinder(0.04, 0.1),
           box_mesh((0.1, 0.06, 0.3)), box_mesh((0.1, 0.06, 0.3), False)]  # fmt: skip
 

@@ -166,9 +166,6 @@ def test_of_all_that_is_certified_the_least_counts(seed):
         assert found.min_clearance <= found.measured_clearance
 
 
-# what is inside, and what is hollow
-
-
 @pytest.mark.parametrize("closed", [True, False])
 @pytest.mark.parametrize("carried", [True, False])
 def test_a_ball_wholly_inside_a_mesh(closed, carried):
@@ -212,9 +209,6 @@ def test_a_hollow_link_is_not_its_hull(thing, off, left):
         found = judged(arm, bodies, *rows, off=None if off is None else [off])
         assert found.accepted is accepted
         assert found.min_clearance <= left + CLOSE or not accepted
-
-
-# between rows, beside the straight line, and to a hair
 
 
 @pytest.mark.parametrize("thickness", [0.1, 1e-6])
@@ -297,9 +291,6 @@ def test_faults_name_pair_place_and_depth_the_nearest_first():
     gap = 0.85 - 0.9 * np.cos(0.5) - 0.03
     assert fault.distance == pytest.approx(gap, abs=1e-6)
     assert fault.text == f"link2 and wall are {1e3 * gap:.4g} mm apart, 50 mm are needed"
-
-
-# what is no motion, and what are no bodies
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])

@@ -88,9 +88,6 @@ def test_the_foreign_judge_agrees(name, seed):
     judged_as_by_fcl(robot, replace(bodies, pairs=tuple(alone)), q, 3.0)
 
 
-# motions that cover cells
-
-
 def asked(**settings):
     """The task with what has to stay clear, and the bodies that this means."""
     task = replace(TASK, collision=Collision(**settings))
@@ -133,8 +130,6 @@ def test_the_foreign_judge_refuses_what_overlaps_where_no_clearance_is_asked(wal
     assert found.collides
     assert not found.accepted
 
-
-# the nearest pair along a motion
 
 CENTRES, FLOOR = np.array([[0.5, 0.2, 0.5], [-0.3, 0.6, 0.4]]), -1.5
 

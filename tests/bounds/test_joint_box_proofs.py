@@ -174,9 +174,6 @@ def test_all_over_what_is_confirmed_fcl_finds_collisions(seed):
         assert largest == 0.0 or (foreign.distances(each) < 0.01 + 1e-6).any()
 
 
-# scenes
-
-
 @sampled
 @pytest.mark.parametrize("name", spread(ARMS[::-1], 2))
 def test_nothing_is_claimed_around_clear_configurations(name):

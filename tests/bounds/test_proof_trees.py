@@ -176,9 +176,6 @@ def test_no_tree_is_accepted_where_a_motion_covers_all(seed):
     assert not verify_proof(robot, cells, task, tree, most=1000).accepted
 
 
-# -- what is no tree ------------------------------------------------------------------------------
-
-
 DEEP, WIDE = Leaf(0), Leaf(0)
 for _ in range(5000):
     DEEP = split(0.0, DEEP, 1)
@@ -244,9 +241,6 @@ def test_what_tick_raises_ends_the_verification():
 
     with pytest.raises(KeyboardInterrupt):
         verify_proof(*stored_case(0), tick=stop)
-
-
-# -- surfaces and rolls ---------------------------------------------------------------------------
 
 
 def strip_of(kind):

@@ -43,9 +43,6 @@ PRIMITIVES = [Box((0.2, 0.3, 0.05)), Sphere(0.1), Capsule(0.04, 0.2), Cylinder(0
 MESHES = [BLOCK, ROUND, bracket()]
 
 
-# scenes
-
-
 SCENES = [*range(20, 42, 2), *range(1000, 1500)]
 
 
@@ -209,9 +206,6 @@ def test_one_gap_at_any_roll_is_enough(gap):
     asked = planar_arm(2), bodies, 0.0, 1e-3, np.zeros(3), np.array([0.0, 0.0, 1.0])
     assert never_clear(*asked).confirmed == (gap is None)
     assert not never_clear(*asked, most=1).confirmed
-
-
-# points inside shapes, and how deep they are
 
 
 def test_open_hollow_dented_and_doubled_meshes_are_told_from_solids():

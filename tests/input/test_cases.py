@@ -129,11 +129,6 @@ def test_a_document_that_is_nested_too_deeply_is_refused(text: str) -> None:
     assert behind.__cause__ is behind.__context__ is None
 
 
-# numbers a thousand times too large, or radians
-
-
-# a changed case in the words of its file
-
 FILE = (GOOD / "commented.toml").read_text()
 CHANGES = {
     (): [],

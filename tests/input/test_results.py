@@ -183,12 +183,6 @@ def test_a_result_is_not_shown_on_another_surface(
         assert not {"tulip", "root:"} & set(str(caught.value).replace('"', " ").split())
 
 
-# with collisions
-
-
-# written whole or not at all
-
-
 def no_space(*_: object) -> None:
     raise OSError(28, "No space left on device")
 

@@ -131,8 +131,6 @@ def test_what_is_read_of_joints(tmp_path: Path) -> None:
         assert (elbow.max_velocity, elbow.fault) == (None, None)
 
 
-# meshes and packages
-
 NAMED = '<robot name="mine"><link name="base"><collision><geometry><mesh filename="{}"/></geometry>\
 </collision></link></robot>'
 BODY = Path(__file__).with_name("good").joinpath("body.obj").read_text()

@@ -122,8 +122,6 @@ def test_the_flags_of_every_command(commands, approved):
     approved("flags", "\n".join(lines))
 
 
-# -- bounds, and what is not checked
-
 LEAST = {
     r"bodies at least (\S+) mm apart": lambda one: 1e3 * one["min_clearance_m"],
     r"joints at least (\S+) deg from": lambda one: one["min_limit_margin_deg"],
@@ -166,8 +164,6 @@ def test_every_text_says_in_one_line_what_is_checked(commands, name):
     clear = "scene" in TABLE[name[0]][name[1]] or "collision" in TABLE[name[0]][name[1]]
     assert (UNCHECKED in asked[0].lower()) == (not clear)
 
-
-# -- numbers
 
 ASKED = [one for one in COMMANDS if one[0] not in ("show", "cases")]
 ASKED += [(command, line) for command in NUMBERS for line in NUMBERS[command]]

@@ -133,8 +133,6 @@ def test_other_arms_are_refused_with_a_sentence(file, robot, said):
         check_program(language_of(file), robot)
 
 
-# -- tools are switched where they work, and frames stand in the head ------------------------------
-
 MARKED = ProgramSettings(on="ON", off="OFF")
 LIFT = 0.022  # [m] over the plate: standoff and tolerance, and no more
 

@@ -30,8 +30,6 @@ GUARD_S = 1800.0  # against hanging alone
 OURS = ("coverable", "feasibility.cli", "feasibility.safe_files", "feasibility.results")
 STORE = ("feasibility.studies.store",)
 
-# -- in this process: at the n-th call of a function of ours ---------------------------------------
-
 
 def check_all(folder: Path):
     """`check` with files in a folder; the same text of the case each time."""
@@ -174,9 +172,6 @@ def test_a_handler_of_someone_else_is_left_alone(tmp_path):
     assert interrupts.INTERRUPTED == 130
 
 
-# -- in processes of their own ---------------------------------------------------------------------
-
-
 def process(code: str, *arguments: object, **more: object) -> subprocess.CompletedProcess[str]:
     """Run a program to its end."""
     return subprocess.run(
@@ -240,8 +235,6 @@ def test_in_an_import_it_waits_until_the_module_is_whole(tmp_path):
     done = process(IMPORT, tmp_path)
     assert (done.returncode, done.stdout, done.stderr) == (0, "True\n", "")
 
-
-# -- at any moment of the commands with outputs ----------------------------------------------------
 
 AT_EVENT = """
 import os, signal, sys

@@ -168,8 +168,6 @@ def test_a_folder_that_cannot_be_written_any_more_ends_nothing(project: Path, la
     assert [asked(project), asked(project)] == [COMPILED, LOADED]
 
 
-# All of our kernels.
-
 TREES = {
     path: ast.parse(path.read_text("utf-8"))
     for folder in PACKAGES

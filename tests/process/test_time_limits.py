@@ -160,9 +160,6 @@ def test_one_limit_for_all_that_is_done_for_a_case_of_a_study():
     assert (arm.verdict, arm.patches, arm.critical_cone_deg) == ("undecided", None, None)
 
 
-# the clock itself
-
-
 def test_compiling_moves_the_deadline_and_nothing_else_does():
     from numba import njit
 

@@ -87,9 +87,6 @@ def test_axes_that_are_almost_z_keep_their_tilt(tilt, sign, tmp_path):
     check_arm(load_text(tmp_path, text), np.random.default_rng(7), 10)
 
 
-# what is refused, and what stays
-
-
 @pytest.mark.parametrize("shapes", [((6,), (6,)), ((2, 5), (2, 5)), ((2, 6), (3, 6))])
 def test_rows_of_the_wrong_shape_are_refused(shapes):
     kinematics = Kinematics(load_robot("puma560"))

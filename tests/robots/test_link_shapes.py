@@ -255,8 +255,6 @@ def test_odd_bodies_have_hulls_that_coal_takes(name, tmp_path):
     assert shapes.solids[1].geometry.closed is closed
 
 
-# what is a solid, of links and of objects alike
-
 CUBE = trimesh.creation.box((1.0, 2.0, 3.0))
 TURNED = np.concatenate([CUBE.faces[:1, ::-1], CUBE.faces[1:]])
 SOLIDS = {
@@ -293,8 +291,6 @@ def test_tangled_bodies_look_outwards():
     assert body.closed
     assert trimesh.Trimesh(body.vertices, body.faces).volume == pytest.approx(12.0)
 
-
-# bodies collide where the shapes do
 
 EXACT = ("puma560", "ur5", "panda", "kinova", "xarm7")
 

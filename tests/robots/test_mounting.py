@@ -46,9 +46,6 @@ def test_roll_pitch_and_yaw_are_scipys_to_the_last_bit():
         np.testing.assert_array_equal(about_fixed_axes(*rpy.tolist()), expected)
 
 
-# tcp, base, reference axis
-
-
 @pytest.mark.parametrize("given", [POSE, matrix(POSE), pin.SE3(matrix(POSE))])
 def test_a_pose_is_a_pair_or_a_matrix(given):
     robot = load_robot("ur5", tcp=given, base=given)
@@ -90,8 +87,6 @@ def test_the_reference_axis_is_across_the_approach_axis(approach, reference, exp
     assert abs(robot.reference_axis @ robot.approach_axis) < 1e-15
     assert np.isclose(np.linalg.norm(robot.reference_axis), 1.0, atol=1e-15)
 
-
-# a cell as one file: the chain between the surface's link and the tool
 
 FIXED = '<joint name="{0}" type="fixed"><parent link="{1}"/><child link="{2}"/>{3}</joint>'
 MOVING = (
@@ -240,8 +235,6 @@ def test_a_locked_table_leaves_the_reach_of_the_arm(cell):
     assert (robot.distance_from_base(points) <= robot.reach + 1e-12).all()
 
 
-# axes composed with an arm
-
 RAIL = Axis("rail", "prismatic", (1, 0, 0), limits=(-1.0, 1.5), position=(0, -1, 0.3),
             rpy_deg=tuple(np.degrees([0, 0.1, 0.2])), max_velocity=0.7)  # fmt: skip
 TILT = Axis("tilt", "revolute", (0, 1, 0.1), limits=(-1.0, 1.2), position=(0.7, 0, 0.4),
@@ -296,9 +289,6 @@ def test_axes_are_locked_and_limited_and_leave_names_alone(tmp_path):
     assert robot.joint_names == ("rail", "mount", "j2")
     assert {"world", "world 2", "rail"} <= set(robot.link_names)
     assert robot.root_link == "world"
-
-
-# what is refused
 
 
 def test_what_makes_no_sense(approved, cell):

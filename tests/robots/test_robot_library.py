@@ -23,9 +23,6 @@ def robot(request):
     return load_robot(request.param)
 
 
-# every listed robot
-
-
 def test_the_arms_that_are_promised_are_there_and_every_urdf_of_their_families():
     promised = """puma560 ur3 ur5 ur5_limited ur5_gripper ur10 ur10_limited panda kinova xarm7 z1
         talos_arm so100 so101 baxter_left baxter_right tiago tiago_dual_left tiago_dual_right
@@ -72,9 +69,6 @@ def test_tools_point_away_from_the_arm(robot):
     if along < 0.9:  # an offset wrist: then the roll axis decides
         last_axis = pin.computeJointJacobians(model, data, pin.neutral(model))[3:, -1]
         assert abs(approach @ last_axis) > 0.999
-
-
-# which link carries the tool
 
 
 def tree(edges):
@@ -153,9 +147,6 @@ def test_any_link_can_be_the_tool_and_the_chain_ends_there(tmp_path):
     np.testing.assert_allclose(Kinematics(ee_link).tool(q), Kinematics(flange).tool(q), atol=1e-11)
 
 
-# limits and held joints
-
-
 def test_limits_can_be_given_for_joints_that_have_none(tmp_path):
     text = arm([joint(1, "continuous", extra='<limit lower="-1" upper="1"/>'), joint(2)])
     free = load_text(tmp_path, text)
@@ -224,9 +215,6 @@ def test_a_joint_may_have_the_name_of_a_link(renamed, clash, tmp_path):
     held = load_text(tmp_path, text, lock={robot.joint_names[1]: 0.4})
     for other, q in ((robot, [0.3, 0.4, -0.2]), (held, [0.3, -0.2])):
         np.testing.assert_allclose(Kinematics(other).tool(q), expected, atol=1e-15)
-
-
-# names, files, and what is refused
 
 
 def test_what_is_refused_by_name_frame_and_lock(approved, tmp_path):

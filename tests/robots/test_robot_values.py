@@ -85,9 +85,6 @@ def test_pickle_round_trip(name):
     np.testing.assert_array_equal(Kinematics(copy).tool(q), Kinematics(robot).tool(q))
 
 
-# reach
-
-
 def furthest(robot, samples, seed=0):
     """Largest distance of the tool point from the first joint's origin, at ends of limits too."""
     rng = np.random.default_rng(seed)

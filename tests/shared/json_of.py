@@ -76,9 +76,6 @@ def ended(one: Any) -> Json:
     return {"robot": one.robot.name, "version": str}
 
 
-# -- parts of several answers
-
-
 def bounds(one: Any) -> Json:
     """A certificate, but for limits and clearance."""
     return {
@@ -161,9 +158,6 @@ def treated(one: Any) -> Json | None:
     }  # fmt: skip
 
 
-# -- check, verify
-
-
 def of_check(one: Any, printed_walk: bool = False) -> Json:
     """A verdict; with `--witness -` its motion, too."""
     walk = {
@@ -205,9 +199,6 @@ def of_verify(one: Any) -> Json:
         "not_judged": list(one.not_judged), "in_time": not one.late, "collisions": checked(known),
         "notes": list, **ended(one),
     }  # fmt: skip
-
-
-# -- path
 
 
 def of_path(one: Any) -> Json:
@@ -313,9 +304,6 @@ def of_runs(one: Any) -> Json:
     }  # fmt: skip
 
 
-# -- divide
-
-
 def of_divide(one: Any) -> Json:
     """The fewest patches; CONTRACT has no words for the answer in Python."""
     plan, cells = one.plan, one.cells
@@ -369,9 +357,6 @@ def move_between(plan: Any, k: int) -> Json:
     }  # fmt: skip
 
 
-# -- explain
-
-
 def with_unit(quantity: Any, key: str, value: float | None) -> Json:
     """A value under a key with its unit: `given_deg`, `given_m`; none without."""
     if not quantity.unit or value is None:
@@ -421,9 +406,6 @@ def of_explain(one: Any) -> Json:
         "collisions": checked(verdict.task.collision), "evaluations": int, "seconds": float,
         "robot": verdict.robot.name, "seed": verdict.seed, "version": str,
     }  # fmt: skip
-
-
-# -- place, study, compare
 
 
 def trial(one: Any) -> Json | None:

@@ -154,9 +154,6 @@ def test_a_motion_refused_by_a_hair_is_looked_for_again(monkeypatch):
     assert again.witness is None
 
 
-# What a verdict holds, and what it is asked of.
-
-
 @pytest.mark.parametrize("name", ["plate", "long plate", "greedy dome", "loaded", "pickled"])
 def test_the_graph_is_what_people_draw_and_networkx_writes(name, tmp_path):
     verdict = verdict_of({"loaded": "plate", "pickled": "long plate"}.get(name, name))

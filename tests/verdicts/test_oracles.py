@@ -34,9 +34,6 @@ def paper_case(name):
     return Problem(made["kind"], size, u, v, *pose, *work, tuple(map(tuple, limits)))
 
 
-# The referee.
-
-
 @pytest.mark.parametrize("name", ARMS)
 def test_the_referees_arms_stand_where_pinocchios_do(name):
     robot = load_robot(name)
@@ -100,9 +97,6 @@ def test_the_referee_says_what_is_wrong():
     assert [fault.split(":")[0] for fault in faults] == ["clearance"]
 
 
-# The oracles of the PUMA and the UR5.
-
-
 @sampled
 @pytest.mark.parametrize("name", spread(names("paper"), 1))
 def test_the_papers_cases_have_their_known_answers(name):
@@ -153,9 +147,6 @@ def test_stored_answers_are_the_oracles(arm, oracle):
         aims = problem.targets(*net(problem, 4).uv[: len(cells)].T)
         for mine, theirs in zip(aims, task.targets(cells)[:2], strict=True):
             np.testing.assert_allclose(mine, theirs, atol=1e-12)
-
-
-# All stored problems.
 
 
 @sampled

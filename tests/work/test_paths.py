@@ -166,9 +166,6 @@ def test_some_cells_only_of_a_feasible_surface_or_of_one_that_is_not():
     assert (single.figures.length, single.figures.revisited_share) == (0.0, 0.0)
 
 
-# -- the choice of nodes, on graphs by hand -------------------------------------------------------
-
-
 def hand_made(rng, cells, nodes, density, wide=3.0):
     """A graph over cells in a row: some nodes over each, random motions between neighbours."""
     verdict = verdict_of("ur5")
@@ -266,9 +263,6 @@ def test_a_detour_goes_back_where_that_saves_more_travel_than_it_costs(share, ov
     assert [graph.cell[x] for x in found.nodes] == over
 
 
-# -- full turns -----------------------------------------------------------------------------------
-
-
 @pytest.fixture(scope="module")
 def small():
     cells = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0.0, 0.0, 0.2)).cells(2, 2)
@@ -302,9 +296,6 @@ def test_home_says_which_turn_and_a_start_is_kept(small):
     free = replace(UR5, lower=np.full(6, -np.inf), upper=np.full(6, np.inf))
     far = unwound(free, small.task, Walk(walk.q + 2.0 * np.pi, walk.cell))  # no numpy warning
     assert np.abs(0.5 * (far.q.min(axis=0) + far.q.max(axis=0))).max() <= np.pi + 1e-9
-
-
-# -- what cannot be asked -------------------------------------------------------------------------
 
 
 def test_what_has_no_path_is_said(approved):

@@ -47,9 +47,6 @@ def run_of(name):
     return trajectory(path_of(name), SPEED)
 
 
-# -- the trajectory as a whole ---------------------------------------------------------------------
-
-
 @sampled
 @pytest.mark.parametrize("name", CASES)
 def test_a_trajectory_is_its_path_and_keeps_to_all_limits_however_it_is_interpolated(name):
@@ -120,9 +117,6 @@ def test_joint_limits_that_the_path_touches_are_nowhere_passed(name):
     assert replay(path.robot, path.cells, path.task, run.walk, path.needed).accepted
 
 
-# -- the fastest there is --------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("seed", range(8))
 def test_speeds_are_those_of_one_linear_program(seed):
     """Where accelerations count for more than bends, the fastest profile has the largest x at every
@@ -178,9 +172,6 @@ def test_a_motion_takes_hardly_longer_than_toppra_says():
     assert h.min() > 0.0
 
 
-# -- among bodies ----------------------------------------------------------------------------------
-
-
 def bodies_of(task):
     return gather(UR5, FLAT, task.collision, task.standoff)
 
@@ -216,9 +207,6 @@ def test_a_timed_motion_that_would_collide_is_refused_with_the_pair(what):
     task = replace(path.task, collision=Collision(self_=False, surface=False, scene=(ahead,)))
     with pytest.raises(PathError, match=r"\w+ and bracket"):
         trajectory(replace(path, task=task), SPEED)
-
-
-# -- what cannot be asked --------------------------------------------------------------------------
 
 
 def test_limits_and_numbers_that_are_none():

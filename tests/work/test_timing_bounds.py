@@ -127,9 +127,6 @@ def test_what_turns_back_along_its_chord_is_beyond_it(times):
     assert beyond(rows, places[None], bound).max() <= 1e-12
 
 
-# -- limits of joints ------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("ends", ["both", "lower", "upper"])
 def test_a_motion_drawn_in_keeps_its_shape_and_its_limits(ends):
     """Random samples with steep ends, whose cubics pass the limits of all joints."""

@@ -69,9 +69,6 @@ def random_object(rng: np.random.Generator, name: str, around: np.ndarray) -> Ob
     return made[int(rng.integers(5))]()
 
 
-# a tool over one target
-
-
 def bracket() -> Triangles:
     """An L of 0.2 m: not convex."""
     ell = np.array([[0.0, 0.0], [0.2, 0.0], [0.2, 0.05], [0.05, 0.05], [0.05, 0.2], [0.0, 0.2]])
@@ -207,9 +204,6 @@ def planted_over(name: str, seed: int) -> Over | None:
     frames = Kinematics(robot).joints(q[None])
     pose = pin.SE3(frames.rotations[0, -1], frames.points[0, -1])
     return over if ToolPoses(robot, over.bodies).clear(pose) else None
-
-
-# walls before plates, and boxes of joints around configurations that are clear
 
 
 def behind_a_wall(name: str, seed: int) -> tuple[Robot, Cells, Task]:
