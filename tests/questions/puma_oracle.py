@@ -60,6 +60,11 @@ def in_link3(theta: Floats, directions: Floats) -> Floats:
     return np.stack([c23 * flat - s23 * z, -s23 * flat - c23 * z, side], axis=-1)
 
 
+def tilts(points: Floats, approaches: Floats) -> Floats:
+    """(S, 4) rad, tool along the forearm (theta5 = 0) from approach, on each branch."""
+    return np.arccos(np.clip(in_link3(arms(points), approaches[:, None])[..., 1], -1.0, 1.0))
+
+
 @njit(cache=True)
 def _intervals(
     seen: Floats, rows: Floats, cos_cone: float, low: float, high: float, slots: int

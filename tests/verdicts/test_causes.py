@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 import plain
+import puma_oracle
 import pytest
 from arm_urdfs import joint
 from asked import question, verdict_of
-from plain import tools
 from random_arms import robot_of
 
 from feasibility import CauseKind, Search, Task, check
@@ -23,8 +23,8 @@ from surfaces import cylinder, plane, sphere
 
 PUMA = load_robot("puma560", limits="set-1")
 UR5 = load_robot("ur5")
-ELBOW = math.hypot(0.1, 0.7)  # [m] from elbow to wrist centre
-REACH = math.hypot(0.7 + ELBOW, 0.1)  # [m] from the first joint's origin to the wrist centre
+REACH = math.hypot(0.7 + math.hypot(0.1, 0.7), 0.1)
+"""m, from the first joint's origin to the wrist centre."""
 
 
 def kinds(verdict):
@@ -91,31 +91,11 @@ def test_orientation_says_the_smallest_angle_that_could_be_had():
     verdict = check(arm, wall.cells(3, 3), Task(0.0, 20))
     assert kinds(verdict) == {CauseKind.ORIENTATION}
     points, approaches, _ = verdict.task.targets(verdict.cells)
+    least = np.degrees(puma_oracle.tilts(points, approaches).min(axis=1))
     for cause in verdict.causes:
-        reported = number(r"tilts ([0-9.]+) deg", cause.detail)
-        best = smallest_angle(points[cause.cell], approaches[cause.cell])
+        reported, best = number(r"tilts ([0-9.]+) deg", cause.detail), least[cause.cell]
         assert best - 0.1 <= reported <= best + 1.5  # found by bisection, from random starts
         assert reported > 20.0
-
-
-def smallest_angle(point, approach):
-    """Over the closed-form arm branches, tool along the forearm, degrees."""
-    best = 180.0
-    radius = math.sqrt(point[0] ** 2 + point[1] ** 2 - 0.1**2)
-    for sign in (1.0, -1.0):
-        q1 = math.atan2(point[1], point[0]) - math.atan2(0.1, sign * radius)
-        far = math.hypot(radius, point[2])
-        bend = (far**2 - 0.7**2 - ELBOW**2) / (2 * 0.7 * ELBOW)
-        for turn in (math.acos(bend), -math.acos(bend)):
-            # In the plane of the arm, angles are counted downwards from the horizontal.
-            q2 = math.atan2(-point[2], sign * radius) - math.atan2(
-                ELBOW * math.sin(turn), 0.7 + ELBOW * math.cos(turn)
-            )
-            q = np.array([q1, q2, turn - math.atan2(0.7, 0.1), 0.0, 0.0, 0.0])
-            points, axes = tools(PUMA, q[None])
-            np.testing.assert_allclose(points[0], point, atol=1e-9)
-            best = min(best, math.degrees(math.acos(np.clip(axes[0] @ approach, -1.0, 1.0))))
-    return best
 
 
 def test_roll_says_which_could_be_had():
@@ -227,14 +207,13 @@ def test_what_a_cut_parts_is_proved_and_named():
         assert "nowhere" in cause.detail
         assert re.search(r"the best motion is (below|above)", cause.detail)
     tree = verdict.proof
-    best = next(q for q, c in zip(verdict.postures, verdict.components, strict=True)
-                if c.tolist() == np.flatnonzero(verdict.covered).tolist())  # fmt: skip
+    postures, cells = tree.folded(verdict.postures), [c.tolist() for c in verdict.components]
+    best = postures[cells.index(np.flatnonzero(verdict.covered).tolist())]
     for cause in apart:
-        posture = next(q for q, c in zip(verdict.postures, verdict.components, strict=True)
-                       if cause.cell in c.tolist())  # fmt: skip
-        cut = tree.parting(tree.folded(best[None])[0], tree.folded(posture[None])[0])
-        above = tree.folded(best[None])[0, cut.joint] > cut.value
-        assert cause.detail.endswith("above" if above else "below")
+        cut = tree.parting(
+            best, next(postures[k] for k in range(len(cells)) if cause.cell in cells[k])
+        )
+        assert cause.detail.endswith("above" if best[cut.joint] > cut.value else "below")
 
 
 CUT = ("puma560 184", "puma560 188", "puma560 197", "a large square and a stop of the wrist")

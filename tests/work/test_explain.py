@@ -11,6 +11,7 @@ import math
 from functools import cache
 
 import numpy as np
+import puma_oracle
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -21,7 +22,7 @@ from feasibility import Answer, Evidence, Search, Task, check
 from feasibility.cases import Case, load_case
 from feasibility.certification import replay
 from feasibility.sensitivity import Kind, explain, last_true
-from robots import Kinematics, load_robot
+from robots import load_robot
 from surfaces import cylinder, plane, poses, sphere
 
 PUMA, UR5 = load_robot("puma560", limits="set-1"), load_robot("ur5")
@@ -146,31 +147,12 @@ def test_4d_names_joint1_and_granting_what_it_needs_is_enough():
     assert replay(*case, dropped.witness, rest).accepted
 
 
-def branch_tilts(point, approach):
-    """Angle (degrees) of the tool along the forearm, for each closed-form branch of joints 1..3."""
-    elbow, tilts = math.hypot(0.1, 0.7), []
-    radius = math.sqrt(point[0] ** 2 + point[1] ** 2 - 0.1**2)
-    for sign in (1.0, -1.0):
-        q1 = math.atan2(point[1], point[0]) - math.atan2(0.1, sign * radius)
-        far = math.hypot(radius, point[2])
-        bend = math.acos((far**2 - 0.7**2 - elbow**2) / (2 * 0.7 * elbow))
-        for turn in (bend, -bend):
-            q2 = math.atan2(-point[2], sign * radius) - math.atan2(
-                elbow * math.sin(turn), 0.7 + elbow * math.cos(turn)
-            )
-            q = np.array([q1, q2, turn - math.atan2(0.7, 0.1), 0.0, 0.0, 0.0])
-            at, axis = Kinematics(PUMA).tool(np.arctan2(np.sin(q), np.cos(q)))
-            np.testing.assert_allclose(at, point, atol=1e-9)
-            tilts.append(math.degrees(math.acos(np.clip(axis @ approach, -1.0, 1.0))))
-    return tilts
-
-
 def test_the_cone_a_stiff_wrist_needs_is_that_of_the_geometry():
     """The covering motion keeps to one branch of the arm: the least of their largest tilts."""
     case, found = given_case("stiff wrist"), threshold_of(explained("stiff wrist"), "cone")
     points, approaches, _ = case[2].targets(case[1])
-    tilts = np.array([branch_tilts(p, a) for p, a in zip(points, approaches, strict=True)])
-    assert -0.2 <= math.degrees(found.feasible.value) - tilts.max(axis=0).min() <= 1.0
+    needed = puma_oracle.tilts(points, approaches).max(axis=0).min()
+    assert -0.2 <= math.degrees(found.feasible.value - needed) <= 1.0
     assert found.other.value < found.feasible.value
     # A wider joint never needs a wider cone.
     limits = {f"joint{k}": np.radians([-15.0, 15.0]) for k in (4, 5)}

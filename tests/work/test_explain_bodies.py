@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from asked import question
 from samples import EVERYTHING, sampled
 
 from feasibility import Answer, Search, Task, check
@@ -117,37 +118,12 @@ def test_seeds_that_fit_neither_arm_nor_cells_are_refused(q, cell, method):
         check(*WHOLE, Search(method), seeds=Walk(q, np.array(cell)))
 
 
-NARROW_CASE = """
-[robot]
-name = "talos_left"
-[robot.limits_deg]
-arm_left_2_joint = [83.7913, 142.0486]
-arm_left_4_joint = [-121.5879, -56.8754]
-arm_left_7_joint = [-36.765, 24.3572]
-[surface]
-kind = "cone"
-cells = [1, 2]
-radius = 0.6672
-slope = 0.736
-u_deg = [72.2804, 101.5253]
-v = [0.0, 0.2384]
-position = [1.236883, -0.196841, 0.817147]
-rpy_deg = [-147.4784, -16.242, -133.9677]
-side = "outside"
-[task]
-standoff = 0.055370055943281066
-cone_deg = 1.0
-tolerance = 0.007184648809461151
-"""
-"""Feasible by a motion that few seeds of a search find."""
-
-
-def test_a_motion_found_beside_a_case_is_tried_on_the_case_itself(tmp_path):
+def test_a_motion_found_beside_a_case_is_tried_on_the_case_itself():
     """`check` alone may end without it; `explain` must not call a case infeasible and say how its
     own motions cover it. Once it is told the motion, `check` finds what `explain` found.
     """
-    (tmp_path / "narrow.toml").write_text(NARROW_CASE)
-    robot, cells, task, *_ = load_case(tmp_path / "narrow.toml").build()
+    asked = question("talos over a cone")  # few seeds of a search find its motion
+    robot, cells, task = asked.robot, asked.cells, asked.task
     found = explain(robot, cells, task)
     assert found.verdict.feasible
     assert found.alone is None or found.alone.answer is not Answer.FEASIBLE
