@@ -11,17 +11,18 @@ import arm_urdfs
 import numpy as np
 import pytest
 from bounds import holds
-from capsule_arms import at, bodies_of, box_mesh, pair, planar_arm
+from capsule_arms import at, bodies_of, box_mesh, fork, pair, planar_arm, wall_at
 from mesh_patches import of_patch
+from plain import triangles_of_grid
 from random_arms import robot_of
 
 from feasibility.certification import collision_replay
 from feasibility.certification.collisions.collision_replay import Couples
 from feasibility.certification.collisions.motion import ArmMotion
 from feasibility.certification.collisions.shapes import Body
-from feasibility.collisions import HalfSpace, Obstacle, Soup
+from feasibility.collisions import Obstacle, Soup
 from robots import Kinematics, load_robot
-from robots.shapes import Solid, Triangles
+from robots.shapes import Solid
 from robots.urdf import Box, Capsule, Cylinder, Sphere
 from surfaces import sphere
 
@@ -185,13 +186,11 @@ def test_a_ball_on_a_circle_comes_as_near_as_is_said(kind, first, last, off, nea
     if kind == "box":
         walls = [Obstacle("wall", Box((0.4, 1.0, 1.0)), at(x + 0.2, y))]
     if kind == "half space":
-        walls = [Obstacle("wall", HalfSpace(), at(x, rotation=[[0, 0, -1], [0, 1, 0], [1, 0, 0]]))]
+        walls = [wall_at(x)]
     if kind == "triangles":
         side = np.linspace(-0.5, 0.5, 9)
         corners = np.array([[x, y + b, c] for b in side for c in side]).reshape(9, 9, 3)
-        a, b, c, d = corners[:-1, :-1], corners[1:, :-1], corners[:-1, 1:], corners[1:, 1:]
-        halves = [np.stack(half, axis=2).reshape(-1, 3, 3) for half in ((a, b, c), (b, d, c))]
-        walls, soups = [], [Soup("wall", np.concatenate(halves), 0.0, False)]
+        walls, soups = [], [Soup("wall", triangles_of_grid(corners), 0.0, False)]
     solid, rows = Solid("link1", 1, at(1.0), Sphere(0.1)), [[first], [last]]
     (one,) = pairings(robot, rows, solid, walls, np.array([[off]]), 0.01, soups)
     assert one.low[0] <= 0.05 + 1e-9
@@ -256,9 +255,7 @@ def test_pairs_may_be_asked_for_more_along_a_segment(which, more):
 @pytest.mark.parametrize("more", [0.05, 0.15])
 def test_the_most_of_what_is_asked_for_along_a_stretch_counts(more):
     """A post between the arms of a fork, 0.2 m from both; the last segment is very short."""
-    arms, aside = box_mesh((1.0, 0.1, 0.1)), np.array([0.0, 0.35, 0.0])
-    both = np.vstack([arms.vertices + aside, arms.vertices - aside])
-    solid = Solid("link1", 1, at(), Triangles(both, np.vstack([arms.faces, arms.faces + 8]), True))
+    solid = Solid("link1", 1, at(), fork())
     bodies = bodies_of([solid], [Obstacle("a", Sphere(0.1), at())], [pair("link1", "a", 0.1)])
     slide, rows = planar_arm([0.1], ["prismatic"]), np.array([[-0.3], [0.2999], [0.3]])
     found = collision_replay(slide, bodies, rows, None, np.array([[0.0, more]]))

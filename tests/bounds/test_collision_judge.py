@@ -9,8 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from capsule_arms import at, bodies_of, box_mesh, capsule_links, pair, planar_arm, wall_at
+from capsule_arms import at, bodies_of, box_mesh, capsule_links, fork, pair, planar_arm, wall_at
 from foreign_clearances import ForeignScene, samples
+from plain import triangles_of_grid
 from scipy.spatial.transform import Rotation
 
 from coverable_errors import ArgumentError
@@ -130,9 +131,7 @@ def test_a_curved_surface_of_many_triangles_needs_its_clearance_too(needed):
     rows = np.linspace(-0.5, 0.5, 13)
     z = np.array([[0.3 + 0.2 * (x**2 + y**2) for y in rows] for x in rows])
     grid = np.stack([*np.meshgrid(rows, rows, indexing="ij"), z], axis=2)
-    a, b, c, d = grid[:-1, :-1], grid[1:, :-1], grid[:-1, 1:], grid[1:, 1:]
-    halves = [np.stack(half, axis=2).reshape(-1, 3, 3) for half in ((a, b, c), (b, d, c))]
-    soup = Soup("surface", np.concatenate(halves), 0.0, False)
+    soup = Soup("surface", triangles_of_grid(grid), 0.0, False)
     ball = Solid("tool", 1, np.eye(4), Sphere(0.1))
     bodies = bodies_of([ball], pairs=[pair("tool", "surface", needed)], soups=[soup])
     found = judged(SLIDE, bodies, [-0.4], [0.45])
@@ -189,13 +188,6 @@ def test_a_mesh_within_a_mesh_and_a_room_with_walls():
     for thing, far, accepted in ((outer, 0.3, False), (room, 0.3, True), (room, 0.45, False)):
         bodies = sliding(box_mesh((0.2, 0.2, 0.2)), thing, place=np.eye(4))
         assert judged(SLIDE, bodies, [-0.2], [far]).accepted is accepted
-
-
-def fork():
-    """Two arms along x, 0.6 m apart: a U-shaped link whose hull is full."""
-    arm, aside = box_mesh((1.0, 0.1, 0.1)), np.array([0.0, 0.35, 0.0])
-    faces = np.vstack([arm.faces, arm.faces + 8])
-    return Triangles(np.vstack([arm.vertices + aside, arm.vertices - aside]), faces, True)
 
 
 @pytest.mark.parametrize("thing", [Cylinder(0.1, 1.0), box_mesh((0.2, 0.2, 1.0)), Sphere(0.1)])

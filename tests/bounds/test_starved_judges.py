@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from arm_urdfs import joint
 from bounds import LARGE, Starved, grown
-from capsule_arms import at, bodies_of, box_mesh, capsule_links, pair, planar_arm
+from capsule_arms import at, bodies_of, capsule_links, fork, pair, planar_arm
 from gantry import configurations, gantry, raster
 from random_arms import robot_of
 
@@ -170,11 +170,7 @@ def test_balls_and_planes_that_part_bodies(name, thing):
 @pytest.mark.parametrize("name", ["moved", "deviation"])
 def test_steps_of_a_hollow_body(name):
     """A post between the arms of a fork that slides along it, which no plane parts."""
-    arms = box_mesh((1.0, 0.1, 0.1))
-    aside = np.array([0.0, 0.35, 0.0])
-    beside = arms.vertices + aside, arms.vertices - aside
-    fork = Triangles(np.vstack(beside), np.vstack([arms.faces, arms.faces + 8]), True)
-    bodies = bodies_of([Solid("link1", 1, at(), fork)], [Obstacle("post", Sphere(0.1), at())],
+    bodies = bodies_of([Solid("link1", 1, at(), fork())], [Obstacle("post", Sphere(0.1), at())],
                        [pair("link1", "post", 0.1)])  # fmt: skip
     rows = np.array([[-0.3], [0.3]])
     for one, accepted in zip(fed(bodies, SLIDE, rows, name), (True, False), strict=True):

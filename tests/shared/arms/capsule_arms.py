@@ -24,18 +24,11 @@ def planar_arm(lengths, kinds=None, axes=None):
     return robot_of([*joints, joint(len(lengths) + 1, "fixed", starts[-1])])
 
 
-def along_x(length, start=0.0):
-    """Placement of a capsule of that length that begins at x = start."""
-    place = np.eye(4)
-    place[:3, :3] = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]
-    place[0, 3] = start + 0.5 * length
-    return place
-
-
 def capsule_links(lengths, radius):
     """A capsule along each link."""
+    turn = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]
     return tuple(
-        Solid(f"link{k}", k, along_x(length), Capsule(radius, length))
+        Solid(f"link{k}", k, at(0.5 * length, rotation=turn), Capsule(radius, length))
         for k, length in enumerate(lengths, start=1)
     )
 
@@ -55,6 +48,13 @@ def box_mesh(size, closed=True):
     sides = (0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)
     faces = np.array([face for a, b, c, d in sides for face in ((a, b, c), (a, c, d))])
     return Triangles(signs * np.array(size) / 2.0, faces if closed else faces[:-1], closed)
+
+
+def fork():
+    """Two arms along x, 0.6 m apart: a U-shaped link whose hull is full."""
+    arm, aside = box_mesh((1.0, 0.1, 0.1)), np.array([0.0, 0.35, 0.0])
+    faces = np.vstack([arm.faces, arm.faces + 8])
+    return Triangles(np.vstack([arm.vertices + aside, arm.vertices - aside]), faces, True)
 
 
 def bodies_of(solids, scene=(), pairs=(), soups=()):

@@ -8,11 +8,19 @@ import numpy as np
 import pinocchio as pin
 from plain import geometry_of
 from referee import Joint, Scene, Shape, closely, fcl_object
+from scipy.optimize import nnls
 
 from robots.shapes import Triangles
 
 cached_model = lru_cache(maxsize=256)(lambda geometry: fcl_object(geometry_of(geometry)))
 samples = closely
+
+
+def distance_from_hull(point, vertices):
+    """m, of a point: of its nearest convex combination of the vertices, by least squares."""
+    shares, _ = nnls(np.vstack([vertices.T, np.full(len(vertices), 1e4)]), np.append(point, 1e4),
+                     maxiter=1000)  # fmt: skip
+    return np.linalg.norm(shares / shares.sum() @ vertices - point)
 
 
 class Joints:
