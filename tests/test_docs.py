@@ -1,7 +1,5 @@
 """What newcomers read is true: the README's code runs, its commands exist, its table holds."""
 
-from __future__ import annotations
-
 import ast
 import base64
 import io

@@ -1,7 +1,5 @@
 """Whole processes: the command from its kernels on disk, and a first check, which compiles."""
 
-from __future__ import annotations
-
 import os
 import resource
 import subprocess

@@ -1,7 +1,5 @@
 """Search and judge: questions of the table, the paper's search, finer and finer cells."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """What is built on a verdict: paths, passes, placements, studies, live pages."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -5,8 +5,6 @@ Times of different machines and days compare as `in FK calls`; counts (evaluatio
 same in every run.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from typing import Any, TypeVar

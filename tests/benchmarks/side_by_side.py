@@ -5,8 +5,6 @@ returns is replayed by the referee of the tests, which knows nothing of any of t
 come with the extra `benchmarks`; one that is not installed has a row that says so.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import subprocess

@@ -1,7 +1,5 @@
 """Who is asked to stay clear of whom; objects and tools, where they stand, and what holds them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh

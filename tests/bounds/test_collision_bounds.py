@@ -3,8 +3,6 @@
 Each bound is held against dense samples by Pinocchio and coal, or against a distance known by hand.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import arm_urdfs

@@ -3,8 +3,6 @@
 Asked through `collision_replay` alone, which keeps its meaning whatever is behind it.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

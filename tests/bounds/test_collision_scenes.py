@@ -1,7 +1,5 @@
 """Motions among many bodies: the judge of collisions beside python-fcl, and what it certifies."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Boxes of joints in which bodies overlap: bounds that hold, and proofs that landings bear out."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

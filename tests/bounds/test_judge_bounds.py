@@ -1,7 +1,5 @@
 """Bounds between rows hold where they are sampled, and less would be wrong; margins are exact."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Motions that work over a surface and are lifted off it: right where they work, never through."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import mesh_patches

@@ -4,8 +4,6 @@ Over a convex edge the tool goes round in an arc of the standoff. The closest po
 gives the true approach direction too: from the tool point to that point.
 """
 
-from __future__ import annotations
-
 import mesh_patches
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The judges of motions: what is right is accepted, damages are refused, and figures are bounds."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Speeds and singular values along segments: the bounds against dense samples by other code."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The judge of the roll: its bounds hold where they are sampled, and both judges obey them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Verdicts at a speed turn where timed motions do, with no bound and no code of the judge's."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import networkx as nx

@@ -1,7 +1,5 @@
 """Odd objects of a scene: what is taken can be used by all libraries, the rest is refused."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

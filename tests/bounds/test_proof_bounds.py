@@ -1,7 +1,5 @@
 """The verifier's bounds: no box around a known place is lost, and no remainder is too small."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Models of the roll over boxes, which proofs rest on: samples, and a second reading of them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from referee import unit

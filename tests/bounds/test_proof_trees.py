@@ -1,7 +1,5 @@
 """The verifier of cut trees: true proofs are accepted, damaged ones refused with the reason."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import mesh_patches

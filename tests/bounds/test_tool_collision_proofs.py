@@ -3,8 +3,6 @@
 And the bounds behind it: points inside shapes, how deep they are, how far poses move them.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import coal

@@ -1,7 +1,5 @@
 """The treated share of certified motions, and what a demanded coverage makes of an answer."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -3,8 +3,6 @@
 `tests/shared/files/readers.py` has the readers, their good files, and what a sound value is.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import sys

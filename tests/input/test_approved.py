@@ -1,7 +1,5 @@
 """What is said of every bad input, word for word, as approved/READER/NAME.txt has it."""
 
-from __future__ import annotations
-
 import pickle
 import re
 from pathlib import Path

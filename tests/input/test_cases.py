@@ -1,7 +1,5 @@
 """Cases: the built-in ones, what settings change, paths, faults together, caps, units, words."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The reference of keys is what reading does: every key is known, judged, and said in messages."""
 
-from __future__ import annotations
-
 import copy
 import datetime
 import math
@@ -15,15 +13,7 @@ import pytest
 
 from coverable_errors import MISSING, Fault
 from feasibility import Search
-from feasibility.cases import (
-    Case,
-    CaseError,
-    CollisionPart,
-    Key,
-    all_keys,
-    as_read,
-    toml_document,
-)
+from feasibility.cases import Case, CaseError, CollisionPart, Key, all_keys, as_read, toml_document
 from feasibility.cases.keys import keys_of, kinds
 from feasibility.collisions import Collision
 

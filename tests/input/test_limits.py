@@ -3,8 +3,6 @@
 Each is read in a process of its own, which ends when it takes more.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """Motions and trajectories as files: columns by name, the same numbers back, YAML for ROS."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Result files: what was saved comes back exactly, for its own case alone, and is written whole."""
 
-from __future__ import annotations
-
 import io
 import json
 import os

@@ -1,7 +1,5 @@
 """Surfaces and scenes of cases: built as their constructors build them, from their files alone."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from collections.abc import Callable

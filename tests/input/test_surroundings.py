@@ -1,7 +1,5 @@
 """Odd outputs, counts and surroundings of commands: each is one sentence that says what is odd."""
 
-from __future__ import annotations
-
 import itertools
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """URDFs and SRDFs that are read: the robot that they describe, and meshes from allowed folders."""
 
-from __future__ import annotations
-
 import os
 from importlib.metadata import distribution
 from pathlib import Path
@@ -17,13 +15,7 @@ from yourdfpy import URDF
 
 from coverable_errors import CoverableError
 from robots.pinocchio_model import chain_model
-from robots.urdf import (
-    CheckedUrdf,
-    MeshFile,
-    UrdfError,
-    check_urdf,
-    read_srdf,
-)
+from robots.urdf import CheckedUrdf, MeshFile, UrdfError, check_urdf, read_srdf
 
 SHARE = next(
     Path(str(file.locate())).parents[1]

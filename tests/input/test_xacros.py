@@ -1,7 +1,5 @@
 """xacro files become the robots that they describe, and do nothing else."""
 
-from __future__ import annotations
-
 import os
 import pickle
 import subprocess

@@ -8,8 +8,6 @@ copy of that, and the tests run until one fails. A fault that no test finds surv
     python tests/mutants/mutants.py [REGEX]      those whose room, file, edit or words match
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import re

@@ -1,7 +1,5 @@
 """The list of small faults keeps up with the code: each can still be put in, exactly once."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 import pytest

@@ -1,7 +1,5 @@
 """The commands of commands.toml, and `ask`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import pytest

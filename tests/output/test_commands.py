@@ -1,8 +1,6 @@
 """Commands, each run once: their words are approved, their bounds hold, and the numbers of `--json`
 are, key by key, what Python answers to the same question."""
 
-from __future__ import annotations
-
 import difflib
 import itertools
 import json

@@ -1,7 +1,5 @@
 """Whatever a case demands, no command says "feasible" or "holds" where it is not held."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Drawn surfaces: cells are filled by their own triangles, in the colour of what became of them."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pages that commands write: approved outlines; they fetch nothing, and names make no markup."""
 
-from __future__ import annotations
-
 import html
 import re
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The picture painted without a browser: what is in it, where, and what hides what."""
 
-from __future__ import annotations
-
 import base64
 import io
 import sys

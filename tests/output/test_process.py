@@ -1,7 +1,5 @@
 """The command as a process: who reads it, bugs and trouble, waiting, Ctrl-C."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import io

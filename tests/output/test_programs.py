@@ -1,7 +1,5 @@
 """Programs, read back by parsers that share nothing with what wrote them; tools switched there."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """`verify` believes nothing that a file says: motions, trees, proofs and second statements."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

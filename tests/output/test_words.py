@@ -1,7 +1,5 @@
 """What sentences say: bounds that hold as printed, each cause and each cut, what is not checked."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math
@@ -24,12 +22,7 @@ from feasibility.reports import changes, comparison, division, path, study, too_
 from feasibility.reports import explanation as explained
 from feasibility.reports import verdict as report
 from feasibility.results import load_motion, load_result
-from feasibility.results.trajectory_files import (
-    as_csv,
-    as_json_text,
-    from_csv,
-    from_json_text,
-)
+from feasibility.results.trajectory_files import as_csv, as_json_text, from_csv, from_json_text
 from feasibility.sensitivity import Explanation, Finding, Kind, Quantity, Threshold
 from feasibility.studies import Comparison, read_study
 from feasibility.timing import trajectory

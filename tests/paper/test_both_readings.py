@@ -1,7 +1,5 @@
 """The compiled search against the literal reading of Algorithms 1 and 2, call by call."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from mesh_patches import in_cells_of

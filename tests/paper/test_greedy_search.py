@@ -1,7 +1,5 @@
 """The twelve published cases under the greedy search, and what is stored of them replayed."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

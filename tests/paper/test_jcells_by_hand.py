@@ -1,7 +1,5 @@
 """Algorithms 1 and 2 on arms and patches small enough to know the answer, and their ends."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The paper's search on surfaces of every kind: what it reaches, and who has to accept it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import mesh_patches

@@ -1,7 +1,5 @@
 """What is held of the code as a whole: what is loaded when, and sizes. Layers: pyproject.toml."""
 
-from __future__ import annotations
-
 import ast
 import re
 import subprocess

@@ -4,8 +4,6 @@ In this process at calls of Python functions, in processes of their own from the
 on, and at what the interpreter tells of itself (audit events).
 """
 
-from __future__ import annotations
-
 import contextlib
 import gc
 import os

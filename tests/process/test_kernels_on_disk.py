@@ -1,7 +1,5 @@
 """Compiled kernels: kept while no code changes, read only where nobody else can write."""
 
-from __future__ import annotations
-
 import ast
 import os
 import re

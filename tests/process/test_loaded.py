@@ -1,7 +1,5 @@
 """What a check loads: only what its case needs."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

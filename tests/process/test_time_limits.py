@@ -4,8 +4,6 @@ The clock that is given runs out at the n-th look at it, for as many n as there 
 that the clock enforces ends at once then, as if its work never ended.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import signal

@@ -5,8 +5,6 @@ keys and replaces some. Stored problems of the oracles are questions too, by fil
 "puma560 17".
 """
 
-from __future__ import annotations
-
 import csv
 import json
 import tempfile

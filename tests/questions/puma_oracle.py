@@ -8,8 +8,6 @@ s5 rho cos(theta4 - phi) + c5 m_y >= cos(alpha): intervals of theta4 at each sam
 joined where intervals overlap. Where a line leaves the reach two branches meet at its last point.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

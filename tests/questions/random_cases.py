@@ -5,8 +5,6 @@ and with cone, limits and place of the surface a little tighter, wider and elsew
 "apart" are without that filter, with the oracles' answers to a little tighter and wider ones.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

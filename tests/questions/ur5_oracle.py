@@ -8,8 +8,6 @@ l2 c2 + l3 c23 - d5 sin psi + d6 s5 cos psi along x1 and d1 - l2 s2 - l3 s23 - d
 neighbouring samples are joined where joints stay continuous; elbows meet where links are stretched.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from oracle_cases import Answer, Floats, Ints, Problem, answer, net

@@ -1,7 +1,5 @@
 """Where arms have their tools: Pinocchio, the compiled chain, and the referee's reader of URDFs."""
 
-from __future__ import annotations
-
 import dataclasses
 import pickle
 

@@ -1,7 +1,5 @@
 """Convex bodies around shapes: nothing stands out of them, and they stand out by little."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh

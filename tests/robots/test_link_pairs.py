@@ -1,7 +1,5 @@
 """Which pairs of links are asked for, how often the others collide, how far tools reach."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The bodies of links: where they are, what stands in for what, what is refused, what they hold."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import replace
 from itertools import combinations

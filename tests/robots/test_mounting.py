@@ -1,7 +1,5 @@
 """What an arm stands on, carries, and works on: tcp, base, axes, and the link with the surface."""
 
-from __future__ import annotations
-
 import math
 import pickle
 from dataclasses import replace

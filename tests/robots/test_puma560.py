@@ -1,7 +1,5 @@
 """The PUMA 560 against the paper, and what the shipped URDF is made of (`tools/puma560.py`)."""
 
-from __future__ import annotations
-
 import runpy
 from pathlib import Path
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """Robots by name and by file: every listed one, which link is the tool, what is held."""
 
-from __future__ import annotations
-
 import random
 from importlib.metadata import distribution
 

@@ -1,7 +1,5 @@
 """Robot as a value: what it refuses, limits, pickling, and how far it reaches."""
 
-from __future__ import annotations
-
 import pickle
 import re
 from dataclasses import replace

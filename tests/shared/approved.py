@@ -4,17 +4,12 @@
 to the next is masked first.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
 import pytest
 
-MASKS = (
-    (re.compile(r"\d+(\.\d+)? s\b"), "# s"),
-    (re.compile(r"\b(pid|port) \d+"), r"\1 #"),
-)
+MASKS = ((re.compile(r"\d+(\.\d+)? s\b"), "# s"), (re.compile(r"\b(pid|port) \d+"), r"\1 #"))
 NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
 
 

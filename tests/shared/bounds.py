@@ -1,7 +1,5 @@
 """Bounds against what is really there, never below it and nearly met; judges that are starved."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -1,7 +1,5 @@
 """The commands of tests/output/commands.toml: each runs once, in one folder for all of them."""
 
-from __future__ import annotations
-
 import io
 import json
 import os

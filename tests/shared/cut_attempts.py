@@ -1,7 +1,5 @@
 """A short search and attempts at a proof, taking turns; and what a proof states."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

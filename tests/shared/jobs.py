@@ -1,7 +1,5 @@
 """Small questions that are answered at once, the command in this process, a clock that runs out."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import math

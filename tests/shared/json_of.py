@@ -4,8 +4,6 @@ Numbers are the answer's own, and null where they are not finite. What Python ca
 sentences, is a type, or several.
 """
 
-from __future__ import annotations
-
 import math
 from types import NoneType
 from typing import Any

@@ -1,7 +1,5 @@
 """The live page in a Chromium: how it is opened, waited for, and read."""
 
-from __future__ import annotations
-
 import io
 import os
 import re

@@ -1,7 +1,5 @@
 """Verdicts changed by hand: some cells missed, for causes of every kind."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import replace
 

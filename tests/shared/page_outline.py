@@ -1,7 +1,5 @@
 """What a page shows, read back from the page itself: texts, tables, legend, objects and tracks."""
 
-from __future__ import annotations
-
 import base64
 import gzip
 import re

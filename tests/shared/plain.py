@@ -1,7 +1,5 @@
 """The product's arms, surfaces, tasks and scenes as plain numbers, which the referee judges by."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any

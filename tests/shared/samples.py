@@ -1,7 +1,5 @@
 """How much is drawn at random: a little in `make test`, everything in `make campaign`."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the kernels of the search say, in words that stay: one place for their work arrays."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -18,13 +16,7 @@ from feasibility.collisions import (
     configuration_bounds,
     segment_clear,
 )
-from feasibility.roadmap import (
-    Ruling,
-    arrays_of,
-    root_box,
-    rule,
-    work_for,
-)
+from feasibility.roadmap import Ruling, arrays_of, root_box, rule, work_for
 from feasibility.roadmap.branch_and_bound import box_bounds, box_contraction
 from feasibility.roadmap.branch_and_bound.boxes import box_work
 from feasibility.roadmap.branch_and_bound.branching import DIRECTIONS

@@ -1,7 +1,5 @@
 """Works for the tests of studies: functions of a module, as workers need them."""
 
-from __future__ import annotations
-
 import os
 import signal
 import time

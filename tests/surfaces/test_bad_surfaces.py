@@ -3,8 +3,6 @@
 Read `approved/bad_*.txt`: a line for each case, with what a user is told.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import json

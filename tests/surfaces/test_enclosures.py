@@ -1,7 +1,5 @@
 """Formulas of u and v over boxes hold what they give at numbers; what is not known is infinite."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from bounds import holds

@@ -1,7 +1,5 @@
 """Surfaces from a user's formula, from grids of points, and from a class of one's own."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import fields, replace

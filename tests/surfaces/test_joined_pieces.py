@@ -1,7 +1,5 @@
 """Patches joined along seams: cut up they are the patch; creases, gaps and turns are told."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

@@ -6,18 +6,7 @@ from functools import cached_property
 import networkx as nx
 import numpy as np
 import pytest
-from mesh_patches import (
-    CONNECTED,
-    PATCHES,
-    Mesh,
-    bent,
-    box,
-    grid,
-    islands,
-    joined,
-    sheet,
-    used,
-)
+from mesh_patches import CONNECTED, PATCHES, Mesh, bent, box, grid, islands, joined, sheet, used
 from mesh_writers import refused
 from samples import sampled, spread
 

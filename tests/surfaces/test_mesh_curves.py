@@ -1,7 +1,5 @@
 """Curves between cells of meshes: on the surface within what they say, at rest over creases."""
 
-from __future__ import annotations
-
 import mesh_patches
 import numpy as np
 import pytest

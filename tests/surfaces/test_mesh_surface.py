@@ -3,8 +3,6 @@
 What holds of every kind of surface is asked of meshes in the contract of surfaces.
 """
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 from functools import cache

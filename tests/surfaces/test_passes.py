@@ -3,8 +3,6 @@
 Distances are known in closed form on surfaces that can be unrolled, or are round.
 """
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """The bracket of the treated share: against closed forms, and points drawn by the area."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -9,13 +7,7 @@ import pytest
 from mesh_patches import grid, panel_with_hole
 
 from surfaces import cylinder, plane
-from surfaces.passes import (
-    ToolLines,
-    WorkingMesh,
-    treated_share,
-    visits,
-    working_mesh,
-)
+from surfaces.passes import ToolLines, WorkingMesh, treated_share, visits, working_mesh
 
 
 def facing(mesh: WorkingMesh) -> np.ndarray:

@@ -1,7 +1,5 @@
 """Poses in place of a surface: their cells, the curves and paths between them, and their bounds."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from bounds import holds

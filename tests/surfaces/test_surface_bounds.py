@@ -3,8 +3,6 @@
 Asked of specimens and of random surfaces of every kind, at every level of every tree.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 

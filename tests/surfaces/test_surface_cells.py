@@ -1,7 +1,5 @@
 """Cells of every kind of surface, which of them are neighbours, and the curves between these."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import pickle

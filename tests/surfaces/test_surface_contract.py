@@ -4,8 +4,6 @@ Each property is written once and asked of all specimens (`tests/shared/shapes/s
 new kind is one row there, and one in `random_surfaces.py`.
 """
 
-from __future__ import annotations
-
 import math
 import pickle
 

@@ -4,8 +4,6 @@ Pairs are near and far, across seams, poles, kinks, edges and creases. Each stra
 is looked at in dense samples, against the bound that is stated for it.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from bounds import holds

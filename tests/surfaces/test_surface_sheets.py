@@ -1,7 +1,5 @@
 """Surfaces as triangles: no place is further from them than is stated."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from bounds import holds

@@ -1,7 +1,5 @@
 """Curves between cells that no arm can follow, and what is said of them and of values."""
 
-from __future__ import annotations
-
 import re
 
 import networkx as nx

@@ -1,7 +1,5 @@
 """Causes: each missed cell has one, and its figures are those of the geometry, known by hand."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """`check` itself: the same question has the same answer; budgets, progress and interruption."""
 
-from __future__ import annotations
-
 import pickle
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace

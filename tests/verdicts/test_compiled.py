@@ -1,7 +1,5 @@
 """How the search kernels are compiled: without counting references, and from what."""
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import pkgutil

@@ -1,7 +1,5 @@
 """The covering walk on hand-made roadmaps: every cell, only stored motions, few detours."""
 
-from __future__ import annotations
-
 import networkx as nx
 import numpy as np
 import pytest

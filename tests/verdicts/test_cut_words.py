@@ -1,7 +1,5 @@
 """Cut trees: which cut parts two configurations, and what trees say in words."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from asked import question

@@ -1,7 +1,5 @@
 """The oracles and the referee, to which verdicts are held: are they right themselves?"""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

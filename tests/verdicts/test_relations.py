@@ -1,7 +1,5 @@
 """Questions whose answers have a known relation: the same asked otherwise, or less asked."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -3,8 +3,6 @@
 The motions are looked at by Pinocchio and by distances from the triangles as they were given.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace

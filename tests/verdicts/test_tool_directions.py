@@ -1,7 +1,5 @@
 """Cone and roll of a task: the angles that count, against the referee and by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import plain
 import pytest

@@ -4,8 +4,6 @@ Motions are looked at by the referee, which shares no code with the product; the
 little worse are refused by the judges. Some stored problems of the oracles are asked as well.
 """
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from functools import cache

@@ -1,7 +1,5 @@
 """Entry and exit: straight along the approach direction, from and to home, inside all limits."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

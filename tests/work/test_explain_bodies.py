@@ -1,7 +1,5 @@
 """What would make a case with collisions feasible; and `check` told the motion of a case nearby."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

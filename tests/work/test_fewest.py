@@ -1,7 +1,5 @@
 """The fewest patches and stations: hundreds of small tables against brute force, and real sizes."""
 
-from __future__ import annotations
-
 from functools import reduce
 from itertools import combinations
 from operator import or_

@@ -1,7 +1,5 @@
 """`coverable path --passes`: parallel passes, run in one certified motion, or in a few."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

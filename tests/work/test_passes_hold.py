@@ -3,8 +3,6 @@
 The tool is where Pinocchio says; the surfaces are formulas and triangles of the referee.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property

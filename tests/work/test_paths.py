@@ -1,7 +1,5 @@
 """Coverage paths: replayed, judged and measured by others, their choices against brute force."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise, product

@@ -1,7 +1,5 @@
 """Orders of cells: permutations, steps between neighbours, and lengths against brute force."""
 
-from __future__ import annotations
-
 from itertools import product
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Timed motions: limits everywhere, not only at samples; the same path; replayed from outside."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 from functools import cache

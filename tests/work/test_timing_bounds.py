@@ -1,7 +1,5 @@
 """What is said of a motion between its samples, against what controllers make of these."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise

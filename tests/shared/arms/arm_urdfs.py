@@ -1,7 +1,5 @@
 """URDF texts that the tests of `robots` build, and an independent forward kinematics for them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Arms whose links are capsules, and other bodies with distances that are known by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 from arm_urdfs import joint
 from random_arms import robot_of

@@ -1,7 +1,5 @@
 """Distances of bodies by python-fcl, which the judge does not use, at samples of a motion."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

@@ -5,8 +5,6 @@ is 100 mm before the wrist. Neither the search nor inverse kinematics by numbers
 the surface's own curves: targets lie on straight lines between cell centres in a serpentine.
 """
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 from functools import cache

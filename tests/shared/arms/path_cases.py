@@ -1,7 +1,5 @@
 """Paths and trajectories that several tests look at, made once."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import asked

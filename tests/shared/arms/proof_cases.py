@@ -1,7 +1,5 @@
 """Questions whose cut trees are known: arms of two joints by hand, stored ones for PUMA and UR5."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 from pathlib import Path

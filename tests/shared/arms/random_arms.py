@@ -1,7 +1,5 @@
 """Random arms, surfaces and straight joint segments, and dense sampling by Pinocchio."""
 
-from __future__ import annotations
-
 import numpy as np
 from arm_urdfs import FREE, arm, joint
 from asked import question

@@ -11,8 +11,6 @@ for it, by name:
 case. In all of them «x»×3 is xxx, and in the x of it # counts from 0 and @ from 1.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import tomllib

@@ -1,7 +1,5 @@
 """Stores of studies that somebody tampered with, made from a seed."""
 
-from __future__ import annotations
-
 import sqlite3
 from contextlib import closing
 from pathlib import Path

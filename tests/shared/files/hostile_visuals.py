@@ -4,8 +4,6 @@ What any mesh file may have wrong stands in tests/surfaces/test_mesh_files.py; h
 which only robots have, and what grows, goes in circles or leads to other files.
 """
 
-from __future__ import annotations
-
 import io
 import os
 import struct

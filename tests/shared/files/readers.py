@@ -4,8 +4,6 @@ Whatever the bytes are, it raises one `CoverableError` with its faults, or gives
 sound: finite, in range, and the same when it is written and read again.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json
@@ -55,10 +53,7 @@ XACRO = (
     "</robot>"
 )
 STUDY = 'base.case = "paper/4a"\nvary."task.cone_deg" = [30, 45]\n'
-TREE = CutTree(
-    Cut(2, -1.43, Cut(3, 0.25, Leaf(3), Leaf(0)), Leaf(7)),
-    ((5, 3.1),),
-)
+TREE = CutTree(Cut(2, -1.43, Cut(3, 0.25, Leaf(3), Leaf(0)), Leaf(7)), ((5, 3.1),))
 """Proves nothing; whether it does is not asked of a reader."""
 
 

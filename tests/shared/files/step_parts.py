@@ -3,8 +3,6 @@
 A script, so that the libraries of Open CASCADE are not loaded beside those of Pinocchio.
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Any

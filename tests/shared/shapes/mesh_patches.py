@@ -1,7 +1,5 @@
 """Test meshes as plain vertices and faces: grids bent into shapes, and grids made irregular."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

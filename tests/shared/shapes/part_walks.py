@@ -1,7 +1,5 @@
 """Walks down trees of parts: whether places of a surface lie in what each part promises."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What any smooth patch is measured with: differences, triangles, and a search without slopes."""
 
-from __future__ import annotations
-
 import numpy as np
 
 POSE = {"position": (0.3, -1.2, 0.7), "rpy_deg": (25.0, -40.0, 110.0)}

@@ -1,7 +1,5 @@
 """Specimens of every kind of surface, extreme ones among them; and their formulas once more."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

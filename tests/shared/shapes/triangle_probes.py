@@ -1,7 +1,5 @@
 """Triangles of every shape, and a look at each of them for the place nearest to a point."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 
