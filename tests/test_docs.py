@@ -35,7 +35,6 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 
 
 def blocks(text: str, language: str) -> list[str]:
-    """The fenced blocks of one language."""
     fenced = re.findall(r"^```(\w*)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
     return [inner for named, inner in fenced if named == language]
 
@@ -118,7 +117,6 @@ def test_commands_and_links_exist(page: str) -> None:
 
 
 def table_of_cases() -> dict[str, dict[str, str]]:
-    """The README's table of the twelve cases, by case and by column."""
     section = README[README.index("## The paper's twelve") :].split("\n## ")[0]
     rows = re.findall(r"^\| (.*) \|$", section, re.M)
     head, *body = [row.split(" | ") for row in rows]

@@ -26,7 +26,6 @@ def processes(benchmark: Any) -> Any:
 
 
 def ask(*arguments: str, **more: str) -> None:
-    """Run Python, which has to end well."""
     environment = {**os.environ, **more}
     subprocess.run([sys.executable, *arguments], env=environment, check=True, capture_output=True)
 

@@ -34,7 +34,6 @@ def fk_us() -> float:
 
 
 def of_verdict(verdict: Verdict) -> dict[str, object]:
-    """What a verdict counts."""
     cells = f"{verdict.n_covered} of {len(verdict.cells)}"
     return {"verdict": str(verdict.answer), "cells": cells, "edges": verdict.n_edges,
             "FK": int(verdict.statistics["fk"])}  # fmt: skip

@@ -35,19 +35,16 @@ PEG = Obstacle.cylinder("peg", 0.02, 0.2, position=(0.15, 0.1, 0.1), frame="tabl
 
 
 def bodies_of(robot=UR5, standoff=0.02, surface=PLATE, **asked):
-    """The bodies of an arm over the plate."""
     return gather(robot, surface, Collision(**asked), standoff)
 
 
 def clearances(bodies):
-    """What is asked for, by pair."""
     asked = {frozenset((pair.first, pair.second)): pair.clearance for pair in bodies.pairs}
     assert len(asked) == len(bodies.pairs), "a pair is asked for twice"
     return asked
 
 
 def left_out(bodies, why=None):
-    """Pairs that are left out, for a reason."""
     return {frozenset((x.first, x.second)) for x in bodies.left_out if why in (None, x.why)}
 
 
@@ -267,7 +264,6 @@ def test_tool_shapes_move_with_the_last_joint():
 
 
 def keys_of(make):
-    """The keys of the faults of a call."""
     with pytest.raises(ArgumentError) as caught:
         make()
     return {fault.key for fault in caught.value.faults}

@@ -25,7 +25,6 @@ AT = (0.5, -0.15, 0.3)
 
 
 def without_bottom(body):
-    """The faces of a body that do not look down."""
     kept = trimesh.Trimesh(body.vertices, body.faces[body.face_normals[:, 2] > -0.5])
     return TriangleMesh(kept.vertices, kept.faces)
 

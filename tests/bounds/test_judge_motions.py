@@ -170,7 +170,6 @@ def test_damaged_rasters_are_refused(made, damage):
 
 
 def test_marks_are_checked(made):
-    """Wrong, swapped, missing and impossible marks."""
     cell, misplaced = marks_of(made), "is not at its centre's target"
     rows = np.flatnonzero(cell >= 0)
     first, other = rows[0], rows[cell[rows] != cell[rows[0]]][0]
@@ -261,7 +260,6 @@ LEVEL = 0.31  # m, where the tool of the raster over the plane is
 
 
 def two_plates(gap):
-    """Two flat pieces, one above the other."""
     levels = LEVEL, LEVEL + gap
     pieces = [plane((0.35, 0.55), (-0.1, 0.1), position=(0, 0, z)) for z in levels]
     return piecewise(pieces, side="outside").cells((4, 5))

@@ -54,12 +54,10 @@ class Known(NamedTuple):
 
 
 def up_to(rng, most):
-    """A random number up to `most`, often `most` itself."""
     return most if rng.random() < EXACT else most * rng.random()
 
 
 def across(rng, vector):
-    """A random unit vector square to another."""
     found = np.cross(vector, rng.normal(size=3))
     return found / np.linalg.norm(found)
 
@@ -287,7 +285,6 @@ def test_children_of_a_part_hold_all_of_it(axis):
 
 
 def cells_of(surface):
-    """A few cells, however the kind is cut."""
     if surface.kind == "mesh":
         return surface.cells(count=20)
     return surface.cells((3, 4)) if surface.kind == "piecewise" else surface.cells(4, 5)

@@ -153,7 +153,6 @@ def test_exchanged_cells_and_cuts_of_other_joints_are_refused_where_a_motion_ref
 
 
 def random_tree(rng, robot, cells, depth=0):
-    """Any tree: random joints, values inside the limits, cells."""
     if depth == 3 or rng.random() < 0.35 * depth:
         return Leaf(int(rng.integers(cells)))
     joint = int(rng.integers(robot.n))
@@ -242,7 +241,6 @@ def test_what_tick_raises_ends_the_verification():
 
 
 def strip_of(kind):
-    """The strip as a mesh, a spline patch or two pieces."""
     if kind == "mesh":
         u, v, faces = mesh_patches.grid(1, 10)
         corners = np.stack([0.99 + 0.02 * u, -0.25 + 0.5 * v, 0.0 * u], axis=1)

@@ -124,7 +124,6 @@ SPECIAL = {
 
 
 def special(kind: str, folder: Path, file: str) -> Path:
-    """What is no regular file."""
     path = folder / kind / file
     path.parent.mkdir(parents=True)
     if kind == "folder":

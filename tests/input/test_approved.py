@@ -30,12 +30,10 @@ MASKS = {
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where the files lie that bad ones name."""
     return bad_input.lay_out(tmp_path_factory.mktemp("input"))
 
 
 def read(reader: str, name: str, folder: Path) -> str:
-    """Read a bad input; what is odd about what came of it."""
     one = bad_input.bad(reader)[name]
     if one.good == "set":
         load_case("paper/4a", list(map(bad_input.many, one.change))).build()

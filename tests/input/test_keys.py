@@ -50,7 +50,6 @@ KINDS = {
 
 
 def tables_of(kind: str) -> Tables:
-    """A good case with this kind of surface."""
     tables = tomllib.loads(bad_input.goods("case")["sphere" if kind in KINDS else kind])
     if kind in KINDS:
         tables["surface"] = {"kind": kind, **KINDS[kind]}
@@ -92,7 +91,6 @@ def faults_of(tables: Tables) -> dict[str, Fault]:
 
 
 def with_value(key: Key, value: object) -> tuple[dict[str, Fault], str]:
-    """The faults of a good case with one key set, and the key as messages write it."""
     tables, table, name = place_of(key)
     if key.name in ALTERNATIVES:
         table.pop(ALTERNATIVES[key.name], None)

@@ -152,5 +152,4 @@ def test_files_that_grow_when_they_are_read(tmp_path: Path) -> None:
 
 
 def as_setting(path: Path) -> object:
-    """The text of a file as a setting of a built-in case."""
     return load_case("paper/4a", [path.read_text("utf-8", errors="replace").strip()])

@@ -25,8 +25,6 @@ def text_of(names=NAMES, rows=ROWS, separator: str = ",") -> str:
 
 @pytest.fixture
 def read(tmp_path: Path):
-    """Read a text as a motion of a robot."""
-
     def reading(text: str, robot: Robot = PUMA):
         (tmp_path / "motion.csv").write_bytes(text.encode())
         return load_motion(tmp_path / "motion.csv", robot)

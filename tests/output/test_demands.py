@@ -93,7 +93,6 @@ def test_every_key_is_a_demand_with_a_judge_or_has_a_reason_to_be_none():
 
 @pytest.fixture(scope="module")
 def known(tmp_path_factory):
-    """A feasible case: its file, its motion, its result, and the result of the greedy search."""
     folder = tmp_path_factory.mktemp("demands")
     case, motion, found, tree = (str(folder / name) for name in ("a.toml", "a.csv", "a", "tree"))
     (folder / "a.toml").write_text(CASE)

@@ -36,7 +36,6 @@ def ur5():
 
 
 def poses(count, seed=0):
-    """Poses in front of the arm."""
     rng = np.random.default_rng(seed)
     low, high = [0.3, -0.4, 0.1, -40, -40, -90], [0.8, 0.4, 0.5, 40, 40, 90]
     return [Pose.of_values(row) for row in rng.uniform(low, high, (count, 6)).round(6)]
@@ -76,13 +75,11 @@ def objects(commands):
 
 
 def colour_of(view, path):
-    """The colour that an object is drawn in."""
     (command,) = (c for c in view.commands if c["type"] == "set_object" and c["path"] == path)
     return command["object"]["materials"][0]["color"]
 
 
 def classes_of(view):
-    """Label -> entry of every class in the legend."""
     return {e.label: e for e in view.legend.entries if e.path and e.path.startswith("/poses/")}
 
 

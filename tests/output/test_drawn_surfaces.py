@@ -48,13 +48,11 @@ def cells():
 
 @pytest.fixture(scope="module")
 def on_mesh(puma, cells):
-    """The dome as a mesh, some cells missed."""
     return missing(check(puma, cells, Task(0.005, 45)), MISSED)
 
 
 @pytest.fixture(scope="module")
 def on_grid(puma):
-    """The dome as a grid, some cells missed."""
     return missing(check(puma, DOME.cells(5, 6), Task(0.005, 45)), {5, 6, 13, 14, 15, 22})
 
 

@@ -30,8 +30,6 @@ PLATE = Case.from_toml(FILES["plate.toml"], name="plate")
 
 
 class Client:
-    """A page, without a browser."""
-
     def __init__(self, page):
         self.page, self.number = page, 0
         self.session = self.post("open")["session"]

@@ -48,7 +48,6 @@ def placed(commands):
 
 
 def place_of(commands, path):
-    """(4, 4) of the group at a path in the world."""
     places, place, names = placed(commands), np.eye(4), path.strip("/").split("/")
     for k in range(len(names)):
         place = place @ places.get("/" + "/".join(names[: k + 1]), np.eye(4))

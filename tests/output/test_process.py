@@ -33,7 +33,6 @@ SMALL = ("check", "paper/4a", "--set", "surface.cells=[2, 2]")
 
 
 def run(*args, **options):
-    """Run the command as a process of its own."""
     given = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True} | options
     return subprocess.run([*COMMAND, *args], timeout=GUARD_S, check=False, cwd=ROOT, **given)
 

@@ -70,7 +70,6 @@ def test_feasible_values_allow_more_and_others_less_by_a_digit_at_most(kind, val
 
 @pytest.fixture(scope="module")
 def plate(commands):
-    """The plate of the table, and its verdict."""
     case = load_case(commands.folder / "plate.toml")
     return case, check(*case.build())
 

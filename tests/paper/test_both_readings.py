@@ -40,14 +40,12 @@ PATCHES = {
 
 
 def both(cells, task, search):
-    """The compiled and the literal search from the same start, and the cell it is over."""
     literal = LiteralSearch.of(PUMA, cells, task, search)
     space = JSpace(PUMA, cells, task, literal.start, search, literal.steps)
     return space, literal, space.cell_of(np.zeros(PUMA.n, dtype=np.int32))
 
 
 def assert_agree(tree, literal, by_call=True):
-    """The same tree, the same graph, the same path in each call, as many J-cells looked at."""
     found = literal.algorithm_2()
     assert tree.capped == 0, "a capped call is no answer; take smaller cells"
     assert {a: tree.parent.get(a) for a in tree.jcell} == found.T

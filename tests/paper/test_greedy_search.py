@@ -43,7 +43,6 @@ def verdict_of(name: str, moves: str) -> Verdict:
 
 
 def test_sphere_as_published() -> None:
-    """4a: 90 cells, 305 calls, 305 edges, at the paper's step."""
     _, _, robot, cells, task, _ = question("paper 4a")
     verdict = greedy_check(robot, cells, task, Search(method="greedy"))
     assert verdict.answer is Answer.FEASIBLE

@@ -29,7 +29,6 @@ def read(arm: str) -> list[tuple[Problem, Answer]]:
 
 
 def draw(rng: np.random.Generator, arm: str = "puma560") -> Problem:
-    """One of the stored problems, at random."""
     problems = read(arm)
     return problems[int(rng.integers(len(problems)))][0]
 

@@ -281,7 +281,6 @@ def test_links_and_objects_agree_on_what_is_a_solid(name):
 
 
 def test_tangled_bodies_look_outwards():
-    """Two boxes, all faces turned at random."""
     faces = np.concatenate([CUBE.faces, 8 + CUBE.faces])
     turned = np.random.default_rng(0).random(24)[:, None] < 0.5
     both = np.concatenate([CUBE.vertices, CUBE.vertices + 5.0])

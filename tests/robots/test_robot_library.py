@@ -70,7 +70,6 @@ def test_tools_point_away_from_the_arm(robot):
 
 
 def tree(edges):
-    """A URDF of (parent, child, whether the joint turns)."""
     names = dict.fromkeys(name for parent, child, _ in edges for name in (parent, child))
     links = "".join(f'<link name="{name}"/>' for name in names)
     joints = "".join(
@@ -83,7 +82,6 @@ def tree(edges):
 
 
 def fixed(*edges):
-    """An arm of two joints, and links fixed to it as (parent, child)."""
     rest = [(parent, child, child in ("left", "right")) for parent, child in edges]
     return [("base_link", "upper", True), ("upper", "wrist", True), *rest]
 

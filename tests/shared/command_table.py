@@ -73,7 +73,6 @@ class Commands:
             os.chdir(before)
 
     def page(self, command: str, name: str) -> str:
-        """The page that a command with --html wrote."""
         self.run(command, name)
         words = self.words(command, name)
         return (self.folder / words[words.index("--html") + 1]).read_text("utf-8")

@@ -45,7 +45,6 @@ search = { method = "greedy", step_deg = 0.05 }
 
 @cache
 def case_named(name: str) -> Case:
-    """The case of that name."""
     return Case.from_toml(TEXTS[name], name=name)
 
 

@@ -51,7 +51,6 @@ def there(**parts: Any) -> Json:
 
 
 def degrees(angle: float | None) -> float | None:
-    """An angle in rad, in degrees."""
     return None if angle is None else math.degrees(angle)
 
 
@@ -200,7 +199,6 @@ def of_verify(one: Any) -> Json:
 
 
 def of_path(one: Any) -> Json:
-    """A path with its timed motion."""
     path, figures, rates, ends = one.path, one.path.figures, one.rates, one.ends
     return {
         "verdict": "feasible", "order": path.order, "cells": int(path.needed.sum()),
@@ -363,7 +361,6 @@ def with_unit(quantity: Any, key: str, value: float | None) -> Json:
 
 
 def finding(quantity: Any, one: Any) -> Json | None:
-    """A verdict at one value of a threshold's quantity."""
     return None if one is None else {
         **with_unit(quantity, "value", one.value), "verdict": one.answer,
         "evidence": one.evidence, "detail": one.detail, "unaided": one.unaided,

@@ -34,7 +34,6 @@ GREEN = "#219954"  # of covered cells
 
 @contextmanager
 def chromium():
-    """The browser that CHROMIUM names, or that is on the path."""
     path = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
     if path is None:
         pytest.fail("there is no Chromium on the path, and CHROMIUM names none")
@@ -57,7 +56,6 @@ def opened(browser, live):
 
 
 def certified(page, kind="feasible|infeasible|undecided"):
-    """Wait for the certified answer."""
     expect(page.locator("#answer")).to_have_class(re.compile(rf"^({kind}) *$"), timeout=PATIENCE_MS)
 
 

@@ -489,7 +489,6 @@ class Shape(NamedTuple):
 
 
 def fcl_object(geometry: tuple) -> Any:
-    """A geometry for fcl."""
     import fcl
 
     match geometry:

@@ -7,12 +7,10 @@ from pathlib import Path
 
 
 def double(tables):
-    """Twice a number."""
     return {"verdict": "feasible", "double": 2 * tables["number"]}
 
 
 def double_slowly(tables):
-    """Twice a number, after a while."""
     time.sleep(0.01)
     return double(tables)
 
@@ -28,7 +26,6 @@ def double_but_the_first_is_last(tables):
 
 
 def whoami(tables):
-    """The process that works."""
     return {"pid": os.getpid()}
 
 

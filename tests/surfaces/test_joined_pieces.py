@@ -32,7 +32,6 @@ WHOLE = {
 
 
 def strip(half_turns, count=6):
-    """A ring of splines that twists by some half turns."""
     pieces = []
     for k in range(count):
         share = np.linspace(k, k + 1, 4)[:, None] / count
@@ -57,7 +56,6 @@ def alike(request):
 
 
 def names(cells):
-    """Cells by their rounded centres, whatever their numbers."""
     return [tuple(np.round(centre, 9) + 0.0) for centre in cells.centres]
 
 

@@ -41,8 +41,6 @@ TEXT, OFF, GREAT = w.text_stl(V, F), w.off(V, F), 512 << 20
 
 
 def sparse(head: bytes, size: int):
-    """A file that is large by its size only."""
-
     def make(path: Path) -> None:
         path.write_bytes(head)
         os.truncate(path, size)
@@ -51,7 +49,6 @@ def sparse(head: bytes, size: int):
 
 
 def zipped() -> bytes:
-    """An archive that inflates to 16 MB of zeros."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("part.stl", bytes(16 << 20))
@@ -63,7 +60,6 @@ def head(*lines: str, kind: str = "ascii") -> bytes:
 
 
 def ply_faces(*polygons: str) -> bytes:
-    """Text with the cube's vertices."""
     first = head("element vertex 8", *XYZ, f"element face {len(polygons)}", LIST)
     return first + "\n".join([" ".join(map(str, row)) for row in V] + [*polygons, ""]).encode()
 

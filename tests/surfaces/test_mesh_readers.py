@@ -54,7 +54,6 @@ METRES = {"mm": 1e-3, "millimeters": 1e-3, "cm": 1e-2, "in": 0.0254, "inches": 0
 
 
 def ball(radius, units=None):
-    """A ball of trimesh, in some unit."""
     made = trimesh.creation.icosphere(subdivisions=1, radius=radius)
     if units is not None:
         made.units = units

@@ -37,7 +37,6 @@ def smooth(request):
 
 
 def form_of(surface):
-    """By the referee, who has to be told of a user's formula."""
     if surface.kind != "parametric":
         return surface_of(surface)
     return Form(

@@ -270,7 +270,6 @@ def test_no_path_is_known_between_faces_and_pieces_that_are_apart():
 
 
 def test_places_that_are_none(named):
-    """NaN in, NaN out."""
     _, surface = named
     offset = offset_surface(surface, 0.01)
     points = np.full((2, 3), np.nan)

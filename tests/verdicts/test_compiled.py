@@ -18,7 +18,6 @@ from surfaces import plane
 
 
 def dispatchers() -> Iterator[tuple[str, Any]]:
-    """All compiled functions of the package."""
     for found in pkgutil.walk_packages(feasibility.__path__, "feasibility."):
         if "__main__" in found.name:
             continue
@@ -29,13 +28,11 @@ def dispatchers() -> Iterator[tuple[str, Any]]:
 
 
 def holds_arrays(kind: types.Type) -> bool:
-    """Is there an array in a type?"""
     inner = kind.types if isinstance(kind, types.BaseTuple) else ()
     return isinstance(kind, types.Array) or any(map(holds_arrays, inner))
 
 
 def tuples_in(kind: types.Type) -> Iterator[type]:
-    """The classes of all named tuples in a type."""
     if isinstance(kind, types.BaseNamedTuple):
         yield kind.instance_class
     for inner in kind.types if isinstance(kind, types.BaseTuple) else ():

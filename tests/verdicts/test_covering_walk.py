@@ -26,7 +26,6 @@ def roadmap_of(graph, cells, cell_of=None, rng=None):
 
 
 def visits(graph, cells, **options):
-    """The cells that the walk of a connected graph visits, in order; all of them."""
     roadmap, _ = roadmap_of(graph, cells, **options)
     order = assert_walked(roadmap, covering_walk(roadmap, 0))
     assert set(order) == set(range(cells))

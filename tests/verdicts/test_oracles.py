@@ -22,7 +22,6 @@ ARMS = ("puma560", "ur5", "panda", "kinova", "xarm7", "z1", "so101", "talos_left
 
 
 def paper_case(name):
-    """A published case as the oracles read it."""
     asked, made = question(name), tables_of(name)["surface"]
     size = tuple(made[key] for key in ("radius", "flare") if key in made)
     u, v = (tuple(made[key] if key in made else made[f"{key}_deg"]) for key in "uv")

@@ -131,7 +131,6 @@ def test_finer_cells_lose_only_new_ones(name):
 
 
 def same(one, other):
-    """The same answer, for the same cells."""
     assert one.answer is other.answer
     assert one.n_covered == other.n_covered
     # Two components may cover as many cells: the same sets have to be there.

@@ -84,7 +84,6 @@ def posed(pan_deg):
 
 @cache
 def behind(low, high):
-    """A cylinder patch behind the UR5, 60 degrees wide."""
     return divide(posed((low, high)), BEHIND.cells(12, 4), TASK)
 
 

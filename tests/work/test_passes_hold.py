@@ -37,8 +37,6 @@ BLENDED = math.radians(2.0)  # how far normals of triangles may be from otherwis
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """One random case."""
-
     arm: str
     surface: Any
     task: Task
@@ -69,7 +67,6 @@ class Drawn:
 
 
 def drawn(number):
-    """The case of a number."""
     rng = np.random.default_rng([28, number])
     arm = tuple(ARMS)[number // len(KINDS) % len(ARMS)]
     surface = surface_of(KINDS[number % len(KINDS)], rng, ARMS[arm])

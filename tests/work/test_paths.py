@@ -76,7 +76,6 @@ TUBES = {
 
 @cache
 def tube(name):
-    """The verdict of a closed cylinder."""
     arm, radius, side, (x, z), height, cone, standoff = TUBES[name]
     ring = cylinder(radius, (0, 360), (0, height), position=(x, 0, z), side=side)
     return check(load_robot(arm), ring.cells(12, 6), Task(standoff=standoff, cone_deg=cone))

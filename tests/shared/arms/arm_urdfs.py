@@ -60,7 +60,6 @@ def joint(
 
 
 def arm(joints: Sequence[str], more: str = "") -> str:
-    """A URDF of the links l0, l1, ... and the joints given."""
     links = "".join(f'<link name="l{i}"/>' for i in range(len(joints) + 1))
     return f'<robot name="test_arm">{links}{"".join(joints)}{more}</robot>'
 
@@ -88,7 +87,6 @@ def random_arm(rng: np.random.Generator) -> str:
 
 
 def load_text(folder: Path, text: str, **options: object) -> Robot:
-    """Write a URDF into `folder` and load it."""
     path = folder / "test_arm.urdf"
     path.write_text(text, encoding="utf-8")
     return load_robot(path, **options)  # type: ignore[arg-type]

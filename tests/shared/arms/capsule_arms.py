@@ -23,7 +23,6 @@ def planar_arm(lengths, kinds=None, axes=None):
 
 
 def capsule_links(lengths, radius):
-    """A capsule along each link."""
     turn = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]
     return tuple(
         Solid(f"link{k}", k, at(0.5 * length, rotation=turn), Capsule(radius, length))
@@ -32,7 +31,6 @@ def capsule_links(lengths, radius):
 
 
 def at(x=0.0, y=0.0, z=0.0, rotation=None):
-    """A placement (4, 4)."""
     place = np.eye(4)
     place[:3, 3] = x, y, z
     if rotation is not None:

@@ -117,7 +117,6 @@ def places_along(cells, task):
 
 @cache
 def raster(name: str) -> Raster:
-    """A raster over one of `SURFACES`."""
     cells, task = SURFACES[name](), LAX if name == "sheets" else TASK
     points, axes = places_along(cells, task)
     roll = 0.2 * np.sin(np.linspace(0.0, 9.0, len(points)))

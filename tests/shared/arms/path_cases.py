@@ -23,7 +23,6 @@ SPEED = 0.15  # [m/s]
 
 @cache
 def patch_verdict(name):
-    """A plate for the UR5, a piece of a ball for the panda."""
     if name == "ur5":
         patch = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside")
     else:
@@ -33,7 +32,6 @@ def patch_verdict(name):
 
 @cache
 def verdict_of(name):
-    """The verdict of a paper case or a patch."""
     if name in COARSE:
         return check(*load_case(f"paper/{COARSE[name]}", ["surface.cells=[4, 4]"]).build())
     return patch_verdict(name) if name in PATCHES else asked.verdict_of(f"paper {name}")
@@ -47,5 +45,4 @@ def path_of(name, order=None):
 
 @cache
 def run_of(name):
-    """Its trajectory at `SPEED`."""
     return trajectory(path_of(name), SPEED)

@@ -17,14 +17,12 @@ RIGHT_ANGLES = (-np.pi / 2, 0.0, np.pi / 2, np.pi)
 
 
 def robot_of(joints: list[str], approach_axis: tuple[float, ...] = (0.0, 0.0, 1.0)) -> Robot:
-    """The arm of joints written by `arm_urdfs.joint`."""
     root = parse_xml(arm(joints).encode(), "URDF text", encoding="utf-8")
     checked = checked_tree(root, "URDF text", "/nowhere", ())
     return robot_from_urdf(checked, name="test_arm", approach_axis=approach_axis)
 
 
 def random_arm(rng: np.random.Generator, least: int = 3, most: int = 8) -> Robot:
-    """A serial chain of `least` to `most` free joints."""
     n = int(rng.integers(least, most + 1))
     square = rng.random() < 0.5
     joints = []
@@ -56,7 +54,6 @@ def rail_arm(base: str, stroke: tuple[float, float] = (-0.5, 0.8)) -> Robot:
 
 
 def finite_limits(robot: Robot, far: float = 2.0 * np.pi) -> tuple[Floats, Floats]:
-    """Lower and upper limits (n,), with `far` where there are none."""
     return (
         np.where(np.isfinite(robot.lower), robot.lower, -far),
         np.where(np.isfinite(robot.upper), robot.upper, far),

@@ -93,7 +93,6 @@ def changed(text: str, change: str | list[str]) -> str:
 
 @cache
 def goods(reader: str) -> dict[str, str]:
-    """The good texts of a reader, by name; those of cases whole."""
     found: dict[str, str] = dict(_tables(reader).get("good", {}))
     if "head" in found:  # cases, a line each
         found = {name: text.replace(" ; ", "\n") + "\n" for name, text in found.items()}
@@ -103,7 +102,6 @@ def goods(reader: str) -> dict[str, str]:
 
 @cache
 def bad(reader: str) -> dict[str, Bad]:
-    """The bad inputs of a reader, by name."""
     found = {}
     for table, changes in _tables(reader).items():
         for name, change in changes.items() if table != "good" else ():
@@ -136,7 +134,6 @@ NET_POINTS = [[[0.1 * i, 0.1 * j, 0.01 * i * j] for j in range(3)] for i in rang
 
 
 def net_csv() -> bytes:
-    """The same net, as rows."""
     rows = [f"{i},{j},{x!r},{y!r},{z!r}" for i, row in enumerate(NET_POINTS)
             for j, (x, y, z) in enumerate(row)]  # fmt: skip
     return "\n".join(["row,column,x,y,z", *rows, ""]).encode()

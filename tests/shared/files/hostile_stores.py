@@ -19,7 +19,6 @@ Row = tuple[Any, ...]
 
 
 def study_with_store(folder: Path) -> Path:
-    """Run a study of two cases in a folder, with its store `out.study`; returns the folder."""
     (folder / "study.toml").write_text(STUDY)
     asked = ["study", str(folder / "study.toml"), "--out", str(folder / "out.study")]
     assert main([*asked, "--workers", "0"]) == 0
@@ -33,7 +32,6 @@ def rows(path: Path) -> list[Row]:
 
 
 def put(path: Path, row: Row) -> None:
-    """Replace a row."""
     with closing(sqlite3.connect(path)) as base:
         base.execute("INSERT OR REPLACE INTO tasks VALUES (?, ?, ?, ?, ?)", row)
         base.commit()

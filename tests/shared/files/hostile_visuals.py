@@ -34,7 +34,6 @@ def urdf(visuals: str) -> str:
 
 
 def visual(name: str, more: str = "") -> str:
-    """One visual that names a mesh."""
     return f'<visual>{more}<geometry><mesh filename="{name}"/></geometry></visual>'
 
 
@@ -79,7 +78,6 @@ def geometry(name: str, primitive: str = "", triangles: int = 1) -> str:
 
 
 def shown(name: str = "one", times: int = 1) -> str:
-    """A geometry, shown so many times."""
     return f"<instance_geometry url='#{name}'/>" * times
 
 
@@ -252,7 +250,6 @@ LARGE: dict[str, tuple[str, Callable[[], str | bytes]]] = {
 
 
 def make(name: str, folder: Path) -> tuple[Path, str]:
-    """Write one robot; gives the path of its URDF and the words of the note."""
     ending, content, words = TRAPS[name] if name in TRAPS else (*LARGE[name], DRAWN)
     folder.mkdir(parents=True)
     os.mkfifo(folder / BESIDE)

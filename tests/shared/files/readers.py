@@ -276,7 +276,6 @@ def _other_array(array: np.ndarray, kind: str, value: Any) -> bytes:
 
 
 def of_bad(reader: str, name: str) -> bytes:
-    """The bytes of a bad input of the tables."""
     one = bad_input.bad(reader)[name]
     return damaged(one.good, one.change) if isinstance(one.change, dict) else one.content
 

@@ -11,7 +11,6 @@ def random_parameters(surface, count, seed=7):
 
 
 def triangle_area(surface, count):
-    """Area of the triangles over a grid of parameters."""
     u, v = (np.linspace(*ends, count + 1) for ends in (surface.u_range, surface.v_range))
     p = surface.point(u[:, None], v[None, :])
     a, b, c, d = p[:-1, :-1], p[1:, :-1], p[1:, 1:], p[:-1, 1:]
@@ -63,7 +62,6 @@ def _least_near(surface, point, lines, start):
 
 
 def same_surface(one, other, tolerance=0.0):
-    """Both give the same points, normals and closest points."""
     u, v = random_parameters(one, 200)
     points = one.point(u, v) + 0.01 * one.normal(u, v)
     a, b = one.closest(points), other.closest(points)

@@ -163,7 +163,6 @@ ALL = {**SMOOTH, **FACETED}
 
 
 def cells_of(surface, nu, nv):
-    """About nu x nv cells of any surface, of each piece."""
     if surface.kind == "mesh":
         return surface.cells(count=max(nu * nv // 2, 1))
     if surface.kind == "piecewise":
@@ -202,7 +201,6 @@ EQUAL = {
 
 
 def sampled(formula, u, v, counts):
-    """(m, n, 3) points of a formula at equal steps."""
     lines = [np.linspace(*ends, count) for ends, count in zip((u, v), counts, strict=True)]
     x, y = (part.reshape(-1) for part in np.meshgrid(*lines, indexing="ij"))
     points = formula(x, y)

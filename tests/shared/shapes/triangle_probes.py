@@ -31,7 +31,6 @@ def least_distances(corners: Array, points: Array) -> Array:
 
 
 def scattered(count: int, size: float, rng: np.random.Generator) -> Array:
-    """Triangles of one size, anywhere."""
     return rng.normal(size=(count, 1, 3)) + size * rng.normal(size=(count, 3, 3))
 
 
