@@ -11,6 +11,7 @@ from random_arms import random_arm
 from random_surfaces import KINDS, random_surface
 from samples import sampled, seeds
 from scipy.spatial.transform import Rotation
+from specimens import cells_of
 
 from feasibility import Task
 from feasibility.certification.cut_proofs.box_cutting import cut, smaller
@@ -284,17 +285,11 @@ def test_children_of_a_part_hold_all_of_it(axis):
 # -- parts and their surface ----------------------------------------------------------------------
 
 
-def cells_of(surface):
-    if surface.kind == "mesh":
-        return surface.cells(count=20)
-    return surface.cells((3, 4)) if surface.kind == "piecewise" else surface.cells(4, 5)
-
-
 @sampled
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", seeds(1, all=10))
 def test_parts_hold_the_places_of_their_surface_and_not_those_of_another(kind, seed):
-    cells = cells_of(random_surface(kind, np.random.default_rng(seed)))
+    cells = cells_of(random_surface(kind, np.random.default_rng(seed)), 4, 5)
     parts = cells.surface.parts(1e-2, 0.1, 2000)
     assert disagreement(cells, parts) == ""
     size = np.ptp(cells.centres, axis=0).max()

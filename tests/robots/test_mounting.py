@@ -9,7 +9,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 import referee
-from arm_urdfs import arm, joint, load_text, random_arm, random_q, said
+from approved import refused
+from arm_urdfs import arm, joint, load_text, random_arm, random_q
 from scipy.spatial.transform import Rotation
 
 from robots import Axis, Kinematics, list_robots, load_robot
@@ -292,18 +293,18 @@ def test_axes_are_locked_and_limited_and_leave_names_alone(tmp_path):
 def test_what_makes_no_sense(approved, cell):
     good = {"name": "rail", "kind": "prismatic", "axis": (1, 0, 0), "limits": (0, 1)}
     assert Axis(**good).axis == (1.0, 0.0, 0.0)
-    lines = [f"axis {wrong}: {said(Axis, **{**good, **wrong})}" for wrong in (
+    lines = [f"axis {wrong}: {refused(Axis, **{**good, **wrong})}" for wrong in (
         {"kind": "screw"}, {"name": " "}, {"limits": None}, {"limits": (2, 1)},
         {"limits": None, "limits_deg": (0, 1)}, {"axis": (0, 0, 0)}, {"position": (0, 0)},
         {"carries": "tool"}, {"max_velocity": 0.0},
     )]  # fmt: skip
     many = [Axis(f"a{k}", "revolute") for k in range(21)]
-    lines += [f"axes {name}: {said(load_robot, 'ur5', axes=axes)}" for name, axes in {
+    lines += [f"axes {name}: {refused(load_robot, 'ur5', axes=axes)}" for name, axes in {
         "twice": [RAIL, RAIL], "a joint": [Axis("elbow_joint", "revolute")],
         "a link": [Axis("tool0", "revolute")],
         "many": many, "a word": "rail",
     }.items()]  # fmt: skip
-    lines += [f"{name}: {said(load_robot, 'ur5', **asked)}" for name, asked in {
+    lines += [f"{name}: {refused(load_robot, 'ur5', **asked)}" for name, asked in {
         "kilometres": {"tcp": ((0, 0, 1e4), (0, 0, 0))},
         "NaN": {"tcp": ((0, 0, np.nan), (0, 0, 0))},
         "a letter": {"tcp": ((0, 0, 0), "z")}, "mirror": {"tcp": np.diag([1, 1, -1, 1])},
@@ -312,12 +313,12 @@ def test_what_makes_no_sense(approved, cell):
         "all": {"tcp": 7, "base": ((0, 0, 2e4), (0, 0, 0)), "reference_axis": (0, 0, 0)},
     }.items()]  # fmt: skip
     lines += [
-        f"{asked}: " + said(load_robot, cell, **{"tool_frame": "tool0", **asked}) for asked in (
+        f"{asked}: " + refused(load_robot, cell, **{"tool_frame": "tool0", **asked}) for asked in (
             {"surface_link": "jib"}, {"surface_link": "tool0"}, {"surface_link": "ee_link"},
             {"surface_link": "hall", "tool_frame": "hall"},
             {"surface_link": "jig", "tool_frame": "cradle", "lock": {"turn": 1.0}},
         )
     ]  # fmt: skip
-    lines.append("alike: " + said(replace, load_robot("ur5"), reference_axis=(0, 0, 1)))
+    lines.append("alike: " + refused(replace, load_robot("ur5"), reference_axis=(0, 0, 1)))
     text = "\n".join(lines).replace(cell, "CELL").replace(load_robot("ur5").urdf, "UR5")
     approved("bad_mounting", text)

@@ -6,7 +6,8 @@ from importlib.metadata import distribution
 import numpy as np
 import pinocchio as pin
 import pytest
-from arm_urdfs import arm, joint, load_text, random_q, said
+from approved import refused
+from arm_urdfs import arm, joint, load_text, random_q
 from samples import sampled, seeds
 
 from robots import Kinematics, RobotError, list_robots, load_robot
@@ -221,10 +222,10 @@ def test_what_is_refused_by_name_frame_and_lock(approved, tmp_path):
         {"panda_joint1": True}, {"a": 0.0, "panda_joint1": 9.0},
         {f"panda_joint{i}": -0.07 * (i == 4) for i in range(1, 8)},
     )]  # fmt: skip
-    lines = [f"{name} {options}: {said(load_robot, name, **options)}" for name, options in asked]
+    lines = [f"{name} {options}: {refused(load_robot, name, **options)}" for name, options in asked]
     forked = tree(fixed(("upper", "side"), ("wrist", "end")))
     for options in ({}, {"tool_frame": "sid"}, {"tool_frame": "base_link"}):
-        lines.append(f"fork {options}: {said(load_text, tmp_path, forked, **options)}")
+        lines.append(f"fork {options}: {refused(load_text, tmp_path, forked, **options)}")
     approved("bad_loads", "\n".join(lines).replace(load_robot("panda").urdf, "PANDA"))
 
 

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from arm_urdfs import UNLIKE, arm, joint, load_text, random_arm, random_q, said, unlike
+from approved import refused
+from arm_urdfs import UNLIKE, arm, joint, load_text, random_arm, random_q, unlike
 from samples import sampled, seeds
 
 from robots import Kinematics, load_robot
@@ -35,9 +36,9 @@ LIMITS = {
 
 
 def test_parts_and_limits_that_do_not_fit_together_are_refused(approved):
-    lines = [f"{name}: {said(replace, PUMA, **change)}" for name, change in CHANGES.items()]
-    lines += [f"limits {name}: {said(PUMA.with_limits, x)}" for name, x in LIMITS.items()]
-    lines.append("no sets: " + said(load_robot, "ur5", limits="set-1"))
+    lines = [f"{name}: {refused(replace, PUMA, **change)}" for name, change in CHANGES.items()]
+    lines += [f"limits {name}: {refused(PUMA.with_limits, x)}" for name, x in LIMITS.items()]
+    lines.append("no sets: " + refused(load_robot, "ur5", limits="set-1"))
     approved("bad_robots", "\n".join(lines))
 
 

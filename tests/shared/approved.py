@@ -9,8 +9,17 @@ from pathlib import Path
 
 import pytest
 
+from coverable_errors import CoverableError
+
 MASKS = ((re.compile(r"\d+(\.\d+)? s\b"), "# s"), (re.compile(r"\b(pid|port) \d+"), r"\1 #"))
 NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
+
+
+def refused(make, *arguments, **named) -> str:
+    """What is said by a refusal, on one line."""
+    with pytest.raises(CoverableError) as caught:
+        make(*arguments, **named)
+    return " / ".join(str(caught.value).splitlines())
 
 
 class Approved:

@@ -6,8 +6,8 @@ from functools import cached_property
 import networkx as nx
 import numpy as np
 import pytest
+from approved import refused
 from mesh_patches import CONNECTED, PATCHES, Mesh, bent, box, grid, islands, joined, sheet, used
-from mesh_writers import refused
 from samples import sampled, spread
 
 from surfaces import mesh

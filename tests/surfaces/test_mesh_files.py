@@ -15,6 +15,7 @@ from pathlib import Path
 import mesh_writers as w
 import numpy as np
 import pytest
+from approved import refused
 from mesh_writers import GOOD, nested_scene
 
 from surfaces.meshes import read_mesh
@@ -246,7 +247,7 @@ def folder(tmp_path_factory):
 def test_what_is_refused_is_said_in_one_line_without_the_folder(folder, approved):
     said = []
     for name in REFUSED:
-        message = w.refused(read_mesh, folder / name)
+        message = refused(read_mesh, folder / name)
         assert message.startswith(repr(name if len(name) <= 100 else f"{name[:100]}...") + ": ")
         assert "\n" not in message
         assert len(message) < 700

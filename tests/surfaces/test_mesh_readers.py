@@ -6,6 +6,7 @@ import mesh_writers as w
 import numpy as np
 import pytest
 import trimesh
+from approved import refused
 from mesh_writers import GOOD
 from scipy.spatial import cKDTree
 
@@ -91,5 +92,5 @@ def test_scales_units_and_names_that_are_none_are_refused(tmp_path, approved):
     asked += [(each, {"scale": 0.0}) for each in (ball(1.0), TriangleMesh(V, F))]
     asked += [(ball(1.0, u), {}) for u in ("furlong", "1 * 2 * mm", "x * mm", "parsec", "angstrom")]
     asked += [("part\0.stl", {}), (ball(800), {}), (ball(1.0), {"side": "above"})]
-    said = [w.refused(mesh, source, **options) for source, options in asked]
+    said = [refused(mesh, source, **options) for source, options in asked]
     approved("scales and units refused", "\n".join(said))

@@ -3,6 +3,7 @@
 import mesh_writers as w
 import numpy as np
 import pytest
+from approved import refused
 from samples import sampled, seeds
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
@@ -129,8 +130,8 @@ MESHES = [
 
 
 def test_arrays_that_are_no_mesh_are_refused(approved):
-    said = [w.refused(clean, *given) for given in ARRAYS]
-    said += [w.refused(TriangleMesh, *given) for given in MESHES]
+    said = [refused(clean, *given) for given in ARRAYS]
+    said += [refused(TriangleMesh, *given) for given in MESHES]
     approved("arrays that are no mesh", "\n".join(said))
 
 

@@ -6,6 +6,7 @@ What lies on its side of a plane, and makes up the whole with the other side, is
 import mesh_writers as w
 import numpy as np
 import pytest
+from approved import refused
 from samples import sampled, seeds
 
 from surfaces import cut_box, cut_plane, faces_within_cone, take_faces
@@ -98,5 +99,5 @@ WRONG = [
 
 
 def test_nothing_left_and_bad_numbers_are_said(approved):
-    said = [w.refused(cut, HILLY, *arguments) for cut, *arguments in WRONG]
+    said = [refused(cut, HILLY, *arguments) for cut, *arguments in WRONG]
     approved("parts that are none", "\n".join(said))

@@ -8,8 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from approved import refused
 from mesh_patches import grid, panel_with_hole
-from mesh_writers import refused
 from pygeodesic import geodesic
 
 from surfaces import cylinder, mesh, piecewise, plane, sphere

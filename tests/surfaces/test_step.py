@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mesh_writers import refused
+from approved import refused
 
 from coverable_processes import Ended, Limits, folder_of, run_apart
 from feasibility.cases import Case

@@ -129,10 +129,6 @@ def test_neighbours_run_clockwise_and_links_name_their_pairs(name):
     np.testing.assert_array_equal(np.sort(np.column_stack([owner, indices]), axis=1), pair)
 
 
-def test_the_papers_grid_has_its_pairs():
-    assert sphere(1.0, (10, 90), (10, 180)).cells(9, 10).pairs.shape == (305, 2)
-
-
 @given(
     rows=st.integers(0, 6), columns=st.integers(0, 7),
     closed=st.tuples(st.booleans(), st.booleans()), poles=st.tuples(st.booleans(), st.booleans()),

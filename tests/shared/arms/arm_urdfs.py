@@ -4,18 +4,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-import pytest
 from numpy.typing import NDArray
 
-from robots import Robot, RobotError, list_robots, load_robot
-
-
-def said(make, *arguments, **named) -> str:
-    """What is said by a refusal, on one line."""
-    with pytest.raises(RobotError) as caught:
-        make(*arguments, **named)
-    return " / ".join(str(caught.value).splitlines())
-
+from robots import Robot, list_robots, load_robot
 
 FREE = (-float("inf"), float("inf"))
 

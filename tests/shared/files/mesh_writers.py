@@ -5,10 +5,8 @@ import struct
 from collections import defaultdict
 
 import numpy as np
-import pytest
 from mesh_patches import grid
 
-from coverable_errors import CoverableError
 from surfaces.meshes import TriangleMesh
 from surfaces.meshes.normals import corner_normals
 
@@ -197,13 +195,6 @@ GOOD: dict[str, bytes] = {
     "nodes.glb": nested_scene(),
 }
 """File name -> its bytes."""
-
-
-def refused(make, *arguments, **named):
-    """What is said by a refusal."""
-    with pytest.raises(CoverableError) as caught:
-        make(*arguments, **named)
-    return str(caught.value)
 
 
 def assert_clean(mesh):
