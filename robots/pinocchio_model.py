@@ -9,13 +9,13 @@ held are fixed placements, and a continuous joint is a revolute one whose value 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import cos, sin, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 
 from coverable_arrays import Array, Mask
-from robots.mounting import about_fixed_axes
 
 if TYPE_CHECKING:
     from robots.urdf import CheckedUrdf, JointInfo
@@ -87,7 +87,7 @@ def _passed(
 ) -> tuple[int, pin.SE3]:
     """The seat of the link on the other side of a joint; a free joint is added to the model."""
     (carrier, offset), slides = seat, joint.kind == "prismatic"
-    origin = pin.SE3(about_fixed_axes(*joint.rpy), np.array(joint.xyz))
+    origin = pin.SE3(_turned(*joint.rpy), np.array(joint.xyz))
     axis = np.array(joint.axis) if outwards else -np.array(joint.axis)
     if joint.name in free:
         kind = pin.JointModelPrismaticUnaligned if slides else pin.JointModelRevoluteUnaligned
@@ -100,6 +100,20 @@ def _passed(
     elif value:
         motion.rotation = pin.AngleAxis(value, axis).matrix()
     return carrier, offset * (origin * motion if outwards else motion * origin.inverse())
+
+
+def _turned(roll: float, pitch: float, yaw: float) -> Array:
+    """(3, 3) the rotation of a joint's origin, to the last bit as Pinocchio's own reader has it.
+
+    By the quaternion of urdfdom, in its order: where a search finds no motion and no proof, what it
+    finds instead depends on the last bit.
+    """
+    a, b, c, u, v, w = (f(0.5 * turn) for f in (cos, sin) for turn in (roll, pitch, yaw))
+    x, y, z = u * b * c - a * v * w, a * v * c + u * b * w, a * b * w - u * v * c
+    real = a * b * c + u * v * w
+    length = sqrt(x * x + y * y + z * z + real * real)
+    turned = pin.Quaternion(*(part / length for part in (real, x, y, z)))
+    return np.asarray(turned.matrix())
 
 
 def world_frame(model: pin.Model) -> int:

@@ -54,6 +54,15 @@ def test_joints_and_limits_are_the_urdfs_and_held_joints_are_inside_theirs(robot
             assert joints[name].lower <= value <= joints[name].upper
 
 
+def test_joints_stand_where_pinocchios_reader_has_them_to_the_last_bit():
+    """On that bit depends what a search finds where it finds neither a motion nor a proof."""
+    robot = load_robot("ur5")
+    mine, theirs = robot.model, pin.buildModelFromUrdf(str(robot.urdf))
+    for name in robot.joint_names:
+        one, other = (m.jointPlacements[m.getJointId(name)].homogeneous for m in (mine, theirs))
+        np.testing.assert_array_equal(one, other)
+
+
 def test_tools_point_away_from_the_arm(robot):
     """From the origin of the last joint whose origin is not the tool point itself; and if the last
     joint turns about a line through the tool, on that line."""
