@@ -17,8 +17,7 @@ from pictures import chromium, save_small
 from PIL import Image
 from playwright.sync_api import Page, expect, sync_playwright
 
-from feasibility.cases import Case
-from feasibility.live import Live
+from coverable import Case, Live
 
 HERE = Path(__file__).parent
 SIZE = {"width": 1000, "height": 600}  # [pixel]

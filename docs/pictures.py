@@ -19,10 +19,7 @@ import numpy as np
 import trimesh
 from PIL import Image
 
-from feasibility import Task, check
-from feasibility.viewer import View, view
-from robots import load_robot
-from surfaces import bspline, mesh, sphere
+from coverable import Task, View, bspline, check, load_robot, mesh, sphere, view
 
 HERE = Path(__file__).parent
 SIZE = (900, 650)  # [pixel]

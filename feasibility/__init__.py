@@ -1,8 +1,8 @@
 """The question: can this arm cover this surface in one continuous motion?
 
->>> from robots import load_robot
->>> from surfaces import sphere
->>> from feasibility import Task, check
+>>> from coverable import load_robot
+>>> from coverable import sphere
+>>> from coverable import Task, check
 >>> puma = load_robot("puma560", limits="set-1")
 >>> dome = sphere(radius=1.0, polar_deg=(10, 90), azimuth_deg=(10, 180), side="inside")
 >>> verdict = check(puma, dome.cells(9, 10), Task(standoff=0.005, cone_deg=45))
@@ -37,7 +37,3 @@ How a verdict comes about; wherever a step has a number, it is one of these.
 12. `reports/verdict.py` prints it; graph G (`roadmap/graph_g.py`) and the cause of each missed cell
     (`roadmap/causes/diagnosis.py`) are made when they are first read.
 """
-
-from lazy_loader import attach_stub
-
-__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -150,7 +150,7 @@ def _attempt(
 
 def _replayed(problem: Problem, found: Found) -> Replay:
     """The replay of a motion over all cells that was found for another problem."""
-    from feasibility.certification import replay
+    from feasibility.certification.motion_replay import replay
 
     needed, walk = np.ones(len(problem.cells), dtype=bool), found.motion
     return replay(problem.robot, problem.cells, problem.task, cast("Walk", walk), needed)
@@ -176,7 +176,8 @@ def _with_clear_start(problem: Problem, clock: Clock) -> Problem:
 
 def _is_clear(problem: Problem, q: NDArray[np.float64]) -> bool:
     """Are the convex bodies of the search as far apart at q (n,) as they have to be?"""
-    from feasibility.collisions import collision_buffer, segment_clear
+    from feasibility.collisions.kernels.clearance import segment_clear
+    from feasibility.collisions.kernels.memory import collision_buffer
 
     bodies = problem.bodies
     if bodies is None:

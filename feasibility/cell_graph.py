@@ -8,8 +8,8 @@ from typing import Any
 import networkx as nx
 import numpy as np
 
-from coverable_arrays import Mask
-from surfaces import Cells
+from coverable.arrays import Mask
+from surfaces.cells import Cells
 
 
 class _Attributes(dict[str, Any]):

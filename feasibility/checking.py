@@ -10,22 +10,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_errors import ArgumentError
+from coverable.errors import ArgumentError
 from feasibility.attempts import Method, attempts_at
 from feasibility.clock import Clock, OutOfTime
 from feasibility.demands import OF_TREE, RATES, further, unjudged
 from feasibility.problem import Problem
 from feasibility.search import Progress, Search
 from feasibility.task import Task
-from feasibility.treated import Decision, with_coverage
+from feasibility.treated.decision import Decision, with_coverage
 from feasibility.verdict import Answer, Cause, Evidence, Replay, Verdict, Walk, deferred
-from robots import Robot
-from surfaces import Cells
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 if TYPE_CHECKING:
-    from feasibility.collisions import Collision
+    from feasibility.collisions.settings import Collision
     from feasibility.found import Found
-    from feasibility.treated import TreatedArea
+    from feasibility.treated.area import TreatedArea
 
 NO_CELLS = "There are no cells, so there is nothing to cover; the arm was not looked at."
 
@@ -70,14 +70,14 @@ def check(
             or the surface has no reference direction for the roll.
 
     Example:
-        >>> from robots import load_robot
-        >>> from surfaces import plane
+        >>> from coverable import load_robot
+        >>> from coverable import plane
         >>> patch = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside")
         >>> verdict = check(load_robot("ur5"), patch.cells(3, 3), Task(standoff=0.02, cone_deg=30))
         >>> verdict.feasible, verdict.n_covered
         (True, 9)
     """
-    from feasibility.speed import check_requirements
+    from feasibility.speed.requirements import check_requirements
 
     search = Search() if search is None else search
     settings = (search, "search", Search, "a Search, such as Search(seed=1)")
@@ -89,11 +89,11 @@ def check(
     if search.method == "greedy":
         if seeds is not None:
             raise ArgumentError("seeds are for the complete search; the greedy one has a start")
-        from feasibility.paper import greedy_search
+        from feasibility.paper.greedy import greedy_search
 
         method = partial(greedy_search, start=robot.start)
     else:
-        from feasibility.roadmap import complete_search
+        from feasibility.roadmap.complete import complete_search
 
         method = partial(complete_search, seeds=seeds)
     clock = Clock(search.time_limit, progress) if clock is None else clock
@@ -123,7 +123,7 @@ def _at_rates(verdict: Verdict, clock: Clock) -> Verdict:
     """The verdict at the speed, and as far from singularities, as the task asks."""
     if not verdict.task.requires_rates:
         return verdict
-    from feasibility.speed import at_rates
+    from feasibility.speed.verdict_at_speed import at_rates
 
     began = time.monotonic()
     found = at_rates(verdict, clock)
@@ -154,8 +154,8 @@ def greedy_check(
         ArgumentError: `start` is not a feasible configuration over one of the cells; or the task
             demands what only the complete search knows.
     """
-    from feasibility.paper import greedy_search
-    from feasibility.speed import check_requirements
+    from feasibility.paper.greedy import greedy_search
+    from feasibility.speed.requirements import check_requirements
 
     search = Search(method="greedy") if search is None else search
     problem = Problem.of(robot, cells, task)
@@ -232,7 +232,7 @@ def _measured(verdict: Verdict, clock: Clock) -> Verdict:
 
 def _treated(verdict: Verdict, clock: Clock) -> TreatedArea | None:
     """What the motion treats; None where there is no motion, or no time to measure it."""
-    from feasibility.treated import treated_by_walk
+    from feasibility.treated.area import treated_by_walk
 
     if verdict.witness is None:
         return None

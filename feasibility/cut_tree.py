@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from coverable_arrays import Array
-from coverable_errors import listed
+from coverable.arrays import Array
+from coverable.errors import listed
 from feasibility.cut_tree import Cut, CutTree, Leaf
-from robots import Robot
-from surfaces import Cells
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 INDENT = "  "
 MOST_NAMED = 4  # cuts that one sentence names
@@ -18,7 +18,7 @@ def joint_value(robot: Robot, joint: int, value: float) -> str:
     """A joint's value with its unit.
 
     Example:
-        >>> from robots import load_robot
+        >>> from coverable import load_robot
         >>> joint_value(load_robot("ur5"), 2, -1.4312)
         '-82 deg'
     """
@@ -51,8 +51,8 @@ def sentence(tree: CutTree, robot: Robot, cells: Cells) -> str:
     """A cut tree in one sentence, without a full stop.
 
     Example:
-        >>> from robots import load_robot
-        >>> from surfaces import plane
+        >>> from coverable import load_robot
+        >>> from coverable import plane
         >>> tree = CutTree(Cut(2, -1.4312, Leaf(13), Leaf(2)))
         >>> sentence(tree, load_robot("ur5"), plane((0, 1), (0, 1)).cells(5, 3))
         ... # doctest: +NORMALIZE_WHITESPACE

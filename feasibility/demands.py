@@ -14,15 +14,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from coverable_errors import ArgumentError, Fault
-from feasibility.certification import Judged, MotionFault
+from coverable.errors import ArgumentError, Fault
+from feasibility.certification.faults import Judged, MotionFault
 from feasibility.task import Task
 from feasibility.verdict import Walk
-from robots import Robot
-from surfaces import Cells
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 if TYPE_CHECKING:
-    from feasibility.treated import TreatedArea
+    from feasibility.treated.area import TreatedArea
 
 AT_START = 1e-9  # [rad] or [m]: a first row this near to the start is at it
 
@@ -67,7 +67,7 @@ def _at_start(robot: Robot, cells: Cells, task: Task, walks: Sequence[Walk]) -> 
 
 def _at_rates(robot: Robot, cells: Cells, task: Task, walks: Sequence[Walk]) -> Findings:
     """Does each motion keep the speed, and its distance from singularities?"""
-    from feasibility.certification.rates import check_rates, replay_rates
+    from feasibility.certification.rates.rate_replay import check_rates, replay_rates
 
     check_rates(robot, task)
     found = [replay_rates(robot, cells, task, walk).refusals for walk in walks]
@@ -76,7 +76,8 @@ def _at_rates(robot: Robot, cells: Cells, task: Task, walks: Sequence[Walk]) -> 
 
 def _treating(robot: Robot, cells: Cells, task: Task, walks: Sequence[Walk]) -> Findings:
     """Do the motions treat enough of the area?"""
-    from feasibility.treated import shortfall, treated_by_walk
+    from feasibility.treated.area import treated_by_walk
+    from feasibility.treated.decision import shortfall
 
     treated = treated_by_walk(robot, cells, task, *walks)
     short = shortfall(task, treated)

@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from feasibility.collisions import gather
-from feasibility.targets import check_references
+from feasibility.collisions.asked_bodies import gather
+from feasibility.targets.references import check_references
 from feasibility.task import PlacementError, Task, check_footprint, check_smooth
-from robots import Robot
-from surfaces import Cells, Surface
+from robots.robot import Robot
+from surfaces.cells import Cells
+from surfaces.surface import Surface
 
 if TYPE_CHECKING:
-    from feasibility.collisions import Bodies, Pair
+    from feasibility.collisions.bodies import Bodies, Pair
 
 HELD = 0.3  # [m] lever by which a shift of the tool turns a joint, about
 NARROWER = 0.9  # [1] of tolerance, cone and roll, when the replay refuses what just kept to them

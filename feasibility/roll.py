@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 
 ALONG = math.sin(math.radians(1.0))  # [1] a reference this near to the approach shows no direction
 

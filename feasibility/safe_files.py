@@ -10,9 +10,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
-import coverable_files
-from coverable_errors import CoverableError
-from coverable_files import reason
+import coverable.files
+from coverable.errors import CoverableError
+from coverable.files import reason
 from feasibility.interrupts import settle, unfinished
 
 
@@ -23,23 +23,23 @@ class FileError(CoverableError):
 def read_regular(path: str | os.PathLike[str], cap: int, what: str) -> bytes:
     """Read a regular file of at most `cap` bytes.
 
-    See `coverable_files.read_regular` for the arguments.
+    See `coverable.files.read_regular` for the arguments.
 
     Raises:
         FileError: there is no such file, it is not a regular one, or it is too large.
     """
     with _named(path):
-        return coverable_files.read_regular(path, cap, what)
+        return coverable.files.read_regular(path, cap, what)
 
 
 def read_text(path: str | os.PathLike[str], cap: int, what: str) -> str:
-    """Read a text file in UTF-8, as `coverable_files.read_text` does.
+    """Read a text file in UTF-8, as `coverable.files.read_text` does.
 
     Raises:
         FileError: as `read_regular`, or it is not such text.
     """
     with _named(path):
-        return coverable_files.read_text(path, cap, what)
+        return coverable.files.read_text(path, cap, what)
 
 
 @contextmanager
@@ -47,7 +47,7 @@ def _named(path: str | os.PathLike[str]) -> Iterator[None]:
     """A fault of a file becomes a `FileError` with its name."""
     try:
         yield
-    except coverable_files.FileFault as error:
+    except coverable.files.FileFault as error:
         raise FileError(error.faults, shown_path(path)) from error
 
 

@@ -9,15 +9,14 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, unit_along
-from coverable_errors import ArgumentError, Checks, Fault
-from feasibility import collisions
+from coverable.arrays import Array, unit_along
+from coverable.errors import ArgumentError, Checks, Fault
 from feasibility.cone import chord_of
 from feasibility.roll import Roll, projected, roll_of_range
-from surfaces import Cells
+from surfaces.cells import Cells
 
 if TYPE_CHECKING:
-    from feasibility.collisions import Collision
+    from feasibility.collisions.settings import Collision
 
 DEFAULT_TOLERANCE = 1e-3  # [m]
 FIXED_DEG = 0.1  # [deg] to either side: a range that counts as "fixed"
@@ -114,6 +113,8 @@ class Task:
 
     def __post_init__(self) -> None:
         """Refuse numbers that describe no task; keep them as plain floats."""
+        from feasibility.collisions.settings import Collision
+
         checks = Checks("task")
         kept: dict[str, Any] = {
             "standoff": checks.number(
@@ -133,7 +134,7 @@ class Task:
             if getattr(self, name) is not None:
                 kept[name] = checks.positive(name, getattr(self, name), unit)
         asked = self.collision
-        if asked is not None and not isinstance(asked, collisions.Collision):
+        if asked is not None and not isinstance(asked, Collision):
             expected = "must be a Collision, such as Collision(clearance=0.005), or None"
             checks.wrong("collision", self.collision, expected)
         kept["approach"] = self._checked_approach(checks)

@@ -10,18 +10,18 @@ from functools import cached_property
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from coverable_arrays import Array, Ints, Mask
-from coverable_errors import at_least
-from feasibility.collisions import said_of
+from coverable.arrays import Array, Ints, Mask
+from coverable.errors import at_least
+from feasibility.collisions.asked_bodies import said_of
 from feasibility.task import PlacementError, Task
-from robots import Robot
-from surfaces import Cells
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 if TYPE_CHECKING:
     import networkx as nx
 
     from feasibility.cut_tree import CutTree
-    from robots.shapes import LeftOut
+    from robots.shapes.pairs import LeftOut
 
 
 class Answer(StrEnum):

@@ -16,27 +16,26 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array, Ints, Mask
-from coverable_errors import ArgumentError, CoverableError
-from feasibility.certification import (
-    MotionFault,
-    replay_over_surface,
-    verify_proof,
-)
+from coverable.arrays import Array, Ints, Mask
+from coverable.errors import ArgumentError, CoverableError
+from feasibility.certification.cut_proofs.proof_verification import verify_proof
+from feasibility.certification.faults import MotionFault
+from feasibility.certification.surface_replay import replay_over_surface
 from feasibility.clock import Clock, OutOfTime
-from feasibility.collisions import Collision, said_of
+from feasibility.collisions.asked_bodies import said_of
+from feasibility.collisions.settings import Collision
 from feasibility.cut_tree import CutTree
 from feasibility.demands import BY_REPLAY, NAMES, OF_TREE, further, unjudged
 from feasibility.problem import Problem
-from feasibility.results import Result
+from feasibility.results.result_file import Result
 from feasibility.search import Search
 from feasibility.task import Task
 from feasibility.verdict import Answer, Certificate, Evidence, Verdict, Walk
-from robots import Robot
-from surfaces import Cells
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 if TYPE_CHECKING:
-    from feasibility.treated import TreatedArea
+    from feasibility.treated.area import TreatedArea
 
 NOT_IN_TIME = (
     "not verified in time: the limit of {:g} s ran out; --set search.time_limit=... gives more time"
@@ -162,9 +161,9 @@ def verify(
         NothingToVerifyError: the verdict has neither a motion nor a proof.
 
     Example:
-        >>> from feasibility import check
-        >>> from robots import load_robot
-        >>> from surfaces import plane
+        >>> from coverable import check
+        >>> from coverable import load_robot
+        >>> from coverable import plane
         >>> patch = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside")
         >>> robot, cells = load_robot("ur5"), patch.cells(3, 3)
         >>> task = Task(standoff=0.02, cone_deg=30)
@@ -299,7 +298,7 @@ def _of_verdict(verdict: Verdict, search: Search | None, clock: Clock) -> Verifi
 
 def _of_tree(verdict: Verdict, search: Search) -> Verification:
     """The tree of the paper's search, by the paper's definitions, which know not every demand."""
-    from feasibility.paper import replay_stored
+    from feasibility.paper.tree_replay import replay_stored
 
     robot, cells, task = verdict.robot, verdict.cells, verdict.task
     found = replay_stored(verdict, search)

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_errors import Checks, Fault, printable, shown
+from coverable.arrays import Array
+from coverable.errors import Checks, Fault, printable, shown
 from robots.errors import RobotError
-from robots.mounting import FURTHEST_BASE, FURTHEST_TCP, checked_pose, made_orthogonal, unit_axis
+from robots.mounting.directions import made_orthogonal, unit_axis
+from robots.mounting.poses import FURTHEST_BASE, FURTHEST_TCP, checked_pose
 
 if TYPE_CHECKING:
-    from robots.urdf import Axis
+    from robots.urdf.axes import Axis
 
 
 class Mounting(NamedTuple):
@@ -60,7 +61,7 @@ def check_arguments(
     Returns:
         The poses as matrices, and the axes.
     """
-    from robots.urdf import Axis
+    from robots.urdf.axes import Axis
 
     checks = Checks(source, RobotError)
     directions = {"approach_axis": approach_axis, "reference_axis": reference_axis}

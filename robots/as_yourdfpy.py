@@ -8,22 +8,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from robots.errors import RobotError
 from robots.joint_checks import numbers
-from robots.mounting import about_fixed_axes
+from robots.mounting.poses import about_fixed_axes
 from robots.robot import Robot
-from robots.urdf import (
-    Box,
-    Capsule,
-    Cylinder,
-    Geometry,
-    JointInfo,
-    LinkShape,
-    Sphere,
-    check_urdf,
-    free_name,
-)
+from robots.urdf.axes import free_name
+from robots.urdf.checked_urdf import check_urdf
+from robots.urdf.geometry import Box, Capsule, Cylinder, Geometry, Sphere
+from robots.urdf.joints import JointInfo
+from robots.urdf.link_shapes import LinkShape
 
 if TYPE_CHECKING:
     import yourdfpy
@@ -47,7 +41,7 @@ def as_yourdfpy(robot: Robot, q: ArrayLike | None = None, *, meshes: bool = True
             configuration of it.
 
     Example:
-        >>> from robots import load_robot
+        >>> from coverable import load_robot
         >>> arm = as_yourdfpy(load_robot("ur5"), [0, -1, 1, 0, 0, 0], meshes=False)
         >>> arm.get_transform("tool0", "base_link")[:3, 3].round(2)
         array([0.62, 0.19, 0.35])

@@ -20,8 +20,8 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from coverable_arrays import Array, Mask
-from coverable_kernels import allocating_entry
+from coverable.arrays import Array, Mask
+from coverable.kernels import allocating_entry
 from robots.errors import RobotError
 from robots.pinocchio_model import joint_axes
 

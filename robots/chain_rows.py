@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from robots.chain import Chain
 
 ROWS = 8192  # configurations at once: what the processor's caches hold
@@ -20,7 +20,7 @@ def moved_by_joints(chain: Chain, q: Array) -> Array:
     m for each radian, or 1 for each metre. The length of one is the joint's lever arm.
 
     Example:
-        >>> from robots import load_robot
+        >>> from coverable import load_robot
         >>> arm = load_robot("puma560")
         >>> np.linalg.norm(moved_by_joints(arm.chain, np.zeros((4, 6))), axis=1)[0].round(6)
         array([0.806226, 0.806226, 0.806226, 0.806226])

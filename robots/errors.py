@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from coverable_errors import CoverableError
+from coverable.errors import CoverableError
 
 
 class RobotError(CoverableError):

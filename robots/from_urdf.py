@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_errors import Fault
+from coverable.errors import Fault
 from robots.arguments import AS_IN_URDF, Mounting
 from robots.errors import RobotError
 from robots.joint_checks import no_limit_set
@@ -20,7 +20,7 @@ from robots.pinocchio_model import chain_model
 from robots.robot import Robot
 
 if TYPE_CHECKING:
-    from robots.urdf import CheckedUrdf
+    from robots.urdf.checked_urdf import CheckedUrdf
 
 
 def robot_from_urdf(

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from robots.errors import RobotError
 
 KINDS = ("revolute", "continuous", "prismatic")

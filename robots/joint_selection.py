@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from numpy.typing import ArrayLike
 
-from coverable_errors import Fault, close_matches, listed
+from coverable.errors import Fault, close_matches, listed
 from robots.joint_checks import moves_both
 
 if TYPE_CHECKING:
-    from robots.urdf import CheckedUrdf, JointInfo
+    from robots.urdf.checked_urdf import CheckedUrdf
+    from robots.urdf.joints import JointInfo
 
 MOST_NAMES = 40  # that a message lists
 MOST_GUESSES = 20  # unknown names for which a known one is looked up

@@ -8,8 +8,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array
-from coverable_errors import ArgumentError
+from coverable.arrays import Array
+from coverable.errors import ArgumentError
 from robots.robot import Robot
 
 
@@ -29,7 +29,7 @@ class Kinematics:
     Holds Pinocchio's working memory, so use one per thread.
 
     Example:
-        >>> from robots import load_robot
+        >>> from coverable import load_robot
         >>> point, axis = Kinematics(load_robot("puma560")).tool([0, 0, 0, 0, 0, 0])
         >>> point.round(6).tolist(), axis.round(6).tolist()
         ([0.8, 0.1, -0.7], [0.0, 0.0, -1.0])
@@ -68,7 +68,7 @@ class Kinematics:
         """Tool points (m, 3) m and unit approach axes (m, 3) at configurations q (m, n).
 
         Example:
-            >>> from robots import load_robot
+            >>> from coverable import load_robot
             >>> points, axes = Kinematics(load_robot("puma560")).tools(np.zeros((4, 6)))
             >>> points.shape, axes.shape
             ((4, 3), (4, 3))
@@ -85,7 +85,7 @@ class Kinematics:
         """(3, 3) axes of the TCP's frame, as columns, in the root frame, at q (n,).
 
         Example:
-            >>> from robots import load_robot
+            >>> from coverable import load_robot
             >>> rotation = Kinematics(load_robot("puma560")).rotation(np.zeros(6))
             >>> np.allclose(rotation, np.diag([1.0, -1.0, -1.0]))
             True
@@ -98,7 +98,7 @@ class Kinematics:
         """Frames of the joints in the root frame at configurations q (m, n).
 
         Example:
-            >>> from robots import load_robot
+            >>> from coverable import load_robot
             >>> Kinematics(load_robot("puma560")).joints(np.zeros((4, 6))).points.shape
             (4, 7, 3)
         """

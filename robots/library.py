@@ -27,7 +27,7 @@ from robots.joint_selection import suggestion
 
 if TYPE_CHECKING:
     from robots.robot import Robot
-    from robots.urdf import Axis
+    from robots.urdf.axes import Axis
 
 HERE = Path(__file__).parent
 DATA = "example-robot-data"
@@ -187,7 +187,8 @@ def _read(
         options: limits and axes of the tool, as in `load_robot`.
     """
     from robots.from_urdf import robot_from_urdf
-    from robots.urdf import carrier_of_surface, check_urdf
+    from robots.urdf.axes import carrier_of_surface
+    from robots.urdf.checked_urdf import check_urdf
 
     link = mounting.surface_link or carrier_of_surface(mounting.axes)
     folders = (*folders, *info.package_dirs)
@@ -251,7 +252,7 @@ def joint_kinds(
         >>> joint_kinds("puma560")["joint6"]
         'revolute'
     """
-    from robots.urdf import check_urdf
+    from robots.urdf.checked_urdf import check_urdf
 
     info = _find(name_or_path) or _unknown(name_or_path)
     folders = (*package_dirs, *info.package_dirs)

@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from coverable_arrays import Array, Mask
+from coverable.arrays import Array, Mask
 
 if TYPE_CHECKING:
-    from robots.urdf import CheckedUrdf, JointInfo
+    from robots.urdf.checked_urdf import CheckedUrdf
+    from robots.urdf.joints import JointInfo
 
 # Names of their frames in a model.
 TCP_FRAME = "coverable tcp"

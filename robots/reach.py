@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from coverable_arrays import Array, Mask
+from coverable.arrays import Array, Mask
 
 SWEEPS = 60  # of the descent below; any number gives a bound, more a tighter one
 MOST_SLIDES = 10  # prismatic joints in a row whose 2^k end positions are looked at one by one

@@ -12,16 +12,16 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array, Mask
+from coverable.arrays import Array, Mask
 from robots.errors import RobotError
 from robots.joint_checks import joint_faults, no_limit_set, numbers
-from robots.mounting import made_orthogonal, unit_axis
+from robots.mounting.directions import made_orthogonal, unit_axis
 from robots.pinocchio_model import TCP_FRAME, world_frame
 
 if TYPE_CHECKING:
     from robots.chain import Chain
     from robots.reach import ReachBound
-    from robots.urdf import Axis
+    from robots.urdf.axes import Axis
 
 
 @dataclass(frozen=True, eq=False)  # no slots: cached properties need a __dict__

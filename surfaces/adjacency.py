@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 
 # Clockwise from the upper left; row = u grows downwards, column = v grows to the right.
 _CLOCKWISE = (

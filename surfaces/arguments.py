@@ -8,9 +8,9 @@ from typing import Any, TypedDict
 
 import numpy as np
 
-import coverable_errors
-from coverable_arrays import Array
-from coverable_errors import MISSING, Fault, real, shown
+import coverable.errors
+from coverable.arrays import Array
+from coverable.errors import MISSING, Fault, real, shown
 from surfaces.surface import TURN_TOLERANCE, Side, SurfaceError, rotation_from_rpy
 
 SIDES: tuple[Side, ...] = ("inside", "outside")
@@ -28,7 +28,7 @@ class PoseArguments(TypedDict):
     """(3, 3)"""
 
 
-class Checks(coverable_errors.Checks):
+class Checks(coverable.errors.Checks):
     """Reads the arguments of a surface one by one; `done` raises a `SurfaceError`."""
 
     def __init__(self, kind: str) -> None:

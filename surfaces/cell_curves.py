@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask, Protected
+from coverable.arrays import Array, Ints, Mask, Protected
 
 STOPPED = 1e-3  # [1] a parallel curve this much slower than the curve counts as stopped
 PLACES = 3  # along a piece, where its slopes are computed

@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from surfaces.cells import Cells
-from surfaces.meshes import FaceTree
-from surfaces.meshes.cells import MeshCells
-from surfaces.patches import GridCells
-from surfaces.piecewise import PieceCells
+from surfaces.meshes.cells.mesh_cells import MeshCells
+from surfaces.meshes.face_tree import FaceTree
+from surfaces.patches.grid_cells import GridCells
+from surfaces.piecewise.cells import PieceCells
 from surfaces.sheet import tiles_of
 from surfaces.surface import SurfaceError, max_principal_curvature
 from surfaces.tiles import CORNERS, FlatTiles

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array, Ints, Mask, Protected
-from coverable_errors import listed
+from coverable.arrays import Array, Ints, Mask, Protected
+from coverable.errors import listed
 from surfaces.adjacency import Neighbours
 from surfaces.cell_curves import CellCurves
 from surfaces.surface import Surface

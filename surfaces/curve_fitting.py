@@ -14,7 +14,7 @@ from functools import cache
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 from surfaces.cell_curves import CellCurves
 from surfaces.cells import Cells
 

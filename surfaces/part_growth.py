@@ -9,8 +9,8 @@ from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
-from coverable_errors import ArgumentError
+from coverable.arrays import Array, Ints, Mask
+from coverable.errors import ArgumentError
 from surfaces.parts import PartModels, SurfaceParts, around
 
 Rows = Ints | Mask

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask, Protected
+from coverable.arrays import Array, Ints, Mask, Protected
 
 MOST_PARTS = 8192
 RELATIVE, ABSOLUTE = 1e-9, 1e-12  # what is added to a radius for rounding

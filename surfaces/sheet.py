@@ -8,12 +8,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from coverable_arrays import Array, Protected
-from coverable_errors import LARGEST, Checks
+from coverable.arrays import Array, Protected
+from coverable.errors import LARGEST, Checks
 from surfaces.at_home import AtHome
-from surfaces.meshes import MeshSurface
-from surfaces.patches import Patch
-from surfaces.piecewise import Piecewise
+from surfaces.meshes.mesh_surface import MeshSurface
+from surfaces.patches.patch import Patch
+from surfaces.piecewise.piecewise_surface import Piecewise
 from surfaces.surface import Surface, SurfaceError
 from surfaces.tiles import FlatTiles, flat_tiles
 
@@ -81,7 +81,7 @@ def sheet_of(
         SurfaceError: no bounds on the surface are known, so that nothing can be certified.
 
     Example:
-        >>> from surfaces import plane
+        >>> from coverable import plane
         >>> sheet = sheet_of(plane((0.0, 0.6), (0.0, 0.4)))
         >>> sheet.triangles.shape, sheet.deviation < 1e-9
         ((2, 3, 3), True)

@@ -10,8 +10,8 @@ from typing import ClassVar, Literal, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array, Mask, Protected
-from coverable_errors import ArgumentError, CoverableError
+from coverable.arrays import Array, Mask, Protected
+from coverable.errors import ArgumentError, CoverableError
 from surfaces.parts import MOST_PARTS, SurfaceParts
 
 Side = Literal["inside", "outside"]

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 from surfaces.parts import PartModels
-from surfaces.patches import Patch
+from surfaces.patches.patch import Patch
 
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 HALVES = np.array([[0, 1, 2], [0, 2, 3]])

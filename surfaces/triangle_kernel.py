@@ -17,9 +17,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
-from coverable_kernels import allocating
-from surfaces.meshes import WIDTH, FaceTree, nearest_face
+from coverable.arrays import Array, Ints, Mask
+from coverable.kernels import allocating
+from surfaces.meshes.face_tree import FaceTree, nearest_face
+from surfaces.meshes.normals import WIDTH
 
 _NEWTON = 4  # steps to the place under a point; each squares what is left
 _TILES = 4  # that are tried one after the other

@@ -21,12 +21,11 @@ import pytest
 from PIL import Image
 
 import coverable
-from feasibility import check
-from feasibility.cases import Case, builtin_cases
+from coverable import Case, builtin_cases, check
 from feasibility.cli.main import main
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("coverable_meshes", "robots", "surfaces", "feasibility")
+PACKAGES = ("coverable.meshes", "robots", "surfaces", "feasibility")
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 README = (ROOT / "README.md").read_text("utf-8")
@@ -176,7 +175,7 @@ def test_the_front_door_is_true() -> None:
     seen = {
         name.asname or name.name
         for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)
-        for name in node.names if str(node.module).split(".")[0] in (*PACKAGES, "coverable_errors")
+        for name in node.names if str(node.module).split(".")[0] in (*PACKAGES, "coverable.errors")
     }  # fmt: skip
     assert sorted(seen | {"__version__"}) == coverable.__all__ == dir(coverable)
     assert None not in [getattr(coverable, name) for name in coverable.__all__]

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, Literal
 
-from coverable_errors import MISSING, is_number
+from coverable.errors import MISSING, is_number
 from feasibility.cases.table_reader import ORIGIN, Pair, Section, Triple, frozen
 
 if TYPE_CHECKING:
-    from robots import Axis
+    from robots.urdf.axes import Axis
 
 KEYS = {"kind": "type", "limits": "limits_m", "max_velocity": "max_velocity_m"}
 """Keys of arguments that are called otherwise in Python, of an axis that slides."""
@@ -51,7 +51,7 @@ def _axis(values: Mapping[str, Any]) -> Axis:
     Raises:
         RobotError: with everything that is wrong with them.
     """
-    from robots import Axis
+    from robots.urdf.axes import Axis
 
     kept = {key: values[key] for key in ("name", "carries", "axis", "position", "rpy_deg")
             if key in values}  # fmt: skip

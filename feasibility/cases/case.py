@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from coverable_errors import MISSING, ArgumentError, Fault, close, printable
+from coverable.errors import MISSING, ArgumentError, Fault, close, printable
 from feasibility.cases.robot_table import RobotPart, faults_of_loading, in_robot_table, read_robot
 from feasibility.cases.surface_reading import (
     AUTO,
@@ -32,13 +32,13 @@ from feasibility.cases.toml import (
 )
 from feasibility.safe_files import FileError, read_text, shown_path
 from feasibility.search import Search
-from feasibility.targets import check_references
+from feasibility.targets.references import check_references
 from feasibility.task import PlacementError, Task, check_footprint
 
 if TYPE_CHECKING:
     from feasibility.cases.collision_table import CollisionPart
-    from robots import Robot
-    from surfaces import Cells
+    from robots.robot import Robot
+    from surfaces.cells import Cells
 
 BUILT_IN = Path(__file__).with_name("built_in.toml")
 LARGEST_FILE = 256 * 1024  # bytes
@@ -103,7 +103,7 @@ class Case:
             CaseError: the robot cannot be loaded, the surface cannot be read or cut, a mesh of the
                 scene cannot be read, a pair names what is not there, or the roll has no reference.
         """
-        from robots import RobotError
+        from robots.errors import RobotError
 
         faults, robot, cells, task = list[Fault](), None, None, None
         try:
@@ -139,7 +139,7 @@ class Case:
         """What is wrong with the SRDF that the case may name, for an arm with these links."""
         if self.collision is None or self.collision.srdf is None:
             return []
-        from robots.shapes import faults_of_srdf
+        from robots.shapes.pairs import faults_of_srdf
 
         found = faults_of_srdf(self.collision.srdf, links)
         return [fault.renamed({}, "collision.srdf") for fault in found]

@@ -6,18 +6,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple, cast
 
-from coverable_errors import MISSING, CoverableError, Fault, is_number
+from coverable.errors import MISSING, CoverableError, Fault, is_number
 from feasibility.cases.table_reader import CaseError, Section, frozen, is_text
-from feasibility.collisions import (
-    SHAPES,
-    Collision,
-    Obstacle,
-    ToolShape,
-    asked_for,
-    checked_distance,
-    checked_pair,
-    read_triangles,
-)
+from feasibility.collisions.pairs import checked_distance, checked_pair
+from feasibility.collisions.scene import SHAPES, Obstacle, ToolShape
+from feasibility.collisions.settings import Collision
+from feasibility.collisions.triangles import read_triangles
+from feasibility.collisions.words import asked_for
 
 MAKERS = {"scene": Obstacle, "tool": ToolShape}
 KINDS = {"scene": tuple(SHAPES), "tool": tuple(kind for kind in SHAPES if kind != "halfspace")}
@@ -185,7 +180,7 @@ def _objects(section: Section, key: str) -> list[_Entry]:
 
 def _object(section: Section, key: str, k: int, entry: Any) -> _Entry | None:
     """One object; None where it has faults."""
-    from surfaces.meshes import metres_per_unit
+    from surfaces.meshes.sources import metres_per_unit
 
     before = len(section.faults)
     found = Section(f"collision.{key}[{k}]", entry, section.faults)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from coverable_errors import printable
+from coverable.errors import printable
 from feasibility.cases.table_reader import DEG, Pair, Section
 
 

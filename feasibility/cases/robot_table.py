@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from coverable_errors import Fault, is_number, printable, shown
+from coverable.errors import Fault, is_number, printable, shown
 from feasibility.cases.axis_table import AxisPart, read_axes
 from feasibility.cases.robot_limits import read_limits_by_name, read_limits_deg
 from feasibility.cases.table_reader import (
@@ -25,7 +25,8 @@ from feasibility.cases.table_reader import (
 )
 
 if TYPE_CHECKING:
-    from robots import Robot, RobotError
+    from robots.errors import RobotError
+    from robots.robot import Robot
 
 POSES = ("tcp", "base")
 URDF_ENDINGS = (".urdf", ".xml", ".xacro")
@@ -90,7 +91,8 @@ class RobotPart:
             RobotError: see `robots.load_robot`; or an angle is given for a sliding joint, or a
                 length for a turning one.
         """
-        from robots import RobotError, load_robot
+        from robots.errors import RobotError
+        from robots.library import load_robot
 
         source = self.urdf or self.name or ""
         try:
@@ -130,7 +132,8 @@ class RobotPart:
 
     def _kinds_alone(self) -> dict[str, str]:
         """The kinds of all moving joints, by name; none where the URDF itself is at fault."""
-        from robots import RobotError, joint_kinds
+        from robots.errors import RobotError
+        from robots.library import joint_kinds
 
         axes = {axis.name: axis.type for axis in self.axis}
         try:
@@ -186,7 +189,7 @@ def _starting_at(robot: Robot, start: tuple[float, ...], in_degrees: bool) -> Ro
     Raises:
         RobotError: it does not fit the joints, or lies outside of their limits.
     """
-    from robots import RobotError
+    from robots.errors import RobotError
 
     key, source = "start_deg" if in_degrees else "start", f"robot {robot.name!r}"
     if len(start) != robot.n:
@@ -218,7 +221,7 @@ def read_robot(table: Any, faults: list[Fault]) -> RobotPart | None:
 
 def faults_of_loading(table: Any) -> list[Fault]:
     """What loading the arm of a table says, without those of its values that cannot be read."""
-    from robots import RobotError
+    from robots.errors import RobotError
 
     part = _part(Section("robot", table, []))
     if (part.name is None) == (part.urdf is None):
@@ -260,7 +263,7 @@ def _part(section: Section) -> RobotPart:
 
 def _axes_poses_and_lock(section: Section) -> dict[str, Any]:
     """The axes and poses of the tool and the base, and the held joints, without what is wrong."""
-    from robots import check_arguments
+    from robots.arguments import check_arguments
 
     values = section.take("approach_axis", "reference_axis", "lock", "xacro_args")
     if not isinstance(values.get("lock", {}), Mapping):

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from coverable_errors import MISSING, Fault
+from coverable.errors import MISSING, Fault
 from feasibility.cases.keys import own_keys
 from feasibility.cases.table_reader import CaseError, with_example
 from feasibility.safe_files import shown_path
@@ -48,7 +48,7 @@ def faults_of(
     Raises:
         CaseError: what happens inside is a fault.
     """
-    from surfaces import SurfaceError
+    from surfaces.surface import SurfaceError
 
     try:
         yield
@@ -86,7 +86,8 @@ def build_surface(kind: str, values: Values, pose: Values, place: str = "surface
 
 def _patch(kind: str, values: Values, pose: Values, place: str) -> Any:
     """A patch from its numbers; a control net may be in a file."""
-    import surfaces
+    import coverable
+    from surfaces.patches.nurbs.control_net_file import read_net
 
     file, keys = values.get("file"), own_keys(kind)
     arguments = {
@@ -99,8 +100,8 @@ def _patch(kind: str, values: Values, pose: Values, place: str) -> Any:
         with faults_of(place, "", kind, file, {**values, **pose}):
             if file is not None:  # what the case says replaces what the file says
                 arguments.pop("points", None)
-                arguments = surfaces.read_net(file)._asdict() | arguments
-            return getattr(surfaces, kind)(**arguments, **pose)
+                arguments = read_net(file)._asdict() | arguments
+            return getattr(coverable, kind)(**arguments, **pose)
     except CaseError as error:
         missing = f"{place}.points" if kind == "bspline" and "points" not in values else None
         faults = [
@@ -110,14 +111,16 @@ def _patch(kind: str, values: Values, pose: Values, place: str) -> Any:
 
 
 def _grid(kind: str, values: Values, pose: Values, place: str) -> Any:
-    from surfaces import grid, read_grid
+    from surfaces.fitted.grid_file import read_grid
+    from surfaces.fitted.point_grid import grid
 
     with faults_of(place, file=values["file"]):
         return grid(read_grid(values["file"], values["units"]), **pose)
 
 
 def _poses(kind: str, values: Values, pose: Values, place: str) -> Any:
-    from surfaces import poses, read_poses
+    from surfaces.toolpaths.given import poses
+    from surfaces.toolpaths.pose_file import read_poses
 
     with faults_of(place, file=values["file"], own=("neighbours",)):
         points = read_poses(values["file"], values["units"])._asdict()
@@ -125,7 +128,8 @@ def _poses(kind: str, values: Values, pose: Values, place: str) -> Any:
 
 
 def _mesh(kind: str, values: Values, pose: Values, place: str) -> Any:
-    from surfaces.meshes import read_mesh, take_faces
+    from surfaces.meshes.selection import take_faces
+    from surfaces.meshes.sources import read_mesh
 
     with faults_of(place, file=values["file"]):
         triangles = read_mesh(values["file"], values.get("scale"))
@@ -136,7 +140,7 @@ def _mesh(kind: str, values: Values, pose: Values, place: str) -> Any:
 
 
 def _step(kind: str, values: Values, pose: Values, place: str) -> Any:
-    from surfaces import step_triangles
+    from surfaces.step_files.step_surface import step_triangles
 
     choice = {key: values[key] for key in CHOICE if key in values}
     if "facing" in values and not {"faces", "colour"} & set(choice):
@@ -148,8 +152,8 @@ def _step(kind: str, values: Values, pose: Values, place: str) -> Any:
 
 def _part(triangles: Any, values: Values, pose: Values, place: str) -> Any:
     """The mesh of what box, cut and facing leave of triangles, in this order."""
-    from surfaces import mesh
-    from surfaces.meshes import cut_box, cut_plane, faces_within_cone
+    from surfaces.meshes.mesh_surface import mesh
+    from surfaces.meshes.selection import cut_box, cut_plane, faces_within_cone
 
     parts: dict[str, Callable[[Any], Any]] = {
         "box": lambda box: cut_box(triangles, *box),
@@ -165,7 +169,7 @@ def _part(triangles: Any, values: Values, pose: Values, place: str) -> Any:
 
 
 def _pieces(kind: str, values: Values, pose: Values, place: str) -> Any:
-    from surfaces.piecewise import piecewise
+    from surfaces.piecewise.piecewise_surface import piecewise
 
     patches = [
         build_surface(piece.kind, piece.values, piece.pose, f"{place}.pieces[{k}]")
@@ -181,8 +185,8 @@ def smooth_mesh(surface: Any, smoothing: tuple[float, float]) -> Any:
     Raises:
         CaseError: it cannot be smoothed so.
     """
-    from surfaces import SurfaceError
-    from surfaces.meshes import smoothed
+    from surfaces.meshes.smoothing import smoothed
+    from surfaces.surface import SurfaceError
 
     try:
         return smoothed(surface, *smoothing)
@@ -222,7 +226,7 @@ def _grid_of(
         return cells
     if footprint is None:
         raise CaseError([Fault("surface.cells", f"is {AUTO!r}, without a footprint")])
-    from surfaces.passes import grid_shape
+    from surfaces.passes.triangulation import grid_shape
 
     nu, nv = grid_shape(patch, WIDTH * min(footprint))
     _check_automatic(nu * nv, footprint, MOST_CELLS)

@@ -10,7 +10,7 @@ from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
-from coverable_errors import MISSING, Fault, alternatives, close, shown
+from coverable.errors import MISSING, Fault, alternatives, close, shown
 from feasibility.cases.keys import kinds, own_keys
 from feasibility.cases.surface_building import (
     AUTO,
@@ -36,7 +36,8 @@ from feasibility.cases.table_reader import (
 )
 
 if TYPE_CHECKING:
-    from surfaces import Cells, Surface
+    from surfaces.cells import Cells
+    from surfaces.surface import Surface
 
 OWN_KEYS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {kind: tuple(own_keys(kind)) for kind in kinds()}
@@ -191,7 +192,7 @@ def named_file(table: Any) -> SurfacePart | None:
 
 def _read(section: Section, known: tuple[str, ...], whole: bool) -> SurfacePart | None:
     """One table; None where it has faults."""
-    from surfaces import check_pose
+    from surfaces.arguments import check_pose
 
     before = len(section.faults)
     kind = _kind(section, known)
@@ -241,8 +242,9 @@ def _kind(section: Section, known: tuple[str, ...]) -> str | None:
 
 def _check(section: Section, kind: str, key: str, values: dict[str, Any]) -> None:
     """Check what no constructor checks before a file is read."""
-    import surfaces  # a patch needs none of what is named here
-    from surfaces import meshes
+    from surfaces.meshes.selection import checked_box, checked_cone, checked_plane
+    from surfaces.meshes.sources import metres_per_unit
+    from surfaces.step_files.step_surface import checked_choice
 
     value = values.get(key)
     make: Callable[..., object]
@@ -261,11 +263,11 @@ def _check(section: Section, kind: str, key: str, values: dict[str, Any]) -> Non
     elif key == "neighbours" and value != "order":
         section.positive(key, value)
     elif key == "scale":
-        section.make(meshes.metres_per_unit, {"scale": value})
+        section.make(metres_per_unit, {"scale": value})
     elif kind == "step" and key in CHOICE:
         chosen = {one: values[one] for one in CHOICE if one in values}
         if key == next(iter(chosen)):  # all at once: they may contradict each other
-            section.make(surfaces.checked_choice, chosen)
+            section.make(checked_choice, chosen)
     elif key == "faces" and (not isinstance(value, list) or not value):
         section.wrong_type(key, value)
     elif isinstance(value, list) and key == "faces":
@@ -274,14 +276,14 @@ def _check(section: Section, kind: str, key: str, values: dict[str, Any]) -> Non
         section.whole(f"faces[{k}]", value[k], 0)
     elif key == "box" and isinstance(value, list) and len(value) == 2:
         ends = dict(zip(("low", "high"), value, strict=True))
-        section.make(meshes.checked_box, ends, SURFACE_NAMES)
+        section.make(checked_box, ends, SURFACE_NAMES)
     elif key == "box":
         section.wrong_type(key, value)
     elif key in ("cut", "facing"):
         part = Section(f"{section.name}.{key}", value, section.faults)
         names = dict.fromkeys(part.keys) | {"within_deg": "half_angle_deg"}
         given = {names[k] or k: part.table.get(k, MISSING) for k in part.keys}
-        make = meshes.checked_plane if key == "cut" else meshes.checked_cone
+        make = checked_plane if key == "cut" else checked_cone
         part.make(make, given, SURFACE_NAMES)
         part.refuse_others()
     elif key == "pieces":

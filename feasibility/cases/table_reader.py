@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
-from coverable_errors import (
+from coverable.errors import (
     MISSING,
     Checks,
     CoverableError,

@@ -13,7 +13,7 @@ from typing import Any
 
 import rtoml
 
-from coverable_errors import CoverableError, Fault, shown
+from coverable.errors import CoverableError, Fault, shown
 
 PATHS, FOLDERS = ("urdf", "file", "srdf"), "package_dirs"  # keys whose values are files, or folders
 NAMED_BY_USERS = ("xacro_args", "lock")  # tables of keys that mean nothing here

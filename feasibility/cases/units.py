@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from coverable_errors import is_number, shown
+from coverable.errors import is_number, shown
 
 # How many times the arm's reach a length may have before its unit is asked for.
 FAR = dict.fromkeys(("position", "u", "v", "radius", "ring", "tube", "semi_axes", "flare"), 30.0)

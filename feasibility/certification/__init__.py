@@ -1,5 +1,1 @@
 """The independent replay that must accept a motion before "feasible" is said."""
-
-from lazy_loader import attach_stub
-
-__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

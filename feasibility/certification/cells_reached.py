@@ -11,13 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from coverable_arrays import Array, Ints, Mask
-from feasibility.certification.rolls import CLOSE_TO_ZERO as ROLL_CLOSE
-from feasibility.certification.rolls import off_middle, reference_axes, roll_vectors
+from coverable.arrays import Array, Ints, Mask
+from feasibility.certification.rolls.bounds import CLOSE_TO_ZERO as ROLL_CLOSE
+from feasibility.certification.rolls.bounds import off_middle, reference_axes, roll_vectors
 from feasibility.certification.stretches import CLOSE_TO_ZERO, Samples
 from feasibility.task import Targets, Task
-from robots import Kinematics, Robot
-from surfaces import Cells
+from robots.kinematics import Kinematics
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 TRIES = np.linspace(0.0, 1.0, 9)  # of the part of a stretch that passes within the tolerance
 NAMED = 5  # cells that are listed

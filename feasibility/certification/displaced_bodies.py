@@ -16,12 +16,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array
-from feasibility.certification.collisions import CollisionFault, collision_replay
+from coverable.arrays import Array
+from feasibility.certification.collisions.collision_replay import CollisionFault, collision_replay
 from feasibility.certification.lever_bounds import stretched_length
-from feasibility.collisions import Bodies, HalfSpace
+from feasibility.collisions.bodies import Bodies
+from feasibility.collisions.shapes import HalfSpace
 from feasibility.collisions.words import SURFACE
-from robots import Robot
+from robots.robot import Robot
 
 SHARES = (0.12, 0.35, 1.0)  # [1] of a margin that are tried: less takes less time
 FURTHER = 1.6  # [1] times the last that is allowed is tried, too

@@ -30,7 +30,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
+from coverable.arrays import Array, Ints
 from feasibility.certification.jacobians import jacobians
 from feasibility.certification.lever_bounds import (
     column_changes,
@@ -41,7 +41,8 @@ from feasibility.certification.rates.segment_rates import smallest_singular
 from feasibility.certification.rows import Rows
 from feasibility.task import Task
 from feasibility.verdict import Bound
-from robots import Kinematics, Robot
+from robots.kinematics import Kinematics
+from robots.robot import Robot
 
 CLOSE = 0.97  # [1] of the least room at a configuration: stretches with so much are not halved
 LEVELS = 12  # halvings of a segment

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.faults import MotionFault
 from feasibility.certification.stretches import Judge, Samples
-from robots import Kinematics
-from surfaces import Surface, meshes
+from robots.kinematics import Kinematics
+from surfaces.surface import Surface
 
 HALVINGS = 30  # to where a motion leaves what it follows
 LEVELS = 20  # halvings of what is lifted, until it is clear of the surface
@@ -156,8 +156,10 @@ def _through(part: FollowedPart, heights: Array) -> MotionFault:
 
 def _heights(surface: Surface, points: Array) -> Array:
     """(k,) m, on the tool's side of a surface; NaN beyond its border."""
+    from surfaces.meshes.mesh_surface import MeshSurface
+
     at = surface.closest(points)
     over = at.inside
-    if isinstance(surface, meshes.MeshSurface):
+    if isinstance(surface, MeshSurface):
         over = ~surface.beyond_border(*surface.nearest(points))
     return np.where(over, surface.side_sign * at.height, np.nan)

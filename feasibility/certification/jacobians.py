@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from feasibility.certification.rows import Rows
-from robots import Kinematics, Robot
+from robots.kinematics import Kinematics
+from robots.robot import Robot
 
 BLOCK = 4096  # configurations at once, to bound the memory
 

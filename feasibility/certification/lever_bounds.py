@@ -25,8 +25,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Mask
-from robots import Robot
+from coverable.arrays import Array, Mask
+from robots.robot import Robot
 
 
 def largest_levers(levers: Array, half: Array, prismatic: Mask, cap: Array | float) -> Array:

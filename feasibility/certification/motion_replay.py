@@ -10,17 +10,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from coverable_arrays import Array, Mask
-from feasibility.certification import collisions, rolls
+from coverable.arrays import Array, Mask
 from feasibility.certification.cells_reached import at_targets
 from feasibility.certification.order import order_of_marks
 from feasibility.certification.placement_margin import margin_fault
 from feasibility.certification.surface_replay import replay_over_surface
-from feasibility.collisions import gather
+from feasibility.collisions.asked_bodies import gather
 from feasibility.task import Task
 from feasibility.verdict import Certificate, Replay, Walk
-from robots import Kinematics, Robot
-from surfaces import Cells
+from robots.kinematics import Kinematics
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 
 def replay(
@@ -46,6 +46,8 @@ def replay(
     Returns:
         What was measured, and the reason if the walk is refused. NaN anywhere refuses.
     """
+    from feasibility.certification.collisions.collision_replay import collision_replay
+
     disorder = _malformed(cells, walk) or order_of_marks(cells, walk)
     if disorder:
         return Replay(Certificate(len(walk.q), np.nan, np.nan, np.nan), disorder)
@@ -55,7 +57,7 @@ def replay(
     bodies = gather(robot, cells.surface, task.collision, task.standoff)
     certificate, collides = found.certificate, False
     if bodies is not None and not refusal:
-        clear = collisions.collision_replay(robot, bodies, walk.q, deviations)
+        clear = collision_replay(robot, bodies, walk.q, deviations)
         certificate, refusal = clear.added_to(certificate), clear.refusal
         collides = not clear.accepted
     if refusal or deviations is not None:  # the margin is of motions that are straight
@@ -75,10 +77,12 @@ def _malformed(cells: Cells, walk: Walk) -> str:
 
 def _misplaced(robot: Robot, cells: Cells, task: Task, walk: Walk) -> str:
     """Why a marked waypoint is not where it says it is; empty where all are."""
+    from feasibility.certification.rolls.bounds import reference_axes
+
     at = np.flatnonzero(walk.cell >= 0)
     q, cell = walk.q[at], walk.cell[at]
     points, axes = Kinematics(robot).tools(q)
-    x = axes if task.roll is None else rolls.reference_axes(robot, q)
+    x = axes if task.roll is None else reference_axes(robot, q)
     right = at_targets(task, task.targets(cells), cell, points, axes, x)[0] < np.inf
     if right.all():
         return ""

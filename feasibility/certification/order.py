@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
+from coverable.arrays import Array, Ints
 from feasibility.certification.faults import MotionFault
 from feasibility.certification.stretches import Samples
 from feasibility.verdict import Walk
-from surfaces import Cells
-from surfaces.places import OffsetSurface
+from surfaces.cells import Cells
+from surfaces.places.places import OffsetSurface
 
 
 def order_of_marks(cells: Cells, walk: Walk) -> str:

@@ -25,7 +25,7 @@ from functools import cache
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from feasibility.certification.displacement_balls import (
     BELOW,
     BOUNDS,
@@ -35,11 +35,12 @@ from feasibility.certification.displacement_balls import (
     left_to_limits,
     ratio,
 )
-from feasibility.collisions import gather
+from feasibility.collisions.asked_bodies import gather
 from feasibility.task import PlacementError, Task
 from feasibility.verdict import Bound, Certificate, PlacementMargin
-from robots import Kinematics, Robot
-from surfaces import Cells
+from robots.kinematics import Kinematics
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 
 def placement_margin(

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_errors import counted
+from coverable.arrays import Array
+from coverable.errors import counted
 from feasibility.certification.faults import MotionFault
-from feasibility.certification.rolls import CLOSE_TO_ZERO as ROLL_CLOSE
+from feasibility.certification.rolls.bounds import CLOSE_TO_ZERO as ROLL_CLOSE
 from feasibility.certification.stretches import CLOSE_TO_ZERO, Bounds, Judge, Samples, Stretches
 from feasibility.cone import angle_of
 from feasibility.task import Task
-from robots import Robot
+from robots.robot import Robot
 
 
 def limits(robot: Robot, rows: Array) -> tuple[float, list[MotionFault]]:

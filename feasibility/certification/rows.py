@@ -7,7 +7,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from coverable_arrays import Mask
+from coverable.arrays import Mask
 
 Chosen = Mask | NDArray[np.intp] | slice
 

@@ -29,16 +29,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.jacobians import ToolPlacements
 from feasibility.certification.lever_bounds import peaks, second_derivatives
-from feasibility.certification.rolls import CLOSE_TO_ZERO as ROLL_CLOSE
-from feasibility.certification.rolls import Held, ToolAxes, reference_axes, tool_frames
+from feasibility.certification.rolls.bounds import CLOSE_TO_ZERO as ROLL_CLOSE
+from feasibility.certification.rolls.bounds import reference_axes, tool_frames
+from feasibility.certification.rolls.held import Held, ToolAxes
 from feasibility.certification.rows import Rows
 from feasibility.task import Task
-from robots import Kinematics, Robot
-from surfaces import Cells
-from surfaces.places import OffsetSurface, Places
+from robots.kinematics import Kinematics
+from robots.robot import Robot
+from surfaces.cells import Cells
+from surfaces.places.places import OffsetSurface, Places
 
 CLOSE_TO_ZERO = 1e-12  # [m], [1]: rounding of double arithmetic on unit vectors
 

@@ -23,8 +23,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
-from feasibility.certification import collisions
+from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.cells_reached import (
     Reached,
     cells_reached,
@@ -40,13 +39,15 @@ from feasibility.certification.stretches import Bounds, Judge, Samples, Stretche
 from feasibility.cone import angle_of
 from feasibility.task import Task
 from feasibility.verdict import Certificate
-from robots import Kinematics, Robot
-from surfaces import Cells, Surface
-from surfaces.places import offset_surface
-from surfaces.toolpaths import PoseSurface
+from robots.kinematics import Kinematics
+from robots.robot import Robot
+from surfaces.cells import Cells
+from surfaces.places.offset_surfaces import offset_surface
+from surfaces.surface import Surface
+from surfaces.toolpaths.pose_surface import PoseSurface
 
 if TYPE_CHECKING:
-    from feasibility.collisions import Bodies
+    from feasibility.collisions.bodies import Bodies
 
 LEVELS = 26  # halvings of a segment between two rows
 MOST_SAMPLES = 1_000_000  # configurations looked at between rows
@@ -90,6 +91,8 @@ def replay_over_surface(
             surface, or over that under poses, whose curves then do not count; elsewhere it may be
             anywhere but through that. Everywhere by default.
     """
+    from feasibility.certification.collisions.collision_replay import collision_replay
+
     rows = np.asarray(q, dtype=float)
     nowhere = np.zeros(len(cells), dtype=bool)
     fault = _malformed(robot, rows)
@@ -126,7 +129,7 @@ def replay_over_surface(
         len(rows), error, angle_of(chord), margin, max_roll=None if task.roll is None else roll
     )
     if bodies is not None:
-        clear = collisions.collision_replay(robot, bodies, rows)
+        clear = collision_replay(robot, bodies, rows)
         faults += clear.faults
         certificate = clear.added_to(certificate)
     if len(cells) and not faults:

@@ -1,5 +1,5 @@
 """`python -m feasibility.cli`: the command `coverable`."""
 
-from coverable_command import run
+from coverable.command import run
 
 run()

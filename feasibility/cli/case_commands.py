@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from coverable_errors import CoverableError
+from coverable.errors import CoverableError
 from feasibility.cli.command import (
     STATUS,
     add_case,
@@ -23,9 +23,9 @@ from feasibility.safe_files import check_writable, shown_path
 
 if TYPE_CHECKING:
     from feasibility.cli.command import OpenCase
-    from feasibility.sensitivity import Explanation
+    from feasibility.sensitivity.thresholds import Explanation
     from feasibility.verdict import Walk
-    from feasibility.viewer import Served
+    from feasibility.viewer.live_server import Served
 
 INSIDE = "-"  # in place of a file: in the object that is printed
 STATUSES = "exit status: 0 feasible, 1 infeasible, 3 undecided, 2 bad input, 130 interrupted"
@@ -131,12 +131,12 @@ def check(args: argparse.Namespace, began: float) -> int:
     else:
         print_out(report.as_text(verdict, case, loaded))
     if args.save is not None:
-        from feasibility.results import save_result
+        from feasibility.results.result_file import save_result
 
         save_result(verdict, case, args.save)
         print_err(f"result: {shown_path(args.save)} (`coverable show` opens it)")
     if args.html is not None:
-        from feasibility.viewer import view
+        from feasibility.viewer.viewer import view
 
         write_text(args.html, view(verdict, case.name).html(), "view")
     if witness is not None:
@@ -155,9 +155,9 @@ def _seeds(args: argparse.Namespace, opened: OpenCase) -> Walk | None:
         return None
     import numpy as np
 
-    from coverable_errors import Fault
-    from feasibility.cases import CaseError
-    from feasibility.results import load_motion
+    from coverable.errors import Fault
+    from feasibility.cases.table_reader import CaseError
+    from feasibility.results.motion_file import load_motion
     from feasibility.verdict import Walk
 
     if opened.case.search.method != "complete":
@@ -172,11 +172,11 @@ def show(args: argparse.Namespace, began: float) -> int:
         check_writable(args.html)
     if args.result.lower().endswith((".step", ".stp")):
         return _show_faces(args)
-    from feasibility.results import load_result
+    from feasibility.results.result_file import load_result
 
     result = load_result(args.result)
     print_out(f"{result.case.name}: {result.verdict!r}")
-    from feasibility.viewer import view
+    from feasibility.viewer.viewer import view
 
     drawn = view(result.verdict, result.case.name)
     if args.html is not None:
@@ -187,9 +187,9 @@ def show(args: argparse.Namespace, began: float) -> int:
 
 def _show_faces(args: argparse.Namespace) -> int:
     """The faces of a STEP file with their numbers."""
-    from feasibility.viewer import LiveView
-    from feasibility.viewer.faces import faces_page
-    from surfaces import face_words, step_parts
+    from feasibility.viewer.faces.faces_view import faces_page
+    from feasibility.viewer.live_server import LiveView
+    from surfaces.step_files.step_surface import face_words, step_parts
 
     parts = step_parts(args.result)
     for face in parts.faces:
@@ -204,7 +204,7 @@ def _show_faces(args: argparse.Namespace) -> int:
 def live(args: argparse.Namespace, began: float) -> int:
     """`coverable live CASE`: a page where one moves the part, until Ctrl-C."""
     with open_case(args, began, {}) as opened:
-        from feasibility.live import Live
+        from feasibility.live.showing import Live
 
         page = Live(opened.case, opened.setup)
     return _serve("live", page, args.browser)
@@ -227,7 +227,7 @@ def _serve(name: str, page: Served, in_browser: bool) -> int:
 def divide(args: argparse.Namespace, began: float) -> int:
     """`coverable divide CASE`: the fewest sub-patches, each covered by one continuous motion."""
     with open_case(args, began, {"--html": args.html}, WHY_COMPLETE["divide"]) as opened:
-        from feasibility.division import divide as run
+        from feasibility.division.surface_division import divide as run
         from feasibility.reports import division as report
 
         loaded = opened.so_far()
@@ -237,7 +237,7 @@ def divide(args: argparse.Namespace, began: float) -> int:
     else:
         print_out(report.as_text(division, opened.case.name, loaded))
     if args.html is not None:
-        from feasibility.viewer import view_division
+        from feasibility.viewer.path_and_division import view_division
 
         page = view_division(division, opened.case.name).html()
         write_text(args.html, page, "view")
@@ -251,7 +251,7 @@ def explain(args: argparse.Namespace, began: float) -> int:
         outputs["--witness"] = os.path.join(args.witness, "x.csv")
     with open_case(args, began, outputs, WHY_COMPLETE["explain"]) as opened:
         from feasibility.reports import explanation as report
-        from feasibility.sensitivity import explain as run
+        from feasibility.sensitivity.explanation import explain as run
 
         explanation = run(*opened.setup, progress=opened.progress, clock=opened.clock)
     name, verdict = opened.case.name, explanation.verdict
@@ -262,7 +262,7 @@ def explain(args: argparse.Namespace, began: float) -> int:
     if args.witness is not None:
         _write_witnesses(args.witness, explanation)
     if args.html is not None:
-        from feasibility.viewer import view
+        from feasibility.viewer.viewer import view
 
         page = report.as_html(explanation, name, view(verdict, name), opened.case)
         write_text(args.html, page, "page")

@@ -23,7 +23,7 @@ from feasibility.safe_files import FileError, check_writable, shown_path, write_
 from feasibility.search import Progress
 
 if TYPE_CHECKING:
-    from feasibility.cases import Case, Setup
+    from feasibility.cases.case import Case, Setup
     from feasibility.clock import Clock
 
 Command = Callable[[argparse.Namespace, float], int]
@@ -157,10 +157,12 @@ def open_case(
         TooLate: the time limit ran out first, here or in the block.
     """
     with progress_bar() as progress:
-        from coverable_errors import Fault
-        from feasibility.cases import CaseError, load_case, unit_notes
+        from coverable.errors import Fault
+        from feasibility.cases.case import load_case
+        from feasibility.cases.table_reader import CaseError
+        from feasibility.cases.units import unit_notes
         from feasibility.clock import OutOfTime
-        from feasibility.collisions import gather
+        from feasibility.collisions.asked_bodies import gather
         from feasibility.notices import CUTTING, MORE, compiling_notice
 
         case = load_case(args.case, args.settings)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, TextIO
 
-from coverable_errors import CoverableError, Fault, shown
+from coverable.errors import CoverableError, Fault, shown
 from feasibility.interrupts import settle
 from feasibility.search import Progress
 

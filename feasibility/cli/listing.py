@@ -51,7 +51,7 @@ def keys(args: argparse.Namespace, began: float) -> int:
 
 def case_rows() -> list[dict[str, Any]]:
     """The built-in cases, one object each."""
-    from feasibility.cases import builtin_cases
+    from feasibility.cases.case import builtin_cases
 
     return [
         {
@@ -71,7 +71,7 @@ def case_rows() -> list[dict[str, Any]]:
 
 def robot_rows() -> list[dict[str, Any]]:
     """The robots of the library, one object each; every URDF is read."""
-    from robots import list_robots, load_robot
+    from robots.library import list_robots, load_robot
 
     rows = []
     for info in list_robots():
@@ -125,7 +125,7 @@ def cases_table(rows: Sequence[dict[str, Any]]) -> str:
 
 def robots_table(rows: Sequence[dict[str, Any]]) -> str:
     """The robots for people, by group: degrees of freedom, reach, limits in order of the joints."""
-    from robots import GROUPS
+    from robots.library import GROUPS
 
     headings = ["robot", "degrees of freedom", "reach", "limits (deg unless in m)", "limit sets"]
     tables = []

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import NoReturn
 
-from coverable_errors import CoverableError
+from coverable.errors import CoverableError
 from feasibility.cli.command import BAD_INPUT, STATUS, MakeClock, TooLate, json_text
 from feasibility.cli.console import prepare, print_err, print_out
 from feasibility.interrupts import INTERRUPTED, MESSAGE, interruptible, leave_at_once

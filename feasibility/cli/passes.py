@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coverable_errors import CoverableError, Fault
+from coverable.errors import CoverableError, Fault
 from feasibility.cli.command import STATUS, json_text, numbers, positive, write_text
 from feasibility.cli.console import print_err, print_out
 from feasibility.cli.programs import period_of, write_programs
@@ -15,12 +15,13 @@ from feasibility.safe_files import shown_path
 
 if TYPE_CHECKING:
     from feasibility.cli.command import OpenCase
-    from feasibility.runs import PassRuns, PlannedPasses
+    from feasibility.runs.pass_runs import PassRuns
+    from feasibility.runs.planning import PlannedPasses
     from feasibility.task import Task
-    from feasibility.timing import Trajectory
-    from surfaces import Surface
-    from surfaces.passes import Passes
-    from surfaces.toolpaths import PoseCells
+    from feasibility.timing.sampled_trajectory import Trajectory
+    from surfaces.passes.parallel import Passes
+    from surfaces.surface import Surface
+    from surfaces.toolpaths.pose_cells import PoseCells
 
 BEST = "best"
 BY = ("distance", "planes", "parameters")
@@ -104,7 +105,8 @@ def direction_of(text: str) -> Any:
 
 def _passes(args: argparse.Namespace, surface: Surface, direction: Any) -> Passes:
     """The passes that the arguments describe, in one direction."""
-    from surfaces.passes import crossed, parallel_passes
+    from surfaces.passes.directions import crossed
+    from surfaces.passes.parallel import parallel_passes
 
     found = [
         parallel_passes(
@@ -123,8 +125,8 @@ def places_asked(args: argparse.Namespace, surface: Surface, task: Task) -> Pose
     Raises:
         CoverableError: the direction is none.
     """
-    from feasibility.runs import tool_way
-    from surfaces.passes import places_along
+    from feasibility.runs.planning import tool_way
+    from surfaces.passes.toolpath import places_along
 
     if args.passes.strip() == BEST:
         fault = "is the best for an arm, which only `coverable path` looks for"
@@ -134,7 +136,7 @@ def places_asked(args: argparse.Namespace, surface: Surface, task: Task) -> Pose
 
 def passes_asked(args: argparse.Namespace, opened: OpenCase) -> PlannedPasses:
     """Plan the passes that the arguments describe, and look for one motion along all of them."""
-    from feasibility.runs import plan_best_passes, plan_passes
+    from feasibility.runs.planning import plan_best_passes, plan_passes
 
     robot, cells, task, search = opened.setup
     opened.progress(0, None, "planning passes")
@@ -153,8 +155,8 @@ def passes_asked(args: argparse.Namespace, opened: OpenCase) -> PlannedPasses:
 def in_runs(args: argparse.Namespace, opened: OpenCase, along: PlannedPasses) -> int:
     """Passes that no single motion is known to run: cut them, and say why; the verdict's status."""
     from feasibility.reports import pass_runs as report
-    from feasibility.runs import pass_runs
-    from feasibility.timing import trajectory
+    from feasibility.runs.pass_runs import pass_runs
+    from feasibility.timing.path_timing import trajectory
 
     verdict = along.verdict
     opened.progress(0, None, "cutting passes into runs")
@@ -177,7 +179,7 @@ def in_runs(args: argparse.Namespace, opened: OpenCase, along: PlannedPasses) ->
     _write(args, found, timed)
     write_programs(args, opened, along, *timed, numbered=True)
     if args.html is not None:
-        from feasibility.viewer.passes import view_passes
+        from feasibility.viewer.passes.pass_view import view_passes
 
         drawn = view_passes(along, found.runs, treated, case=opened.case.name)
         write_text(args.html, drawn.html(), "view")
@@ -186,7 +188,7 @@ def in_runs(args: argparse.Namespace, opened: OpenCase, along: PlannedPasses) ->
 
 def _write(args: argparse.Namespace, found: PassRuns, timed: list[Trajectory]) -> None:
     """A trajectory a run, numbered from 1 in the order in which they are run."""
-    from feasibility.results import save_trajectory
+    from feasibility.results.trajectory_files import save_trajectory
 
     for out in args.out:
         for number, run in enumerate(timed, start=1):

@@ -22,15 +22,16 @@ from feasibility.cli.programs import add_programs, check_programs, period_of, wr
 from feasibility.safe_files import shown_path
 
 if TYPE_CHECKING:
-    from feasibility.cases import Case
+    from feasibility.cases.case import Case
     from feasibility.cli.command import OpenCase
-    from feasibility.paths import CoveragePath
-    from feasibility.runs import PlannedPasses
+    from feasibility.paths.coverage import CoveragePath
+    from feasibility.runs.planning import PlannedPasses
     from feasibility.task import Task
-    from feasibility.timing import MotionLimits, Trajectory
-    from feasibility.treated import TreatedArea
+    from feasibility.timing.sampled_trajectory import Trajectory
+    from feasibility.timing.speed_limits import MotionLimits
+    from feasibility.treated.area import TreatedArea
     from feasibility.verdict import Verdict
-    from feasibility.viewer import View
+    from feasibility.viewer.viewer import View
 
 ORDERS = ("rows", "columns", "spiral", "shortest", "given")
 STATUSES = "exit status: as of `coverable check`"
@@ -97,8 +98,8 @@ def path(args: argparse.Namespace, began: float) -> int:
     outputs |= {f"--program[{k}]": file for k, file in enumerate(args.program)}
 
     def check_case(case: Case) -> None:
-        from feasibility.paths import check_order
-        from feasibility.results import check_ending
+        from feasibility.paths.order import check_order
+        from feasibility.results.trajectory_files import check_ending
 
         check_passes(args)
         for out in args.out:
@@ -110,11 +111,12 @@ def path(args: argparse.Namespace, began: float) -> int:
     with open_case(args, began, outputs, WHY_COMPLETE, check_case) as opened:
         from feasibility.checking import check
         from feasibility.clock import OutOfTime
-        from feasibility.entry import ends_of
-        from feasibility.paths import coverage_path
+        from feasibility.entry.ends import ends_of
+        from feasibility.paths.coverage import coverage_path
         from feasibility.reports import path as report
-        from feasibility.speed import path_rates
-        from feasibility.timing import motion_limits, trajectory
+        from feasibility.speed.motion_rates import path_rates
+        from feasibility.timing.path_timing import trajectory
+        from feasibility.timing.speed_limits import motion_limits
         from feasibility.verdict import Answer, Walk
 
         robot, loaded = opened.setup.robot, opened.so_far()
@@ -169,8 +171,8 @@ def _view(
     limits: MotionLimits,
 ) -> View:
     """The picture of a path over cells, or along passes."""
-    from feasibility.viewer import view_path
-    from feasibility.viewer.passes import view_passes
+    from feasibility.viewer.passes.pass_view import view_passes
+    from feasibility.viewer.path_and_division import view_path
 
     if along is None:
         return view_path(found, run, opened.case.name, limits, treated)
@@ -181,7 +183,7 @@ def _treated(
     opened: OpenCase, along: PlannedPasses | None, found: CoveragePath
 ) -> TreatedArea | None:
     """What the path treats; None where the task has no footprint."""
-    from feasibility.treated import treated_by_walk
+    from feasibility.treated.area import treated_by_walk
 
     if along is not None:
         return along.treated(found.walk)
@@ -221,7 +223,7 @@ def _write(args: argparse.Namespace, run: Trajectory) -> None:
         FileError: a file cannot be written.
     """
     for out in args.out:
-        from feasibility.results import save_trajectory
+        from feasibility.results.trajectory_files import save_trajectory
 
         save_trajectory(out, run)
         print_err(f"trajectory: {shown_path(out)}")

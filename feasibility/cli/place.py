@@ -27,8 +27,11 @@ from feasibility.safe_files import shown_path, write_whole
 
 if TYPE_CHECKING:
     from feasibility.cli.command import OpenCase
-    from feasibility.placement import Evaluator, PlacementMap, Placements, StationPlan
-    from feasibility.viewer import View
+    from feasibility.placement.map import PlacementMap
+    from feasibility.placement.placements import Placements
+    from feasibility.placement.stations import StationPlan
+    from feasibility.placement.trials import Evaluator
+    from feasibility.viewer.viewer import View
 
 AXES = {
     "x": "m", "y": "m", "z": "m", "roll": "degrees", "pitch": "degrees", "yaw": "degrees"
@@ -89,8 +92,11 @@ def run_place(args: argparse.Namespace, began: float) -> int:
     drawn = chart = plan = None
     opening = open_case(args, began, files, time_limit=args.time_limit)
     with opening as opened, contextlib.ExitStack() as stack:
-        from feasibility.placement import COUNT, Pose, Region, evaluator_of_study, place
-        from feasibility.studies import Store, open_workers
+        from feasibility.placement.placements import COUNT, place
+        from feasibility.placement.region import Pose, Region
+        from feasibility.placement.trials import evaluator_of_study
+        from feasibility.studies.store import Store
+        from feasibility.studies.workers import open_workers
 
         case, setup, clock = opened.case, opened.setup, opened.clock
         held = Pose.of_values([*case.surface.position, *case.surface.rpy_deg])
@@ -131,7 +137,7 @@ def _view(
     """The view, where it is wanted; its motion is searched for in the time that is left."""
     if args.html is None:
         return None
-    from feasibility.viewer import view_placements
+    from feasibility.viewer.placements import view_placements
 
     left = opened.clock.left
     limit = None if math.isinf(left) else max(left, _LEAST)
@@ -150,7 +156,8 @@ def _further(
 ) -> tuple[StationPlan | None, PlacementMap | None]:
     """Stations and map, where they are wanted; reports what there was no time for."""
     from feasibility.clock import OutOfTime
-    from feasibility.placement import map_around_best, station_plan
+    from feasibility.placement.map import map_around_best
+    from feasibility.placement.stations import station_plan
 
     plan = chart = None
     clock, progress = opened.clock, with_rate(opened.progress)
@@ -208,7 +215,7 @@ def _report(
     if args.csv is not None:
         write_text(args.csv, report.as_csv(placements), "table")
     if chart is not None:
-        from feasibility.viewer import plot_map
+        from feasibility.viewer.figures import plot_map
 
         figure = plot_map(chart, placements, title=name)
         kind = str(args.map).rsplit(".", 1)[-1].lower()

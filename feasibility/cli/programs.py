@@ -6,17 +6,17 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from coverable_errors import CoverableError, Fault, alternatives
+from coverable.errors import CoverableError, Fault, alternatives
 from feasibility.cli.command import numbers
 from feasibility.cli.console import print_err
 from feasibility.safe_files import shown_path
 
 if TYPE_CHECKING:
-    from feasibility.cases import Case
+    from feasibility.cases.case import Case
     from feasibility.cli.command import OpenCase
-    from feasibility.programs import ProgramSettings
-    from feasibility.runs import PlannedPasses
-    from feasibility.timing import Trajectory
+    from feasibility.programs.axes import ProgramSettings
+    from feasibility.runs.planning import PlannedPasses
+    from feasibility.timing.sampled_trajectory import Trajectory
 
 PERIOD = 0.02  # [s] between samples
 ARGUMENTS = {
@@ -83,8 +83,9 @@ def check_programs(args: argparse.Namespace, case: Case) -> None:
         CoverableError: a file's ending is that of no program, the arm has none of that kind, or
             arguments do not go together.
     """
-    from feasibility.programs import ProgramError, check_program, language_of
-    from robots import RobotError
+    from feasibility.programs.axes import ProgramError, check_program
+    from feasibility.programs.controllers import language_of
+    from robots.errors import RobotError
 
     languages = {language_of(file) for file in args.program}
     for flag, text in (("--on", args.on), ("--off", args.off)):
@@ -109,7 +110,7 @@ def check_programs(args: argparse.Namespace, case: Case) -> None:
 
 def period_of(args: argparse.Namespace) -> float:
     """S between samples: as asked for, else what the programs take, if there is no other file."""
-    from feasibility.programs import language_of
+    from feasibility.programs.controllers import language_of
 
     if args.period is not None:
         return float(args.period)
@@ -119,7 +120,7 @@ def period_of(args: argparse.Namespace) -> float:
 
 def _settings(args: argparse.Namespace) -> ProgramSettings:
     """What the arguments say of the controller."""
-    from feasibility.programs import ProgramSettings
+    from feasibility.programs.axes import ProgramSettings
 
     return ProgramSettings(
         args.axis_signs, args.axis_offsets_deg, args.pulses_per_deg, not args.j3_from_upper_arm,
@@ -141,7 +142,8 @@ def write_programs(
     Raises:
         FileError: a file cannot be written.
     """
-    from feasibility.programs import save_program, working_places
+    from feasibility.programs.working import working_places
+    from feasibility.programs.writing import save_program
 
     work = None if along is None else working_places(along.places, along.passes.stretches)
     robot, cells = opened.setup.robot, opened.setup.cells

@@ -20,8 +20,9 @@ from feasibility.cli.console import print_err, print_out, progress_bar, with_rat
 from feasibility.safe_files import shown_path
 
 if TYPE_CHECKING:
-    from feasibility.studies import Row, Study
-    from feasibility.viewer import View
+    from feasibility.studies.file import Study
+    from feasibility.studies.run import Row
+    from feasibility.viewer.viewer import View
 
 
 def add(subcommands: argparse._SubParsersAction) -> None:
@@ -57,7 +58,10 @@ def study(args: argparse.Namespace, began: float) -> int:
         0; 3 where some cases failed.
     """
     from feasibility.reports import study as report
-    from feasibility.studies import Store, load_study, open_workers, run_tasks
+    from feasibility.studies.file import load_study
+    from feasibility.studies.run import run_tasks
+    from feasibility.studies.store import Store
+    from feasibility.studies.workers import open_workers
 
     outputs = {"--out": args.out, "--csv": args.csv, "--html": args.html}
     check_outputs(outputs, args.file)
@@ -88,10 +92,10 @@ def study(args: argparse.Namespace, began: float) -> int:
 
 def compare(args: argparse.Namespace, began: float) -> int:
     """`coverable compare CASE --robots a,b,c`: one case, one arm after the other."""
-    from feasibility.cases import load_case
+    from feasibility.cases.case import load_case
     from feasibility.reports import comparison as report
-    from feasibility.studies import compare as run
-    from feasibility.studies import open_workers
+    from feasibility.studies.robot_comparison import compare as run
+    from feasibility.studies.workers import open_workers
 
     check_outputs({"--csv": args.csv, "--html": args.html}, args.case)
     case = load_case(args.case, args.settings)
@@ -109,7 +113,7 @@ def compare(args: argparse.Namespace, began: float) -> int:
 
 def _poses(study: Study, rows: tuple[Row, ...]) -> View | None:
     """The poses of the surface, where a study varies them."""
-    from feasibility.viewer import view_study
+    from feasibility.viewer.placements import view_study
 
     if not any(label.startswith(("surface.position", "surface.rpy_deg")) for label in study.labels):
         return None

@@ -20,7 +20,7 @@ from feasibility.safe_files import shown_path
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from feasibility.cases import Case
+    from feasibility.cases.case import Case
     from feasibility.verifying import Verification
 
 LIMIT = "search.time_limit"
@@ -64,7 +64,7 @@ def _motion(args: argparse.Namespace, began: float) -> int:
         with open_case(args, began, {}, check_case=check_case) as opened:
             import numpy as np
 
-            from feasibility.results import load_motion
+            from feasibility.results.motion_file import load_motion
             from feasibility.verifying import verify as run
 
             robot, cells, task, _ = opened.setup
@@ -88,9 +88,9 @@ def _motion(args: argparse.Namespace, began: float) -> int:
 def _result(args: argparse.Namespace, began: float) -> int:
     """Check a saved result."""
     with progress_bar() as progress:
-        from coverable_errors import CoverableError
+        from coverable.errors import CoverableError
         from feasibility.clock import OutOfTime
-        from feasibility.results import ResultError, case_of_result, load_result
+        from feasibility.results.result_file import ResultError, case_of_result, load_result
         from feasibility.verifying import verify as run
 
         if args.passes is not None or args.pitch is not None:

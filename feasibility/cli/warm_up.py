@@ -107,7 +107,7 @@ def warm_up(
 
 def _say_where_nothing_is_kept() -> None:
     """That this was in vain, because kernels cannot be written anywhere."""
-    from coverable_kernels import FOLDER
+    from coverable.kernels import FOLDER
 
     if FOLDER is None:
         print_err(

@@ -12,8 +12,8 @@ from feasibility.collisions.words import checked_words
 if TYPE_CHECKING:
     from feasibility.collisions.bodies import Bodies
     from feasibility.collisions.settings import Collision
-    from robots import Robot
-    from surfaces import Surface
+    from robots.robot import Robot
+    from surfaces.surface import Surface
 
 
 def gather(

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from feasibility.collisions.scene import Obstacle
-from robots.shapes import LeftOut, Polytope, Solid
+from robots.shapes.bodies import Polytope, Solid
+from robots.shapes.pairs import LeftOut
 
 if TYPE_CHECKING:
-    from surfaces import Sheet
+    from surfaces.sheet import Sheet
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_errors import ArgumentError
+from coverable.errors import ArgumentError
 from feasibility.collisions.bodies import Bodies, Pair, Soup
 from feasibility.collisions.outer_bodies import polytopes_of, soup_of, tool_polytopes, tool_solids
 from feasibility.collisions.overlaps_at_rest import overlapping
@@ -17,23 +17,14 @@ from feasibility.collisions.scene import ToolShape
 from feasibility.collisions.seats import Seat, carried_bodies, furthest, seats_of
 from feasibility.collisions.settings import Collision
 from feasibility.collisions.words import SURFACE, TOOL
-from robots import Robot
-from robots.shapes import (
-    BARE,
-    Fineness,
-    LeftOut,
-    LinkPairs,
-    LinkShapes,
-    Polytope,
-    Reach,
-    bare_length,
-    link_pairs,
-    link_shapes,
-    tool_line,
-    tool_reach,
-    with_crude_links_cut,
-)
-from surfaces import Surface, sheet_of
+from robots.robot import Robot
+from robots.shapes.bodies import Fineness, Polytope
+from robots.shapes.links import LinkShapes, link_shapes
+from robots.shapes.pairs import LeftOut, LinkPairs, link_pairs
+from robots.shapes.sampling import with_crude_links_cut
+from robots.shapes.tool import BARE, Reach, bare_length, tool_line, tool_reach
+from surfaces.sheet import sheet_of
+from surfaces.surface import Surface
 
 KEPT = 16  # problems whose bodies are remembered: `explain` and `place` come back to them
 FURTHEST = 1e4  # [m] that an arm on a rail without end is taken to get

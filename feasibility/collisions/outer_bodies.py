@@ -12,13 +12,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from feasibility.collisions.bodies import Soup
 from feasibility.collisions.scene import Obstacle, ToolShape
 from feasibility.collisions.shapes import HalfSpace
 from feasibility.collisions.words import TOOL
-from robots import Robot
-from robots.shapes import Polytope, Solid, Triangles, hull_of, is_convex
+from robots.robot import Robot
+from robots.shapes.bodies import Polytope, Solid, Triangles
+from robots.shapes.hulls import hull_of, is_convex
 
 Points = Array
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from robots.shapes import Polytope, coal_distance
+from robots.shapes.bodies import Polytope
+from robots.shapes.coal_shapes import coal_distance
 
 Pair = tuple[str, str]
 

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from coverable_errors import Checks, Fault, close, shown
+from coverable.errors import Checks, Fault, close, shown
 
 CLEAREST = 10.0  # [m], the largest clearance, and the thickest sheet
 

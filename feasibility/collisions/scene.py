@@ -10,8 +10,8 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_errors import ArgumentError, Checks, Fault
+from coverable.arrays import Array
+from coverable.errors import ArgumentError, Checks, Fault
 from feasibility.collisions.pairs import checked_distance
 from feasibility.collisions.shapes import (
     ORIGIN,
@@ -23,8 +23,8 @@ from feasibility.collisions.shapes import (
 )
 from feasibility.collisions.triangles import PLACEHOLDER, read_triangles
 from feasibility.collisions.words import SURFACE, TOOL
-from robots.shapes import Triangles
-from robots.urdf import Box, Capsule, Cylinder, Sphere
+from robots.shapes.bodies import Triangles
+from robots.urdf.geometry import Box, Capsule, Cylinder, Sphere
 
 Point = Sequence[float]
 Path = str | os.PathLike[str]
@@ -46,7 +46,7 @@ class Obstacle:
         >>> floor = Obstacle.halfspace("floor", clearance=0.02)
         >>> Obstacle.sphere("ball", radius=0.0, position=(0.0, float("nan"), 0.0))
         Traceback (most recent call last):
-        coverable_errors.ArgumentError: obstacle 'ball': 2 faults:
+        coverable.errors.ArgumentError: obstacle 'ball': 2 faults:
           position must be three finite numbers (metres), got (0.0, nan, 0.0)
           radius must be a finite number > 0 (metres), got 0.0
     """

@@ -15,9 +15,10 @@ from feasibility.collisions.bodies import Seat
 from feasibility.collisions.outer_bodies import below
 from feasibility.collisions.scene import Obstacle
 from feasibility.collisions.shapes import HalfSpace
-from robots import Robot
-from robots.shapes import Fineness, Polytope, Solid, Triangles, outer_bodies
-from robots.urdf import Box
+from robots.robot import Robot
+from robots.shapes.bodies import Fineness, Polytope, Solid, Triangles
+from robots.shapes.links import outer_bodies
+from robots.urdf.geometry import Box
 
 
 def seats_of(robot: Robot, scene: Iterable[Obstacle]) -> tuple[Seat, ...]:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, get_args
 
-from coverable_errors import Checks, Fault
+from coverable.errors import Checks, Fault
 from feasibility.collisions.pairs import (
     checked_distance,
     clearances_of,
@@ -18,7 +18,7 @@ from feasibility.collisions.pairs import (
 )
 from feasibility.collisions.scene import Obstacle, ToolShape
 from feasibility.collisions.words import SURFACE, TOOL, asked_for
-from robots.shapes import Fineness
+from robots.shapes.bodies import Fineness
 
 MOST_OBJECTS = 1000
 
@@ -33,13 +33,13 @@ class Collision:
             `unknown_names`.
 
     Example:
-        >>> from feasibility.collisions import Obstacle
+        >>> from coverable import Obstacle
         >>> shelf = Obstacle.box("shelf", (0.5, 0.6, 0.02), position=(0.55, 0.0, 0.5))
         >>> Collision(clearance=0.005, scene=(shelf,)).checked
         ('self', 'surface', 'scene')
         >>> Collision(clearance=-1.0, shapes="x")
         Traceback (most recent call last):
-        coverable_errors.ArgumentError: collision: 2 faults:
+        coverable.errors.ArgumentError: collision: 2 faults:
           clearance must be a number in 0 .. 10 (metres), got -1.0
           shapes must be 'hulls', 'pieces' or 'meshes', got 'x'
     """

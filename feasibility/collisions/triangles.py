@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
-from coverable_errors import Checks, CoverableError, Fault
-from coverable_files import shown_name
-from robots.shapes import Triangles, solid_faces
+from coverable.arrays import Array, Ints
+from coverable.errors import Checks, CoverableError, Fault
+from coverable.files import shown_name
+from robots.shapes.bodies import Triangles
+from robots.shapes.triangles import solid_faces
 
 MOST_FACES = 500_000
 SMALLEST_EXTENT, LARGEST_EXTENT = 1e-6, 1e4  # [m], of the widest side
@@ -38,8 +39,8 @@ def read_triangles(path: str | os.PathLike[str], scale: float | None = None) -> 
         ArgumentError: no such file, not a mesh, damaged, too large, flat to a line, or of an
             unlikely size.
     """
-    from coverable_meshes import read_raw
-    from surfaces.meshes import metres_per_unit, refuse_unlikely_unit
+    from coverable.meshes.mesh_file import read_raw
+    from surfaces.meshes.sources import metres_per_unit, refuse_unlikely_unit
 
     checks = Checks()
     name = shown_name(path)

@@ -57,7 +57,7 @@ def checked_words(asked: Asked | None) -> str:
     Example:
         >>> checked_words(None)
         'collisions are not checked'
-        >>> from feasibility.collisions import Collision
+        >>> from coverable import Collision
         >>> print(checked_words(Collision(surface=False, clearance=0.005)))
         collisions are checked with the arm itself, 5 mm apart
     """

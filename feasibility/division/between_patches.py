@@ -11,14 +11,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from coverable_arrays import Array
-from feasibility.certification import CollisionReplay, collision_replay
-from feasibility.collisions import Bodies, collision_buffer, gather
+from coverable.arrays import Array
+from feasibility.certification.collisions.collision_replay import CollisionReplay, collision_replay
+from feasibility.collisions.asked_bodies import gather
+from feasibility.collisions.bodies import Bodies
+from feasibility.collisions.kernels.memory import collision_buffer
 from feasibility.division.free_motion import FreeSpace, free_motion
 from feasibility.division.reconfiguration import Reconfiguration
 from feasibility.task import Task
-from robots import Kinematics, Robot, configuration_near
-from surfaces import Cells
+from robots.kinematics import Kinematics, configuration_near
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 LIFT = 0.02  # [m]
 STEPS = 4  # of the lift: a straight line of the tool point to 0.01 mm or so

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from coverable_arrays import Ints, Protected
-from coverable_errors import counted
-from feasibility.collisions import said_of
+from coverable.arrays import Ints, Protected
+from coverable.errors import counted
+from feasibility.collisions.asked_bodies import said_of
 from feasibility.cut_tree import CutTree
 from feasibility.division.reconfiguration import Reconfiguration
 from feasibility.task import Task
 from feasibility.verdict import Cause, Certificate, Walk
-from robots import Robot
-from surfaces import Cells
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 
 @dataclass(frozen=True, eq=False, slots=True)

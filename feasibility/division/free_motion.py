@@ -12,9 +12,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from coverable_arrays import Array
-from feasibility.collisions import clearance_gradient, segment_clear
-from robots import Robot
+from coverable.arrays import Array
+from feasibility.collisions.kernels.clearance import clearance_gradient, segment_clear
+from robots.robot import Robot
 
 MOST_LINES = 40_000  # that are tried for one motion
 FIRST_LINE = 0.5  # [rad], length of the pieces that a line is tried in at first

@@ -5,15 +5,16 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import NamedTuple
 
-from coverable_arrays import Mask
+from coverable.arrays import Mask
 from feasibility.clock import Clock, OutOfTime
-from feasibility.roadmap import covering_walk, exploration_of, explore
+from feasibility.roadmap.search import exploration_of, explore
+from feasibility.roadmap.walk import covering_walk
 from feasibility.search import Search
-from feasibility.speed import replay_at_rates
+from feasibility.speed.motion_rates import replay_at_rates
 from feasibility.task import Task
 from feasibility.verdict import Walk
-from robots import Robot
-from surfaces import Cells
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 
 class OneMotion(NamedTuple):

@@ -17,14 +17,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable_arrays import Array, Mask
+from coverable.arrays import Array, Mask
 from feasibility.division.between_patches import clear_moves
 from feasibility.division.division import Plan, SubPatch
 from feasibility.division.reconfiguration import itinerary
 from feasibility.division.set_covering import set_cover
 from feasibility.division.sharing import TIME_LIMIT, fewest_patches, pieces_in
-from feasibility.roadmap import UNTRIED, Exploration, Links, improve, links_of, patch_walk
-from feasibility.speed import replay_at_rates
+from feasibility.roadmap.expansion import UNTRIED
+from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.search import improve
+from feasibility.roadmap.walk import Links, links_of, patch_walk
+from feasibility.speed.motion_rates import replay_at_rates
 from feasibility.task import Task
 from feasibility.verdict import Walk
 

@@ -11,11 +11,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from coverable_arrays import Ints, Mask
+from coverable.arrays import Ints, Mask
 from feasibility.cut_tree import CutTree
 from feasibility.division.division import Apart
-from feasibility.roadmap import Exploration
-from feasibility.roadmap.cuts import Prover, components_of, places_on
+from feasibility.roadmap.cuts.gaps import components_of
+from feasibility.roadmap.cuts.places import places_on
+from feasibility.roadmap.cuts.prover import Prover
+from feasibility.roadmap.exploration import Exploration
 from feasibility.task import Task
 
 ATTEMPTS = 4  # at a proof, each with the configurations that refuted the one before

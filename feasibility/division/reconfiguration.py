@@ -20,12 +20,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask, Protected
-from feasibility.certification import CollisionReplay
+from coverable.arrays import Array, Ints, Mask, Protected
+from feasibility.certification.collisions.collision_replay import CollisionReplay
 from feasibility.division.free_motion import in_radians
-from feasibility.paths import improved, turns_inside
+from feasibility.paths.two_opt import improved
+from feasibility.paths.winding import turns_inside
 from feasibility.verdict import Walk
-from robots import Robot
+from robots.robot import Robot
 
 TURN = 2.0 * np.pi
 MOST_EXACT = 7  # patches up to which all orders are tried; beyond, one is improved by 2-opt

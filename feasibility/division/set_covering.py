@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable_arrays import Ints, Mask
-from coverable_errors import ArgumentError
+from coverable.arrays import Ints, Mask
+from coverable.errors import ArgumentError
 
 ROUNDING = 1e-6  # by how much HiGHS's numbers may differ from integers
 

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable_arrays import Ints, Mask, Protected
-from coverable_errors import ArgumentError
+from coverable.arrays import Ints, Mask, Protected
+from coverable.errors import ArgumentError
 from feasibility.division.set_covering import set_cover
-from surfaces import components
+from surfaces.adjacency import components
 
 TIME_LIMIT = 10.0  # [s]
 

@@ -7,33 +7,31 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Ints
-from coverable_errors import ArgumentError, counted
+from coverable.arrays import Ints
+from coverable.errors import ArgumentError, counted
 from feasibility.clock import Clock, OutOfTime
-from feasibility.collisions import Pair
+from feasibility.collisions.bodies import Pair
 from feasibility.demands import OF_EACH, further, unjudged
 from feasibility.division.division import Division, Plan
 from feasibility.division.plans import collect_components, plan_of
 from feasibility.division.proved_bound import ProvedBound, prove_apart
 from feasibility.notices import compiling_notice
 from feasibility.problem import Problem
-from feasibility.roadmap import (
-    Exploration,
-    Ruling,
-    SearchArrays,
-    exploration_of,
-    explore,
-    warm_up,
-    within,
-)
-from feasibility.roadmap.causes import cause_of, causes_of, diagnose, disconnected
+from feasibility.roadmap.branch_and_bound.ruling import Ruling
+from feasibility.roadmap.causes.diagnosis import cause_of, causes_of, diagnose
+from feasibility.roadmap.causes.disconnection import disconnected
+from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.motions.arrays import SearchArrays, within
+from feasibility.roadmap.search import exploration_of, explore
+from feasibility.roadmap.warmup import warm_up
 from feasibility.search import Progress, Search
-from feasibility.speed import check_requirements, keep_fast_motions, required_words
-from feasibility.targets import blocked_curves
+from feasibility.speed.fast_motions import keep_fast_motions
+from feasibility.speed.requirements import check_requirements, required_words
+from feasibility.targets.blocked import blocked_curves
 from feasibility.task import Task
 from feasibility.verdict import Cause
-from robots import Robot
-from surfaces import Cells
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 NOT_GREEDY = (
     "a division needs search.method 'complete', got {!r}: the greedy search keeps one tree of "
@@ -77,8 +75,8 @@ def divide(
         RobotError: the arm is no serial chain of one-dof joints.
 
     Example:
-        >>> from robots import load_robot
-        >>> from surfaces import plane
+        >>> from coverable import load_robot
+        >>> from coverable import plane
         >>> patch = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside")
         >>> division = divide(load_robot("ur5"), patch.cells(3, 3), Task(0.02, cone_deg=30))
         >>> len(division.patches), division.optimal, division.whole

@@ -13,12 +13,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable_arrays import Array, Protected
-from feasibility.certification import collision_replay, placements, second_derivatives
-from feasibility.collisions import Bodies, collision_buffer, gather
-from feasibility.division import FreeSpace, free_motion, tool_moved
-from feasibility.paths import CoveragePath, PathError
-from robots import Robot
+from coverable.arrays import Array, Protected
+from feasibility.certification.collisions.collision_replay import collision_replay
+from feasibility.certification.jacobians import placements
+from feasibility.certification.lever_bounds import second_derivatives
+from feasibility.collisions.asked_bodies import gather
+from feasibility.collisions.bodies import Bodies
+from feasibility.collisions.kernels.memory import collision_buffer
+from feasibility.division.between_patches import tool_moved
+from feasibility.division.free_motion import FreeSpace, free_motion
+from feasibility.paths.coverage import CoveragePath
+from feasibility.paths.order import PathError
+from robots.robot import Robot
 
 STEP = 0.005  # [m] of the tool point drawn back from row to row, at most
 MOST_HALVINGS = 6  # of that, until the motion is straight enough between rows

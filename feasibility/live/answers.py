@@ -12,11 +12,11 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from coverable_errors import CoverableError
-from feasibility.cases import Case, Setup
+from coverable.errors import CoverableError
+from feasibility.cases.case import Case, Setup
 from feasibility.checking import check
 from feasibility.clock import Clock, OutOfTime
-from feasibility.collisions import said_of
+from feasibility.collisions.asked_bodies import said_of
 from feasibility.live import picture
 from feasibility.live.controls import Controls
 from feasibility.live.jobs import Answer, Job, Superseded

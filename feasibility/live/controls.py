@@ -14,9 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from coverable_errors import Fault, is_number, printable, shown
-from feasibility.cases import Case, CaseError, toml_key
-from robots import Robot
+from coverable.errors import Fault, is_number, printable, shown
+from feasibility.cases.case import Case
+from feasibility.cases.table_reader import CaseError
+from feasibility.cases.toml import toml_key
+from robots.robot import Robot
 
 DIGITS = 9  # of a number of the page, which hides what conversions leave behind
 STEP = 0.5  # mm or degrees, of one press of an arrow key
@@ -42,7 +44,7 @@ class Controls:
     """The controls of one case.
 
     Example:
-        >>> from feasibility.cases import load_case
+        >>> from coverable import load_case
         >>> case = load_case("paper/4a")
         >>> controls = Controls(case, case.robot.build())
         >>> controls.values["standoff"], controls.values["limits"]["joint5"]

@@ -13,31 +13,21 @@ from typing import Any, NamedTuple
 import networkx as nx
 import numpy as np
 
-from coverable_arrays import Array, Mask
-from feasibility.cases import Setup
+from coverable.arrays import Array, Mask
+from feasibility.cases.case import Setup
 from feasibility.verdict import Answer, Evidence, Verdict
-from feasibility.viewer import (
-    HULLS,
-    ROBOT,
-    Colour,
-    Command,
-    Entry,
-    View,
-    animate,
-    hex_colour,
-    layers,
-    missed_groups,
-    motion_of,
-    pose,
-    stream_of,
-    trail,
-    view,
-)
-from feasibility.viewer import MISSED as NOT_YET
-from feasibility.viewer import patch as filled
-from feasibility.viewer.frames import GROUP, carried, world_tracks
-from robots import Robot
-from surfaces import Cells
+from feasibility.viewer.cell_meshes import patch as filled
+from feasibility.viewer.frames.standing_world import GROUP, carried, world_tracks
+from feasibility.viewer.html_page import Entry
+from feasibility.viewer.obstacles import HULLS
+from feasibility.viewer.playback import animate, motion_of
+from feasibility.viewer.robot import ROBOT, pose
+from feasibility.viewer.scene import MISSED as NOT_YET
+from feasibility.viewer.scene import layers, missed_groups, trail
+from feasibility.viewer.threejs import Colour, Command, hex_colour, stream_of
+from feasibility.viewer.viewer import View, view
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 SURFACE, CELLS = "/surface", "/cells"
 COVERED: Colour = (0.13, 0.60, 0.33)

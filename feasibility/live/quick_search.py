@@ -11,21 +11,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Mask
+from coverable.arrays import Array, Mask
 from feasibility.clock import Clock, OutOfTime
 from feasibility.notices import compiling_notice
-from feasibility.paper import greedy_search
+from feasibility.paper.greedy import greedy_search
 from feasibility.problem import Problem
-from feasibility.roadmap import (
-    Exploration,
-    arrays_of,
-    evenly,
-    improve,
-    seed_middle,
-    warm_up,
-)
+from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.motions.arrays import arrays_of
+from feasibility.roadmap.search import evenly, improve, seed_middle
+from feasibility.roadmap.warmup import warm_up
 from feasibility.search import Search
-from feasibility.targets import start_cell
+from feasibility.targets.starting import start_cell
 
 SEEDS = 2  # guesses at a cell that is not reached
 ROUNDS = 3

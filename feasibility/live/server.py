@@ -10,10 +10,10 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from coverable_errors import CoverableError
+from coverable.errors import CoverableError
 from feasibility.live.controls import Controls
 from feasibility.live.sessions import MOST, Gone, Sessions, TooManyPages
-from feasibility.viewer import File, Handler, LocalServer
+from feasibility.viewer.live_server import File, Handler, LocalServer
 
 LONGEST_WAIT = 2.0  # [s] for an answer; then the page hears how far it is, and asks again
 LARGEST_REQUEST = 64 * 1024  # bytes

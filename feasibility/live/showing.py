@@ -10,15 +10,17 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from coverable_errors import CoverableError
-from feasibility.cases import Case, Setup, load_case
+from coverable.errors import CoverableError
+from feasibility.cases.case import Case, Setup, load_case
 from feasibility.live import picture
 from feasibility.live.answers import Answers
 from feasibility.live.controls import Controls
 from feasibility.live.server import PageServer
 from feasibility.live.sessions import Sessions
 from feasibility.live.workbench import Workbench
-from feasibility.viewer import HTML, PAGE, File, Served, View, in_notebook, meshcat_program
+from feasibility.viewer.html_page import PAGE, meshcat_program
+from feasibility.viewer.live_server import HTML, File, Served
+from feasibility.viewer.viewer import View, in_notebook
 
 FILES = Path(__file__).with_name("page")
 SHARED = (PAGE / "picture.css", PAGE / "picture.js")  # with the page of a view

@@ -12,13 +12,16 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, TypeVar
 
-from coverable_errors import ArgumentError
-from feasibility.cases import Case, CaseError, Setup, in_robot_table
-from feasibility.placement import Pose, moved_cells
-from feasibility.targets import check_references
+from coverable.errors import ArgumentError
+from feasibility.cases.case import Case, Setup
+from feasibility.cases.robot_table import in_robot_table
+from feasibility.cases.table_reader import CaseError
+from feasibility.placement.region import Pose, moved_cells
+from feasibility.targets.references import check_references
 from feasibility.task import Task
-from robots import Robot, RobotError
-from surfaces import Cells
+from robots.errors import RobotError
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 KEPT = 8  # arms and surfaces that are remembered: undo comes back to them
 

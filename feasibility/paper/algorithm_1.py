@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coverable_arrays import Array, Ints
-from coverable_kernels import allocating, allocating_entry
+from coverable.arrays import Array, Ints
+from coverable.kernels import allocating, allocating_entry
 from feasibility.paper.jcell_grid import (
     HAIR,
     cell_of,

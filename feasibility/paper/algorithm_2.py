@@ -9,7 +9,7 @@ import numpy as np
 from feasibility.clock import Clock
 from feasibility.paper.continuity import JSpace, Outcome
 from feasibility.paper.tree_and_graph import Tree
-from surfaces import Cells
+from surfaces.cells import Cells
 
 
 def tree_search(space: JSpace, cells: Cells, start: int, clock: Clock | None = None) -> Tree:

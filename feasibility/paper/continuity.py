@@ -9,21 +9,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from coverable_arrays import Array, Ints
-from coverable_errors import ArgumentError
+from coverable.arrays import Array, Ints
+from coverable.errors import ArgumentError
 from feasibility.clock import Clock
 from feasibility.paper import algorithm_1 as jcells
 from feasibility.paper.jcell_grid import Grid, cell_of, place_tool, rolls_within
 from feasibility.paper.jcell_steps import Steps
 from feasibility.search import Search
 from feasibility.task import Task
-from robots import Robot
-from surfaces import Cells
-from surfaces.patches import GridCells
+from robots.robot import Robot
+from surfaces.cells import Cells
+from surfaces.patches.grid_cells import GridCells
 
 if TYPE_CHECKING:
-    from surfaces import TriangleKernel
-    from surfaces.patches import PatchKernel
+    from surfaces.patches.closed_form_kernels import PatchKernel
+    from surfaces.triangle_kernel import TriangleKernel
 
 CAP = 20_000  # J-cells of one call at the step below, unless the search says otherwise
 CAP_STEP_DEG = 0.01

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from feasibility.roll import projected, roll_of
-from feasibility.targets import u_directions
+from feasibility.targets.references import u_directions
 from feasibility.task import Task
-from robots import Kinematics
-from surfaces import Cells
+from robots.kinematics import Kinematics
+from surfaces.cells import Cells
 
 
 def approaches_at(cells: Cells, task: Task, points: Array) -> Array:

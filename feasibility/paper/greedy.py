@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_errors import ArgumentError, counted
+from coverable.errors import ArgumentError, counted
 from feasibility.clock import Clock
 from feasibility.found import Found
 from feasibility.notices import GREEDY, compiling_notice

@@ -19,11 +19,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
-from coverable_kernels import allocating, allocating_entry
-from robots import frames
-from surfaces import cell_under, u_direction_under
-from surfaces.patches import cell_at, closest_on_patch, u_direction
+from coverable.arrays import Array, Ints
+from coverable.kernels import allocating, allocating_entry
+from robots.chain import frames
+from surfaces.patches.closed_form_kernels import cell_at, closest_on_patch, u_direction
+from surfaces.triangle_kernel import cell_under, u_direction_under
 
 HAIR = 1e-12  # [m], [1]: required beyond the task, so that another rounding of the same q agrees
 

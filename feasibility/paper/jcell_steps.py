@@ -38,15 +38,17 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Mask
+from coverable.arrays import Array, Mask
 from feasibility.cone import chord_of
 from feasibility.search import Search
-from feasibility.targets import target_curves
+from feasibility.targets.curves import target_curves
 from feasibility.task import Task
-from robots import Robot
-from surfaces import Cells, Triangulation, triangulation
-from surfaces.patches import ClosedFormPatch, GridCells
-from surfaces.piecewise import PieceCells
+from robots.robot import Robot
+from surfaces.cell_triangles import Triangulation, triangulation
+from surfaces.cells import Cells
+from surfaces.patches.grid_cells import GridCells
+from surfaces.patches.patch import ClosedFormPatch
+from surfaces.piecewise.cells import PieceCells
 
 TOLERANCE_STEPS = 0.5
 """Default tolerance, in steps times reach: half of what the tool can move in one step."""

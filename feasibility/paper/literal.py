@@ -23,16 +23,17 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array
-from coverable_errors import ArgumentError
+from coverable.arrays import Array
+from coverable.errors import ArgumentError
 from feasibility.paper.exact_rolls import rolls_at
 from feasibility.paper.jcell_grid import HAIR
 from feasibility.paper.jcell_steps import Steps
 from feasibility.paper.starts import candidates
 from feasibility.search import Search
 from feasibility.task import Task
-from robots import Kinematics, Robot
-from surfaces import Cells
+from robots.kinematics import Kinematics
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 JCell = tuple[int, ...]
 """A J-cell, by its offsets from the one at the start, in steps of delta q."""
@@ -60,8 +61,8 @@ class LiteralSearch:
     """Algorithms 1 and 2 for one arm, one surface cut into E-cells, and one first J-cell.
 
     Example:
-        >>> from robots import load_robot
-        >>> from surfaces import plane
+        >>> from coverable import load_robot
+        >>> from coverable import plane
         >>> cells = plane((0.5, 0.6), (0.0, 0.1), side="outside").cells(2, 2)
         >>> search = Search(method="greedy", step_deg=2.0)
         >>> literal = LiteralSearch.of(load_robot("ur5"), cells, Task(0.1, 30), search)

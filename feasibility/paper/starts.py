@@ -17,13 +17,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from coverable_arrays import Array, Mask
+from coverable.arrays import Array, Mask
 from feasibility.clock import Clock
 from feasibility.search import Search
 from feasibility.task import Targets, Task
-from robots import Kinematics, Robot
-from surfaces import Cells
-from surfaces.patches import GridCells
+from robots.kinematics import Kinematics
+from robots.robot import Robot
+from surfaces.cells import Cells
+from surfaces.patches.grid_cells import GridCells
 
 ACCURACY = 1e-9  # [m], [1]: of a start's tool point and axis
 CLOSE = 1e-3  # [rad], [m]: configurations nearer than this are taken as one

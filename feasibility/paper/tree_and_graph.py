@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from coverable_arrays import Array, Ints
+from coverable.arrays import Array, Ints
 from feasibility.verdict import Verdict, Walk
-from robots import Kinematics
-from surfaces import Cells
+from robots.kinematics import Kinematics
+from surfaces.cells import Cells
 
 if TYPE_CHECKING:
     import networkx as nx

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from coverable_arrays import Array, Mask
-from feasibility.certification import replay_over_surface
+from coverable.arrays import Array, Mask
+from feasibility.certification.surface_replay import replay_over_surface
 from feasibility.cone import angle_of
 from feasibility.paper.exact_rolls import approaches_at, rolls_at
 from feasibility.paper.jcell_steps import Steps
@@ -20,9 +20,10 @@ from feasibility.paper.tree_and_graph import corners, there_and_back
 from feasibility.search import Search
 from feasibility.task import Task
 from feasibility.verdict import Certificate, Replay, Verdict
-from robots import Kinematics, Robot
-from surfaces import Cells
-from surfaces.patches import GridCells
+from robots.kinematics import Kinematics
+from robots.robot import Robot
+from surfaces.cells import Cells
+from surfaces.patches.grid_cells import GridCells
 
 SAME = 1e-9  # [rad], [m], [1]: rounding allowed where two computations of one number meet
 

@@ -19,9 +19,9 @@ from dataclasses import dataclass
 import networkx as nx
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask, Protected
-from coverable_errors import listed
-from feasibility.certification import replay
+from coverable.arrays import Array, Ints, Mask, Protected
+from coverable.errors import listed
+from feasibility.certification.motion_replay import replay
 from feasibility.paths.ladder import FEW, JointRoute, joint_route
 from feasibility.paths.metrics import PathFigures, figures_of
 from feasibility.paths.motion_graph import MotionGraph, motion_graph_of
@@ -39,8 +39,8 @@ from feasibility.paths.order import (
 from feasibility.paths.winding import unwound
 from feasibility.task import Task
 from feasibility.verdict import Answer, Certificate, Verdict, Walk
-from robots import Robot
-from surfaces import Cells
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 MOST_CELLS = 6000  # cells that are passed in all attempts together, so that large grids end too
 MOST_TRIED = 24  # attempts at one order
@@ -108,9 +108,9 @@ def coverage_path(
             or no path was found that the replay accepts.
 
     Example:
-        >>> from feasibility import Task, check
-        >>> from robots import load_robot
-        >>> from surfaces import plane
+        >>> from coverable import Task, check
+        >>> from coverable import load_robot
+        >>> from coverable import plane
         >>> plate = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside")
         >>> verdict = check(load_robot("ur5"), plate.cells(2, 3), Task(standoff=0.02, cone_deg=30))
         >>> path = coverage_path(verdict, "rows")

@@ -16,7 +16,7 @@ from itertools import pairwise
 import networkx as nx
 import numpy as np
 
-from coverable_arrays import Ints
+from coverable.arrays import Ints
 from feasibility.paths.motion_graph import (
     MotionGraph,
     join_self_motions,
@@ -25,7 +25,7 @@ from feasibility.paths.motion_graph import (
     windings,
 )
 from feasibility.paths.order import PathError
-from surfaces import Cells
+from surfaces.cells import Cells
 
 KEPT = 4  # nodes that are kept over each cell of the route
 APART = 0.1  # [rad] or [m], a node nearer to a cheaper one than this is a copy of it

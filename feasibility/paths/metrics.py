@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask, Protected
-from feasibility.certification import placements
-from feasibility.certification.rates import smallest_singular_values
+from coverable.arrays import Array, Ints, Mask, Protected
+from feasibility.certification.jacobians import placements
+from feasibility.certification.rates.segment_rates import smallest_singular_values
 from feasibility.task import Task
 from feasibility.verdict import Certificate, Walk
-from robots import Robot
-from surfaces import Cells
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 BETWEEN = 4  # places along each straight line of joints at which the tool point is computed
 

@@ -15,18 +15,14 @@ from itertools import pairwise
 import networkx as nx
 import numpy as np
 
-from coverable_arrays import Array, Ints
-from feasibility.roadmap import (
-    SearchArrays,
-    Work,
-    arrays_of,
-    connect,
-    look_at,
-    track,
-    work_for,
-)
+from coverable.arrays import Array, Ints
+from feasibility.roadmap.motions.aiming import look_at
+from feasibility.roadmap.motions.arrays import SearchArrays, arrays_of
+from feasibility.roadmap.motions.self_motion import connect
+from feasibility.roadmap.motions.tracking import track
+from feasibility.roadmap.motions.working_memory import Work, work_for
 from feasibility.verdict import Verdict, Walk
-from surfaces import Cells
+from surfaces.cells import Cells
 
 Motion = Array
 """(k, n) waypoints, both ends included."""

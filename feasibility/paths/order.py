@@ -14,10 +14,10 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from coverable_arrays import Ints, Mask
-from coverable_errors import CoverableError
+from coverable.arrays import Ints, Mask
+from coverable.errors import CoverableError
 from feasibility.paths.two_opt import improved, tour_length
-from surfaces import Cells
+from surfaces.cells import Cells
 
 Order = Literal["rows", "columns", "spiral", "shortest", "given"]
 ORDERS: tuple[Order, ...] = ("rows", "columns", "spiral", "shortest")  # of cells on a surface
@@ -78,7 +78,7 @@ def closed_sides(cells: Cells) -> tuple[bool, bool]:
     """Whether the last row of a grid touches the first one all along; and the columns too.
 
     Example:
-        >>> from surfaces import cylinder
+        >>> from coverable import cylinder
         >>> closed_sides(cylinder(0.5, (0, 360), (0, 1)).cells(6, 3))
         (True, False)
     """

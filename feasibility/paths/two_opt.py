@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
+from coverable.arrays import Array, Ints
 
 LONGEST_PART = 3  # places that Or-opt moves at once
 GAIN = 1e-9  # [1], share of the whole length that a change must gain

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from feasibility.task import Task
 from feasibility.verdict import Walk
-from robots import Robot
+from robots.robot import Robot
 
 TURN = 2.0 * np.pi
 ROUNDING = 1e-12  # [1] of a turn

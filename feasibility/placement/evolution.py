@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from feasibility.clock import Clock, OutOfTime
 from feasibility.placement.reach_bound import Reach
 from feasibility.placement.region import Pose, Region

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable_arrays import Array, Mask
+from coverable.arrays import Array, Mask
 from feasibility.placement.placements import Placements
 from feasibility.placement.region import AXES, PlacementError, Pose, Region
 from feasibility.placement.trials import Evaluator, search_all

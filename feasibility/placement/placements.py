@@ -19,22 +19,22 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
-from coverable_errors import Checks, Fault, at_least, counted
+from coverable.errors import Checks, Fault, at_least, counted
 from feasibility.clock import Clock
-from feasibility.collisions import said_of
+from feasibility.collisions.asked_bodies import said_of
 from feasibility.demands import refuse_start
 from feasibility.notices import compiling_notice
 from feasibility.placement.evolution import INTERRUPTED, Evolution, distinct
 from feasibility.placement.reach_bound import Beyond, Reach
 from feasibility.placement.region import PlacementError, Region
 from feasibility.placement.trials import Evaluator, Trial, evaluator_here
-from feasibility.roadmap import warm_up
+from feasibility.roadmap.warmup import warm_up
 from feasibility.search import Progress, Search
-from feasibility.targets import blocked_curves, smoothing_offer
+from feasibility.targets.blocked import blocked_curves, smoothing_offer
 from feasibility.task import Task
 from feasibility.verdict import Answer, CauseKind, Evidence
-from robots import Robot
-from surfaces import Cells
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 MISSED = {
     CauseKind.OUT_OF_REACH: "out of reach",
@@ -142,9 +142,9 @@ def place(
         ArgumentError: the arm has a start.
 
     Example:
-        >>> from feasibility.placement import Pose
-        >>> from robots import load_robot
-        >>> from surfaces import plane
+        >>> from coverable import Pose
+        >>> from coverable import load_robot
+        >>> from coverable import plane
         >>> plate = plane((-0.1, 0.1), (-0.1, 0.1), position=(1.2, 0, 0.3), side="outside")
         >>> region = Region.around(Pose.of_surface(plate), {"x": (0.3, 1.2), "yaw_deg": (0, 90)})
         >>> task = Task(standoff=0.02, cone_deg=30)

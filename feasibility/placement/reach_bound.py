@@ -18,11 +18,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Mask
+from coverable.arrays import Array, Mask
 from feasibility.placement.region import Pose, Region
 from feasibility.task import Task
-from robots import Robot
-from surfaces import Cells, rotation_from_rpy
+from robots.robot import Robot
+from surfaces.cells import Cells
+from surfaces.surface import rotation_from_rpy
 
 MOST_BOXES = 4096  # boxes of poses tested before the region counts as open
 MOST_TARGETS = 200  # targets that each box is tested for; a bound on some is one on all

@@ -9,10 +9,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_errors import CoverableError
-from surfaces import Cells, Surface, rotation_from_rpy
-from surfaces.patches import GridCells
+from coverable.arrays import Array
+from coverable.errors import CoverableError
+from surfaces.cells import Cells
+from surfaces.patches.grid_cells import GridCells
+from surfaces.surface import Surface, rotation_from_rpy
 
 Triple = tuple[float, float, float]
 
@@ -68,7 +69,7 @@ class Region:
     """All poses between two ends, one range for each of `AXES`; what does not vary has equal ends.
 
     Example:
-        >>> from surfaces import plane
+        >>> from coverable import plane
         >>> plate = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3))
         >>> region = Region.around(Pose.of_surface(plate), {"x": (-0.3, 0.3), "yaw_deg": (0, 90)})
         >>> region.varies

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable_arrays import Ints, Mask, Protected
+from coverable.arrays import Ints, Mask, Protected
 from feasibility.clock import Clock
 from feasibility.demands import OF_EACH, unjudged
-from feasibility.division import motion_over, set_cover
+from feasibility.division.one_motion import motion_over
+from feasibility.division.set_covering import set_cover
 from feasibility.placement.placements import COUNT, Placements
 from feasibility.placement.reach_bound import Reach
 from feasibility.placement.region import Pose, moved_cells

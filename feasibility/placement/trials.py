@@ -8,23 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from coverable_arrays import Mask
-from feasibility.cases import Case
+from coverable.arrays import Mask
+from feasibility.cases.case import Case
 from feasibility.checking import check
 from feasibility.placement.region import Pose, moved_cells
 from feasibility.search import Progress, Search
-from feasibility.studies import (
-    Store,
-    StudyTask,
-    Workers,
-    cells_of,
-    outcome_of,
-    run_tasks,
-)
+from feasibility.studies.outcome import cells_of, outcome_of
+from feasibility.studies.pool import Workers
+from feasibility.studies.run import StudyTask, run_tasks
+from feasibility.studies.store import Store
 from feasibility.task import Task
 from feasibility.verdict import Answer, Evidence
-from robots import Robot
-from surfaces import Cells
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 FEW, EACH = 2_000, 40  # evaluations of a quick look, in all and for each cell
 AHEAD = 4  # placements for each worker in one batch

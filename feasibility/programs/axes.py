@@ -23,10 +23,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_errors import Checks, CoverableError, Fault
+from coverable.arrays import Array
+from coverable.errors import Checks, CoverableError, Fault
 from feasibility.programs.controllers import INFORM, TP, Language
-from robots import Kinematics, Robot
+from robots.kinematics import Kinematics
+from robots.robot import Robot
 
 JOINTS = 6  # of the arm itself, in every language
 SECOND, THIRD = 1, 2  # axes of the arm

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from coverable_errors import alternatives
+from coverable.errors import alternatives
 from feasibility.safe_files import FileError, shown_path
 
 

@@ -8,15 +8,15 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
-from coverable_arrays import Array
-from coverable_errors import counted
-from feasibility.collisions import listed_words
+from coverable.arrays import Array
+from coverable.errors import counted
+from feasibility.collisions.words import listed_words
 from feasibility.programs.axes import AxisMap
 from feasibility.programs.controllers import INFORM, KRL, RAPID, TP, URSCRIPT, Language
-from feasibility.timing import Trajectory
+from feasibility.timing.sampled_trajectory import Trajectory
 from feasibility.version import version
-from robots import Robot
-from surfaces import Surface
+from robots.robot import Robot
+from surfaces.surface import Surface
 
 FLANGES = ("tool0", "flange", "ee_link")
 

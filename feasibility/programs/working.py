@@ -7,9 +7,10 @@ from itertools import groupby
 
 import numpy as np
 
-from coverable_arrays import Ints
-from feasibility.timing import Trajectory
-from surfaces.passes import LIFTED, Pass, PassPlaces
+from coverable.arrays import Ints
+from feasibility.timing.sampled_trajectory import Trajectory
+from surfaces.passes.stretches import Pass
+from surfaces.passes.toolpath import LIFTED, PassPlaces
 
 OFF = -1
 

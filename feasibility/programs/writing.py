@@ -10,7 +10,7 @@ from typing import IO
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
+from coverable.arrays import Array, Ints
 from feasibility.programs.axes import AxisMap, ProgramSettings, check_program
 from feasibility.programs.controllers import INFORM, KRL, RAPID, TP, URSCRIPT, language_of
 from feasibility.programs.header import head
@@ -18,9 +18,9 @@ from feasibility.programs.listings import inform, tp
 from feasibility.programs.motions import SERVO, Points, krl, rapid, urscript
 from feasibility.programs.working import working_times
 from feasibility.safe_files import write_whole
-from feasibility.timing import Trajectory
-from robots import Robot
-from surfaces import Surface
+from feasibility.timing.sampled_trajectory import Trajectory
+from robots.robot import Robot
+from surfaces.surface import Surface
 
 ROUNDING = 1e-6  # [s]
 LONGEST_NAME = 24  # characters of a program's name

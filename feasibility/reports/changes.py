@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from feasibility.cases import toml_key
-from feasibility.sensitivity import Change, Kind, Quantity, range_of, tilted
+from feasibility.cases.toml import toml_key
+from feasibility.sensitivity.quantities import Kind, Quantity, range_of, tilted
+from feasibility.sensitivity.thresholds import Change
 from feasibility.verdict import Verdict
-from robots import Robot
+from robots.robot import Robot
 
 if TYPE_CHECKING:
-    from feasibility.cases import Case
+    from feasibility.cases.case import Case
 
 LIMITS = (Kind.LOWER, Kind.UPPER)
 

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
 
-from feasibility.collisions import checked, checked_words
+from feasibility.collisions.words import checked, checked_words
 from feasibility.reports.pages import COLOURS, page, table
 from feasibility.reports.parts import MARGINS, aligned, bodiless, csv_text, percent
-from feasibility.sensitivity import LEAST_CONE_DEG
-from feasibility.studies import Arm, Comparison
+from feasibility.sensitivity.quantities import LEAST_CONE_DEG
+from feasibility.studies.robot_comparison import Arm, Comparison
 from feasibility.version import version
 
 Column = tuple[str, Callable[[Arm], str]]

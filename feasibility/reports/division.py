@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from coverable_errors import counted
-from feasibility.collisions import checked, said_of
+from coverable.errors import counted
+from feasibility.collisions.asked_bodies import said_of
+from feasibility.collisions.words import checked
 from feasibility.cut_words import lines as proof_lines
-from feasibility.division import Apart, Division, Reconfiguration, SubPatch
+from feasibility.division.division import Apart, Division, SubPatch
+from feasibility.division.reconfiguration import Reconfiguration
 from feasibility.reports.parts import (
     causes_json,
     certificate_json,
@@ -24,9 +26,9 @@ from feasibility.reports.parts import (
 )
 from feasibility.reports.proof import proof_json
 from feasibility.reports.verdict import causes_listed
-from feasibility.results import plain
+from feasibility.results.plain import plain
 from feasibility.version import version
-from surfaces import Cells
+from surfaces.cells import Cells
 
 PHASES = {"search_s": "search", "divide_s": "division"}
 STATUS = {"complete": 0, "partial": 1, "undecided": 3}

@@ -9,7 +9,8 @@ import shlex
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from feasibility.collisions import checked, said_of
+from feasibility.collisions.asked_bodies import said_of
+from feasibility.collisions.words import checked
 from feasibility.reports.changes import key, settings, worded
 from feasibility.reports.explanation_words import (
     SEEDED,
@@ -27,22 +28,22 @@ from feasibility.reports.explanation_words import (
 )
 from feasibility.reports.pages import framed, page, table
 from feasibility.reports.parts import aligned, filled, walk_csv, widening
-from feasibility.results import plain
-from feasibility.sensitivity import (
+from feasibility.results.plain import plain
+from feasibility.sensitivity.quantities import Quantity
+from feasibility.sensitivity.thresholds import (
     Change,
     ChangePair,
     Dropped,
     Explanation,
     Finding,
-    Quantity,
     Threshold,
 )
 from feasibility.verdict import Answer, Verdict, Walk
 from feasibility.version import version
 
 if TYPE_CHECKING:
-    from feasibility.cases import Case
-    from feasibility.viewer import View
+    from feasibility.cases.case import Case
+    from feasibility.viewer.viewer import View
 
 FEASIBLE_HEADS = ("tightened alone", "now", "feasible to", "beyond that")
 HEADS = ("one change", "now", "feasible from", "short of that")

@@ -8,12 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_errors import at_least, counted
+from coverable.errors import at_least, counted
 from feasibility.cut_words import what_opens
 from feasibility.reports.changes import LIMITS, label, shown, worded
-from feasibility.sensitivity import Change, Explanation, Finding, Kind, Quantity, Threshold
+from feasibility.sensitivity.quantities import Kind, Quantity
+from feasibility.sensitivity.thresholds import Change, Explanation, Finding, Threshold
 from feasibility.verdict import Evidence, Verdict
-from robots import Kinematics
+from robots.kinematics import Kinematics
 
 SEEDED = "[1]"  # behind thresholds that a search without known motions did not find
 SPARE = 1.0 / 3.0  # [1] of a joint's range: a limit that may tighten by more does not matter

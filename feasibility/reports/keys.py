@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from coverable_errors import ArgumentError, alternatives, close
-from feasibility.cases import Key, all_keys
+from coverable.errors import ArgumentError, alternatives, close
+from feasibility.cases.keys import Key, all_keys
 
 HEADINGS = ("key", "type", "unit", "default", "meaning", "example")
 NEEDED = "needed"

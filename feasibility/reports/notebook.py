@@ -6,12 +6,12 @@ import base64
 import html
 from collections import Counter
 
-from coverable_errors import counted
-from feasibility.collisions import said_of
+from coverable.errors import counted
+from feasibility.collisions.asked_bodies import said_of
 from feasibility.reports.pages import table
 from feasibility.reports.verdict import CAUSES, SENTENCES, rows_of
 from feasibility.verdict import Verdict
-from feasibility.viewer import view
+from feasibility.viewer.viewer import view
 
 
 def mimebundle(verdict: Verdict) -> dict[str, str]:

@@ -9,11 +9,11 @@ from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING
 
-from feasibility.collisions import Asked, checked_words
+from feasibility.collisions.words import Asked, checked_words
 from feasibility.version import version
 
 if TYPE_CHECKING:
-    from feasibility.viewer import View
+    from feasibility.viewer.viewer import View
 
 FILE = Path(__file__).with_name("page") / "report.html"
 # Colours that most colour-blind people can tell apart.

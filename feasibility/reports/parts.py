@@ -13,17 +13,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_errors import at_least, at_most, counted, listed
-from feasibility.results import plain
+from coverable.arrays import Array
+from coverable.errors import at_least, at_most, counted, listed
+from feasibility.results.plain import plain
 from feasibility.task import Task
 from feasibility.verdict import Bound, Cause, Certificate, PlacementMargin, Walk
-from robots import Robot
-from surfaces import Cells, Surface
+from robots.robot import Robot
+from surfaces.cells import Cells
+from surfaces.surface import Surface
 
 if TYPE_CHECKING:
-    from feasibility.certification.collisions import CollisionReplay
-    from robots.shapes import LeftOut
+    from feasibility.certification.collisions.collision_replay import CollisionReplay
+    from robots.shapes.pairs import LeftOut
 
 WIDTH = 100  # columns
 MARGINS = ("limit_deg", "limit_m", "cone_deg", "reach_m", "placement_m")

@@ -6,8 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from coverable_errors import counted
-from feasibility.collisions import checked, said_of
+from coverable.errors import counted
+from feasibility.collisions.asked_bodies import said_of
+from feasibility.collisions.words import checked
 from feasibility.reports.parts import (
     aligned,
     certificate_json,
@@ -16,11 +17,13 @@ from feasibility.reports.parts import (
     smooth_text,
     summary,
 )
-from feasibility.runs import Interruption, PassRuns, PlannedPasses
-from feasibility.timing import Trajectory
-from feasibility.treated import TreatedArea, treated_json, treated_words
+from feasibility.runs.pass_runs import Interruption, PassRuns
+from feasibility.runs.planning import PlannedPasses
+from feasibility.timing.sampled_trajectory import Trajectory
+from feasibility.treated.area import TreatedArea
+from feasibility.treated.words import treated_json, treated_words
 from feasibility.version import version
-from surfaces.passes import Passes
+from surfaces.passes.parallel import Passes
 
 FEWEST = "no fewer with the configurations found"
 LISTED = 3  # gaps that are named

@@ -7,11 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from coverable_errors import at_least, at_most, counted
-from feasibility.certification.rates import RateReplay
-from feasibility.collisions import checked, said_of
-from feasibility.entry import Ends
-from feasibility.paths import CoveragePath, PathFigures
+from coverable.errors import at_least, at_most, counted
+from feasibility.certification.rates.rate_replay import RateReplay
+from feasibility.collisions.asked_bodies import said_of
+from feasibility.collisions.words import checked
+from feasibility.entry.ends import Ends
+from feasibility.paths.coverage import CoveragePath
+from feasibility.paths.metrics import PathFigures
 from feasibility.reports.parts import (
     certificate_json,
     clearance_json,
@@ -24,13 +26,16 @@ from feasibility.reports.parts import (
 )
 from feasibility.reports.pass_runs import passes_json, passes_text
 from feasibility.reports.verdict import as_json as verdict_json
-from feasibility.results import plain
-from feasibility.timing import MotionLimits, Trajectory, used
-from feasibility.treated import TreatedArea, share_words, treated_json, treated_words
+from feasibility.results.plain import plain
+from feasibility.timing.limits_used import used
+from feasibility.timing.sampled_trajectory import Trajectory
+from feasibility.timing.speed_limits import MotionLimits
+from feasibility.treated.area import TreatedArea
+from feasibility.treated.words import share_words, treated_json, treated_words
 from feasibility.verdict import Verdict
 from feasibility.version import version
-from robots import Robot
-from surfaces.passes import Passes
+from robots.robot import Robot
+from surfaces.passes.parallel import Passes
 
 FEW = 5  # cells that are named
 HARDLY_LESS = 0.9  # [1] of the required speed

@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from coverable_arrays import Array, Mask
-from coverable_errors import at_least, counted
-from feasibility.collisions import checked, said_of
-from feasibility.placement import (
-    AXES,
-    PlacementMap,
-    Placements,
-    Pose,
-    StationPlan,
-    Trial,
-)
+from coverable.arrays import Array, Mask
+from coverable.errors import at_least, counted
+from feasibility.collisions.asked_bodies import said_of
+from feasibility.collisions.words import checked
+from feasibility.placement.map import PlacementMap
+from feasibility.placement.placements import Placements
+from feasibility.placement.region import AXES, Pose
+from feasibility.placement.stations import StationPlan
+from feasibility.placement.trials import Trial
 from feasibility.reports.parts import aligned, csv_text, summary
 from feasibility.reports.verdict import CAUSES, EVIDENCE
 from feasibility.verdict import Answer, CauseKind, Evidence

@@ -6,8 +6,8 @@ import math
 from typing import Any
 
 from feasibility.cut_tree import Cut, CutTree, Leaf
-from robots import Robot
-from surfaces import Cells
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 
 def proof_json(tree: CutTree | None, robot: Robot, cells: Cells) -> dict[str, Any] | None:

@@ -8,17 +8,19 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from coverable_errors import counted
-from feasibility.cases import CollisionPart, ObjectPart
-from feasibility.collisions import CHECKABLE, UNCHECKED, checked, checked_words
+from coverable.errors import counted
+from feasibility.cases.collision_table import CollisionPart, ObjectPart
+from feasibility.collisions.words import CHECKABLE, UNCHECKED, checked, checked_words
 from feasibility.reports.pages import COLOURS, framed, page, table
 from feasibility.reports.parts import MARGINS, aligned, bodiless, csv_text, percent
 from feasibility.reports.study_plot import are_numbers, charts, short, worded
-from feasibility.studies import Row, Study, StudyTask, merit
+from feasibility.studies.file import Study
+from feasibility.studies.outcome import merit
+from feasibility.studies.run import Row, StudyTask
 from feasibility.version import version
 
 if TYPE_CHECKING:
-    from feasibility.viewer import View
+    from feasibility.viewer.viewer import View
 
 COLUMNS = ("verdict", "evidence", "cells", "covered", "share", "edges", "pairs")
 BAR = 640  # px

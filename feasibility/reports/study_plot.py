@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Mask
+from coverable.arrays import Array, Mask
 from feasibility.reports.pages import COLOURS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from feasibility.studies import Row
+    from feasibility.studies.run import Row
 
 MAPS = 6  # at most
 PANELS = 4  # values of a key that is no number, each with a map of its own

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from feasibility.cases import Case
-from feasibility.collisions import checked, checked_words
+from feasibility.cases.case import Case
+from feasibility.collisions.words import checked, checked_words
 from feasibility.reports.parts import summary
 from feasibility.version import version
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from coverable_errors import counted
-from feasibility import paper
-from feasibility.cases import OWN_KEYS, Case
-from feasibility.collisions import checked, said_of
+from coverable.errors import counted
+from feasibility.cases.case import Case
+from feasibility.cases.surface_reading import OWN_KEYS
+from feasibility.collisions.asked_bodies import said_of
+from feasibility.collisions.words import checked
 from feasibility.reports.parts import (
     causes_json,
     certificate_text,
@@ -23,10 +24,10 @@ from feasibility.reports.parts import (
     summary,
     walk_csv,
 )
-from feasibility.treated import share_words, treated_json, treated_words
+from feasibility.treated.words import share_words, treated_json, treated_words
 from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict, Walk
 from feasibility.version import version
-from surfaces import Cells
+from surfaces.cells import Cells
 
 DETAILS = 3  # cells of one group whose details are listed
 ENOUGH = 0.99  # [1] share of the area, below which it is said how to treat more
@@ -319,9 +320,11 @@ def witness_json(verdict: Verdict) -> dict[str, Any] | None:
 
 def _walk(verdict: Verdict) -> Walk | None:
     """The covering motion, also of the greedy search; None where there is none."""
+    from feasibility.paper.tree_and_graph import tree_walk
+
     if verdict.answer is not Answer.FEASIBLE:
         return None
-    return paper.tree_walk(verdict) if verdict.method == "greedy" else verdict.witness
+    return tree_walk(verdict) if verdict.method == "greedy" else verdict.witness
 
 
 def as_csv(verdict: Verdict) -> str | None:

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from coverable_arrays import Mask
-from coverable_errors import counted
-from feasibility.collisions import checked, checked_words, said_of
+from coverable.arrays import Mask
+from coverable.errors import counted
+from feasibility.collisions.asked_bodies import said_of
+from feasibility.collisions.words import checked, checked_words
 from feasibility.reports.parts import (
     certificate_text,
     measured_json,
@@ -19,14 +20,14 @@ from feasibility.reports.parts import (
     summary,
 )
 from feasibility.reports.proof import proof_json
-from feasibility.treated import treated_json, treated_words
+from feasibility.treated.words import treated_json, treated_words
 from feasibility.verifying import NOT_IN_TIME, Verification
 from feasibility.version import version
-from surfaces import Cells
-from surfaces.toolpaths import PoseSurface
+from surfaces.cells import Cells
+from surfaces.toolpaths.pose_surface import PoseSurface
 
 if TYPE_CHECKING:
-    from feasibility.cases import Case
+    from feasibility.cases.case import Case
 
 WORDS = {
     "motion": (

@@ -18,8 +18,8 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from coverable_errors import CoverableError, shown
-from coverable_files import size
+from coverable.errors import CoverableError, shown
+from coverable.files import size
 from feasibility.safe_files import FileError, read_regular, shown_path, write_whole
 
 TEXT_MEMBER = "meta.json"

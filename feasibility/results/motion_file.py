@@ -20,11 +20,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
-from coverable_errors import Fault, close, number_in, printable, shown
+from coverable.arrays import Array, Ints, Mask
+from coverable.errors import Fault, close, number_in, printable, shown
 from feasibility.results.trajectory_files import COMMENT, WORKING, load_trajectory
 from feasibility.safe_files import FileError, read_text, shown_path
-from robots import Robot
+from robots.robot import Robot
 
 CAP = 64 << 20  # bytes
 MOST_ROWS = 1_000_000

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from coverable_arrays import Ints
+from coverable.arrays import Ints
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from feasibility.results.archive import Archive
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from coverable_arrays import Array, Ints
+from coverable.arrays import Array, Ints
 from feasibility.results.archive import Archive, Fields
-from robots import Robot
-from surfaces import Cells
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -126,7 +126,7 @@ def probes(robot: Robot) -> Array:
     The limits fill the first n rows (2 of 6 columns, infinite ones as 0 with a flag beside them);
     tool points and axes at four configurations the rest.
     """
-    from robots import Kinematics
+    from robots.kinematics import Kinematics
 
     n = robot.n
     low, high = np.clip(robot.lower, -3.0, 3.0), np.clip(robot.upper, -3.0, 3.0)

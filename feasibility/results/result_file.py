@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_errors import CoverableError, shown
-from feasibility.cases import Case, CaseError, Setup
+from coverable.arrays import Array
+from coverable.errors import CoverableError, shown
+from feasibility.cases.case import Case, Setup
+from feasibility.cases.table_reader import CaseError
 from feasibility.results.archive import Archive, ArchiveError, Fields, write_archive
 from feasibility.results.proof_arrays import pack_proof, unpack_proof
 from feasibility.results.result_arrays import (
@@ -52,9 +53,9 @@ from feasibility.version import version
 
 if TYPE_CHECKING:
     from feasibility.task import Task
-    from feasibility.treated import TreatedArea
-    from robots import Robot
-    from surfaces import Cells
+    from feasibility.treated.area import TreatedArea
+    from robots.robot import Robot
+    from surfaces.cells import Cells
 
 FORMAT = "coverable-result"
 FORMAT_VERSION = 5  # 4 had weights of all joints in each cut of a proof
@@ -300,7 +301,7 @@ def _with_margin(
         return certificate
 
     def found() -> PlacementMargin | None:
-        from feasibility.certification import replay
+        from feasibility.certification.motion_replay import replay
 
         needed = np.ones(len(cells), dtype=bool)
         return replay(robot, cells, task, witness, needed).certificate.placement_margin
@@ -317,6 +318,6 @@ def _postures(fields: Fields, archive: Archive, count: int, n: int) -> Array | N
 
 def _treated(robot: Robot, cells: Cells, task: Task, witness: Walk) -> TreatedArea | None:
     """What the motion treats; what measures it is imported only then."""
-    from feasibility.treated import treated_by_walk
+    from feasibility.treated.area import treated_by_walk
 
     return treated_by_walk(robot, cells, task, witness)

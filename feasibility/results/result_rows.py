@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from coverable_errors import shown
+from coverable.errors import shown
 from feasibility.results.archive import Fields
 from feasibility.results.plain import plain
 from feasibility.verdict import Cause, CauseKind, Certificate
-from robots import shapes
+from robots.shapes.pairs import LeftOut
 
 
 def cause_row(cause: Cause) -> dict[str, Any]:
@@ -60,8 +60,10 @@ def read_certificate(fields: Fields) -> Certificate | None:
     )
 
 
-def read_left_out(fields: Fields) -> tuple[shapes.LeftOut, ...]:
+def read_left_out(fields: Fields) -> tuple[LeftOut, ...]:
     """The pairs that were left out."""
+    from robots.shapes.pairs import LeftOut
+
     found = []
     given = fields.entries.get("pairs_left_out")
     for k, entry in enumerate(() if given is None else fields.get("pairs_left_out", list, "rows")):
@@ -69,7 +71,7 @@ def read_left_out(fields: Fields) -> tuple[shapes.LeftOut, ...]:
             raise fields.archive.error(f"meta.json: pairs_left_out[{k}] is not an object")
         row = Fields(fields.archive, entry, f"pairs_left_out[{k}].")
         first, second, why = (row.text(key) for key in ("first", "second", "why"))
-        found.append(shapes.LeftOut(first, second, why, _maybe(row, "rate")))
+        found.append(LeftOut(first, second, why, _maybe(row, "rate")))
     return tuple(found)
 
 

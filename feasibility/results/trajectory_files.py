@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_errors import ArgumentError, Checks, CoverableError, Fault, is_whole
-from feasibility.collisions import CHECKABLE, listed_words
+from coverable.arrays import Array
+from coverable.errors import ArgumentError, Checks, CoverableError, Fault, is_whole
+from feasibility.collisions.words import CHECKABLE, listed_words
 from feasibility.safe_files import FileError, read_text, shown_path, write_whole
-from feasibility.timing import Trajectory
+from feasibility.timing.sampled_trajectory import Trajectory
 
 MOST_SAMPLES = 1_000_000
 MOST_JOINTS = 64

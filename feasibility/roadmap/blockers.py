@@ -7,13 +7,18 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from feasibility.certification import ArmCheck, ArmCollisions, PoseCheck, never_clear
-from feasibility.collisions import Bodies, gather
-from feasibility.roadmap.branch_and_bound import root_box
-from feasibility.roadmap.motions import PROJECTION_STEPS, SearchArrays, Work, project_near_cell
+from feasibility.certification.cut_proofs.arm_collisions import ArmCheck, ArmCollisions
+from feasibility.certification.overlaps.every_pose import PoseCheck, never_clear
+from feasibility.collisions.asked_bodies import gather
+from feasibility.collisions.bodies import Bodies
+from feasibility.roadmap.branch_and_bound.branching import root_box
+from feasibility.roadmap.motions.arrays import SearchArrays
+from feasibility.roadmap.motions.off_target import project_near_cell
+from feasibility.roadmap.motions.projection import PROJECTION_STEPS
+from feasibility.roadmap.motions.working_memory import Work
 from feasibility.task import Task
-from robots import Robot
-from surfaces import Cells
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 POSE_BOXES, ALL_POSE_BOXES = 4_000, 20_000  # of tilt and roll, of one cell and of all
 ARM_BOXES, ALL_ARM_BOXES = 30_000, 40_000  # of joint values

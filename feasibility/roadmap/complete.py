@@ -9,14 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from coverable_errors import ArgumentError, Checks, Fault
-from feasibility import certification
+from coverable.errors import ArgumentError, Checks, Fault
 from feasibility.clock import Clock, OutOfTime
-from feasibility.collisions import blamed, segment_clear
+from feasibility.collisions.kernels.clearance import blamed, segment_clear
 from feasibility.found import Found
 from feasibility.notices import REASONS, compiling_notice
 from feasibility.problem import Problem
-from feasibility.roadmap import causes, forward
 from feasibility.roadmap.exploration import Exploration, wound
 from feasibility.roadmap.outcome import (
     exhausted_words,
@@ -29,16 +27,16 @@ from feasibility.roadmap.search import close, exploration_of, explore, restart
 from feasibility.roadmap.walk import covering_walk
 from feasibility.roadmap.warmup import warm_up
 from feasibility.search import Search
-from feasibility.targets import start_cell
+from feasibility.targets.starting import start_cell
 from feasibility.task import Task
 from feasibility.verdict import Cause, Replay, Walk
-from robots import Kinematics
+from robots.kinematics import Kinematics
 
 if TYPE_CHECKING:
     import networkx as nx
 
-    from feasibility.collisions import Bodies
-    from feasibility.roadmap.forward import OrderedRun
+    from feasibility.collisions.bodies import Bodies
+    from feasibility.roadmap.forward.run import OrderedRun
 
 FIRST, SECOND, THIRD, LAST = 1, 4, 8, 16  # rounds without gain
 FEW_CUT_BOXES, MORE_CUT_BOXES = 20_000, 200_000
@@ -73,6 +71,8 @@ def _search(
     problem: Problem, search: Search, clock: Clock, seeds: Walk | None, begin: int | None
 ) -> Found:
     """`complete_search`, from a cell that the arm's start is over."""
+    from feasibility.roadmap.forward.run import run_in_order
+
     with clock.enforced():  # loading kernels takes a second or two
         warm_up()
         problem.cells.curves  # noqa: B018 - part of the cells, made once
@@ -96,7 +96,7 @@ def _search(
         if not search.early or problem.cells.in_order:
             close(exploration)
         if problem.cells.in_order and exploration.complete and known is None:
-            run = forward.run_in_order(exploration)
+            run = run_in_order(exploration)
     except OutOfTime:
         late = clock.limits
     exploration.clock = Clock()  # graph and causes are made later, when somebody reads them
@@ -179,7 +179,9 @@ def _begin(exploration: Exploration, cell: int, bodies: Bodies | None) -> None:
 
 def _collides(exploration: Exploration, bodies: Bodies, start: NDArray[np.float64]) -> str:
     """Why a start (n,) is refused: for the shapes, or for the bodies around them alone."""
-    judged = certification.collision_replay(exploration.robot, bodies, start[None])
+    from feasibility.certification.collisions.collision_replay import collision_replay
+
+    judged = collision_replay(exploration.robot, bodies, start[None])
     if not judged.accepted:
         found = "; ".join(fault.text for fault in judged.faults)
         return f"collides, or is too near ({found}); choose another start"
@@ -271,14 +273,18 @@ def _hindered(exploration: Exploration) -> bool:
 
 def _causes(problem: Problem, exploration: Exploration) -> tuple[Cause, ...]:
     """Why cells are missed."""
+    from feasibility.roadmap.causes.diagnosis import causes_of
+
     if exploration.complete:
         return ()
     with compiling_notice(notice=REASONS):
-        return causes.causes_of(exploration, proof_of(exploration), problem.pairs)
+        return causes_of(exploration, proof_of(exploration), problem.pairs)
 
 
 def _in_order(found: Found, run: OrderedRun, problem: Problem, exploration: Exploration) -> Found:
     """The same of a toolpath, all of whose poses one component covers."""
+    from feasibility.roadmap.forward.run import changes_in_place
+
     total, walk = len(problem.cells), run.walk
     counts = {**found.counts, "fk": int(exploration.work.counts[0])}
     if walk is None:
@@ -287,9 +293,7 @@ def _in_order(found: Found, run: OrderedRun, problem: Problem, exploration: Expl
             exhausted=run.failed_words(total), make_causes=lambda: run.causes(total),
         )  # fmt: skip
     near = IN_PLACE * problem.task.effective_tolerance
-    counts["in_place"] = forward.changes_in_place(
-        problem.robot, exploration.arrays.points, walk, near
-    )
+    counts["in_place"] = changes_in_place(problem.robot, exploration.arrays.points, walk, near)
     return replace(
         found, counts=counts, start=0, motion=walk, replay=partial(_replayed, problem, walk),
         accepted=f"One motion of {{waypoints}} waypoints runs the {total} poses in order, without "
@@ -300,5 +304,7 @@ def _in_order(found: Found, run: OrderedRun, problem: Problem, exploration: Expl
 
 def _replayed(problem: Problem, walk: Walk) -> Replay:
     """Replay the walk: it must visit every cell, whatever the search recorded as covered."""
+    from feasibility.certification.motion_replay import replay
+
     needed = np.ones(len(problem.cells), dtype=bool)
-    return certification.replay(problem.robot, problem.cells, problem.task, walk, needed)
+    return replay(problem.robot, problem.cells, problem.task, walk, needed)

@@ -11,24 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
+from coverable.arrays import Array, Ints
 from feasibility.roadmap.graph import Blocked, Roadmap
-from feasibility.roadmap.motions import (
-    NEXT,
-    PROJECTION_STEPS,
-    SETTLE_STEPS,
-    SearchArrays,
-    Work,
-    aim,
-    connect,
-    effects,
-    look_at,
-    place,
-    project_near_cell,
-    settle,
-    stand_still,
-    track,
-)
+from feasibility.roadmap.motions.aiming import aim, look_at, stand_still
+from feasibility.roadmap.motions.arrays import SearchArrays
+from feasibility.roadmap.motions.off_target import project_near_cell
+from feasibility.roadmap.motions.projection import PROJECTION_STEPS
+from feasibility.roadmap.motions.self_motion import SETTLE_STEPS, connect, effects, settle
+from feasibility.roadmap.motions.tracking import track
+from feasibility.roadmap.motions.working_memory import NEXT, Work, place
 from feasibility.roadmap.moving_clear import moved_clear
 
 MOST_FAILURES = 12  # failed connections after which a pair of components is left alone

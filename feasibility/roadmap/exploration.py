@@ -10,20 +10,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 from feasibility.clock import Clock
-from feasibility.roadmap import branch_and_bound
-from feasibility.roadmap.branch_and_bound import Ruling
+from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.expansion import JOINED, Grower
 from feasibility.roadmap.graph import Roadmap
-from feasibility.roadmap.motions import SearchArrays, Work, passable, work_for
-from robots import Robot
-from surfaces import Cells, components
+from feasibility.roadmap.motions.arrays import SearchArrays, passable
+from feasibility.roadmap.motions.working_memory import Work, work_for
+from robots.robot import Robot
+from surfaces.adjacency import components
+from surfaces.cells import Cells
 
 if TYPE_CHECKING:
     from feasibility.cut_tree import CutTree
     from feasibility.roadmap.blockers import Blockers
-    from feasibility.roadmap.branch_and_bound import Boxes
+    from feasibility.roadmap.branch_and_bound.branching import Boxes
 
 BUDGET = 8_000  # evaluations of the arm between two checks of the clock
 GUESSES = 4  # of one `explore_self_motions`
@@ -309,10 +310,12 @@ class Exploration:
 
     def rule(self, cell: int, boxes: Boxes, most: int) -> Ruling:
         """Branch and bound on one cell; a configuration that it finds becomes a seed."""
+        from feasibility.roadmap.branch_and_bound.branching import rule
+
         ruling, examined = Ruling.OPEN, int(boxes.counts[1])
         while ruling is Ruling.OPEN and boxes.counts[1] < most:
             budget = self.clock.affordable(min(most, BUDGET))
-            ruling, q = branch_and_bound.rule(self.arrays, self.work, cell, boxes, budget)
+            ruling, q = rule(self.arrays, self.work, cell, boxes, budget)
             self.tick("proving cells out of reach")
         self.boxes += int(boxes.counts[1]) - examined
         self.rulings[cell] = ruling

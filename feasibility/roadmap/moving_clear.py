@@ -4,21 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_kernels import entry
-from feasibility.collisions import clearance_gradient, segment_clear
-from feasibility.roadmap.motions import (
-    CONE_SLACK,
-    HERE,
-    NEWTON_AT_REST,
-    SearchArrays,
-    Work,
-    copy_slot,
-    look_at,
-    place,
-    project,
-    put,
-)
+from coverable.arrays import Array
+from coverable.kernels import entry
+from feasibility.collisions.kernels.clearance import clearance_gradient, segment_clear
+from feasibility.roadmap.motions.aiming import look_at
+from feasibility.roadmap.motions.arrays import SearchArrays
+from feasibility.roadmap.motions.projection import project
+from feasibility.roadmap.motions.self_motion import CONE_SLACK, NEWTON_AT_REST
+from feasibility.roadmap.motions.working_memory import HERE, Work, copy_slot, place, put
 
 PUSHES = 8  # steps that a colliding configuration gets
 PUSH = 0.2  # [rad] or [m] of one step

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from feasibility import targets
 from feasibility.problem import Problem
-from feasibility.roadmap.branch_and_bound import Ruling
+from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.proving import Proving
 
@@ -59,15 +58,17 @@ def proved_words(problem: Problem, proving: Proving, proof: CutTree) -> str:
 
 def unfinished_words(problem: Problem, proving: Proving, late: str) -> str:
     """What is known to be left untried; empty where nothing is. `late`: the limit that ran out."""
+    from feasibility.targets.blocked import blocked_curves, smoothing_offer
+
     exploration, total = proving.exploration, len(problem.cells)
     if late:
         return (
             f"The {late} ran out; the best single motion so far covers "
             f"{exploration.n_covered} of {total} cells."
         )
-    blocked = targets.blocked_curves(problem.cells, problem.task)
+    blocked = blocked_curves(problem.cells, problem.task)
     if blocked:
-        offer = targets.smoothing_offer(problem.cells, problem.task, exploration.clock)
+        offer = smoothing_offer(problem.cells, problem.task, exploration.clock)
         return f"{blocked} {offer}".rstrip()
     missed = np.flatnonzero(~exploration.reached)
     if len(missed):

@@ -13,14 +13,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from feasibility import targets
-from feasibility.roadmap import cuts
 from feasibility.roadmap.exploration import Exploration, wound
 from feasibility.task import Task
-from surfaces import SurfaceError
+from surfaces.surface import SurfaceError
 
 if TYPE_CHECKING:
-    from feasibility.roadmap.cuts import OpenGap, Prover
+    from feasibility.roadmap.cuts.guess import OpenGap
+    from feasibility.roadmap.cuts.prover import Prover
 
 MOST_BOXES = 1_000_000  # of one attempt
 ATTEMPTS = 6  # in a row, as long as each finds seeds that gain something
@@ -69,6 +68,8 @@ class Proving:
 
     def _attempt(self, budget: int) -> bool:
         """One attempt; True when its seeds made the search grow."""
+        from feasibility.roadmap.cuts.gaps import components_of
+
         exploration = self.exploration
         prover = self._ready()
         if prover is None:
@@ -81,7 +82,7 @@ class Proving:
             more, told = int(work.counts[0]) - told, int(work.counts[0])
             exploration.tick("proving that no motion joins the parts", more)
 
-        made = prover.attempt(cuts.components_of(exploration.roadmap), budget, tick)
+        made = prover.attempt(components_of(exploration.roadmap), budget, tick)
         self.attempts += 1
         self.boxes += made.boxes
         exploration.cut_tree, self.open_gaps = made.tree, made.open_gaps
@@ -98,16 +99,20 @@ class Proving:
         Over a sharp seam between pieces the targets jump. A tool may well go round in an arc, which
         is not certified, nor ruled out: that nothing is on the surface in between proves nothing.
         """
+        from feasibility.roadmap.cuts.places import places_on
+        from feasibility.roadmap.cuts.prover import Prover
+        from feasibility.targets.blocked import blocked_curves
+
         if self._prover is None and not self.unable:
-            self.unable = targets.blocked_curves(self.exploration.cells, self.task)
+            self.unable = blocked_curves(self.exploration.cells, self.task)
             if self.unable:
                 return None
             try:
-                places = cuts.places_on(self.exploration.cells.surface, self.task)
+                places = places_on(self.exploration.cells.surface, self.task)
             except SurfaceError as error:
                 self.unable = str(error)
                 return None
             # Random numbers of its own: whether it is tried does not change the search.
             rng = np.random.default_rng([self.exploration.seed, 1])
-            self._prover = cuts.Prover(self.exploration.arrays, places, rng)
+            self._prover = Prover(self.exploration.arrays, places, rng)
         return self._prover

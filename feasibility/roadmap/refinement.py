@@ -14,14 +14,14 @@ from itertools import combinations
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
+from coverable.arrays import Array, Ints
 from feasibility.clock import Clock
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import Roadmap
-from feasibility.roadmap.motions import arrays_of
+from feasibility.roadmap.motions.arrays import arrays_of
 from feasibility.roadmap.search import improve
 from feasibility.task import Task
-from surfaces import Finer
+from surfaces.cells import Finer
 
 # Each cell is cut into so many by so many, until a motion is found: at first, and in the end.
 COARSE, FINE = (3,), (9, 27)

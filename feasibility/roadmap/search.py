@@ -24,18 +24,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from coverable_arrays import Ints
+from coverable.arrays import Ints
 from feasibility.clock import Clock
-from feasibility.roadmap import branch_and_bound
-from feasibility.roadmap.branch_and_bound import Ruling
+from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.motions import arrays_of, margin_shares
+from feasibility.roadmap.motions.arrays import arrays_of
+from feasibility.roadmap.motions.self_motion import margin_shares
 from feasibility.task import Task
-from robots import Robot
-from surfaces import Cells
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 if TYPE_CHECKING:
-    from feasibility.roadmap.branch_and_bound import Boxes
+    from feasibility.roadmap.branch_and_bound.branching import Boxes
 
 PIVOT_SEEDS = 8
 TOP = 5  # components that a round works on
@@ -119,6 +119,8 @@ def seed_middle(exploration: Exploration) -> bool:
 
 def _unreached(exploration: Exploration) -> None:
     """Step 7: a ruling on every cell that no component has reached."""
+    from feasibility.roadmap.branch_and_bound.branching import root_box
+
     distance = exploration.robot.distance_from_base(exploration.arrays.points)
     beyond = distance > exploration.robot.reach + exploration.arrays.tolerance
     for cell in np.flatnonzero(beyond).tolist():
@@ -138,7 +140,7 @@ def _unreached(exploration: Exploration) -> None:
             return
         if exploration.tool_collides(cell):
             continue
-        boxes = branch_and_bound.root_box(exploration.arrays)
+        boxes = root_box(exploration.arrays)
         if exploration.rule(cell, boxes, FIRST_BOXES) is Ruling.OPEN:
             if exploration.add_seeds(cell, exploration.guesses(NEWTON_STARTS)) == 0:
                 open_boxes[cell] = boxes
@@ -167,6 +169,8 @@ def _at_the_target(exploration: Exploration) -> None:
     Up to here the cone had to hold at the tool point's own closest point on the surface too. Where
     the tool point is off its target by much of the tolerance, that may leave nothing of the cone.
     """
+    from feasibility.roadmap.branch_and_bound.branching import root_box
+
     left = [
         cell
         for cell, ruling in exploration.rulings.items()
@@ -179,7 +183,7 @@ def _at_the_target(exploration: Exploration) -> None:
         if not exploration.reached[cell]:
             exploration.add_seeds(cell, exploration.guesses(NEWTON_STARTS))
         if not exploration.reached[cell]:
-            exploration.rule(cell, branch_and_bound.root_box(exploration.arrays), MORE_BOXES)
+            exploration.rule(cell, root_box(exploration.arrays), MORE_BOXES)
 
 
 def _where_the_arm_collides(exploration: Exploration) -> None:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from coverable_arrays import Mask
+from coverable.arrays import Mask
 from feasibility.roadmap.graph import Roadmap
 from feasibility.verdict import Walk
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from feasibility.task import Task
-from robots import Robot
-from surfaces import Cells
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 
 def warm_up(rarely_used: bool = False) -> None:
@@ -27,8 +27,8 @@ def warm_up(rarely_used: bool = False) -> None:
 
 def _two_cells(width: tuple[float, float]) -> tuple[Robot, Cells, Task]:
     """An arm over two small cells, this far to the side."""
-    from robots import load_robot
-    from surfaces.patches import plane
+    from robots.library import load_robot
+    from surfaces.patches.plane import plane
 
     cells = plane(width=width, length=(0.1, 0.12), side="outside").cells(1, 2)
     return load_robot("puma560"), cells, Task(standoff=0.01, cone_deg=60)
@@ -36,9 +36,9 @@ def _two_cells(width: tuple[float, float]) -> tuple[Robot, Cells, Task]:
 
 def _explore_two_cells() -> None:
     """Cover two cells in one motion, and replay it."""
-    from feasibility.certification import replay
+    from feasibility.certification.motion_replay import replay
     from feasibility.roadmap.exploration import Exploration
-    from feasibility.roadmap.motions import arrays_of
+    from feasibility.roadmap.motions.arrays import arrays_of
     from feasibility.roadmap.search import close, explore
     from feasibility.roadmap.walk import covering_walk
 
@@ -52,10 +52,10 @@ def _explore_two_cells() -> None:
 
 def _look_for_reasons() -> None:
     """Rule cells out, cut, and say why they are missed."""
-    from feasibility.roadmap.branch_and_bound import root_box
-    from feasibility.roadmap.causes import diagnose
+    from feasibility.roadmap.branch_and_bound.branching import root_box
+    from feasibility.roadmap.causes.diagnosis import diagnose
     from feasibility.roadmap.exploration import Exploration
-    from feasibility.roadmap.motions import arrays_of
+    from feasibility.roadmap.motions.arrays import arrays_of
     from feasibility.roadmap.proving import Proving
     from feasibility.roadmap.search import explore
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import networkx as nx
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 
 RESOLUTION = 1e-12  # [m] lengths are counted in this, so that equal sums are equal
 # What one step costs, as digits of one number; none of them has more than 32 bits in all.

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable_arrays import Array, Mask
-from feasibility.collisions import Pair
-from feasibility.roadmap import Exploration
-from feasibility.roadmap.causes import cause_of
+from coverable.arrays import Array, Mask
+from feasibility.collisions.bodies import Pair
+from feasibility.roadmap.causes.diagnosis import cause_of
+from feasibility.roadmap.exploration import Exploration
 from feasibility.runs.stopping import where_it_stops
 from feasibility.task import Task
 from feasibility.verdict import Cause
-from surfaces.passes import PassPlaces
+from surfaces.passes.toolpath import PassPlaces
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,30 +9,26 @@ from itertools import pairwise
 import numpy as np
 
 from feasibility.clock import Clock, OutOfTime
-from feasibility.collisions import Pair
-from feasibility.division import (
-    Reconfiguration,
-    clear_moves,
-    collect_components,
-    connect_pairs,
-)
-from feasibility.paths import CoveragePath, unwound
+from feasibility.collisions.bodies import Pair
+from feasibility.division.between_patches import clear_moves
+from feasibility.division.plans import collect_components, connect_pairs
+from feasibility.division.reconfiguration import Reconfiguration
+from feasibility.paths.coverage import CoveragePath
+from feasibility.paths.winding import unwound
 from feasibility.problem import Problem
-from feasibility.roadmap import (
-    Exploration,
-    exploration_of,
-    explore,
-    route_walk,
-    warm_up,
-)
+from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.search import exploration_of, explore
+from feasibility.roadmap.walk import route_walk
+from feasibility.roadmap.warmup import warm_up
 from feasibility.runs.fewest import Run, Stations, fewest_runs
 from feasibility.runs.gaps import Gap, along_stretch, gaps_of, place_words
 from feasibility.runs.stopping import RunStop, where_it_stops
-from feasibility.speed import keep_fast_motions, replay_at_rates
+from feasibility.speed.fast_motions import keep_fast_motions
+from feasibility.speed.motion_rates import replay_at_rates
 from feasibility.task import Task
-from robots import Robot
-from surfaces.passes import PassPlaces
-from surfaces.toolpaths import PoseCells
+from robots.robot import Robot
+from surfaces.passes.toolpath import PassPlaces
+from surfaces.toolpaths.pose_cells import PoseCells
 
 
 @dataclass(frozen=True, eq=False, slots=True)

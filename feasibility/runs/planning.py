@@ -7,27 +7,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from coverable_arrays import Mask
-from coverable_errors import counted
-from feasibility.certification import less_deviations
+from coverable.arrays import Mask
+from coverable.errors import counted
+from feasibility.certification.surface_replay import less_deviations
 from feasibility.checking import check
 from feasibility.clock import Clock
 from feasibility.search import Search
 from feasibility.task import Task
-from feasibility.treated import TreatedArea, treated_by_passes
+from feasibility.treated.area import TreatedArea, treated_by_passes
 from feasibility.verdict import Verdict, Walk
-from robots import Robot
-from surfaces import Surface
-from surfaces.passes import (
-    Pass,
-    Passes,
-    PassPlaces,
-    PassRoute,
-    ToolWay,
-    pass_route,
-    ranked_directions,
-)
-from surfaces.toolpaths import PoseCells
+from robots.robot import Robot
+from surfaces.passes.directions import ranked_directions
+from surfaces.passes.parallel import Passes
+from surfaces.passes.stretches import Pass
+from surfaces.passes.toolpath import PassPlaces, PassRoute, pass_route
+from surfaces.passes.ways import ToolWay
+from surfaces.surface import Surface
+from surfaces.toolpaths.pose_cells import PoseCells
 
 RETRACT = 0.05  # m, by default
 WITHIN = 0.25  # [1] of the tolerance: how far straight lines between places may be from the surface
@@ -78,9 +74,9 @@ def plan_passes(
         SurfaceError: see `surfaces.passes.pass_route`.
 
     Example:
-        >>> from feasibility import Task
-        >>> from robots import load_robot
-        >>> from surfaces import parallel_passes, plane
+        >>> from coverable import Task
+        >>> from coverable import load_robot
+        >>> from coverable import parallel_passes, plane
         >>> plate = plane((0, 0.2), (0, 0.1), "outside", (0.4, -0.1, 0.2))
         >>> task = Task(standoff=0.02, cone_deg=20, footprint=0.06)
         >>> along = plan_passes(load_robot("ur5"), parallel_passes(plate, 0.05), task)

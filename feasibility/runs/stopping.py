@@ -6,11 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array
-from feasibility.collisions import Pair
-from feasibility.roadmap import Exploration, track
-from feasibility.roadmap.motions import COLLISION, CONE, FOLD, LIMIT, LONG, ROLL, SINGULAR
-from feasibility.speed import motion_rates
+from coverable.arrays import Array
+from feasibility.collisions.bodies import Pair
+from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.motions.arrays import COLLISION, CONE, FOLD, LIMIT, LONG, ROLL, SINGULAR
+from feasibility.roadmap.motions.tracking import track
+from feasibility.speed.motion_rates import motion_rates
 from feasibility.task import Task
 
 WORDS = {

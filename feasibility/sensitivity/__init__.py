@@ -1,5 +1,1 @@
 """One number of a case varied at a time: where the verdict turns."""
-
-from lazy_loader import attach_stub
-
-__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -8,22 +8,24 @@ from dataclasses import replace
 
 import numpy as np
 
-from coverable_errors import ArgumentError
+from coverable.errors import ArgumentError
 from feasibility.checking import check
 from feasibility.clock import Clock, OutOfTime
 from feasibility.demands import refuse_start
-from feasibility.division import divide, motion_over
+from feasibility.division.one_motion import motion_over
+from feasibility.division.surface_division import divide
 from feasibility.search import Progress, Search
 from feasibility.sensitivity.pairs import changes_together
 from feasibility.sensitivity.probes import Prober
 from feasibility.sensitivity.quantities import Kind, Quantity, Variant, quantities
 from feasibility.sensitivity.thresholds import Dropped, Explanation, Threshold
-from feasibility.speed import check_requirements, rate_figures
+from feasibility.speed.largest import rate_figures
+from feasibility.speed.requirements import check_requirements
 from feasibility.task import Task
-from feasibility.treated import shortfall
+from feasibility.treated.decision import shortfall
 from feasibility.verdict import Evidence, Verdict, Walk
-from robots import Robot
-from surfaces import Cells
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 EFFORT, MOST = 2, 15_000  # of one verdict: times that of the case as given, but not above ...
 FEW, EACH = 8_000, 20  # ... or so many evaluations, and for each cell, where that is more
@@ -69,8 +71,8 @@ def explain(
         RobotError: the arm is no serial chain of one-dof joints.
 
     Example:
-        >>> from robots import load_robot
-        >>> from surfaces import plane
+        >>> from coverable import load_robot
+        >>> from coverable import plane
         >>> patch = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside")
         >>> found = explain(load_robot("ur5"), patch.cells(2, 2), Task(standoff=0.02, cone_deg=30))
         >>> f"{np.degrees(found.thresholds[0].feasible.value):.1f}"

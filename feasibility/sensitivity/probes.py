@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-from coverable_errors import counted
+from coverable.errors import counted
 from feasibility.checking import check
 from feasibility.clock import Clock, OutOfTime
 from feasibility.search import Search

@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import unit_along
-from feasibility.collisions import Collision
+from coverable.arrays import unit_along
+from feasibility.collisions.settings import Collision
 from feasibility.task import Task
-from robots import Robot
-from surfaces import Cells
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 ANGLE_STEP_DEG = 0.1  # resolution of cone and revolute joints
 LENGTH_STEP = 1e-3  # [m], resolution of standoff, shifts and prismatic joints

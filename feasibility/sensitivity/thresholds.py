@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from coverable_arrays import Ints, Protected
+from coverable.arrays import Ints, Protected
 from feasibility.sensitivity.quantities import Quantity
-from feasibility.speed import RateFigures
+from feasibility.speed.largest import RateFigures
 from feasibility.verdict import Answer, Evidence, Verdict, Walk
 
 

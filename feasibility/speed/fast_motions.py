@@ -11,12 +11,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from feasibility.clock import OutOfTime
-from feasibility.paths import MotionGraph
-from feasibility.roadmap import Exploration, Roadmap
+from feasibility.paths.motion_graph import MotionGraph
+from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.graph import Roadmap
 from feasibility.speed.rated_graph import Edge, RatedGraph, grow
 from feasibility.task import Task
 from feasibility.verdict import Cause, CauseKind
-from surfaces import components
+from surfaces.adjacency import components
 
 
 def keep_fast_motions(exploration: Exploration, task: Task) -> dict[int, Cause]:

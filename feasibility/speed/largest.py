@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from feasibility.certification.rates import RateReplay, replay_rates
+from feasibility.certification.rates.rate_replay import RateReplay, replay_rates
 from feasibility.clock import Clock, OutOfTime
 from feasibility.speed.rated_graph import RatedGraph, grow, rated_graph
 from feasibility.speed.routes import covered

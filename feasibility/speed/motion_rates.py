@@ -7,21 +7,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
-from feasibility.certification import replay
-from feasibility.certification.rates import (
-    RateReplay,
-    SegmentRates,
-    in_place,
-    replay_rates,
-    segment_rates,
-)
+from coverable.arrays import Array, Ints, Mask
+from feasibility.certification.motion_replay import replay
+from feasibility.certification.rates.rate_replay import RateReplay, in_place, replay_rates
+from feasibility.certification.rates.segment_rates import SegmentRates, segment_rates
 from feasibility.demands import TOGETHER, further
-from feasibility.paths import CoveragePath, PathError
+from feasibility.paths.coverage import CoveragePath
+from feasibility.paths.order import PathError
 from feasibility.task import Task
 from feasibility.verdict import Certificate, Walk
-from robots import Robot
-from surfaces import Cells
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 
 class MotionRates(NamedTuple):

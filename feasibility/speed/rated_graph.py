@@ -12,12 +12,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from feasibility.clock import Clock
-from feasibility.paths import MotionGraph, join_self_motions, motion_graph_of, step_to
+from feasibility.paths.motion_graph import MotionGraph, join_self_motions, motion_graph_of, step_to
 from feasibility.speed.motion_rates import motion_rates, too_slow_words
 from feasibility.task import Task
 from feasibility.verdict import Verdict
-from robots import Robot
-from surfaces import Cells
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 Edge = tuple[int, int]
 """Two nodes, the lower index first."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_errors import ArgumentError, Fault
+from coverable.errors import ArgumentError, Fault
 from feasibility.search import Search
 from feasibility.task import Task
-from robots import Robot
+from robots.robot import Robot
 
 
 def check_requirements(robot: Robot, task: Task, search: Search) -> None:
@@ -23,7 +23,7 @@ def check_requirements(robot: Robot, task: Task, search: Search) -> None:
     if search.method != "complete":
         what = "needs the complete search: the greedy one has no motion over the cells' centres"
         raise ArgumentError(Fault("speed" if task.speed else "min_manipulability", what), "task")
-    from feasibility.certification.rates import check_rates
+    from feasibility.certification.rates.rate_replay import check_rates
 
     check_rates(robot, task)
 

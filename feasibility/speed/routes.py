@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import networkx as nx
 import numpy as np
 
-from coverable_arrays import Mask
+from coverable.arrays import Mask
 from feasibility.speed.rated_graph import Edge, RatedGraph
 
 

@@ -12,9 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from coverable_arrays import Mask
-from coverable_errors import at_least, counted
-from feasibility.certification.rates import RateReplay, replay_rates
+from coverable.arrays import Mask
+from coverable.errors import at_least, counted
+from feasibility.certification.rates.rate_replay import RateReplay, replay_rates
 from feasibility.clock import Clock, OutOfTime
 from feasibility.speed.largest import begin_of, largest_speed
 from feasibility.speed.motion_rates import replay_at_rates

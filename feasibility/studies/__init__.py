@@ -1,5 +1,1 @@
 """Many cases on many processes, kept as they finish."""
-
-from lazy_loader import attach_stub
-
-__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -7,8 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from coverable_errors import LARGEST_WHOLE, Fault, alternatives, close, is_number, printable, shown
-from feasibility.cases import TABLES, Section, is_text, is_urdf
+from coverable.errors import LARGEST_WHOLE, Fault, alternatives, close, is_number, printable, shown
+from feasibility.cases.case import TABLES
+from feasibility.cases.robot_table import is_urdf
+from feasibility.cases.table_reader import Section, is_text
 
 POSES = {"position": ("x", "y", "z"), "rpy_deg": ("roll", "pitch", "yaw")}
 SAMPLERS = ("sobol",)

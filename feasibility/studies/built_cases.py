@@ -12,16 +12,22 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from coverable_files import stamps
-from feasibility.cases import TABLES, Case, parse_toml, read_robot, read_surface, toml_document
+from coverable.files import stamps
+from feasibility.cases.case import TABLES, Case
+from feasibility.cases.robot_table import read_robot
+from feasibility.cases.surface_reading import read_surface
+from feasibility.cases.toml import parse_toml, toml_document
 from feasibility.clock import Clock
 from feasibility.studies.case_files import files_of_arm
 from feasibility.studies.pool import Tables
-from robots import Robot, flange_axis
-from surfaces import Cells, SurfaceError, check_pose, rotation_from_rpy
+from robots.library import flange_axis
+from robots.robot import Robot
+from surfaces.arguments import check_pose
+from surfaces.cells import Cells
+from surfaces.surface import SurfaceError, rotation_from_rpy
 
 if TYPE_CHECKING:
-    from surfaces.meshes.cells import MeshCells
+    from surfaces.meshes.cells.mesh_cells import MeshCells
 
 HOME = {"position": (0.0, 0.0, 0.0), "rpy_deg": (0.0, 0.0, 0.0)}
 CASES_KEPT = 32  # that one worker keeps, with the surface at home
@@ -128,7 +134,7 @@ def cut_of(case: Case) -> Cells:
     Raises:
         CaseError: there is no such surface, or it cannot be cut so.
     """
-    from surfaces.meshes.cells import MeshCells
+    from surfaces.meshes.cells.mesh_cells import MeshCells
 
     if case.surface.kind not in ("mesh", "step"):
         return case.surface.cut(case.task.disc)

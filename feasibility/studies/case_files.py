@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from feasibility.cases import RobotPart, as_read, read_robot
+from feasibility.cases.robot_table import RobotPart, read_robot
+from feasibility.cases.toml import as_read
 
 
 class CaseFiles(NamedTuple):
@@ -51,8 +52,8 @@ def files_of_arm(arm: RobotPart, *, meshes: bool) -> tuple[str, ...]:
 
 def _further(path: str, *more: Any, meshes: bool = False) -> tuple[str, ...]:
     """The files that a URDF or an SRDF names."""
-    from robots import RobotError
-    from robots.urdf import files_named_by
+    from robots.errors import RobotError
+    from robots.urdf.files import files_named_by
 
     try:
         return files_named_by(path, *more, meshes=meshes)

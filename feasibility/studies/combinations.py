@@ -12,15 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from coverable_errors import Fault, shown
-from feasibility.cases import (
-    CaseError,
-    as_read,
-    faults_of_building,
-    in_robot_table,
-    parse_toml,
-    read_surface,
-)
+from coverable.errors import Fault, shown
+from feasibility.cases.robot_table import in_robot_table
+from feasibility.cases.surface_reading import faults_of_building, read_surface
+from feasibility.cases.table_reader import CaseError
+from feasibility.cases.toml import as_read, parse_toml
 from feasibility.studies.axes import POSES, Key, Variation
 from feasibility.studies.built_cases import (
     arm_of,
@@ -150,7 +146,7 @@ def draw(varied: Variation) -> list[tuple[float, ...]]:
 
 def faults_of(tables: Tables) -> list[Fault]:
     """What is wrong with a case, its arm and its files too."""
-    from robots import RobotError
+    from robots.errors import RobotError
 
     try:
         case = case_of(tables)

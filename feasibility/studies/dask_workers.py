@@ -13,7 +13,7 @@ from distributed import Client, Future, KilledWorker, wait
 from distributed.comm import get_address_host
 
 from feasibility.notices import slow_notice
-from feasibility.roadmap import warm_up
+from feasibility.roadmap.warmup import warm_up
 from feasibility.studies.pool import (
     LOOK,
     Receive,

@@ -27,19 +27,10 @@ from functools import reduce
 from operator import getitem
 from typing import Any
 
-from coverable_errors import Fault, listed, shown
-from feasibility.cases import (
-    TABLES,
-    CaseError,
-    Section,
-    TomlError,
-    as_read,
-    load_case,
-    make_absolute,
-    parse_toml,
-    read_document,
-    toml_key,
-)
+from coverable.errors import Fault, listed, shown
+from feasibility.cases.case import TABLES, load_case, read_document
+from feasibility.cases.table_reader import CaseError, Section
+from feasibility.cases.toml import TomlError, as_read, make_absolute, parse_toml, toml_key
 from feasibility.safe_files import shown_path
 from feasibility.studies.axes import Range, Variation, VariedKey, read_variation
 from feasibility.studies.combinations import cause_of, faults_of, put, tasks_of

@@ -6,11 +6,12 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from feasibility.cases import Case
+from feasibility.cases.case import Case
 from feasibility.checking import check
 from feasibility.clock import Clock, OutOfTime
-from feasibility.division import divide
-from feasibility.sensitivity import LEAST_CONE_DEG, last_true
+from feasibility.division.surface_division import divide
+from feasibility.sensitivity.probes import last_true
+from feasibility.sensitivity.quantities import LEAST_CONE_DEG
 from feasibility.verdict import Verdict
 
 MOST_DIVIDED = 400  # cells of a surface that is divided: a division takes several verdicts

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Mask
-from feasibility.collisions import gather
-from feasibility.division import undominated
+from coverable.arrays import Mask
+from feasibility.collisions.asked_bodies import gather
+from feasibility.division.set_covering import undominated
 from feasibility.studies.built_cases import arm_of, case_of, clock_of, cut_of
 from feasibility.studies.pool import Tables
 from feasibility.verdict import CauseKind, Verdict
@@ -42,8 +42,8 @@ def cause_counts(verdict: Verdict) -> CauseCounts:
     if verdict.method == "greedy":
         kinds = [str(cause.kind) for cause in verdict.causes]
         return CauseCounts(_counted(kinds), len(kinds))
-    from feasibility.roadmap import exploration_of
-    from feasibility.roadmap.causes import cause_of
+    from feasibility.roadmap.causes.diagnosis import cause_of
+    from feasibility.roadmap.search import exploration_of
 
     robot, cells, task = verdict.robot, verdict.cells, verdict.task
     reached = np.isin(np.arange(len(cells)), np.concatenate([[], *verdict.components]))

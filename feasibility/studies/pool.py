@@ -21,10 +21,10 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any, Protocol
 
-from coverable_errors import CoverableError, counted
+from coverable.errors import CoverableError, counted
 from feasibility.clock import OutOfTime
 from feasibility.notices import compiling_notice, notify
-from feasibility.roadmap import warm_up
+from feasibility.roadmap.warmup import warm_up
 
 LOOK = 0.1  # [s] between two calls of `receive`
 PATIENCE = 3  # workers that may die with a task before it is given up

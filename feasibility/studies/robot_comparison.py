@@ -6,8 +6,12 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
-from coverable_errors import Fault
-from feasibility.cases import Case, CaseError, CollisionPart, absolute, as_read, is_urdf
+from coverable.errors import Fault
+from feasibility.cases.case import Case
+from feasibility.cases.collision_table import CollisionPart
+from feasibility.cases.robot_table import is_urdf
+from feasibility.cases.table_reader import CaseError, absolute
+from feasibility.cases.toml import as_read
 from feasibility.search import Progress
 from feasibility.studies.axes import Key
 from feasibility.studies.built_cases import arm_of, case_of
@@ -103,8 +107,8 @@ def compare(
         CaseError: an arm cannot be loaded, or is named twice; all of them together.
 
     Example:
-        >>> from feasibility.cases import load_case
-        >>> from feasibility.studies import open_workers
+        >>> from coverable import load_case
+        >>> from coverable import open_workers
         >>> with open_workers(0) as workers:
         ...     found = compare(load_case("paper/4a"), ["puma560", "ur5"], workers, divide=False)
         >>> [(arm.robot, arm.verdict) for arm in found.ranked]

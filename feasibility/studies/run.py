@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from typing import Any
 
-from coverable_files import FileFault, open_regular, stamps
+from coverable.files import FileFault, open_regular, stamps
 from feasibility.search import Progress
 from feasibility.studies.case_files import files_of
 from feasibility.studies.outcome import evaluate
@@ -28,7 +28,7 @@ class StudyTask:
     """One task of a study.
 
     Example:
-        >>> from feasibility.cases import load_case
+        >>> from coverable import load_case
         >>> tables = load_case("paper/4a").to_tables()
         >>> StudyTask(tables, {}).key == StudyTask(dict(tables), {"note": "same"}).key
         True
@@ -99,8 +99,8 @@ def run_tasks(
         WorkersError: the workers were lost for good.
 
     Example:
-        >>> from feasibility.cases import load_case
-        >>> from feasibility.studies import open_workers
+        >>> from coverable import load_case
+        >>> from coverable import open_workers
         >>> tables = load_case("paper/4a").to_tables()
         >>> with open_workers(0) as workers:
         ...     (row,) = run_tasks([StudyTask(tables, {})], workers)

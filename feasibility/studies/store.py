@@ -17,7 +17,7 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from coverable_files import FileFault, open_regular
+from coverable.files import FileFault, open_regular
 from feasibility.safe_files import FileError, check_writable, shown_path
 from feasibility.studies.stored import json_object
 

@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from coverable_errors import alternatives, is_number, is_whole, printable, shown
+from coverable.errors import alternatives, is_number, is_whole, printable, shown
 from feasibility.studies.outcome import cells_of
 from feasibility.verdict import Answer, CauseKind, Evidence
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from coverable_arrays import Mask
+from coverable.arrays import Mask
 from feasibility.clock import Clock
 from feasibility.targets.curves import RELIABLE, target_curves
 from feasibility.task import Task
-from surfaces import Cells, SurfaceError, components
+from surfaces.adjacency import components
+from surfaces.cells import Cells
+from surfaces.surface import SurfaceError
 
 GROWTH = 2.0**0.5  # from one length of smoothing that is tried to the next
 MOST_LENGTHS = 10
@@ -65,7 +67,8 @@ def smoothing_offer(cells: Cells, task: Task, clock: Clock) -> str:
 
     Lengths are tried one after the other, which takes seconds, for as long as there is time.
     """
-    from surfaces.meshes import MeshSurface, smoothed
+    from surfaces.meshes.mesh_surface import MeshSurface
+    from surfaces.meshes.smoothing import smoothed
 
     surface = cells.surface
     if not isinstance(surface, MeshSurface):

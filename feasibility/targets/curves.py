@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 from feasibility.targets.directions import approach_curves
 from feasibility.task import Task
-from surfaces import Cells
-from surfaces.places import offset_surface
-from surfaces.toolpaths import PoseSurface, straight
+from surfaces.cells import Cells
+from surfaces.places.offset_surfaces import offset_surface
+from surfaces.toolpaths.arcs import straight
+from surfaces.toolpaths.pose_surface import PoseSurface
 
 if TYPE_CHECKING:
     from feasibility.targets.frames import FrameCurves

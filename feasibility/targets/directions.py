@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
+from coverable.arrays import Array, Ints
 from feasibility.task import Task
-from surfaces import Cells, fit_directions
-from surfaces.toolpaths import arc_at
+from surfaces.cells import Cells
+from surfaces.curve_fitting import fit_directions
+from surfaces.toolpaths.arcs import arc_at
 
 BESIDE_CREASES = 4  # times as many samples for each cubic of a mesh, whose curves may come to rest
 ROUNDING = 1.0 + 1e-12  # covers the rounding of the few operations on derivative bounds

@@ -6,13 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-import surfaces
-from coverable_arrays import Array, Ints
+from coverable.arrays import Array, Ints
 from feasibility.roll import ALONG, projected
 from feasibility.targets.directions import DirectionCurves, fitted
 from feasibility.targets.references import on_patches, reference_directions
 from feasibility.task import Task
-from surfaces import Cells, Patch, max_principal_curvature
+from surfaces.cells import Cells
+from surfaces.patches.patch import Patch
+from surfaces.surface import max_principal_curvature
 
 PLACES = (0.0, 0.5, 1.0)  # along a piece, where the frame's turning to the side is measured
 STEP = 1e-4  # [1] of a range of parameters: of differences
@@ -84,9 +85,11 @@ def _curvature(
     cells: Cells, task: Task, curvature: Array, least: Array, made: DirectionCurves
 ) -> Array:
     """(P,) see `FrameCurves.curvature`; `least` (P,) is the sine of the reference's angle to b."""
+    from surfaces.piecewise.piecewise_surface import Piecewise
+
     if task.fixed_reference(cells) is not None:
         return np.divide(curvature, least, out=np.full(len(least), np.inf), where=least > 0.0)
-    if not isinstance(cells.surface, (Patch, surfaces.Piecewise)):
+    if not isinstance(cells.surface, (Patch, Piecewise)):
         return np.zeros(len(curvature))
     return np.maximum(_sideways(cells, task), curvature)
 

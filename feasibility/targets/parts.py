@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from coverable_arrays import unit_along
+from coverable.arrays import unit_along
 from feasibility.task import Direction
-from surfaces import Surface, SurfaceParts
+from surfaces.parts import SurfaceParts
+from surfaces.surface import Surface
 
 MOST = 8192
 
@@ -39,7 +40,7 @@ def target_parts(
         directions in that of normals.
 
     Example:
-        >>> from surfaces import sphere
+        >>> from coverable import sphere
         >>> dome = sphere(1.0, polar_deg=(10, 90), azimuth_deg=(0, 90))
         >>> parts = target_parts(dome, standoff=0.005, flat=1e-3, straight=0.1)
         >>> finest = parts.children[:, 0] < 0

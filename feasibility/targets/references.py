@@ -11,13 +11,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-import surfaces
-from coverable_arrays import Array, Ints
-from coverable_errors import ArgumentError, Fault
+from coverable.arrays import Array, Ints
+from coverable.errors import ArgumentError, Fault
 from feasibility.roll import ALONG, projected
 from feasibility.task import Task
-from surfaces import Cells, Patch, Surface
-from surfaces.toolpaths import arc_at
+from surfaces.cells import Cells
+from surfaces.patches.patch import Patch
+from surfaces.surface import Surface
+from surfaces.toolpaths.arcs import arc_at
 
 
 class OnPatch(NamedTuple):
@@ -34,10 +35,12 @@ class OnPatch(NamedTuple):
 
 def on_patches(surface: Surface, points: Array) -> Iterator[OnPatch]:
     """The places of a patch, or of several, that are closest to points (k, 3) m."""
+    from surfaces.piecewise.piecewise_surface import Piecewise
+
     if isinstance(surface, Patch):
         found = surface.closest(points)
         yield OnPatch(np.arange(len(points)), surface, found.u, found.v)
-    elif isinstance(surface, surfaces.Piecewise):
+    elif isinstance(surface, Piecewise):
         nearest = surface.nearest(points)
         for k, patch in enumerate(surface.placed):
             rows = np.flatnonzero(nearest.piece == k)
@@ -46,8 +49,10 @@ def on_patches(surface: Surface, points: Array) -> Iterator[OnPatch]:
 
 def u_directions(surface: Surface, points: Array) -> Array | None:
     """(k, 3) unit, in which u grows under points (k, 3) m; None where there is no u."""
+    from surfaces.piecewise.piecewise_surface import Piecewise
+
     one = isinstance(surface, Patch)
-    if not one and not isinstance(surface, surfaces.Piecewise):
+    if not one and not isinstance(surface, Piecewise):
         return None
     directions = np.full(points.shape, np.nan)
     for rows, patch, u, v in on_patches(surface, points):

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_errors import ArgumentError, Fault
+from coverable.errors import ArgumentError, Fault
 from feasibility.roll import roll_of
 from feasibility.task import Targets, Task
-from robots import Kinematics, Robot
-from surfaces import Cells
+from robots.kinematics import Kinematics
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 EXACT = 1e-9  # [m] and [rad], for a start that was rounded
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 
 ROUNDING = 1e-12  # [rad] or [m]
 

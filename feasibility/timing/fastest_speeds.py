@@ -20,8 +20,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_kernels import entry, kernel
+from coverable.arrays import Array
+from coverable.kernels import entry, kernel
 
 CROSSINGS = 100  # per place; with what is left over then, the speed is 0 there
 ROUNDING = 1e-12  # [1]

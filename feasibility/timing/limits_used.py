@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from feasibility.timing.sampled_trajectory import Trajectory, bends
 from feasibility.timing.speed_limits import MotionLimits, tool_slopes, tool_speeds
-from robots import Robot
+from robots.robot import Robot
 
 PLACES = 4  # at which the tool is looked at on each piece, its first end among them
 ROUNDING = 1e-12  # [rad] or [m] that is left free inside a joint's limits

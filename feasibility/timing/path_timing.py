@@ -16,11 +16,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array, Ints, Mask
-from coverable_errors import real
-from feasibility.certification import collision_replay, replay
-from feasibility.collisions import Bodies, checked, gather
-from feasibility.paths import CoveragePath, PathError
+from coverable.arrays import Array, Ints, Mask
+from coverable.errors import real
+from feasibility.certification.collisions.collision_replay import collision_replay
+from feasibility.certification.motion_replay import replay
+from feasibility.collisions.asked_bodies import gather
+from feasibility.collisions.bodies import Bodies
+from feasibility.collisions.words import checked
+from feasibility.paths.coverage import CoveragePath
+from feasibility.paths.order import PathError
 from feasibility.task import Task
 from feasibility.timing.limits_used import PLACES, held_inside, past_limits, used, used_each
 from feasibility.timing.sampled_trajectory import Trajectory
@@ -28,8 +32,8 @@ from feasibility.timing.smoothing import Curve, blended, control_points
 from feasibility.timing.speed_limits import MotionLimits, motion_limits
 from feasibility.timing.timed_curve import CurveBounds, TimedCurve
 from feasibility.verdict import Walk
-from robots import Robot
-from surfaces.toolpaths import PoseSurface
+from robots.robot import Robot
+from surfaces.toolpaths.pose_surface import PoseSurface
 
 DEFAULT_SPEED = 0.1  # [m/s] of the tool point
 DEFAULT_PERIOD = 0.02  # [s] between samples
@@ -75,10 +79,10 @@ def trajectory(
         PathError: a number is not as it should be, or no such motion was found.
 
     Example:
-        >>> from feasibility import Task, check
-        >>> from feasibility.paths import coverage_path
-        >>> from robots import load_robot
-        >>> from surfaces import plane
+        >>> from coverable import Task, check
+        >>> from coverable import coverage_path
+        >>> from coverable import load_robot
+        >>> from coverable import plane
         >>> plate = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside")
         >>> verdict = check(load_robot("ur5"), plate.cells(2, 3), Task(standoff=0.02, cone_deg=30))
         >>> run = trajectory(coverage_path(verdict), speed=0.1)

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
-from coverable_arrays import Array, Ints, Mask
-from coverable_errors import ArgumentError
+from coverable.arrays import Array, Ints, Mask
+from coverable.errors import ArgumentError
 from feasibility.timing.between_samples import deviations
 from feasibility.timing.speed_limits import tool_slopes
 from feasibility.verdict import Walk
-from robots import Robot
+from robots.robot import Robot
 
 
 @dataclass(frozen=True, eq=False, slots=True)

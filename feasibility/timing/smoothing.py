@@ -19,14 +19,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import BSpline
 
-from coverable_arrays import Array, Ints
-from feasibility.certification import replay
-from feasibility.paths import PathError
+from coverable.arrays import Array, Ints
+from feasibility.certification.motion_replay import replay
+from feasibility.paths.order import PathError
 from feasibility.task import Task
 from feasibility.timing.between_samples import deviations
 from feasibility.verdict import Walk
-from robots import Kinematics, Robot
-from surfaces import Cells
+from robots.kinematics import Kinematics
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 WIDEST = 0.5  # [1] share of the lines next to a waypoint that its turn may use
 SHARPEST = 2.0**-12  # [1] share below which it is given up

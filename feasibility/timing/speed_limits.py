@@ -8,10 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array, Protected
-from coverable_errors import real
-from feasibility.paths import PathError
-from robots import Kinematics, Robot, moved_by_joints
+from coverable.arrays import Array, Protected
+from coverable.errors import real
+from feasibility.paths.order import PathError
+from robots.chain_rows import moved_by_joints
+from robots.kinematics import Kinematics
+from robots.robot import Robot
 
 ACCELERATION_TIME = 0.5  # [s], in which a joint gets to its largest velocity, by default
 # [rad/s], [m/s] or their acceleration: more is no limit, less does not move; both are refused.
@@ -48,7 +50,7 @@ def motion_limits(
         PathError: a number is not positive and finite, or the URDF gives a joint no velocity.
 
     Example:
-        >>> from robots import load_robot
+        >>> from coverable import load_robot
         >>> limits = motion_limits(load_robot("puma560"), tool_speed=0.1)
         >>> limits.velocity.tolist(), limits.acceleration.tolist()
         ([3.0, 3.0, 3.0, 3.0, 3.0, 3.0], [6.0, 6.0, 6.0, 6.0, 6.0, 6.0])

@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
-from feasibility.paths import PathError
+from coverable.arrays import Array, Ints
+from feasibility.paths.order import PathError
 from feasibility.timing.fastest_speeds import Rows, fastest_speeds
 from feasibility.timing.smoothing import Curve, inside
 from feasibility.timing.speed_limits import MotionLimits, tool_speeds
-from robots import Robot
+from robots.robot import Robot
 
 COARSEST, FINEST = 4, 32  # places of the grid on each piece of a curve
 MOST_PLACES = 400_000  # of a grid

@@ -8,22 +8,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Protected
+from coverable.arrays import Array, Ints, Protected
 from feasibility.task import Task
 from feasibility.treated.contact_path import ContactPath, contacts_along, contacts_on
 from feasibility.verdict import Walk
-from robots import Robot
-from surfaces import Cells, Surface, components
-from surfaces.passes import (
-    PassPlaces,
-    ToolLines,
-    Treated,
-    WorkingMesh,
-    treated_share,
-    visits,
-    working_mesh,
-)
-from surfaces.toolpaths import PoseSurface
+from robots.robot import Robot
+from surfaces.adjacency import components
+from surfaces.cells import Cells
+from surfaces.passes.tool_lines import ToolLines, visits
+from surfaces.passes.toolpath import PassPlaces
+from surfaces.passes.treated import Treated, treated_share
+from surfaces.passes.triangles import WorkingMesh
+from surfaces.passes.triangulation import working_mesh
+from surfaces.surface import Surface
+from surfaces.toolpaths.pose_surface import PoseSurface
 
 FINE = 0.5  # [1] of the footprint's radius: edges of the triangles that are measured on
 ACROSS = 60  # edges along the surface's extent, at least: triangles cut the corners of curved parts

@@ -12,12 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
+from coverable.arrays import Array, Ints
 from feasibility.verdict import Walk
-from robots import Kinematics, Robot
-from surfaces import Surface
-from surfaces.passes import PassPlaces, ToolLines
-from surfaces.toolpaths import arc_at
+from robots.kinematics import Kinematics
+from robots.robot import Robot
+from surfaces.passes.tool_lines import ToolLines
+from surfaces.passes.toolpath import PassPlaces
+from surfaces.surface import Surface
+from surfaces.toolpaths.arcs import arc_at
 
 SAG = 1e-5  # [m] how far the path between two contacts may be from straight
 FAR = 10.0  # [m] the reach of an arm whose slides have no ends

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from coverable_errors import listed
+from coverable.errors import listed
 
 if TYPE_CHECKING:
     from feasibility.treated.area import TreatedArea, UntreatedRegion

@@ -12,11 +12,11 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 from feasibility.viewer.meshes import merge_vertices, split_at_creases
-from surfaces import Cells, CellTriangles
-from surfaces.meshes import half_edge_ends, half_edges
-from surfaces.meshes.cells import MeshCells
+from surfaces.cells import Cells, CellTriangles
+from surfaces.meshes.cells.mesh_cells import MeshCells
+from surfaces.meshes.triangle_mesh import half_edge_ends, half_edges
 
 FULL_DETAIL = 1_500  # cells; more are drawn without centre marks, and edges as plain lines
 BUDGET = 30_000  # triangles

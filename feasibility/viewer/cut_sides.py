@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable_arrays import Ints
+from coverable.arrays import Ints
 from feasibility.cut_tree import Cut, Leaf
 from feasibility.cut_words import place_of
 from feasibility.verdict import Verdict

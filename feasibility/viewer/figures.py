@@ -13,15 +13,17 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from matplotlib.figure import Figure
 
-from coverable_arrays import Array, Ints
-from coverable_errors import ArgumentError
-from feasibility.placement import AXES, PlacementMap, Placements
+from coverable.arrays import Array, Ints
+from coverable.errors import ArgumentError
+from feasibility.placement.map import PlacementMap
+from feasibility.placement.placements import Placements
+from feasibility.placement.region import AXES
 from feasibility.verdict import Verdict
 from feasibility.viewer.cut_sides import COLOURS, LOST, sides_of
 from feasibility.viewer.scene import CENTRES, EDGES, MISSED, START, missed_groups
 from feasibility.viewer.threejs import Colour
-from robots import Kinematics
-from surfaces import Cells
+from robots.kinematics import Kinematics
+from surfaces.cells import Cells
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

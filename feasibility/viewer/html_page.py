@@ -17,7 +17,7 @@ from functools import cache
 from pathlib import Path
 from string import Template
 
-from feasibility.collisions import UNCHECKED
+from feasibility.collisions.words import UNCHECKED
 from feasibility.viewer.threejs import Colour, Command, hex_colour, stream_of
 
 PAGE = Path(__file__).with_name("page")

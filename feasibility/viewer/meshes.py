@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
-from coverable_meshes import RawMesh
+from coverable.arrays import Array, Ints
+from coverable.meshes.raw_mesh import RawMesh
 from feasibility.viewer.threejs import Colour
-from robots.urdf import Box, Capsule, Cylinder, Sphere
-from surfaces.meshes import doubled_areas
+from robots.urdf.geometry import Box, Capsule, Cylinder, Sphere
+from surfaces.meshes.triangle_mesh import doubled_areas
 
 CREASE = 0.7  # [rad]: edges sharper than this keep a visible edge (40 degrees)
 DEGREE = 57.0  # [1/rad] normals that agree to about a degree are one

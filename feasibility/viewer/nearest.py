@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from coverable_arrays import Array
-from feasibility.certification.collisions import NearPair, nearest_along
-from feasibility.collisions import Bodies
+from coverable.arrays import Array
+from feasibility.certification.collisions.nearest import NearPair, nearest_along
+from feasibility.collisions.bodies import Bodies
 from feasibility.viewer import threejs
 from feasibility.viewer.cell_meshes import marks
 from feasibility.viewer.html_page import Entry
@@ -17,7 +17,7 @@ from feasibility.viewer.meshes import tubes
 from feasibility.viewer.playback import Playback, key_times
 from feasibility.viewer.scene import Layer
 from feasibility.viewer.threejs import Colour, Command
-from robots import Robot
+from robots.robot import Robot
 
 ROOT = "/nearest pair"
 LINE: Colour = (0.90, 0.00, 0.55)

@@ -7,16 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from coverable_arrays import Array
-from feasibility.collisions import TOOL, Bodies, HalfSpace, Obstacle, Seat
+from coverable.arrays import Array
+from feasibility.collisions.bodies import Bodies, Seat
+from feasibility.collisions.scene import Obstacle
+from feasibility.collisions.shapes import HalfSpace
+from feasibility.collisions.words import TOOL
 from feasibility.viewer import threejs
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.meshes import CREASE, Mesh, as_mesh, moved, shaded, solid_mesh, thinned
 from feasibility.viewer.robot import joint_paths
 from feasibility.viewer.scene import Layer, hidden
 from feasibility.viewer.threejs import Colour, Command
-from robots import Robot
-from robots.shapes import Polytope, Triangles
+from robots.robot import Robot
+from robots.shapes.bodies import Polytope, Triangles
 
 HULLS = "/hulls"  # a tree of joints beside that of the arm
 SCENE: Colour = (0.66, 0.54, 0.40)

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
-from coverable_kernels import entry
+from coverable.arrays import Array, Ints
+from coverable.kernels import entry
 from feasibility.viewer.html_page import Camera
 from feasibility.viewer.threejs import Command, numbers_of
-from surfaces.meshes import doubled_areas
+from surfaces.meshes.triangle_mesh import doubled_areas
 
 LENS = np.tan(np.radians(37.5))  # half the height of meshcat's picture at a distance of 1
 NEAR = 0.02  # [m]: what is nearer to the camera is left out

@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_errors import counted
-from feasibility.treated import TreatedArea, share_words
+from coverable.arrays import Array
+from coverable.errors import counted
+from feasibility.treated.area import TreatedArea
+from feasibility.treated.words import share_words
 from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer import threejs
-from feasibility.viewer.areas import painted_layers
+from feasibility.viewer.areas.treated import painted_layers
 from feasibility.viewer.cell_meshes import cell_size
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.meshes import tubes
@@ -33,12 +34,15 @@ from feasibility.viewer.scene import (
 )
 from feasibility.viewer.threejs import Colour
 from feasibility.viewer.viewer import View, compose, titled
-from robots import Kinematics, Robot
+from robots.kinematics import Kinematics
+from robots.robot import Robot
 
 if TYPE_CHECKING:
-    from feasibility.division import Division, Reconfiguration
-    from feasibility.paths import CoveragePath
-    from feasibility.timing import MotionLimits, Trajectory
+    from feasibility.division.division import Division
+    from feasibility.division.reconfiguration import Reconfiguration
+    from feasibility.paths.coverage import CoveragePath
+    from feasibility.timing.sampled_trajectory import Trajectory
+    from feasibility.timing.speed_limits import MotionLimits
 
 RECONFIGURED: Colour = (0.80, 0.05, 0.05)
 BANDS: tuple[tuple[float, Colour, str], ...] = (

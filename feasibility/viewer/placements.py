@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_errors import ArgumentError, at_least, counted
-from feasibility.cases import Setup
-from feasibility.placement import Pose, Trial, moved_cells
+from coverable.arrays import Array
+from coverable.errors import ArgumentError, at_least, counted
+from feasibility.cases.case import Setup
+from feasibility.placement.region import Pose, moved_cells
+from feasibility.placement.trials import Trial
 from feasibility.search import Progress, Search
 from feasibility.verdict import Evidence
 from feasibility.viewer import robot as robot_visuals
@@ -34,11 +35,12 @@ from feasibility.viewer.poses import (
 from feasibility.viewer.scene import Layer, cells_layers, hidden
 from feasibility.viewer.stage import framing, joint_points
 from feasibility.viewer.viewer import View, compose, titled
-from robots import Robot
+from robots.robot import Robot
 
 if TYPE_CHECKING:
-    from feasibility.placement import Placements, StationPlan
-    from feasibility.studies import Row, StudyTask
+    from feasibility.placement.placements import Placements
+    from feasibility.placement.stations import StationPlan
+    from feasibility.studies.run import Row, StudyTask
 
 
 LOOKED = 24  # configurations of a motion that have to be in the picture
@@ -108,7 +110,8 @@ def view_study(
     Raises:
         ArgumentError: there are no rows, or not one for each task.
     """
-    from feasibility.studies import arm_of, case_of, cells_of, cut_of, merit
+    from feasibility.studies.built_cases import arm_of, case_of, cut_of
+    from feasibility.studies.outcome import cells_of, merit
 
     if len(rows) == 0 or len(tasks) != len(rows):
         raise ArgumentError(f"expected a row for each task, got {len(rows)} for {len(tasks)} tasks")

@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING, Any
 import networkx as nx
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_errors import ArgumentError
+from coverable.arrays import Array
+from coverable.errors import ArgumentError
 from feasibility.verdict import Verdict
 from feasibility.viewer import threejs
 from feasibility.viewer.robot import ROBOT, joint_paths, joint_placements
-from robots import Kinematics, Robot
+from robots.kinematics import Kinematics
+from robots.robot import Robot
 
 if TYPE_CHECKING:
-    from feasibility.timing import Trajectory
+    from feasibility.timing.sampled_trajectory import Trajectory
 
 KEY_FRAMES = 400
 SAMPLES = 3_000  # of a trajectory that are drawn, at most

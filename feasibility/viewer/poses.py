@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
-from coverable_errors import counted
-from feasibility.placement import Pose, Trial, moved_cells
+from coverable.arrays import Array, Ints, Mask
+from coverable.errors import counted
+from feasibility.placement.region import Pose, moved_cells
+from feasibility.placement.trials import Trial
 from feasibility.viewer import threejs
 from feasibility.viewer.cell_meshes import marks, patch
 from feasibility.viewer.meshes import tubes
@@ -30,11 +31,12 @@ from feasibility.viewer.scene import (
     trail,
 )
 from feasibility.viewer.threejs import Colour
-from surfaces import Cells, CellTriangles, components
+from surfaces.adjacency import components
+from surfaces.cells import Cells, CellTriangles
 
 if TYPE_CHECKING:
-    from feasibility.placement import StationPlan
-    from feasibility.studies import Row
+    from feasibility.placement.stations import StationPlan
+    from feasibility.studies.run import Row
 
 
 MOST = 96  # segments of one outline

@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from feasibility.viewer.html_page import Readout
 from feasibility.viewer.playback import Playback, key_times
-from robots import Kinematics, Robot
-from surfaces import Cells
+from robots.kinematics import Kinematics
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 
 def readout_of(robot: Robot, cells: Cells, motion: Playback) -> Readout:

@@ -14,9 +14,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array
-from coverable_errors import listed
-from coverable_meshes import MeshError, MeshFiles
+from coverable.arrays import Array
+from coverable.errors import listed
+from coverable.meshes.raw_mesh import MeshError
+from coverable.meshes.robot_files import MeshFiles
 from feasibility.viewer import threejs
 from feasibility.viewer.meshes import (
     GREY,
@@ -28,8 +29,11 @@ from feasibility.viewer.meshes import (
     solid_mesh,
     thinned,
 )
-from robots import Kinematics, Robot, RobotError
-from robots.urdf import LinkShape, MeshFile
+from robots.errors import RobotError
+from robots.kinematics import Kinematics
+from robots.robot import Robot
+from robots.urdf.geometry import MeshFile
+from robots.urdf.link_shapes import LinkShape
 
 ROBOT = "/robot"
 TRIANGLES = 60_000  # of a whole robot; more are thinned
@@ -150,7 +154,7 @@ def _visuals(robot: Robot) -> tuple[list[LinkShape], list[str]]:
     """The checked visuals of the robot's URDF, and what is wrong with the others."""
     if robot.urdf is None:
         return [], []
-    from robots.urdf import check_urdf
+    from robots.urdf.checked_urdf import check_urdf
 
     try:
         checked = check_urdf(

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array, Ints
-from coverable_errors import counted
+from coverable.arrays import Array, Ints
+from coverable.errors import counted
 from feasibility.verdict import Cause, CauseKind, Verdict
 from feasibility.viewer import threejs
 from feasibility.viewer.cell_meshes import FULL_DETAIL, borders, cell_size, marks, patch
@@ -23,7 +23,7 @@ from feasibility.viewer.html_page import Entry
 from feasibility.viewer.meshes import tubes
 from feasibility.viewer.playback import Playback
 from feasibility.viewer.threejs import Colour, Command
-from surfaces import Cells
+from surfaces.cells import Cells
 
 SURFACE: Colour = (0.62, 0.71, 0.80)
 OUTLINES: Colour = (0.30, 0.35, 0.41)

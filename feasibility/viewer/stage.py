@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer import threejs
-from feasibility.viewer.frames import in_world, triad
+from feasibility.viewer.frames.standing_world import in_world
+from feasibility.viewer.frames.triads import triad
 from feasibility.viewer.html_page import Camera
 from feasibility.viewer.threejs import Command
-from robots import Robot
-from surfaces import Cells
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 THICKNESS = 0.12  # [1] of the reach: by how much links may stand out beyond their joints
 STILL = np.eye(4)

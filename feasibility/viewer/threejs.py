@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from coverable_arrays import Array, Mask
-from coverable_errors import ArgumentError
+from coverable.arrays import Array, Mask
+from coverable.errors import ArgumentError
 
 Command = dict[str, Any]
 Colour = tuple[float, float, float]

@@ -1,6 +1,6 @@
 """The picture of a verdict: the arm at work over the surface, in a file, a notebook or a window.
 
-    from feasibility.viewer import show
+    from coverable import show
     show(verdict)
 
 Nothing but other views, reports, commands and the live page imports the viewer.
@@ -19,17 +19,19 @@ from typing import Any
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_errors import counted
-from feasibility.collisions import gather, said_of
+from coverable.arrays import Array
+from coverable.errors import counted
+from feasibility.collisions.asked_bodies import gather, said_of
 from feasibility.cut_words import sentence
 from feasibility.safe_files import write_whole
 from feasibility.task import Task
 from feasibility.verdict import Verdict
 from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer import threejs
-from feasibility.viewer.areas import area_layers, margin_layers
-from feasibility.viewer.frames import carried, root_in_world, triads, world_tracks
+from feasibility.viewer.areas.margin_along import margin_layers
+from feasibility.viewer.areas.treated import area_layers
+from feasibility.viewer.frames.standing_world import carried, root_in_world, world_tracks
+from feasibility.viewer.frames.triads import triads
 from feasibility.viewer.html_page import Camera, Entry, Legend, Readout, page
 from feasibility.viewer.live_server import LiveView
 from feasibility.viewer.nearest import draw_nearest
@@ -39,8 +41,8 @@ from feasibility.viewer.readout import readout_of, with_nearest
 from feasibility.viewer.scene import Layer, layers, trail
 from feasibility.viewer.stage import camera_on, ground
 from feasibility.viewer.threejs import Command
-from robots import Robot
-from surfaces import Cells
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 ARM: threejs.Colour = (0.35, 0.37, 0.40)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_arrays import Array, unit_along
+from coverable.arrays import Array, unit_along
 
 PARALLEL = 1e-6  # [1], sine of the angle below which two directions count as parallel
 

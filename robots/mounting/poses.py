@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_errors import Checks, Fault, shown
+from coverable.arrays import Array
+from coverable.errors import Checks, Fault, shown
 
 FURTHEST_TCP = 10.0  # [m] from tool_frame: no tool is longer, but many are given in millimetres
 FURTHEST_BASE = 1e4  # [m] from the origin of the world

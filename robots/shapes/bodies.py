@@ -7,9 +7,9 @@ from typing import Literal
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
+from coverable.arrays import Array, Ints
 from robots.errors import RobotError
-from robots.urdf import Box, Capsule, Cylinder, Sphere
+from robots.urdf.geometry import Box, Capsule, Cylinder, Sphere
 
 
 @dataclass(frozen=True, eq=False, slots=True)

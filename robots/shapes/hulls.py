@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
+from coverable.arrays import Array, Ints
 from robots.shapes.bodies import Geometry, Triangles
-from robots.urdf import Box, Capsule, Cylinder, Sphere
+from robots.urdf.geometry import Box, Capsule, Cylinder, Sphere
 
 MOST_VERTICES = 64
 CLOSE_ENOUGH = 1e-4  # [m]: no vertex is added for less

@@ -10,14 +10,15 @@ from typing import Literal
 
 import numpy as np
 
-from coverable_errors import Fault, listed
+from coverable.errors import Fault, listed
 from robots.errors import RobotError
 from robots.joint_selection import suggestion
 from robots.robot import Robot
 from robots.shapes.bodies import Polytope, Solid
 from robots.shapes.links import LinkShapes
 from robots.shapes.sampling import Pair, PairSampling, random_configurations
-from robots.urdf import DisabledPairs, UrdfError, read_srdf
+from robots.urdf.srdf import DisabledPairs, read_srdf
+from robots.urdf.xml import UrdfError
 
 Why = Literal["rigid", "adjacent", "always", "allowed", "srdf"]
 FIRST_LOOK = 30  # configurations after which most pairs are known not to collide always

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from robots.shapes.bodies import Geometry, Triangles
 from robots.shapes.hulls import Hull, hull_of, hull_volume, is_convex, outer_hull
 

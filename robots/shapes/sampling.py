@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 
-from coverable_arrays import Array, Mask
+from coverable.arrays import Array, Mask
 from robots.kinematics import Kinematics
 from robots.robot import Robot
 from robots.shapes.bodies import Polytope, Solid

@@ -13,7 +13,7 @@ from robots.robot import Robot
 from robots.shapes.bodies import Geometry, Polytope, Solid, Triangles
 from robots.shapes.hulls import Hull, hull_of, rims
 from robots.shapes.links import LinkShapes
-from robots.urdf import Cylinder
+from robots.urdf.geometry import Cylinder
 
 NEAR = 1e-3  # [m]
 HEAVY = 1e3  # [1] of a sum of weights beside lengths
@@ -46,7 +46,7 @@ def tool_line(robot: Robot) -> ToolLine:
     """The flange is the link of the tool frame, or the last before it that is elsewhere.
 
     Example:
-        >>> from robots import load_robot
+        >>> from coverable import load_robot
         >>> line = tool_line(load_robot("ur5", tcp=((0, 0, 0.15), (0, 0, 0))))
         >>> line.flange, (line.ends[1] - line.ends[0]).round(9).tolist()
         ('tool0', [0.0, 0.15, 0.0])

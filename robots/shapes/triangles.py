@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
-from coverable_files import FileFault, read_regular
-from coverable_meshes import MeshError, MeshFiles, distinct, largest_file
+from coverable.arrays import Array, Ints, Mask
+from coverable.files import FileFault, read_regular
+from coverable.meshes.raw_mesh import MeshError, distinct
+from coverable.meshes.robot_files import MeshFiles, largest_file
 from robots.errors import RobotError
 from robots.shapes.bodies import Triangles
-from robots.urdf import MeshFile
+from robots.urdf.geometry import MeshFile
 
 LARGEST = 1e4  # [m] a coordinate beyond it is no link's
 MOST_SECONDS = 60.0  # of processor time for all files of a robot

@@ -16,10 +16,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_errors import MISSING, Checks, Fault, shown
+from coverable.arrays import Array
+from coverable.errors import MISSING, Checks, Fault, shown
 from robots.errors import RobotError
-from robots.mounting import FURTHEST_BASE, matrix_of
+from robots.mounting.poses import FURTHEST_BASE, matrix_of
 from robots.urdf.joints import JointInfo
 from robots.urdf.xml import MAX_LENGTH, MAX_NAME, UrdfError
 

@@ -12,9 +12,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from robots.urdf.axes import Axis, axis_joints
-from robots.urdf.expansion import expanded, is_xacro
+from robots.urdf.expansion.xacro_files import expanded, is_xacro
 from robots.urdf.joints import JointInfo
 from robots.urdf.link_shapes import (
     CollisionShapes,

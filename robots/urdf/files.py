@@ -6,9 +6,9 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from coverable_files import Remembered
+from coverable.files import Remembered
 from robots.urdf.checked_urdf import check_urdf
-from robots.urdf.expansion import expanded, is_xacro
+from robots.urdf.expansion.xacro_files import expanded, is_xacro
 
 
 class _Named(NamedTuple):

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_errors import Fault
-from robots.mounting import about_fixed_axes
+from coverable.arrays import Array
+from coverable.errors import Fault
+from robots.mounting.poses import about_fixed_axes
 from robots.urdf.mesh_folders import MeshFolders
 from robots.urdf.xml import BadValue, Node, Triple, numbers, shown, triple
 

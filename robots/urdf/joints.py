@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from coverable_errors import close_matches
+from coverable.errors import close_matches
 from robots.urdf.xml import (
     MAX_LENGTH,
     BadValue,

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from coverable_arrays import Array
-from coverable_errors import Fault, listed, worded
+from coverable.arrays import Array
+from coverable.errors import Fault, listed, worded
 from robots.urdf.geometry import Geometry, read_shape
 from robots.urdf.mesh_folders import MeshFolders
 from robots.urdf.xml import BadValue, Faults, Node, numbers, shown

@@ -7,8 +7,8 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from coverable_errors import listed
-from coverable_files import FileFault, read_regular
+from coverable.errors import listed
+from coverable.files import FileFault, read_regular
 from robots.urdf.xml import UrdfError, parse_xml
 
 PACKAGE_LEVELS = 5  # how far above the URDF a package.xml is looked for

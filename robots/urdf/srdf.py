@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 
-from robots.urdf.expansion import expanded, is_xacro
+from robots.urdf.expansion.xacro_files import expanded, is_xacro
 from robots.urdf.xml import Faults, UrdfError, name_of, parse_xml, read_bytes
 
 TAKEN = ("Adjacent", "Default", "Always", "User")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import replace
 
-from coverable_errors import close_matches
+from coverable.errors import close_matches
 from robots.urdf.joints import JointInfo, read_joint
 from robots.urdf.mesh_folders import leaves_package
 from robots.urdf.xml import Faults, Node, UrdfError, name_of, shown

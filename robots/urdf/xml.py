@@ -12,8 +12,8 @@ import re
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
-from coverable_errors import CoverableError, Fault
-from coverable_files import FileFault, read_regular, too_large
+from coverable.errors import CoverableError, Fault
+from coverable.files import FileFault, read_regular, too_large
 from robots.errors import RobotError
 
 MAX_BYTES = 8 * 2**20  # the largest URDF in example-robot-data has 0.2 MB

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_errors import Fault, shown
+from coverable.arrays import Array
+from coverable.errors import Fault, shown
 from surfaces.arguments import LARGEST_COORDINATE
 from surfaces.surface import SurfaceError
 

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from surfaces.parts import PartModels
-from surfaces.patches.nurbs import SplineMap, SplinePatch
+from surfaces.patches.nurbs.bspline import SplinePatch
+from surfaces.patches.nurbs.nurbs import SplineMap
 
 Flags = tuple[bool, bool]
 

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_errors import Fault, shown
+from coverable.arrays import Array
+from coverable.errors import Fault, shown
 from surfaces.arguments import ORIGIN, Checks
 from surfaces.fitted.calls import HOW, Formula
 from surfaces.fitted.fitted_patch import (
@@ -25,7 +25,8 @@ from surfaces.fitted.fitted_patch import (
     poles_of,
     spline_through,
 )
-from surfaces.patches.nurbs import SplineMap, regularity_faults
+from surfaces.patches.nurbs.nurbs import SplineMap
+from surfaces.patches.nurbs.nurbs_checks import regularity_faults
 from surfaces.surface import Side, SurfaceError
 
 DEGREE = 5

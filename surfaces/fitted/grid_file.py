@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_errors import CoverableError
-from coverable_files import read_regular, shown_name
+from coverable.arrays import Array
+from coverable.errors import CoverableError
+from coverable.files import read_regular, shown_name
 from surfaces.arguments import Checks
-from surfaces.patches.nurbs import read_net
+from surfaces.patches.nurbs.control_net_file import read_net
 from surfaces.surface import SurfaceError
 
 MOST_BYTES = 16 << 20

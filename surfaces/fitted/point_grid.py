@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_errors import Fault
+from coverable.arrays import Array
+from coverable.errors import Fault
 from surfaces.arguments import ORIGIN, Checks, metres
 from surfaces.fitted.fitted_patch import (
     ONE_PLACE,
@@ -19,7 +19,8 @@ from surfaces.fitted.fitted_patch import (
     poles_of,
     spline_through,
 )
-from surfaces.patches.nurbs import MOST_POINTS, SplineMap, regularity_faults
+from surfaces.patches.nurbs.nurbs import SplineMap
+from surfaces.patches.nurbs.nurbs_checks import MOST_POINTS, regularity_faults
 from surfaces.surface import Side, SurfaceError
 
 DEGREE = 3

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_kernels import kernel
+from coverable.kernels import kernel
 
 THIN = 1e-4  # [1], square of the sine of the first corner's angle
 

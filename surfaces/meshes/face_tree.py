@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
-from coverable_kernels import allocating_entry, entry, kernel
+from coverable.arrays import Array, Ints
+from coverable.kernels import allocating_entry, entry, kernel
 from surfaces.meshes.closest_point import on_triangle
 
 LEAF = 2  # triangles in a leaf, at most

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 from surfaces.meshes.normals import WIDTH, crease_share
 
 FEWEST, MOST = 2, 6  # triangles or pairs of them from the edge of a strip to its crease

@@ -14,7 +14,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 from surfaces.meshes.facets import Facets
 from surfaces.part_growth import Pieces, Rows
 from surfaces.parts import PartModels

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 from surfaces.arguments import ORIGIN, Checks
 from surfaces.meshes.facets import facets_of
 from surfaces.meshes.mesh_parts import Clusters
@@ -30,7 +30,7 @@ from surfaces.parts import MOST_PARTS, SurfaceParts
 from surfaces.surface import ClosestPoint, Side, Smoothing, Surface, points_of
 
 if TYPE_CHECKING:
-    from surfaces.meshes.cells import MeshCells
+    from surfaces.meshes.cells.mesh_cells import MeshCells
     from surfaces.meshes.face_tree import FaceTree
 
 
@@ -71,7 +71,7 @@ class MeshSurface(Surface):
     @property
     def notes(self) -> tuple[str, ...]:
         """What was repaired in the mesh, and what to know about it."""
-        from surfaces.meshes.repair import notes_of
+        from surfaces.meshes.repair.mesh_notes import notes_of
 
         made = self.smoothing
         return (*notes_of(self.mesh), *([] if made is None else [made.words()]))
@@ -204,7 +204,7 @@ class MeshSurface(Surface):
         Raises:
             SurfaceError: not exactly one of the two is given, or it makes no sense.
         """
-        from surfaces.meshes.cells import MeshCells
+        from surfaces.meshes.cells.mesh_cells import MeshCells
 
         return MeshCells.cut(self, count, size)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_kernels import entry
+from coverable.kernels import entry
 from surfaces.meshes.normals import WIDTH
 
 

@@ -20,9 +20,9 @@ import math
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
+from coverable.arrays import Array, Ints
 from surfaces.arguments import Checks
-from surfaces.meshes.cells import subdivide
+from surfaces.meshes.cells.subdivision import subdivide
 from surfaces.meshes.mesh_surface import MeshSurface
 from surfaces.meshes.normals import corner_normals
 from surfaces.meshes.triangle_mesh import TriangleMesh
@@ -47,7 +47,8 @@ def smoothed(surface: MeshSurface, length: float, tolerance: float) -> MeshSurfa
         SurfaceError: the length makes no sense, or is too short for a surface of this size.
 
     Example:
-        >>> from surfaces.meshes import TriangleMesh, mesh
+        >>> from surfaces.meshes.triangle_mesh import TriangleMesh
+        >>> from coverable import mesh
         >>> ridge = [[0, 0, 0], [1, 0, 0.1], [1, 1, 0.1], [0, 1, 0], [2, 0, 0], [2, 1, 0]]
         >>> roof = TriangleMesh(ridge, [[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2]])
         >>> copy = smoothed(mesh(roof), 0.5, tolerance=0.02)

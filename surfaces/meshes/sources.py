@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from coverable_errors import shown
-from coverable_files import shown_name
-from coverable_meshes import MeshError, read_raw
+from coverable.errors import shown
+from coverable.files import shown_name
+from coverable.meshes.mesh_file import read_raw
+from coverable.meshes.raw_mesh import MeshError
 from surfaces.arguments import Checks
-from surfaces.meshes.repair import clean
+from surfaces.meshes.repair.cleaning import clean
 from surfaces.meshes.triangle_mesh import TriangleMesh
 from surfaces.surface import SurfaceError
 

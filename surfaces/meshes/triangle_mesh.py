@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Protected
+from coverable.arrays import Array, Ints, Protected
 from surfaces.adjacency import components
 from surfaces.surface import SurfaceError
 

@@ -21,8 +21,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
-from surfaces.meshes import corner_angles
+from coverable.arrays import Array, Ints, Mask
+from surfaces.meshes.normals import corner_angles
 from surfaces.passes.triangles import WorkingMesh, border_edges
 
 FLAT = 1e-4  # [1] of a turn's square over the surface: less curvature than this is none

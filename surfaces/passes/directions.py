@@ -26,8 +26,8 @@ def ranked_directions(surface: Surface, pitch: float) -> list[float]:
         pitch: m > 0, the largest distance between passes.
 
     Example:
-        >>> from surfaces import plane
-        >>> from surfaces.passes import ranked_directions
+        >>> from coverable import plane
+        >>> from surfaces.passes.directions import ranked_directions
         >>> found = ranked_directions(plane((0, 0.6), (0, 0.2)), 0.03)
         >>> found[0]
         0.0

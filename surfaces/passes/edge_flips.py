@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 from surfaces.passes.triangles import WorkingMesh, twin_sides
 
 IN_ONE_PLANE = 1e-6  # [1] of the edge: corners this far off the other face's plane are in it

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 from surfaces.adjacency import components
 from surfaces.passes.beyond_ends import FirstPass, carried_on, slopes
 from surfaces.passes.triangles import WorkingMesh, cut_at_middles, cut_edges, edges_of, twin_sides

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
+from coverable.arrays import Array, Ints
 from surfaces.passes.triangles import WorkingMesh, border_edges
 
 MOST_RINGS = 40

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 from surfaces.passes.triangles import WorkingMesh
 
 OFF_VERTICES = 1e-7  # [1] of the field's range by which a level is off all vertices' values

@@ -10,15 +10,15 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array, Mask
-from coverable_errors import ArgumentError, Checks, counted
+from coverable.arrays import Array, Mask
+from coverable.errors import ArgumentError, Checks, counted
 from surfaces.passes.first_pass import Field, distance_field, plane_field
 from surfaces.passes.holes import Lidded, with_lids
 from surfaces.passes.levels import Line, level_lines
 from surfaces.passes.stretches import LevelLine, Pass, in_order, stretch_of
 from surfaces.passes.triangles import WorkingMesh
 from surfaces.passes.triangulation import WorkingCopy, working_copy, working_mesh
-from surfaces.patches import Patch
+from surfaces.patches.patch import Patch
 from surfaces.surface import Surface
 
 By = Literal["distance", "planes", "parameters"]
@@ -102,8 +102,8 @@ def parallel_passes(
         SurfaceError: passes over a surface of this kind are not supported.
 
     Example:
-        >>> from surfaces import plane
-        >>> from surfaces.passes import parallel_passes
+        >>> from coverable import plane
+        >>> from coverable import parallel_passes
         >>> found = parallel_passes(plane((0, 0.6), (0, 0.4)), 0.03)
         >>> found.count, round(found.spacing, 6), round(found.length, 3)
         (14, 0.028571, 8.4)

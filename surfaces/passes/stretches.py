@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.linalg import norm
 
-from coverable_arrays import Array, Mask, Protected
+from coverable.arrays import Array, Mask, Protected
 from surfaces.passes.levels import Line
 from surfaces.surface import Surface
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coverable_arrays import Array, Ints
+from coverable.arrays import Array, Ints
 
 CLOSE = 0.2  # [1] of the radius: points of the path are about this far apart
 CHUNK = 2_000  # places that are looked at together

@@ -12,12 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 from surfaces.passes.parallel import Passes
 from surfaces.passes.stretches import Pass
 from surfaces.passes.ways import ToolWay, along_surface, beside, fitted
 from surfaces.surface import SurfaceError
-from surfaces.toolpaths import PoseCells, poses
+from surfaces.toolpaths.given import poses
+from surfaces.toolpaths.pose_cells import PoseCells
 
 RETRACT = 0.05  # m
 BESIDE = 2.0  # [1] times the spacing: to an end this near the tool goes on along the surface
@@ -151,8 +152,8 @@ def pass_toolpath(found: Passes, retract: float = RETRACT) -> PoseCells:
     """All stretches in their order as poses, to be run in one motion; see `pass_route`.
 
     Example:
-        >>> from surfaces import plane
-        >>> from surfaces.passes import parallel_passes, pass_toolpath
+        >>> from coverable import plane
+        >>> from coverable import parallel_passes, pass_toolpath
         >>> line = pass_toolpath(parallel_passes(plane((0, 0.3), (0, 0.2)), 0.05))
         >>> len(line), line.in_order
         (100, True)

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask, Protected
+from coverable.arrays import Array, Ints, Mask, Protected
 from surfaces.adjacency import components
 from surfaces.passes.tool_lines import ToolLines
 from surfaces.passes.triangles import WorkingMesh, cut_at_middles, edges_of, twin_sides

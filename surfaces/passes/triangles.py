@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
-from surfaces.meshes import doubled_areas, half_edge_ends, half_edges
+from coverable.arrays import Array, Ints, Mask
+from surfaces.meshes.triangle_mesh import doubled_areas, half_edge_ends, half_edges
 
 
 class WorkingMesh(NamedTuple):

@@ -18,11 +18,12 @@ from typing import NamedTuple
 import numpy as np
 
 from surfaces.adjacency import components
-from surfaces.meshes import MeshSurface, doubled_areas
+from surfaces.meshes.mesh_surface import MeshSurface
+from surfaces.meshes.triangle_mesh import doubled_areas
 from surfaces.passes.edge_flips import delaunay
 from surfaces.passes.triangles import WorkingMesh, border_edges, cut_at_middles, edges_of
-from surfaces.patches import Patch
-from surfaces.piecewise import Piecewise
+from surfaces.patches.patch import Patch
+from surfaces.piecewise.piecewise_surface import Piecewise
 from surfaces.surface import Surface, SurfaceError
 
 MOST_FACES = 2_000_000

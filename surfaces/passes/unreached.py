@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
-from coverable_errors import counted
+from coverable.arrays import Array, Ints
+from coverable.errors import counted
 from surfaces.adjacency import components
 from surfaces.passes.triangles import WorkingMesh
 from surfaces.surface import SurfaceError

@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from surfaces.passes.parallel import Passes
 from surfaces.passes.stretches import Pass
-from surfaces.places import offset_surface
+from surfaces.places.offset_surfaces import offset_surface
 from surfaces.surface import Surface
-from surfaces.toolpaths import arc_at
+from surfaces.toolpaths.arcs import arc_at
 
 WITHIN = 1e-4  # [m], by default
 LEANS = 0.05  # [rad] of a normal from the great arc; over triangles it may be more

@@ -1,5 +1,1 @@
 """Smooth parametric patches g(u, v) of several kinds, cut into grids of E-cells."""
-
-from lazy_loader import attach_stub
-
-__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

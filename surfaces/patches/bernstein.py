@@ -13,7 +13,7 @@ from math import comb
 import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 
 
 def span_matrix(knots: Array, degree: int, low: float, high: float) -> tuple[int, Array]:

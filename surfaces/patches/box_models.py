@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
+from coverable.arrays import Array, Ints
 from surfaces.parts import ABSOLUTE, RELATIVE, PartModels
 from surfaces.patches import bernstein
 from surfaces.patches.enclosure_functions import Enclosure

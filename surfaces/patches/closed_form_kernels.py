@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_kernels import allocating, allocating_entry
+from coverable.kernels import allocating, allocating_entry
 
 PLANE, SPHERE, CYLINDER, HYPERBOLOID = 0, 1, 2, 3
 EDGE = 1e-9  # [rad], [m]: a point that misses the patch by no more than this lies on it

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 
 _MOST_STEPS = 60
 _MOST_HALVINGS = 40

@@ -10,8 +10,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array
-from coverable_errors import Fault
+from coverable.arrays import Array
+from coverable.errors import Fault
 from surfaces.arguments import LARGEST_RATIO, ORIGIN, Checks
 from surfaces.patches.patch import LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.surface import Side

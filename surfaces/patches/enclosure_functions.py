@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from coverable_arrays import Array, Mask
+from coverable.arrays import Array, Mask
 from surfaces.patches import bernstein
 from surfaces.patches.enclosures import (
     FUNCTIONS,

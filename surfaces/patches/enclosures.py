@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from surfaces.patches import bernstein
 
 KEPT = 4  # coefficients along each parameter that results are brought down to

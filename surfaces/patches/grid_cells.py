@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array, Ints
+from coverable.arrays import Array, Ints
 from surfaces.adjacency import Neighbours, grid_neighbours
 from surfaces.arguments import Checks
 from surfaces.at_home import AtHome

@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 
 ROUNDING = 1.0 + 1e-12  # covers the rounding of the few operations below
 

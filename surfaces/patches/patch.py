@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 from surfaces.part_growth import Boxes, grown
 from surfaces.parts import MOST_PARTS, PartModels, SurfaceParts
 from surfaces.patches.box_models import (
@@ -242,7 +242,7 @@ class Patch(Surface):
             SurfaceError: nu or nv is not a whole number >= 0.
 
         Example:
-            >>> from surfaces import sphere
+            >>> from coverable import sphere
             >>> cells = sphere(1.0, polar_deg=(10, 90), azimuth_deg=(10, 180)).cells(9, 10)
             >>> len(cells), len(cells.pairs)
             (90, 305)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from coverable_arrays import Array, Mask, Protected
-from coverable_errors import Fault
+from coverable.arrays import Array, Mask, Protected
+from coverable.errors import Fault
 from surfaces.patches.closest_point import ClosestPointSearch, Jet
 from surfaces.patches.enclosures import Enclosure
 from surfaces.patches.slopes import Slope

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 from surfaces.surface import SurfaceError
 
 TOLERANCE = 1e-10  # of a piece's area: the two rules differ by no more

@@ -9,8 +9,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array
-from coverable_errors import Fault
+from coverable.arrays import Array
+from coverable.errors import Fault
 from surfaces.arguments import ORIGIN, Checks, metres
 from surfaces.patches.patch import EDGE, LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.patches.profile import Profile

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from surfaces.arguments import ORIGIN, Checks
 from surfaces.patches.normal_bounds import CurvatureSlices
 from surfaces.patches.patch import ClosedFormPatch

@@ -1,5 +1,1 @@
 """Several patches joined along their seams into one surface."""
-
-from lazy_loader import attach_stub
-
-__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 from surfaces.adjacency import grid_neighbours
 from surfaces.piecewise.seams import Border, contacts, sides_of
 

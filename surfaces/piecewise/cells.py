@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 from surfaces.adjacency import Neighbours
 from surfaces.cell_curves import CellCurves
 from surfaces.cells import Cells, CellTriangles, Finer, Unrolled
 from surfaces.curve_fitting import CurveFit
-from surfaces.patches import GridCells
+from surfaces.patches.grid_cells import GridCells
 from surfaces.piecewise.across_seams import SMOOTH, SeamPairs, curves_across, seam_pairs_of
 from surfaces.piecewise.piecewise_surface import Piecewise
 from surfaces.surface import SurfaceError

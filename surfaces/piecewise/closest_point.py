@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
-from surfaces.patches import Patch
+from coverable.arrays import Array, Ints, Mask
+from surfaces.patches.patch import Patch
 
 TIE = 1e-9  # [m]: of two pieces so equally close, the one with the point inside it counts
 BLOCK = 50_000  # points at once, to bound the memory

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array, Ints
-from coverable_errors import Fault
+from coverable.arrays import Array, Ints
+from coverable.errors import Fault
 from surfaces.adjacency import components
 from surfaces.arguments import ORIGIN, Checks
 from surfaces.part_growth import Boxes, grown
 from surfaces.parts import MOST_PARTS, PartModels, SurfaceParts
-from surfaces.patches import Patch
+from surfaces.patches.patch import Patch
 from surfaces.piecewise.closest_point import PieceClosestPoints, nearest_places
 from surfaces.piecewise.seams import Seam, on_each_other, sides_of, survey, turned_pieces
 from surfaces.surface import ClosestPoint, Side, Surface, SurfaceError, points_of
@@ -187,7 +187,7 @@ def piecewise(
             Moebius strip.
 
     Example:
-        >>> from surfaces import sphere
+        >>> from coverable import sphere
         >>> east, west = (sphere(1.0, (20, 90), ends) for ends in ((0, 180), (180, 360)))
         >>> len(piecewise([east, west]).cells((4, 6)).pairs) == len(
         ...     sphere(1.0, (20, 90), (0, 360)).cells(4, 12).pairs)

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
-from surfaces.patches import Patch
+from coverable.arrays import Array, Ints
+from surfaces.patches.patch import Patch
 from surfaces.surface import SurfaceError
 
 VERTICES = 129  # on a side, as a first guess of its nearest place

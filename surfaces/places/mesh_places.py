@@ -16,8 +16,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
-from surfaces.meshes import WIDTH, MeshSurface, cut_faces
+from coverable.arrays import Array, Ints, Mask
+from surfaces.meshes.facets import cut_faces
+from surfaces.meshes.mesh_surface import MeshSurface
+from surfaces.meshes.normals import WIDTH
 from surfaces.places.places import (
     ROUNDING,
     OffsetSurface,
@@ -28,7 +30,7 @@ from surfaces.places.places import (
 )
 
 if TYPE_CHECKING:
-    from surfaces.meshes import FaceTree
+    from surfaces.meshes.face_tree import FaceTree
 
 GRID = np.linspace(0.0, 1.0, 9)  # places on an edge that are tried, in so many rounds
 ROUNDS = 8
@@ -57,7 +59,7 @@ class MeshPlaces(OffsetSurface):
         A face on a crease has several, so that the arc round an edge becomes a few of them. Nothing
         rests on how well they fit.
         """
-        from surfaces.meshes import FaceTree  # compiled: loaded when it is needed
+        from surfaces.meshes.face_tree import FaceTree  # compiled: loaded when it is needed
 
         face, weights = cut_faces(self.surface.on_crease, SLICES)
         corners = Places(np.repeat(face, 3), weights.reshape(-1, 3)[:, 1:])

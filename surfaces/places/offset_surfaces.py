@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from surfaces.patches import Patch
+from surfaces.patches.patch import Patch
 from surfaces.places.patch_places import PatchPlaces
 from surfaces.places.places import OffsetSurface
 from surfaces.surface import Surface, SurfaceError
@@ -19,7 +19,7 @@ def offset_surface(surface: Surface, height: float) -> OffsetSurface:
 
     Example:
         >>> import numpy as np
-        >>> from surfaces import sphere
+        >>> from coverable import sphere
         >>> dome = offset_surface(sphere(1.0, (10, 90), (0, 180)), -0.25)
         >>> point = np.array([[0.0, 0.5, 0.5]])
         >>> places = dome.nearest(point, point, 0.01)
@@ -29,12 +29,12 @@ def offset_surface(surface: Surface, height: float) -> OffsetSurface:
     if isinstance(surface, Patch):
         return PatchPlaces(height, surface)
     # Loaded where they are needed: most questions are about one patch.
-    from surfaces.meshes import MeshSurface
-    from surfaces.piecewise import Piecewise
+    from surfaces.meshes.mesh_surface import MeshSurface
+    from surfaces.piecewise.piecewise_surface import Piecewise
     from surfaces.places.mesh_places import MeshPlaces
     from surfaces.places.piece_places import PiecePlaces
     from surfaces.places.pose_places import PosePlaces
-    from surfaces.toolpaths import PoseSurface
+    from surfaces.toolpaths.pose_surface import PoseSurface
 
     if isinstance(surface, Piecewise):
         return PiecePlaces(height, surface)

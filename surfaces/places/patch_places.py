@@ -12,8 +12,8 @@ from functools import partial
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
-from surfaces.patches import Patch
+from coverable.arrays import Array, Ints
+from surfaces.patches.patch import Patch
 from surfaces.places.places import ROUNDING, OffsetSurface, PlacePaths, Places, by_closest_points
 from surfaces.surface import SurfaceError
 

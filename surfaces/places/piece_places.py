@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
-from surfaces.piecewise import Piecewise
+from coverable.arrays import Array, Ints
+from surfaces.piecewise.piecewise_surface import Piecewise
 from surfaces.places.patch_places import PatchPlaces
 from surfaces.places.places import OffsetSurface, PlacePaths, Places, by_closest_points, share_of
 

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 
 ROUNDING = 1.0 + 1e-9  # covers the rounding of the bounds' own operations
 GUESSES = 6  # closest points that lead from a guess to a place

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
+from coverable.arrays import Array, Ints
 from surfaces.places.places import ROUNDING, OffsetSurface, PlacePaths, Places, share_of
-from surfaces.toolpaths import PoseSurface, arc_angles, arc_at
+from surfaces.toolpaths.arcs import arc_angles, arc_at
+from surfaces.toolpaths.pose_surface import PoseSurface
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree

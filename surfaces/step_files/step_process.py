@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
-from coverable_files import FileFault, read_regular
-from coverable_processes import Ended, Limits, folder_of, run_apart
+from coverable.arrays import Array, Ints
+from coverable.files import FileFault, read_regular
+from coverable.processes import Ended, Limits, folder_of, run_apart
 from surfaces.surface import SurfaceError
 
 EXTRA = "needs the extra: pip install 'coverable[step]'"

@@ -10,12 +10,14 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array, Ints
-from coverable_errors import Fault, listed, shown
-from coverable_files import shown_name
+from coverable.arrays import Array, Ints
+from coverable.errors import Fault, listed, shown
+from coverable.files import shown_name
 from surfaces.arguments import ORIGIN, Checks
-from surfaces.meshes import MeshSurface, TriangleMesh, mesh, with_likely_unit
-from surfaces.meshes.repair import clean
+from surfaces.meshes.mesh_surface import MeshSurface, mesh
+from surfaces.meshes.repair.cleaning import clean
+from surfaces.meshes.sources import with_likely_unit
+from surfaces.meshes.triangle_mesh import TriangleMesh
 from surfaces.step_files.step_process import CAPS, Caps, Read, read_step
 from surfaces.surface import Side, SurfaceError
 

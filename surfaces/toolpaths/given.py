@@ -7,8 +7,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array, Ints
-from coverable_errors import Fault, listed, real, shown
+from coverable.arrays import Array, Ints
+from coverable.errors import Fault, listed, real, shown
 from surfaces.arguments import ORIGIN, Checks, metres, table
 from surfaces.surface import Side, SurfaceError
 from surfaces.toolpaths.arcs import arc_angles

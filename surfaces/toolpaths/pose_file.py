@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_errors import CoverableError, Fault, number_in
-from coverable_files import read_text, shown_name
+from coverable.arrays import Array
+from coverable.errors import CoverableError, Fault, number_in
+from coverable.files import read_text, shown_name
 from surfaces.arguments import Checks
 from surfaces.surface import SurfaceError
 from surfaces.toolpaths.given import MOST_POSES

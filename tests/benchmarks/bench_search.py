@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from asked import names, question, verdict_of
 
-from feasibility import Search, check
-from feasibility.certification import collision_replay
+from coverable import Search, check
+from feasibility.certification.collisions.collision_replay import collision_replay
 from feasibility.problem import Problem
 
 PAPER = names("paper")
@@ -25,8 +25,8 @@ ASKED = [
 ]  # fmt: skip
 PEAK = """
 import json, resource, sys
-from feasibility import check
-from feasibility.cases import load_case
+from coverable import check
+from coverable import load_case
 robot, cells, task, _ = load_case("paper/4a").build()
 check(robot, cells, task)
 verdict = check(robot, cells.surface.cells(int(sys.argv[1]), int(sys.argv[2])), task)

@@ -26,7 +26,7 @@ from coverable import (
     run_tasks,
     trajectory,
 )  # fmt: skip
-from surfaces.meshes import TriangleMesh
+from surfaces.meshes.triangle_mesh import TriangleMesh
 
 PAPER = [f"paper/{figure}{letter}" for figure in "45" for letter in "abcdef"]
 STUDY = """

@@ -12,8 +12,7 @@ from typing import Any, TypeVar
 import pinocchio as pin
 import pytest
 
-from feasibility import Verdict
-from robots import load_robot
+from coverable import Verdict, load_robot
 
 T = TypeVar("T")
 

@@ -6,23 +6,15 @@ import trimesh
 from foreign_clearances import distance_from_hull
 from scipy.spatial.transform import Rotation
 
-from coverable_errors import ArgumentError
-from feasibility.certification import collision_replay
-from feasibility.collisions import (
-    TOOL,
-    Collision,
-    HalfSpace,
-    Obstacle,
-    ToolShape,
-    gather,
-    polytopes_of,
-    soup_of,
-    tool_polytopes,
-    tool_solids,
-)
-from robots import Axis, load_robot
-from robots.shapes import Triangles
-from surfaces import plane, rotation_from_rpy
+from coverable import Axis, Collision, Obstacle, ToolShape, load_robot, plane
+from coverable.errors import ArgumentError
+from feasibility.certification.collisions.collision_replay import collision_replay
+from feasibility.collisions.asked_bodies import gather
+from feasibility.collisions.outer_bodies import polytopes_of, soup_of, tool_polytopes, tool_solids
+from feasibility.collisions.shapes import HalfSpace
+from feasibility.collisions.words import TOOL
+from robots.shapes.bodies import Triangles
+from surfaces.surface import rotation_from_rpy
 
 UR5 = load_robot("ur5")
 PLATE = plane((0.4, 0.6), (-0.1, 0.1), position=(0.0, 0.0, 0.3), side="outside")

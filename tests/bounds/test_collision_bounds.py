@@ -14,15 +14,14 @@ from mesh_patches import of_patch
 from plain import triangles_of_grid
 from random_arms import robot_of
 
-from feasibility.certification import collision_replay
-from feasibility.certification.collisions.collision_replay import Couples
+from coverable import Obstacle, load_robot, sphere
+from feasibility.certification.collisions.collision_replay import Couples, collision_replay
 from feasibility.certification.collisions.motion import ArmMotion
 from feasibility.certification.collisions.shapes import Body
-from feasibility.collisions import Obstacle, Soup
-from robots import Kinematics, load_robot
-from robots.shapes import Solid
-from robots.urdf import Box, Capsule, Cylinder, Sphere
-from surfaces import sphere
+from feasibility.collisions.bodies import Soup
+from robots.kinematics import Kinematics
+from robots.shapes.bodies import Solid
+from robots.urdf.geometry import Box, Capsule, Cylinder, Sphere
 
 UR5 = load_robot("ur5")
 COAL = 1e-7  # m, what coal's distances may be off

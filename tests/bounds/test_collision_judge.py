@@ -12,11 +12,12 @@ from foreign_clearances import ForeignScene, samples
 from plain import triangles_of_grid
 from scipy.spatial.transform import Rotation
 
-from coverable_errors import ArgumentError
-from feasibility.certification import collision_replay
-from feasibility.collisions import Obstacle, Soup
-from robots.shapes import Solid, Triangles
-from robots.urdf import Box, Capsule, Cylinder, Sphere
+from coverable import Obstacle
+from coverable.errors import ArgumentError
+from feasibility.certification.collisions.collision_replay import collision_replay
+from feasibility.collisions.bodies import Soup
+from robots.shapes.bodies import Solid, Triangles
+from robots.urdf.geometry import Box, Capsule, Cylinder, Sphere
 
 CLOSE = 2e-6  # m, what coal is trusted with
 SLIDE, CRANK, ELBOW = planar_arm([0.1], ["prismatic"]), planar_arm([1.0]), planar_arm([0.5, 0.4])

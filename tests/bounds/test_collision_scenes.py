@@ -11,14 +11,15 @@ from mesh_patches import grid
 from samples import sampled, spread
 from scipy.spatial.transform import Rotation
 
-from feasibility import Task, check, verify
-from feasibility.certification import collision_replay, replay
-from feasibility.certification.collisions import nearest_along
-from feasibility.collisions import Collision, HalfSpace, Obstacle, Pair, Soup, ToolShape, gather
-from robots import Kinematics, load_robot
-from robots.shapes import link_shapes
-from robots.urdf import Box, Capsule, Cylinder, Sphere
-from surfaces import plane
+from coverable import Collision, Obstacle, Task, ToolShape, check, load_robot, plane, replay, verify
+from feasibility.certification.collisions.collision_replay import collision_replay
+from feasibility.certification.collisions.nearest import nearest_along
+from feasibility.collisions.asked_bodies import gather
+from feasibility.collisions.bodies import Pair, Soup
+from feasibility.collisions.shapes import HalfSpace
+from robots.kinematics import Kinematics
+from robots.shapes.links import link_shapes
+from robots.urdf.geometry import Box, Capsule, Cylinder, Sphere
 
 UR5 = load_robot("ur5")
 PLATE = plane((0.4, 0.6), (-0.1, 0.1), position=(0.0, 0.0, 0.3), side="outside")

@@ -10,14 +10,15 @@ from hard_scenes import ARMS, behind_a_wall, bracket, clear_box, within_a_turn
 from samples import sampled, seeds, spread
 from search_kernels import Motions
 
-from feasibility import Answer, CauseKind, Evidence, check
-from feasibility.certification import verify_proof
-from feasibility.certification.overlaps import Overlapping
-from feasibility.collisions import HalfSpace, Obstacle, gather
+from coverable import Answer, CauseKind, Evidence, Obstacle, check
+from feasibility.certification.cut_proofs.proof_verification import verify_proof
+from feasibility.certification.overlaps.everywhere import Overlapping
+from feasibility.collisions.asked_bodies import gather
+from feasibility.collisions.shapes import HalfSpace
 from feasibility.cut_tree import CutTree, Leaf
-from robots import Kinematics
-from robots.shapes import Solid
-from robots.urdf import Box, Capsule, Cylinder, Sphere
+from robots.kinematics import Kinematics
+from robots.shapes.bodies import Solid
+from robots.urdf.geometry import Box, Capsule, Cylinder, Sphere
 
 FEW = ("puma560", "puma560 on a rail", "ur5")
 ROUNDING = 1e-9

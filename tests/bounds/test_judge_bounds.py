@@ -10,10 +10,9 @@ from bounds import holds
 from random_arms import between, finite_limits, random_arm, robot_of
 from samples import sampled, seeds
 
-from feasibility import Task
-from feasibility.certification import less_deviations, placements, second_derivatives
+from coverable import Task, cylinder, mesh, plane
 from feasibility.certification.cells_reached import at_targets, cells_reached
-from feasibility.certification.jacobians import jacobians
+from feasibility.certification.jacobians import jacobians, placements
 from feasibility.certification.lever_bounds import (
     largest_levers,
     lever_bounds,
@@ -21,17 +20,18 @@ from feasibility.certification.lever_bounds import (
     longest_levers,
     peaks,
     second_derivative_bound,
+    second_derivatives,
     stretched_length,
 )
 from feasibility.certification.order import order_of_marks, order_of_places
 from feasibility.certification.refusals import exact_faults, limits
 from feasibility.certification.stretches import Judge
+from feasibility.certification.surface_replay import less_deviations
 from feasibility.task import Targets
 from feasibility.verdict import Walk
-from robots import Kinematics
-from surfaces import cylinder, mesh, plane
-from surfaces.meshes import TriangleMesh
-from surfaces.places import offset_surface
+from robots.kinematics import Kinematics
+from surfaces.meshes.triangle_mesh import TriangleMesh
+from surfaces.places.offset_surfaces import offset_surface
 
 S = np.linspace(0.0, 1.0, 401)
 X, Y, Z = np.eye(3)

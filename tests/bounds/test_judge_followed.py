@@ -9,12 +9,11 @@ from arm_urdfs import joint
 from gantry import configurations, gantry, raster
 from random_arms import robot_of
 
-from feasibility import Task
-from feasibility.certification import replay_over_surface
+from coverable import Task, cylinder, mesh, parametric, plane, poses
 from feasibility.certification.followed import lifted_faults
-from robots import Kinematics
-from surfaces import cylinder, mesh, parametric, plane, poses
-from surfaces.meshes import TriangleMesh
+from feasibility.certification.surface_replay import replay_over_surface
+from robots.kinematics import Kinematics
+from surfaces.meshes.triangle_mesh import TriangleMesh
 
 OUT = {"side": "outside"}
 TASK = Task(0.01, 20, 1e-3)

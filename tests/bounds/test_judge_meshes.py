@@ -15,10 +15,10 @@ from referee import Facets
 from referee import evenly as dense
 from samples import sampled, spread
 
-from feasibility import Task, check, verify
-from feasibility.certification import replay_over_surface
-from robots import Kinematics, load_robot
-from surfaces.meshes import TriangleMesh, mesh
+from coverable import Task, check, load_robot, mesh, verify
+from feasibility.certification.surface_replay import replay_over_surface
+from robots.kinematics import Kinematics
+from surfaces.meshes.triangle_mesh import TriangleMesh
 
 UR5 = load_robot("ur5")
 AT = (0.5, -0.15, 0.3)

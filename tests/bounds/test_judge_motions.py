@@ -20,14 +20,12 @@ from random_arms import robot_of
 from referee import Facets
 from referee import evenly as dense
 
-from feasibility import Task
-from feasibility.certification import replay, replay_over_surface
-from feasibility.collisions import Obstacle
+from coverable import Obstacle, Task, cylinder, load_robot, piecewise, plane, poses, replay, sphere
+from feasibility.certification.surface_replay import replay_over_surface
 from feasibility.verdict import Walk
-from robots import Kinematics, load_robot
-from robots.shapes import Solid
-from robots.urdf import Sphere
-from surfaces import cylinder, piecewise, plane, poses, sphere
+from robots.kinematics import Kinematics
+from robots.shapes.bodies import Solid
+from robots.urdf.geometry import Sphere
 
 
 def off_and_tilt(cells, task, q):

@@ -9,22 +9,18 @@ from gantry import configurations, gantry
 from random_arms import robot_of
 from samples import sampled, seeds
 
-from coverable_errors import ArgumentError
-from feasibility import Task
-from feasibility.certification import second_derivatives
+from coverable import Task, load_robot, plane
+from coverable.errors import ArgumentError
 from feasibility.certification.jacobians import jacobians
-from feasibility.certification.lever_bounds import levers_along
-from feasibility.certification.rates import (
-    check_rates,
+from feasibility.certification.lever_bounds import levers_along, second_derivatives
+from feasibility.certification.rates.rate_replay import check_rates, in_place, replay_rates
+from feasibility.certification.rates.segment_rates import (
     fastest_anywhere,
-    in_place,
-    replay_rates,
     segment_rates,
     smallest_singular_values,
 )
 from feasibility.verdict import Walk
-from robots import Kinematics, load_robot
-from surfaces import plane
+from robots.kinematics import Kinematics
 
 PLATE = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0, 0, 0.3)).cells(3, 3)
 TASK = Task(standoff=0.02, cone_deg=30)

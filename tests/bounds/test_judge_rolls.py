@@ -11,27 +11,24 @@ from random_arms import random_arm, robot_of
 from referee import roll_about, unit
 from samples import sampled, seeds
 
-from feasibility import Task
-from feasibility.certification import placements, replay, replay_over_surface
-from feasibility.certification.rolls import (
-    Directions,
-    Held,
-    ToolAxes,
-    reference_axes,
-    reference_parts,
-    tool_frames,
-)
+from coverable import Task, cylinder, replay, sphere
+from feasibility.certification.jacobians import placements
 from feasibility.certification.rolls.bounds import (
     largest_off,
     off_middle,
     products_of_changes,
+    reference_axes,
+    tool_frames,
     vectors_of,
 )
+from feasibility.certification.rolls.box_models import Directions, reference_parts
+from feasibility.certification.rolls.held import Held, ToolAxes
+from feasibility.certification.surface_replay import replay_over_surface
 from feasibility.roll import Roll
-from feasibility.targets import u_directions
+from feasibility.targets.references import u_directions
 from feasibility.verdict import Walk
-from surfaces import cylinder, sphere
-from surfaces.places import PlacePaths, Places, offset_surface
+from surfaces.places.offset_surfaces import offset_surface
+from surfaces.places.places import PlacePaths, Places
 
 S = np.linspace(0.0, 1.0, 101)[:, None]
 X, Y, Z = np.eye(3)

@@ -8,12 +8,11 @@ import pytest
 from samples import sampled, spread
 from scipy.optimize import minimize_scalar
 
-from feasibility import Task, check, verify
+from coverable import Task, check, load_robot, plane, sphere, verify
 from feasibility.clock import Clock
-from feasibility.speed import rate_figures
+from feasibility.speed.largest import rate_figures
 from feasibility.speed.rated_graph import grow, rated_graph
-from robots import Kinematics, load_robot
-from surfaces import plane, sphere
+from robots.kinematics import Kinematics
 
 UR5 = load_robot("ur5")
 CELLS = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0, 0, 0.3)).cells(2, 2)

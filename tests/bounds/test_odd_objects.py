@@ -7,20 +7,12 @@ import pytest
 from capsule_arms import box_mesh
 from samples import sampled, seeds
 
-from feasibility.certification import collision_replay
-from feasibility.collisions import (
-    Bodies,
-    Obstacle,
-    Pair,
-    ToolShape,
-    polytopes_of,
-    soup_of,
-    tool_polytopes,
-    tool_solids,
-)
-from robots import load_robot
-from robots.shapes import Solid, Triangles
-from robots.urdf import Sphere
+from coverable import Obstacle, ToolShape, load_robot
+from feasibility.certification.collisions.collision_replay import collision_replay
+from feasibility.collisions.bodies import Bodies, Pair
+from feasibility.collisions.outer_bodies import polytopes_of, soup_of, tool_polytopes, tool_solids
+from robots.shapes.bodies import Solid, Triangles
+from robots.urdf.geometry import Sphere
 
 UR5, SMALL, LARGE = load_robot("ur5"), 1e-6, 1e4
 SHAPES = [

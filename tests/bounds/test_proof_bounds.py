@@ -13,7 +13,7 @@ from samples import sampled, seeds
 from scipy.spatial.transform import Rotation
 from specimens import cells_of
 
-from feasibility import Task
+from coverable import Task, cone, cylinder, hyperboloid, load_robot, plane, sphere, torus
 from feasibility.certification.cut_proofs.box_cutting import cut, smaller
 from feasibility.certification.cut_proofs.empty_region import Claim, Emptiness
 from feasibility.certification.cut_proofs.linear_models import (
@@ -29,10 +29,9 @@ from feasibility.certification.cut_proofs.parts_agreement import (
 )
 from feasibility.certification.cut_proofs.region import JointRegion
 from feasibility.certification.overlaps.everywhere import Deepest
-from feasibility.certification.rolls import reference_axes
+from feasibility.certification.rolls.bounds import reference_axes
 from feasibility.roll import projected, roll_of
-from robots import Kinematics, load_robot
-from surfaces import cone, cylinder, hyperboloid, plane, sphere, torus
+from robots.kinematics import Kinematics
 
 OUT = {"side": "outside"}
 PATCHES = (

@@ -4,24 +4,23 @@ import numpy as np
 import pytest
 from referee import unit
 
-from feasibility import Task
+from coverable import Task, load_robot, sphere
 from feasibility.certification.cut_proofs.linear_models import (
     Allowed,
     ArmModel,
     Boxes,
     target_parts,
 )
-from feasibility.certification.rolls import (
+from feasibility.certification.rolls.bounds import reference_axes
+from feasibility.certification.rolls.box_models import (
     Directions,
     TargetModel,
     ToolModel,
-    reference_axes,
     reference_parts,
     roll_models,
 )
 from feasibility.roll import Roll, projected
-from robots import Kinematics, load_robot
-from surfaces import sphere
+from robots.kinematics import Kinematics
 
 UR5 = load_robot("ur5")
 

@@ -24,13 +24,11 @@ from proof_cases import (
 from random_arms import robot_of
 from samples import EVERYTHING, sampled, seeds
 
-from feasibility import Task
-from feasibility.certification import verify_proof
-from feasibility.certification.cut_proofs.proof_verification import verify_on
+from coverable import Task, bspline, load_robot, mesh, piecewise, plane
+from feasibility.certification.cut_proofs.proof_verification import verify_on, verify_proof
 from feasibility.cut_tree import Cut, CutTree, Leaf
-from robots import Kinematics, load_robot
-from surfaces import bspline, mesh, piecewise, plane
-from surfaces.meshes import TriangleMesh
+from robots.kinematics import Kinematics
+from surfaces.meshes.triangle_mesh import TriangleMesh
 
 FEW = 8_000
 

@@ -16,21 +16,24 @@ from capsule_arms import at, bodies_of, capsule_links, fork, pair, planar_arm
 from gantry import configurations, gantry, raster
 from random_arms import robot_of
 
-from feasibility import Task, certification
-from feasibility.certification import rates, rolls
-from feasibility.certification.collisions import collision_replay
-from feasibility.certification.collisions.collision_replay import Couples
+from coverable import Obstacle, Task, parametric, plane
+from feasibility.certification.collisions.collision_replay import Couples, collision_replay
 from feasibility.certification.collisions.motion import ArmMotion
+from feasibility.certification.jacobians import placements
+from feasibility.certification.rates.rate_replay import in_place
+from feasibility.certification.rates.segment_rates import segment_rates
+from feasibility.certification.rolls.bounds import largest_off
+from feasibility.certification.rolls.box_models import TargetModel, ToolModel, roll_models
 from feasibility.certification.stretches import Judge
-from feasibility.collisions import Obstacle, Soup
+from feasibility.certification.surface_replay import replay_over_surface
+from feasibility.collisions.bodies import Soup
 from feasibility.roll import Roll
-from feasibility.treated import treated_by_walk
+from feasibility.treated.area import treated_by_walk
 from feasibility.verdict import Walk
-from robots import Kinematics
-from robots.shapes import Solid, Triangles
-from robots.urdf import Box, Sphere
-from surfaces import parametric, plane
-from surfaces.places import offset_surface
+from robots.kinematics import Kinematics
+from robots.shapes.bodies import Solid, Triangles
+from robots.urdf.geometry import Box, Sphere
+from surfaces.places.offset_surfaces import offset_surface
 
 FAR = 9e3  # m, of an axis: as far as a URDF may put it
 PLANAR, LINKS = planar_arm((0.5, 0.4)), capsule_links((0.5, 0.4), 0.03)
@@ -56,7 +59,7 @@ def test_stretches_of_a_motion(name, held, bent):
     rows = np.vstack([a + share * (b - a) for a, b in itertools.pairwise(rows)])
     offset = offset_surface(surface, surface.side_sign * task.standoff)
     judge = Judge(robot, task, offset, cells)
-    poses, x = certification.placements(robot, rows), judge.reference_axes(rows)
+    poses, x = placements(robot, rows), judge.reference_axes(rows)
     known = judge.compared(np.arange(len(rows)), 0.0 * rows[:, 0], poses.points, poses.axes, x)
     parts = judge.between_rows(rows, poses, known)
     assert judge.within(judge.bounds(parts)).all()
@@ -95,23 +98,23 @@ def test_what_a_surface_deviates_by(off, standoff, cone, accepted):
     q = configurations(points, np.tile([0.0, 0.0, -1.0], (2, 1)))
     for tip in (0.0, 1e-5):
         q[1, 4] += tip
-        found = certification.replay_over_surface(gantry(), cells, task, q)
+        found = replay_over_surface(gantry(), cells, task, q)
         assert found.accepted == accepted, found.refusal
 
 
 def test_a_roll_between_two_instants_and_over_boxes():
     z, none = np.array([[2.0, 0.0]]), np.zeros((1, 2))
-    assert np.isfinite(rolls.largest_off(z, z, np.zeros(1), none, 0.5))
-    assert not np.isfinite(rolls.largest_off(z, z, np.full(1, LARGE), none, 0.5))
+    assert np.isfinite(largest_off(z, z, np.zeros(1), none, 0.5))
+    assert not np.isfinite(largest_off(z, z, np.full(1, LARGE), none, 0.5))
     for end in (0, 1):
-        assert not np.isfinite(rolls.largest_off(z, z, np.zeros(1), grown(none, end), 0.5))
+        assert not np.isfinite(largest_off(z, z, np.zeros(1), grown(none, end), 0.5))
     x, y, b = np.eye(3)
     bits = np.full((1, 2), 0.01)
-    tool = rolls.ToolModel(np.stack([x, y])[None], np.full((1, 6, 2, 3), 0.1), bits, bits)
-    aim = rolls.TargetModel(np.stack([b, x])[None], np.full((1, 2, 2, 3), 1e-3), 100 * bits, bits)
+    tool = ToolModel(np.stack([x, y])[None], np.full((1, 6, 2, 3), 0.1), bits, bits)
+    aim = TargetModel(np.stack([b, x])[None], np.full((1, 2, 2, 3), 1e-3), 100 * bits, bits)
 
     def radius(tool=tool, aim=aim):
-        return rolls.roll_models(tool, aim, Roll(0.3, 0.5)).radius
+        return roll_models(tool, aim, Roll(0.3, 0.5)).radius
 
     assert (radius() < 1.1).all()
     for k in (0, 1):
@@ -132,14 +135,14 @@ def test_rates_of_an_arm_with_an_axis_far_away(turn, asked, far, accepted):
     robot = robot.with_limits({"j6": (-np.inf, np.inf)})  # so that lengths are measured by 1 m
     start = np.array([[0.1, -0.4, 0.9, 0.3, 0.4, 0.2, 0.0, 0.0]])
     end = start + np.array([0.2, 0.1, -0.1, 0.2, 0.1, 0.1, turn, -turn])
-    found = rates.segment_rates(robot, start, end, **asked)
+    found = segment_rates(robot, start, end, **asked)
     assert found.sampled_speed[0] > 0.05
     assert found.sampled_sigma[0] > 0.2
     assert all((getattr(found, name)[0] >= least) == accepted for name, least in asked.items())
     tool, _ = Kinematics(robot).tool(start[0])
     spot = plane((0, 1), (0, 1), "outside", tool - (0.5, 0.5, 0.02)).cells(1, 1)
     rests = start + np.outer([0, 1], [0, 0, 0, 0, 0, 0, 0.05, -0.05])
-    assert rates.in_place(robot, spot, Task(0.02, 30), rests)[0] == accepted
+    assert in_place(robot, spot, Task(0.02, 30), rests)[0] == accepted
 
 
 def fed(bodies, arm, rows, name):

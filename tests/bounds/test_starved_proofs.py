@@ -12,7 +12,7 @@ from bounds import LARGE, grown
 from capsule_arms import at, bodies_of, capsule_links, pair, planar_arm
 from proof_cases import elbow_case
 
-from feasibility import Task
+from coverable import Collision, Obstacle, Task, ToolShape, load_robot, plane, sphere
 from feasibility.certification.cut_proofs.box_exclusion import contract, separated
 from feasibility.certification.cut_proofs.linear_models import (
     Allowed,
@@ -21,12 +21,12 @@ from feasibility.certification.cut_proofs.linear_models import (
     target_parts,
 )
 from feasibility.certification.cut_proofs.proof_verification import verify_on
-from feasibility.certification.overlaps import Overlapping, never_clear
-from feasibility.collisions import Collision, Obstacle, ToolShape, gather
-from robots import Kinematics, load_robot
-from robots.shapes import Solid
-from robots.urdf import Sphere
-from surfaces import plane, sphere
+from feasibility.certification.overlaps.every_pose import never_clear
+from feasibility.certification.overlaps.everywhere import Overlapping
+from feasibility.collisions.asked_bodies import gather
+from robots.kinematics import Kinematics
+from robots.shapes.bodies import Solid
+from robots.urdf.geometry import Sphere
 
 UR5 = load_robot("ur5")
 FLAT = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0, 0, 0.3))

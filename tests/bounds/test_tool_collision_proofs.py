@@ -16,14 +16,27 @@ from random_arms import planar_arm
 from samples import sampled, seeds, spread
 from scipy.spatial.transform import Rotation
 
-from feasibility import Answer, CauseKind, Evidence, Task, check
-from feasibility.certification import never_clear, verify_proof
+from coverable import (
+    Answer,
+    CauseKind,
+    Collision,
+    Evidence,
+    Obstacle,
+    Task,
+    ToolShape,
+    check,
+    cylinder,
+)
+from feasibility.certification.cut_proofs.proof_verification import verify_proof
 from feasibility.certification.overlaps.depths import depths, planes_around, points_inside
-from feasibility.collisions import Bodies, Collision, HalfSpace, Obstacle, Pair, ToolShape
+from feasibility.certification.overlaps.every_pose import never_clear
+from feasibility.collisions.bodies import Bodies, Pair
+from feasibility.collisions.shapes import HalfSpace
 from feasibility.cut_tree import CutTree, Leaf
-from robots.shapes import Solid, Triangles, checked_triangles, coal_shape
-from robots.urdf import Box, Capsule, Cylinder, Sphere
-from surfaces import cylinder
+from robots.shapes.bodies import Solid, Triangles
+from robots.shapes.coal_shapes import coal_shape
+from robots.shapes.triangles import checked_triangles
+from robots.urdf.geometry import Box, Capsule, Cylinder, Sphere
 
 NOZZLE = ToolShape.cylinder(0.01, 0.1, position=(0.0, 0.0, -0.05))
 CRATE = Obstacle.box("crate", (0.4, 0.4, 0.4), position=(0.5, 0.0, 0.3))

@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 from gantry import configurations, gantry
 
-from coverable_errors import CoverableError
-from feasibility import Answer, Task, check
-from feasibility.cases import CaseError, load_case
-from feasibility.treated import Decision, treated_by_walk, with_coverage
+from coverable import Answer, CaseError, Task, check, load_case, load_robot, plane, poses
+from coverable.errors import CoverableError
+from feasibility.treated.area import treated_by_walk
+from feasibility.treated.decision import Decision, with_coverage
 from feasibility.verdict import Evidence, Walk
-from robots import load_robot
-from surfaces import plane, poses
 
 UR5 = load_robot("ur5")
 CELLS = plane((0.0, 0.3), (0.0, 0.2), "outside", (0.4, -0.1, 0.2)).cells(3, 2)

@@ -26,9 +26,7 @@ from live_pages import (
 )
 from playwright.sync_api import expect
 
-from feasibility import check
-from feasibility.cases import Case, load_case
-from feasibility.live import Live
+from coverable import Case, Live, check, load_case
 from feasibility.reports import verdict as report
 from feasibility.viewer.live_server import LiveView
 

@@ -8,9 +8,7 @@ import pytest
 from live_pages import PATIENCE_MS, chromium, painted
 from scipy.spatial.transform import Rotation
 
-from feasibility import check
-from feasibility.cases import load_case
-from feasibility.viewer import view
+from coverable import check, load_case, view
 
 ASK = """(time) => {
   const slider = document.getElementById("time");

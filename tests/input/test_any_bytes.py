@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from readers import READERS
 
-from coverable_errors import CoverableError
+from coverable.errors import CoverableError
 
 FEW = {"xacro": 6}  # each in a process of its own
 MANY = 2000

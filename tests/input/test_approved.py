@@ -9,12 +9,10 @@ import pytest
 from approved import Approved
 from readers import READERS, of_bad
 
-from coverable_errors import CoverableError
-from feasibility.cases import load_case
-from robots.urdf import check_urdf
-from robots.urdf.expansion import expanded
-from robots.urdf.expansion.xacro_files import Caps
-from surfaces import bspline, read_net
+from coverable import bspline, load_case, read_net
+from coverable.errors import CoverableError
+from robots.urdf.checked_urdf import check_urdf
+from robots.urdf.expansion.xacro_files import Caps, expanded
 
 TABLES = tuple(sorted(path.stem for path in bad_input.TABLES.glob("*.toml")))
 BAD = [(reader, name) for reader in TABLES for name in bad_input.bad(reader)]

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from bad_input import GOOD_CASE, changed, goods, lay_out
 
-from feasibility import Search, Task
-from feasibility.cases import Case, CaseError, load_case
+from coverable import Case, CaseError, Search, Task, load_case
 from feasibility.cases.robot_table import RobotPart
 
 GOOD = Path(__file__).with_name("good")

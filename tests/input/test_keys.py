@@ -11,11 +11,11 @@ from typing import Any
 import bad_input
 import pytest
 
-from coverable_errors import MISSING, Fault
-from feasibility import Search
-from feasibility.cases import Case, CaseError, CollisionPart, Key, all_keys, as_read, toml_document
-from feasibility.cases.keys import keys_of, kinds
-from feasibility.collisions import Collision
+from coverable import Case, CaseError, Collision, Search
+from coverable.errors import MISSING, Fault
+from feasibility.cases.collision_table import CollisionPart
+from feasibility.cases.keys import Key, all_keys, keys_of, kinds
+from feasibility.cases.toml import as_read, toml_document
 
 Tables = dict[str, Any]
 WRONG = datetime.date(2026, 1, 1)  # no key takes a date

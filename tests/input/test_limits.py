@@ -20,13 +20,11 @@ import samples
 from readers import READERS, of_bad
 from samples import sampled
 
-from coverable_errors import CoverableError
-from feasibility.cases import load_case
-from feasibility.studies import load_study
+from coverable import load_case, load_robot, load_study
+from coverable.errors import CoverableError
 from feasibility.viewer.robot import draw
-from robots import load_robot
-from robots.shapes import link_shapes
-from surfaces.meshes import read_mesh
+from robots.shapes.links import link_shapes
+from surfaces.meshes.sources import read_mesh
 
 MOST_MEMORY = 1 << 30  # [byte]
 MOST_TIME = 20  # [s] of processor time

@@ -15,14 +15,13 @@ from jobs import TEXTS, case_named, verdict_named
 from mesh_writers import stl_of
 from readers import TREE, members, packed
 
-from feasibility import Evidence, check
-from feasibility.cases import Case, load_case
+from coverable import Case, Evidence, check, load_case, load_result, save_result, view
 from feasibility.cut_tree import CutTree, Leaf
-from feasibility.results import ResultError, load_result, plain, save_result
+from feasibility.results.plain import plain
+from feasibility.results.result_file import ResultError
 from feasibility.safe_files import FileError, write_whole
 from feasibility.verdict import Verdict
 from feasibility.version import version
-from feasibility.viewer import view
 
 UR5 = """
 robot.name = "ur5"

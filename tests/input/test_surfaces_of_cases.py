@@ -13,12 +13,11 @@ import numpy as np
 import pytest
 from bad_input import changed, goods, lay_out
 
-import surfaces
-from feasibility.cases import Case, load_case
-from feasibility.collisions import HalfSpace
-from robots.urdf import Box, Capsule
-from surfaces import cut_box, cut_plane, faces_within_cone, mesh, take_faces
-from surfaces.meshes import read_mesh
+import coverable
+from coverable import Case, cut_box, cut_plane, faces_within_cone, load_case, mesh, take_faces
+from feasibility.collisions.shapes import HalfSpace
+from robots.urdf.geometry import Box, Capsule
+from surfaces.meshes.sources import read_mesh
 
 POSE = {"position": (0.1, -0.2, 0.3), "rpy_deg": (10.0, 20.0, -30.0)}
 POSED = ["surface.position = [0.1, -0.2, 0.3]", "surface.rpy_deg = [10, 20, -30]"]
@@ -48,19 +47,19 @@ PIECES = (
 
 
 def net(**more: Any) -> Any:
-    return surfaces.bspline(bad_input.NET_POINTS, **{"degree": (2, 2), **more})
+    return coverable.bspline(bad_input.NET_POINTS, **{"degree": (2, 2), **more})
 
 
 def grid(**more: Any) -> Any:
     x, y = np.meshgrid([400.0, 500.0, 600.0], [-100.0, 0.0, 100.0, 200.0], indexing="ij")
-    return surfaces.grid(1e-3 * np.stack([x, y, 300.0 + 0 * x], axis=2), **more)
+    return coverable.grid(1e-3 * np.stack([x, y, 300.0 + 0 * x], axis=2), **more)
 
 
 def made_of(kind: str, **more: Any) -> Any:
     """What the constructor makes of the values of a good case, in their order."""
     table = tomllib.loads(goods("case")[kind])["surface"]
     values = [value for key, value in table.items() if key not in ("kind", "side", "cells")]
-    return getattr(surfaces, kind)(*values, **more)
+    return getattr(coverable, kind)(*values, **more)
 
 
 def part(take: Callable[[Any], Any]) -> Callable[..., Any]:
@@ -73,7 +72,7 @@ MADE: dict[str, tuple[str, list[str], Callable[..., Any], dict[str, Any]]] = {
        for kind in ("cone", "torus", "ellipsoid", "revolution", "bspline")},
     "rational net": (
         "bspline", RATIONAL,
-        lambda **k: surfaces.bspline(
+        lambda **k: coverable.bspline(
             NET_POINTS, degree=(2, 2), knots=([0, 0, 0, 1, 1, 1], [0, 0, 0, 2, 2, 2]),
             weights=[[1, 2, 1], [1, 1, 1], [1, 0.5, 1]], u=(0.25, 1), v=(0, 1.5), **k,
         ), GRID,
@@ -112,8 +111,8 @@ MADE: dict[str, tuple[str, list[str], Callable[..., Any], dict[str, Any]]] = {
     ),
     "pieces": (
         "piecewise", [PIECES, "surface.gap = 1e-5"],
-        lambda **k: surfaces.piecewise(
-            [net(), surfaces.plane((0, 0.2), (-0.1, 0.1), position=(0.5, 0, 0), rpy_deg=(0, 0, 90)),
+        lambda **k: coverable.piecewise(
+            [net(), coverable.plane((0, 0.2), (-0.1, 0.1), position=(0.5, 0, 0), rpy_deg=(0, 0, 90)),
              grid()], gap=1e-5, **k,
         ), {"counts": [(3, 4), (2, 2), (2, 3)]},
     ),

@@ -8,10 +8,8 @@ from pathlib import Path
 import pytest
 from jobs import coverable as asked
 
-from feasibility import Search, Task, check
+from coverable import Search, Task, check, load_robot, plane
 from feasibility.cli.main import main
-from robots import load_robot
-from surfaces import plane
 
 SMALL = ["--set", "surface.cells=[1, 2]"]
 

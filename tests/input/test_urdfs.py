@@ -13,9 +13,12 @@ from readers import link_placements, of_bad, sound_urdf
 from samples import sampled, spread
 from yourdfpy import URDF
 
-from coverable_errors import CoverableError
+from coverable.errors import CoverableError
 from robots.pinocchio_model import chain_model
-from robots.urdf import CheckedUrdf, MeshFile, UrdfError, check_urdf, read_srdf
+from robots.urdf.checked_urdf import CheckedUrdf, check_urdf
+from robots.urdf.geometry import MeshFile
+from robots.urdf.srdf import read_srdf
+from robots.urdf.xml import UrdfError
 
 SHARE = next(
     Path(str(file.locate())).parents[1]

@@ -9,12 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coverable_errors import CoverableError
-from feasibility.cases import load_case
-from robots import RobotError, load_robot
-from robots.shapes import link_shapes
-from robots.urdf import UrdfError, check_urdf, read_srdf
-from robots.urdf.expansion import child, expanded, xacro_files
+from coverable import RobotError, load_case, load_robot
+from coverable.errors import CoverableError
+from robots.shapes.links import link_shapes
+from robots.urdf.checked_urdf import check_urdf
+from robots.urdf.expansion import child, xacro_files
+from robots.urdf.expansion.xacro_files import expanded
+from robots.urdf.srdf import read_srdf
+from robots.urdf.xml import UrdfError
 
 GOOD = Path(__file__).with_name("good")
 HEAD = '<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">'

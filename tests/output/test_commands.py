@@ -15,23 +15,37 @@ import pytest
 from approved import NUMBER
 from command_table import COMMANDS, NEEDS, NUMBERS, REFUSED, TABLE, WHOLE
 
-from feasibility import check, verify
-from feasibility.cases import load_case
+from coverable import (
+    Pose,
+    Region,
+    check,
+    compare,
+    coverage_path,
+    divide,
+    explain,
+    load_case,
+    load_motion,
+    load_result,
+    load_study,
+    motion_limits,
+    open_workers,
+    parallel_passes,
+    pass_runs,
+    place,
+    plan_passes,
+    run_tasks,
+    station_plan,
+    trajectory,
+    verify,
+)
 from feasibility.cli.main import _parser
-from feasibility.collisions import UNCHECKED
-from feasibility.division import divide
-from feasibility.entry import ends_of
-from feasibility.paths import coverage_path
-from feasibility.placement import Pose, Region, evaluator_of_study, place, station_plan
-from feasibility.results import load_motion, load_result
-from feasibility.runs import pass_runs, plan_passes
-from feasibility.sensitivity import explain
-from feasibility.speed import path_rates
-from feasibility.studies import compare, load_study, open_workers, run_tasks
-from feasibility.timing import motion_limits, trajectory, used
-from feasibility.treated import treated_by_walk
+from feasibility.collisions.words import UNCHECKED
+from feasibility.entry.ends import ends_of
+from feasibility.placement.trials import evaluator_of_study
+from feasibility.speed.motion_rates import path_rates
+from feasibility.timing.limits_used import used
+from feasibility.treated.area import treated_by_walk
 from feasibility.verdict import Walk
-from surfaces.passes import parallel_passes
 
 CHOICES = re.compile(r"\(choose from .*?\)")  # each version of Python has other quotes
 STATUS = ("zero", "one", "two", "three")

@@ -7,12 +7,21 @@ import pytest
 from command_table import forged
 from jobs import coverable as asked
 
-from feasibility import Search, verify
-from feasibility.cases import all_keys, load_case
+from coverable import (
+    Pose,
+    Region,
+    Search,
+    evaluator_here,
+    load_case,
+    load_motion,
+    load_result,
+    place,
+    station_plan,
+    verify,
+)
+from feasibility.cases.keys import all_keys
 from feasibility.cli.main import _parser
 from feasibility.demands import DEMANDS, further
-from feasibility.placement import Pose, Region, evaluator_here, place, station_plan
-from feasibility.results import load_motion, load_result
 from feasibility.verdict import Walk
 
 CASE = """

@@ -12,11 +12,13 @@ from hostile_visuals import urdf, visual, write
 from page_outline import faces_of, points_of
 from samples import sampled, spread
 
-from coverable_meshes import MeshError, MeshFiles, robot_files
+from coverable import load_robot
+from coverable.meshes import robot_files
+from coverable.meshes.raw_mesh import MeshError
+from coverable.meshes.robot_files import MeshFiles
 from feasibility.viewer.robot import TRIANGLES, draw, joint_paths
 from feasibility.viewer.threejs import safe_name
-from robots import load_robot
-from robots.urdf import check_urdf
+from robots.urdf.checked_urdf import check_urdf
 
 TWO_LINKS = (
     '<robot name="two"><link name="base">{base}</link><link name="arm">{arm}</link>'

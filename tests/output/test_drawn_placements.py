@@ -10,11 +10,23 @@ import pytest
 from page_outline import points_of
 from scipy.spatial.transform import Rotation
 
-from feasibility import Answer, Evidence, Task
-from feasibility.placement import Placements, Pose, Region, Trial
-from feasibility.studies import Row, bits_of
+from coverable import (
+    Answer,
+    Evidence,
+    Placements,
+    Pose,
+    Region,
+    Task,
+    cylinder,
+    load_robot,
+    plane,
+    sphere,
+    view_placements,
+)
+from feasibility.placement.trials import Trial
+from feasibility.studies.outcome import bits_of
+from feasibility.studies.run import Row
 from feasibility.viewer import poses as pose_layers
-from feasibility.viewer import view_placements
 from feasibility.viewer.poses import (
     Class,
     class_of_row,
@@ -22,8 +34,6 @@ from feasibility.viewer.poses import (
     outline,
 )
 from feasibility.viewer.threejs import hex_colour
-from robots import load_robot
-from surfaces import cylinder, plane, sphere
 
 PLATE = plane((-0.15, 0.15), (-0.1, 0.1), position=(0.5, 0, 0.2), side="outside")
 CELLS = PLATE.cells(3, 2)

@@ -11,15 +11,22 @@ from matplotlib.colors import to_rgb
 from mesh_patches import grid
 from page_outline import faces_of, points_of
 
-from feasibility import CauseKind, Task, check
-from feasibility.results import load_result
+from coverable import (
+    CauseKind,
+    Task,
+    check,
+    load_result,
+    load_robot,
+    mesh,
+    plot_sides,
+    sphere,
+    view,
+)
 from feasibility.viewer import cell_meshes as cell_shapes
-from feasibility.viewer import plot_sides, scene, view
+from feasibility.viewer import scene
 from feasibility.viewer.cell_meshes import make_display_mesh
 from feasibility.viewer.cut_sides import sides_of
 from feasibility.viewer.figures import plot_causes, plot_graph
-from robots import load_robot
-from surfaces import mesh, sphere
 
 COUNT = 24
 MISSED = {2, 3, 7, 11, 15, 20}

@@ -14,15 +14,11 @@ import pytest
 from arm_urdfs import arm, joint, load_text
 from timed_motions import TURN, UR5, motion
 
-from feasibility.programs import (
-    ProgramError,
-    ProgramSettings,
-    check_program,
-    language_of,
-    listings,
-    save_program,
-)
-from robots import Kinematics
+from coverable import ProgramSettings, save_program
+from feasibility.programs import listings
+from feasibility.programs.axes import ProgramError, check_program
+from feasibility.programs.controllers import language_of
+from robots.kinematics import Kinematics
 
 PULSES = (1341.4, 1341.4, 1000.0, 811.0, 800.5, 452.2)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from command_table import FILES
 
-from feasibility.cases import Case, CaseError, load_case
+from coverable import Case, CaseError, load_case
 from feasibility.live.controls import Controls
 
 PLATE = Case.from_toml(FILES["plate.toml"], name="plate")

@@ -14,16 +14,14 @@ import pytest
 from command_table import FILES
 from page_outline import unpacked
 
-from feasibility import check
-from feasibility.cases import Case
-from feasibility.live import Live, live, showing
+from coverable import Case, Live, View, check, live
+from feasibility.live import showing
 from feasibility.live.answers import Answers
 from feasibility.live.controls import Controls
 from feasibility.live.jobs import Job, Superseded
 from feasibility.live.server import LARGEST_REQUEST
 from feasibility.live.workbench import Workbench
 from feasibility.reports import verdict as report
-from feasibility.viewer import View
 
 GUARD_S = 1800.0
 PLATE = Case.from_toml(FILES["plate.toml"], name="plate")

@@ -16,17 +16,24 @@ import pytest
 from page_outline import points_of, tracks_of
 from scipy.spatial.transform import Rotation
 
-from feasibility import Task, check
-from feasibility.cases import load_case
-from feasibility.collisions import Collision, Obstacle, ToolShape
+from coverable import (
+    Axis,
+    Collision,
+    Obstacle,
+    Task,
+    ToolShape,
+    check,
+    load_case,
+    load_robot,
+    plane,
+    view,
+)
 from feasibility.viewer import playback as motion
-from feasibility.viewer import view
 from feasibility.viewer.frames.standing_world import GROUP
 from feasibility.viewer.live_server import LiveView
 from feasibility.viewer.robot import joint_paths
 from feasibility.viewer.viewer import compose, show
-from robots import Axis, Kinematics, load_robot
-from surfaces import plane
+from robots.kinematics import Kinematics
 
 GUARD_S = 1800.0
 

@@ -8,16 +8,25 @@ import pytest
 from command_table import COMMANDS, TABLE
 from page_outline import Page, fetched
 
-from feasibility import check
-from feasibility.cases import load_case
-from feasibility.collisions import UNCHECKED
-from feasibility.division import divide
-from feasibility.placement import Pose, Region, place
+from coverable import (
+    Comparison,
+    Pose,
+    Region,
+    check,
+    divide,
+    explain,
+    load_case,
+    place,
+    read_study,
+    view,
+    view_division,
+    view_placements,
+)
+from feasibility.collisions.words import UNCHECKED
 from feasibility.reports import comparison, explanation, study
-from feasibility.sensitivity import explain
-from feasibility.studies import Arm, Comparison, Row, read_study
+from feasibility.studies.robot_comparison import Arm
+from feasibility.studies.run import Row
 from feasibility.version import version
-from feasibility.viewer import view, view_division, view_placements
 from feasibility.viewer.robot import joint_paths
 
 PAGES = [(command, name) for command, name in COMMANDS if "--html" in TABLE[command][name]]

@@ -10,9 +10,8 @@ import pytest
 from made_up import missing
 from PIL import Image
 
-from feasibility import check
-from feasibility.cases import load_case
-from feasibility.viewer import plot_graph, plot_views, threejs, view
+from coverable import check, load_case, plot_graph, plot_views, view
+from feasibility.viewer import threejs
 from feasibility.viewer.html_page import Camera
 from feasibility.viewer.painter import LENS, painted
 

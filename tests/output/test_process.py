@@ -39,7 +39,7 @@ def run(*args, **options):
 
 def test_the_installed_command_is_this_one(ask):
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    assert project["scripts"] == {"coverable": "coverable_command:run"}
+    assert project["scripts"] == {"coverable": "coverable.command:run"}
     assert ask("--version") == (0, f"coverable {version()}\n", "")
 
 

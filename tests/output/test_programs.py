@@ -11,18 +11,12 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 from timed_motions import TURN, UR5, motion
 
-from feasibility.programs import (
-    ProgramError,
-    ProgramSettings,
-    check_program,
-    language_of,
-    save_program,
-    working_places,
-    working_times,
-)
-from robots import Axis, Kinematics, load_robot
-from surfaces import plane
-from surfaces.passes import PassPlaces, parallel_passes
+from coverable import Axis, ProgramSettings, load_robot, parallel_passes, plane, save_program
+from feasibility.programs.axes import ProgramError, check_program
+from feasibility.programs.controllers import language_of
+from feasibility.programs.working import working_places, working_times
+from robots.kinematics import Kinematics
+from surfaces.passes.toolpath import PassPlaces
 
 RAIL = Axis("rail", "prismatic", (1, 0, 0), limits=(-2.0, 4.0))
 IRB = replace(load_robot("ur5", axes=[RAIL]), name="irb1200_on_a_rail")

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from command_table import forged
 
-from feasibility import Answer, Evidence, NothingToVerifyError, check, verify
-from feasibility.cases import load_case
+from coverable import Answer, Evidence, check, load_case, load_result, save_result, verify
 from feasibility.cut_tree import CutTree, Leaf
-from feasibility.results import ResultError, load_result, save_result
+from feasibility.results.result_file import ResultError
+from feasibility.verifying import NothingToVerifyError
 
 
 @pytest.fixture(scope="module")

@@ -11,23 +11,34 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coverable_errors import at_least, at_most
-from feasibility import Answer, Evidence, check
-from feasibility.cases import all_keys, builtin_cases, load_case
-from feasibility.collisions import CHECKABLE, UNCHECKED
+from coverable import (
+    Answer,
+    Comparison,
+    Evidence,
+    Explanation,
+    builtin_cases,
+    check,
+    coverage_path,
+    divide,
+    list_robots,
+    load_case,
+    load_motion,
+    load_result,
+    read_study,
+    trajectory,
+)
+from coverable.errors import at_least, at_most
+from feasibility.cases.keys import all_keys
+from feasibility.collisions.words import CHECKABLE, UNCHECKED
 from feasibility.cut_words import place_of
-from feasibility.division import divide
-from feasibility.paths import coverage_path
 from feasibility.reports import changes, comparison, division, path, study, too_late
 from feasibility.reports import explanation as explained
 from feasibility.reports import verdict as report
-from feasibility.results import load_motion, load_result
 from feasibility.results.trajectory_files import as_csv, as_json_text, from_csv, from_json_text
-from feasibility.sensitivity import Explanation, Finding, Kind, Quantity, Threshold
-from feasibility.studies import Comparison, read_study
-from feasibility.timing import trajectory
+from feasibility.sensitivity.quantities import Kind, Quantity
+from feasibility.sensitivity.thresholds import Finding, Threshold
 from feasibility.verdict import Cause, CauseKind, Certificate, Walk
-from robots import GROUPS, list_robots
+from robots.library import GROUPS
 
 
 @pytest.mark.parametrize("digits", [1, 3, 4])

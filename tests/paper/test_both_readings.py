@@ -5,12 +5,21 @@ import pytest
 from mesh_patches import in_cells_of
 from samples import sampled, spread
 
-from feasibility import Search, Task
+from coverable import (
+    Search,
+    Task,
+    bspline,
+    cylinder,
+    hyperboloid,
+    load_robot,
+    piecewise,
+    plane,
+    sphere,
+    torus,
+)
 from feasibility.paper.algorithm_2 import tree_search
 from feasibility.paper.continuity import JSpace
 from feasibility.paper.literal import LiteralSearch
-from robots import load_robot
-from surfaces import bspline, cylinder, hyperboloid, piecewise, plane, sphere, torus
 
 PUMA = load_robot("puma560", limits="set-1")
 NET = [[(x, y, 0.35 + x * (0.25 * y - 0.1 * x)) for y in (-0.2, 0, 0.2)] for x in (0.5, 0.65, 0.8)]

@@ -11,7 +11,7 @@ import samples
 from asked import names, question
 from samples import sampled
 
-from feasibility import Answer, Evidence, Search, Verdict, greedy_check
+from coverable import Answer, Evidence, Search, Verdict, greedy_check
 from feasibility.paper.jcell_steps import Steps
 from feasibility.paper.starts import starts
 

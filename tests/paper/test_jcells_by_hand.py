@@ -7,11 +7,20 @@ import pytest
 from arm_urdfs import joint
 from random_arms import robot_of
 
-from feasibility import Answer, CauseKind, Evidence, Search, Task, greedy_check
+from coverable import (
+    Answer,
+    CauseKind,
+    Evidence,
+    Search,
+    Task,
+    cylinder,
+    greedy_check,
+    load_robot,
+    plane,
+    sphere,
+)
 from feasibility.paper.continuity import JSpace, Outcome
 from feasibility.paper.jcell_steps import Steps
-from robots import load_robot
-from surfaces import cylinder, plane, sphere
 
 PUMA = load_robot("puma560", limits="set-1")
 

@@ -9,15 +9,15 @@ import pytest
 import referee
 from mesh_patches import in_cells_of
 
-from coverable_kernels import allocating_entry
-from feasibility import Answer, Search, Task, greedy_check
-from feasibility.paper import tree_walk
+from coverable import Answer, Search, Task, greedy_check, load_robot, mesh, sphere, torus
+from coverable.kernels import allocating_entry
 from feasibility.paper.jcell_steps import Steps
+from feasibility.paper.tree_and_graph import tree_walk
 from feasibility.paper.tree_replay import Path, replay_stored, replay_tree, within_cells
-from robots import Kinematics, load_robot
-from surfaces import cell_under as cell_under_kernel
-from surfaces import mesh, sphere, torus, triangulation
-from surfaces.meshes import TriangleMesh
+from robots.kinematics import Kinematics
+from surfaces.cell_triangles import triangulation
+from surfaces.meshes.triangle_mesh import TriangleMesh
+from surfaces.triangle_kernel import cell_under as cell_under_kernel
 
 cell_under = allocating_entry(cell_under_kernel)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = ("coverable_meshes", "robots", "surfaces", "feasibility")
+PACKAGES = ("coverable.meshes", "robots", "surfaces", "feasibility")
 FILES = [
     *ROOT.glob("coverable*.py"),
     *(p for room in PACKAGES for p in (ROOT / room).rglob("*.py")),
@@ -51,7 +51,7 @@ def test_libraries_are_loaded_where_they_are_used(
 
 
 def test_loading_the_judge_loads_nothing_of_the_search() -> None:
-    found = loaded("from feasibility.certification import replay; replay.__module__")
+    found = loaded("from coverable import replay; replay.__module__")
     ours = {name for name in found if name.startswith("feasibility.")}
     searching = ("roadmap", "paper", "checking", "attempts", "collisions.kernels")
     assert "feasibility.certification.motion_replay" in ours

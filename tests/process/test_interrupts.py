@@ -17,11 +17,10 @@ import pytest
 from jobs import PLATE, coverable, verdict_named
 from samples import sampled, seeds, spread
 
+from coverable import Store, load_result
 from feasibility import interrupts
 from feasibility.interrupts import interruptible
-from feasibility.results import load_result
 from feasibility.safe_files import write_whole
-from feasibility.studies import Store
 
 INTERRUPTED = "coverable: interrupted\n"
 GUARD_S = 1800.0  # against hanging alone
@@ -185,7 +184,7 @@ def interrupt(event, about):
     if event == "import" and about[0] == point:
         os.kill(os.getpid(), 2)
 sys.addaudithook(interrupt)
-from coverable_command import run
+from coverable.command import run
 run()
 """  # Ctrl-C just before a module is imported for the first time
 
@@ -203,7 +202,7 @@ class Late(io.StringIO):
         if sys._getframe(1).f_code.co_name == "run":
             os.kill(os.getpid(), 2)
 sys.stdout = Late()
-from coverable_command import run
+from coverable.command import run
 run()
 """  # Ctrl-C when the answer has been given
 
@@ -239,13 +238,13 @@ import os, signal, sys
 left, begun = int(sys.argv.pop(1)), False
 def interrupt(event, about):
     global left, begun
-    begun = begun or event == "exec" and about[0].co_filename.endswith("coverable_command.py")
+    begun = begun or event == "exec" and about[0].co_filename.endswith("coverable/command.py")
     if begun:
         left -= 1
         if left == 0:
             os.killpg(0, signal.SIGINT)
 sys.addaudithook(interrupt)
-from coverable_command import run
+from coverable.command import run
 run()
 """  # Ctrl-C, to the whole group as from a terminal, at the n-th event from our first one on
 STUDY = 'base.case = "plate.toml"\nvary."task.cone_deg" = [20, 30, 40, 50, 60, 70]\n'

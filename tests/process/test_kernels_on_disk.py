@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from coverable_kernels import CODE, is_safe
+from coverable.kernels import CODE, is_safe
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("robots", "surfaces", "feasibility")
@@ -52,22 +52,22 @@ def test_what_is_as_safe_as_the_code(
 # A project of two kernels, and what new processes make of it.
 
 INNER = """
-from coverable_kernels import kernel
+from coverable.kernels import kernel
 SCALE = 2.0
 @kernel
 def inner(x):
     return (x + 1.0) * SCALE
 """
 OUTER = """
-from coverable_kernels import entry
+from coverable.kernels import entry
 from surfaces.triangle_kernel import inner
 @entry
 def outer(x):
     return inner(x) / 0.0 if x < 0.0 else inner(x)
 """
 ASK = """
-from robots.chain import outer; import coverable_kernels, numba
-print(outer(1.0), sum(outer.stats.cache_hits.values()), int(coverable_kernels.FOLDER is None),
+from robots.chain import outer; import coverable.kernels, numba
+print(outer(1.0), sum(outer.stats.cache_hits.values()), int(coverable.kernels.FOLDER is None),
       outer(-3.0), repr(numba.config.CACHE_LOCATOR_CLASSES))
 """
 BESIDE = "__pycache__/coverable-kernels"
@@ -81,7 +81,7 @@ def project(tmp_path: Path) -> Path:
     for path, text in (("robots/chain.py", OUTER), ("surfaces/triangle_kernel.py", INNER)):
         (folder / path).parent.mkdir(parents=True, mode=0o755)
         (folder / path).write_text(text)
-    shutil.copy(ROOT / "coverable_kernels.py", folder)
+    shutil.copy(ROOT / "coverable/kernels.py", folder)
     return folder
 
 
@@ -150,7 +150,7 @@ def test_where_nothing_can_be_written_it_is_compiled_all_the_same(project: Path)
 
 
 LOSE = """
-import shutil; from coverable_kernels import FOLDER
+import shutil; from coverable.kernels import FOLDER
 shutil.rmtree(FOLDER / "robots", ignore_errors=True); (FOLDER / "robots").symlink_to("/nowhere")
 """
 

@@ -8,7 +8,7 @@ ROOT = Path(__file__).parents[2]
 MOST_LINES = 23_000
 # Parts that paper/4a has no use for: no bodies, no roll, one patch, nothing missed, no page.
 UNUSED = (
-    "coverable_meshes", "robots.shapes", "surfaces.meshes.", "surfaces.piecewise.",
+    "coverable.meshes", "robots.shapes", "surfaces.meshes.", "surfaces.piecewise.",
     "feasibility.certification.collisions.", "feasibility.certification.cut_proofs.",
     "feasibility.collisions.scene", "feasibility.collisions.kernels.segments",
     "feasibility.roadmap.causes.", "feasibility.roadmap.cuts.", "feasibility.roadmap.forward.",

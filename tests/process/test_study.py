@@ -19,16 +19,11 @@ import study_works
 from jobs import case_named, coverable, verdict_named
 from samples import sampled, spread
 
-from feasibility.cases import as_read
-from feasibility.studies import (
-    Store,
-    StudyTask,
-    WorkersError,
-    cells_of,
-    load_study,
-    open_workers,
-    run_tasks,
-)
+from coverable import Store, load_study, open_workers, run_tasks
+from feasibility.cases.toml import as_read
+from feasibility.studies.outcome import cells_of
+from feasibility.studies.pool import WorkersError
+from feasibility.studies.run import StudyTask
 
 SHARED = Path(study_works.__file__).parent
 
@@ -301,7 +296,9 @@ DYING = """
 import os
 if __name__ != "__main__":
     os._exit(3)  # a worker imports this module first
-from feasibility.studies import StudyTask, WorkersError, open_workers, run_tasks
+from feasibility.studies.run import StudyTask
+from feasibility.studies.pool import WorkersError
+from coverable import open_workers, run_tasks
 from study_works import double
 try:
     with open_workers(1) as workers:

@@ -10,9 +10,12 @@ import pytest
 from bad_input import sheet
 from mesh_writers import stl_of
 
-from feasibility.cases import TABLES, Case, CaseError, load_case, toml_document
-from feasibility.placement import Pose, evaluator_of_study
-from feasibility.studies import Store, StudyTask, case_of, cut_of, open_workers, run_tasks
+from coverable import Case, CaseError, Pose, Store, load_case, open_workers, run_tasks
+from feasibility.cases.case import TABLES
+from feasibility.cases.toml import toml_document
+from feasibility.placement.trials import evaluator_of_study
+from feasibility.studies.built_cases import case_of, cut_of
+from feasibility.studies.run import StudyTask
 
 XACRO = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
 BEAM = "elsewhere/beam.obj"

@@ -9,10 +9,7 @@ from dataclasses import replace
 import pytest
 from jobs import PLATE, coverable
 
-from feasibility import check
-from feasibility.cases import Case, CaseError, load_case
-from feasibility.division import divide
-from feasibility.studies import compare, open_workers, read_study
+from coverable import Case, CaseError, check, compare, divide, load_case, open_workers, read_study
 
 STRIP = PLATE.replace("[0.4, 0.6]", "[0.3, 0.7]").replace("[3, 4]", "[4, 2]")
 STRIP = STRIP.replace("[0, 0, 0.3]", "[0, 0, 0.2]") + "search.seed = 4\n"

@@ -14,7 +14,9 @@ import study_works
 from jobs import coverable
 from samples import sampled, spread
 
-from feasibility.studies import Store, StudyTask, WorkersError, open_workers, run_tasks
+from coverable import Store, open_workers, run_tasks
+from feasibility.studies.pool import WorkersError
+from feasibility.studies.run import StudyTask
 
 distributed = pytest.importorskip("distributed")
 

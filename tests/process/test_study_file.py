@@ -8,8 +8,8 @@ import json
 import numpy as np
 import pytest
 
-from feasibility.cases import Case, CaseError, as_read, load_case, toml_document
-from feasibility.studies import load_study, read_study
+from coverable import Case, CaseError, load_case, load_study, read_study
+from feasibility.cases.toml import as_read, toml_document
 
 GRID = """
 base.case = "paper/4a"

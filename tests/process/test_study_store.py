@@ -13,10 +13,10 @@ import pytest
 from hostile_stores import ODD, SCRIPT, allowed, put, rows, study_with_store
 from jobs import case_named, coverable
 
-from feasibility.cases import load_case
-from feasibility.placement import Pose, evaluator_of_study
+from coverable import Pose, Store, compare, load_case, open_workers, run_tasks
+from feasibility.placement.trials import evaluator_of_study
 from feasibility.safe_files import FileError
-from feasibility.studies import Store, StudyTask, compare, open_workers, run_tasks
+from feasibility.studies.run import StudyTask
 from feasibility.studies.store import FIND, Record, StoreError
 
 

@@ -14,13 +14,21 @@ import pytest
 from jobs import TEXTS, EndingClock, case_named, coverable, ends_at, verdict_named
 from samples import spread
 
-from feasibility import Answer, Evidence, check, verify
-from feasibility.cases import as_read
+from coverable import (
+    Answer,
+    Evidence,
+    check,
+    compare,
+    divide,
+    open_workers,
+    run_tasks,
+    save_result,
+    verify,
+)
+from feasibility.cases.toml import as_read
 from feasibility.clock import Clock, OutOfTime, compiling
-from feasibility.division import divide
 from feasibility.interrupts import interruptible
-from feasibility.results import save_result
-from feasibility.studies import StudyTask, compare, open_workers, run_tasks
+from feasibility.studies.run import StudyTask
 
 LIMIT = ("--set", "search.time_limit=3600")
 PLACE = ("--workers", "0", "--x", "0.3", "0.4", "--count", "4")

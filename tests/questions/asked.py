@@ -19,10 +19,7 @@ import plain
 import tomli_w
 from mesh_writers import stl_of
 
-from feasibility import Search, Task, Verdict, check
-from feasibility.cases import Case, load_case
-from robots import Robot
-from surfaces import Cells
+from coverable import Case, Cells, Robot, Search, Task, Verdict, check, load_case
 
 HERE = Path(__file__).parent
 TABLES = ("robot", "surface", "task", "collision", "search")

@@ -11,9 +11,7 @@ from pathlib import Path
 import numpy as np
 from oracle_cases import Answer, Problem
 
-from feasibility import Task
-from robots import Robot
-from surfaces import Cells, Surface, cylinder, hyperboloid, plane, sphere
+from coverable import Cells, Robot, Surface, Task, cylinder, hyperboloid, plane, sphere
 
 HERE = Path(__file__).parent
 

@@ -9,15 +9,10 @@ from arm_urdfs import UNLIKE, arm, joint, load_text, random_arm, random_q, unlik
 from plain import arm_of
 from samples import sampled, seeds
 
-from robots import (
-    Kinematics,
-    RobotError,
-    frames,
-    jacobians,
-    list_robots,
-    load_robot,
-    moved_by_joints,
-)  # fmt: skip
+from coverable import RobotError, list_robots, load_robot
+from robots.chain import frames, jacobians
+from robots.chain_rows import moved_by_joints
+from robots.kinematics import Kinematics
 
 CLOSE = {"rtol": 0, "atol": 1e-12}
 

@@ -6,17 +6,13 @@ import numpy as np
 import pytest
 import trimesh
 
-from robots import RobotError, load_robot
-from robots.shapes import (
-    Polytope,
-    Solid,
-    checked_triangles,
-    link_pairs,
-    link_shapes,
-    outer_bodies,
-    tool_reach,
-)  # fmt: skip
-from robots.urdf import Sphere
+from coverable import RobotError, load_robot
+from robots.shapes.bodies import Polytope, Solid
+from robots.shapes.links import link_shapes, outer_bodies
+from robots.shapes.pairs import link_pairs
+from robots.shapes.tool import tool_reach
+from robots.shapes.triangles import checked_triangles
+from robots.urdf.geometry import Sphere
 
 SRDF = '<robot name="x">{}</robot>'
 PAIR = '<disable_collisions link1="{}" link2="{}" {}/>'

@@ -17,18 +17,15 @@ from plain import arm_of
 from samples import sampled, seeds
 from scipy.spatial import ConvexHull
 
-from feasibility.collisions import Obstacle
-from robots import Kinematics, RobotError, list_robots, load_robot
-from robots.shapes import (
-    Triangles,
-    checked_triangles,
-    link_pairs,
-    link_shapes,
-    solid_faces,
-    with_crude_links_cut,
-)  # fmt: skip
-from robots.shapes.sampling import PairSampling, random_configurations
-from robots.urdf import Cylinder, check_urdf
+from coverable import Obstacle, RobotError, list_robots, load_robot
+from robots.kinematics import Kinematics
+from robots.shapes.bodies import Triangles
+from robots.shapes.links import link_shapes
+from robots.shapes.pairs import link_pairs
+from robots.shapes.sampling import PairSampling, random_configurations, with_crude_links_cut
+from robots.shapes.triangles import checked_triangles, solid_faces
+from robots.urdf.checked_urdf import check_urdf
+from robots.urdf.geometry import Cylinder
 
 LINKS = (
     '<robot name="three"><link name="base">{base}</link><link name="arm" {mark}>{arm}</link>'

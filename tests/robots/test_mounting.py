@@ -13,10 +13,11 @@ from approved import refused
 from arm_urdfs import arm, joint, load_text, random_arm, random_q
 from scipy.spatial.transform import Rotation
 
-from robots import Axis, Kinematics, list_robots, load_robot
-from robots.mounting import about_fixed_axes
-from robots.shapes import link_shapes
-from robots.urdf import check_urdf
+from coverable import Axis, list_robots, load_robot
+from robots.kinematics import Kinematics
+from robots.mounting.poses import about_fixed_axes
+from robots.shapes.links import link_shapes
+from robots.urdf.checked_urdf import check_urdf
 
 POSE = ((0.03, -0.02, 0.12), (20.0, -30.0, 75.0))
 STAND = ((0.4, -0.3, 0.8), (5.0, 10.0, 90.0))

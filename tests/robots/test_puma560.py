@@ -7,8 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from robots import Kinematics, load_robot
-from robots.urdf import check_urdf
+from coverable import load_robot
+from robots.kinematics import Kinematics
+from robots.urdf.checked_urdf import check_urdf
 
 TOOL = SimpleNamespace(
     **runpy.run_path(str(Path(__file__).parents[2] / "tools" / "puma560.py"), run_name="tool")

@@ -10,8 +10,9 @@ from approved import refused
 from arm_urdfs import arm, joint, load_text, random_q
 from samples import sampled, seeds
 
-from robots import Kinematics, RobotError, list_robots, load_robot
-from robots.urdf import check_urdf
+from coverable import RobotError, list_robots, load_robot
+from robots.kinematics import Kinematics
+from robots.urdf.checked_urdf import check_urdf
 
 ROBOTS = {info.name: info for info in list_robots()}
 USUAL = ("tcp", "tool0", "flange", "ee_link")

@@ -10,7 +10,8 @@ from approved import refused
 from arm_urdfs import UNLIKE, arm, joint, load_text, random_arm, random_q, unlike
 from samples import sampled, seeds
 
-from robots import Kinematics, load_robot
+from coverable import load_robot
+from robots.kinematics import Kinematics
 
 PUMA = load_robot("puma560")
 

@@ -12,13 +12,11 @@ from random_arms import rail_arm, random_arm, random_configuration, tilted, turn
 from samples import sampled, seeds
 from search_kernels import contracted
 
-from feasibility import Task
-from feasibility.roadmap import arrays_of
+from coverable import Task, cone, cylinder, hyperboloid, load_robot, plane, sphere, torus
 from feasibility.roadmap.branch_and_bound.boxes import place_at_rest
-from feasibility.roadmap.cuts import places_on
+from feasibility.roadmap.cuts.places import places_on
+from feasibility.roadmap.motions.arrays import arrays_of
 from feasibility.roll import projected, roll_of
-from robots import load_robot
-from surfaces import cone, cylinder, hyperboloid, plane, sphere, torus
 
 ARMS = {
     **{name: (lambda rng, name=name: load_robot(name)) for name in ("puma560", "ur5", "panda")},

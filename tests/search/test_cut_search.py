@@ -13,14 +13,23 @@ from random_cases import built, read, surface_of
 from samples import sampled, seeds, spread
 from scipy.interpolate import make_interp_spline
 
+from coverable import (
+    bspline,
+    cylinder,
+    hyperboloid,
+    load_robot,
+    mesh,
+    piecewise,
+    plane,
+    revolution,
+    sphere,
+)
 from feasibility.cut_tree import Cut, Leaf
-from feasibility.roadmap import Ruling
 from feasibility.roadmap.branch_and_bound.branching import branch_and_bound
-from feasibility.roadmap.cuts import components_of
+from feasibility.roadmap.branch_and_bound.ruling import Ruling
+from feasibility.roadmap.cuts.gaps import components_of
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.motions import arrays_of
-from robots import load_robot
-from surfaces import bspline, cylinder, hyperboloid, mesh, piecewise, plane, revolution, sphere
+from feasibility.roadmap.motions.arrays import arrays_of
 from surfaces.meshes.triangle_mesh import TriangleMesh
 
 

@@ -8,11 +8,10 @@ from arm_urdfs import FREE, joint
 from cut_attempts import nothing, prove
 from random_arms import robot_of
 
-from feasibility import Task
+from coverable import Task, cylinder, plane
 from feasibility.cut_tree import Cut, Leaf
-from feasibility.roadmap import Ruling
+from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.cuts.regions import limits_of
-from surfaces import cylinder, plane
 
 ANY_AXIS = Task(0.0, 180.0, 1e-3)
 

@@ -14,8 +14,10 @@ from samples import sampled, spread
 from scipy.spatial.transform import Rotation
 from search_kernels import Clearance
 
-from coverable_kernels import entry
-from feasibility.collisions import Bodies, Collision, Obstacle, Pair, Soup, gather
+from coverable import Collision, Obstacle, Robot, load_robot, sphere
+from coverable.kernels import entry
+from feasibility.collisions.asked_bodies import gather
+from feasibility.collisions.bodies import Bodies, Pair, Soup
 from feasibility.collisions.kernels import link_frames
 from feasibility.collisions.kernels.box_tree import box_tree, moved
 from feasibility.collisions.kernels.tables import (
@@ -30,9 +32,7 @@ from feasibility.collisions.kernels.tables import (
     row,
     views,
 )
-from robots import Robot, load_robot
-from robots.shapes import Polytope
-from surfaces import sphere
+from robots.shapes.bodies import Polytope
 
 LENGTH, RADIUS = 0.3, 0.03  # m, of each link, a capsule along x
 chord_deviation, place_bodies = entry(link_frames.chord_deviation), entry(link_frames.place_bodies)

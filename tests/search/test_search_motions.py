@@ -10,20 +10,15 @@ from plain import tools
 from random_arms import QUESTIONS, planar_arm, robot_of
 from search_kernels import assert_walked
 
-from coverable_arrays import unit_along
-from feasibility import Search, Task, check
-from feasibility.certification import replay
-from feasibility.roadmap import (
-    Exploration,
-    arrays_of,
-    close,
-    covering_walk,
-    explore,
-)
+from coverable import Search, Task, check, cylinder, plane, replay, sphere
+from coverable.arrays import unit_along
+from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.motions.arrays import arrays_of
+from feasibility.roadmap.search import close, explore
+from feasibility.roadmap.walk import covering_walk
 from feasibility.roll import projected
-from feasibility.targets import target_curves
+from feasibility.targets.curves import target_curves
 from feasibility.verdict import Walk
-from surfaces import cylinder, plane, sphere
 
 DOME = sphere(1.0, (10, 90), (10, 180), rpy_deg=(30, 0, 20), position=(1, 2, 3)).cells(4, 5)
 PIPE = cylinder(0.2, (0, 360), (0, 1), side="outside", rpy_deg=(0, 50, 0)).cells(6, 3)

@@ -20,10 +20,11 @@ from random_arms import (
 )
 from search_kernels import ruled
 
-from feasibility import Task
-from feasibility.roadmap import Exploration, Ruling, arrays_of, root_box
-from robots import load_robot
-from surfaces import plane
+from coverable import Task, load_robot, plane
+from feasibility.roadmap.branch_and_bound.branching import root_box
+from feasibility.roadmap.branch_and_bound.ruling import Ruling
+from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.motions.arrays import arrays_of
 
 UP = np.array([0.0, 0.0, 1.0])
 

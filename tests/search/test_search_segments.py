@@ -25,13 +25,11 @@ from samples import sampled, seeds
 from scipy.spatial.transform import Rotation
 from search_kernels import Motions
 
-from coverable_kernels import entry
-from feasibility import Task
+from coverable import Task, cylinder, load_robot, sphere
+from coverable.kernels import entry
 from feasibility.roadmap.motions import roll, segment_bound
 from feasibility.roll import Roll, projected, roll_of
-from robots import load_robot
-from surfaces import cylinder, sphere
-from surfaces.patches import GridCells
+from surfaces.patches.grid_cells import GridCells
 
 ROUNDING = 1e-12
 frame_rates, peak = entry(roll.frame_rates), entry(segment_bound.peak)

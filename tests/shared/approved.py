@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from coverable_errors import CoverableError
+from coverable.errors import CoverableError
 
 MASKS = ((re.compile(r"\d+(\.\d+)? s\b"), "# s"), (re.compile(r"\b(pid|port) \d+"), r"\1 #"))
 NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")

@@ -9,8 +9,7 @@ from collections.abc import Iterator
 from functools import cache, partial
 from typing import Any, NamedTuple
 
-from feasibility import Verdict, check
-from feasibility.cases import Case
+from coverable import Case, Verdict, check
 from feasibility.cli.main import main
 from feasibility.clock import Clock, OutOfTime
 

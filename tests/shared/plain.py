@@ -10,12 +10,11 @@ import referee
 from numpy.typing import ArrayLike, NDArray
 from referee import Arm, Asked, Facets, Floats, Form, Pieces, Scene, Shape
 
-from feasibility import Task, Verdict
-from feasibility.collisions import HalfSpace, gather
-from robots import Robot
-from robots.shapes import Triangles
-from robots.urdf import Box, Capsule, Cylinder, Sphere
-from surfaces import Cells, Surface
+from coverable import Cells, Robot, Surface, Task, Verdict
+from feasibility.collisions.asked_bodies import gather
+from feasibility.collisions.shapes import HalfSpace
+from robots.shapes.bodies import Triangles
+from robots.urdf.geometry import Box, Capsule, Cylinder, Sphere
 
 NAMED = ("plane", "sphere", "cylinder", "cone", "torus", "hyperboloid", "ellipsoid")
 

@@ -6,25 +6,20 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coverable_kernels import entry
-from feasibility import Task
-from feasibility.collisions import (
-    Bodies,
-    blamed,
-    clearance_gradient,
-    collision_buffer,
-    configuration_bounds,
-    segment_clear,
-)
-from feasibility.roadmap import Ruling, arrays_of, root_box, rule, work_for
+from coverable import Cells, Robot, Task, plane
+from coverable.kernels import entry
+from feasibility.collisions.bodies import Bodies
+from feasibility.collisions.kernels.clearance import blamed, clearance_gradient, segment_clear
+from feasibility.collisions.kernels.memory import collision_buffer, configuration_bounds
 from feasibility.roadmap.branch_and_bound import box_bounds, box_contraction
 from feasibility.roadmap.branch_and_bound.boxes import box_work
-from feasibility.roadmap.branch_and_bound.branching import DIRECTIONS
-from feasibility.roadmap.motions import aiming, project_near_cell, projection, segment_bound
+from feasibility.roadmap.branch_and_bound.branching import DIRECTIONS, root_box, rule
+from feasibility.roadmap.branch_and_bound.ruling import Ruling
+from feasibility.roadmap.motions import aiming, projection, segment_bound
 from feasibility.roadmap.motions.aiming import aim, stand_still
-from feasibility.roadmap.motions.working_memory import place
-from robots import Robot
-from surfaces import Cells, plane
+from feasibility.roadmap.motions.arrays import arrays_of
+from feasibility.roadmap.motions.off_target import project_near_cell
+from feasibility.roadmap.motions.working_memory import place, work_for
 
 Floats = NDArray[np.float64]
 

@@ -71,7 +71,7 @@ count = 24
 
 def stop_after_keeping():
     """From now on this process stops, and says so on stdout, as soon as it has kept something."""
-    from feasibility.studies import Store
+    from coverable import Store
 
     keep = Store.keep
 

@@ -15,7 +15,7 @@ from approved import refused
 from smooth_probes import same_surface
 from specimens import WEIGHTS, ball, hood, sampled
 
-from surfaces import (
+from coverable import (
     bspline,
     cone,
     cylinder,
@@ -32,7 +32,7 @@ from surfaces import (
     revolution,
     sphere,
     torus,
-)  # fmt: skip
+)
 
 NAN, INF = math.nan, math.inf
 TURN = {"angle_deg": (0, 90), "height": (0, 1)}

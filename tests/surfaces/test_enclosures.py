@@ -5,9 +5,9 @@ import pytest
 from bounds import holds
 from samples import sampled, seeds
 
-from surfaces import Patch, SurfaceError
-from surfaces.patches import bernstein, over_boxes
-from surfaces.patches.box_models import VectorModel
+from coverable import Patch, SurfaceError
+from surfaces.patches import bernstein
+from surfaces.patches.box_models import VectorModel, over_boxes
 from surfaces.patches.enclosure_functions import FUNCTIONS, UFUNCS, Enclosure
 from surfaces.patches.slopes import Slope
 

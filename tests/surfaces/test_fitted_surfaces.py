@@ -11,13 +11,22 @@ from bounds import holds
 from part_walks import lost
 from specimens import EQUAL, ball, ring, sampled
 
-from feasibility import Task, check
-from feasibility.certification import replay_over_surface
-from feasibility.viewer import view
-from robots import load_robot
-from surfaces import SurfaceError, bspline, grid, parametric, piecewise, sheet_of
-from surfaces.passes import parallel_passes
-from surfaces.places import Places, offset_surface
+from coverable import (
+    SurfaceError,
+    Task,
+    bspline,
+    check,
+    grid,
+    load_robot,
+    parallel_passes,
+    parametric,
+    piecewise,
+    view,
+)
+from feasibility.certification.surface_replay import replay_over_surface
+from surfaces.places.offset_surfaces import offset_surface
+from surfaces.places.places import Places
+from surfaces.sheet import sheet_of
 
 PAGE = Path(__file__).parents[2] / "docs" / "own_surfaces.md"
 

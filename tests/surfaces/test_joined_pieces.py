@@ -8,7 +8,7 @@ import pytest
 from smooth_probes import least_distances
 from specimens import hood, quarter_turn, turned
 
-from surfaces import SurfaceError, bspline, cone, cylinder, piecewise, plane, sphere
+from coverable import SurfaceError, bspline, cone, cylinder, piecewise, plane, sphere
 
 # A patch, the patches that it is cut into, and how its cells are cut.
 WHOLE = {

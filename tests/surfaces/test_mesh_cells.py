@@ -10,11 +10,13 @@ from approved import refused
 from mesh_patches import CONNECTED, PATCHES, Mesh, bent, box, grid, islands, joined, sheet, used
 from samples import sampled, spread
 
-from surfaces import mesh
-from surfaces.meshes import FaceTree, TriangleMesh
-from surfaces.meshes.cells import MeshCells, subdivide
+from coverable import mesh
 from surfaces.meshes.cells.clustering import cells_for, cluster_faces
+from surfaces.meshes.cells.mesh_cells import MeshCells
 from surfaces.meshes.cells.properties import coarse, figures
+from surfaces.meshes.cells.subdivision import subdivide
+from surfaces.meshes.face_tree import FaceTree
+from surfaces.meshes.triangle_mesh import TriangleMesh
 
 N = 60
 

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from mesh_patches import can, roof
 
-from feasibility import Task
-from feasibility.targets import blocked_curves
-from surfaces.meshes import TriangleMesh, mesh
+from coverable import Task, mesh
+from feasibility.targets.blocked import blocked_curves
+from surfaces.meshes.triangle_mesh import TriangleMesh
 
 
 def squares(size: float, seed: int, count: int = 674) -> TriangleMesh:

@@ -18,8 +18,8 @@ import pytest
 from approved import refused
 from mesh_writers import GOOD, nested_scene
 
-from surfaces.meshes import read_mesh
-from surfaces.meshes.repair import notes_of
+from surfaces.meshes.repair.mesh_notes import notes_of
+from surfaces.meshes.sources import read_mesh
 
 V, F = w.cube()
 P, G = w.plate(3, 2)  # 12 vertices, 12 faces, 0.06 m^2
@@ -278,8 +278,8 @@ ALONE = """
 import resource, sys
 from pathlib import Path
 resource.setrlimit(resource.RLIMIT_AS, (2 << 30, 2 << 30))
-from surfaces.meshes import read_mesh
-from surfaces import SurfaceError
+from surfaces.meshes.sources import read_mesh
+from coverable import SurfaceError
 read_mesh(sys.argv[1] + "/cube.glb")  # which loads the libraries
 opened = []
 sys.addaudithook(lambda event, facts: opened.append(facts[0]) if event == "open" else None)

@@ -10,8 +10,10 @@ from approved import refused
 from mesh_writers import GOOD
 from scipy.spatial import cKDTree
 
-from surfaces.meshes import TriangleMesh, mesh, read_mesh
-from surfaces.meshes.repair import notes_of
+from coverable import mesh
+from surfaces.meshes.repair.mesh_notes import notes_of
+from surfaces.meshes.sources import read_mesh
+from surfaces.meshes.triangle_mesh import TriangleMesh
 
 V, F = w.cube()
 

@@ -8,11 +8,13 @@ from samples import sampled, seeds
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from surfaces import SurfaceError
-from surfaces.meshes import TriangleMesh
+from coverable import SurfaceError
 from surfaces.meshes.normals import blended
-from surfaces.meshes.repair import clean, notes_of, one_fan_each, weld_distance
-from surfaces.meshes.repair.degenerate import welded
+from surfaces.meshes.repair.cleaning import clean
+from surfaces.meshes.repair.degenerate import weld_distance, welded
+from surfaces.meshes.repair.mesh_notes import notes_of
+from surfaces.meshes.repair.orientation import one_fan_each
+from surfaces.meshes.triangle_mesh import TriangleMesh
 
 V, F = w.cube()
 UNCLEAN = {"caps": w.chain_of_caps(), "bow tie": w.bow_tie(), "wavy": w.hilly(12, 9)}

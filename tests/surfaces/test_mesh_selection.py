@@ -9,8 +9,8 @@ import pytest
 from approved import refused
 from samples import sampled, seeds
 
-from surfaces import cut_box, cut_plane, faces_within_cone, take_faces
-from surfaces.meshes.repair import clean
+from coverable import cut_box, cut_plane, faces_within_cone, take_faces
+from surfaces.meshes.repair.cleaning import clean
 
 CUBE = clean(*w.cube(0.2))
 HILLY = clean(*w.hilly())

@@ -16,11 +16,12 @@ from part_walks import survivors
 from samples import sampled, seeds
 from triangle_probes import KINDS, assert_nearest, degenerate, least_distances, scattered
 
-from coverable_errors import CoverableError
-from surfaces import mesh
-from surfaces.meshes import TriangleMesh, smoothed
+from coverable import mesh
+from coverable.errors import CoverableError
 from surfaces.meshes.facets import facets_of
 from surfaces.meshes.normals import sectors
+from surfaces.meshes.smoothing import smoothed
+from surfaces.meshes.triangle_mesh import TriangleMesh
 
 POSE = {"position": (0.3, -1.2, 0.7), "rpy_deg": (25.0, -40.0, 110.0)}
 

@@ -12,9 +12,9 @@ from approved import refused
 from mesh_patches import grid, panel_with_hole
 from pygeodesic import geodesic
 
-from surfaces import cylinder, mesh, piecewise, plane, sphere
-from surfaces.meshes import TriangleMesh
-from surfaces.passes import parallel_passes, pass_route
+from coverable import cylinder, mesh, parallel_passes, piecewise, plane, sphere
+from surfaces.meshes.triangle_mesh import TriangleMesh
+from surfaces.passes.toolpath import pass_route
 
 HALF = math.pi / 2
 SURFACES = {

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 from mesh_patches import grid, panel_with_hole
 
-from surfaces import cylinder, plane
-from surfaces.passes import ToolLines, WorkingMesh, treated_share, visits, working_mesh
+from coverable import cylinder, plane
+from surfaces.passes.tool_lines import ToolLines, visits
+from surfaces.passes.treated import treated_share
+from surfaces.passes.triangles import WorkingMesh
+from surfaces.passes.triangulation import working_mesh
 
 
 def facing(mesh: WorkingMesh) -> np.ndarray:

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from bounds import holds
 
-from surfaces import SurfaceError, poses
-from surfaces.places import Places, offset_surface
+from coverable import SurfaceError, poses
+from surfaces.places.offset_surfaces import offset_surface
+from surfaces.places.places import Places
 
 LINE = np.array([[0.4, 0.0, 0.3], [0.4, 0.1, 0.3], [0.4, 0.2, 0.3], [0.4, 0.2, 0.3]])
 UP = np.tile([0.0, 0.0, 2.0], (4, 1))

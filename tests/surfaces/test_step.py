@@ -15,11 +15,12 @@ import numpy as np
 import pytest
 from approved import refused
 
-from coverable_processes import Ended, Limits, folder_of, run_apart
-from feasibility.cases import Case
+from coverable import Case, SurfaceError, mesh, step, step_faces
+from coverable.processes import Ended, Limits, folder_of, run_apart
 from feasibility.cli.main import main
-from surfaces import SurfaceError, mesh, step, step_faces, step_parts, step_triangles
-from surfaces.step_files import Caps, step_process
+from surfaces.step_files import step_process
+from surfaces.step_files.step_process import Caps
+from surfaces.step_files.step_surface import step_parts, step_triangles
 
 SIZE = (0.2, 0.1, 0.05)  # m
 ROUND = 0.01  # [m], radius of the one edge that is round

@@ -15,8 +15,8 @@ from samples import sampled, seeds
 from smooth_probes import POSE
 from specimens import EXTREME, FACETED, SMOOTH
 
-from coverable_errors import ArgumentError
-from surfaces import cylinder, hyperboloid, plane, sphere
+from coverable import cylinder, hyperboloid, plane, sphere
+from coverable.errors import ArgumentError
 
 PATCHES = {**SMOOTH, **EXTREME}
 FLAT, STRAIGHT, MOST = 2e-3, 0.05, 400

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from specimens import ALL, SMOOTH, cells_of
 
-from coverable_kernels import allocating_entry
-from surfaces import SurfaceError, cylinder, plane, sphere, torus
+from coverable import SurfaceError, cylinder, plane, sphere, torus
+from coverable.kernels import allocating_entry
 from surfaces.adjacency import grid_neighbours
 from surfaces.patches import closed_form_kernels
 

@@ -14,17 +14,7 @@ from referee import Form
 from smooth_probes import extrapolated_area, least_distances, same_surface
 from specimens import ALL, CLOSED, POLES, SMOOTH, cells_of
 
-from surfaces import (
-    bspline,
-    cone,
-    cylinder,
-    ellipsoid,
-    hyperboloid,
-    plane,
-    poses,
-    sphere,
-    torus,
-)  # fmt: skip
+from coverable import bspline, cone, cylinder, ellipsoid, hyperboloid, plane, poses, sphere, torus
 
 TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 SHIFT = np.array([0.3, -0.2, 0.1])

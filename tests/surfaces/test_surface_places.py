@@ -10,7 +10,7 @@ from bounds import holds
 from random_surfaces import random_surface
 from specimens import EGG, FACETED, SMOOTH, VASE, quarter_turn, turned
 
-from surfaces import (
+from coverable import (
     bspline,
     cone,
     cylinder,
@@ -21,8 +21,9 @@ from surfaces import (
     revolution,
     sphere,
     torus,
-)  # fmt: skip
-from surfaces.places import Places, offset_surface
+)
+from surfaces.places.offset_surfaces import offset_surface
+from surfaces.places.places import Places
 
 DENSE = np.linspace(0.0, 1.0, 33)
 WEIGHT = (0.5 * DENSE * (1.0 - DENSE))[1:-1]

@@ -12,8 +12,9 @@ from smooth_probes import POSE
 from specimens import EXTREME
 from triangle_probes import least_distances
 
-from coverable_errors import ArgumentError
-from surfaces import SurfaceError, cylinder, plane, poses, sheet_of, sphere
+from coverable import SurfaceError, cylinder, plane, poses, sphere
+from coverable.errors import ArgumentError
+from surfaces.sheet import sheet_of
 
 TURN, SHIFT = Rotation.from_euler("xyz", [0.3, -1.0, 2.0]).as_matrix(), [0.4, -1.0, 2.0]
 

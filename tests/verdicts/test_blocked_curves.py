@@ -6,11 +6,11 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from feasibility import Task
-from feasibility.roadmap.causes import decimals
-from feasibility.targets import blocked_curves, target_curves
-from surfaces import plane, sphere
-from surfaces.meshes import TriangleMesh, mesh
+from coverable import Task, mesh, plane, sphere
+from feasibility.roadmap.causes.diagnosis import decimals
+from feasibility.targets.blocked import blocked_curves
+from feasibility.targets.curves import target_curves
+from surfaces.meshes.triangle_mesh import TriangleMesh
 
 
 def zigzag(*turns_deg):

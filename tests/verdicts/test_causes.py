@@ -12,12 +12,22 @@ from arm_urdfs import joint
 from asked import question, verdict_of
 from random_arms import robot_of
 
-from feasibility import CauseKind, Search, Task, check
-from feasibility.collisions import Collision, Obstacle, ToolShape
-from feasibility.roadmap import arrays_of, work_for
+from coverable import (
+    CauseKind,
+    Collision,
+    Obstacle,
+    Search,
+    Task,
+    ToolShape,
+    check,
+    cylinder,
+    load_robot,
+    plane,
+    sphere,
+)
 from feasibility.roadmap.causes import diagnosis
-from robots import load_robot
-from surfaces import cylinder, plane, sphere
+from feasibility.roadmap.motions.arrays import arrays_of
+from feasibility.roadmap.motions.working_memory import work_for
 
 PUMA = load_robot("puma560", limits="set-1")
 UR5 = load_robot("ur5")

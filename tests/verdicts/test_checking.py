@@ -11,13 +11,22 @@ import pytest
 from asked import case_of, question, verdict_of
 from jobs import EndingClock
 
-from coverable_errors import ArgumentError
-from feasibility import Answer, Evidence, Search, Verdict, check, greedy_check, verify
-from feasibility.collisions import Collision
+from coverable import (
+    Answer,
+    Collision,
+    Evidence,
+    Search,
+    Verdict,
+    check,
+    greedy_check,
+    load_result,
+    save_result,
+    verify,
+)
+from coverable.errors import ArgumentError
 from feasibility.reports.verdict import as_json
-from feasibility.results import load_result, save_result
-from feasibility.roadmap import warm_up
 from feasibility.roadmap.exploration import BUDGET
+from feasibility.roadmap.warmup import warm_up
 
 FEW = ("paper 5d", "puma560 190", "ur5 12", "dome of halves", "beside a post")
 

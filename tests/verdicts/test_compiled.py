@@ -10,11 +10,9 @@ from typing import Any
 from numba.core import types
 
 import feasibility
-from coverable_kernels import CODE, ROOT
-from feasibility import Task, check
-from feasibility.roadmap import warm_up
-from robots import load_robot
-from surfaces import plane
+from coverable import Task, check, load_robot, plane
+from coverable.kernels import CODE, ROOT
+from feasibility.roadmap.warmup import warm_up
 
 
 def dispatchers() -> Iterator[tuple[str, Any]]:

@@ -6,8 +6,9 @@ import pytest
 from samples import sampled, seeds
 from search_kernels import assert_walked
 
-from feasibility.roadmap import Roadmap, covering_walk
-from surfaces import plane
+from coverable import plane
+from feasibility.roadmap.graph import Roadmap
+from feasibility.roadmap.walk import covering_walk
 
 
 def roadmap_of(graph, cells, cell_of=None, rng=None):

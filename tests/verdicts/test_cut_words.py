@@ -5,14 +5,15 @@ import pytest
 from asked import question
 from samples import sampled, seeds
 
+from coverable import load_robot, plane
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from feasibility.cut_words import lines, nowhere, place_of, sentence, what_opens
 from feasibility.problem import Problem
-from feasibility.roadmap import Exploration, arrays_of, explore
+from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.motions.arrays import arrays_of
 from feasibility.roadmap.outcome import unfinished_words
 from feasibility.roadmap.proving import Proving
-from robots import load_robot
-from surfaces import plane
+from feasibility.roadmap.search import explore
 
 PUMA = load_robot("puma560")
 CELLS = plane((0, 1), (0, 1)).cells(5, 5)

@@ -14,9 +14,8 @@ from plain import tools
 from random_cases import built, read
 from samples import sampled, spread
 
-from feasibility import Answer as Said
-from feasibility import Evidence
-from robots import load_robot
+from coverable import Answer as Said
+from coverable import Evidence, load_robot
 
 ARMS = ("puma560", "ur5", "panda", "kinova", "xarm7", "z1", "so101", "talos_left")
 

@@ -10,13 +10,10 @@ import tomli_w
 from asked import question, tables_of, verdict_of
 from samples import sampled, seeds, spread
 
-from feasibility import CauseKind, check
-from feasibility.cases import Case
-from feasibility.collisions import Obstacle
+from coverable import Case, CauseKind, Obstacle, Robot, check, load_robot
 from feasibility.verdict import Answer
-from robots import Robot, load_robot
 from robots.pinocchio_model import joint_axes
-from surfaces import rotation_from_rpy
+from surfaces.surface import rotation_from_rpy
 
 ALIKE = (
     ("4d as a cone", "paper 4d"),

@@ -14,12 +14,9 @@ from mesh_writers import stl
 from plain import tools
 from referee import Facets, evenly
 
-from feasibility import check, verify
-from feasibility.cases import Case
+from coverable import Case, check, load_result, mesh, verify
 from feasibility.cli.main import main
-from feasibility.results import load_result
-from surfaces import mesh
-from surfaces.meshes import smoothed
+from surfaces.meshes.smoothing import smoothed
 
 STANDOFF = 0.2
 TOML = """

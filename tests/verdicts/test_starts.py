@@ -7,12 +7,19 @@ import pinocchio as pin
 import pytest
 from asked import question, verdict_of
 
-from coverable_errors import ArgumentError
-from feasibility import Search, Task, check, verify
-from feasibility.collisions import Collision, Obstacle
-from feasibility.paths import coverage_path
-from robots import Kinematics, load_robot
-from surfaces import plane
+from coverable import (
+    Collision,
+    Obstacle,
+    Search,
+    Task,
+    check,
+    coverage_path,
+    load_robot,
+    plane,
+    verify,
+)
+from coverable.errors import ArgumentError
+from robots.kinematics import Kinematics
 
 UR5 = load_robot("ur5")
 CLEAR_BUT_FOR_HULLS = (

@@ -6,11 +6,8 @@ import pytest
 import referee
 from asked import question, verdict_of
 
-from feasibility import Task, verify
-from feasibility.division import divide
-from feasibility.paths import coverage_path
+from coverable import Task, coverage_path, divide, plane, verify
 from feasibility.roll import projected, roll_of
-from surfaces import plane
 
 
 def test_the_roll_is_the_angle_after_the_least_rotation_onto_the_approach():

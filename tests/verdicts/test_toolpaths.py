@@ -5,13 +5,19 @@ import dataclasses
 import numpy as np
 import pytest
 
-from feasibility import Task, check, verify
-from feasibility.certification import replay
-from feasibility.collisions import Collision
-from feasibility.paths import PathError, coverage_path
+from coverable import (
+    Collision,
+    PathError,
+    Task,
+    check,
+    coverage_path,
+    load_robot,
+    plane,
+    poses,
+    replay,
+    verify,
+)
 from feasibility.verdict import Answer
-from robots import load_robot
-from surfaces import plane, poses
 
 PATCH = plane((0.3, 0.7), (-0.2, 0.2), position=(0, 0, 0.3), side="outside").cells(6, 6)
 TASK = Task(standoff=0.02, cone_deg=10)

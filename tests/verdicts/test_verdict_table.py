@@ -28,8 +28,7 @@ from asked import (
 )
 from samples import sampled, seeds, spread
 
-from feasibility import Answer, CauseKind, Evidence, Search, check, verify
-from feasibility.certification import replay
+from coverable import Answer, CauseKind, Evidence, Search, check, replay, verify
 from feasibility.verdict import Walk
 
 TABLE = [name for name in names() if name not in names("dear walls")]

@@ -18,16 +18,24 @@ from random_arms import planar_arm
 from random_cases import built, draw, read
 from samples import sampled, spread
 
-from feasibility import Answer, Search, Task, check
-from feasibility.cases import load_case
-from feasibility.certification import replay, verify_proof
-from feasibility.certification.rates import replay_rates
+from coverable import (
+    Answer,
+    Search,
+    Task,
+    check,
+    cylinder,
+    divide,
+    load_case,
+    load_robot,
+    plane,
+    replay,
+    sphere,
+)
+from feasibility.certification.cut_proofs.proof_verification import verify_proof
+from feasibility.certification.rates.rate_replay import replay_rates
 from feasibility.cut_tree import Leaf
-from feasibility.division import divide
 from feasibility.division.reconfiguration import itinerary
 from feasibility.verdict import CauseKind, Walk
-from robots import load_robot
-from surfaces import cylinder, plane, sphere
 
 UR5 = load_robot("ur5")
 TASK = Task(0.01, cone_deg=30)

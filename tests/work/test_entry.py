@@ -7,15 +7,24 @@ import pytest
 from referee import evenly as dense
 from timed_motions import keeps_to_limits
 
-from feasibility import Task, check
-from feasibility.certification import collision_replay, replay
-from feasibility.collisions import Collision, Obstacle, gather
-from feasibility.entry import ends_of
-from feasibility.paths import PathError, coverage_path
-from feasibility.timing import motion_limits, trajectory
+from coverable import (
+    Collision,
+    Obstacle,
+    PathError,
+    Task,
+    check,
+    coverage_path,
+    load_robot,
+    motion_limits,
+    plane,
+    replay,
+    trajectory,
+)
+from feasibility.certification.collisions.collision_replay import collision_replay
+from feasibility.collisions.asked_bodies import gather
+from feasibility.entry.ends import ends_of
 from feasibility.verdict import Walk
-from robots import Kinematics, load_robot
-from surfaces import plane
+from robots.kinematics import Kinematics
 
 UR5 = load_robot("ur5")
 CELLS = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0, 0, 0.3)).cells(2, 2)

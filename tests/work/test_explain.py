@@ -18,12 +18,24 @@ from hypothesis import strategies as st
 from jobs import case_named, coverable
 from samples import EVERYTHING, sampled
 
-from feasibility import Answer, Evidence, Search, Task, check
-from feasibility.cases import Case, load_case
-from feasibility.certification import replay
-from feasibility.sensitivity import Kind, explain, last_true
-from robots import load_robot
-from surfaces import cylinder, plane, poses, sphere
+from coverable import (
+    Answer,
+    Case,
+    Evidence,
+    Search,
+    Task,
+    check,
+    cylinder,
+    explain,
+    load_case,
+    load_robot,
+    plane,
+    poses,
+    replay,
+    sphere,
+)
+from feasibility.sensitivity.probes import last_true
+from feasibility.sensitivity.quantities import Kind
 
 PUMA, UR5 = load_robot("puma560", limits="set-1"), load_robot("ur5")
 PLATE = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0.0, 0.0, 0.3))

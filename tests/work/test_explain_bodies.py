@@ -8,14 +8,22 @@ import pytest
 from asked import question
 from samples import EVERYTHING, sampled
 
-from feasibility import Answer, Search, Task, check
-from feasibility.cases import load_case
-from feasibility.certification import replay
-from feasibility.collisions import Collision, Obstacle, ToolShape
-from feasibility.sensitivity import Kind, explain
+from coverable import (
+    Answer,
+    Collision,
+    Obstacle,
+    Search,
+    Task,
+    ToolShape,
+    check,
+    explain,
+    load_case,
+    load_robot,
+    plane,
+    replay,
+)
+from feasibility.sensitivity.quantities import Kind
 from feasibility.verdict import Walk
-from robots import load_robot
-from surfaces import plane
 
 UR5 = load_robot("ur5")
 PLATE = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0.0, 0.0, 0.3))

@@ -10,13 +10,15 @@ import numpy as np
 import pytest
 from foreign_clearances import ForeignScene, samples
 
-from feasibility import Task, check
-from feasibility.certification import collision_replay
-from feasibility.collisions import Collision, Obstacle, ToolShape, collision_buffer, gather
-from feasibility.division import FreeSpace, Reconfiguration, clear_moves, divide, free_motion
-from feasibility.roadmap import arrays_of
-from robots import Kinematics, load_robot
-from surfaces import plane
+from coverable import Collision, Obstacle, Task, ToolShape, check, divide, load_robot, plane
+from feasibility.certification.collisions.collision_replay import collision_replay
+from feasibility.collisions.asked_bodies import gather
+from feasibility.collisions.kernels.memory import collision_buffer
+from feasibility.division.between_patches import clear_moves
+from feasibility.division.free_motion import FreeSpace, free_motion
+from feasibility.division.reconfiguration import Reconfiguration
+from feasibility.roadmap.motions.arrays import arrays_of
+from robots.kinematics import Kinematics
 
 UR5 = load_robot("ur5")
 POST = Obstacle.box("post", (0.1, 0.1, 1.2), position=(0.45, 0.0, 0.6))

@@ -6,14 +6,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from coverable_errors import CoverableError
-from feasibility import Task, check, verify
+from coverable import (
+    Collision,
+    Task,
+    check,
+    cylinder,
+    load_robot,
+    parallel_passes,
+    pass_toolpath,
+    plane,
+    poses,
+    verify,
+)
+from coverable.errors import CoverableError
 from feasibility.cli.main import main
-from feasibility.collisions import Collision
-from robots import load_robot
-from surfaces import cylinder, parallel_passes, pass_toolpath, plane, poses
-from surfaces.passes import pass_route
-from surfaces.toolpaths import PoseCells
+from surfaces.passes.toolpath import pass_route
+from surfaces.toolpaths.pose_cells import PoseCells
 
 UR5 = load_robot("ur5")
 PANEL = """

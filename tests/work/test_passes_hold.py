@@ -17,14 +17,25 @@ from referee import Facets, Form, angles_between, on_triangles
 from samples import EVERYTHING, sampled, seeds
 from scipy.spatial.transform import Rotation
 
-from feasibility import Task, verify
-from feasibility.paths import coverage_path
-from feasibility.runs import PlannedPasses, plan_passes
-from feasibility.timing import trajectory
-from robots import load_robot
-from surfaces import SurfaceError, cone, cylinder, hyperboloid, mesh, plane, sphere, torus
-from surfaces.meshes import TriangleMesh
-from surfaces.passes import parallel_passes
+from coverable import (
+    PlannedPasses,
+    SurfaceError,
+    Task,
+    cone,
+    coverage_path,
+    cylinder,
+    hyperboloid,
+    load_robot,
+    mesh,
+    parallel_passes,
+    plan_passes,
+    plane,
+    sphere,
+    torus,
+    trajectory,
+    verify,
+)
+from surfaces.meshes.triangle_mesh import TriangleMesh
 
 ARMS = {"ur5": 0.5, "ur10": 0.7, "panda": 0.5, "puma560": 0.6}  # and m, where the surfaces stand
 KINDS = ("plane", "cylinder", "sphere", "cone", "torus", "hyperboloid", "bumps", "bumps with hole")

@@ -12,17 +12,26 @@ from plain import faults_of
 from referee import evenly
 from samples import sampled, seeds, spread
 
-from feasibility import Answer, Task, check
-from feasibility.certification import replay
-from feasibility.paths import MotionGraph, PathError, coverage_path, unwound
+from coverable import (
+    Answer,
+    PathError,
+    Task,
+    check,
+    coverage_path,
+    cylinder,
+    load_robot,
+    plane,
+    replay,
+)
 from feasibility.paths.ladder import joint_route
 from feasibility.paths.metrics import revisiting
-from feasibility.paths.motion_graph import joint_length
+from feasibility.paths.motion_graph import MotionGraph, joint_length
 from feasibility.paths.order import ORDERS, closed_sides, grid_order
-from feasibility.roadmap import arrays_of, work_for
+from feasibility.paths.winding import unwound
+from feasibility.roadmap.motions.arrays import arrays_of
+from feasibility.roadmap.motions.working_memory import work_for
 from feasibility.verdict import Walk
-from robots import Kinematics, load_robot
-from surfaces import cylinder, plane
+from robots.kinematics import Kinematics
 
 ASKED = [
     *product(("4a", "4e", "5c", *PATCHES), ORDERS),

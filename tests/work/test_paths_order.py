@@ -9,7 +9,7 @@ from mesh_patches import sheet
 from path_cases import verdict_of
 from samples import sampled, seeds
 
-from feasibility.paths import PathError, coverage_path
+from coverable import PathError, coverage_path, cylinder, mesh, plane, sphere
 from feasibility.paths.order import (
     GRID_ORDERS,
     ORDERS,
@@ -20,8 +20,7 @@ from feasibility.paths.order import (
     step_lengths,
 )
 from feasibility.paths.two_opt import improved, tour_length
-from surfaces import cylinder, mesh, plane, sphere
-from surfaces.meshes import TriangleMesh
+from surfaces.meshes.triangle_mesh import TriangleMesh
 
 SHAPES = {(0, 3): [(False, False)], (1, 5): [(False, False)], (5, 1): [(False, False)],
           (4, 6): [(False, False)], (5, 4): [*product((True, False), repeat=2)][1:]}  # fmt: skip

@@ -19,26 +19,31 @@ from hypothesis import strategies as st
 from jobs import PLATE, coverable
 from samples import sampled, spread
 
-from feasibility import Answer, CauseKind, Evidence, Search, Task, check
-from feasibility.cases import Case
-from feasibility.collisions import Collision, Obstacle, ToolShape
-from feasibility.division import motion_over
-from feasibility.placement import (
-    AXES,
-    PlacementError,
+from coverable import (
+    Answer,
+    Case,
+    CauseKind,
+    Collision,
+    Evidence,
+    Obstacle,
     Pose,
     Region,
+    Search,
+    Task,
+    ToolShape,
+    check,
     evaluator_here,
-    evaluator_of_study,
-    moved_cells,
+    load_robot,
+    open_workers,
     place,
     placement_map,
+    plane,
 )
+from feasibility.division.one_motion import motion_over
 from feasibility.placement.reach_bound import Reach
-from feasibility.placement.trials import effort
-from feasibility.studies import open_workers
-from robots import load_robot
-from surfaces import plane, rotation_from_rpy
+from feasibility.placement.region import AXES, PlacementError, moved_cells
+from feasibility.placement.trials import effort, evaluator_of_study
+from surfaces.surface import rotation_from_rpy
 
 SHIFT, TURN_DEG = 0.3, 40.0  # [m], [deg] that a surface is moved by, at most
 WIDTHS = np.array([SHIFT] * 3 + [TURN_DEG] * 3)

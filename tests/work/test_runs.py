@@ -14,14 +14,21 @@ import numpy as np
 import pytest
 from samples import sampled, seeds
 
-from feasibility import Task, verify
-from feasibility.certification import replay
-from feasibility.certification.rates import replay_rates
+from coverable import (
+    Task,
+    load_robot,
+    parallel_passes,
+    pass_runs,
+    plan_passes,
+    plane,
+    poses,
+    replay,
+    verify,
+)
+from feasibility.certification.rates.rate_replay import replay_rates
 from feasibility.clock import Clock
-from feasibility.runs import Stations, fewest_runs, pass_runs, plan_passes
-from robots import load_robot
-from surfaces import plane, poses
-from surfaces.passes import PassPlaces, parallel_passes
+from feasibility.runs.fewest import Stations, fewest_runs
+from surfaces.passes.toolpath import PassPlaces
 
 # -- the fewest -----------------------------------------------------------------------------------
 

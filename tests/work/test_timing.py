@@ -13,17 +13,27 @@ from referee import evenly as dense
 from samples import EVERYTHING, sampled
 from timed_motions import interpolated, keeps_to_limits
 
-from feasibility import Task, check
-from feasibility.certification import collision_replay, replay
-from feasibility.collisions import Collision, Obstacle, gather
-from feasibility.paths import PathError, coverage_path
-from feasibility.timing import motion_limits, trajectory, used
+from coverable import (
+    Collision,
+    Obstacle,
+    PathError,
+    Task,
+    check,
+    coverage_path,
+    load_robot,
+    motion_limits,
+    plane,
+    replay,
+    trajectory,
+)
+from feasibility.certification.collisions.collision_replay import collision_replay
+from feasibility.collisions.asked_bodies import gather
 from feasibility.timing.fastest_speeds import Rows, fastest_speeds
+from feasibility.timing.limits_used import used
 from feasibility.timing.path_timing import within_limits
 from feasibility.timing.smoothing import control_points
 from feasibility.verdict import Walk
-from robots import Kinematics, load_robot
-from surfaces import plane
+from robots.kinematics import Kinematics
 
 UR5 = load_robot("ur5")
 POST = Obstacle.box("post", (0.1, 0.1, 0.6), position=(0.75, 0.0, 0.3))

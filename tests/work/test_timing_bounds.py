@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from timed_motions import UR5, at, interpolated
 
-from feasibility.timing import Trajectory, motion_limits, used
+from coverable import Trajectory, load_robot, motion_limits
 from feasibility.timing.between_samples import deviations
-from feasibility.timing.limits_used import held_inside, past_limits
-from robots import Kinematics, load_robot
+from feasibility.timing.limits_used import held_inside, past_limits, used
+from robots.kinematics import Kinematics
 
 MANY = 40  # places between two samples
 

@@ -12,15 +12,15 @@ from functools import lru_cache
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_errors import ArgumentError
+from coverable.arrays import Array
+from coverable.errors import ArgumentError
 from feasibility.certification.collisions.motion import ArmMotion
 from feasibility.certification.collisions.pairing import ROUNDING, Pairing
 from feasibility.certification.collisions.shapes import Body, body_of_soup
 from feasibility.certification.faults import Judged, MotionFault
-from feasibility.collisions import Bodies, Pair
+from feasibility.collisions.bodies import Bodies, Pair
 from feasibility.verdict import Certificate
-from robots import Robot
+from robots.robot import Robot
 
 TOUCHING = 5e-7  # [m] overlap that is called touching
 MEASURED = 8  # couples, with the lowest certified distances, of which coal measures the least

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from feasibility.certification.collisions.shapes import Body
-from robots.shapes import Triangles
+from robots.shapes.bodies import Triangles
 
 
 def one_inside_other(a: Body, b: Body, rotation: Array, point: Array) -> bool:

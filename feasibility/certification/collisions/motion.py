@@ -24,9 +24,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coverable_arrays import Array
-from coverable_errors import ArgumentError
-from robots import Kinematics, Robot
+from coverable.arrays import Array
+from coverable.errors import ArgumentError
+from robots.kinematics import Kinematics
+from robots.robot import Robot
 
 
 class Chords(NamedTuple):

@@ -13,12 +13,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from coverable_arrays import Array, Mask
+from coverable.arrays import Array, Mask
 from feasibility.certification.collisions.collision_replay import couples_of
 from feasibility.certification.collisions.motion import ArmMotion
 from feasibility.certification.collisions.pairing import Pairing
-from feasibility.collisions import Bodies
-from robots import Robot
+from feasibility.collisions.bodies import Bodies
+from robots.robot import Robot
 
 Names = tuple[str, str]
 

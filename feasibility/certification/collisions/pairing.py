@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.collisions.inside import one_inside_other
 from feasibility.certification.collisions.motion import ArmMotion
 from feasibility.certification.collisions.shapes import COAL, Body

@@ -13,11 +13,14 @@ from typing import Any
 import coal
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_errors import ArgumentError
-from feasibility.collisions import HalfSpace, Soup
-from robots.shapes import Triangles, coal_hull, coal_shape, is_convex, with_contacts
-from robots.urdf import Box, Capsule, Cylinder, Sphere
+from coverable.arrays import Array
+from coverable.errors import ArgumentError
+from feasibility.collisions.bodies import Soup
+from feasibility.collisions.shapes import HalfSpace
+from robots.shapes.bodies import Triangles
+from robots.shapes.coal_shapes import coal_hull, coal_shape, with_contacts
+from robots.shapes.hulls import is_convex
+from robots.urdf.geometry import Box, Capsule, Cylinder, Sphere
 
 COAL = 1e-7  # [m] more than coal's distances are off, which stops at GJK
 GJK = 1e-8  # [m]

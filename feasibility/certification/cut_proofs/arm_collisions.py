@@ -11,17 +11,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from feasibility.certification.cut_proofs.empty_region import Claim, Emptiness
 from feasibility.certification.cut_proofs.linear_models import Allowed, ArmModel, cell_parts
 from feasibility.certification.cut_proofs.refutation import Refuter
 from feasibility.certification.cut_proofs.region import JointRegion
 from feasibility.certification.lever_bounds import out_of_line
-from feasibility.certification.overlaps import Overlapping
-from feasibility.collisions import Bodies
+from feasibility.certification.overlaps.everywhere import Overlapping
+from feasibility.collisions.bodies import Bodies
 from feasibility.task import Task
-from robots import Robot
-from surfaces import Cells
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 
 class ArmCheck(NamedTuple):

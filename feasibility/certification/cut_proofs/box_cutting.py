@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
+from coverable.arrays import Array, Ints
 from feasibility.certification.cut_proofs.linear_models import Boxes, Models, Parts
 
 KEPT = 0.7  # share of a box's width, in its shortest joint, over which contraction is no progress

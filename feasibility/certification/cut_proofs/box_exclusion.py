@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_arrays import Array, Mask
+from coverable.arrays import Array, Mask
 from feasibility.certification.cut_proofs.linear_models import Models
 
 SWEEPS = 2  # of the coordinate descent

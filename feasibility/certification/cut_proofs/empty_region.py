@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.cut_proofs.box_cutting import smaller
 from feasibility.certification.cut_proofs.box_exclusion import (
     contract,
@@ -36,7 +36,7 @@ from feasibility.certification.cut_proofs.linear_models import (
 )
 from feasibility.certification.cut_proofs.refutation import Refuter
 from feasibility.certification.cut_proofs.region import JointRegion
-from feasibility.certification.overlaps import Overlapping
+from feasibility.certification.overlaps.everywhere import Overlapping
 
 BATCH = 2048  # boxes at a time
 FIRST_TRY = 300  # boxes after which a refutation is first tried

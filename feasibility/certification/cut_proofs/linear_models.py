@@ -22,22 +22,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
+from coverable.arrays import Array, Ints
 from feasibility.certification.jacobians import Jacobians, cross, jacobians, lengths
 from feasibility.certification.lever_bounds import lever_bounds, longest_levers
-from feasibility.certification.rolls import (
+from feasibility.certification.rolls.bounds import reference_axes
+from feasibility.certification.rolls.box_models import (
     Directions,
     TargetModel,
     ToolModel,
-    reference_axes,
     reference_parts,
     roll_models,
 )
 from feasibility.certification.rows import Rows
 from feasibility.roll import Roll
 from feasibility.task import Targets, Task
-from robots import Kinematics, Robot
-from surfaces import Cells, SurfaceParts
+from robots.kinematics import Kinematics
+from robots.robot import Robot
+from surfaces.cells import Cells
+from surfaces.parts import SurfaceParts
 
 TYPICAL = 0.2  # of the longest lever: what a difference of axes is weighed by; found by trying
 ANY_AXIS = 4.0  # a chord that two unit vectors never have

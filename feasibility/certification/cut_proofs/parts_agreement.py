@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
-from surfaces import Cells, SurfaceParts
-from surfaces.places import offset_surface
+from coverable.arrays import Array, Ints, Mask
+from surfaces.cells import Cells
+from surfaces.parts import SurfaceParts
+from surfaces.places.offset_surfaces import offset_surface
 
 SAMPLES = 300
 AT_ONCE = 60  # curves between poses that are looked at

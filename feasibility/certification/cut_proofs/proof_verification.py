@@ -40,13 +40,16 @@ from feasibility.certification.cut_proofs.refutation import Refuter
 from feasibility.certification.cut_proofs.region import TURN, JointRegion
 from feasibility.certification.cut_proofs.tree_shape import malformed
 from feasibility.certification.lever_bounds import out_of_line, stretched_length
-from feasibility.certification.overlaps import Overlapping, PoseCheck, never_clear
-from feasibility.collisions import gather
+from feasibility.certification.overlaps.every_pose import PoseCheck, never_clear
+from feasibility.certification.overlaps.everywhere import Overlapping
+from feasibility.collisions.asked_bodies import gather
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from feasibility.cut_words import joint_value
 from feasibility.task import Task
-from robots import Robot
-from surfaces import Cells, SurfaceError, SurfaceParts
+from robots.robot import Robot
+from surfaces.cells import Cells
+from surfaces.parts import SurfaceParts
+from surfaces.surface import SurfaceError
 
 MOST_BOXES = 2_000_000
 WITHOUT_BODIES = 20_000  # boxes after which it is looked into whether bodies overlap

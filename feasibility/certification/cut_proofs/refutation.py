@@ -10,15 +10,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.cells_reached import at_targets
 from feasibility.certification.cut_proofs.linear_models import derivatives
 from feasibility.certification.cut_proofs.region import JointRegion
 from feasibility.certification.stretches import Judge, Samples
 from feasibility.task import Task
-from robots import Kinematics, Robot
-from surfaces import Cells
-from surfaces.places import offset_surface
+from robots.kinematics import Kinematics
+from robots.robot import Robot
+from surfaces.cells import Cells
+from surfaces.places.offset_surfaces import offset_surface
 
 STEPS = 15  # of Newton's method
 LONGEST = 0.7  # [rad], [m] of a joint in one step

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable_arrays import Array, Mask
+from coverable.arrays import Array, Mask
 
 TURN = 2.0 * np.pi
 

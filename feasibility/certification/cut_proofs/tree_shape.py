@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from coverable_errors import is_number, is_whole, shown
+from coverable.errors import is_number, is_whole, shown
 from feasibility.cut_tree import Cut, CutTree, Leaf
-from robots import Robot
+from robots.robot import Robot
 
 MOST_NODES = 10_000
 MOST_CUTS_DEEP = 1_000

@@ -12,11 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from feasibility.certification.collisions.inside import winding
-from feasibility.collisions import HalfSpace
-from robots.shapes import Triangles, rims
-from robots.urdf import Box, Capsule, Cylinder, Sphere
+from feasibility.collisions.shapes import HalfSpace
+from robots.shapes.bodies import Triangles
+from robots.shapes.hulls import rims
+from robots.urdf.geometry import Box, Capsule, Cylinder, Sphere
 
 ALONG, ACROSS = 9, 5  # points along the longest side of a body, and along the others
 AROUND = 24  # points on each rim of a cylinder

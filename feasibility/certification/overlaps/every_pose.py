@@ -20,10 +20,10 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from coverable_arrays import Array, Mask
+from coverable.arrays import Array, Mask
 from feasibility.certification.overlaps.tool_pairs import ToolPair, tool_pairs
-from feasibility.collisions import Bodies
-from robots import Robot
+from feasibility.collisions.bodies import Bodies
+from robots.robot import Robot
 
 MOST_BOXES = 100_000
 BATCH = 512  # boxes at a time

@@ -20,13 +20,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
+from coverable.arrays import Array, Ints
 from feasibility.certification.collisions.collision_replay import collision_replay
 from feasibility.certification.overlaps.depths import Balls, depths, points_inside
 from feasibility.certification.rows import Rows
-from feasibility.collisions import Bodies
-from robots import Kinematics, Robot
-from robots.shapes import Triangles
+from feasibility.collisions.bodies import Bodies
+from robots.kinematics import Kinematics
+from robots.robot import Robot
+from robots.shapes.bodies import Triangles
 
 GUARD = 1e-7  # [m] that an overlap has to be larger by
 

@@ -12,11 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from feasibility.certification.overlaps.depths import Balls, depths, points_inside
-from feasibility.collisions import Bodies, Obstacle, Pair
-from robots import Robot
-from robots.shapes import Solid, Triangles
+from feasibility.collisions.bodies import Bodies, Pair
+from feasibility.collisions.scene import Obstacle
+from robots.robot import Robot
+from robots.shapes.bodies import Solid, Triangles
 
 GUARD = 1e-7  # [m] that an overlap has to be larger by
 FINEST = 40  # parts of the tool's reach that triangles of a sheet are cut to

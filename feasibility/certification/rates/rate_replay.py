@@ -22,8 +22,8 @@ from typing import Literal
 import numpy as np
 from scipy.spatial import cKDTree
 
-from coverable_arrays import Array, Ints, Mask
-from coverable_errors import ArgumentError, Fault
+from coverable.arrays import Array, Ints, Mask
+from coverable.errors import ArgumentError, Fault
 from feasibility.certification.jacobians import Jacobians, jacobians, placements
 from feasibility.certification.lever_bounds import second_derivatives
 from feasibility.certification.rates.segment_rates import (
@@ -34,8 +34,9 @@ from feasibility.certification.rates.segment_rates import (
 )
 from feasibility.task import Task
 from feasibility.verdict import Walk
-from robots import Kinematics, Robot
-from surfaces import Cells
+from robots.kinematics import Kinematics
+from robots.robot import Robot
+from surfaces.cells import Cells
 
 IN_PLACE = 0.1  # [1] share of the tolerance within which the tool point begins and ends in place
 CORNER_DEG = 30.0  # [deg] by which the tool's path turns at a corner

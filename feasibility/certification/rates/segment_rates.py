@@ -26,7 +26,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.jacobians import Jacobians, jacobians
 from feasibility.certification.lever_bounds import (
     column_changes,
@@ -35,7 +35,8 @@ from feasibility.certification.lever_bounds import (
     second_derivative_bound,
 )
 from feasibility.certification.rows import Rows
-from robots import Kinematics, Robot
+from robots.kinematics import Kinematics
+from robots.robot import Robot
 
 LOOSE = 0.005  # [1] share by which a bound may be below an exact value, before it is good enough
 LEVELS = 14  # halvings of a segment

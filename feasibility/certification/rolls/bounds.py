@@ -23,11 +23,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Mask
+from coverable.arrays import Array, Mask
 from feasibility.certification.jacobians import cross, lengths
 from feasibility.certification.lever_bounds import peaks, second_derivatives
 from feasibility.roll import Roll
-from robots import Kinematics, Robot
+from robots.kinematics import Kinematics
+from robots.robot import Robot
 
 ROUNDS = 24  # halvings of the angle that is looked for
 CLOSE_TO_ZERO = 1e-9  # [1], [rad]: u directions are known by differences to about this

@@ -28,9 +28,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from feasibility.roll import Roll, projected
-from surfaces.places import second_derivative_of_unit
+from surfaces.places.places import second_derivative_of_unit
 
 ROUNDING = 1e-9  # [1], and of u directions, which are differences
 NEVER = 4.0  # [1] of |F - 1|, which says nothing

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from feasibility.certification.rolls.bounds import (
     ROOT,
     largest_off,
@@ -27,8 +27,8 @@ from feasibility.certification.rolls.bounds import (
 from feasibility.certification.rolls.box_models import Directions, reference_parts
 from feasibility.roll import Roll, projected
 from feasibility.task import Task
-from surfaces import Cells
-from surfaces.places import OffsetSurface, PlacePaths, Places
+from surfaces.cells import Cells
+from surfaces.places.places import OffsetSurface, PlacePaths, Places
 
 FIRST, LAST = 0, 2  # pieces of a path; in the middle one the place changes sides, on the spot
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
+from coverable.arrays import Array, Ints
 from feasibility.collisions.kernels import tables as T
 
 Whole = Ints

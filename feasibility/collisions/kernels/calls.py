@@ -18,7 +18,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from coverable_kernels import entry
+from coverable.kernels import entry
 
 SEGMENT, PUSH, MEASURE = np.int64(0), np.int64(1), np.int64(2)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_kernels import entry
+from coverable.kernels import entry
 from feasibility.collisions.kernels import tables as T
 from feasibility.collisions.kernels.calls import PUSH, SEGMENT, call
 from feasibility.collisions.kernels.tables import row

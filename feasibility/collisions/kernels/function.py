@@ -9,8 +9,8 @@ import numpy as np
 from numba import types
 from numba.core import event
 
-from coverable_arrays import Array
-from coverable_kernels import callback, kernel
+from coverable.arrays import Array
+from coverable.kernels import callback, kernel
 from feasibility.collisions.kernels.calls import MEASURE, PUSH
 from feasibility.collisions.kernels.measuring import measure
 from feasibility.collisions.kernels.push import push

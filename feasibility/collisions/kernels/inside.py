@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_kernels import kernel
+from coverable.kernels import kernel
 from feasibility.collisions.kernels import tables as T
 
 # The ray's direction: no simple fractions, so that no edge of a drawn shape is met but by chance.

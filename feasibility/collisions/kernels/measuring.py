@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_kernels import kernel
+from coverable.kernels import kernel
 from feasibility.collisions.kernels import tables as T
 from feasibility.collisions.kernels.distances import of_item
 from feasibility.collisions.kernels.segments import slot_of_start

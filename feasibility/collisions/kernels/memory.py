@@ -8,14 +8,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array
-from feasibility.collisions import Bodies
+from coverable.arrays import Array
+from feasibility.collisions.bodies import Bodies
 from feasibility.collisions.kernels import tables as T
 from feasibility.collisions.kernels.calls import MEASURE, call
 from feasibility.collisions.kernels.function import with_address
 from feasibility.collisions.kernels.packing import packed
 from feasibility.collisions.kernels.tables import views
-from robots import Robot
+from robots.robot import Robot
 
 
 def collision_buffer(bodies: Bodies, robot: Robot) -> Array:

@@ -7,13 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from feasibility.collisions import Bodies, Soup
+from feasibility.collisions.bodies import Bodies, Soup
 from feasibility.collisions.kernels import tables as T
 from feasibility.collisions.kernels.box_tree import BoxTree, box_tree, moved
 from feasibility.collisions.kernels.tables import Array, Tables, flat, views
 from feasibility.collisions.words import SURFACE
-from robots import Robot, joint_alignments
-from robots.shapes import Polytope
+from robots.chain import joint_alignments
+from robots.robot import Robot
+from robots.shapes.bodies import Polytope
 
 KEPT = 16  # problems, and trees, that are remembered: a search is often run again
 INFLUENCE = 0.05  # m beyond its clearance: nearer pairs push

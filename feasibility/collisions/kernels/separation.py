@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_kernels import kernel
+from coverable.kernels import kernel
 from feasibility.collisions.kernels import tables as T
 from feasibility.collisions.kernels.simplex import WEIGHT, WIDTH, reduce
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_kernels import kernel
+from coverable.kernels import kernel
 from feasibility.collisions.kernels.tables import SIMPLEX
 
 WEIGHT = 6

@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_kernels import kernel
+from coverable.arrays import Array
+from coverable.kernels import kernel
 
 ADDRESS = 0  # the number that holds the function's address
 HEADER = 64  # numbers ahead of the first table: three for each table, from number 1 on

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_kernels import kernel
+from coverable.kernels import kernel
 from feasibility.collisions.kernels import tables as T
 from feasibility.collisions.kernels.link_frames import pose_of, transformed
 from feasibility.collisions.kernels.separation import BEST, POINTS, TOUCHING, UPPER, support

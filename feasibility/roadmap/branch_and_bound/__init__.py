@@ -1,5 +1,1 @@
 """Branch and bound over joint boxes: what proofs that the arm cannot do something are made of."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

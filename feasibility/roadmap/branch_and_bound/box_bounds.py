@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_kernels import allocating, kernel
+from coverable.kernels import allocating, kernel
 
 
 @kernel

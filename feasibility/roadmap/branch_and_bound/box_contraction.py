@@ -27,7 +27,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_kernels import kernel
+from coverable.kernels import kernel
 from feasibility.roadmap.branch_and_bound.box_bounds import contract_to_ball, reach_of_box
 from feasibility.roadmap.branch_and_bound.roll_bounds import (
     contract_roll,
@@ -38,8 +38,8 @@ from feasibility.roadmap.branch_and_bound.roll_bounds import (
     rolls_over,
     unturned,
 )
-from feasibility.roadmap.motions import NEXT, place
-from robots import jacobians
+from feasibility.roadmap.motions.working_memory import NEXT, place
+from robots.chain import jacobians
 
 THINNEST = 1e-6  # [rad], [m]: boxes are not halved further
 ROUNDING = 1e-10  # [m], [1], [rad]: more than the error of double arithmetic in a cut

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
-from feasibility.roadmap.motions import SearchArrays
+from coverable.arrays import Array, Ints
+from feasibility.roadmap.motions.arrays import SearchArrays
 
 STACK = 512  # most boxes on the stack; depth first, so their number grows with the depth only
 

@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_kernels import allocating_entry, kernel
+from coverable.arrays import Array
+from coverable.kernels import allocating_entry, kernel
 from feasibility.roadmap.branch_and_bound.box_bounds import static_levers
 from feasibility.roadmap.branch_and_bound.box_contraction import THINNEST, shrink
 from feasibility.roadmap.branch_and_bound.boxes import (
@@ -25,7 +25,8 @@ from feasibility.roadmap.branch_and_bound.boxes import (
     place_at_rest,
 )
 from feasibility.roadmap.branch_and_bound.ruling import Ruling
-from feasibility.roadmap.motions import SearchArrays, Work, put
+from feasibility.roadmap.motions.arrays import SearchArrays
+from feasibility.roadmap.motions.working_memory import Work, put
 
 DIRECTIONS = np.array(
     [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1], [1, 1, -1], [1, -1, 1], [-1, 1, 1]], dtype=float

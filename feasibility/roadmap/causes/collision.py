@@ -7,12 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from coverable_arrays import Array
-from feasibility.certification import ArmCheck
-from feasibility.collisions import Pair, configuration_bounds
-from feasibility.roadmap.branch_and_bound import Ruling
+from coverable.arrays import Array
+from feasibility.certification.cut_proofs.arm_collisions import ArmCheck
+from feasibility.collisions.bodies import Pair
+from feasibility.collisions.kernels.memory import configuration_bounds
+from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.motions import PROJECTION_STEPS, project_near_cell
+from feasibility.roadmap.motions.off_target import project_near_cell
+from feasibility.roadmap.motions.projection import PROJECTION_STEPS
 from feasibility.roadmap.moving_clear import moved_clear
 from feasibility.verdict import Cause, CauseKind
 

@@ -20,29 +20,26 @@ from dataclasses import replace
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_kernels import allocating_entry
-from feasibility.collisions import Pair
+from coverable.arrays import Array
+from coverable.kernels import allocating_entry
+from feasibility.collisions.bodies import Pair
 from feasibility.cone import angle_of
 from feasibility.cut_tree import CutTree
-from feasibility.roadmap.branch_and_bound import Ruling
+from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.causes.collision import colliding, proved_collision
 from feasibility.roadmap.causes.disconnection import disconnected
 from feasibility.roadmap.causes.relaxed import STARTS, other_rolls, solutions, with_cone
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.motions import (
-    NEXT,
-    SearchArrays,
-    cholesky_solve,
-    connect,
-    look_at,
-    place,
-    put,
-    with_free_roll,
-)
+from feasibility.roadmap.motions.aiming import look_at
+from feasibility.roadmap.motions.arrays import SearchArrays, with_free_roll
+from feasibility.roadmap.motions.linear_steps import cholesky_solve
+from feasibility.roadmap.motions.self_motion import connect
+from feasibility.roadmap.motions.working_memory import NEXT, place, put
 from feasibility.roadmap.search import evenly
 from feasibility.verdict import Cause, CauseKind
-from robots import Kinematics, Robot, jacobians
+from robots.chain import jacobians
+from robots.kinematics import Kinematics
+from robots.robot import Robot
 
 MOST_EXAMINED = 400  # cells that are diagnosed one by one
 ENOUGH = 5  # solutions among which the least violation is taken

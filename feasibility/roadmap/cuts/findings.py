@@ -12,22 +12,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Mask
-from coverable_kernels import entry
-from feasibility.roadmap.branch_and_bound import Places, place_at_rest, unturned
+from coverable.arrays import Array, Mask
+from coverable.kernels import entry
+from feasibility.roadmap.branch_and_bound.boxes import place_at_rest
+from feasibility.roadmap.branch_and_bound.branching import Places
+from feasibility.roadmap.branch_and_bound.roll_bounds import unturned
 from feasibility.roadmap.cuts.regions import Region, folded
 from feasibility.roadmap.cuts.statements import Statement
-from feasibility.roadmap.motions import (
-    NEXT,
-    PROJECTION_SLACK,
-    SearchArrays,
-    Work,
-    place,
-    project,
-    stand_still,
-    with_free_roll,
-    work_for,
-)
+from feasibility.roadmap.motions.aiming import stand_still
+from feasibility.roadmap.motions.arrays import SearchArrays, with_free_roll
+from feasibility.roadmap.motions.projection import PROJECTION_SLACK, project
+from feasibility.roadmap.motions.working_memory import NEXT, Work, place, work_for
 from robots.chain import tool
 
 SAMPLES = 100  # Newton tries onto the motion set, each attempt

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Mask
+from coverable.arrays import Array, Mask
 from feasibility.roadmap.cuts.regions import TURN
 from feasibility.roadmap.graph import Roadmap
 

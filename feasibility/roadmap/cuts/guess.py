@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Mask
+from coverable.arrays import Array, Mask
 from feasibility.cut_tree import Cut, Leaf
-from feasibility.roadmap.branch_and_bound import Ruling
+from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.cuts.findings import Findings, ProvedCut, ProvedLeaf
 from feasibility.roadmap.cuts.gaps import Component, JointGap, gaps
 from feasibility.roadmap.cuts.regions import Region

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_arrays import Array, unit_along
-from feasibility.roadmap.branch_and_bound import Places, toward_middle
-from feasibility.targets import target_parts
+from coverable.arrays import Array, unit_along
+from feasibility.roadmap.branch_and_bound.boxes import toward_middle
+from feasibility.roadmap.branch_and_bound.branching import Places
+from feasibility.targets.parts import target_parts
 from feasibility.task import Task
-from surfaces import Surface, SurfaceParts
+from surfaces.parts import SurfaceParts
+from surfaces.surface import Surface
 
 FLAT = 0.5  # [1] of the tolerance: largest radius of target points on the finest parts
 STRAIGHT = 0.1  # [1] of the cone chord: the same of approach directions

@@ -12,15 +12,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from feasibility.cut_tree import Cut, CutTree, Leaf
-from feasibility.roadmap.branch_and_bound import Places
+from feasibility.roadmap.branch_and_bound.branching import Places
 from feasibility.roadmap.cuts.findings import Findings
 from feasibility.roadmap.cuts.gaps import Component, openings
 from feasibility.roadmap.cuts.guess import Guessing, OpenGap, first_proved
 from feasibility.roadmap.cuts.regions import Region, folded, limits_of, turn_from, wide_joints
 from feasibility.roadmap.cuts.statements import Budget
-from feasibility.roadmap.motions import SearchArrays
+from feasibility.roadmap.motions.arrays import SearchArrays
 
 MOST_SEEDS = 12  # handed back by an attempt
 

@@ -10,10 +10,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from coverable_arrays import Array
-from feasibility.roadmap.branch_and_bound import Boxes, Places, Ruling, examine
+from coverable.arrays import Array
+from feasibility.roadmap.branch_and_bound.branching import Boxes, Places, examine
+from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.cuts.regions import Region
-from feasibility.roadmap.motions import SearchArrays, Work
+from feasibility.roadmap.motions.arrays import SearchArrays
+from feasibility.roadmap.motions.working_memory import Work
 
 BATCH = 4000  # boxes between two ticks
 LEAST = 500  # boxes of a statement before it is compared with others

@@ -17,12 +17,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Mask
+from coverable.arrays import Array, Mask
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import Roadmap
 from feasibility.roadmap.walk import route_walk
 from feasibility.verdict import Cause, CauseKind, Walk
-from robots import Kinematics, Robot
+from robots.kinematics import Kinematics
+from robots.robot import Robot
 
 CHANGE_COST = 1e6  # [waypoints] that a change of posture in place counts as
 IDLE_ROUNDS = 8  # rounds without gain after which no run is found

@@ -1,5 +1,1 @@
 """Certified motions of the tool over the surface: what the search is made of."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_kernels import entry, kernel
+from coverable.kernels import entry, kernel
 from feasibility.roadmap.motions.arrays import NEAR_COST
 from feasibility.roadmap.motions.roll import frame_rates, level
 

@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coverable_arrays import Array, Ints, Mask
-from feasibility import collisions
-from feasibility.targets import target_curves
+from coverable.arrays import Array, Ints, Mask
+from feasibility.targets.curves import target_curves
 from feasibility.task import Task
-from robots import Chain, Robot
-from surfaces import Cells, Surface
+from robots.chain import Chain
+from robots.robot import Robot
+from surfaces.cells import Cells
+from surfaces.surface import Surface
 
 if TYPE_CHECKING:
-    from feasibility.targets import FrameCurves
+    from feasibility.targets.frames import FrameCurves
 
 NEWTON = 0.02  # [1] share of the tolerance that the Newton iteration leaves at a waypoint
 # [1] share of the cone chord, and of the roll's half range, that this may cost, by how the
@@ -186,8 +187,11 @@ def _frames(curves: FrameCurves | None, tilts: Array, cone_chord: float) -> _Fra
 
 def collisions_of(robot: Robot, surface: Surface, task: Task) -> Array:
     """Bodies and pairs as the compiled search reads them; empty where they are not checked."""
-    bodies = collisions.gather(robot, surface, task.collision, task.standoff)
-    return np.zeros(0) if bodies is None else collisions.collision_buffer(bodies, robot)
+    from feasibility.collisions.asked_bodies import gather
+    from feasibility.collisions.kernels.memory import collision_buffer
+
+    bodies = gather(robot, surface, task.collision, task.standoff)
+    return np.zeros(0) if bodies is None else collision_buffer(bodies, robot)
 
 
 def with_free_roll(arrays: SearchArrays) -> SearchArrays:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_kernels import entry, kernel
+from coverable.kernels import entry, kernel
 from feasibility.roadmap.motions.linear_steps import least_step
 from feasibility.roadmap.motions.projection import (
     POINT,

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_kernels import entry, kernel
+from coverable.kernels import entry, kernel
 from feasibility.roadmap.motions.aiming import look_at
 from feasibility.roadmap.motions.arrays import CONE, LIMIT, ROLL, SINGULAR
 from feasibility.roadmap.motions.linear_steps import least_step
 from feasibility.roadmap.motions.roll import roll_gradient
 from feasibility.roadmap.motions.working_memory import HERE, NEXT, OF_CONE, OF_ROLL, place
-from robots import jacobians
+from robots.chain import jacobians
 
 COMFORT = 0.7  # [1] share of cone chord, and of the roll's range, that a step keeps to if it can
 LARGEST_STEP = 0.35  # [rad] or [m], largest change of one joint in one Newton step

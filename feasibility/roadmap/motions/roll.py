@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_kernels import kernel
+from coverable.kernels import kernel
 
 TURN = 2.0 * np.pi
 

@@ -48,8 +48,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_kernels import kernel
-from feasibility.collisions import blamed, segment_clear
+from coverable.kernels import kernel
+from feasibility.collisions.kernels.clearance import blamed, segment_clear
 from feasibility.roadmap.motions.arrays import COLLISION, CONE, ROLL
 from feasibility.roadmap.motions.roll import TURN
 from feasibility.roadmap.motions.working_memory import HERE, NEXT, cone_used, roll_lost

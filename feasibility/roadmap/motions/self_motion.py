@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_kernels import entry, kernel
-from feasibility.collisions import clearance_gradient
+from coverable.arrays import Array
+from coverable.kernels import entry, kernel
+from feasibility.collisions.kernels.clearance import clearance_gradient
 from feasibility.roadmap.motions.aiming import look_at
 from feasibility.roadmap.motions.arrays import SearchArrays
 from feasibility.roadmap.motions.off_target import STEPS_FROM_NEAR, project_off_target

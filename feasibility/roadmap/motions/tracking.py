@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_kernels import entry, kernel
+from coverable.arrays import Array
+from coverable.kernels import entry, kernel
 from feasibility.roadmap.motions.aiming import aim, bounds_between
 from feasibility.roadmap.motions.arrays import FOLD, LONG, SINGULAR, STOPPED, SearchArrays
 from feasibility.roadmap.motions.off_target import STEPS_FROM_NEAR, project_off_target

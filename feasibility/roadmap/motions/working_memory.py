@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
-from coverable_kernels import entry, kernel
+from coverable.arrays import Array, Ints, Mask
+from coverable.kernels import entry, kernel
 from feasibility.roadmap.motions.roll import roll_off_middle
-from robots import frames
+from robots.chain import frames
 
 HERE, NEXT = np.int64(0), np.int64(1)  # slots of `Work`: where the arm is, where it tries to go
 OF_CONE, OF_ROLL = np.int64(0), np.int64(1)  # rows of `Work.gradients`

@@ -10,7 +10,7 @@ from feasibility.verdict import Verdict
 from feasibility.viewer.cell_meshes import cell_size, marks
 from feasibility.viewer.scene import Layer, hidden, lines_layer, mesh_layer
 from feasibility.viewer.threejs import Colour
-from robots import Kinematics
+from robots.kinematics import Kinematics
 
 BANDS: tuple[tuple[float, Colour], ...] = (
     (1.5, (0.84, 0.12, 0.12)),

@@ -7,14 +7,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Ints
-from feasibility.treated import TreatedArea
+from coverable.arrays import Ints
+from feasibility.treated.area import TreatedArea
 from feasibility.viewer import threejs
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.playback import Playback
 from feasibility.viewer.scene import SURFACE, Layer, mesh_layer
 from feasibility.viewer.threejs import Colour, Command
-from surfaces.passes import WorkingMesh
+from surfaces.passes.triangles import WorkingMesh
 
 UNTREATED: Colour = (0.84, 0.12, 0.12)
 TIMES: tuple[tuple[str, Colour], ...] = (  # a sequence that colour-blind readers can tell apart

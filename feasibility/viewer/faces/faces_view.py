@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.linalg import norm
 
-from coverable_arrays import Array, Ints
-from coverable_errors import counted
+from coverable.arrays import Array, Ints
+from coverable.errors import counted
 from feasibility.viewer import threejs
-from feasibility.viewer.frames import triad
+from feasibility.viewer.frames.triads import triad
 from feasibility.viewer.html_page import Entry, Legend, page
 from feasibility.viewer.meshes import GREY, tubes
-from feasibility.viewer.passes import digit_lines
+from feasibility.viewer.passes.digits import digit_lines
 from feasibility.viewer.scene import OUTLINES
 from feasibility.viewer.stage import framing
-from surfaces import StepFace, StepParts
+from surfaces.step_files.step_surface import StepFace, StepParts
 
 MOST_LINES = 40  # of the legend, the largest faces
 TALL, SMALLEST, LARGEST = 0.5, 0.03, 0.1  # [1] a digit, of a face's width; of the whole part

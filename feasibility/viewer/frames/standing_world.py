@@ -14,10 +14,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from feasibility.viewer import threejs
 from feasibility.viewer.html_page import Entry
-from robots import Kinematics, Robot
+from robots.kinematics import Kinematics
+from robots.robot import Robot
 
 GROUP = "/with the surface"
 

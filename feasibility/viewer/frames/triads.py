@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from feasibility.viewer import threejs
 from feasibility.viewer.meshes import tubes
 from feasibility.viewer.robot import SKELETON, joint_paths
-from robots import Robot
-from robots.shapes import tool_line
+from robots.robot import Robot
+from robots.shapes.tool import tool_line
 
 AXES = ((0.85, 0.1, 0.1), (0.1, 0.65, 0.1), (0.1, 0.2, 0.9))
 THIN = 0.003  # [1] of the reach: radius of the line from flange to TCP

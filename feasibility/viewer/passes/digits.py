@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 
 WIDTH = 0.5  # [1] of the height
 GAP = 0.25  # [1] of the height, between digits

@@ -11,21 +11,24 @@ from typing import Any
 
 import numpy as np
 
-from coverable_arrays import Array
-from coverable_errors import counted
-from feasibility.paths import CoveragePath
-from feasibility.runs import PlannedPasses
-from feasibility.timing import MotionLimits, Trajectory
-from feasibility.treated import TreatedArea, share_words
+from coverable.arrays import Array
+from coverable.errors import counted
+from feasibility.paths.coverage import CoveragePath
+from feasibility.runs.planning import PlannedPasses
+from feasibility.timing.sampled_trajectory import Trajectory
+from feasibility.timing.speed_limits import MotionLimits
+from feasibility.treated.area import TreatedArea
+from feasibility.treated.words import share_words
 from feasibility.viewer import robot as robot_visuals
-from feasibility.viewer.areas import painted_layers, surface_layer
+from feasibility.viewer.areas.treated import painted_layers, surface_layer
 from feasibility.viewer.passes.digits import GAP, WIDTH, digit_lines
 from feasibility.viewer.path_and_division import painting, trail_pieces
 from feasibility.viewer.playback import Playback, paced, timed
 from feasibility.viewer.scene import MISSED, OUTLINES, PATCHES, Layer, drawn_lines
 from feasibility.viewer.viewer import View, compose, titled
-from robots import Robot
-from surfaces.passes import Pass, working_mesh
+from robots.robot import Robot
+from surfaces.passes.stretches import Pass
+from surfaces.passes.triangulation import working_mesh
 
 THIN = 0.03  # [1] of the distance between passes: radius of their lines
 TALL = 0.5  # [1] of it: height of their numbers

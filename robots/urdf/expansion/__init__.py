@@ -1,5 +1,1 @@
 """xacro files into the URDF that they stand for, in a process of its own."""
-
-from lazy_loader import attach_stub
-
-__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -13,9 +13,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from coverable_errors import Fault
-from coverable_files import Remembered
-from coverable_processes import Limits, folder_of, run_apart
+from coverable.errors import Fault
+from coverable.files import Remembered
+from coverable.processes import Limits, folder_of, run_apart
 from robots.urdf.mesh_folders import MeshFolders
 from robots.urdf.packages import seen_words
 from robots.urdf.xml import MAX_BYTES, UrdfError, read_bytes

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask, Protected
-from coverable_kernels import allocating, allocating_entry
+from coverable.arrays import Array, Ints, Mask, Protected
+from coverable.kernels import allocating, allocating_entry
 from surfaces.adjacency import Neighbours
 from surfaces.meshes.closest_point import on_triangle
 from surfaces.meshes.triangle_mesh import edge_partners, sum_by

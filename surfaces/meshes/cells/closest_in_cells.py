@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable_kernels import allocating, allocating_entry, kernel
+from coverable.kernels import allocating, allocating_entry, kernel
 from surfaces.meshes.closest_point import on_triangle
 from surfaces.meshes.face_tree import nearest_face
 

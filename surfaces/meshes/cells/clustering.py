@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
-from coverable_errors import LARGEST, LARGEST_WHOLE, SMALLEST, Fault, is_whole, real, shown
+from coverable.arrays import Array, Ints
+from coverable.errors import LARGEST, LARGEST_WHOLE, SMALLEST, Fault, is_whole, real, shown
 from surfaces.adjacency import components
 from surfaces.meshes.cells.subdivision import Subdivision, subdivide
 from surfaces.meshes.cells.voronoi import far_seeds, flood, recentre, smooth, units, whole_steps

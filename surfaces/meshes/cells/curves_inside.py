@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
-from coverable_arrays import Array, Ints
+from coverable.arrays import Array, Ints
 from surfaces.cells import Cells
 from surfaces.curve_fitting import PIECES, CurveFit, fit_between_centres
 from surfaces.meshes.mesh_surface import MeshSurface

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask, Protected
+from coverable.arrays import Array, Ints, Mask, Protected
 from surfaces.adjacency import Neighbours
 from surfaces.meshes.cells.borders import (
     LabelledFaces,

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
+from coverable.arrays import Array, Ints
 from surfaces.cell_curves import PLACES, slopes_of
 from surfaces.cells import Cells
 from surfaces.curve_fitting import BLOCK, PIECES, CurveFit, fit_between_centres, fit_cubics

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
-from coverable_kernels import allocating, allocating_entry
+from coverable.arrays import Array, Ints, Mask
+from coverable.kernels import allocating, allocating_entry
 from surfaces.meshes.triangle_mesh import areas_of, half_edge_ends, half_edges
 from surfaces.surface import SurfaceError
 

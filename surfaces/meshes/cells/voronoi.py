@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
-from coverable_kernels import allocating, allocating_entry
+from coverable.arrays import Array, Ints
+from coverable.kernels import allocating, allocating_entry
 
 DETOUR = 1.35
 """Over flat ground, steps from face to face are at most about this much longer than the straight

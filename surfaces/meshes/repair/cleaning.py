@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array, Ints, Mask
-from coverable_errors import counted
+from coverable.arrays import Array, Ints, Mask
+from coverable.errors import counted
 from surfaces.meshes.repair.degenerate import flipped, thin, weld_distance, welded
 from surfaces.meshes.repair.orientation import one_fan_each, oriented, place
 from surfaces.meshes.triangle_mesh import TriangleMesh, areas_of, half_edge_ends, half_edges

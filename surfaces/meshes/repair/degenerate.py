@@ -12,7 +12,7 @@ from itertools import product
 
 import numpy as np
 
-from coverable_arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask
 from surfaces.meshes.triangle_mesh import areas_of, components, half_edge_ends, half_edges
 
 WELD = 1e-6  # of the mesh's diagonal: no vertex moves further; thinner faces have no area

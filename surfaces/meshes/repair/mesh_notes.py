@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from coverable_arrays import Array, Ints
-from coverable_errors import counted
+from coverable.arrays import Array, Ints
+from coverable.errors import counted
 from surfaces.adjacency import components
 
 if TYPE_CHECKING:

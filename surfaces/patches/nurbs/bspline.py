@@ -9,8 +9,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coverable_arrays import Array
-from coverable_errors import Fault, shown
+from coverable.arrays import Array
+from coverable.errors import Fault, shown
 from surfaces.arguments import ORIGIN, Checks, table
 from surfaces.patches.enclosures import Enclosure
 from surfaces.patches.nurbs.nurbs import SplineMap

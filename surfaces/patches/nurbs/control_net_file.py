@@ -10,8 +10,8 @@ import os
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from coverable_errors import number_in
-from coverable_files import read_text, shown_name
+from coverable.errors import number_in
+from coverable.files import read_text, shown_name
 from surfaces.patches.nurbs.nurbs_checks import MOST_POINTS
 from surfaces.surface import SurfaceError
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from coverable_arrays import Array
+from coverable.arrays import Array
 from surfaces.patches import bernstein
 from surfaces.patches.enclosures import Enclosure
 

@@ -24,27 +24,34 @@ from bounds import holds
 from random_arms import planar_arm, robot_of
 from samples import sampled, seeds
 
-from coverable_errors import ArgumentError
-from feasibility import Search, Task, check, verify
-from feasibility.certification import displaced_bodies, placement_margin, replay, surface_replay
-from feasibility.certification import displacement_balls as lemma
-from feasibility.collisions import Collision, Obstacle, gather
-from feasibility.task import PlacementError
-from feasibility.verdict import Bound, Walk
-from robots import Axis, load_robot
-from surfaces import (
+from coverable import (
+    Axis,
+    Collision,
+    Obstacle,
+    Search,
+    Task,
+    check,
     cone,
     cylinder,
     ellipsoid,
     hyperboloid,
+    load_robot,
     mesh,
     plane,
     poses,
+    replay,
     revolution,
     sphere,
     torus,
-)  # fmt: skip
-from surfaces.meshes import TriangleMesh
+    verify,
+)
+from coverable.errors import ArgumentError
+from feasibility.certification import displaced_bodies, placement_margin, surface_replay
+from feasibility.certification import displacement_balls as lemma
+from feasibility.collisions.asked_bodies import gather
+from feasibility.task import PlacementError
+from feasibility.verdict import Bound, Walk
+from surfaces.meshes.triangle_mesh import TriangleMesh
 
 ARMS = ("ur5", "puma560", "panda", "kinova", "xarm7", "z1", "on a rail", "over a turntable")
 OUT = {"side": "outside"}

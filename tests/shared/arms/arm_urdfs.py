@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from robots import Robot, list_robots, load_robot
+from coverable import Robot, list_robots, load_robot
 
 FREE = (-float("inf"), float("inf"))
 

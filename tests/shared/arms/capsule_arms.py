@@ -4,9 +4,11 @@ import numpy as np
 from arm_urdfs import joint
 from random_arms import robot_of
 
-from feasibility.collisions import Bodies, HalfSpace, Obstacle, Pair
-from robots.shapes import Solid, Triangles
-from robots.urdf import Capsule
+from coverable import Obstacle
+from feasibility.collisions.bodies import Bodies, Pair
+from feasibility.collisions.shapes import HalfSpace
+from robots.shapes.bodies import Solid, Triangles
+from robots.urdf.geometry import Capsule
 
 
 def planar_arm(lengths, kinds=None, axes=None):

@@ -8,7 +8,7 @@ from plain import geometry_of
 from referee import Joint, Scene, Shape, closely, fcl_object
 from scipy.optimize import nnls
 
-from robots.shapes import Triangles
+from robots.shapes.bodies import Triangles
 
 cached_model = lru_cache(maxsize=256)(lambda geometry: fcl_object(geometry_of(geometry)))
 samples = closely

@@ -16,10 +16,8 @@ from mesh_patches import bent
 from numpy.typing import NDArray
 from random_arms import robot_of
 
-from feasibility import Task
-from robots import Robot
-from surfaces import Cells, bspline, cylinder, mesh, piecewise, plane, sphere, torus
-from surfaces.meshes import TriangleMesh
+from coverable import Cells, Robot, Task, bspline, cylinder, mesh, piecewise, plane, sphere, torus
+from surfaces.meshes.triangle_mesh import TriangleMesh
 
 TOOL = 0.1  # m, from the wrist to the tool point
 SPACING = 2e-3  # m between targets

@@ -11,12 +11,24 @@ import pinocchio as pin
 import trimesh
 from foreign_clearances import ForeignScene
 
-from feasibility import Task
-from feasibility.certification import PoseCheck, never_clear
-from feasibility.collisions import Bodies, Collision, Obstacle, ToolShape, gather
-from robots import Axis, Kinematics, Robot, load_robot
-from robots.shapes import Triangles, checked_triangles
-from surfaces import Cells, Surface, plane
+from coverable import (
+    Axis,
+    Cells,
+    Collision,
+    Obstacle,
+    Robot,
+    Surface,
+    Task,
+    ToolShape,
+    load_robot,
+    plane,
+)
+from feasibility.certification.overlaps.every_pose import PoseCheck, never_clear
+from feasibility.collisions.asked_bodies import gather
+from feasibility.collisions.bodies import Bodies
+from robots.kinematics import Kinematics
+from robots.shapes.bodies import Triangles
+from robots.shapes.triangles import checked_triangles
 
 ARMS = ("ur5", "panda", "kinova", "xarm7", "puma560", "puma560 on a rail")
 CLEARANCE = 0.005  # m, that is asked for

@@ -4,12 +4,7 @@ from functools import cache
 
 import asked
 
-from feasibility import Task, check
-from feasibility.cases import load_case
-from feasibility.paths import coverage_path
-from feasibility.timing import trajectory
-from robots import load_robot
-from surfaces import plane, sphere
+from coverable import Task, check, coverage_path, load_case, load_robot, plane, sphere, trajectory
 
 FEASIBLE = ("4a", "4b", "4c", "4e", "5a", "5b", "5c", "5d", "5e", "5f")
 COARSE = {f"{name}, coarse": name for name in ("4a", "4c", "5c")}

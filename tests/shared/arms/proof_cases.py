@@ -9,10 +9,8 @@ import numpy as np
 from arm_urdfs import joint
 from random_arms import robot_of
 
-from feasibility import Task
+from coverable import Cells, Robot, Task, cylinder, hyperboloid, load_robot, plane, sphere
 from feasibility.cut_tree import Cut, CutTree, Leaf
-from robots import Robot, load_robot
-from surfaces import Cells, cylinder, hyperboloid, plane, sphere
 
 STORED = json.loads((Path(__file__).parents[2] / "bounds" / "cut_trees.json").read_text("utf-8"))
 """Problems of an oracle; the last one is feasible and has no tree."""

@@ -5,12 +5,10 @@ from arm_urdfs import FREE, arm, joint
 from asked import question
 from numpy.typing import NDArray
 
-from feasibility import Task
-from robots import Axis, Robot, load_robot
+from coverable import Axis, Robot, Surface, Task, cylinder, hyperboloid, load_robot, plane, sphere
 from robots.from_urdf import robot_from_urdf
 from robots.urdf.checked_urdf import checked_tree
 from robots.urdf.xml import parse_xml
-from surfaces import Surface, cylinder, hyperboloid, plane, sphere
 
 Floats = NDArray[np.float64]
 RIGHT_ANGLES = (-np.pi / 2, 0.0, np.pi / 2, np.pi)

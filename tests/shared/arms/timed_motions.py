@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.interpolate import BPoly
 
-from feasibility.timing import Trajectory
-from robots import Kinematics, load_robot
+from coverable import Trajectory, load_robot
+from robots.kinematics import Kinematics
 
 UR5 = load_robot("ur5")
 TURN = 180.0 / np.pi

@@ -7,8 +7,8 @@ from collections import defaultdict
 import numpy as np
 from mesh_patches import grid
 
-from surfaces.meshes import TriangleMesh
 from surfaces.meshes.normals import corner_normals
+from surfaces.meshes.triangle_mesh import TriangleMesh
 
 
 def cube(size=0.2):

@@ -23,25 +23,33 @@ import pinocchio as pin
 from jobs import case_named, verdict_named
 from mesh_writers import GOOD
 
-from coverable_errors import CoverableError
-from coverable_meshes import MeshFiles
-from feasibility import Evidence
-from feasibility.cases import Case, load_case
-from feasibility.cut_tree import Cut, CutTree, Leaf
-from feasibility.results import (
+from coverable import (
+    Case,
+    Evidence,
+    SurfaceError,
+    bspline,
+    grid,
+    load_case,
     load_motion,
     load_result,
+    load_robot,
+    load_study,
     load_trajectory,
+    poses,
+    read_grid,
+    read_net,
+    read_poses,
     save_result,
     save_trajectory,
 )
-from feasibility.studies import load_study
-from robots import load_robot
+from coverable.errors import CoverableError
+from coverable.meshes.robot_files import MeshFiles
+from feasibility.cut_tree import Cut, CutTree, Leaf
 from robots.pinocchio_model import chain_model
-from robots.urdf import CheckedUrdf, check_urdf, read_srdf
-from robots.urdf.expansion import expanded
-from surfaces import SurfaceError, bspline, grid, poses, read_grid, read_net, read_poses
-from surfaces.meshes import read_mesh
+from robots.urdf.checked_urdf import CheckedUrdf, check_urdf
+from robots.urdf.expansion.xacro_files import expanded
+from robots.urdf.srdf import read_srdf
+from surfaces.meshes.sources import read_mesh
 
 SRDF = (
     '<robot name="r"><disable_collisions link1="a" link2="b" reason="Adjacent"/>'

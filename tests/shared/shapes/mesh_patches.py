@@ -6,11 +6,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from surfaces import Patch
-from surfaces.meshes import MeshSurface, TriangleMesh
-from surfaces.meshes import mesh as surface_of
-from surfaces.meshes.cells import MeshCells
-from surfaces.patches import GridCells
+from coverable import MeshSurface, Patch
+from coverable import mesh as surface_of
+from surfaces.meshes.cells.mesh_cells import MeshCells
+from surfaces.meshes.triangle_mesh import TriangleMesh
+from surfaces.patches.grid_cells import GridCells
 
 Floats = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ import itertools
 import mesh_patches
 import numpy as np
 
-from surfaces import (
+from coverable import (
     SurfaceError,
     bspline,
     cone,

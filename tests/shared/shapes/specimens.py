@@ -6,7 +6,7 @@ import numpy as np
 from mesh_patches import bent, of_patch
 from smooth_probes import POSE
 
-from surfaces import (
+from coverable import (
     bspline,
     cone,
     cylinder,
@@ -19,8 +19,8 @@ from surfaces import (
     revolution,
     sphere,
     torus,
-)  # fmt: skip
-from surfaces.meshes import TriangleMesh
+)
+from surfaces.meshes.triangle_mesh import TriangleMesh
 
 # Control nets of exact quadrics, and of a free form.
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from surfaces.meshes import FaceTree
+from surfaces.meshes.face_tree import FaceTree
 
 Array = NDArray[np.float64]
 

@@ -1,1 +1,0 @@
-from .faces_view import faces_page as faces_page

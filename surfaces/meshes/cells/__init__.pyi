@@ -1,2 +1,0 @@
-from .mesh_cells import MeshCells as MeshCells
-from .subdivision import subdivide as subdivide
