@@ -13,25 +13,26 @@ is first used, so `import coverable` costs nothing.
 
 from __future__ import annotations
 
-from typing import Any
+_listed: dict[str, tuple[str, str]] = {}
 
 
 def _public() -> dict[str, tuple[str, str]]:
     """The module of each public name and its name there, as `__init__.pyi` lists them."""
+    if _listed:
+        return _listed
     import ast
     from pathlib import Path
 
-    found: dict[str, tuple[str, str]] = {}
     for line in ast.parse(Path(__file__).with_suffix(".pyi").read_text("utf-8")).body:
         if isinstance(line, ast.ImportFrom):
-            found |= {name.name: (line.module or "", name.name) for name in line.names}
+            _listed.update({name.name: (line.module or "", name.name) for name in line.names})
         if isinstance(line, ast.Assign):  # by another name here
             module, _, there = ast.unparse(line.value).rpartition(".")
-            found[ast.unparse(line.targets[0])] = module, there
-    return found
+            _listed[ast.unparse(line.targets[0])] = module, there
+    return _listed
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     """Import a public name from its module when it is first used."""
     from importlib import import_module
 

@@ -91,8 +91,6 @@ def replay_over_surface(
             surface, or over that under poses, whose curves then do not count; elsewhere it may be
             anywhere but through that. Everywhere by default.
     """
-    from feasibility.certification.collisions.collision_replay import collision_replay
-
     rows = np.asarray(q, dtype=float)
     nowhere = np.zeros(len(cells), dtype=bool)
     fault = _malformed(robot, rows)
@@ -129,14 +127,23 @@ def replay_over_surface(
         len(rows), error, angle_of(chord), margin, max_roll=None if task.roll is None else roll
     )
     if bodies is not None:
-        clear = collision_replay(robot, bodies, rows)
-        faults += clear.faults
-        certificate = clear.added_to(certificate)
+        certificate, hit = _among(bodies, robot, rows, certificate)
+        faults += hit
     if len(cells) and not faults:
         certificate = replace(certificate, margin=margin_of(robot, cells, task, rows, found.room))
         short = margin_fault(task, certificate)
         faults += [MotionFault(-1, 0.0, short)] if short else []
     return MotionReplay(certificate, tuple(faults), at)
+
+
+def _among(
+    bodies: Bodies, robot: Robot, rows: Array, certificate: Certificate
+) -> tuple[Certificate, tuple[MotionFault, ...]]:
+    """The certificate with what was measured between bodies, and where these are too near."""
+    from feasibility.certification.collisions.collision_replay import collision_replay
+
+    clear = collision_replay(robot, bodies, rows)
+    return clear.added_to(certificate), clear.faults
 
 
 def _less_room(room: Array, task: Task, row: Ints, chord: Array, roll: Array) -> None:

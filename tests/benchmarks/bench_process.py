@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-CHECK = ["-m", "feasibility.cli", "check"]
+CHECK = ["-m", "coverable", "check"]
 
 
 def children_s() -> float:

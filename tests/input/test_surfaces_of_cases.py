@@ -112,8 +112,8 @@ MADE: dict[str, tuple[str, list[str], Callable[..., Any], dict[str, Any]]] = {
     "pieces": (
         "piecewise", [PIECES, "surface.gap = 1e-5"],
         lambda **k: coverable.piecewise(
-            [net(), coverable.plane((0, 0.2), (-0.1, 0.1), position=(0.5, 0, 0), rpy_deg=(0, 0, 90)),
-             grid()], gap=1e-5, **k,
+            [net(), coverable.plane((0, 0.2), (-0.1, 0.1), position=(0.5, 0, 0),
+                                    rpy_deg=(0, 0, 90)), grid()], gap=1e-5, **k,
         ), {"counts": [(3, 4), (2, 2), (2, 3)]},
     ),
 }  # fmt: skip

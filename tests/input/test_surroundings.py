@@ -23,7 +23,7 @@ def said(*args: object) -> str:
 
 
 def test_outputs_are_written_where_no_stream_is_open(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "feasibility.cli", "check", "paper/4a", *SMALL]
+    command = [sys.executable, "-m", "coverable", "check", "paper/4a", *SMALL]
     outputs = ["--witness", str(tmp_path / "w.csv"), "--save", str(tmp_path / "r.result")]
     closed = ["sh", "-c", '"$@" <&- >&- 2>&-', "sh", *command, *outputs]
     assert subprocess.run(closed, cwd=Path(__file__).parents[2], check=False).returncode == 0

@@ -27,7 +27,7 @@ from feasibility.version import version
 from feasibility.viewer.live_server import LiveView
 
 ROOT = Path(__file__).parents[2]
-COMMAND = [sys.executable, "-m", "feasibility.cli"]
+COMMAND = [sys.executable, "-m", "coverable"]
 GUARD_S = 1800.0
 SMALL = ("check", "paper/4a", "--set", "surface.cells=[2, 2]")
 

@@ -189,7 +189,7 @@ run()
 """  # Ctrl-C just before a module is imported for the first time
 
 
-@pytest.mark.parametrize("module", ["signal", "lazy_loader", "argparse", "numba"])
+@pytest.mark.parametrize("module", ["signal", "argparse", "numba"])
 def test_from_the_first_instruction(module):
     found = process(AT_IMPORT, module, "check", "paper/4a")
     assert (found.returncode, found.stdout, found.stderr) == (130, "", INTERRUPTED)

@@ -1,0 +1,5 @@
+"""`python -m coverable`: the command `coverable`."""
+
+from coverable.command import run
+
+run()
