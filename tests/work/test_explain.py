@@ -181,14 +181,14 @@ def test_a_ring_that_a_stop_cuts_in_two_needs_joint1_to_pass_it():
     degrees; backwards, as the mirror image, for the same in the other direction.
     """
     arm = PUMA.with_limits({"joint1": np.radians([-100.0, 100.0])})
-    ring = cylinder(0.6, (20, 160), (0.2, 0.3)).cells(8, 1)
+    ring = cylinder(0.6, (20, 160), (0.2, 0.3)).cells(4, 1)
     explanation = explain(arm, ring, Task(0.02, 40))
     assert explanation.verdict.evidence is Evidence.PROOF
     needed = np.degrees(ring.u).max() - math.degrees(math.asin(0.1 / 0.58))
     for name, sign in (("joint1 upper limit", 1.0), ("joint1 lower limit", -1.0)):
         found = threshold_of(explanation, name)
         assert abs(sign * math.degrees(found.feasible.value) - needed) <= 0.2
-    assert len(explanation.dropped.cells) == 8 - explanation.verdict.n_covered
+    assert len(explanation.dropped.cells) == 4 - explanation.verdict.n_covered
     assert explanation.dropped.waypoints is not None
 
 

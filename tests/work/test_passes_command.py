@@ -46,8 +46,8 @@ CASES = {
     """.replace("\n            ", " "),
     "round": """
         robot.name = "ur5"
-        robot.limits_deg = { shoulder_pan_joint = [-180, 180], wrist_2_joint = [-100, 100] }
-        surface = { kind = "cylinder", radius = 0.3, u_deg = [-170, 170], v = [0.0, 0.1],
+        robot.limits_deg = { shoulder_pan_joint = [-110, 110], wrist_2_joint = [-100, 100] }
+        surface = { kind = "cylinder", radius = 0.3, u_deg = [-130, 130], v = [0.0, 0.1],
             position = [0.0, 0.0, 0.25], side = "outside", cells = [2, 2] }
         task = { standoff = 0.12, cone_deg = 20, footprint = 0.1 }
     """.replace("\n            ", " "),

@@ -352,7 +352,7 @@ def test_the_command_answers_with_places_that_check_accepts(tmp_path):
     case.write_text(PLATE + "surface.rpy_deg = [0, 0, 0]\n")
     small = ("--set", "surface.cells=[3,3]")
     assert coverable("check", case, "--set", "surface.position=[0.6, 0, 0.3]").status == 1
-    asked = "place", case, *small, "--x", -0.2, 0.6, "--yaw", -20, 20, "--count", 8, "--json"
+    asked = "place", case, *small, "--x", -0.2, 0.6, "--count", 8, "--json"
     files = "--csv", tmp_path / "p.csv", "--map", tmp_path / "p.svg", "--out", tmp_path / "p.study"
     told = json.loads(coverable(*asked, *files, "--workers", 0).out)
     assert told["answer"] == "feasible"
@@ -364,7 +364,7 @@ def test_the_command_answers_with_places_that_check_accepts(tmp_path):
     shares = [float(line["share"]) for line in lines]
     assert shares == sorted(shares, reverse=True)
     assert "<svg" in (tmp_path / "p.svg").read_text("utf-8")
-    assert told["map"]["axes"] == ["x", "yaw_deg"]
+    assert told["map"]["axes"] == ["x", "y"]
 
 
 # -- regions ---------------------------------------------------------------------------------------
