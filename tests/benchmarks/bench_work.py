@@ -6,26 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from coverable import (
-    Collision,
-    Pose,
-    Region,
-    Task,
-    ToolShape,
-    check,
-    explain,
-    load_case,
-    load_robot,
-    mesh,
-    open_workers,
-    parallel_passes,
-    path,
-    place,
-    plan_passes,
-    read_study,
-    run_tasks,
-    trajectory,
-)  # fmt: skip
+import coverable
+from coverable import load_case, parallel_passes, path, plan_passes, run_tasks, trajectory
 from surfaces.meshes.triangle_mesh import TriangleMesh
 
 PAPER = [f"paper/{figure}{letter}" for figure in "45" for letter in "abcdef"]
@@ -41,7 +23,7 @@ count = 200
 @pytest.mark.parametrize("name", [name for name in PAPER if name[-1] in "abc"])
 def bench_path(name: str, measured: Callable[..., Any]) -> None:
     """The path over a case and its motion at up to 0.1 m/s; goal of 4a: 300 ms, 15 % revisited."""
-    verdict = check(*load_case(name).build()[:3])
+    verdict = coverable.check(*load_case(name).build()[:3])
     if not verdict.feasible:
         pytest.skip("no motion")
     share = path(verdict).figures.revisited_share
@@ -56,13 +38,13 @@ def bench_panel(collisions: bool, measured: Callable[..., Any]) -> None:
     first = (101 * np.arange(50)[:, None] + np.arange(100)).ravel()[:, None]
     faces = first + np.array([[[0, 1, 102]], [[0, 102, 101]]])
     points = np.column_stack([x, y, 0.06 * (1.0 - (x / 0.3 - 1.0) ** 2)])
-    panel = mesh(
+    panel = coverable.mesh(
         TriangleMesh(points, faces.reshape(-1, 3)), side="outside", position=(0.35, -0.2, 0.1)
     )
-    gun = ToolShape.cylinder(radius=0.015, length=0.14, position=(0.0, 0.0, -0.08))
-    around = Collision(clearance=0.005, tool_clearance=0.01, tool=(gun,))
-    robot = load_robot("ur10", tcp=((0.0, 0.0, 0.15), (0.0, 0.0, 0.0)))
-    task = Task(0.05, 15.0, footprint=0.05, collision=around if collisions else None)
+    gun = coverable.ToolShape.cylinder(radius=0.015, length=0.14, position=(0.0, 0.0, -0.08))
+    around = coverable.Collision(clearance=0.005, tool_clearance=0.01, tool=(gun,))
+    robot = coverable.load_robot("ur10", tcp=((0.0, 0.0, 0.15), (0.0, 0.0, 0.0)))
+    task = coverable.Task(0.05, 15.0, footprint=0.05, collision=around if collisions else None)
 
     def work() -> Any:
         along = plan_passes(robot, parallel_passes(panel, 0.03, overrun=0.0, step=0.03), task)
@@ -75,7 +57,7 @@ def bench_panel(collisions: bool, measured: Callable[..., Any]) -> None:
 def bench_explain(name: str, measured: Callable[..., Any]) -> None:
     """What would make a case feasible; goal: 15 verdicts in the middle, 40 at most."""
     asked = load_case(name).build()[:3]
-    measured(lambda: explain(*asked), 2, FK=lambda found: int(found.evaluations))
+    measured(lambda: coverable.explain(*asked), 2, FK=lambda found: int(found.evaluations))
 
 
 @pytest.mark.parametrize("reach", [0.3, 1.5])
@@ -83,14 +65,14 @@ def bench_place(reach: float, measured: Callable[..., Any]) -> None:
     """64 placements of 4c within a box around its own."""
     robot, cells, task, search = load_case("paper/4c").build()
     ranges = {"x": (-reach, reach), "y": (-reach, reach), "yaw_deg": (-90.0, 90.0)}
-    region = Region.around(Pose.of_surface(cells.surface), ranges)
-    measured(lambda: place(robot, cells, task, region, search, count=64), 2,
+    region = coverable.Region.around(coverable.Pose.of_surface(cells.surface), ranges)
+    measured(lambda: coverable.place(robot, cells, task, region, search, count=64), 2,
              answer=lambda found: str(found.answer))  # fmt: skip
 
 
 @pytest.mark.parametrize("workers", [0, 1, 2])
 def bench_study(workers: int, measured: Callable[..., Any]) -> None:
     """200 placements of 4a. Run with --benchmark-timer=time.perf_counter to see the speed-up."""
-    tasks = read_study(STUDY).tasks
-    with open_workers(workers) as crew:
+    tasks = coverable.read_study(STUDY).tasks
+    with coverable.open_workers(workers) as crew:
         measured(lambda: run_tasks(tasks, crew), 2, placements=len)

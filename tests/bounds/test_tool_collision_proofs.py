@@ -16,17 +16,8 @@ from random_arms import planar_arm
 from samples import sampled, seeds, spread
 from scipy.spatial.transform import Rotation
 
-from coverable import (
-    Answer,
-    CauseKind,
-    Collision,
-    Evidence,
-    Obstacle,
-    Task,
-    ToolShape,
-    check,
-    cylinder,
-)
+import coverable
+from coverable import CauseKind, Collision, Evidence, Obstacle, Task, ToolShape, check, cylinder
 from feasibility.certification.cut_proofs.proof_verification import verify_proof
 from feasibility.certification.overlaps.depths import depths, planes_around, points_inside
 from feasibility.certification.overlaps.every_pose import never_clear
@@ -191,7 +182,7 @@ def test_a_crate_that_swallows_the_target_is_a_proof():
     asked = Collision(self_=False, surface=False, scene=(CRATE,), tool=(NOZZLE,))
     task = Task(0.02, 30, 0.001, collision=asked)
     verdict = check(UR5, CELLS, task)
-    assert (verdict.answer, verdict.evidence) == (Answer.INFEASIBLE, Evidence.PROOF)
+    assert (verdict.answer, verdict.evidence) == (coverable.Answer.INFEASIBLE, Evidence.PROOF)
     assert verdict.proof.kind == "cell"
     assert "the tool collides there in every pose" in verdict.message
     (cause,) = verdict.causes

@@ -15,29 +15,8 @@ import pytest
 from approved import NUMBER
 from command_table import COMMANDS, NEEDS, NUMBERS, REFUSED, TABLE, WHOLE
 
-from coverable import (
-    Pose,
-    Region,
-    check,
-    compare,
-    coverage_path,
-    divide,
-    explain,
-    load_case,
-    load_motion,
-    load_result,
-    load_study,
-    motion_limits,
-    open_workers,
-    parallel_passes,
-    pass_runs,
-    place,
-    plan_passes,
-    run_tasks,
-    station_plan,
-    trajectory,
-    verify,
-)
+import coverable
+from coverable import check, load_case, load_motion, open_workers, pass_runs, trajectory, verify
 from feasibility.cli.main import _parser
 from feasibility.collisions.words import UNCHECKED
 from feasibility.entry.ends import ends_of
@@ -198,15 +177,15 @@ def of_check(args):
 def of_path(args):
     setup = load_case(args.case, args.settings).build()
     speed = args.speed or setup.task.speed or 0.1
-    limits = motion_limits(setup.robot, speed, args.velocity, args.acceleration)
+    limits = coverable.motion_limits(setup.robot, speed, args.velocity, args.acceleration)
     timing = {"velocity": args.velocity, "acceleration": args.acceleration, "period": 0.02}
     along = passes = None
     if args.passes is None:
         verdict = check(*setup)
     else:
         angle = math.radians(float(args.passes))
-        passes = parallel_passes(setup.cells.surface, args.pitch, angle)
-        along = plan_passes(setup.robot, passes, setup.task, search=setup.search)
+        passes = coverable.parallel_passes(setup.cells.surface, args.pitch, angle)
+        along = coverable.plan_passes(setup.robot, passes, setup.task, search=setup.search)
         verdict = along.verdict
     if along is not None and not verdict.feasible:
         found = pass_runs(setup.robot, along.cells, verdict.task, along.places, verdict.seed)
@@ -216,7 +195,7 @@ def of_path(args):
         return json_of.of_runs(asked)
     if not verdict.feasible:
         return json_of.of_check(verdict) | {"trajectory": None}
-    path = coverage_path(verdict, args.order)
+    path = coverable.coverage_path(verdict, args.order)
     treated = treated_by_walk(setup.robot, path.cells, setup.task, path.walk)
     if along is not None:
         treated = along.treated(path.walk)
@@ -232,45 +211,45 @@ def of_path(args):
 def of_place(args):
     case = load_case(args.case, args.settings)
     setup = case.build()
-    held = Pose.of_values([*case.surface.position, *case.surface.rpy_deg])
+    held = coverable.Pose.of_values([*case.surface.position, *case.surface.rpy_deg])
     ranges = {"x": args.x} | ({} if args.yaw is None else {"yaw_deg": args.yaw})
     with open_workers(0) as workers:
         evaluator = evaluator_of_study(case, len(setup.cells), workers)
         count = {} if args.count is None else {"count": args.count}
-        region = Region.around(held, ranges)
-        found = place(*setup[:3], region, setup.search, evaluator=evaluator, **count)
+        region = coverable.Region.around(held, ranges)
+        found = coverable.place(*setup[:3], region, setup.search, evaluator=evaluator, **count)
         wanted = args.stations and found.answer != "feasible"
-        plan = station_plan(found, evaluator, setup.search, **count) if wanted else None
+        plan = coverable.station_plan(found, evaluator, setup.search, **count) if wanted else None
     return json_of.of_place(SimpleNamespace(found=found, plan=plan))
 
 
 def of_study(args):
-    study = load_study(args.file)
+    study = coverable.load_study(args.file)
     with open_workers(0) as workers:
-        rows = run_tasks(study.tasks, workers)
+        rows = coverable.run_tasks(study.tasks, workers)
     return json_of.of_study(SimpleNamespace(study=study, rows=rows))
 
 
 def of_compare(args):
     with open_workers(0) as workers:
         case, arms = load_case(args.case, args.settings), args.robots.split(",")
-        return json_of.of_compare(compare(case, arms, workers, critical=args.critical))
+        return json_of.of_compare(coverable.compare(case, arms, workers, critical=args.critical))
 
 
 def of_verify(args):
     if args.motion is None:
-        return json_of.of_verify(verify(load_result(args.case)))
+        return json_of.of_verify(verify(coverable.load_result(args.case)))
     setup = load_case(args.case, args.settings).build()
     motion = load_motion(args.motion, setup.robot)
     return json_of.of_verify(verify(*setup[:3], motion.q, marks=motion.marks))
 
 
 def of_divide(args):
-    return json_of.of_divide(divide(*load_case(args.case, args.settings).build()))
+    return json_of.of_divide(coverable.divide(*load_case(args.case, args.settings).build()))
 
 
 def of_explain(args):
-    return json_of.of_explain(explain(*load_case(args.case, args.settings).build()))
+    return json_of.of_explain(coverable.explain(*load_case(args.case, args.settings).build()))
 
 
 def refuse(word):

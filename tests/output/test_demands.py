@@ -7,18 +7,8 @@ import pytest
 from command_table import forged
 from jobs import coverable as asked
 
-from coverable import (
-    Pose,
-    Region,
-    Search,
-    evaluator_here,
-    load_case,
-    load_motion,
-    load_result,
-    place,
-    station_plan,
-    verify,
-)
+import coverable
+from coverable import Pose, Region, load_case, load_motion, load_result, place, station_plan, verify
 from feasibility.cases.keys import all_keys
 from feasibility.cli.main import _parser
 from feasibility.demands import DEMANDS, further
@@ -141,7 +131,7 @@ def says_yes(ask, known, settings):
         return said
     if placed.answer == "feasible":
         said.add("place")
-    plan = station_plan(placed, evaluator_here(*setup[:3], Search()), count=1)
+    plan = station_plan(placed, coverable.evaluator_here(*setup[:3], coverable.Search()), count=1)
     whole = len(plan.stations) > 0 and not len(plan.stations.left_out)
     return said | {"stations"} if whole and plan.certified and not plan.not_judged else said
 

@@ -10,19 +10,8 @@ import pytest
 from page_outline import points_of
 from scipy.spatial.transform import Rotation
 
-from coverable import (
-    Answer,
-    Evidence,
-    Placements,
-    Pose,
-    Region,
-    Task,
-    cylinder,
-    load_robot,
-    plane,
-    sphere,
-    view_placements,
-)
+import coverable
+from coverable import Answer, Evidence, Pose, cylinder, load_robot, plane, sphere, view_placements
 from feasibility.placement.trials import Trial
 from feasibility.studies.outcome import bits_of
 from feasibility.studies.run import Row
@@ -37,7 +26,7 @@ from feasibility.viewer.threejs import hex_colour
 
 PLATE = plane((-0.15, 0.15), (-0.1, 0.1), position=(0.5, 0, 0.2), side="outside")
 CELLS = PLATE.cells(3, 2)
-TASK = Task(standoff=0.02, cone_deg=30)
+TASK = coverable.Task(standoff=0.02, cone_deg=30)
 
 
 @cache
@@ -67,8 +56,8 @@ def fabricated(*extra):
         *(Trial(next(at), {"message": "no"}) for _ in range(3)),
         *extra,
     ]
-    region = Region.around(Pose.of_surface(PLATE), {"x": (0.2, 0.9)})
-    return Placements(
+    region = coverable.Region.around(Pose.of_surface(PLATE), {"x": (0.2, 0.9)})
+    return coverable.Placements(
         ur5(), CELLS, TASK, region, Answer.INFEASIBLE, Evidence.EXHAUSTED, "", (), tuple(trials),
         None, statistics={"bound": 11},
     )  # fmt: skip

@@ -11,17 +11,8 @@ from matplotlib.colors import to_rgb
 from mesh_patches import grid
 from page_outline import faces_of, points_of
 
-from coverable import (
-    CauseKind,
-    Task,
-    check,
-    load_result,
-    load_robot,
-    mesh,
-    plot_sides,
-    sphere,
-    view,
-)
+import coverable
+from coverable import Task, check, load_result, load_robot, mesh, plot_sides, sphere, view
 from feasibility.viewer import cell_meshes as cell_shapes
 from feasibility.viewer import scene
 from feasibility.viewer.cell_meshes import make_display_mesh
@@ -175,6 +166,6 @@ def test_the_flat_graph_and_causes_show_every_cell_once(kind, request):
     for part in collections(plot_causes(verdict), PolyCollection):
         boxes[to_rgb(part.get_facecolor()[0])] += len(part.get_paths())
     assert sum(boxes.values()) == len(cells)
-    for kind in CauseKind:
+    for kind in coverable.CauseKind:
         own = sum(cause.kind == kind for cause in verdict.causes)
         assert boxes[to_rgb(scene.CAUSES[kind])] == own

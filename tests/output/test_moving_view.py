@@ -16,18 +16,8 @@ import pytest
 from page_outline import points_of, tracks_of
 from scipy.spatial.transform import Rotation
 
-from coverable import (
-    Axis,
-    Collision,
-    Obstacle,
-    Task,
-    ToolShape,
-    check,
-    load_case,
-    load_robot,
-    plane,
-    view,
-)
+import coverable
+from coverable import Axis, Collision, Obstacle, check, load_case, load_robot, plane, view
 from feasibility.viewer import playback as motion
 from feasibility.viewer.frames.standing_world import GROUP
 from feasibility.viewer.live_server import LiveView
@@ -150,7 +140,7 @@ def table():
     shelf = Obstacle.box("shelf", (0.4, 0.3, 0.02), position=(0.5, -0.2, 0.9))
     played = motion.paced(robot, walk, False, "a motion")
     cells = plane((-0.2, 0.2), (-0.1, 0.1)).cells(2, 2)
-    task = Task(0.05, 30, collision=Collision(scene=(shelf,)))
+    task = coverable.Task(0.05, 30, collision=Collision(scene=(shelf,)))
     drawn = compose(robot, cells, "", "", [], played, resting=walk[0], play=False, task=task)
     return robot, drawn.commands
 
@@ -198,7 +188,7 @@ def test_the_world_stands_still_while_the_motion_plays(table):
 
 def test_bodies_move_with_the_arm_and_the_nearest_pair_has_its_distance(verdict):
     scene = (Obstacle.box("shelf", (0.4, 0.3, 0.02), (0.3, -0.6, 0.5), (0.0, 0.0, 30.0)),)
-    ball = ToolShape.sphere(0.01, (0.0, 0.0, -0.02))
+    ball = coverable.ToolShape.sphere(0.01, (0.0, 0.0, -0.02))
     asked = Collision(surface=False, scene=scene, tool=(ball,))
     drawn = view(replace(verdict, task=replace(verdict.task, collision=asked)), play=False, at=0.5)
     commands, places = drawn.commands, placed(drawn.commands)

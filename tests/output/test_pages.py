@@ -8,20 +8,8 @@ import pytest
 from command_table import COMMANDS, TABLE
 from page_outline import Page, fetched
 
-from coverable import (
-    Comparison,
-    Pose,
-    Region,
-    check,
-    divide,
-    explain,
-    load_case,
-    place,
-    read_study,
-    view,
-    view_division,
-    view_placements,
-)
+import coverable
+from coverable import Comparison, check, load_case, read_study, view, view_division, view_placements
 from feasibility.collisions.words import UNCHECKED
 from feasibility.reports import comparison, explanation, study
 from feasibility.studies.robot_comparison import Arm
@@ -62,16 +50,18 @@ def pages():
     names = (EVIL, *setup.robot.joint_names[1:])
     robot = replace(setup.robot, name=EVIL, joint_names=names)
     verdict = check(robot, *setup[1:])
-    region = Region.around(Pose.of_surface(setup.cells.surface), {"x": (3.0, 3.1)})
-    placed = place(robot, setup.cells, setup.task, region)
+    region = coverable.Region.around(
+        coverable.Pose.of_surface(setup.cells.surface), {"x": (3.0, 3.1)}
+    )
+    placed = coverable.place(robot, setup.cells, setup.task, region)
     asked = read_study('base.case = "paper/4a"\nvary."task.cone_deg" = [30]\n')
     result = {"verdict": "undecided", "evidence": "budget", "message": EVIL}
     rows = [Row({"task.cone_deg": EVIL}, "failed", result, 0.0)]
     arm = Arm(EVIL, 6, 1.0, "infeasible", "proof", EVIL, cause=EVIL)
-    explained = explain(robot, *setup[1:])
+    explained = coverable.explain(robot, *setup[1:])
     return {
         "view": view(verdict, EVIL).html(),
-        "division": view_division(divide(robot, *setup[1:]),
+        "division": view_division(coverable.divide(robot, *setup[1:]),
                                   EVIL).html(),
         "placements": view_placements(placed, case=EVIL).html(),
         "explanation": explanation.as_html(explained, EVIL, view(verdict, EVIL)),

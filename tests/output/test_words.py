@@ -11,22 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coverable import (
-    Answer,
-    Comparison,
-    Evidence,
-    Explanation,
-    builtin_cases,
-    check,
-    coverage_path,
-    divide,
-    list_robots,
-    load_case,
-    load_motion,
-    load_result,
-    read_study,
-    trajectory,
-)
+import coverable
+from coverable import Answer, Evidence, check, list_robots, load_case, load_motion, load_result
 from coverable.errors import at_least, at_most
 from feasibility.cases.keys import all_keys
 from feasibility.collisions.words import CHECKABLE, UNCHECKED
@@ -133,13 +119,13 @@ def test_the_motion_as_a_table_is_the_motion(commands):
 
 
 def test_a_number_of_motions_is_the_least_only_where_the_search_has_ended(plate):
-    found = divide(*plate[0].build()[:3])
+    found = coverable.divide(*plate[0].build()[:3])
     assert (found.plan.optimal, division.as_json(found)["optimal"]) == (True, True)
     assert division.as_json(replace(found, ended=False))["optimal"] is False
 
 
 def test_what_a_path_goes_over_again_is_not_covered_twice(plate):
-    found = coverage_path(plate[1], "rows")
+    found = coverable.coverage_path(plate[1], "rows")
     length = found.figures.length
     told = path.as_json(replace(found, figures=replace(found.figures, revisited=0.25 * length)))
     assert told["covered_m"] == pytest.approx(0.75 * length)
@@ -160,7 +146,7 @@ def test_a_motion_across_a_cut_opens_it(commands, side):
     cone = Quantity(Kind.CONE, "cone", "rad", math.radians(3), math.pi, 0.1, True)
     walk = Walk(q, np.array([0, 1]))
     found = Finding(math.radians(9), Answer.FEASIBLE, Evidence.WITNESS, "a motion", witness=walk)
-    made = Explanation(verdict, (Threshold(cone, found, None),), (), None, 0, 0.0)
+    made = coverable.Explanation(verdict, (Threshold(cone, found, None),), (), None, 0, 0.0)
     (threshold,) = explained.as_json(made, "x")["thresholds"]
     place = place_of(root, verdict.robot)
     lost = list(verdict.cells.unravel((root.below if side < 0 else root.above).cell))
@@ -183,7 +169,7 @@ def test_comparisons_studies_and_late_answers_say_what_the_case_asks_for(asked):
     case = load_case("paper/4a", settings)
     names = [] if case.collision is None else list(case.collision.checked)
     assert names == [name for name in ("self", "surface") if asked and asked != (f"{name}=false",)]
-    found = Comparison("x", (), divided=False, critical=False, collision=case.collision)
+    found = coverable.Comparison("x", (), divided=False, critical=False, collision=case.collision)
     assert comparison.as_json(found)["collisions"] == names
     assert too_late.as_json(case, "late", 1.0)["collisions"] == names
     said = too_late.as_text(case, "late").lower()
@@ -193,7 +179,7 @@ def test_comparisons_studies_and_late_answers_say_what_the_case_asks_for(asked):
 
 def test_a_study_says_what_all_its_cases_check():
     def of(*lines):
-        return read_study("\n".join(['base.case = "paper/4a"', *lines]))
+        return coverable.read_study("\n".join(['base.case = "paper/4a"', *lines]))
 
     mixed = of('vary."collision.surface" = [true, false]', 'vary."collision.self" = [true]')
     none = of('vary."task.cone_deg" = [30, 40]')
@@ -208,7 +194,7 @@ def test_a_study_says_what_all_its_cases_check():
 
 def test_trajectories_say_it_in_their_header_and_are_read_back(commands, plate, tmp_path):
     commands.run("path", "feasible")
-    run = trajectory(coverage_path(plate[1]), 0.1)
+    run = coverable.trajectory(coverable.coverage_path(plate[1]), 0.1)
     table, text = as_csv(run), as_json_text(run)
     assert table.splitlines()[0] == f"# {UNCHECKED}"
     assert json.loads(text)["collisions"] == []
@@ -267,5 +253,5 @@ def test_robots_and_cases_list_all_there_are(ask):
     limits = [rows[name]["joints"][0]["limits_deg"] for name in ("puma560", "kinova")]
     assert limits == [[-180.0, 180.0], None]
     cases = json.loads(ask("cases", "--json").out)["cases"]
-    assert [row["name"] for row in cases] == list(builtin_cases())
+    assert [row["name"] for row in cases] == list(coverable.builtin_cases())
     assert cases[0]["cells"] == [9, 10]

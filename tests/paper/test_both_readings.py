@@ -5,23 +5,13 @@ import pytest
 from mesh_patches import in_cells_of
 from samples import sampled, spread
 
-from coverable import (
-    Search,
-    Task,
-    bspline,
-    cylinder,
-    hyperboloid,
-    load_robot,
-    piecewise,
-    plane,
-    sphere,
-    torus,
-)
+import coverable
+from coverable import Search, Task, cylinder, hyperboloid, piecewise, plane, sphere, torus
 from feasibility.paper.algorithm_2 import tree_search
 from feasibility.paper.continuity import JSpace
 from feasibility.paper.literal import LiteralSearch
 
-PUMA = load_robot("puma560", limits="set-1")
+PUMA = coverable.load_robot("puma560", limits="set-1")
 NET = [[(x, y, 0.35 + x * (0.25 * y - 0.1 * x)) for y in (-0.2, 0, 0.2)] for x in (0.5, 0.65, 0.8)]
 AT = {"side": "outside", "position": (0.3, 0, -0.3)}
 PATCHES = {
@@ -34,7 +24,7 @@ PATCHES = {
     "halves": lambda: piecewise(
         [sphere(1.0, polar, (40, 85)) for polar in ((50, 62), (62, 75))], side="inside"
     ).cells((2, 3)),
-    "spline": lambda: bspline(NET, degree=(2, 2), side="outside").cells(2, 2),
+    "spline": lambda: coverable.bspline(NET, degree=(2, 2), side="outside").cells(2, 2),
     # Over these the tool rolls as the arm turns.
     "cap": lambda: sphere(0.5, (15, 40), (-40, 40), **AT).cells(3, 3),
     "tyre": lambda: torus(

@@ -7,18 +7,8 @@ import pytest
 from arm_urdfs import joint
 from random_arms import robot_of
 
-from coverable import (
-    Answer,
-    CauseKind,
-    Evidence,
-    Search,
-    Task,
-    cylinder,
-    greedy_check,
-    load_robot,
-    plane,
-    sphere,
-)
+import coverable
+from coverable import Answer, CauseKind, Evidence, Task, greedy_check, load_robot, plane, sphere
 from feasibility.paper.continuity import JSpace, Outcome
 from feasibility.paper.jcell_steps import Steps
 
@@ -40,7 +30,7 @@ def gantry(x=(-2.0, 2.0)):
 
 
 def greedy(**settings):
-    return Search(method="greedy", **settings)
+    return coverable.Search(method="greedy", **settings)
 
 
 def edges(graph):
@@ -49,7 +39,7 @@ def edges(graph):
 
 # An arc of a circle of radius 1.5 m about the base: elbow angle and shoulder angle are independent,
 # so turning the shoulder alone runs along the arc, and the shoulder's limits cut it where they say.
-ARC = cylinder(1.5, (0, 80), (-0.1, 0.1), side="inside").cells(8, 1)  # 10 degrees each
+ARC = coverable.cylinder(1.5, (0, 80), (-0.1, 0.1), side="inside").cells(8, 1)  # 10 degrees each
 ELBOW = math.acos(1.5**2 / 2.0 - 1.0)  # cosine rule: |p|^2 = 2 + 2 cos(elbow)
 
 

@@ -15,24 +15,8 @@ from approved import refused
 from smooth_probes import same_surface
 from specimens import WEIGHTS, ball, hood, sampled
 
-from coverable import (
-    bspline,
-    cone,
-    cylinder,
-    ellipsoid,
-    grid,
-    hyperboloid,
-    parametric,
-    piecewise,
-    plane,
-    poses,
-    read_grid,
-    read_net,
-    read_poses,
-    revolution,
-    sphere,
-    torus,
-)
+import coverable
+from coverable import bspline, grid, hyperboloid, parametric, piecewise, plane, poses, revolution
 
 NAN, INF = math.nan, math.inf
 TURN = {"angle_deg": (0, 90), "height": (0, 1)}
@@ -40,21 +24,21 @@ LENGTHS = (0, -2.0, NAN, INF, "1", True, 10**400, None)
 RANGES = ((90, 90), (90, 10), (0, NAN), (0,), "ab", 90, (0, None), (0, 361), (-400, 0))
 # Of each kind what makes one, and what does not in its place.
 KINDS = {
-    sphere: (
+    coverable.sphere: (
         {"radius": 1, "polar_deg": (10, 90), "azimuth_deg": (10, 180)},
         {"radius": LENGTHS, "polar_deg": (*RANGES, (-1, 90), (0, 181)), "azimuth_deg": RANGES,
          "side": ("top", None, 3, [], np.array([1, 2]), np.array(["inside"])),
          "position": ((0, 0), (0, 0, INF), "x"), "rpy_deg": ((0, NAN, 0), None)},
     ),
-    cylinder: ({"radius": 1, **TURN}, {"radius": (0,), "angle_deg": ((-200, 200),),
+    coverable.cylinder: ({"radius": 1, **TURN}, {"radius": (0,), "angle_deg": ((-200, 200),),
                                        "height": ((1, 0), (0, INF))}),
     hyperboloid: ({"waist": 1, "flare": 2, **TURN}, {"waist": (0,), "flare": (-1, 1e9, 1e-9)}),
     plane: ({"width": (0, 1), "length": (0, 1)}, {"width": ((0, 0),), "length": ((1, 0),)}),
-    cone: ({"radius": 1, "slope": -0.5, **TURN},
+    coverable.cone: ({"radius": 1, "slope": -0.5, **TURN},
            {"radius": (0,), "slope": (NAN, "1", 1e7), "height": ((0, 2), (3, 4))}),
-    torus: ({"ring": 1, "tube": 0.2, "u_deg": (0, 90), "v_deg": (0, 90)},
+    coverable.torus: ({"ring": 1, "tube": 0.2, "u_deg": (0, 90), "v_deg": (0, 90)},
             {"ring": (INF, 0.2), "tube": (1, 1e-8), "v_deg": ((90, 0),)}),
-    ellipsoid: ({"semi_axes": (1, 1, 1), "polar_deg": (0, 90), "azimuth_deg": (0, 90)},
+    coverable.ellipsoid: ({"semi_axes": (1, 1, 1), "polar_deg": (0, 90), "azimuth_deg": (0, 90)},
                 {"semi_axes": ((1, 2), (1, 0, 1), (1, 1, 1e-7)), "polar_deg": ((-1, 90),)}),
 }  # fmt: skip
 
@@ -208,15 +192,15 @@ def npy(array, **options):
 
 
 FILES = {
-    read_net: {},  # of contents see tests/input/bad/net.toml
-    read_grid: {
+    coverable.read_net: {},  # of contents see tests/input/bad/net.toml
+    coverable.read_grid: {
         "a.txt": "", "a.npy": "", "flat.npy": npy(np.zeros((3, 3))),
         "object.npy": npy(np.array([{}], dtype=object), allow_pickle=True),
         "pairs.npy": npy(np.zeros((3, 3, 2))), "header.csv": "x,y\n1,2\n",
         "complex.npy": npy(np.zeros((2, 2, 3), dtype=complex)),
         "cut.npy": npy(np.zeros((2, 2, 3)))[:-8], "hole.csv": TABLE.replace("1,1,", "1,9,", 1),
     },
-    read_poses: {
+    coverable.read_poses: {
         "empty.csv": "", "few.csv": "x,y,z\n1,2,3\n", "half.csv": POSES[:-1] + ",ax\n",
         "foreign.csv": POSES[:-1] + ",w\n", "many.csv": POSES + "0,0,0,0,0,1\n" * 20_001,
         "lines.csv": POSES + "1,2,3,0,0,1\n1,2,3\n1,2,x,0,0,1\n",
@@ -246,7 +230,7 @@ def test_a_net_comes_back_from_files_to_the_last_digit(tmp_path):
     knots = [[0, 0, 0, 0, 0.2, 0.7, 1, 1, 1, 1], [0, 0, 0, 0, 1, 2, 3, 4, 4, 4, 4]]
     net = {"points": hood().tolist(), "knots": knots, "weights": WEIGHTS.tolist(), "degree": [3, 3]}
     (tmp_path / "hood.json").write_text(json.dumps(net), encoding="utf-8-sig")
-    read = bspline(**read_net(str(tmp_path / "hood.json"))._asdict(), side="outside")
+    read = bspline(**coverable.read_net(str(tmp_path / "hood.json"))._asdict(), side="outside")
     assert (read.net.points == hood()).all()
     assert (read.net.weights == WEIGHTS).all()
     assert same_surface(read, bspline(hood(), (3, 3), knots, WEIGHTS, side="outside"))
@@ -255,7 +239,7 @@ def test_a_net_comes_back_from_files_to_the_last_digit(tmp_path):
         csv.writer(stream).writerows([[*NET.strip().split(","), "weight"]])
         csv.writer(stream).writerows([rows[k] for k in np.random.default_rng(3).permutation(42)])
         stream.write("\n\n")
-    read = read_net(tmp_path / "hood.CSV")
+    read = coverable.read_net(tmp_path / "hood.CSV")
     assert (np.array(read.points) == hood()).all()
     assert (np.array(read.weights) == WEIGHTS).all()
 
@@ -267,5 +251,5 @@ def test_grids_come_back_from_files_in_their_units(tmp_path):
              for j, (x, y, z) in enumerate(row)]  # fmt: skip
     (tmp_path / "dome.csv").write_text(NET + "\n".join(lines))
     for name in ("dome.npy", "dome.csv"):
-        np.testing.assert_allclose(read_grid(tmp_path / name, "mm"), points, atol=1e-15)
-    assert read_grid(tmp_path / "dome.npy").max() > 100.0
+        np.testing.assert_allclose(coverable.read_grid(tmp_path / name, "mm"), points, atol=1e-15)
+    assert coverable.read_grid(tmp_path / "dome.npy").max() > 100.0

@@ -11,18 +11,8 @@ from bounds import holds
 from part_walks import lost
 from specimens import EQUAL, ball, ring, sampled
 
-from coverable import (
-    SurfaceError,
-    Task,
-    bspline,
-    check,
-    grid,
-    load_robot,
-    parallel_passes,
-    parametric,
-    piecewise,
-    view,
-)
+import coverable
+from coverable import bspline, check, grid, load_robot, parallel_passes, parametric, piecewise, view
 from feasibility.certification.surface_replay import replay_over_surface
 from surfaces.places.offset_surfaces import offset_surface
 from surfaces.places.places import Places
@@ -163,7 +153,7 @@ def test_the_class_of_the_page_needs_no_more_than_its_formulas(names):
     ):  # fmt: skip
         off = np.linalg.norm(values - values[0] - t * (values[-1] - values[0]), axis=1).max()
         assert 0.4 * bound < off < bound
-    task, robot = Task(0.02, 60, roll_deg=(-175, 175)), load_robot("puma560")
+    task, robot = coverable.Task(0.02, 60, roll_deg=(-175, 175)), load_robot("puma560")
     verdict = check(robot, cells, task)
     assert verdict.feasible
     assert replay_over_surface(robot, cells, task, verdict.witness.q).accepted
@@ -179,7 +169,7 @@ def test_a_kind_that_cannot_be_followed_is_measured(names):
             return super().local_point(np.where(u > 2.0, 0.0, u), v)
 
     own = Unknown(**{f.name: getattr(names["screw"], f.name) for f in fields(names["screw"])})
-    with pytest.raises(SurfaceError, match=r"np\.greater is not known"):
+    with pytest.raises(coverable.SurfaceError, match=r"np\.greater is not known"):
         sheet_of(own)
     places = [Places(np.zeros(1, dtype=int), np.array([[u, 0.2]])) for u in (0.0, 0.1)]
     known, measured = (

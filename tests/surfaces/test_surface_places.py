@@ -10,18 +10,8 @@ from bounds import holds
 from random_surfaces import random_surface
 from specimens import EGG, FACETED, SMOOTH, VASE, quarter_turn, turned
 
-from coverable import (
-    bspline,
-    cone,
-    cylinder,
-    ellipsoid,
-    hyperboloid,
-    piecewise,
-    plane,
-    revolution,
-    sphere,
-    torus,
-)
+import coverable
+from coverable import bspline, ellipsoid, hyperboloid, piecewise, plane, revolution, sphere, torus
 from surfaces.places.offset_surfaces import offset_surface
 from surfaces.places.places import Places
 
@@ -46,9 +36,9 @@ def half_pipe():
 SURFACES = {
     "plane": SMOOTH["sheet"],
     "sphere": sphere(1.2, (0, 180), (0, 360), position=(1, 2, 3), rpy_deg=(10, 20, 30)),
-    "cylinder": cylinder(0.7, (0, 360), (0.0, 1.0)),
+    "cylinder": coverable.cylinder(0.7, (0, 360), (0.0, 1.0)),
     "hyperboloid": hyperboloid(0.5, 0.2, (0, 360), (-0.6, 0.8)),
-    "cone": cone(0.2, 1.5, (0, 360), (-0.12, 0.5)),
+    "cone": coverable.cone(0.2, 1.5, (0, 360), (-0.12, 0.5)),
     "torus": torus(0.5, 0.2, (0, 360), (0, 360)),
     "ellipsoid": ellipsoid((1.0, 0.4, 0.6), (0, 180), (0, 360)),
     "vase": SMOOTH["vase"],

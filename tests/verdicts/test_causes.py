@@ -12,19 +12,8 @@ from arm_urdfs import joint
 from asked import question, verdict_of
 from random_arms import robot_of
 
-from coverable import (
-    CauseKind,
-    Collision,
-    Obstacle,
-    Search,
-    Task,
-    ToolShape,
-    check,
-    cylinder,
-    load_robot,
-    plane,
-    sphere,
-)
+import coverable
+from coverable import CauseKind, Search, Task, ToolShape, check, cylinder, load_robot, plane, sphere
 from feasibility.roadmap.causes import diagnosis
 from feasibility.roadmap.motions.arrays import arrays_of
 from feasibility.roadmap.motions.working_memory import work_for
@@ -126,7 +115,7 @@ def test_roll_says_which_could_be_had():
 # In the way: of the tool only a ball around its point is asked for.
 
 BALL = 0.05
-ALONE = Collision(self_=False, surface=False, tool=(ToolShape.sphere(BALL),))
+ALONE = coverable.Collision(self_=False, surface=False, tool=(ToolShape.sphere(BALL),))
 
 
 def asked_beside(obstacle, clearance):
@@ -141,7 +130,7 @@ def asked_beside(obstacle, clearance):
 @pytest.mark.parametrize("gap", [-0.02, 0.03])
 def test_what_is_in_the_way_is_named_with_its_distance(gap):
     at = 0.5 + BALL + gap
-    wall = Obstacle.halfspace("wall", position=(at, 0.0, 0.0), rpy_deg=(0.0, -90.0, 0.0))
+    wall = coverable.Obstacle.halfspace("wall", position=(at, 0.0, 0.0), rpy_deg=(0.0, -90.0, 0.0))
     (cause,) = asked_beside(wall, 0.05).causes
     assert cause.kind is CauseKind.COLLISION
     assert cause.pair == ("tool", "wall")

@@ -11,18 +11,8 @@ import pytest
 from asked import case_of, question, verdict_of
 from jobs import EndingClock
 
-from coverable import (
-    Answer,
-    Collision,
-    Evidence,
-    Search,
-    Verdict,
-    check,
-    greedy_check,
-    load_result,
-    save_result,
-    verify,
-)
+import coverable
+from coverable import Answer, Evidence, Search, Verdict, check, load_result, save_result, verify
 from coverable.errors import ArgumentError
 from feasibility.reports.verdict import as_json
 from feasibility.roadmap.exploration import BUDGET
@@ -214,13 +204,13 @@ def test_what_collides_is_refused_and_nothing_asked_is_no_collision():
     assert any("roof" in fault.text for fault in judged.faults)
     assert not verify(replace(free, task=task)).holds
     assert not check(robot, cells, task, seeds=free.witness).feasible
-    none = check(robot, cells, task, collision=Collision(self_=False, surface=False))
+    none = check(robot, cells, task, collision=coverable.Collision(self_=False, surface=False))
     one, other = (as_json(answer) for answer in (none, free))
     assert {k: v for k, v in one.items() if k != "timing"} == {
         k: v for k, v in other.items() if k != "timing"
     }
     with pytest.raises(ArgumentError, match="knows no collisions"):
-        greedy_check(robot, cells, task)
+        coverable.greedy_check(robot, cells, task)
 
 
 def test_links_are_cut_into_pieces_only_where_hulls_are_in_the_way():

@@ -7,17 +7,8 @@ import pinocchio as pin
 import pytest
 from asked import question, verdict_of
 
-from coverable import (
-    Collision,
-    Obstacle,
-    Search,
-    Task,
-    check,
-    coverage_path,
-    load_robot,
-    plane,
-    verify,
-)
+import coverable
+from coverable import Collision, Search, Task, check, coverage_path, load_robot, plane, verify
 from coverable.errors import ArgumentError
 from robots.kinematics import Kinematics
 
@@ -83,7 +74,7 @@ def test_a_start_off_the_motion_set_is_refused_with_its_distance(anywhere):
 
 
 def test_a_start_that_collides_is_refused(started):
-    ball = Obstacle.sphere("ball", 0.32, position=(0.5, 0.0, 0.5))
+    ball = coverable.Obstacle.sphere("ball", 0.32, position=(0.5, 0.0, 0.5))
     with pytest.raises(ArgumentError, match="start collides"):
         check(started, PLATE, replace(TASK, collision=Collision(scene=(ball,))))
 

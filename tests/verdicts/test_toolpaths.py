@@ -5,18 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from coverable import (
-    Collision,
-    PathError,
-    Task,
-    check,
-    coverage_path,
-    load_robot,
-    plane,
-    poses,
-    replay,
-    verify,
-)
+import coverable
+from coverable import Task, check, coverage_path, load_robot, plane, poses, replay, verify
 from feasibility.verdict import Answer
 
 PATCH = plane((0.3, 0.7), (-0.2, 0.2), position=(0, 0, 0.3), side="outside").cells(6, 6)
@@ -50,7 +40,7 @@ def test_a_toolpath_is_run_in_order_and_never_back(ur5):
     path = coverage_path(verdict)
     assert (path.order, path.visits.tolist()) == ("given", list(range(36)))
     assert coverage_path(verdict, only=[4, 9]).visits.tolist() == [4, 5, 6, 7, 8, 9]
-    with pytest.raises(PathError, match="is run in its order"):
+    with pytest.raises(coverable.PathError, match="is run in its order"):
         coverage_path(verdict, "shortest")
 
 
@@ -67,7 +57,7 @@ def test_the_tool_may_turn_on_the_spot_and_a_pose_may_come_twice(ur5, standoff):
 
 def test_collisions_with_a_surface_are_left_out_where_there_is_none(ur5):
     cells = poses(PATCH.centres[SNAKE][:6], PATCH.normals[SNAKE][:6])
-    verdict = check(ur5, cells, TASK, collision=Collision(allow=(("tool", "surface"),)))
+    verdict = check(ur5, cells, TASK, collision=coverable.Collision(allow=(("tool", "surface"),)))
     assert verdict.task.collision.checked == ("self",)
     assert verdict.answer is Answer.FEASIBLE
     assert any("no surface between them" in note for note in cells.notes)

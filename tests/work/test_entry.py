@@ -7,29 +7,18 @@ import pytest
 from referee import evenly as dense
 from timed_motions import keeps_to_limits
 
-from coverable import (
-    Collision,
-    Obstacle,
-    PathError,
-    Task,
-    check,
-    coverage_path,
-    load_robot,
-    motion_limits,
-    plane,
-    replay,
-    trajectory,
-)
+import coverable
+from coverable import Collision, Obstacle, PathError, check, coverage_path, replay, trajectory
 from feasibility.certification.collisions.collision_replay import collision_replay
 from feasibility.collisions.asked_bodies import gather
 from feasibility.entry.ends import ends_of
 from feasibility.verdict import Walk
 from robots.kinematics import Kinematics
 
-UR5 = load_robot("ur5")
-CELLS = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0, 0, 0.3)).cells(2, 2)
+UR5 = coverable.load_robot("ur5")
+CELLS = coverable.plane((0.4, 0.6), (-0.1, 0.1), "outside", (0, 0, 0.3)).cells(2, 2)
 HOME = (0.0, -90.0, 90.0, -90.0, -90.0, 0.0)
-TASK = Task(standoff=0.02, cone_deg=15, home_deg=HOME)
+TASK = coverable.Task(standoff=0.02, cone_deg=15, home_deg=HOME)
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +46,7 @@ def test_the_tool_comes_and_goes_straight_along_the_approach(path):
 
 
 def test_the_whole_motion_keeps_to_all_limits_and_goes_along_the_path(path):
-    limits, ends = motion_limits(UR5, 0.2), ends_of(path, 0.05)
+    limits, ends = coverable.motion_limits(UR5, 0.2), ends_of(path, 0.05)
     whole = trajectory(path, 0.2, entry=ends.entry, leave=ends.exit)
     assert np.allclose(whole.q[[0, -1]], np.radians(HOME))
     assert np.abs(whole.dq[[0, -1]]).max() <= 1e-9

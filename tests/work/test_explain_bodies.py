@@ -8,25 +8,13 @@ import pytest
 from asked import question
 from samples import EVERYTHING, sampled
 
-from coverable import (
-    Answer,
-    Collision,
-    Obstacle,
-    Search,
-    Task,
-    ToolShape,
-    check,
-    explain,
-    load_case,
-    load_robot,
-    plane,
-    replay,
-)
+import coverable
+from coverable import Obstacle, Search, Task, ToolShape, check, explain, load_case, replay
 from feasibility.sensitivity.quantities import Kind
 from feasibility.verdict import Walk
 
-UR5 = load_robot("ur5")
-PLATE = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0.0, 0.0, 0.3))
+UR5 = coverable.load_robot("ur5")
+PLATE = coverable.plane((0.4, 0.6), (-0.1, 0.1), "outside", (0.0, 0.0, 0.3))
 CELLS = PLATE.cells(1, 2)
 FREE = UR5.with_limits(np.tile([-np.inf, np.inf], (6, 1)))
 """Without limits, which have nothing to do with bodies and take most of the time to vary."""
@@ -40,7 +28,7 @@ POST = Obstacle.box("post", (0.1, 0.1, 1.0), position=(-0.6, -0.6, 0.5))
 @cache
 def explained(clearance):
     ball = ToolShape.sphere(RADIUS)
-    asked = Collision(
+    asked = coverable.Collision(
         self_=False, surface=False, clearance=clearance, scene=(WALL, POST), tool=(ball,)
     )
     return explain(FREE, CELLS, Task(0.02, 30, TOLERANCE, collision=asked))
@@ -84,7 +72,7 @@ def test_the_object_in_the_way_is_named_and_only_that():
 
 
 def test_what_is_left_out_takes_its_pairs_along():
-    asked = Collision(
+    asked = coverable.Collision(
         self_=False, surface=False, scene=(WALL, POST), tool=(ToolShape.sphere(RADIUS),),
         allow=(("forearm_link", "post"),), clearances=(("tool", "wall", 0.2),),
     )  # fmt: skip
@@ -132,7 +120,7 @@ def test_a_motion_found_beside_a_case_is_tried_on_the_case_itself():
     robot, cells, task = asked.robot, asked.cells, asked.task
     found = explain(robot, cells, task)
     assert found.verdict.feasible
-    assert found.alone is None or found.alone.answer is not Answer.FEASIBLE
+    assert found.alone is None or found.alone.answer is not coverable.Answer.FEASIBLE
     some = [t for t in found.thresholds if t.margin > 0.0 and t.quantity.joint >= 0]
     assert len(some) > 5
     for threshold in some:
@@ -147,6 +135,6 @@ def test_a_search_ends_after_so_many_evaluations_on_any_machine():
     """As at the deadline: undecided, and why cells are missed can still be read."""
     robot, cells, task, _ = load_case("paper/5f").with_overrides(["task.standoff=0.505"]).build()
     verdict = check(robot, cells, task, Search(evaluations=30_000))
-    assert verdict.answer is Answer.UNDECIDED
+    assert verdict.answer is coverable.Answer.UNDECIDED
     assert 30_000 < verdict.statistics["fk"] < 100_000
     assert len(verdict.causes) == len(cells) - verdict.n_covered

@@ -6,24 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from coverable import (
-    Collision,
-    Task,
-    check,
-    cylinder,
-    load_robot,
-    parallel_passes,
-    pass_toolpath,
-    plane,
-    poses,
-    verify,
-)
+import coverable
+from coverable import Collision, Task, check, cylinder, parallel_passes, pass_toolpath, verify
 from coverable.errors import CoverableError
 from feasibility.cli.main import main
 from surfaces.passes.toolpath import pass_route
 from surfaces.toolpaths.pose_cells import PoseCells
 
-UR5 = load_robot("ur5")
+UR5 = coverable.load_robot("ur5")
 PANEL = """
 robot.name = "ur5"
 surface.kind = "plane"
@@ -71,7 +61,7 @@ def path(tmp_path, capsys):
 
 
 def test_between_stretches_that_are_apart_the_tool_is_lifted():
-    laid = parallel_passes(plane((0.0, 0.2), (0.0, 0.2), "outside"), 0.1, one_way=True)
+    laid = parallel_passes(coverable.plane((0.0, 0.2), (0.0, 0.2), "outside"), 0.1, one_way=True)
     cells = pass_toolpath(laid, retract=0.03)
     assert np.ptp(cells.centres[:, 2]) == pytest.approx(0.03)
     assert (cells.centres[:, 2] > 0.02).sum() == 2
@@ -85,7 +75,7 @@ def test_between_stretches_that_are_apart_the_tool_is_lifted():
 
 
 def test_the_surface_under_the_passes_is_no_less_a_wall():
-    plate = plane((0.0, 0.1), (0.0, 0.1), "outside", (0.45, 0.0, 0.2))
+    plate = coverable.plane((0.0, 0.1), (0.0, 0.1), "outside", (0.45, 0.0, 0.2))
     cells = pass_toolpath(parallel_passes(plate, 0.1))
     assert cells.surface.wall is plate
     moved = cells.surface.moved(np.eye(3), (0.0, 0.0, 0.1))
@@ -124,7 +114,7 @@ def test_a_way_through_the_part_is_refused():
     task = Task(0.0, 30, 5e-4)
     route = pass_route(parallel_passes(part, 0.06, np.pi / 2))
     kept = route.places.stretch >= 0
-    cut = poses(route.places.points[kept], route.places.normals[kept])
+    cut = coverable.poses(route.places.points[kept], route.places.normals[kept])
     verdict = check(UR5, cut, task)
     assert verdict.feasible  # there is no surface that anybody knows of
     q, on = verdict.witness.q, np.ones(kept.sum(), dtype=bool)

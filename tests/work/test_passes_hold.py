@@ -17,30 +17,14 @@ from referee import Facets, Form, angles_between, on_triangles
 from samples import EVERYTHING, sampled, seeds
 from scipy.spatial.transform import Rotation
 
-from coverable import (
-    PlannedPasses,
-    SurfaceError,
-    Task,
-    cone,
-    coverage_path,
-    cylinder,
-    hyperboloid,
-    load_robot,
-    mesh,
-    parallel_passes,
-    plan_passes,
-    plane,
-    sphere,
-    torus,
-    trajectory,
-    verify,
-)
+import coverable
+from coverable import Task, parallel_passes, plan_passes, plane, sphere, torus, trajectory, verify
 from surfaces.meshes.triangle_mesh import TriangleMesh
 
 ARMS = {"ur5": 0.5, "ur10": 0.7, "panda": 0.5, "puma560": 0.6}  # and m, where the surfaces stand
 KINDS = ("plane", "cylinder", "sphere", "cone", "torus", "hyperboloid", "bumps", "bumps with hole")
-MAKERS = {"cylinder": cylinder, "sphere": sphere, "cone": cone, "torus": torus,
-          "hyperboloid": hyperboloid}  # fmt: skip
+MAKERS = {"cylinder": coverable.cylinder, "sphere": sphere, "cone": coverable.cone, "torus": torus,
+          "hyperboloid": coverable.hyperboloid}  # fmt: skip
 PLACES = 12  # of each segment that are looked at
 ROUNDING = 1e-6  # [m], [rad]
 BLENDED = math.radians(2.0)  # how far normals of triangles may be from otherwise blended ones
@@ -69,12 +53,12 @@ class Drawn:
         return form
 
     @cached_property
-    def planned(self) -> PlannedPasses:
+    def planned(self) -> coverable.PlannedPasses:
         """Passes, and the verdict on one motion along them."""
         laid = parallel_passes(
             self.surface, self.pitch, self.direction, overrun=self.overrun, one_way=self.one_way
         )
-        return plan_passes(load_robot(self.arm), laid, self.task, retract=0.03)
+        return plan_passes(coverable.load_robot(self.arm), laid, self.task, retract=0.03)
 
 
 def drawn(number):
@@ -139,7 +123,7 @@ def bumps(rng, wide, deep, pose, hole):
     waves = rng.uniform(-0.002, 0.002, 2)
     z = waves[0] * np.sin(20 * points[:, 0]) + waves[1] * np.cos(15 * points[:, 1])
     own = used(Mesh(np.column_stack([points - [wide / 2, deep / 2], z]), faces))
-    return mesh(TriangleMesh(*own), side="outside", position=pose[0], rpy_deg=pose[1])
+    return coverable.mesh(TriangleMesh(*own), side="outside", position=pose[0], rpy_deg=pose[1])
 
 
 def nearest(form, points):
@@ -199,13 +183,13 @@ def test_what_is_called_feasible_is_right_over_the_surface(number, held):
     held[number] = False
     try:
         along = case.planned
-    except SurfaceError:  # the tool would have to be lifted further
+    except coverable.SurfaceError:  # the tool would have to be lifted further
         return
     robot, cells, task = along.verdict.robot, along.cells, along.verdict.task
     if not along.verdict.feasible:
         return
     held[number] = True
-    run = trajectory(coverage_path(along.verdict), 0.2)
+    run = trajectory(coverable.coverage_path(along.verdict), 0.2)
     for q, cell in ((along.verdict.witness.q, along.verdict.witness.cell), (run.q, run.cell)):
         found = verify(robot, cells, task, q, working=cells.surface.works(cell))
         assert found.holds, found.refusal

@@ -12,17 +12,8 @@ from plain import faults_of
 from referee import evenly
 from samples import sampled, seeds, spread
 
-from coverable import (
-    Answer,
-    PathError,
-    Task,
-    check,
-    coverage_path,
-    cylinder,
-    load_robot,
-    plane,
-    replay,
-)
+import coverable
+from coverable import PathError, Task, check, coverage_path, cylinder, load_robot, plane, replay
 from feasibility.paths.ladder import joint_route
 from feasibility.paths.metrics import revisiting
 from feasibility.paths.motion_graph import MotionGraph, joint_length
@@ -307,7 +298,7 @@ def test_home_says_which_turn_and_a_start_is_kept(small):
 def test_what_has_no_path_is_said(approved):
     verdict, patch = verdict_of("4d"), verdict_of("ur5")
     missed = int(np.flatnonzero(~verdict.covered)[0])
-    undecided = replace(verdict, answer=Answer.UNDECIDED, graph=None, causes=())
+    undecided = replace(verdict, answer=coverable.Answer.UNDECIDED, graph=None, causes=())
     greedy = replace(patch, method="greedy")
     empty = check(patch.robot, patch.cells.surface.cells(0, 3), patch.task)
     asked = [(verdict, {}), (undecided, {}), (greedy, {}), (empty, {}), (patch, {"only": []})]

@@ -14,17 +14,8 @@ import numpy as np
 import pytest
 from samples import sampled, seeds
 
-from coverable import (
-    Task,
-    load_robot,
-    parallel_passes,
-    pass_runs,
-    plan_passes,
-    plane,
-    poses,
-    replay,
-    verify,
-)
+import coverable
+from coverable import Task, load_robot, parallel_passes, pass_runs, plan_passes, plane, verify
 from feasibility.certification.rates.rate_replay import replay_rates
 from feasibility.clock import Clock
 from feasibility.runs.fewest import Stations, fewest_runs
@@ -147,7 +138,7 @@ def ring(count=30):
     """A toolpath of most of a circle about the base, all of it one stretch."""
     angle = np.linspace(-170.0, 170.0, count) * DEG
     points = np.column_stack([0.5 * np.cos(angle), 0.5 * np.sin(angle), np.full(count, 0.2)])
-    cells = poses(points, np.tile([0.0, 0.0, 1.0], (count, 1)))
+    cells = coverable.poses(points, np.tile([0.0, 0.0, 1.0], (count, 1)))
     stretch, on = np.zeros(count, dtype=np.int64), np.ones(count, dtype=bool)
     return cells, PassPlaces(cells.centres, cells.normals, stretch, on)
 
@@ -163,7 +154,7 @@ def test_runs_work_on_all_of_it_and_are_replayed(found):
     assert len(runs.runs) > 1
     assert (runs.left_out, runs.gaps, runs.refusals) == (0.0, (), ())
     for run in runs.runs:
-        assert replay(SHORT, cells, TASK, run.walk, run.needed).accepted
+        assert coverable.replay(SHORT, cells, TASK, run.walk, run.needed).accepted
     for cut, (a, b) in zip(runs.cuts, itertools.pairwise(runs.runs), strict=True):
         assert int(a.visits[-1]) <= int(b.visits[0]) <= int(a.visits[-1]) + 1
         assert cut.cause

@@ -13,19 +13,8 @@ from referee import evenly as dense
 from samples import EVERYTHING, sampled
 from timed_motions import interpolated, keeps_to_limits
 
-from coverable import (
-    Collision,
-    Obstacle,
-    PathError,
-    Task,
-    check,
-    coverage_path,
-    load_robot,
-    motion_limits,
-    plane,
-    replay,
-    trajectory,
-)
+import coverable
+from coverable import Collision, PathError, Task, check, coverage_path, motion_limits, trajectory
 from feasibility.certification.collisions.collision_replay import collision_replay
 from feasibility.collisions.asked_bodies import gather
 from feasibility.timing.fastest_speeds import Rows, fastest_speeds
@@ -35,10 +24,10 @@ from feasibility.timing.smoothing import control_points
 from feasibility.verdict import Walk
 from robots.kinematics import Kinematics
 
-UR5 = load_robot("ur5")
-POST = Obstacle.box("post", (0.1, 0.1, 0.6), position=(0.75, 0.0, 0.3))
+UR5 = coverable.load_robot("ur5")
+POST = coverable.Obstacle.box("post", (0.1, 0.1, 0.6), position=(0.75, 0.0, 0.3))
 AMONG = Collision(clearance=0.005, scene=(POST,))
-FLAT = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside")
+FLAT = coverable.plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside")
 CASES = ("5c, coarse", *PATCHES, *("4a", "4c", "5c") * EVERYTHING)
 
 
@@ -60,7 +49,7 @@ def run_of(name):
 def test_a_trajectory_is_its_path_and_keeps_to_all_limits_however_it_is_interpolated(name):
     run, path = run_of(name), path_of(name)
     robot, limits = path.robot, motion_limits(path.robot, SPEED)
-    assert replay(robot, path.cells, path.task, run.walk, path.needed).accepted
+    assert coverable.replay(robot, path.cells, path.task, run.walk, path.needed).accepted
     marks = run.cell >= 0
     assert_over(path, run.cell[marks], run.q[marks])
     assert np.array_equal(run.cell[marks], path.visits)
@@ -122,7 +111,7 @@ def test_joint_limits_that_the_path_touches_are_nowhere_passed(name):
     assert (most <= path.robot.upper).all()
     # The limits are touched, or nearly so: the test would see a motion that passes them.
     assert min((least - path.robot.lower).min(), (path.robot.upper - most).min()) < 1e-6
-    assert replay(path.robot, path.cells, path.task, run.walk, path.needed).accepted
+    assert coverable.replay(path.robot, path.cells, path.task, run.walk, path.needed).accepted
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -207,18 +196,18 @@ def test_a_timed_motion_that_would_collide_is_refused_with_the_pair(what):
             assert collision_replay(UR5, bodies_of(task), row[None]).accepted
         return
     if what == "in the way":
-        ahead = Obstacle.box("bracket", (0.05, 0.05, 0.3), position=(0.5, 0.0, 0.5))
+        ahead = coverable.Obstacle.box("bracket", (0.05, 0.05, 0.3), position=(0.5, 0.0, 0.5))
     else:
         half = Kinematics(UR5).joints(run_of("post").q[len(run_of("post")) // 2][None])
         middle = half.points[0, -1]
-        ahead = Obstacle.sphere("bracket", 0.01, position=tuple(middle))
+        ahead = coverable.Obstacle.sphere("bracket", 0.01, position=tuple(middle))
     task = replace(path.task, collision=Collision(self_=False, surface=False, scene=(ahead,)))
     with pytest.raises(PathError, match=r"\w+ and bracket"):
         trajectory(replace(path, task=task), SPEED)
 
 
 def test_limits_and_numbers_that_are_none():
-    puma, path = replace(load_robot("puma560"), max_velocity=np.nan), path_of("ur5")
+    puma, path = replace(coverable.load_robot("puma560"), max_velocity=np.nan), path_of("ur5")
     with pytest.raises(PathError, match=r"joint1, .*give velocity"):
         motion_limits(puma, 0.1)
     assert motion_limits(puma, 0.1, velocity=2.0).acceleration.tolist() == [4.0] * 6

@@ -11,18 +11,8 @@ import pinocchio as pin
 import trimesh
 from foreign_clearances import ForeignScene
 
-from coverable import (
-    Axis,
-    Cells,
-    Collision,
-    Obstacle,
-    Robot,
-    Surface,
-    Task,
-    ToolShape,
-    load_robot,
-    plane,
-)
+import coverable
+from coverable import Axis, Cells, Collision, Obstacle, Robot, Task, ToolShape, load_robot, plane
 from feasibility.certification.overlaps.every_pose import PoseCheck, never_clear
 from feasibility.collisions.asked_bodies import gather
 from feasibility.collisions.bodies import Bodies
@@ -97,7 +87,7 @@ class Over:
     """A tool over one cell."""
 
     robot: Robot
-    surface: Surface
+    surface: coverable.Surface
     task: Task
     point: np.ndarray
     approach: np.ndarray

@@ -23,25 +23,8 @@ import pinocchio as pin
 from jobs import case_named, verdict_named
 from mesh_writers import GOOD
 
-from coverable import (
-    Case,
-    Evidence,
-    SurfaceError,
-    bspline,
-    grid,
-    load_case,
-    load_motion,
-    load_result,
-    load_robot,
-    load_study,
-    load_trajectory,
-    poses,
-    read_grid,
-    read_net,
-    read_poses,
-    save_result,
-    save_trajectory,
-)
+import coverable
+from coverable import Evidence, load_motion, load_result, read_net, read_poses, save_result
 from coverable.errors import CoverableError
 from coverable.meshes.robot_files import MeshFiles
 from feasibility.cut_tree import Cut, CutTree, Leaf
@@ -79,8 +62,8 @@ class Reader(NamedTuple):
     """Fails where a value that was read is none; may write into a folder."""
 
 
-def sound_case(case: Case, folder: Path) -> None:
-    assert Case.from_toml(case.to_toml()) == case
+def sound_case(case: coverable.Case, folder: Path) -> None:
+    assert coverable.Case.from_toml(case.to_toml()) == case
     assert case.with_overrides([]) == case
     with contextlib.suppress(CoverableError):  # whatever its numbers are, or a sentence
         case.build()
@@ -128,14 +111,14 @@ def sound_net(net: Any, folder: Path) -> None:
     kept = {key: value for key, value in net._asdict().items() if value is not None}
     (folder / "again.json").write_text(json.dumps(kept))
     assert read_net(folder / "again.json")._replace(degree=net.degree) == net
-    made_or_refused(lambda: bspline(**net._asdict()))
+    made_or_refused(lambda: coverable.bspline(**net._asdict()))
 
 
 def made_or_refused(make: Callable[[], Any]) -> None:
     """A surface of finite cells, or a sentence."""
     try:
         made = make()
-    except SurfaceError as error:
+    except coverable.SurfaceError as error:
         assert error.faults  # noqa: PT017 - both outcomes are right
         return
     centres = made.centres if hasattr(made, "centres") else made.cells(2, 2).centres
@@ -143,11 +126,11 @@ def made_or_refused(make: Callable[[], Any]) -> None:
 
 
 def sound_grid(points: Any, _: Path) -> None:
-    made_or_refused(lambda: grid(points))
+    made_or_refused(lambda: coverable.grid(points))
 
 
 def sound_poses(given: Any, _: Path) -> None:
-    made_or_refused(lambda: poses(**given._asdict()))
+    made_or_refused(lambda: coverable.poses(**given._asdict()))
 
 
 def read_alone(*_: object) -> None:
@@ -180,7 +163,9 @@ def sound_trajectory(run: Any, folder: Path) -> None:
     assert np.isfinite(run.q).all()
     assert (np.diff(run.time) > 0.0).all()
     for ending in ("csv", "json"):
-        again = load_trajectory(save_trajectory(folder / f"again.{ending}", run))
+        again = coverable.load_trajectory(
+            coverable.save_trajectory(folder / f"again.{ending}", run)
+        )
         assert again.joint_names == run.joint_names
         for name in ("time", "q", "dq", "ddq", "tool_speed", "cell"):
             assert np.array_equal(getattr(again, name), getattr(run, name))
@@ -292,18 +277,18 @@ def _text(reader: str, name: str) -> Callable[[], bytes]:
     return lambda: bad_input.many(bad_input.goods(reader)[name].replace("§", "")).encode()
 
 
-PUMA = load_robot("puma560")
+PUMA = coverable.load_robot("puma560")
 CASES = "sphere", "revolution", "bspline", "piecewise", "scene", "mounted"
 READERS = {
-    **{f"case: {kind}": Reader("case.toml", load_case, _text("case", kind), sound_case)
+    **{f"case: {kind}": Reader("case.toml", coverable.load_case, _text("case", kind), sound_case)
        for kind in CASES},
-    "study": Reader("study.toml", load_study, STUDY.encode, read_alone),
+    "study": Reader("study.toml", coverable.load_study, STUDY.encode, read_alone),
     "urdf": Reader("arm.urdf", check_urdf, _text("urdf", "arm"), sound_urdf),
     "xacro": Reader("arm.xacro", lambda path: expanded(str(path)), XACRO.encode, read_alone),
     "srdf": Reader("arm.srdf", read_srdf, SRDF.encode, sound_srdf),
     "net as JSON": Reader("net.json", read_net, _text("net", "json"), sound_net),
     "net as CSV": Reader("net.csv", read_net, bad_input.net_csv, sound_net),
-    "grid": Reader("grid.npy", read_grid, lambda: npy(GRID), sound_grid),
+    "grid": Reader("grid.npy", coverable.read_grid, lambda: npy(GRID), sound_grid),
     "poses": Reader("poses.csv", lambda path: read_poses(path, "mm"), bad_input.POSES.encode,
                     sound_poses),
     **{file: Reader(file, lambda path: read_mesh(path, 1.0), lambda file=file: GOOD[file],
@@ -312,9 +297,9 @@ READERS = {
     "COLLADA": Reader("part.dae", parts_of, hostile.GOOD.encode, sound_parts),
     "result": Reader("a.result", load_result, lambda: packed(members("plate")), sound_result),
     "proof": Reader("a.result", load_result, lambda: packed(members("proof")), sound_result),
-    "trajectory as CSV": Reader("run.csv", load_trajectory, _text("trajectory", "csv"),
+    "trajectory as CSV": Reader("run.csv", coverable.load_trajectory, _text("trajectory", "csv"),
                                 sound_trajectory),
-    "trajectory as JSON": Reader("run.json", load_trajectory, _text("trajectory", "json"),
+    "trajectory as JSON": Reader("run.json", coverable.load_trajectory, _text("trajectory", "json"),
                                  sound_trajectory),
     "motion": Reader("motion.csv", lambda path: load_motion(path, PUMA), _text("motion", "two"),
                      sound_motion),

@@ -5,20 +5,8 @@ import itertools
 import mesh_patches
 import numpy as np
 
-from coverable import (
-    SurfaceError,
-    bspline,
-    cone,
-    cylinder,
-    ellipsoid,
-    hyperboloid,
-    mesh,
-    piecewise,
-    plane,
-    revolution,
-    sphere,
-    torus,
-)
+import coverable
+from coverable import bspline, cylinder, mesh, piecewise, plane, revolution, sphere, torus
 from surfaces.meshes.triangle_mesh import TriangleMesh
 
 
@@ -68,7 +56,7 @@ def _cylinder(rng):
 def _hyperboloid(rng):
     waist, flare = _decade(rng, -3, 0), _decade(rng, -3, 0)
     height = _interval(rng, rng.choice([waist, flare]))
-    return hyperboloid(waist, flare, _angles(rng), height, **_pose(rng))
+    return coverable.hyperboloid(waist, flare, _angles(rng), height, **_pose(rng))
 
 
 def _cone(rng):
@@ -77,7 +65,7 @@ def _cone(rng):
     near, far = sorted(_decade(rng, -4, 1) * abs(radius / slope) for _ in range(2))
     toward = -np.sign(apex)
     height = sorted((float(apex + toward * near), float(apex + toward * far)))
-    return cone(radius, slope, _angles(rng), height, **_pose(rng))
+    return coverable.cone(radius, slope, _angles(rng), height, **_pose(rng))
 
 
 def _torus(rng):
@@ -88,7 +76,7 @@ def _torus(rng):
 
 def _ellipsoid(rng):
     axes = [_decade(rng, -3, 0) for _ in range(3)]
-    return ellipsoid(axes, _polar(rng), _angles(rng), **_pose(rng))
+    return coverable.ellipsoid(axes, _polar(rng), _angles(rng), **_pose(rng))
 
 
 def _revolution(rng):
@@ -163,5 +151,5 @@ def random_surface(kind, rng):
     while True:
         try:
             return KINDS[kind](rng)
-        except SurfaceError:
+        except coverable.SurfaceError:
             continue

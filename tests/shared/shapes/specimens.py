@@ -6,20 +6,8 @@ import numpy as np
 from mesh_patches import bent, of_patch
 from smooth_probes import POSE
 
-from coverable import (
-    bspline,
-    cone,
-    cylinder,
-    ellipsoid,
-    hyperboloid,
-    mesh,
-    parametric,
-    piecewise,
-    plane,
-    revolution,
-    sphere,
-    torus,
-)
+import coverable
+from coverable import bspline, ellipsoid, hyperboloid, piecewise, plane, revolution, sphere, torus
 from surfaces.meshes.triangle_mesh import TriangleMesh
 
 # Control nets of exact quadrics, and of a free form.
@@ -72,15 +60,15 @@ SMOOTH = {
     "dome": sphere(1.0, (10, 90), (10, 180)),
     "ball": sphere(0.6, (0, 180), (-180, 180), **OUT, **POSE),
     "cap": sphere(2.5, (120, 180), (200, 560), **POSE),
-    "shell": cylinder(0.8, (-60, 100), (0, 0.9)),
-    "pipe": cylinder(0.2, (90, 450), (-3, -1), **OUT, **POSE),
+    "shell": coverable.cylinder(0.8, (-60, 100), (0, 0.9)),
+    "pipe": coverable.cylinder(0.2, (90, 450), (-3, -1), **OUT, **POSE),
     "horn": hyperboloid(0.5, 0.5, (0, 180), (0, 0.5)),
     "tower": hyperboloid(2.0, 3.0, (-180, 180), (-4, 1), **OUT, **POSE),
     "flat cone": hyperboloid(0.1, 0.03, (300, 420), (0.05, 0.2), **POSE),
     "sheet": plane((0.0, 0.6), (-0.4, 0.4)),
     "wall": plane((1, 2), (5, 9), **OUT, **POSE),
-    "funnel": cone(0.2, 1.0, (0, 360), (-0.1, 0.4), **POSE),
-    "spike": cone(0.5, -0.25, (-70, 100), (-0.3, 1.5), **OUT),
+    "funnel": coverable.cone(0.2, 1.0, (0, 360), (-0.1, 0.4), **POSE),
+    "spike": coverable.cone(0.5, -0.25, (-70, 100), (-0.3, 1.5), **OUT),
     "doughnut": torus(0.5, 0.2, (-180, 180), (0, 360), **OUT, **POSE),
     "bend": torus(0.8, 0.1, (30, 130), (100, 280)),
     "egg": ellipsoid((0.5, 0.6, 0.9), (0, 180), (10, 370), **POSE),
@@ -91,7 +79,7 @@ SMOOTH = {
     "part of degree 5": bspline(hood(9, 8), degree=(5, 2), u=(0.21, 0.77), v=(0.1, 0.5)),
     "rational": bspline(hood(), weights=WEIGHTS, u=(0.1, 0.8)),
     "spline pipe": bspline(PIPE, (2, 1), (TURN_KNOTS, None), PIPE_WEIGHTS, **POSE),
-    "formula": parametric(
+    "formula": coverable.parametric(
         lambda u, v: (u, v, 0.3 * np.sin(2 * u) * v), (0.0, 1.0), (0.0, 0.8), **POSE
     ),
 }  # fmt: skip
@@ -102,8 +90,8 @@ POLES = {"ball": (True, True), "cap": (False, True), "egg": (True, True)}
 EXTREME = {
     "trumpet": hyperboloid(0.01, 0.001, (0, 360), (-0.7, 1.0), **POSE),
     "almost a pipe": hyperboloid(0.3, 3000.0, (0, 360), (0.1, 1.0)),
-    "needle": cone(0.2, 1.0, (0, 360), (-0.199999, 0.4)),
-    "disc": cone(0.5, -400.0, (200, 300), (-0.002, 0.001), **POSE),
+    "needle": coverable.cone(0.2, 1.0, (0, 360), (-0.199999, 0.4)),
+    "disc": coverable.cone(0.5, -400.0, (200, 300), (-0.002, 0.001), **POSE),
     "wire": torus(0.5, 0.0005, (0, 360), (0, 360)),
     "fat ring": torus(0.5, 0.4999, (0, 360), (90, 270)),
     "coin": ellipsoid((1.0, 0.8, 0.01), (0, 180), (-100, 260)),
@@ -122,7 +110,7 @@ EXTREME = {
 def ridge(count, turn_deg):
     """Two flat strips of triangles that meet at an angle."""
     tilt, half = np.radians(turn_deg / 2), lambda u: u - 0.5
-    return mesh(TriangleMesh(*bent(
+    return coverable.mesh(TriangleMesh(*bent(
         lambda u, v: (half(u) * np.cos(tilt), 0.5 * v, -np.abs(half(u)) * np.sin(tilt)),
         2 * count, count,
     )))  # fmt: skip
@@ -135,12 +123,12 @@ def bowl(count):
         x, y = 0.8 * u - 0.4, 0.8 * v - 0.4
         return x, y, 0.6 * (x**2 + y**2) + 0.1 * x * y
 
-    return mesh(TriangleMesh(*bent(shape, count - 1, count - 1)))
+    return coverable.mesh(TriangleMesh(*bent(shape, count - 1, count - 1)))
 
 
 def flat(name, count=12):
     """A smooth specimen as triangles."""
-    return mesh(TriangleMesh(*of_patch(SMOOTH[name], count, count)))
+    return coverable.mesh(TriangleMesh(*of_patch(SMOOTH[name], count, count)))
 
 
 FACETED = {
@@ -149,7 +137,7 @@ FACETED = {
     "ridge": ridge(4, 70).cells(count=12).surface,
     "halves": piecewise([sphere(0.2, (0, 80), a) for a in ((0, 180), (180, 360))], **POSE),
     "can": piecewise(
-        [cylinder(0.3, (0, 360), (0, 0.5)),
+        [coverable.cylinder(0.3, (0, 360), (0, 0.5)),
          ellipsoid((0.3, 0.3, 0.1), (0, 90), (0, 360), position=(0, 0, 0.5))], **OUT, **POSE,
     ),
     "flap": piecewise(
