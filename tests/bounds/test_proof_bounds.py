@@ -14,14 +14,10 @@ from scipy.spatial.transform import Rotation
 from specimens import cells_of
 
 from coverable import Task, cone, cylinder, hyperboloid, load_robot, plane, sphere, torus
+from feasibility.certification.cut_proofs import linear_models
 from feasibility.certification.cut_proofs.box_cutting import cut, smaller
 from feasibility.certification.cut_proofs.empty_region import Claim, Emptiness
-from feasibility.certification.cut_proofs.linear_models import (
-    Allowed,
-    ArmModel,
-    Boxes,
-    target_parts,
-)
+from feasibility.certification.cut_proofs.linear_models import ArmModel, Boxes, target_parts
 from feasibility.certification.cut_proofs.parts_agreement import (
     disagreement,
     on_a_finest_part,
@@ -83,7 +79,7 @@ def known(rng, boxes=50):
         task = rolled_task(rng, robot, q, patch, (u, v), standoff)
     parts = target_parts(patch.parts(0.3 * tolerance, 0.3 * chord, 600), patch.cells(1, 1), task)
     arm = ArmModel(robot, robot.lower - FAR, robot.upper + FAR)
-    allowed = Allowed(tolerance, chord, 0.5, task.roll)
+    allowed = linear_models.Allowed(tolerance, chord, 0.5, task.roll)
     emptiness = Emptiness(arm, parts, lambda cell: 0, allowed, lambda: None)
     part, x = at_parameters(patch, u, v)
     made, within = boxes_around(rng, robot, q, parts, int(part[0]), x[0], boxes)
@@ -192,7 +188,7 @@ def test_models_hold_over_their_boxes_and_hardly_less_would(size):
     task = Task(0.02, 20)
     parts = target_parts(dome.parts(0.01, 0.05), dome.cells(1, 1), task)
     part = int(np.argmin(parts.radius[:, 0]))
-    arm, allowed = ArmModel(UR5, UR5.lower, UR5.upper), Allowed(0.0, 0.0, 0.5)
+    arm, allowed = ArmModel(UR5, UR5.lower, UR5.upper), linear_models.Allowed(0.0, 0.0, 0.5)
     for halves in (*(size * np.eye(6)[:5]), np.full(6, 0.2 * size)):
         q, x = rng.uniform(-1.5, 1.5, 6), rng.uniform(-0.5, 0.5, 2)
         centre, half = np.append(q, x), np.append(halves, [0.4, 0.4])
@@ -239,7 +235,7 @@ def test_bodies_are_asked_to_overlap_wherever_the_target_of_a_box_may_be():
 
     parts = target_parts(dome.parts(0.01, 0.05), dome.cells(1, 1), Task(0.02, 20))
     arm, part = ArmModel(UR5, UR5.lower, UR5.upper), int(np.argmax(parts.radius[:, 0]))
-    allowed = Allowed(10.0, 4.0, 0.5)  # so that nothing is excluded
+    allowed = linear_models.Allowed(10.0, 4.0, 0.5)  # so that nothing is excluded
     search = Emptiness(arm, parts, lambda cell: part, allowed, lambda: None, Asked())
     q, x = np.zeros(6), np.array([0.3, -0.2])
     half = np.append(np.full(6, 1e-3), [0.5, 0.25])

@@ -5,20 +5,11 @@ import pytest
 from referee import unit
 
 from coverable import Task, load_robot, sphere
-from feasibility.certification.cut_proofs.linear_models import (
-    Allowed,
-    ArmModel,
-    Boxes,
-    target_parts,
-)
+from feasibility.certification.cut_proofs import linear_models
+from feasibility.certification.cut_proofs.linear_models import Allowed, ArmModel, target_parts
+from feasibility.certification.rolls import box_models
 from feasibility.certification.rolls.bounds import reference_axes
-from feasibility.certification.rolls.box_models import (
-    Directions,
-    TargetModel,
-    ToolModel,
-    reference_parts,
-    roll_models,
-)
+from feasibility.certification.rolls.box_models import Directions, reference_parts, roll_models
 from feasibility.roll import Roll, projected
 from robots.kinematics import Kinematics
 
@@ -33,7 +24,7 @@ def tool_model(q, half):
     turning = Kinematics(UR5).twists(q[None]).transpose(0, 2, 1)[..., 3:]
     second = half @ (half + 2.0 * (np.cumsum(half) - half))
     many = np.full((1, 2), second), np.full((1, 2), min(half.sum(), 2.0))
-    return ToolModel(both, np.cross(turning[:, :, None], both[:, None]), *many)
+    return box_models.ToolModel(both, np.cross(turning[:, :, None], both[:, None]), *many)
 
 
 def test_models_of_the_roll_hold_over_their_boxes():
@@ -48,7 +39,7 @@ def test_models_of_the_roll_hold_over_their_boxes():
         model = Directions(b[None], slopes, radius)
         held = reference_parts(model, Directions.fixed(r, 1))
         q = rng.uniform(-2, 2, UR5.n)
-        target = TargetModel(
+        target = box_models.TargetModel(
             np.stack([b, held.centre[0]])[None], np.stack([slopes, held.slopes], axis=2),
             np.ones((1, 2)), np.array([[radius[0], held.radius[0]]]),
         )  # fmt: skip
@@ -79,7 +70,7 @@ def test_all_joints_together_turn_the_reference_axis():
 
     def radii(joints):
         half = np.append(1e-4 * joints, [1.0, 1.0])
-        box = Boxes((q - half)[None], (q + half)[None], *np.array([[part], [0]]))
+        box = linear_models.Boxes((q - half)[None], (q + half)[None], *np.array([[part], [0]]))
         return arm.models(box, parts, Allowed(1e-3, 0.3, 1.0, task.roll)).radius[0, 2:]
 
     none = radii(np.zeros(6))
@@ -117,9 +108,9 @@ def test_radii_are_those_of_the_lemma():
         x = unit(rng.normal(size=3))
         y, columns = unit(np.cross(x, rng.normal(size=3))), 0.3 * rng.normal(size=(1, 6, 2, 3))
         second, moves = rng.uniform(0.0, 0.1, (2, 1, 2))
-        tool = ToolModel(np.stack([x, y])[None], columns, second, moves)
+        tool = box_models.ToolModel(np.stack([x, y])[None], columns, second, moves)
         values, both = np.stack([b, t])[None], np.stack([slopes, k], axis=1)[None]
-        target = TargetModel(values, both, half[None], np.array([[r_b, r_t]]))
+        target = box_models.TargetModel(values, both, half[None], np.array([[r_b, r_t]]))
         roll = Roll(rng.uniform(-3, 3), rng.uniform(0.1, 1.5))
         found = roll_models(tool, target, roll)
         spans = [lengths(half[:, None] * one) for one in (slopes, k)]

@@ -5,22 +5,11 @@ from dataclasses import replace
 import mesh_patches
 import numpy as np
 import pinocchio as pin
+import proof_cases
 import pytest
 from arm_urdfs import joint
 from gantry import gantry
-from proof_cases import (
-    ACROSS,
-    FLAT,
-    QUICK,
-    STORED,
-    elbow,
-    elbow_case,
-    free_elbow_case,
-    rail_case,
-    split,
-    stored_case,
-    strip,
-)  # fmt: skip
+from proof_cases import elbow, elbow_case, free_elbow_case, rail_case, split, stored_case, strip
 from random_arms import robot_of
 from samples import EVERYTHING, sampled, seeds
 
@@ -69,7 +58,9 @@ def test_trees_made_by_hand_are_accepted(make):
 
 
 @sampled
-@pytest.mark.parametrize("index", range(len(STORED) - 1) if EVERYTHING else QUICK)
+@pytest.mark.parametrize(
+    "index", range(len(proof_cases.STORED) - 1) if EVERYTHING else proof_cases.QUICK
+)
 def test_stored_trees_are_accepted(index):
     ticks = []
     found = verify_proof(*stored_case(index), tick=lambda: ticks.append(1))
@@ -97,7 +88,7 @@ def test_a_cell_out_of_reach_is_a_leaf_alone():
     assert not verified(near, Leaf(0), cells=cells, **free).accepted
     slides = [joint(1, "prismatic", axis=(1, 0, 0)), joint(2, "prismatic", axis=(-1, 0, 0))]
     robot = robot_of(slides).with_limits(np.tile([-np.inf, np.inf], (2, 1)))
-    found = verify_proof(robot, strip(), FLAT, CutTree(Leaf(0)))
+    found = verify_proof(robot, strip(), proof_cases.FLAT, CutTree(Leaf(0)))
     assert found.refusal == "j1 and j2 slide without limits, which no bound covers"
 
 
@@ -136,7 +127,7 @@ def with_first_leaf(node, leaf):
     return replace(node, below=with_first_leaf(node.below, leaf))
 
 
-@pytest.mark.parametrize("index", QUICK[:3])
+@pytest.mark.parametrize("index", proof_cases.QUICK[:3])
 def test_exchanged_cells_and_cuts_of_other_joints_are_refused_where_a_motion_refutes_them(index):
     case, refused = stored_case(index), [0, 0]
     leaves = [with_first_leaf(case.tree.root, Leaf(k)) for k in range(0, len(case.cells), 4)]
@@ -162,11 +153,11 @@ def random_tree(rng, robot, cells, depth=0):
 @pytest.mark.parametrize("seed", seeds(3, all=30))
 def test_no_tree_is_accepted_where_a_motion_covers_all(seed):
     """Elbow up alone covers the strip, with the first joint's limits a little wider."""
-    rng, arm = np.random.default_rng(seed), elbow(q1=ACROSS + 0.3)
+    rng, arm = np.random.default_rng(seed), elbow(q1=proof_cases.ACROSS + 0.3)
     for _ in range(19):
         tree = CutTree(random_tree(rng, arm, 5))
-        assert not verify_proof(arm, strip(), FLAT, tree).accepted
-    robot, cells, task, _ = stored_case(len(STORED) - 1)
+        assert not verify_proof(arm, strip(), proof_cases.FLAT, tree).accepted
+    robot, cells, task, _ = stored_case(len(proof_cases.STORED) - 1)
     tree = CutTree(random_tree(rng, robot, len(cells)))
     assert not verify_proof(robot, cells, task, tree, most=1000).accepted
 
@@ -202,7 +193,7 @@ SHAPES = {
 
 @pytest.mark.parametrize("words", SHAPES)
 def test_what_is_no_tree_is_refused(words):
-    found = verify_proof(elbow(), strip(), FLAT, SHAPES[words])
+    found = verify_proof(elbow(), strip(), proof_cases.FLAT, SHAPES[words])
     assert words in found.refusal
     assert found.boxes == 0
 

@@ -13,13 +13,9 @@ from capsule_arms import at, bodies_of, capsule_links, pair, planar_arm
 from proof_cases import elbow_case
 
 from coverable import Collision, Obstacle, Task, ToolShape, load_robot, plane, sphere
+from feasibility.certification.cut_proofs import linear_models
 from feasibility.certification.cut_proofs.box_exclusion import contract, separated
-from feasibility.certification.cut_proofs.linear_models import (
-    Allowed,
-    ArmModel,
-    Boxes,
-    target_parts,
-)
+from feasibility.certification.cut_proofs.linear_models import ArmModel, Boxes, target_parts
 from feasibility.certification.cut_proofs.proof_verification import verify_on
 from feasibility.certification.overlaps.every_pose import never_clear
 from feasibility.certification.overlaps.everywhere import Overlapping
@@ -54,7 +50,7 @@ def test_boxes_of_joints(roll):
     task, cells = Task(0.02, 20, **roll), DOME.cells(1, 1)
     parts = target_parts(DOME.parts(0.01, 0.05), cells, task)
     arm, q = ArmModel(UR5, UR5.lower, UR5.upper), np.append(np.full(6, 0.3), [0.0, 0.0])
-    fed = Allowed(task.effective_tolerance, task.cone_chord, 0.2, task.roll)
+    fed = linear_models.Allowed(task.effective_tolerance, task.cone_chord, 0.2, task.roll)
 
     def model(parts=parts, allowed=fed, half=0.01):
         none = np.zeros(1, dtype=np.int64)
