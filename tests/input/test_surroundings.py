@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from jobs import coverable as asked
+from jobs import run_coverable as asked
 
 from coverable import Search, Task, check, load_robot, plane
 from feasibility.cli.main import main

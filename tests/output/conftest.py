@@ -4,13 +4,13 @@ from collections.abc import Callable
 
 import pytest
 from command_table import Commands
-from jobs import Said, coverable
+from jobs import Said, run_coverable
 
 
 @pytest.fixture
 def ask() -> Callable[..., Said]:
     """ask(arguments) -> status, stdout, stderr of a command that runs in this process."""
-    return coverable
+    return run_coverable
 
 
 @pytest.fixture(scope="session")

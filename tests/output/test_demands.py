@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from command_table import forged
-from jobs import coverable as asked
+from jobs import run_coverable as asked
 
 import coverable
 from coverable import Pose, Region, load_case, load_motion, load_result, place, station_plan, verify

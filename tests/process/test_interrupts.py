@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from jobs import PLATE, coverable, verdict_named
+from jobs import PLATE, run_coverable, verdict_named
 from samples import sampled, seeds, spread
 
 from coverable import Store, load_result
@@ -33,7 +33,7 @@ def check_all(folder: Path):
     case = folder.parent / "plate.toml"
     case.write_text(PLATE)
     files = "--witness", folder / "walk.csv", "--save", folder / "a.result"
-    return coverable("check", case, *files)
+    return run_coverable("check", case, *files)
 
 
 @contextlib.contextmanager
@@ -99,10 +99,10 @@ def test_a_store_is_closed_wherever_it_is_cut_short(tmp_path):
     asked = "place", case, "--workers", 0, "--x", 0.3, 0.5, "--count", 1, "--out"
     gc.disable()
     try:
-        assert coverable(*asked, tmp_path / "whole").status == 0  # and all is imported
+        assert run_coverable(*asked, tmp_path / "whole").status == 0  # and all is imported
         for call in spread(range(30), 8):  # it is open after 26
             with interrupted_at(call, ours=STORE):
-                assert coverable(*asked, tmp_path / str(call)).status == 130
+                assert run_coverable(*asked, tmp_path / str(call)).status == 130
             assert list(tmp_path.glob("*-*")) == []
     finally:
         gc.enable()

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import study_works
-from jobs import case_named, coverable, verdict_named
+from jobs import case_named, run_coverable, verdict_named
 from samples import sampled, spread
 
 from coverable import Store, load_study, open_workers, run_tasks
@@ -237,7 +237,7 @@ def in_peace(tmp_path_factory):
     folder = tmp_path_factory.mktemp("peace")
     study = folder / "plates.toml"
     study.write_text(study_works.STUDY, encoding="utf-8")
-    assert coverable(*asked(study, folder, "0"), "--workers", 0).status == 0
+    assert run_coverable(*asked(study, folder, "0"), "--workers", 0).status == 0
     text = (folder / "0.csv").read_text(encoding="utf-8")
     verdicts = [line["verdict"] for line in csv.DictReader(io.StringIO(text))]
     assert len(verdicts) == 24
@@ -265,7 +265,7 @@ def test_the_command_killed_and_run_again(in_peace, tmp_path) -> None:
     assert 0 < held[0] < held[1] < 24
     with Store(path) as store:
         assert len(store.find(task.key for task in load_study(study).tasks)) == held[-1]
-    said = coverable(*asked(study, tmp_path, "a"), "--workers", 1)
+    said = run_coverable(*asked(study, tmp_path, "a"), "--workers", 1)
     assert said.status == 0
     assert f"{held[-1]} finished cases" in said.err
     assert (tmp_path / "a.csv").read_text(encoding="utf-8") == text

@@ -7,7 +7,7 @@ import json
 from dataclasses import replace
 
 import pytest
-from jobs import PLATE, coverable
+from jobs import PLATE, run_coverable
 
 from coverable import Case, CaseError, check, compare, divide, load_case, open_workers, read_study
 
@@ -25,7 +25,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def test_compare_says_of_each_arm_what_check_and_divide_say(folder) -> None:
-    said = coverable(
+    said = run_coverable(
         "compare", "strip.toml", "--robots", ", ".join(ROBOTS), "--workers", 0, "--json",
         "--csv", "a.csv",
     )  # fmt: skip

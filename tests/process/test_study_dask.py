@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 import study_works
-from jobs import coverable
+from jobs import run_coverable
 from samples import sampled, spread
 
 from coverable import Store, open_workers, run_tasks
@@ -78,7 +78,7 @@ def test_a_worker_killed_while_it_works(count, tmp_path) -> None:
         assert [row.result["double"] for row in rows] == list(range(0, 2 * count, 2))
         for stem, how in (("dask", ("--dask", address)), ("0", ("--workers", 0))):
             files = "--out", tmp_path / f"{stem}.study", "--csv", tmp_path / f"{stem}.csv"
-            assert coverable("study", study, *files, *how).status == 0
+            assert run_coverable("study", study, *files, *how).status == 0
     assert (tmp_path / "dask.csv").read_bytes() == (tmp_path / "0.csv").read_bytes()
     assert len((tmp_path / "0.csv").read_text(encoding="utf-8").splitlines()) == 25
 

@@ -11,7 +11,7 @@ from contextlib import closing
 
 import pytest
 from hostile_stores import ODD, SCRIPT, allowed, put, rows, study_with_store
-from jobs import case_named, coverable
+from jobs import case_named, run_coverable
 
 from coverable import Pose, Store, compare, load_case, open_workers, run_tasks
 from feasibility.placement.trials import evaluator_of_study
@@ -184,7 +184,7 @@ def good(tmp_path_factory):
 
 def ask(folder, store, *more):
     """The command on a study, from what a store holds."""
-    return coverable("study", folder / "study.toml", "--out", store, "--workers", 0, *more)
+    return run_coverable("study", folder / "study.toml", "--out", store, "--workers", 0, *more)
 
 
 def refused(folder, store) -> str:

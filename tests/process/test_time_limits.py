@@ -11,20 +11,11 @@ import time
 
 import numpy as np
 import pytest
-from jobs import TEXTS, EndingClock, case_named, coverable, ends_at, verdict_named
+from jobs import TEXTS, EndingClock, case_named, ends_at, run_coverable, verdict_named
 from samples import spread
 
-from coverable import (
-    Answer,
-    Evidence,
-    check,
-    compare,
-    divide,
-    open_workers,
-    run_tasks,
-    save_result,
-    verify,
-)
+import coverable
+from coverable import Evidence, check, compare, divide, open_workers, run_tasks, save_result, verify
 from feasibility.cases.toml import as_read
 from feasibility.clock import Clock, OutOfTime, compiling
 from feasibility.interrupts import interruptible
@@ -54,7 +45,7 @@ def ask(folder, name, look, *more):
     """A command whose time is up at a look at its clock."""
     command, case, *rest = QUESTIONS[name]
     clock = ends_at(look, clocks := [])
-    said = coverable(command, folder / f"{case}.toml", *rest, *LIMIT, *more, clock=clock)
+    said = run_coverable(command, folder / f"{case}.toml", *rest, *LIMIT, *more, clock=clock)
     return said, sum(clock.looks[0] for clock in clocks)
 
 
@@ -90,7 +81,7 @@ def test_a_verdict_claims_no_more_than_there_was_time_for(name):
     for look in range(clock.looks[0] + 1):
         found = check(*case, clock=EndingClock(at=look))
         causes, last = found.causes, look == clock.looks[0]
-        if found.answer is Answer.UNDECIDED:
+        if found.answer is coverable.Answer.UNDECIDED:
             assert found.evidence is Evidence.BUDGET
             assert (found.witness, found.certificate, found.proof) == (None, None, None)
         else:
@@ -144,10 +135,10 @@ def test_what_is_not_verified_in_time_does_not_hold(folder, tmp_path):
         header=",".join(verdict.robot.joint_names),
     )  # fmt: skip
     for what in ([folder / "plate.toml", motion], [saved]):
-        assert coverable("verify", *what, *LIMIT).status == 0
-        looks = coverable("verify", *what, *LIMIT, clock=ends_at(math.inf, made := [])) and made
+        assert run_coverable("verify", *what, *LIMIT).status == 0
+        looks = run_coverable("verify", *what, *LIMIT, clock=ends_at(math.inf, made := [])) and made
         for look in range(looks[0].looks[0]):
-            said = coverable("verify", *what, *LIMIT, "--json", clock=ends_at(look))
+            said = run_coverable("verify", *what, *LIMIT, "--json", clock=ends_at(look))
             found = json.loads(said.out)
             assert said.status == 1
             assert (found["verdict"], found["in_time"]) == ("does not hold", False)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jobs import Said, coverable
+from jobs import Said, run_coverable
 
 TABLE = tomllib.loads(Path(__file__).parents[1].joinpath("output/commands.toml").read_text("utf-8"))
 LINES, NUMBERS, REFUSED, WHOLE = map(TABLE.pop, ("files", "numbers", "refused", "whole"))
@@ -68,7 +68,7 @@ class Commands:
         before = Path.cwd()
         os.chdir(self.folder)
         try:
-            return coverable(*words)
+            return run_coverable(*words)
         finally:
             os.chdir(before)
 

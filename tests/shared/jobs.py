@@ -66,7 +66,7 @@ class Said(NamedTuple):
         return " ".join(self.out.split())
 
 
-def coverable(*args: object, clock: Any = None) -> Said:
+def run_coverable(*args: object, clock: Any = None) -> Said:
     """Run the command in this process."""
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):

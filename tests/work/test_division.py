@@ -12,25 +12,14 @@ from itertools import pairwise, permutations, product
 import networkx as nx
 import numpy as np
 import pytest
-from jobs import coverable
+from jobs import run_coverable
 from plain import assert_motion
 from random_arms import planar_arm
 from random_cases import built, draw, read
 from samples import sampled, spread
 
-from coverable import (
-    Answer,
-    Search,
-    Task,
-    check,
-    cylinder,
-    divide,
-    load_case,
-    load_robot,
-    plane,
-    replay,
-    sphere,
-)
+import coverable
+from coverable import Search, Task, check, divide, load_case, load_robot, plane, replay, sphere
 from feasibility.certification.cut_proofs.proof_verification import verify_proof
 from feasibility.certification.rates.rate_replay import replay_rates
 from feasibility.cut_tree import Leaf
@@ -39,7 +28,7 @@ from feasibility.verdict import CauseKind, Walk
 
 UR5 = load_robot("ur5")
 TASK = Task(0.01, cone_deg=30)
-BEHIND = cylinder(0.6, angle_deg=(150, 210), height=(0.1, 0.5), side="inside")
+BEHIND = coverable.cylinder(0.6, angle_deg=(150, 210), height=(0.1, 0.5), side="inside")
 
 
 def disconnected_problem(number):
@@ -99,7 +88,7 @@ def behind(low, high):
 
 
 def test_4d_is_one_patch_of_all_that_can_be_covered():
-    said = coverable("divide", "paper/4d", "--json")
+    said = run_coverable("divide", "paper/4d", "--json")
     told = json.loads(said.out)
     assert (said.status, told["answer"], told["covered"]) == (1, "partial", 60)
     assert [row["cell"] for row in told["left_out"]] == [
@@ -192,7 +181,7 @@ def test_every_patch_holds_the_rates_that_are_asked(asked, whole):
     task = replace(Task(standoff=0.02, cone_deg=20), **asked)
     found = divide(UR5, CELLS, task)
     assert_division(found)
-    assert found.whole == whole == (check(UR5, CELLS, task).answer is Answer.FEASIBLE)
+    assert found.whole == whole == (check(UR5, CELLS, task).answer is coverable.Answer.FEASIBLE)
     for patch in found.patches:
         assert not replay_rates(UR5, CELLS, task, patch.walk).refusals
         assert len(patch.cells) > 1
@@ -220,7 +209,7 @@ def test_what_cannot_be_divided():
     with pytest.raises(ValueError, match="greedy"):
         divide(UR5, patch, Task(0.02, 30), Search(method="greedy"))
     for settings, status in (("task.cone_deg=0", 3), ("search.method=greedy", 2)):
-        assert coverable("divide", "paper/4d", "--set", settings).status == status
+        assert run_coverable("divide", "paper/4d", "--set", settings).status == status
 
 
 # -- order and ends --------------------------------------------------------------------------------

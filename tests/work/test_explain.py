@@ -15,25 +15,11 @@ import puma_oracle
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from jobs import case_named, coverable
+from jobs import case_named, run_coverable
 from samples import EVERYTHING, sampled
 
-from coverable import (
-    Answer,
-    Case,
-    Evidence,
-    Search,
-    Task,
-    check,
-    cylinder,
-    explain,
-    load_case,
-    load_robot,
-    plane,
-    poses,
-    replay,
-    sphere,
-)
+import coverable
+from coverable import Answer, Evidence, Task, check, explain, load_case, load_robot, plane, sphere
 from feasibility.sensitivity.probes import last_true
 from feasibility.sensitivity.quantities import Kind
 
@@ -114,7 +100,7 @@ def test_what_is_said_of_a_side_is_what_a_verdict_says(name):
             sides += 1
             if side is found.feasible:
                 assert side.evidence is Evidence.WITNESS
-                assert replay(*changed, side.witness, every).accepted
+                assert coverable.replay(*changed, side.witness, every).accepted
                 assert verdict.feasible, found.quantity.name
             else:
                 assert not verdict.feasible, found.quantity.name
@@ -156,7 +142,7 @@ def test_4d_names_joint1_and_granting_what_it_needs_is_enough():
     assert dropped.share == pytest.approx(1 / 3)
     assert dropped.area == pytest.approx(0.5 * math.radians(40) * 0.9)
     rest = np.arange(36) < 24
-    assert replay(*case, dropped.witness, rest).accepted
+    assert coverable.replay(*case, dropped.witness, rest).accepted
 
 
 def test_the_cone_a_stiff_wrist_needs_is_that_of_the_geometry():
@@ -181,7 +167,7 @@ def test_a_ring_that_a_stop_cuts_in_two_needs_joint1_to_pass_it():
     degrees; backwards, as the mirror image, for the same in the other direction.
     """
     arm = PUMA.with_limits({"joint1": np.radians([-100.0, 100.0])})
-    ring = cylinder(0.6, (20, 160), (0.2, 0.3)).cells(4, 1)
+    ring = coverable.cylinder(0.6, (20, 160), (0.2, 0.3)).cells(4, 1)
     explanation = explain(arm, ring, Task(0.02, 40))
     assert explanation.verdict.evidence is Evidence.PROOF
     needed = np.degrees(ring.u).max() - math.degrees(math.asin(0.1 / 0.58))
@@ -235,19 +221,21 @@ def test_the_change_that_is_named_first_makes_the_case_feasible(name, tmp_path):
     case = case_named("plate").with_overrides(SETS[name])
     (tmp_path / "case.toml").write_text(case.to_toml())
     (tmp_path / "motions").mkdir()
-    said = coverable("explain", tmp_path / "case.toml", "--json", "--witness", tmp_path / "motions")
+    said = run_coverable(
+        "explain", tmp_path / "case.toml", "--json", "--witness", tmp_path / "motions"
+    )
     told = json.loads(said.out)
     assert (said.status, told["verdict"]) == (1, "infeasible")
     sets = told["useful"]["set"]
     assert (told["pair"] is None) == (name not in ("diagonal", "two joints"))
-    assert check(*Case.from_toml(case.to_toml()).with_overrides(sets).build()).feasible
+    assert check(*coverable.Case.from_toml(case.to_toml()).with_overrides(sets).build()).feasible
     if told["pair"] is not None:
         assert not any(t["feasible"] for t in told["thresholds"])
         for alone in sets if len(sets) == 2 else ():
             assert not check(*case.with_overrides([alone]).build()).feasible
         motion = tmp_path / "motions" / "pair.csv"
         options = [part for text in sets for part in ("--set", text)]
-        assert coverable("verify", tmp_path / "case.toml", motion, *options).status == 0
+        assert run_coverable("verify", tmp_path / "case.toml", motion, *options).status == 0
 
 
 # -- the search, asked from outside ----------------------------------------------------------------
@@ -282,7 +270,7 @@ def test_bisection_ends_beside_a_failure_whatever_the_answers(size, data):
 def test_toolpaths_stay_in_their_order_and_are_not_divided():
     s = np.linspace(0.0, 1.0, 6)
     points = np.column_stack([0.4 + 0.2 * s, 0.1 * np.sin(5.0 * s), 0.2 + 0.0 * s])
-    walk = poses(points, np.tile((0.0, 0.0, 1.0), (6, 1)), side="outside")
+    walk = coverable.poses(points, np.tile((0.0, 0.0, 1.0), (6, 1)), side="outside")
     found = explain(UR5, walk, Task(0.01, 10.0))
     assert len(found.thresholds) >= 6
     for threshold in found.thresholds:
@@ -291,7 +279,7 @@ def test_toolpaths_stay_in_their_order_and_are_not_divided():
         assert np.array_equal(np.unique(marks), np.arange(6))
         assert (np.diff(marks) >= 0).all()
     far = np.column_stack([np.linspace(0.7, 1.1, 4), np.zeros(4), np.full(4, 0.2)])
-    walk = poses(far, np.tile((0.0, 0.0, 1.0), (4, 1)), side="outside")
+    walk = coverable.poses(far, np.tile((0.0, 0.0, 1.0), (4, 1)), side="outside")
     found = explain(UR5, walk, Task(0.01, 10.0))
     assert found.verdict.answer is Answer.INFEASIBLE
     helping = [t.quantity.axis for t in found.thresholds if t.feasible is not None]
@@ -302,8 +290,8 @@ def test_edges():
     empty = explain(UR5, PLATE.cells(0, 3), Task(0.02, 30))
     assert (empty.verdict.feasible, empty.thresholds, empty.dropped) == (True, (), None)
     with pytest.raises(ValueError, match="method must be 'complete'"):
-        explain(*given_case("plate"), Search(method="greedy"))
-    late = explain(*given_case("4d"), Search(time_limit=1e-9))
+        explain(*given_case("plate"), coverable.Search(method="greedy"))
+    late = explain(*given_case("4d"), coverable.Search(time_limit=1e-9))
     assert late.verdict.answer is Answer.UNDECIDED
     assert not any(t.feasible for t in late.thresholds)
     assert len(late.left_out) == 21 - len(late.thresholds) > 0

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from jobs import PLATE, coverable
+from jobs import PLATE, run_coverable
 from samples import sampled, spread
 
 from coverable import (
@@ -293,7 +293,7 @@ def test_stations_share_out_what_no_placement_covers_alone(tmp_path):
     long = ["surface.u=[-0.1, 0.1]", "surface.v=[-0.9, 0.9]", "surface.cells=[1, 9]",
             "surface.position=[0.5, 0, 0.3]"]  # fmt: skip
     sets = [part for text in long for part in ("--set", text)]
-    said = coverable(
+    said = run_coverable(
         "place", tmp_path / "plate.toml", *sets, "--y", -0.6, 0.6, "--count", 8, "--stations",
         "--json", "--workers", 0,
     )  # fmt: skip
@@ -351,15 +351,15 @@ def test_the_command_answers_with_places_that_check_accepts(tmp_path):
     case = tmp_path / "plate.toml"
     case.write_text(PLATE + "surface.rpy_deg = [0, 0, 0]\n")
     small = ("--set", "surface.cells=[3,3]")
-    assert coverable("check", case, "--set", "surface.position=[0.6, 0, 0.3]").status == 1
+    assert run_coverable("check", case, "--set", "surface.position=[0.6, 0, 0.3]").status == 1
     asked = "place", case, *small, "--x", -0.2, 0.6, "--count", 8, "--json"
     files = "--csv", tmp_path / "p.csv", "--map", tmp_path / "p.svg", "--out", tmp_path / "p.study"
-    told = json.loads(coverable(*asked, *files, "--workers", 0).out)
+    told = json.loads(run_coverable(*asked, *files, "--workers", 0).out)
     assert told["answer"] == "feasible"
     for found in told["placements"]:
         sets = [f"surface.position={found['position']}", f"surface.rpy_deg={found['rpy_deg']}"]
         options = [part for text in sets for part in ("--set", text)]
-        assert coverable("check", case, *small, *options).status == 0
+        assert run_coverable("check", case, *small, *options).status == 0
     lines = list(csv.DictReader((tmp_path / "p.csv").read_text("utf-8").splitlines()))
     shares = [float(line["share"]) for line in lines]
     assert shares == sorted(shares, reverse=True)
