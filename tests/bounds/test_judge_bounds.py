@@ -142,9 +142,6 @@ def test_slides_behind_a_joint_lengthen_its_lever_by_their_further_end():
     assert [stretched_length(robot, without=j) for j in (1, 2)] == pytest.approx([1.5, 4.0])
 
 
-# -- stretches of a motion ------------------------------------------------------------------------
-
-
 def flat(kind):
     """The plane x = 0.5, as one patch, as two triangles, or a wall that is bent about z."""
     if kind == "patch":
@@ -276,9 +273,6 @@ def test_what_a_surface_may_deviate_by_is_taken_off(off, leans):
     far = less_deviations(task, SimpleNamespace(deviations=(0.5, 2.0)))
     assert far.effective_tolerance < 1e-11
     assert far.cone == 0.0
-
-
-# -- cells, limits and order ----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("what", range(4))

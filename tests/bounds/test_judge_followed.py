@@ -78,9 +78,6 @@ def test_what_stays_open_is_no_clear_way():
     assert not lifted_faults(None, rows, ends, Kinematics(SLIDES), 1e-3)
 
 
-# -- toolpaths over a surface ---------------------------------------------------------------------
-
-
 DOME = cylinder(0.3, (-170, 170), (-0.5, 0.5), rpy_deg=(90, 0, 0), **OUT)  # along y
 
 

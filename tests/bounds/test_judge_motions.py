@@ -115,9 +115,6 @@ def test_a_row_that_is_off_is_named_with_its_distance_whatever_its_mark(made, sh
         assert str(fault).startswith(f"row {row + 1}: the tool point is 1.5 mm off")
 
 
-# -- damages: each changes a raster, and names a word of the refusal -------------------------------
-
-
 def replaced(**values):
     return lambda made: made._replace(**{k: change(made) for k, change in values.items()})
 
@@ -198,9 +195,6 @@ def test_a_turn_more_in_one_joint(made):
         assert replay_over_surface(free, made.cells, made.task, q).accepted == (j == 5)
 
 
-# -- between rows ---------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("factor", [0.9, 0.999, 1.001, 3.0])
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-2])
 def test_a_motion_that_is_bad_only_between_two_rows(factor, tolerance):
@@ -249,9 +243,6 @@ def test_the_figure_of_a_single_cell_is_that_of_the_closest_point_inside_the_con
     turn = np.arctan(4.0 / 22.0)
     assert found.accepted
     assert found.certificate.max_angle == pytest.approx(turn if cone > 10.0 else 0.0, abs=1e-6)
-
-
-# -- places ---------------------------------------------------------------------------------------
 
 
 LEVEL = 0.31  # m, where the tool of the raster over the plane is

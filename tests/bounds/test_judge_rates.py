@@ -133,9 +133,6 @@ def test_what_is_asked_is_decided_and_nothing_more(factor, possible):
         assert (found.sigma[0] >= factor * sigma) == possible
 
 
-# -- motions --------------------------------------------------------------------------------------
-
-
 def line(turn=0.0):
     """The gantry's tool from the first cell to the second and round a corner to the fifth."""
     at = PLATE.centres[[0, 1, 4]] + [0.0, 0.0, 0.02]

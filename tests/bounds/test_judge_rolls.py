@@ -93,9 +93,6 @@ def test_frames_of_the_tool_bend_no_more_than_is_said(seed):
     assert seed or truth > 0.99 * bound
 
 
-# -- references along paths of places -------------------------------------------------------------
-
-
 @pytest.mark.parametrize("kind", ["dome", "tube", "by u"])
 def test_references_bend_no_more_than_is_said(kind):
     """Past where the approach is nearly along the reference, t turns fast."""
@@ -180,9 +177,6 @@ def test_the_bounds_of_references_are_those_of_the_lemma(kind):
         ends = [ToolAxes(axes[k : k + 1], x[k : k + 1]) for k in (0, 1)]
         found = held.rolls_between(*ends, np.array([second]), path, path.normals)
         assert found[0] == pytest.approx(max(worst), abs=1e-7)
-
-
-# -- both judges of motions -----------------------------------------------------------------------
 
 
 REFERENCES = {

@@ -175,9 +175,6 @@ def test_no_region_around_a_known_place_is_said_to_be_empty(seed):
             assert case.emptiness.test(claims, NoRefutation(), 600).failed is not None
 
 
-# -- linear models --------------------------------------------------------------------------------
-
-
 UR5 = load_robot("ur5")
 
 
@@ -250,9 +247,6 @@ def test_bodies_are_asked_to_overlap_wherever_the_target_of_a_box_may_be():
     assert min(parts.radius[part, 0], moved) > 1e-3
 
 
-# -- boxes and regions ----------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("axis", [-1, 0, 1])
 def test_children_of_a_part_hold_all_of_it(axis):
     """Halves hold what is theirs; children of any other kind may hold a place anywhere."""
@@ -275,9 +269,6 @@ def test_children_of_a_part_hold_all_of_it(axis):
     assert only == (2 if axis == 0 else 1)
     expected = (2 * np.array([0.2, 0.9]) - 1, 2 * np.array([-0.5, -0.1]) + 1)[axis]
     np.testing.assert_allclose([at[only][0][axis], at[only][1][axis]], expected)
-
-
-# -- parts and their surface ----------------------------------------------------------------------
 
 
 @sampled

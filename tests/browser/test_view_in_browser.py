@@ -1,7 +1,5 @@
 """A saved view in a real browser: it paints the scene, and its slider moves arm and read-out."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

@@ -122,8 +122,6 @@ def test_an_arm_without_pictures_is_a_chain_of_capsules(tmp_path):
     assert "two.urdf" in note
 
 
-# -- traps: counted before they are made, and nothing beside them opened --------------------------
-
 opened: list[str] = []
 sys.addaudithook(lambda event, facts: opened.append(str(facts[0])) if event == "open" else None)
 

@@ -1,7 +1,5 @@
 """Pictures of poses: each that was tried is drawn where it was, in the colour of its share."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 
@@ -16,12 +14,7 @@ from feasibility.placement.trials import Trial
 from feasibility.studies.outcome import bits_of
 from feasibility.studies.run import Row
 from feasibility.viewer import poses as pose_layers
-from feasibility.viewer.poses import (
-    Class,
-    class_of_row,
-    class_of_share,
-    outline,
-)
+from feasibility.viewer.poses import Class, class_of_row, class_of_share, outline
 from feasibility.viewer.threejs import hex_colour
 
 PLATE = plane((-0.15, 0.15), (-0.1, 0.1), position=(0.5, 0, 0.2), side="outside")
@@ -88,9 +81,6 @@ def turned(points, pose):
     return turn.apply(np.reshape(points, (-1, 3))) + pose.position
 
 
-# -- classes ----------------------------------------------------------------------------------
-
-
 def test_every_class_is_in_the_legend_and_every_pose_a_dot_where_the_surface_was_tried():
     """The middle of the outline, against scipy's rotations; hundreds of them are one object."""
     asked = fabricated()
@@ -125,12 +115,6 @@ def test_whole_shares_are_feasible_only_where_that_was_said():
         ("failed", {"verdict": "undecided", "evidence": "budget", "message": "died"}, Class.FAILED),
     ):
         assert class_of_row(Row({}, status, result, 0.1)) is kind
-
-
-# -- outlines ---------------------------------------------------------------------------------
-
-
-# -- the best one -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -140,9 +140,6 @@ def test_the_two_sides_of_a_cut_are_drawn_and_named(commands):
     assert words[-1] == sides.lost_name
 
 
-# -- flat pictures --------------------------------------------------------------------------------
-
-
 def collections(figure, kind):
     return [part for part in figure.axes[0].collections if type(part) is kind]
 

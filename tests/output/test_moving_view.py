@@ -1,7 +1,5 @@
 """The arm in a view moves like Pinocchio's, the world stands still, its server lets nobody in."""
 
-from __future__ import annotations
-
 import itertools
 import socket
 import sys
@@ -56,9 +54,6 @@ def object_at(commands, end):
     (found,) = [c for c in commands if c["type"] == "set_object" and c["path"].endswith(end)]
     place = place_of(commands, found["path"])
     return found["path"], points_of(found) @ place[:3, :3].T + place[:3, 3]
-
-
-# -- the motion -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["puma", "rail"])
@@ -126,9 +121,6 @@ def test_without_a_witness_the_longest_path_of_the_tree_is_one_motion():
         assert motion.longest_path(tree, centres) == longest
 
 
-# -- frames, and a world that stands still while the part moves -----------------------------------
-
-
 @pytest.fixture(scope="module")
 def table():
     """An arm whose part stands on a turning table, with a shelf of the world: arm, view."""
@@ -183,9 +175,6 @@ def test_the_world_stands_still_while_the_motion_plays(table):
     assert np.ptp(world, axis=0).max() > 0.5
 
 
-# -- bodies ---------------------------------------------------------------------------------------
-
-
 def test_bodies_move_with_the_arm_and_the_nearest_pair_has_its_distance(verdict):
     scene = (Obstacle.box("shelf", (0.4, 0.3, 0.02), (0.3, -0.6, 0.5), (0.0, 0.0, 30.0)),)
     ball = coverable.ToolShape.sphere(0.01, (0.0, 0.0, -0.02))
@@ -215,12 +204,6 @@ def test_bodies_move_with_the_arm_and_the_nearest_pair_has_its_distance(verdict)
     for (path, kind), (_, visible) in tracks_of(commands).items():
         if kind == ".visible":
             assert visible == [path.endswith(f" {name}") for name in drawn.readout.nearest]
-
-
-# -- paths and divisions --------------------------------------------------------------------------
-
-
-# -- windows and their server ---------------------------------------------------------------------
 
 
 def test_a_browser_that_goes_away_is_no_fault(capfd):

@@ -43,9 +43,6 @@ def test_the_installed_command_is_this_one(ask):
     assert ask("--version") == (0, f"coverable {version()}\n", "")
 
 
-# -- who reads it ---------------------------------------------------------------------------------
-
-
 def test_a_reader_that_leaves_is_no_error_and_a_full_disk_status_2():
     first, rest = os.pipe()
     os.close(first)
@@ -87,9 +84,6 @@ def test_a_terminal_sees_progress_and_stdout_the_answer_alone():
     assert child.returncode == 0
     assert json.loads(out)["verdict"] == "feasible"
     assert b"a search" in seen
-
-
-# -- bugs and trouble -----------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -146,9 +140,6 @@ def test_what_cannot_be_done_is_refused_before_any_search(ask, search, line):
     assert "must not run" not in said.err
 
 
-# -- waiting for kernels --------------------------------------------------------------------------
-
-
 def out_of_patience():
     for thread in threading.enumerate():
         if isinstance(thread, threading.Timer):
@@ -190,9 +181,6 @@ def test_after_a_warm_up_nothing_is_compiled(ask):
             assert ask(*line.split()).status in (0, 1, 3)
         assert recorded.buffer == []
     assert ask("warm-up").out == "everything is compiled already\n"
-
-
-# -- pages until Ctrl-C ---------------------------------------------------------------------------
 
 
 def test_show_serves_the_view_until_ctrl_c(commands, monkeypatch):

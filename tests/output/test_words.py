@@ -62,9 +62,6 @@ def test_feasible_values_allow_more_and_others_less_by_a_digit_at_most(kind, val
         assert 0.0 < more < digit
 
 
-# -- verdicts -------------------------------------------------------------------------------------
-
-
 @pytest.fixture(scope="module")
 def plate(commands):
     case = load_case(commands.folder / "plate.toml")
@@ -132,9 +129,6 @@ def test_what_a_path_goes_over_again_is_not_covered_twice(plate):
     assert told["revisited_share"] == pytest.approx(1 / 3)
 
 
-# -- other sentences ------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("side", [-1, 0, 1])
 def test_a_motion_across_a_cut_opens_it(commands, side):
     """One threshold of the cone, made up: feasible at 9 degrees, by a motion on a side or both."""
@@ -158,9 +152,6 @@ def test_a_motion_across_a_cut_opens_it(commands, side):
     assert said in " ".join(explained.as_text(made, "x").split())
     bare = replace(made, thresholds=(Threshold(cone, replace(found, witness=None), None),))
     assert explained.as_json(bare, "x")["thresholds"][0]["opens"] is None
-
-
-# -- collisions -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("asked", [(), ("self=true",), ("self=false",), ("clearance=0.01",)])
@@ -218,9 +209,6 @@ def test_the_body_that_would_do_does(commands):
     body = f'collision.tool=[{{kind="capsule", {shape}}}]'
     said = commands.run("check", "collisions", "--json", "--set", body)
     assert json.loads(said.out)["unchecked_links"] == []
-
-
-# -- lists ----------------------------------------------------------------------------------------
 
 
 def test_keys_prints_each_key_with_type_unit_default_and_meaning(ask):

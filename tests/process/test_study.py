@@ -1,7 +1,5 @@
 """Studies: the table is the same whoever works, and whoever is killed meanwhile."""
 
-from __future__ import annotations
-
 import csv
 import io
 import multiprocessing
@@ -40,9 +38,6 @@ def pool():
         yield workers
 
 
-# -- one task --------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", ["plate", "long plate"])
 def test_an_outcome_says_what_the_verdict_says(name) -> None:
     verdict, case = verdict_named(name), case_named(name)
@@ -66,9 +61,6 @@ def test_an_outcome_says_what_the_verdict_says(name) -> None:
         assert margins["limit_deg"] == pytest.approx(least)
         assert 0.0 <= margins["cone_deg"] <= verdict.task.cone_deg
         assert 0.0 < margins["reach_m"] < robot.reach
-
-
-# -- many tasks ------------------------------------------------------------------------------------
 
 
 def test_rows_come_in_the_order_of_the_tasks(pool, tmp_path) -> None:
@@ -121,9 +113,6 @@ def test_work_that_no_worker_can_be_told(pool) -> None:
         pass
     with pytest.raises(ValueError, match=r"0 \.\. 1,000"), open_workers(-1):
         pass
-
-
-# -- killing ---------------------------------------------------------------------------------------
 
 
 def test_a_worker_that_dies_costs_its_own_task_alone(tmp_path) -> None:

@@ -1,7 +1,5 @@
 """Cases of a study: read once and placed, they are those read by themselves, with files of now."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

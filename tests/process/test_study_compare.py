@@ -1,7 +1,5 @@
 """`compare`: what is said of each arm is what its own `check` says."""
 
-from __future__ import annotations
-
 import csv
 import json
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Studies on a Dask cluster of this machine: the same table, though a worker is killed."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

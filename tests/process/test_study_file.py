@@ -1,7 +1,5 @@
 """Study files: the tasks they make, against products and counts; faults, all of them at once."""
 
-from __future__ import annotations
-
 import itertools
 import json
 

@@ -1,7 +1,5 @@
 """The store of a study: what goes in comes out, and nothing else is touched or believed."""
 
-from __future__ import annotations
-
 import json
 import os
 import resource
@@ -34,9 +32,6 @@ def run_sql(path, *programs: str) -> None:
         for program in programs:
             base.execute(program)
         base.commit()
-
-
-# -- what is kept ----------------------------------------------------------------------------------
 
 
 def test_what_is_kept_is_found_also_by_two_at_a_time(tmp_path) -> None:
@@ -118,9 +113,6 @@ def test_other_programs_may_read_it_meanwhile(tmp_path) -> None:
         assert "USING PRIMARY KEY (key=?)" in plan[-1]
         store.keep([record(20)])
         assert base.execute(asked).fetchone() == (21,)
-
-
-# -- what no study has written ---------------------------------------------------------------------
 
 
 def test_a_file_of_someone_else_is_refused_and_left_alone(tmp_path) -> None:

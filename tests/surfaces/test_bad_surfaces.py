@@ -179,8 +179,6 @@ def test_bad_formulas_grids_pieces_and_poses(approved):
     approved("bad_others", "\n".join(f"{name}: {refused(make)}" for name, make in OTHERS.items()))
 
 
-# files
-
 NET, POSES = "row,column,x,y,z\n", "x,y,z,nx,ny,nz\n"
 TABLE = NET + "".join(f"{i},{j},{i},{j},0\n" for i in range(4) for j in range(5))
 

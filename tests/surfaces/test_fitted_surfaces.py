@@ -106,9 +106,6 @@ def test_models_are_wider_by_what_a_spline_deviates():
         np.testing.assert_allclose(other.radius - one.radius, [[1e-3, 1e-2]])
 
 
-# the page on surfaces of one's own
-
-
 @pytest.fixture(scope="module")
 def names():
     found = {}

@@ -107,9 +107,6 @@ def test_few_and_many_cells_are_even_too(name, count):
     assert_even(Cut(PATCHES[name](), count), count)
 
 
-# -- figures -------------------------------------------------------------------------------------
-
-
 def to_segments(points, starts, ends):
     """(P,) distance of each point from the nearest of some segments."""
     along = ends - starts
@@ -206,9 +203,6 @@ def test_advice_on_coarse_cells_does_help():
     assert coarse(Cut(used(Mesh(box().vertices, box().faces[:2])), count=10).figures) == ""
 
 
-# -- numbers of cells, and subdivision ------------------------------------------------------------
-
-
 def test_pieces_share_cells_by_area_and_size_is_the_side_of_a_square():
     cut, area = cells_for(*islands(), count=100), areas_of(*islands())
     ends = np.cumsum([2 * 20 * 20, 2 * 24 * 20, 2 * 8 * 8])
@@ -284,9 +278,6 @@ def test_what_makes_no_cells_is_refused(approved):
     assert surface.cells(5).unravel(4) == (4,)
     with pytest.raises(IndexError):
         surface.cells(5).unravel(5)
-
-
-# -- as cells of a surface ------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["blade", "box", "scattered"])

@@ -58,9 +58,6 @@ def surface(request):
     return meshes()[request.param]
 
 
-# -- nearest places ------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 17, 1000])
 def test_nearest_places_are_those_of_a_look_at_each(count):
     rng = np.random.default_rng(count)
@@ -98,9 +95,6 @@ def test_heights_are_distances_from_the_nearest_triangle(name):
     if name == "box":
         within = ((points > low) & (points < high)).all(axis=1)
         np.testing.assert_array_equal(height < 0.0, within)
-
-
-# -- normals -------------------------------------------------------------------------------------
 
 
 CREASED = {"roof": lambda: roof(90), "steep roof": lambda: roof(140), "box": lambda: plain("box"),
@@ -170,9 +164,6 @@ def test_corners_are_parted_by_creases_alone():
     assert {1, 2, 3} <= counts
 
 
-# -- parts for searches --------------------------------------------------------------------------
-
-
 def places(surface, count=2000, seed=4):
     """Faces (k,) and weights (k, 3): inside, on edges and corners, and on strips along creases."""
     rng = np.random.default_rng(seed)
@@ -225,8 +216,6 @@ def test_facets_are_the_mesh_and_their_normals_its_own(surface, straight):
     assert (np.abs(length - 1.0) <= facets.off + 1e-12).all()
     assert direction / length[:, None] == pytest.approx(found @ surface.rotation, abs=1e-7)
 
-
-# -- smoothed copies -----------------------------------------------------------------------------
 
 LENGTH = 0.1
 

@@ -144,8 +144,6 @@ def test_limits_that_no_part_keeps_are_refused(limits):
         sphere(1.0, (10, 90), (0, 90)).parts(*limits)
 
 
-# how fast normals turn, over and beside a patch
-
 WAISTS = {
     "bell": hyperboloid(0.5, 0.5, (0, 90), (0.1, 0.9)),
     "steep": hyperboloid(0.5, 0.15, (0, 90), (-0.05, 0.6), **POSE),
@@ -222,9 +220,6 @@ FOLDS = [
 @pytest.mark.parametrize(("surface", "height", "slack", "folds"), FOLDS)
 def test_nothing_is_said_exactly_where_the_parallel_surface_folds(surface, height, slack, folds):
     assert [math.isinf(each) for each in vars_of(surface.bounds(height, slack))] == [folds] * 2
-
-
-# curvatures at the centres of cells
 
 
 @pytest.mark.parametrize("name", SMOOTH)

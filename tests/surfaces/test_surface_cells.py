@@ -92,9 +92,6 @@ def test_triangles_of_cells_face_outwards_and_fill_them(cells):
     assert np.abs(cells.surface.closest(cells.borders(3)).height).max() < 1e-9
 
 
-# neighbours
-
-
 def test_cells_are_neighbours_exactly_where_they_share_a_corner(grid):
     surface = grid.surface
     corners = grid.outlines(samples=1)[:, :4]
@@ -173,9 +170,6 @@ def test_sizes_must_be_whole_numbers(bad):
                 ask(k)
 
 
-# compiled: the same closest points, and the cell they fall in
-
-
 @pytest.mark.parametrize("name", [n for n, s in SMOOTH.items() if hasattr(s, "patch_kernel")])
 def test_the_compiled_patch_is_the_patch_to_the_last_bit(name):
     surface, rng = SMOOTH[name], np.random.default_rng(7)
@@ -205,9 +199,6 @@ def test_beside_the_patch_there_is_no_cell_and_its_rim_belongs_to_it():
     assert [cell_at(kernel, *at) for at in ((0, 0), (0.6, 0.4), (0.6 + 1e-12, -1e-12))] == [0, 5, 4]
     assert cell_at(plane((0, 1), (0, 1)).cells(0, 3).patch_kernel, 0.5, 0.5) == -1
     assert plane((0, 1), (0, 2)).cells(3, 4).at([-5, 5, 0.5], [-5, 5, 9]).tolist() == [0, 11, 7]
-
-
-# curves between centres
 
 
 def test_curves_join_centres_on_the_surface_within_what_they_state(cells):

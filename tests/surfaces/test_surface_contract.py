@@ -50,9 +50,6 @@ def reach(surface):
     return found
 
 
-# points, normals
-
-
 def test_points_normals_and_u_directions_are_those_of_the_formula(smooth):
     """The referee's, who writes formulas once more and knows nothing of the product's."""
     u, v = some(smooth)
@@ -82,9 +79,6 @@ def test_shapes_broadcast(smooth):
     assert smooth.closest(points[2, 1]).height.shape == ()
     with pytest.raises(ValueError, match=r"\(\.\.\., 3\)"):
         smooth.closest([1.0, 2.0])
-
-
-# closest points
 
 
 def test_closest_finds_back_where_points_were_put(smooth):
@@ -222,9 +216,6 @@ def test_beyond_the_apex_of_a_cone_the_apex_is_closest_and_not_inside():
     assert not found.inside.any()
 
 
-# areas
-
-
 def test_areas_are_those_of_fine_triangles_and_add_up(smooth):
     total = float(smooth.area(*smooth.u_range, *smooth.v_range))
     cells = smooth.cells(7, 5)
@@ -249,9 +240,6 @@ AREAS = [
 @pytest.mark.parametrize(("surface", "area", "rel"), AREAS)
 def test_known_areas(surface, area, rel):
     assert float(surface.area(*surface.u_range, *surface.v_range)) == pytest.approx(area, rel=rel)
-
-
-# the same surface again
 
 
 @pytest.mark.parametrize("name", ALL)

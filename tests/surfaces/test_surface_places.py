@@ -278,9 +278,6 @@ def test_paths_beside_a_pole_are_near_it():
         assert offset.paths(start, end).deviations[0, 2].max() < 5.0 * beside
 
 
-# the u direction
-
-
 @pytest.mark.parametrize("name", [n for n, s in SURFACES.items() if s.kind != "mesh"])
 def test_the_u_direction_turns_as_is_said(name):
     surface = SURFACES[name]

@@ -1,7 +1,5 @@
 """Dividing a surface: few patches, a certified walk for each, and the moves between them."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import math
@@ -82,9 +80,6 @@ def posed(pan_deg):
 @cache
 def behind(low, high):
     return divide(posed((low, high)), BEHIND.cells(12, 4), TASK)
-
-
-# -- what is found ---------------------------------------------------------------------------------
 
 
 def test_4d_is_one_patch_of_all_that_can_be_covered():
@@ -210,9 +205,6 @@ def test_what_cannot_be_divided():
         divide(UR5, patch, Task(0.02, 30), Search(method="greedy"))
     for settings, status in (("task.cone_deg=0", 3), ("search.method=greedy", 2)):
         assert run_coverable("divide", "paper/4d", "--set", settings).status == status
-
-
-# -- order and ends --------------------------------------------------------------------------------
 
 
 def largest_by_brute_force(robot, choices):

@@ -4,8 +4,6 @@ Thresholds that geometry gives in closed form, and each side of every threshold 
 cases that are built from scratch.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from functools import cache
@@ -80,8 +78,6 @@ def case_at(case, quantity, value):
     return robot, cells, task
 
 
-# -- both sides of every threshold -----------------------------------------------------------------
-
 ASKED = ["plate", "stiff wrist", "deep plate", "4d"] + ["4a", "5e", "dome"] * EVERYTHING
 
 
@@ -123,9 +119,6 @@ def test_margins_run_from_the_case_as_it_stands_inwards(name):
         else:
             assert way * (found.other.value - found.feasible.value) > 0.0
             assert found.resolution == abs(found.other.value - found.feasible.value)
-
-
-# -- thresholds in closed form ---------------------------------------------------------------------
 
 
 def test_4d_names_joint1_and_granting_what_it_needs_is_enough():
@@ -198,8 +191,6 @@ def test_nothing_helps_a_plate_that_leaves_the_room():
     assert explanation.pair is None
 
 
-# -- in the words of the case file -----------------------------------------------------------------
-
 SETS = {
     "named set": ["robot.name=puma560", "robot.limits=set-3", "task.cone_deg=45",
                   "surface.side=inside", "surface.kind=cylinder", "surface.radius=0.5",
@@ -236,9 +227,6 @@ def test_the_change_that_is_named_first_makes_the_case_feasible(name, tmp_path):
         motion = tmp_path / "motions" / "pair.csv"
         options = [part for text in sets for part in ("--set", text)]
         assert run_coverable("verify", tmp_path / "case.toml", motion, *options).status == 0
-
-
-# -- the search, asked from outside ----------------------------------------------------------------
 
 
 @settings(max_examples=25)

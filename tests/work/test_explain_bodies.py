@@ -81,8 +81,6 @@ def test_what_is_left_out_takes_its_pairs_along():
     assert threshold_of(found, "without post").feasible is None
 
 
-# -- `check`, told a motion ------------------------------------------------------------------------
-
 WHOLE = (UR5, PLATE.cells(3, 3), Task(0.02, 30))
 
 

@@ -1,7 +1,5 @@
 """Moves between patches that keep clear: found, certified, and judged by a library of their own."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import cache
@@ -109,8 +107,6 @@ def test_a_move_that_is_not_found_is_refused_and_said():
     assert (same is moves[0], same.refusal) == (True, "")
     np.testing.assert_array_equal(same.waypoints, [[0.0], [1.0]])
 
-
-# -- a tool that touches the surface ---------------------------------------------------------------
 
 FLAT = plane((0.4, 0.6), (-0.15, 0.15), "outside", (0.0, 0.0, 0.3)).cells(1, 3)
 NOZZLE = ToolShape.cylinder(0.01, 0.1, position=(0.0, 0.0, -0.05))

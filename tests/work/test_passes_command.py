@@ -129,9 +129,6 @@ def test_a_way_through_the_part_is_refused():
     assert not check(UR5, over, task).feasible
 
 
-# -- more than one motion, and directions ---------------------------------------------------------
-
-
 def test_passes_are_cut_where_they_cannot_be_run(path, tmp_path):
     switch = ("--program", tmp_path / "run.script", "--on", "ON", "--off", "OFF", "--json")
     asked = ("--passes", "0", "--pitch", "0.1", "--out", tmp_path / "run.csv")

@@ -3,8 +3,6 @@
 Bounds on regions against dense samples; who tries placements, and who stops it, change nothing.
 """
 
-from __future__ import annotations
-
 import csv
 import json
 import math
@@ -106,9 +104,6 @@ def case_at(name, pose):
     return case_of(name).with_overrides(sets).build()
 
 
-# -- what the search finds -------------------------------------------------------------------------
-
-
 @sampled
 @pytest.mark.parametrize(("name", "seed"), [*MOVED[:2], *spread(MOVED, 2)[2:]])
 def test_a_surface_moved_away_is_put_back(name, seed):
@@ -204,9 +199,6 @@ def test_no_place_is_feasible_whose_motion_would_not_stay_clear():
     assert trial.feasible
 
 
-# -- bounds ----------------------------------------------------------------------------------------
-
-
 def test_the_bound_on_a_region_holds_for_its_placements():
     """Against samples and corners of regions, some near the edge of reach; and it proves some."""
     proved = several = 0
@@ -258,9 +250,6 @@ def test_distances_are_those_of_the_targets_and_what_is_discarded_is_infeasible(
     assert 3 < discarded < 17
 
 
-# -- one placement ---------------------------------------------------------------------------------
-
-
 def test_moved_cells_are_those_of_the_case():
     for name in TEXTS:
         for seed in range(2):
@@ -303,9 +292,6 @@ def test_stations_share_out_what_no_placement_covers_alone(tmp_path):
     assert all(one["certified"] for one in told["stations"])
     assert (told["left_out"], told["optimal"]) == ([], True)
     assert len(told["stations"]) == told["at_least"] == 2
-
-
-# -- workers, stores, maps, the command ------------------------------------------------------------
 
 
 def told(trials):
@@ -366,8 +352,6 @@ def test_the_command_answers_with_places_that_check_accepts(tmp_path):
     assert "<svg" in (tmp_path / "p.svg").read_text("utf-8")
     assert told["map"]["axes"] == ["x", "y"]
 
-
-# -- regions ---------------------------------------------------------------------------------------
 
 ANGLES = st.floats(-180.0, 180.0)
 

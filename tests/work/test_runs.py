@@ -4,8 +4,6 @@ The fewest against all choices, and against reaching as far as one can; then a r
 whose first joint stops, and plates beyond its reach.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import replace
@@ -20,8 +18,6 @@ from feasibility.certification.rates.rate_replay import replay_rates
 from feasibility.clock import Clock
 from feasibility.runs.fewest import Stations, fewest_runs
 from surfaces.passes.toolpath import PassPlaces
-
-# -- the fewest -----------------------------------------------------------------------------------
 
 
 def drawn(rng, stations, classes, share):
@@ -124,8 +120,6 @@ def test_cuts_are_made_between_passes_where_they_can_be(turn):
     assert [int(over[run.nodes[-1]]) for run in found] == [turn, 9]
     assert int(over[found[1].nodes[0]]) in (turn, turn + 1)
 
-
-# -- of arms --------------------------------------------------------------------------------------
 
 DEG = math.pi / 180.0
 LIMITS = [[-150, 150], [-170, -10], [-150, 150], [-180, 180], [-180, 180], [-180, 180]]
