@@ -16,13 +16,10 @@ from robots.urdf.geometry import Sphere
 
 UR5, SMALL, LARGE = load_robot("ur5"), 1e-6, 1e4
 SHAPES = [
-    ("box", ([SMALL, LARGE, 0.1],)),
-    ("sphere", (LARGE,)),
-    ("cylinder", (LARGE, SMALL)),
-    ("cylinder", (SMALL, LARGE)),
-    ("capsule", (SMALL, SMALL)),
+    ("box", ([SMALL, LARGE, 0.1],)), ("sphere", (LARGE,)), ("cylinder", (LARGE, SMALL)),
+    ("cylinder", (SMALL, LARGE)), ("capsule", (SMALL, SMALL)),
     ("halfspace", ((LARGE, -LARGE, LARGE), (1e6, 0, 180))),
-]
+]  # fmt: skip
 
 
 def use(obstacle, tool=()):

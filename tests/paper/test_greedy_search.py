@@ -19,18 +19,11 @@ STEP_DEG = {"single": 0.02, "all": 0.5}
 
 # (cells touched by the best tree, edges of its G), with seed 0: regression anchors.
 KNOWN = {
-    ("4a", "all"): (90, 305),
-    ("4b", "all"): (90, 305),
-    ("4c", "all"): (90, 305),
-    ("4d", "all"): (70, 231),
-    ("4e", "all"): (90, 305),
-    ("5a", "all"): (90, 305),
-    ("5b", "all"): (90, 305),
-    ("5d", "all"): (90, 305),
-    ("4a", "single"): (90, 305),
-    ("4b", "single"): (90, 305),
-    ("5a", "single"): (90, 305),
-}
+    ("4a", "all"): (90, 305), ("4b", "all"): (90, 305), ("4c", "all"): (90, 305),
+    ("4d", "all"): (70, 231), ("4e", "all"): (90, 305), ("5a", "all"): (90, 305),
+    ("5b", "all"): (90, 305), ("5d", "all"): (90, 305), ("4a", "single"): (90, 305),
+    ("4b", "single"): (90, 305), ("5a", "single"): (90, 305),
+}  # fmt: skip
 
 
 @cache

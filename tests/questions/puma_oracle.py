@@ -199,14 +199,9 @@ def fibres(problem: Problem, domain: Domain, folds: Ints, row_step: float) -> Fi
     slots = int(np.ceil((limits[3, 1] - limits[3, 0]) / TAU - 1e-12)) + 1
     spans = _intervals(seen, rows, np.cos(np.radians(problem.cone_deg)), *limits[3], slots)
     return Fibres(
-        sample,
-        branch,
-        real[sample, branch, turn],
-        arm_at[sample, branch],
-        np.concatenate(links),
-        rows,
-        spans,
-    )
+        sample, branch, real[sample, branch, turn], arm_at[sample, branch], np.concatenate(links),
+        rows, spans,
+    )  # fmt: skip
 
 
 def components(found: Fibres, domain: Domain) -> tuple[Ints, Ints]:

@@ -19,13 +19,10 @@ LINES, NUMBERS, REFUSED, WHOLE = map(TABLE.pop, ("files", "numbers", "refused", 
 FILES = {name: text.replace(" ; ", "\n") + "\n" for name, text in LINES.items()}
 COMMANDS = [(command, name) for command in TABLE for name in TABLE[command]]
 NEEDS = {
-    "walk.csv": ("check", "files"),
-    "plate.result": ("check", "files"),
-    "long.result": ("check", "no motion to write"),
-    "greedy.result": ("check", "greedy"),
-    "cut.result": ("check", "cut"),
-    "exhausted.result": ("check", "greedy without a motion"),
-}
+    "walk.csv": ("check", "files"), "plate.result": ("check", "files"),
+    "long.result": ("check", "no motion to write"), "greedy.result": ("check", "greedy"),
+    "cut.result": ("check", "cut"), "exhausted.result": ("check", "greedy without a motion"),
+}  # fmt: skip
 BROKEN = {"empty.stl": b"", "zip.stl": b"PK\x03\x04" + bytes(200), "page.stl": b"<html>",
           "cut.stl": b"x" * 80 + b"\xff\xff\xff\x7f" + bytes(50)}  # fmt: skip
 

@@ -136,10 +136,7 @@ def scene(vertices, faces, **more):
     points = np.asarray(vertices, "<f4").tobytes()
     data = points + np.asarray(faces, "<u4").tobytes()
     content = {
-        "asset": {"version": "2.0"},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0}],
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
         "accessors": [
             {"bufferView": 0, "componentType": 5126, "count": len(vertices), "type": "VEC3"},
@@ -150,7 +147,7 @@ def scene(vertices, faces, **more):
             {"buffer": 0, "byteOffset": len(points), "byteLength": len(data) - len(points)},
         ],
         "buffers": [{"byteLength": len(data)}],
-    }
+    }  # fmt: skip
     return content | more, data
 
 
@@ -184,16 +181,11 @@ def nested_scene() -> bytes:
 
 
 GOOD: dict[str, bytes] = {
-    "binary.stl": stl(V, F),
-    "text.stl": text_stl(V, F),
-    "cube.obj": obj(V, QUADS, more="mtllib a\no b\n"),
-    "text.ply": ply(V, F, ""),
-    "little.ply": ply(V, QUADS, "<"),
-    "big.ply": ply(V, F, ">"),
-    "cube.off": off(V, F),
-    "cube.glb": glb(*scene(V, F)),
-    "nodes.glb": nested_scene(),
-}
+    "binary.stl": stl(V, F), "text.stl": text_stl(V, F),
+    "cube.obj": obj(V, QUADS, more="mtllib a\no b\n"), "text.ply": ply(V, F, ""),
+    "little.ply": ply(V, QUADS, "<"), "big.ply": ply(V, F, ">"), "cube.off": off(V, F),
+    "cube.glb": glb(*scene(V, F)), "nodes.glb": nested_scene(),
+}  # fmt: skip
 """File name -> its bytes."""
 
 
