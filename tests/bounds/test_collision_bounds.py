@@ -1,7 +1,4 @@
-"""The parts of the judge of collisions that bound: how bodies move between rows, what parts them.
-
-Each bound is held against dense samples by Pinocchio and coal, or against a distance known by hand.
-"""
+"""The parts of the judge of collisions that bound: how bodies move between rows, what parts them."""
 
 from itertools import pairwise
 

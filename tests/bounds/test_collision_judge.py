@@ -1,7 +1,4 @@
-"""The judge of collisions on bodies whose distances are known by hand: what it accepts and refuses.
-
-Asked through `collision_replay` alone, which keeps its meaning whatever is behind it.
-"""
+"""The judge of collisions on bodies whose distances are known by hand: what it accepts and refuses."""
 
 from dataclasses import replace
 

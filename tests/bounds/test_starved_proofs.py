@@ -1,7 +1,4 @@
-"""Each quantity that a verifier of proofs takes off is made absurdly large: nothing is proved.
-
-See `test_starved_judges`: each test first shows that what is not starved is accepted.
-"""
+"""Each quantity that a verifier of proofs takes off is made absurdly large: nothing is proved."""
 
 from dataclasses import replace
 

@@ -1,7 +1,4 @@
-"""Cells over which the tool collides in every pose: proved, and refuted by no pose.
-
-And the bounds behind it: points inside shapes, how deep they are, how far poses move them.
-"""
+"""Cells over which the tool collides in every pose: proved, and refuted by no pose."""
 
 from dataclasses import replace
 

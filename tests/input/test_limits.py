@@ -1,7 +1,4 @@
-"""Hostile files, made from seeds: none takes 1 GB or 20 s, opens another file, or lacks its words.
-
-Each is read in a process of its own, which ends when it takes more.
-"""
+"""Hostile files, made from seeds: none takes 1 GB or 20 s, opens another file, or lacks its words."""
 
 import json
 import os

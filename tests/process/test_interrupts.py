@@ -1,8 +1,4 @@
-"""Ctrl-C: always status 130, no traceback, no half-written file, wherever the command is.
-
-In this process at calls of Python functions, in processes of their own from the first instruction
-on, and at what the interpreter tells of itself (audit events).
-"""
+"""Ctrl-C: always status 130, no traceback, no half-written file, wherever the command is."""
 
 import contextlib
 import gc

@@ -1,7 +1,4 @@
-"""Numbers, nets, grids, poses and files that make no surface: what is said of each is approved.
-
-Read `approved/bad_*.txt`: a line for each case, with what a user is told.
-"""
+"""Numbers, nets, grids, poses and files that make no surface: what is said of each is approved."""
 
 import csv
 import io

@@ -1,7 +1,4 @@
-"""Mesh files that go wrong in every way we know of: each gives its message, or its stated repair.
-
-What is said stands in approved texts; what a repaired mesh must be is worked out here.
-"""
+"""Mesh files that go wrong in every way we know of: each gives its message, or its stated repair."""
 
 import gzip
 import io

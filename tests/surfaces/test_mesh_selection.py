@@ -1,7 +1,4 @@
-"""Parts of meshes: exact areas, however the cut runs.
-
-What lies on its side of a plane, and makes up the whole with the other side, is right.
-"""
+"""Parts of meshes: exact areas, however the cut runs."""
 
 import mesh_writers as w
 import numpy as np

@@ -1,7 +1,4 @@
-"""Meshes as surfaces: nearest places, continuous normals over creases too, parts, smoothed copies.
-
-What holds of every kind of surface is asked of meshes in the contract of surfaces.
-"""
+"""Meshes as surfaces: nearest places, continuous normals over creases too, parts, smoothed copies."""
 
 import itertools
 from dataclasses import replace

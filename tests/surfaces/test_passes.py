@@ -1,7 +1,4 @@
-"""Passes keep their distance on the surface, go round holes, and run in the order they say.
-
-Distances are known in closed form on surfaces that can be unrolled, or are round.
-"""
+"""Passes keep their distance on the surface, go round holes, and run in the order they say."""
 
 import math
 from itertools import pairwise

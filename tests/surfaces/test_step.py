@@ -1,7 +1,4 @@
-"""Faces of STEP files become surfaces in metres, and files that are none become sentences.
-
-Open CASCADE writes the files, and what it says of the same question is asked once.
-"""
+"""Faces of STEP files become surfaces in metres, and files that are none become sentences."""
 
 import base64
 import gzip

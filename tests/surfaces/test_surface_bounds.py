@@ -1,7 +1,4 @@
-"""Bounds on whole surfaces (parts, turning normals, curvatures) hold, and hardly less would do.
-
-Asked of specimens and of random surfaces of every kind, at every level of every tree.
-"""
+"""Bounds on whole surfaces (parts, turning normals, curvatures) hold, and hardly less would do."""
 
 import itertools
 import math

@@ -1,8 +1,4 @@
-"""Paths of places over every kind of surface, at every scale: what is said along them holds.
-
-Pairs are near and far, across seams, poles, kinks, edges and creases. Each straight piece of a path
-is looked at in dense samples, against the bound that is stated for it.
-"""
+"""Paths of places over every kind of surface, at every scale: what is said along them holds."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,4 @@
-"""A large standoff over a concave detail: folds are named, and a smoothed copy is decided.
-
-The motions are looked at by Pinocchio and by distances from the triangles as they were given.
-"""
+"""A large standoff over a concave detail: folds are named, and a smoothed copy is decided."""
 
 import json
 import re

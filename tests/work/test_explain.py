@@ -1,8 +1,4 @@
-"""What would make a case feasible, and the margins of a feasible one, held to `check`.
-
-Thresholds that geometry gives in closed form, and each side of every threshold asked again, in
-cases that are built from scratch.
-"""
+"""What would make a case feasible, and the margins of a feasible one, held to `check`."""
 
 import json
 import math

@@ -1,7 +1,4 @@
-"""Placements: found where there are some, and again by `check`; refused where a bound shows it.
-
-Bounds on regions against dense samples; who tries placements, and who stops it, change nothing.
-"""
+"""Placements: found where there are some, and again by `check`; refused where a bound shows it."""
 
 import csv
 import json

@@ -1,8 +1,4 @@
-"""Passes that no single motion runs: the fewest interruptions, and where they are.
-
-The fewest against all choices, and against reaching as far as one can; then a ring about an arm
-whose first joint stops, and plates beyond its reach.
-"""
+"""Passes that no single motion runs: the fewest interruptions, and where they are."""
 
 import itertools
 import math
