@@ -1,4 +1,4 @@
-"""The parts of the judge of collisions that bound: how bodies move between rows, what parts them."""
+"""What bounds in the judge of collisions: how bodies move between rows, what parts them."""
 
 from itertools import pairwise
 

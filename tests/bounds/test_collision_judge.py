@@ -1,4 +1,4 @@
-"""The judge of collisions on bodies whose distances are known by hand: what it accepts and refuses."""
+"""The judge of collisions, on bodies of known distances: what it accepts and refuses."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Hostile files, made from seeds: none takes 1 GB or 20 s, opens another file, or lacks its words."""
+"""Hostile files from seeds: none takes 1 GB or 20 s, opens another file, or lacks its words."""
 
 import json
 import os

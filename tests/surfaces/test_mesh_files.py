@@ -1,4 +1,4 @@
-"""Mesh files that go wrong in every way we know of: each gives its message, or its stated repair."""
+"""Mesh files that go wrong in all known ways: each gives its message, or its stated repair."""
 
 import gzip
 import io

@@ -1,4 +1,4 @@
-"""Meshes as surfaces: nearest places, continuous normals over creases too, parts, smoothed copies."""
+"""Meshes as surfaces: nearest places, normals also over creases, parts, smoothed copies."""
 
 import itertools
 from dataclasses import replace
