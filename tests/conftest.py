@@ -33,7 +33,6 @@ LONGEST = (
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Two switches of our own."""
     parser.addoption("--accept", action="store_true", help="write approved texts anew")
     parser.addoption("--samples", choices=("few", "all"), default="few", help="how much is drawn")
 

@@ -61,7 +61,6 @@ def test_case_file_of_the_readme_is_feasible(tmp_path: Path) -> None:
 
 
 def interrupted(page: coverable.Live) -> None:
-    """The user looks at a page, and presses Ctrl-C."""
     raise KeyboardInterrupt
 
 

@@ -101,7 +101,6 @@ def walk():
 
 @pytest.fixture(scope="module")
 def least(walk):
-    """m, the distance of each pair along it, at samples by fcl."""
     foreign = ForeignScene(UR5, asked()[1])
     return np.min([foreign.distances(row) for row in samples(walk.q, np.radians(3.0))], axis=0)
 

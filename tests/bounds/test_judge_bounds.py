@@ -153,7 +153,6 @@ def flat(kind):
 
 
 def judged(robot, surface, task):
-    """A judge over the surface itself."""
     cells = surface.cells(2, 2) if surface.kind != "mesh" else surface.cells(4)
     return Judge(robot, task, offset_surface(surface, 0.0), cells)
 

@@ -82,7 +82,6 @@ DOME = cylinder(0.3, (-170, 170), (-0.5, 0.5), rpy_deg=(90, 0, 0), **OUT)  # alo
 
 
 def over(under, feet, normals, works):
-    """Poses over a surface, at which the tool works or not."""
     made = poses(feet, normals)
     return replace(made, surface=replace(made.surface, under=under, working=np.array(works, bool)))
 

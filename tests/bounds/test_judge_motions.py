@@ -45,7 +45,6 @@ def off_and_tilt(cells, task, q):
 
 
 def leaning(name, angle):
-    """A raster whose tool leans to one side by an angle (rad)."""
     made = raster(name)
     points, axes = places_along(made.cells, made.task)
     side = np.cross(axes, [0.3, 0.5, 0.7])
@@ -62,7 +61,6 @@ def off_by(made, row, distance):
 
 
 def ask(made, q=None, cell=None, **changes):
-    """`replay` of a raster with its marks, tampered with."""
     q, cell = made.q if q is None else q, marks_of(made) if cell is None else cell
     needed = np.ones(len(made.cells), dtype=bool)
     return replay(made.robot, made.cells, replace(made.task, **changes), Walk(q, cell), needed)
@@ -70,7 +68,6 @@ def ask(made, q=None, cell=None, **changes):
 
 @pytest.fixture(params=SURFACES)
 def made(request):
-    """A motion made by other means."""
     return raster(request.param)
 
 

@@ -187,7 +187,6 @@ BESIDE = 0.5  # deg
 
 
 def rolls(cells, q, reference):
-    """(k,) rad, over the closest points of the surface."""
     points, axes = tools_of(q)
     found = cells.surface.closest(points)
     b = -cells.surface.side_sign * found.normal
@@ -240,7 +239,6 @@ def test_a_turn_of_the_tool_between_two_rows_is_seen(name, turn):
 @pytest.mark.parametrize("long_way", [False, True])
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_the_long_way_round_is_refused(sign, long_way):
-    """Over one cell, from one end of the range to the other."""
     made = raster("plane")
     roll = np.degrees(rolls(made.cells, made.q[:1], None)[0])
     task = replace(made.task, roll_deg=(roll - 20.0, roll + 20.0))

@@ -224,8 +224,6 @@ def test_bodies_are_asked_to_overlap_wherever_the_target_of_a_box_may_be():
     dome, asked = sphere(0.3, (0, 25), (0, 360), **OUT), []
 
     class Asked:
-        """Takes note of what it is asked, and knows nothing."""
-
         def deepest(self, low, high, target, off):
             asked.append((target, off))
             return Deepest(np.full(len(low), np.inf), np.zeros(low.shape), np.full(len(low), -1))

@@ -32,8 +32,6 @@ BALL = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
 
 
 class Outcome(NamedTuple):
-    """What became of one file."""
-
     said: str
     opened: list[str]
     seconds: float

@@ -75,7 +75,6 @@ def test_millimetres_on_a_rail(tmp_path: Path, read) -> None:
 
 
 def small_run(k: int, n: int, seed: int = 0) -> Trajectory:
-    """A made-up trajectory."""
     rng = np.random.default_rng(seed)
     return Trajectory(
         joint_names=tuple(f'joint {j}, "{"ä" * j}"' for j in range(n)),

@@ -46,7 +46,6 @@ def unwrapped(text):
 
 
 def transcript(line, said):
-    """A command with its answer, as on a terminal, and its status."""
     parts = [f"$ coverable {line}".rstrip() + f"  -> {STATUS[said.status]}"]
     parts += [unwrapped(said.out.rstrip())] if said.out else []
     parts += ["-- stderr", unwrapped(said.err.rstrip())] if said.err else []

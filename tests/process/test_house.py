@@ -15,7 +15,6 @@ HEAVY = {"OCP", "collada", "distributed", "matplotlib", "meshcat", "rich", "trim
 
 
 def loaded(code: str) -> set[str]:
-    """All modules after some code, in a new process."""
     said = f"{code}\nimport sys\nprint(*sys.modules)"
     done = subprocess.run(
         [sys.executable, "-c", said], cwd=ROOT, capture_output=True, text=True, check=True

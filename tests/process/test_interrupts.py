@@ -166,7 +166,6 @@ def test_a_handler_of_someone_else_is_left_alone(tmp_path):
 
 
 def process(code: str, *arguments: object, **more: object) -> subprocess.CompletedProcess[str]:
-    """Run a program to its end."""
     return subprocess.run(
         [sys.executable, "-c", code, *map(str, arguments)],
         capture_output=True, text=True, timeout=GUARD_S, check=False, **more,
@@ -258,7 +257,6 @@ COMMANDS = {
 
 
 def is_whole(file: Path) -> bool:
-    """Is an output one that a command has finished?"""
     data = file.read_bytes()
     ends = {".html": b"</html>", ".png": b"IEND\xaeB`\x82", ".json": b"}", ".csv": b""}
     if file.suffix in ends:

@@ -99,7 +99,6 @@ def asked(folder: Path, value: float = 4.0, ask: str = ASK, **more: str) -> tupl
 
 
 def kept(folder: Path) -> set[Path]:
-    """All folders with kernels."""
     return {path.parent for path in folder.parent.rglob("*.nbc")}
 
 

@@ -27,13 +27,11 @@ SHARED = Path(study_works.__file__).parent
 
 
 def numbers(count, work=study_works.double, **more):
-    """Tasks about the numbers 0, 1, 2, ..."""
     return [StudyTask({"number": k, **more}, {"number": k}, work) for k in range(count)]
 
 
 @pytest.fixture(scope="module")
 def pool():
-    """Two worker processes."""
     with open_workers(2, warm=False) as workers:
         yield workers
 
@@ -192,7 +190,6 @@ def wait_until_kept(process) -> None:
 
 
 def stored(path) -> int:
-    """How many rows a store holds."""
     if not path.exists():
         return 0
     with Store(path) as store:
@@ -210,7 +207,6 @@ def processes() -> dict[int, int]:
 
 
 def children_of(pid: int) -> set[int]:
-    """Processes that a process has started."""
     return {child for child, parent in processes().items() if parent == pid}
 
 
@@ -235,7 +231,6 @@ def in_peace(tmp_path_factory):
 
 
 def asked(study, folder, stem):
-    """`coverable study` with its files in a folder."""
     return "study", study, "--out", folder / f"{stem}.study", "--csv", folder / f"{stem}.csv"
 
 

@@ -143,12 +143,10 @@ def test_what_cannot_be_read_is_left_to_the_task(folder: Path, kind: str, fault:
 
 
 def by_itself(tables) -> Case:
-    """What reading the tables as text gives."""
     return Case.from_toml(toml_document({t: tables[t] for t in TABLES if t in tables}))
 
 
 def read(how, tables):
-    """A case, and its text; or what is wrong with it."""
     try:
         case = how(tables)
     except CaseError as error:

@@ -16,7 +16,6 @@ ROBOTS = ("ur3", "ur5", "puma560", "xarm7")  # of these ur3 misses a part
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch):
-    """A folder with a case, where the command runs."""
     (tmp_path / "strip.toml").write_text(STRIP)
     monkeypatch.chdir(tmp_path)
     return tmp_path

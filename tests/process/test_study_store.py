@@ -27,7 +27,6 @@ def facts(found: dict[str, Record]) -> dict[str, tuple]:
 
 
 def run_sql(path, *programs: str) -> None:
-    """Change a store as another program might."""
     with closing(sqlite3.connect(path)) as base:
         for program in programs:
             base.execute(program)
@@ -175,7 +174,6 @@ def good(tmp_path_factory):
 
 
 def ask(folder, store, *more):
-    """The command on a study, from what a store holds."""
     return run_coverable("study", folder / "study.toml", "--out", store, "--workers", 0, *more)
 
 
@@ -190,7 +188,6 @@ def refused(folder, store) -> str:
 
 
 def copied(good, tmp_path):
-    """A copy of the store."""
     path = tmp_path / "copy.study"
     path.write_bytes((good / "out.study").read_bytes())
     return path

@@ -34,7 +34,6 @@ QUESTIONS = {
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """The small cases as files."""
     made = tmp_path_factory.mktemp("cases")
     for name, text in TEXTS.items():
         (made / f"{name}.toml").write_text(text)
@@ -42,7 +41,6 @@ def folder(tmp_path_factory):
 
 
 def ask(folder, name, look, *more):
-    """A command whose time is up at a look at its clock."""
     command, case, *rest = QUESTIONS[name]
     clock = ends_at(look, clocks := [])
     said = run_coverable(command, folder / f"{case}.toml", *rest, *LIMIT, *more, clock=clock)

@@ -58,7 +58,6 @@ def names(*tags: str) -> list[str]:
 
 
 def stored(file: str) -> list[str]:
-    """The names of all problems in a file of the oracles."""
     return [f"{file} {number}" for number in range(len(_stored(file)))]
 
 
@@ -90,7 +89,6 @@ def counted(name: str) -> tuple[int, int] | None:
 
 @cache
 def tables_of(name: str) -> dict[str, Any]:
-    """The tables of a question's case, as plain numbers."""
     file, _, number = name.rpartition(" ")
     if file in STORED:
         one = _stored(file)[int(number)]
@@ -117,13 +115,11 @@ def _merged(name: str) -> dict[str, Any]:
 
 @cache
 def case_of(name: str) -> Case:
-    """The case of a question."""
     return Case.from_toml(tomli_w.dumps(tables_of(name)), FILES.name, name=name)
 
 
 @cache
 def question(name: str) -> Question:
-    """A question, built."""
     return Question(name, case_of(name), *case_of(name).build())
 
 

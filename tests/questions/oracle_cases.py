@@ -34,7 +34,6 @@ class Problem:
 
     @staticmethod
     def read(plain: dict[str, Any]) -> Problem:
-        """The problem from what JSON held."""
         made = dict(plain)
         for name in ("size", "u", "v", "position", "rpy_deg", "cells"):
             made[name] = tuple(made[name])
@@ -84,7 +83,6 @@ def _pairs(nu: int, nv: int) -> Ints:
 
 
 def _middles(limits: Floats, count: int) -> Floats:
-    """Mid parameters of `count` equal steps."""
     return np.asarray(limits[0] + (limits[1] - limits[0]) * (np.arange(count) + 0.5) / count)
 
 
@@ -115,8 +113,6 @@ def net(problem: Problem, pieces: int) -> Domain:
 
 
 class Answer(NamedTuple):
-    """What an oracle says."""
-
     feasible: bool  # One component covers every cell
     covered: int  # Cells of the best single component
     reachable: int  # Cells that some component covers

@@ -224,7 +224,6 @@ def _rows(limits: Floats, step: float) -> Floats:
 
 
 def solve(problem: Problem) -> Answer:
-    """The oracle's answer."""
     n_cells = problem.cells[0] * problem.cells[1]
     if (problem.limits[:, 0] > problem.limits[:, 1]).any():
         return Answer(n_cells == 0, 0, 0)

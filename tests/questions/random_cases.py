@@ -32,7 +32,6 @@ def draw(rng: np.random.Generator, arm: str = "puma560") -> Problem:
 
 
 def surface_of(problem: Problem) -> Surface:
-    """A problem's surface as the project's own."""
     made = {"plane": plane, "sphere": sphere, "cylinder": cylinder, "hyperboloid": hyperboloid}
     pose = {"side": problem.side, "position": problem.position, "rpy_deg": problem.rpy_deg}
     return made[problem.kind](*problem.size, problem.u, problem.v, **pose)

@@ -67,7 +67,6 @@ def test_an_arm_on_its_lift():
 @sampled
 @pytest.mark.parametrize("seed", seeds(25, all=500))
 def test_random_chains(seed, tmp_path):
-    """With tool axes and a TCP of their own."""
     rng = np.random.default_rng(seed)
     more = {"approach_axis": rng.normal(size=3), "tcp": ((0.03, -0.02, 0.12), (20, -30, 75))}
     check_arm(load_text(tmp_path, random_arm(rng), **more), rng, 5)

@@ -100,7 +100,6 @@ def test_a_cylinder_is_inside_its_prism_and_the_prism_hardly_larger(radius, exac
 
 
 def bodies(*parts):
-    """Triangles of closed parts, as one body."""
     whole = trimesh.util.concatenate(parts)
     return checked_triangles(np.asarray(whole.vertices), np.asarray(whole.faces))
 

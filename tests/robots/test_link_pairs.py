@@ -36,7 +36,6 @@ def arm(folder, *links):
 
 
 def ball(radius=0.05, z=0.0):
-    """A collision shape."""
     origin = f'<origin xyz="0 0 {z}"/>'
     return "", f'<collision>{origin}<geometry><sphere radius="{radius}"/></geometry></collision>'
 

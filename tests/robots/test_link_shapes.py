@@ -46,7 +46,6 @@ BALL = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
 
 
 def three(folder, base=COLLISION, arm=COLLISION, hand=COLLISION, mark=""):
-    """An arm of two joints."""
     (folder / "three.urdf").write_text(LINKS.format(base=base, arm=arm, hand=hand, mark=mark))
     return load_robot(str(folder / "three.urdf"))
 
@@ -203,7 +202,6 @@ def test_triangles_that_are_no_body_are_refused(approved):
 
 
 def grid(height):
-    """Triangles over 20 x 20 points."""
     x, y, faces = mesh_patches.grid(19, 19)
     return 0.01 * np.column_stack([19 * x, 19 * y, height(19 * x, 19 * y)]), faces
 

@@ -101,7 +101,6 @@ def fixed(*edges):
 
 
 def random_tree(rng):
-    """A tree of up to ten links, some of them with usual names."""
     count = rng.randint(3, 10)
     names = [f"l{k}" for k in range(count)]
     for name in rng.sample(USUAL, rng.randint(0, 2)):

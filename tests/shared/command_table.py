@@ -37,8 +37,6 @@ def sheet(count: int = 4, size: float = 0.2) -> str:
 
 
 class Commands:
-    """Runs the commands of the table in its folder, each once."""
-
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.run = cache(self._run)
@@ -50,7 +48,6 @@ class Commands:
         (folder / "mm.off").write_text(sheet(size=200.0))
 
     def words(self, command: str, name: str) -> list[str]:
-        """The arguments of a command."""
         return [command, *shlex.split(TABLE[command][name])]
 
     def _run(self, command: str, name: str, *more: str) -> Said:
@@ -61,7 +58,6 @@ class Commands:
         return self.say(words)
 
     def say(self, words: list[str]) -> Said:
-        """Run `coverable` with these arguments in the folder."""
         before = Path.cwd()
         os.chdir(self.folder)
         try:

@@ -17,8 +17,6 @@ from feasibility.roadmap.search import improve, seed_middle
 
 
 class Proving(NamedTuple):
-    """How it ended."""
-
     exploration: Exploration
     prover: Prover
     attempt: object | None = None

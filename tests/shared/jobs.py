@@ -49,13 +49,10 @@ def case_named(name: str) -> Case:
 
 @cache
 def verdict_named(name: str) -> Verdict:
-    """What `check` says of it."""
     return check(*case_named(name).build())
 
 
 class Said(NamedTuple):
-    """What a command left."""
-
     status: int
     out: str
     err: str
@@ -67,7 +64,6 @@ class Said(NamedTuple):
 
 
 def run_coverable(*args: object, clock: Any = None) -> Said:
-    """Run the command in this process."""
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         status = main([str(arg) for arg in args], clock)

@@ -69,7 +69,6 @@ def checked(asked: Any) -> list[str]:
 
 
 def ended(one: Any) -> Json:
-    """Whose answer it is."""
     return {"robot": one.robot.name, "version": str}
 
 
@@ -91,7 +90,6 @@ def bounds(one: Any) -> Json:
 
 
 def clearances(one: Any) -> Json:
-    """What a certificate says of collisions."""
     pair = None if one.nearest_pair is None else list(one.nearest_pair)
     return there(min_clearance_m=one.min_clearance, measured_clearance_m=one.measured_clearance,
                  nearest_pair=pair)  # fmt: skip
@@ -113,7 +111,6 @@ def certificate(one: Any) -> Json | None:
 
 
 def causes(given: Any, cells: Any) -> list[Json]:
-    """Why cells are missed."""
     return [
         {
             "cell": index(cells, one.cell), "cause": str(one.kind), "proved": one.proved,
@@ -156,7 +153,6 @@ def treated(one: Any) -> Json | None:
 
 
 def of_check(one: Any, printed_walk: bool = False) -> Json:
-    """A verdict; with `--witness -` its motion, too."""
     walk = {
         "joints": list(one.robot.joint_names), "q": one.witness.q.tolist(),
         "cell": [None if k < 0 else int(k) for k in one.witness.cell],
@@ -179,7 +175,6 @@ def of_check(one: Any, printed_walk: bool = False) -> Json:
 
 
 def of_verify(one: Any) -> Json:
-    """What became of a claim."""
     reached = one.reached
     missed = [] if reached is None else np.flatnonzero(~reached).tolist()
     known = None if "collisions" in one.not_judged else one.task.collision
@@ -231,7 +226,6 @@ def of_path(one: Any) -> Json:
 
 
 def travel(robot: Any, q: np.ndarray) -> Json:
-    """How far each joint goes."""
     ways = zip(robot.joint_names, np.abs(np.diff(q, axis=0)).sum(axis=0), robot.prismatic,
                strict=True)  # fmt: skip
     return {
@@ -241,7 +235,6 @@ def travel(robot: Any, q: np.ndarray) -> Json:
 
 
 def layout(one: Any) -> Json:
-    """Parallel passes."""
     return {
         "count": one.count, "stretches": len(one.stretches), "by": one.by, "pitch_m": one.pitch,
         "spacing_m": one.spacing, "widest_m": one.widest, "length_m": one.length,
@@ -250,7 +243,6 @@ def layout(one: Any) -> Json:
 
 
 def timed(one: Any) -> Json:
-    """A trajectory, how much of the limits it uses, and these."""
     most, limits, time = one.most, one.limits, one.run.time
 
     def by_joint(values: np.ndarray) -> Json:
@@ -269,7 +261,6 @@ def timed(one: Any) -> Json:
 
 
 def of_runs(one: Any) -> Json:
-    """Passes in several motions."""
     found, along = one.found, one.along
     return {
         "verdict": along.verdict.answer, "evidence": along.verdict.evidence,
@@ -368,7 +359,6 @@ def finding(quantity: Any, one: Any) -> Json | None:
 
 
 def of_explain(one: Any) -> Json:
-    """What would change a verdict."""
     verdict, rates, dropped = one.verdict, one.rates, one.dropped
     cells, stops = verdict.cells, [] if rates is None else [s.why for s in rates.witness.stops]
     share = dropped and cells.areas[dropped.cells].sum()
@@ -404,7 +394,6 @@ def of_explain(one: Any) -> Json:
 
 
 def trial(one: Any) -> Json | None:
-    """A placement that was tried."""
     return None if one is None else {
         "position": list(one.pose.position), "rpy_deg": list(one.pose.rpy_deg),
         "tried": "fully" if one.fully else "quickly",
@@ -415,7 +404,6 @@ def trial(one: Any) -> Json | None:
 
 
 def of_place(one: Any) -> Json:
-    """Where a surface may stand."""
     found, plan, best = one.found, one.plan, one.found.best
     axes = ("x", "y", "z", "roll_deg", "pitch_deg", "yaw_deg")
     return {
@@ -449,7 +437,6 @@ def without_times(result: Any) -> Any:
 
 
 def of_study(one: Any) -> Json:
-    """Many cases."""
     words = ("feasible", "infeasible", "undecided")
     return {
         "study": str, "description": str, "parameters": list(one.study.labels),
@@ -472,7 +459,6 @@ ARM = ("robot", "joints", "reach_m", "verdict", "evidence", "message", "share", 
 
 
 def of_compare(one: Any) -> Json:
-    """Which arm fits."""
     arms = [{**{name: getattr(arm, name) for name in ARM}, "seconds": float} for arm in one.arms]
     return {
         "case": one.case, "collisions": checked(one.collision), "robots": arms,

@@ -53,8 +53,6 @@ def unpacked(data: bytes) -> list[dict[str, Any]]:
 
 
 class Page(HTMLParser):
-    """A page, taken apart."""
-
     def __init__(self, text: str) -> None:
         super().__init__()
         self.text, self.tags, self.attributes = text, Counter[str](), list[tuple[str, Any]]()

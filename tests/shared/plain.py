@@ -96,7 +96,6 @@ def facets_of(form: Form, nu: int, nv: int) -> Floats:
 
 
 def asked_of(task: Task, cells: Cells) -> Asked:
-    """What a task asks of the tool; directions in the root frame."""
     roll = task.roll_deg
     roll = None if roll is None or roll[1] - roll[0] >= 360.0 else tuple(np.radians(roll))
     turned, approach = cells.surface.rotation, task.approach
@@ -128,7 +127,6 @@ def targets_of(cells: Cells, task: Task) -> tuple[Floats, Floats]:
 
 
 def geometry_of(shape: Any) -> tuple:
-    """A shape of the product as the referee's."""
     match shape:
         case Box(size):
             return ("box", tuple(size))

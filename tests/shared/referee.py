@@ -37,7 +37,6 @@ def turn(rpy: ArrayLike) -> Floats:
 
 
 def placement(position: ArrayLike = (0, 0, 0), rpy: ArrayLike = (0, 0, 0)) -> Floats:
-    """(4, 4)."""
     made = np.eye(4)
     made[:3, :3], made[:3, 3] = turn(rpy), position
     return made
@@ -167,7 +166,6 @@ class Arm:
         return here if self.seen_from is None else np.linalg.inv(frames[self.seen_from]) @ here
 
     def tool(self, q: ArrayLike) -> tuple[Floats, Floats, Floats]:
-        """Tool points, approach axes and reference axes (k, 3)."""
         here = self.placed(q)
         approach = unit(self.approach)
         reference = np.asarray(self.reference, float)
@@ -179,8 +177,6 @@ class Arm:
 
 
 class Places(NamedTuple):
-    """Places of a surface."""
-
     points: Floats  # (k, 3) m
     normals: Floats  # (k, 3) unit, outward
     along: Floats  # (k, 3) unit, where the parameter u grows; NaN where there is none
@@ -478,8 +474,6 @@ DEEP = 20.0  # m, a box in place of a half space: fcl crashes on a half space be
 
 
 class Shape(NamedTuple):
-    """One shape of a body."""
-
     link: str | None  # That it moves with; None for the root frame
     placement: Floats  # (4, 4) in the link's frame
     geometry: Any

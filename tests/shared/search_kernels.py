@@ -35,7 +35,6 @@ class Clearance:
     """How far the bodies of an arm are apart, as the search sees them."""
 
     def __init__(self, robot: Robot, bodies: Bodies) -> None:
-        """Ready for many questions."""
         self.n, self.buffer = robot.n, collision_buffer(bodies, robot)
 
     def margin(self, q0: Any, q1: Any) -> float:
@@ -44,7 +43,6 @@ class Clearance:
         return segment_clear(self.buffer, *ends)
 
     def clear(self, q0: Any, q1: Any) -> bool:
-        """Is a segment certainly clear?"""
         return self.margin(q0, q1) > 0.0
 
     def bounds(self, q: Any) -> Floats:
@@ -73,10 +71,7 @@ class Held(NamedTuple):
 
 
 class Motions:
-    """Segments over the cells of one question."""
-
     def __init__(self, robot: Robot, cells: Cells | None = None, task: Task | None = None) -> None:
-        """With no cells: only how the tool moves is asked."""
         cells = plane((-1, 1), (-1, 1)).cells(1, 1) if cells is None else cells
         self.task = Task(0.0, 30) if task is None else task
         self.arrays, self.work = arrays_of(robot, cells, self.task), work_for(robot.n)
@@ -124,7 +119,6 @@ class Motions:
     def at_rest(
         self, q0: Floats, q1: Floats, point: Any, approach: Any, reference: Any = (1.0, 0.0, 0.0)
     ) -> Held:
-        """A segment whose target stays where it is."""
         self.work.target[:3] = point, approach, reference
         stand_still(self.arrays, self.work)
         for slot, q in enumerate((q0, q1)):

@@ -44,7 +44,6 @@ def strip(half_turns, count=6):
 
 @pytest.fixture(scope="module", params=WHOLE)
 def alike(request):
-    """The cells of one patch, and those of its pieces."""
     one, pieces, shape = WHOLE[request.param]
     names = ("u_range", "v_range")
     counts = [
@@ -195,7 +194,6 @@ def test_a_twisted_ring_is_refused_and_an_untwisted_one_is_not():
 
 
 def test_seams_of_full_turns():
-    """Closed borders that begin at different angles."""
     stacked = piecewise(
         [cylinder(0.3, (0, 360), (0, 0.4)),
          cylinder(0.3, (-77, 283), (0, 0.4), position=(0, 0, 0.4))]

@@ -38,8 +38,6 @@ def parts_of(pairs, count):
 
 
 class Cut:
-    """A patch cut into cells, and their figures."""
-
     def __init__(self, given: Mesh, count: int = N) -> None:
         self.given = given
         cut = cells_for(*given, count=count)
@@ -218,7 +216,6 @@ def test_pieces_share_cells_by_area_and_size_is_the_side_of_a_square():
 
 
 def assert_subdivided(given, most_area):
-    """Everything that a subdivision promises, against the old mesh."""
     fine = subdivide(given.vertices, given.faces, most_area)
     old, new = areas_of(*given), areas_of(fine.vertices, fine.faces)
     assert new.max() <= most_area * (1 + 1e-8)

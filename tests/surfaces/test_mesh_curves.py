@@ -28,7 +28,6 @@ def squares(size: float, seed: int, count: int = 674) -> TriangleMesh:
 
 
 def corner() -> TriangleMesh:
-    """A sheet like an L."""
     u, v, faces = mesh_patches.grid(40, 40)
     i, j = np.divmod(np.arange(1600), 40)
     flat = np.column_stack([0.4 * u, 0.4 * v, 0.0 * u])

@@ -44,7 +44,6 @@ def away(name, points, line):
 
 
 def by_level(found):
-    """The stretches of each pass."""
     assert sorted({each.level for each in found.stretches}) == list(range(found.count))
     return [[e for e in found.stretches if e.level == level] for level in range(found.count)]
 

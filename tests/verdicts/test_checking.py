@@ -22,7 +22,6 @@ FEW = ("paper 5d", "puma560 190", "ur5 12", "dome of halves", "beside a post")
 
 
 def same(one, other):
-    """Equal to the last bit."""
     assert (one.answer, one.evidence, one.message) == (other.answer, other.evidence, other.message)
     np.testing.assert_array_equal(one.covered, other.covered)
     assert (one.witness is None) == (other.witness is None)

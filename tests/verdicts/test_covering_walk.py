@@ -35,7 +35,6 @@ def visits(graph, cells, **options):
 
 @pytest.mark.parametrize("n", [1, 2, 3, 50])
 def test_a_line_is_walked_once_and_a_star_from_leaf_to_leaf(n):
-    """A line from one end to the other, in either order of its edges' ends."""
     backwards = nx.relabel_nodes(nx.path_graph(n), {k: n - 1 - k for k in range(n)})
     for graph in (nx.path_graph(n), backwards):
         assert visits(graph, n) in (list(range(n)), list(range(n))[::-1])
@@ -77,7 +76,6 @@ def test_several_nodes_over_one_cell(seed):
 
 
 def test_only_the_component_asked_for():
-    """Two lines and a lone node: each walk keeps to its own."""
     graph = nx.disjoint_union_all([nx.path_graph(4), nx.path_graph(5), nx.empty_graph(1)])
     roadmap, of = roadmap_of(graph, 10)
     for first, expected in ((0, range(4)), (4, range(4, 9)), (9, range(9, 10))):

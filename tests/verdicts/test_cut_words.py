@@ -47,7 +47,6 @@ OPENED = (
 
 
 def test_trees_and_their_cuts_in_words(approved) -> None:
-    """A tree, indented and as a sentence; slides in millimetres."""
     robot = question("on a rail").robot
     (slide,) = np.flatnonzero(robot.prismatic)
     approved("cut_words", "\n".join([

@@ -140,7 +140,6 @@ def same(one, other):
 @sampled
 @pytest.mark.parametrize("name", [*spread(PROBLEMS, 2), "beside a post", "torus"])
 def test_moving_all_by_one_rigid_motion_changes_nothing(name):
-    """Arm, surface and scene."""
     q, angles, shift = question(name), (0.4, -0.7, 1.9), np.array([0.5, -1.0, 0.3])
     motion = pin.SE3(rotation_from_rpy(*angles), shift)
     name_of = q.robot.name

@@ -49,7 +49,6 @@ SAMPLES = {"hood": 6}  # between rows, where the referee's formula is slow
 
 @cache
 def feasible(name):
-    """Has it a motion to be looked at?"""
     return verdict_of(name).witness is not None and len(verdict_of(name).witness.q) > 1
 
 

@@ -51,7 +51,6 @@ def assert_partition(found, covers):
 @sampled
 @pytest.mark.parametrize("block", seeds(3, all=20))
 def test_random_tables_against_brute_force(block):
-    """The order of rows and cells is no matter."""
     rng = np.random.default_rng(block)
     for seed in range(40 * block, 40 * block + 40):
         covers, pairs = random_table(seed)

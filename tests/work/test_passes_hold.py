@@ -54,7 +54,6 @@ class Drawn:
 
     @cached_property
     def planned(self) -> coverable.PlannedPasses:
-        """Passes, and the verdict on one motion along them."""
         laid = parallel_passes(
             self.surface, self.pitch, self.direction, overrun=self.overrun, one_way=self.one_way
         )
@@ -171,7 +170,6 @@ def worst(case, q, cell):
 
 @pytest.fixture(scope="module")
 def held():
-    """Of each case whether a motion was found."""
     return {}
 
 

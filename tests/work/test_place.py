@@ -89,13 +89,11 @@ def moved_away(name, seed):
 
 
 def region_about(pose, widths=WIDTHS):
-    """All poses within some widths of one."""
     ends = zip(AXES, pose.values.tolist(), widths, strict=True)
     return Region.around(pose, {name: (v - w, v + w) for name, v, w in ends})
 
 
 def case_at(name, pose):
-    """The case with its surface at a pose, read anew."""
     position, rpy = list(pose.position), list(pose.rpy_deg)
     sets = [f"surface.position={position}", f"surface.rpy_deg={rpy}"]
     return case_of(name).with_overrides(sets).build()
@@ -123,7 +121,6 @@ def test_a_surface_moved_away_is_put_back(name, seed):
 
 
 def nobody(poses, fully):
-    """An evaluator that must not be asked."""
     raise AssertionError("no search should be run")
 
 
@@ -292,7 +289,6 @@ def test_stations_share_out_what_no_placement_covers_alone(tmp_path):
 
 
 def told(trials):
-    """All that trials say."""
     return [(trial.pose, trial.fully, dict(trial.result)) for trial in trials]
 
 

@@ -61,7 +61,6 @@ def bodies_of(solids, scene=(), pairs=(), soups=()):
 
 
 def wall_at(x):
-    """The half space beyond x = `x`."""
     return Obstacle("wall", HalfSpace(), at(x, rotation=[[0, 0, -1], [0, 1, 0], [1, 0, 0]]))
 
 

@@ -41,8 +41,6 @@ def configurations(points, axes, roll=0.0):
 
 
 class Raster(NamedTuple):
-    """A motion, and what it is judged over."""
-
     robot: Robot
     cells: Cells
     task: Task
@@ -50,8 +48,6 @@ class Raster(NamedTuple):
 
 
 def sheet():
-    """A bumpy mesh."""
-
     def shape(u, v):
         x, y = 0.24 * u - 0.12, 0.2 * v - 0.1
         return x + 0.45, y + 0.05, 0.25 + 0.02 * np.sin(12 * x) * np.cos(9 * y) - 0.8 * x**2
@@ -60,7 +56,6 @@ def sheet():
 
 
 def net():
-    """Control points of a wavy sheet."""
     x, y = np.meshgrid(np.linspace(0, 0.25, 5), np.linspace(-0.1, 0.1, 4), indexing="ij")
     z = 0.03 * np.cos(9 * x) + 0.02 * np.sin(15 * y)
     return np.stack([x + 0.35, y, z + 0.25], axis=-1).tolist()

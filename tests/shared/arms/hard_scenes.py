@@ -29,7 +29,6 @@ CELLS = PLATE.cells(1, 1)
 
 @cache
 def arm(name: str) -> Robot:
-    """The arm of that name, with its own collision shapes."""
     if name != "puma560 on a rail":
         return load_robot(name)
     return load_robot("puma560", axes=[Axis("rail", "prismatic", (0, 1, 0), limits=(-0.5, 0.5))])
@@ -84,8 +83,6 @@ def bracket() -> Triangles:
 
 @dataclass(frozen=True)
 class Over:
-    """A tool over one cell."""
-
     robot: Robot
     surface: coverable.Surface
     task: Task

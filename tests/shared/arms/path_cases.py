@@ -34,7 +34,6 @@ def verdict_of(name):
 
 @cache
 def path_of(name, order=None):
-    """A path of a paper case or a patch."""
     return coverage_path(verdict_of(name), order or BEST.get(name, "rows"))
 
 

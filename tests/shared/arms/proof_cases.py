@@ -22,8 +22,6 @@ ACROSS = float(np.arccos(0.68))
 
 
 class Proved(NamedTuple):
-    """A question and the tree that answers it with no."""
-
     robot: Robot
     cells: Cells
     task: Task

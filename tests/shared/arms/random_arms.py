@@ -75,7 +75,6 @@ def between(q0: Floats, q1: Floats, samples: int) -> tuple[Floats, Floats]:
 
 
 def random_turn(rng: np.random.Generator) -> Floats:
-    """A random rotation (3, 3)."""
     q, r = np.linalg.qr(rng.normal(size=(3, 3)))
     q *= np.sign(np.diag(r))
     return q if np.linalg.det(q) > 0.0 else -q

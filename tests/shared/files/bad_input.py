@@ -28,8 +28,6 @@ KEY = re.compile(r"(robot|surface|task|collision|search|serach|tusk)\.([^ ]+)(?:
 
 
 class Bad(NamedTuple):
-    """One bad input."""
-
     good: str
     """The table that it is from: of which good text it is, or one of the tables of their own."""
     change: Any
@@ -52,7 +50,6 @@ def many(text: str) -> str:
 
 
 def slug(name: str) -> str:
-    """What the file of its approved text is called."""
     return re.sub(r"[^\w.]+", "-", name)
 
 
@@ -77,7 +74,6 @@ def with_key(text: str, change: str) -> str:
 
 
 def changed(text: str, change: str | list[str]) -> str:
-    """A good text with a change, as the tables write it."""
     if isinstance(change, str) and not KEY.fullmatch(change):
         return text.replace("§", change) if "§" in text else f"{text}{change}\n"
     changes = [change] if isinstance(change, str) else change

@@ -26,7 +26,6 @@ def study_with_store(folder: Path) -> Path:
 
 
 def rows(path: Path) -> list[Row]:
-    """All rows of a store."""
     with closing(sqlite3.connect(path)) as base:
         return base.execute("SELECT * FROM tasks ORDER BY key").fetchall()
 

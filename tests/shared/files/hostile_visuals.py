@@ -38,13 +38,11 @@ def visual(name: str, more: str = "") -> str:
 
 
 def write(folder: Path, name: str, content: str | bytes) -> str:
-    """A new file; gives its name."""
     (folder / name).write_bytes(content.encode() if isinstance(content, str) else content)
     return name
 
 
 def stl(triangles: int) -> bytes:
-    """A binary STL of that many triangles, each beside the last."""
     beside = np.arange(triangles)[:, None, None] * [1.0, 0, 0]
     return w.stl_of(beside + CORNERS)
 
@@ -94,7 +92,6 @@ def tree(levels: int, times: int, step: int = 1) -> str:
 
 
 def circle(count: int) -> str:
-    """Nodes that show themselves."""
     each = (f"<node id='n{k}'>{referred(f'n{(k + 1) % count}')}</node>" for k in range(count))
     return collada(nodes="".join(each), scene=referred("n0"))
 

@@ -25,7 +25,6 @@ def plate(nu, nv, width=0.3, height=0.2):
 
 
 def hilly(nu=14, nv=11):
-    """A wavy plate."""
     vertices, faces = plate(nu, nv)
     vertices[:, 2] = 0.03 * np.sin(20 * vertices[:, 0]) * np.cos(15 * vertices[:, 1])
     return vertices, faces
@@ -49,7 +48,6 @@ def strip(twisted, count=24):
 
 
 def stacked(*parts):
-    """Meshes as one."""
     starts = np.cumsum([0] + [len(v) for v, _ in parts])
     faces = [f + k for (_, f), k in zip(parts, starts, strict=False)]
     return np.concatenate([v for v, _ in parts]), np.concatenate(faces)
@@ -67,7 +65,6 @@ def chain_of_caps():
 
 
 def bow_tie():
-    """Two triangles that meet in a point."""
     return [[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [-0.1, 0, 0], [0, -0.1, 0]], [[0, 1, 2], [0, 3, 4]]
 
 

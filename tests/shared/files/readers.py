@@ -52,8 +52,6 @@ GRID = np.stack(np.broadcast_arrays([[0.0], [0.1], [0.2]], [[0.0, 0.1, 0.2]], 0.
 
 
 class Reader(NamedTuple):
-    """One kind of file."""
-
     file: str
     """A name that it may have."""
     read: Callable[[Path], Any]
@@ -213,7 +211,6 @@ def packed(content: dict[str, bytes], twice: str = "") -> bytes:
 
 
 def npy(array: np.ndarray, pickled: bool = False) -> bytes:
-    """An array as a member of a result."""
     stream = io.BytesIO()
     np.save(stream, array, allow_pickle=pickled)
     return stream.getvalue()

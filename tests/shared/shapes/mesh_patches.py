@@ -75,7 +75,6 @@ def dome(nu: int = 40, nv: int = 50) -> Mesh:
 
 
 def shell(nu: int = 50, nv: int = 30) -> Mesh:
-    """Part of a cylinder."""
     return bent(lambda u, v: (0.5 * np.cos(2.8 * u), 0.5 * np.sin(2.8 * u), 0.9 * v), nu, nv)
 
 
@@ -178,7 +177,6 @@ def islands() -> Mesh:
 
 
 def used(mesh: Mesh) -> Mesh:
-    """Without the vertices that no face uses."""
     kept, inverse = np.unique(mesh.faces.ravel(), return_inverse=True)
     return Mesh(mesh.vertices[kept], inverse.reshape(-1, 3).astype(np.int64))
 
@@ -230,7 +228,6 @@ def roof(angle_deg: float, side: float = 0.3) -> TriangleMesh:
 
 
 def can() -> TriangleMesh:
-    """A round tin without its bottom."""
     turn = np.linspace(0, 2 * np.pi, 48, endpoint=False)
     circle = 0.15 * np.column_stack([np.cos(turn), np.sin(turn)])
     low, high = (np.column_stack([circle, np.full(48, z)]) for z in (-0.1, 0.1))

@@ -108,7 +108,6 @@ EXTREME = {
 
 
 def ridge(count, turn_deg):
-    """Two flat strips of triangles that meet at an angle."""
     tilt, half = np.radians(turn_deg / 2), lambda u: u - 0.5
     return coverable.mesh(TriangleMesh(*bent(
         lambda u, v: (half(u) * np.cos(tilt), 0.5 * v, -np.abs(half(u)) * np.sin(tilt)),
@@ -117,8 +116,6 @@ def ridge(count, turn_deg):
 
 
 def bowl(count):
-    """A paraboloid of triangles."""
-
     def shape(u, v):
         x, y = 0.8 * u - 0.4, 0.8 * v - 0.4
         return x, y, 0.6 * (x**2 + y**2) + 0.1 * x * y
@@ -127,7 +124,6 @@ def bowl(count):
 
 
 def flat(name, count=12):
-    """A smooth specimen as triangles."""
     return coverable.mesh(TriangleMesh(*of_patch(SMOOTH[name], count, count)))
 
 
