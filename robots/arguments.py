@@ -10,8 +10,7 @@ import numpy as np
 from coverable.arrays import Array
 from coverable.errors import Checks, Fault, printable, shown
 from robots.errors import RobotError
-from robots.mounting.directions import made_orthogonal, unit_axis
-from robots.mounting.poses import FURTHEST_BASE, FURTHEST_TCP, checked_pose
+from robots.poses import FURTHEST_BASE, FURTHEST_TCP, checked_pose, made_orthogonal, unit_axis
 
 if TYPE_CHECKING:
     from robots.urdf.axes import Axis

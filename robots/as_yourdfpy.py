@@ -10,14 +10,13 @@ from numpy.typing import ArrayLike
 
 from coverable.arrays import Array
 from robots.errors import RobotError
-from robots.joint_checks import numbers
-from robots.mounting.poses import about_fixed_axes
+from robots.joint_selection import numbers
+from robots.poses import about_fixed_axes
 from robots.robot import Robot
 from robots.urdf.axes import free_name
 from robots.urdf.checked_urdf import check_urdf
-from robots.urdf.geometry import Box, Capsule, Cylinder, Geometry, Sphere
 from robots.urdf.joints import JointInfo
-from robots.urdf.link_shapes import LinkShape
+from robots.urdf.link_shapes import Box, Capsule, Cylinder, Geometry, LinkShape, Sphere
 
 if TYPE_CHECKING:
     import yourdfpy

@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike
 from coverable.errors import Fault
 from robots.arguments import AS_IN_URDF, Mounting
 from robots.errors import RobotError
-from robots.joint_checks import no_limit_set
-from robots.joint_selection import MOST_GUESSES, Selection, select_joints, suggestion
+from robots.joint_selection import MOST_GUESSES, Selection, no_limit_set, select_joints, suggestion
 from robots.pinocchio_model import chain_model
 from robots.robot import Robot
 

@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 
 from coverable.arrays import Array, Mask
 from robots.errors import RobotError
-from robots.joint_checks import joint_faults, no_limit_set, numbers
-from robots.mounting.directions import made_orthogonal, unit_axis
+from robots.joint_selection import joint_faults, no_limit_set, numbers
 from robots.pinocchio_model import TCP_FRAME, world_frame
+from robots.poses import made_orthogonal, unit_axis
 
 if TYPE_CHECKING:
     from robots.chain import Chain

@@ -1,7 +1,7 @@
 """Numbers of a case that look as if they were millimetres, or radians: asked, never refused.
 
 A wall of 600 m may be meant. Files of meshes and a TCP far away are refused instead: there a key
-says the unit (`surfaces/meshes/sources.py`), or no tool is as long (`robots/mounting/poses.py`).
+says the unit (`surfaces/meshes/sources.py`), or no tool is as long (`robots/poses.py`).
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ from feasibility.collisions.shapes import (
 from feasibility.collisions.triangles import PLACEHOLDER, read_triangles
 from feasibility.collisions.words import SURFACE, TOOL
 from robots.shapes.bodies import Triangles
-from robots.urdf.geometry import Box, Capsule, Cylinder, Sphere
+from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
 Point = Sequence[float]
 Path = str | os.PathLike[str]

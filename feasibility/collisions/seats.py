@@ -18,7 +18,7 @@ from feasibility.collisions.shapes import HalfSpace
 from robots.robot import Robot
 from robots.shapes.bodies import Fineness, Polytope, Solid, Triangles
 from robots.shapes.links import outer_bodies
-from robots.urdf.geometry import Box
+from robots.urdf.link_shapes import Box
 
 
 def seats_of(robot: Robot, scene: Iterable[Obstacle]) -> tuple[Seat, ...]:

@@ -11,9 +11,9 @@ from typing import Any
 from coverable.arrays import Array
 from coverable.errors import Checks, Fault, shown
 from feasibility.collisions.triangles import object_triangles
-from robots.mounting.poses import matrix_of, rigid_matrix
+from robots.poses import matrix_of, rigid_matrix
 from robots.shapes.bodies import Triangles
-from robots.urdf.geometry import Box, Capsule, Cylinder, Sphere
+from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
 SMALLEST_SIDE, LARGEST_SIDE = 1e-6, 1e4  # [m]
 FARTHEST = 1e4  # [m], from the origin of the world

@@ -11,7 +11,7 @@ from coverable.arrays import Array, Ints
 from coverable.errors import Checks, CoverableError, Fault
 from coverable.files import shown_name
 from robots.shapes.bodies import Triangles
-from robots.shapes.triangles import solid_faces
+from robots.shapes.solids import solid_faces
 
 MOST_FACES = 500_000
 SMALLEST_EXTENT, LARGEST_EXTENT = 1e-6, 1e4  # [m], of the widest side

@@ -53,7 +53,7 @@ def files_of_arm(arm: RobotPart, *, meshes: bool) -> tuple[str, ...]:
 def _further(path: str, *more: Any, meshes: bool = False) -> tuple[str, ...]:
     """The files that a URDF or an SRDF names."""
     from robots.errors import RobotError
-    from robots.urdf.files import files_named_by
+    from robots.urdf.named_files import files_named_by
 
     try:
         return files_named_by(path, *more, meshes=meshes)

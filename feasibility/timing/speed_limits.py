@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from coverable.arrays import Array, Protected
 from coverable.errors import real
 from feasibility.paths.order import PathError
-from robots.chain_rows import moved_by_joints
+from robots.chain import moved_by_joints
 from robots.kinematics import Kinematics
 from robots.robot import Robot
 

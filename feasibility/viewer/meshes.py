@@ -12,7 +12,7 @@ import numpy as np
 from coverable.arrays import Array, Ints
 from coverable.meshes.raw_mesh import RawMesh
 from feasibility.viewer.threejs import Colour
-from robots.urdf.geometry import Box, Capsule, Cylinder, Sphere
+from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 from surfaces.meshes.triangle_mesh import doubled_areas
 
 CREASE = 0.7  # [rad]: edges sharper than this keep a visible edge (40 degrees)

@@ -32,8 +32,7 @@ from feasibility.viewer.meshes import (
 from robots.errors import RobotError
 from robots.kinematics import Kinematics
 from robots.robot import Robot
-from robots.urdf.geometry import MeshFile
-from robots.urdf.link_shapes import LinkShape
+from robots.urdf.link_shapes import LinkShape, MeshFile
 
 ROBOT = "/robot"
 TRIANGLES = 60_000  # of a whole robot; more are thinned

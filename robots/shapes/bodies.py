@@ -9,7 +9,7 @@ import numpy as np
 
 from coverable.arrays import Array, Ints
 from robots.errors import RobotError
-from robots.urdf.geometry import Box, Capsule, Cylinder, Sphere
+from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -17,7 +17,7 @@ import numpy as np
 from coverable.arrays import Array, Ints
 from robots.shapes.bodies import Geometry, Polytope, Triangles
 from robots.shapes.hulls import thickened
-from robots.urdf.geometry import Box, Capsule, Cylinder, Sphere
+from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
 LEAST = 1e-9  # [m] radius of a ball or capsule for coal
 KEPT = 256  # meshes whose trees are kept

@@ -12,12 +12,10 @@ from coverable.errors import listed
 from robots.errors import RobotError
 from robots.robot import Robot
 from robots.shapes.bodies import Fineness, Geometry, Polytope, Solid
-from robots.shapes.hulls import hull_of
-from robots.shapes.pieces import pieces_of
-from robots.shapes.triangles import MeshBodies
+from robots.shapes.hulls import hull_of, pieces_of
+from robots.shapes.solids import MeshBodies
 from robots.urdf.checked_urdf import CheckedUrdf, check_urdf
-from robots.urdf.geometry import MeshFile
-from robots.urdf.link_shapes import LinkShape
+from robots.urdf.link_shapes import LinkShape, MeshFile
 
 MOST_NAMED = 8  # links in one note
 

@@ -13,7 +13,7 @@ from robots.robot import Robot
 from robots.shapes.bodies import Geometry, Polytope, Solid, Triangles
 from robots.shapes.hulls import Hull, hull_of, rims
 from robots.shapes.links import LinkShapes
-from robots.urdf.geometry import Cylinder
+from robots.urdf.link_shapes import Cylinder
 
 NEAR = 1e-3  # [m]
 HEAVY = 1e3  # [1] of a sum of weights beside lengths

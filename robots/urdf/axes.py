@@ -19,7 +19,7 @@ import numpy as np
 from coverable.arrays import Array
 from coverable.errors import MISSING, Checks, Fault, shown
 from robots.errors import RobotError
-from robots.mounting.poses import FURTHEST_BASE, matrix_of
+from robots.poses import FURTHEST_BASE, matrix_of
 from robots.urdf.joints import JointInfo
 from robots.urdf.xml import MAX_LENGTH, MAX_NAME, UrdfError
 

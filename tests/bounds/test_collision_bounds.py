@@ -18,7 +18,7 @@ from feasibility.certification.collisions.shapes import Body
 from feasibility.collisions.bodies import Soup
 from robots.kinematics import Kinematics
 from robots.shapes.bodies import Solid
-from robots.urdf.geometry import Box, Capsule, Cylinder, Sphere
+from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
 UR5 = load_robot("ur5")
 COAL = 1e-7  # m, what coal's distances may be off

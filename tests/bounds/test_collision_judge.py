@@ -14,7 +14,7 @@ from coverable.errors import ArgumentError
 from feasibility.certification.collisions.collision_replay import collision_replay
 from feasibility.collisions.bodies import Soup
 from robots.shapes.bodies import Solid, Triangles
-from robots.urdf.geometry import Box, Capsule, Cylinder, Sphere
+from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
 CLOSE = 2e-6  # m, what coal is trusted with
 SLIDE, CRANK, ELBOW = planar_arm([0.1], ["prismatic"]), planar_arm([1.0]), planar_arm([0.5, 0.4])

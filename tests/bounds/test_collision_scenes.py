@@ -19,7 +19,7 @@ from feasibility.collisions.bodies import Pair, Soup
 from feasibility.collisions.shapes import HalfSpace
 from robots.kinematics import Kinematics
 from robots.shapes.links import link_shapes
-from robots.urdf.geometry import Box, Capsule, Cylinder, Sphere
+from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
 UR5 = load_robot("ur5")
 PLATE = plane((0.4, 0.6), (-0.1, 0.1), position=(0.0, 0.0, 0.3), side="outside")

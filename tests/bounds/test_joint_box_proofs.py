@@ -18,7 +18,7 @@ from feasibility.collisions.shapes import HalfSpace
 from feasibility.cut_tree import CutTree, Leaf
 from robots.kinematics import Kinematics
 from robots.shapes.bodies import Solid
-from robots.urdf.geometry import Box, Capsule, Cylinder, Sphere
+from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
 FEW = ("puma560", "puma560 on a rail", "ur5")
 ROUNDING = 1e-9

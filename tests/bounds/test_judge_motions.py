@@ -25,7 +25,7 @@ from feasibility.certification.surface_replay import replay_over_surface
 from feasibility.verdict import Walk
 from robots.kinematics import Kinematics
 from robots.shapes.bodies import Solid
-from robots.urdf.geometry import Sphere
+from robots.urdf.link_shapes import Sphere
 
 
 def off_and_tilt(cells, task, q):

@@ -12,7 +12,7 @@ from feasibility.certification.collisions.collision_replay import collision_repl
 from feasibility.collisions.bodies import Bodies, Pair
 from feasibility.collisions.outer_bodies import polytopes_of, soup_of, tool_polytopes, tool_solids
 from robots.shapes.bodies import Solid, Triangles
-from robots.urdf.geometry import Sphere
+from robots.urdf.link_shapes import Sphere
 
 UR5, SMALL, LARGE = load_robot("ur5"), 1e-6, 1e4
 SHAPES = [

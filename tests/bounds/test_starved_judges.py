@@ -32,7 +32,7 @@ from feasibility.treated.area import treated_by_walk
 from feasibility.verdict import Walk
 from robots.kinematics import Kinematics
 from robots.shapes.bodies import Solid, Triangles
-from robots.urdf.geometry import Box, Sphere
+from robots.urdf.link_shapes import Box, Sphere
 from surfaces.places.offset_surfaces import offset_surface
 
 FAR = 9e3  # m, of an axis: as far as a URDF may put it

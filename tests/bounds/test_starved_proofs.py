@@ -19,7 +19,7 @@ from feasibility.certification.overlaps.everywhere import Overlapping
 from feasibility.collisions.asked_bodies import gather
 from robots.kinematics import Kinematics
 from robots.shapes.bodies import Solid
-from robots.urdf.geometry import Sphere
+from robots.urdf.link_shapes import Sphere
 
 UR5 = load_robot("ur5")
 FLAT = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0, 0, 0.3))

@@ -23,8 +23,8 @@ from feasibility.collisions.shapes import HalfSpace
 from feasibility.cut_tree import CutTree, Leaf
 from robots.shapes.bodies import Solid, Triangles
 from robots.shapes.coal_shapes import coal_shape
-from robots.shapes.triangles import checked_triangles
-from robots.urdf.geometry import Box, Capsule, Cylinder, Sphere
+from robots.shapes.solids import checked_triangles
+from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
 NOZZLE = ToolShape.cylinder(0.01, 0.1, position=(0.0, 0.0, -0.05))
 CRATE = Obstacle.box("crate", (0.4, 0.4, 0.4), position=(0.5, 0.0, 0.3))

@@ -16,7 +16,7 @@ from bad_input import changed, goods, lay_out
 import coverable
 from coverable import Case, cut_box, cut_plane, faces_within_cone, load_case, mesh, take_faces
 from feasibility.collisions.shapes import HalfSpace
-from robots.urdf.geometry import Box, Capsule
+from robots.urdf.link_shapes import Box, Capsule
 from surfaces.meshes.sources import read_mesh
 
 POSE = {"position": (0.1, -0.2, 0.3), "rpy_deg": (10.0, 20.0, -30.0)}

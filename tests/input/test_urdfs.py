@@ -16,7 +16,7 @@ from yourdfpy import URDF
 from coverable.errors import CoverableError
 from robots.pinocchio_model import chain_model
 from robots.urdf.checked_urdf import CheckedUrdf, check_urdf
-from robots.urdf.geometry import MeshFile
+from robots.urdf.link_shapes import MeshFile
 from robots.urdf.srdf import read_srdf
 from robots.urdf.xml import UrdfError
 

@@ -10,8 +10,7 @@ from plain import arm_of
 from samples import sampled, seeds
 
 from coverable import RobotError, list_robots, load_robot
-from robots.chain import frames, jacobians
-from robots.chain_rows import moved_by_joints
+from robots.chain import frames, jacobians, moved_by_joints
 from robots.kinematics import Kinematics
 
 CLOSE = {"rtol": 0, "atol": 1e-12}

@@ -8,10 +8,9 @@ from foreign_clearances import distance_from_hull
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from robots.shapes.hulls import hull_of, outer_hull
-from robots.shapes.pieces import pieces_of
-from robots.shapes.triangles import checked_triangles
-from robots.urdf.geometry import Box, Capsule, Cylinder, Sphere
+from robots.shapes.hulls import hull_of, outer_hull, pieces_of
+from robots.shapes.solids import checked_triangles
+from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
 MARGIN = 1e-9  # [m] of the least squares below
 

@@ -10,9 +10,9 @@ from coverable import RobotError, load_robot
 from robots.shapes.bodies import Polytope, Solid
 from robots.shapes.links import link_shapes, outer_bodies
 from robots.shapes.pairs import link_pairs
+from robots.shapes.solids import checked_triangles
 from robots.shapes.tool import tool_reach
-from robots.shapes.triangles import checked_triangles
-from robots.urdf.geometry import Sphere
+from robots.urdf.link_shapes import Sphere
 
 SRDF = '<robot name="x">{}</robot>'
 PAIR = '<disable_collisions link1="{}" link2="{}" {}/>'

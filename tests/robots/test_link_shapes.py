@@ -23,9 +23,9 @@ from robots.shapes.bodies import Triangles
 from robots.shapes.links import link_shapes
 from robots.shapes.pairs import link_pairs
 from robots.shapes.sampling import PairSampling, random_configurations, with_crude_links_cut
-from robots.shapes.triangles import checked_triangles, solid_faces
+from robots.shapes.solids import checked_triangles, solid_faces
 from robots.urdf.checked_urdf import check_urdf
-from robots.urdf.geometry import Cylinder
+from robots.urdf.link_shapes import Cylinder
 
 LINKS = (
     '<robot name="three"><link name="base">{base}</link><link name="arm" {mark}>{arm}</link>'

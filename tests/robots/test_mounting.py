@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from coverable import Axis, list_robots, load_robot
 from robots.kinematics import Kinematics
-from robots.mounting.poses import about_fixed_axes
+from robots.poses import about_fixed_axes
 from robots.shapes.links import link_shapes
 from robots.urdf.checked_urdf import check_urdf
 

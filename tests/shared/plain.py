@@ -14,7 +14,7 @@ from coverable import Cells, Robot, Surface, Task, Verdict
 from feasibility.collisions.asked_bodies import gather
 from feasibility.collisions.shapes import HalfSpace
 from robots.shapes.bodies import Triangles
-from robots.urdf.geometry import Box, Capsule, Cylinder, Sphere
+from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
 NAMED = ("plane", "sphere", "cylinder", "cone", "torus", "hyperboloid", "ellipsoid")
 

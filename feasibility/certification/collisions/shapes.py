@@ -20,7 +20,7 @@ from feasibility.collisions.shapes import HalfSpace
 from robots.shapes.bodies import Triangles
 from robots.shapes.coal_shapes import coal_hull, coal_shape, with_contacts
 from robots.shapes.hulls import is_convex
-from robots.urdf.geometry import Box, Capsule, Cylinder, Sphere
+from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
 COAL = 1e-7  # [m] more than coal's distances are off, which stops at GJK
 GJK = 1e-8  # [m]

@@ -17,7 +17,7 @@ from feasibility.certification.collisions.inside import winding
 from feasibility.collisions.shapes import HalfSpace
 from robots.shapes.bodies import Triangles
 from robots.shapes.hulls import rims
-from robots.urdf.geometry import Box, Capsule, Cylinder, Sphere
+from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
 ALONG, ACROSS = 9, 5  # points along the longest side of a body, and along the others
 AROUND = 24  # points on each rim of a cylinder

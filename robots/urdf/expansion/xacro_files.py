@@ -16,8 +16,7 @@ from typing import Any, NamedTuple
 from coverable.errors import Fault
 from coverable.files import Remembered
 from coverable.processes import Limits, folder_of, run_apart
-from robots.urdf.mesh_folders import MeshFolders
-from robots.urdf.packages import seen_words
+from robots.urdf.mesh_folders import MeshFolders, seen_words
 from robots.urdf.xml import MAX_BYTES, UrdfError, read_bytes
 
 EXTRA = "needs the extra: pip install 'coverable[xacro]'"
@@ -72,7 +71,7 @@ def expanded(
         path: the file.
         package_dirs: folders that hold the packages of $(find ...); with them, the file's own
             folder, the ROS package around it and the packages it asks for by the name in their
-            package.xml (`robots.urdf.packages`), all that the file may read.
+            package.xml (`robots.urdf.mesh_folders`), all that the file may read.
         args: its arguments: texts, numbers and truth values.
         caps: of the process.
 

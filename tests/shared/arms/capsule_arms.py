@@ -8,7 +8,7 @@ from coverable import Obstacle
 from feasibility.collisions.bodies import Bodies, Pair
 from feasibility.collisions.shapes import HalfSpace
 from robots.shapes.bodies import Solid, Triangles
-from robots.urdf.geometry import Capsule
+from robots.urdf.link_shapes import Capsule
 
 
 def planar_arm(lengths, kinds=None, axes=None):

@@ -18,7 +18,7 @@ from feasibility.collisions.asked_bodies import gather
 from feasibility.collisions.bodies import Bodies
 from robots.kinematics import Kinematics
 from robots.shapes.bodies import Triangles
-from robots.shapes.triangles import checked_triangles
+from robots.shapes.solids import checked_triangles
 
 ARMS = ("ur5", "panda", "kinova", "xarm7", "puma560", "puma560 on a rail")
 CLEARANCE = 0.005  # m, that is asked for

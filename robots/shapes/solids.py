@@ -13,7 +13,7 @@ from coverable.meshes.raw_mesh import MeshError, distinct
 from coverable.meshes.robot_files import MeshFiles, largest_file
 from robots.errors import RobotError
 from robots.shapes.bodies import Triangles
-from robots.urdf.geometry import MeshFile
+from robots.urdf.link_shapes import MeshFile
 
 LARGEST = 1e4  # [m] a coordinate beyond it is no link's
 MOST_SECONDS = 60.0  # of processor time for all files of a robot
