@@ -21,8 +21,8 @@ from feasibility.collisions.scene import ToolShape as ToolShape
 from feasibility.collisions.settings import Collision as Collision
 from feasibility.division.division import Division as Division
 from feasibility.division.surface_division import divide as divide
-from feasibility.live.showing import Live as Live
-from feasibility.live.showing import live as live
+from feasibility.live.serving import Live as Live
+from feasibility.live.serving import live as live
 from feasibility.paper.literal import LiteralSearch as LiteralSearch
 from feasibility.paper.starts import starts as starts
 from feasibility.paths.coverage import CoveragePath as CoveragePath

@@ -204,7 +204,7 @@ def _show_faces(args: argparse.Namespace) -> int:
 def live(args: argparse.Namespace, began: float) -> int:
     """`coverable live CASE`: a page where one moves the part, until Ctrl-C."""
     with open_case(args, began, {}) as opened:
-        from feasibility.live.showing import Live
+        from feasibility.live.serving import Live
 
         page = Live(opened.case, opened.setup)
     return _serve("live", page, args.browser)

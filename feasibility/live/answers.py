@@ -6,58 +6,80 @@ proofs and causes. The certified answer is that of `check`, in its words.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 import numpy as np
 
-from coverable.errors import CoverableError
+from coverable.arrays import Array
 from feasibility.cases.case import Case, Setup
 from feasibility.checking import check
 from feasibility.clock import Clock, OutOfTime
 from feasibility.collisions.asked_bodies import said_of
-from feasibility.live import picture
-from feasibility.live.controls import Controls
-from feasibility.live.jobs import Answer, Job, Superseded
 from feasibility.live.quick_search import quick_search
-from feasibility.live.workbench import Workbench
 from feasibility.problem import Problem
 from feasibility.reports import verdict as report
+from feasibility.verdict import Verdict
+from feasibility.viewer.areas.margin_along import margin_layers
+from feasibility.viewer.areas.treated import area_layers
+from feasibility.viewer.playback import Playback, motion_of
+from feasibility.viewer.scene import (
+    MISSED,
+    Layer,
+    filled,
+    layers,
+    missed_groups,
+    missed_layer,
+    trail,
+)
+from feasibility.viewer.threejs import Colour
 
 STEPS = 60  # looks at the clock, between which a search does 8,000 evaluations at most
 STEPS_WITH_BODIES = 24  # the same where distances of bodies make an evaluation dearer
-JSON_HINT = " (--json lists all)"  # of the command, which a page has not
-BUG = "this is a bug in coverable: {}: {}; the page goes on working"
+COVERED: Colour = (0.13, 0.60, 0.33)
+PALE = 0.35  # [1] of white in the colours of what is not certified
+DRAWN_ONCE = ("/surface/patch", "/surface/cell", "/cells")
+
+
+class Superseded(Exception):
+    """A newer question has come, or the page is gone: nobody waits for this answer."""
 
 
 class Watch(Clock):
     """A clock that also ends a search after some steps, or when nobody waits for it any more."""
 
-    def __init__(self, job: Job, limit: float | None = None, steps: float = np.inf) -> None:
+    def __init__(
+        self,
+        wanted: Callable[[], bool],
+        said: Callable[[str], None],
+        limit: float | None = None,
+        steps: float = np.inf,
+    ) -> None:
         """A clock that does not run yet.
 
         Args:
-            job: what the search is for.
+            wanted: does anybody wait for the answer?
+            said: hears how far it is.
             limit: seconds, see `Clock`.
             steps: looks at the clock after which the search ends.
         """
         super().__init__(limit)
-        self._job, self._left = job, steps
+        self._wanted, self._said, self._left = wanted, said, steps
 
     def report(self, done: int, total: int | None, text: str) -> None:
-        """Keep it for the page that waits."""
+        """Tell the page that waits."""
         cells = f"{done} of {total} cells" if total else f"{done} cells"
-        self._job.said = f"{cells} so far; {text}"
+        self._said(f"{cells} so far; {text}")
 
     def tick(self, done: int, total: int | None, text: str, spent: int = 0) -> None:
         """Report, and stop where nobody waits or enough has been tried.
 
         Raises:
             OutOfTime: the steps are used up, or the deadline has passed.
-            Superseded: the job has been dropped.
+            Superseded: nobody waits.
         """
-        if self._job.dropped:
+        if not self._wanted():
             raise Superseded
         self._left -= 1
         if self._left < 0:
@@ -70,79 +92,91 @@ class Watch(Clock):
         yield
 
 
-class Answers:
-    """Answers the questions of all pages of one case."""
+@dataclass(frozen=True, eq=False, slots=True)
+class Answer:
+    """What a page shows."""
 
-    def __init__(self, controls: Controls, bench: Workbench) -> None:
-        """Answer for a case.
-
-        Args:
-            controls: what can be changed in it.
-            bench: builds the changed cases.
-        """
-        self.controls, self.bench = controls, bench
-
-    def __call__(self, job: Job) -> Answer:
-        """The answer as the page has it; bad values and faults of ours are answers, too.
-
-        Raises:
-            Superseded: nobody waits for it any more.
-        """
-        try:
-            case = self.controls.changed(job.values)
-            setup = self.bench.build(case, roughly=not job.final)
-            began = time.perf_counter()
-            found = certified(case, setup, job) if job.final else quick_look(setup, job)
-            return {**found, "seconds": time.perf_counter() - began}
-        except CoverableError as error:
-            return {"kind": "error", "head": str(error)}
-        except (Superseded, KeyboardInterrupt):
-            raise
-        except Exception as error:  # noqa: BLE001 - the page goes on working
-            return {"kind": "error", "head": BUG.format(type(error).__name__, error)}
+    kind: str
+    """'quick', 'error', or the verdict's answer."""
+    head: str
+    state: str = ""
+    """What kind of answer it is, in a few words."""
+    paint: tuple[Layer, ...] = ()
+    """The cells, by what became of them."""
+    parts: tuple[Layer, ...] = ()
+    """What only a certified answer has: graph, start, sides of a cut, treated area, the trail."""
+    rows: tuple[tuple[str, str], ...] = ()
+    causes: tuple[str, ...] = ()
+    q: Array | None = None
+    """(n,) where the arm is shown."""
+    motion: Playback | None = None
 
 
-def quick_look(setup: Setup, job: Job) -> Answer:
+def quick_look(setup: Setup, watch: Watch) -> Answer:
     """How much of the surface a short search reaches; neither certified nor complete."""
     robot, cells, task, search = setup
-    watch = Watch(job, steps=STEPS if task.collision is None else STEPS_WITH_BODIES)
     covered, q = quick_search(Problem.of(robot, cells, task), search, watch)
     number, total = int(covered.sum()), len(cells)
-    what = "cells" if not cells.in_order else "poses, in any order,"
-    paint = picture.quick_paint(covered)
-    return {
-        "kind": "quick",
-        "head": f"quick look: one motion reaches {number:,} of {total:,} {what}".rstrip(",")
-        + ("" if number == total else " so far"),
-        "covered": number,
-        "cells": total,
-        "rows": [],
-        "groups": [],
-        "note": said_of(robot, task.collision),
-        "paint": paint._asdict(),
-        "commands": picture.packed(picture.posed(robot, q, task.collision is not None)),
-        "parts": {"paths": [], "entries": [], "seconds": 0.0},
-    }
+    what = "cells" if not cells.in_order else "poses, in any order"
+    groups = (("reached", COVERED, covered), ("not reached so far", MISSED, ~covered))
+    paint = [
+        filled(cells, np.flatnonzero(own), pale(colour), f"/cells/{k}", f"{name} ({own.sum()})")
+        for k, (name, colour, own) in enumerate(groups)
+        if own.any()
+    ]
+    head = f"quick look: one motion reaches {number:,} of {total:,} {what}"
+    head += "" if number == total else " so far"
+    note = (("collisions", said_of(robot, task.collision)),)
+    return Answer("quick", head, "hold still for the certified answer", (*paint,), rows=note, q=q)
 
 
-def certified(case: Case, setup: Setup, job: Job) -> Answer:
+def steps_of(setup: Setup) -> int:
+    """How long a quick look may take."""
+    return STEPS if setup.task.collision is None else STEPS_WITH_BODIES
+
+
+def certified(case: Case, setup: Setup, watch: Watch) -> Answer:
     """What `coverable check` says of the case, with the cells in the colours of their causes."""
-    watch = Watch(job, limit=setup.search.time_limit)
     verdict = check(*setup, clock=watch)
-    paint, parts = picture.certified_paint(verdict), picture.certified_parts(verdict)
-    return {
-        "kind": str(verdict.answer),
-        "head": report.as_text(verdict, case).splitlines()[0],
-        "covered": verdict.n_covered,
-        "cells": len(verdict.cells),
-        "evidence": str(verdict.evidence),
-        "rows": [[name, text] for name, text in report.rows_of(verdict) if text],
-        "groups": [
-            line.removesuffix(JSON_HINT)
-            for line in report.causes_listed(verdict.causes, verdict.cells)
-        ],
-        "note": said_of(verdict.robot, verdict.task.collision),
-        "paint": paint._asdict(),
-        "commands": picture.packed(parts.commands),
-        "parts": {"paths": parts.paths, "entries": parts.entries, "seconds": parts.seconds},
-    }
+    cells, motion = verdict.cells, motion_of(verdict)
+    known = verdict.postures if verdict.witness is None else verdict.witness.q
+    rows = [(name, text) for name, text in report.rows_of(verdict) if text]
+    return Answer(
+        kind=str(verdict.answer),
+        head=report.as_text(verdict, case).splitlines()[0],
+        state=f"certified · {verdict.n_covered} of {len(cells)} cells · "
+        f"evidence: {verdict.evidence}",
+        paint=tuple(_painted(verdict)),
+        parts=tuple(_parts(verdict, motion)),
+        rows=(*rows, ("collisions", said_of(verdict.robot, verdict.task.collision))),
+        causes=tuple(report.causes_listed(verdict.causes, cells, hint="")),
+        q=motion.walk[0] if motion else None if known is None or not len(known) else known[0],
+        motion=motion,
+    )
+
+
+def _painted(verdict: Verdict) -> Iterator[Layer]:
+    """The covered cells, and the missed ones in the colours of their causes."""
+    cells, which = verdict.cells, np.flatnonzero(verdict.covered)
+    if len(which):
+        yield filled(cells, which, COVERED, "/cells/covered", f"covered ({len(which)})")
+    for group in missed_groups(verdict.causes, np.flatnonzero(~verdict.covered)):
+        yield missed_layer(cells, group)
+
+
+def _parts(verdict: Verdict, motion: Playback | None) -> Iterator[Layer]:
+    """What else is drawn of a verdict."""
+    for part in layers(verdict):
+        if part.entry.path is not None and not part.entry.path.startswith(DRAWN_ONCE):
+            yield part
+    if verdict.treated is not None:
+        yield from area_layers(verdict.treated, verdict.cells.surface.side_sign)
+    if motion is not None:
+        yield trail(verdict.cells, motion)
+    yield from margin_layers(verdict)
+
+
+def pale(colour: Colour) -> Colour:
+    """A colour mixed with white."""
+    red, green, blue = (part + PALE * (1.0 - part) for part in colour)
+    return red, green, blue

@@ -6,40 +6,44 @@ leaves its key of the case as it was written.
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from coverable.errors import Fault, is_number, printable, shown
 from feasibility.cases.case import Case
-from feasibility.cases.table_reader import CaseError
-from feasibility.cases.toml import toml_key
+from feasibility.cases.toml import as_read
+from feasibility.cases.toml_edits import inline
 from robots.robot import Robot
 
 DIGITS = 9  # of a number of the page, which hides what conversions leave behind
-STEP = 0.5  # mm or degrees, of one press of an arrow key
-FURTHEST = 1e3  # [mm] that a surface can be moved by sliders where the arm has no bounded reach
-WIDENED = 90.0  # [deg] by which a limit can be widened with its slider
-WIDENED_MM = 500.0
+STEP = 0.5  # mm or degrees
+FURTHEST = 1e3  # [mm] that things can be moved by sliders where the arm has no bounded reach
+TOOL = 500.0  # [mm] that the tool centre point can be moved
+WIDENED, WIDENED_MM = 90.0, 500.0  # [deg], [mm] by which a limit can be widened with its slider
 LONGEST_STANDOFF = 100.0  # [mm]
-KEYS = {
-    "position": ("surface.position", 1e3),
-    "rpy_deg": ("surface.rpy_deg", 1.0),
-    "standoff": ("task.standoff", 1e3),
-    "cone_deg": ("task.cone_deg", 1.0),
-}
-"""Keys of the case, and units of the page in those of the case."""
+PLACE, TURN = ("x", "y", "z"), ("roll", "pitch", "yaw")
+SURFACE, BASE, TCP = "placement of the surface", "base of the arm", "tool centre point"
+TASK, LIMITS = "tool", "joint limits"
 
-Values = dict[str, Any]
-"""`position` (3 mm), `rpy_deg` (3), `standoff` (mm), `cone_deg`, and `limits`: by joint a pair of
-degrees or millimetres, or None where the joint turns freely."""
+Path = tuple[str | int, ...]
+Values = dict[tuple[str, str], Any]
+"""By the group and the name of a dial: mm or degrees, of a joint its two limits."""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+class Dial(NamedTuple):
+    """A slider of the page."""
+
+    group: str
+    name: str
+    unit: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, eq=False)
 class Controls:
     """The controls of one case.
 
@@ -47,9 +51,9 @@ class Controls:
         >>> from coverable import load_case
         >>> case = load_case("paper/4a")
         >>> controls = Controls(case, case.robot.build())
-        >>> controls.values["standoff"], controls.values["limits"]["joint5"]
-        (5.0, [-180.0, 180.0])
-        >>> moved = controls.changed({"position": [0, 0, 20.5], "cone_deg": 30})
+        >>> controls.values[TASK, "standoff"], controls.values[LIMITS, "joint5"]
+        (5.0, (-180.0, 180.0))
+        >>> moved = controls.changed({(SURFACE, "z"): 20.5, (TASK, "cone"): 30})
         >>> moved.surface.position, moved.task.cone_deg
         ((0.0, 0.0, 0.0205), 30.0)
     """
@@ -57,120 +61,119 @@ class Controls:
     case: Case
     robot: Robot
 
-    @property
+    @cached_property
+    def poses(self) -> dict[str, Path]:
+        """What can be moved: by its group, where in the tables of the case its pose stands."""
+        found: dict[str, Path] = {SURFACE: ("surface",), BASE: ("robot", "base")}
+        found[TCP] = ("robot", "tcp")
+        for number, axis in enumerate(self.case.robot.axis):
+            found[f"axis {axis.name}"] = ("robot", "axis", number)
+        scene = () if self.case.collision is None else self.case.collision.scene
+        for number, one in enumerate(scene):
+            found[f"object {one.values['name']}"] = ("collision", "scene", number)
+        return found
+
+    @cached_property
+    def in_root_frame(self) -> list[str]:
+        """Those of them whose poses are in the frame that the picture is drawn in."""
+        carried = {axis.carries for axis in self.case.robot.axis}
+        tables, found = self.case.to_tables(), [SURFACE]
+        for group, path in self.poses.items():
+            free = group == BASE and "base" not in carried
+            if group.startswith("object "):
+                free = "frame" not in _part_of(tables, path)
+            found += [group] * (free and self.robot.surface_link is None)
+        return found
+
+    @cached_property
     def values(self) -> Values:
         """All values as the case has them."""
-        robot, pairs = self.robot, dict[str, Any]()
-        for name, slides, *pair in zip(
+        tables, robot, found = as_read(self.case.to_tables()), self.robot, Values()
+        for group, path in self.poses.items():
+            part = _part_of(tables, path)
+            for key, names, unit in (("position", PLACE, 1e3), ("rpy_deg", TURN, 1.0)):
+                numbers = part.get(key) or (0.0, 0.0, 0.0)
+                pairs = zip(names, numbers, strict=True)
+                found |= {(group, name): _rounded(unit * number) for name, number in pairs}
+        found[TASK, "cone"] = self.case.task.cone_deg
+        found[TASK, "standoff"] = _rounded(1e3 * self.case.task.standoff)
+        for name, slides, *ends in zip(
             robot.joint_names, robot.prismatic, robot.lower, robot.upper, strict=True
         ):
-            ends = [_rounded(1e3 * end if slides else math.degrees(end)) for end in pair]
-            pairs[name] = ends if all(map(math.isfinite, ends)) else None
-        return {
-            "position": [_rounded(1e3 * value) for value in self.case.surface.position],
-            "rpy_deg": list(self.case.surface.rpy_deg),
-            "standoff": _rounded(1e3 * self.case.task.standoff),
-            "cone_deg": self.case.task.cone_deg,
-            "limits": pairs,
-        }
+            pair = tuple(_rounded(1e3 * end if slides else math.degrees(end)) for end in ends)
+            found[LIMITS, name] = pair if all(map(math.isfinite, pair)) else (-360.0, 360.0)
+        return found
 
-    def described(self) -> dict[str, Any]:
-        """What the page needs to draw sliders: values, and the range of each."""
-        values, robot = self.values, self.robot
+    @cached_property
+    def dials(self) -> list[Dial]:
+        """Every slider, in the order of the page."""
+        values, robot, found = self.values, self.robot, list[Dial]()
         far = math.ceil(1e3 * robot.reach / 50.0) * 50.0 if np.isfinite(robot.reach) else FURTHEST
-        cone, high = values["cone_deg"], 180.0 if values["cone_deg"] > 90.0 else 90.0
-        joints = []
-        for name, slides in zip(robot.joint_names, robot.prismatic, strict=True):
-            low, up = values["limits"][name] or (-360.0, 360.0)
-            by = WIDENED_MM if slides else WIDENED
-            ends = [10.0 * math.floor((low - by) / 10.0), 10.0 * math.ceil((up + by) / 10.0)]
-            joints.append({"name": name, "unit": "mm" if slides else "deg", "range": ends})
-        return {
-            "values": values,
-            "step": STEP,
-            "ranges": {
-                "position": [[round(v) - far, round(v) + far] for v in values["position"]],
-                "rpy_deg": [[min(-180.0, v), max(180.0, v)] for v in values["rpy_deg"]],
-                "standoff": [0.0, max(LONGEST_STANDOFF, 2.0 * values["standoff"])],
-                "cone_deg": [0.0, max(high, cone)],
-            },
-            "joints": joints,
-        }
+        for group in self.poses:
+            by = TOOL if group == TCP else far
+            for name in (*PLACE, *TURN):
+                value = values[group, name]
+                low, high = (value - by, value + by) if name in PLACE else (-180.0, 180.0)
+                low, high = min(round(low), value), max(round(high), value)
+                found.append(Dial(group, name, "mm" if name in PLACE else "deg", low, high))
+        cone, standoff = values[TASK, "cone"], values[TASK, "standoff"]
+        steepest = 180.0 if cone > 90.0 else 90.0
+        found.append(Dial(TASK, "cone", "deg", 0.0, steepest))
+        found.append(Dial(TASK, "standoff", "mm", 0.0, max(LONGEST_STANDOFF, 2.0 * standoff)))
+        for name, slides in zip(robot.joint_names, robot.prismatic.tolist(), strict=True):
+            (low, high), by = values[LIMITS, name], WIDENED_MM if slides else WIDENED
+            ends = 10.0 * math.floor((low - by) / 10.0), 10.0 * math.ceil((high + by) / 10.0)
+            found.append(Dial(LIMITS, name, "mm" if slides else "deg", *ends))
+        first = [dial for dial in found if dial.group in (SURFACE, TASK, LIMITS)]
+        return first + [dial for dial in found if dial not in first]
 
-    def changed(self, given: object) -> Case:
+    def changed(self, given: Values) -> Case:
         """The case with values of the page; those that are left out stay as they are.
-
-        Args:
-            given: values as in `values`, from elsewhere: nothing is known of them.
 
         Raises:
             CaseError: with everything that is wrong.
         """
-        values, before = _checked(given, self.case.name), self.values
-        if "limits" in values:
-            values["limits"] = {**before["limits"], **values["limits"]}
-        new = {key: value for key, value in values.items() if value != before[key]}
+        values = self.values | given
+        new = {dial for dial, value in self.values.items() if values[dial] != value}
+        tables: dict[str, Any] = as_read(self.case.to_tables())
+        written = list[tuple[Any, Any]]()  # tables and keys
+        for group, path in self.poses.items():
+            for key, names, unit in (("position", PLACE, 1e3), ("rpy_deg", TURN, 1.0)):
+                if new & {(group, name) for name in names}:
+                    numbers = [_plain(values[group, name], unit) for name in names]
+                    _part_of(tables, path, make=True)[key] = numbers
+                    written.append((path[0], (*path, key)[1]))
+        for name, key, unit in (("cone", "cone_deg", 1.0), ("standoff", "standoff", 1e3)):
+            if (TASK, name) in new:
+                tables["task"][key] = _plain(values[TASK, name], unit)
+                written.append(("task", key))
         settings = [
-            f"{name}={_toml(new[key], unit)}" for key, (name, unit) in KEYS.items() if key in new
+            f"{table}.{key}={inline(tables[table][key])}" for table, key in dict.fromkeys(written)
         ]
-        if "limits" in new:
-            settings += self._limit_settings(new["limits"])
+        if any(group == LIMITS for group, _ in new):
+            settings += self._limits(values, new)
         return self.case.with_overrides(settings) if settings else self.case
 
-    def _limit_settings(self, limits: Mapping[str, list[float] | None]) -> list[str]:
+    def _limits(self, values: Values, new: set[tuple[str, str]]) -> list[str]:
         """The limits of all joints by name, in place of those of the case."""
-        joints = dict(zip(self.robot.joint_names, self.robot.prismatic, strict=True))
-        unknown = [name for name in limits if name not in joints]
-        freed = [name for name in limits if limits[name] is None and self.values["limits"][name]]
-        faults = [
-            Fault(f"limits.{printable(name)}", f"is no joint of {self.robot.name}")
-            for name in unknown
-        ]
-        faults += [Fault(f"limits.{printable(name)}", "must be two numbers") for name in freed]
-        if faults:
-            raise CaseError(faults, self.case.name)
-        tables: dict[str, list[str]] = {"limits_deg": [], "limits_m": []}
-        for name, pair in limits.items():
-            if pair is not None:
-                key, unit = ("limits_m", 1e3) if joints[name] else ("limits_deg", 1.0)
-                tables[key].append(f"{toml_key(name)} = {_toml(pair, unit)}")
-        written = {key: f"{{ {', '.join(rows)} }}" if rows else "" for key, rows in tables.items()}
-        return ["robot.limits=", *(f"robot.{key}={text}" for key, text in written.items())]
+        tables: dict[str, dict[str, Any]] = {"limits_deg": {}, "limits_m": {}}
+        for name, slides, low in zip(
+            self.robot.joint_names, self.robot.prismatic, self.robot.lower, strict=True
+        ):
+            if (LIMITS, name) in new or math.isfinite(low):
+                key, unit = ("limits_m", 1e3) if slides else ("limits_deg", 1.0)
+                tables[key][name] = [_plain(end, unit) for end in values[LIMITS, name]]
+        given = [f"robot.{key}={inline(pairs)}" for key, pairs in tables.items() if pairs]
+        return ["robot.limits=", "robot.limits_deg=", "robot.limits_m=", *given]
 
 
-def _checked(given: object, name: str) -> Values:
-    """The values, where each is a number or as many numbers as it should be.
-
-    Raises:
-        CaseError: some are not.
-    """
-    if not isinstance(given, Mapping):
-        raise CaseError(f"values must be an object, got {shown(given)}", name)
-    faults, values = list[Fault](), Values()
-
-    def kept(key: str, value: object, count: int) -> Any:
-        numbers = [value] if count == 1 else value
-        if isinstance(numbers, list) and len(numbers) == count and all(map(is_number, numbers)):
-            plain = [float(one) for one in numbers]
-            return plain[0] if count == 1 else plain
-        expected = "a number" if count == 1 else f"{count} numbers"
-        faults.append(Fault(key, f"must be {expected}, got {shown(value)}"))
-        return None
-
-    counts = {"position": 3, "rpy_deg": 3, "standoff": 1, "cone_deg": 1}
-    for key, value in given.items():
-        if key in counts:
-            values[key] = kept(key, value, counts[key])
-        elif key == "limits" and isinstance(value, Mapping):
-            values[key] = {
-                joint: None if pair is None else kept(f"limits.{printable(str(joint))}", pair, 2)
-                for joint, pair in value.items()
-            }
-        else:
-            faults.append(Fault(printable(str(key)), "is nothing that the page can change"))
-    if faults:
-        raise CaseError(faults, name)
-    return values
+def _part_of(tables: Any, path: Path, make: bool = False) -> Any:
+    """The table at a path; where there is none an empty one, which can be put there."""
+    for key in path:
+        if isinstance(key, str) and make:
+            tables.setdefault(key, {})
+        tables = tables.get(key, {}) if isinstance(key, str) else tables[key]
+    return tables
 
 
 def _rounded(value: float) -> float:
@@ -178,8 +181,6 @@ def _rounded(value: float) -> float:
     return round(float(value), DIGITS) + 0.0
 
 
-def _toml(value: Any, unit: float) -> str:
-    """Numbers divided by their unit as TOML, without what conversions leave behind."""
-    if isinstance(value, list):
-        return f"[{', '.join(_toml(one, unit) for one in value)}]"
-    return json.dumps(float(f"{value / unit:.12g}"))
+def _plain(value: float, unit: float) -> float:
+    """A number divided by its unit, without what conversions leave behind."""
+    return float(f"{value / unit:.12g}")

@@ -23,7 +23,7 @@ from robots.errors import RobotError
 from robots.robot import Robot
 from surfaces.cells import Cells
 
-KEPT = 8  # arms and surfaces that are remembered: undo comes back to them
+KEPT = 32  # arms, surfaces and scenes that are remembered: undo comes back to them
 
 Made = TypeVar("Made")
 
@@ -44,12 +44,15 @@ class Workbench:
         self.case = case
         self.setup = case.build() if setup is None else setup
         self._lock = threading.Lock()
-        self._robots: OrderedDict[str, Robot] = OrderedDict({_key(case.robot): self.setup.robot})
-        self._cells: OrderedDict[str, Cells] = OrderedDict({_pose_key(case): self.setup.cells})
-        self._rough: OrderedDict[str, Cells] = OrderedDict({_pose_key(case): self.setup.cells})
+        self._made = OrderedDict[tuple[str, str], Any]()
+        robot, cells, task, _ = self.setup
+        self._kept("arm", case.robot.table(), lambda: robot)
+        self._kept("bodies", _collision(case), lambda: task.collision)
+        for kind in ("cells", "cells, roughly"):
+            self._kept(kind, _pose(case), lambda: cells)
 
     def build(self, case: Case, roughly: bool = False) -> Setup:
-        """What the case builds, which differs from the first in pose, task and limits alone.
+        """What the case builds, which differs from the first in what a page changes alone.
 
         Args:
             case: the changed one.
@@ -61,10 +64,11 @@ class Workbench:
         """
         if case == self.case:
             return self.setup
-        robot = self._kept(self._robots, _key(case.robot), lambda: _robot(case))
-        known = self._rough if roughly else self._cells
-        cells = self._kept(known, _pose_key(case), lambda: self._moved(case, roughly))
-        task: Task = replace(case.task, collision=self.setup.task.collision)
+        robot = self._kept("arm", case.robot.table(), lambda: _robot(case))
+        kind = "cells, roughly" if roughly else "cells"
+        cells = self._kept(kind, _pose(case), lambda: self._moved(case, roughly))
+        collision = self._kept("bodies", _collision(case), lambda: case.built_task().collision)
+        task: Task = replace(case.task, collision=collision)
         try:
             check_references(cells, task)
         except ArgumentError as error:
@@ -82,17 +86,18 @@ class Workbench:
             vars(cells)["curves"] = first.curves.moved(turn, new.position - turn @ old.position)
         return cells
 
-    def _kept(self, known: OrderedDict[str, Made], key: str, make: Callable[[], Made]) -> Made:
-        """What was made before for that key, or is made now; the oldest ones are forgotten."""
+    def _kept(self, kind: str, of: Any, make: Callable[[], Made]) -> Made:
+        """What was made before of these tables, or is made now; the oldest is forgotten."""
+        key = kind, json.dumps(of, sort_keys=True, default=dict)
         with self._lock:
-            if key in known:
-                known.move_to_end(key)
-                return known[key]
+            if key in self._made:
+                self._made.move_to_end(key)
+                return self._made[key]
         made = make()
         with self._lock:
-            known[key] = made
-            while len(known) > KEPT:
-                known.popitem(last=False)
+            self._made[key] = made
+            while len(self._made) > KEPT:
+                self._made.popitem(last=False)
         return made
 
 
@@ -108,11 +113,11 @@ def _robot(case: Case) -> Robot:
         raise CaseError(in_robot_table(error), case.name) from error
 
 
-def _key(part: Any) -> str:
-    """A table of a case as text."""
-    return json.dumps(part.table(), sort_keys=True, default=dict)
+def _collision(case: Case) -> Any:
+    """What the arm must stay clear of, as a table."""
+    return None if case.collision is None else case.collision.table()
 
 
-def _pose_key(case: Case) -> str:
-    """The pose of the surface, as text."""
-    return json.dumps([case.surface.position, case.surface.rpy_deg])
+def _pose(case: Case) -> Any:
+    """Where the surface is."""
+    return [case.surface.position, case.surface.rpy_deg]

@@ -30,6 +30,7 @@ from feasibility.version import version
 from surfaces.cells import Cells
 
 DETAILS = 3  # cells of one group whose details are listed
+JSON_HINT = " (--json lists all)"  # of commands, behind what is left out
 ENOUGH = 0.99  # [1] share of the area, below which it is said how to treat more
 OVERLAPPING = 0.9  # [1] of the footprint: passes that far apart leave nothing between them
 PHASES = {"search_s": "search", "certify_s": "certificate"}
@@ -204,7 +205,7 @@ def _treated_text(verdict: Verdict) -> str:
     )
 
 
-def causes_listed(missed: Iterable[Cause], cells: Cells) -> Iterator[str]:
+def causes_listed(missed: Iterable[Cause], cells: Cells, hint: str = JSON_HINT) -> Iterator[str]:
     """Causes grouped by kind, the largest group first, with the first few details."""
     groups: dict[tuple[CauseKind, bool], list[Cause]] = {}
     for cause in missed:
@@ -214,7 +215,7 @@ def causes_listed(missed: Iterable[Cause], cells: Cells) -> Iterator[str]:
         for cause in causes[:DETAILS]:
             yield f"    {list(cells.unravel(cause.cell))} {cause.detail}".rstrip()
         if len(causes) > DETAILS:
-            yield f"    ... and {len(causes) - DETAILS:,} more (--json lists all)"
+            yield f"    ... and {len(causes) - DETAILS:,} more{hint}"
 
 
 def _hints(verdict: Verdict, case: Case) -> list[str]:

@@ -1,229 +1,292 @@
-"""The server of a live page: who is answered, with what, and that a saved case is what is shown."""
+"""A live page: who is served, that answers are those of `check`, that what is saved is shown."""
 
 import base64
 import http.client
-import json
+import itertools
+import math
 import re
 import socket
-import urllib.error
-import urllib.request
 
 import numpy as np
+import pinocchio as pin
 import psutil
 import pytest
 from command_table import FILES
-from page_outline import unpacked
+from live_windows import GUARD_S, Window, until
 
 from coverable import Case, Live, View, check, live
-from feasibility.live import showing
-from feasibility.live.answers import Answers
-from feasibility.live.controls import Controls
-from feasibility.live.jobs import Job, Superseded
-from feasibility.live.server import LARGEST_REQUEST
-from feasibility.live.workbench import Workbench
+from coverable.errors import CoverableError
+from feasibility.live import serving
+from feasibility.live.controls import BASE, LIMITS, SURFACE, TASK, TCP
+from feasibility.live.page import Page
 from feasibility.reports import verdict as report
+from robots.kinematics import Kinematics
 
-GUARD_S = 1800.0
 PLATE = Case.from_toml(FILES["plate.toml"], name="plate")
 
 
-class Client:
-    def __init__(self, page):
-        self.page, self.number = page, 0
-        self.session = self.post("open")["session"]
-
-    def post(self, name, **asked):
-        request = urllib.request.Request(
-            self.page.url + name,
-            data=json.dumps(asked).encode(),
-            headers={"Content-Type": "application/json"},
-        )
-        with urllib.request.urlopen(request, timeout=GUARD_S) as reply:
-            return json.loads(reply.read())
-
-    def ask(self, final, **values):
-        self.number += 1
-        asked = {"session": self.session, "number": self.number, "final": final}
-        while True:
-            reply = self.post("ask", **asked, values=values)
-            if reply["status"] != "deciding":
-                return reply["answer"]
-
-
 @pytest.fixture(scope="module")
-def page():
-    with Live(PLATE) as served:
-        yield served
+def served():
+    with Live(PLATE) as one:
+        yield one
 
 
 @pytest.fixture
-def client(page):
-    one = Client(page)
+def window(served):
+    one = Window(served)
+    one.answered()
     yield one
-    one.post("close", session=one.session)
+    one.close()
+    until(lambda: one.page.closed)
 
 
-def refused(url, data=None, **headers):
-    request = urllib.request.Request(url, data=data, headers=headers)
-    with pytest.raises(urllib.error.HTTPError, match="404") as error:
-        urllib.request.urlopen(request, timeout=GUARD_S)
-    error.value.close()
+def status(port, path, **headers):
+    """What a request for a file, and one for viser's socket, are answered with."""
+    socket_too = {"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13",
+                  "Sec-WebSocket-Key": base64.b64encode(bytes(16)).decode()}  # fmt: skip
+    found = []
+    for more in ({}, socket_too):
+        line = http.client.HTTPConnection("127.0.0.1", port, timeout=GUARD_S)
+        line.putrequest("GET", path, skip_host="Host" in headers)
+        for name, value in (headers | more).items():
+            line.putheader(name, value)
+        line.endheaders()
+        found.append(line.getresponse().status)
+        line.close()
+    return found
 
 
-def test_strangers_get_nothing(page, client):
+def test_strangers_get_nothing(served):
+    port, _, path = served.url.removeprefix("http://127.0.0.1:").partition("/")
+    port, path = int(port), f"/{path}"
     listening = [
         connection.laddr.ip
         for connection in psutil.Process().net_connections("tcp")
-        if connection.status == psutil.CONN_LISTEN and connection.laddr.port == page.port
+        if connection.status == psutil.CONN_LISTEN and connection.laddr.port == port
     ]
     assert listening == ["127.0.0.1"]
-    assert re.fullmatch(rf"http://127\.0\.0\.1:{page.port}/[\w-]{{20,}}/", page.url)
-    json_type, here = {"Content-Type": "application/json"}, f"http://127.0.0.1:{page.port}/"
-    foreign = [{"Host": host} for host in
-               ("evil.example", f"evil.example:{page.port}", f"localhost:{page.port}")]  # fmt: skip
-    foreign += [{"Origin": origin} for origin in
-                ("http://evil.example", "null", f"http://127.0.0.1:{page.port + 1}")]  # fmt: skip
-    for name, data in (("", None), ("case.json", None), ("open", b"{}"), ("save", b"{}")):
-        kind = {} if data is None else json_type
-        refused(here + name, data, **kind)
-        refused(f"{here}{'x' * 22}/{name}", data, **kind)
-        for headers in foreign:
-            refused(page.url + name, data, **headers, **kind)
-    refused(page.url + "../../etc/passwd")
-    refused(page.url + "live.py")
-    # What a form of a page elsewhere can send without asking first.
-    for kind in ("text/plain", "application/x-www-form-urlencoded", "multipart/form-data"):
-        refused(page.url + "open", b"{}", **{"Content-Type": kind})
-    for body in (b"", b"[]", b"{", b"\xff", b"[" * 50_000, b"x" * (LARGEST_REQUEST + 1)):
-        refused(page.url + "ask", body, **json_type)
-    refused(page.url + "nothing", b"{}", **json_type)
-    assert client.post("beat", session=client.session) == {"status": "there"}
-    assert client.post("beat", session="another") == {"status": "gone"}
-    assert client.post("ask", session="another", number=1, values={}) == {"status": "gone"}
+    assert re.fullmatch(r"/[\w-]{20,}/", path)
+    assert status(port, path) == [200, 101]
+    for wrong in ("/", "/index.html", f"/{'x' * 22}/", path[:-2] + "/"):
+        assert status(port, wrong) == [404, 404], wrong
+    for host in ("evil.example", f"evil.example:{port}", f"localhost:{port}"):
+        assert status(port, path, Host=host) == [404, 404], host
+    for origin in ("http://evil.example", "null", f"http://127.0.0.1:{port + 1}"):
+        assert status(port, path, Origin=origin) == [404, 404], origin
+    assert status(port, path, Origin=f"http://127.0.0.1:{port}") == [200, 101]
+    for file in ("../../etc/passwd", "%2e%2e/%2e%2e/etc/passwd", "no-such-file"):
+        assert status(port, path + file)[0] == 404, file
 
 
-def test_odd_questions_are_refused_and_the_next_one_is_answered(client, monkeypatch):
-    for number in (None, "1", 1.5, [1]):
-        reply = client.post("ask", session=client.session, number=number, values={})
-        assert reply == {"status": "superseded"}
-    for values in ({"standoff": -3}, {"standoff": "far"}, {"robot": {"urdf": "x"}}):
-        said = client.ask(True, **values)
-        assert said["kind"] == "error"
-        assert said["head"].startswith("plate: ")
-    monkeypatch.setattr("feasibility.live.answers.check", lambda *_, **__: 1 / 0)
-    assert "ZeroDivisionError" in client.ask(True)["head"]
-    monkeypatch.undo()
-    assert client.ask(True)["kind"] == "feasible"
-
-
-def test_the_answer_is_that_of_check_in_its_words(client):
-    case = PLATE
+def test_the_answer_is_that_of_check_in_its_words(window):
+    page = window.page
     for values in (
-        {}, {"position": [700.0, 0.0, 300.0], "cone_deg": 22.0},
-        {"limits": {"elbow_joint": [-30, 30]}},
-    ):  # fmt: skip
-        answer = client.ask(True, **values)
-        changed = Case.from_toml(client.post("save", values=values)["toml"], name=case.name)
+        {},
+        {(SURFACE, "x"): 700.0, (SURFACE, "z"): 300.0, (TASK, "cone"): 22.0},
+        {(LIMITS, "elbow_joint"): (-30.0, 30.0)},
+    ):
+        page.press("reset")
+        page.set(values)
+        answer, changed = window.answered(), page.controls.changed(page.values)
         verdict = check(*changed.build())
         text = report.as_text(verdict, changed)
-        assert answer["head"] == text.splitlines()[0]
-        assert answer["kind"] == verdict.answer
-        assert (answer["evidence"], answer["covered"]) == (verdict.evidence, verdict.n_covered)
-        assert dict(map(tuple, answer["rows"]))["found"] == verdict.message
-        for line in answer["groups"]:
+        assert (answer.kind, answer.head) == (verdict.answer, text.splitlines()[0])
+        assert f"{verdict.n_covered} of 6 cells · evidence: {verdict.evidence}" in answer.state
+        rows = dict(answer.rows)
+        assert (rows["found"], rows["collisions"]) == (
+            verdict.message,
+            "collisions are not checked",
+        )
+        for line in answer.causes:
             assert line in text
-        assert answer["note"] == "collisions are not checked"
-        # Cells that are covered have the first colour, each cause one of its own.
-        classes = np.array(answer["paint"]["classes"])
-        assert np.array_equal(classes == 0, verdict.covered)
-        labels = [entry["label"] for entry in answer["paint"]["entries"]]
-        kinds = {cause.cell: cause.kind.replace("_", " ") for cause in verdict.causes}
-        for cell, kind in kinds.items():
-            assert kind in labels[classes[cell]]
+        # The cells that are covered have one colour, each cause one of its own.
+        counts = [int(re.search(r"\((\d+)", layer.entry.label)[1]) for layer in answer.paint]
+        assert sum(counts) == 6
+        assert (counts[0] if verdict.covered.any() else 0) == verdict.n_covered
+        for cause in verdict.causes:
+            assert any(cause.kind.replace("_", " ") in one.entry.label for one in answer.paint)
+        drawn = [path for path in page.scene.nodes if path.startswith("/cells/")]
+        assert sorted(drawn) == sorted(layer.entry.path for layer in answer.paint)
     assert not verdict.feasible  # the last one has something to say
 
 
-def test_a_quick_look_says_so_and_calls_nothing_feasible(client):
-    quick, full = client.ask(False), client.ask(True)
-    assert quick["kind"] == "quick"
-    assert quick["head"] == "quick look: one motion reaches 6 of 6 cells"
-    assert "evidence" not in quick
-    assert quick["rows"] == []
-    assert (full["kind"], full["covered"]) == ("feasible", 6)
-    drawn = unpacked(base64.b64decode(full["commands"]))  # graph, motion and posture
-    assert [one["type"] for one in drawn].count("set_animation") == 1
-    paths = {one["path"] for one in drawn if one["type"] == "set_object"}
-    assert all(any(path.startswith(part) for part in full["parts"]["paths"]) for path in paths)
-    assert any(path.startswith("/graph/edges of G") for path in paths)
-    far = client.ask(False, position=[900.0, 0.0, 300.0])
-    assert far["head"].endswith("cells so far")
-    assert 0 < far["paint"]["classes"].count(1) == 6 - far["covered"]
+def test_quick_looks_come_first_say_so_and_call_nothing_feasible(window, monkeypatch):
+    shown, show = [], Page._show
+    monkeypatch.setattr(Page, "_show", lambda *all: (shown.append(all[1]), show(*all)))
+    page = window.page
+    window.slide(page.sliders[SURFACE, "x"], 10.0)
+    assert page.values[SURFACE, "x"] == 10.0
+    assert window.answered("feasible").state.startswith("certified")
+    quick, full = shown
+    assert (quick.kind, quick.head) == ("quick", "quick look: one motion reaches 6 of 6 cells")
+    assert quick.parts == ()
+    assert quick.motion is None
+    assert full.motion is not None
+    page.set({(SURFACE, "x"): 900.0, (SURFACE, "z"): 300.0})
+    window.answered()
+    assert shown[2].head.endswith("of 6 cells so far")
 
 
-def test_what_is_saved_is_what_is_shown_and_nothing_is_written(client, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    values = {
-        "position": [20.0, -15.0, 290.0], "rpy_deg": [0.0, 4.0, 10.0], "standoff": 15.5,
-        "cone_deg": 22.0, "limits": {"wrist_1_joint": [-200.0, 100.0]},
-    }  # fmt: skip
-    text = client.post("save", values=values)["toml"]
-    assert list(tmp_path.iterdir()) == []
-    saved = Case.from_toml(text)
-    again = Controls(saved, saved.robot.build()).values
-    assert again == {**values, "limits": {**again["limits"], **values["limits"]}}
-    assert client.post("save", values={"cone_deg": -1})["error"].startswith("plate: task.cone_deg")
+def test_a_certificate_that_nobody_waits_for_is_given_up(window, monkeypatch):
+    begun, given_up = [], []
+
+    def slow(robot, cells, task, search, clock):
+        begun.append(cells.surface.position[0])
+        try:
+            for k in itertools.count():
+                clock.tick(k, None, "still looking")
+        except BaseException as error:
+            given_up.append(type(error).__name__)
+            raise
+
+    monkeypatch.setattr("feasibility.live.answers.check", slow)
+    window.page.set({(SURFACE, "x"): 20.0})
+    until(lambda: begun)
+    monkeypatch.undo()
+    window.page.set({(SURFACE, "x"): 30.0})
+    window.answered("feasible")
+    assert (begun, given_up) == ([0.02], ["Superseded"])
 
 
-def test_the_page_is_whole_and_fetches_nothing_from_elsewhere(page):
-    paths = (*showing.FILES.iterdir(), *showing.SHARED)
-    names = [path.name for path in paths if path.suffix != ".html"]
-    texts = {}
-    for name in ("", *names, "meshcat.js", "scene", "case.json"):
-        with urllib.request.urlopen(page.url + name, timeout=GUARD_S) as reply:
-            assert "default-src 'none'" in reply.headers["Content-Security-Policy"]
-            assert reply.headers["Cache-Control"] == "no-store"
-            texts[name] = reply.read()
-    for name in ("", *names):
-        assert not re.search(rb"https?://", texts[name]), name
-    for wanted in re.findall(r'(?:src|href)="([^":]+)"', texts[""].decode()):
-        assert wanted in texts
-    told = json.loads(texts["case.json"])
-    owners = np.frombuffer(base64.b64decode(told["cells"]["owners"]), "<u4")
-    assert sorted(set(owners.tolist())) == list(range(6))
-    corners = np.frombuffer(base64.b64decode(told["cells"]["corners"]), "<u4").reshape(-1, 3)
-    assert (owners[corners] == owners[corners][:, :1]).all()  # a triangle is of one cell
+def test_faults_are_said_and_the_page_goes_on(window, monkeypatch):
+    page = window.page
+    page.set({(LIMITS, "elbow_joint"): (20.0, -20.0)})
+    assert "the wrong way round" in window.answered("error").head
+    monkeypatch.setattr("feasibility.live.answers.check", lambda *_, **__: 1 / 0)
+    page.press("reset")
+    until(lambda: "ZeroDivisionError" in page.answer.head)
+    monkeypatch.undo()
+    page.set({(TASK, "cone"): 31.0})
+    window.answered("feasible")
 
 
-def test_a_browser_that_keeps_its_connection_hears_that_all_is_over():
-    kind, live = {"Content-Type": "application/json"}, Live(PLATE)
-    host, _, path = live.url.removeprefix("http://").partition("/")
-    connection = http.client.HTTPConnection(host, timeout=GUARD_S)
-    connection.request("POST", f"/{path}open", b"{}", kind)
-    assert json.loads(connection.getresponse().read())["session"]
-    live.close()
-    connection.request("POST", f"/{path}open", b"{}", kind)
-    assert connection.getresponse().status == 404
-    connection.close()
+def test_what_was_done_is_undone_step_by_step(window):
+    page, x = window.page, (SURFACE, "x")
+    for value in (10.0, 20.0, 30.0):  # one drag
+        page.change({x: value})
+    window.answered()
+    page.change({x: 40.0})
+    window.answered()
+    seen = []
+    for button in ("undo", "undo", "undo", "redo", "redo", "redo", "undo", "reset", "undo"):
+        page.press(button)
+        seen.append(page.values[x])
+        assert page.sliders[x].value == page.values[x]
+    assert seen == [30.0, 0.0, 0.0, 30.0, 40.0, 40.0, 30.0, 0.0, 30.0]
 
 
-def test_a_search_ends_where_nobody_waits_for_it_any_more():
-    case = PLATE
-    bench = Workbench(case)
-    answers = Answers(Controls(case, bench.setup.robot), bench)
-    bodies = PLATE.with_overrides(["collision.surface=false", "surface.cells=[1, 1]"])
-    clear = Answers(Controls(bodies, Workbench(bodies).setup.robot), Workbench(bodies))
-    for final in (False, True):
-        assert clear(Job("page", 1, final, {}))["note"] != "collisions are not checked"
-        left = Job("page", 1, final, {})
-        left.drop()
-        with pytest.raises(Superseded):
-            answers(left)
+def test_the_saved_case_is_what_is_shown(window, monkeypatch):
+    saved, page = [], window.page
+    keep = lambda name, content, **_: saved.append((name, content.decode()))  # noqa: E731
+    monkeypatch.setattr(page.client, "send_file_download", keep)
+    values = {(SURFACE, "x"): 20.0, (SURFACE, "yaw"): 10.0, (TASK, "standoff"): 15.5,
+              (LIMITS, "wrist_1_joint"): (-200.0, 100.0)}  # fmt: skip
+    page.set(values)
+    page.press("save as case")
+    ((name, text),) = saved
+    assert name == "plate-live.toml"
+    case = Case.from_toml(text)
+    assert case.surface.position[0] == 0.02
+    assert case == page.controls.changed(page.values)
+    page.set({(TASK, "standoff"): -1.0})
+    page.press("save as case")
+    assert "task.standoff" in page.head.content
+    assert len(saved) == 1
 
 
-def test_python_gets_the_page_of_a_name_and_a_notebook_a_frame_over_a_picture(monkeypatch):
+def place_of(page, path):
+    """Where a node is: the places of all groups above it, one in the other."""
+    place, names = pin.SE3.Identity(), path.strip("/").split("/")
+    for k in range(len(names)):
+        node = page.scene.nodes.get("/" + "/".join(names[: k + 1]))
+        if node is not None:
+            w, *xyz = node.wxyz
+            place = place * pin.SE3(pin.Quaternion(w, *xyz), np.array(node.position))
+    return place
+
+
+def test_base_tool_and_scene_are_drawn_where_they_are_moved_and_joints_are_moved_by_hand():
+    post = '\n[[collision.scene]]\nname = "post"\nkind = "box"\nsize = [0.1, 0.1, 0.5]\n'
+    with Live(Case.from_toml(FILES["plate.toml"] + post, name="plate")) as live:
+        window = Window(live)
+        page = window.page
+        window.answered()
+        first = page.arm.setup.robot
+        before = page.scene.nodes["/scene/0 post/body"].vertices.copy()
+        page.set(
+            {(BASE, "z"): 150.0, (BASE, "yaw"): 20.0, (TCP, "z"): 80.0, ("object post", "y"): 700.0}
+        )
+        window.answered()
+        robot, kinematics = page.arm.setup.robot, Kinematics(page.arm.setup.robot)
+        window.slide(page.arm._sliders[1], -70.0)
+        until(lambda: page.arm.said() in page.arm._said.content)
+        q = page.arm.q
+        assert np.degrees(q[1]) == pytest.approx(-70.0)
+        data = robot.model.createData()
+        pin.framesForwardKinematics(robot.model, data, kinematics.configuration(q))
+        drawn = {path.rpartition("/part")[0] for path in page.scene.nodes if "/part" in path}
+        assert len(drawn) == 7
+        for path in drawn:  # meshes are in the frame of their joint, where the link was at first
+            link = path.rpartition("link ")[2]
+            at = first.model.frames[first.model.getFrameId(link)].placement
+            shown = place_of(page, path) * at
+            number = robot.model.getFrameId(link, pin.FrameType.BODY)
+            assert np.allclose(shown.homogeneous, data.oMf[number].homogeneous, atol=1e-9), link
+        assert np.allclose(
+            page.scene.nodes["/scene/0 post/body"].vertices - before, [0, 0.7, 0], atol=1e-4
+        )
+        point = 1e3 * kinematics.tools(q[None])[0][0]
+        assert page.arm.said().startswith("tool at ({:.1f}, {:.1f}, {:.1f}) mm".format(*point))
+        assert "nearest: " in page.arm.said()
+        window.close()
+
+
+def test_the_handle_moves_what_is_chosen(window):
+    page = window.page
+    handle, turn = page.handle, (math.cos(math.pi / 8), 0.0, 0.0, math.sin(math.pi / 8))
+    middle = np.array(handle.gizmo.position)
+    window.drag(turn, middle + np.array([0.1, 0.0, 0.0]))
+    until(lambda: page.values[SURFACE, "yaw"] == 45.0)
+    case = page.controls.changed(page.values)
+    assert np.allclose(
+        case.build().cells.centres.mean(axis=0), middle + np.array([0.1, 0, 0]), atol=2e-4
+    )
+    assert [page.values[SURFACE, name] for name in ("z", "roll", "pitch")] == [
+        page.controls.values[SURFACE, name] for name in ("z", "roll", "pitch")
+    ]
+    handle._choose(BASE)
+    assert np.allclose(handle.gizmo.position, 0.0)
+    window.drag((1.0, 0.0, 0.0, 0.0), np.array([0.0, 0.0, 0.2]))
+    until(lambda: page.values[BASE, "z"] == 200.0)
+
+
+def test_a_window_that_is_closed_frees_its_place_and_there_are_not_too_many(served, monkeypatch):
+    monkeypatch.setattr(serving, "MOST_PAGES", 1)
+    first = Window(served)
+    told = list[str]()
+    monkeypatch.setattr("viser.GuiApi.add_markdown", lambda gui, text: told.append(text))
+    monkeypatch.setattr("live_windows.GUARD_S", 1.0)
+    with pytest.raises(AssertionError):  # it gets no page
+        Window(served)
+    monkeypatch.undo()
+    assert told == [serving.TOO_MANY]
+    first.close()
+    until(lambda: first.page.closed and not served.pages)
+
+
+def test_cells_are_not_too_many_and_the_library_is_there(monkeypatch):
+    monkeypatch.setattr(serving, "MOST_CELLS", 5)
+    with pytest.raises(CoverableError, match="plate: has 6 cells; a live page takes at most 5"):
+        Live(PLATE)
+    monkeypatch.setitem(__import__("sys").modules, "viser", None)
+    with pytest.raises(CoverableError, match=r"pip install 'coverable\[live\]'"):
+        Live(PLATE)
+
+
+def test_python_gets_the_page_of_a_name_and_a_notebook_a_frame_over_a_picture(monkeypatch, capsys):
+    opened = []
     monkeypatch.setattr(Live, "open", lambda page: opened.append(page.url))
     monkeypatch.setattr(View, "png", lambda drawn: b"\x89PNG")
-    opened = []
     page = live("paper/4a", block=False)
     try:
         assert opened == [page.url]
@@ -234,5 +297,7 @@ def test_python_gets_the_page_of_a_name_and_a_notebook_a_frame_over_a_picture(mo
         assert bundle["image/png"] in bundle["text/html"]
     finally:
         page.close()
+        page.close()  # twice does no harm
+    assert capsys.readouterr().out == "", "stdout is the program's"
     with pytest.raises(ConnectionRefusedError):
-        socket.create_connection(("127.0.0.1", page.port), timeout=GUARD_S)
+        socket.create_connection(("127.0.0.1", int(page.url.split(":")[2].split("/")[0])))
