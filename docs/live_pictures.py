@@ -10,18 +10,24 @@ is feasible: live-1.png, live-2.png and live-3.png beside this file. It needs th
 from __future__ import annotations
 
 import io
-import re
+import math
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 from pictures import chromium, save_small
 from PIL import Image
-from playwright.sync_api import Page, expect, sync_playwright
+from playwright.sync_api import Page as Tab
+from playwright.sync_api import expect, sync_playwright
 
 from coverable import Case, Live
+from coverable.arrays import Array
 
 HERE = Path(__file__).parent
 SIZE = {"width": 1000, "height": 600}  # [pixel]
 PATIENCE = 120_000  # [ms]
+PLANE = np.array([0.06, 0.06, 0.0])  # [m] where the handle moves things level, from its middle
+NEARER = np.array([-0.25, -0.08, 0.0])  # [m]
 CASE = """
 [robot]
 name = "ur5"
@@ -44,52 +50,49 @@ cone_deg = 20
 """
 
 
-def keep(page: Page, name: str) -> None:
+def keep(tab: Tab, name: str) -> None:
     """Take a picture of the page, as a small PNG."""
-    with Image.open(io.BytesIO(page.screenshot())) as image:
+    with Image.open(io.BytesIO(tab.screenshot())) as image:
         save_small(image.convert("RGB"), HERE / name)
 
 
-def answered(page: Page, kind: str) -> None:
+def answered(tab: Tab, kind: str) -> None:
     """Wait for an answer of that kind."""
-    expect(page.locator("#answer")).to_have_class(re.compile(rf"^{kind} "), timeout=PATIENCE)
-    page.wait_for_timeout(500)  # to be painted
+    expect(tab.locator(f"b.{kind}").first).to_be_visible(timeout=PATIENCE)
+    tab.wait_for_timeout(1500)  # to be painted
 
 
-def on_screen(page: Page, point: tuple[float, float, float]) -> tuple[float, float]:
+def on_screen(tab: Tab, page: Page, point: Array) -> tuple[float, float]:
     """Where a point of the world, m, is in the window."""
-    x, y = page.evaluate(
-        """(point) => {
-          const {viewer, handle} = window.page.scene;
-          const box = document.getElementById("meshcat-pane").getBoundingClientRect();
-          viewer.camera.updateMatrixWorld();
-          const place = handle.group.localToWorld(new MeshCat.THREE.Vector3(...point));
-          place.project(viewer.camera);
-          return [box.left + (place.x + 1) / 2 * box.width,
-                  box.top + (1 - place.y) / 2 * box.height];
-        }""",
-        list(point),
-    )
-    return x, y
+    eye, target = np.array(page.client.camera.position), np.array(page.client.camera.look_at)
+    ahead = (target - eye) / np.linalg.norm(target - eye)
+    right = np.cross(ahead, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    x, y, z = np.stack([right, np.cross(right, ahead), ahead]) @ (point - eye)
+    box: Any = tab.locator("canvas").first.bounding_box()
+    scale = 0.5 * box["height"] / math.tan(0.5 * LENS)
+    middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    return middle[0] + scale * x / z, middle[1] - scale * y / z
 
 
-def story(page: Page) -> None:
-    """The hood is too far away; it is dragged nearer; it is let go."""
-    answered(page, "infeasible")
-    keep(page, "live-1.png")
-    x, y, z = page.evaluate("window.page.scene.handle.body.position.toArray()")
-    page.mouse.move(*on_screen(page, (x, y, z)))
-    page.mouse.down()
-    page.mouse.move(*on_screen(page, (x - 0.08, y - 0.03, z)), steps=8)
-    answered(page, "quick")
-    keep(page, "live-2.png")
-    page.mouse.move(*on_screen(page, (x - 0.25, y - 0.08, z)), steps=8)
-    answered(page, "quick")
-    page.mouse.up()
-    answered(page, "feasible")
-    page.mouse.move(5, 5)
-    page.wait_for_timeout(500)
-    keep(page, "live-3.png")
+def story(tab: Tab, page: Page) -> None:
+    """The hood is too far away; it is dragged nearer by the plane of its handle; it is let go."""
+    answered(tab, "infeasible")
+    keep(tab, "live-1.png")
+    middle = np.array(page.handle.gizmo.position)
+    tab.mouse.move(*on_screen(tab, page, middle + PLANE))
+    tab.wait_for_timeout(500)
+    tab.mouse.down()
+    for share in np.linspace(0.0, 0.4, 8):
+        tab.mouse.move(*on_screen(tab, page, middle + PLANE + share * NEARER))
+    answered(tab, "quick")
+    keep(tab, "live-2.png")
+    for share in np.linspace(0.4, 1.0, 8):
+        tab.mouse.move(*on_screen(tab, page, middle + PLANE + share * NEARER))
+    tab.mouse.up()
+    tab.mouse.move(5, 5)
+    answered(tab, "feasible")
+    keep(tab, "live-3.png")
 
 
 def main() -> None:
@@ -97,9 +100,10 @@ def main() -> None:
     flags = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--disable-dev-shm-usage"]
     with Live(Case.from_toml(CASE, name="hood.toml")) as live, sync_playwright() as tools:
         browser = tools.chromium.launch(executable_path=chromium(), args=flags)
-        page = browser.new_page(viewport=SIZE)
-        page.goto(live.url)
-        story(page)
+        tab = browser.new_page(viewport=SIZE)
+        tab.goto(live.url)
+        answered(tab, "infeasible")
+        story(tab, *live.pages.values())
         browser.close()
 
 

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from http.server import BaseHTTPRequestHandler
 from socketserver import ThreadingTCPServer
 from typing import Any, Self
+from urllib.parse import urlsplit
 
 ADDRESS = "127.0.0.1"
 PATIENCE = 30.0  # [s] for a browser to send its next request
@@ -101,6 +102,7 @@ class Served:
             stop: ends that.
         """
         self.url, self._stop = url, stop
+        self.port = urlsplit(url).port
         self._closed = threading.Event()
 
     def open(self) -> bool:

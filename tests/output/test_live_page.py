@@ -57,25 +57,26 @@ def status(port, path, **headers):
 
 
 def test_strangers_get_nothing(served):
-    port, _, path = served.url.removeprefix("http://127.0.0.1:").partition("/")
-    port, path = int(port), f"/{path}"
-    listening = [
-        connection.laddr.ip
-        for connection in psutil.Process().net_connections("tcp")
-        if connection.status == psutil.CONN_LISTEN and connection.laddr.port == port
-    ]
-    assert listening == ["127.0.0.1"]
-    assert re.fullmatch(r"/[\w-]{20,}/", path)
-    assert status(port, path) == [200, 101]
-    for wrong in ("/", "/index.html", f"/{'x' * 22}/", path[:-2] + "/"):
-        assert status(port, wrong) == [404, 404], wrong
-    for host in ("evil.example", f"evil.example:{port}", f"localhost:{port}"):
-        assert status(port, path, Host=host) == [404, 404], host
-    for origin in ("http://evil.example", "null", f"http://127.0.0.1:{port + 1}"):
-        assert status(port, path, Origin=origin) == [404, 404], origin
-    assert status(port, path, Origin=f"http://127.0.0.1:{port}") == [200, 101]
-    for file in ("../../etc/passwd", "%2e%2e/%2e%2e/etc/passwd", "no-such-file"):
-        assert status(port, path + file)[0] == 404, file
+    with LiveView("<p>a view</p>") as view:
+        for page, own in ((served, [200, 101]), (view, [200, 200])):
+            port, path = page.port, page.url.removeprefix(f"http://127.0.0.1:{page.port}")
+            listening = [
+                connection.laddr.ip
+                for connection in psutil.Process().net_connections("tcp")
+                if connection.status == psutil.CONN_LISTEN and connection.laddr.port == port
+            ]
+            assert listening == ["127.0.0.1"]
+            assert re.fullmatch(r"/[\w-]{20,}/", path)
+            assert status(port, path) == own
+            for wrong in ("/", "/index.html", f"/{'x' * 22}/", path[:-2] + "/"):
+                assert status(port, wrong) == [404, 404], wrong
+            for host in ("evil.example", f"evil.example:{port}", f"localhost:{port}"):
+                assert status(port, path, Host=host) == [404, 404], host
+            for origin in ("http://evil.example", "null", f"http://127.0.0.1:{port + 1}"):
+                assert status(port, path, Origin=origin) == [404, 404], origin
+            assert status(port, path, Origin=f"http://127.0.0.1:{port}") == own
+            for file in ("../../etc/passwd", "%2e%2e/%2e%2e/etc/passwd", "no-such-file"):
+                assert status(port, path + file)[0] == 404, file
 
 
 def test_the_answer_is_that_of_check_in_its_words(window):
@@ -189,6 +190,7 @@ def test_the_saved_case_is_what_is_shown(window, monkeypatch):
     assert case.surface.position[0] == 0.02
     assert case == page.controls.changed(page.values)
     page.set({(TASK, "standoff"): -1.0})
+    window.answered("error")
     page.press("save as case")
     assert "task.standoff" in page.head.content
     assert len(saved) == 1
@@ -300,4 +302,4 @@ def test_python_gets_the_page_of_a_name_and_a_notebook_a_frame_over_a_picture(mo
         page.close()  # twice does no harm
     assert capsys.readouterr().out == "", "stdout is the program's"
     with pytest.raises(ConnectionRefusedError):
-        socket.create_connection(("127.0.0.1", int(page.url.split(":")[2].split("/")[0])))
+        socket.create_connection(("127.0.0.1", page.port))

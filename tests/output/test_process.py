@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numba
 import pytest
+from live_windows import window
 from samples import EVERYTHING
 
 import feasibility.checking
@@ -200,14 +201,7 @@ def test_show_serves_the_view_until_ctrl_c(commands, monkeypatch):
 
 
 def test_a_live_page_is_served_until_ctrl_c_which_is_its_end_and_no_fault():
-    """Right after a question, too."""
-
-    def post(url, **asked):
-        kind = {"Content-Type": "application/json"}
-        request = urllib.request.Request(url, data=json.dumps(asked).encode(), headers=kind)
-        with urllib.request.urlopen(request, timeout=GUARD_S) as reply:
-            return json.loads(reply.read())
-
+    """Right after a window has asked something, too."""
     with subprocess.Popen(
         [*COMMAND, "live", "paper/4a", "--no-browser"], cwd=ROOT, text=True,
         env={**os.environ, "PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
@@ -215,9 +209,8 @@ def test_a_live_page_is_served_until_ctrl_c_which_is_its_end_and_no_fault():
         line = child.stderr.readline()
         wanted = r"live: (http://127\.0\.0\.1:\d+/\S+/) \(served until Ctrl-C\)\n"
         url = re.fullmatch(wanted, line)[1]
-        session = post(url + "open")["session"]
-        reply = post(url + "ask", session=session, number=1, final=True, values={})
-        assert reply["status"] in ("deciding", "answered")
-        child.send_signal(signal.SIGINT)
-        out, err = child.communicate(timeout=GUARD_S)
+        with window(url) as socket:
+            socket.recv(timeout=GUARD_S)
+            child.send_signal(signal.SIGINT)
+            out, err = child.communicate(timeout=GUARD_S)
     assert (child.returncode, out, err.strip()) == (0, "", "")

@@ -9,7 +9,7 @@ import msgspec
 import viser
 from websockets.sync.client import connect
 
-GUARD_S = 600.0
+GUARD_S = 1800.0
 
 
 def until(met, what="it came to pass"):
@@ -20,17 +20,25 @@ def until(met, what="it came to pass"):
         time.sleep(0.01)
 
 
+CAMERA = {"wxyz": (1, 0, 0, 0), "position": (3, 0, 1), "fov": 1.0, "near": 0.1, "far": 100.0,
+          "image_height": 600, "image_width": 800, "look_at": (0, 0, 0),
+          "up_direction": (0, 0, 1)}  # fmt: skip
+
+
+def window(url):
+    """The socket of a new window."""
+    address, version = url.rstrip("/").replace("http:", "ws:"), f"viser-v{viser.__version__}"
+    socket = connect(address, subprotocols=[version], max_size=None)
+    socket.send(msgspec.msgpack.encode({"type": "ViewerCameraMessage", **CAMERA}))
+    return socket
+
+
 class Window:
     """One window of a page; `page` is what the program knows of it."""
 
     def __init__(self, live):
-        known, address = set(live.pages), live.url.rstrip("/").replace("http:", "ws:")
-        self.socket = connect(address, subprotocols=[f"viser-v{viser.__version__}"], max_size=None)
+        known, self.socket = set(live.pages), window(live.url)
         threading.Thread(target=self._hear, daemon=True).start()
-        self.send(
-            "ViewerCameraMessage", wxyz=(1, 0, 0, 0), position=(3, 0, 1), fov=1.0, near=0.1,
-            far=100.0, image_height=600, image_width=800, look_at=(0, 0, 0), up_direction=(0, 0, 1),
-        )  # fmt: skip
         until(lambda: set(live.pages) - known)
         self.page = live.pages[(set(live.pages) - known).pop()]
 
