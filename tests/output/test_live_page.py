@@ -20,6 +20,7 @@ from feasibility.live import serving
 from feasibility.live.controls import BASE, LIMITS, SURFACE, TASK, TCP
 from feasibility.live.page import Page
 from feasibility.reports import verdict as report
+from feasibility.viewer.live_server import LiveView
 from robots.kinematics import Kinematics
 
 PLATE = Case.from_toml(FILES["plate.toml"], name="plate")
