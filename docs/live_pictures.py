@@ -22,6 +22,8 @@ from playwright.sync_api import expect, sync_playwright
 
 from coverable import Case, Live
 from coverable.arrays import Array
+from feasibility.live.arm import LENS
+from feasibility.live.page import Page
 
 HERE = Path(__file__).parent
 SIZE = {"width": 1000, "height": 600}  # [pixel]
