@@ -2,7 +2,6 @@
 
 import ast
 import os
-import re
 import shutil
 import stat
 import subprocess
@@ -183,15 +182,10 @@ KERNELS = {(p, n.name): made_by(n) for p, t in TREES.items() for n in t.body if 
 
 
 def origin(module: str, name: str) -> Path:
-    """The file that a name comes from, also through a package that imports lazily."""
+    """The file that a name comes from."""
     path = ROOT / module.replace(".", "/")
-    stub = path / "__init__.pyi"
-    if (path / f"{name}.py").exists():
-        return path / f"{name}.py"
-    inside = (
-        re.search(rf"from \.([\w.]+) import {name} as", stub.read_text()) if stub.exists() else None
-    )
-    return origin(f"{module}.{inside[1]}", name) if inside else path.with_suffix(".py")
+    inner = path / f"{name}.py"
+    return inner if inner.exists() else path.with_suffix(".py")
 
 
 def named(path: Path, compiled: bool) -> Iterator[tuple[Path, str]]:
