@@ -4,8 +4,6 @@ It needs the extra `browser` (playwright) and a Chromium, which `CHROMIUM` names
 Without them it fails.
 """
 
-from __future__ import annotations
-
 import re
 import time
 

@@ -1,7 +1,5 @@
 """What contraction keeps of boxes around known points of the motion set: the points."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import NamedTuple
 

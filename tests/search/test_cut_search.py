@@ -1,7 +1,5 @@
 """The prover on stored problems with a known answer, whatever their surface is made of."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import count
 
@@ -13,17 +11,8 @@ from random_cases import built, read, surface_of
 from samples import sampled, seeds, spread
 from scipy.interpolate import make_interp_spline
 
-from coverable import (
-    bspline,
-    cylinder,
-    hyperboloid,
-    load_robot,
-    mesh,
-    piecewise,
-    plane,
-    revolution,
-    sphere,
-)
+import coverable
+from coverable import bspline, cylinder, hyperboloid, mesh, piecewise, plane, revolution, sphere
 from feasibility.cut_tree import Cut, Leaf
 from feasibility.roadmap.branch_and_bound.branching import branch_and_bound
 from feasibility.roadmap.branch_and_bound.ruling import Ruling
@@ -40,7 +29,7 @@ def stored(arm, feasible):
 
 
 def case(arm, problem):
-    return built(problem, load_robot(arm))
+    return built(problem, coverable.load_robot(arm))
 
 
 @pytest.fixture(scope="module", params=[("puma560", 9), ("ur5", 2)], ids=lambda p: p[0])

@@ -1,7 +1,5 @@
 """Proofs of cuts on arms so simple that what divides their motions is known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from arm_urdfs import FREE, joint

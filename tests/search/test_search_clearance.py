@@ -1,7 +1,5 @@
 """The clearance that the search compiles: what it calls clear is clear for coal at every sample."""
 
-from __future__ import annotations
-
 import coal
 import numpy as np
 import pinocchio as pin
@@ -205,9 +203,6 @@ def test_no_segment_with_a_collision_is_called_clear(name, seed):
         assert refused - collides <= 0.1 * (clear + refused)
 
 
-# by hand
-
-
 def stick(owner, joint):
     """A link of the planar arm."""
     return Polytope(owner, joint, np.array([[0.0, 0.0, 0.0], [LENGTH, 0.0, 0.0]]), RADIUS)
@@ -325,9 +320,6 @@ def test_the_push_is_the_gradient_of_the_nearest_distance():
                 checked += 1
     ball = Polytope("ball", 0, np.array([[2.0, 0.0, 0.0]]), 0.1)
     assert one_pair(stick("l1", 1), ball).push(np.array([0.5]), 0.1) == (0.0, 0.0)
-
-
-# the bounds behind
 
 
 def test_no_point_moves_further_nor_leaves_its_chord_further_than_bounded():

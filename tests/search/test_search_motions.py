@@ -1,7 +1,5 @@
 """What the search stores holds: targets and their curves, configurations, motions, the walk."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from arm_urdfs import FREE, joint
@@ -28,9 +26,6 @@ TASKS = {
     "held upright": Task(0.01, 20, roll_deg=(0, 0), approach=(0.2, 0.1, -1)),
     "all fixed": Task(0.01, 20, roll_deg=(0, 5), approach=(0, 0, -2), roll_reference=(1, 2, 0)),
 }
-
-
-# targets
 
 
 def along(first, cubics, curves, t):
@@ -82,9 +77,6 @@ def test_frames_follow_the_surface_within_their_bounds_and_turn_no_faster(name, 
     assert (turn <= found.frames.centre_curvature * step + 1e-8).all()
 
 
-# verdicts
-
-
 @pytest.mark.parametrize("short", [0.3, 0.99, 1.01])
 def test_a_target_beyond_reach_is_covered_within_the_tolerance_and_no_further(short):
     """A planar arm of three links, and one small cell a share of the tolerance beyond its reach."""
@@ -115,9 +107,6 @@ def test_a_slide_whose_stroke_lies_far_out(stroke, tool, feasible):
     assert ((guesses >= robot.lower) & (guesses <= robot.upper)).all()
     verdict = check(robot, cells, Task(0.0, 180))
     assert (verdict.feasible, verdict.evidence) == (feasible, "witness" if feasible else "proof")
-
-
-# motions, and the walk
 
 
 def refusal(robot, cells, task, q, first, last):

@@ -1,7 +1,5 @@
 """Branch and bound never rules out a configuration that exists, and proves plain impossibility."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

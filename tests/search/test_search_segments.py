@@ -1,7 +1,5 @@
 """The search's bound between samples, against dense sampling by Pinocchio, on random arms."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -47,9 +45,6 @@ def sag_of(values, s):
     chord = (1.0 - s[:, None]) * values[0] + s[:, None] * values[-1]
     off = np.linalg.norm(values - chord, axis=1)[1:-1]
     return np.maximum(off - ROUNDING, 0.0) / (0.5 * s * (1.0 - s))[1:-1]
-
-
-# the tool along a segment
 
 
 def test_second_derivatives_bound_the_sag_of_every_segment():
@@ -98,9 +93,6 @@ def test_peak_is_the_largest_value():
     assert peak(0.2, 0.2, 8.0) == pytest.approx(1.2, rel=1e-15)
     assert peak(0.1, 0.2, np.inf) == np.inf
     assert all(np.isnan(peak(*np.where(np.arange(3) == k, np.nan, 0.1))) for k in range(3))
-
-
-# segments beside a moving target
 
 
 def two_cells(surface, parameters):
@@ -255,9 +247,6 @@ def test_nothing_that_is_not_a_number_passes():
     assert motions.at_rest(q, q + 1e-3, np.zeros(3), up).holds
     motions.arrays = motions.arrays._replace(curvature=np.inf)
     assert not motions.at_rest(q, q + 1e-3, np.zeros(3), up).holds
-
-
-# roll
 
 
 def random_frame(rng, size):
