@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coverable.arrays import Array, Ints, Mask
-from feasibility.certification.rolls.bounds import CLOSE_TO_ZERO as ROLL_CLOSE
 from feasibility.certification.rolls.bounds import off_middle, reference_axes, roll_vectors
-from feasibility.certification.stretches import CLOSE_TO_ZERO, Samples
+from feasibility.certification.stretches import Samples, beyond
 from feasibility.task import Targets, Task
 from robots.kinematics import Kinematics
 from robots.robot import Robot
@@ -143,13 +142,11 @@ def at_targets(
     off = np.linalg.norm(points - aims.points[cell], axis=1)
     approaches = aims.approaches[cell]
     chord = np.linalg.norm(axes - approaches, axis=1)
-    inside = np.asarray(chord <= task.cone_chord + CLOSE_TO_ZERO)
     roll = np.zeros(len(cell))
     if task.roll is not None and aims.references is not None:
-        z = roll_vectors(x, axes, aims.references[cell], approaches, task.roll)
-        roll = off_middle(z)
-        inside &= roll <= task.roll.half + ROLL_CLOSE
-    return np.where((off <= task.effective_tolerance) & inside, chord, np.inf), roll
+        roll = off_middle(roll_vectors(x, axes, aims.references[cell], approaches, task.roll))
+    inside = (beyond(task, off, chord, roll) <= 0.0).all(axis=0)
+    return np.where(inside, chord, np.inf), roll
 
 
 def _passing(aims: Array, starts: Array, ends: Array, within: float) -> tuple[Array, Array]:

@@ -7,16 +7,12 @@ axis, z_j x a, has the length s_j, a sine. A joint that slides has z_j in place 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from coverable.arrays import Array
 from feasibility.certification.rows import Rows
 from robots.kinematics import Kinematics
-from robots.robot import Robot
-
-BLOCK = 4096  # configurations at once, to bound the memory
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -62,25 +58,3 @@ def lengths(a: Array) -> Array:
     """(m, n) lengths of vectors (m, 3, n); numpy's own sums are slow over three numbers."""
     x, y, z = a[:, 0], a[:, 1], a[:, 2]
     return np.sqrt(x * x + y * y + z * z)
-
-
-class ToolPlacements(NamedTuple):
-    """Tool points and axes of m configurations, and the lengths of their derivatives."""
-
-    points: Array
-    """(m, 3) tool points, m."""
-    axes: Array
-    """(m, 3) approach axes."""
-    levers: Array
-    """(m, n) distance of the tool point from each revolute axis, m; 1 for a prismatic joint."""
-    sines: Array
-    """(m, n) sine of the angle between each revolute axis and the approach axis; 0 if prismatic."""
-
-
-def placements(robot: Robot, q: Array) -> ToolPlacements:
-    """Tool points, axes and lever arms at q (m, n)."""
-    kinematics, parts = Kinematics(robot), []
-    for first in range(0, max(len(q), 1), BLOCK):
-        at = jacobians(kinematics, q[first : first + BLOCK])
-        parts.append((at.points, at.axes, at.levers, at.sines))
-    return ToolPlacements(*(np.concatenate(part) for part in zip(*parts, strict=True)))

@@ -2,18 +2,18 @@
 
 Take a part of the segment between two rows, with its own parameter s in 0..1, whose ends are over
 the places x0 and x1: found for their tool points, though any would do. `surfaces.places` gives a
-continuous path from x0 to x1 of straight pieces, and for each piece numbers D_T and D_b, d_T and
-d_b, such that T and b differ from straight lines by at most t (1 - t) / 2 of the first two, and by
-the other two on top, t the piece's own parameter.
+continuous path from x0 to x1 of straight pieces, and for each piece numbers d_T and d_b, such that
+T and b differ from straight lines by at most these.
 Tool point and axis differ likewise from straight lines, by D_p and D_a of the stretch
 (`lever_bounds`), and by w^2 D_p and w^2 D_a on a part of it that is w of the whole. So on the
 part that goes with a piece
 
-    |p - T| <= (1 - t) e0 + t e1 + t (1 - t) / 2 (w^2 D_p + D_T) + d_T
+    |p - T| <= (1 - t) e0 + t e1 + t (1 - t) / 2 w^2 D_p + d_T
 
-with e0 and e1 bounds of |p - T| at its ends: there p is known to s (1 - s) / 2 D_p. The same holds
-for |a - b|, and for the roll what `certification.rolls` says. Nothing else is assumed of the
-surface: not that closest points are unique, nor that they move continuously.
+with t the piece's own parameter, and e0 and e1 bounds of |p - T| at its ends: there p is known to
+s (1 - s) / 2 D_p. The same holds for |a - b|, and for the roll what `certification.rolls` says.
+Nothing else is assumed of the surface: not that closest points are unique, nor that they move
+continuously.
 
 **On a mesh** the normals of targets are interpolated, and the tool point has to keep its distance
 from the triangles themselves, too: standoff less tolerance from all of them, so that nothing
@@ -30,11 +30,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
-from feasibility.certification.jacobians import ToolPlacements
+from feasibility.certification.jacobians import Jacobians
 from feasibility.certification.lever_bounds import peaks, second_derivatives
 from feasibility.certification.rolls.bounds import CLOSE_TO_ZERO as ROLL_CLOSE
-from feasibility.certification.rolls.bounds import reference_axes, tool_frames
-from feasibility.certification.rolls.held import Held, ToolAxes
+from feasibility.certification.rolls.bounds import frame_second_derivatives, reference_axes
+from feasibility.certification.rolls.held import Held
 from feasibility.certification.rows import Rows
 from feasibility.task import Task
 from robots.kinematics import Kinematics
@@ -42,6 +42,7 @@ from robots.robot import Robot
 from surfaces.cells import Cells
 from surfaces.places.places import OffsetSurface, Places
 
+ANY_CHORD = 4.0  # more than any; what is not known is inside a cone of all directions
 CLOSE_TO_ZERO = 1e-12  # [m], [1]: rounding of double arithmetic on unit vectors
 
 
@@ -166,7 +167,7 @@ class Judge:
         q = rows[row] + share[:, None] * (rows[row + 1] - rows[row])
         return self.sampled(row, share, q)
 
-    def between_rows(self, rows: Array, poses: ToolPlacements, at: Samples) -> Stretches:
+    def between_rows(self, rows: Array, poses: Jacobians, at: Samples) -> Stretches:
         """The stretches from row to row, with the samples `at` every row."""
         steps, slides = np.abs(np.diff(rows, axis=0)), self.robot.prismatic
         second = [
@@ -175,9 +176,7 @@ class Judge:
             np.zeros(len(steps)),
         ]
         if self.task.roll is not None:
-            second[2] = tool_frames(self.robot, rows, at.axes, at.x).second_derivatives(
-                self.robot, steps
-            )
+            second[2] = frame_second_derivatives(self.robot, rows, at.axes, at.x)
         index = np.arange(len(rows))
         ends = at.of(index[:-1]), at.of(index[1:])
         return Stretches(*ends, np.stack(second, axis=1), np.ones(len(steps)))
@@ -185,37 +184,46 @@ class Judge:
     def bounds(self, s: Stretches) -> Bounds:
         """See the module's text."""
         path = self.offset.paths(s.start.places, s.end.places)
-        share, bounds = path.share[..., None], path.derivative_bounds[..., 0]
-        off_line = path.deviations[..., 0]
-        width = np.diff(path.share, axis=1) ** 2
+        share, width = path.share[..., None], np.diff(path.share, axis=1) ** 2
         found = []
-        approaches = self._held.approaches(path.normals)
-        of_axes, off_axes = self._held.bends(path)
-        for start, end, aims, own, of_targets, beside in (
-            (s.start.points, s.end.points, path.points, s.second[:, :1], bounds, off_line),
-            (s.start.axes, s.end.axes, approaches, s.second[:, 1:2], of_axes, off_axes),
+        approaches, off_axes = self._held.approaches(path.normals), self._held.deviations(path)
+        for start, end, aims, own, beside in (
+            (s.start.points, s.end.points, path.points, s.second[:, :1], path.deviations[..., 0]),
+            (s.start.axes, s.end.axes, approaches, s.second[:, 1:2], off_axes),
         ):  # fmt: skip
             line = (1.0 - share) * start[:, None] + share * end[:, None]
             sag = 0.5 * path.share * (1.0 - path.share) * own
             off = np.linalg.norm(line - aims, axis=2) + sag
-            peak = peaks(off[:, :-1], off[:, 1:], width * own + of_targets) + beside
+            peak = peaks(off[:, :-1], off[:, 1:], width * own) + beside
             found.append(peak.max(axis=1, initial=0.0))
-        first, last = ToolAxes(s.start.axes, s.start.x), ToolAxes(s.end.axes, s.end.x)
-        roll = self._held.rolls_between(first, last, s.second[:, 2], path, approaches)
+        roll = self._held.rolls_between(s.start, s.end, s.second[:, 2], path, approaches)
         return Bounds(found[0], found[1], _apart(s), path.known, roll)
+
+    def beyond(self, one: Samples | Bounds) -> Array:
+        """(4, k) see `beyond`; and m, how far too near to the triangles of a mesh."""
+        least = self.task.standoff - self.task.effective_tolerance - CLOSE_TO_ZERO
+        return np.vstack([beyond(self.task, one.error, one.chord, one.roll), least - one.facets])
 
     def within(self, one: Samples | Bounds) -> Mask:
         """(k,) inside tolerance, cone and roll, apart from a mesh's triangles; NaN is not."""
-        cone = self.task.cone_chord + CLOSE_TO_ZERO
-        inside = (one.error <= self.task.effective_tolerance) & (one.chord <= cone)
-        if self.task.roll is not None:
-            inside &= one.roll <= self.task.roll.half + ROLL_CLOSE
-        return np.asarray(inside & (one.facets >= self.least_distance - CLOSE_TO_ZERO))
+        return np.asarray((self.beyond(one) <= 0.0).all(axis=0))
 
-    @property
-    def least_distance(self) -> float:
-        """m, of the tool point from the triangles of a mesh."""
-        return self.task.standoff - self.task.effective_tolerance
+
+def beyond(task: Task, error: Array, chord: Array, roll: Array) -> Array:
+    """(3, k) by how much tools are outside of what is allowed; NaN is not inside.
+
+    Args:
+        task: its tolerance, cone and roll are used exactly.
+        error: (k,) m, how far tool points are off.
+        chord: (k,) |a - b|.
+        roll: (k,) rad, how far the roll is off the middle of its range; 0 where it is free.
+    """
+    half = 0.0 if task.roll is None else task.roll.half
+    return np.stack([
+        error - task.effective_tolerance,
+        np.minimum(chord, ANY_CHORD) - (task.cone_chord + CLOSE_TO_ZERO),
+        roll - (half + ROLL_CLOSE),
+    ])  # fmt: skip
 
 
 def _apart(s: Stretches) -> Array:

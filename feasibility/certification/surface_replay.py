@@ -31,7 +31,7 @@ from feasibility.certification.cells_reached import (
     missed_text,
 )
 from feasibility.certification.faults import Judged, MotionFault
-from feasibility.certification.jacobians import placements
+from feasibility.certification.jacobians import jacobians
 from feasibility.certification.order import curves_of_marks, order_of_places
 from feasibility.certification.placement_margin import margin_fault, margin_of
 from feasibility.certification.refusals import exact_faults, limits, open_fault
@@ -218,7 +218,7 @@ def _tool_along(
     judge: Judge, rows: Array, cells: Cells | None = None, marks: Ints | None = None
 ) -> _Along:
     """Judge tool point, axis and roll at all rows and between them."""
-    poses, x = placements(judge.robot, rows), judge.reference_axes(rows)
+    poses, x = jacobians(Kinematics(judge.robot), rows), judge.reference_axes(rows)
     count = np.arange(len(rows))
     at_rows = judge.compared(count, np.zeros(len(rows)), poses.points, poses.axes, x)
     if marks is not None and cells is not None:

@@ -6,12 +6,12 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, TypeVar, cast
+from typing import Any, TypedDict, TypeVar, Unpack, cast
 
 import numpy as np
 
 from coverable.arrays import Array
-from coverable.errors import ArgumentError, Checks, Fault
+from coverable.errors import ArgumentError, Checks
 from feasibility.collisions.pairs import checked_distance
 from feasibility.collisions.shapes import (
     ORIGIN,
@@ -29,6 +29,13 @@ from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 Point = Sequence[float]
 Path = str | os.PathLike[str]
 Made = TypeVar("Made")
+
+
+class Own(TypedDict, total=False):
+    """What an object may have of its own."""
+
+    clearance: float | None
+    frame: str | None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -94,13 +101,9 @@ class Obstacle:
 
     @staticmethod
     def box(
-        name: str,
-        size: Point,
-        position: Point = ORIGIN,
-        rpy_deg: Point = ORIGIN,
-        clearance: float | None = None,
-        frame: str | None = None,
-    ) -> Obstacle:
+        name: str, size: Point, position: Point = ORIGIN, rpy_deg: Point = ORIGIN,
+        **own: Unpack[Own],
+    ) -> Obstacle:  # fmt: skip
         """A box about its position, with full edge lengths `size` (m).
 
         Args:
@@ -108,78 +111,48 @@ class Obstacle:
             size: (3,) m, along x, y and z of its own frame.
             position: (3,) m, of its middle in the world or in `frame`, as for the other kinds.
             rpy_deg: (3,) fixed-axis roll, pitch, yaw of its frame.
-            clearance: m, in place of `Collision.clearance` for every pair with it.
-            frame: the link that carries it; None for the world.
+            own: `clearance` and `frame`, see the class.
         """
-        return _placed(
-            Obstacle, Box(cast("Any", size)), position, rpy_deg, name, clearance, frame=frame
-        )
+        return _placed(Obstacle, Box(cast("Any", size)), position, rpy_deg, name, **own)
 
     @staticmethod
     def cylinder(
-        name: str,
-        radius: float,
-        length: float,
-        position: Point = ORIGIN,
-        rpy_deg: Point = ORIGIN,
-        clearance: float | None = None,
-        frame: str | None = None,
-    ) -> Obstacle:
+        name: str, radius: float, length: float, position: Point = ORIGIN, rpy_deg: Point = ORIGIN,
+        **own: Unpack[Own],
+    ) -> Obstacle:  # fmt: skip
         """A cylinder along z of its own frame, about its position; lengths in m."""
-        return _placed(
-            Obstacle, Cylinder(radius, length), position, rpy_deg, name, clearance, frame=frame
-        )
+        return _placed(Obstacle, Cylinder(radius, length), position, rpy_deg, name, **own)
 
     @staticmethod
     def sphere(
-        name: str,
-        radius: float,
-        position: Point = ORIGIN,
-        rpy_deg: Point = ORIGIN,
-        clearance: float | None = None,
-        frame: str | None = None,
-    ) -> Obstacle:
+        name: str, radius: float, position: Point = ORIGIN, rpy_deg: Point = ORIGIN,
+        **own: Unpack[Own],
+    ) -> Obstacle:  # fmt: skip
         """A ball, m."""
-        return _placed(Obstacle, Sphere(radius), position, rpy_deg, name, clearance, frame=frame)
+        return _placed(Obstacle, Sphere(radius), position, rpy_deg, name, **own)
 
     @staticmethod
     def capsule(
-        name: str,
-        radius: float,
-        length: float,
-        position: Point = ORIGIN,
-        rpy_deg: Point = ORIGIN,
-        clearance: float | None = None,
-        frame: str | None = None,
-    ) -> Obstacle:
+        name: str, radius: float, length: float, position: Point = ORIGIN, rpy_deg: Point = ORIGIN,
+        **own: Unpack[Own],
+    ) -> Obstacle:  # fmt: skip
         """A cylinder along z of that length (m), with a half ball on each end."""
-        return _placed(
-            Obstacle, Capsule(radius, length), position, rpy_deg, name, clearance, frame=frame
-        )
+        return _placed(Obstacle, Capsule(radius, length), position, rpy_deg, name, **own)
 
     @staticmethod
     def halfspace(
-        name: str,
-        position: Point = ORIGIN,
-        rpy_deg: Point = ORIGIN,
-        clearance: float | None = None,
-        frame: str | None = None,
+        name: str, position: Point = ORIGIN, rpy_deg: Point = ORIGIN, **own: Unpack[Own]
     ) -> Obstacle:
         """All that is below the xy plane of its own frame: a floor at `position` (m)."""
-        return _placed(Obstacle, HalfSpace(), position, rpy_deg, name, clearance, frame=frame)
+        return _placed(Obstacle, HalfSpace(), position, rpy_deg, name, **own)
 
     @staticmethod
     def mesh(
-        name: str,
-        file: Path,
-        scale: float | None = None,
-        position: Point = ORIGIN,
-        rpy_deg: Point = ORIGIN,
-        clearance: float | None = None,
-        frame: str | None = None,
-    ) -> Obstacle:
+        name: str, file: Path, scale: float | None = None, position: Point = ORIGIN,
+        rpy_deg: Point = ORIGIN, **own: Unpack[Own],
+    ) -> Obstacle:  # fmt: skip
         """The triangles of a file; see `read_triangles` for its formats and its unit."""
-        return _from_file(Obstacle, file, scale, position, rpy_deg, name, clearance, frame=frame)
+        return _placed(Obstacle, (file, scale), position, rpy_deg, name, **own)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -238,7 +211,7 @@ class ToolShape:
         file: Path, scale: float | None = None, position: Point = ORIGIN, rpy_deg: Point = ORIGIN
     ) -> ToolShape:
         """The triangles of a file; see `read_triangles`."""
-        return _from_file(ToolShape, file, scale, position, rpy_deg)
+        return _placed(ToolShape, (file, scale), position, rpy_deg)
 
 
 SHAPES: Mapping[str, tuple[str, ...]] = MappingProxyType(
@@ -269,12 +242,16 @@ def _placed(
     rpy_deg: Any,
     name: str | None = None,
     clearance: float | None = None,
-    faults: Sequence[Fault] = (),
     frame: str | None = None,
 ) -> Made:
-    """An object or a tool shape at a place; all faults together, with those found before."""
+    """An object or a tool shape at a place, of a shape or a file and its scale; all its faults."""
     checks = Checks("a tool shape" if name is None else f"obstacle {name!r}")
-    checks.faults += faults
+    if isinstance(geometry, tuple):
+        file, geometry = geometry, PLACEHOLDER
+        try:
+            geometry = read_triangles(*file)
+        except ArgumentError as error:
+            checks.faults += error.faults
     placement = placement_of(checks, position, rpy_deg)
     try:
         if name is None:
@@ -285,22 +262,3 @@ def _placed(
         checks.faults += error.faults
     checks.done()
     return made
-
-
-def _from_file(
-    make: Callable[..., Made],
-    file: Path,
-    scale: float | None,
-    position: Any,
-    rpy_deg: Any,
-    name: str | None = None,
-    clearance: float | None = None,
-    frame: str | None = None,
-) -> Made:
-    """The same with the triangles of a file."""
-    shape, faults = PLACEHOLDER, tuple[Fault, ...]()
-    try:
-        shape = read_triangles(file, scale)
-    except ArgumentError as error:
-        faults = error.faults
-    return _placed(make, shape, position, rpy_deg, name, clearance, faults, frame)

@@ -15,7 +15,7 @@ import numpy as np
 
 from coverable.arrays import Array, Protected
 from feasibility.certification.collisions.collision_replay import collision_replay
-from feasibility.certification.jacobians import placements
+from feasibility.certification.jacobians import jacobians
 from feasibility.certification.lever_bounds import second_derivatives
 from feasibility.collisions.asked_bodies import gather
 from feasibility.collisions.bodies import Bodies
@@ -24,6 +24,7 @@ from feasibility.division.between_patches import tool_moved
 from feasibility.division.free_motion import FreeSpace, free_motion
 from feasibility.paths.coverage import CoveragePath
 from feasibility.paths.order import PathError
+from robots.kinematics import Kinematics
 from robots.robot import Robot
 
 STEP = 0.005  # [m] of the tool point drawn back from row to row, at most
@@ -157,9 +158,8 @@ def _drawn_back(
         if len(rows) <= count:
             why = _in_the_way(robot, rows[-1], distance * (len(rows) - 1) / count)
             break
-        poses = placements(robot, rows)
-        steps = np.abs(np.diff(rows, axis=0))
-        bound = second_derivatives(steps, robot.prismatic, poses.levers, np.inf)
+        at, steps = jacobians(Kinematics(robot), rows), np.abs(np.diff(rows, axis=0))
+        bound = second_derivatives(steps, robot.prismatic, at.levers, np.inf)
         if bound.max() / 8.0 + CLOSE <= tolerance:
             return rows
         count *= 2

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask, Protected
-from feasibility.certification.jacobians import placements
 from feasibility.certification.rates.segment_rates import smallest_singular_values
 from feasibility.task import Task
 from feasibility.verdict import Certificate, Walk
+from robots.kinematics import Kinematics
 from robots.robot import Robot
 from surfaces.cells import Cells
 
@@ -59,7 +59,7 @@ def figures_of(
 ) -> PathFigures:
     """Measure a path over the cells `needed` (N,) that a replay has accepted with a certificate."""
     along, owner = _denser(walk.q)
-    points = placements(robot, along).points
+    points, _ = Kinematics(robot).tools(along)
     closest_point = cells.surface.closest(points)
     places = points - closest_point.height[:, None] * closest_point.normal
     steps = np.linalg.norm(np.diff(places, axis=0), axis=1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -10,8 +11,8 @@ import pinocchio as pin
 from scipy.optimize import nnls
 
 from robots.robot import Robot
-from robots.shapes.bodies import Geometry, Polytope, Solid, Triangles
-from robots.shapes.hulls import Hull, hull_of, rims
+from robots.shapes.bodies import Polytope, Solid, Triangles
+from robots.shapes.hulls import hull_of
 from robots.shapes.links import LinkShapes
 from robots.urdf.link_shapes import Cylinder
 
@@ -21,14 +22,12 @@ BARE = 0.02  # [m] from the tool point to the nearest body, from which on that i
 
 
 class Reach(NamedTuple):
-    """The place of one owner's bodies that is furthest along the approach axis."""
+    """How far one owner's bodies reach along the approach axis."""
 
     owner: str
     """A link, or 'tool'."""
     beyond: float
     """m beyond the tool point; negative where all ends behind it."""
-    radius: float
-    """m, largest distance from the axis of what ends there, or within 1 mm of it."""
 
 
 class ToolLine(NamedTuple):
@@ -94,39 +93,22 @@ def tool_reach(
         tool: bodies on the last joint that are no link's.
     """
     frame = robot.model.frames[robot.tool_frame_id].placement
-    axis = frame.rotation @ robot.approach_axis
-    furthest: dict[str, Reach] = {}
-    bodies: list[tuple[Solid | Polytope, np.ndarray, float]] = [
-        (solid, *_points_of(solid)) for solid in shapes.solids if solid.joint == robot.n
-    ]
-    bodies += [(body, np.asarray(body.vertices), body.radius) for body in tool]
-    for body, points, around in bodies:
-        offsets = points - frame.translation
-        along = offsets @ axis
-        end = float(along.max())
-        last = offsets[along > end - NEAR] - np.outer(along[along > end - NEAR], axis)
-        # A ball around the last point ends on the parallel to the axis through its centre.
-        reach = Reach(body.owner, end + around, float(np.linalg.norm(last, axis=1).max()))
-        known = furthest.get(body.owner)
-        if known is None or reach.beyond > known.beyond:
-            furthest[body.owner] = reach
-    return tuple(sorted(furthest.values(), key=lambda reach: -reach.beyond))
+    axis, beyond = frame.rotation @ robot.approach_axis, dict[str, float]()
+    ends = [(one.owner, _end(one, axis)) for one in shapes.solids if one.joint == robot.n]
+    ends += [(one.owner, float((one.vertices @ axis).max()) + one.radius) for one in tool]
+    for owner, end in ends:
+        beyond[owner] = max(beyond.get(owner, -np.inf), end - float(frame.translation @ axis))
+    return tuple(sorted(map(Reach._make, beyond.items()), key=lambda reach: -reach.beyond))
 
 
-def _points_of(solid: Solid) -> tuple[np.ndarray, float]:
-    """Points (k, 3) m in the joint's frame whose hull, thickened by a radius, is a shape's.
-
-    Rims of cylinders are 360 points of them.
-    """
-    points, radius = _extreme_points(solid.geometry)
-    return points @ solid.placement[:3, :3].T + solid.placement[:3, 3], radius
-
-
-def _extreme_points(shape: Geometry) -> Hull:
-    match shape:
+def _end(solid: Solid, axis: np.ndarray) -> float:
+    """m, how far along a unit vector (3,) a shape reaches from the origin of its joint's frame."""
+    own, place = solid.placement[:3, :3].T @ axis, float(solid.placement[:3, 3] @ axis)
+    match solid.geometry:
         case Triangles(vertices):
-            return Hull(vertices, 0.0)
+            return place + float((vertices @ own).max())
         case Cylinder(radius, length):
-            return Hull(rims(radius, length, 360), 0.0)
-        case _:
-            return hull_of(shape)
+            return place + 0.5 * length * abs(own[2]) + radius * math.hypot(own[0], own[1])
+        case shape:
+            vertices, around = hull_of(shape)
+            return place + float((vertices @ own).max()) + around

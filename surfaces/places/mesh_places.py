@@ -84,8 +84,7 @@ class MeshPlaces(OffsetSurface):
         made = PlacePaths.straight((self.at(start), self.at(end)), none, start, end)
         same = (start.chart == end.chart) & (start.chart >= 0)
         row = np.flatnonzero(same)
-        bounds = self._derivative_bounds(start.chart[row], start.x[row], end.x[row])
-        made.derivative_bounds[row, 2] = bounds
+        made.deviations[row, 2] = self._deviations(start.chart[row], start.x[row], end.x[row])
         row = np.flatnonzero(~same & (start.chart >= 0) & (end.chart >= 0))
         faces = self.surface.mesh.faces
         equal = faces[start.chart[row]][:, :, None] == faces[end.chart[row]][:, None, :]
@@ -127,11 +126,11 @@ class MeshPlaces(OffsetSurface):
         four = (start, before, after, end)
         placed = [self.at(places) for places in four]
         to, fro = (np.linalg.norm(placed[k + 1][0] - placed[k][0], axis=1) for k in (0, 2))
-        bounds = (
-            self._derivative_bounds(start.chart, start.x, before.x),
-            self._derivative_bounds(end.chart, after.x, end.x),
+        off = (
+            self._deviations(start.chart, start.x, before.x),
+            self._deviations(end.chart, after.x, end.x),
         )
-        return PlacePaths.over(four, placed, share_of(to, fro), bounds)
+        return PlacePaths.over(four, placed, share_of(to, fro), off)
 
     def _shortest(self, start: Places, end: Places, corner: Ints, last: Ints, t: Array) -> Array:
         """(k,) 0..1, where on the edge from `corner` to `last` the path from T to T is shortest.
@@ -160,13 +159,14 @@ class MeshPlaces(OffsetSurface):
         those of the offset surface are not."""
         return self.surface.points_at(places.chart, _weights(places.x))
 
-    def _derivative_bounds(self, face: Ints, start: Array, stop: Array) -> Array:
-        """(k, 2) see `PlacePaths.derivative_bounds`, for straight lines in the weights of a face.
+    def _deviations(self, face: Ints, start: Array, stop: Array) -> Array:
+        """(k, 2) see `PlacePaths.deviations`, for straight lines in the weights of a face.
 
-        On one side of the strip's border v is smooth: v'' = 2 t' g' for the sum g of
-        w_c (crease_c - own_c). A line over that border has a kink there; its slope is at most
+        An eighth of bounds of second derivatives. On one side of the strip's border v is smooth:
+        v'' = 2 t' g' for the sum g of w_c (crease_c - own_c). A line over that border has a kink
+        there; its slope is at most
         |o'| + |t'| |g| + |g'|, with o the sum of w_c own_c, and a curve of slope M differs from a
-        straight line by at most 2 M s (1 - s).
+        straight line by at most 2 M s (1 - s), as one with the second derivative 4 M.
         """
         surface = self.surface
         a, b = _weights(start), _weights(stop)
@@ -192,7 +192,7 @@ class MeshPlaces(OffsetSurface):
         positive = least > 0.0
         kinked = np.where(positive, 4.0 * slope / np.where(positive, least, 1.0), np.inf)
         normal = np.where(beside | within, smooth, kinked)
-        normal = np.where((start == stop).all(axis=1), 0.0, normal) * ROUNDING
+        normal = np.where((start == stop).all(axis=1), 0.0, normal / 8.0) * ROUNDING
         point = abs(self.height) * normal if self.height else np.zeros_like(normal)
         return np.stack([np.where(positive, point, np.inf), normal], axis=1)
 

@@ -57,9 +57,8 @@ class PatchPlaces(OffsetSurface):
                 step[:, axis] -= period * np.round(step[:, axis] / period)
         stop = start.x + step
         ends = self._at(start.x), self._at(end.x)
-        made = PlacePaths.straight(ends, np.zeros_like(step), start, Places(end.chart, stop))
-        made.deviations[:, 2] = self._deviations(start.x, stop)
-        return made
+        off = self._deviations(start.x, stop)
+        return PlacePaths.straight(ends, off, start, Places(end.chart, stop))
 
     def _deviations(self, start: Array, stop: Array) -> Array:
         """(k, 2) how far offset points (m) and normals are from straight between their ends."""

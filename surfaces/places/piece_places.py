@@ -78,17 +78,13 @@ class PiecePlaces(OffsetSurface):
             np.linalg.norm(path.points[:, 3] - path.points[:, 0], axis=1) for path in (first, last)
         )
         ends = ((first, 0), (first, 3), (last, 0), (last, 3))
-        none = np.zeros((len(to), 2))
-        made = PlacePaths.over(
+        off = [np.where(joined[:, None], path.deviations[:, 2], np.inf) for path in (first, last)]
+        return PlacePaths.over(
             [path.place(k) for path, k in ends],
             [(path.points[:, k], path.normals[:, k]) for path, k in ends],
             share_of(to, fro),
-            (none, none),
+            (off[0], off[1]),
         )
-        for piece, path in ((0, first), (2, last)):
-            own = np.where(joined[:, None], path.deviations[:, 2], np.inf)
-            made.deviations[:, piece] = own
-        return made
 
     def tangents(self, places: Places) -> Array:
         """See `OffsetSurface.tangents`."""

@@ -3,9 +3,8 @@
 A place is a point of the surface by its parameters: u and v on a patch, weights on the face of a
 mesh. Over a place x with the point f(x) and the outward unit normal n(x), the offset surface at a
 signed height h has the point T(x) = f(x) + h n(x). A path of places runs straight in the parameters
-between up to four of them. Along each straight piece, with its own parameter s in 0..1, T and n
-differ from straight lines by at most s (1 - s) / 2 times one bound, and another one; so whoever
-knows both at the ends of a piece knows them along it.
+between up to four of them. Along each straight piece T and n are near to straight lines between
+its ends; so whoever knows both there knows them along it.
 """
 
 from __future__ import annotations
@@ -54,12 +53,9 @@ class PlacePaths(NamedTuple):
     """(k, 4, 3) m, the offset surface's points over them."""
     normals: Array
     """(k, 4, 3) the surface's outward unit normals there."""
-    derivative_bounds: Array
-    """(k, 3, 2) of second derivatives: along each piece offset point (m) and normal differ from the
-    straight line between its ends by at most s (1 - s) / 2 times this; inf where nothing is known.
-    """
     deviations: Array
-    """(k, 3, 2) by how much they may be further off, anywhere along a piece; inf likewise."""
+    """(k, 3, 2) how far offset point (m) and normal may be, anywhere along each piece, from the
+    straight line between its ends; inf where nothing is known."""
     chart: Ints
     """(k, 4) patch or face of the four places."""
     x: Array
@@ -73,7 +69,7 @@ class PlacePaths(NamedTuple):
     @staticmethod
     def straight(
         ends: tuple[tuple[Array, Array], tuple[Array, Array]],
-        bounds: Array,
+        deviations: Array,
         start: Places,
         end: Places,
     ) -> PlacePaths:
@@ -81,19 +77,19 @@ class PlacePaths(NamedTuple):
 
         Args:
             ends: points and normals (k, 3) of the first, and of the last places.
-            bounds: (k, 2) derivative bounds of that piece.
+            deviations: (k, 2) of that piece.
             start, end: the places.
         """
         four, placed = (start, start, start, end), (ends[0], ends[0], ends[0], ends[1])
-        at_once = np.zeros(len(bounds))
-        return PlacePaths.over(four, placed, at_once, (np.zeros_like(bounds), bounds))
+        at_once = np.zeros(len(deviations))
+        return PlacePaths.over(four, placed, at_once, (np.zeros_like(deviations), deviations))
 
     @staticmethod
     def over(
         four: Sequence[Places],
         placed: Sequence[tuple[Array, Array]],
         share: Array,
-        bounds: tuple[Array, Array],
+        deviations: tuple[Array, Array],
     ) -> PlacePaths:
         """Paths of two pieces, over a place that belongs to both: on an edge, a seam, a pole.
 
@@ -101,7 +97,7 @@ class PlacePaths(NamedTuple):
             four: k places each: the first, that place twice, and the last.
             placed: points and normals (k, 3) over them.
             share: (k,) when a motion is to be at the place that belongs to both.
-            bounds: (k, 2) derivative bounds of the first, and of the last piece.
+            deviations: (k, 2) of the first, and of the last piece.
         """
         zero = np.zeros_like(share)
         points, normals = (np.stack(part, axis=1) for part in zip(*placed, strict=True))
@@ -110,8 +106,7 @@ class PlacePaths(NamedTuple):
             np.stack([zero, share, share, zero + 1.0], axis=1),
             points,
             normals,
-            np.stack([bounds[0], np.zeros_like(bounds[0]), bounds[1]], axis=1),
-            np.zeros((len(share), 3, 2)),
+            np.stack([deviations[0], np.zeros_like(deviations[0]), deviations[1]], axis=1),
             chart,
             x,
         )
@@ -119,15 +114,7 @@ class PlacePaths(NamedTuple):
     @property
     def known(self) -> Mask:
         """(k,) whether something is known of all pieces."""
-        both = self.derivative_bounds + self.deviations
-        return np.asarray(np.isfinite(both).all(axis=(1, 2)))
-
-    def of(self, rows: Ints | Mask) -> PlacePaths:
-        """Some of the paths."""
-        return PlacePaths(
-            self.share[rows], self.points[rows], self.normals[rows],
-            self.derivative_bounds[rows], self.deviations[rows], self.chart[rows], self.x[rows],
-        )  # fmt: skip
+        return np.asarray(np.isfinite(self.deviations).all(axis=(1, 2)))
 
     def put(self, rows: Ints | Mask, others: PlacePaths) -> None:
         """Replace some of the paths."""

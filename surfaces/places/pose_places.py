@@ -187,17 +187,17 @@ class PosePlaces(OffsetSurface):
         known = (start.chart >= 0) & (end.chart >= 0)
         made = PlacePaths.straight(ends, np.full((len(start.chart), 2), np.inf), start, end)
         same = np.flatnonzero(known & (start.chart == end.chart))
-        bounds = self._derivative_bounds(start.chart[same], start.x[same, 0], end.x[same, 0])
-        made.derivative_bounds[same, 2] = bounds
+        off = self._deviations(start.chart[same], start.x[same, 0], end.x[same, 0])
+        made.deviations[same, 2] = off
         rest = np.flatnonzero(known & (start.chart != end.chart))
         if len(rest):
             self._over_poses(made, rest, start.of(rest), end.of(rest))
         return made
 
-    def _derivative_bounds(self, chart: Ints, t0: Array, t1: Array) -> Array:
-        """(k, 2) see `PlacePaths.derivative_bounds`; a direction that turns at an even speed."""
+    def _deviations(self, chart: Ints, t0: Array, t1: Array) -> Array:
+        """(k, 2) see `PlacePaths.deviations`; a direction that turns at an even speed."""
         turn = (t1 - t0) * self._turn[chart]
-        return np.stack([np.zeros(len(chart)), ROUNDING * turn**2], axis=1)
+        return np.stack([np.zeros(len(chart)), ROUNDING * turn**2 / 8.0], axis=1)
 
     def _over_poses(self, made: PlacePaths, rows: Ints, start: Places, end: Places) -> None:
         """Paths from one curve to another, where they share a pose."""
@@ -211,12 +211,12 @@ class PosePlaces(OffsetSurface):
             self._length(start.chart, np.abs(start.x[:, 0] - to)),
             self._length(end.chart, np.abs(end.x[:, 0] - fro)),
         )
-        bounds = (
-            self._derivative_bounds(start.chart, start.x[:, 0], to),
-            self._derivative_bounds(end.chart, fro, end.x[:, 0]),
+        off = (
+            self._deviations(start.chart, start.x[:, 0], to),
+            self._deviations(end.chart, fro, end.x[:, 0]),
         )
         four = [start, _placed(start.chart, to), _placed(end.chart, fro), end]
-        made.put(rows, PlacePaths.over(four, [self.at(places) for places in four], share, bounds))
+        made.put(rows, PlacePaths.over(four, [self.at(places) for places in four], share, off))
 
     def tangents(self, places: Places) -> Array:
         """See `OffsetSurface.tangents`: between the tangents of both poses."""

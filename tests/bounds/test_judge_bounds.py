@@ -12,7 +12,7 @@ from samples import sampled, seeds
 
 from coverable import Task, cylinder, mesh, plane
 from feasibility.certification.cells_reached import at_targets, cells_reached
-from feasibility.certification.jacobians import jacobians, placements
+from feasibility.certification.jacobians import jacobians
 from feasibility.certification.lever_bounds import (
     largest_levers,
     lever_bounds,
@@ -161,7 +161,7 @@ def along(robot, surface, task, first, last, rounds=4):
     """Stretches of a motion of one joint, halved: of each its bounds, and 401 samples there."""
     judge, rows = judged(robot, surface, task), np.array([[first], [last]])
     at = judge.sampled(np.arange(2), np.zeros(2), rows)
-    stretch, found = judge.between_rows(rows, placements(robot, rows), at), []
+    stretch, found = judge.between_rows(rows, jacobians(Kinematics(robot), rows), at), []
     for _ in range(rounds):
         bounds = judge.bounds(stretch)
         for k in range(len(stretch.length)):
@@ -253,7 +253,7 @@ def test_what_is_not_known_at_an_end_is_not_known_between():
         np.array([[0.0], [0.1]]),
     )
     at = judge.sampled(np.arange(2), np.zeros(2), rows)
-    whole = judge.between_rows(rows, placements(judge.robot, rows), at)
+    whole = judge.between_rows(rows, jacobians(Kinematics(judge.robot), rows), at)
     assert judge.within(judge.bounds(whole)).all()
     for end in ("start", "end"):
         for name in ("points", "axes", "facets"):

@@ -88,8 +88,7 @@ def test_paths_of_places_bend_no_more_than_is_said(height):
     x, chart = rng.uniform(0, 1, (2, 300, 2)) * [1, 0], rng.integers(0, 24, 300)
     after = np.minimum(chart + rng.integers(0, 2, 300), 23)
     paths = offset.paths(Places(chart, x[0]), Places(after, x[1]))
-    assert np.isfinite(paths.derivative_bounds).all()
-    weight = (0.5 * DENSE * (1.0 - DENSE))[1:-1, None]
+    assert np.isfinite(paths.deviations).all()
     stated, found, aside, turned = [], [], [], []
     for piece in (0, 2):
         some = paths.share[:, piece + 1] > paths.share[:, piece]
@@ -99,9 +98,8 @@ def test_paths_of_places_bend_no_more_than_is_said(height):
         dense = Places(np.tile(one.chart, 41), line.reshape(-1, 2))
         values = np.stack(offset.at(dense), axis=1).reshape(41, -1, 2, 3)
         ends = values[[0]] + DENSE[:, None, None, None] * (values[[-1]] - values[[0]])
-        off = np.linalg.norm(values - ends, axis=3)[1:-1]
-        found.append((off / weight[..., None]).max(axis=0))
-        stated.append(paths.derivative_bounds[some, piece])
+        found.append(np.linalg.norm(values - ends, axis=3).max(axis=0))
+        stated.append(paths.deviations[some, piece])
         aside.append(offset.tangent_deviations(one, other))
         ways = offset.tangents(dense).reshape(41, -1, 3)
         line = ways[[0]] + DENSE[:, None, None] * (ways[[-1]] - ways[[0]])
@@ -111,7 +109,7 @@ def test_paths_of_places_bend_no_more_than_is_said(height):
     holds(stated[:, 0], found[:, 0], used=0.0, tiny=1e-9)  # offset points run straight
     holds(np.concatenate(aside), np.concatenate(turned), used=0.95, tiny=1e-9)
     far = offset.paths(Places(chart[:1], x[0, :1]), Places((chart[:1] + 12) % 24, x[0, :1]))
-    assert np.isinf(far.derivative_bounds).any()
+    assert np.isinf(far.deviations).any()
 
 
 @pytest.mark.parametrize("neighbours", ["order", 0.3])

@@ -24,7 +24,7 @@ from scipy.spatial import cKDTree
 
 from coverable.arrays import Array, Ints, Mask
 from coverable.errors import ArgumentError, Fault
-from feasibility.certification.jacobians import Jacobians, jacobians, placements
+from feasibility.certification.jacobians import Jacobians, jacobians
 from feasibility.certification.lever_bounds import second_derivatives
 from feasibility.certification.rates.segment_rates import (
     SegmentRates,
@@ -149,7 +149,7 @@ def in_place(robot: Robot, cells: Cells, task: Task, q: Array) -> Mask:
     targets, tolerance = task.targets(cells).points, task.effective_tolerance
     if len(q) < 2 or not len(targets):
         return np.zeros(max(len(q) - 1, 0), dtype=bool)
-    poses = placements(robot, q)
+    poses = jacobians(Kinematics(robot), q)
     off, nearest = cKDTree(targets).query(poses.points)
     after = np.linalg.norm(poses.points[1:] - targets[nearest[:-1]], axis=1)
     second = second_derivatives(np.abs(np.diff(q, axis=0)), robot.prismatic, poses.levers, np.inf)

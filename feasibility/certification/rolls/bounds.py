@@ -19,8 +19,6 @@ of its half turns is left out: there it is enough that F >= 0 for one sign, or t
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from coverable.arrays import Array, Mask
@@ -35,23 +33,6 @@ CLOSE_TO_ZERO = 1e-9  # [1], [rad]: u directions are known by differences to abo
 ROOT = float(np.sqrt(2.0))
 
 
-class ToolFrames(NamedTuple):
-    """The reference axes of m configurations, by Pinocchio."""
-
-    x: Array
-    """(m, 3) the reference axis."""
-    x_sines: Array
-    """(m, n) sine of the angle between each revolute axis and x; 0 if prismatic."""
-    y_sines: Array
-    """(m, n) the same with y, the third axis."""
-
-    def second_derivatives(self, robot: Robot, steps: Array) -> Array:
-        """(m - 1,) D_x + D_y between rows that differ by `steps` (m - 1, n), absolute."""
-        both = (self.x_sines, self.y_sines)
-        found = [second_derivatives(steps, robot.prismatic, sines, 1.0) for sines in both]
-        return found[0] + found[1]
-
-
 def reference_axes(robot: Robot, q: Array) -> Array:
     """(m, 3) x of the tool at configurations q (m, n), in the root frame."""
     frame = robot.model.frames[robot.tool_frame_id]
@@ -59,11 +40,15 @@ def reference_axes(robot: Robot, q: Array) -> Array:
     return np.asarray(joints @ (frame.placement.rotation @ robot.reference_axis))
 
 
-def tool_frames(robot: Robot, q: Array, axes: Array, x: Array) -> ToolFrames:
-    """The frames at q (m, n), whose approach and reference axes (m, 3) are known."""
-    angular = Kinematics(robot).twists(q)[:, 3:]
-    x_sines, y_sines = (lengths(cross(angular, axis)) for axis in (x, np.cross(axes, x)))
-    return ToolFrames(x, x_sines, y_sines)
+def frame_second_derivatives(robot: Robot, q: Array, axes: Array, x: Array) -> Array:
+    """(m - 1,) D_x + D_y between rows q (m, n), whose approach and reference axes (m, 3) are known.
+
+    With the sines of the angles between revolute axes and x, or y, in place of levers.
+    """
+    angular, steps = Kinematics(robot).twists(q)[:, 3:], np.abs(np.diff(q, axis=0))
+    sines = [lengths(cross(angular, axis)) for axis in (x, np.cross(axes, x))]
+    found = [second_derivatives(steps, robot.prismatic, one, 1.0) for one in sines]
+    return found[0] + found[1]
 
 
 def roll_vectors(x: Array, axes: Array, references: Array, approaches: Array, roll: Roll) -> Array:

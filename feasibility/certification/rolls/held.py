@@ -1,17 +1,17 @@
 """How a task wants the tool held over places of a surface: approach and reference direction.
 
-Along a straight piece of a path of places b differs from a straight line by at most
-s (1 - s) / 2 D_b + d_b (`PlacePaths`), and so by no more than D_b / 8 + d_b. The reference e is
-fixed, or the u direction, which differs from a straight line by a known amount, too
-(`OffsetSurface.tangent_deviations`). What that says of t, `box_models.reference_parts` knows, as
-over boxes: t is within a radius r_t of a straight line, and within d_t = 2 r_t of that between its
-ends. The product u = b x t has D_u = 2 |db| |dt|, and d_u = D_b / 8 + d_b + d_t on top.
+Along a straight piece of a path of places b differs from a straight line by at most d_b
+(`PlacePaths`). The reference e is fixed, or the u direction, which differs from a straight line by
+a known amount, too (`OffsetSurface.tangent_deviations`). What that says of t,
+`box_models.reference_parts` knows, as over boxes: t is within a radius r_t of a straight line, and
+within d_t = 2 r_t of that between its ends. The product u = b x t has D_u = 2 |db| |dt|, and
+d_u = d_b + d_t on top.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -30,16 +30,10 @@ from feasibility.task import Task
 from surfaces.cells import Cells
 from surfaces.places.places import OffsetSurface, PlacePaths, Places
 
+if TYPE_CHECKING:
+    from feasibility.certification.stretches import Samples
+
 FIRST, LAST = 0, 2  # pieces of a path; in the middle one the place changes sides, on the spot
-
-
-class ToolAxes(NamedTuple):
-    """Approach and reference axis of k configurations."""
-
-    axes: Array
-    """(k, 3)"""
-    x: Array
-    """(k, 3)"""
 
 
 class ReferencesAlong(NamedTuple):
@@ -84,12 +78,10 @@ class Held:
             return self.sign * normals
         return np.where(np.isnan(normals), np.nan, self.approach)
 
-    def bends(self, path: PlacePaths) -> tuple[Array, Array]:
-        """D_b and d_b (k, 3) of the pieces of paths."""
-        none = np.zeros_like(path.deviations[..., 1])
-        if self.approach is not None:
-            return none, none
-        return path.derivative_bounds[..., 1], path.deviations[..., 1]
+    def deviations(self, path: PlacePaths) -> Array:
+        """d_b (k, 3) of the pieces of paths."""
+        off = path.deviations[..., 1]
+        return off if self.approach is None else np.zeros_like(off)
 
     def _references(self, places: Places, approaches: Array) -> tuple[Array, Array]:
         """t (k, 3) and h (k,) at places."""
@@ -111,7 +103,7 @@ class Held:
         return off_middle(roll_vectors(x, axes, references, approaches, self.roll))
 
     def rolls_between(
-        self, start: ToolAxes, end: ToolAxes, second: Array, path: PlacePaths, approaches: Array
+        self, start: Samples, end: Samples, second: Array, path: PlacePaths, approaches: Array
     ) -> Array:
         """(k,) rad, bounds on that along stretches; inf where the roll may leave its range.
 
@@ -151,8 +143,7 @@ class Held:
         """
         ends = [self._references(path.place(k), approaches[:, k])[0] for k in range(4)]
         references = np.stack(ends, axis=1)
-        turned, aside = self.bends(path)
-        d_b = turned / 8.0 + aside
+        d_b = self.deviations(path)
         db, dt = (np.linalg.norm(np.diff(a, axis=1), axis=2) for a in (approaches, references))
         beside = np.zeros_like(d_b)
         for piece in (FIRST, LAST):
