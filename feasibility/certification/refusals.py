@@ -7,7 +7,7 @@ import numpy as np
 from coverable.arrays import Array
 from coverable.errors import counted
 from feasibility.certification.faults import MotionFault
-from feasibility.certification.stretches import Bounds, Judge, Samples, Stretches
+from feasibility.certification.stretches import Bounds, Judge, SampledStretches, Samples
 from feasibility.cone import angle_of
 from robots.robot import Robot
 
@@ -72,11 +72,11 @@ def _others(number: int, noun: str) -> str:
     return f" (the worst; wrong at {others}, too)" if number > 0 else ""
 
 
-def open_fault(judge: Judge, left: Stretches, bounds: Bounds) -> MotionFault:
+def open_fault(judge: Judge, left: SampledStretches, bounds: Bounds) -> MotionFault:
     """What to say of a stretch that neither bounds nor exact configurations decide."""
     # One with a jump first, then the shortest: what is wrong there is nearest to a place.
     one = int(np.lexsort((left.length, bounds.joined))[0])
-    row, share = int(left.start.row[one]), float(left.start.share[one] + 0.5 * left.length[one])
+    row, share = int(left.row[one]), float(left.middle[one])
     if not bounds.joined[one]:
         target = [
             judge.offset.at(s.places.of(np.array([one])))[0][0] for s in (left.start, left.end)

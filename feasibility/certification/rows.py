@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import Any, Self
 
 import numpy as np
@@ -38,8 +39,7 @@ class Rows:
 
     def _values(self) -> list[Any]:
         """What is in the fields."""
-        names: tuple[str, ...] = self.__slots__
-        return [getattr(self, name) for name in names]
+        return [getattr(self, one.name) for one in fields(self)]  # type: ignore[arg-type]
 
 
 def _some(value: Any, rows: Chosen) -> Any:

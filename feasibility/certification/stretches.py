@@ -30,6 +30,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
+from feasibility.certification.bisection import Stretches
 from feasibility.certification.jacobians import Jacobians
 from feasibility.certification.lever_bounds import peaks, second_derivatives
 from feasibility.certification.rolls.bounds import CLOSE_TO_ZERO as ROLL_CLOSE
@@ -72,21 +73,16 @@ class Samples(Rows):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Stretches(Rows):
+class SampledStretches(Stretches[Samples]):
     """k stretches from sample to sample."""
 
-    start: Samples
-    end: Samples
-    second: Array
-    """(k, 3) D_p (m), D_a and D_x + D_y by the stretch's own parameter."""
-    length: Array
-    """(k,) share of the segment between two rows."""
+    of_segment: Array
+    """(k, 3) D_p (m), D_a and D_x + D_y of the segment from row to row."""
 
-    def halves(self, middle: Samples) -> Stretches:
-        """Both halves of each, first all first halves."""
-        ends = Samples.join(self.start, middle), Samples.join(middle, self.end)
-        second = 0.25 * np.concatenate([self.second, self.second])
-        return Stretches(*ends, second, 0.5 * np.concatenate([self.length, self.length]))
+    @property
+    def second(self) -> Array:
+        """(k, 3) the same by the stretch's own parameter."""
+        return self.of_segment * self.length[:, None] ** 2
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -161,13 +157,13 @@ class Judge:
         target, normal = self.offset.at(places)
         return target, self._held.approaches(normal)
 
-    def middles(self, rows: Array, stretches: Stretches) -> Samples:
+    def middles(self, rows: Array, stretches: SampledStretches) -> Samples:
         """Samples in the middle of stretches of the motion `rows` (m, n)."""
-        row, share = stretches.start.row, stretches.start.share + 0.5 * stretches.length
+        row, share = stretches.row, stretches.middle
         q = rows[row] + share[:, None] * (rows[row + 1] - rows[row])
         return self.sampled(row, share, q)
 
-    def between_rows(self, rows: Array, poses: Jacobians, at: Samples) -> Stretches:
+    def between_rows(self, rows: Array, poses: Jacobians, at: Samples) -> SampledStretches:
         """The stretches from row to row, with the samples `at` every row."""
         steps, slides = np.abs(np.diff(rows, axis=0)), self.robot.prismatic
         second = [
@@ -177,26 +173,27 @@ class Judge:
         ]
         if self.task.roll is not None:
             second[2] = frame_second_derivatives(self.robot, rows, at.axes, at.x)
-        index = np.arange(len(rows))
-        ends = at.of(index[:-1]), at.of(index[1:])
-        return Stretches(*ends, np.stack(second, axis=1), np.ones(len(steps)))
+        row, none = np.arange(len(steps)), np.zeros(len(steps))
+        ends = at.of(row), at.of(row + 1)
+        return SampledStretches(row, none, none + 1.0, *ends, np.stack(second, axis=1))
 
-    def bounds(self, s: Stretches) -> Bounds:
+    def bounds(self, s: SampledStretches) -> Bounds:
         """See the module's text."""
         path = self.offset.paths(s.start.places, s.end.places)
         share, width = path.share[..., None], np.diff(path.share, axis=1) ** 2
+        second = s.second
         found = []
         approaches, off_axes = self._held.approaches(path.normals), self._held.deviations(path)
         for start, end, aims, own, beside in (
-            (s.start.points, s.end.points, path.points, s.second[:, :1], path.deviations[..., 0]),
-            (s.start.axes, s.end.axes, approaches, s.second[:, 1:2], off_axes),
+            (s.start.points, s.end.points, path.points, second[:, :1], path.deviations[..., 0]),
+            (s.start.axes, s.end.axes, approaches, second[:, 1:2], off_axes),
         ):  # fmt: skip
             line = (1.0 - share) * start[:, None] + share * end[:, None]
             sag = 0.5 * path.share * (1.0 - path.share) * own
             off = np.linalg.norm(line - aims, axis=2) + sag
             peak = peaks(off[:, :-1], off[:, 1:], width * own) + beside
             found.append(peak.max(axis=1, initial=0.0))
-        roll = self._held.rolls_between(s.start, s.end, s.second[:, 2], path, approaches)
+        roll = self._held.rolls_between(s.start, s.end, second[:, 2], path, approaches)
         return Bounds(found[0], found[1], _apart(s), path.known, roll)
 
     def beyond(self, one: Samples | Bounds) -> Array:
@@ -226,7 +223,7 @@ def beyond(task: Task, error: Array, chord: Array, roll: Array) -> Array:
     ])  # fmt: skip
 
 
-def _apart(s: Stretches) -> Array:
+def _apart(s: SampledStretches) -> Array:
     """(k,) m, lower bounds of the tool point's distance from the triangles of a mesh."""
     a, b = s.start.facets, s.end.facets
     known = np.isfinite(a) & np.isfinite(b)

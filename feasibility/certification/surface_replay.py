@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
+from feasibility.certification.bisection import bisected
 from feasibility.certification.cells_reached import (
     Reached,
     cells_reached,
@@ -35,7 +36,7 @@ from feasibility.certification.jacobians import jacobians
 from feasibility.certification.order import curves_of_marks, order_of_places
 from feasibility.certification.placement_margin import margin_fault, margin_of
 from feasibility.certification.refusals import exact_faults, limits, open_fault
-from feasibility.certification.stretches import Bounds, Judge, Samples, Stretches
+from feasibility.certification.stretches import Bounds, Judge, SampledStretches, Samples
 from feasibility.cone import angle_of
 from feasibility.task import Task
 from feasibility.verdict import Certificate
@@ -326,32 +327,33 @@ def _off(judge: Judge, one: Samples | Bounds) -> Array:
     return np.maximum(one.error, judge.task.standoff - one.facets)
 
 
-def _between(judge: Judge, rows: Array, stretches: Stretches) -> _Between:
+def _between(judge: Judge, rows: Array, stretches: SampledStretches) -> _Between:
     """Judge stretches whose ends are good, halved as needed."""
     most, samples, wrong = np.zeros(3), list[Samples](), list[Samples]()
-    left, seen, held = stretches, 0, list[tuple[Ints, Array, Array]]()
-    for level in range(LEVELS + 1):
+    held = list[tuple[Ints, Array, Array]]()
+
+    def decided(left: SampledStretches) -> Mask:
         bounds = judge.bounds(left)
         good = judge.within(bounds)
         each = (_off(judge, bounds), bounds.chord, bounds.roll)
-        most = np.maximum(most, [np.max(one[good], initial=0.0) for one in each])
-        held.append((left.start.row[good], bounds.chord[good], bounds.roll[good]))
-        left, bounds = left.of(~good), bounds.of(~good)
-        seen += len(left.length)
-        enough = sum(len(part.row) for part in wrong) > ENOUGH
-        if not len(left.length) or enough or level == LEVELS or seen > MOST_SAMPLES:
-            break
+        np.maximum(most, [np.max(one[good], initial=0.0) for one in each], out=most)
+        held.append((left.row[good], bounds.chord[good], bounds.roll[good]))
+        return good
+
+    def halves(left: SampledStretches) -> SampledStretches:
         middle = judge.middles(rows, left)
         good = judge.within(middle)
         samples.append(middle)
         if not good.all():
             wrong.append(middle.of(~good))
-        left = left.of(good).halves(middle.of(good))
-    faults = list[MotionFault]()
+        enough = sum(len(part.row) for part in wrong) > ENOUGH
+        return left.of(good & (not enough)).halves(middle.of(good & (not enough)))
+
+    left, faults = bisected(stretches, decided, halves, LEVELS, MOST_SAMPLES), list[MotionFault]()
     if wrong:
         faults = exact_faults(judge, Samples.join(*wrong), "place")
-    elif len(left.length):
-        faults = [open_fault(judge, left, bounds)]
+    elif len(left.row):
+        faults = [open_fault(judge, left, judge.bounds(left))]
     return _Between(most, faults, samples, held)
 
 

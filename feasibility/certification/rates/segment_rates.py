@@ -27,6 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
+from feasibility.certification.bisection import Stretches, bisected
 from feasibility.certification.jacobians import Jacobians, jacobians
 from feasibility.certification.lever_bounds import (
     column_changes,
@@ -40,7 +41,7 @@ from robots.robot import Robot
 
 LOOSE = 0.005  # [1] share by which a bound may be below an exact value, before it is good enough
 LEVELS = 14  # halvings of a segment
-MOST_PIECES = 400_000  # that are looked at, of all segments together
+MOST = 400_000  # stretches that are halved, of all segments together
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -62,16 +63,12 @@ class SegmentRates:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class _Pieces(Rows):
-    """Parts of segments that are still looked at."""
+class _Ends(Rows):
+    """k configurations."""
 
-    owner: Ints
-    low: Array
-    high: Array
-    first: Jacobians
-    last: Jacobians
-    sigmas: Array
-    """(k, 2) the smallest singular values at both ends; NaN where they do not matter."""
+    at: Jacobians
+    sigma: Array
+    """(k,) the smallest singular value; NaN where it does not matter."""
 
 
 @np.errstate(invalid="ignore")  # NaN where the velocity of a joint is not known
@@ -103,47 +100,52 @@ def segment_rates(
     rate, joint = allowed.min(axis=1, initial=np.inf), allowed.argmin(axis=1)
     rate = rate if resting is None else np.where(resting, np.inf, rate)
     groups = np.zeros(m, dtype=np.int64) if group is None else group
-    left = _whole(robot, starts, ends, sigma is not None)
+
+    def speeds(p: Stretches[_Ends]) -> tuple[Array, ...]:
+        r, found = rate[p.row], _way_bounds(robot, (ends - starts)[p.row], p)
+        return tuple(np.where(np.isinf(r), np.inf, value * r) for value in found)
+
+    def sigmas(p: Stretches[_Ends]) -> tuple[Array, ...]:
+        return _sigma_bounds(robot, steps[p.row], p)
+
     v, s = _Least(groups, speed), _Least(groups, sigma)
-    for level in range(LEVELS + 1):
-        width, r = left.high - left.low, rate[left.owner]
-        low, first, last = _way_bounds(robot, (ends - starts)[left.owner], width, left)
-        with np.errstate(invalid="ignore"):
-            still = np.isinf(r)
-            low, first, last = (np.where(still, np.inf, value * r) for value in (low, first, last))
-        open_ = v.seen(left, low, first, last)
-        if sigma is not None:
-            scaled = _sigma_bounds(robot, steps[left.owner] * width[:, None], left)
-            open_ |= s.seen(left, *scaled)
-        if level == LEVELS or 2 * open_.sum() > MOST_PIECES:
-            open_[:] = False
-        v.keep(left.owner[~open_], low[~open_])
-        if sigma is not None:
-            s.keep(left.owner[~open_], scaled[0][~open_])
-        left = _halved(robot, starts, ends, left.of(open_), sigma is not None)
-        if not len(left.owner):
-            break
+    figures = [(v, speeds), (s, sigmas)][: 1 if sigma is None else 2]
+
+    def decided(p: Stretches[_Ends]) -> Mask:
+        bounds = [(one, bound(p)) for one, bound in figures]
+        good = np.asarray(np.all([one.seen(p, *known) for one, known in bounds], axis=0))
+        for one, (low, _, _) in bounds:
+            one.keep(p.row[good], low[good])
+        return good
+
+    def halves(p: Stretches[_Ends]) -> Stretches[_Ends]:
+        q = starts[p.row] + p.middle[:, None] * (ends - starts)[p.row]
+        return p.halves(_ends(robot, q, sigma is not None))
+
+    left = _whole(robot, starts, ends, sigma is not None)
+    left = bisected(left, decided, halves, LEVELS, MOST)
+    for one, bound in figures:
+        one.keep(left.row, bound(left)[0])
     return SegmentRates(v.low, v.exact, joint, v.share, s.low, s.exact)
 
 
-def _whole(robot: Robot, starts: Array, ends: Array, with_sigma: bool) -> _Pieces:
+def _whole(robot: Robot, starts: Array, ends: Array, with_sigma: bool) -> Stretches[_Ends]:
     """Segments (m, n) as they are; where one begins where another ends, the arm is asked once."""
     m = len(starts)
     alone = np.ones(m, dtype=bool)
     alone[:-1] = (ends[:-1] != starts[1:]).any(axis=1)
-    at = jacobians(Kinematics(robot), np.vstack([starts, ends[alone]]))
+    known = _ends(robot, np.vstack([starts, ends[alone]]), with_sigma)
     before, after = np.arange(m), np.arange(1, m + 1)
     after[alone] = m + np.arange(alone.sum())
-    sigma = _sigma(robot, at, with_sigma)
-    sigmas = np.column_stack([sigma[before], sigma[after]])
-    return _Pieces(before, np.zeros(m), np.ones(m), at.of(before), at.of(after), sigmas)
+    return Stretches(before, np.zeros(m), np.ones(m), known.of(before), known.of(after))
 
 
-def _sigma(robot: Robot, at: Jacobians, asked: bool) -> Array:
-    """(k,) the smallest singular values, where they are asked for; NaN elsewhere."""
-    if not asked:
-        return np.full(len(at.points), np.nan)
-    return smallest_singular(at, robot.length_unit)
+def _ends(robot: Robot, q: Array, with_sigma: bool) -> _Ends:
+    """What has to be known of configurations (k, n)."""
+    at = jacobians(Kinematics(robot), q)
+    return _Ends(
+        at, smallest_singular(at, robot.length_unit) if with_sigma else np.full(len(q), np.nan)
+    )
 
 
 class _Least:
@@ -154,67 +156,45 @@ class _Least:
         self.groups, self.asked = groups, asked
         self.low, self.exact, self.share = np.full(m, np.inf), np.full(m, np.inf), np.zeros(m)
 
-    def seen(self, p: _Pieces, low: Array, first: Array, last: Array) -> Mask:
-        """Take note of exact values at the ends of pieces (k,); which pieces are still open."""
+    def seen(self, p: Stretches[_Ends], low: Array, first: Array, last: Array) -> Mask:
+        """Take note of exact values at the ends of stretches (k,); which of them are decided."""
         for values, where in ((first, p.low), (last, p.high)):
-            better = values < self.exact[p.owner]
-            np.minimum.at(self.exact, p.owner, values)
-            self.share[p.owner[better]] = where[better]
+            better = values < self.exact[p.row]
+            np.minimum.at(self.exact, p.row, values)
+            self.share[p.row[better]] = where[better]
         if self.asked is not None and np.isfinite(self.asked):
-            return np.asarray((low < self.asked) & (self.exact[p.owner] >= self.asked))
+            return np.asarray(~((low < self.asked) & (self.exact[p.row] >= self.asked)))
         least = np.full(int(self.groups.max(initial=0)) + 1, np.inf)
         np.minimum.at(least, self.groups, self.exact)
-        return np.asarray(low < (1.0 - LOOSE) * least[self.groups[p.owner]])
+        return np.asarray(~(low < (1.0 - LOOSE) * least[self.groups[p.row]]))
 
-    def keep(self, owner: Ints, low: Array) -> None:
-        """Take bounds of pieces that are not halved any more."""
-        np.minimum.at(self.low, owner, np.maximum(low, 0.0))
-
-
-def _halved(robot: Robot, starts: Array, ends: Array, left: _Pieces, with_sigma: bool) -> _Pieces:
-    """Both halves of each piece."""
-    if not len(left.owner):
-        return left
-    middle = 0.5 * (left.low + left.high)
-    begins = starts[left.owner]
-    at = jacobians(Kinematics(robot), begins + middle[:, None] * (ends[left.owner] - begins))
-    sigma, (before, after) = _sigma(robot, at, with_sigma), left.sigmas.T
-    sigmas = np.vstack([np.column_stack([before, sigma]), np.column_stack([sigma, after])])
-    return _Pieces(
-        np.concatenate([left.owner, left.owner]),
-        np.concatenate([left.low, middle]),
-        np.concatenate([middle, left.high]),
-        Jacobians.join(left.first, at),
-        Jacobians.join(at, left.last),
-        sigmas,
-    )
+    def keep(self, row: Ints, low: Array) -> None:
+        """Take bounds of stretches that are not halved any more."""
+        np.minimum.at(self.low, row, np.maximum(low, 0.0))
 
 
-def _way_bounds(robot: Robot, ways: Array, width: Array, p: _Pieces) -> tuple[Array, Array, Array]:
+def _way_bounds(robot: Robot, ways: Array, p: Stretches[_Ends]) -> tuple[Array, Array, Array]:
     """Lower bound of |p'| by the segment's own parameter, and its values at both ends, (k,)."""
-    steps = np.abs(ways) * width[:, None]
-    levers = levers_along(steps, robot.prismatic, p.first.levers, p.last.levers, np.inf)
+    at, steps = (p.start.at, p.end.at), np.abs(ways) * p.length[:, None]
+    levers = levers_along(steps, robot.prismatic, at[0].levers, at[1].levers, np.inf)
     second = second_derivative_bound(levers, steps, robot.prismatic)
-    ends = [
-        np.linalg.norm(np.einsum("kij,kj->ki", at.point, ways), axis=1) for at in (p.first, p.last)
-    ]
-    chord = np.linalg.norm(p.last.points - p.first.points, axis=1)
-    low = np.maximum(0.5 * ((ends[0] + ends[1]) * width - second), chord - 0.5 * second)
-    return low / width, ends[0], ends[1]
+    first, last = (np.linalg.norm(np.einsum("kij,kj->ki", end.point, ways), axis=1) for end in at)
+    chord = np.linalg.norm(at[1].points - at[0].points, axis=1)
+    low = np.maximum(0.5 * ((first + last) * p.length - second), chord - 0.5 * second)
+    return low / p.length, first, last
 
 
-def _sigma_bounds(robot: Robot, steps: Array, p: _Pieces) -> tuple[Array, Array, Array]:
+def _sigma_bounds(robot: Robot, steps: Array, p: Stretches[_Ends]) -> tuple[Array, Array, Array]:
     """Lower bound of the singular value, and its values at both ends, (k,)."""
-    scale = robot.length_unit
-    square = np.zeros(len(steps))
+    square, steps = np.zeros(len(steps)), steps * p.length[:, None]
     for first, last, cap, unit in (
-        (p.first.levers, p.last.levers, np.inf, scale),
-        (p.first.sines, p.last.sines, 1.0, 1.0),
+        (p.start.at.levers, p.end.at.levers, np.inf, robot.length_unit),
+        (p.start.at.sines, p.end.at.sines, 1.0, 1.0),
     ):
         most = levers_along(steps, robot.prismatic, first, last, cap)
         change = column_changes(most, steps, robot.prismatic)
         square += ((change / unit) ** 2).sum(axis=1)
-    first, last = p.sigmas.T
+    first, last = p.start.sigma, p.end.sigma
     return 0.5 * (first + last - np.sqrt(square)), first, last
 
 
