@@ -11,7 +11,7 @@ import numpy as np
 
 from coverable.errors import ArgumentError
 from feasibility.collisions.bodies import Bodies, Pair, Soup
-from feasibility.collisions.outer_bodies import polytopes_of, soup_of, tool_polytopes, tool_solids
+from feasibility.collisions.outer_bodies import polytopes_of, soup_of, tool_solids
 from feasibility.collisions.overlaps_at_rest import overlapping
 from feasibility.collisions.scene import ToolShape
 from feasibility.collisions.seats import Seat, carried_bodies, furthest, seats_of
@@ -19,7 +19,7 @@ from feasibility.collisions.settings import Collision
 from feasibility.collisions.words import SURFACE, TOOL
 from robots.robot import Robot
 from robots.shapes.bodies import Fineness, Polytope
-from robots.shapes.links import LinkShapes, link_shapes
+from robots.shapes.links import LinkShapes, link_shapes, outer_bodies
 from robots.shapes.pairs import LeftOut, LinkPairs, link_pairs
 from robots.shapes.sampling import with_crude_links_cut
 from robots.shapes.tool import BARE, Reach, bare_length, tool_line, tool_reach
@@ -103,11 +103,12 @@ def _arm(
         scene: names of its objects.
         with_itself: is the arm to stay clear of itself?
     """
-    hulls, bodies = link_shapes(robot, fineness), tool_polytopes(tool, robot)
+    hulls, solids = link_shapes(robot, fineness), tool_solids(tool, robot)
+    bodies = [body for solid in solids for body in outer_bodies(solid)]
 
     def sorted_pairs(shapes: LinkShapes) -> LinkPairs:
         others = [*scene, SURFACE, TOOL]
-        return link_pairs(robot, shapes, allow, srdf, bodies, others, tool_solids(tool, robot))
+        return link_pairs(robot, shapes, allow, srdf, bodies, others, solids)
 
     shapes = hulls
     if with_itself and fineness == "hulls":

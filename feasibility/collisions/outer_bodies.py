@@ -19,7 +19,8 @@ from feasibility.collisions.shapes import HalfSpace
 from feasibility.collisions.words import TOOL
 from robots.robot import Robot
 from robots.shapes.bodies import Polytope, Solid, Triangles
-from robots.shapes.hulls import hull_of, is_convex
+from robots.shapes.hulls import is_convex
+from robots.shapes.links import outer_bodies
 
 Points = Array
 
@@ -47,8 +48,7 @@ def polytopes_of(obstacle: Obstacle, reach: float) -> tuple[Polytope, ...] | Non
         return (Polytope(obstacle.name, 0, vertices, 0.0),)
     if isinstance(geometry, Triangles) and not _is_convex(geometry):
         return None
-    vertices, radius = hull_of(geometry)
-    return (Polytope(obstacle.name, 0, _moved(placement, vertices), radius),)
+    return tuple(outer_bodies(Solid(obstacle.name, 0, placement, geometry)))
 
 
 def soup_of(obstacle: Obstacle) -> Soup | None:
@@ -68,15 +68,6 @@ def tool_solids(tool: Sequence[ToolShape], robot: Robot) -> tuple[Solid, ...]:
         Solid(TOOL, int(frame.parentJoint), mount @ shape.placement, shape.geometry)
         for shape in tool
     )
-
-
-def tool_polytopes(tool: Sequence[ToolShape], robot: Robot) -> tuple[Polytope, ...]:
-    """Convex bodies around the shapes of the tool, on the last joint; a mesh gets its hull."""
-    found = []
-    for solid in tool_solids(tool, robot):
-        vertices, radius = hull_of(solid.geometry)
-        found.append(Polytope(TOOL, solid.joint, _moved(solid.placement, vertices), radius))
-    return tuple(found)
 
 
 def _is_convex(shape: Triangles) -> bool:

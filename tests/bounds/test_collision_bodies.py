@@ -10,10 +10,11 @@ from coverable import Axis, Collision, Obstacle, ToolShape, load_robot, plane
 from coverable.errors import ArgumentError
 from feasibility.certification.collisions.collision_replay import collision_replay
 from feasibility.collisions.asked_bodies import gather
-from feasibility.collisions.outer_bodies import polytopes_of, soup_of, tool_polytopes, tool_solids
+from feasibility.collisions.outer_bodies import polytopes_of, soup_of, tool_solids
 from feasibility.collisions.shapes import HalfSpace
 from feasibility.collisions.words import TOOL
 from robots.shapes.bodies import Triangles
+from robots.shapes.links import outer_bodies
 from surfaces.surface import rotation_from_rpy
 
 UR5 = load_robot("ur5")
@@ -246,7 +247,8 @@ def test_convex_meshes_are_one_body_and_others_are_triangles():
 def test_tool_shapes_move_with_the_last_joint():
     """For the judge and for the search: the ends of a capsule, 0.1 m apart."""
     shape = ToolShape.capsule(0.02, 0.1, position=(0.0, 0.01, -0.05), rpy_deg=(90, 0, 0))
-    (solid,), (body,) = tool_solids((shape,), UR5), tool_polytopes((shape,), UR5)
+    (solid,) = tool_solids((shape,), UR5)
+    (body,) = outer_bodies(solid)
     assert (solid.owner, body.owner, solid.joint, body.joint) == ("tool", "tool", 6, 6)
     flange = UR5.model.frames[UR5.tool_frame_id].placement.homogeneous
     assert np.allclose(solid.placement, flange @ shape.placement)

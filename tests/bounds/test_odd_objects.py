@@ -10,8 +10,9 @@ from samples import sampled, seeds
 from coverable import Obstacle, ToolShape, load_robot
 from feasibility.certification.collisions.collision_replay import collision_replay
 from feasibility.collisions.bodies import Bodies, Pair
-from feasibility.collisions.outer_bodies import polytopes_of, soup_of, tool_polytopes, tool_solids
+from feasibility.collisions.outer_bodies import polytopes_of, soup_of, tool_solids
 from robots.shapes.bodies import Solid, Triangles
+from robots.shapes.links import outer_bodies
 from robots.urdf.link_shapes import Sphere
 
 UR5, SMALL, LARGE = load_robot("ur5"), 1e-6, 1e4
@@ -29,7 +30,7 @@ def use(obstacle, tool=()):
     for found in (*(body.vertices for body in bodies or ()), *([soup.triangles] if soup else ())):
         assert len(found)
         assert np.isfinite(found).all()
-    for body in tool_polytopes(tool, UR5):
+    for body in (body for solid in tool_solids(tool, UR5) for body in outer_bodies(solid)):
         assert 1 <= len(body.vertices) <= 64
         assert np.isfinite(body.vertices).all()
     solids = (*tool_solids(tool, UR5), Solid("ball", UR5.n, np.eye(4), Sphere(0.05)))

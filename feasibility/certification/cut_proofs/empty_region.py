@@ -14,7 +14,7 @@ are cut along what moves the point that shows it.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -68,36 +68,23 @@ class Outcome:
     """(n,) a configuration that refutes it, if one was found."""
 
 
+@dataclass(eq=False, slots=True)
 class Emptiness:
     """Proves regions empty of configurations with the tool on the surface, or at cells' targets."""
 
-    def __init__(
-        self,
-        arm: ArmModel,
-        parts: Parts,
-        roots: Callable[[int | None], int],
-        allowed: Allowed,
-        tick: Callable[[], object],
-        overlapping: Overlapping | None = None,
-    ) -> None:
-        """Work for one arm and one surface.
-
-        Args:
-            arm: the arm.
-            parts: the parts of the surface, and targets of cells as parts of their own.
-            roots: the part of a cell's target, or of the whole surface for None.
-            allowed: how far the tool may be off.
-            tick: called between batches; may raise.
-            overlapping: finds boxes in which bodies overlap; None where they may.
-        """
-        self.overlapping = overlapping
-        self.blamed = set[int]()
-        """Indices of the pairs that were found to overlap all over some box."""
-        self.arm = arm
-        self.parts = parts
-        self.roots = roots
-        self.allowed = allowed
-        self.tick = tick
+    arm: ArmModel
+    parts: Parts
+    """Of the surface, and targets of cells as parts of their own."""
+    roots: Callable[[int | None], int]
+    """The part of a cell's target, or of the whole surface for None."""
+    allowed: Allowed
+    """How far the tool may be off."""
+    tick: Callable[[], object]
+    """Called between batches; may raise."""
+    overlapping: Overlapping | None = None
+    """Finds boxes in which bodies overlap; None where they may."""
+    blamed: set[int] = field(default_factory=set)
+    """Indices of the pairs that were found to overlap all over some box."""
 
     def test(self, claims: list[Claim], refuter: Refuter, most: int) -> Outcome:
         """Confirm all claims, refute one, or give up after `most` boxes."""

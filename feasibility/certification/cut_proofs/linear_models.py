@@ -46,7 +46,8 @@ ANY_AXIS = 4.0  # a chord that two unit vectors never have
 GUARD = 1e-9  # [m], [1] added to every radius; rounding of double arithmetic is about 1e-15
 
 
-class Parts(NamedTuple):
+@dataclass(frozen=True, eq=False, slots=True)
+class Parts(Rows):
     """Parts of the surface that the tool point is to be on, with target points and approaches."""
 
     centre: Array
@@ -98,20 +99,6 @@ def cell_parts(targets: Targets) -> Parts:
         np.full((count, 2), -1),
         np.full(count, -1),
         Directions(known, np.zeros((count, 2, 3)), np.zeros(count)),
-    )
-
-
-def with_cells(parts: Parts, targets: Targets) -> Parts:
-    """The parts, and after them those of `cell_parts`."""
-    cells = cell_parts(targets)
-    held = zip(parts.references, cells.references, strict=True)
-    return Parts(
-        np.concatenate([parts.centre, cells.centre]),
-        np.concatenate([parts.slopes, cells.slopes]),
-        np.concatenate([parts.radius, cells.radius]),
-        np.concatenate([parts.children, cells.children]),
-        np.concatenate([parts.axis, cells.axis]),
-        Directions(*(np.concatenate(both) for both in held)),
     )
 
 

@@ -32,8 +32,8 @@ from feasibility.certification.cut_proofs.linear_models import (
     Allowed,
     ArmModel,
     Parts,
+    cell_parts,
     target_parts,
-    with_cells,
 )
 from feasibility.certification.cut_proofs.parts_agreement import disagreement
 from feasibility.certification.cut_proofs.refutation import Refuter
@@ -149,7 +149,7 @@ def verify_on(
     bodies = gather(robot, cells.surface, task.collision, task.standoff)
 
     def tested(boxes: int, overlapping: Overlapping | None = None) -> Outcome:
-        held = with_cells(surface, targets)
+        held = surface.join(surface, cell_parts(targets))
         emptiness = Emptiness(arm, held, root_of, allowed, tick or (lambda: None), overlapping)
         return emptiness.test(claims, refuter, boxes)
 

@@ -24,11 +24,13 @@ more, h the least |g|. Where e is square to b everywhere, as the u direction is 
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from coverable.arrays import Array
+from feasibility.certification.rows import Rows
 from feasibility.roll import Roll, projected
 from surfaces.places.places import second_derivative_of_unit
 
@@ -37,7 +39,8 @@ NEVER = 4.0  # [1] of |F - 1|, which says nothing
 LEAST = 0.02  # [1] of h: nearer to a reference along b nothing is said
 
 
-class Directions(NamedTuple):
+@dataclass(frozen=True, eq=False, slots=True)
+class Directions(Rows):
     """Unit vectors over K parts: within a radius of affine models, or on them at their ends."""
 
     centre: Array
@@ -61,7 +64,7 @@ class Directions(NamedTuple):
     @staticmethod
     def unknown(count: int) -> Directions:
         """Of which nothing is known."""
-        return Directions.fixed(np.zeros(3), count)._replace(radius=np.full(count, np.inf))
+        return replace(Directions.fixed(np.zeros(3), count), radius=np.full(count, np.inf))
 
 
 @np.errstate(invalid="ignore", divide="ignore", over="ignore")  # what is not known is inf or NaN
@@ -75,7 +78,7 @@ def reference_parts(b: Directions, e: Directions, square: bool = False) -> Direc
         ([[1.0, 0.0, 0.0]], [0.0])
     """
     if square:
-        return _where_known(*e)
+        return _where_known(e.centre, e.slopes, e.radius)
     length = np.linalg.norm(b.centre, axis=1)
     ahead = b.centre / length[:, None]
     t, sine = projected(e.centre, ahead)
