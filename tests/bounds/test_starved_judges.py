@@ -64,7 +64,7 @@ def test_stretches_of_a_motion(name, held, bent):
     parts = judge.between_rows(rows, poses, known)
     assert judge.within(judge.bounds(parts)).all()
     for column in bent:
-        bounds = judge.bounds(replace(parts, second=grown(parts.second, column)))
+        bounds = judge.bounds(replace(parts, of_segment=grown(parts.of_segment, column)))
         assert not judge.within(bounds).any()
         assert column or not (np.isfinite(bounds.facets) & (bounds.facets > 0.0)).any()
     away = replace(parts, end=replace(parts.end, points=parts.end.points + LARGE))
