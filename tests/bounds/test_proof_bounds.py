@@ -251,7 +251,8 @@ def test_children_of_a_part_hold_all_of_it(axis):
     parts = target_parts(plane((0, 1), (0, 1)).parts(1e-3, 0.1), plane((0, 1), (0, 1)).cells(1, 1),
                          Task(0.0, 20))  # fmt: skip
     many = [getattr(parts, name) for name in ("centre", "slopes", "radius")]
-    parts = parts._replace(
+    parts = replace(
+        parts,
         **{name: np.repeat(value[:1], 3, axis=0) for name, value in
            zip(("centre", "slopes", "radius"), many, strict=True)},
         children=np.array([[1, 2], [-1, -1], [-1, -1]]), axis=np.array([axis, -1, -1]),

@@ -65,7 +65,7 @@ def test_boxes_of_joints(roll):
         assert proved(replace(away, radius=grown(away.radius, column))) == (False, False)
     for k, name in enumerate(("position", "axis")):
         assert model(allowed=fed._replace(**{name: LARGE})).radius[0, k] >= 0.2 * LARGE
-        assert model(parts._replace(radius=grown(parts.radius, k))).radius[0, k] >= 0.2 * LARGE
+        assert model(replace(parts, radius=grown(parts.radius, k))).radius[0, k] >= 0.2 * LARGE
         assert model(half=np.pi).radius[0, k] > 1.0 + least[k]
 
 
