@@ -193,7 +193,8 @@ class Judge:
             off = np.linalg.norm(line - aims, axis=2) + sag
             peak = peaks(off[:, :-1], off[:, 1:], width * own) + beside
             found.append(peak.max(axis=1, initial=0.0))
-        roll = self._held.rolls_between(s.start, s.end, second[:, 2], path, approaches)
+        x, axes = (s.start.x, s.end.x), (s.start.axes, s.end.axes)
+        roll = self._held.rolls_between(x, axes, second[:, 2], path, approaches)
         return Bounds(found[0], found[1], _apart(s), path.known, roll)
 
     def beyond(self, one: Samples | Bounds) -> Array:

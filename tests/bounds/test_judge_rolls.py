@@ -172,7 +172,7 @@ def test_the_bounds_of_references_are_those_of_the_lemma(kind):
             unknown = np.array([[s * (1.0 - s) / 2.0 * second for s in at[k : k + 2]]])
             unknown += np.sqrt(2.0) * (2.0 * d_t + d_b)
             worst.append(largest_off(z0, z1, np.array([most]), unknown, half)[0])
-        ends = [SimpleNamespace(axes=axes[k : k + 1], x=x[k : k + 1]) for k in (0, 1)]
+        ends = [tuple(np.split(one, 2)) for one in (x, axes)]
         found = held.rolls_between(*ends, np.array([second]), path, path.normals)
         assert found[0] == pytest.approx(max(worst), abs=1e-7)
 

@@ -11,7 +11,7 @@ d_u = d_b + d_t on top.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,9 +29,6 @@ from feasibility.roll import Roll, projected
 from feasibility.task import Task
 from surfaces.cells import Cells
 from surfaces.places.places import OffsetSurface, PlacePaths, Places
-
-if TYPE_CHECKING:
-    from feasibility.certification.stretches import Samples
 
 FIRST, LAST = 0, 2  # pieces of a path; in the middle one the place changes sides, on the spot
 
@@ -103,12 +100,17 @@ class Held:
         return off_middle(roll_vectors(x, axes, references, approaches, self.roll))
 
     def rolls_between(
-        self, start: Samples, end: Samples, second: Array, path: PlacePaths, approaches: Array
+        self,
+        x: tuple[Array, Array],
+        axes: tuple[Array, Array],
+        second: Array,
+        path: PlacePaths,
+        approaches: Array,
     ) -> Array:
         """(k,) rad, bounds on that along stretches; inf where the roll may leave its range.
 
         Args:
-            start, end: the tool at both ends.
+            x, axes: (k, 3) of the tool at both ends.
             second: (k,) D_x + D_y along the stretch.
             path: of places.
             approaches: (k, 4, 3) at its four places.
@@ -118,15 +120,15 @@ class Held:
             return np.zeros(count)
         references, second_u, beside = self.references_along(path, approaches)
         share = path.share[..., None]
-        ends = (start.x, end.x), (np.cross(start.axes, start.x), np.cross(end.axes, end.x))
-        x, y = ((1.0 - share) * one[:, None] + share * other[:, None] for one, other in ends)
-        z = vectors_of(x, y, references, np.cross(approaches, references), self.roll)
+        ends = x, tuple(map(np.cross, axes, x))
+        xs, ys = ((1.0 - share) * one[:, None] + share * other[:, None] for one, other in ends)
+        z = vectors_of(xs, ys, references, np.cross(approaches, references), self.roll)
         unknown = 0.5 * path.share * (1.0 - path.share) * second[:, None]
         dt, du = np.diff(references, axis=1), np.diff(np.cross(approaches, references), axis=1)
         width = np.diff(path.share, axis=1)
         with np.errstate(invalid="ignore"):  # inf * 0 is NaN, and refused
             most = width**2 * second[:, None] + ROOT * second_u
-            most += products_of_changes(np.diff(x, axis=1), np.diff(y, axis=1), dt, du)
+            most += products_of_changes(np.diff(xs, axis=1), np.diff(ys, axis=1), dt, du)
         most[:, 1] = 0.0  # on the spot: right on both sides is enough
         found = []
         for k in range(3):
