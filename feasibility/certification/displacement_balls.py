@@ -44,11 +44,12 @@ from feasibility.verdict import Bound
 from robots.kinematics import Kinematics
 from robots.robot import Robot
 
-CLOSE = 0.97  # [1] of the least room at a configuration: stretches with so much are not halved
+CLOSE = 0.95  # [1] of the least room at a configuration: stretches with so much are not halved
 LEVELS = 12  # halvings of a segment
-BALLS = 3  # that are tried, each of the size that the one before allows
+BALLS = 2  # that are tried, each of the size that the one before allows: a third is the second
 MOST = 10.0  # [m] no larger ball is tried
-ROUNDS = 40  # halvings of the angle that is looked for
+LEAST = 1e-9  # [m], [rad] so that nothing is divided by 0
+FREE = 1e9  # [rad] room for what is free
 BELOW = 1.0 - 1e-9  # [1] of what is found is claimed: rounding
 SINGULAR = 1e-10  # [1] ratio of squared singular values, up to which there is no right inverse
 BOUNDS = (Bound.LIMIT, Bound.CONE, Bound.ROLL, Bound.SINGULAR)
@@ -133,42 +134,41 @@ class Balls(Rows):
     far: Array
     """(k,) m, r."""
 
-    def allowed(self, theta: Array) -> Array:
-        """(k, 4) m, y with the part turned by theta (k,), by `BOUNDS`; below 0 where not so far."""
-        left = self.room - theta[:, None]
-        chord = 2.0 * np.sin(0.5 * np.clip(left[:, 0], 0.0, np.pi))
-        first, bend = self.tilts.T
-        tilt = ratio(2.0 * chord, first + np.sqrt(first**2 + 2.0 * bend * chord))
-        tilt = np.where(np.isinf(left[:, 0]), MOST, tilt)
-        roll = ratio(np.maximum(left[:, 1], 0.0), self.turns)
-        both = np.where(left < 0.0, -1.0, np.stack([tilt, roll], axis=1))
-        return np.column_stack([self.caps[:, 0], both, self.caps[:, 1]])
+    def allowed(self, turn: Array | float) -> Array:
+        """(k, 4) m, y by `BOUNDS`, with the part turned by so many rad for each metre of f(y)."""
+        cone, roll = self.room.T
+        chord = np.where(cone < np.pi, 2.0 * np.sin(0.5 * cone), FREE)
+        less, (first, bend) = turn * chord / np.maximum(cone, LEAST), self.tilts.T
+        tilt = solved(first + less * self.slope, bend - less * self.second, chord)
+        twist = solved(self.turns + turn * self.slope, -turn * self.second, roll)
+        return np.column_stack([self.caps[:, 0], tilt, twist, self.caps[:, 1]])
 
-    def reached(self, theta: Array) -> Array:
-        """(k,) m, f of that; below 0 where the part must not be turned so far."""
-        y = self.allowed(theta).min(axis=1)
-        return np.where(y < 0.0, -1.0, self.slope * y - 0.5 * self.second * y**2)
+    def reached(self, turn: Array | float) -> Array:
+        """(k,) m, f of the least of these."""
+        y = self.allowed(turn).min(axis=1)
+        return np.asarray(self.slope * y - 0.5 * self.second * y**2)
 
     @property
     def positions(self) -> Array:
         """(k,) m, D where Theta = 0."""
-        return self.reached(np.zeros(len(self.row)))
+        return self.reached(0.0)
 
     @property
     def angles(self) -> Array:
-        """(k,) rad, Theta where D = 0."""
-        low, high = np.zeros(len(self.row)), np.minimum(self.room.min(axis=1), np.pi)
-        for _ in range(ROUNDS):
-            middle = 0.5 * (low + high)
-            good = self.reached(middle) >= middle * self.far
-            low, high = np.where(good, middle, low), np.where(good, high, middle)
-        return low
+        """(k,) rad, Theta where D = 0: the chord of what is left of the cone is concave in it."""
+        most = np.minimum(self.room.min(axis=1), np.pi)
+        return np.minimum(self.reached(1.0 / self.far) / self.far, most)
 
     def moved(self, position: float, angle: float) -> Array:
         """(k, n) rad or m, e_j wherever the part stands in that triangle."""
         rho = np.maximum(position, angle * self.far)
-        root = np.sqrt(np.maximum(self.slope**2 - 2.0 * self.second * rho, 0.0))
-        return self.moves * ratio(2.0 * rho, self.slope + root)[:, None]
+        return self.moves * solved(self.slope, -self.second, rho)[:, None]
+
+
+def solved(a: Array, b: Array, c: Array) -> Array:
+    """(k,) the least y >= 0 with a y + b y^2 / 2 = c, at most `MOST`; that, too, where none is."""
+    under = a**2 + 2.0 * b * c
+    return np.where(under < 0.0, MOST, ratio(2.0 * c, a + np.sqrt(np.maximum(under, 0.0))))
 
 
 def ratio(a: Array, b: Array) -> Array:
@@ -199,7 +199,7 @@ def best_balls(case: Given, s: Parts) -> Balls:
     none, size = np.zeros(len(s.row)), np.full(len(s.row), MOST)
     made = balls_of(case, s, none, size)  # a guess: it holds for |v| = 0 alone
     for _ in range(BALLS):
-        size = made.allowed(none).min(axis=1)
+        size = made.allowed(0.0).min(axis=1)
         made = balls_of(case, s, size, size)
     return made
 
@@ -218,18 +218,19 @@ def balls_of(case: Given, s: Parts, size: Array, most: Array) -> Balls:
     changes = [_norms(column_changes(levers, steps, slides)) for levers in along]
     slope = np.maximum(1.0 - off - 0.5 * norm * changes[0], 0.0)
     second, bend = (second_derivative_bound(levers, moves, slides) for levers in within)
-    spare = 0.5 * (a.sigma + b.sigma - _falls(robot, along, steps)) - asked
-    singular = ratio(np.maximum(spare, 0.0), _falls(robot, within, moves))
-    singular = np.minimum(singular, np.where(slope > 0.0, ratio(BELOW * slope, second), 0.0))
-    singular = np.minimum(singular, most)
+    singular = np.minimum(most, np.where(slope > 0.0, ratio(BELOW * slope, second), 0.0))
+    if asked:
+        spare = 0.5 * (a.sigma + b.sigma - _falls(robot, along, steps)) - asked
+        rest = ratio(np.maximum(spare, 0.0), _falls(robot, within, moves))
+        singular = np.minimum(singular, rest)
     limits = ratio(left_to_limits(robot, a.q, b.q), moves)
     far = np.maximum(*(np.linalg.norm(end.points - case.pivot, axis=1) for end in (a, b)))
     tilts = np.column_stack([turned + 0.5 * norm * changes[1], bend])
     return Balls(
         s.row, s.share, slope, second, tilts, moves,
         np.where(slides, 0.0, moves).sum(axis=1), np.column_stack([limits.min(axis=1), singular]),
-        s.room * [1.0, np.cos(0.5 * min(case.task.cone, 0.5 * np.pi))],
-        far + 0.5 * (along[0] * steps).sum(axis=1),
+        np.minimum(s.room, FREE) * [1.0, np.cos(0.5 * min(case.task.cone, 0.5 * np.pi))],
+        np.maximum(far + 0.5 * (along[0] * steps).sum(axis=1), LEAST),
     )  # fmt: skip
 
 
@@ -238,22 +239,20 @@ def balls_along(case: Given, q: Array, room: Array) -> Iterator[Balls]:
     ends, row = ends_of(case, q), np.arange(len(q) - 1)
     whole = np.tile([0.0, 1.0], (len(row), 1))
     left = Parts(row, whole, ends.of(row), ends.of(row + 1), room[row])
-    middle, most = left.first, np.full(2, np.inf)
+    here, most = replace(left, last=left.first), np.full(2, np.inf)
     for level in range(LEVELS + 1):
-        at = best_balls(case, replace(left, first=middle, last=middle))
+        found = best_balls(case, Parts.join(here, left))
+        at, made = found.of(slice(len(here.row))), found.of(slice(len(here.row), None))
         most = np.minimum(most, [at.positions.min(), at.angles.min()])
-        if level:
-            low, high = left.share.T
-            half = 0.5 * (low + high)
-            left = Parts.join(
-                replace(left, share=np.column_stack([low, half]), last=middle),
-                replace(left, share=np.column_stack([half, high]), first=middle),
-            )
-        made = best_balls(case, left)
         good = (made.positions >= CLOSE * most[0]) & (made.angles >= CLOSE * most[1])
         good |= level == LEVELS
         yield made.of(good)
         if good.all():
             return
-        left = left.of(~good)
-        middle = ends_of(case, 0.5 * (left.first.q + left.last.q))
+        left, (low, high) = left.of(~good), left.share[~good].T
+        middle, half = ends_of(case, 0.5 * (left.first.q + left.last.q)), 0.5 * (low + high)
+        here = replace(left, first=middle, last=middle)
+        left = Parts.join(
+            replace(left, share=np.column_stack([low, half]), last=middle),
+            replace(left, share=np.column_stack([half, high]), first=middle),
+        )

@@ -14,8 +14,9 @@ Theta, and moves the tool point by rho = D + Theta r, r the largest distance fro
 that is required of y is convex in (y, Theta). So where y_1 will do for (D, 0), and y_2 for
 (0, Theta), means of both do between: for whatever has position / D + angle / Theta <= 1.
 
-**Bodies.** The judge of collisions is asked again, with e_j as deviations, and the clearances of
-pairs with the surface, or what is at rest beside it (which may go with it, or not), raised.
+**Bodies.** How much nearer two may come as joints are off by e_j, and the part, or what is at rest
+beside it, is displaced (both may be, or one), is convex in (D, Theta), too: the judge of collisions
+says which share of it they allow.
 """
 
 from __future__ import annotations
@@ -42,9 +43,11 @@ from robots.kinematics import Kinematics
 from robots.robot import Robot
 from surfaces.cells import Cells
 
+SHARES = (0.25, 1.0)  # [1] of a margin that bodies are asked about: less takes less of them
+
 
 def placement_margin(
-    robot: Robot, cells: Cells, task: Task, q: Array, room: Array
+    robot: Robot, cells: Cells, task: Task, q: Array, room: Array, apart: float
 ) -> PlacementMargin:
     """The margin of an accepted motion; see the module.
 
@@ -52,6 +55,7 @@ def placement_margin(
         robot, cells, task: the case.
         q: (m, n) the motion, m >= 1, rad or m.
         room: (m, 2) rad, what is left of cone and roll from each row to the next; inf where free.
+        apart: m, that all pairs of bodies are along it, at least.
     """
     case = Given(robot, task, cells.centres.mean(axis=0))
     middle = tuple(case.pivot.tolist())
@@ -64,22 +68,22 @@ def placement_margin(
     along = np.full(len(q) - 1, np.inf)
     np.minimum.at(along, balls.row, balls.positions)
     worst = balls.of(np.array([np.argmin(balls.positions)]))
-    row, bound_by = int(worst.row[0]), BOUNDS[int(np.argmin(worst.allowed(np.zeros(1))))]
+    row, bound_by = int(worst.row[0]), BOUNDS[int(np.argmin(worst.allowed(0.0)))]
     what, most = "", (BELOW * float(along.min()), BELOW * float(balls.angles.min()))
     if bound_by is Bound.LIMIT:
         left = left_to_limits(robot, q[row], q[row + 1])
         what = robot.joint_names[int(np.argmin(ratio(left, worst.moves[0])))]
     bodies = gather(robot, cells.surface, task.collision, task.standoff)
     if bodies is not None and bodies.pairs and most[0] > 0.0:
-        from feasibility.certification.displaced_bodies import clear_share
+        from feasibility.certification.displaced_bodies import displaced_share
 
-        def moved(share: float) -> Array:
-            found = np.zeros((len(along), robot.n))
-            np.maximum.at(found, balls.row, balls.moved(share * most[0], share * most[1]))
-            return found
-
-        clear = clear_share(robot, bodies, q, case.pivot, most, moved)
-        most = clear.share * most[0], clear.share * most[1]
+        for some in SHARES:
+            part, moved = (some * most[0], some * most[1]), np.zeros((len(along), robot.n))
+            np.maximum.at(moved, balls.row, balls.moved(*part))
+            clear = displaced_share(robot, bodies, q, case.pivot, part, moved, apart)
+            if clear.share < 1.0:
+                break
+        most = clear.share * part[0], clear.share * part[1]
         if clear.pair is not None:
             row, bound_by, what = clear.row, Bound.CLEARANCE, " and ".join(clear.pair)
     return PlacementMargin(*most, middle, bound_by, _cell(case, cells, q[row]), what, along)
@@ -104,6 +108,6 @@ def margin_fault(task: Task, certificate: Certificate) -> str:
 
 def margin_of(
     robot: Robot, cells: Cells, task: Task, q: Array, room: Array
-) -> Callable[[], PlacementMargin]:
-    """`placement_margin`, found when it is first asked for, and once."""
-    return cache(lambda: placement_margin(robot, cells, task, q, room))
+) -> Callable[[float | None], PlacementMargin]:
+    """`placement_margin` by how far bodies are apart, found once, when it is first asked for."""
+    return cache(lambda apart: placement_margin(robot, cells, task, q, room, apart or 0.0))

@@ -14,7 +14,7 @@ import numpy as np
 
 from coverable.arrays import Array
 from coverable.errors import ArgumentError
-from feasibility.certification.collisions.motion import ArmMotion
+from feasibility.certification.collisions.motion import ArmMotion, Chords
 from feasibility.certification.collisions.pairing import ROUNDING, Pairing
 from feasibility.certification.collisions.shapes import Body, body_of_soup
 from feasibility.certification.faults import Judged, MotionFault
@@ -111,11 +111,7 @@ class Couples:
             motion: of the arm.
             raised: (pairs, m - 1) m, what each pair of the problem needs besides its clearance.
         """
-        joints = np.array([body.joint for body in self.bodies], dtype=np.intp)
-        centres, balls = np.stack([b.centre for b in self.bodies]), [b.ball for b in self.bodies]
-        # A half space, whose ball has no end, is at rest.
-        chords = motion.chords(joints, centres, np.where(np.isfinite(balls), balls, 0.0))
-        found = list[Pairing]()
+        chords, found = self._chords(motion), list[Pairing]()
         known = zip(self.pairs, self.numbers, self.couples, self.which, strict=True)
         for pair, number, (a, b), j in known:
             delta, moved, off = (one[a.joint, :, j] for one in chords)
@@ -129,6 +125,17 @@ class Couples:
             bends = delta, np.minimum(moved, straight), off
             found.append(Pairing((a, b), motion, pair.clearance, low, bends))
         return found
+
+    def nearer(self, motion: ArmMotion) -> list[Array]:
+        """(m - 1,) m, how much nearer each couple may come by what the motion deviates."""
+        off = self._chords(motion).deviation
+        return [off[a.joint, :, j] for (a, _), j in zip(self.couples, self.which, strict=True)]
+
+    def _chords(self, motion: ArmMotion) -> Chords:
+        joints = np.array([body.joint for body in self.bodies], dtype=np.intp)
+        centres, balls = np.stack([b.centre for b in self.bodies]), [b.ball for b in self.bodies]
+        # A half space, whose ball has no end, is at rest.
+        return motion.chords(joints, centres, np.where(np.isfinite(balls), balls, 0.0))
 
 
 @lru_cache(maxsize=KEPT)

@@ -124,11 +124,12 @@ class Pairing:
             found = np.append(self.measured(times[::2]), least)[[0, 2, 1]]
             step *= 0.5
 
-    def certify(self, nearest: float) -> None:
+    def certify(self, nearest: float, most: tuple[int, int] = CALLS) -> None:
         """Certify what is needed, and most of what is over it: raise `low`, or refuse.
 
         Args:
             nearest: m, the least distance of any two bodies that was met.
+            most: calls after which it is given up, and refused; see `CALLS`.
         """
         self._aim = max(self.needed, ENOUGH * nearest)
         wanted = max(self.needed, NEAR * nearest)
@@ -146,7 +147,7 @@ class Pairing:
             ends = self._cut(ends)
             if self.calls > EASY[0] + EASY[1] * len(self._rows):
                 self._aim = min(self._aim, max(self.needed, LITTLE * nearest))
-            if self.calls > CALLS[0] + CALLS[1] * len(self._rows) and len(ends):
+            if self.calls > most[0] + most[1] * len(self._rows) and len(ends):
                 self._refuse(float(ends[0].mean()), math.nan)
         self.low[open_] = np.maximum(self.low[open_], self._aim)
 
