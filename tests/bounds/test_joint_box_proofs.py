@@ -62,19 +62,13 @@ def test_a_slide_gets_a_ball_out_of_a_wall_where_it_does(clearance):
         [on(2, Sphere(0.1))], 0.2), 0.16)  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("rest", "place", "way", "depth"),
-    [
-        (Sphere(0.1), (0, 0, 0), Z, 0.1),
-        (Box((0.2, 0.3, 0.1)), (0, 0, 0), Z, 0.05),
-        (Capsule(0.05, 0.2), (0, 0, 0.12), Z, 0.03),
-        (Capsule(0.05, 0.2), (0, 0, 0), X, 0.05),
-        (Cylinder(0.1, 0.1), (0, 0, 0), Z, 0.05),
-        (Cylinder(0.05, 0.4), (0, 0, 0), X, 0.05),
-        (HalfSpace(), (0, 0, -0.04), Z, 0.04),
-        (box_mesh((0.2, 0.3, 0.1)), (0, 0, 0), Z, 0.05),
-    ],
-)
+@pytest.mark.parametrize(("rest", "place", "way", "depth"), [
+    (Sphere(0.1), (0, 0, 0), Z, 0.1), (Box((0.2, 0.3, 0.1)), (0, 0, 0), Z, 0.05),
+    (Capsule(0.05, 0.2), (0, 0, 0.12), Z, 0.03), (Capsule(0.05, 0.2), (0, 0, 0), X, 0.05),
+    (Cylinder(0.1, 0.1), (0, 0, 0), Z, 0.05), (Cylinder(0.05, 0.4), (0, 0, 0), X, 0.05),
+    (HalfSpace(), (0, 0, -0.04), Z, 0.04),
+    (box_mesh((0.2, 0.3, 0.1)), (0, 0, 0), Z, 0.05),
+])  # fmt: skip
 def test_shapes_are_as_deep_as_they_are(rest, place, way, depth):
     """A ball of 2 cm at a place inside a body gets out on the shortest way, and not before."""
     scene = [Obstacle("thing", rest, at(0.3, -0.2, 0.1))]
@@ -86,17 +80,11 @@ def test_shapes_are_as_deep_as_they_are(rest, place, way, depth):
     assert not everywhere(slide(Z), far, 1e-3)
 
 
-@pytest.mark.parametrize(
-    ("shape", "ahead"),
-    [
-        (Sphere(0.05), 0.05),
-        (Capsule(0.05, 0.2), 0.05),
-        (Cylinder(0.05, 0.2), 0.05),
-        (Box((0.1, 0.2, 0.3)), 0.05),
-        (box_mesh((0.1, 0.2, 0.3)), 0.05),
-        (bracket(), 0.2),  # it reaches from 0 to 0.2 m along x
-    ],
-)
+@pytest.mark.parametrize(("shape", "ahead"), [
+    (Sphere(0.05), 0.05), (Capsule(0.05, 0.2), 0.05), (Cylinder(0.05, 0.2), 0.05),
+    (Box((0.1, 0.2, 0.3)), 0.05), (box_mesh((0.1, 0.2, 0.3)), 0.05),
+    (bracket(), 0.2),  # it reaches from 0 to 0.2 m along x
+])  # fmt: skip
 def test_no_body_reaches_further_into_a_wall_than_it_does(shape, ahead):
     """How far ahead a body's deepest point is: most of that counts, and never more."""
     bodies = in_a_wall([on(1, shape)], 0.1)

@@ -44,13 +44,10 @@ FACES = np.array([[0, 1, 2], [1, 2, 3]])
 HELD = {"roll_deg": (-170, 170), "roll_reference": (1, 0, 0)}
 
 
-@pytest.mark.parametrize(
-    ("name", "held", "bent"),
-    [
-        ("ball", {}, (0, 1)), ("mesh", {}, (0, 1)), ("ball", HELD, (0, 1, 2)),
-        ("plane", {"roll_deg": (-90, 90)}, (0, 1, 2)),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "held", "bent"), [
+    ("ball", {}, (0, 1)), ("mesh", {}, (0, 1)), ("ball", HELD, (0, 1, 2)),
+    ("plane", {"roll_deg": (-90, 90)}, (0, 1, 2)),
+])  # fmt: skip
 def test_stretches_of_a_motion(name, held, bent):
     """What tool point, axis, roll (`bent`), places and the u direction may do between rows."""
     robot, cells, task, q = raster(name)

@@ -40,14 +40,10 @@ def test_a_number_of_threads_that_is_none(value: str, monkeypatch: pytest.Monkey
     assert main(["cases"]) == 0
 
 
-@pytest.mark.parametrize(
-    "args",
-    [
-        ("check", "paper/4a", *SMALL, "--html", "view.html"),
-        ("study", "study.toml", "--out", "out.study"),
-        ("check", "case.toml"),
-    ],
-)
+@pytest.mark.parametrize("args", [
+    ("check", "paper/4a", *SMALL, "--html", "view.html"),
+    ("study", "study.toml", "--out", "out.study"), ("check", "case.toml"),
+])  # fmt: skip
 def test_a_working_directory_that_is_gone(
     args: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

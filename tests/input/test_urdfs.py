@@ -203,17 +203,12 @@ def test_packages_are_found_by_the_name_in_their_package_xml(tmp_path: Path) -> 
     assert "lies outside" in mesh_of(urdf, "package://linked/meshes/a.obj")
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        '<!DOCTYPE p [<!ENTITY n "ur_description">]><package><name>&n;</name></package>',
-        "<package><name>ur_description</name>" + " " * 2**16 + "</package>",
-        "<robot><name>ur_description</name></robot>",
-        "<package><name>../ur_description</name></package>",
-        "not XML",
-    ],
-    ids=["entity", "large", "other", "path", "text"],
-)
+@pytest.mark.parametrize("text", [
+    '<!DOCTYPE p [<!ENTITY n "ur_description">]><package><name>&n;</name></package>',
+    "<package><name>ur_description</name>" + " " * 2**16 + "</package>",
+    "<robot><name>ur_description</name></robot>",
+    "<package><name>../ur_description</name></package>", "not XML",
+], ids=["entity", "large", "other", "path", "text"])  # fmt: skip
 def test_a_package_xml_that_is_none_names_nothing(text: str, tmp_path: Path) -> None:
     clone = package(tmp_path / "clone", "ur_description")
     (clone / "package.xml").write_text(text)

@@ -13,15 +13,11 @@ def test_every_fault_of_the_list_can_be_put_in() -> None:
     assert len(every) >= 120
 
 
-@pytest.mark.parametrize(
-    ("file", "old", "said"),
-    [
-        ("no/such.py", "a", "no such file"),
-        ("feasibility/cone.py", "no such line", "0 times"),
-        ("feasibility/cone.py", "math", "times"),
-        ("feasibility/cone.py", "2.0 * math.sin(0.5 * cone)", ""),
-    ],
-)
+@pytest.mark.parametrize(("file", "old", "said"), [
+    ("no/such.py", "a", "no such file"),
+    ("feasibility/cone.py", "no such line", "0 times"), ("feasibility/cone.py", "math", "times"),
+    ("feasibility/cone.py", "2.0 * math.sin(0.5 * cone)", ""),
+])  # fmt: skip
 def test_an_edit_that_does_not_match_once_is_refused(file, old, said) -> None:
     faults = list(Mutant("a room", file, old, "b", "words", ()).faults())
     assert len(faults) == bool(said)

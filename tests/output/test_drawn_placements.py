@@ -117,15 +117,12 @@ def test_whole_shares_are_feasible_only_where_that_was_said():
         assert class_of_row(Row({}, status, result, 0.1)) is kind
 
 
-@pytest.mark.parametrize(
-    ("cells", "expected"),
-    [
-        (CELLS, 2 * (0.3 + 0.2)),
-        (cylinder(0.3, angle_deg=(0, 360), height=(0.0, 0.5)).cells(24, 3), 4 * np.pi * 0.3),
-        # Closed: three sections, each a full circle.
-        (sphere(0.4, polar_deg=(0, 180), azimuth_deg=(0, 360)).cells(12, 24), 6 * np.pi * 0.4),
-    ],
-)
+@pytest.mark.parametrize(("cells", "expected"), [
+    (CELLS, 2 * (0.3 + 0.2)),
+    (cylinder(0.3, angle_deg=(0, 360), height=(0.0, 0.5)).cells(24, 3), 4 * np.pi * 0.3),
+    # Closed: three sections, each a full circle.
+    (sphere(0.4, polar_deg=(0, 180), azimuth_deg=(0, 360)).cells(12, 24), 6 * np.pi * 0.4),
+])  # fmt: skip
 def test_an_outline_is_the_rim_or_three_sections(cells, expected):
     """By its length, without the stroke that shows the tool's side."""
     lines, surface = outline(cells), cells.surface

@@ -89,15 +89,12 @@ def test_base_tool_axes_and_objects_are_moved_and_nothing_else():
     assert controls_of(PLATE).in_root_frame == [SURFACE, BASE]
 
 
-@pytest.mark.parametrize(
-    ("values", "said"),
-    [
-        ({(TASK, "standoff"): -3.0}, "task.standoff: must be a finite number >= 0"),
-        ({(LIMITS, "elbow_joint"): (20.0, -20.0)}, "the wrong way round"),
-        ({(SURFACE, "x"): 1e300}, "surface.position: must be three finite numbers"),
-        ({(TCP, "x"): 1e300}, "robot.tcp.position: must"),
-    ],
-)
+@pytest.mark.parametrize(("values", "said"), [
+    ({(TASK, "standoff"): -3.0}, "task.standoff: must be a finite number >= 0"),
+    ({(LIMITS, "elbow_joint"): (20.0, -20.0)}, "the wrong way round"),
+    ({(SURFACE, "x"): 1e300}, "surface.position: must be three finite numbers"),
+    ({(TCP, "x"): 1e300}, "robot.tcp.position: must"),
+])  # fmt: skip
 def test_what_makes_no_sense_is_refused_in_words(values, said):
     with pytest.raises(CaseError, match="plate: ") as refused:
         controls_of(PLATE).changed(values)

@@ -114,14 +114,11 @@ def test_a_bug_says_that_it_is_one(search, monkeypatch, capsys):
     assert "Traceback (most recent call last)" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ("error", "words"),
-    [
-        (OSError(errno.ENOSPC, "No space left on device", "x"), "x: No space left on device"),
-        (MemoryError(), "not enough memory; use fewer cells"),
-        (ImportError("libpinocchio.so: cannot open"), "libpinocchio.so: cannot open"),
-    ],
-)
+@pytest.mark.parametrize(("error", "words"), [
+    (OSError(errno.ENOSPC, "No space left on device", "x"), "x: No space left on device"),
+    (MemoryError(), "not enough memory; use fewer cells"),
+    (ImportError("libpinocchio.so: cannot open"), "libpinocchio.so: cannot open"),
+])  # fmt: skip
 def test_trouble_of_the_machine_is_status_2_and_no_bug(ask, search, error, words):
     search(error)
     said = ask(*SMALL)

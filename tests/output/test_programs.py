@@ -109,17 +109,14 @@ def test_rounding_leaves_no_joint_outside_its_limits():
             assert np.abs(arm - end * unit).max() <= 10.0**-digits
 
 
-@pytest.mark.parametrize(
-    ("file", "robot", "said"),
-    [
-        ("a.script", load_robot("ur5", lock={"wrist_3_joint": 0.0}), "5 of them move here"),
-        ("a.script", IRB, "URScript has no external axes; there are rail"),
-        ("a.mod", load_robot("panda"), "7 of them move here"),
-        ("a.mod", replace(UR5, surface_link="upper_arm_link"), "order of its axes"),
-        ("a.ls", IRB, "external axes are not written in TP yet; there are"),
-        ("a.jbi", UR5, "pulses_per_deg is missing"),
-    ],
-)
+@pytest.mark.parametrize(("file", "robot", "said"), [
+    ("a.script", load_robot("ur5", lock={"wrist_3_joint": 0.0}), "5 of them move here"),
+    ("a.script", IRB, "URScript has no external axes; there are rail"),
+    ("a.mod", load_robot("panda"), "7 of them move here"),
+    ("a.mod", replace(UR5, surface_link="upper_arm_link"), "order of its axes"),
+    ("a.ls", IRB, "external axes are not written in TP yet; there are"),
+    ("a.jbi", UR5, "pulses_per_deg is missing"),
+])  # fmt: skip
 def test_other_arms_are_refused_with_a_sentence(file, robot, said):
     with pytest.raises(ProgramError, match=re.escape(said)):
         check_program(language_of(file), robot)
@@ -191,13 +188,10 @@ def test_a_tool_is_off_over_holes_and_on_from_pass_to_pass():
     assert (times == run.time[[[5, 15], [17, 21], [27, 31], [33, 43]]]).all()
 
 
-@pytest.mark.parametrize(
-    ("file", "name", "move", "on"),
-    [
-        ("a.mod", "irb120", r"^MoveAbsJ", r"ON$"),
-        ("a.src", "kr6", r"^S?PTP ", r"TRIGGER WHEN PATH=0 (ONSTART )?DELAY=0 DO ON$"),
-    ],
-)
+@pytest.mark.parametrize(("file", "name", "move", "on"), [
+    ("a.mod", "irb120", r"^MoveAbsJ", r"ON$"),
+    ("a.src", "kr6", r"^S?PTP ", r"TRIGGER WHEN PATH=0 (ONSTART )?DELAY=0 DO ON$"),
+])  # fmt: skip
 def test_lines_stand_at_their_samples(tmp_path, file, name, move, on):
     run = motion(UR5)
     cell = np.full(len(run), -1)

@@ -77,18 +77,13 @@ def test_both_readings_agree_call_by_call(name, cone_deg, step_deg, moves):
     assert_agree(tree_search(space, cells, at), literal)
 
 
-@pytest.mark.parametrize(
-    ("name", "asked"),
-    [
-        ("cap", {"roll_deg": (40, 80), "roll_reference": (1, 0, 0)}),
-        ("cap", {"approach": (0.3, 0, -1), "cone_deg": 20}),
-        ("pipe", {"roll_deg": (-10, 10)}),
-        ("plate", {"roll_deg": (-8, 8)}),
-        ("tyre", {"roll_deg": (-13, 13)}),
-        ("meshed cap", {"roll_deg": (-20, 20), "roll_reference": (1, 0, 0)}),
-        ("meshed cap", {"approach": (0.3, 0, -1), "cone_deg": 10}),
-    ],
-)
+@pytest.mark.parametrize(("name", "asked"), [
+    ("cap", {"roll_deg": (40, 80), "roll_reference": (1, 0, 0)}),
+    ("cap", {"approach": (0.3, 0, -1), "cone_deg": 20}), ("pipe", {"roll_deg": (-10, 10)}),
+    ("plate", {"roll_deg": (-8, 8)}), ("tyre", {"roll_deg": (-13, 13)}),
+    ("meshed cap", {"roll_deg": (-20, 20), "roll_reference": (1, 0, 0)}),
+    ("meshed cap", {"approach": (0.3, 0, -1), "cone_deg": 10}),
+])  # fmt: skip
 def test_both_readings_agree_where_approach_or_roll_are_asked_for(name, asked):
     cells, task = PATCHES[name](), Task(**{"standoff": 0.005, "cone_deg": 45, **asked})
     search = Search(method="greedy", step_deg=1.0 if "meshed" in name else 0.5)

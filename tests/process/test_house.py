@@ -27,16 +27,12 @@ LATE = {"networkx", "scipy.spatial", "scipy.optimize", "urllib.request", "surfac
         "feasibility.collisions.gathering", "feasibility.paper.greedy"}  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("code", "needed", "late"),
-    [
-        ("import coverable", set(), {"numpy", "numba", "pinocchio", "scipy"}),
-        (COMMAND.format(["check", "--hlep"]), {"feasibility"},
-         {"numpy", "numba", "pinocchio", "coal", "scipy", "networkx", "robots"}),
-        (COMMAND.format(["check", "paper/4a"]), {"numba", "feasibility.roadmap.complete"}, LATE),
-    ],
-    ids=["import", "refused", "check"],
-)  # fmt: skip
+@pytest.mark.parametrize(("code", "needed", "late"), [
+    ("import coverable", set(), {"numpy", "numba", "pinocchio", "scipy"}),
+    (COMMAND.format(["check", "--hlep"]), {"feasibility"},
+     {"numpy", "numba", "pinocchio", "coal", "scipy", "networkx", "robots"}),
+    (COMMAND.format(["check", "paper/4a"]), {"numba", "feasibility.roadmap.complete"}, LATE),
+], ids=["import", "refused", "check"])  # fmt: skip
 def test_libraries_are_loaded_where_they_are_used(
     code: str, needed: set[str], late: set[str]
 ) -> None:

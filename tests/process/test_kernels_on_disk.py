@@ -21,24 +21,21 @@ PACKAGES = ("robots", "surfaces", "feasibility")
 ME, OTHER, SYSTEM, GROUP, USERS = 1000, 1001, 0, 100, 200
 
 
-@pytest.mark.parametrize(
-    ("found", "code", "safe"),
-    [
-        ((ME, GROUP, 0o755), (ME, GROUP, 0o755), True),
-        ((ME, GROUP, 0o700), (SYSTEM, SYSTEM, 0o755), True),  # in the home folder
-        ((SYSTEM, SYSTEM, 0o755), (SYSTEM, SYSTEM, 0o755), True),  # in a shared installation
-        ((OTHER, GROUP, 0o755), (OTHER, GROUP, 0o755), True),  # whose code runs anyway
-        ((OTHER, GROUP, 0o755), (ME, GROUP, 0o755), False),
-        ((OTHER, GROUP, 0o755), (SYSTEM, SYSTEM, 0o755), False),
-        ((ME, GROUP, 0o777), (ME, GROUP, 0o755), False),
-        ((ME, GROUP, 0o757), (ME, GROUP, 0o757), False),  # not even where the code can be changed
-        ((SYSTEM, SYSTEM, 0o1777), (ME, GROUP, 0o755), True),  # the folder for temporary files
-        ((OTHER, GROUP, 0o1777), (ME, GROUP, 0o755), False),
-        ((ME, GROUP, 0o775), (ME, GROUP, 0o755), False),
-        ((ME, GROUP, 0o775), (ME, GROUP, 0o775), True),  # the same people can change the code
-        ((ME, USERS, 0o775), (ME, GROUP, 0o775), False),
-    ],
-)
+@pytest.mark.parametrize(("found", "code", "safe"), [
+    ((ME, GROUP, 0o755), (ME, GROUP, 0o755), True),
+    ((ME, GROUP, 0o700), (SYSTEM, SYSTEM, 0o755), True),  # in the home folder
+    ((SYSTEM, SYSTEM, 0o755), (SYSTEM, SYSTEM, 0o755), True),  # in a shared installation
+    ((OTHER, GROUP, 0o755), (OTHER, GROUP, 0o755), True),  # whose code runs anyway
+    ((OTHER, GROUP, 0o755), (ME, GROUP, 0o755), False),
+    ((OTHER, GROUP, 0o755), (SYSTEM, SYSTEM, 0o755), False),
+    ((ME, GROUP, 0o777), (ME, GROUP, 0o755), False),
+    ((ME, GROUP, 0o757), (ME, GROUP, 0o757), False),  # not even where the code can be changed
+    ((SYSTEM, SYSTEM, 0o1777), (ME, GROUP, 0o755), True),  # the folder for temporary files
+    ((OTHER, GROUP, 0o1777), (ME, GROUP, 0o755), False),
+    ((ME, GROUP, 0o775), (ME, GROUP, 0o755), False),
+    ((ME, GROUP, 0o775), (ME, GROUP, 0o775), True),  # the same people can change the code
+    ((ME, USERS, 0o775), (ME, GROUP, 0o775), False),
+])  # fmt: skip
 def test_what_is_as_safe_as_the_code(
     found: tuple[int, int, int], code: tuple[int, int, int], safe: bool
 ) -> None:

@@ -185,22 +185,18 @@ def answered(arrays=b"", **said):
     return json.dumps({"faces": [], **said}).encode() + b"\n" + arrays
 
 
-@pytest.mark.parametrize(
-    ("written", "words"),
-    [
-        *((each, BROKEN) for each in (b"", b"\xff\n", b"[]\n")),
-        (answered(faces=[{"kind": "plane"}]), BROKEN),
-        (answered(b"0" * 35, vertices=1, triangles=1), BROKEN),
-        (answered(vertices=-1, triangles=2), BROKEN),
-        (answered(faces=3), BROKEN),
-        (answered(b"0" * 12, taken=[1], counts=[2], vertices=0, triangles=1), BROKEN),
-        (answered(b"0" * 12, taken=[1, 2], counts=[1], vertices=0, triangles=1), BROKEN),
-        (answered(EYE + np.array([0, 1, 2, 2, 1, 0], "<i4").tobytes(), **WHOLE), BROKEN),
-        (answered(vertices=0, triangles=11), "more than 10; take fewer faces"),
-        (answered(EYE + np.array([0, 1, 7], "<i4").tobytes(), **WHOLE), "do not exist"),
-        (answered(EYE + np.array([0, 1, -2], "<i4").tobytes(), **WHOLE), "do not exist"),
-    ],
-)
+@pytest.mark.parametrize(("written", "words"), [
+    *((each, BROKEN) for each in (b"", b"\xff\n", b"[]\n")),
+    (answered(faces=[{"kind": "plane"}]), BROKEN),
+    (answered(b"0" * 35, vertices=1, triangles=1), BROKEN),
+    (answered(vertices=-1, triangles=2), BROKEN), (answered(faces=3), BROKEN),
+    (answered(b"0" * 12, taken=[1], counts=[2], vertices=0, triangles=1), BROKEN),
+    (answered(b"0" * 12, taken=[1, 2], counts=[1], vertices=0, triangles=1), BROKEN),
+    (answered(EYE + np.array([0, 1, 2, 2, 1, 0], "<i4").tobytes(), **WHOLE), BROKEN),
+    (answered(vertices=0, triangles=11), "more than 10; take fewer faces"),
+    (answered(EYE + np.array([0, 1, 7], "<i4").tobytes(), **WHOLE), "do not exist"),
+    (answered(EYE + np.array([0, 1, -2], "<i4").tobytes(), **WHOLE), "do not exist"),
+])  # fmt: skip
 def test_what_the_process_writes_is_not_believed(folder, written, words):
     caps = Caps(triangles=10, run=lambda *given: Ended(written))
     with pytest.raises(SurfaceError, match=words):

@@ -27,19 +27,13 @@ def test_the_roll_is_the_angle_after_the_least_rotation_onto_the_approach():
     assert (more - there[:1] - 0.3 + np.pi) % (2 * np.pi) - np.pi == pytest.approx(0.0, abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("given", "cone_deg", "kept", "cone"),
-    [
-        ((-15, 15), 20, (0.0, 15.0), 20.0),
-        ((60, 70), 20, (65.0, 5.0), 20.0),
-        ((-100, 100), 20, (0.0, 100.0), 20.0),
-        ((0, 0), 0, (0.0, 0.1), 0.1),  # fixed: a tenth of a degree
-        ((-360, -360), 20, (-360.0, 0.1), 20.0),
-        ((0, 5), 0, (2.5, 2.5), 0.0),
-        ((-180, 180), 20, None, 20.0),
-        (None, 0, None, 0.0),
-    ],
-)
+@pytest.mark.parametrize(("given", "cone_deg", "kept", "cone"), [
+    ((-15, 15), 20, (0.0, 15.0), 20.0), ((60, 70), 20, (65.0, 5.0), 20.0),
+    ((-100, 100), 20, (0.0, 100.0), 20.0),
+    ((0, 0), 0, (0.0, 0.1), 0.1),  # fixed: a tenth of a degree
+    ((-360, -360), 20, (-360.0, 0.1), 20.0), ((0, 5), 0, (2.5, 2.5), 0.0),
+    ((-180, 180), 20, None, 20.0), (None, 0, None, 0.0),
+])  # fmt: skip
 def test_ranges_of_the_roll(given, cone_deg, kept, cone):
     task = Task(0.005, cone_deg, roll_deg=given)
     found = None if task.roll is None else tuple(np.degrees(task.roll))

@@ -95,16 +95,11 @@ def test_a_known_motion_is_taken_as_it_is_and_one_of_a_case_nearby_leads_to_anot
     assert replay(*WHOLE, check(*WHOLE, seeds=beside).witness, every).accepted
 
 
-@pytest.mark.parametrize(
-    ("q", "cell", "method"),
-    [
-        (np.full((2, 6), np.nan), [0, 1], "complete"),
-        (np.zeros((2, 5)), [0, 1], "complete"),
-        (np.zeros((2, 6)), [0, 9], "complete"),
-        (np.zeros((2, 6)), [0], "complete"),
-        (np.zeros((2, 6)), [0, 1], "greedy"),
-    ],
-)
+@pytest.mark.parametrize(("q", "cell", "method"), [
+    (np.full((2, 6), np.nan), [0, 1], "complete"), (np.zeros((2, 5)), [0, 1], "complete"),
+    (np.zeros((2, 6)), [0, 9], "complete"), (np.zeros((2, 6)), [0], "complete"),
+    (np.zeros((2, 6)), [0, 1], "greedy"),
+])  # fmt: skip
 def test_seeds_that_fit_neither_arm_nor_cells_are_refused(q, cell, method):
     with pytest.raises(ValueError, match="greedy" if method == "greedy" else "seeds"):
         check(*WHOLE, Search(method), seeds=Walk(q, np.array(cell)))
