@@ -156,8 +156,7 @@ class Balls(Rows):
     @property
     def angles(self) -> Array:
         """(k,) rad, Theta where D = 0: the chord of what is left of the cone is concave in it."""
-        most = np.minimum(self.room.min(axis=1), np.pi)
-        return np.minimum(self.reached(1.0 / self.far) / self.far, most)
+        return np.minimum(self.reached(1.0 / self.far) / self.far, np.pi)
 
     def moved(self, position: float, angle: float) -> Array:
         """(k, n) rad or m, e_j wherever the part stands in that triangle."""
