@@ -28,7 +28,7 @@ from numba.core.caching import InTreeCacheLocator
 from numba.core.compiler_lock import global_compiler_lock
 from numba.extending import register_jitable
 
-ROOT = Path(__file__).resolve().parent
+ROOT = Path(__file__).resolve().parents[1]
 CODE = (  # files of kernels, of all that they name, and of the named tuples that they are given
     "coverable/kernels.py", "robots/chain.py", "surfaces/triangle_kernel.py",
     "surfaces/meshes/*.py", "surfaces/meshes/cells/*.py", "surfaces/patches/closed_form_kernels.py",
@@ -76,7 +76,8 @@ def _made(place: str) -> Path | None:
 
 
 _HOME = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-_PLACES = _SETTINGS["CACHE_DIR"], f"{ROOT}/__pycache__", _HOME if os.path.isabs(_HOME) else ""
+_BESIDE = f"{ROOT}/coverable/__pycache__"
+_PLACES = _SETTINGS["CACHE_DIR"], _BESIDE, _HOME if os.path.isabs(_HOME) else ""
 FOLDER = next(filter(None, (_made(place) for place in _PLACES if place)), None)
 """Of all kernels: in `NUMBA_CACHE_DIR`, beside the code, or in the home folder's cache; or none."""
 _STAMP = b"".join(path.read_bytes() for code in CODE for path in sorted(ROOT.glob(code)))

@@ -11,9 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from coverable.kernels import CODE, is_safe
+from coverable.kernels import CODE, ROOT, is_safe
 
-ROOT = Path(__file__).parents[2]
 PACKAGES = ("robots", "surfaces", "feasibility")
 
 # Which files are read: a kernel is machine code, so only where nobody else can write.
@@ -66,7 +65,7 @@ from robots.chain import outer; import coverable.kernels, numba
 print(outer(1.0), sum(outer.stats.cache_hits.values()), int(coverable.kernels.FOLDER is None),
       outer(-3.0), repr(numba.config.CACHE_LOCATOR_CLASSES))
 """
-BESIDE = "__pycache__/coverable-kernels"
+BESIDE = "coverable/__pycache__/coverable-kernels"
 LOADED, COMPILED, NOWHERE = (1, 0), (0, 0), (0, 1)
 
 
@@ -77,7 +76,9 @@ def project(tmp_path: Path) -> Path:
     for path, text in (("robots/chain.py", OUTER), ("surfaces/triangle_kernel.py", INNER)):
         (folder / path).parent.mkdir(parents=True, mode=0o755)
         (folder / path).write_text(text)
-    shutil.copy(ROOT / "coverable/kernels.py", folder)
+    (folder / "coverable").mkdir(mode=0o755)
+    (folder / "coverable/__init__.py").touch()
+    shutil.copy(ROOT / "coverable/kernels.py", folder / "coverable")
     return folder
 
 
@@ -137,7 +138,7 @@ def test_what_others_can_change_is_neither_read_nor_written(project: Path) -> No
 
 
 def test_where_nothing_can_be_written_it_is_compiled_all_the_same(project: Path) -> None:
-    (project / "__pycache__").touch()  # a file, where even root can make no folder
+    (project / "coverable/__pycache__").touch()  # a file, where even root can make no folder
     assert asked(project, HOME="/dev/null", XDG_CACHE_HOME="/dev/null") == NOWHERE
     assert asked(project, XDG_CACHE_HOME="relative") == NOWHERE
     assert kept(project) == set()
