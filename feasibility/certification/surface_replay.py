@@ -227,14 +227,12 @@ def _tool_along(
     good = judge.within(at_rows)
     faults = exact_faults(judge, at_rows.of(~good), "row")
     stretches = judge.between_rows(rows, poses, at_rows).of(good[:-1] & good[1:])
-    looked = _between(judge, rows, stretches)
-    samples = in_order(Samples.join(at_rows, *looked.samples))
-    each = (_off(judge, samples), samples.chord, samples.roll)
-    most = np.maximum(looked.most, [np.max(one, initial=0.0) for one in each])
-    room = np.full((len(rows), 2), np.inf)
-    for one in ((samples.row, samples.chord, samples.roll), *looked.held):
-        _less_room(room, judge.task, *one)
-    return _Along(most, faults + looked.faults, samples, room)
+    most, room = np.zeros(3), np.full((len(rows), 2), np.inf)
+    more, between = _between(judge, rows, stretches, most, room)
+    samples = in_order(Samples.join(at_rows, *between))
+    np.maximum(most, _most(judge, samples), out=most)
+    _less_room(room, judge.task, samples.row, samples.chord, samples.roll)
+    return _Along(most, faults + more, samples, room)
 
 
 def _with_what_follows(
@@ -308,36 +306,31 @@ def _too_vague(task: Task, surface: Surface) -> list[MotionFault]:
     return faults
 
 
-class _Between(NamedTuple):
-    """What is found between rows."""
+def _most(judge: Judge, one: Samples | Bounds) -> Array:
+    """(3,) the most of how far tool points are off (m), of |a - b| and of the roll (rad).
 
-    most: Array
-    """(3,) see `_Along`, where stretches are right."""
-    faults: list[MotionFault]
-    samples: list[Samples]
-    held: list[tuple[Ints, Array, Array]]
-    """Row, |a - b| and roll (k,) of stretches that are right."""
-
-
-def _off(judge: Judge, one: Samples | Bounds) -> Array:
-    """(k,) m, how far tool points are off; nearer to a mesh's triangles than the standoff is, too.
-
-    Further from them than that they are by no more than from their targets.
+    Nearer to a mesh's triangles than the standoff they are off, too; further from them they are off
+    by no more than from their targets.
     """
-    return np.maximum(one.error, judge.task.standoff - one.facets)
+    off = np.maximum(one.error, judge.task.standoff - one.facets)
+    return np.array([np.max(each, initial=0.0) for each in (off, one.chord, one.roll)])
 
 
-def _between(judge: Judge, rows: Array, stretches: SampledStretches) -> _Between:
-    """Judge stretches whose ends are good, halved as needed."""
-    most, samples, wrong = np.zeros(3), list[Samples](), list[Samples]()
-    held = list[tuple[Ints, Array, Array]]()
+def _between(
+    judge: Judge, rows: Array, stretches: SampledStretches, most: Array, room: Array
+) -> tuple[list[MotionFault], list[Samples]]:
+    """Judge stretches whose ends are good, halved as needed: what is wrong, and what was looked at.
+
+    What is known where they are right goes into `most` and `room`, see `_Along`.
+    """
+    samples, wrong = list[Samples](), list[Samples]()
 
     def decided(left: SampledStretches) -> Mask:
         bounds = judge.bounds(left)
         good = judge.within(bounds)
-        each = (_off(judge, bounds), bounds.chord, bounds.roll)
-        np.maximum(most, [np.max(one[good], initial=0.0) for one in each], out=most)
-        held.append((left.row[good], bounds.chord[good], bounds.roll[good]))
+        right = bounds.of(good)
+        np.maximum(most, _most(judge, right), out=most)
+        _less_room(room, judge.task, left.row[good], right.chord, right.roll)
         return good
 
     def halves(left: SampledStretches) -> SampledStretches:
@@ -346,15 +339,13 @@ def _between(judge: Judge, rows: Array, stretches: SampledStretches) -> _Between
         samples.append(middle)
         if not good.all():
             wrong.append(middle.of(~good))
-        enough = sum(len(part.row) for part in wrong) > ENOUGH
-        return left.of(good & (not enough)).halves(middle.of(good & (not enough)))
+        good &= sum(len(part.row) for part in wrong) <= ENOUGH
+        return left.of(good).halves(middle.of(good))
 
-    left, faults = bisected(stretches, decided, halves, LEVELS, MOST_SAMPLES), list[MotionFault]()
+    left = bisected(stretches, decided, halves, LEVELS, MOST_SAMPLES)
     if wrong:
-        faults = exact_faults(judge, Samples.join(*wrong), "place")
-    elif len(left.row):
-        faults = [open_fault(judge, left, judge.bounds(left))]
-    return _Between(most, faults, samples, held)
+        return exact_faults(judge, Samples.join(*wrong), "place"), samples
+    return [open_fault(judge, left, judge.bounds(left))] if len(left.row) else [], samples
 
 
 def _malformed(robot: Robot, rows: Array) -> MotionFault | None:
