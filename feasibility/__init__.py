@@ -19,14 +19,15 @@ How a verdict comes about; wherever a step has a number, it is one of these.
 4. `attempts.py` calls a method: that of the paper (`paper/greedy.py`, Algorithm 2 over 1), or the
    complete one, steps 5 to 9; again with a narrower task where step 10 narrowly refuses its motion.
 5. `roadmap/complete.py` hands arm, curves and bodies to the compiled kernels as arrays
-   (`roadmap/motions/arrays.py`). The order of what follows is that of `roadmap/search.py`:
-6. Guesses over a cell in the middle are projected onto eqs. (5) to (7)
+   (`roadmap/motions/arrays.py`).
+6. Guesses over a cell in the middle (`roadmap/search.py`) are projected onto eqs. (5) to (7)
    (`roadmap/motions/projection.py`) and pushed clear (`roadmap/moving_clear.py`). From each a
    component grows over the surface (`roadmap/expansion.py`) along motions
    (`roadmap/motions/tracking.py`), each of whose segments is certified
    (`roadmap/motions/segment_bound.py`, `collisions/kernels/segments.py`). Mostly that is all.
-7. Cells that nothing reaches are seeded, or proved uncoverable: by `roadmap/branch_and_bound/`, and
-   with bodies by the judge, which `roadmap/blockers.py` asks (`certification/overlaps/`).
+7. `roadmap/rounds.py`: cells that nothing reaches are seeded, or proved uncoverable: by
+   `roadmap/branch_and_bound/`, and with bodies by the judge, which `roadmap/blockers.py` asks
+   (`certification/overlaps/`).
 8. Rounds of more guesses, self-motions and bridges; where they gain nothing, a proof by cuts
    (`roadmap/proving.py`), finer cells (`roadmap/refinement.py`), new starts.
 9. One component over all cells becomes one motion (`roadmap/walk.py`).

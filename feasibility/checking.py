@@ -17,8 +17,7 @@ from feasibility.demands import OF_TREE, RATES, further, unjudged
 from feasibility.problem import Problem
 from feasibility.search import Progress, Search
 from feasibility.task import Task
-from feasibility.treated.decision import Decision, with_coverage
-from feasibility.verdict import Answer, Cause, Evidence, Replay, Verdict, Walk, deferred
+from feasibility.verdict import Answer, Cause, Decision, Evidence, Replay, Verdict, Walk, deferred
 from robots.robot import Robot
 from surfaces.cells import Cells
 
@@ -222,6 +221,8 @@ def _measured(verdict: Verdict, clock: Clock) -> Verdict:
     if task.coverage is None:
         return replace(verdict, treated=deferred(lambda: _treated(verdict, clock)))
     treated = _treated(verdict, clock)
+    from feasibility.treated.decision import with_coverage
+
     said = Decision(verdict.answer, verdict.evidence, verdict.message)
     decision = with_coverage(said, task, treated)
     kept: dict[str, Any] = {"treated": treated, **decision._asdict()}

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from feasibility.collisions.asked_bodies import gather
-from feasibility.targets.references import check_references
 from feasibility.task import PlacementError, Task, check_footprint, check_smooth
 from robots.robot import Robot
 from surfaces.cells import Cells
@@ -55,7 +54,10 @@ class Problem:
             (task, "task", Task, "a Task, such as Task(standoff=0.02, cone_deg=20)"),
             *others,
         )
-        check_references(cells, task)
+        if task.roll is not None:
+            from feasibility.targets.references import check_references
+
+            check_references(cells, task)
         check_footprint(cells, task)
         check_smooth(cells, task)
         task = task_over(cells, task)

@@ -12,11 +12,11 @@ import numpy as np
 from coverable.arrays import Array, unit_along
 from coverable.errors import ArgumentError, Checks, Fault
 from feasibility.cone import chord_of
-from feasibility.roll import Roll, projected, roll_of_range
 from surfaces.cells import Cells
 
 if TYPE_CHECKING:
     from feasibility.collisions.settings import Collision
+    from feasibility.roll import Roll
 
 DEFAULT_TOLERANCE = 1e-3  # [m]
 FIXED_DEG = 0.1  # [deg] to either side: a range that counts as "fixed"
@@ -113,8 +113,6 @@ class Task:
 
     def __post_init__(self) -> None:
         """Refuse numbers that describe no task; keep them as plain floats."""
-        from feasibility.collisions.settings import Collision
-
         checks = Checks("task")
         kept: dict[str, Any] = {
             "standoff": checks.number(
@@ -134,9 +132,12 @@ class Task:
             if getattr(self, name) is not None:
                 kept[name] = checks.positive(name, getattr(self, name), unit)
         asked = self.collision
-        if asked is not None and not isinstance(asked, Collision):
-            expected = "must be a Collision, such as Collision(clearance=0.005), or None"
-            checks.wrong("collision", self.collision, expected)
+        if asked is not None:
+            from feasibility.collisions.settings import Collision
+
+            if not isinstance(asked, Collision):
+                expected = "must be a Collision, such as Collision(clearance=0.005), or None"
+                checks.wrong("collision", self.collision, expected)
         kept["approach"] = self._checked_approach(checks)
         kept["roll_deg"] = roll = self._checked_roll(checks, kept["cone_deg"])
         if self.roll_reference is not None:
@@ -266,7 +267,11 @@ class Task:
     @property
     def roll(self) -> Roll | None:
         """The range of the roll, rad; None where it is free."""
-        return None if self.roll_deg is None else roll_of_range(*self.roll_deg)
+        if self.roll_deg is None:
+            return None
+        from feasibility.roll import roll_of_range
+
+        return roll_of_range(*self.roll_deg)
 
     def fixed_approach(self, cells: Cells) -> Array | None:
         """(3,) unit, in the root frame, where the approach is one direction; None elsewhere."""
@@ -324,6 +329,8 @@ class Task:
                 ),
                 "task",
             )
+        from feasibility.roll import projected
+
         return projected(directions, approaches)[0]
 
 

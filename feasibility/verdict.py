@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from coverable.arrays import Array, Ints, Mask
 from coverable.errors import at_least
@@ -43,6 +43,14 @@ class Evidence(StrEnum):
     """The search ended at its stated resolution without finding a covering motion."""
     BUDGET = "budget"
     """The search was stopped before it ended."""
+
+
+class Decision(NamedTuple):
+    """An answer, its evidence and the sentences about it."""
+
+    answer: Answer
+    evidence: Evidence
+    message: str
 
 
 class CauseKind(StrEnum):

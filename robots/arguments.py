@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -60,8 +60,6 @@ def check_arguments(
     Returns:
         The poses as matrices, and the axes.
     """
-    from robots.urdf.axes import Axis
-
     checks = Checks(source, RobotError)
     directions = {"approach_axis": approach_axis, "reference_axis": reference_axis}
     for key, value in directions.items():
@@ -73,7 +71,7 @@ def check_arguments(
         checks.number(f"lock.{printable(joint)}", value, "must be a finite number (rad or m)")
     _check_xacro_args(checks, {} if xacro_args is None else xacro_args)
     listed = isinstance(axes, (list, tuple))
-    if not (listed and all(isinstance(axis, Axis) for axis in axes)):
+    if not listed or (axes and not _are_axes(axes)):
         checks.wrong("axes", axes, "must be a list of Axis")
     mounting = Mounting(
         None if tcp is None else checked_pose(checks, "tcp", tcp, FURTHEST_TCP),
@@ -82,6 +80,13 @@ def check_arguments(
     )
     checks.done()
     return mounting
+
+
+def _are_axes(axes: Sequence[Any]) -> bool:
+    """Are all of these axes?"""
+    from robots.urdf.axes import Axis
+
+    return all(isinstance(axis, Axis) for axis in axes)
 
 
 def _check_xacro_args(checks: Checks, args: Any) -> None:

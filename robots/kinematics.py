@@ -208,6 +208,13 @@ def _points_and_rotations(poses: list[bytes]) -> tuple[Array, Array]:
     return values[:, 9:].copy(), np.ascontiguousarray(rotations)
 
 
+def reference_axes(robot: Robot, q: ArrayLike) -> Array:
+    """(m, 3) the reference axis of the tool at configurations q (m, n), in the root frame."""
+    frame = robot.model.frames[robot.tool_frame_id]
+    joints = Kinematics(robot).joints(q).rotations[:, frame.parentJoint]
+    return np.asarray(joints @ (frame.placement.rotation @ robot.reference_axis))
+
+
 def configuration_near(
     kinematics: Kinematics,
     q: Array,

@@ -187,10 +187,13 @@ def _read(
         options: limits and axes of the tool, as in `load_robot`.
     """
     from robots.from_urdf import robot_from_urdf
-    from robots.urdf.axes import carrier_of_surface
     from robots.urdf.checked_urdf import check_urdf
 
-    link = mounting.surface_link or carrier_of_surface(mounting.axes)
+    link = mounting.surface_link
+    if mounting.axes and not link:
+        from robots.urdf.axes import carrier_of_surface
+
+        link = carrier_of_surface(mounting.axes)
     folders = (*folders, *info.package_dirs)
     robot = robot_from_urdf(
         check_urdf(info.urdf, folders, mounting.axes, mounting.base, xacro_args),

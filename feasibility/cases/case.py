@@ -32,7 +32,6 @@ from feasibility.cases.toml import (
 )
 from feasibility.safe_files import FileError, read_text, shown_path
 from feasibility.search import Search
-from feasibility.targets.references import check_references
 from feasibility.task import PlacementError, Task, check_footprint
 
 if TYPE_CHECKING:
@@ -128,7 +127,10 @@ class Case:
         if robot is None or cells is None or task is None or faults:
             raise CaseError(faults, self.name)
         try:
-            check_references(cells, task)
+            if task.roll is not None:
+                from feasibility.targets.references import check_references
+
+                check_references(cells, task)
             check_footprint(cells, task)
         except ArgumentError as error:
             named = [fault.renamed({}, "task") for fault in error.faults]
@@ -241,11 +243,11 @@ def load_case(name_or_path: str | os.PathLike[str], overrides: Iterable[str] = (
         CaseError: with everything that is wrong.
     """
     name = os.fspath(name_or_path)
-    if isinstance(name_or_path, str) and name in builtin_cases():
-        return builtin_cases()[name].with_overrides(overrides)
-    known = tuple(builtin_cases())
+    known = _builtin_tables()
+    if isinstance(name_or_path, str) and name in known:
+        return _builtin_case(name).with_overrides(overrides)
     if not os.path.lexists(name) and not name.endswith(".toml"):
-        guess = close(name, known)
+        guess = close(name, tuple(known))
         hint = f"did you mean {guess}? " if guess else ""
         raise CaseError(
             f"is neither a built-in case nor a file; {hint}`coverable cases` lists the built-in "
@@ -267,18 +269,29 @@ def read_document(path: str | os.PathLike[str], what: str) -> str:
 @cache
 def builtin_cases() -> Mapping[str, Case]:
     """The built-in cases by name, in the order of their file."""
-    entries = parse_toml(BUILT_IN.read_text(encoding="utf-8"))
-    tables: dict[str, Tables] = {}
-    cases = {}
-    for name, entry in entries.items():
-        base = tables[entry["like"]] if "like" in entry else {}
-        tables[name] = {
+    return {name: _builtin_case(name) for name in _builtin_tables()}
+
+
+@cache
+def _builtin_case(name: str) -> Case:
+    """One of them; the others are not looked at."""
+    tables, description = _builtin_tables()[name]
+    return _from_tables(tables, name, (), description)
+
+
+@cache
+def _builtin_tables() -> Mapping[str, tuple[Tables, str]]:
+    """The tables of each, and its description."""
+    found: dict[str, tuple[Tables, str]] = {}
+    for name, entry in parse_toml(BUILT_IN.read_text(encoding="utf-8")).items():
+        base = found[entry["like"]][0] if "like" in entry else {}
+        tables = {
             title: {**base.get(title, {}), **entry.get(title, {})}
             for title in TABLES
             if title in base or title in entry
         }
-        cases[name] = _from_tables(tables[name], name, (), entry["description"])
-    return cases
+        found[name] = tables, entry["description"]
+    return found
 
 
 def _from_tables(

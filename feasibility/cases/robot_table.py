@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from coverable.errors import Fault, is_number, printable, shown
-from feasibility.cases.axis_table import AxisPart, read_axes
 from feasibility.cases.robot_limits import read_limits_by_name, read_limits_deg
 from feasibility.cases.table_reader import (
     METRES,
@@ -25,6 +24,7 @@ from feasibility.cases.table_reader import (
 )
 
 if TYPE_CHECKING:
+    from feasibility.cases.axis_table import AxisPart
     from robots.errors import RobotError
     from robots.robot import Robot
 
@@ -251,7 +251,7 @@ def _part(section: Section) -> RobotPart:
         limits=section.text("limits"),
         limits_deg=read_limits_deg(section),
         limits_m=read_limits_by_name(section, "limits_m", METRES),
-        axis=read_axes(section),
+        axis=_axes(section),
         start=_values(section, "start"),
         start_deg=_values(section, "start_deg"),
         **_axes_poses_and_lock(section),
@@ -259,6 +259,15 @@ def _part(section: Section) -> RobotPart:
     _refuse_contradictions(section)
     section.refuse_others()
     return part
+
+
+def _axes(section: Section) -> tuple[AxisPart, ...]:
+    """Those that arm or surface are mounted on, without faults."""
+    if not section.has("axis"):
+        return ()
+    from feasibility.cases.axis_table import read_axes
+
+    return read_axes(section)
 
 
 def _axes_poses_and_lock(section: Section) -> dict[str, Any]:

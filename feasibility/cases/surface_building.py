@@ -87,7 +87,6 @@ def build_surface(kind: str, values: Values, pose: Values, place: str = "surface
 def _patch(kind: str, values: Values, pose: Values, place: str) -> Any:
     """A patch from its numbers; a control net may be in a file."""
     import coverable
-    from surfaces.patches.nurbs.control_net_file import read_net
 
     file, keys = values.get("file"), own_keys(kind)
     arguments = {
@@ -99,6 +98,8 @@ def _patch(kind: str, values: Values, pose: Values, place: str) -> Any:
     try:
         with faults_of(place, "", kind, file, {**values, **pose}):
             if file is not None:  # what the case says replaces what the file says
+                from surfaces.patches.nurbs.control_net_file import read_net
+
                 arguments.pop("points", None)
                 arguments = read_net(file)._asdict() | arguments
             return getattr(coverable, kind)(**arguments, **pose)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import partial
 from types import MappingProxyType
@@ -14,11 +14,9 @@ from coverable.errors import MISSING, Fault, alternatives, close, shown
 from feasibility.cases.keys import kinds, own_keys
 from feasibility.cases.surface_building import (
     AUTO,
-    CHOICE,
     FILES,
     MOST_CELLS,
     MOST_MESH_CELLS,
-    SURFACE_NAMES,
     Footprint,
     build_surface,
     cut_surface,
@@ -242,12 +240,7 @@ def _kind(section: Section, known: tuple[str, ...]) -> str | None:
 
 def _check(section: Section, kind: str, key: str, values: dict[str, Any]) -> None:
     """Check what no constructor checks before a file is read."""
-    from surfaces.meshes.selection import checked_box, checked_cone, checked_plane
-    from surfaces.meshes.sources import metres_per_unit
-    from surfaces.step_files.step_surface import checked_choice
-
     value = values.get(key)
-    make: Callable[..., object]
     if key == "file":
         required = kind != "bspline"
         values.pop(key, None)
@@ -262,32 +255,12 @@ def _check(section: Section, kind: str, key: str, values: dict[str, Any]) -> Non
         section.wrong_type(key, value)
     elif key == "neighbours" and value != "order":
         section.positive(key, value)
-    elif key == "scale":
-        section.make(metres_per_unit, {"scale": value})
-    elif kind == "step" and key in CHOICE:
-        chosen = {one: values[one] for one in CHOICE if one in values}
-        if key == next(iter(chosen)):  # all at once: they may contradict each other
-            section.make(checked_choice, chosen)
-    elif key == "faces" and (not isinstance(value, list) or not value):
-        section.wrong_type(key, value)
-    elif isinstance(value, list) and key == "faces":
-        bad = (k for k, n in enumerate(value) if not isinstance(n, int) or n is True or n < 0)
-        k = next(bad, len(value) - 1)
-        section.whole(f"faces[{k}]", value[k], 0)
-    elif key == "box" and isinstance(value, list) and len(value) == 2:
-        ends = dict(zip(("low", "high"), value, strict=True))
-        section.make(checked_box, ends, SURFACE_NAMES)
-    elif key == "box":
-        section.wrong_type(key, value)
-    elif key in ("cut", "facing"):
-        part = Section(f"{section.name}.{key}", value, section.faults)
-        names = dict.fromkeys(part.keys) | {"within_deg": "half_angle_deg"}
-        given = {names[k] or k: part.table.get(k, MISSING) for k in part.keys}
-        make = checked_plane if key == "cut" else checked_cone
-        part.make(make, given, SURFACE_NAMES)
-        part.refuse_others()
     elif key == "pieces":
         values[key] = _pieces(section, values.get(key, MISSING))
+    elif kind in MESHES:
+        from feasibility.cases.mesh_reading import check_key
+
+        check_key(section, kind, key, values)
 
 
 def _pieces(section: Section, entries: Any) -> tuple[SurfacePart, ...]:

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coverable.arrays import Array, Ints, Mask
-from feasibility.certification.rolls.bounds import off_middle, reference_axes, roll_vectors
 from feasibility.certification.stretches import Samples, beyond
 from feasibility.task import Targets, Task
-from robots.kinematics import Kinematics
+from robots.kinematics import Kinematics, reference_axes
 from robots.robot import Robot
 from surfaces.cells import Cells
 
@@ -144,6 +143,8 @@ def at_targets(
     chord = np.linalg.norm(axes - approaches, axis=1)
     roll = np.zeros(len(cell))
     if task.roll is not None and aims.references is not None:
+        from feasibility.certification.rolls.bounds import off_middle, roll_vectors
+
         roll = off_middle(roll_vectors(x, axes, aims.references[cell], approaches, task.roll))
     inside = (beyond(task, off, chord, roll) <= 0.0).all(axis=0)
     return np.where(inside, chord, np.inf), roll

@@ -31,13 +31,12 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.arrays import Array, Ints
-from feasibility.certification.jacobians import jacobians
+from feasibility.certification.jacobians import jacobians, smallest_singular
 from feasibility.certification.lever_bounds import (
     column_changes,
     largest_levers,
     second_derivative_bound,
 )
-from feasibility.certification.rates.segment_rates import smallest_singular
 from feasibility.certification.rows import Rows
 from feasibility.task import Task
 from feasibility.verdict import Bound

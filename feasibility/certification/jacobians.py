@@ -58,3 +58,10 @@ def lengths(a: Array) -> Array:
     """(m, n) lengths of vectors (m, 3, n); numpy's own sums are slow over three numbers."""
     x, y, z = a[:, 0], a[:, 1], a[:, 2]
     return np.sqrt(x * x + y * y + z * z)
+
+
+def smallest_singular(at: Jacobians, scale: float) -> Array:
+    """(k,) the smallest singular value that counts: of two directions of the axis, not three."""
+    both = np.concatenate([at.point / scale, at.axis], axis=1)
+    values = np.linalg.svd(both, compute_uv=False)
+    return np.asarray(values[:, min(both.shape[2], 5) - 1])

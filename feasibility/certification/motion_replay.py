@@ -12,13 +12,12 @@ import numpy as np
 
 from coverable.arrays import Array, Mask
 from feasibility.certification.cells_reached import at_targets
-from feasibility.certification.order import order_of_marks
 from feasibility.certification.placement_margin import margin_fault
 from feasibility.certification.surface_replay import replay_over_surface
 from feasibility.collisions.asked_bodies import gather
 from feasibility.task import Task
 from feasibility.verdict import Certificate, Replay, Walk
-from robots.kinematics import Kinematics
+from robots.kinematics import Kinematics, reference_axes
 from robots.robot import Robot
 from surfaces.cells import Cells
 
@@ -46,9 +45,11 @@ def replay(
     Returns:
         What was measured, and the reason if the walk is refused. NaN anywhere refuses.
     """
-    from feasibility.certification.collisions.collision_replay import collision_replay
+    disorder = _malformed(cells, walk)
+    if cells.in_order and not disorder:
+        from feasibility.certification.order import order_of_marks
 
-    disorder = _malformed(cells, walk) or order_of_marks(cells, walk)
+        disorder = order_of_marks(cells, walk)
     if disorder:
         return Replay(Certificate(len(walk.q), np.nan, np.nan, np.nan), disorder)
     here = replace(task, placement_error=None)  # its margin is judged last
@@ -57,6 +58,8 @@ def replay(
     bodies = gather(robot, cells.surface, task.collision, task.standoff)
     certificate, collides = found.certificate, False
     if bodies is not None and not refusal:
+        from feasibility.certification.collisions.collision_replay import collision_replay
+
         clear = collision_replay(robot, bodies, walk.q, deviations)
         certificate, refusal = clear.added_to(certificate), clear.refusal
         collides = not clear.accepted
@@ -77,8 +80,6 @@ def _malformed(cells: Cells, walk: Walk) -> str:
 
 def _misplaced(robot: Robot, cells: Cells, task: Task, walk: Walk) -> str:
     """Why a marked waypoint is not where it says it is; empty where all are."""
-    from feasibility.certification.rolls.bounds import reference_axes
-
     at = np.flatnonzero(walk.cell >= 0)
     q, cell = walk.q[at], walk.cell[at]
     points, axes = Kinematics(robot).tools(q)

@@ -34,11 +34,11 @@ from feasibility.certification.bisection import Stretches
 from feasibility.certification.jacobians import Jacobians
 from feasibility.certification.lever_bounds import peaks, second_derivatives
 from feasibility.certification.rolls.bounds import CLOSE_TO_ZERO as ROLL_CLOSE
-from feasibility.certification.rolls.bounds import frame_second_derivatives, reference_axes
+from feasibility.certification.rolls.bounds import frame_second_derivatives
 from feasibility.certification.rolls.held import Held
 from feasibility.certification.rows import Rows
 from feasibility.task import Task
-from robots.kinematics import Kinematics
+from robots.kinematics import Kinematics, reference_axes
 from robots.robot import Robot
 from surfaces.cells import Cells
 from surfaces.places.places import OffsetSurface, Places

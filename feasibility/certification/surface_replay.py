@@ -19,7 +19,7 @@ Where bodies are given, they have to stay clear of each other too (`collisions`)
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeGuard
 
 import numpy as np
 
@@ -33,7 +33,6 @@ from feasibility.certification.cells_reached import (
 )
 from feasibility.certification.faults import Judged, MotionFault
 from feasibility.certification.jacobians import jacobians
-from feasibility.certification.order import curves_of_marks, order_of_places
 from feasibility.certification.placement_margin import margin_fault, margin_of
 from feasibility.certification.refusals import exact_faults, limits, open_fault
 from feasibility.certification.stretches import Bounds, Judge, SampledStretches, Samples
@@ -45,10 +44,10 @@ from robots.robot import Robot
 from surfaces.cells import Cells
 from surfaces.places.offset_surfaces import offset_surface
 from surfaces.surface import Surface
-from surfaces.toolpaths.pose_surface import PoseSurface
 
 if TYPE_CHECKING:
     from feasibility.collisions.bodies import Bodies
+    from surfaces.toolpaths.pose_surface import PoseSurface
 
 LEVELS = 26  # halvings of a segment between two rows
 MOST_SAMPLES = 1_000_000  # configurations looked at between rows
@@ -102,7 +101,9 @@ def replay_over_surface(
     vague = _too_vague(task, surface)
     if vague:
         return MotionReplay(Certificate(len(rows), np.nan, np.nan, np.nan), tuple(vague), nowhere)
-    if working is None and marks is not None:
+    if working is None and marks is not None and _is_of_poses(cells.surface):
+        from feasibility.certification.order import curves_of_marks
+
         curves = curves_of_marks(cells, marks)
     offset = offset_surface(surface, surface.side_sign * task.standoff)
     judge = Judge(robot, less_deviations(task, surface), offset, cells, curves)
@@ -118,10 +119,13 @@ def replay_over_surface(
     missed = np.flatnonzero(~at if needed is None else needed & ~at)
     if len(missed):
         faults.append(MotionFault(-1, 0.0, missed_text(cells, task, missed, found.samples)))
-    faults += order_of_places(offset, found.samples, task.effective_tolerance)
-    if isinstance(surface, PoseSurface) and not faults:
-        found = _with_what_follows(found, judge, rows, cells, surface)
-        faults += found.faults
+    if _is_of_poses(surface):
+        from feasibility.certification.order import order_of_places
+
+        faults += order_of_places(offset, found.samples, task.effective_tolerance)
+        if not faults:
+            found = _with_what_follows(found, judge, rows, cells, surface)
+            faults += found.faults
     _less_room(found.room, task, reached.row[at], reached.chord[at], reached.roll[at])
     error, chord, roll = found.most.tolist()
     certificate = Certificate(
@@ -156,10 +160,15 @@ def _less_room(room: Array, task: Task, row: Ints, chord: Array, roll: Array) ->
         np.minimum.at(room[:, 1], row, np.maximum(task.roll.half - roll, 0.0))
 
 
+def _is_of_poses(surface: Surface) -> TypeGuard[PoseSurface]:
+    """Are there poses alone, or poses over a surface?"""
+    return surface.kind == "poses"
+
+
 def _surface_of(cells: Cells, task: Task, working: Mask | None) -> Surface:
     """What a motion is judged over."""
     surface = cells.surface
-    if not isinstance(surface, PoseSurface):
+    if not _is_of_poses(surface):
         return surface
     if working is not None and surface.under is not None:
         return surface.under
@@ -169,7 +178,7 @@ def _surface_of(cells: Cells, task: Task, working: Mask | None) -> Surface:
 
 def _at_work(cells: Cells) -> Mask | None:
     """(N,) the poses at which the tool works, where cells are poses; None for all cells."""
-    return cells.surface.working if isinstance(cells.surface, PoseSurface) else None
+    return cells.surface.working if _is_of_poses(cells.surface) else None
 
 
 def _tool_at_work(

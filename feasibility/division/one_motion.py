@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 from coverable.arrays import Mask
 from feasibility.clock import Clock, OutOfTime
-from feasibility.roadmap.search import exploration_of, explore
+from feasibility.roadmap.rounds import explore
+from feasibility.roadmap.search import exploration_of
 from feasibility.roadmap.walk import covering_walk
 from feasibility.search import Search
 from feasibility.speed.motion_rates import replay_at_rates

@@ -25,7 +25,7 @@ from feasibility.division.set_covering import set_cover
 from feasibility.division.sharing import TIME_LIMIT, fewest_patches, pieces_in
 from feasibility.roadmap.expansion import UNTRIED
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.search import improve
+from feasibility.roadmap.rounds import improve
 from feasibility.roadmap.walk import Links, links_of, patch_walk
 from feasibility.speed.motion_rates import replay_at_rates
 from feasibility.task import Task

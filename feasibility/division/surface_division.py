@@ -22,7 +22,8 @@ from feasibility.roadmap.causes.diagnosis import cause_of, causes_of, diagnose
 from feasibility.roadmap.causes.disconnection import disconnected
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions.arrays import SearchArrays, within
-from feasibility.roadmap.search import exploration_of, explore
+from feasibility.roadmap.rounds import explore
+from feasibility.roadmap.search import exploration_of
 from feasibility.roadmap.warmup import warm_up
 from feasibility.search import Progress, Search
 from feasibility.speed.fast_motions import keep_fast_motions

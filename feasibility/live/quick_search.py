@@ -18,7 +18,8 @@ from feasibility.paper.greedy import greedy_search
 from feasibility.problem import Problem
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions.arrays import arrays_of
-from feasibility.roadmap.search import evenly, improve, seed_middle
+from feasibility.roadmap.rounds import evenly, improve
+from feasibility.roadmap.search import seed_middle
 from feasibility.roadmap.warmup import warm_up
 from feasibility.search import Search
 from feasibility.targets.starting import start_cell

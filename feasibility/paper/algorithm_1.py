@@ -25,14 +25,17 @@ from feasibility.paper.jcell_grid import (
     rolls_within,
 )
 
-RUNNING, FOUND, EXHAUSTED, CAPPED, FULL = 0, 1, 2, 3, 4  # what a call is doing: counters[STATE]
+RUNNING, FOUND, EXHAUSTED, CAPPED = 0, 1, 2, 3  # what a call is doing: counters[STATE]
 STATE, DEPTH, NODES, PLACED, CALL = 0, 1, 2, 3, 4  # places in `Memory.counters`
 
 REFRESH = 256  # levels of the stack between full evaluations of the tool: keeps rounding below HAIR
 
 
 class Memory(NamedTuple):
-    """Working memory of one call; all that it takes to stop it and go on later."""
+    """Working memory of one call; all that it takes to stop it and go on later.
+
+    There is room for as many J-cells as a call may check; the system gives it when it is used.
+    """
 
     counters: Ints
     """(5,) STATE, DEPTH, NODES (the first, and those checked), PLACED (joint frames), CALL."""
@@ -70,18 +73,6 @@ def _key(offsets):
 def _weight(i):
     """An odd 64-bit factor for joint i (wraps around on purpose)."""
     return (2 * i + 1) * -7070675565921424023 + 2 * i
-
-
-@allocating_entry
-def rehash(memory):
-    """Enter all nodes of the running call into a new, empty table."""
-    counters, table, nodes = memory.counters, memory.table, memory.nodes
-    mask = table.shape[0] - 1
-    for node in range(counters[NODES]):
-        slot = _mixed(_key(nodes[node])) & mask
-        while table[slot] >> 32 == counters[CALL]:
-            slot = (slot + 1) & mask
-        table[slot] = counters[CALL] << 32 | node
 
 
 @allocating_entry
@@ -147,8 +138,7 @@ def extend_search(chain, patch_kernel, triangles, grid, target, target_cell, bud
     """Go on with a call of Algorithm 1 for at most `budget` more neighbours.
 
     Leaves counters[STATE] at FOUND (the stack and the last node are the path), EXHAUSTED (no
-    unchecked neighbour is left), CAPPED (`cap` J-cells were checked), RUNNING (call again) or
-    FULL (enlarge the memory, and call again).
+    unchecked neighbour is left), CAPPED (`cap` J-cells were checked) or RUNNING (call again).
 
     Args:
         chain, grid: a `Chain` and a `Grid`.
@@ -168,15 +158,15 @@ def extend_search(chain, patch_kernel, triangles, grid, target, target_cell, bud
     base, partial = np.empty((n, 12)), np.empty((n + 1, 6))
     offsets, delta, held = np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros(n, np.int64)
     call, count, depth = counters[CALL], counters[NODES], counters[DEPTH]
-    tool, last = partial[0], min(cap + 1, nodes.shape[0])
+    tool = partial[0]
     while depth >= 0:
         shared = _expand(nodes, stack_node[depth], stack_tool[depth], offsets, held, partial)
         placed = min(placed, shared)
         key, away = _key(offsets), stack_tool[depth, 6]
         number, deeper, nearer = stack_next[depth], False, away
         while not deeper and neighbour(number, moves_all, delta):
-            if count == last or depth + 1 == stack_node.shape[0] or budget == 0:
-                state = RUNNING if budget == 0 else (CAPPED if count > cap else FULL)
+            if count > cap or budget == 0:
+                state = RUNNING if budget == 0 else CAPPED
                 break
             budget -= 1
             number += 1

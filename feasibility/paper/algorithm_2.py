@@ -53,7 +53,7 @@ def _try_edge(tree: Tree, cell: int, neighbour: int, clock: Clock) -> bool:
     tree.checked += found.checked
     tree.fk += found.fk
     tree.capped += found.outcome is Outcome.CAPPED
-    tree.complete = found.outcome is not Outcome.OUT_OF_TIME
+    tree.complete = found.outcome is not Outcome.OUT_OF_TIME and not clock.out_of_time
     if found.outcome is not Outcome.FOUND:
         return False
     tree.edges[cell, neighbour] = found.jcells

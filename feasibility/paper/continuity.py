@@ -127,7 +127,7 @@ class JSpace:
             roll=self.steps.roll,
             reference=np.empty(0) if reference is None else reference,
         )
-        self._memory = _memory(robot.n, nodes=4096, stack=4096)
+        self._memory = _memory(robot.n, self._cap + 1)
 
     def load(self) -> None:
         """Load the compiled kernels, or compile them, before anything is timed."""
@@ -177,9 +177,7 @@ class JSpace:
                 self._memory,
             )  # fmt: skip
             state = self._memory.counters[jcells.STATE]
-            if state == jcells.FULL:
-                self._memory = _enlarged(self._memory)
-            elif state != jcells.RUNNING:
+            if state != jcells.RUNNING:
                 break
             if clock is not None and clock.out_of_time:
                 return self._result(Outcome.OUT_OF_TIME)
@@ -216,27 +214,13 @@ def _last_offset(origin: Array, step: Array, upper: Array) -> Ints:
     return last
 
 
-def _memory(n: int, nodes: int, stack: int) -> jcells.Memory:
-    """Empty working memory for `nodes` J-cells of n joints and a stack of `stack` levels."""
+def _memory(n: int, most: int) -> jcells.Memory:
+    """Empty working memory for `most` J-cells of n joints, all of which may be on the stack."""
     return jcells.Memory(
         counters=np.zeros(5, dtype=np.int64),
-        table=np.zeros(4 * nodes, dtype=np.int64),
-        nodes=np.empty((nodes, n), dtype=np.int32),
-        stack_node=np.empty(stack, dtype=np.int64),
-        stack_next=np.empty(stack, dtype=np.int64),
-        stack_tool=np.empty((stack, 7)),
+        table=np.zeros(1 << (2 * most).bit_length(), dtype=np.int64),
+        nodes=np.empty((most, n), dtype=np.int32),
+        stack_node=np.empty(most, dtype=np.int64),
+        stack_next=np.empty(most, dtype=np.int64),
+        stack_tool=np.empty((most, 7)),
     )
-
-
-def _enlarged(memory: jcells.Memory) -> jcells.Memory:
-    """The same running call with larger arrays for what is full: J-cells, stack, or both."""
-    nodes, n = memory.nodes.shape
-    stack = len(memory.stack_node)
-    more_nodes = 4 if memory.counters[jcells.NODES] >= nodes else 1
-    more_stack = 4 if memory.counters[jcells.DEPTH] + 1 >= stack else 1
-    larger = _memory(n, more_nodes * nodes, more_stack * stack)
-    for name in ("counters", "nodes", "stack_node", "stack_next", "stack_tool"):
-        kept = getattr(memory, name)
-        getattr(larger, name)[: len(kept)] = kept
-    jcells.rehash(larger)
-    return larger

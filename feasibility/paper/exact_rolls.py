@@ -8,7 +8,7 @@ from coverable.arrays import Array
 from feasibility.roll import projected, roll_of
 from feasibility.targets.references import u_directions
 from feasibility.task import Task
-from robots.kinematics import Kinematics
+from robots.kinematics import Kinematics, reference_axes
 from surfaces.cells import Cells
 
 
@@ -32,12 +32,11 @@ def rolls_at(kinematics: Kinematics, cells: Cells, task: Task, q: Array) -> Arra
         q: (k, n) configurations, rad or m.
     """
     points, axes = kinematics.tools(q)
-    own = kinematics.robot.reference_axis
-    x = np.array([kinematics.rotation(row) @ own for row in q]).reshape(-1, 3)
     reference = task.fixed_reference(cells)
     if reference is None:
         reference = u_directions(cells.surface, points)
     if reference is None:
         return np.full(len(q), np.nan)
     b = approaches_at(cells, task, points)
+    x = reference_axes(kinematics.robot, q)
     return roll_of(x, axes, projected(reference, b)[0], b)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,19 +16,10 @@ from feasibility.found import Found
 from feasibility.notices import REASONS, compiling_notice
 from feasibility.problem import Problem
 from feasibility.roadmap.exploration import Exploration, wound
-from feasibility.roadmap.outcome import (
-    exhausted_words,
-    proof_of,
-    proved_words,
-    unfinished_words,
-)
-from feasibility.roadmap.proving import Proving
-from feasibility.roadmap.search import close, exploration_of, explore, restart
+from feasibility.roadmap.search import close, exploration_of, seed_middle
 from feasibility.roadmap.walk import covering_walk
 from feasibility.roadmap.warmup import warm_up
 from feasibility.search import Search
-from feasibility.targets.starting import start_cell
-from feasibility.task import Task
 from feasibility.verdict import Cause, Replay, Walk
 from robots.kinematics import Kinematics
 
@@ -37,9 +28,8 @@ if TYPE_CHECKING:
 
     from feasibility.collisions.bodies import Bodies
     from feasibility.roadmap.forward.run import OrderedRun
+    from feasibility.roadmap.proving import Proving
 
-FIRST, SECOND, THIRD, LAST = 1, 4, 8, 16  # rounds without gain
-FEW_CUT_BOXES, MORE_CUT_BOXES = 20_000, 200_000
 IN_PLACE = 0.1  # [1] share of the tolerance within which a tool point stays over a pose
 
 
@@ -62,7 +52,11 @@ def complete_search(
     """
     if seeds is not None:
         _check_seeds(problem, seeds)
-    begin = start_cell(problem.robot, problem.cells, problem.task)
+    begin = None
+    if problem.robot.start is not None:
+        from feasibility.targets.starting import start_cell
+
+        begin = start_cell(problem.robot, problem.cells, problem.task)
     with compiling_notice():
         return _search(problem, search, clock, seeds, begin)
 
@@ -71,8 +65,6 @@ def _search(
     problem: Problem, search: Search, clock: Clock, seeds: Walk | None, begin: int | None
 ) -> Found:
     """`complete_search`, from a cell that the arm's start is over."""
-    from feasibility.roadmap.forward.run import run_in_order
-
     with clock.enforced():  # loading kernels takes a second or two
         warm_up()
         problem.cells.curves  # noqa: B018 - part of the cells, made once
@@ -81,7 +73,7 @@ def _search(
         problem.robot, problem.cells, problem.task, search.seed, clock, problem.searched
     )
     exploration.early = search.early
-    proving = Proving(exploration, problem.task)
+    proving: Proving | None = None
     late, known, run = "", None, None
     try:
         if seeds is not None:
@@ -91,11 +83,17 @@ def _search(
             _begin(exploration, begin, problem.bodies)
         if seeds is not None and not (search.early and known is not None):
             _seed_cells(exploration, seeds)
-        if known is None:
-            explore(exploration, partial(between_rounds, exploration, proving, problem.searched))
+        if known is None and not seed_middle(exploration):
+            from feasibility.roadmap.proving import Proving, between_rounds
+            from feasibility.roadmap.rounds import go_on
+
+            proving = Proving(exploration, problem.task)
+            go_on(exploration, partial(between_rounds, proving, problem.searched))
         if not search.early or problem.cells.in_order:
             close(exploration)
         if problem.cells.in_order and exploration.complete and known is None:
+            from feasibility.roadmap.forward.run import run_in_order
+
             run = run_in_order(exploration)
     except OutOfTime:
         late = clock.limits
@@ -103,37 +101,6 @@ def _search(
     judged = None if seeds is None or known is None else (seeds, known)
     found = _found(problem, exploration, proving, late, judged)
     return found if run is None else _in_order(found, run, problem, exploration)
-
-
-def between_rounds(exploration: Exploration, proving: Proving, task: Task, idle: int) -> None:
-    """What is tried after rounds that gained nothing; rounds go on where it gains something.
-
-    In this order, because each costs more than the one before: a cut proof with few boxes; with
-    more boxes, and then the surface in finer cells; new starts all over the surface; the finest
-    cells and the last proof.
-
-    `task` is the one that the search keeps to; `idle` rounds in a row have gained nothing.
-    """
-
-    from feasibility.roadmap.refinement import COARSE, FINE, refine
-
-    def proved(budget: int) -> bool:
-        # Where a cell is proved uncoverable already, only more cells can be gained.
-        return not exploration.proved and proving.attempt(budget)
-
-    if not exploration.apart:
-        return
-    if idle == FIRST:
-        proved(FEW_CUT_BOXES)
-    elif idle == SECOND and not proved(MORE_CUT_BOXES):
-        refine(exploration, task, COARSE)
-    elif idle == THIRD:
-        before = exploration.sizes()
-        restart(exploration)
-        if exploration.sizes() == before:
-            proved(MORE_CUT_BOXES)
-    elif idle == LAST and not refine(exploration, task, FINE):
-        proved(MORE_CUT_BOXES)
 
 
 def _check_seeds(problem: Problem, seeds: Walk) -> None:
@@ -212,7 +179,7 @@ def _seed_cells(exploration: Exploration, seeds: Walk) -> None:
 def _found(
     problem: Problem,
     exploration: Exploration,
-    proving: Proving,
+    proving: Proving | None,
     late: str,
     judged: tuple[Walk, Replay] | None = None,
 ) -> Found:
@@ -226,7 +193,11 @@ def _found(
     walk, known = (None, None) if judged is None else judged
     if complete:
         walk, known = covering_walk(exploration.roadmap, exploration.best, start), None
-    proof = None if walk is not None else proof_of(exploration)
+    said: dict[str, Any] = {}
+    if walk is None:
+        from feasibility.roadmap.outcome import outcome_of
+
+        said = outcome_of(problem, exploration, proving, late)
     return Found(
         covered=exploration.covered if walk is None else np.ones(total, dtype=bool),
         components=tuple(np.flatnonzero(exploration.covers(r)) for r in exploration.roots()),
@@ -239,7 +210,7 @@ def _found(
             "fk": int(exploration.work.counts[0]),
             "nodes": len(exploration.roadmap.cell),
             "motions": len(exploration.roadmap.edges),
-            "boxes": exploration.boxes + proving.boxes,
+            "boxes": exploration.boxes + (0 if proving is None else proving.boxes),
             "rounds": exploration.rounds,
         },
         motion=walk,
@@ -249,10 +220,7 @@ def _found(
         f"Pinocchio's replay holds it {problem.within}, between waypoints too.",
         refused="A motion over every cell was found, but the independent replay refuses it: "
         "{refusal}.",
-        proof=proof,
-        proved="" if proof is None else proved_words(problem, proving, proof),
-        unfinished="" if walk is not None else unfinished_words(problem, proving, late),
-        exhausted=exhausted_words(problem, exploration, proving),
+        **said,
         make_graph=partial(_graph, exploration),
         make_causes=lambda: _causes(problem, exploration),
     )
@@ -273,10 +241,11 @@ def _hindered(exploration: Exploration) -> bool:
 
 def _causes(problem: Problem, exploration: Exploration) -> tuple[Cause, ...]:
     """Why cells are missed."""
-    from feasibility.roadmap.causes.diagnosis import causes_of
-
     if exploration.complete:
         return ()
+    from feasibility.roadmap.causes.diagnosis import causes_of
+    from feasibility.roadmap.outcome import proof_of
+
     with compiling_notice(notice=REASONS):
         return causes_of(exploration, proof_of(exploration), problem.pairs)
 

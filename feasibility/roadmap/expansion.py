@@ -20,7 +20,6 @@ from feasibility.roadmap.motions.projection import PROJECTION_STEPS
 from feasibility.roadmap.motions.self_motion import SETTLE_STEPS, connect, effects, settle
 from feasibility.roadmap.motions.tracking import track
 from feasibility.roadmap.motions.working_memory import NEXT, Work, place
-from feasibility.roadmap.moving_clear import moved_clear
 
 MOST_FAILURES = 12  # failed connections after which a pair of components is left alone
 PATIENCE = 60  # the same for `explore_self_motions`
@@ -101,11 +100,19 @@ class Grower:
         q = guess.copy()
         if not project_near_cell(self.arrays, self.work, cell, q, PROJECTION_STEPS):
             return False
-        if moved_clear(self.arrays, self.work, cell, q):
+        if self._clear(cell, q):
             settle(self.arrays, self.work, cell, q, SETTLE_STEPS)
             if self.join(cell, q) is None:
                 self.add_node(cell, q, self.roadmap.add_component())
         return True
+
+    def _clear(self, cell: int, q: Array) -> bool:
+        """Is q (n,) clear of collisions, or could it be moved clear of them, in place?"""
+        if not len(self.arrays.collisions):
+            return True
+        from feasibility.roadmap.moving_clear import moved_clear
+
+        return bool(moved_clear(self.arrays, self.work, cell, q))
 
     def spread(
         self, neighbours: Sequence[Sequence[tuple[int, int]]], enough: Callable[[int], bool]

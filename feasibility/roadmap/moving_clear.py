@@ -4,31 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable.arrays import Array
 from coverable.kernels import entry
 from feasibility.collisions.kernels.clearance import clearance_gradient, segment_clear
 from feasibility.roadmap.motions.aiming import look_at
-from feasibility.roadmap.motions.arrays import SearchArrays
 from feasibility.roadmap.motions.projection import project
 from feasibility.roadmap.motions.self_motion import CONE_SLACK, NEWTON_AT_REST
-from feasibility.roadmap.motions.working_memory import HERE, Work, copy_slot, place, put
+from feasibility.roadmap.motions.working_memory import HERE, copy_slot, place, put
 
 PUSHES = 8  # steps that a colliding configuration gets
 PUSH = 0.2  # [rad] or [m] of one step
 
 
-def moved_clear(arrays: SearchArrays, work: Work, cell: int, q: Array) -> bool:
+@entry
+def moved_clear(arrays, work, cell, q):  # type: ignore[no-untyped-def]
     """Move q (n,), in place, over its cell until it collides no more; False where it still does.
 
     Each step goes down the gradient of the penetration, and is projected back onto the target. This
-    is no motion of the arm: q becomes another start.
+    is no motion of the arm: q becomes another start. Collisions have to be checked.
     """
-    return len(arrays.collisions) == 0 or bool(_pushed_clear(arrays, work, cell, q))
-
-
-@entry
-def _pushed_clear(arrays, work, cell, q):  # type: ignore[no-untyped-def]
-    """`moved_clear`, where collisions are checked."""
     if segment_clear(arrays.collisions, q, q) > 0.0:
         return True
     look_at(arrays, work, cell)

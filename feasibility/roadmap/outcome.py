@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from feasibility.problem import Problem
 from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.proving import Proving
 
 if TYPE_CHECKING:
     from feasibility.cut_tree import CutTree
+    from feasibility.roadmap.proving import Proving
 
 
 def proof_of(exploration: Exploration) -> CutTree | None:
@@ -24,16 +24,34 @@ def proof_of(exploration: Exploration) -> CutTree | None:
     return exploration.cut_tree if cell is None else CutTree(Leaf(cell))
 
 
-def proved_words(problem: Problem, proving: Proving, proof: CutTree) -> str:
-    """What is proved: which cells cannot be covered, or which cuts part them."""
+def outcome_of(
+    problem: Problem, exploration: Exploration, proving: Proving | None, late: str
+) -> dict[str, Any]:
+    """The fields of `Found` that say why no motion was found.
+
+    Args:
+        problem, exploration: what was searched.
+        proving: the attempts at a proof, if there were any.
+        late: the limit that ran out, if one did.
+    """
+    proof, boxes = proof_of(exploration), 0 if proving is None else proving.boxes
+    return {
+        "proof": proof,
+        "proved": "" if proof is None else proved_words(problem, exploration, boxes, proof),
+        "unfinished": unfinished_words(problem, exploration, proving, late),
+        "exhausted": exhausted_words(problem, exploration, proving),
+    }
+
+
+def proved_words(problem: Problem, exploration: Exploration, examined: int, proof: CutTree) -> str:
+    """What is proved: which cells cannot be covered, or which cuts part them (by boxes)."""
     from feasibility.cut_words import sentence
 
-    exploration = proving.exploration
     best = f"the best single motion covers {exploration.n_covered} of {len(problem.cells)}"
     if proof.kind == "cut":
         return (
             f"No single motion covers every cell {problem.within}, which is proved: "
-            f"{sentence(proof, problem.robot, problem.cells)} ({proving.boxes} boxes); {best}."
+            f"{sentence(proof, problem.robot, problem.cells)} ({examined} boxes); {best}."
         )
     proved = sum(ruling is Ruling.PROVED for ruling in exploration.rulings.values())
     how = list[str]()
@@ -56,11 +74,13 @@ def proved_words(problem: Problem, proving: Proving, proof: CutTree) -> str:
     )
 
 
-def unfinished_words(problem: Problem, proving: Proving, late: str) -> str:
+def unfinished_words(
+    problem: Problem, exploration: Exploration, proving: Proving | None, late: str
+) -> str:
     """What is known to be left untried; empty where nothing is. `late`: the limit that ran out."""
     from feasibility.targets.blocked import blocked_curves, smoothing_offer
 
-    exploration, total = proving.exploration, len(problem.cells)
+    total = len(problem.cells)
     if late:
         return (
             f"The {late} ran out; the best single motion so far covers "
@@ -84,7 +104,9 @@ def unfinished_words(problem: Problem, proving: Proving, late: str) -> str:
             f"{exploration.n_covered} of {total}); the search still grew when it was stopped after "
             f"{exploration.rounds} rounds. Another seed may find a motion."
         )
-    if proving.unable or proving.attempts == 0 or (proving.starved and not proving.alarmed):
+    if proving is None or proving.unable or proving.attempts == 0:
+        return ""
+    if proving.starved and not proving.alarmed:
         return ""
     from feasibility.cut_words import joint_value
 
@@ -103,12 +125,12 @@ def unfinished_words(problem: Problem, proving: Proving, late: str) -> str:
     )
 
 
-def exhausted_words(problem: Problem, exploration: Exploration, proving: Proving) -> str:
+def exhausted_words(problem: Problem, exploration: Exploration, proving: Proving | None) -> str:
     """What was tried in vain."""
     tried = [f"{exploration.rounds} rounds"]
     if exploration.finest > 1:
         tried.append(f"cells cut {exploration.finest} x {exploration.finest}")
-    if proving.attempts:
+    if proving is not None and proving.attempts:
         tried.append(f"{proving.attempts} attempts at a proof, {proving.boxes} boxes")
     nodes = len(exploration.roadmap.cell)
     none, best = "by no single component", "the best"

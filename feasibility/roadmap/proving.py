@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from feasibility.roadmap.exploration import Exploration, wound
+from feasibility.roadmap.refinement import COARSE, FINE, refine
+from feasibility.roadmap.rounds import restart
 from feasibility.task import Task
 from surfaces.surface import SurfaceError
 
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
     from feasibility.roadmap.cuts.guess import OpenGap
     from feasibility.roadmap.cuts.prover import Prover
 
+FIRST, SECOND, THIRD, LAST = 1, 4, 8, 16  # rounds without gain
+FEW_CUT_BOXES, MORE_CUT_BOXES = 20_000, 200_000
 MOST_BOXES = 1_000_000  # of one attempt
 ATTEMPTS = 6  # in a row, as long as each finds seeds that gain something
 
@@ -116,3 +120,33 @@ class Proving:
             rng = np.random.default_rng([self.exploration.seed, 1])
             self._prover = Prover(self.exploration.arrays, places, rng)
         return self._prover
+
+
+def between_rounds(proving: Proving, searched: Task, idle: int) -> None:
+    """What is tried after rounds that gained nothing; rounds go on where it gains something.
+
+    In this order, because each costs more than the one before: a cut proof with few boxes; with
+    more boxes, and then the surface in finer cells; new starts all over the surface; the finest
+    cells and the last proof.
+
+    The search keeps to the task `searched`; `idle` rounds in a row have gained nothing.
+    """
+    exploration = proving.exploration
+
+    def proved(budget: int) -> bool:
+        # Where a cell is proved uncoverable already, only more cells can be gained.
+        return not exploration.proved and proving.attempt(budget)
+
+    if not exploration.apart:
+        return
+    if idle == FIRST:
+        proved(FEW_CUT_BOXES)
+    elif idle == SECOND and not proved(MORE_CUT_BOXES):
+        refine(exploration, searched, COARSE)
+    elif idle == THIRD:
+        before = exploration.sizes()
+        restart(exploration)
+        if exploration.sizes() == before:
+            proved(MORE_CUT_BOXES)
+    elif idle == LAST and not refine(exploration, searched, FINE):
+        proved(MORE_CUT_BOXES)

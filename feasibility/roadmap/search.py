@@ -4,14 +4,7 @@ In this order, because each step (of the list in `feasibility`) is much cheaper 
 
 6. Seed a pivot cell in the middle, and spread each seed at once into the cells that its component
    does not cover yet. Most feasible cases end here.
-7. Branch and bound over every cell that no component has reached: it either proves that no
-   configuration covers the cell, or finds one (which becomes a seed). Before that, whether the tool
-   collides over the cell in every pose, whatever the arm does; and after it, over a few cells,
-   whether something collides wherever the tool is there.
-8. Rounds: seed cells that the best component misses; explore self-motions at the border of the
-   largest components, to find configurations that reach further; bridge two components, and explore
-   self-motions over cells that both cover. The search is exhausted when some rounds in a row have
-   gained nothing.
+7. and 8. Where that does not do, more is tried, in `rounds.py`; which is loaded then.
 
 A verdict with a witness or a proof does not depend on the order or on chance; without either the
 verdict is "exhausted", and its message says what was tried.
@@ -19,14 +12,9 @@ verdict is "exhausted", and its message says what was tried.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from coverable.arrays import Ints
 from feasibility.clock import Clock
-from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions.arrays import arrays_of
 from feasibility.roadmap.motions.self_motion import margin_shares
@@ -34,28 +22,7 @@ from feasibility.task import Task
 from robots.robot import Robot
 from surfaces.cells import Cells
 
-if TYPE_CHECKING:
-    from feasibility.roadmap.branch_and_bound.branching import Boxes
-
 PIVOT_SEEDS = 8
-TOP = 5  # components that a round works on
-RESTARTS = 6  # cells seeded anew before a search counts as exhausted
-IDLE_ROUNDS = 24  # rounds without gain after which the search is exhausted
-SETTLED_ROUNDS = 12  # the same once a proof decides the verdict, and only more cells can be gained
-PARTED_ROUNDS = 3  # the same once a cut tree parts the components found
-MOST_ROUNDS = 200
-SEEDS = 6  # guesses at a missed cell, each round
-FIRST_BOXES = 1000  # boxes for each cell that no component has reached
-MORE_BOXES = 20_000  # boxes once Newton has failed there too
-DEEP_BOXES = 2_000_000  # boxes for the few cells that are examined until one is proved
-DEEP_CELLS = 3
-ARM_CELLS = 4  # for which a collision of any part of the arm is tried to be proved
-MOST_RULED = 500  # cells examined in a row without reaching any; on a fine grid the rest are alike
-NEWTON_STARTS = 25
-
-
-Between = Callable[[int], None]
-"""Called after so many rounds without gain, to try something else."""
 
 
 def exploration_of(
@@ -86,24 +53,14 @@ def exploration_of(
     return Exploration(robot, cells, arrays, seed, clock, blockers)
 
 
-def explore(exploration: Exploration, between: Between | None = None) -> None:
-    """Run the search to its end; the exploration holds the result.
-
-    Args:
-        exploration: the search.
-        between: what to try between rounds, see `Between`.
+def seed_middle(exploration: Exploration) -> bool:
+    """Step 6; True when one component covers every cell.
 
     Raises:
         OutOfTime: the deadline passed; the exploration holds what was found until then.
     """
-    if len(exploration.cells) == 0 or seed_middle(exploration):
-        return
-    _unreached(exploration)
-    _rounds(exploration, between)
-
-
-def seed_middle(exploration: Exploration) -> bool:
-    """Step 6; True when one component covers every cell."""
+    if len(exploration.cells) == 0:
+        return True
     pivot = exploration.cells.middle
     exploration.tick("looking for configurations")
     guesses = exploration.guesses(PIVOT_SEEDS)
@@ -115,175 +72,6 @@ def seed_middle(exploration: Exploration) -> bool:
         if exploration.complete:
             return True
     return False
-
-
-def _unreached(exploration: Exploration) -> None:
-    """Step 7: a ruling on every cell that no component has reached."""
-    from feasibility.roadmap.branch_and_bound.branching import root_box
-
-    distance = exploration.robot.distance_from_base(exploration.arrays.points)
-    beyond = distance > exploration.robot.reach + exploration.arrays.tolerance
-    for cell in np.flatnonzero(beyond).tolist():
-        exploration.rulings[cell] = Ruling.PROVED
-    if exploration.early and exploration.proved:
-        return
-    open_boxes: dict[int, Boxes] = {}
-    in_vain = 0
-    for cell in evenly(np.flatnonzero(~exploration.reached & ~beyond)).tolist():
-        if exploration.reached[cell]:
-            in_vain = 0
-            continue  # reached from a cell examined before it
-        in_vain += 1
-        if in_vain > MOST_RULED:
-            break
-        if exploration.early and exploration.proved:
-            return
-        if exploration.tool_collides(cell):
-            continue
-        boxes = root_box(exploration.arrays)
-        if exploration.rule(cell, boxes, FIRST_BOXES) is Ruling.OPEN:
-            if exploration.add_seeds(cell, exploration.guesses(NEWTON_STARTS)) == 0:
-                open_boxes[cell] = boxes
-        elif exploration.rulings[cell] is Ruling.UNKNOWN:
-            exploration.add_seeds(cell, exploration.guesses(NEWTON_STARTS))
-    for cell, boxes in open_boxes.items():
-        if not exploration.reached[cell]:
-            exploration.rule(cell, boxes, MORE_BOXES)
-    if exploration.proved:
-        return
-    _at_the_target(exploration)
-    _where_the_arm_collides(exploration)
-    if exploration.proved:
-        return
-    # One proof is enough for the verdict: examine the furthest of the remaining cells deeper.
-    left = [cell for cell in open_boxes if not exploration.reached[cell]]
-    left = [cell for cell in left if exploration.rulings[cell] is Ruling.OPEN]
-    for cell in sorted(left, key=lambda cell: -distance[cell])[:DEEP_CELLS]:
-        if exploration.rule(cell, open_boxes[cell], DEEP_BOXES) is Ruling.PROVED:
-            return
-
-
-def _at_the_target(exploration: Exploration) -> None:
-    """Look again for cells that are still open, with the cone at the target only.
-
-    Up to here the cone had to hold at the tool point's own closest point on the surface too. Where
-    the tool point is off its target by much of the tolerance, that may leave nothing of the cone.
-    """
-    from feasibility.roadmap.branch_and_bound.branching import root_box
-
-    left = [
-        cell
-        for cell, ruling in exploration.rulings.items()
-        if ruling is not Ruling.PROVED and not exploration.reached[cell]
-    ]
-    if not left:
-        return
-    exploration.arrays = exploration.arrays._replace(off_target_cost=0.0)
-    for cell in left:
-        if not exploration.reached[cell]:
-            exploration.add_seeds(cell, exploration.guesses(NEWTON_STARTS))
-        if not exploration.reached[cell]:
-            exploration.rule(cell, root_box(exploration.arrays), MORE_BOXES)
-
-
-def _where_the_arm_collides(exploration: Exploration) -> None:
-    """Try to prove of a few open cells that something collides wherever the tool is there.
-
-    Over these the tool can be, as far as limits, cone and roll go.
-    """
-    if exploration.blockers is None:
-        return
-    open_ = [
-        cell
-        for cell, ruling in exploration.rulings.items()
-        if ruling in (Ruling.REACHED, Ruling.UNKNOWN) and not exploration.reached[cell]
-    ]
-    for cell in evenly(np.array(open_, dtype=np.int64))[:ARM_CELLS].tolist():
-        exploration.prove_collisions(cell)
-
-
-def evenly(cells: Ints) -> Ints:
-    """The same cells in an order of which every first part is spread over all of them."""
-    golden = 0.5 * (np.sqrt(5.0) - 1.0)
-    return cells[np.argsort(np.modf(golden * np.arange(len(cells)))[0], kind="stable")]
-
-
-def _rounds(exploration: Exploration, between: Between | None) -> None:
-    """Step 8: rounds of seeding and exploring, until some in a row have gained nothing.
-
-    What is gained are cells of the largest components. A small component that is found, joins
-    another, and is found again is no gain, or there would be no end.
-    """
-    idle, most = 0, exploration.sizes(TOP)
-    if exploration.early and exploration.proved:
-        return
-    for _ in range(MOST_ROUNDS):
-        roots = exploration.roots()
-        if not roots or not exploration.apart:
-            return  # the best component covers every cell that any component covers
-        if exploration.improvable:
-            _round(exploration, roots[:TOP])
-        exploration.rounds += 1
-        idle += 1
-        if exploration.sizes(TOP) > most:
-            idle, most = 0, exploration.sizes(TOP)
-        if exploration.complete or idle >= _enough(exploration):
-            return
-        if exploration.cut_tree is not None or between is None:
-            continue
-        between(idle)
-        if exploration.cut_tree is not None or exploration.sizes(TOP) > most:
-            idle, most = 0, max(most, exploration.sizes(TOP))
-    exploration.stopped = True
-
-
-def _enough(exploration: Exploration) -> int:
-    """Rounds without gain after which they end; fewer once a proof decides the verdict."""
-    if exploration.cut_tree is not None:
-        return PARTED_ROUNDS
-    return SETTLED_ROUNDS if exploration.proved else IDLE_ROUNDS
-
-
-def _round(exploration: Exploration, top: list[int]) -> None:
-    """One round: seed what the best component misses, and improve the largest ones."""
-    missed = np.flatnonzero(~exploration.covered & exploration.reached)
-    if len(missed):
-        exploration.add_seeds(int(exploration.rng.choice(missed)), exploration.guesses(SEEDS))
-    improve(exploration, top)
-
-
-def improve(exploration: Exploration, components: list[int]) -> None:
-    """Explore self-motions at the borders of some components, and bridge each two of them."""
-    rng = exploration.rng
-    for component in components:
-        if exploration.complete:
-            return
-        exploration.tick("exploring self-motions at borders")
-        border = exploration.border(component)
-        if len(border):
-            exploration.explore_self_motions(int(rng.choice(border)))
-    for a in range(len(components)):
-        for b in range(a):
-            one, other = (exploration.roadmap.root(components[k]) for k in (a, b))
-            # Every pair in every round would cost too much where there are many.
-            if one == other or (len(components) > 3 and rng.random() > 0.3):
-                continue
-            exploration.tick("bridging components")
-            exploration.bridge(one, other)
-            shared = np.flatnonzero(exploration.covers(one) & exploration.covers(other))
-            if exploration.complete:
-                return
-            if len(shared):
-                exploration.explore_self_motions(int(rng.choice(shared)))
-
-
-def restart(exploration: Exploration) -> None:
-    """Seed several cells all over the surface anew, as if each were the first."""
-    for cell in evenly(np.arange(len(exploration.cells)))[:RESTARTS].tolist():
-        exploration.tick("starting anew elsewhere")
-        exploration.add_seeds(cell, exploration.guesses(PIVOT_SEEDS))
-        if exploration.complete:
-            return
 
 
 def close(exploration: Exploration) -> None:

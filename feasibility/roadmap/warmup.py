@@ -39,12 +39,12 @@ def _explore_two_cells() -> None:
     from feasibility.certification.motion_replay import replay
     from feasibility.roadmap.exploration import Exploration
     from feasibility.roadmap.motions.arrays import arrays_of
-    from feasibility.roadmap.search import close, explore
+    from feasibility.roadmap.search import close, seed_middle
     from feasibility.roadmap.walk import covering_walk
 
     robot, cells, task = _two_cells((0.7, 0.72))
     exploration = Exploration(robot, cells, arrays_of(robot, cells, task), 0)
-    explore(exploration)
+    seed_middle(exploration)
     close(exploration)
     walk = covering_walk(exploration.roadmap, exploration.best)
     replay(robot, cells, task, walk, exploration.covered)
@@ -57,7 +57,7 @@ def _look_for_reasons() -> None:
     from feasibility.roadmap.exploration import Exploration
     from feasibility.roadmap.motions.arrays import arrays_of
     from feasibility.roadmap.proving import Proving
-    from feasibility.roadmap.search import explore
+    from feasibility.roadmap.rounds import explore
 
     robot, cells, task = _two_cells((0.7, 0.72))
     exploration = Exploration(robot, cells, arrays_of(robot, cells, task), 0)

@@ -17,7 +17,8 @@ from feasibility.paths.coverage import CoveragePath
 from feasibility.paths.winding import unwound
 from feasibility.problem import Problem
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.search import exploration_of, explore
+from feasibility.roadmap.rounds import explore
+from feasibility.roadmap.search import exploration_of
 from feasibility.roadmap.walk import route_walk
 from feasibility.roadmap.warmup import warm_up
 from feasibility.runs.fewest import Run, Stations, fewest_runs

@@ -12,8 +12,6 @@ from feasibility.targets.directions import approach_curves
 from feasibility.task import Task
 from surfaces.cells import Cells
 from surfaces.places.offset_surfaces import offset_surface
-from surfaces.toolpaths.arcs import straight
-from surfaces.toolpaths.pose_surface import PoseSurface
 
 if TYPE_CHECKING:
     from feasibility.targets.frames import FrameCurves
@@ -92,6 +90,8 @@ def _see_surface(cells: Cells, height: float, deviations: Array) -> None:
 
     Whether a motion is right over the surface is for the judge to say.
     """
+    from surfaces.toolpaths.pose_surface import PoseSurface
+
     surface = cells.surface
     if not isinstance(surface, PoseSurface) or surface.under is None:
         return
@@ -147,6 +147,8 @@ def _target_curves(cells: Cells, task: Task) -> TargetCurves:
     deviations = curves.deviations + cells.surface.deviations
     deviations[:, 0] += standoff * deviations[:, 1]
     if cells.surface.bare:
+        from surfaces.toolpaths.arcs import straight
+
         cubics[..., :3] = straight(task.targets(cells).points, cells.pairs, curves.first)
         derivative_bounds[:, 0] = deviations[:, 0] = 0.0
         _see_surface(cells, height, deviations)

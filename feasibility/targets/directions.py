@@ -11,7 +11,6 @@ from coverable.arrays import Array, Ints
 from feasibility.task import Task
 from surfaces.cells import Cells
 from surfaces.curve_fitting import fit_directions
-from surfaces.toolpaths.arcs import arc_at
 
 BESIDE_CREASES = 4  # times as many samples for each cubic of a mesh, whose curves may come to rest
 ROUNDING = 1.0 + 1e-12  # covers the rounding of the few operations on derivative bounds
@@ -80,5 +79,7 @@ def approach_curves(cells: Cells, task: Task) -> DirectionCurves | None:
         return DirectionCurves(cubics, np.zeros((pieces, 2)), np.zeros(curves))
     if cells.approaches is None or task.along_normals(cells):
         return None
+    from surfaces.toolpaths.arcs import arc_at
+
     ends = cells.approaches[cells.pairs]
     return fitted(cells, lambda curve, t: arc_at(ends[curve, 0], ends[curve, 1], t)[0], ends)

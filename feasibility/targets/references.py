@@ -18,7 +18,6 @@ from feasibility.task import Task
 from surfaces.cells import Cells
 from surfaces.patches.patch import Patch
 from surfaces.surface import Surface
-from surfaces.toolpaths.arcs import arc_at
 
 
 class OnPatch(NamedTuple):
@@ -69,6 +68,8 @@ def reference_directions(cells: Cells, task: Task, curves: Ints, t: Array) -> Ar
     found = u_directions(cells.surface, points)
     if found is not None:
         return found
+    from surfaces.toolpaths.arcs import arc_at
+
     ends = _tangents(cells)[cells.pairs[curves]]
     return arc_at(ends[:, 0], ends[:, 1], t)[0]
 

@@ -7,7 +7,7 @@ import numpy as np
 from coverable.errors import ArgumentError, Fault
 from feasibility.roll import roll_of
 from feasibility.task import Targets, Task
-from robots.kinematics import Kinematics
+from robots.kinematics import Kinematics, reference_axes
 from robots.robot import Robot
 from surfaces.cells import Cells
 
@@ -48,11 +48,8 @@ def _off_roll(robot: Robot, task: Task, targets: Targets) -> np.ndarray:
     """(N,) rad, by how much the roll over each cell is beyond its range; negative inside it."""
     if task.roll is None or targets.references is None or robot.start is None:
         return np.full(len(targets.points), -np.inf)
-    frame = robot.model.frames[robot.tool_frame_id]
-    turned = Kinematics(robot).joints(robot.start[None]).rotations[0, frame.parentJoint]
-    axes = (turned @ frame.placement.rotation) @ np.array(
-        [robot.reference_axis, robot.approach_axis]
-    ).T
-    x, a = (np.broadcast_to(one, targets.approaches.shape) for one in axes.T)
+    start, shape = robot.start[None], targets.approaches.shape
+    axes = reference_axes(robot, start), Kinematics(robot).tools(start)[1]
+    x, a = (np.broadcast_to(one, shape) for one in axes)
     roll = roll_of(x, a, targets.references, targets.approaches)
     return np.asarray(np.abs(task.roll.off(roll)) - task.roll.half)

@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from feasibility.task import Task
 from feasibility.treated.words import share_words
-from feasibility.verdict import Answer, Evidence
+from feasibility.verdict import Answer, Decision, Evidence
 
 if TYPE_CHECKING:
     from feasibility.treated.area import TreatedArea
 
 NOT_MEASURED = "No motion along which the treated area could be measured is known."
-
-
-class Decision(NamedTuple):
-    """An answer, its evidence and the sentences about it."""
-
-    answer: Answer
-    evidence: Evidence
-    message: str
 
 
 def with_coverage(decision: Decision, task: Task, found: TreatedArea | None) -> Decision:

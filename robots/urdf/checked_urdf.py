@@ -10,11 +10,9 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from coverable.arrays import Array
-from robots.urdf.axes import Axis, axis_joints
-from robots.urdf.expansion.xacro_files import expanded, is_xacro
 from robots.urdf.joints import JointInfo
 from robots.urdf.link_shapes import (
     CollisionShapes,
@@ -25,7 +23,10 @@ from robots.urdf.link_shapes import (
 )
 from robots.urdf.mesh_folders import MeshFolders
 from robots.urdf.tree import read_links, read_tree, refuse_other_formats
-from robots.urdf.xml import Faults, Node, UrdfError, parse_xml, read_bytes, shown
+from robots.urdf.xml import Faults, Node, UrdfError, is_xacro, parse_xml, read_bytes, shown
+
+if TYPE_CHECKING:
+    from robots.urdf.axes import Axis
 
 MAX_WARNINGS = 100
 
@@ -105,6 +106,8 @@ def check_urdf(
     checked = checked_tree(root, name, os.path.dirname(os.path.abspath(name)), package_dirs)
     if not axes:
         return checked
+    from robots.urdf.axes import axis_joints
+
     joints = axis_joints(axes, base, checked.joints, checked.root, name)
     links = (joints[0].parent, *(joint.child for joint in joints))
     return replace(checked, root=links[0], links=links, joints=joints)
@@ -115,6 +118,8 @@ def _root_of(
 ) -> Node:
     """The first element of a file; lines are those of the expanded text."""
     if is_xacro(path):
+        from robots.urdf.expansion.xacro_files import expanded
+
         called = f"{path} (expanded)"
         found = expanded(path, tuple(map(os.fsdecode, package_dirs)), xacro_args)
         root = parse_xml(found.text, called, encoding="utf-8")

@@ -5,8 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 
-from robots.urdf.expansion.xacro_files import expanded, is_xacro
-from robots.urdf.xml import Faults, UrdfError, name_of, parse_xml, read_bytes
+from robots.urdf.xml import Faults, UrdfError, is_xacro, name_of, parse_xml, read_bytes
 
 TAKEN = ("Adjacent", "Default", "Always", "User")
 """Reasons that are accepted. "Never" is a guess from samples, so it is not."""
@@ -33,7 +32,14 @@ def read_srdf(path: str | os.PathLike[str]) -> DisabledPairs:
         UrdfError: the file cannot be read, is no SRDF, or a pair lacks a link; with every fault.
     """
     name = os.fsdecode(path)
-    root = parse_xml(expanded(name).text if is_xacro(name) else read_bytes(name), name)
+    text: str | bytes
+    if is_xacro(name):
+        from robots.urdf.expansion.xacro_files import expanded
+
+        text = expanded(name).text
+    else:
+        text = read_bytes(name)
+    root = parse_xml(text, name)
     faults = Faults()
     if root.tag != "robot":
         raise UrdfError(f"line {root.line}: an SRDF starts with <robot name=...>", name)

@@ -8,6 +8,7 @@ ever followed: what is not in the bytes given is not read.
 from __future__ import annotations
 
 import math
+import os
 import re
 from dataclasses import dataclass, field
 from xml.parsers import expat
@@ -264,3 +265,13 @@ def only(node: Node, tag: str, faults: Faults, owner: str) -> Node | None:
             node, f"{owner} has {len(found)} <{tag}> elements (lines {lines}); keep one of them"
         )
     return found[0] if found else None
+
+
+def is_xacro(path: str | os.PathLike[str]) -> bool:
+    """True for a file name that ends in .xacro.
+
+    Example:
+        >>> is_xacro("arm.urdf.xacro"), is_xacro("arm.urdf")
+        (True, False)
+    """
+    return os.fsdecode(path).lower().endswith(".xacro")

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from coverable.arrays import Array, Ints, Mask
-from surfaces.part_growth import Boxes, grown
 from surfaces.parts import MOST_PARTS, PartModels, SurfaceParts
 from surfaces.patches.box_models import (
     Pieces,
@@ -27,7 +26,6 @@ from surfaces.patches.box_models import (
 )
 from surfaces.patches.enclosures import Enclosure, enclosed
 from surfaces.patches.normal_bounds import CurvatureSlices, NormalBounds, normal_bounds
-from surfaces.patches.slopes import Slope
 from surfaces.surface import TURN_TOLERANCE, ClosestPoint, Surface, SurfaceError, points_of
 
 if TYPE_CHECKING:
@@ -114,6 +112,7 @@ class Patch(Surface):
         Raises:
             SurfaceError: see `local_enclosures`.
         """
+        from surfaces.patches.slopes import Slope
 
         def ahead(u: Enclosure, v: Enclosure) -> Any:
             zero = np.zeros(u.shape)
@@ -190,6 +189,8 @@ class Patch(Surface):
 
     def parts(self, flat: float, straight: float, most: int = MOST_PARTS) -> SurfaceParts:
         """See `Surface.parts`."""
+        from surfaces.part_growth import Boxes, grown
+
         low, high = self.part_roots
         roots = Boxes(self._root_models, np.arange(len(low)), low, high)
         return grown(roots, flat, straight, most)

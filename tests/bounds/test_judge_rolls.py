@@ -17,7 +17,6 @@ from feasibility.certification.rolls.bounds import (
     largest_off,
     off_middle,
     products_of_changes,
-    reference_axes,
     vectors_of,
 )
 from feasibility.certification.rolls.box_models import Directions, reference_parts
@@ -26,7 +25,7 @@ from feasibility.certification.surface_replay import replay_over_surface
 from feasibility.roll import Roll
 from feasibility.targets.references import u_directions
 from feasibility.verdict import Walk
-from robots.kinematics import Kinematics
+from robots.kinematics import Kinematics, reference_axes
 from surfaces.places.offset_surfaces import offset_surface
 from surfaces.places.places import PlacePaths, Places
 

@@ -25,9 +25,8 @@ from feasibility.certification.cut_proofs.parts_agreement import (
 )
 from feasibility.certification.cut_proofs.region import JointRegion
 from feasibility.certification.overlaps.everywhere import Deepest
-from feasibility.certification.rolls.bounds import reference_axes
 from feasibility.roll import projected, roll_of
-from robots.kinematics import Kinematics
+from robots.kinematics import Kinematics, reference_axes
 
 OUT = {"side": "outside"}
 PATCHES = (

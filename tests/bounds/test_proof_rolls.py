@@ -8,10 +8,9 @@ from coverable import Task, load_robot, sphere
 from feasibility.certification.cut_proofs import linear_models
 from feasibility.certification.cut_proofs.linear_models import Allowed, ArmModel, target_parts
 from feasibility.certification.rolls import box_models
-from feasibility.certification.rolls.bounds import reference_axes
 from feasibility.certification.rolls.box_models import Directions, reference_parts, roll_models
 from feasibility.roll import Roll, projected
-from robots.kinematics import Kinematics
+from robots.kinematics import Kinematics, reference_axes
 
 UR5 = load_robot("ur5")
 

@@ -9,8 +9,8 @@ from gantry import configurations, gantry
 from coverable import Answer, CaseError, Task, check, load_case, load_robot, plane, poses
 from coverable.errors import CoverableError
 from feasibility.treated.area import treated_by_walk
-from feasibility.treated.decision import Decision, with_coverage
-from feasibility.verdict import Evidence, Walk
+from feasibility.treated.decision import with_coverage
+from feasibility.verdict import Decision, Evidence, Walk
 
 UR5 = load_robot("ur5")
 CELLS = plane((0.0, 0.3), (0.0, 0.2), "outside", (0.4, -0.1, 0.2)).cells(3, 2)

@@ -12,7 +12,8 @@ from coverable import Search, Task, check, cylinder, plane, replay, sphere
 from coverable.arrays import unit_along
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions.arrays import arrays_of
-from feasibility.roadmap.search import close, explore
+from feasibility.roadmap.rounds import explore
+from feasibility.roadmap.search import close
 from feasibility.roadmap.walk import covering_walk
 from feasibility.roll import projected
 from feasibility.targets.curves import target_curves

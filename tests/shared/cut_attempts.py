@@ -13,7 +13,8 @@ from feasibility.roadmap.cuts.regions import limits_of, turn_from
 from feasibility.roadmap.cuts.statements import Budget, Statement
 from feasibility.roadmap.exploration import Exploration, wound
 from feasibility.roadmap.motions.arrays import arrays_of
-from feasibility.roadmap.search import improve, seed_middle
+from feasibility.roadmap.rounds import improve
+from feasibility.roadmap.search import seed_middle
 
 
 class Proving(NamedTuple):

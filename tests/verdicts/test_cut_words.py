@@ -13,7 +13,7 @@ from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions.arrays import arrays_of
 from feasibility.roadmap.outcome import unfinished_words
 from feasibility.roadmap.proving import Proving
-from feasibility.roadmap.search import explore
+from feasibility.roadmap.rounds import explore
 
 PUMA = load_robot("puma560")
 CELLS = plane((0, 1), (0, 1)).cells(5, 5)
@@ -103,6 +103,6 @@ def test_points_of_the_motion_set_on_every_cut_leave_it_undecided() -> None:
     proving.attempt(200_000)
     assert not exploration.complete
     assert exploration.cut_tree is None
-    words = unfinished_words(Problem.of(robot, cells, task), proving, "")
+    words = unfinished_words(Problem.of(robot, cells, task), exploration, proving, "")
     assert "has configurations on the surface between the parts" in words
     assert " deg" in words

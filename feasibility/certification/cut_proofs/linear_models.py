@@ -25,7 +25,6 @@ import numpy as np
 from coverable.arrays import Array, Ints
 from feasibility.certification.jacobians import Jacobians, cross, jacobians, lengths
 from feasibility.certification.lever_bounds import lever_bounds, longest_levers
-from feasibility.certification.rolls.bounds import reference_axes
 from feasibility.certification.rolls.box_models import (
     Directions,
     TargetModel,
@@ -36,7 +35,7 @@ from feasibility.certification.rolls.box_models import (
 from feasibility.certification.rows import Rows
 from feasibility.roll import Roll
 from feasibility.task import Targets, Task
-from robots.kinematics import Kinematics
+from robots.kinematics import Kinematics, reference_axes
 from robots.robot import Robot
 from surfaces.cells import Cells
 from surfaces.parts import SurfaceParts

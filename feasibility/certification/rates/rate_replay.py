@@ -24,13 +24,12 @@ from scipy.spatial import cKDTree
 
 from coverable.arrays import Array, Ints, Mask
 from coverable.errors import ArgumentError, Fault
-from feasibility.certification.jacobians import Jacobians, jacobians
+from feasibility.certification.jacobians import Jacobians, jacobians, smallest_singular
 from feasibility.certification.lever_bounds import second_derivatives
 from feasibility.certification.rates.segment_rates import (
     SegmentRates,
     fastest_anywhere,
     segment_rates,
-    smallest_singular,
 )
 from feasibility.task import Task
 from feasibility.verdict import Walk

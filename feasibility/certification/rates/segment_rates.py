@@ -28,7 +28,7 @@ import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.bisection import Stretches, bisected
-from feasibility.certification.jacobians import Jacobians, jacobians
+from feasibility.certification.jacobians import Jacobians, jacobians, smallest_singular
 from feasibility.certification.lever_bounds import (
     column_changes,
     levers_along,
@@ -196,13 +196,6 @@ def _sigma_bounds(robot: Robot, steps: Array, p: Stretches[_Ends]) -> tuple[Arra
         square += ((change / unit) ** 2).sum(axis=1)
     first, last = p.start.sigma, p.end.sigma
     return 0.5 * (first + last - np.sqrt(square)), first, last
-
-
-def smallest_singular(at: Jacobians, scale: float) -> Array:
-    """(k,) the smallest singular value that counts: of two directions of the axis, not three."""
-    both = np.concatenate([at.point / scale, at.axis], axis=1)
-    values = np.linalg.svd(both, compute_uv=False)
-    return np.asarray(values[:, min(both.shape[2], 5) - 1])
 
 
 def smallest_singular_values(robot: Robot, q: Array) -> Array:

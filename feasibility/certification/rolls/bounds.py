@@ -33,13 +33,6 @@ CLOSE_TO_ZERO = 1e-9  # [1], [rad]: u directions are known by differences to abo
 ROOT = float(np.sqrt(2.0))
 
 
-def reference_axes(robot: Robot, q: Array) -> Array:
-    """(m, 3) x of the tool at configurations q (m, n), in the root frame."""
-    frame = robot.model.frames[robot.tool_frame_id]
-    joints = Kinematics(robot).joints(q).rotations[:, frame.parentJoint]
-    return np.asarray(joints @ (frame.placement.rotation @ robot.reference_axis))
-
-
 def frame_second_derivatives(robot: Robot, q: Array, axes: Array, x: Array) -> Array:
     """(m - 1,) D_x + D_y between rows q (m, n), whose approach and reference axes (m, 3) are known.
 

@@ -93,46 +93,63 @@ def contract_to_ball(rows, gap, distance, radius, directions, g, low, high):
 
 
 @kernel
-def reach_of_box(arrays, work, half, longest, lever, sine):
-    """Largest levers and sines over a box about slot 1; returns (first, D/2, first, Da/2).
+def reach_of_point(arrays, work, half, longest, lever):
+    """Largest levers of the tool point over a box about slot 1; returns (first, D/2).
 
     Args:
         arrays, work: the `SearchArrays` and the `Work`; slot 1 holds the box's centre.
         half: (n,) half widths.
         longest: (n,) of `static_levers`.
-        lever, sine: (n,) out.
+        lever: (n,) out.
     """
-    n = longest.shape[0]
-    behind, behind_axis, before = 0.0, 0.0, 0.0
-    for j in range(n):
-        if not arrays.chain.prismatic[j]:
-            before += half[j]
-    first, second, first_axis, second_axis = 0.0, 0.0, 0.0, 0.0
-    for j in range(n - 1, -1, -1):
+    before, first, second = turns_of(arrays, half), 0.0, 0.0
+    for j in range(half.shape[0] - 1, -1, -1):
         h = half[j]
+        lever[j] = 1.0
         if arrays.chain.prismatic[j]:
-            lever[j], sine[j] = 1.0, 0.0
-            first += h
             second += h * before
-            behind += h
-            continue
-        before -= h
-        zx, zy, zz = work.axes[1, j, 0], work.axes[1, j, 1], work.axes[1, j, 2]
-        x = work.point[1, 0] - work.origins[1, j, 0]
-        y = work.point[1, 1] - work.origins[1, j, 1]
-        z = work.point[1, 2] - work.origins[1, j, 2]
-        r = np.sqrt((zy * z - zz * y) ** 2 + (zz * x - zx * z) ** 2 + (zx * y - zy * x) ** 2)
-        x, y, z = work.axis[1, 0], work.axis[1, 1], work.axis[1, 2]
-        s = np.sqrt((zy * z - zz * y) ** 2 + (zz * x - zx * z) ** 2 + (zx * y - zy * x) ** 2)
-        lever[j] = min(r + behind, longest[j])
-        sine[j] = min(1.0, s + behind_axis)
+        else:
+            before -= h
+            x = work.point[1, 0] - work.origins[1, j, 0]
+            y = work.point[1, 1] - work.origins[1, j, 1]
+            z = work.point[1, 2] - work.origins[1, j, 2]
+            lever[j] = min(_across(work.axes[1, j], x, y, z) + first, longest[j])
+            second += 0.5 * lever[j] * h * (h + 2.0 * before)
         first += lever[j] * h
-        second += 0.5 * lever[j] * h * (h + 2.0 * before)
-        first_axis += sine[j] * h
-        second_axis += 0.5 * sine[j] * h * (h + 2.0 * before)
-        behind += lever[j] * h
-        behind_axis += sine[j] * h
-    return first, second, first_axis, second_axis
+    return first, second
+
+
+@kernel
+def reach_of_direction(arrays, work, direction, half, sine):
+    """As `reach_of_point` for a direction (3,) of the tool: (first, Da/2), and its sines (n,)."""
+    before, first, second = turns_of(arrays, half), 0.0, 0.0
+    for j in range(sine.shape[0] - 1, -1, -1):
+        h = half[j]
+        sine[j] = 0.0
+        if not arrays.chain.prismatic[j]:
+            before -= h
+            s = _across(work.axes[1, j], direction[0], direction[1], direction[2])
+            sine[j] = min(1.0, s + first)
+            second += 0.5 * sine[j] * h * (h + 2.0 * before)
+            first += sine[j] * h
+    return first, second
+
+
+@kernel
+def turns_of(arrays, half):
+    """The sum of what the revolute joints turn by, of half widths (n,)."""
+    total = 0.0
+    for j in range(half.shape[0]):
+        if not arrays.chain.prismatic[j]:
+            total += half[j]
+    return total
+
+
+@kernel
+def _across(axis, x, y, z):
+    """How far a vector reaches from an axis (3,)."""
+    a, b, c = axis[0], axis[1], axis[2]
+    return np.sqrt((b * z - c * y) ** 2 + (c * x - a * z) ** 2 + (a * y - b * x) ** 2)
 
 
 @kernel

@@ -28,11 +28,14 @@ from __future__ import annotations
 import numpy as np
 
 from coverable.kernels import kernel
-from feasibility.roadmap.branch_and_bound.box_bounds import contract_to_ball, reach_of_box
+from feasibility.roadmap.branch_and_bound.box_bounds import (
+    contract_to_ball,
+    reach_of_direction,
+    reach_of_point,
+)
 from feasibility.roadmap.branch_and_bound.roll_bounds import (
     contract_roll,
     length_of,
-    reach_of_reference,
     reference_rows,
     roll_chord,
     rolls_over,
@@ -77,16 +80,13 @@ def _place_centre(arrays, work, places, part, low, high, space):
 def _first_and_second(arrays, work, places, part, space):
     """Bounds of first and second order, for the point and for the axis, over the present box."""
     n, m = space.q.shape[0], space.half.shape[0]
-    first, second, first_axis, second_axis = reach_of_box(
-        arrays, work, space.half, space.longest, space.lever, space.sine
+    first, second = reach_of_point(arrays, work, space.half[:n], space.longest, space.lever)
+    first_axis, second_axis = reach_of_direction(
+        arrays, work, work.axis[1], space.half[:n], space.sine
     )
     for i in range(m - n):
-        slope, turn = 0.0, 0.0
-        for k in range(3):
-            slope += places.slopes[part, i, k] ** 2
-            turn += places.slopes[part, i, 3 + k] ** 2
-        first += np.sqrt(slope) * space.half[n + i]
-        first_axis += np.sqrt(turn) * space.half[n + i]
+        first += length_of(places.slopes[part, i, :3]) * space.half[n + i]
+        first_axis += length_of(places.slopes[part, i, 3:6]) * space.half[n + i]
     return first, second, first_axis, second_axis
 
 
@@ -145,7 +145,9 @@ def _first_and_second_of_roll(arrays, work, places, part, space):
     n, m = space.q.shape[0], space.half.shape[0]
     for k in range(3):
         space.gap[2, k] = space.toward[k] - work.reference[1, k]
-    first, second = reach_of_reference(arrays, work, space.half, space.reference_sine)
+    first, second = reach_of_direction(
+        arrays, work, work.reference[1], space.half[:n], space.reference_sine
+    )
     for i in range(m - n):
         first += length_of(places.slopes[part, i, 6:]) * space.half[n + i]
     return first, second

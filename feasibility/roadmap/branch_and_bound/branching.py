@@ -24,6 +24,7 @@ from feasibility.roadmap.branch_and_bound.boxes import (
     box_work,
     place_at_rest,
 )
+from feasibility.roadmap.branch_and_bound.roll_bounds import length_of
 from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.motions.arrays import SearchArrays
 from feasibility.roadmap.motions.working_memory import Work, put
@@ -64,11 +65,8 @@ def _split(arrays, places, part, driver, space, low, high):  # type: ignore[no-u
                 worst, largest = j, move
     for i in range(m - n):
         width = high[n + i] - low[n + i]
-        slope, turn = 0.0, 0.0
-        for k in range(3):
-            slope += places.slopes[part, i, k] ** 2
-            turn += places.slopes[part, i, 3 + k] ** 2
-        slope, turn = np.sqrt(slope) * width, np.sqrt(turn) * width
+        slope = length_of(places.slopes[part, i, :3]) * width
+        turn = length_of(places.slopes[part, i, 3:6]) * width
         move = for_point * slope + for_axis * turn
         if max(slope, turn) > THINNEST and move > largest:
             worst, largest = n + i, move

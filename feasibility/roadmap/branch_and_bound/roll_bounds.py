@@ -55,29 +55,6 @@ def length_of(vector):
 
 
 @kernel
-def reach_of_reference(arrays, work, half, sine):
-    """As `reach_of_box` for the reference axis: (first, Dx/2); fills sines (n,) against it."""
-    before = 0.0
-    for j in range(sine.shape[0]):
-        if not arrays.chain.prismatic[j]:
-            before += half[j]
-    first, second = 0.0, 0.0
-    for j in range(sine.shape[0] - 1, -1, -1):
-        sine[j] = 0.0
-        if arrays.chain.prismatic[j]:
-            continue
-        h = half[j]
-        before -= h
-        zx, zy, zz = work.axes[1, j, 0], work.axes[1, j, 1], work.axes[1, j, 2]
-        x, y, z = work.reference[1, 0], work.reference[1, 1], work.reference[1, 2]
-        s = np.sqrt((zy * z - zz * y) ** 2 + (zz * x - zx * z) ** 2 + (zx * y - zy * x) ** 2)
-        sine[j] = min(1.0, s + first)
-        second += 0.5 * sine[j] * h * (h + 2.0 * before)
-        first += sine[j] * h
-    return first, second
-
-
-@kernel
 def reference_rows(arrays, work, rows):
     """Derivatives (3, n) of the tool's reference axis in slot 1: z x x, 0 by a prismatic joint."""
     x, y, z = work.reference[1, 0], work.reference[1, 1], work.reference[1, 2]

@@ -35,7 +35,7 @@ from feasibility.roadmap.motions.arrays import SearchArrays, with_free_roll
 from feasibility.roadmap.motions.linear_steps import cholesky_solve
 from feasibility.roadmap.motions.self_motion import connect
 from feasibility.roadmap.motions.working_memory import NEXT, place, put
-from feasibility.roadmap.search import evenly
+from feasibility.roadmap.rounds import evenly
 from feasibility.verdict import Cause, CauseKind
 from robots.chain import jacobians
 from robots.kinematics import Kinematics

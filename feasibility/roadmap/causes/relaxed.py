@@ -8,13 +8,12 @@ from __future__ import annotations
 import numpy as np
 
 from coverable.arrays import Array
-from feasibility.certification.rolls.bounds import reference_axes
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions.arrays import SearchArrays, with_free_roll
 from feasibility.roadmap.motions.projection import PROJECTION_STEPS, project_onto_cell
 from feasibility.roadmap.motions.working_memory import Work
 from feasibility.roll import Roll, roll_of
-from robots.kinematics import Kinematics
+from robots.kinematics import Kinematics, reference_axes
 
 STARTS = 16  # Newton starts for each relaxed problem
 MANY = 32  # configurations whose rolls are looked at

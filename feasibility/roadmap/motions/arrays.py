@@ -188,10 +188,13 @@ def _frames(curves: FrameCurves | None, tilts: Array, cone_chord: float) -> _Fra
 def collisions_of(robot: Robot, surface: Surface, task: Task) -> Array:
     """Bodies and pairs as the compiled search reads them; empty where they are not checked."""
     from feasibility.collisions.asked_bodies import gather
-    from feasibility.collisions.kernels.memory import collision_buffer
 
     bodies = gather(robot, surface, task.collision, task.standoff)
-    return np.zeros(0) if bodies is None else collision_buffer(bodies, robot)
+    if bodies is None:
+        return np.zeros(0)
+    from feasibility.collisions.kernels.memory import collision_buffer
+
+    return collision_buffer(bodies, robot)
 
 
 def with_free_roll(arrays: SearchArrays) -> SearchArrays:

@@ -52,16 +52,6 @@ class Expansion(NamedTuple):
 _known = Remembered[Expansion](most=16)
 
 
-def is_xacro(path: str | os.PathLike[str]) -> bool:
-    """True for a file name that ends in .xacro.
-
-    Example:
-        >>> is_xacro("arm.urdf.xacro"), is_xacro("arm.urdf")
-        (True, False)
-    """
-    return os.fsdecode(path).lower().endswith(".xacro")
-
-
 def expanded(
     path: str, package_dirs: Sequence[str] = (), args: Mapping[str, Any] = {}, caps: Caps = CAPS
 ) -> Expansion:
