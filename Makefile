@@ -1,6 +1,7 @@
 # make demo   set up .venv and decide paper/4a        make bench  the table of speeds
 # make test   set up .venv and run every check        make clean  remove what was made
 # make lint   style and types alone                   make distclean   the same, and .venv
+# make docs   the pages as a site, in out/docs
 # make campaign NAME=oracle   the same tests with all that takes too long for make test; all without NAME
 # make bench BENCH=old.json   the same, with figures in that file and not in out/bench.json
 # make bench-compare OLD=old.json NEW=new.json   two such files side by side
@@ -16,7 +17,7 @@ IS_RECENT := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
 unexport PYTHONDONTWRITEBYTECODE
 
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-browser lint kernels greedy collected bench bench-compare campaign mutants clean distclean
+.PHONY: help demo docs test test-browser lint kernels greedy collected bench bench-compare campaign mutants clean distclean
 
 help:
 	@sed -n '/^#/!q; s/^# //p' Makefile
@@ -69,6 +70,11 @@ collected: .venv/installed
 test: .venv/installed
 	@$(MAKE) --no-print-directory --jobs=2 kernels lint greedy collected
 	COVERABLE_FEW=1 $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder --nbmake --nbmake-timeout=900
+	@$(MAKE) --no-print-directory docs
+
+docs: .venv/installed
+	$(BIN)/python docs/figures.py
+	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going -b html docs out/docs
 
 # Installs nothing: it needs the extra `browser`, and a Chromium on the path or named by CHROMIUM.
 test-browser:

@@ -261,7 +261,7 @@ class Task:
 
     @property
     def cone_chord(self) -> float:
-        """|a - b| at the boundary of the cone, 0 .. 2; inf where any axis will do."""
+        """The length of a - b at the boundary of the cone, 0 .. 2; inf where any axis will do."""
         return chord_of(self.cone)
 
     @property

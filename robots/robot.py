@@ -61,7 +61,7 @@ class Robot:
     urdf: str | None = None
     """Path of the URDF file, for the viewer; None for a robot that was built in memory."""
     package_dirs: tuple[str, ...] = ()
-    """Folders that `package://` mesh names are looked up in."""
+    """Folders in which meshes that a package names are looked up."""
     locked: Mapping[str, float] = field(default_factory=dict)
     """Every moving joint of the URDF that is not free here, with the value it is held at."""
     notes: tuple[str, ...] = ()

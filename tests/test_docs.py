@@ -24,9 +24,11 @@ from feasibility.cli.main import main
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("coverable", "robots", "surfaces", "feasibility")
-PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")
+SITE = sorted((ROOT / "docs").glob("*.md"))
+PAGES = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")] + SITE
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 README = (ROOT / "README.md").read_text("utf-8")
+WRITTEN = {path.stem: path.read_text("utf-8") for path in SITE}
 CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 
@@ -36,12 +38,13 @@ def blocks(text: str, language: str) -> list[str]:
     return [inner for named, inner in fenced if named == language]
 
 
-def test_python_of_the_readme_runs_and_says_what_it_promises(
-    capsys: pytest.CaptureFixture[str],
+@pytest.mark.parametrize("page", [README, WRITTEN["first_cell"]], ids=["README", "first cell"])
+def test_python_of_the_pages_runs_and_says_what_it_promises(
+    page: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (code,) = blocks(README, "python")
+    (code,) = blocks(page, "python")
     names: dict[str, Any] = {}
-    exec(compile(code, "README.md", "exec"), names)
+    exec(compile(code, "page", "exec"), names)
     promised = re.findall(r"# (feasible.*edges\.)", code)
     assert len(promised) == 1
     assert capsys.readouterr().out.startswith(promised[0])
@@ -49,12 +52,11 @@ def test_python_of_the_readme_runs_and_says_what_it_promises(
     assert names["verdict"].witness.q.shape[1] == 6
 
 
-def test_case_file_of_the_readme_is_feasible(tmp_path: Path) -> None:
-    text, collision, _ = blocks(README, "toml")
-    (tmp_path / "case.toml").write_text(text)
-    assert check(*Case.from_toml(text, tmp_path).build()).feasible
-    assert main(["check", str(tmp_path / "case.toml")]) == 0
-    clear = check(*Case.from_toml(f"{text}\n{collision}", tmp_path).build())
+def test_case_files_of_the_pages_are_feasible() -> None:
+    (alone,), (collision,) = blocks(README, "toml"), blocks(WRITTEN["collisions"], "toml")
+    (text,) = blocks(WRITTEN["first_cell"], "toml")
+    assert check(*Case.from_toml(alone).build()).feasible
+    clear = check(*Case.from_toml(f"{text}\n{collision}").build())
     assert clear.feasible
     assert clear.task.collision is not None
     assert clear.task.collision.checked == ("self", "surface", "scene")
@@ -64,16 +66,18 @@ def interrupted(page: coverable.Live) -> None:
     raise KeyboardInterrupt
 
 
-def test_commands_of_the_readme_run(
+def test_commands_of_the_pages_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    for name, text in zip(("case", "collision", "study"), blocks(README, "toml"), strict=True):
-        (tmp_path / f"{name}.toml").write_text(text)
-    lines = [line for block in blocks(README, "") for line in block.splitlines()]
+    for name, page in (("case", "first_cell"), ("study", "studies")):
+        (tmp_path / f"{name}.toml").write_text(*blocks(WRITTEN[page], "toml"))
+    pages = [WRITTEN["first_cell"], *WRITTEN.values()]  # later ones use what the first writes
+    found = [block for page in pages for block in blocks(page, "")]
+    lines = dict.fromkeys(line for block in found for line in block.splitlines())
     commands = [shlex.split(x, comments=True) for x in lines if x.startswith("coverable")]
     monkeypatch.setattr(coverable.Live, "wait", interrupted)
-    assert len(commands) >= 8
+    assert len(commands) >= 18
     for _, *arguments in commands:
         if arguments == ["warm-up"]:  # a campaign
             continue
@@ -98,11 +102,12 @@ def test_commands_of_the_readme_run(
     assert len((tmp_path / "table.csv").read_text().splitlines()) == 1 + 2 * 3 * 4
 
 
-@pytest.mark.parametrize("page", PAGES)
-def test_commands_and_links_exist(page: str) -> None:
-    text = (ROOT / page).read_text("utf-8")
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_commands_and_links_exist(page: Path) -> None:
+    text = page.read_text("utf-8")
     for target in re.findall(r"\]\((?!https?:)([^)#]+)\)", text):
-        assert (ROOT / target).exists(), target
+        # `make docs` makes the figures.
+        assert (page.parent / target).exists() or target.startswith("figures/"), target
     targets = re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE)
     assert set(re.findall(r"\bmake ([a-z]+)`", text)) <= set(targets)
     made = {line.split()[1] for block in blocks(text, "") for line in block.splitlines()
@@ -113,7 +118,7 @@ def test_commands_and_links_exist(page: str) -> None:
 
 
 def table_of_cases() -> dict[str, dict[str, str]]:
-    section = README[README.index("## The paper's twelve") :].split("\n## ")[0]
+    section = WRITTEN["paper"].split("\n## The twelve cases\n")[1].split("\n## ")[0]
     rows = re.findall(r"^\| (.*) \|$", section, re.M)
     head, *body = [row.split(" | ") for row in rows]
     return {row[0]: dict(zip(head, row, strict=True)) for row in body}
@@ -172,6 +177,11 @@ def test_the_front_door_is_true() -> None:
         assert not name.endswith("Error") or issubclass(one, coverable.CoverableError)
     with pytest.raises(AttributeError, match="no attribute 'sphare'"):
         coverable.sphare  # noqa: B018
+
+
+def test_the_reference_lists_each_public_name_once() -> None:
+    listed = re.findall(r"^\.\. auto\w+:: coverable\.(\w+)$", WRITTEN["reference"], re.M)
+    assert sorted([*listed, "__version__"]) == dir(coverable)
 
 
 def test_make_help_names_every_target() -> None:
