@@ -132,17 +132,14 @@ def test_the_foreign_judge_refuses_what_overlaps_where_no_clearance_is_asked(wal
 CENTRES, FLOOR = np.array([[0.5, 0.2, 0.5], [-0.3, 0.6, 0.4]]), -1.5
 
 
-def ball_among(*scene):
-    """A ball of 3 cm at the tool point, far in front of the flange, and no other pair."""
-    links = [name for name in UR5.link_names if name.endswith("_link") and name != "ee_link"]
-    allow = tuple((link, one.name) for link in links for one in scene)
-    tool = (ToolShape.sphere(0.03),)
-    return gather(UR5, PLATE, Collision(False, False, scene=scene, tool=tool, allow=allow), 0.02)
-
-
 def test_distances_pairs_and_lines_are_those_of_the_closed_form():
     scene = [Obstacle.sphere(f"ball {k}", 0.05, tuple(c)) for k, c in enumerate(CENTRES)]
-    bodies = ball_among(*scene, Obstacle.halfspace("floor", (0.0, 0.0, FLOOR)))
+    scene.append(Obstacle.halfspace("floor", (0.0, 0.0, FLOOR)))
+    # A ball of 3 cm at the tool point, far in front of the flange, and no other pair.
+    links = [name for name in UR5.link_names if name.endswith("_link") and name != "ee_link"]
+    allow = tuple((link, one.name) for link in links for one in scene)
+    asked = Collision(False, False, scene=scene, tool=(ToolShape.sphere(0.03),), allow=allow)
+    bodies = gather(UR5, PLATE, asked, 0.02)
     steps = np.random.default_rng(5).normal(0.0, 0.12, (80, UR5.n))
     rows = np.array([0.3, -1.5, 1.5, -1.5, -1.5, 0.0]) + np.cumsum(steps, axis=0)
     found, tips = nearest_along(UR5, bodies, rows), Kinematics(UR5).tools(rows)[0]

@@ -245,16 +245,12 @@ def test_the_figure_of_a_single_cell_is_that_of_the_closest_point_inside_the_con
 LEVEL = 0.31  # m, where the tool of the raster over the plane is
 
 
-def two_plates(gap):
-    levels = LEVEL, LEVEL + gap
-    pieces = [plane((0.35, 0.55), (-0.1, 0.1), position=(0, 0, z)) for z in levels]
-    return piecewise(pieces, side="outside").cells((4, 5))
-
-
 def test_a_jump_between_two_sheets_is_refused():
     """Both are within the tolerance half way, but no path on the surface leads across."""
     gap, made = 1.5e-3, raster("plane")
-    cells, task = two_plates(gap), Task(standoff=0.0, cone_deg=20, tolerance=1e-3)
+    plates = [plane((0.35, 0.55), (-0.1, 0.1), position=(0, 0, LEVEL + z)) for z in (0.0, gap)]
+    cells = piecewise(plates, side="outside").cells((4, 5))
+    task = Task(standoff=0.0, cone_deg=20, tolerance=1e-3)
     away = off_by(made, len(made.q) - 1, gap)[-1:]
 
     def judged(rows):

@@ -103,20 +103,13 @@ def bodies(*parts):
     return checked_triangles(np.asarray(whole.vertices), np.asarray(whole.faces))
 
 
-def turned_l(turn):
-    """An L of two boxes, 0.5 m long and 0.3 m to the side."""
-    foot, long = trimesh.creation.box((0.1, 0.1, 0.3)), trimesh.creation.box((0.5, 0.1, 0.1))
-    foot.apply_translation((0.0, 0.0, 0.1))
-    long.apply_translation((0.2, 0.0, 0.0))
-    for part in (foot, long):
-        part.apply_transform(turn)
-    return foot, long
-
-
 @pytest.mark.parametrize("angle", [0.0, 0.4, 1.0])
 def test_every_point_of_a_solid_is_in_one_of_its_pieces(angle):
     turn = trimesh.transformations.rotation_matrix(angle, (1, 2, 3))
-    mesh = bodies(*turned_l(turn))
+    foot, long = trimesh.creation.box((0.1, 0.1, 0.3)), trimesh.creation.box((0.5, 0.1, 0.1))
+    foot.apply_translation((0.0, 0.0, 0.1))  # an L, 0.5 m long and 0.3 m to the side
+    long.apply_translation((0.2, 0.0, 0.0))
+    mesh = bodies(foot.apply_transform(turn), long.apply_transform(turn))
     pieces = pieces_of(mesh)
     assert mesh.closed
     assert 1 < len(pieces) <= 8

@@ -155,11 +155,6 @@ def test_paths_bend_no_more_than_is_said(named, height):
     assert some_known[short].mean() > 0.9 or name in ("ridge", "can")
 
 
-def of_unit(least, first, second):
-    """|d2/ds2 (g / |g|)| from |g|, |g'| and |g''|."""
-    return second / least + 2.0 / np.sqrt(3.0) * (first / least) ** 2
-
-
 def test_normals_along_creases_bend_as_each_term_says():
     """v is the sum of w_c (own_c + t (crease_c - own_c)), t from the weight on the crease."""
     surface, rng = FACETED["ridge"], np.random.default_rng(6)
@@ -179,7 +174,8 @@ def test_normals_along_creases_bend_as_each_term_says():
     slope = np.linalg.norm(p - o, axis=1) + rate * most + off
     share = (0.5 * (level[0] + level[1]) - 0.9) / 0.1
     middle = np.linalg.norm(0.5 * (o + p + share[:, None] * (g + h)), axis=1)
-    expected = of_unit(middle - 0.5 * slope, slope, 2.0 * rate * off) / 8.0
+    least = middle - 0.5 * slope  # |d2/ds2 (g / |g|)| from |g|, |g'| and |g''|
+    expected = (2.0 * rate * off / least + 2.0 / np.sqrt(3.0) * (slope / least) ** 2) / 8.0
     start, end = (Places(face, w[:, 1:]) for w in ends)
     found = offset_surface(surface, 0.0).paths(start, end).deviations[:, 2, 1]
     known = inner[0] & inner[1] & (middle > 0.5 * slope)
