@@ -13,7 +13,7 @@ from typing import IO
 import coverable.files
 from coverable.errors import CoverableError
 from coverable.files import reason
-from feasibility.interrupts import settle, unfinished
+from feasibility.interrupts import unfinished
 
 
 class FileError(CoverableError):
@@ -89,7 +89,6 @@ def write_whole(path: str | os.PathLike[str], write: Callable[[IO[bytes]], objec
 
     Raises:
         FileError: the file cannot be written; nothing is left behind.
-        KeyboardInterrupt: there has been a Ctrl-C in a command; nothing is left behind.
     """
     check_writable(path)
     if _is_special(Path(path)):
@@ -106,7 +105,6 @@ def write_whole(path: str | os.PathLike[str], write: Callable[[IO[bytes]], objec
                 os.fsync(stream.fileno())
             if mode is not None:
                 os.chmod(temporary, mode)
-            settle()
             os.replace(temporary, file)
     except OSError as error:
         raise FileError(f"cannot be written: {reason(error)}", shown_path(path)) from error

@@ -18,7 +18,7 @@ from feasibility.cli.command import (
     write_text,
 )
 from feasibility.cli.console import print_err, print_out
-from feasibility.interrupts import forgive
+from feasibility.interrupts import raised
 from feasibility.safe_files import check_writable, shown_path
 
 if TYPE_CHECKING:
@@ -212,14 +212,13 @@ def live(args: argparse.Namespace, began: float) -> int:
 
 def _serve(name: str, page: Served, in_browser: bool) -> int:
     """Serve a page until Ctrl-C; returns the exit status."""
-    with page:
+    with page, raised():
         if in_browser:
             page.open()
         print_err(f"{name}: {page.url} (served until Ctrl-C)")
         try:
             page.wait()
         except KeyboardInterrupt:
-            forgive()
             print_err("")
     return 0
 

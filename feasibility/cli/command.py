@@ -17,8 +17,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from feasibility.cli.console import Bar, print_err, progress_bar
-from feasibility.interrupts import settle
+from feasibility.cli.console import Bar, print_err
 from feasibility.safe_files import FileError, check_writable, shown_path, write_whole
 from feasibility.search import Progress
 
@@ -156,7 +155,7 @@ def open_case(
         FileError: an output cannot be written.
         TooLate: the time limit ran out first, here or in the block.
     """
-    with progress_bar() as progress:
+    with Bar() as progress:
         from coverable.errors import Fault
         from feasibility.cases.case import load_case
         from feasibility.cases.table_reader import CaseError
@@ -178,7 +177,6 @@ def open_case(
                 setup = case.build()
                 task, surface = setup.task, setup.cells.surface
                 bodies = gather(setup.robot, surface, task.collision, task.standoff)
-            settle()
             for note in unit_notes(case.to_tables(), setup.robot.length_unit):
                 print_err(f"note: {note}")
             for note in setup.robot.notes:

@@ -5,17 +5,17 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, suppress
 from typing import Any, TextIO
 
 from coverable.errors import CoverableError, Fault, shown
-from feasibility.interrupts import settle
+from feasibility.interrupts import at_leave
 from feasibility.search import Progress
 
 THREADS = "NUMBA_NUM_THREADS"
 MOST_THREADS = 1_024
 PAUSE = 0.05  # [s] between two updates of the progress bar
+CLEAN = b"\r\x1b[2K\x1b[?25h"  # to a terminal: the line of a bar is empty, the cursor is shown
 
 
 def prepare() -> None:
@@ -44,10 +44,8 @@ def print_out(text: str) -> None:
     """Write an answer to stdout. A reader that has gone away (`| head`) is no error.
 
     Raises:
-        KeyboardInterrupt: there has been a Ctrl-C; nothing is written.
         OSError: stdout cannot be written for another reason, such as a full disk.
     """
-    settle()
     with suppress(BrokenPipeError):
         _write(sys.stdout, text)
 
@@ -74,18 +72,10 @@ def _write(stream: TextIO | None, text: str) -> None:
         raise
 
 
-@contextmanager
-def progress_bar() -> Iterator[Bar]:
-    """A progress bar, and a Ctrl-C that is never lost: at the latest it is raised at the end."""
-    with Bar() as bar:
-        yield bar
-        settle()
-
-
 class Bar:
     """A progress bar on a terminal's stderr; nothing elsewhere.
 
-    A search reports to it, and it appears with the first report. Each report asks for a Ctrl-C.
+    A search reports to it, and it appears with the first report.
     """
 
     def __init__(self) -> None:
@@ -94,10 +84,10 @@ class Bar:
         self._bar: Any = None
         self._task: Any = None
         self._last = -1.0
+        self._ends = ExitStack()
 
     def __call__(self, done: int, total: int | None, text: str) -> None:
         """Show that `done` of `total` parts (None: unknown how many) are done."""
-        settle()
         now = time.monotonic()
         if not self.shown or (now - self._last < PAUSE and done != total):
             return
@@ -117,7 +107,8 @@ class Bar:
         # On this very stream: what a command says inside of another one may go elsewhere.
         self._bar = Progress(*columns, console=Console(file=sys.stderr), transient=True)
         self._task = self._bar.add_task("", total=None)
-        self._bar.start()
+        self._ends.enter_context(at_leave(lambda: os.write(2, CLEAN)))
+        self._ends.enter_context(self._bar)
 
     def __enter__(self) -> Bar:
         """Nothing is drawn yet."""
@@ -125,8 +116,7 @@ class Bar:
 
     def __exit__(self, *exception: object) -> None:
         """Remove the bar."""
-        if self._bar is not None:
-            self._bar.stop()
+        self._ends.close()
 
 
 def with_rate(bar: Progress, what: str = "") -> Progress:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import gc
 import os
 import sys
 import time
@@ -18,7 +17,7 @@ from typing import NoReturn
 from coverable.errors import CoverableError
 from feasibility.cli.command import BAD_INPUT, STATUS, MakeClock, TooLate, json_text
 from feasibility.cli.console import prepare, print_err, print_out
-from feasibility.interrupts import INTERRUPTED, MESSAGE, interruptible, leave_at_once
+from feasibility.interrupts import INTERRUPTED, MESSAGE, enforcing, leave_at_once
 
 TRACEBACK = "COVERABLE_TRACEBACK"
 MODULES = {
@@ -81,7 +80,7 @@ def main(argv: Sequence[str] | None = None, clock: MakeClock | None = None) -> i
     """
     began = time.perf_counter()
     try:
-        with interruptible():
+        with enforcing():
             prepare()
             words = sys.argv[1:] if argv is None else argv
             args = _parser(next(iter(words), "")).parse_args(words)
@@ -93,7 +92,8 @@ def main(argv: Sequence[str] | None = None, clock: MakeClock | None = None) -> i
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else 0
     except KeyboardInterrupt:
-        pass  # and only when it is let go, what it cut short can be
+        print_err(MESSAGE)
+        return INTERRUPTED
     except Exception as error:  # noqa: BLE001 - the last line before the user
         if _with_traceback():
             import traceback
@@ -101,9 +101,6 @@ def main(argv: Sequence[str] | None = None, clock: MakeClock | None = None) -> i
             print_err("".join(traceback.format_exception(error)))
         print_err(f"coverable: {_message(error)}")
         return BAD_INPUT
-    gc.collect()  # a store that was cut short is closed: SQLite keeps files beside an open one
-    print_err(MESSAGE)
-    return INTERRUPTED
 
 
 def _too_late(args: argparse.Namespace, late: TooLate) -> int:
@@ -164,9 +161,6 @@ def run() -> NoReturn:
     of a second, also after Ctrl-C.
     """
     leave_at_once()
-    if not _with_traceback():
-        # Messages about objects that a Ctrl-C left half made help nobody.
-        sys.unraisablehook = lambda _: None
     status = main()
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError, ValueError, AttributeError):

@@ -22,7 +22,7 @@ from feasibility.cli.command import (
     write_text,
 )
 from feasibility.cli.console import print_err, print_out, with_rate
-from feasibility.interrupts import INTERRUPTED, MESSAGE, forgive, settle
+from feasibility.interrupts import INTERRUPTED, MESSAGE, raised
 from feasibility.safe_files import shown_path, write_whole
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ def run_place(args: argparse.Namespace, began: float) -> int:
     files = {"--csv": args.csv, "--map": args.map, "--out": args.out, "--html": args.html}
     drawn = chart = plan = None
     opening = open_case(args, began, files, time_limit=args.time_limit)
-    with opening as opened, contextlib.ExitStack() as stack:
+    with opening as opened, contextlib.ExitStack() as stack, raised() as settle:
         from feasibility.placement.placements import COUNT, place
         from feasibility.placement.region import Pose, Region
         from feasibility.placement.trials import evaluator_of_study
@@ -117,8 +117,6 @@ def run_place(args: argparse.Namespace, began: float) -> int:
                 drawn = _view(args, opened, placements, plan)
         except KeyboardInterrupt:
             interrupted = True
-        if interrupted:
-            forgive()  # what is known is still reported
     placements.timing["command_s"] = time.perf_counter() - began
     _report(args, placements, case.name, plan, chart)
     if drawn is not None:

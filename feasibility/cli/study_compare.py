@@ -16,7 +16,8 @@ from feasibility.cli.command import (
     json_text,
     write_text,
 )
-from feasibility.cli.console import print_err, print_out, progress_bar, with_rate
+from feasibility.cli.console import Bar, print_err, print_out, with_rate
+from feasibility.interrupts import at_leave
 from feasibility.safe_files import shown_path
 
 if TYPE_CHECKING:
@@ -67,16 +68,18 @@ def study(args: argparse.Namespace, began: float) -> int:
     check_outputs(outputs, args.file)
     loaded = load_study(args.file)
     stored_in = shown_path(args.out)
-    with Store(args.out) as store:
+    with Store(args.out) as store, at_leave(store.close):
         before = len(store)
         if before:
             print_err(f"{stored_in} holds {before} finished cases; continuing from there")
-        try:
-            with progress_bar() as bar, open_workers(args.workers, args.dask) as workers:
-                rows = run_tasks(loaded.tasks, workers, store, with_rate(bar, "deciding cases"))
-        except KeyboardInterrupt:
-            print_err(f"{len(store)} cases are stored in {stored_in}; run again to continue")
-            raise
+
+        def say() -> None:
+            store.close()  # and what was being written is not
+            with Store(args.out) as kept:
+                print_err(f"{len(kept)} cases are stored in {stored_in}; run again to continue")
+
+        with Bar() as bar, open_workers(args.workers, args.dask) as workers, at_leave(say):
+            rows = run_tasks(loaded.tasks, workers, store, with_rate(bar, "deciding cases"))
     if args.json:
         print_out(json_text(report.as_json(loaded, rows)))
     else:
@@ -100,7 +103,7 @@ def compare(args: argparse.Namespace, began: float) -> int:
     check_outputs({"--csv": args.csv, "--html": args.html}, args.case)
     case = load_case(args.case, args.settings)
     robots = [name.strip() for name in args.robots.split(",") if name.strip()]
-    with progress_bar() as bar, open_workers(args.workers, args.dask) as workers:
+    with Bar() as bar, open_workers(args.workers, args.dask) as workers:
         progress = with_rate(bar, "comparing robots")
         found = run(case, robots, workers, critical=args.critical, progress=progress)
     print_out(json_text(report.as_json(found)) if args.json else report.as_text(found))
@@ -117,5 +120,5 @@ def _poses(study: Study, rows: tuple[Row, ...]) -> View | None:
 
     if not any(label.startswith(("surface.position", "surface.rpy_deg")) for label in study.labels):
         return None
-    with progress_bar() as bar:
+    with Bar() as bar:
         return view_study(study.tasks, rows, study.name, progress=bar)

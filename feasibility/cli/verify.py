@@ -13,7 +13,7 @@ from feasibility.cli.command import (
     json_text,
     open_case,
 )
-from feasibility.cli.console import print_out, progress_bar
+from feasibility.cli.console import Bar, print_out
 from feasibility.cli.passes import add_layout, check_passes, places_asked
 from feasibility.safe_files import shown_path
 
@@ -87,7 +87,7 @@ def _motion(args: argparse.Namespace, began: float) -> int:
 
 def _result(args: argparse.Namespace, began: float) -> int:
     """Check a saved result."""
-    with progress_bar() as progress:
+    with Bar() as progress:
         from coverable.errors import CoverableError
         from feasibility.clock import OutOfTime
         from feasibility.results.result_file import ResultError, case_of_result, load_result

@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 
 from feasibility.cli.command import STATUS, add_command, json_text
-from feasibility.cli.console import print_err, print_out, progress_bar
+from feasibility.cli.console import Bar, print_err, print_out
 
 MESH = """
 robot.name = "ur5"
@@ -81,7 +81,7 @@ def warm_up(
     from numba.core import event
 
     with (
-        progress_bar() as bar,
+        Bar() as bar,
         tempfile.TemporaryDirectory() as folder,
         event.install_recorder("numba:compile") as recorded,
     ):

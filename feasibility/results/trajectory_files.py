@@ -1,6 +1,6 @@
 """Trajectories as files: CSV, JSON, and YAML shaped like a ROS `trajectory_msgs/JointTrajectory`.
 
-CSV and JSON are read back as the same numbers; YAML is written for other programs alone. Files are
+CSV is read back as the same numbers; JSON and YAML are written for other programs alone. Files are
 untrusted: they are read with a cap, as plain text, and every number is checked.
 """
 
@@ -56,18 +56,17 @@ def check_ending(path: str | os.PathLike[str]) -> None:
 
 
 def load_trajectory(path: str | os.PathLike[str]) -> Trajectory:
-    """Read a trajectory that `save_trajectory` wrote as CSV or JSON.
+    """Read a trajectory that `save_trajectory` wrote as CSV.
 
     Raises:
         FileError: there is no such file, or it is not such a trajectory: all faults, with places.
     """
     name = shown_path(path)
-    read = _of_ending(path, {"csv": from_csv, "json": from_json_text, "yaml": None})
-    if read is None:
-        raise FileError("YAML is written only; load the trajectory from CSV or JSON", name)
-    text = read_text(path, CAP, "a trajectory (.csv or .json)")
+    if not _of_ending(path, {"csv": True, "json": False, "yaml": False}):
+        raise FileError("JSON and YAML are written only; load the trajectory from CSV", name)
+    text = read_text(path, CAP, "a trajectory (.csv)")
     try:
-        return read(text)
+        return from_csv(text)
     except CoverableError as error:
         raise FileError(error.faults, name) from error
 
@@ -175,70 +174,6 @@ def as_json_text(trajectory: Trajectory) -> str:
     if trajectory.working is not None:
         record[WORKING] = trajectory.working.tolist()
     return json.dumps({**record, "cell": cells}, allow_nan=False) + "\n"
-
-
-def from_json_text(text: str) -> Trajectory:
-    """Read what `as_json_text` wrote.
-
-    Raises:
-        ArgumentError: it is something else.
-    """
-    try:
-        record = json.loads(text)
-    except RecursionError as error:
-        raise ArgumentError("is nested too deeply for a trajectory") from error
-    except ValueError as error:
-        raise ArgumentError(f"is not JSON: {error}") from error
-    keys = {"format", "joint_names", *ARRAYS, "cell"}
-    known = keys | {"collisions", WORKING}  # not all files have them
-    if not isinstance(record, dict) or record.get("format") != FORMAT:
-        raise ArgumentError(f'expected an object with "format": "{FORMAT}"')
-    faults = [Fault(key, "is missing") for key in sorted(keys - set(record))]
-    faults += [Fault(key[:40], "is not known here") for key in sorted(set(record) - known)]
-    if faults:
-        raise ArgumentError(faults)
-    checks = Checks()
-    joints, time, cells = record["joint_names"], record["time"], record["cell"]
-    named = isinstance(joints, list) and all(isinstance(name, str) for name in joints)
-    if not named or not 1 <= len(joints) <= MOST_JOINTS:
-        checks.wrong("joint_names", joints, f"must be a list of 1 to {MOST_JOINTS} names")
-    if not isinstance(time, list) or len(time) > MOST_SAMPLES:
-        checks.wrong("time", time, f"must be a list of at most {MOST_SAMPLES:,} numbers")
-    checks.done()
-    k, n = len(time), len(joints)
-    arrays = {
-        name: _array(checks, key, record[key], (k, n) if name in ("q", "dq", "ddq") else (k,))
-        for key, name in ARRAYS.items()
-    }
-    fits = isinstance(cells, list) and len(cells) == k
-    if not fits or not all(cell is None or is_whole(cell, 0, 2**62 - 1) for cell in cells):
-        expected = f"must be a list of {k} whole numbers >= 0, or null between centres"
-        checks.wrong("cell", cells, expected)
-    collisions = record.get("collisions", [])
-    if not isinstance(collisions, list) or not all(name in CHECKABLE for name in collisions):
-        checks.wrong("collisions", collisions, f"must be a list of some of {', '.join(CHECKABLE)}")
-    working = record.get(WORKING)
-    if working is not None and not (
-        isinstance(working, list) and len(working) == k and {type(one) for one in working} <= {bool}
-    ):
-        checks.wrong(WORKING, working, f"must be a list of {k} times true or false")
-    checks.done()
-    at = np.array([-1 if cell is None else cell for cell in cells], dtype=np.int64)
-    return Trajectory(
-        joint_names=tuple(joints), **arrays, cell=at, collisions=tuple(collisions), working=working
-    )
-
-
-def _array(checks: Checks, key: str, value: object, shape: tuple[int, ...]) -> Array:
-    """Numbers out of nested lists; whether they are finite, `Trajectory` says."""
-    try:
-        found = np.array(value if isinstance(value, list) else [])
-    except ValueError:  # rows of different lengths
-        found = np.array([], dtype=object)
-    if found.shape == shape and found.dtype.kind in "fiu":
-        return found.astype(float)
-    checks.wrong(key, value, f"must hold {' x '.join(map(str, shape))} numbers")
-    return np.zeros(shape)
 
 
 # -- YAML --------------------------------------------------------------------------------------

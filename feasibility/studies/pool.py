@@ -17,6 +17,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any, Protocol
@@ -184,6 +185,7 @@ class Processes:
         """
         ours, theirs = self._context.Pipe()
         process = self._context.Process(target=_serve, args=[theirs], daemon=True)
+        resource_tracker.ensure_running()  # which would unblock it, in the first process's start
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             process.start()

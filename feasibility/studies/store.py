@@ -107,7 +107,7 @@ class Store(AbstractContextManager["Store"]):
         try:
             with self._reported():
                 self._prepare()
-        except StoreError:
+        except BaseException:  # SQLite keeps files beside one that is open
             self._base.close()
             raise
 

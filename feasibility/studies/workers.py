@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from feasibility.interrupts import at_leave
 from feasibility.studies.pool import Here, Processes, Workers, WorkersError
 
 MOST = 1_000  # processes
@@ -56,7 +57,8 @@ def open_workers(
     else:
         workers = Processes(processors() if count is None else count, warm)
     try:
-        yield workers
+        with at_leave(workers.close):
+            yield workers
     finally:
         workers.close()
 

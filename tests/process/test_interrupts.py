@@ -1,7 +1,6 @@
 """Ctrl-C: always status 130, no traceback, no half-written file, wherever the command is."""
 
 import contextlib
-import gc
 import os
 import signal
 import subprocess
@@ -14,14 +13,12 @@ from jobs import PLATE, run_coverable, verdict_named
 from samples import sampled, seeds, spread
 
 from coverable import Store, load_result
-from feasibility import interrupts
-from feasibility.interrupts import interruptible
+from feasibility.interrupts import at_leave, leave_at_once, raised
 from feasibility.safe_files import write_whole
 
 INTERRUPTED = "coverable: interrupted\n"
 GUARD_S = 1800.0  # against hanging alone
 OURS = ("coverable", "feasibility.cli", "feasibility.safe_files", "feasibility.results")
-STORE = ("feasibility.studies.store",)
 
 
 def check_all(folder: Path):
@@ -33,22 +30,17 @@ def check_all(folder: Path):
 
 
 @contextlib.contextmanager
-def interrupted_at(call: int, swallowed: bool = False, ours: tuple[str, ...] = OURS):
-    """Ctrl-C at a call or return of functions of these modules; a library may swallow it.
-
-    Counted from where a command begins to hear it: what comes before has tests of its own.
-    """
-    count, empty = [0], contextlib.nullcontext
+def interrupted_at(call: int, ours: tuple[str, ...] = OURS):
+    """Ctrl-C at a call or return of functions of these modules."""
+    count = [0]
 
     def profile(frame, event, argument):
         counts = event in ("call", "return")
-        counts = counts and frame.f_globals.get("__name__", "").startswith(ours)
-        if counts and signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        if counts and frame.f_globals.get("__name__", "").startswith(ours):
             count[0] += 1
             if count[0] == call + 1:
                 sys.setprofile(None)
-                with contextlib.suppress(KeyboardInterrupt) if swallowed else empty():
-                    signal.raise_signal(signal.SIGINT)
+                signal.raise_signal(signal.SIGINT)
 
     sys.setprofile(profile)
     try:
@@ -57,112 +49,93 @@ def interrupted_at(call: int, swallowed: bool = False, ours: tuple[str, ...] = O
         sys.setprofile(None)
 
 
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    """What the command leaves when it is left alone, and the calls that it makes."""
+def forked(work, said: Path) -> tuple[int, str]:
+    """The status of a process that begins as this one and works; what it says to stderr."""
+    if (child := os.fork()) == 0:
+        os.dup2(os.open(said, os.O_CREAT | os.O_WRONLY), 2)
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        leave_at_once()
+        with contextlib.suppress(BaseException):
+            work()
+        os._exit(99)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), said.read_text()
+
+
+def test_at_any_call_of_a_command_that_writes_files(tmp_path):
     verdict_named("plate")  # kernels
-    folder = tmp_path_factory.mktemp("whole") / "out"
-    folder.mkdir()
-    check_all(folder)
+    (whole := tmp_path / "whole" / "out").mkdir(parents=True)
+    check_all(whole)  # and all is imported
     with interrupted_at(10**9) as calls:
-        assert check_all(folder).status == 0
-    return {file.name: file.read_bytes() for file in folder.iterdir()}, calls[0]
+        assert check_all(whole).status == 0
+    known = {file.name: file.read_bytes() for file in whole.iterdir()}
+    assert calls[0] > 250
+    for call in spread(range(calls[0] - 9), 20):  # a call more or less is made from run to run
+        (folder := tmp_path / str(call) / "out").mkdir(parents=True)
 
+        def work(call=call, folder=folder):
+            with interrupted_at(call):
+                check_all(folder)
 
-@pytest.mark.parametrize("swallowed", [False, True])
-def test_at_any_call_of_a_command_that_writes_files(swallowed, whole, tmp_path):
-    known, calls = whole
-    assert calls > 300
-    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGALRM), sys.unraisablehook
-    left = []
-    for call in spread(range(calls - 9), 20):  # a call more or less is made from run to run
-        folder = tmp_path / str(call) / "out"
-        folder.mkdir(parents=True)
-        with interrupted_at(call, swallowed):
-            said = check_all(folder)
-        assert (said.status, said.err.endswith(INTERRUPTED)) == (130, True), (call, said)
+        assert forked(work, folder.parent / "said") == (130, INTERRUPTED), call
         for file in folder.iterdir():
-            same = file.read_bytes() == known[file.name]
-            left += [] if same or (file.suffix == ".result" and is_whole(file)) else [file]
-        after = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGALRM)
-        assert (*after, sys.unraisablehook) == before
-    assert left == []
+            whole_result = file.suffix == ".result" and is_whole(file)
+            assert whole_result or file.read_bytes() == known[file.name], (call, file)
 
 
-def test_a_store_is_closed_wherever_it_is_cut_short(tmp_path):
-    """SQLite keeps files beside one that is open, and in a process garbage is collected seldom."""
+def test_place_says_what_is_known_and_a_store_is_closed(tmp_path):
+    """SQLite keeps files beside one that is open."""
     (case := tmp_path / "plate.toml").write_text(PLATE)
-    asked = "place", case, "--workers", 0, "--x", 0.3, 0.5, "--count", 1, "--out"
-    gc.disable()
-    try:
-        assert run_coverable(*asked, tmp_path / "whole").status == 0  # and all is imported
-        for call in spread(range(30), 8):  # it is open after 26
-            with interrupted_at(call, ours=STORE):
-                assert run_coverable(*asked, tmp_path / str(call)).status == 130
-            assert list(tmp_path.glob("*-*")) == []
-    finally:
-        gc.enable()
+    asked = "place", case, "--workers", 0, "--x", 0.3, 0.5, "--count", 3, "--out"
+    assert run_coverable(*asked, tmp_path / "whole").status == 0  # and all is imported
+    told = []
+    for call in spread(range(0, 400, 20), 5):
+
+        def work(call=call):
+            with interrupted_at(call, ours=("feasibility.studies", "feasibility.placement")):
+                said = run_coverable(*asked, tmp_path / str(call))
+            os.write(2, f"{said.out}{said.err}".encode())
+            os._exit(said.status)
+
+        status, said = forked(work, tmp_path / "said")
+        (tmp_path / "said").unlink()
+        assert (status, said.endswith(INTERRUPTED)) == (130, True), (call, said)
+        assert list(tmp_path.glob("*-*")) == []
+        told.append("placements" in said)
+    assert any(told)
 
 
-class Dying:
-    """The interpreter prints what its callback raises, and goes on."""
+def test_the_first_one_is_raised_where_that_is_asked_for_and_the_second_ends_the_process(tmp_path):
+    def dropped():
+        with raised() as again:
+            with contextlib.suppress(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGINT)
+            with contextlib.suppress(KeyboardInterrupt):
+                again()
+                os._exit(1)
+            with (
+                at_leave(lambda: os.write(2, b"outer\n")),
+                at_leave(lambda: os.write(2, b"inner\n")),
+            ):
+                signal.raise_signal(signal.SIGINT)
 
-    def __del__(self):
-        signal.raise_signal(signal.SIGINT)
+    assert forked(dropped, tmp_path / "said") == (130, f"inner\nouter\n{INTERRUPTED}")
 
+    def writing():
+        write_whole(tmp_path / "a", lambda stream: signal.raise_signal(signal.SIGINT))
 
-def printed_and_dropped():
-    """As the generated code of Cython does where nothing can be raised."""
-    try:
-        signal.raise_signal(signal.SIGINT)
-    except KeyboardInterrupt as error:
-        sys.excepthook(type(error), error, error.__traceback__)
-
-
-@pytest.mark.parametrize("drop", [Dying, printed_and_dropped])
-def test_what_is_dropped_is_raised_again_without_waiting_for_an_output(drop):
-    def work():
-        with interruptible():
-            drop()
-            while True:  # ended by the second attempt alone
-                pass
-
-    with pytest.raises(KeyboardInterrupt):
-        work()
+    assert forked(writing, tmp_path / "more") == (130, INTERRUPTED)
+    assert {file.name for file in tmp_path.iterdir()} == {"said", "more"}
 
 
-def test_a_second_one_ends_the_process_and_leaves_no_file(tmp_path):
-    """Also while a file is written, and its writer holds on."""
-    code = """
-import contextlib, signal, sys
-from feasibility.interrupts import interruptible
-from feasibility.safe_files import write_whole
-def write(stream):
-    with contextlib.suppress(BaseException):
-        signal.raise_signal(signal.SIGINT)
-    print("writing", flush=True)
-    signal.raise_signal(signal.SIGINT)
-    print("not reached")
-with interruptible():
-    write_whole(sys.argv[1], write)
-"""
-    done = process(code, tmp_path / "a.csv")
-    assert (done.returncode, done.stdout, done.stderr) == (130, "writing\n", INTERRUPTED)
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_handler_of_someone_else_is_left_alone(tmp_path):
+def test_a_handler_of_someone_else_is_left_alone():
     heard = []
     before = signal.signal(signal.SIGINT, lambda *_: heard.append(1))
     try:
-        with interruptible():
+        with raised():
             signal.raise_signal(signal.SIGINT)
-            write_whole(tmp_path / "a", lambda stream: stream.write(b"whole"))
     finally:
         signal.signal(signal.SIGINT, before)
     assert heard == [1]
-    assert (tmp_path / "a").read_bytes() == b"whole"
-    assert interrupts.INTERRUPTED == 130
 
 
 def process(code: str, *arguments: object, **more: object) -> subprocess.CompletedProcess[str]:
@@ -209,13 +182,12 @@ def test_at_the_end_of_the_process():
 
 IMPORT = """
 import sys
-from feasibility.interrupts import interruptible
+from feasibility.interrupts import raised
 sys.path.insert(0, sys.argv[1])
 try:
-    with interruptible():
+    with raised() as again:
         import imported_when_interrupted
-        while True:
-            pass
+        again()
 except KeyboardInterrupt:
     print(sys.modules["imported_when_interrupted"].whole)
 """

@@ -164,12 +164,12 @@ def test_workers_that_are_killed_at_random(count, tmp_path) -> None:
 
 COMMAND = """
 import sys
-from feasibility.cli.main import main
+from feasibility.cli.main import run
 if __name__ == "__main__":
     if sys.argv.pop(1) == "stop":
         from study_works import stop_after_keeping
         stop_after_keeping()
-    sys.exit(main(sys.argv[1:]))
+    run()
 """
 
 

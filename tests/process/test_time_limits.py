@@ -4,6 +4,7 @@ The clock that is given runs out at the n-th look at it, for as many n as there 
 that the clock enforces ends at once then, as if its work never ended.
 """
 
+import contextlib
 import json
 import math
 import signal
@@ -18,7 +19,7 @@ import coverable
 from coverable import Evidence, check, compare, divide, open_workers, run_tasks, save_result, verify
 from feasibility.cases.toml import as_read
 from feasibility.clock import Clock, OutOfTime, compiling
-from feasibility.interrupts import interruptible
+from feasibility.interrupts import enforcing, limited
 from feasibility.studies.run import StudyTask
 
 LIMIT = ("--set", "search.time_limit=3600")
@@ -182,7 +183,7 @@ def test_compiling_moves_the_deadline_and_nothing_else_does():
 
 def within(clock, work):
     """Some work in a command, as long as there is time."""
-    with interruptible(), clock.enforced():
+    with enforcing(), clock.enforced():
         work()
 
 
@@ -197,6 +198,23 @@ def test_work_that_never_ends_is_ended_soon_after_its_limit():
     with pytest.raises(OutOfTime):
         within(clock, for_ever)
     assert clock.left < -0.3
+
+
+def test_the_limit_that_ends_first_counts_and_one_that_is_dropped_rings_again():
+    def dropping():
+        with contextlib.suppress(OutOfTime):
+            for_ever()
+        for_ever()
+
+    for inner, outer, error in ((0.0, 60.0, KeyError), (60.0, 0.0, OutOfTime)):
+        first, then = (lambda left=outer: left), (lambda left=inner: left)
+        with pytest.raises(error), enforcing(), limited(first, OutOfTime), limited(then, KeyError):
+            for_ever()
+    with pytest.raises(OutOfTime):
+        within(Clock(0.01).start(), dropping)
+    dropped = contextlib.suppress(OutOfTime)
+    with pytest.raises(OutOfTime), enforcing(), limited(lambda: 0.0, OutOfTime), dropped:
+        for_ever()
 
 
 def test_elsewhere_than_in_a_command_nothing_is_enforced():
