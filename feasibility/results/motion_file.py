@@ -15,14 +15,13 @@ import io
 import math
 import os
 from collections.abc import Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
 from coverable.errors import Fault, close, number_in, printable, shown
-from feasibility.results.trajectory_files import COMMENT, WORKING, load_trajectory
+from feasibility.results.trajectory_files import COMMENT, WORKING
 from feasibility.safe_files import FileError, read_text, shown_path
 from robots.robot import Robot
 
@@ -58,20 +57,12 @@ class Motion(NamedTuple):
 
 
 def load_motion(path: str | os.PathLike[str], robot: Robot) -> Motion:
-    """Read a joint motion for a robot: CSV, or a trajectory that `save_trajectory` wrote as JSON.
+    """Read a joint motion for a robot: CSV, also a trajectory that `save_trajectory` wrote so.
 
     Raises:
         FileError: it cannot be read, or is no motion of this robot: all faults, with places.
     """
     name = shown_path(path)
-    if Path(path).suffix.lower() == ".json":
-        found = load_trajectory(path)
-        columns, faults = _columns(list(found.joint_names), robot)
-        if faults:
-            raise FileError(faults, name)
-        note = "its times and velocities are not used: rows are joined by straight lines"
-        q = found.q[:, [column for column, _ in columns]]
-        return _checked(q, robot, name, (note,))._replace(working=found.working, marks=found.cell)
     text = read_text(path, CAP, "a joint motion (.csv)")
     try:
         return _from_csv(text, robot, name)

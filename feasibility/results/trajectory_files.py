@@ -16,9 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from coverable.arrays import Array
-from coverable.errors import ArgumentError, Checks, CoverableError, Fault, is_whole
-from feasibility.collisions.words import CHECKABLE, listed_words
+from coverable.errors import ArgumentError, Checks, CoverableError, Fault
+from feasibility.collisions.words import listed_words
 from feasibility.safe_files import FileError, read_text, shown_path, write_whole
 from feasibility.timing.sampled_trajectory import Trajectory
 
