@@ -15,6 +15,7 @@ import io
 import math
 import os
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -63,6 +64,8 @@ def load_motion(path: str | os.PathLike[str], robot: Robot) -> Motion:
         FileError: it cannot be read, or is no motion of this robot: all faults, with places.
     """
     name = shown_path(path)
+    if Path(path).suffix.lower() == ".json":
+        raise FileError("JSON is written only; give the motion as CSV", name)
     text = read_text(path, CAP, "a joint motion (.csv)")
     try:
         return _from_csv(text, robot, name)

@@ -60,9 +60,11 @@ def test_columns_beside_the_joints(read, tmp_path: Path) -> None:
         "joint6 moves by more than half a turn from row 2 to 3; values must be unwrapped",
     )
     run = replace(small_run(k=2, n=6), joint_names=NAMES[::-1], q=ROWS[:, ::-1])
-    found = load_motion(save_trajectory(tmp_path / "run.json", run), PUMA)
+    found = load_motion(save_trajectory(tmp_path / "run.csv", run), PUMA)
     assert np.array_equal(found.q, ROWS)
     assert found.marks.tolist() == run.cell.tolist()
+    with pytest.raises(FileError, match="JSON is written only; give the motion as CSV"):
+        load_motion(save_trajectory(tmp_path / "run.json", run), PUMA)
 
 
 def test_millimetres_on_a_rail(tmp_path: Path, read) -> None:
