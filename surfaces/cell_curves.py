@@ -66,7 +66,9 @@ class CellCurves(Protected):
         folded = np.zeros(len(self.cubics), dtype=bool)
         for point, normal in self._slopes_along():
             onward = ((point + height * normal) * point).sum(axis=1)
-            folded |= ~(onward > STOPPED * (point**2).sum(axis=1))
+            square = (point**2).sum(axis=1)
+            # On an edge the normal turns on the spot: nothing runs backwards there.
+            folded |= ~((onward > STOPPED * square) | (square == 0.0))
         return np.logical_or.reduceat(folded, self.first[:-1]) if len(self) else folded
 
     def curvature(self, height: float) -> Array:

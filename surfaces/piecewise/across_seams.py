@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,9 @@ import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
 from surfaces.adjacency import grid_neighbours
+from surfaces.cells import Cells
+from surfaces.curve_fitting import CurveFit
+from surfaces.piecewise.edges import SMOOTH
 from surfaces.piecewise.seams import Border, contacts, sides_of
 
 if TYPE_CHECKING:
@@ -18,7 +20,6 @@ if TYPE_CHECKING:
 
 Counts = Sequence[tuple[int, int]]
 
-SMOOTH = math.radians(0.1)  # seams that bend by more are creases
 JUMP = 3.0  # times the step along the straight line: there closest points jump
 MARKS = 16  # on each cell's border side; cells that share fewer than one of them do not touch
 
@@ -207,6 +208,55 @@ def curves_across(
             surface, seam_pairs.rows(over), start[over], end[over], t, pieces
         )
     return points, normals
+
+
+def fit_round_edges(fit: CurveFit, surface: Piecewise, touching: SeamPairs, pieces: Ints) -> None:
+    """Replace rough curves over outer edges by such that turn on the spot there.
+
+    Args:
+        fit: the curves.
+        surface: the pieces.
+        touching: where the cells of each pair that lies across a seam touch.
+        pieces: (M, 2) of the cells of each curve.
+    """
+    curves, corners, normals = fit.rough, touching.crossings, touching.normals
+    row = np.searchsorted(_keys(touching.pairs), _keys(fit.cells.pairs[curves]))
+    for edge, of in surface.edges:
+        some = np.flatnonzero((pieces[curves] == of).all(axis=1))
+        on = edge.closest(corners[row[some]])
+        some = some[np.abs(on.height) <= 2.0 * surface.gap]
+        on_edge, at = curves[some], row[some]
+
+        def legs(
+            rows: Ints, first: Array, second: Array, on_edge: Ints = on_edge, at: Ints = at,
+            of: tuple[int, int] = of,
+        ) -> list[Array]:  # fmt: skip
+            pairs, corner, found = fit.cells.pairs[on_edge[rows]], corners[at[rows]], []
+            between = normals[at[rows]].mean(axis=1)
+            for end, piece in enumerate(of):
+                found.append(_up_to(fit.cells, surface, pairs[:, end], piece, corner, first))
+                turned = normals[at[rows], end] + second[:, None, None] * (
+                    between - normals[at[rows], end]
+                )
+                turned /= np.linalg.norm(turned, axis=2, keepdims=True)
+                found.append(np.concatenate([np.broadcast_to(corner, turned.shape), turned], 2))
+            return found
+
+        off = [surface.nearest(corners[at], [piece]).places - corners[at] for piece in of]
+        fit.over_corners(on_edge, legs, np.linalg.norm(off, axis=2).max(axis=0))
+
+
+def _up_to(
+    cells: Cells, surface: Piecewise, which: Ints, piece: int, corners: Array, share: Array
+) -> Array:
+    """(k, m, 6) points and normals at shares (k,) of the way from centres to corners (m, 3)."""
+    start = cells.centres[which]
+    lines = start + share[:, None, None] * (corners - start)
+    found = surface.nearest(lines, [piece])
+    values = np.column_stack([found.places, found.normals]).reshape(len(share), -1, 6)
+    values[..., :3] += share[:, None, None] * (corners - values[-1, :, :3])
+    values[0] = np.hstack([start, cells.normals[which]])
+    return values
 
 
 def _over_the_border(

@@ -17,7 +17,13 @@ from surfaces.cell_curves import CellCurves
 from surfaces.cells import Cells, CellTriangles, Finer, Unrolled
 from surfaces.curve_fitting import CurveFit
 from surfaces.patches.grid_cells import GridCells
-from surfaces.piecewise.across_seams import SMOOTH, SeamPairs, curves_across, seam_pairs_of
+from surfaces.piecewise.across_seams import (
+    SeamPairs,
+    curves_across,
+    fit_round_edges,
+    seam_pairs_of,
+)
+from surfaces.piecewise.edges import SMOOTH
 from surfaces.piecewise.piecewise_surface import Piecewise
 from surfaces.surface import SurfaceError
 
@@ -100,7 +106,18 @@ class PieceCells(Cells):
     @cached_property
     def curves(self) -> CellCurves:
         """See `Cells.curves`."""
-        return CurveFit.of(self).joined()
+        fit = CurveFit.of(self)
+        fit_round_edges(fit, self.surface, self.seam_pairs, self.piece[self.pairs])
+        return fit.joined()
+
+    @property
+    def creased(self) -> Mask:
+        """See `Cells.creased`: along an edge round which the tool can go."""
+        edges = {pieces for _, pieces in self.surface.edges}
+        of = self.piece[self.seam_pairs.pairs]
+        creased = np.zeros(len(self), dtype=bool)
+        creased[self.seam_pairs.pairs[[tuple(two) in edges for two in of.tolist()]]] = True
+        return creased
 
     def trace(self, pairs: Ints, t: Array) -> tuple[Array, Array]:
         """See `Cells.trace`: within a piece as on its grid, across a seam see `curves_across`."""

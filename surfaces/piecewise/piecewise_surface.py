@@ -24,6 +24,7 @@ from surfaces.surface import ClosestPoint, Side, Surface, SurfaceError, points_o
 
 if TYPE_CHECKING:
     from surfaces.piecewise.cells import PieceCells
+    from surfaces.piecewise.edges import Edge
 
 
 GAP = 1e-4  # m, how far apart two borders may be that are one seam
@@ -100,6 +101,19 @@ class Piecewise(Surface):
         """+1.0 where a piece's own normal is outward, -1.0 where it is turned over."""
         return tuple(-1.0 if turned else 1.0 for turned in self.turned)
 
+    @cached_property
+    def edges(self) -> tuple[tuple[Edge, tuple[int, int]], ...]:
+        """The outer edges round which the tool can go, each with its two pieces."""
+        from surfaces.piecewise.edges import outer_edges
+
+        return tuple(outer_edges(self))
+
+    @cached_property
+    def charts(self) -> tuple[tuple[Patch, float], ...]:
+        """Each piece and each edge in the root frame, -1.0 where its normal is turned over."""
+        pieces = zip(self.placed, self.signs, strict=True)
+        return (*pieces, *((edge, 1.0) for edge, _ in self.edges))
+
     def nearest(self, points: ArrayLike, pieces: Sequence[int] | None = None) -> PieceClosestPoints:
         """The nearest places of some pieces (all if None) to points (k, 3) m, in the root frame."""
         some = range(len(self.pieces)) if pieces is None else pieces
@@ -123,15 +137,18 @@ class Piecewise(Surface):
         return ClosestPoint.of_rows(points.shape[:-1], values, found.inside)
 
     def parts(self, flat: float, straight: float, most: int = MOST_PARTS) -> SurfaceParts:
-        """See `Surface.parts`: those of all pieces, their normals turned over where theirs are."""
-        roots = [piece.part_roots for piece in self.placed]
+        """See `Surface.parts`: those of all pieces, their normals turned over where theirs are.
+
+        And those of all edges: a tool that goes round one is where no piece has its normal.
+        """
+        roots = [patch.part_roots for patch, _ in self.charts]
         owner = np.repeat(np.arange(len(roots)), [len(low) for low, _ in roots])
 
         def bounds(root: Ints, low: Array, high: Array) -> PartModels:
             some = [np.flatnonzero(owner[root] == k) for k in range(len(roots))]
             models = [
-                piece.placed_models(low[rows], high[rows], sign)
-                for piece, sign, rows in zip(self.placed, self.signs, some, strict=True)
+                patch.placed_models(low[rows], high[rows], sign)
+                for (patch, sign), rows in zip(self.charts, some, strict=True)
                 if len(rows)
             ]
             back = np.argsort(np.concatenate(some), kind="stable")

@@ -43,14 +43,22 @@ class Border:
         """Whether its two ends are one place."""
         return self.patch.v_closed if self.fixed == 0 else self.patch.u_closed
 
-    def parameters(self, s: Array, inward: float = 0.0) -> tuple[Array, Array]:
-        """u and v at s, a share of the fixed parameter's range away from the border."""
-        ranges = self.patch.u_range, self.patch.v_range
-        low, high = ranges[self.fixed]
+    @property
+    def ends(self) -> tuple[float, float]:
+        """The parameter along it, at s = 0 and at s = 1."""
+        return (self.patch.u_range, self.patch.v_range)[1 - self.fixed]
+
+    def at(self, along: Array, inward: float = 0.0) -> tuple[Array, Array]:
+        """u and v by the parameter along it, a share of the other's range off the border."""
+        low, high = (self.patch.u_range, self.patch.v_range)[self.fixed]
         fixed = high - inward * (high - low) if self.upper else low + inward * (high - low)
-        low, high = ranges[1 - self.fixed]
-        along, across = low + s * (high - low), np.full(np.shape(s), fixed)
+        across = np.full_like(along, fixed)
         return (across, along) if self.fixed == 0 else (along, across)
+
+    def parameters(self, s: Array, inward: float = 0.0) -> tuple[Array, Array]:
+        """u and v at s, likewise."""
+        low, high = self.ends
+        return self.at(low + s * (high - low), inward)
 
     def point(self, s: Array) -> Array:
         """(k, 3) m."""
@@ -84,6 +92,12 @@ class Border:
         if len(some) == 0:
             return some, np.empty(0)
         points = points[some]
+        s = self.nearest(points)
+        near = np.linalg.norm(points - self.point(s), axis=1) <= gap
+        return some[near], s[near]
+
+    def nearest(self, points: Array) -> Array:
+        """(k,) s of the places nearest to points (k, 3) m, from the nearest vertices on."""
         away = np.linalg.norm(points[:, None] - self.vertices, axis=2)
         s = np.argmin(away, axis=1) / (VERTICES - 1.0)
         for _ in range(REFINEMENTS):
@@ -93,8 +107,7 @@ class Border:
             step = ((points - self.point(s)) * slope).sum(axis=1) / square
             s = s + np.clip(step, -1.0 / VERTICES, 1.0 / VERTICES)
             s = np.mod(s, 1.0) if self.closed else np.clip(s, 0.0, 1.0)
-        near = np.linalg.norm(points - self.point(s), axis=1) <= gap
-        return some[near], s[near]
+        return s
 
     @cached_property
     def _sag(self) -> float:

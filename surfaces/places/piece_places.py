@@ -8,9 +8,11 @@ from functools import cached_property
 import numpy as np
 
 from coverable.arrays import Array, Ints
+from surfaces.piecewise.closest_point import nearest_places
 from surfaces.piecewise.piecewise_surface import Piecewise
 from surfaces.places.patch_places import PatchPlaces
 from surfaces.places.places import OffsetSurface, PlacePaths, Places, by_closest_points, share_of
+from surfaces.surface import points_of
 
 BORDERS = 2.0  # [1] of the gap that seams may have: so far apart may two sides of one place be
 
@@ -19,17 +21,18 @@ BORDERS = 2.0  # [1] of the gap that seams may have: so far apart may two sides 
 class PiecePlaces(OffsetSurface):
     """The places of several patches, `Places.chart` the number of the patch.
 
-    A path from one piece to another goes to their seam, changes sides there, and goes on. Where the
-    surface has a crease, normals jump with the side; who follows the path has to be right for both.
+    After the pieces the outer edges count, round which the normal turns. A path from one piece to
+    another goes to their seam, changes sides there, and goes on; normals jump with the side where
+    the surface has a crease, and who follows the path has to be right for both. From a piece to an
+    edge of its own it goes to where both have the same normal.
     """
 
     surface: Piecewise
 
     @cached_property
     def pieces(self) -> tuple[PatchPlaces, ...]:
-        """The places of each piece."""
-        both = zip(self.surface.placed, self.surface.signs, strict=True)
-        return tuple(PatchPlaces(self.height, patch, sign) for patch, sign in both)
+        """The places of each piece, and of each edge."""
+        return tuple(PatchPlaces(self.height, *chart) for chart in self.surface.charts)
 
     def at(self, places: Places) -> tuple[Array, Array]:
         """See `OffsetSurface.at`."""
@@ -46,8 +49,9 @@ class PiecePlaces(OffsetSurface):
         return by_closest_points(self, self._closest, points, ahead, within)
 
     def _closest(self, points: Array) -> Places:
-        found = self.surface.nearest(points)
-        return Places(found.piece.copy(), np.stack([found.u, found.v], axis=-1))
+        patches, signs = zip(*self.surface.charts, strict=True)
+        found = nearest_places(patches, signs, points_of(points), self.surface.gap)
+        return Places(found.piece, np.stack([found.u, found.v], axis=-1))
 
     def paths(self, start: Places, end: Places) -> PlacePaths:
         """See `OffsetSurface.paths`."""
@@ -64,12 +68,9 @@ class PiecePlaces(OffsetSurface):
 
     def _across(self, start: Places, end: Places) -> PlacePaths:
         """Paths from one piece to another, over the place of their seam that is closest to both."""
-        a, b = self.pieces[start.chart[0]], self.pieces[end.chart[0]]
-        middle = 0.5 * (_on(a, start.x) + _on(b, end.x))
-        before = a.closest(middle).x
-        for _ in range(2):  # back and forth, from one border to the other
-            after = b.closest(_on(a, before)).x
-            before = a.closest(_on(b, after)).x
+        numbers = int(start.chart[0]), int(end.chart[0])
+        a, b = (self.pieces[k] for k in numbers)
+        before, after = self._meeting(numbers, start.x, end.x)
         apart = np.linalg.norm(_on(a, before) - _on(b, after), axis=1)
         joined = apart <= BORDERS * self.surface.gap
         first = a.paths(start, Places(start.chart, before))
@@ -86,12 +87,42 @@ class PiecePlaces(OffsetSurface):
             (off[0], off[1]),
         )
 
+    def _meeting(self, numbers: tuple[int, int], start: Array, end: Array) -> tuple[Array, Array]:
+        """u and v (k, 2) on two pieces of places at which they meet, near to others of both."""
+        a, b = (self.pieces[k] for k in numbers)
+        middle = 0.5 * (_on(a, start) + _on(b, end))
+        for (edge, piece), back in ((numbers, 1), (numbers[::-1], -1)):
+            found = self._turned_to(edge, piece, middle)
+            if found is not None:
+                return found[::back]
+        before = a.closest(middle).x
+        for _ in range(2):  # back and forth, from one border to the other
+            after = b.closest(_on(a, before)).x
+            before = a.closest(_on(b, after)).x
+        return before, after
+
+    def _turned_to(self, edge: int, piece: int, points: Array) -> tuple[Array, Array] | None:
+        """u and v (k, 2) on an edge and a piece of its own where both have the same normal.
+
+        Near to points (k, 3) m; None where the first number is of no edge of this piece.
+        """
+        if edge < len(self.surface.pieces):
+            return None
+        patch, pieces = self.surface.edges[edge - len(self.surface.pieces)]
+        if piece not in pieces:
+            return None
+        which = pieces.index(piece)
+        u = patch.along((points - patch.position) @ patch.rotation)
+        x = np.stack(patch.on_side(which, u), axis=-1)
+        return np.stack([u, np.full_like(u, float(which))], axis=-1), x
+
     def tangents(self, places: Places) -> Array:
         """See `OffsetSurface.tangents`."""
         found = np.full((len(places.chart), 3), np.nan)
         for k in np.unique(places.chart[places.chart >= 0]):
             some = np.flatnonzero(places.chart == k)
-            found[some] = self.pieces[k].tangents(places.of(some))
+            if k < len(self.surface.pieces):  # on an edge they jump from one piece's to the other's
+                found[some] = self.pieces[k].tangents(places.of(some))
         return found
 
     def tangent_deviations(self, start: Places, end: Places) -> Array:

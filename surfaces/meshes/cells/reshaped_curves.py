@@ -21,16 +21,21 @@ import numpy as np
 from coverable.arrays import Array, Ints
 from surfaces.cell_curves import PLACES, slopes_of
 from surfaces.cells import Cells
-from surfaces.curve_fitting import BLOCK, PIECES, CurveFit, fit_between_centres, fit_cubics
+from surfaces.curve_fitting import (
+    BLOCK,
+    ENOUGH,
+    PIECES,
+    SAMPLES,
+    CurveFit,
+    fit_between_centres,
+)
 from surfaces.meshes.mesh_surface import MeshSurface
 from surfaces.meshes.normals import sharp_edges
 
 Shares = Callable[[Ints, Array], Array]
 """From pairs (m, 2) and points (m, k, 3) m to (m, k), see `MeshSurface.crease_share`."""
 
-SAMPLES = 4  # for each cubic
 TRACED = 257  # places on the line to a corner, to find its strip
-ENOUGH = 0.7  # [1] share of the deviation: what more cubics must reach to be worth it
 PACED = 513  # places on the trace, to find how fast the normal turns
 ROUGH = 4e-3  # [1] a normal that deviates less moves a target 100 mm away by 0.4 mm at most
 TURNED = 0.1  # [1] |n1 - n0| of the normals at both ends: less is roughness, and no bend
@@ -64,37 +69,18 @@ def fit_over_creases(fit: CurveFit, creases: Creases, shares: Shares) -> None:
     corners = _corners(cells, cells.pairs[curves], creases)
     found = np.isfinite(corners[:, 0])
     curves, corners = curves[found], corners[found]
-    for count in PIECES[1:-2]:
-        left = np.flatnonzero((fit.deviations[curves] > fit.close[curves]).any(axis=1))
-        for start in range(0, len(left), BLOCK):
-            rows = left[start : start + BLOCK]
-            some = curves[rows]
-            cubics, deviations = _by_corners(cells, cells.pairs[some], corners[rows], shares, count)
-            before = fit.deviations[some]
-            better = (deviations <= np.maximum(before, fit.close[some])).all(axis=1)
-            better &= (deviations < ENOUGH * before).any(axis=1)
-            fit.put(some[better], cubics[better], deviations[better])
-            fit.creased[some[better]] = True
 
+    def legs(rows: Ints, first: Array, second: Array) -> list[Array]:
+        pairs, found = cells.pairs[curves[rows]], []
+        for end in range(2):
+            centre = cells.centres[pairs[:, end]]
+            border = _strip_borders(pairs, centre, corners[rows], shares)
+            found.append(_along(cells, pairs, centre, border, first))
+            found[-1][0] = np.hstack([centre, cells.normals[pairs[:, end]]])
+            found.append(_along(cells, pairs, border, corners[rows], second))
+        return found
 
-def _by_corners(
-    cells: Cells, pairs: Ints, corners: Array, shares: Shares, count: int
-) -> tuple[Array, Array]:
-    """Cubics (m, 4 count, 4, 6) over corners (m, 3) m, and their deviations (m, 2)."""
-    cubics, deviations = [], []
-    tau = np.linspace(0.0, 1.0, 2 * SAMPLES * count + 1)
-    for end in range(2):
-        centre = cells.centres[pairs[:, end]]
-        border = _strip_borders(pairs, centre, corners, shares)
-        first = _along(cells, pairs, centre, border, tau * (2.0 - tau))
-        first[0] = np.hstack([centre, cells.normals[pairs[:, end]]])
-        second = _along(cells, pairs, border, corners, tau * tau * (3.0 - 2.0 * tau))
-        for values, rests in ((first, "last"), (second, "both")):
-            part, deviation = fit_cubics(cells, pairs, values, count, rests)
-            cubics.append(part if end == 0 else _backwards(part))
-            deviations.append(deviation)
-    order = (0, 1, 3, 2)
-    return np.concatenate([cubics[k] for k in order], axis=1), np.max(deviations, axis=0)
+    fit.over_corners(curves, legs)
 
 
 def _along(cells: Cells, pairs: Ints, start: Array, stop: Array, share: Array) -> Array:
@@ -117,12 +103,6 @@ def _strip_borders(pairs: Ints, centres: Array, corners: Array, shares: Shares) 
     ahead = np.divide(one, two - one, out=np.zeros(len(one)), where=two > one)
     place = t[off + 1] - np.clip(ahead, 0.0, 1.0) / (TRACED - 1)
     return np.asarray(lines[:, 0] + place[:, None] * (corners - centres))
-
-
-def _backwards(cubics: Array) -> Array:
-    """The same curves (m, count, 4, 6) run through from their ends."""
-    a, b, c, d = np.moveaxis(cubics[:, ::-1], 2, 0)
-    return np.stack([a + b + c + d, -(b + 2.0 * c + 3.0 * d), c + 3.0 * d, -d], axis=2)
 
 
 def _corners(cells: Cells, pairs: Ints, creases: Creases) -> Array:
