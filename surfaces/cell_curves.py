@@ -33,7 +33,10 @@ class CellCurves(Protected):
     deviations: Array
     """(M, 2) how far point (m) and normal (1) deviate from the surface's own, at most."""
     rests: Mask
-    """(P,) pieces at an end of which the point is at rest, next to a crease of a mesh."""
+    """(P,) pieces at an end of which the point is at rest, next to a crease."""
+    leans: Array
+    """(M,) at an inner crease, how far its two normals are from the one between them; 0 elsewhere.
+    There the target stays where it is while the normal turns: the middle two of four legs."""
 
     def __len__(self) -> int:
         """Number of curves."""
@@ -69,6 +72,7 @@ class CellCurves(Protected):
             square = (point**2).sum(axis=1)
             # On an edge the normal turns on the spot: nothing runs backwards there.
             folded |= ~((onward > STOPPED * square) | (square == 0.0))
+        folded &= ~self._turning
         return np.logical_or.reduceat(folded, self.first[:-1]) if len(self) else folded
 
     def curvature(self, height: float) -> Array:
@@ -84,7 +88,15 @@ class CellCurves(Protected):
             none = np.where(turn > 0.0, np.inf, 0.0)  # it turns on the spot, or not at all
             rate = np.divide(turn, speed, out=none, where=speed > 0.0)
             fastest = np.maximum(fastest, rate)
-        return fastest
+        return np.where(self._turning, 0.0, fastest)
+
+    @property
+    def _turning(self) -> Mask:
+        """(P,) pieces along which the target stays where it is."""
+        count = np.diff(self.first)
+        at = 4 * (np.arange(len(self.cubics)) - np.repeat(self.first[:-1], count))
+        middle = (at >= np.repeat(count, count)) & (at < np.repeat(3 * count, count))
+        return np.asarray(middle & np.repeat(self.leans > 0.0, count))
 
     def _slopes_along(self) -> Iterator[tuple[Array, Array]]:
         """Derivatives by s of point and normal (P, 3), at places along every piece.

@@ -127,6 +127,13 @@ class Cells(Protected, ABC):
         """The row of `pairs` that each entry of the neighbours' `indices` belongs to."""
         return self.neighbours.links  # not write-protected: to kernels that is another type
 
+    def at_height(self, height: float) -> Cells:
+        """These cells with the `curves` for targets at a signed height (m).
+
+        They are other ones over inner creases alone, which no target reaches.
+        """
+        return self
+
     @property
     @abstractmethod
     def curves(self) -> CellCurves:

@@ -47,6 +47,8 @@ class CurveFit:
     """(M, 2) deviations reached so far; inf before the first fit."""
     creased: Mask
     """(M,) curves that consist of `LEGS` legs and are at rest between them."""
+    leans: Array
+    """(M,) see `CellCurves.leans`."""
     cubics: list[tuple[Ints, Array]] = field(default_factory=list)
     """Curves (k,) and their cubics (k, count, 4, 6); the last fit of each curve counts."""
 
@@ -58,7 +60,9 @@ class CurveFit:
         close = np.full((len(pairs), 2), CLOSE if edge == 0.0 else FACETED)
         close[:, 0] = np.maximum(CLOSE * length, FACETED_POINT * edge)
         unknown = np.full((len(pairs), 2), np.inf)
-        fit = CurveFit(cells, close, unknown, np.zeros(len(pairs), dtype=bool))
+        fit = CurveFit(
+            cells, close, unknown, np.zeros(len(pairs), dtype=bool), np.zeros(len(pairs))
+        )
         missing = np.arange(len(pairs))
         for count in PIECES:
             # Between its facets a mesh has no detail: no more pieces than half the samples.
@@ -93,7 +97,7 @@ class CurveFit:
         self.cubics.append((curves, cubics))
         self.deviations[curves] = deviations
 
-    def over_corners(self, curves: Ints, legs: Legs, off: Array | float = 0.0) -> None:
+    def over_corners(self, curves: Ints, legs: Legs, off: Array | float = 0.0) -> Mask:
         """Replace some curves (k,) by such in four legs over a corner, where these deviate less.
 
         Args:
@@ -101,8 +105,12 @@ class CurveFit:
             legs: samples of rows (j,) of `curves`, see `fit_in_legs`; by shares of the way to where
                 a leg ends, at rest at its last end, and at both.
             off: (k,) m, how far those may be off the surface.
+
+        Returns:
+            (k,) which were replaced.
         """
         cells, off = self.cells, np.broadcast_to(off, len(curves))
+        taken = np.zeros(len(curves), dtype=bool)
         for count in PIECES[1:-2]:
             left = np.flatnonzero((self.deviations[curves] > self.close[curves]).any(axis=1))
             for start in range(0, len(left), BLOCK):
@@ -118,7 +126,8 @@ class CurveFit:
                 better = (deviations <= np.maximum(before, self.close[some])).all(axis=1)
                 better &= (deviations < ENOUGH * before).any(axis=1)
                 self.put(some[better], cubics[better], deviations[better])
-                self.creased[some[better]] = True
+                self.creased[some[better]] = taken[rows[better]] = True
+        return taken
 
     def joined(self) -> CellCurves:
         """All curves in the order of the pairs, with bounds on their second derivatives."""
@@ -142,7 +151,8 @@ class CurveFit:
         ends = begin, begin + 6.0 * joined[:, 3]
         sizes = [[np.sqrt(_squares(end[:, half])) for half in HALVES] for end in ends]
         bounds = np.max(sizes, axis=0).T
-        return CellCurves(first, joined, ROUNDING * square * bounds, self.deviations, rests)
+        bounds *= ROUNDING * square
+        return CellCurves(first, joined, bounds, self.deviations, rests, self.leans)
 
 
 def _blocks(samples: Ints) -> Iterator[tuple[Ints, int]]:

@@ -59,6 +59,13 @@ def blocked_curves(cells: Cells, task: Task) -> str:
             "cells, a finer or smoother mesh, cut it along its creases, or allow a wider cone or a "
             "larger tolerance."
         )
+    leans = cells.at_height(cells.surface.side_sign * task.standoff).curves.leans
+    if leans.any():
+        return (
+            f"Pieces meet in an inner crease {some.format(int((leans > 0.0).sum()))}, where only "
+            "motions are tried along which the tool turns on the spot, so one may have been "
+            "missed; allow a wider cone."
+        )
     return ""
 
 

@@ -135,9 +135,10 @@ def target_curves(cells: Cells, task: Task) -> TargetCurves:
 @lru_cache(maxsize=4)
 def _target_curves(cells: Cells, task: Task) -> TargetCurves:
     """`target_curves` of a task whose cone and range do not matter."""
-    curves, sign = cells.curves, cells.surface.side_sign
-    standoff, tolerance = task.standoff, task.effective_tolerance
+    sign, standoff, tolerance = cells.surface.side_sign, task.standoff, task.effective_tolerance
     height = sign * standoff
+    cells = cells.at_height(height)
+    curves = cells.curves
     folded = folded_curves(cells, height)
     cubics = np.empty_like(curves.cubics)
     cubics[..., :3] = curves.cubics[..., :3] + height * curves.cubics[..., 3:]
@@ -146,6 +147,7 @@ def _target_curves(cells: Cells, task: Task) -> TargetCurves:
     derivative_bounds[:, 0] += standoff * derivative_bounds[:, 1]
     deviations = curves.deviations + cells.surface.deviations
     deviations[:, 0] += standoff * deviations[:, 1]
+    deviations[:, 1] += curves.leans
     if cells.surface.bare:
         from surfaces.toolpaths.arcs import straight
 

@@ -11,7 +11,7 @@ import numpy as np
 from coverable.arrays import Array, Ints, Mask
 from surfaces.adjacency import grid_neighbours
 from surfaces.cells import Cells
-from surfaces.curve_fitting import CurveFit
+from surfaces.curve_fitting import CurveFit, Legs
 from surfaces.piecewise.edges import SMOOTH
 from surfaces.piecewise.seams import Border, contacts, sides_of
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 Counts = Sequence[tuple[int, int]]
 
 JUMP = 3.0  # times the step along the straight line: there closest points jump
+MEETING = 6  # steps to where two offset surfaces meet
 MARKS = 16  # on each cell's border side; cells that share fewer than one of them do not touch
 
 
@@ -219,31 +220,81 @@ def fit_round_edges(fit: CurveFit, surface: Piecewise, touching: SeamPairs, piec
         touching: where the cells of each pair that lies across a seam touch.
         pieces: (M, 2) of the cells of each curve.
     """
-    curves, corners, normals = fit.rough, touching.crossings, touching.normals
-    row = np.searchsorted(_keys(touching.pairs), _keys(fit.cells.pairs[curves]))
-    for edge, of in surface.edges:
-        some = np.flatnonzero((pieces[curves] == of).all(axis=1))
-        on = edge.closest(corners[row[some]])
-        some = some[np.abs(on.height) <= 2.0 * surface.gap]
-        on_edge, at = curves[some], row[some]
+    for edge, of in surface.creases.edges:
+        some = np.flatnonzero((pieces[fit.rough] == of).all(axis=1))
+        at = touching.of(fit.cells.pairs[fit.rough[some]])
+        on = np.abs(edge.closest(at.crossings).height) <= 2.0 * surface.gap
+        curves, at = fit.rough[some[on]], at.rows(on)
+        off = [surface.nearest(at.crossings, [k]).places - at.crossings for k in of]
+        away = np.linalg.norm(off, axis=2).max(axis=0)
+        corners = np.broadcast_to(at.crossings[:, None], at.normals.shape)
+        ends = np.concatenate([corners, at.normals], axis=2)
+        legs = _legs(fit, surface, curves, of, ends, at.crossings, 0.0)
+        fit.over_corners(curves, legs, away)
 
-        def legs(
-            rows: Ints, first: Array, second: Array, on_edge: Ints = on_edge, at: Ints = at,
-            of: tuple[int, int] = of,
-        ) -> list[Array]:  # fmt: skip
-            pairs, corner, found = fit.cells.pairs[on_edge[rows]], corners[at[rows]], []
-            between = normals[at[rows]].mean(axis=1)
-            for end, piece in enumerate(of):
-                found.append(_up_to(fit.cells, surface, pairs[:, end], piece, corner, first))
-                turned = normals[at[rows], end] + second[:, None, None] * (
-                    between - normals[at[rows], end]
-                )
-                turned /= np.linalg.norm(turned, axis=2, keepdims=True)
-                found.append(np.concatenate([np.broadcast_to(corner, turned.shape), turned], 2))
-            return found
 
-        off = [surface.nearest(corners[at], [piece]).places - corners[at] for piece in of]
-        fit.over_corners(on_edge, legs, np.linalg.norm(off, axis=2).max(axis=0))
+def fit_over_inner(
+    fit: CurveFit, surface: Piecewise, touching: SeamPairs, pieces: Ints, height: float
+) -> None:
+    """Replace rough curves over inner creases by such that turn where both offset surfaces meet.
+
+    There the direction that the tool is held in has to be right for both pieces.
+
+    Args:
+        fit, surface, touching, pieces: see `fit_round_edges`.
+        height: m, signed, of the offset surfaces.
+    """
+    for of in surface.creases.inner:
+        curves = fit.rough[(pieces[fit.rough] == of).all(axis=1)]
+        at = touching.of(fit.cells.pairs[curves])
+        cosine = (at.normals[:, 0] * at.normals[:, 1]).sum(axis=1, keepdims=True)
+        target = at.crossings + height * at.normals.sum(axis=1) / (1.0 + cosine)
+        for last in (*[False] * MEETING, True):
+            both = [surface.nearest(target, [k]) for k in of]
+            normals = np.stack([found.normals for found in both], axis=1)
+            if last:
+                break
+            miss = np.stack([found.height - height for found in both], axis=1)
+            target = target - (np.linalg.pinv(normals) @ miss[..., None])[..., 0]
+        feet = target[:, None] - height * normals
+        off = np.stack([found.places for found in both], axis=1) - feet
+        lean = 0.5 * np.linalg.norm(normals[:, 0] - normals[:, 1], axis=1)
+        ends = np.concatenate([feet, normals], axis=2)
+        legs = _legs(fit, surface, curves, of, ends, target, height)
+        taken = fit.over_corners(curves, legs, np.linalg.norm(off, axis=2).max(axis=1))
+        fit.leans[curves[taken]] = lean[taken]
+
+
+def _legs(
+    fit: CurveFit,
+    surface: Piecewise,
+    curves: Ints,
+    of: tuple[int, int],
+    ends: Array,
+    target: Array,
+    height: float,
+) -> Legs:
+    """Legs to places of both pieces and on, while the normal turns, over one target.
+
+    Args:
+        fit, surface, of: see `fit_over_inner`.
+        curves: (k,)
+        ends: (k, 2, 6) points (m) and normals of both pieces.
+        target: (k, 3) m, at the `height` (m) over both.
+    """
+
+    def legs(rows: Ints, first: Array, second: Array) -> list[Array]:
+        pairs, found = fit.cells.pairs[curves[rows]], []
+        between = ends[rows, :, 3:].mean(axis=1)
+        for end, piece in enumerate(of):
+            foot, normal = ends[rows, end, :3], ends[rows, end, 3:]
+            found.append(_up_to(fit.cells, surface, pairs[:, end], piece, foot, first))
+            turned = normal + second[:, None, None] * (between - normal)
+            turned /= np.linalg.norm(turned, axis=2, keepdims=True)
+            found.append(np.concatenate([target[rows] - height * turned, turned], axis=2))
+        return found
+
+    return legs
 
 
 def _up_to(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -20,6 +20,7 @@ from surfaces.patches.grid_cells import GridCells
 from surfaces.piecewise.across_seams import (
     SeamPairs,
     curves_across,
+    fit_over_inner,
     fit_round_edges,
     seam_pairs_of,
 )
@@ -106,14 +107,26 @@ class PieceCells(Cells):
     @cached_property
     def curves(self) -> CellCurves:
         """See `Cells.curves`."""
+        return self._fitted().joined()
+
+    def _fitted(self) -> CurveFit:
         fit = CurveFit.of(self)
         fit_round_edges(fit, self.surface, self.seam_pairs, self.piece[self.pairs])
-        return fit.joined()
+        return fit
+
+    def at_height(self, height: float) -> PieceCells:
+        """See `Cells.at_height`."""
+        if not self.surface.creases.inner:
+            return self
+        cells, fit = replace(self), self._fitted()
+        fit_over_inner(fit, self.surface, self.seam_pairs, self.piece[self.pairs], height)
+        vars(cells)["curves"] = fit.joined()
+        return cells
 
     @property
     def creased(self) -> Mask:
         """See `Cells.creased`: along an edge round which the tool can go."""
-        edges = {pieces for _, pieces in self.surface.edges}
+        edges = {pieces for _, pieces in self.surface.creases.edges}
         of = self.piece[self.seam_pairs.pairs]
         creased = np.zeros(len(self), dtype=bool)
         creased[self.seam_pairs.pairs[[tuple(two) in edges for two in of.tolist()]]] = True

@@ -3,16 +3,16 @@
 The tool goes round an outer edge in an arc: at each point f of the edge the surface has all normals
 between those of the two pieces, n(v) = (1 - v) n_1 + v n_2 over its length, v from 0 to 1, and so
 the offset surface has a strip f + h n(v) that joins those of both. That is right on the side on
-which the edge is convex, where the edge is what is nearest to the tool; on the other the strips of
-both pieces cross before they reach the edge, and nothing joins them.
+which the edge is convex, where the edge is what is nearest to the tool; on the other,
+an inner crease, the strips of both pieces cross before they reach it, and a tool goes from one to
+the other where they do: there the same point is right over both pieces.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 SMOOTH = math.radians(0.1)  # seams that bend by more are creases
 UPRIGHT = 1e-7  # m, by which the steps to the nearest place of a border may miss it
-LEAST = 1e-300
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -120,22 +119,45 @@ def _back(patch: Any) -> tuple[Array, Array]:
     return patch.rotation.T, -patch.rotation.T @ patch.position
 
 
-def outer_edges(surface: Piecewise) -> Iterator[tuple[Edge, tuple[int, int]]]:
-    """The edges round which a tool can go, each with its two pieces; in the root frame.
+class Creases(NamedTuple):
+    """What is known of the creases between pieces, from the tool's side."""
 
-    Those that are creases all along, and along which places of both pieces belong together evenly,
-    as on planes, and on surfaces that are turned about one axis.
-    """
+    edges: tuple[tuple[Edge, tuple[int, int]], ...]
+    """Outer edges, each with its two pieces: those along which places of both pieces belong
+    together evenly, as on planes, and on surfaces that are turned about one axis."""
+    inner: frozenset[tuple[int, int]]
+    """Pairs of pieces that meet in an inner one."""
+
+
+def creases_of(surface: Piecewise) -> Creases:
+    """The seams that are creases of one kind all along, in the root frame."""
     sides = sides_of(surface.placed, surface.gap)
     s = (np.arange(PARTS) + 0.5) / PARTS
     joined = {seam.pieces for seam in surface.seams}
+    edges, inner = [], set()
     for contact in contacts(sides, [s] * len(sides), surface.gap):
         pair = sides[contact.side], sides[contact.other]
         pieces = pair[0].piece, pair[1].piece
-        if pieces in joined and pieces[0] < pieces[1] and len(contact.marks) > 1:
+        if pieces not in joined or len(contact.marks) < 2:
+            continue
+        bends = _bends(surface, pair, s[contact.marks], contact.there)
+        if (bends < -SMOOTH).all():
+            inner.add(pieces)
+        elif (bends > SMOOTH).all():
             edge = _edge(surface, pair, s[contact.marks], contact.there)
-            if edge is not None and _is_outer(edge, surface.side_sign):
-                yield edge, pieces
+            edges += [] if edge is None else [(edge, pieces)]
+    return Creases(tuple(edges), frozenset(inner))
+
+
+def _bends(surface: Piecewise, sides: tuple[Border, Border], here: Array, there: Array) -> Array:
+    """(k,) rad, from one normal to the other at places of two borders; below 0 at inner creases."""
+    one, other = (
+        surface.signs[side.piece] * side.normal(s)
+        for side, s in zip(sides, (here, there), strict=True)
+    )
+    inward = sides[0].patch.point(*sides[0].parameters(here, INWARD)) - sides[0].point(here)
+    size = 2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(one - other, axis=1), 0.0, 1.0))
+    return np.asarray(-surface.side_sign * np.sign((inward * other).sum(axis=1)) * size)
 
 
 def _edge(
@@ -173,16 +195,3 @@ def _edge(
     except SurfaceError:
         return None
     return made
-
-
-def _is_outer(edge: Edge, side_sign: float) -> bool:
-    """Whether it is convex for the tool, and a crease, all along."""
-    low, high = edge.u_range
-    u = low + (np.arange(PARTS) + 0.5) / PARTS * (high - low)
-    one, other = edge.ends(u)
-    side = edge.sides[0]
-    inward = side.patch.local_point(*side.at(u, INWARD)) - edge.local_point(u, u)
-    inward /= np.maximum(np.linalg.norm(inward, axis=1, keepdims=True), LEAST)
-    bend = 2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(one - other, axis=1), 0.0, 1.0))
-    convex = side_sign * (inward * other).sum(axis=1) < 0.0
-    return bool((convex & (bend > SMOOTH)).all())

@@ -24,7 +24,7 @@ from surfaces.surface import ClosestPoint, Side, Surface, SurfaceError, points_o
 
 if TYPE_CHECKING:
     from surfaces.piecewise.cells import PieceCells
-    from surfaces.piecewise.edges import Edge
+    from surfaces.piecewise.edges import Creases
 
 
 GAP = 1e-4  # m, how far apart two borders may be that are one seam
@@ -62,9 +62,9 @@ class Piecewise(Surface):
         words += [
             f"pieces[{a}] and pieces[{b}] meet at a crease of up to {math.degrees(angle):.3g} "
             "degrees; motions across it cannot be certified where it is sharper than tolerance "
-            "and cone allow. Over outer edges they are of triangles: export the part as a mesh."
+            "and cone allow."
             for (a, b), angle in creases.items()
-            if angle > CREASE
+            if angle > CREASE and (a, b) not in {pieces for _, pieces in self.creases.edges}
         ]
         words += [f"pieces[{k}]: {note}" for k, one in enumerate(self.pieces) for note in one.notes]
         groups = self.groups
@@ -102,17 +102,17 @@ class Piecewise(Surface):
         return tuple(-1.0 if turned else 1.0 for turned in self.turned)
 
     @cached_property
-    def edges(self) -> tuple[tuple[Edge, tuple[int, int]], ...]:
-        """The outer edges round which the tool can go, each with its two pieces."""
-        from surfaces.piecewise.edges import outer_edges
+    def creases(self) -> Creases:
+        """Where pieces meet at an angle: outer edges, and pairs that meet in an inner crease."""
+        from surfaces.piecewise.edges import creases_of
 
-        return tuple(outer_edges(self))
+        return creases_of(self)
 
     @cached_property
     def charts(self) -> tuple[tuple[Patch, float], ...]:
         """Each piece and each edge in the root frame, -1.0 where its normal is turned over."""
         pieces = zip(self.placed, self.signs, strict=True)
-        return (*pieces, *((edge, 1.0) for edge, _ in self.edges))
+        return (*pieces, *((edge, 1.0) for edge, _ in self.creases.edges))
 
     def nearest(self, points: ArrayLike, pieces: Sequence[int] | None = None) -> PieceClosestPoints:
         """The nearest places of some pieces (all if None) to points (k, 3) m, in the root frame."""

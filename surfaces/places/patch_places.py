@@ -31,9 +31,10 @@ class PatchPlaces(OffsetSurface):
 
     def at(self, places: Places) -> tuple[Array, Array]:
         """See `OffsetSurface.at`."""
-        return self._at(places.x)
+        return self.placed(places.x)
 
-    def _at(self, x: Array) -> tuple[Array, Array]:
+    def placed(self, x: Array) -> tuple[Array, Array]:
+        """Points and normals (..., 3) at u and v (..., 2)."""
         normals = self.sign * self.patch.normal(x[..., 0], x[..., 1])
         return self.patch.point(x[..., 0], x[..., 1]) + self.height * normals, normals
 
@@ -56,7 +57,7 @@ class PatchPlaces(OffsetSurface):
             if period:
                 step[:, axis] -= period * np.round(step[:, axis] / period)
         stop = start.x + step
-        ends = self._at(start.x), self._at(end.x)
+        ends = self.placed(start.x), self.placed(end.x)
         off = self._deviations(start.x, stop)
         return PlacePaths.straight(ends, off, start, Places(end.chart, stop))
 
@@ -72,7 +73,7 @@ class PatchPlaces(OffsetSurface):
         return 2.0 * np.stack([radius[:, 0] + leaning, radius[:, 1]], axis=1)
 
     def _at_once(self, which: int, x: Array) -> Array:
-        return self._at(x)[which]
+        return self.placed(x)[which]
 
     def tangents(self, places: Places) -> Array:
         """See `OffsetSurface.tangents`."""

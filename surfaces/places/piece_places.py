@@ -7,13 +7,16 @@ from functools import cached_property
 
 import numpy as np
 
-from coverable.arrays import Array, Ints
+from coverable.arrays import Array, Ints, Mask
 from surfaces.piecewise.closest_point import nearest_places
 from surfaces.piecewise.piecewise_surface import Piecewise
 from surfaces.places.patch_places import PatchPlaces
 from surfaces.places.places import OffsetSurface, PlacePaths, Places, by_closest_points, share_of
 from surfaces.surface import points_of
 
+SHARED = 0.3  # of what is near: two pieces so near are equally so
+STEPS = 6  # to where the offsets of two pieces meet
+SMALLEST = 1e-12  # of the sine between two normals, squared
 BORDERS = 2.0  # [1] of the gap that seams may have: so far apart may two sides of one place be
 
 
@@ -23,8 +26,10 @@ class PiecePlaces(OffsetSurface):
 
     After the pieces the outer edges count, round which the normal turns. A path from one piece to
     another goes to their seam, changes sides there, and goes on; normals jump with the side where
-    the surface has a crease, and who follows the path has to be right for both. From a piece to an
-    edge of its own it goes to where both have the same normal.
+    the surface has a crease, and who follows the path has to be right for both. At an inner crease
+    it changes sides before, where the offset points of both are one: the tool is at the right
+    distance from both pieces there. From a piece to an edge of its own it goes to where both have
+    the same normal.
     """
 
     surface: Piecewise
@@ -46,7 +51,19 @@ class PiecePlaces(OffsetSurface):
         self, points: Array, ahead: Array, within: float, only: Ints | None = None
     ) -> Places:
         """See `OffsetSurface.nearest`."""
-        return by_closest_points(self, self._closest, points, ahead, within)
+        places = by_closest_points(self, self._closest, points, ahead, within)
+        up = np.sign(self.height) * (points - ahead)
+        best = (self.at(places)[1] * up).sum(axis=1)
+        # Where a tool goes from one piece to another, over the one that it is held for.
+        for k in sorted({k for both in self.surface.creases.inner for k in both}):
+            found = self.pieces[k].closest(points)
+            target, normals = self.pieces[k].placed(found.x)
+            upright = (normals * up).sum(axis=1)
+            near = np.linalg.norm(points - target, axis=1) <= SHARED * within
+            some = np.flatnonzero(near & (upright > best))
+            places.put(some, Places(np.full(len(some), k), found.x[some]))
+            best[some] = upright[some]
+        return places
 
     def _closest(self, points: Array) -> Places:
         patches, signs = zip(*self.surface.charts, strict=True)
@@ -73,6 +90,10 @@ class PiecePlaces(OffsetSurface):
         before, after = self._meeting(numbers, start.x, end.x)
         apart = np.linalg.norm(_on(a, before) - _on(b, after), axis=1)
         joined = apart <= BORDERS * self.surface.gap
+        if tuple(sorted(numbers)) in self.surface.creases.inner:
+            crossing, met = self._crossing(a, b, start.x, end.x)
+            before[met], after[met] = crossing[0][met], crossing[1][met]
+            joined |= met
         first = a.paths(start, Places(start.chart, before))
         last = b.paths(Places(end.chart, after), end)
         to, fro = (
@@ -86,6 +107,26 @@ class PiecePlaces(OffsetSurface):
             share_of(to, fro),
             (off[0], off[1]),
         )
+
+    def _crossing(
+        self, a: PatchPlaces, b: PatchPlaces, start: Array, end: Array
+    ) -> tuple[tuple[Array, Array], Mask]:
+        """u and v (k, 2) on two pieces whose offset points are one, near to others of both.
+
+        And (k,) whether they are. By Newton's steps, of least length, to where both heights are.
+        """
+        target = 0.5 * (a.placed(start)[0] + b.placed(end)[0])
+        for _ in range(STEPS):
+            x = a.closest(target).x, b.closest(target).x
+            (p, m), (q, n) = a.placed(x[0]), b.placed(x[1])
+            cosine = (m * n).sum(axis=1)
+            one, other = ((target - at) * way for at, way in ((p, m), (q, n)))
+            one, other = one.sum(axis=1), other.sum(axis=1)
+            square = np.maximum(1.0 - cosine**2, SMALLEST)
+            shares = (one - cosine * other) / square, (other - cosine * one) / square
+            target = target - shares[0][:, None] * m - shares[1][:, None] * n
+        apart = np.linalg.norm(p - q, axis=1)
+        return x, np.asarray(apart <= BORDERS * self.surface.gap)
 
     def _meeting(self, numbers: tuple[int, int], start: Array, end: Array) -> tuple[Array, Array]:
         """u and v (k, 2) on two pieces of places at which they meet, near to others of both."""
@@ -108,7 +149,7 @@ class PiecePlaces(OffsetSurface):
         """
         if edge < len(self.surface.pieces):
             return None
-        patch, pieces = self.surface.edges[edge - len(self.surface.pieces)]
+        patch, pieces = self.surface.creases.edges[edge - len(self.surface.pieces)]
         if piece not in pieces:
             return None
         which = pieces.index(piece)
@@ -119,16 +160,16 @@ class PiecePlaces(OffsetSurface):
     def tangents(self, places: Places) -> Array:
         """See `OffsetSurface.tangents`."""
         found = np.full((len(places.chart), 3), np.nan)
-        for k in np.unique(places.chart[places.chart >= 0]):
+        pieces = len(self.surface.pieces)  # on an edge directions jump from one's to the other's
+        for k in np.unique(places.chart[(places.chart >= 0) & (places.chart < pieces)]):
             some = np.flatnonzero(places.chart == k)
-            if k < len(self.surface.pieces):  # on an edge they jump from one piece's to the other's
-                found[some] = self.pieces[k].tangents(places.of(some))
+            found[some] = self.pieces[k].tangents(places.of(some))
         return found
 
     def tangent_deviations(self, start: Places, end: Places) -> Array:
         """See `OffsetSurface.tangent_deviations`."""
-        found = np.full(len(start.chart), np.inf)
-        for k in np.unique(start.chart[start.chart >= 0]):
+        found, pieces = np.full(len(start.chart), np.inf), len(self.surface.pieces)
+        for k in np.unique(start.chart[(start.chart >= 0) & (start.chart < pieces)]):
             some = np.flatnonzero((start.chart == k) & (end.chart == k))
             found[some] = self.pieces[k].tangent_deviations(start.of(some), end.of(some))
         return found

@@ -90,7 +90,8 @@ def curves(points: Array, directions: Array, pairs: Ints, count: Ints) -> CellCu
     angles = arc_angles(directions[i], directions[j]) / count
     deviations[:, 1] = angles**4 / 384.0 + ROUNDING_OF_DIRECTIONS
     cubics = np.concatenate([straight(points, pairs, first), turns], axis=2)
-    return CellCurves(first, cubics, bounds, deviations, np.zeros(len(owner), dtype=bool))
+    none = np.zeros(len(owner), dtype=bool)
+    return CellCurves(first, cubics, bounds, deviations, none, np.zeros(len(deviations)))
 
 
 def curve_parts(

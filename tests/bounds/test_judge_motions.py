@@ -263,6 +263,81 @@ def test_a_jump_between_two_sheets_is_refused():
     assert "jumps" in outcome.refusal
 
 
+def round_an_edge(side, turn, reach=0.02, lean=0.0):
+    """Two plates that meet at an edge, the second bent up by a turn (rad); rows over both.
+
+    In between in an arc `reach` (m) from the edge, with the tool ahead or behind by `lean` (rad).
+    """
+    plates = [
+        plane((0.0, 0.1), (-0.1, 0.1)),
+        plane((-0.1, 0.0), (-0.1, 0.1), rpy_deg=(0, np.degrees(turn), 0)),
+    ]
+    cells = piecewise(plates, side=side, position=(0.45, 0.0, 0.3)).cells((2, 3))
+    sign = 1.0 if side == "outside" else -1.0
+
+    def up(angles):
+        return np.stack([np.sin(angles), 0 * angles, np.cos(angles)], axis=-1)
+
+    along = np.linspace(0.09, 0.0, 40)[:, None]
+    angles = np.concatenate([np.zeros(40), np.linspace(0.0, turn, 41)[1:-1], np.full(40, turn)])
+    first, last = np.cos([0.0, turn]), np.sin([0.0, turn])
+    ways = [np.array([c, 0.0, -s]) for c, s in zip(first, last, strict=True)]
+    feet = np.concatenate([along * ways[0], np.zeros((39, 3)), -along[::-1] * ways[1]])
+    heights = np.where(np.arange(119) // 40 == 1, reach, 0.02)[:, None]
+    heights[[40, 78]] = 0.02
+    points = cells.surface.position + feet + sign * heights * up(angles)
+    return cells, configurations(points, -sign * up(angles + lean))
+
+
+@pytest.mark.parametrize(("side", "turn"), [("outside", -1.0), ("inside", 1.0), ("outside", -0.7)])
+def test_round_an_outer_edge_the_tool_keeps_its_distance_from_the_edge(side, turn):
+    task = Task(standoff=0.02, cone_deg=20, tolerance=1e-3)
+
+    def judged(*how):
+        cells, rows = round_an_edge(side, turn, *how)
+        return replay_over_surface(gantry(), cells, task, rows, np.zeros(len(cells), dtype=bool))
+
+    for how in ((), (0.0209,), (0.0191,), (0.02, 0.34), (0.02, -0.34)):
+        found = judged(*how)
+        assert found.accepted, found.refusal
+        lean = how[1] if len(how) > 1 else 0.0
+        assert found.certificate.max_angle == pytest.approx(abs(lean), abs=2e-3)
+    for how in ((0.0211,), (0.0189,), (0.02, 0.36), (0.02, -0.36)):
+        assert not judged(*how).accepted
+    cells, rows = round_an_edge(side, turn)
+    straight = np.concatenate([rows[:40], rows[79:]])  # from one plate to the other at once
+    found = replay_over_surface(gantry(), cells, task, straight, np.zeros(12, dtype=bool))
+    assert "is not known between" in found.refusal or "off" in found.refusal
+    # The other way the plates are in the way of each other.
+    other = "inside" if side == "outside" else "outside"
+    cells, rows = round_an_edge(other, turn)
+    assert not replay_over_surface(gantry(), cells, task, rows, np.zeros(12, dtype=bool)).accepted
+
+
+@pytest.mark.parametrize(("cone_deg", "off", "good"), [
+    (20, 0.0, True), (13, 0.0, True), (10, 0.0, False), (20, 0.25e-3, True), (20, 1.1e-3, False),
+])  # fmt: skip
+def test_at_an_inner_crease_the_tool_changes_plates_where_it_is_right_over_both(
+    cone_deg, off, good
+):
+    """Where the parallels of both meet, by half of the turn from either normal."""
+    turn, h = 0.4, 0.02
+    plates = [plane((0.0, 0.1), (-0.1, 0.1))]
+    plates += [plane((-0.1, 0.0), (-0.1, 0.1), rpy_deg=(0, np.degrees(turn), 0))]
+    cells = piecewise(plates, side="outside", position=(0.45, 0.0, 0.3)).cells((2, 3))
+    angles = np.concatenate([np.zeros(30), np.linspace(0.0, turn, 31), np.full(30, turn)])
+    up = np.stack([np.sin(angles), 0 * angles, np.cos(angles)], axis=-1)
+    meeting = (h / np.cos(turn / 2) + off) * np.array([np.sin(turn / 2), 0, np.cos(turn / 2)])
+    along = np.linspace(0.06, 0.0, 30, endpoint=False)[:, None]
+    ways = np.array([1.0, 0.0, 0.0]), -np.array([np.cos(turn), 0.0, -np.sin(turn)])
+    points = np.concatenate(
+        [meeting + along * ways[0], np.tile(meeting, (31, 1)), meeting + along[::-1] * ways[1]]
+    )
+    rows = configurations(cells.surface.position + points, -up)
+    task, none = Task(standoff=h, cone_deg=cone_deg, tolerance=1e-3), np.zeros(12, dtype=bool)
+    assert replay_over_surface(gantry(), cells, task, rows, none).accepted == good
+
+
 @pytest.mark.parametrize(("polar", "azimuth"), [
     (np.linspace(0.8, -0.8, 400), 0.7), (np.linspace(0.8, -0.8, 401), -2.0),
     (0.5, np.linspace(0.3, 7.3, 900)),

@@ -381,7 +381,17 @@ class Pieces:
         return self.pieces[0].sign
 
     def over(self, points: Floats, standoff: float) -> list[Places]:
-        return [one.over(points, standoff)[0] for one in self.pieces]
+        """On each piece; and on what is nearest of all, with the normal that leads to the point,
+        where that is on two pieces: round an edge it turns from one's to the other's."""
+        found = [one.over(points, standoff)[0] for one in self.pieces]
+        away = np.stack([points - place.points for place in found])
+        far = np.linalg.norm(away, axis=2)
+        first, row = far.argmin(axis=0), np.arange(len(points))
+        shared = (far <= far.min(axis=0) + SAME).sum(axis=0) > 1
+        ahead = self.sign * away[first, row] / np.maximum(far[first, row], SAME)[:, None]
+        normals = np.where(shared[:, None], ahead, np.nan)
+        edge = np.stack([place.points for place in found])[first, row]
+        return [*found, Places(edge, normals, np.full_like(edge, np.nan))]
 
 
 class Facets:

@@ -89,7 +89,7 @@ def test_parts_of_joined_surfaces_hold_their_places(name):
     above[parts.children[~finest]] = np.flatnonzero(~finest)[:, None]
     for k, (piece, sign) in enumerate(pieces_of(surface)):
         u, v = spread(piece, 2000)
-        first = np.full(len(u), len(surface.pieces) - 1 + k)
+        first = np.full(len(u), len(surface.charts) - 1 + k)
         places = piece.point(u, v), sign * piece.normal(u, v)
         used = walk(parts, first, at_parameters(piece, u, v)[1], *places)
         assert max(used.points, used.normals) <= 1.0

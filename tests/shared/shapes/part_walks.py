@@ -110,10 +110,8 @@ def size_of(surface):
 
 
 def pieces_of(surface):
-    """(patch, sign of its normals) of a patch, or of each piece of a joined surface."""
-    if surface.kind == "piecewise":
-        return list(zip(surface.placed, surface.signs, strict=True))
-    return [(surface, 1.0)]
+    """(patch, sign of its normals) of a patch, or of each piece and edge of a joined surface."""
+    return surface.charts if surface.kind == "piecewise" else [(surface, 1.0)]
 
 
 def lost(surface, rng, count=2000):

@@ -139,6 +139,10 @@ FACETED = {
     "flap": piecewise(
         [plane((0, 1), (0, 1)), plane((0, 1), (0, 1), position=(0, 1, 0), rpy_deg=(50, 0, 0))]
     ),
+    "lid": piecewise(
+        [cylinder(0.3, (0, 360), (0, 0.5)),
+         cone(0.3, -0.6, (-90, 270), (0, 0.2), position=(0, 0, 0.5))], **OUT, **POSE,
+    ),
     "turned over": piecewise(
         [plane((0.0, 0.2), (0.0, 0.2)), plane((0.0, 0.2), (0.0, 0.2), rpy_deg=(180, 0, 180))]
     ),
