@@ -141,8 +141,10 @@ def test_what_it_rests_on_holds(name):
     assert certificate.max_angle <= asked.cone
     kept = kept_by(name)
     if kept is not None and name not in names("meshes", "fitted"):
-        # The judge looks at the place it follows, the referee at the nearest one.
-        assert kept.tilt.max() <= certificate.max_angle + 5e-3
+        # The judge looks at the place it follows, the referee at the nearest one: round an edge
+        # the two are as far apart as the tool is off.
+        apart = certificate.max_position_error / 0.02 if name in names("creases") else 0.0
+        assert kept.tilt.max() <= certificate.max_angle + 5e-3 + apart
         if hasattr(surface, "kind"):
             assert kept.off.max() <= certificate.max_position_error + 1e-9
     if kept is not None and asked.roll is not None:
