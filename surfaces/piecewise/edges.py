@@ -12,18 +12,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from coverable.arrays import Array
-from surfaces.patches.patch import LocalClosestPoints, SmoothPatch
-from surfaces.piecewise.seams import INWARD, PARTS, Border, contacts, sides_of
-from surfaces.surface import SurfaceError
-
-if TYPE_CHECKING:
-    from surfaces.piecewise.piecewise_surface import Piecewise
+from surfaces.patches.patch import LocalClosestPoints, Patch, SmoothPatch
+from surfaces.piecewise.seams import INWARD, PARTS, Border, Seam, contacts, sides_of
+from surfaces.surface import Side, SurfaceError
 
 SMOOTH = math.radians(0.1)  # seams that bend by more are creases
 UPRIGHT = 1e-7  # m, by which the steps to the nearest place of a border may miss it
@@ -119,6 +116,21 @@ def _back(patch: Any) -> tuple[Array, Array]:
     return patch.rotation.T, -patch.rotation.T @ patch.position
 
 
+class Joined(NamedTuple):
+    """What has to be known of joined pieces; see `Piecewise`."""
+
+    placed: tuple[Patch, ...]
+    signs: tuple[float, ...]
+    seams: tuple[Seam, ...]
+    gap: float
+    side: Side
+
+    @property
+    def side_sign(self) -> float:
+        """See `Surface.side_sign`."""
+        return 1.0 if self.side == "outside" else -1.0
+
+
 class Creases(NamedTuple):
     """What is known of the creases between pieces, from the tool's side."""
 
@@ -129,7 +141,7 @@ class Creases(NamedTuple):
     """Pairs of pieces that meet in an inner one."""
 
 
-def creases_of(surface: Piecewise) -> Creases:
+def creases_of(surface: Joined) -> Creases:
     """The seams that are creases of one kind all along, in the root frame."""
     sides = sides_of(surface.placed, surface.gap)
     s = (np.arange(PARTS) + 0.5) / PARTS
@@ -149,7 +161,7 @@ def creases_of(surface: Piecewise) -> Creases:
     return Creases(tuple(edges), frozenset(inner))
 
 
-def _bends(surface: Piecewise, sides: tuple[Border, Border], here: Array, there: Array) -> Array:
+def _bends(surface: Joined, sides: tuple[Border, Border], here: Array, there: Array) -> Array:
     """(k,) rad, from one normal to the other at places of two borders; below 0 at inner creases."""
     one, other = (
         surface.signs[side.piece] * side.normal(s)
@@ -160,9 +172,7 @@ def _bends(surface: Piecewise, sides: tuple[Border, Border], here: Array, there:
     return np.asarray(-surface.side_sign * np.sign((inward * other).sum(axis=1)) * size)
 
 
-def _edge(
-    surface: Piecewise, sides: tuple[Border, Border], here: Array, there: Array
-) -> Edge | None:
+def _edge(surface: Joined, sides: tuple[Border, Border], here: Array, there: Array) -> Edge | None:
     """The edge between two borders, from shares of both that lie on each other."""
     one, other = sides
     order = np.argsort(here)

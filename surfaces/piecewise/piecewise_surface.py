@@ -104,9 +104,9 @@ class Piecewise(Surface):
     @cached_property
     def creases(self) -> Creases:
         """Where pieces meet at an angle: outer edges, and pairs that meet in an inner crease."""
-        from surfaces.piecewise.edges import creases_of
+        from surfaces.piecewise.edges import Joined, creases_of
 
-        return creases_of(self)
+        return creases_of(Joined(self.placed, self.signs, self.seams, self.gap, self.side))
 
     @cached_property
     def charts(self) -> tuple[tuple[Patch, float], ...]:

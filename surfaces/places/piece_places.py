@@ -135,7 +135,7 @@ class PiecePlaces(OffsetSurface):
         for (edge, piece), back in ((numbers, 1), (numbers[::-1], -1)):
             found = self._turned_to(edge, piece, middle)
             if found is not None:
-                return found[::back]
+                return found if back > 0 else (found[1], found[0])
         before = a.closest(middle).x
         for _ in range(2):  # back and forth, from one border to the other
             after = b.closest(_on(a, before)).x

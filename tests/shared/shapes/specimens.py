@@ -141,7 +141,7 @@ FACETED = {
     ),
     "lid": piecewise(
         [cylinder(0.3, (0, 360), (0, 0.5)),
-         cone(0.3, -0.6, (-90, 270), (0, 0.2), position=(0, 0, 0.5))], **OUT, **POSE,
+         coverable.cone(0.3, -0.6, (-90, 270), (0, 0.2), position=(0, 0, 0.5))], **OUT, **POSE,
     ),
     "turned over": piecewise(
         [plane((0.0, 0.2), (0.0, 0.2)), plane((0.0, 0.2), (0.0, 0.2), rpy_deg=(180, 0, 180))]
