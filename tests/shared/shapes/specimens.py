@@ -140,7 +140,7 @@ FACETED = {
         [plane((0, 1), (0, 1)), plane((0, 1), (0, 1), position=(0, 1, 0), rpy_deg=(50, 0, 0))]
     ),
     "lid": piecewise(
-        [cylinder(0.3, (0, 360), (0, 0.5)),
+        [coverable.cylinder(0.3, (0, 360), (0, 0.5)),
          coverable.cone(0.3, -0.6, (-90, 270), (0, 0.2), position=(0, 0, 0.5))], **OUT, **POSE,
     ),
     "turned over": piecewise(
