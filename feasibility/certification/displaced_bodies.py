@@ -28,7 +28,7 @@ from feasibility.collisions.shapes import HalfSpace
 from feasibility.collisions.words import SURFACE
 from robots.robot import Robot
 
-FEW = (50, 1)  # calls for a pair, and for each row, after which what is known by then has to do
+FEW = (50, 0)  # calls for a pair, and for each row, after which what is known by then has to do
 LEAST = 1e-12  # [m] so that nothing is divided by 0
 
 

@@ -71,13 +71,19 @@ def ball_along(robot, q, size, least=None):
 
 
 def test_the_largest_lever_of_a_stretch_counts():
-    """Where the elbow is straight between its ends, and where one end sees the axis across."""
+    """The elbow is straight between its ends; one end sees the axis across; the pivot is behind."""
     robot, middle = load_robot("ur5"), np.array([0.3, -1.2, 0.0, 0.4, 0.3, 0.0])
-    for which, k, turned in ((0, 2, 1.5), (1, 4, 0.3)):
+    arm = plain.arm_of(robot)
+    ((x, y, _),), *_ = arm.tool(middle)
+    middle[0] += np.radians(225.0) - np.arctan2(y, x)
+    for which, k, turned in ((0, 2, 1.5), (1, 4, 0.3), (2, 0, 0.5)):
         way = turned * np.eye(6)[k]
         ball = ball_along(robot, np.stack([middle - way, middle + way]), 0.0)
         there = middle + np.linspace(-1.0, 1.0, 21)[:, None] * way
-        levers = np.linalg.norm(derivative(plain.arm_of(robot), there, which), axis=1)
+        if which == 2:
+            holds(ball.far, np.linalg.norm(arm.tool(there)[0] - np.ones(3), axis=1), 0.5)
+            continue
+        levers = np.linalg.norm(derivative(arm, there, which), axis=1)
         bound = ball.tilts[:, 1] if which else ball.second
         holds(bound, twice(levers, ball.moves[0], robot.prismatic), 0.5)
 
@@ -137,7 +143,7 @@ def test_bounds_along_stretches(name, seed):
             continue
         inverse = np.linalg.pinv(derivative(arm, q))
         d, share = norm(inverse.transpose(0, 2, 1)).max(axis=0), np.linspace(0.0, 1.0, 9)
-        np.testing.assert_allclose(ball.moves[0], d, rtol=1e-5, atol=1e-9)
+        np.testing.assert_allclose(ball.moves[0], d, rtol=1e-5, atol=1e-6)
         np.testing.assert_allclose(ball.turns, d[~slides].sum(), rtol=1e-5)
         mean = np.einsum("ks,kij->sij", [1.0 - share, share], inverse)
         rows, v = start + share[:, None] * way, referee.unit(rng.normal(size=(2, 9, 3)))[..., None]
@@ -256,6 +262,9 @@ def test_the_last_row_counts_for_the_last_segment():
     room[3, 0] = 0.01
     margin = placement_margin.placement_margin(slides(), PLATE, Task(0.0, 30.0), q, room, 0.0)
     assert margin.angle == pytest.approx(0.01, rel=1e-6)
+    q[3, 2] = 0.996  # [m], of 1
+    margin = placement_margin.placement_margin(slides(), PLATE, Task(0.0, 30.0), q, room, 0.0)
+    assert margin.position == pytest.approx(0.004, rel=1e-6)
 
 
 @sampled
