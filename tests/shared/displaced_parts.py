@@ -5,8 +5,6 @@ the motion or where there is least room. The claimed configuration, by Newton's 
 has to be inside the ball, the limits, the cone, the range of the roll, and clear by python-fcl.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from copy import copy
 from types import SimpleNamespace

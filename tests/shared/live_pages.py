@@ -1,7 +1,5 @@
 """Pages in a Chromium: how it is started, and what is painted there."""
 
-from __future__ import annotations
-
 import io
 import os
 import shutil

@@ -1,7 +1,5 @@
 """A window of a live page without a browser: it speaks with viser as viser's page does."""
 
-from __future__ import annotations
-
 import threading
 import time
 
