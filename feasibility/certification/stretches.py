@@ -3,17 +3,17 @@
 Take a part of the segment between two rows, with its own parameter s in 0..1, whose ends are over
 the places x0 and x1: found for their tool points, though any would do. `surfaces.places` gives a
 continuous path from x0 to x1 of straight pieces, and for each piece numbers d_T and d_b, such that
-T and b differ from straight lines by at most these.
+T and b differ from straight lines by at most these; or by at most 4 t (1 - t) times these, t the
+piece's own parameter, as what bends evenly does.
 Tool point and axis differ likewise from straight lines, by D_p and D_a of the stretch
 (`lever_bounds`), and by w^2 D_p and w^2 D_a on a part of it that is w of the whole. So on the
 part that goes with a piece
 
-    |p - T| <= (1 - t) e0 + t e1 + t (1 - t) / 2 w^2 D_p + d_T
+    |p - T| <= (1 - t) e0 + t e1 + t (1 - t) / 2 w^2 D_p + d_T    or 4 t (1 - t) d_T
 
-with t the piece's own parameter, and e0 and e1 bounds of |p - T| at its ends: there p is known to
-s (1 - s) / 2 D_p. The same holds for |a - b|, and for the roll what `certification.rolls` says.
-Nothing else is assumed of the surface: not that closest points are unique, nor that they move
-continuously.
+with e0 and e1 bounds of |p - T| at its ends: there p is known to s (1 - s) / 2 D_p. The same holds
+for |a - b|, and for the roll what `certification.rolls` says. Nothing else is assumed of the
+surface: not that closest points are unique, nor that they move continuously.
 
 **On a mesh** the normals of targets are interpolated, and the tool point has to keep its distance
 from the triangles themselves, too: standoff less tolerance from all of them, so that nothing
@@ -191,7 +191,10 @@ class Judge:
             line = (1.0 - share) * start[:, None] + share * end[:, None]
             sag = 0.5 * path.share * (1.0 - path.share) * own
             off = np.linalg.norm(line - aims, axis=2) + sag
-            peak = peaks(off[:, :-1], off[:, 1:], width * own) + beside
+            if self.offset.bends_evenly:
+                peak = peaks(off[:, :-1], off[:, 1:], width * own + 8.0 * beside)
+            else:
+                peak = peaks(off[:, :-1], off[:, 1:], width * own) + beside
             found.append(peak.max(axis=1, initial=0.0))
         x, axes = (s.start.x, s.end.x), (s.start.axes, s.end.axes)
         roll = self._held.rolls_between(x, axes, second[:, 2], path, approaches)

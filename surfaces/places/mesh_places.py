@@ -43,6 +43,11 @@ class MeshPlaces(OffsetSurface):
 
     surface: MeshSurface
 
+    @property
+    def bends_evenly(self) -> bool:
+        """See `OffsetSurface.bends_evenly`."""
+        return True
+
     def at(self, places: Places) -> tuple[Array, Array]:
         """See `OffsetSurface.at`."""
         face, weights = np.maximum(places.chart, 0), _weights(places.x)

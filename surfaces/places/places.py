@@ -55,7 +55,8 @@ class PlacePaths(NamedTuple):
     """(k, 4, 3) the surface's outward unit normals there."""
     deviations: Array
     """(k, 3, 2) how far offset point (m) and normal may be, anywhere along each piece, from the
-    straight line between its ends; inf where nothing is known."""
+    straight line between its ends; inf where nothing is known. On a surface that `bends_evenly`
+    no further than 4 s (1 - s) times this, s the piece's own parameter in 0..1."""
     chart: Ints
     """(k, 4) patch or face of the four places."""
     x: Array
@@ -145,6 +146,11 @@ class OffsetSurface(ABC):
             within: m, the distance from which on a second guess is worth its while.
             only: (k,) between poses, the curve that each is on, where that is known.
         """
+
+    @property
+    def bends_evenly(self) -> bool:
+        """Are `PlacePaths.deviations` from bounds of second derivatives?"""
+        return False
 
     def facets(self, points: Array) -> Array:
         """(k,) m, how far points (k, 3) are from the triangles of a mesh themselves.

@@ -31,6 +31,11 @@ class PosePlaces(OffsetSurface):
     poses: PoseSurface
 
     @property
+    def bends_evenly(self) -> bool:
+        """See `OffsetSurface.bends_evenly`."""
+        return True
+
+    @property
     def least_look(self) -> float:
         """See `OffsetSurface.least_look`."""
         return TURN
