@@ -41,7 +41,6 @@ SLIDE = planar_arm([0.1], ["prismatic"])
 ROWS = np.array([[0.3, 0.0], [0.2, 0.1], [0.1, 0.2]])  # of the planar arm
 CORNERS = np.array([[0.3, 0.8, -0.1], [0.3, 0.8, 0.1], [0.5, 0.9, 0], [0.5, 1, 0.1]])  # of a sheet
 FACES = np.array([[0, 1, 2], [1, 2, 3]])
-AS_NEAR = np.full((1, 1, 2), 1e-4)
 HELD = {"roll_deg": (-170, 170), "roll_reference": (1, 0, 0)}
 
 
@@ -79,7 +78,7 @@ def test_stretches_of_a_motion(name, held, bent):
         blind = Judge(robot, task, one, cells)
         assert not blind.within(blind.bounds(parts)).any()
     if not offset.bends_evenly:  # as near to a model, and no nearer, at the ends
-        near = Starved(offset, "paths", lambda path: path._replace(deviations=AS_NEAR))
+        near = Starved(offset, "paths", lambda path: path._replace(deviations=0 * path[3] + 1e-4))
         aside = replace(parts, end=replace(parts.end, points=parts.end.points + 0.01))
         off = np.linalg.norm(aside.end.points - judge.targets(aside.end.places)[0], axis=1)
         assert (Judge(robot, task, near, cells).bounds(aside).error > off + 0.99e-4).all()
