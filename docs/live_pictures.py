@@ -87,7 +87,8 @@ def story(tab: Tab, page: Page) -> None:
     tab.mouse.down()
     for share in np.linspace(0.0, 0.4, 8):
         tab.mouse.move(*on_screen(tab, page, middle + PLANE + share * NEARER))
-    answered(tab, "quick")
+        tab.wait_for_timeout(150)  # while it moves, nothing else is looked for
+    expect(tab.get_by_text("hold still for the certified answer")).to_be_visible(timeout=PATIENCE)
     keep(tab, "live-2.png")
     for share in np.linspace(0.4, 1.0, 8):
         tab.mouse.move(*on_screen(tab, page, middle + PLANE + share * NEARER))

@@ -23,7 +23,6 @@ from feasibility.reports.explanation_words import (
     joint_rows,
     rates_sentence,
     row_of,
-    sentence,
     what_it_opens,
 )
 from feasibility.reports.pages import framed, page, table
@@ -289,7 +288,6 @@ def _threshold(threshold: Threshold, verdict: Verdict) -> dict[str, Any]:
         "other": _finding(quantity, threshold.other),
         "tried": threshold.tried,
         "opens": what_it_opens(threshold, verdict) or None,
-        "sentence": sentence(threshold, verdict),
     }
 
 

@@ -242,69 +242,12 @@ def _range(ends: Iterable[float], slides: bool) -> str:
     return f"{round(low, digits):.10g} .. {round(high, digits):.10g} {'m' if slides else 'deg'}"
 
 
-# -- sentences ------------------------------------------------------------------------------------
-
-
-def sentence(threshold: Threshold, verdict: Verdict) -> str:
-    """One threshold as a sentence.
-
-    Args:
-        threshold: what was found.
-        verdict: of the case as given; where it is feasible the threshold is a margin.
-    """
-    quantity, found = threshold.quantity, threshold.feasible
-    if found is None:
-        return _helpless(threshold)
-    value, now = shown(quantity, found.value, True), shown(quantity, quantity.given)
-    text = (_margin if verdict.feasible else _remedy)(quantity, value, now)
-    if threshold.other is not None and quantity.kind is not Kind.WITHOUT:
-        text += f"; {_against(quantity, threshold.other)}"
-    elif verdict.feasible and found.value == quantity.end:
-        text += f", {FURTHEST}"
-    opens = what_it_opens(threshold, verdict)
-    text += f"; {opens}" if opens else ""
-    return text + ("." if found.unaided is not False else f" {SEEDED}.")
-
-
 def what_it_opens(threshold: Threshold, verdict: Verdict) -> str:
     """How the motion of a changed case gets past the proof of this one; empty without cuts."""
     found, proof = threshold.feasible, verdict.proof
     if found is None or found.witness is None or proof is None or proof.kind != "cut":
         return ""
     return what_opens(proof, found.witness.q, verdict.robot, verdict.cells)
-
-
-def _margin(quantity: Quantity, value: str, now: str) -> str:
-    """How far a feasible case can be tightened."""
-    if quantity.kind is Kind.SHIFT:
-        return f"{label(quantity)} can move by {value}"
-    change = "tighten"
-    if quantity.kind not in (*LIMITS, Kind.CONE, Kind.ROLL):
-        change = "grow" if quantity.end > quantity.given else "shrink"
-    return f"{label(quantity)} can {change} to {value} ({now} now)"
-
-
-def _remedy(quantity: Quantity, value: str, now: str) -> str:
-    """What would make a case feasible."""
-    if quantity.kind is Kind.WITHOUT:
-        return f"feasible {quantity.name}"
-    if quantity.kind is Kind.SHIFT:
-        return f"feasible with {label(quantity)} moved by {value}"
-    start = "feasible from" if quantity.kind in (Kind.CONE, Kind.ROLL) else "feasible with"
-    return f"{start} {label(quantity)} = {value} ({now} now)"
-
-
-def _helpless(threshold: Threshold) -> str:
-    """No value was found to help."""
-    quantity, other = threshold.quantity, threshold.other
-    text = f"{label(quantity)} to {shown(quantity, quantity.end)} alone does not help"
-    if quantity.kind is Kind.WITHOUT:
-        text = f"not feasible {quantity.name} either"
-    if threshold.tried:
-        text += f" ({threshold.tried})"
-    if other is not None:
-        text += f": {_against(quantity, other)}"
-    return text + "."
 
 
 def _against(quantity: Quantity, other: Finding) -> str:

@@ -9,7 +9,7 @@ import time
 
 import numpy as np
 import pytest
-from live_pages import PATIENCE_MS, chromium, painted
+from live_pages import PATIENCE_MS, chromium, painted, pixels
 from playwright.sync_api import expect
 
 from feasibility.cases.case import Case, load_case
@@ -85,7 +85,7 @@ def test_a_slider_is_dragged_and_the_cells_change_colour(tab, live):
     (page,) = live.pages.values()
     assert SENTENCES["feasible"] in tab.locator("b.feasible").inner_text()
     waited(tab, lambda: painted(tab) > 2000)
-    green, red = painted(tab), painted(tab, "red")
+    before = pixels(tab)
     box = tab.locator(".mantine-Slider-thumb").first.bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     tab.mouse.move(x, y)
@@ -98,7 +98,9 @@ def test_a_slider_is_dragged_and_the_cells_change_colour(tab, live):
     says(tab, "infeasible")
     moved = page.values[SURFACE, "x"]
     assert 200 < moved < 500
-    waited(tab, lambda: painted(tab) < green and painted(tab, "red") > red + 300)
+    waited(tab, lambda: (np.abs(pixels(tab) - before) > 20).any(axis=2).mean() > 0.01)
+    drawn = [path for path in page.scene.nodes if path.startswith("/cells/")]
+    assert sorted(drawn) == sorted(layer.entry.path for layer in page.answer.paint)
     expect(
         tab.get_by_text(re.compile("not covered: (out of reach|orientation)")).first
     ).to_be_visible()

@@ -374,7 +374,6 @@ def of_explain(one: Any) -> Json:
                 "feasible": finding(limit.quantity, limit.feasible),
                 "other": finding(limit.quantity, limit.other),
                 "tried": limit.tried, "opens": (str, NoneType),
-                "sentence": str,
             } for limit in one.thresholds
         ],
         "useful": {"sentence": str, "set": list}, "pair": (list, NoneType), "joints": list,

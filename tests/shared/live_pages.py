@@ -28,11 +28,13 @@ def chromium():
         opened.close()
 
 
-def painted(page, of="green"):
-    """How many pixels of the picture are green, or red or purple as missed cells are."""
+def pixels(page):
+    """The picture, (height, width, 3), 0 to 255."""
     canvas = page.locator("canvas").first
-    pixels = np.asarray(Image.open(io.BytesIO(canvas.screenshot())).convert("RGB")).astype(int)
-    red, green, blue = pixels[..., 0], pixels[..., 1], pixels[..., 2]
-    if of == "green":
-        return int(((green > red + 20) & (green > blue + 10)).sum())
-    return int(((red > green + 30) & (red > blue + 10)).sum())
+    return np.asarray(Image.open(io.BytesIO(canvas.screenshot())).convert("RGB")).astype(int)
+
+
+def painted(page):
+    """How many pixels of the picture are green, as covered cells are."""
+    red, green, blue = np.moveaxis(pixels(page), 2, 0)
+    return int(((green > red + 20) & (green > blue + 10)).sum())
