@@ -326,6 +326,9 @@ def test_bodies_come_nearer_by_what_the_displacement_needs(monkeypatch):
     floor = np.array(list(more.pop("floor").values()))
     assert (floor >= turn * np.linalg.norm(tips - pivot, axis=1).max()).all()
     assert not np.concatenate([each for some in more.values() for each in some.values()]).any()
+    displaced_bodies.displaced_share(robot, bodies, q, pivot, (0.01, 0.0), moved, apart)
+    shifted = zip(bodies.pairs, asked[-1][4], strict=True)
+    assert {each.max() for pair, each in shifted if pair.second in ("box", "floor")} == {0.01}
 
 
 # -- random cases ---------------------------------------------------------------------------------
