@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -34,7 +35,12 @@ IN_PLACE = 0.1  # [1] share of the tolerance within which a tool point stays ove
 
 
 def complete_search(
-    problem: Problem, search: Search, clock: Clock, seeds: Walk | None = None
+    problem: Problem,
+    search: Search,
+    clock: Clock,
+    seeds: Walk | None = None,
+    suspects: Collection[int] = (),
+    judging: bool = True,
 ) -> Found:
     """Search until one component of the roadmap covers every cell, or rounds gain nothing more.
 
@@ -44,6 +50,8 @@ def complete_search(
         clock: started once the kernels are loaded, unless it runs already; reports the cells of the
             best component.
         seeds: a motion to begin from, see `check`.
+        suspects: cells to look at first, whether one is proved uncoverable.
+        judging: may the seeds be the answer, where they are accepted as they are?
 
     Raises:
         ArgumentError: the seeds do not fit the arm or the cells, or the arm's start is not on the
@@ -58,11 +66,17 @@ def complete_search(
 
         begin = start_cell(problem.robot, problem.cells, problem.task)
     with compiling_notice():
-        return _search(problem, search, clock, seeds, begin)
+        return _search(problem, search, clock, seeds, begin, suspects, judging)
 
 
 def _search(
-    problem: Problem, search: Search, clock: Clock, seeds: Walk | None, begin: int | None
+    problem: Problem,
+    search: Search,
+    clock: Clock,
+    seeds: Walk | None,
+    begin: int | None,
+    suspects: Collection[int],
+    judging: bool,
 ) -> Found:
     """`complete_search`, from a cell that the arm's start is over."""
     with clock.enforced():  # loading kernels takes a second or two
@@ -76,14 +90,20 @@ def _search(
     proving: Proving | None = None
     late, known, run = "", None, None
     try:
-        if seeds is not None:
+        if seeds is not None and judging:
             with clock.enforced():
                 known = _known(problem, seeds)
         if begin is not None and known is None:
             _begin(exploration, begin, problem.bodies)
-        if seeds is not None and not (search.early and known is not None):
+        ruled_out = False
+        if suspects:
+            from feasibility.roadmap.rounds import suspect
+
+            ruled_out = suspect(exploration, suspects)
+        if seeds is not None and not (search.early and known is not None) and not ruled_out:
             _seed_cells(exploration, seeds)
-        if known is None and not seed_middle(exploration):
+        done = known is not None or ruled_out or exploration.complete
+        if not done and not seed_middle(exploration):
             from feasibility.roadmap.proving import Proving, between_rounds
             from feasibility.roadmap.rounds import go_on
 

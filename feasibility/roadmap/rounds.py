@@ -12,7 +12,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -63,6 +63,26 @@ def go_on(exploration: Exploration, between: Between | None) -> None:
     """`explore`, from step 7 on."""
     _unreached(exploration)
     _rounds(exploration, between)
+
+
+def suspect(exploration: Exploration, cells: Collection[int]) -> bool:
+    """Is one of a few cells proved uncoverable, by what is cheapest to try?"""
+    from feasibility.roadmap.branch_and_bound.branching import root_box, rule
+
+    arrays, robot = exploration.arrays, exploration.robot
+    distance = robot.distance_from_base(arrays.points[list(cells)])
+    for cell, away in zip(cells, distance.tolist(), strict=True):
+        if away > robot.reach + arrays.tolerance:
+            exploration.rulings[cell] = Ruling.PROVED
+        elif not exploration.tool_collides(cell):
+            boxes = root_box(arrays)
+            ruled, _ = rule(arrays, exploration.work, cell, boxes, FIRST_BOXES)
+            exploration.boxes += int(boxes.counts[1])
+            if ruled is Ruling.PROVED:
+                exploration.rulings[cell] = ruled
+        if exploration.proved:
+            return True
+    return False
 
 
 def _unreached(exploration: Exploration) -> None:

@@ -38,16 +38,16 @@ def _sets(prober: Prober, varied: Sequence[Quantity]) -> Iterator[Steps]:
     helpers = [q for q in varied if q.kind in (Kind.LOWER, Kind.UPPER)]
     helpers += [q for q in varied if q.kind in LAST_PUT_BACK]
     opened = tuple((quantity, quantity.last) for quantity in helpers)
-    if prober.at(opened).feasible:
+    if prober.at(opened).walk:
         yield _needed(prober, opened, opened)
     for share in SHIFTS:
         moved = [(shift, max(1, round(share * shift.last))) for shift in shifts]
         for step in moved:
-            if prober.at((step, *opened)).feasible:
+            if prober.at((step, *opened)).walk:
                 yield _needed(prober, (step, *opened), opened)
         for one, other in itertools.combinations(moved, 2):
             opposite = one[0].axis == tuple(-x for x in other[0].axis)
-            if not opposite and prober.at((one, other)).feasible:
+            if not opposite and prober.at((one, other)).walk:
                 yield one, other
 
 
@@ -56,23 +56,30 @@ def _needed(prober: Prober, steps: Steps, removable: Steps) -> Steps:
     needed = steps
     for step in removable:
         rest = tuple(other for other in needed if other is not step)
-        if len(needed) > 1 and prober.at(rest, prober.at(needed).witness).feasible:
+        if len(needed) > 1 and prober.at(rest, prober.at(needed).walk).walk:
             needed = rest
     return needed
 
 
 def _narrowed(prober: Prober, steps: Steps) -> ChangePair | None:
-    """Both changes made as small as they were found to do, one after the other."""
+    """Both changes made as small as they were found to do, one after the other.
+
+    None where `check` does not accept the motion, of the small ones nor of those given.
+    """
+    narrow = steps
     for index in (0, 1):
-        steps = _smaller(prober, steps, *steps[index])
-    walk = prober.at(steps).witness
-    changes = tuple(Change(quantity, quantity.value(k)) for quantity, k in steps)
-    return None if walk is None else ChangePair(changes, walk)
+        narrow = _smaller(prober, narrow, *narrow[index])
+    for found in (narrow, steps):
+        walk = prober.judged(found, prober.at(found).walk).walk
+        if walk is not None:
+            changes = tuple(Change(quantity, quantity.value(k)) for quantity, k in found)
+            return ChangePair(changes, walk)
+    return None
 
 
 def _smaller(prober: Prober, steps: Steps, quantity: Quantity, k: int) -> Steps:
     """The same with one of them as small as was found to do."""
-    seeds = prober.at(steps).witness
+    seeds = prober.at(steps).walk
 
     def changed(k: int) -> Steps:
         return tuple((other, k if other is quantity else j) for other, j in steps)
@@ -80,7 +87,7 @@ def _smaller(prober: Prober, steps: Steps, quantity: Quantity, k: int) -> Steps:
     def holds(k: int) -> bool:
         nonlocal seeds
         found = prober.at(changed(k), seeds)
-        seeds = found.witness or seeds
-        return found.feasible
+        seeds = found.walk or seeds
+        return found.walk is not None
 
     return changed(last_true(holds, k, 0, REMEDIES)[0])

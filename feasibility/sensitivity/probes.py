@@ -1,7 +1,8 @@
-"""Where the verdict changes along one quantity: `check` with a limited effort, by halving.
+"""Where the verdict changes along one quantity: searches with a limited effort, by halving.
 
-Each check begins from the motion found at the nearest feasible value. The far side of a threshold,
-where that led to none, is what `check` says without any motion known, with the same effort.
+Each begins from the motion found at the nearest feasible value. What is said in the end, `check`
+says: of the feasible side, from that motion; of the other side with none known, with the same
+effort, unless it is proved.
 """
 
 from __future__ import annotations
@@ -10,18 +11,25 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import NamedTuple
 
 from coverable.errors import counted
 from feasibility.checking import check
 from feasibility.clock import Clock, OutOfTime
+from feasibility.cut_tree import CutTree
+from feasibility.found import Found
+from feasibility.problem import Problem
+from feasibility.roadmap.complete import complete_search
 from feasibility.search import Search
 from feasibility.sensitivity.quantities import Kind, Quantity, Variant
 from feasibility.sensitivity.thresholds import Finding, Threshold
-from feasibility.verdict import Evidence, Verdict, Walk
+from feasibility.verdict import Answer, Certificate, Evidence, Verdict, Walk
+from surfaces.cells import Cells
 
 NEARBY = (1 / 8, 1 / 4, 1 / 2, 1)  # [1] of the way to its end: values of what is not monotone
 ALL_ALONG = (1 / 32, 1 / 16, 1 / 8, 3 / 16, 1 / 4, 3 / 8, 1 / 2, 5 / 8, 3 / 4, 7 / 8, 1)
 MARGINS, REMEDIES = 4, 8  # halvings, at most, towards what is not feasible, or no longer is
+SUSPECTS = 3  # cells that a search looks at first
 SEEDED = 0.5  # [1] of the effort of a verdict without a known motion
 
 Steps = tuple[tuple[Quantity, int], ...]
@@ -55,41 +63,114 @@ def last_true(holds: Callable[[int], bool], good: int, bad: int, most: int = 64)
     return good, bad
 
 
+class Look(NamedTuple):
+    """What was found of a changed case, by a search alone or by `check`."""
+
+    evidence: Evidence
+    walk: Walk | None
+    """A covering motion, where one was found."""
+    proof: CutTree | None
+    covered: int
+    """Cells of the best motion."""
+    evaluations: int
+    certificate: Certificate | None = None
+    """Of the motion, where `check` accepted it; a search alone does not ask."""
+
+    @property
+    def accepted(self) -> bool:
+        """Is it said by `check` that the case is feasible?"""
+        return self.certificate is not None
+
+    @classmethod
+    def of_search(cls, found: Found) -> Look:
+        """What a search says by itself."""
+        undecided = Evidence.BUDGET if found.unfinished or found.motion else Evidence.EXHAUSTED
+        evidence = Evidence.PROOF if found.proof is not None else undecided
+        covered = int(found.covered.sum())
+        return cls(evidence, found.motion, found.proof, covered, int(found.counts["fk"]))
+
+    @classmethod
+    def of_verdict(cls, verdict: Verdict) -> Look:
+        """What `check` says."""
+        return cls(
+            verdict.evidence, verdict.witness, verdict.proof, verdict.n_covered,
+            int(verdict.statistics["fk"]), verdict.certificate,
+        )  # fmt: skip
+
+
 @dataclass
 class Prober:
-    """Verdicts of a case with some of its numbers changed, each made once."""
+    """What is found of a case with some of its numbers changed.
+
+    Searches lead the way, each from the nearest motion that is known; `check` is asked for what is
+    said in the end, unless that is a proof.
+    """
 
     given: Variant
     verdict: Verdict
     """Of the case as given."""
     search: Search
-    """Its evaluations are those that one verdict may take."""
+    """Its evaluations are those that one search may take."""
     clock: Clock
     tick: Callable[[], None]
-    """Called before each verdict, and while it is made."""
+    """Called before each search, and while it goes on."""
     spent: int = 0
     """Evaluations of the arm so far."""
-    known: dict[Steps, Verdict] = field(default_factory=dict)
-    seeded: set[Steps] = field(default_factory=set)
-    """Those that began from a motion and found none."""
+    looks: dict[Steps, Look] = field(default_factory=dict)
+    """The latest at each value."""
+    suspects: list[int] = field(default_factory=list)
+    """Cells that were proved uncoverable with some number changed, the latest first."""
 
-    def at(self, steps: Steps, seeds: Walk | None = None) -> Verdict:
-        """The verdict of a changed case, from a known motion if there is one.
+    def __post_init__(self) -> None:
+        """Begin with what is known of the case as given."""
+        self.looks[()] = Look.of_verdict(self.verdict)
+        self._suspect(self.looks[()])
+
+    def at(self, steps: Steps, seeds: Walk | None = None) -> Look:
+        """What a search finds of a changed case, from a known motion if there is one.
 
         Raises:
             OutOfTime: the deadline passed before it was decided.
         """
         steps = tuple((quantity, k) for quantity, k in steps if k)
-        if not steps:
-            return self.verdict
-        if steps not in self.known:
-            variant = self.given
-            for quantity, k in steps:
-                variant = quantity.applied(variant, k)
-            self.known[steps] = self.asked(variant, seeds)
-            if seeds is not None and not self.known[steps].feasible:
-                self.seeded.add(steps)
-        return self.known[steps]
+        if steps not in self.looks:
+            self.looks[steps] = self._searched(steps, seeds)
+        return self.looks[steps]
+
+    def judged(self, steps: Steps, seeds: Walk | None = None) -> Look:
+        """What `check` says of a changed case, unless the answer is proved, or accepted already.
+
+        Raises:
+            OutOfTime: the deadline passed before it was decided.
+        """
+        steps = tuple((quantity, k) for quantity, k in steps if k)
+        before = self.looks.get(steps)
+        if before is None or not (not steps or before.accepted or before.proof is not None):
+            self.looks[steps] = Look.of_verdict(self.asked(self._variant(steps), seeds))
+        return self.looks[steps]
+
+    def _variant(self, steps: Steps) -> Variant:
+        """The changed case."""
+        variant = self.given
+        for quantity, k in steps:
+            variant = quantity.applied(variant, k)
+        return variant
+
+    def _searched(self, steps: Steps, seeds: Walk | None) -> Look:
+        """What a search says, without the judges; where shapes are in the way, what `check` says.
+
+        Raises:
+            OutOfTime: the deadline passed before it was decided.
+        """
+        clock, search, variant = *self._limits(SEEDED if seeds else 1.0), self._variant(steps)
+        problem = Problem.of(*variant)
+        clock.allow(search.evaluations)
+        found = complete_search(problem, search, clock, seeds, self.suspects, judging=False)
+        look = Look.of_search(found)
+        self._count(look)
+        if look.walk is None and look.proof is None and found.hindered and seeds is None:
+            return Look.of_verdict(self.asked(variant))
+        return look
 
     def asked(self, variant: Variant, seeds: Walk | None = None, effort: float = 1.0) -> Verdict:
         """What `check` says, with so many times the usual effort.
@@ -97,101 +178,134 @@ class Prober:
         Raises:
             OutOfTime: the deadline passed before it was decided.
         """
+        clock, search = self._limits(SEEDED if seeds else effort)
+        found = check(*variant, search, seeds=seeds, clock=clock)
+        self._count(Look.of_verdict(found))
+        return found
+
+    def _limits(self, effort: float) -> tuple[Clock, Search]:
+        """Time and evaluations of the next search.
+
+        Raises:
+            OutOfTime: the deadline has passed.
+        """
         self.tick()
         if self.clock.out_of_time:
             raise OutOfTime
-        effort = SEEDED if seeds is not None else effort
-        search = replace(self.search, evaluations=int(effort * (self.search.evaluations or 1)))
+        evaluations = int(effort * (self.search.evaluations or 1))
         clock = self.clock.part(1.0, lambda *_: self.tick())
-        found = check(*variant, search, seeds=seeds, clock=clock)
-        self.spent += int(found.statistics["fk"])
-        if self.clock.out_of_time and not found.feasible:
+        return clock, replace(self.search, evaluations=evaluations)
+
+    def _count(self, look: Look) -> None:
+        """Count a search, and learn from it.
+
+        Raises:
+            OutOfTime: the deadline passed before it found a motion.
+        """
+        self.spent += look.evaluations
+        self._suspect(look)
+        if self.clock.out_of_time and look.walk is None:
             raise OutOfTime
-        return found
+
+    def _suspect(self, look: Look) -> None:
+        """Look first at a cell that was proved uncoverable, from now on."""
+        leaves = [] if look.proof is None else list(look.proof.leaves())
+        if len(leaves) == 1:
+            kept = [cell for cell in self.suspects if cell != leaves[0].cell]
+            self.suspects = [leaves[0].cell, *kept][:SUSPECTS]
 
     def threshold(self, quantity: Quantity) -> Threshold:
         """Where the verdict changes on the way from the value given to the end."""
         feasible, before = self.verdict.feasible, 0
         stops = _stops(quantity, feasible)
         for k in stops:
-            if self._holds(quantity, k) != feasible:
+            holds = self._holds(quantity, k)
+            if holds and (not feasible or k == stops[-1]):
+                holds = self._accepted(quantity, k)
+            if holds != feasible:
                 return self._between(quantity, *((before, k) if feasible else (k, before)))
             before = k
-        end = self.finding(quantity, before)
         if feasible:
-            return Threshold(quantity, end, None)
-        proofs = sum(self.finding(quantity, k).evidence is Evidence.PROOF for k in stops)
+            return Threshold(quantity, self.finding(quantity, before), None)
+        proofs = sum(self.at(((quantity, k),)).proof is not None for k in stops)
+        self.judged(((quantity, before),))
         tried = f"{counted(len(stops), 'value')} tried, {proofs} of them proved infeasible"
-        each = proofs == len(stops) and not quantity.monotone
-        return Threshold(quantity, None, end, "" if quantity.monotone else tried, each)
+        each, tried = proofs == len(stops), "" if quantity.monotone else tried
+        end = self.finding(quantity, before)
+        return Threshold(quantity, None, end, tried, each and not quantity.monotone)
 
     def finding(self, quantity: Quantity, k: int) -> Finding:
-        """The verdict at a value that was looked at."""
-        return finding_of(quantity.value(k) if k else quantity.given, self.at(((quantity, k),)))
+        """What was found at a value."""
+        value = quantity.value(k) if k else quantity.given
+        return finding_of(value, self.at(((quantity, k),)), self.given.cells)
+
+    def _along(self, quantity: Quantity) -> dict[int, Look]:
+        """What was found along a quantity, by the number of steps."""
+        single = {
+            steps[0][1]: look
+            for steps, look in self.looks.items()
+            if len(steps) == 1 and steps[0][0] is quantity
+        }
+        return {0: self.looks[()], **single}
 
     def _holds(self, quantity: Quantity, k: int) -> bool:
-        """Is the case feasible there, as far as the nearest motion leads?"""
-        motions = {0: self.verdict.witness} | {
-            steps[0][1]: found.witness
-            for steps, found in self.known.items()
-            if len(steps) == 1 and steps[0][0] is quantity and found.feasible
-        }
-        nearest = min(
-            (j for j, walk in motions.items() if walk is not None),
-            key=lambda j: abs(j - k),
-            default=0,
-        )
-        return self.at(((quantity, k),), motions[nearest]).feasible
+        """Is there a motion, as far as a search from the nearest one leads?"""
+        known = {j: one.walk for j, one in self._along(quantity).items() if one.walk is not None}
+        nearest = min(known, key=lambda j: abs(j - k), default=None)
+        seeds = None if nearest is None else known[nearest]
+        return self.at(((quantity, k),), seeds).walk is not None
+
+    def _accepted(self, quantity: Quantity, k: int) -> bool:
+        """Does `check` accept the motion that was found there?"""
+        steps = ((quantity, k),)
+        return self.judged(steps, self.at(steps).walk).accepted
 
     def _between(self, quantity: Quantity, good: int, bad: int) -> Threshold:
-        """The threshold between two values; further on where `check` alone goes further."""
-        holds, most = partial(self._holds, quantity), MARGINS if self.verdict.feasible else REMEDIES
+        """The threshold between two values; further on where `check` alone goes further.
+
+        Args:
+            quantity: what is varied.
+            good: where it is feasible, as `check` says.
+            bad: where no motion was found.
+        """
+        most = MARGINS if self.verdict.feasible else REMEDIES
         while True:
+            sure, good = good, self._as_far(quantity, good, bad)
+            good, bad = last_true(partial(self._holds, quantity), good, bad, most)
             good = self._as_far(quantity, good, bad)
-            good, bad = last_true(holds, good, bad, most)
-            good = self._as_far(quantity, good, bad)
-            if not self._holds_alone(quantity, bad):
+            if not self._accepted(quantity, good):
+                good, bad = sure, good
+                continue
+            further = self._as_far(quantity, good, bad)  # now that its cone was measured
+            good = further if self._accepted(quantity, further) else good
+            if not self.judged(((quantity, bad),)).accepted:
                 sides = self.finding(quantity, good), self.finding(quantity, bad)
                 return Threshold(quantity, *sides)
             way = 1 if bad > good else -1
-            failed = [0] if not self.verdict.feasible else []
-            failed += [
-                steps[0][1]
-                for steps, found in self.known.items()
-                if len(steps) == 1 and steps[0][0] is quantity and not found.feasible
-            ]
-            further = [k for k in failed if (k - bad) * way > 0]
-            good, bad = bad, min(further, key=lambda k: abs(k - bad)) if further else quantity.last
-            if good == bad or (not further and holds(bad)):
-                return Threshold(quantity, self.finding(quantity, bad), None)
+            failed = [k for k, one in self._along(quantity).items() if one.walk is None]
+            ahead = [k for k in failed if (k - bad) * way > 0]
+            good, bad = bad, min(ahead, key=lambda k: abs(k - bad)) if ahead else quantity.last
+            if good == bad or (not ahead and self._holds(quantity, bad)):
+                return Threshold(quantity, self.finding(quantity, good), None)
 
     def _as_far(self, quantity: Quantity, good: int, bad: int) -> int:
         """The value nearest to `bad` for which the motion found at `good` does as it is."""
         found = self.at(((quantity, good),))
-        if found.witness is None or found.certificate is None:
-            return good
-        if quantity.kind is Kind.CONE:
+        if quantity.kind is Kind.CONE and found.certificate is not None:
             used = found.certificate.max_angle
-        elif quantity.kind is Kind.LOWER:
-            used = float(found.witness.q[:, quantity.joint].min())
-        elif quantity.kind is Kind.UPPER:
-            used = float(found.witness.q[:, quantity.joint].max())
+        elif quantity.kind is Kind.LOWER and found.walk is not None:
+            used = float(found.walk.q[:, quantity.joint].min())
+        elif quantity.kind is Kind.UPPER and found.walk is not None:
+            used = float(found.walk.q[:, quantity.joint].max())
         else:
             return good
         steps = (used - quantity.given) * (1.0 if quantity.end > quantity.given else -1.0)
         steps = (math.degrees(steps) if quantity.unit == "rad" else steps) / quantity.step
         k = math.floor(steps) if bad > good else math.ceil(steps)
-        between = min(good, bad) < k < max(good, bad)
-        return k if between and self._holds(quantity, k) else good
-
-    def _holds_alone(self, quantity: Quantity, k: int) -> bool:
-        """Does `check` find a motion there with none known, where a known one led to none?"""
-        steps = ((quantity, k),)
-        if steps in self.seeded and self.known[steps].evidence is not Evidence.PROOF:
-            self.known[steps] = self.asked(quantity.applied(self.given, k))
-            self.seeded.discard(steps)
-            return self.known[steps].feasible
-        return False
+        if not min(good, bad) < k < max(good, bad):
+            return good
+        look = self.looks.setdefault(((quantity, k),), found._replace(certificate=None))
+        return good if look.walk is None else k
 
 
 def _stops(quantity: Quantity, feasible: bool) -> list[int]:
@@ -207,21 +321,22 @@ def _stops(quantity: Quantity, feasible: bool) -> list[int]:
     return sorted({max(1, round(last * share)) for share in shares})
 
 
-def finding_of(value: float, verdict: Verdict) -> Finding:
-    """What `check` found at a value."""
-    cells, proof = verdict.cells, verdict.proof
-    if verdict.witness is not None:
-        detail = f"one motion of {len(verdict.witness.q)} waypoints"
-        return Finding(value, verdict.answer, verdict.evidence, detail, None, verdict.witness)
-    best = f"the best motion covers {verdict.n_covered} of {counted(len(cells), 'cell')}"
-    detail = f"`check` finds no motion with {verdict.statistics['fk']} evaluations; {best}"
-    cell = None
-    if proof is not None:
-        leaves = list(proof.leaves())
-        cell = leaves[0].cell if len(leaves) == 1 else None
-        detail = "no single motion covers every cell, which is proved"
-        if cell is not None:
-            detail = f"cell {list(cells.unravel(cell))} is proved uncoverable"
-    elif verdict.evidence is Evidence.EXHAUSTED:
+def finding_of(value: float, look: Look, cells: Cells) -> Finding:
+    """What was found at a value."""
+    if look.accepted and look.walk is not None:
+        detail = f"one motion of {len(look.walk.q)} waypoints"
+        return Finding(value, Answer.FEASIBLE, Evidence.WITNESS, detail, None, look.walk)
+    best = f"the best motion covers {look.covered} of {counted(len(cells), 'cell')}"
+    if look.evidence is Evidence.BUDGET:
+        detail = f"`check` finds no motion with {look.evaluations} evaluations; {best}"
+        return Finding(value, Answer.UNDECIDED, look.evidence, detail)
+    if look.proof is None:
         detail = f"the search ended without a covering motion; {best}"
-    return Finding(value, verdict.answer, verdict.evidence, detail, cell)
+        return Finding(value, Answer.INFEASIBLE, look.evidence, detail)
+    leaves = list(look.proof.leaves())
+    if len(leaves) > 1:
+        detail = "no single motion covers every cell, which is proved"
+        return Finding(value, Answer.INFEASIBLE, look.evidence, detail)
+    cell = leaves[0].cell
+    detail = f"cell {list(cells.unravel(cell))} is proved uncoverable"
+    return Finding(value, Answer.INFEASIBLE, look.evidence, detail, cell)
