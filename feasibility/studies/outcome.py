@@ -14,11 +14,10 @@ from feasibility.collisions.asked_bodies import gather
 from feasibility.division.set_covering import undominated
 from feasibility.studies.built_cases import arm_of, case_of, clock_of, cut_of
 from feasibility.studies.pool import Tables
+from feasibility.studies.stored import Further, Margins, Outcome, bits_of
 from feasibility.verdict import CauseKind, Verdict
 
 EXAMINED = 6  # missed cells whose causes are determined; the others take that of the nearest one
-
-Outcome = dict[str, Any]
 
 
 class CauseCounts(NamedTuple):
@@ -69,7 +68,7 @@ def _counted(kinds: list[str]) -> dict[str, int]:
     return dict(sorted(Counter(kinds).items(), key=lambda entry: (-entry[1], entry[0])))
 
 
-def evaluate(tables: Tables) -> Outcome:
+def evaluate(tables: Tables) -> Outcome | Further:
     """Decide one case.
 
     The outcome depends on the tables alone, as long as the search has no time limit; a limit
@@ -105,27 +104,14 @@ def outcome_of(verdict: Verdict, causes: bool = True) -> Outcome:
     Args:
         verdict: of a case.
         causes: whether to look for the causes of missed cells, which takes some time.
-
-    Returns:
-        verdict, evidence, message: as in `Verdict`; method, seed.
-        cells, covered, share: how many, how many the best motion covers, and the share of the area
-            (0..1) that it covers.
-        edges, pairs: neighbouring cells that a motion joins, and all of them.
-        causes: missed cells by cause, the most frequent first; `examined` says how many of them
-            were examined, the others counting as the nearest of these.
-        components: see `component_covers`, as hexadecimal bits (see `cells_of`).
-        margins: what the covering motion leaves (see `margins_of`), None unless feasible.
-        certificate: what the replay measured, None unless feasible.
-        unchecked_links: what has no body, as in `Verdict`.
-        fk: evaluations of the arm.
     """
     areas = np.asarray(verdict.cells.areas)
     total = float(areas.sum())
     counts = cause_counts(verdict) if causes else CauseCounts({}, 0)
     measured = verdict.certificate
     return {
-        "verdict": str(verdict.answer),
-        "evidence": str(verdict.evidence),
+        "verdict": verdict.answer,
+        "evidence": verdict.evidence,
         "message": verdict.message,
         "method": verdict.method,
         "seed": int(verdict.seed),
@@ -171,16 +157,8 @@ def merit(outcome: Mapping[str, Any]) -> tuple[bool, float, float]:
     return outcome["verdict"] != "feasible", -share, -margin
 
 
-def margins_of(verdict: Verdict) -> dict[str, float | None] | None:
-    """What the covering motion keeps from every bound; None where no motion is certified.
-
-    Returns:
-        limit_deg, limit_m: least distance of a revolute (a prismatic) joint from its limits, None
-            where no such joint has one.
-        cone_deg: by how much the tool axis stays inside the cone.
-        reach_m: by how much the furthest target is nearer than the arm's reach; None without one.
-        placement_m: how far the surface may be shifted; None where that is not known.
-    """
+def margins_of(verdict: Verdict) -> Margins | None:
+    """What the covering motion keeps from every bound; None where no motion is certified."""
     certificate, robot, task = verdict.certificate, verdict.robot, verdict.task
     if certificate is None or not verdict.feasible or len(verdict.cells) == 0:
         return None
@@ -204,29 +182,3 @@ def margins_of(verdict: Verdict) -> dict[str, float | None] | None:
 def finite(value: float) -> float | None:
     """JSON has neither inf nor NaN."""
     return float(value) if math.isfinite(value) else None
-
-
-def bits_of(cover: Mask) -> str:
-    """Cells (N,) as hexadecimal bits, the first cell first.
-
-    Example:
-        >>> bits_of(np.array([True, False, False, True, True]))
-        '98'
-    """
-    return np.packbits(cover).tobytes().hex()
-
-
-def cells_of(bits: str, n: int) -> Mask:
-    """(n,) the cells that `bits_of` wrote.
-
-    Example:
-        >>> cells_of("98", 5).tolist()
-        [True, False, False, True, True]
-
-    Raises:
-        ValueError: they are no bits of n cells.
-    """
-    data = np.frombuffer(bytes.fromhex(bits), dtype=np.uint8)
-    if len(data) != (n + 7) // 8:
-        raise ValueError(f"{len(data)} bytes do not hold the bits of {n} cells")
-    return np.unpackbits(data, count=n).astype(bool)

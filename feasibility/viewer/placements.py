@@ -111,7 +111,8 @@ def view_study(
         ArgumentError: there are no rows, or not one for each task.
     """
     from feasibility.studies.built_cases import arm_of, case_of, cut_of
-    from feasibility.studies.outcome import cells_of, merit
+    from feasibility.studies.outcome import merit
+    from feasibility.studies.stored import cells_of
 
     if len(rows) == 0 or len(tasks) != len(rows):
         raise ArgumentError(f"expected a row for each task, got {len(rows)} for {len(tasks)} tasks")

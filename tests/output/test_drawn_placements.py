@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 import coverable
 from coverable import Answer, Evidence, Pose, cylinder, load_robot, plane, sphere, view_placements
 from feasibility.placement.trials import Trial
-from feasibility.studies.outcome import bits_of
 from feasibility.studies.run import Row
+from feasibility.studies.stored import bits_of
 from feasibility.viewer import poses as pose_layers
 from feasibility.viewer.poses import Class, class_of_row, class_of_share, outline
 from feasibility.viewer.threejs import hex_colour

@@ -19,9 +19,9 @@ from samples import sampled, spread
 
 from coverable import Store, load_study, open_workers, run_tasks
 from feasibility.cases.toml import as_read
-from feasibility.studies.outcome import cells_of
 from feasibility.studies.pool import WorkersError
 from feasibility.studies.run import StudyTask
+from feasibility.studies.stored import cells_of
 
 SHARED = Path(study_works.__file__).parent
 
