@@ -27,8 +27,8 @@ from feasibility.verdict import Evidence, Verdict, Walk
 from robots.robot import Robot
 from surfaces.cells import Cells
 
-EFFORT, MOST = 1, 8_000  # of one search: times that of the case as given, but not above ...
-FEW, EACH = 4_000, 20  # ... or so many evaluations, and for each cell, where that is more
+EFFORT, MOST = 2, 15_000  # of one verdict: times that of the case as given, but not above ...
+FEW, EACH = 8_000, 20  # ... or so many evaluations, and for each cell, where that is more
 ALONE = 4  # times that, for `check` with the one change that is recommended
 NEAREST = 4  # changed cases whose motions are tried on the case as given
 VERDICT_SHARE = 0.5  # of the time limit, at most, for the verdict of the case as given

@@ -30,7 +30,7 @@ NEARBY = (1 / 8, 1 / 4, 1 / 2, 1)  # [1] of the way to its end: values of what i
 ALL_ALONG = (1 / 32, 1 / 16, 1 / 8, 3 / 16, 1 / 4, 3 / 8, 1 / 2, 5 / 8, 3 / 4, 7 / 8, 1)
 MARGINS, REMEDIES = 4, 8  # halvings, at most, towards what is not feasible, or no longer is
 SUSPECTS = 3  # cells that a search looks at first
-SEEDED = 0.5  # [1] of the effort of a verdict without a known motion
+LED, SEEDED = 0.5, 0.3  # [1] of the effort of `check`: a search, and from a known motion
 
 Steps = tuple[tuple[Quantity, int], ...]
 """Quantities, and how many steps each is from the value given."""
@@ -162,7 +162,7 @@ class Prober:
         Raises:
             OutOfTime: the deadline passed before it was decided.
         """
-        clock, search, variant = *self._limits(SEEDED if seeds else 1.0), self._variant(steps)
+        clock, search, variant = *self._limits(SEEDED if seeds else LED), self._variant(steps)
         problem = Problem.of(*variant)
         clock.allow(search.evaluations)
         found = complete_search(problem, search, clock, seeds, self.suspects, judging=False)
@@ -285,7 +285,9 @@ class Prober:
             failed = [k for k, one in self._along(quantity).items() if one.walk is None]
             ahead = [k for k in failed if (k - bad) * way > 0]
             good, bad = bad, min(ahead, key=lambda k: abs(k - bad)) if ahead else quantity.last
-            if good == bad or (not ahead and self._holds(quantity, bad)):
+            if not ahead and good != bad and self._holds(quantity, bad):
+                good = bad if self._accepted(quantity, bad) else good
+            if good == bad:
                 return Threshold(quantity, self.finding(quantity, good), None)
 
     def _as_far(self, quantity: Quantity, good: int, bad: int) -> int:
