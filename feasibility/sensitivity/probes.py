@@ -30,7 +30,7 @@ NEARBY = (1 / 8, 1 / 4, 1 / 2, 1)  # [1] of the way to its end: values of what i
 ALL_ALONG = (1 / 32, 1 / 16, 1 / 8, 3 / 16, 1 / 4, 3 / 8, 1 / 2, 5 / 8, 3 / 4, 7 / 8, 1)
 MARGINS, REMEDIES = 4, 8  # halvings, at most, towards what is not feasible, or no longer is
 SUSPECTS = 3  # cells that a search looks at first
-LED, SEEDED = 0.5, 0.3  # [1] of the effort of `check`: a search, and from a known motion
+SEEDED = 0.5  # [1] of the effort of a search without a known motion
 
 Steps = tuple[tuple[Quantity, int], ...]
 """Quantities, and how many steps each is from the value given."""
@@ -162,7 +162,7 @@ class Prober:
         Raises:
             OutOfTime: the deadline passed before it was decided.
         """
-        clock, search, variant = *self._limits(SEEDED if seeds else LED), self._variant(steps)
+        clock, search, variant = *self._limits(SEEDED if seeds else 1.0), self._variant(steps)
         problem = Problem.of(*variant)
         clock.allow(search.evaluations)
         found = complete_search(problem, search, clock, seeds, self.suspects, judging=False)
