@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -23,7 +23,7 @@ EXAMINED = 6  # missed cells whose causes are determined; the others take that o
 class CauseCounts(NamedTuple):
     """Why the cells of one verdict are missed."""
 
-    cells: dict[str, int]
+    cells: dict[CauseKind, int]
     """Number of missed cells by cause, the most frequent first."""
     examined: int
     """How many cells were examined for it."""
@@ -39,14 +39,14 @@ def cause_counts(verdict: Verdict) -> CauseCounts:
     if len(missed) == 0:
         return CauseCounts({}, 0)
     if verdict.method == "greedy":
-        kinds = [str(cause.kind) for cause in verdict.causes]
+        kinds = [cause.kind for cause in verdict.causes]
         return CauseCounts(_counted(kinds), len(kinds))
     from feasibility.roadmap.causes.diagnosis import cause_of
     from feasibility.roadmap.search import exploration_of
 
     robot, cells, task = verdict.robot, verdict.cells, verdict.task
     reached = np.isin(np.arange(len(cells)), np.concatenate([[], *verdict.components]))
-    kinds = [str(CauseKind.DISCONNECTED)] * int(reached[missed].sum())
+    kinds = [CauseKind.DISCONNECTED] * int(reached[missed].sum())
     lost = missed[~reached[missed]]
     if len(lost) == 0:
         return CauseCounts(_counted(kinds), 0)
@@ -59,11 +59,11 @@ def cause_counts(verdict: Verdict) -> CauseCounts:
         exploration.tool_collides(cell)
     examined = [cause_of(exploration, cell, pairs) for cell in few.tolist()]
     away = np.linalg.norm(cells.centres[lost][:, None] - cells.centres[few], axis=2)  # (L, E)
-    kinds += [str(examined[int(k)].kind) for k in away.argmin(axis=1)]
+    kinds += [examined[int(k)].kind for k in away.argmin(axis=1)]
     return CauseCounts(_counted(kinds), len(examined))
 
 
-def _counted(kinds: list[str]) -> dict[str, int]:
+def _counted(kinds: list[CauseKind]) -> dict[CauseKind, int]:
     """Causes with their number of cells, the most frequent first."""
     return dict(sorted(Counter(kinds).items(), key=lambda entry: (-entry[1], entry[0])))
 
@@ -95,7 +95,8 @@ def evaluate(tables: Tables) -> Outcome | Further:
         return found
     from feasibility.studies.further_figures import further_figures
 
-    return found | further_figures(verdict, case, clock, wanted["patches"], wanted["critical"])
+    more = further_figures(verdict, case, clock, wanted["patches"], wanted["critical"])
+    return cast("Further", {**found, **more})
 
 
 def outcome_of(verdict: Verdict, causes: bool = True) -> Outcome:
@@ -113,7 +114,7 @@ def outcome_of(verdict: Verdict, causes: bool = True) -> Outcome:
         "verdict": verdict.answer,
         "evidence": verdict.evidence,
         "message": verdict.message,
-        "method": verdict.method,
+        "method": "greedy" if verdict.method == "greedy" else "complete",
         "seed": int(verdict.seed),
         "cells": len(verdict.cells),
         "covered": verdict.n_covered,

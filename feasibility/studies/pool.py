@@ -14,7 +14,7 @@ import signal
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
@@ -33,7 +33,7 @@ STARTS = 3  # workers that may die before they are ready, one after the other
 COMPILING, READY = b"!", b"."  # from a worker, ahead of its first reply
 
 Tables = dict[str, Any]
-Work = Callable[[Tables], dict[str, Any]]
+Work = Callable[[Tables], Mapping[str, Any]]
 Done = tuple[str | None, str, float]
 """Of one task: its result as JSON or None, why it failed, the seconds that it took."""
 
