@@ -106,6 +106,7 @@ def main() -> None:
         tab = browser.new_page(viewport=SIZE)
         tab.goto(live.url)
         answered(tab, "infeasible")
+        tab.locator(".mantine-Notification-closeButton").first.click()  # of drawing without a GPU
         story(tab, *live.pages.values())
         browser.close()
 

@@ -97,14 +97,11 @@ def replay_over_surface(
     if fault is not None:
         unknown = Certificate(len(rows) if rows.ndim else 0, np.nan, np.nan, np.nan)
         return MotionReplay(unknown, (fault,), nowhere)
-    surface, curves = _surface_of(cells, task, working), None
+    surface = _surface_of(cells, task, working)
     vague = _too_vague(task, surface)
     if vague:
         return MotionReplay(Certificate(len(rows), np.nan, np.nan, np.nan), tuple(vague), nowhere)
-    if working is None and marks is not None and _is_of_poses(cells.surface):
-        from feasibility.certification.order import curves_of_marks
-
-        curves = curves_of_marks(cells, marks)
+    curves = None if working is not None or marks is None else _marked_curves(cells, marks)
     offset = offset_surface(surface, surface.side_sign * task.standoff)
     judge = Judge(robot, less_deviations(task, surface), offset, cells, curves)
     margin, faults = limits(robot, rows)
@@ -139,6 +136,15 @@ def replay_over_surface(
         short = margin_fault(task, certificate)
         faults += [MotionFault(-1, 0.0, short)] if short else []
     return MotionReplay(certificate, tuple(faults), at)
+
+
+def _marked_curves(cells: Cells, marks: Ints) -> Ints | None:
+    """The curve between poses that each row is said to be on; None where cells are no poses."""
+    if not _is_of_poses(cells.surface):
+        return None
+    from feasibility.certification.order import curves_of_marks
+
+    return curves_of_marks(cells, marks)
 
 
 def _among(
