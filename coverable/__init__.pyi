@@ -35,7 +35,7 @@ from feasibility.placement.region import Pose as Pose
 from feasibility.placement.region import Region as Region
 from feasibility.placement.stations import station_plan as station_plan
 from feasibility.placement.trials import evaluator_here as evaluator_here
-from feasibility.programs.axes import ProgramSettings as ProgramSettings
+from feasibility.programs.controller_axes import ProgramSettings as ProgramSettings
 from feasibility.programs.writing import save_program as save_program
 from feasibility.reports.placement import settings_of as settings_of
 from feasibility.results.motion_file import load_motion as load_motion
@@ -48,7 +48,7 @@ from feasibility.runs.pass_runs import pass_runs as pass_runs
 from feasibility.runs.planning import PlannedPasses as PlannedPasses
 from feasibility.runs.planning import plan_best_passes as plan_best_passes
 from feasibility.runs.planning import plan_passes as plan_passes
-from feasibility.search import Search as Search
+from feasibility.search_settings import Search as Search
 from feasibility.sensitivity.explanation import explain as explain
 from feasibility.sensitivity.thresholds import Explanation as Explanation
 from feasibility.studies.file import Study as Study
@@ -82,8 +82,8 @@ from feasibility.viewer.figures import unrolled_edges as unrolled_edges
 from feasibility.viewer.passes.pass_view import view_passes as view_passes
 from feasibility.viewer.path_and_division import view_division as view_division
 from feasibility.viewer.path_and_division import view_path as view_path
-from feasibility.viewer.placements import view_placements as view_placements
-from feasibility.viewer.placements import view_study as view_study
+from feasibility.viewer.placement_view import view_placements as view_placements
+from feasibility.viewer.placement_view import view_study as view_study
 from feasibility.viewer.view_figures import plot_view as plot_view
 from feasibility.viewer.view_figures import plot_views as plot_views
 from feasibility.viewer.viewer import View as View

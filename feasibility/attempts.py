@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from feasibility.clock import Clock, OutOfTime
 from feasibility.found import Found
 from feasibility.problem import Problem
-from feasibility.search import Search
+from feasibility.search_settings import Search
 from feasibility.task import PlacementError
 from feasibility.verdict import Replay, Walk
 

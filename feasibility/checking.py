@@ -15,7 +15,7 @@ from feasibility.attempts import Method, attempts_at
 from feasibility.clock import Clock, OutOfTime
 from feasibility.demands import OF_TREE, RATES, further, unjudged
 from feasibility.problem import Problem
-from feasibility.search import Progress, Search
+from feasibility.search_settings import Progress, Search
 from feasibility.task import Task
 from feasibility.verdict import Answer, Cause, Decision, Evidence, Replay, Verdict, Walk, deferred
 from robots.robot import Robot

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from feasibility.interrupts import limited
-from feasibility.search import Progress
+from feasibility.search_settings import Progress
 
 GRACE = 0.4  # [s] past the limit that is left to what looks at the clock itself ...
 GRACE_SHARE = 0.05  # [1] ... and this share of the limit; starting and answering take some too

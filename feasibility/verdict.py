@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import networkx as nx
 
     from feasibility.cut_tree import CutTree
-    from robots.shapes.pairs import LeftOut
+    from robots.shapes.link_pairs import LeftOut
 
 
 class Answer(StrEnum):

@@ -28,7 +28,7 @@ from feasibility.cut_tree import CutTree
 from feasibility.demands import BY_REPLAY, NAMES, OF_TREE, further, unjudged
 from feasibility.problem import Problem
 from feasibility.results.result_file import Result
-from feasibility.search import Search
+from feasibility.search_settings import Search
 from feasibility.task import Task
 from feasibility.verdict import Answer, Certificate, Evidence, Verdict, Walk
 from robots.robot import Robot

@@ -11,7 +11,7 @@ from surfaces.cells import Cells
 from surfaces.meshes.cells.mesh_cells import MeshCells
 from surfaces.meshes.face_tree import FaceTree
 from surfaces.patches.grid_cells import GridCells
-from surfaces.piecewise.cells import PieceCells
+from surfaces.piecewise.piece_cells import PieceCells
 from surfaces.sheet import tiles_of
 from surfaces.surface import SurfaceError, max_principal_curvature
 from surfaces.tiles import CORNERS, FlatTiles

@@ -31,7 +31,7 @@ from feasibility.cases.toml import (
     toml_document,
 )
 from feasibility.safe_files import FileError, read_text, shown_path
-from feasibility.search import Search
+from feasibility.search_settings import Search
 from feasibility.task import PlacementError, Task, check_footprint
 
 if TYPE_CHECKING:
@@ -141,7 +141,7 @@ class Case:
         """What is wrong with the SRDF that the case may name, for an arm with these links."""
         if self.collision is None or self.collision.srdf is None:
             return []
-        from robots.shapes.pairs import faults_of_srdf
+        from robots.shapes.link_pairs import faults_of_srdf
 
         found = faults_of_srdf(self.collision.srdf, links)
         return [fault.renamed({}, "collision.srdf") for fault in found]

@@ -23,7 +23,7 @@ from feasibility.certification.collisions.collision_replay import couples_of
 from feasibility.certification.collisions.motion import ArmMotion
 from feasibility.certification.collisions.pairing import ENOUGH, Pairing
 from feasibility.certification.lever_bounds import stretched_length
-from feasibility.collisions.bodies import Bodies
+from feasibility.collisions.problem_bodies import Bodies
 from feasibility.collisions.shapes import HalfSpace
 from feasibility.collisions.words import SURFACE
 from robots.robot import Robot

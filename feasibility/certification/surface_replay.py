@@ -46,7 +46,7 @@ from surfaces.places.offset_surfaces import offset_surface
 from surfaces.surface import Surface
 
 if TYPE_CHECKING:
-    from feasibility.collisions.bodies import Bodies
+    from feasibility.collisions.problem_bodies import Bodies
     from surfaces.toolpaths.pose_surface import PoseSurface
 
 LEVELS = 26  # halvings of a segment between two rows
@@ -117,7 +117,7 @@ def replay_over_surface(
     if len(missed):
         faults.append(MotionFault(-1, 0.0, missed_text(cells, task, missed, found.samples)))
     if _is_of_poses(surface):
-        from feasibility.certification.order import order_of_places
+        from feasibility.certification.toolpath_order import order_of_places
 
         faults += order_of_places(offset, found.samples, task.effective_tolerance)
         if not faults:
@@ -142,7 +142,7 @@ def _marked_curves(cells: Cells, marks: Ints) -> Ints | None:
     """The curve between poses that each row is said to be on; None where cells are no poses."""
     if not _is_of_poses(cells.surface):
         return None
-    from feasibility.certification.order import curves_of_marks
+    from feasibility.certification.toolpath_order import curves_of_marks
 
     return curves_of_marks(cells, marks)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from coverable.errors import CoverableError
-from feasibility.cli.command import (
+from feasibility.cli.command_parts import (
     STATUS,
     add_case,
     add_command,
@@ -22,7 +22,7 @@ from feasibility.interrupts import raised
 from feasibility.safe_files import check_writable, shown_path
 
 if TYPE_CHECKING:
-    from feasibility.cli.command import OpenCase
+    from feasibility.cli.command_parts import OpenCase
     from feasibility.sensitivity.thresholds import Explanation
     from feasibility.verdict import Walk
     from feasibility.viewer.live_server import Served

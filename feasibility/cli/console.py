@@ -10,7 +10,7 @@ from typing import Any, TextIO
 
 from coverable.errors import CoverableError, Fault, shown
 from feasibility.interrupts import at_leave
-from feasibility.search import Progress
+from feasibility.search_settings import Progress
 
 THREADS = "NUMBA_NUM_THREADS"
 MOST_THREADS = 1_024

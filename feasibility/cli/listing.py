@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
-from feasibility.cli.command import add_command, json_text
+from feasibility.cli.command_parts import add_command, json_text
 from feasibility.cli.console import print_out
 
 WIDE = 240  # columns of a file, so that nothing is wrapped

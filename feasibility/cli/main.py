@@ -15,7 +15,7 @@ from importlib import import_module
 from typing import NoReturn
 
 from coverable.errors import CoverableError
-from feasibility.cli.command import BAD_INPUT, STATUS, MakeClock, TooLate, json_text
+from feasibility.cli.command_parts import BAD_INPUT, STATUS, MakeClock, TooLate, json_text
 from feasibility.cli.console import prepare, print_err, print_out
 from feasibility.interrupts import INTERRUPTED, MESSAGE, enforcing, leave_at_once
 

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coverable.errors import CoverableError, Fault
-from feasibility.cli.command import STATUS, json_text, numbers, positive, write_text
+from feasibility.cli.command_parts import STATUS, json_text, numbers, positive, write_text
 from feasibility.cli.console import print_err, print_out
 from feasibility.cli.programs import period_of, write_programs
 from feasibility.safe_files import shown_path
 
 if TYPE_CHECKING:
-    from feasibility.cli.command import OpenCase
+    from feasibility.cli.command_parts import OpenCase
     from feasibility.runs.pass_runs import PassRuns
     from feasibility.runs.planning import PlannedPasses
     from feasibility.task import Task
@@ -105,8 +105,8 @@ def direction_of(text: str) -> Any:
 
 def _passes(args: argparse.Namespace, surface: Surface, direction: Any) -> Passes:
     """The passes that the arguments describe, in one direction."""
-    from surfaces.passes.directions import crossed
     from surfaces.passes.parallel import parallel_passes
+    from surfaces.passes.pass_directions import crossed
 
     found = [
         parallel_passes(

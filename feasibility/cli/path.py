@@ -6,7 +6,7 @@ import argparse
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from feasibility.cli.command import (
+from feasibility.cli.command_parts import (
     STATUS,
     add_case,
     add_command,
@@ -23,7 +23,7 @@ from feasibility.safe_files import shown_path
 
 if TYPE_CHECKING:
     from feasibility.cases.case import Case
-    from feasibility.cli.command import OpenCase
+    from feasibility.cli.command_parts import OpenCase
     from feasibility.paths.coverage import CoveragePath
     from feasibility.runs.planning import PlannedPasses
     from feasibility.task import Task

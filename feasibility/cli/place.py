@@ -9,7 +9,7 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from feasibility.cli.command import (
+from feasibility.cli.command_parts import (
     STATUS,
     add_case,
     add_command,
@@ -26,7 +26,7 @@ from feasibility.interrupts import INTERRUPTED, MESSAGE, raised
 from feasibility.safe_files import shown_path, write_whole
 
 if TYPE_CHECKING:
-    from feasibility.cli.command import OpenCase
+    from feasibility.cli.command_parts import OpenCase
     from feasibility.placement.map import PlacementMap
     from feasibility.placement.placements import Placements
     from feasibility.placement.stations import StationPlan
@@ -135,7 +135,7 @@ def _view(
     """The view, where it is wanted; its motion is searched for in the time that is left."""
     if args.html is None:
         return None
-    from feasibility.viewer.placements import view_placements
+    from feasibility.viewer.placement_view import view_placements
 
     left = opened.clock.left
     limit = None if math.isinf(left) else max(left, _LEAST)

@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from coverable.errors import CoverableError, Fault, alternatives
-from feasibility.cli.command import numbers
+from feasibility.cli.command_parts import numbers
 from feasibility.cli.console import print_err
 from feasibility.safe_files import shown_path
 
 if TYPE_CHECKING:
     from feasibility.cases.case import Case
-    from feasibility.cli.command import OpenCase
-    from feasibility.programs.axes import ProgramSettings
+    from feasibility.cli.command_parts import OpenCase
+    from feasibility.programs.controller_axes import ProgramSettings
     from feasibility.runs.planning import PlannedPasses
     from feasibility.timing.sampled_trajectory import Trajectory
 
@@ -83,7 +83,7 @@ def check_programs(args: argparse.Namespace, case: Case) -> None:
         CoverableError: a file's ending is that of no program, the arm has none of that kind, or
             arguments do not go together.
     """
-    from feasibility.programs.axes import ProgramError, check_program
+    from feasibility.programs.controller_axes import ProgramError, check_program
     from feasibility.programs.controllers import language_of
     from robots.errors import RobotError
 
@@ -120,7 +120,7 @@ def period_of(args: argparse.Namespace) -> float:
 
 def _settings(args: argparse.Namespace) -> ProgramSettings:
     """What the arguments say of the controller."""
-    from feasibility.programs.axes import ProgramSettings
+    from feasibility.programs.controller_axes import ProgramSettings
 
     return ProgramSettings(
         args.axis_signs, args.axis_offsets_deg, args.pulses_per_deg, not args.j3_from_upper_arm,

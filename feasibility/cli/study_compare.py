@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from feasibility.cli.command import (
+from feasibility.cli.command_parts import (
     STATUS,
     add_case,
     add_command,
@@ -116,7 +116,7 @@ def compare(args: argparse.Namespace, began: float) -> int:
 
 def _poses(study: Study, rows: tuple[Row, ...]) -> View | None:
     """The poses of the surface, where a study varies them."""
-    from feasibility.viewer.placements import view_study
+    from feasibility.viewer.placement_view import view_study
 
     if not any(label.startswith(("surface.position", "surface.rpy_deg")) for label in study.labels):
         return None

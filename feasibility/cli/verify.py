@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from feasibility.cli.command import (
+from feasibility.cli.command_parts import (
     TooLate,
     add_case,
     add_command,

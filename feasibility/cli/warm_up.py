@@ -11,7 +11,7 @@ from contextlib import redirect_stderr, redirect_stdout
 from functools import partial
 from pathlib import Path
 
-from feasibility.cli.command import STATUS, add_command, json_text
+from feasibility.cli.command_parts import STATUS, add_command, json_text
 from feasibility.cli.console import Bar, print_err, print_out
 
 MESH = """

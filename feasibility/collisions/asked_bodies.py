@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from feasibility.collisions.words import checked_words
 
 if TYPE_CHECKING:
-    from feasibility.collisions.bodies import Bodies
+    from feasibility.collisions.problem_bodies import Bodies
     from feasibility.collisions.settings import Collision
     from robots.robot import Robot
     from surfaces.surface import Surface

@@ -10,17 +10,17 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.errors import ArgumentError
-from feasibility.collisions.bodies import Bodies, Pair, Soup
 from feasibility.collisions.outer_bodies import polytopes_of, soup_of, tool_solids
 from feasibility.collisions.overlaps_at_rest import overlapping
+from feasibility.collisions.problem_bodies import Bodies, Pair, Soup
 from feasibility.collisions.scene import ToolShape
 from feasibility.collisions.seats import Seat, carried_bodies, furthest, seats_of
 from feasibility.collisions.settings import Collision
 from feasibility.collisions.words import SURFACE, TOOL
 from robots.robot import Robot
 from robots.shapes.bodies import Fineness, Polytope
+from robots.shapes.link_pairs import LeftOut, LinkPairs, link_pairs
 from robots.shapes.links import LinkShapes, link_shapes, outer_bodies
-from robots.shapes.pairs import LeftOut, LinkPairs, link_pairs
 from robots.shapes.sampling import with_crude_links_cut
 from robots.shapes.tool import BARE, Reach, bare_length, tool_line, tool_reach
 from surfaces.sheet import sheet_of

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from coverable.arrays import Array
-from feasibility.collisions.bodies import Soup
+from feasibility.collisions.problem_bodies import Soup
 from feasibility.collisions.scene import Obstacle, ToolShape
 from feasibility.collisions.shapes import HalfSpace
 from feasibility.collisions.words import TOOL

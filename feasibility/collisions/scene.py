@@ -12,7 +12,8 @@ import numpy as np
 
 from coverable.arrays import Array
 from coverable.errors import ArgumentError, Checks
-from feasibility.collisions.pairs import checked_distance
+from feasibility.collisions.named_pairs import checked_distance
+from feasibility.collisions.scene_triangles import PLACEHOLDER, read_triangles
 from feasibility.collisions.shapes import (
     ORIGIN,
     HalfSpace,
@@ -21,7 +22,6 @@ from feasibility.collisions.shapes import (
     checked_shape,
     placement_of,
 )
-from feasibility.collisions.triangles import PLACEHOLDER, read_triangles
 from feasibility.collisions.words import SURFACE, TOOL
 from robots.shapes.bodies import Triangles
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere

@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from feasibility.collisions.bodies import Seat
 from feasibility.collisions.outer_bodies import below
+from feasibility.collisions.problem_bodies import Seat
 from feasibility.collisions.scene import Obstacle
 from feasibility.collisions.shapes import HalfSpace
 from robots.robot import Robot

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, get_args
 
 from coverable.errors import Checks, Fault
-from feasibility.collisions.pairs import (
+from feasibility.collisions.named_pairs import (
     checked_distance,
     clearances_of,
     names_of,

@@ -10,7 +10,7 @@ from typing import Any
 
 from coverable.arrays import Array
 from coverable.errors import Checks, Fault, shown
-from feasibility.collisions.triangles import object_triangles
+from feasibility.collisions.scene_triangles import object_triangles
 from robots.poses import matrix_of, rigid_matrix
 from robots.shapes.bodies import Triangles
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere

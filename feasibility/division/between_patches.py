@@ -14,8 +14,8 @@ import numpy as np
 from coverable.arrays import Array
 from feasibility.certification.collisions.collision_replay import CollisionReplay, collision_replay
 from feasibility.collisions.asked_bodies import gather
-from feasibility.collisions.bodies import Bodies
 from feasibility.collisions.kernels.memory import collision_buffer
+from feasibility.collisions.problem_bodies import Bodies
 from feasibility.division.free_motion import FreeSpace, free_motion
 from feasibility.division.reconfiguration import Reconfiguration
 from feasibility.task import Task

@@ -10,7 +10,7 @@ from feasibility.clock import Clock, OutOfTime
 from feasibility.roadmap.rounds import explore
 from feasibility.roadmap.search import exploration_of
 from feasibility.roadmap.walk import covering_walk
-from feasibility.search import Search
+from feasibility.search_settings import Search
 from feasibility.speed.motion_rates import replay_at_rates
 from feasibility.task import Task
 from feasibility.verdict import Walk

@@ -15,8 +15,8 @@ from coverable.arrays import Ints, Mask
 from feasibility.cut_tree import CutTree
 from feasibility.division.division import Apart
 from feasibility.roadmap.cuts.gaps import components_of
-from feasibility.roadmap.cuts.places import places_on
 from feasibility.roadmap.cuts.prover import Prover
+from feasibility.roadmap.cuts.target_places import places_on
 from feasibility.roadmap.exploration import Exploration
 from feasibility.task import Task
 

@@ -10,7 +10,7 @@ import numpy as np
 from coverable.arrays import Ints
 from coverable.errors import ArgumentError, counted
 from feasibility.clock import Clock, OutOfTime
-from feasibility.collisions.bodies import Pair
+from feasibility.collisions.problem_bodies import Pair
 from feasibility.demands import OF_EACH, further, unjudged
 from feasibility.division.division import Division, Plan
 from feasibility.division.plans import collect_components, plan_of
@@ -21,11 +21,11 @@ from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.causes.diagnosis import cause_of, causes_of, diagnose
 from feasibility.roadmap.causes.disconnection import disconnected
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.motions.arrays import SearchArrays, within
+from feasibility.roadmap.motions.search_arrays import SearchArrays, within
 from feasibility.roadmap.rounds import explore
 from feasibility.roadmap.search import exploration_of
 from feasibility.roadmap.warmup import warm_up
-from feasibility.search import Progress, Search
+from feasibility.search_settings import Progress, Search
 from feasibility.speed.fast_motions import keep_fast_motions
 from feasibility.speed.requirements import check_requirements, required_words
 from feasibility.targets.blocked import blocked_curves

@@ -18,8 +18,8 @@ from feasibility.certification.collisions.collision_replay import collision_repl
 from feasibility.certification.jacobians import jacobians
 from feasibility.certification.lever_bounds import second_derivatives
 from feasibility.collisions.asked_bodies import gather
-from feasibility.collisions.bodies import Bodies
 from feasibility.collisions.kernels.memory import collision_buffer
+from feasibility.collisions.problem_bodies import Bodies
 from feasibility.division.between_patches import tool_moved
 from feasibility.division.free_motion import FreeSpace, free_motion
 from feasibility.paths.coverage import CoveragePath

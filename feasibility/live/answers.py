@@ -22,9 +22,10 @@ from feasibility.problem import Problem
 from feasibility.reports import verdict as report
 from feasibility.verdict import Verdict
 from feasibility.viewer.areas.margin_along import margin_layers
-from feasibility.viewer.areas.treated import area_layers
+from feasibility.viewer.areas.treated_map import area_layers
 from feasibility.viewer.playback import Playback, motion_of
-from feasibility.viewer.scene import (
+from feasibility.viewer.threejs import Colour
+from feasibility.viewer.verdict_scene import (
     MISSED,
     Layer,
     filled,
@@ -33,7 +34,6 @@ from feasibility.viewer.scene import (
     missed_layer,
     trail,
 )
-from feasibility.viewer.threejs import Colour
 
 STEPS = 60  # looks at the clock, between which a search does 8,000 evaluations at most
 STEPS_WITH_BODIES = 24  # the same where distances of bodies make an evaluation dearer

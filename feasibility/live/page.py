@@ -21,8 +21,8 @@ from feasibility.live.drawing import Scene
 from feasibility.live.handle import Handle
 from feasibility.live.workbench import Workbench
 from feasibility.viewer.html_page import Entry
-from feasibility.viewer.scene import Layer
 from feasibility.viewer.threejs import hex_colour
+from feasibility.viewer.verdict_scene import Layer
 from feasibility.viewer.viewer import View
 
 STILL = 0.25  # [s] without a change, after which the certified answer is looked for

@@ -15,7 +15,7 @@ from feasibility.clock import Clock
 from feasibility.paper import algorithm_1 as jcells
 from feasibility.paper.jcell_grid import Grid, cell_of, place_tool, rolls_within
 from feasibility.paper.jcell_steps import Steps
-from feasibility.search import Search
+from feasibility.search_settings import Search
 from feasibility.task import Task
 from robots.robot import Robot
 from surfaces.cells import Cells

@@ -22,7 +22,7 @@ from feasibility.paper.starts import candidates
 from feasibility.paper.tree_and_graph import Tree, graph_of, tree_of
 from feasibility.paper.tree_replay import Path, replay_tree
 from feasibility.problem import Problem
-from feasibility.search import Search
+from feasibility.search_settings import Search
 from feasibility.verdict import Cause, CauseKind, Replay
 
 KNOWS_NO_COLLISIONS = (

@@ -40,7 +40,7 @@ import numpy as np
 
 from coverable.arrays import Array, Mask
 from feasibility.cone import chord_of
-from feasibility.search import Search
+from feasibility.search_settings import Search
 from feasibility.targets.curves import target_curves
 from feasibility.task import Task
 from robots.robot import Robot
@@ -48,7 +48,7 @@ from surfaces.cell_triangles import Triangulation, triangulation
 from surfaces.cells import Cells
 from surfaces.patches.grid_cells import GridCells
 from surfaces.patches.patch import ClosedFormPatch
-from surfaces.piecewise.cells import PieceCells
+from surfaces.piecewise.piece_cells import PieceCells
 
 TOLERANCE_STEPS = 0.5
 """Default tolerance, in steps times reach: half of what the tool can move in one step."""

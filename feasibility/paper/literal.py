@@ -29,7 +29,7 @@ from feasibility.paper.exact_rolls import rolls_at
 from feasibility.paper.jcell_grid import HAIR
 from feasibility.paper.jcell_steps import Steps
 from feasibility.paper.starts import candidates
-from feasibility.search import Search
+from feasibility.search_settings import Search
 from feasibility.task import Task
 from robots.kinematics import Kinematics
 from robots.robot import Robot

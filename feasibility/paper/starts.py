@@ -19,7 +19,7 @@ import numpy as np
 
 from coverable.arrays import Array, Mask
 from feasibility.clock import Clock
-from feasibility.search import Search
+from feasibility.search_settings import Search
 from feasibility.task import Targets, Task
 from robots.kinematics import Kinematics
 from robots.robot import Robot

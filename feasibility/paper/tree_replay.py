@@ -17,7 +17,7 @@ from feasibility.cone import angle_of
 from feasibility.paper.exact_rolls import approaches_at, rolls_at
 from feasibility.paper.jcell_steps import Steps
 from feasibility.paper.tree_and_graph import corners, there_and_back
-from feasibility.search import Search
+from feasibility.search_settings import Search
 from feasibility.task import Task
 from feasibility.verdict import Certificate, Replay, Verdict
 from robots.kinematics import Kinematics

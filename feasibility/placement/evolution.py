@@ -13,7 +13,7 @@ from feasibility.clock import Clock, OutOfTime
 from feasibility.placement.reach_bound import Reach
 from feasibility.placement.region import Pose, Region
 from feasibility.placement.trials import Evaluator, Trial
-from feasibility.search import Progress
+from feasibility.search_settings import Progress
 
 SMALLEST = 5  # poses that evolution needs
 STRIDES = (0.4, 0.9)  # [1] of the difference of two poses, by which a third one is moved

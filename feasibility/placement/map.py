@@ -11,7 +11,7 @@ from coverable.arrays import Array, Mask
 from feasibility.placement.placements import Placements
 from feasibility.placement.region import AXES, PlacementError, Pose, Region
 from feasibility.placement.trials import Evaluator, search_all
-from feasibility.search import Progress
+from feasibility.search_settings import Progress
 
 SIDE = 15  # places along each of the first two axes
 PANELS = 3  # places along the third

@@ -29,7 +29,7 @@ from feasibility.placement.reach_bound import Beyond, Reach
 from feasibility.placement.region import PlacementError, Region
 from feasibility.placement.trials import Evaluator, Trial, evaluator_here
 from feasibility.roadmap.warmup import warm_up
-from feasibility.search import Progress, Search
+from feasibility.search_settings import Progress, Search
 from feasibility.targets.blocked import blocked_curves, smoothing_offer
 from feasibility.task import Task
 from feasibility.verdict import Answer, CauseKind, Evidence

@@ -22,7 +22,7 @@ from feasibility.placement.placements import COUNT, Placements
 from feasibility.placement.reach_bound import Reach
 from feasibility.placement.region import Pose, moved_cells
 from feasibility.placement.trials import Evaluator, Trial, effort, search_all
-from feasibility.search import Progress, Search
+from feasibility.search_settings import Progress, Search
 
 TIME_LIMIT = 60.0  # [s] for the optimum; tables of thousands of rows take far less
 

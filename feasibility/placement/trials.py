@@ -12,12 +12,12 @@ from coverable.arrays import Mask
 from feasibility.cases.case import Case
 from feasibility.checking import check
 from feasibility.placement.region import Pose, moved_cells
-from feasibility.search import Progress, Search
-from feasibility.studies.outcome import outcome_of
+from feasibility.search_settings import Progress, Search
 from feasibility.studies.pool import Workers
 from feasibility.studies.run import StudyTask, run_tasks
 from feasibility.studies.store import Store
 from feasibility.studies.stored import cells_of
+from feasibility.studies.study_outcome import outcome_of
 from feasibility.task import Task
 from feasibility.verdict import Answer, Evidence
 from robots.robot import Robot

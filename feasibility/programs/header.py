@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from coverable.arrays import Array
 from coverable.errors import counted
 from feasibility.collisions.words import listed_words
-from feasibility.programs.axes import AxisMap
+from feasibility.programs.controller_axes import AxisMap
 from feasibility.programs.controllers import INFORM, KRL, RAPID, TP, URSCRIPT, Language
 from feasibility.timing.sampled_trajectory import Trajectory
 from feasibility.version import version

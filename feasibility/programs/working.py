@@ -9,7 +9,7 @@ import numpy as np
 
 from coverable.arrays import Ints
 from feasibility.timing.sampled_trajectory import Trajectory
-from surfaces.passes.stretches import Pass
+from surfaces.passes.pass_stretches import Pass
 from surfaces.passes.toolpath import LIFTED, PassPlaces
 
 OFF = -1

@@ -11,7 +11,7 @@ from typing import IO
 import numpy as np
 
 from coverable.arrays import Array, Ints
-from feasibility.programs.axes import AxisMap, ProgramSettings, check_program
+from feasibility.programs.controller_axes import AxisMap, ProgramSettings, check_program
 from feasibility.programs.controllers import INFORM, KRL, RAPID, TP, URSCRIPT, language_of
 from feasibility.programs.header import head
 from feasibility.programs.listings import inform, tp

@@ -14,7 +14,8 @@ from feasibility.collisions.words import checked
 from feasibility.cut_words import lines as proof_lines
 from feasibility.division.division import Apart, Division, SubPatch
 from feasibility.division.reconfiguration import Reconfiguration
-from feasibility.reports.parts import (
+from feasibility.reports.proof import proof_json
+from feasibility.reports.text_and_tables import (
     causes_json,
     certificate_json,
     clearance_json,
@@ -24,7 +25,6 @@ from feasibility.reports.parts import (
     seconds_text,
     summary,
 )
-from feasibility.reports.proof import proof_json
 from feasibility.reports.verdict import causes_listed
 from feasibility.results.plain import plain
 from feasibility.version import version

@@ -26,7 +26,7 @@ from feasibility.reports.explanation_words import (
     what_it_opens,
 )
 from feasibility.reports.pages import framed, page, table
-from feasibility.reports.parts import aligned, filled, walk_csv, widening
+from feasibility.reports.text_and_tables import aligned, filled, walk_csv, widening
 from feasibility.results.plain import plain
 from feasibility.sensitivity.quantities import Quantity
 from feasibility.sensitivity.thresholds import (

@@ -9,7 +9,7 @@ from typing import Any
 from coverable.errors import counted
 from feasibility.collisions.asked_bodies import said_of
 from feasibility.collisions.words import checked
-from feasibility.reports.parts import (
+from feasibility.reports.text_and_tables import (
     aligned,
     certificate_json,
     clearance_json,

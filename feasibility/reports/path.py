@@ -14,7 +14,8 @@ from feasibility.collisions.words import checked
 from feasibility.entry.ends import Ends
 from feasibility.paths.coverage import CoveragePath
 from feasibility.paths.metrics import PathFigures
-from feasibility.reports.parts import (
+from feasibility.reports.pass_runs import passes_json, passes_text
+from feasibility.reports.text_and_tables import (
     certificate_json,
     clearance_json,
     clearance_text,
@@ -24,7 +25,6 @@ from feasibility.reports.parts import (
     smooth_text,
     summary,
 )
-from feasibility.reports.pass_runs import passes_json, passes_text
 from feasibility.reports.verdict import as_json as verdict_json
 from feasibility.results.plain import plain
 from feasibility.timing.limits_used import used

@@ -14,7 +14,7 @@ from feasibility.placement.placements import Placements
 from feasibility.placement.region import AXES, Pose
 from feasibility.placement.stations import StationPlan
 from feasibility.placement.trials import Trial
-from feasibility.reports.parts import aligned, csv_text, summary
+from feasibility.reports.text_and_tables import aligned, csv_text, summary
 from feasibility.reports.verdict import CAUSES, EVIDENCE
 from feasibility.verdict import Answer, CauseKind, Evidence
 from feasibility.version import version

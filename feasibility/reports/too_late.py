@@ -6,7 +6,7 @@ from typing import Any
 
 from feasibility.cases.case import Case
 from feasibility.collisions.words import checked, checked_words
-from feasibility.reports.parts import summary
+from feasibility.reports.text_and_tables import summary
 from feasibility.version import version
 
 HEAD = "undecided: the time limit ran out before the search began."

@@ -10,7 +10,7 @@ from feasibility.cases.case import Case
 from feasibility.cases.surface_reading import OWN_KEYS
 from feasibility.collisions.asked_bodies import said_of
 from feasibility.collisions.words import checked
-from feasibility.reports.parts import (
+from feasibility.reports.text_and_tables import (
     causes_json,
     certificate_text,
     left_out_json,

@@ -11,7 +11,8 @@ from coverable.arrays import Mask
 from coverable.errors import counted
 from feasibility.collisions.asked_bodies import said_of
 from feasibility.collisions.words import checked, checked_words
-from feasibility.reports.parts import (
+from feasibility.reports.proof import proof_json
+from feasibility.reports.text_and_tables import (
     certificate_text,
     measured_json,
     placement_text,
@@ -19,7 +20,6 @@ from feasibility.reports.parts import (
     smooth_text,
     summary,
 )
-from feasibility.reports.proof import proof_json
 from feasibility.treated.words import treated_json, treated_words
 from feasibility.verifying import NOT_IN_TIME, Verification
 from feasibility.version import version

@@ -10,7 +10,7 @@ from coverable.errors import shown
 from feasibility.results.archive import Fields
 from feasibility.results.plain import plain
 from feasibility.verdict import Cause, CauseKind, Certificate
-from robots.shapes.pairs import LeftOut
+from robots.shapes.link_pairs import LeftOut
 
 
 def cause_row(cause: Cause) -> dict[str, Any]:
@@ -62,7 +62,7 @@ def read_certificate(fields: Fields) -> Certificate | None:
 
 def read_left_out(fields: Fields) -> tuple[LeftOut, ...]:
     """The pairs that were left out."""
-    from robots.shapes.pairs import LeftOut
+    from robots.shapes.link_pairs import LeftOut
 
     found = []
     given = fields.entries.get("pairs_left_out")

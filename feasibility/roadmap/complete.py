@@ -20,15 +20,15 @@ from feasibility.roadmap.exploration import Exploration, wound
 from feasibility.roadmap.search import close, exploration_of, seed_middle
 from feasibility.roadmap.walk import covering_walk
 from feasibility.roadmap.warmup import warm_up
-from feasibility.search import Search
+from feasibility.search_settings import Search
 from feasibility.verdict import Cause, Replay, Walk
 from robots.kinematics import Kinematics
 
 if TYPE_CHECKING:
     import networkx as nx
 
-    from feasibility.collisions.bodies import Bodies
-    from feasibility.roadmap.forward.run import OrderedRun
+    from feasibility.collisions.problem_bodies import Bodies
+    from feasibility.roadmap.forward.ordered_run import OrderedRun
     from feasibility.roadmap.proving import Proving
 
 IN_PLACE = 0.1  # [1] share of the tolerance within which a tool point stays over a pose
@@ -112,7 +112,7 @@ def _search(
         if not search.early or problem.cells.in_order:
             close(exploration)
         if problem.cells.in_order and exploration.complete and known is None:
-            from feasibility.roadmap.forward.run import run_in_order
+            from feasibility.roadmap.forward.ordered_run import run_in_order
 
             run = run_in_order(exploration)
     except OutOfTime:
@@ -272,7 +272,7 @@ def _causes(problem: Problem, exploration: Exploration) -> tuple[Cause, ...]:
 
 def _in_order(found: Found, run: OrderedRun, problem: Problem, exploration: Exploration) -> Found:
     """The same of a toolpath, all of whose poses one component covers."""
-    from feasibility.roadmap.forward.run import changes_in_place
+    from feasibility.roadmap.forward.ordered_run import changes_in_place
 
     total, walk = len(problem.cells), run.walk
     counts = {**found.counts, "fk": int(exploration.work.counts[0])}

@@ -103,8 +103,8 @@ class Proving:
         Over a sharp seam between pieces the targets jump. A tool may well go round in an arc, which
         is not certified, nor ruled out: that nothing is on the surface in between proves nothing.
         """
-        from feasibility.roadmap.cuts.places import places_on
         from feasibility.roadmap.cuts.prover import Prover
+        from feasibility.roadmap.cuts.target_places import places_on
         from feasibility.targets.blocked import blocked_curves
 
         if self._prover is None and not self.unable:

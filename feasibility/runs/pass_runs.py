@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from feasibility.clock import Clock, OutOfTime
-from feasibility.collisions.bodies import Pair
+from feasibility.collisions.problem_bodies import Pair
 from feasibility.division.between_patches import clear_moves
 from feasibility.division.plans import collect_components, connect_pairs
 from feasibility.division.reconfiguration import Reconfiguration
@@ -22,7 +22,7 @@ from feasibility.roadmap.search import exploration_of
 from feasibility.roadmap.walk import route_walk
 from feasibility.roadmap.warmup import warm_up
 from feasibility.runs.fewest import Run, Stations, fewest_runs
-from feasibility.runs.gaps import Gap, along_stretch, gaps_of, place_words
+from feasibility.runs.left_out import Gap, along_stretch, gaps_of, place_words
 from feasibility.runs.stopping import RunStop, where_it_stops
 from feasibility.speed.fast_motions import keep_fast_motions
 from feasibility.speed.motion_rates import replay_at_rates

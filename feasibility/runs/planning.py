@@ -12,14 +12,14 @@ from coverable.errors import counted
 from feasibility.certification.surface_replay import less_deviations
 from feasibility.checking import check
 from feasibility.clock import Clock
-from feasibility.search import Search
+from feasibility.search_settings import Search
 from feasibility.task import Task
 from feasibility.treated.area import TreatedArea, treated_by_passes
 from feasibility.verdict import Verdict, Walk
 from robots.robot import Robot
-from surfaces.passes.directions import ranked_directions
 from surfaces.passes.parallel import Passes
-from surfaces.passes.stretches import Pass
+from surfaces.passes.pass_directions import ranked_directions
+from surfaces.passes.pass_stretches import Pass
 from surfaces.passes.toolpath import PassPlaces, PassRoute, pass_route
 from surfaces.passes.ways import ToolWay
 from surfaces.surface import Surface

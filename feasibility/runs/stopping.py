@@ -7,9 +7,17 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.arrays import Array
-from feasibility.collisions.bodies import Pair
+from feasibility.collisions.problem_bodies import Pair
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.motions.arrays import COLLISION, CONE, FOLD, LIMIT, LONG, ROLL, SINGULAR
+from feasibility.roadmap.motions.search_arrays import (
+    COLLISION,
+    CONE,
+    FOLD,
+    LIMIT,
+    LONG,
+    ROLL,
+    SINGULAR,
+)
 from feasibility.roadmap.motions.tracking import track
 from feasibility.speed.motion_rates import motion_rates
 from feasibility.task import Task

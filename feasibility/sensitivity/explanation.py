@@ -14,11 +14,11 @@ from feasibility.clock import Clock, OutOfTime
 from feasibility.demands import refuse_start
 from feasibility.division.one_motion import motion_over
 from feasibility.division.surface_division import divide
-from feasibility.search import Progress, Search
-from feasibility.sensitivity.pairs import changes_together
+from feasibility.search_settings import Progress, Search
 from feasibility.sensitivity.probes import Prober
 from feasibility.sensitivity.quantities import Kind, Quantity, Variant, quantities
 from feasibility.sensitivity.thresholds import Dropped, Explanation, Threshold
+from feasibility.sensitivity.two_changes import changes_together
 from feasibility.speed.largest import rate_figures
 from feasibility.speed.requirements import check_requirements
 from feasibility.task import Task

@@ -20,7 +20,7 @@ from feasibility.cut_tree import CutTree
 from feasibility.found import Found
 from feasibility.problem import Problem
 from feasibility.roadmap.complete import complete_search
-from feasibility.search import Search
+from feasibility.search_settings import Search
 from feasibility.sensitivity.quantities import Kind, Quantity, Variant
 from feasibility.sensitivity.thresholds import Finding, Threshold
 from feasibility.verdict import Answer, Certificate, Evidence, Verdict, Walk

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from coverable.errors import ArgumentError, Fault
-from feasibility.search import Search
+from feasibility.search_settings import Search
 from feasibility.task import Task
 from robots.robot import Robot
 

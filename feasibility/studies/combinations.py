@@ -17,7 +17,6 @@ from feasibility.cases.robot_table import in_robot_table
 from feasibility.cases.surface_reading import faults_of_building, read_surface
 from feasibility.cases.table_reader import CaseError
 from feasibility.cases.toml import as_read, parse_toml
-from feasibility.studies.axes import POSES, Key, Variation
 from feasibility.studies.built_cases import (
     arm_of,
     case_of,
@@ -27,6 +26,7 @@ from feasibility.studies.built_cases import (
 )
 from feasibility.studies.pool import Tables
 from feasibility.studies.run import StudyTask
+from feasibility.studies.varied_keys import POSES, Key, Variation
 
 ORIGIN = (0.0, 0.0, 0.0)
 POSED = [[key] for key in POSES]

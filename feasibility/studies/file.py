@@ -32,10 +32,10 @@ from feasibility.cases.case import TABLES, load_case, read_document
 from feasibility.cases.table_reader import CaseError, Section
 from feasibility.cases.toml import TomlError, as_read, make_absolute, parse_toml, toml_key
 from feasibility.safe_files import shown_path
-from feasibility.studies.axes import Range, Variation, VariedKey, read_variation
 from feasibility.studies.combinations import cause_of, faults_of, put, tasks_of
 from feasibility.studies.pool import Tables
 from feasibility.studies.run import StudyTask
+from feasibility.studies.varied_keys import Range, Variation, VariedKey, read_variation
 
 MOST_TASKS = 1_000_000
 MOST_ALIKE = 3  # values of one key, wrong for the same cause, that are reported one by one

@@ -12,13 +12,13 @@ from feasibility.cases.collision_table import CollisionPart
 from feasibility.cases.robot_table import is_urdf
 from feasibility.cases.table_reader import CaseError, absolute
 from feasibility.cases.toml import as_read
-from feasibility.search import Progress
-from feasibility.studies.axes import Key
+from feasibility.search_settings import Progress
 from feasibility.studies.built_cases import arm_of, case_of
 from feasibility.studies.combinations import case_with
-from feasibility.studies.outcome import finite, merit
 from feasibility.studies.pool import Tables, Workers
 from feasibility.studies.run import StudyTask, run_tasks
+from feasibility.studies.study_outcome import finite, merit
+from feasibility.studies.varied_keys import Key
 
 if TYPE_CHECKING:
     from feasibility.studies.store import Store

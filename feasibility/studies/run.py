@@ -11,12 +11,12 @@ from functools import lru_cache, partial
 from typing import Any
 
 from coverable.files import FileFault, open_regular, stamps
-from feasibility.search import Progress
+from feasibility.search_settings import Progress
 from feasibility.studies.case_files import files_of
-from feasibility.studies.outcome import evaluate
 from feasibility.studies.pool import Reply, Tables, Work, Workers
 from feasibility.studies.store import Record, Status, Store
 from feasibility.studies.stored import outcome_fault
+from feasibility.studies.study_outcome import evaluate
 from feasibility.version import version
 
 LARGEST = 1 << 30  # bytes; no reader takes a file beyond it

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
-from feasibility.targets.directions import approach_curves
+from feasibility.targets.direction_cubics import approach_curves
 from feasibility.task import Task
 from surfaces.cells import Cells
 from surfaces.places.offset_surfaces import offset_surface

@@ -8,7 +8,7 @@ import numpy as np
 
 from coverable.arrays import Array, Ints
 from feasibility.roll import ALONG, projected
-from feasibility.targets.directions import DirectionCurves, fitted
+from feasibility.targets.direction_cubics import DirectionCurves, fitted
 from feasibility.targets.references import on_patches, reference_directions
 from feasibility.task import Task
 from surfaces.cells import Cells

@@ -21,14 +21,14 @@ from coverable.errors import real
 from feasibility.certification.collisions.collision_replay import collision_replay
 from feasibility.certification.motion_replay import replay
 from feasibility.collisions.asked_bodies import gather
-from feasibility.collisions.bodies import Bodies
+from feasibility.collisions.problem_bodies import Bodies
 from feasibility.collisions.words import checked
 from feasibility.paths.coverage import CoveragePath
 from feasibility.paths.order import PathError
 from feasibility.task import Task
 from feasibility.timing.limits_used import PLACES, held_inside, past_limits, used, used_each
 from feasibility.timing.sampled_trajectory import Trajectory
-from feasibility.timing.smoothing import Curve, blended, control_points
+from feasibility.timing.smooth_curve import Curve, blended, control_points
 from feasibility.timing.speed_limits import MotionLimits, motion_limits
 from feasibility.timing.timed_curve import CurveBounds, TimedCurve
 from feasibility.verdict import Walk

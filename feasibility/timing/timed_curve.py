@@ -15,7 +15,7 @@ import numpy as np
 from coverable.arrays import Array, Ints
 from feasibility.paths.order import PathError
 from feasibility.timing.fastest_speeds import Rows, fastest_speeds
-from feasibility.timing.smoothing import Curve, inside
+from feasibility.timing.smooth_curve import Curve, inside
 from feasibility.timing.speed_limits import MotionLimits, tool_speeds
 from robots.robot import Robot
 

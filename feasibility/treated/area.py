@@ -17,9 +17,9 @@ from surfaces.adjacency import components
 from surfaces.cells import Cells
 from surfaces.passes.tool_lines import ToolLines, visits
 from surfaces.passes.toolpath import PassPlaces
-from surfaces.passes.treated import Treated, treated_share
-from surfaces.passes.triangles import WorkingMesh
+from surfaces.passes.treated_share import Treated, treated_share
 from surfaces.passes.triangulation import working_mesh
+from surfaces.passes.welded_triangles import WorkingMesh
 from surfaces.surface import Surface
 from surfaces.toolpaths.pose_surface import PoseSurface
 
@@ -125,7 +125,7 @@ def _measured(
 ) -> TreatedArea:
     """The bracket: an ellipse holds the disc of its smaller axis, and lies in that of its larger.
 
-    The disc is a ball about each contact, see `surfaces.passes.treated`.
+    The disc is a ball about each contact, see `surfaces.passes.treated_share`.
     """
     inner, outer = 0.5 * min(footprint), 0.5 * max(footprint)
     mesh = _mesh_of(surface.wall or surface, FINE * inner)  # not a smoothed copy

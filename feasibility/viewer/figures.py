@@ -20,8 +20,8 @@ from feasibility.placement.placements import Placements
 from feasibility.placement.region import AXES
 from feasibility.verdict import Verdict
 from feasibility.viewer.cut_sides import COLOURS, LOST, sides_of
-from feasibility.viewer.scene import CENTRES, EDGES, MISSED, START, missed_groups
 from feasibility.viewer.threejs import Colour
+from feasibility.viewer.verdict_scene import CENTRES, EDGES, MISSED, START, missed_groups
 from robots.kinematics import Kinematics
 from surfaces.cells import Cells
 

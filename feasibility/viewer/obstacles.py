@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 
 from coverable.arrays import Array
-from feasibility.collisions.bodies import Bodies, Seat
+from feasibility.collisions.problem_bodies import Bodies, Seat
 from feasibility.collisions.scene import Obstacle
 from feasibility.collisions.shapes import HalfSpace
 from feasibility.collisions.words import TOOL
 from feasibility.viewer import threejs
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.meshes import CREASE, Mesh, as_mesh, moved, shaded, solid_mesh, thinned
-from feasibility.viewer.robot import joint_paths
-from feasibility.viewer.scene import Layer, hidden
+from feasibility.viewer.robot_visuals import joint_paths
 from feasibility.viewer.threejs import Colour, Command
+from feasibility.viewer.verdict_scene import Layer, hidden
 from robots.robot import Robot
 from robots.shapes.bodies import Polytope, Triangles
 

@@ -16,14 +16,14 @@ from coverable.arrays import Array
 from coverable.errors import counted
 from feasibility.treated.area import TreatedArea
 from feasibility.treated.words import share_words
-from feasibility.viewer import robot as robot_visuals
-from feasibility.viewer import threejs
-from feasibility.viewer.areas.treated import painted_layers
+from feasibility.viewer import robot_visuals, threejs
+from feasibility.viewer.areas.treated_map import painted_layers
 from feasibility.viewer.cell_meshes import cell_size
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.meshes import tubes
 from feasibility.viewer.playback import Playback, paced, timed
-from feasibility.viewer.scene import (
+from feasibility.viewer.threejs import Colour
+from feasibility.viewer.verdict_scene import (
     TRAIL,
     Layer,
     cells_layers,
@@ -32,7 +32,6 @@ from feasibility.viewer.scene import (
     missed_layer,
     patch_layers,
 )
-from feasibility.viewer.threejs import Colour
 from feasibility.viewer.viewer import View, compose, titled
 from robots.kinematics import Kinematics
 from robots.robot import Robot

@@ -14,7 +14,7 @@ from coverable.arrays import Array
 from coverable.errors import ArgumentError
 from feasibility.verdict import Verdict
 from feasibility.viewer import threejs
-from feasibility.viewer.robot import ROBOT, joint_paths, joint_placements
+from feasibility.viewer.robot_visuals import ROBOT, joint_paths, joint_placements
 from robots.kinematics import Kinematics
 from robots.robot import Robot
 

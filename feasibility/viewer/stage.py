@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from coverable.arrays import Array
-from feasibility.viewer import robot as robot_visuals
-from feasibility.viewer import threejs
+from feasibility.viewer import robot_visuals, threejs
 from feasibility.viewer.frames.standing_world import in_world
 from feasibility.viewer.frames.triads import triad
 from feasibility.viewer.html_page import Camera

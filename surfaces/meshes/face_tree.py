@@ -13,7 +13,7 @@ import numpy as np
 
 from coverable.arrays import Array, Ints
 from coverable.kernels import allocating_entry, entry, kernel
-from surfaces.meshes.closest_point import on_triangle
+from surfaces.meshes.closest_on_triangle import on_triangle
 
 LEAF = 2  # triangles in a leaf, at most
 SAME = 2e-14  # [1] of the largest coordinate: distances that differ by less are rounding

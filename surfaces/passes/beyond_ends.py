@@ -23,7 +23,7 @@ import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
 from surfaces.meshes.normals import corner_angles
-from surfaces.passes.triangles import WorkingMesh, border_edges
+from surfaces.passes.welded_triangles import WorkingMesh, border_edges
 
 FLAT = 1e-4  # [1] of a turn's square over the surface: less curvature than this is none
 SQUARE = 0.05  # [1] cosine up to which a border is square to the pass

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
-from surfaces.passes.triangles import WorkingMesh, twin_sides
+from surfaces.passes.welded_triangles import WorkingMesh, twin_sides
 
 IN_ONE_PLANE = 1e-6  # [1] of the edge: corners this far off the other face's plane are in it
 HAIR = 1e-9  # [rad] beyond pi, so that four corners on a circle are left alone

@@ -9,8 +9,14 @@ import numpy as np
 from coverable.arrays import Array, Ints, Mask
 from surfaces.adjacency import components
 from surfaces.passes.beyond_ends import FirstPass, carried_on, slopes
-from surfaces.passes.triangles import WorkingMesh, cut_at_middles, cut_edges, edges_of, twin_sides
 from surfaces.passes.unreached import Reached, exact_distances, reached, refuse_parts
+from surfaces.passes.welded_triangles import (
+    WorkingMesh,
+    cut_at_middles,
+    cut_edges,
+    edges_of,
+    twin_sides,
+)
 
 SNAP = 0.02  # [1] of an edge: a crossing nearer to its end is put there, or slivers would arise
 HALVINGS = 2  # of the edges along the first pass: distances are taken from their vertices

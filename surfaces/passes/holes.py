@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.arrays import Array, Ints
-from surfaces.passes.triangles import WorkingMesh, border_edges
+from surfaces.passes.welded_triangles import WorkingMesh, border_edges
 
 MOST_RINGS = 40
 HOLE = 0.5  # [1] of the longest border: a border shorter than this goes round a hole

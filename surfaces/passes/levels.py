@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
-from surfaces.passes.triangles import WorkingMesh
+from surfaces.passes.welded_triangles import WorkingMesh
 
 OFF_VERTICES = 1e-7  # [1] of the field's range by which a level is off all vertices' values
 

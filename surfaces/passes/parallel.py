@@ -15,9 +15,9 @@ from coverable.errors import ArgumentError, Checks, counted
 from surfaces.passes.first_pass import Field, distance_field, plane_field
 from surfaces.passes.holes import Lidded, with_lids
 from surfaces.passes.levels import Line, level_lines
-from surfaces.passes.stretches import LevelLine, Pass, in_order, stretch_of
-from surfaces.passes.triangles import WorkingMesh
+from surfaces.passes.pass_stretches import LevelLine, Pass, in_order, stretch_of
 from surfaces.passes.triangulation import WorkingCopy, working_copy, working_mesh
+from surfaces.passes.welded_triangles import WorkingMesh
 from surfaces.patches.patch import Patch
 from surfaces.surface import Surface
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
 from surfaces.passes.parallel import Passes
-from surfaces.passes.stretches import Pass
+from surfaces.passes.pass_stretches import Pass
 from surfaces.passes.ways import ToolWay, along_surface, beside, fitted
 from surfaces.surface import SurfaceError
 from surfaces.toolpaths.given import poses

@@ -21,7 +21,7 @@ from surfaces.adjacency import components
 from surfaces.meshes.mesh_surface import MeshSurface
 from surfaces.meshes.triangle_mesh import doubled_areas
 from surfaces.passes.edge_flips import delaunay
-from surfaces.passes.triangles import WorkingMesh, border_edges, cut_at_middles, edges_of
+from surfaces.passes.welded_triangles import WorkingMesh, border_edges, cut_at_middles, edges_of
 from surfaces.patches.patch import Patch
 from surfaces.piecewise.piecewise_surface import Piecewise
 from surfaces.surface import Surface, SurfaceError

@@ -15,7 +15,7 @@ import numpy as np
 from coverable.arrays import Array, Ints
 from coverable.errors import counted
 from surfaces.adjacency import components
-from surfaces.passes.triangles import WorkingMesh
+from surfaces.passes.welded_triangles import WorkingMesh
 from surfaces.surface import SurfaceError
 
 REMEDY = "measure between section planes (--by planes), which needs no way over the surface"

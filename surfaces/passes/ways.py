@@ -13,7 +13,7 @@ import numpy as np
 
 from coverable.arrays import Array
 from surfaces.passes.parallel import Passes
-from surfaces.passes.stretches import Pass
+from surfaces.passes.pass_stretches import Pass
 from surfaces.places.offset_surfaces import offset_surface
 from surfaces.surface import Surface
 from surfaces.toolpaths.arcs import arc_at

@@ -10,7 +10,7 @@ import numpy as np
 
 from coverable.arrays import Array, Mask, Protected
 from coverable.errors import Fault
-from surfaces.patches.closest_point import ClosestPointSearch, Jet
+from surfaces.patches.closest_on_patch import ClosestPointSearch, Jet
 from surfaces.patches.enclosures import Enclosure
 from surfaces.patches.slopes import Slope
 

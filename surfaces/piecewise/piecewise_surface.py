@@ -18,13 +18,13 @@ from surfaces.arguments import ORIGIN, Checks
 from surfaces.part_growth import Boxes, grown
 from surfaces.parts import MOST_PARTS, PartModels, SurfaceParts
 from surfaces.patches.patch import Patch
-from surfaces.piecewise.closest_point import PieceClosestPoints, nearest_places
+from surfaces.piecewise.closest_on_pieces import PieceClosestPoints, nearest_places
 from surfaces.piecewise.seams import Seam, on_each_other, sides_of, survey, turned_pieces
 from surfaces.surface import ClosestPoint, Side, Surface, SurfaceError, points_of
 
 if TYPE_CHECKING:
-    from surfaces.piecewise.cells import PieceCells
     from surfaces.piecewise.edges import Creases
+    from surfaces.piecewise.piece_cells import PieceCells
 
 
 GAP = 1e-4  # m, how far apart two borders may be that are one seam
@@ -166,7 +166,7 @@ class Piecewise(Surface):
         Raises:
             SurfaceError: that is not what the counts are.
         """
-        from surfaces.piecewise.cells import PieceCells
+        from surfaces.piecewise.piece_cells import PieceCells
 
         return PieceCells.cut(self, counts)
 

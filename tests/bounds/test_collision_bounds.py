@@ -13,9 +13,9 @@ from random_arms import robot_of
 
 from coverable import Obstacle, load_robot, sphere
 from feasibility.certification.collisions.collision_replay import Couples, collision_replay
+from feasibility.certification.collisions.judged_shapes import Body
 from feasibility.certification.collisions.motion import ArmMotion
-from feasibility.certification.collisions.shapes import Body
-from feasibility.collisions.bodies import Soup
+from feasibility.collisions.problem_bodies import Soup
 from robots.kinematics import Kinematics
 from robots.shapes.bodies import Solid
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from coverable import Obstacle
 from coverable.errors import ArgumentError
 from feasibility.certification.collisions.collision_replay import collision_replay
-from feasibility.collisions.bodies import Soup
+from feasibility.collisions.problem_bodies import Soup
 from robots.shapes.bodies import Solid, Triangles
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 

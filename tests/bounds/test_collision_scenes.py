@@ -15,7 +15,7 @@ from coverable import Collision, Obstacle, Task, ToolShape, check, load_robot, p
 from feasibility.certification.collisions.collision_replay import collision_replay
 from feasibility.certification.collisions.nearest import nearest_along
 from feasibility.collisions.asked_bodies import gather
-from feasibility.collisions.bodies import Pair, Soup
+from feasibility.collisions.problem_bodies import Pair, Soup
 from feasibility.collisions.shapes import HalfSpace
 from robots.kinematics import Kinematics
 from robots.shapes.links import link_shapes

@@ -23,10 +23,10 @@ from feasibility.certification.lever_bounds import (
     second_derivatives,
     stretched_length,
 )
-from feasibility.certification.order import order_of_marks, order_of_places
 from feasibility.certification.refusals import exact_faults, limits
 from feasibility.certification.stretches import Judge
 from feasibility.certification.surface_replay import less_deviations
+from feasibility.certification.toolpath_order import order_of_marks, order_of_places
 from feasibility.task import Targets
 from feasibility.verdict import Walk
 from robots.kinematics import Kinematics

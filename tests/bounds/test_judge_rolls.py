@@ -19,8 +19,8 @@ from feasibility.certification.rolls.bounds import (
     products_of_changes,
     vectors_of,
 )
-from feasibility.certification.rolls.box_models import Directions, reference_parts
 from feasibility.certification.rolls.held import Held
+from feasibility.certification.rolls.roll_box_models import Directions, reference_parts
 from feasibility.certification.surface_replay import replay_over_surface
 from feasibility.roll import Roll
 from feasibility.targets.references import u_directions

@@ -7,8 +7,8 @@ from referee import unit
 from coverable import Task, load_robot, sphere
 from feasibility.certification.cut_proofs import linear_models
 from feasibility.certification.cut_proofs.linear_models import Allowed, ArmModel, target_parts
-from feasibility.certification.rolls import box_models
-from feasibility.certification.rolls.box_models import Directions, reference_parts, roll_models
+from feasibility.certification.rolls import roll_box_models
+from feasibility.certification.rolls.roll_box_models import Directions, reference_parts, roll_models
 from feasibility.roll import Roll, projected
 from robots.kinematics import Kinematics, reference_axes
 
@@ -23,7 +23,7 @@ def tool_model(q, half):
     turning = Kinematics(UR5).twists(q[None]).transpose(0, 2, 1)[..., 3:]
     second = half @ (half + 2.0 * (np.cumsum(half) - half))
     many = np.full((1, 2), second), np.full((1, 2), min(half.sum(), 2.0))
-    return box_models.ToolModel(both, np.cross(turning[:, :, None], both[:, None]), *many)
+    return roll_box_models.ToolModel(both, np.cross(turning[:, :, None], both[:, None]), *many)
 
 
 def test_models_of_the_roll_hold_over_their_boxes():
@@ -38,7 +38,7 @@ def test_models_of_the_roll_hold_over_their_boxes():
         model = Directions(b[None], slopes, radius)
         held = reference_parts(model, Directions.fixed(r, 1))
         q = rng.uniform(-2, 2, UR5.n)
-        target = box_models.TargetModel(
+        target = roll_box_models.TargetModel(
             np.stack([b, held.centre[0]])[None], np.stack([slopes, held.slopes], axis=2),
             np.ones((1, 2)), np.array([[radius[0], held.radius[0]]]),
         )  # fmt: skip
@@ -107,9 +107,9 @@ def test_radii_are_those_of_the_lemma():
         x = unit(rng.normal(size=3))
         y, columns = unit(np.cross(x, rng.normal(size=3))), 0.3 * rng.normal(size=(1, 6, 2, 3))
         second, moves = rng.uniform(0.0, 0.1, (2, 1, 2))
-        tool = box_models.ToolModel(np.stack([x, y])[None], columns, second, moves)
+        tool = roll_box_models.ToolModel(np.stack([x, y])[None], columns, second, moves)
         values, both = np.stack([b, t])[None], np.stack([slopes, k], axis=1)[None]
-        target = box_models.TargetModel(values, both, half[None], np.array([[r_b, r_t]]))
+        target = roll_box_models.TargetModel(values, both, half[None], np.array([[r_b, r_t]]))
         roll = Roll(rng.uniform(-3, 3), rng.uniform(0.1, 1.5))
         found = roll_models(tool, target, roll)
         spans = [lengths(half[:, None] * one) for one in (slopes, k)]

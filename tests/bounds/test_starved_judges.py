@@ -23,10 +23,10 @@ from feasibility.certification.jacobians import jacobians
 from feasibility.certification.rates.rate_replay import in_place
 from feasibility.certification.rates.segment_rates import segment_rates
 from feasibility.certification.rolls.bounds import largest_off
-from feasibility.certification.rolls.box_models import TargetModel, ToolModel, roll_models
+from feasibility.certification.rolls.roll_box_models import TargetModel, ToolModel, roll_models
 from feasibility.certification.stretches import Judge
 from feasibility.certification.surface_replay import replay_over_surface
-from feasibility.collisions.bodies import Soup
+from feasibility.collisions.problem_bodies import Soup
 from feasibility.roll import Roll
 from feasibility.treated.area import treated_by_walk
 from feasibility.verdict import Walk

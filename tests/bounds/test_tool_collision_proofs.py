@@ -18,7 +18,7 @@ from coverable import CauseKind, Collision, Evidence, Obstacle, Task, ToolShape,
 from feasibility.certification.cut_proofs.proof_verification import verify_proof
 from feasibility.certification.overlaps.depths import depths, planes_around, points_inside
 from feasibility.certification.overlaps.every_pose import never_clear
-from feasibility.collisions.bodies import Bodies, Pair
+from feasibility.collisions.problem_bodies import Bodies, Pair
 from feasibility.collisions.shapes import HalfSpace
 from feasibility.cut_tree import CutTree, Leaf
 from robots.shapes.bodies import Solid, Triangles

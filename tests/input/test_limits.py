@@ -19,7 +19,7 @@ from samples import sampled
 
 from coverable import load_case, load_robot, load_study
 from coverable.errors import CoverableError
-from feasibility.viewer.robot import draw
+from feasibility.viewer.robot_visuals import draw
 from robots.shapes.links import link_shapes
 from surfaces.meshes.sources import read_mesh
 

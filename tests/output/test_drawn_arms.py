@@ -16,7 +16,7 @@ from coverable import load_robot
 from coverable.meshes import robot_files
 from coverable.meshes.raw_mesh import MeshError
 from coverable.meshes.robot_files import MeshFiles
-from feasibility.viewer.robot import TRIANGLES, draw, joint_paths
+from feasibility.viewer.robot_visuals import TRIANGLES, draw, joint_paths
 from feasibility.viewer.threejs import safe_name
 from robots.urdf.checked_urdf import check_urdf
 

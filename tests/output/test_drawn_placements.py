@@ -13,8 +13,8 @@ from coverable import Answer, Evidence, Pose, cylinder, load_robot, plane, spher
 from feasibility.placement.trials import Trial
 from feasibility.studies.run import Row
 from feasibility.studies.stored import bits_of
-from feasibility.viewer import poses as pose_layers
-from feasibility.viewer.poses import Class, class_of_row, class_of_share, outline
+from feasibility.viewer import pose_outlines as pose_layers
+from feasibility.viewer.pose_outlines import Class, class_of_row, class_of_share, outline
 from feasibility.viewer.threejs import hex_colour
 
 PLATE = plane((-0.15, 0.15), (-0.1, 0.1), position=(0.5, 0, 0.2), side="outside")

@@ -14,7 +14,7 @@ from page_outline import faces_of, points_of
 import coverable
 from coverable import Task, check, load_result, load_robot, mesh, plot_sides, sphere, view
 from feasibility.viewer import cell_meshes as cell_shapes
-from feasibility.viewer import scene
+from feasibility.viewer import verdict_scene
 from feasibility.viewer.cell_meshes import make_display_mesh
 from feasibility.viewer.cut_sides import sides_of
 from feasibility.viewer.figures import plot_causes, plot_graph
@@ -90,7 +90,7 @@ def test_a_fine_mesh_is_thinned_and_its_cells_keep_their_areas():
 def test_edges_run_from_target_to_target_at_the_standoff(kind, request):
     verdict = request.getfixturevalue(kind)
     cells = verdict.cells
-    lines, points = scene.edge_lines(verdict), verdict.task.targets(cells).points
+    lines, points = verdict_scene.edge_lines(verdict), verdict.task.targets(cells).points
     assert len(lines) == verdict.graph.number_of_edges() > 20
     rows = {tuple(pair): k for k, pair in enumerate(cells.pairs.tolist())}
     for pair, line in zip(verdict.graph.edges, lines, strict=True):
@@ -125,7 +125,7 @@ def test_the_two_sides_of_a_cut_are_drawn_and_named(commands):
     commands.run("check", "cut")
     verdict = load_result(commands.folder / "cut.result").verdict
     sides, root = sides_of(verdict), verdict.proof.root
-    parts = {layer.entry.label: layer for layer in scene.layers(verdict)}
+    parts = {layer.entry.label: layer for layer in verdict_scene.layers(verdict)}
     for k, name in enumerate(sides.names):
         own = set(np.flatnonzero(sides.labels == k).tolist())
         if own:
@@ -165,4 +165,4 @@ def test_the_flat_graph_and_causes_show_every_cell_once(kind, request):
     assert sum(boxes.values()) == len(cells)
     for kind in coverable.CauseKind:
         own = sum(cause.kind == kind for cause in verdict.causes)
-        assert boxes[to_rgb(scene.CAUSES[kind])] == own
+        assert boxes[to_rgb(verdict_scene.CAUSES[kind])] == own

@@ -16,7 +16,7 @@ from timed_motions import TURN, UR5, motion
 
 from coverable import ProgramSettings, save_program
 from feasibility.programs import listings
-from feasibility.programs.axes import ProgramError, check_program
+from feasibility.programs.controller_axes import ProgramError, check_program
 from feasibility.programs.controllers import language_of
 from robots.kinematics import Kinematics
 

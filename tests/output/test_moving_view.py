@@ -19,7 +19,7 @@ from coverable import Axis, Collision, Obstacle, check, load_case, load_robot, p
 from feasibility.viewer import playback as motion
 from feasibility.viewer.frames.standing_world import GROUP
 from feasibility.viewer.live_server import LiveView
-from feasibility.viewer.robot import joint_paths
+from feasibility.viewer.robot_visuals import joint_paths
 from feasibility.viewer.viewer import compose, show
 from robots.kinematics import Kinematics
 

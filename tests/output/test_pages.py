@@ -15,7 +15,7 @@ from feasibility.reports import comparison, explanation, study
 from feasibility.studies.robot_comparison import Arm
 from feasibility.studies.run import Row
 from feasibility.version import version
-from feasibility.viewer.robot import joint_paths
+from feasibility.viewer.robot_visuals import joint_paths
 
 PAGES = [(command, name) for command, name in COMMANDS if "--html" in TABLE[command][name]]
 ALIKE = ("path", "infeasible"), ("check", "no motion to write")  # as within that of `explain`

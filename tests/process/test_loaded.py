@@ -14,7 +14,7 @@ UNUSED = (
     "feasibility.roadmap.causes.", "feasibility.roadmap.cuts.", "feasibility.roadmap.forward.",
     "feasibility.roadmap.branch_and_bound.branching", "feasibility.targets.frames",
     "feasibility.roadmap.rounds", "feasibility.roadmap.proving",
-    "feasibility.certification.order", "robots.urdf.axes",
+    "feasibility.certification.toolpath_order", "robots.urdf.axes",
     "robots.urdf.expansion.", "surfaces.step_files.", "surfaces.toolpaths.",
     "feasibility.paper.", "feasibility.viewer", "feasibility.paths", "feasibility.cli.path",
 )  # fmt: skip

@@ -8,8 +8,8 @@ import trimesh
 
 from coverable import RobotError, load_robot
 from robots.shapes.bodies import Polytope, Solid
+from robots.shapes.link_pairs import link_pairs
 from robots.shapes.links import link_shapes, outer_bodies
-from robots.shapes.pairs import link_pairs
 from robots.shapes.solids import checked_triangles
 from robots.shapes.tool import tool_reach
 from robots.urdf.link_shapes import Sphere

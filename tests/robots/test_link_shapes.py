@@ -20,8 +20,8 @@ from scipy.spatial import ConvexHull
 from coverable import Obstacle, RobotError, list_robots, load_robot
 from robots.kinematics import Kinematics
 from robots.shapes.bodies import Triangles
+from robots.shapes.link_pairs import link_pairs
 from robots.shapes.links import link_shapes
-from robots.shapes.pairs import link_pairs
 from robots.shapes.sampling import PairSampling, random_configurations, with_crude_links_cut
 from robots.shapes.solids import checked_triangles, solid_faces
 from robots.urdf.checked_urdf import check_urdf

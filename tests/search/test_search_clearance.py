@@ -15,7 +15,6 @@ from search_kernels import Clearance
 from coverable import Collision, Obstacle, Robot, load_robot, sphere
 from coverable.kernels import entry
 from feasibility.collisions.asked_bodies import gather
-from feasibility.collisions.bodies import Bodies, Pair, Soup
 from feasibility.collisions.kernels import link_frames
 from feasibility.collisions.kernels.box_tree import box_tree, moved
 from feasibility.collisions.kernels.tables import (
@@ -30,6 +29,7 @@ from feasibility.collisions.kernels.tables import (
     row,
     views,
 )
+from feasibility.collisions.problem_bodies import Bodies, Pair, Soup
 from robots.shapes.bodies import Polytope
 
 LENGTH, RADIUS = 0.3, 0.03  # m, of each link, a capsule along x

@@ -8,9 +8,9 @@ from mesh_patches import grid, panel_with_hole
 
 from coverable import cylinder, plane
 from surfaces.passes.tool_lines import ToolLines, visits
-from surfaces.passes.treated import treated_share
-from surfaces.passes.triangles import WorkingMesh
+from surfaces.passes.treated_share import treated_share
 from surfaces.passes.triangulation import working_mesh
+from surfaces.passes.welded_triangles import WorkingMesh
 
 
 def facing(mesh: WorkingMesh) -> np.ndarray:

@@ -20,7 +20,7 @@ from feasibility.collisions.asked_bodies import gather
 from feasibility.timing.fastest_speeds import Rows, fastest_speeds
 from feasibility.timing.limits_used import used
 from feasibility.timing.path_timing import within_limits
-from feasibility.timing.smoothing import control_points
+from feasibility.timing.smooth_curve import control_points
 from feasibility.verdict import Walk
 from robots.kinematics import Kinematics
 

@@ -14,11 +14,11 @@ import numpy as np
 
 from coverable.arrays import Array
 from coverable.errors import ArgumentError
+from feasibility.certification.collisions.judged_shapes import Body, body_of_soup
 from feasibility.certification.collisions.motion import ArmMotion, Chords
 from feasibility.certification.collisions.pairing import ROUNDING, Pairing
-from feasibility.certification.collisions.shapes import Body, body_of_soup
 from feasibility.certification.faults import Judged, MotionFault
-from feasibility.collisions.bodies import Bodies, Pair
+from feasibility.collisions.problem_bodies import Bodies, Pair
 from feasibility.verdict import Certificate
 from robots.robot import Robot
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from coverable.arrays import Array
-from feasibility.certification.collisions.shapes import Body
+from feasibility.certification.collisions.judged_shapes import Body
 from robots.shapes.bodies import Triangles
 
 

@@ -17,7 +17,7 @@ from coverable.arrays import Array, Mask
 from feasibility.certification.collisions.collision_replay import couples_of
 from feasibility.certification.collisions.motion import ArmMotion
 from feasibility.certification.collisions.pairing import Pairing
-from feasibility.collisions.bodies import Bodies
+from feasibility.collisions.problem_bodies import Bodies
 from robots.robot import Robot
 
 Names = tuple[str, str]

@@ -29,8 +29,8 @@ import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.collisions.inside import one_inside_other
+from feasibility.certification.collisions.judged_shapes import COAL, Body
 from feasibility.certification.collisions.motion import ArmMotion
-from feasibility.certification.collisions.shapes import COAL, Body
 
 ROUNDING = 1e-9  # [m] of placements, and what keeps distances from vanishing
 ENOUGH = 0.82  # [1] share of the least distance met, that will do where less is needed

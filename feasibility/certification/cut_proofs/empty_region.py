@@ -27,6 +27,7 @@ from feasibility.certification.cut_proofs.box_exclusion import (
     nearest,
     separated,
 )
+from feasibility.certification.cut_proofs.cut_region import JointRegion
 from feasibility.certification.cut_proofs.linear_models import (
     Allowed,
     ArmModel,
@@ -35,7 +36,6 @@ from feasibility.certification.cut_proofs.linear_models import (
     Parts,
 )
 from feasibility.certification.cut_proofs.refutation import Refuter
-from feasibility.certification.cut_proofs.region import JointRegion
 from feasibility.certification.overlaps.everywhere import Overlapping
 
 BATCH = 2048  # boxes at a time

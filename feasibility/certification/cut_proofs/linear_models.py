@@ -25,7 +25,7 @@ import numpy as np
 from coverable.arrays import Array, Ints
 from feasibility.certification.jacobians import Jacobians, cross, jacobians, lengths
 from feasibility.certification.lever_bounds import lever_bounds, longest_levers
-from feasibility.certification.rolls.box_models import (
+from feasibility.certification.rolls.roll_box_models import (
     Directions,
     TargetModel,
     ToolModel,

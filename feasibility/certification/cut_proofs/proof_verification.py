@@ -27,6 +27,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from feasibility.certification.cut_proofs.cut_region import TURN, JointRegion
 from feasibility.certification.cut_proofs.empty_region import Claim, Emptiness, Outcome
 from feasibility.certification.cut_proofs.linear_models import (
     Allowed,
@@ -37,7 +38,6 @@ from feasibility.certification.cut_proofs.linear_models import (
 )
 from feasibility.certification.cut_proofs.parts_agreement import disagreement
 from feasibility.certification.cut_proofs.refutation import Refuter
-from feasibility.certification.cut_proofs.region import TURN, JointRegion
 from feasibility.certification.cut_proofs.tree_shape import malformed
 from feasibility.certification.lever_bounds import out_of_line, stretched_length
 from feasibility.certification.overlaps.every_pose import PoseCheck, never_clear

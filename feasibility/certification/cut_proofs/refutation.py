@@ -12,8 +12,8 @@ import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.cells_reached import at_targets
+from feasibility.certification.cut_proofs.cut_region import JointRegion
 from feasibility.certification.cut_proofs.linear_models import derivatives
-from feasibility.certification.cut_proofs.region import JointRegion
 from feasibility.certification.stretches import Judge, Samples
 from feasibility.task import Task
 from robots.kinematics import Kinematics

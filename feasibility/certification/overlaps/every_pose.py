@@ -22,7 +22,7 @@ import pinocchio as pin
 
 from coverable.arrays import Array, Mask
 from feasibility.certification.overlaps.tool_pairs import ToolPair, tool_pairs
-from feasibility.collisions.bodies import Bodies
+from feasibility.collisions.problem_bodies import Bodies
 from robots.robot import Robot
 
 MOST_BOXES = 100_000

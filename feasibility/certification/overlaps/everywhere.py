@@ -24,7 +24,7 @@ from coverable.arrays import Array, Ints
 from feasibility.certification.collisions.collision_replay import collision_replay
 from feasibility.certification.overlaps.depths import Balls, depths, points_inside
 from feasibility.certification.rows import Rows
-from feasibility.collisions.bodies import Bodies
+from feasibility.collisions.problem_bodies import Bodies
 from robots.kinematics import Kinematics
 from robots.robot import Robot
 from robots.shapes.bodies import Triangles

@@ -14,7 +14,7 @@ import numpy as np
 
 from coverable.arrays import Array
 from feasibility.certification.overlaps.depths import Balls, depths, points_inside
-from feasibility.collisions.bodies import Bodies, Pair
+from feasibility.collisions.problem_bodies import Bodies, Pair
 from feasibility.collisions.scene import Obstacle
 from robots.robot import Robot
 from robots.shapes.bodies import Solid, Triangles

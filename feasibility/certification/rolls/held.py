@@ -24,7 +24,7 @@ from feasibility.certification.rolls.bounds import (
     roll_vectors,
     vectors_of,
 )
-from feasibility.certification.rolls.box_models import Directions, reference_parts
+from feasibility.certification.rolls.roll_box_models import Directions, reference_parts
 from feasibility.roll import Roll, projected
 from feasibility.task import Task
 from surfaces.cells import Cells

@@ -6,7 +6,7 @@ import numpy as np
 
 from coverable.kernels import entry
 from feasibility.collisions.kernels import tables as T
-from feasibility.collisions.kernels.calls import PUSH, SEGMENT, call
+from feasibility.collisions.kernels.kernel_calls import PUSH, SEGMENT, call
 from feasibility.collisions.kernels.tables import row
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from coverable.kernels import kernel
 from feasibility.collisions.kernels import tables as T
-from feasibility.collisions.kernels.inside import inside_tree
+from feasibility.collisions.kernels.inside_mesh import inside_tree
 from feasibility.collisions.kernels.link_frames import pose_of, transformed
 from feasibility.collisions.kernels.separation import BEST, MOST_TURNS, remember, separation
 from feasibility.collisions.kernels.tree_distances import of_tree

@@ -11,7 +11,7 @@ from numba.core import event
 
 from coverable.arrays import Array
 from coverable.kernels import callback, kernel
-from feasibility.collisions.kernels.calls import MEASURE, PUSH
+from feasibility.collisions.kernels.kernel_calls import MEASURE, PUSH
 from feasibility.collisions.kernels.measuring import measure
 from feasibility.collisions.kernels.push import push
 from feasibility.collisions.kernels.segments import segment_holds_clear

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from coverable.arrays import Array
-from feasibility.collisions.bodies import Bodies
 from feasibility.collisions.kernels import tables as T
-from feasibility.collisions.kernels.calls import MEASURE, call
 from feasibility.collisions.kernels.function import with_address
+from feasibility.collisions.kernels.kernel_calls import MEASURE, call
 from feasibility.collisions.kernels.packing import packed
 from feasibility.collisions.kernels.tables import views
+from feasibility.collisions.problem_bodies import Bodies
 from robots.robot import Robot
 
 

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from feasibility.collisions.bodies import Bodies, Soup
 from feasibility.collisions.kernels import tables as T
 from feasibility.collisions.kernels.box_tree import BoxTree, box_tree, moved
 from feasibility.collisions.kernels.tables import Array, Tables, flat, views
+from feasibility.collisions.problem_bodies import Bodies, Soup
 from feasibility.collisions.words import SURFACE
 from robots.chain import joint_alignments
 from robots.robot import Robot

@@ -17,7 +17,7 @@ import numpy as np
 
 from coverable.kernels import kernel
 from feasibility.roadmap.branch_and_bound.box_bounds import contract
-from feasibility.roadmap.motions.roll import TURN, level, roll_gradient
+from feasibility.roadmap.motions.roll_kernels import TURN, level, roll_gradient
 
 ROUNDING = 1e-10  # [rad]
 FLATTEST = 0.1  # [1] 1 + cos of a tilt beyond which roll is not looked at

@@ -9,8 +9,8 @@ import numpy as np
 
 from coverable.arrays import Array
 from feasibility.certification.cut_proofs.arm_collisions import ArmCheck
-from feasibility.collisions.bodies import Pair
 from feasibility.collisions.kernels.memory import configuration_bounds
+from feasibility.collisions.problem_bodies import Pair
 from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions.off_target import project_near_cell

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from feasibility.collisions.bodies import Pair
+from feasibility.collisions.problem_bodies import Pair
 from feasibility.cut_tree import CutTree
 from feasibility.cut_words import nowhere
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import Blocked
-from feasibility.roadmap.motions.arrays import COLLISION, CONE, FOLD, LIMIT, LONG, ROLL, SINGULAR
+from feasibility.roadmap.motions.search_arrays import (
+    COLLISION,
+    CONE,
+    FOLD,
+    LIMIT,
+    LONG,
+    ROLL,
+    SINGULAR,
+)
 from feasibility.verdict import Cause, CauseKind
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
 from coverable.kernels import entry, kernel
-from feasibility.roadmap.motions.roll import roll_off_middle
+from feasibility.roadmap.motions.roll_kernels import roll_off_middle
 from robots.chain import frames
 
 HERE, NEXT = np.int64(0), np.int64(1)  # slots of `Work`: where the arm is, where it tries to go

@@ -8,8 +8,8 @@ import numpy as np
 
 from feasibility.verdict import Verdict
 from feasibility.viewer.cell_meshes import cell_size, marks
-from feasibility.viewer.scene import Layer, hidden, lines_layer, mesh_layer
 from feasibility.viewer.threejs import Colour
+from feasibility.viewer.verdict_scene import Layer, hidden, lines_layer, mesh_layer
 from robots.kinematics import Kinematics
 
 BANDS: tuple[tuple[float, Colour], ...] = (

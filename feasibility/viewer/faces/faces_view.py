@@ -12,8 +12,8 @@ from feasibility.viewer.frames.triads import triad
 from feasibility.viewer.html_page import Entry, Legend, page
 from feasibility.viewer.meshes import GREY, tubes
 from feasibility.viewer.passes.digits import digit_lines
-from feasibility.viewer.scene import OUTLINES
 from feasibility.viewer.stage import framing
+from feasibility.viewer.verdict_scene import OUTLINES
 from surfaces.step_files.step_surface import StepFace, StepParts
 
 MOST_LINES = 40  # of the legend, the largest faces

@@ -7,7 +7,7 @@ import numpy as np
 from coverable.arrays import Array
 from feasibility.viewer import threejs
 from feasibility.viewer.meshes import tubes
-from feasibility.viewer.robot import SKELETON, joint_paths
+from feasibility.viewer.robot_visuals import SKELETON, joint_paths
 from robots.robot import Robot
 from robots.shapes.tool import tool_line
 

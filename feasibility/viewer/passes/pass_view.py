@@ -19,15 +19,15 @@ from feasibility.timing.sampled_trajectory import Trajectory
 from feasibility.timing.speed_limits import MotionLimits
 from feasibility.treated.area import TreatedArea
 from feasibility.treated.words import share_words
-from feasibility.viewer import robot as robot_visuals
-from feasibility.viewer.areas.treated import painted_layers, surface_layer
+from feasibility.viewer import robot_visuals
+from feasibility.viewer.areas.treated_map import painted_layers, surface_layer
 from feasibility.viewer.passes.digits import GAP, WIDTH, digit_lines
 from feasibility.viewer.path_and_division import painting, trail_pieces
 from feasibility.viewer.playback import Playback, paced, timed
-from feasibility.viewer.scene import MISSED, OUTLINES, PATCHES, Layer, drawn_lines
+from feasibility.viewer.verdict_scene import MISSED, OUTLINES, PATCHES, Layer, drawn_lines
 from feasibility.viewer.viewer import View, compose, titled
 from robots.robot import Robot
-from surfaces.passes.stretches import Pass
+from surfaces.passes.pass_stretches import Pass
 from surfaces.passes.triangulation import working_mesh
 
 THIN = 0.03  # [1] of the distance between passes: radius of their lines

@@ -11,7 +11,7 @@ import numpy as np
 from coverable.arrays import Array, Ints, Mask, Protected
 from coverable.kernels import allocating, allocating_entry
 from surfaces.adjacency import Neighbours
-from surfaces.meshes.closest_point import on_triangle
+from surfaces.meshes.closest_on_triangle import on_triangle
 from surfaces.meshes.triangle_mesh import edge_partners, sum_by
 
 _INSIDE = 0.25  # of sqrt(area): as far from the border as this is well inside (a disc has 0.56)

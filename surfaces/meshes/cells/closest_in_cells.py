@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from coverable.kernels import allocating, allocating_entry, kernel
-from surfaces.meshes.closest_point import on_triangle
+from surfaces.meshes.closest_on_triangle import on_triangle
 from surfaces.meshes.face_tree import nearest_face
 
 

@@ -89,7 +89,7 @@ class SplinePatch(SmoothPatch):
         return self.net.spans.tangents_over(*turned)
 
     def local_closest_points(self, points: Array) -> LocalClosestPoints:
-        """By search; see `surfaces.patches.closest_point`."""
+        """By search; see `surfaces.patches.closest_on_patch`."""
         x = self.net.search.nearest(points)
         normal = self.net.normal(x)
         away = points - self.net.point(x)

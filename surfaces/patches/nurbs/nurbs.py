@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from coverable.arrays import Array, Protected
-from surfaces.patches.closest_point import ClosestPointSearch, Jet
+from surfaces.patches.closest_on_patch import ClosestPointSearch, Jet
 from surfaces.patches.enclosures import Enclosure
 from surfaces.patches.nurbs.spline_enclosures import SpanNets
 

@@ -5,7 +5,7 @@ from arm_urdfs import joint
 from random_arms import robot_of
 
 from coverable import Obstacle
-from feasibility.collisions.bodies import Bodies, Pair
+from feasibility.collisions.problem_bodies import Bodies, Pair
 from feasibility.collisions.shapes import HalfSpace
 from robots.shapes.bodies import Solid, Triangles
 from robots.urdf.link_shapes import Capsule

@@ -15,7 +15,7 @@ import coverable
 from coverable import Axis, Cells, Collision, Obstacle, Robot, Task, ToolShape, load_robot, plane
 from feasibility.certification.overlaps.every_pose import PoseCheck, never_clear
 from feasibility.collisions.asked_bodies import gather
-from feasibility.collisions.bodies import Bodies
+from feasibility.collisions.problem_bodies import Bodies
 from robots.kinematics import Kinematics
 from robots.shapes.bodies import Triangles
 from robots.shapes.solids import checked_triangles

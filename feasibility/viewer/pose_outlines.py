@@ -20,7 +20,8 @@ from feasibility.viewer import threejs
 from feasibility.viewer.cell_meshes import marks, patch
 from feasibility.viewer.meshes import tubes
 from feasibility.viewer.playback import Playback
-from feasibility.viewer.scene import (
+from feasibility.viewer.threejs import Colour
+from feasibility.viewer.verdict_scene import (
     MISSED,
     PATCHES,
     Layer,
@@ -30,7 +31,6 @@ from feasibility.viewer.scene import (
     mesh_layer,
     trail,
 )
-from feasibility.viewer.threejs import Colour
 from surfaces.adjacency import components
 from surfaces.cells import Cells, CellTriangles
 

@@ -12,9 +12,9 @@ from feasibility.treated.area import TreatedArea
 from feasibility.viewer import threejs
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.playback import Playback
-from feasibility.viewer.scene import SURFACE, Layer, mesh_layer
 from feasibility.viewer.threejs import Colour, Command
-from surfaces.passes.triangles import WorkingMesh
+from feasibility.viewer.verdict_scene import SURFACE, Layer, mesh_layer
+from surfaces.passes.welded_triangles import WorkingMesh
 
 UNTREATED: Colour = (0.84, 0.12, 0.12)
 TIMES: tuple[tuple[str, Colour], ...] = (  # a sequence that colour-blind readers can tell apart

@@ -17,11 +17,11 @@ from coverable.errors import ArgumentError, at_least, counted
 from feasibility.cases.case import Setup
 from feasibility.placement.region import Pose, moved_cells
 from feasibility.placement.trials import Trial
-from feasibility.search import Progress, Search
+from feasibility.search_settings import Progress, Search
 from feasibility.verdict import Evidence
-from feasibility.viewer import robot as robot_visuals
+from feasibility.viewer import robot_visuals
 from feasibility.viewer.playback import Playback, motion_of
-from feasibility.viewer.poses import (
+from feasibility.viewer.pose_outlines import (
     Class,
     Tried,
     best_layers,
@@ -32,8 +32,8 @@ from feasibility.viewer.poses import (
     placed,
     station_layers,
 )
-from feasibility.viewer.scene import Layer, cells_layers, hidden
 from feasibility.viewer.stage import framing, joint_points
+from feasibility.viewer.verdict_scene import Layer, cells_layers, hidden
 from feasibility.viewer.viewer import View, compose, titled
 from robots.robot import Robot
 
@@ -111,8 +111,8 @@ def view_study(
         ArgumentError: there are no rows, or not one for each task.
     """
     from feasibility.studies.built_cases import arm_of, case_of, cut_of
-    from feasibility.studies.outcome import merit
     from feasibility.studies.stored import cells_of
+    from feasibility.studies.study_outcome import merit
 
     if len(rows) == 0 or len(tasks) != len(rows):
         raise ArgumentError(f"expected a row for each task, got {len(rows)} for {len(tasks)} tasks")

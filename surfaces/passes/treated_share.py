@@ -21,7 +21,7 @@ import numpy as np
 from coverable.arrays import Array, Ints, Mask, Protected
 from surfaces.adjacency import components
 from surfaces.passes.tool_lines import ToolLines
-from surfaces.passes.triangles import WorkingMesh, cut_at_middles, edges_of, twin_sides
+from surfaces.passes.welded_triangles import WorkingMesh, cut_at_middles, edges_of, twin_sides
 
 ROUNDS = 3  # how often faces between treated and untreated are cut in four
 JUNG = 3.0**-0.5  # [1] of its longest edge: no place of a triangle is further from its middle

@@ -9,14 +9,14 @@ import numpy as np
 
 from coverable.arrays import Array
 from feasibility.certification.collisions.nearest import NearPair, nearest_along
-from feasibility.collisions.bodies import Bodies
+from feasibility.collisions.problem_bodies import Bodies
 from feasibility.viewer import threejs
 from feasibility.viewer.cell_meshes import marks
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.meshes import tubes
 from feasibility.viewer.playback import Playback, key_times
-from feasibility.viewer.scene import Layer
 from feasibility.viewer.threejs import Colour, Command
+from feasibility.viewer.verdict_scene import Layer
 from robots.robot import Robot
 
 ROOT = "/nearest pair"

@@ -27,7 +27,7 @@ def ranked_directions(surface: Surface, pitch: float) -> list[float]:
 
     Example:
         >>> from coverable import plane
-        >>> from surfaces.passes.directions import ranked_directions
+        >>> from surfaces.passes.pass_directions import ranked_directions
         >>> found = ranked_directions(plane((0, 0.6), (0, 0.2)), 0.03)
         >>> found[0]
         0.0

@@ -24,7 +24,7 @@ from surfaces.surface import Surface
 
 if TYPE_CHECKING:
     from feasibility.certification.collisions.collision_replay import CollisionReplay
-    from robots.shapes.pairs import LeftOut
+    from robots.shapes.link_pairs import LeftOut
 
 WIDTH = 100  # columns
 MARGINS = ("limit_deg", "limit_m", "cone_deg", "reach_m", "placement_m")

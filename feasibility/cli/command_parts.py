@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from feasibility.cli.console import Bar, print_err
 from feasibility.safe_files import FileError, check_writable, shown_path, write_whole
-from feasibility.search import Progress
+from feasibility.search_settings import Progress
 
 if TYPE_CHECKING:
     from feasibility.cases.case import Case, Setup

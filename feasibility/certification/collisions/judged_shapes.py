@@ -15,7 +15,7 @@ import numpy as np
 
 from coverable.arrays import Array
 from coverable.errors import ArgumentError
-from feasibility.collisions.bodies import Soup
+from feasibility.collisions.problem_bodies import Soup
 from feasibility.collisions.shapes import HalfSpace
 from robots.shapes.bodies import Triangles
 from robots.shapes.coal_shapes import coal_hull, coal_shape, with_contacts

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from coverable.arrays import Array
 from feasibility.collisions.scene import Obstacle
 from robots.shapes.bodies import Polytope, Solid
-from robots.shapes.pairs import LeftOut
+from robots.shapes.link_pairs import LeftOut
 
 if TYPE_CHECKING:
     from surfaces.sheet import Sheet

@@ -7,7 +7,7 @@ import numpy as np
 from coverable.arrays import Array, unit_along
 from feasibility.roadmap.branch_and_bound.boxes import toward_middle
 from feasibility.roadmap.branch_and_bound.branching import Places
-from feasibility.targets.parts import target_parts
+from feasibility.targets.target_parts import target_parts
 from feasibility.task import Task
 from surfaces.parts import SurfaceParts
 from surfaces.surface import Surface

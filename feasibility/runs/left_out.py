@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from coverable.arrays import Array, Mask
-from feasibility.collisions.bodies import Pair
+from feasibility.collisions.problem_bodies import Pair
 from feasibility.roadmap.causes.diagnosis import cause_of
 from feasibility.roadmap.exploration import Exploration
 from feasibility.runs.stopping import where_it_stops
