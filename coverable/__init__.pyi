@@ -64,7 +64,7 @@ from feasibility.timing.path_timing import trajectory as trajectory
 from feasibility.timing.sampled_trajectory import Trajectory as Trajectory
 from feasibility.timing.speed_limits import motion_limits as motion_limits
 from feasibility.treated.area import TreatedArea as TreatedArea
-from feasibility.treated.words import treated_words as treated_words
+from feasibility.treated.treated_words import treated_words as treated_words
 from feasibility.verdict import Answer as Answer
 from feasibility.verdict import Cause as Cause
 from feasibility.verdict import CauseKind as CauseKind

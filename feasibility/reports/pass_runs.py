@@ -21,7 +21,7 @@ from feasibility.runs.pass_runs import Interruption, PassRuns
 from feasibility.runs.planning import PlannedPasses
 from feasibility.timing.sampled_trajectory import Trajectory
 from feasibility.treated.area import TreatedArea
-from feasibility.treated.words import treated_json, treated_words
+from feasibility.treated.treated_words import treated_json, treated_words
 from feasibility.version import version
 from surfaces.passes.parallel import Passes
 

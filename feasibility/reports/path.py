@@ -31,7 +31,7 @@ from feasibility.timing.limits_used import used
 from feasibility.timing.sampled_trajectory import Trajectory
 from feasibility.timing.speed_limits import MotionLimits
 from feasibility.treated.area import TreatedArea
-from feasibility.treated.words import share_words, treated_json, treated_words
+from feasibility.treated.treated_words import share_words, treated_json, treated_words
 from feasibility.verdict import Verdict
 from feasibility.version import version
 from robots.robot import Robot

@@ -24,7 +24,7 @@ from feasibility.reports.text_and_tables import (
     summary,
     walk_csv,
 )
-from feasibility.treated.words import share_words, treated_json, treated_words
+from feasibility.treated.treated_words import share_words, treated_json, treated_words
 from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict, Walk
 from feasibility.version import version
 from surfaces.cells import Cells

@@ -20,7 +20,7 @@ from feasibility.reports.text_and_tables import (
     smooth_text,
     summary,
 )
-from feasibility.treated.words import treated_json, treated_words
+from feasibility.treated.treated_words import treated_json, treated_words
 from feasibility.verifying import NOT_IN_TIME, Verification
 from feasibility.version import version
 from surfaces.cells import Cells

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from feasibility.task import Task
-from feasibility.treated.words import share_words
+from feasibility.treated.treated_words import share_words
 from feasibility.verdict import Answer, Decision, Evidence
 
 if TYPE_CHECKING:

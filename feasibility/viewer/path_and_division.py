@@ -15,7 +15,7 @@ import numpy as np
 from coverable.arrays import Array
 from coverable.errors import counted
 from feasibility.treated.area import TreatedArea
-from feasibility.treated.words import share_words
+from feasibility.treated.treated_words import share_words
 from feasibility.viewer import robot_visuals, threejs
 from feasibility.viewer.areas.treated_map import painted_layers
 from feasibility.viewer.cell_meshes import cell_size

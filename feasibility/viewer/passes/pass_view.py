@@ -18,7 +18,7 @@ from feasibility.runs.planning import PlannedPasses
 from feasibility.timing.sampled_trajectory import Trajectory
 from feasibility.timing.speed_limits import MotionLimits
 from feasibility.treated.area import TreatedArea
-from feasibility.treated.words import share_words
+from feasibility.treated.treated_words import share_words
 from feasibility.viewer import robot_visuals
 from feasibility.viewer.areas.treated_map import painted_layers, surface_layer
 from feasibility.viewer.passes.digits import GAP, WIDTH, digit_lines
