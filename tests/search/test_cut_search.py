@@ -18,7 +18,7 @@ from feasibility.roadmap.branch_and_bound.branching import branch_and_bound
 from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.cuts.gaps import components_of
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.motions.search_arrays import arrays_of
+from feasibility.roadmap.motions.arrays import arrays_of
 from surfaces.meshes.triangle_mesh import TriangleMesh
 
 

@@ -11,7 +11,7 @@ from search_kernels import assert_walked
 from coverable import Search, Task, check, cylinder, plane, replay, sphere
 from coverable.arrays import unit_along
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.motions.search_arrays import arrays_of
+from feasibility.roadmap.motions.arrays import arrays_of
 from feasibility.roadmap.rounds import explore
 from feasibility.roadmap.search import close
 from feasibility.roadmap.walk import covering_walk
