@@ -23,12 +23,14 @@ def _public() -> dict[str, tuple[str, str]]:
     import ast
     from pathlib import Path
 
+    found: dict[str, tuple[str, str]] = {}
     for line in ast.parse(Path(__file__).with_suffix(".pyi").read_text("utf-8")).body:
         if isinstance(line, ast.ImportFrom):
-            _listed.update({name.name: (line.module or "", name.name) for name in line.names})
+            found |= {name.name: (line.module or "", name.name) for name in line.names}
         if isinstance(line, ast.Assign):  # by another name here
             module, _, there = ast.unparse(line.value).rpartition(".")
-            _listed[ast.unparse(line.targets[0])] = module, there
+            found[ast.unparse(line.targets[0])] = module, there
+    _listed.update(found)  # all at once: another thread may look meanwhile
     return _listed
 
 
