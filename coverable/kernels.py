@@ -1,21 +1,21 @@
 """Compiled functions, kept on disk for as long as no code of kernels changes.
 
-`entry` is for functions that Python calls, and `kernel` for those that only these call, and each
-other: called from Python, one runs as plain, slow Python. What makes arrays is `allocating_entry`
-or `allocating`: numba counts references to the arrays in a `NamedTuple`, which others do not need,
-whose callers hold what they are given; it refuses to compile one that should count. A division by
-zero gives inf or NaN, which no comparison in the search accepts: an exception would end it.
+`entry` is for functions that Python calls, and `kernel` for those that only these call: called
+from Python, one runs as plain, slow Python. What makes arrays is `allocating_entry` or
+`allocating`: numba counts references there, and refuses to compile what should count and does not.
+A division by zero gives inf or NaN, which no comparison in the search accepts.
 
-numba keeps what it has compiled until the file of that function changes. What the function calls,
-and the constants that it reads, may stand in other files; so kernels are kept here for as long as
-all of `CODE` is as it was. And they are machine code, so that whoever could change one could run
-anything: their folder is this user's alone, and nobody else can put another in its place.
+Kernels are kept while all of `CODE` is as it was, as what a function calls may stand elsewhere.
+Their folder bears its stamp: numba loads the classes that a kernel is given before it compares
+stamps, and fails where one has moved. And as they are machine code, their folder is this user's
+alone, and nobody else can put another in its place.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import shutil
 import stat
 from collections.abc import Callable
 from contextlib import suppress
@@ -38,6 +38,8 @@ CODE = (  # files of kernels, of all that they name, and of the named tuples tha
     "feasibility/roadmap/motions/*.py", "feasibility/timing/fastest_speeds.py",
     "feasibility/viewer/painter.py",
 )  # fmt: skip
+_FILES = (path for code in CODE for path in sorted(ROOT.glob(code)))
+_STAMP = hashlib.sha256(b"".join(path.read_bytes() for path in _FILES)).hexdigest()[:16]
 HOOK, _SETTINGS = "CACHE_LOCATOR_CLASSES", vars(config)  # of numba, from 0.62 on
 
 
@@ -48,12 +50,7 @@ def is_safe(found: os.stat_result, code: os.stat_result, user: int) -> bool:
     for a group that may write to the code too; or nobody may change what is another's, as in /tmp.
 
     Args:
-        found, code: owner and permissions of the folder, and of that of the code.
-        user: who runs it.
-
-    Example:
-        >>> is_safe(os.stat("/"), os.stat("/"), os.geteuid())
-        True
+        found, code, user: whose the folder is, and who may write; the code's likewise; who asks.
     """
     same_group = code.st_mode & stat.S_IWGRP and found.st_gid == code.st_gid
     others = stat.S_IWOTH if same_group else stat.S_IWOTH | stat.S_IWGRP
@@ -62,7 +59,7 @@ def is_safe(found: os.stat_result, code: os.stat_result, user: int) -> bool:
 
 
 def _made(place: str) -> Path | None:
-    """The folder of kernels in a place, made if it is missing; None where it is not safe."""
+    """The folder for the kernels of this code in a place, free of others; None where not safe."""
     folder, user = Path(place).resolve() / "coverable-kernels", os.geteuid()
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
@@ -72,7 +69,11 @@ def _made(place: str) -> Path | None:
     except OSError:
         return None
     alone = stat.S_ISDIR(own.st_mode) and own.st_uid == user and not own.st_mode & 0o077
-    return folder if safe and alone and os.access(folder, os.W_OK) else None
+    if not (safe and alone and os.access(folder, os.W_OK)):
+        return None
+    for other in set(folder.iterdir()) - {folder / _STAMP}:
+        shutil.rmtree(other, ignore_errors=True)
+    return folder / _STAMP
 
 
 _HOME = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
@@ -80,7 +81,6 @@ _BESIDE = f"{ROOT}/coverable/__pycache__"
 _PLACES = _SETTINGS["CACHE_DIR"], _BESIDE, _HOME if os.path.isabs(_HOME) else ""
 FOLDER = next(filter(None, (_made(place) for place in _PLACES if place)), None)
 """Of all kernels: in `NUMBA_CACHE_DIR`, beside the code, or in the home folder's cache; or none."""
-_STAMP = b"".join(path.read_bytes() for code in CODE for path in sorted(ROOT.glob(code)))
 
 
 class Kept(InTreeCacheLocator):
@@ -92,14 +92,14 @@ class Kept(InTreeCacheLocator):
         return f"{FOLDER}/{inside.replace(os.sep, '-').replace('..', 'up')}"
 
     def get_source_stamp(self) -> bytes:
-        """All that the function can be compiled from."""
-        return hashlib.sha256(_STAMP + Path(self._py_file).read_bytes()).digest()
+        """Its own file: all others that it is compiled from have their stamp in the folder."""
+        return hashlib.sha256(Path(self._py_file).read_bytes()).digest()
 
 
 @global_compiler_lock
 def _kept(compiling: Callable[..., Any], function: Any) -> Any:
     """Let numba compile a function, and keep it where it can: a disk may be full by then."""
-    usual, _SETTINGS[HOOK] = _SETTINGS[HOOK], f"{__name__}.{Kept.__name__}"
+    usual, _SETTINGS[HOOK] = _SETTINGS[HOOK], f"{__name__}.Kept"
     try:
         kept = compiling(cache=FOLDER is not None)(function)
     except (OSError, RuntimeError):
