@@ -1,26 +1,25 @@
 """The mesh files of a robot's links: each read once, within caps on bytes, triangles and time.
 
 They are not trusted. Only the file itself is opened: textures and materials that it names are not.
+Those of COLLADA (.dae) are read together, by a process of their own.
 """
 
 from __future__ import annotations
 
-import io
-import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from coverable.errors import CoverableError
-from coverable.files import read_regular, reason
-from coverable.meshes.collada_limits import check_collada
+from coverable.files import read_regular
+from coverable.meshes.collada import read_collada
 from coverable.meshes.mesh_file import read_parts
 from coverable.meshes.raw_mesh import MeshError, RawMesh
 
 MOST_TRIANGLES = 1_500_000  # of a robot, each use of a file counted
+MOST_BYTES = 256 << 20  # of .dae files that are read together; the last may exceed it
 MOST_SECONDS = 8.0  # of processor time, for a picture
 
 
@@ -29,15 +28,18 @@ class MeshFiles:
 
     def __init__(
         self,
+        paths: Iterable[str] = (),
         clock: Callable[[], float] = time.thread_time,
         most_seconds: float = MOST_SECONDS,
     ) -> None:
         """Start with nothing read.
 
         Args:
+            paths: of files that will be asked for: .dae files are read together.
             clock: processor time, s.
             most_seconds: processor time after which no other file is opened.
         """
+        self._paths = tuple(dict.fromkeys(paths))
         self._clock = clock
         self._most_seconds = most_seconds
         self._started = clock()
@@ -54,7 +56,7 @@ class MeshFiles:
             MeshError: it is no mesh, or with it the robot has too many triangles.
         """
         if path not in self._read:
-            self._read[path] = self._first_read(Path(path))
+            self._first_read(path)
         found = self._read[path]
         if isinstance(found, MeshError):
             raise MeshError(found.faults)
@@ -73,15 +75,38 @@ class MeshFiles:
             )
         self._triangles += triangles
 
-    def _first_read(self, file: Path) -> list[RawMesh] | MeshError:
-        """The parts of a file in its own unit, or what is wrong with it."""
+    def _first_read(self, path: str) -> None:
+        """Read a file in its own unit, or find what is wrong with it."""
+        file = Path(path)
         if self._clock() - self._started > self._most_seconds:
             took = f"reading took more than {self._most_seconds:g} s"
-            return MeshError(f"{took}; thin the robot's meshes")
-        try:
-            return read_parts_of(file)
-        except MeshError as error:
-            return error
+            self._read[path] = MeshError(f"{took}; thin the robot's meshes")
+        elif file.suffix.lower() == ".dae":
+            self._read_collada(path)
+        else:
+            try:
+                self._read[path] = _usable(file, read_parts(file, largest_file(file)))
+            except CoverableError as fault:
+                self._read[path] = _refused(file, fault)
+
+    def _read_collada(self, path: str) -> None:
+        """Read a .dae file, and with it the others that will be asked for."""
+        given, size = dict[str, bytes](), 0
+        for one in dict.fromkeys((path, *self._paths)):
+            file = Path(one)
+            if one in self._read or file.suffix.lower() != ".dae" or size > MOST_BYTES:
+                continue
+            try:
+                given[one] = read_regular(file, largest_file(file), "a mesh of a robot")
+                size += len(given[one])
+            except CoverableError as fault:
+                self._read[one] = _refused(file, fault)
+        for one, found in zip(given, read_collada(list(given.values())), strict=True):
+            file = Path(one)
+            if isinstance(found, MeshError):
+                self._read[one] = _refused(file, found)
+            else:
+                self._read[one] = _usable(file, found)
 
 
 def largest_file(file: Path) -> int:
@@ -89,59 +114,15 @@ def largest_file(file: Path) -> int:
     return 64 << 20 if file.suffix.lower() in (".stl", ".glb", ".dae") else 12 << 20
 
 
-def read_parts_of(file: Path) -> list[RawMesh]:
-    """Read every part of a mesh file.
+def _refused(file: Path, fault: CoverableError) -> MeshError:
+    return MeshError(f"{file.name}: {fault}")
 
-    Args:
-        file: STL, OBJ, PLY, OFF, GLB or DAE.
 
-    Raises:
-        MeshError: the file is missing, damaged, too large, or holds no finite triangles.
-    """
-    try:
-        if file.suffix.lower() == ".dae":
-            parts = _collada(read_regular(file, largest_file(file), "a mesh of a robot"))
-        else:
-            parts = read_parts(file, largest_file(file))
-    except CoverableError as fault:
-        raise MeshError(f"{file.name}: {fault}") from fault
-    parts = [part for part in parts if len(part.faces)]
+def _usable(file: Path, found: list[RawMesh]) -> list[RawMesh] | MeshError:
+    """The parts of a file that have triangles, or what is wrong with it."""
+    parts = [part for part in found if len(part.faces)]
     if not parts:
-        raise MeshError(f"{file.name}: holds no triangles")
+        return _refused(file, MeshError("holds no triangles"))
     if not all(np.isfinite(part.vertices).all() for part in parts):
-        raise MeshError(f"{file.name}: has a vertex that is not finite")
+        return _refused(file, MeshError("has a vertex that is not finite"))
     return parts
-
-
-def _collada(data: bytes) -> list[RawMesh]:
-    """A .dae by trimesh, after a look at what would become of it."""
-    import trimesh
-
-    check_collada(data)
-    log = logging.getLogger("trimesh")
-    before = log.level
-    log.setLevel(logging.CRITICAL)  # it prints tracebacks about textures
-    try:
-        # From memory: trimesh cannot know where other files would lie.
-        parts = trimesh.load_scene(io.BytesIO(data), file_type="dae").dump()
-    except Exception as error:
-        raise MeshError(f"cannot be read as a mesh: {reason(error)}") from error
-    finally:
-        log.setLevel(before)
-    return [
-        RawMesh(np.asarray(one.vertices, float), np.asarray(one.faces, np.int64), (), _rgba(one))
-        for one in parts
-        if isinstance(one, trimesh.Trimesh)
-    ]
-
-
-def _rgba(part: Any) -> tuple[float, ...] | None:
-    """The colour that a part of trimesh brings along."""
-    visual = part.visual
-    if visual.kind == "texture":
-        rgba = visual.material.main_color
-    elif visual.kind in ("vertex", "face"):
-        rgba = visual.main_color
-    else:
-        return None
-    return tuple(float(value) / 255.0 for value in rgba)

@@ -32,7 +32,7 @@ from feasibility.viewer.meshes import (
 from robots.errors import RobotError
 from robots.kinematics import Kinematics
 from robots.robot import Robot
-from robots.urdf.link_shapes import LinkShape, MeshFile
+from robots.urdf.link_shapes import LinkShape, MeshFile, mesh_paths
 
 ROBOT = "/robot"
 TRIANGLES = 60_000  # of a whole robot; more are thinned
@@ -107,7 +107,7 @@ def draw(robot: Robot) -> Drawing:
 
 def _draw(robot: Robot) -> Drawing:
     visuals, notes = _visuals(robot)
-    files = MeshFiles()
+    files = MeshFiles(mesh_paths(visuals))
     missing: dict[str, list[str]] = {}  # what is wrong -> links
     parts: dict[tuple[int, str], list[Mesh]] = {}
     for visual in visuals:

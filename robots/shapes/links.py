@@ -15,7 +15,7 @@ from robots.shapes.bodies import Fineness, Geometry, Polytope, Solid
 from robots.shapes.hulls import hull_of, pieces_of
 from robots.shapes.solids import MeshBodies
 from robots.urdf.checked_urdf import CheckedUrdf, check_urdf
-from robots.urdf.link_shapes import LinkShape, MeshFile
+from robots.urdf.link_shapes import LinkShape, MeshFile, mesh_paths
 
 MOST_NAMED = 8  # links in one note
 
@@ -105,7 +105,8 @@ class _Gathered:
     def __init__(self, robot: Robot, checked: CheckedUrdf) -> None:
         self.robot = robot
         self.root = checked.root
-        self.meshes = MeshBodies()
+        shapes = checked.collisions.shapes or checked.visuals
+        self.meshes = MeshBodies(mesh_paths(shapes))
         self.solids: list[Solid] = []
         self.collisions, self.visuals = map(_by_link, (checked.collisions.shapes, checked.visuals))
         self.collision_faults = {fault.link: fault.why for fault in checked.collisions.faults}

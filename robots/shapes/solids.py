@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from hashlib import sha256
 from pathlib import Path
 
@@ -146,9 +147,13 @@ def _turned(sides: Ints, agree: Mask, volumes: Array) -> Array | None:
 class MeshBodies:
     """The meshes of one robot's links; each content is read and checked once a process."""
 
-    def __init__(self) -> None:
-        """Start with nothing read."""
-        self._files = MeshFiles(most_seconds=MOST_SECONDS)
+    def __init__(self, paths: Iterable[str] = ()) -> None:
+        """Start with nothing read.
+
+        Args:
+            paths: of files that will be asked for; see `MeshFiles`.
+        """
+        self._files = MeshFiles(paths, most_seconds=MOST_SECONDS)
         self._digests: dict[str, bytes] = {}
 
     def read(self, mesh: MeshFile) -> Triangles:

@@ -9,7 +9,7 @@ The geometry of a <visual> or a <collision>: one shape, and where it is on its l
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,6 +63,11 @@ class Sphere:
 
 
 Geometry = MeshFile | Box | Cylinder | Capsule | Sphere
+
+
+def mesh_paths(shapes: Iterable[LinkShape]) -> list[str]:
+    """The mesh files of shapes."""
+    return [shape.geometry.path for shape in shapes if isinstance(shape.geometry, MeshFile)]
 
 
 def read_shape(node: Node, folders: MeshFolders) -> tuple[Array, Geometry]:

@@ -1,5 +1,6 @@
 """The drawn arm: every link, in the right place, whatever its files are like."""
 
+import json
 import sys
 from pathlib import Path
 
@@ -13,9 +14,11 @@ from page_outline import faces_of, points_of
 from samples import sampled, spread
 
 from coverable import load_robot
-from coverable.meshes import robot_files
+from coverable.meshes import collada, robot_files
+from coverable.meshes.collada import read_collada
 from coverable.meshes.raw_mesh import MeshError
 from coverable.meshes.robot_files import MeshFiles
+from coverable.processes import Ended, run_apart
 from feasibility.viewer.robot_visuals import TRIANGLES, draw, joint_paths
 from feasibility.viewer.threejs import safe_name
 from robots.urdf.checked_urdf import check_urdf
@@ -164,3 +167,42 @@ def test_no_other_file_is_opened_after_the_time_is_up(tmp_path):
     assert len(files.parts(paths[0])) == 1, "it was read before"
     with pytest.raises(MeshError, match=r"reading took more than 8 s; thin the robot's meshes"):
         files.parts(paths[1])
+
+
+TRIANGLE = np.eye(3).tobytes()
+
+
+def written(parts, *arrays):
+    return json.dumps({"parts": parts}).encode() + b"\n" + b"".join(arrays)
+
+
+@pytest.mark.parametrize("one", [  # in the place of what is said of the second file
+    b"", b"[]\n", b'{"parts": 3}\n', written([[3, 1]]), written([[3, 1, None]], TRIANGLE),
+    written([[-1, 1, None]], TRIANGLE), written([[3, 0, [2.0, 0, 0, 1]]], TRIANGLE),
+    written([[3, 1, None]], TRIANGLE, np.array([[0, 1, 3]]).tobytes()),
+    written([[3, 1, None]], TRIANGLE, np.array([[0, -1, 2]]).tobytes()),
+])  # fmt: skip
+def test_what_the_process_of_dae_files_writes_is_not_believed(one):
+    good = written([[3, 1, [1, 0, 0, 1]]], TRIANGLE, np.array([[0, 1, 2]]).tobytes())
+    before, found, after = read_collada([b"", b"", b""], lambda *_: Ended(good + one))
+    assert (len(before), before[0].rgba) == (1, (1, 0, 0, 1))
+    assert isinstance(found, MeshError)
+    assert isinstance(after, MeshError)
+
+
+def test_that_process_opens_nothing_once_it_sees_a_file(tmp_path):
+    """Tried with one that tries."""
+    text = collada.CHILD.read_text()
+    tries = text.replace("given.read(size)", "open('/dev/null', 'rb').read()")
+    assert tries != text
+    (tmp_path / "tries.py").write_text(tries)
+    files = [hostile.GOOD.encode()]
+    assert len(read_collada(files)[0]) == 1
+    seen = []
+
+    def run(_, *rest):
+        seen.append(run_apart(tmp_path / "tries.py", *rest))
+        return seen[0]
+
+    assert isinstance(read_collada(files, run)[0], MeshError)
+    assert seen[0].written == b""

