@@ -7,22 +7,57 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from coverable import (
+    Plot,
+    Robot,
     builtin_cases,
     check,
     greedy_check,
+    list_robots,
+    load_robot,
     plot_causes,
     plot_graph,
     plot_transition,
     plot_views,
     view,
 )
+from coverable.arrays import Array
+from feasibility.viewer.painter import painted
+from feasibility.viewer.robot_visuals import draw, home, pose
+from feasibility.viewer.stage import framing, joint_points
 
 FOLDER = Path(__file__).parent / "figures"
+FROM = np.array([0.9, -1.4, 0.6])  # where arms are seen from
 FIGURES = {  # the paper's, and the cases that they are of
     "fig-4": ("4a", "4b", "4c", "4d", "4e", "4f"),
     "fig-5": ("5a", "5b", "5c", "5d", "5e", "5f"),
 }
+
+
+def arms(groups: tuple[str, ...], columns: int) -> Plot:
+    """The arms of the library that are here, each below its name."""
+    names = [info.name for info in list_robots() if info.group in groups]
+    rows = -(-len(names) // columns)
+    figure = Plot(figsize=(1.6 * columns, 1.75 * rows), layout="constrained")
+    grid = figure.subplots(rows, columns, squeeze=False)
+    for axes in grid.flat:
+        axes.set_axis_off()
+    for axes, name in zip(grid.flat, names, strict=False):
+        axes.imshow(picture(load_robot(name)), interpolation="lanczos")
+        axes.set_title(name, fontsize=8)
+    return figure
+
+
+def picture(robot: Robot, side: int = 260) -> Array:
+    """(side, side, 3) an arm with its second and third joint bent."""
+    q = home(robot)
+    q[1:3] += (-0.5, 0.8)
+    q = np.clip(q, robot.lower, robot.upper)
+    points = np.vstack([np.zeros((1, 3)), joint_points(robot, q)])
+    commands = (*draw(robot).commands, *pose(robot, q))
+    return painted(commands, framing(points, FROM / np.linalg.norm(FROM), 1.5), side, side)
 
 
 def main() -> None:
@@ -36,6 +71,8 @@ def main() -> None:
         "fig-2": plot_transition(greedy["4a"]),
         "fig-3": plot_graph(greedy["4a"]),
         "missed": plot_graph(greedy["4d"]),
+        "arms": arms(("manipulator", "industrial"), columns=7),
+        "arms-of-robots": arms(("humanoid", "legged"), columns=6),
     }
     for name, shown in FIGURES.items():
         views = {case: view(verdicts[case], case, play=False) for case in shown}

@@ -2,7 +2,8 @@
 
 `library.toml` gives for each name the URDF, the tool's link, the axis along which the tool points
 and the joints on the chain that are held. example-robot-data is only read as files: its arms are
-found through the metadata of the installed distribution.
+found through the metadata of the installed distribution. `catalogue.toml` gives the same of arms
+whose files `robots.catalogue` fetches when they are first loaded; what it holds comes last.
 """
 
 from __future__ import annotations
@@ -58,25 +59,49 @@ class RobotInfo:
     package_dirs: tuple[str, ...] = ()
     group: str = "manipulator"
     """What carries it: one of `GROUPS`."""
+    licence: str = ""
+    """Of its files."""
+    payload: float | None = None
+    """kg, by its maker."""
+    note: str = ""
+    """What whoever uses it should know."""
+    xacro_args: Mapping[str, str] = field(default_factory=dict)
+    module: str = ""
+    """Of an arm that is fetched: its description in the catalogue; its `urdf` is empty then."""
+    joints: int | None = None
+    """Of an arm that is fetched: how many are free."""
+    reach: float | None = None
+    """m, of an arm that is fetched, by its maker."""
 
 
+CAPSULES = "its bodies are capsules of estimated radius, not the maker's housing"
+SUFFIX = "_description"  # which names in the catalogue may have
+LICENCES = {"coverable": "BSD-2-Clause", DATA: "BSD-3-Clause"}
 GROUPS = {
     "manipulator": "manipulators",
+    "industrial": "industrial arms, with capsules of estimated radius for bodies",
     "humanoid": "arms of humanoids and of robots on wheels",
     "legged": "arms on legged robots",
+    "catalogue": "arms of robot_descriptions (coverable[arms]), fetched when they are first loaded",
 }
 """Kinds of robots whose arms the library has, manipulators first, and what they are called."""
 
 
-def list_robots() -> tuple[RobotInfo, ...]:
+def list_robots(catalogue: bool = False) -> tuple[RobotInfo, ...]:
     """Every robot that `load_robot` knows by name, manipulators first; reads no URDF.
+
+    Args:
+        catalogue: also those that are fetched when they are first loaded, last.
 
     Example:
         >>> [info.name for info in list_robots()][:3]
         ['puma560', 'ur3', 'ur3_limited']
+        >>> [info.name for info in list_robots(catalogue=True) if info.module][:2]
+        ['ur3e', 'ur5e']
     """
     order = tuple(GROUPS)
-    return tuple(sorted(_library().values(), key=lambda info: order.index(info.group)))
+    known = (*_library().values(), *(_catalogue().values() if catalogue else ()))
+    return tuple(sorted(known, key=lambda info: order.index(info.group)))
 
 
 def load_robot(
@@ -99,7 +124,8 @@ def load_robot(
 
     Free are the joints between the URDF's root link and the tool frame; every other joint is held
     at zero, brought into its limits. A continuous joint is one real coordinate without limits
-    (whatever the URDF writes there) until `limits` gives it some.
+    (whatever the URDF writes there) until `limits` gives it some. An arm of the catalogue is
+    fetched when it is first loaded, after a line on stderr.
 
     A pose is a pair (position in m, fixed-axis roll, pitch and yaw in degrees) as in a case file,
     such as ((0, 0, 0.12), (0, 0, 0)) or a `Pose`; or a (4, 4) matrix, such as a `pin.SE3`.
@@ -125,7 +151,7 @@ def load_robot(
         xacro_args: arguments of a .xacro file, name -> text, number or truth value.
 
     Raises:
-        RobotError: the name is unknown, or the URDF or an argument has faults: all are named.
+        RobotError: the name is unknown, its arm cannot be fetched, or something has faults.
 
     Example:
         >>> load_robot("puma560", limits="set-1")
@@ -133,7 +159,7 @@ def load_robot(
         >>> load_robot("ur5", tcp=((0, 0, 0.12), (0, 0, 0)))
         Robot('ur5', 6 joints, tool 'tool0' + (0, 0, 0.12) m)
     """
-    info = _find(name_or_path) or _unknown(name_or_path)
+    info = find_robot(name_or_path)
     approach_axis = _approach_axis(info, tool_frame) if approach_axis is None else approach_axis
     source = f"robot {os.fspath(name_or_path)!r}"
     given = {"tcp": tcp, "base": base, "axes": axes, "xacro_args": xacro_args}
@@ -161,7 +187,7 @@ def flange_axis(name: str | None, tool_frame: str | None = None) -> tuple[float,
         >>> flange_axis("ur5"), flange_axis("kinova")
         ((0.0, 0.0, 1.0), (1, 0, 0))
     """
-    info = _library().get(name or "")
+    info = _named(name or "")
     return (0.0, 0.0, 1.0) if info is None else _approach_axis(info, tool_frame)
 
 
@@ -195,6 +221,7 @@ def _read(
 
         link = carrier_of_surface(mounting.axes)
     folders = (*folders, *info.package_dirs)
+    xacro_args = {**info.xacro_args, **xacro_args}
     robot = robot_from_urdf(
         check_urdf(info.urdf, folders, mounting.axes, mounting.base, xacro_args),
         name=info.name,
@@ -204,7 +231,8 @@ def _read(
         limit_sets=_limit_sets(Path(info.limits)) if info.limits is not None else None,
         **options,
     )
-    return replace(robot, xacro_args=tuple(xacro_args.items())) if xacro_args else robot
+    notes = (*robot.notes, *filter(None, [info.note]))
+    return replace(robot, xacro_args=tuple(xacro_args.items()), notes=notes)
 
 
 def _unknown(urdf: str | os.PathLike[str]) -> RobotInfo:
@@ -221,21 +249,39 @@ def _folders(package_dirs: str | os.PathLike[str] | Sequence[Any]) -> tuple[str,
     return tuple(map(str, package_dirs))
 
 
-def _find(name_or_path: str | os.PathLike[str]) -> RobotInfo | None:
-    """The library's entry of that name; None where a path was given."""
-    if not isinstance(name_or_path, str):
-        return None
-    library = _library()
-    if name_or_path in library:
-        return library[name_or_path]
-    is_path = os.sep in name_or_path or name_or_path.lower().endswith((".urdf", ".xml", ".xacro"))
-    if is_path or Path(name_or_path).is_file():
-        return None
+def find_robot(name_or_path: str | os.PathLike[str]) -> RobotInfo:
+    """What is known of an arm before its URDF is read; its files are here then.
+
+    Raises:
+        RobotError: the name is unknown, or the arm cannot be fetched.
+    """
+    known = _named(name_or_path) if isinstance(name_or_path, str) else None
+    if known is not None:
+        return _fetched(known) if known.module else known
+    path = os.fspath(name_or_path)
+    is_path = os.sep in path or path.lower().endswith((".urdf", ".xml", ".xacro"))
+    if is_path or not isinstance(name_or_path, str) or Path(path).is_file():
+        return _unknown(path)
     raise RobotError(
-        f"there is no robot {name_or_path!r} in the library; "
-        f"{suggestion(name_or_path, list(library))} (`coverable robots` lists them all). "
+        f"there is no robot {path!r} in the library; "
+        f"{suggestion(path, [*_library(), *_catalogue()])} (`coverable robots` lists them all). "
         f"{BRING_YOUR_OWN}"
     )
+
+
+def _named(name: str) -> RobotInfo | None:
+    """What is known of a name, in the catalogue with or without its ending; None of another."""
+    library, catalogue = _library(), _catalogue()
+    return library.get(name) or catalogue.get(name) or catalogue.get(name.removesuffix(SUFFIX))
+
+
+def _fetched(info: RobotInfo) -> RobotInfo:
+    """An arm of the catalogue with its files, which are fetched where they are not here."""
+    from robots.catalogue import description
+
+    found = description(info.module)
+    args = found.xacro_args
+    return replace(info, urdf=found.path, package_dirs=found.folders, xacro_args=args)
 
 
 def joint_kinds(
@@ -257,9 +303,10 @@ def joint_kinds(
     """
     from robots.urdf.checked_urdf import check_urdf
 
-    info = _find(name_or_path) or _unknown(name_or_path)
+    info = find_robot(name_or_path)
     folders = (*package_dirs, *info.package_dirs)
-    checked = check_urdf(info.urdf, package_dirs=folders, xacro_args=xacro_args)
+    args = {**info.xacro_args, **xacro_args}
+    checked = check_urdf(info.urdf, package_dirs=folders, xacro_args=args)
     return {joint.name: joint.kind for joint in checked.joints if joint.moves}
 
 
@@ -282,7 +329,23 @@ def _library() -> Mapping[str, RobotInfo]:
             limits=str(HERE / entry["limits"]) if "limits" in entry else None,
             package_dirs=() if built_in else (str(share),),
             group=entry.get("group", "manipulator"),
+            licence=LICENCES[entry["source"]],
+            payload=entry.get("payload"),
+            note=CAPSULES if entry.get("group") == "industrial" else "",
         )
+    return MappingProxyType(entries)
+
+
+@cache
+def _catalogue() -> Mapping[str, RobotInfo]:
+    """The entries of catalogue.toml; nothing is fetched for it."""
+    table = tomllib.loads((HERE / "catalogue.toml").read_text(encoding="utf-8"))
+    entries = {}
+    for name, entry in table.items():
+        module = entry.pop("module", name.removesuffix(SUFFIX)) + SUFFIX
+        given = {"source": "robot_descriptions", "urdf": "", "group": "catalogue", **entry}
+        axis = tuple(entry.get("approach_axis", (0.0, 0.0, 1.0)))
+        entries[name] = RobotInfo(name, **given | {"approach_axis": axis}, module=module)
     return MappingProxyType(entries)
 
 

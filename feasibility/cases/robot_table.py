@@ -131,7 +131,12 @@ class RobotPart:
         ]
 
     def _kinds_alone(self) -> dict[str, str]:
-        """The kinds of all moving joints, by name; none where the URDF itself is at fault."""
+        """The kinds of all moving joints, by name; none where the URDF itself is at fault.
+
+        Nor where no limit is given for a name: what cannot be fetched is not asked for twice.
+        """
+        if not self.limits_m and not isinstance(self.limits_deg, Mapping):
+            return {}
         from robots.errors import RobotError
         from robots.library import joint_kinds
 

@@ -6,18 +6,28 @@ import argparse
 import math
 from collections import Counter
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from feasibility.cli.command_parts import add_command, json_text
 from feasibility.cli.console import print_out
 
+if TYPE_CHECKING:
+    from robots.library import RobotInfo
+    from robots.robot import Robot
+
 WIDE = 240  # columns of a file, so that nothing is wrapped
+JOINT_HEADINGS = ["robot", "tool", "limits (deg unless in m)", "limit sets"]
+HEADINGS = ["robot", "joints", "reach", "payload", "from", "licence", "files"]
 
 
 def add(subcommands: argparse._SubParsersAction) -> None:
     """Add the commands."""
     add_command(subcommands, "cases", cases, help="list the built-in cases")
-    add_command(subcommands, "robots", robots, help="list the robots by name")
+    parser = add_command(subcommands, "robots", robots, help="list the robots by name")
+    parser.add_argument(
+        "names", metavar="NAME", nargs="*",
+        help="only these, with tool, limits and limit sets; one that git has to fetch is fetched",
+    )  # fmt: skip
     parser = add_command(subcommands, "keys", keys, help="print the reference of the case file")
     parser.add_argument(
         "table", metavar="TABLE", nargs="*",
@@ -34,9 +44,10 @@ def cases(args: argparse.Namespace, began: float) -> int:
 
 
 def robots(args: argparse.Namespace, began: float) -> int:
-    """`coverable robots`: the robots that a case can name."""
-    rows = robot_rows()
-    print_out(json_text({"robots": rows}) if args.json else robots_table(rows))
+    """`coverable robots [NAME ...]`: the robots that a case can name."""
+    rows = robot_rows(args.names)
+    table = limits_table if args.names else robots_table
+    print_out(json_text({"robots": rows}) if args.json else table(rows))
     return 0
 
 
@@ -69,34 +80,49 @@ def case_rows() -> list[dict[str, Any]]:
     ]
 
 
-def robot_rows() -> list[dict[str, Any]]:
-    """The robots of the library, one object each; every URDF is read."""
-    from robots.library import list_robots, load_robot
+def robot_rows(names: Sequence[str] = ()) -> list[dict[str, Any]]:
+    """The robots of the library, one object each; of those that are fetched no URDF is read.
 
-    rows = []
-    for info in list_robots():
-        robot = load_robot(info.name)
-        ends = (robot.lower.tolist(), robot.upper.tolist())
-        joints = [
-            {"name": name, "kind": kind, **_limits(kind, low, high)}
-            for name, kind, low, high in zip(
-                robot.joint_names, robot.joint_kinds, *ends, strict=True
-            )
-        ]
-        rows.append(
-            {
-                "name": info.name,
-                "group": info.group,
-                "description": info.description,
-                "source": info.source,
-                "tool_frame": robot.tool_frame,
-                "degrees_of_freedom": robot.n,
-                "reach_m": robot.reach if math.isfinite(robot.reach) else None,
-                "limit_sets": sorted(robot.limit_sets),
-                "joints": joints,
-            }
-        )
-    return rows
+    Args:
+        names: only these, all of whose URDFs are read.
+
+    Raises:
+        RobotError: a name is unknown, or its arm cannot be fetched.
+    """
+    from robots.library import find_robot, list_robots, load_robot
+
+    if names:
+        return [_robot_row(find_robot(name), load_robot(name)) for name in names]
+    listed = list_robots(catalogue=True)
+    return [_robot_row(info, None if info.module else load_robot(info.name)) for info in listed]
+
+
+def _robot_row(info: RobotInfo, robot: Robot | None) -> dict[str, Any]:
+    """One robot; joints and tool come from its URDF, where it is here."""
+    from robots.catalogue import is_here
+
+    reach = info.reach if robot is None else robot.reach
+    return {
+        "name": info.name,
+        "group": info.group,
+        "description": info.description,
+        "source": info.source,
+        "licence": info.licence,
+        "here": not info.module or is_here(info.module),
+        "tool_frame": info.tool_frame if robot is None else robot.tool_frame,
+        "degrees_of_freedom": info.joints if robot is None else robot.n,
+        "reach_m": reach if reach is not None and math.isfinite(reach) else None,
+        "payload_kg": info.payload,
+        "limit_sets": [] if robot is None else sorted(robot.limit_sets),
+        "joints": None if robot is None else _joints(robot),
+    }
+
+
+def _joints(robot: Robot) -> list[dict[str, Any]]:
+    """The free joints, base to tip."""
+    ends = (robot.lower.tolist(), robot.upper.tolist())
+    every = zip(robot.joint_names, robot.joint_kinds, *ends, strict=True)
+    return [{"name": name, "kind": kind, **_limits(kind, *pair)} for name, kind, *pair in every]
 
 
 def _limits(kind: str, low: float, high: float) -> dict[str, Any]:
@@ -124,25 +150,47 @@ def cases_table(rows: Sequence[dict[str, Any]]) -> str:
 
 
 def robots_table(rows: Sequence[dict[str, Any]]) -> str:
-    """The robots for people, by group: degrees of freedom, reach, limits in order of the joints."""
+    """The robots for people, by group."""
     from robots.library import GROUPS
 
-    headings = ["robot", "degrees of freedom", "reach", "limits (deg unless in m)", "limit sets"]
     tables = []
     for group, title in GROUPS.items():
         lines = [
             [
                 row["name"],
-                _kinds(row["joints"]),
-                "any" if row["reach_m"] is None else f"{row['reach_m']:.2f} m",
-                ", ".join(map(_limits_text, row["joints"])),
-                ", ".join(row["limit_sets"]),
+                _kinds(row["joints"]) if row["joints"] else str(row["degrees_of_freedom"]),
+                _reach(row),
+                "" if row["payload_kg"] is None else f"{row['payload_kg']:g} kg",
+                row["source"],
+                row["licence"],
+                "here" if row["here"] else "to be fetched",
             ]
             for row in rows
             if row["group"] == group
         ]
-        tables.append(f"{title.capitalize()}\n\n{_table(headings, lines)}")
+        tables.append(f"{title[0].upper()}{title[1:]}\n\n{_table(HEADINGS, lines)}")
     return "\n\n".join(tables)
+
+
+def _reach(row: dict[str, Any]) -> str:
+    """'1.41 m', 'any' on a rail without ends, nothing where it is not known."""
+    if row["reach_m"] is not None:
+        return f"{row['reach_m']:.2f} m"
+    return "any" if row["joints"] else ""
+
+
+def limits_table(rows: Sequence[dict[str, Any]]) -> str:
+    """Some robots for people: tool, limits in order of the joints, limit sets."""
+    lines = [
+        [
+            row["name"],
+            row["tool_frame"],
+            ", ".join(map(_limits_text, row["joints"])),
+            ", ".join(row["limit_sets"]),
+        ]
+        for row in rows
+    ]
+    return _table(JOINT_HEADINGS, lines)
 
 
 def _kinds(joints: Sequence[dict[str, Any]]) -> str:

@@ -250,7 +250,7 @@ def _hints(verdict: Verdict, case: Case) -> list[str]:
     if kinds & {CauseKind.OUT_OF_REACH, CauseKind.JOINT_LIMITS}:
         hints.append("--set 'surface.position=[x, y, z]' moves the surface nearer to the arm")
     if CauseKind.JOINT_LIMITS in kinds:
-        hints.append("--set robot.limits=... tries other joint limits (`coverable robots`)")
+        hints.append("--set robot.limits=... tries other joint limits (`coverable robots NAME`)")
     if CauseKind.ORIENTATION in kinds and verdict.task.cone_deg > 0.0:
         hints.append(f"--set task.cone_deg=... opens the cone ({verdict.task.cone_deg:g} now)")
         if verdict.task.roll is not None and verdict.task.roll_deg is not None:

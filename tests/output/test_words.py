@@ -224,19 +224,30 @@ def test_keys_prints_each_key_with_type_unit_default_and_meaning(ask):
 
 def test_robots_and_cases_list_all_there_are(ask):
     said = ask("robots")
-    listed = {line.split()[0]: line for line in said.out.splitlines() if " m  " in line}
-    assert (said.status, said.err, list(listed)) == (0, "", [one.name for one in list_robots()])
-    heads = [said.out.index(title.capitalize()) for title in GROUPS.values()]
+    names = [one.name for one in list_robots(catalogue=True)]
+    rows = [line for line in said.out.splitlines() if line.endswith((" here", " fetched"))]
+    listed = {row.split()[0]: row for row in rows}
+    assert (said.status, said.err, list(listed)) == (0, "", names)
+    assert max(map(len, said.out.splitlines())) <= 120
+    heads = [said.out.index(title[1:]) for title in GROUPS.values()]
     assert heads == sorted(heads)
     for name, words in (
-        ("puma560", "1.41 m"), ("puma560", "-180..180"), ("puma560", "set-1, set-2, set-3, set-4"),
-        ("kinova", "6 (3 continuous)"), ("kinova", "free, 47..313, 19..341, free, 30..330, free"),
+        ("puma560", "1.41 m"), ("puma560", "2.5 kg"), ("kinova", "6 (3 continuous)"),
+        ("irb52", "7 kg     coverable  BSD-2-Clause  here"), ("ur20", "to be fetched"),
     ):  # fmt: skip
         assert words in listed[name]
     rows = {row["name"]: row for row in json.loads(ask("robots", "--json").out)["robots"]}
-    assert list(rows) == list(listed)
+    assert list(rows) == names
     limits = [rows[name]["joints"][0]["limits_deg"] for name in ("puma560", "kinova")]
     assert limits == [[-180.0, 180.0], None]
+    assert (rows["ur20"]["joints"], rows["ur20"]["reach_m"], rows["ur20"]["here"]) == (
+        None,
+        1.75,
+        False,
+    )
+    two = ask("robots", "puma560", "kinova").out
+    for words in ("-180..180", "set-1, set-2, set-3, set-4", "free, 47..313, 19..341, free"):
+        assert words in two
     cases = json.loads(ask("cases", "--json").out)["cases"]
     assert [row["name"] for row in cases] == list(coverable.builtin_cases())
     assert cases[0]["cells"] == [9, 10]

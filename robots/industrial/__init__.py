@@ -1,0 +1,1 @@
+"""Industrial arms: their URDFs, written by `tools/industrial_urdfs.py` from `arms.toml`."""
