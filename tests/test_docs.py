@@ -23,7 +23,6 @@ from coverable import Case, builtin_cases, check
 from feasibility.cli.main import main
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("coverable", "robots", "surfaces", "feasibility")
 SITE = sorted((ROOT / "docs").glob("*.md"))
 PAGES = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")] + SITE
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from capsule_arms import at, bodies_of, box_mesh, capsule_links, fork, pair, planar_arm, wall_at
 from foreign_clearances import ForeignScene, samples
-from plain import triangles_of_grid
 from scipy.spatial.transform import Rotation
 
 from coverable import Obstacle
@@ -43,16 +42,6 @@ def touches_from(judge, low, high):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if judge(middle).accepted else (low, middle)
     return low
-
-
-@pytest.mark.parametrize("turn", [90, -90])
-def test_a_cylinder_meets_a_half_space_with_either_end(turn):
-    """It lies along x, and its ends are 0.1 m from its middle."""
-    solid = Solid("link1", 1, at(rotation=Rotation.from_euler("y", turn, True).as_matrix()),
-                  Cylinder(0.05, 0.2))  # fmt: skip
-    bodies = bodies_of([solid], [wall_at(0.5)], [pair("link1", "wall")])
-    assert judged(SLIDE, bodies, [0.0], [0.3]).min_clearance == pytest.approx(0.1, abs=CLOSE)
-    assert not judged(SLIDE, bodies, [0.0], [0.41]).accepted
 
 
 @pytest.mark.parametrize("clearance", [0.0, 0.03])
@@ -119,21 +108,6 @@ def test_what_triangles_may_be_off_is_taken_off_their_distance(gap, names, joint
     assert gap - 0.0041 <= found.min_clearance <= gap - 0.004 + 1e-6
     if found.accepted:
         assert found.measured_clearance == pytest.approx(gap + 0.004)
-
-
-@pytest.mark.parametrize("needed", [0.05, 0.199, 0.203, 0.3])
-def test_a_curved_surface_of_many_triangles_needs_its_clearance_too(needed):
-    """A ball goes past a wavy sheet whose nearest point is 0.2 m from it, halfway."""
-    rows = np.linspace(-0.5, 0.5, 13)
-    z = np.array([[0.3 + 0.2 * (x**2 + y**2) for y in rows] for x in rows])
-    grid = np.stack([*np.meshgrid(rows, rows, indexing="ij"), z], axis=2)
-    soup = Soup("surface", triangles_of_grid(grid), 0.0, False)
-    ball = Solid("tool", 1, np.eye(4), Sphere(0.1))
-    bodies = bodies_of([ball], pairs=[pair("tool", "surface", needed)], soups=[soup])
-    found = judged(SLIDE, bodies, [-0.4], [0.45])
-    assert found.accepted == (needed < 0.2)
-    if found.accepted:
-        assert needed <= found.min_clearance <= 0.2
 
 
 GANTRY = planar_arm(

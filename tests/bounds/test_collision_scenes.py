@@ -77,8 +77,7 @@ def judged_as_by_fcl(robot, bodies, q, step_deg):
 SCENES = [("ur5", 1), *((name, [500, k]) for k in range(133) for name in ARMS[:3]), ("puma560", 0)]
 
 
-@sampled
-@pytest.mark.parametrize(("name", "seed"), spread(SCENES, 2))
+@sampled(("name", "seed"), spread(SCENES, 2))
 def test_the_foreign_judge_agrees(name, seed):
     """The arm itself is often in collision; alone among the objects, both answers occur."""
     robot, bodies, q = random_scene(name, seed, 2, 0.3, 6 if isinstance(seed, int) else 30)

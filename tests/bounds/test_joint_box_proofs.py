@@ -161,8 +161,7 @@ def test_all_over_what_is_confirmed_fcl_finds_collisions(seed):
         assert largest == 0.0 or (foreign.distances(each) < 0.01 + 1e-6).any()
 
 
-@sampled
-@pytest.mark.parametrize("name", spread(ARMS[::-1], 2))
+@sampled("name", spread(ARMS[::-1], 2))
 def test_nothing_is_claimed_around_clear_configurations(name):
     asked = 0
     for seed in seeds(8, all=300):
@@ -187,8 +186,7 @@ def lands_clear(robot, cells, task, cell, count, rng):
     return False
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(1, all=10))
+@sampled("seed", seeds(1, all=10))
 @pytest.mark.parametrize("name", spread(FEW, 1))
 def test_a_wall_before_a_plate_is_a_proof_that_landings_bear_out(name, seed):
     robot, cells, task = behind_a_wall(name, seed)

@@ -99,8 +99,7 @@ def test_levers_grow_as_joints_behind_turn(turn):
             holds(in_box, truth)
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(12, all=100))
+@sampled("seed", seeds(12, all=100))
 def test_levers_and_bends_hold_along_segments_and_over_boxes(seed):
     rng = np.random.default_rng(seed)
     robot = random_arm(rng)

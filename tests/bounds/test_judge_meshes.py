@@ -49,8 +49,7 @@ EDGES = {  # part, place, task, cells, what normals lean by from the facets' own
 }
 
 
-@sampled
-@pytest.mark.parametrize("name", spread([*EDGES], 6))  # rounded is left out
+@sampled("name", spread([*EDGES], 6))  # rounded is left out
 def test_a_motion_over_edges_keeps_standoff_and_cone(name):
     part, position, task, count, lean = EDGES[name]
     robot = load_robot("ur10") if name == "rounded" else UR5

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from arm_urdfs import joint
 from capsule_arms import at as placed
 from capsule_arms import bodies_of, pair
 from gantry import (
@@ -16,11 +15,10 @@ from gantry import (
     raster,
     tools_of,
 )  # fmt: skip
-from random_arms import robot_of
 from referee import Facets
 from referee import evenly as dense
 
-from coverable import Obstacle, Task, cylinder, load_robot, piecewise, plane, poses, replay, sphere
+from coverable import Obstacle, Task, load_robot, piecewise, plane, poses, replay, sphere
 from feasibility.certification.surface_replay import replay_over_surface
 from feasibility.verdict import Walk
 from robots.kinematics import Kinematics
@@ -212,18 +210,6 @@ def test_a_motion_that_is_bad_only_between_two_rows(factor, tolerance):
         assert 0.0 < outcome.faults[0].share < 1.0
         assert "row 1 to 2" in outcome.refusal
         assert "tool point is" in outcome.refusal
-
-
-def test_the_figure_of_one_joint_is_its_sagitta():
-    """An arm of a single joint: its tool follows the inside of a cylinder about the axis."""
-    robot = robot_of([joint(1, limits=(-1.0, 1.0)), joint(2, "fixed", (0.5, 0, 0))], (1, 0, 0))
-    cells = cylinder(0.51, (-50, 50), (-0.1, 0.1)).cells(5, 1)
-    q = np.radians(np.linspace(-40, 40, 81))[:, None]
-    cell = np.where(np.arange(81) % 20 == 0, np.arange(81) // 20, -1)
-    outcome = replay(robot, cells, Task(0.01, 10), Walk(q, cell), np.ones(5, dtype=bool))
-    assert outcome.accepted, outcome.refusal
-    sag = 2 * 0.5 * np.radians(1.0) ** 2 / 8
-    assert outcome.certificate.max_position_error == pytest.approx(sag, rel=0.05)
 
 
 @pytest.mark.parametrize("cone", [15.0, 5.0])

@@ -48,8 +48,7 @@ def sampled_rates(robot, start, end):
     return min(speeds), min(values)
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(1, all=20))
+@sampled("seed", seeds(1, all=20))
 @pytest.mark.parametrize("name", UNLIKE)
 def test_bounds_hold_and_are_close(name, seed):
     robot = unlike(name)

@@ -65,8 +65,7 @@ def largest(verdict):
     return 0.0
 
 
-@sampled
-@pytest.mark.parametrize("cells", spread([DOME, CELLS], 1))
+@sampled("cells", spread([DOME, CELLS], 1))
 def test_the_verdict_turns_where_timed_motions_do(cells):
     plain = check(ARM, cells, TASK)
     robot, cells, turn = plain.robot, plain.cells, largest(plain)

@@ -46,8 +46,7 @@ def test_shapes_at_the_edge_of_what_is_taken_can_be_used(kind, sizes):
     use(getattr(Obstacle, kind)("thing", *sizes), tool)
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(6, all=400))
+@sampled("seed", seeds(6, all=400))
 def test_sheets_and_tangles_can_be_used(seed):
     """Open, inverted, doubled, thin, flat, or any triangles of a few points at any scale."""
     rng, cube = np.random.default_rng(seed), box_mesh((1.0, 1.0, 1.0))

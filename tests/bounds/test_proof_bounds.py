@@ -142,8 +142,7 @@ def lost(case):
     return missed
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(4, all=120))
+@sampled("seed", seeds(4, all=120))
 def test_no_box_around_a_known_place_is_lost(seed):
     rng = np.random.default_rng(seed)
     for boxes in (1, 40, 150, 150, 150, 150, 150, 150):
@@ -157,8 +156,7 @@ class NoRefutation:
         """Nothing."""
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(2, all=40))
+@sampled("seed", seeds(2, all=40))
 def test_no_region_around_a_known_place_is_said_to_be_empty(seed):
     """Joints that turn may be some turns away from it: the tool is at the same place there."""
     rng = np.random.default_rng(seed)
@@ -269,9 +267,8 @@ def test_children_of_a_part_hold_all_of_it(axis):
     np.testing.assert_allclose([at[only][0][axis], at[only][1][axis]], expected)
 
 
-@sampled
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("seed", seeds(1, all=10))
+@sampled("seed", seeds(1, all=10))
 def test_parts_hold_the_places_of_their_surface_and_not_those_of_another(kind, seed):
     cells = cells_of(random_surface(kind, np.random.default_rng(seed)), 4, 5)
     parts = cells.surface.parts(1e-2, 0.1, 2000)

@@ -57,10 +57,7 @@ def test_trees_made_by_hand_are_accepted(make):
     assert 0 < found.boxes < 2000
 
 
-@sampled
-@pytest.mark.parametrize(
-    "index", range(len(proof_cases.STORED) - 1) if EVERYTHING else proof_cases.QUICK
-)
+@sampled("index", range(len(proof_cases.STORED) - 1) if EVERYTHING else proof_cases.QUICK)
 def test_stored_trees_are_accepted(index):
     ticks = []
     found = verify_proof(*stored_case(index), tick=lambda: ticks.append(1))
@@ -149,8 +146,7 @@ def random_tree(rng, robot, cells, depth=0):
     return Cut(joint, value, *(random_tree(rng, robot, cells, depth + 1) for _ in range(2)))
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(3, all=30))
+@sampled("seed", seeds(3, all=30))
 def test_no_tree_is_accepted_where_a_motion_covers_all(seed):
     """Elbow up alone covers the strip, with the first joint's limits a little wider."""
     rng, arm = np.random.default_rng(seed), elbow(q1=proof_cases.ACROSS + 0.3)

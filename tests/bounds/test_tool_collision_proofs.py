@@ -37,7 +37,6 @@ def mesh_of(body):
 
 BLOCK = mesh_of(trimesh.creation.box((0.2, 0.3, 0.1)))
 ROUND = mesh_of(trimesh.creation.icosphere(subdivisions=1, radius=0.1))
-CONE = mesh_of(trimesh.creation.cone(0.1, 0.2, sections=8))
 PRIMITIVES = [Box((0.2, 0.3, 0.05)), Sphere(0.1), Capsule(0.04, 0.2), Cylinder(0.08, 0.1)]
 MESHES = [BLOCK, ROUND, bracket()]
 
@@ -45,8 +44,7 @@ MESHES = [BLOCK, ROUND, bracket()]
 SCENES = [*range(20, 42, 2), *range(1000, 1500)]
 
 
-@sampled
-@pytest.mark.parametrize("seed", SCENES[: len(seeds(11, 511))])
+@sampled("seed", SCENES[: len(seeds(11, 511))])
 def test_no_pose_is_clear_where_it_is_proved(seed):
     scene, rng = random_over(seed), np.random.default_rng(seed)
     assert not (scene.proved().confirmed and scene.clear_pose(30 if seed < 1000 else 2000, rng))
@@ -57,8 +55,7 @@ def test_random_scenes_hold_both_answers():
     assert 2 <= sum(proved) <= 9
 
 
-@sampled
-@pytest.mark.parametrize("name", spread(ARMS, 2))
+@sampled("name", spread(ARMS, 2))
 def test_a_cell_with_a_known_pose_is_never_proved(name):
     scenes = [planted_over(name, seed) for seed in seeds(7, all=150)]
     known = [one for one in scenes if one is not None]
@@ -70,8 +67,7 @@ def test_a_cell_with_a_known_pose_is_never_proved(name):
 OVER_A_CELL = [(name, seed) for name in ARMS[::-1] for seed in range(1000, 1004)]
 
 
-@sampled
-@pytest.mark.parametrize(("name", "seed"), spread(OVER_A_CELL, 1))
+@sampled(("name", "seed"), spread(OVER_A_CELL, 1))
 def test_an_object_over_a_cell_is_a_proof_that_landings_bear_out(name, seed):
     rng, robot = np.random.default_rng([seed, 2]), arm(name)
     cells, task = a_plate(rng, robot)

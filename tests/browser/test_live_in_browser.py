@@ -12,14 +12,12 @@ import pytest
 from live_pages import PATIENCE_MS, chromium, painted, pixels
 from playwright.sync_api import expect
 
-from feasibility.cases.case import Case, load_case
-from feasibility.live.arm import LENS
-from feasibility.live.controls import SURFACE, TASK
+from feasibility.cases.case import Case
+from feasibility.live.controls import SURFACE
 from feasibility.live.serving import Live
 from feasibility.reports.verdict import SENTENCES
 from feasibility.viewer.live_server import LiveView
 
-ABOVE = np.array([0.0, 0.0, 0.12])  # [m] where the arrow along z is, from the middle
 PLATE = """
 [robot]
 name = "ur5"
@@ -114,54 +112,6 @@ def test_a_slider_is_dragged_and_the_cells_change_colour(tab, live):
     tab.get_by_role("button", name="reset").click()
     says(tab, "feasible")
     assert page.values == page.controls.values
-
-
-def test_a_number_is_typed_and_the_handle_is_dragged(tab, live):
-    (page,) = live.pages.values()
-    number = tab.locator("input[type=text]").nth(6)  # behind those of the placement
-    number.fill("25")
-    number.press("Enter")
-    waited(tab, lambda: page.values[TASK, "cone"] == 25.0)
-    says(tab, "feasible")
-    before, box = page.values, tab.locator("canvas").first.bounding_box()
-    eye, target = np.array(page.client.camera.position), np.array(page.client.camera.look_at)
-    x, y = on_screen(np.array(page.handle.gizmo.position) + ABOVE, eye, target, box)
-    tab.mouse.move(x, y)
-    tab.wait_for_timeout(300)
-    tab.mouse.down()
-    tab.mouse.move(x, y - 30, steps=6)
-    tab.wait_for_timeout(300)
-    tab.mouse.up()
-    waited(tab, lambda: page.values != before)
-    new = {dial[1] for dial, value in page.values.items() if before[dial] != value}
-    assert new == {"z"}, "the arrow along z moves along z alone"
-    assert page.values[SURFACE, "z"] > before[SURFACE, "z"]
-
-
-def on_screen(point, eye, target, box):
-    """Where a point of the world (m) is in the window."""
-    ahead = (target - eye) / np.linalg.norm(target - eye)
-    right = np.cross(ahead, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    x, y, z = np.stack([right, np.cross(right, ahead), ahead]) @ (point - eye)
-    scale = 0.5 * box["height"] / np.tan(0.5 * LENS)
-    return (box["x"] + box["width"] / 2 + scale * x / z,
-            box["y"] + box["height"] / 2 - scale * y / z)  # fmt: skip
-
-
-def test_the_saved_case_is_what_is_shown(tab, live, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (page,) = live.pages.values()
-    page.set({(SURFACE, "x"): 130.5, (SURFACE, "yaw"): 12.0, (TASK, "standoff"): 31.0})
-    with tab.expect_download() as begun:
-        tab.get_by_role("button", name="save as case").click()
-    assert begun.value.suggested_filename == "plate-live.toml"
-    assert list(tmp_path.iterdir()) == []  # the browser keeps it; the program writes nothing
-    begun.value.save_as(tmp_path / "saved.toml")
-    saved = load_case(tmp_path / "saved.toml")
-    assert saved.surface.position == (0.1305, 0.0, 0.1)
-    assert saved.surface.rpy_deg == (0.0, 0.0, 12.0)
-    assert saved.task.standoff == 0.031
 
 
 def test_a_notebook_shows_the_page_over_a_picture_that_outlives_it(browser):

@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import bad_input
 import hostile_visuals as hostile
-import pytest
 import samples
 from readers import READERS, of_bad
 from samples import sampled
@@ -82,8 +81,7 @@ def within_limits(
         assert not [one for one in outcome.opened if re.match("/etc|/dev/(?!null)", one)]
 
 
-@sampled
-@pytest.mark.parametrize("name", TRAPS)
+@sampled("name", TRAPS)
 def test_a_mesh_that_is_a_trap(name: str, tmp_path: Path) -> None:
     """As a picture of a robot, as its body beside a ball, and as a surface; all within limits."""
     folder = tmp_path / "robot"

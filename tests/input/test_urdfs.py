@@ -85,8 +85,7 @@ def test_an_odd_file_gives_the_robot_it_describes(name: str, tmp_path: Path) -> 
     same_as_others_read(checked, path)
 
 
-@sampled
-@pytest.mark.parametrize("path", spread(ROBOTS, 9), ids=lambda path: path.stem)
+@sampled("path", spread(ROBOTS, 9), ids=lambda path: path.stem)
 def test_robots_of_example_robot_data_pass_unchanged(path: Path) -> None:
     checked = check_urdf(path, [SHARE])
     sound_urdf(checked, path)

@@ -54,8 +54,7 @@ def two_links(folder, base="", arm=""):
     return load_robot(str(file))
 
 
-@sampled
-@pytest.mark.parametrize("name", spread(["puma560", "ur5", "panda", "baxter_left", "xarm7"], 2))
+@sampled("name", spread(["puma560", "ur5", "panda", "baxter_left", "xarm7"], 2))
 def test_every_link_with_visuals_is_drawn_whole_and_within_its_own_shape(name):
     robot = load_robot(name)
     checked = check_urdf(robot.urdf, package_dirs=robot.package_dirs)

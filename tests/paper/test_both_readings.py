@@ -66,10 +66,7 @@ ASKED = [
 ]  # fmt: skip
 
 
-@sampled
-@pytest.mark.parametrize(
-    ("name", "cone_deg", "step_deg", "moves"), [*spread(ASKED, 7), *spread(FINE, 0)]
-)
+@sampled(("name", "cone_deg", "step_deg", "moves"), [*spread(ASKED, 7), *spread(FINE, 0)])
 def test_both_readings_agree_call_by_call(name, cone_deg, step_deg, moves):
     cells = PATCHES[name]()
     search = Search(method="greedy", step_deg=step_deg, moves=moves)

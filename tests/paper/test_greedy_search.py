@@ -60,8 +60,7 @@ CHEAP = [(name, moves) for moves in STEP_DEG for name in PAPER if name not in DE
 BOTH = [(name, moves) for moves in STEP_DEG for name in PAPER]
 
 
-@sampled
-@pytest.mark.parametrize(("name", "moves"), BOTH if samples.EVERYTHING else CHEAP)
+@sampled(("name", "moves"), BOTH if samples.EVERYTHING else CHEAP)
 def test_case(name: str, moves: str) -> None:
     verdict = verdict_of(name, moves)
     if (name, moves) in KNOWN:

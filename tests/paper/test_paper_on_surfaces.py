@@ -13,7 +13,7 @@ from coverable import Answer, Search, Task, greedy_check, load_robot, mesh, sphe
 from coverable.kernels import allocating_entry
 from feasibility.paper.jcell_steps import Steps
 from feasibility.paper.tree_and_graph import tree_walk
-from feasibility.paper.tree_replay import Path, replay_stored, replay_tree, within_cells
+from feasibility.paper.tree_replay import Path, replay_stored, replay_tree
 from robots.kinematics import Kinematics
 from surfaces.cell_triangles import triangulation
 from surfaces.meshes.triangle_mesh import TriangleMesh
@@ -24,7 +24,6 @@ cell_under = allocating_entry(cell_under_kernel)
 PUMA, UR5 = load_robot("puma560", limits="set-1"), load_robot("ur5")
 TASK = Task(0.005, 45)
 COARSE = Search(method="greedy", step_deg=0.5)
-DOME = sphere(1.0, (10, 90), (10, 180), side="inside").cells(5, 6)
 RING = torus(0.8, 0.3, (20, 60), (-20, 20), side="inside").cells(3, 3)
 
 
@@ -101,32 +100,3 @@ def test_a_roll_that_is_limited_is_kept_between_jcells():
     held = replace(task, roll_deg=(-5, 5))
     assert not greedy_check(PUMA, cells, held, COARSE).feasible
     assert not replay_stored(replace(verdict, task=held), COARSE).accepted
-
-
-@pytest.mark.parametrize(("moves", "step"), [("single", 0.1), ("all", 0.5)])
-def test_the_covering_walk_takes_whole_steps_inside_all_constraints_over_every_cell(moves, step):
-    search = Search(method="greedy", moves=moves, step_deg=step)
-    verdict = greedy_check(PUMA, DOME, TASK, search)
-    walk = tree_walk(verdict)
-    moved = np.diff(walk.q, axis=0) / np.radians(step)
-    count = np.abs(moved).max(axis=1).round().astype(int)
-    assert (count >= 1).all()
-    steps_of_one = np.abs(moved / count[:, None])
-    assert set(steps_of_one.round(7).ravel()) <= {0.0, 1.0}
-    assert moves == "all" or (steps_of_one.round().sum(axis=1) == 1).all()
-    parts = [a + np.arange(k)[:, None] * (b - a) / k
-             for a, b, k in zip(walk.q[:-1], walk.q[1:], count, strict=True)]  # fmt: skip
-    allowed = Steps.of(PUMA, DOME, TASK, search).tolerance
-    plain.assert_motion(replace(verdict, task=replace(TASK, tolerance=allowed)), walk.q)
-    q = np.concatenate([*parts, walk.q[-1:]])
-    near = DOME.surface.closest(plain.arm_of(PUMA).tool(q)[0])
-    at = np.column_stack([near.u, near.v])
-    assert all(within_cells(DOME, at, [cell] * len(q)).any() for cell in range(len(DOME)))
-    # A row is at a cell only where the tool is at its centre.
-    away = np.linalg.norm(
-        Kinematics(PUMA).tools(walk.q)[0][:, None] - TASK.targets(DOME).points, axis=2
-    )
-    at = np.where(away.min(axis=1) <= 1e-3, away.argmin(axis=1), -1)
-    np.testing.assert_array_equal(walk.cell, at)
-    arm = PUMA.with_limits({"joint1": np.radians([-30.0, 20.0])})
-    assert not greedy_check(arm, DOME, TASK, replace(search, moves="all")).feasible

@@ -241,8 +241,7 @@ def is_whole(file: Path) -> bool:
 
 
 # Not in a plain run: which event is the n-th depends on what Python finds compiled.
-@sampled
-@pytest.mark.parametrize("number", seeds(0, all=200))
+@sampled("number", seeds(0, all=200))
 def test_at_a_random_event(number, tmp_path):
     """Files and imports, most of them: a command has some ten thousand such events."""
     rng = np.random.default_rng([20260713, number])

@@ -137,8 +137,7 @@ def test_a_worker_that_dies_costs_its_own_task_alone(tmp_path) -> None:
     assert killed
 
 
-@sampled
-@pytest.mark.parametrize("count", spread([60, 2000], 1))
+@sampled("count", spread([60, 2000], 1))
 def test_workers_that_are_killed_at_random(count, tmp_path) -> None:
     """Each task has one row, the one that it should have."""
     rng, seen, killed = np.random.default_rng(count), [], []

@@ -51,8 +51,7 @@ def cluster(folder, workers):
             process.wait()
 
 
-@sampled
-@pytest.mark.parametrize("count", spread([60, 2000], 1))
+@sampled("count", spread([60, 2000], 1))
 def test_a_worker_killed_while_it_works(count, tmp_path) -> None:
     """Each task has one row; and real verdicts are those of this process alone, byte by byte."""
     study = tmp_path / "plates.toml"

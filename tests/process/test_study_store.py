@@ -15,7 +15,7 @@ from coverable import Pose, Store, compare, load_case, open_workers, run_tasks
 from feasibility.placement.trials import evaluator_of_study
 from feasibility.safe_files import FileError
 from feasibility.studies.run import StudyTask
-from feasibility.studies.store import FIND, Record, StoreError
+from feasibility.studies.store import Record, StoreError
 
 
 def record(k: int, status: str = "done", size: int = 10) -> Record:
@@ -99,19 +99,6 @@ def test_a_locked_store_says_so(tmp_path) -> None:
         base.execute("ROLLBACK")
         store.keep([record(3)])
         assert set(store.find(["key1", "key2", "key3"])) == {"key1", "key3"}
-
-
-def test_other_programs_may_read_it_meanwhile(tmp_path) -> None:
-    """By SQL; the index on keys is used."""
-    path = tmp_path / "a.study"
-    with Store(path) as store, closing(sqlite3.connect(path)) as base:
-        store.keep([record(k) for k in range(20)])
-        asked = "SELECT count(*) FROM tasks WHERE json_extract(result, '$.verdict') = 'feasible'"
-        assert base.execute(asked).fetchone() == (20,)
-        (plan,) = base.execute(f"EXPLAIN QUERY PLAN {FIND}", ["key3"]).fetchall()
-        assert "USING PRIMARY KEY (key=?)" in plan[-1]
-        store.keep([record(20)])
-        assert base.execute(asked).fetchone() == (21,)
 
 
 def test_a_file_of_someone_else_is_refused_and_left_alone(tmp_path) -> None:

@@ -63,8 +63,7 @@ def test_an_arm_on_its_lift():
     check_arm(unlike(UNLIKE[-1]), np.random.default_rng(3), 5)
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(25, all=500))
+@sampled("seed", seeds(25, all=500))
 def test_random_chains(seed, tmp_path):
     rng = np.random.default_rng(seed)
     more = {"approach_axis": rng.normal(size=3), "tcp": ((0.03, -0.02, 0.12), (20, -30, 75))}

@@ -2,7 +2,6 @@
 
 from collections import Counter
 from dataclasses import replace
-from itertools import combinations
 
 import mesh_patches
 import numpy as np
@@ -10,8 +9,6 @@ import pinocchio as pin
 import pytest
 import trimesh
 from arm_urdfs import random_q
-from capsule_arms import bodies_of, pair
-from foreign_clearances import ForeignScene
 from mesh_writers import stl
 from plain import arm_of
 from samples import sampled, seeds
@@ -82,8 +79,7 @@ FEW = ["puma560", "ur5", "panda", "talos_arm"]
 NAMES = [*FEW, *(info.name for info in list_robots() if info.name not in FEW)]
 
 
-@sampled
-@pytest.mark.parametrize("name", [NAMES[k] for k in seeds(4, all=len(NAMES))])
+@sampled("name", [NAMES[k] for k in seeds(4, all=len(NAMES))])
 def test_bodies_are_where_the_urdf_has_them_and_hulls_and_pieces_hold_them(name):
     """Placements by joints of the URDF, locked ones and fixed links included, without Pinocchio."""
     robot = load_robot(name)
@@ -282,26 +278,6 @@ def test_tangled_bodies_look_outwards():
     body = checked_triangles(both, np.where(turned, faces[:, ::-1], faces))
     assert body.closed
     assert trimesh.Trimesh(body.vertices, body.faces).volume == pytest.approx(12.0)
-
-
-EXACT = ("puma560", "ur5", "panda", "kinova", "xarm7")
-
-
-@sampled
-@pytest.mark.parametrize("name", [EXACT[k] for k in seeds(2, all=5)])
-def test_hulls_and_pieces_collide_wherever_the_exact_shapes_do(name):
-    """Of exact shapes, by python-fcl."""
-    robot = load_robot(name)
-    hulls, pieces = link_shapes(robot), link_shapes(robot, "pieces")
-    joint = {body.owner: body.joint for body in hulls.polytopes}
-    pairs = [(a, b) for a, b in combinations(joint, 2) if joint[a] != joint[b]]
-    q = random_configurations(robot)[:40]
-    scene = ForeignScene(robot, bodies_of(hulls.solids, pairs=[pair(*two) for two in pairs]))
-    exact = np.array([scene.touching(row) for row in q])
-    assert exact.any()
-    for shapes in (hulls, pieces):
-        found = PairSampling(robot, shapes.polytopes).collisions(pairs, q)
-        assert not (exact & ~found).any()
 
 
 def test_l_shaped_links_are_cut_from_the_start_and_then_meet_as_rarely_as_they_do():

@@ -109,8 +109,7 @@ def random_tree(rng):
     return [(p, c, rng.random() < 0.5) for p, c in zip(parents, names[1:], strict=True)]
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(60, all=600))
+@sampled("seed", seeds(60, all=600))
 def test_any_tree(tmp_path, seed):
     """By the definition, link by link."""
     edges = random_tree(random.Random(seed))

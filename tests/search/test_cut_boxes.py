@@ -116,8 +116,7 @@ def loses(known, rng):
     return not (kept and (low - 1e-9 <= y).all() and (y <= high + 1e-9).all())
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(1, all=60))
+@sampled("seed", seeds(1, all=60))
 @pytest.mark.parametrize("arm", ARMS)
 def test_no_box_loses_a_known_point(arm, seed):
     """Six kinds of surfaces, 25 boxes each; tolerance and cone are used up to 0.1 percent."""

@@ -68,8 +68,7 @@ def test_a_cut_through_the_motion_set_and_a_leaf_of_a_covered_cell_are_refuted(p
     assert refuted >= 10
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(1, all=4))
+@sampled("seed", seeds(1, all=4))
 @pytest.mark.parametrize("newton", [True, False], ids=["newton", "boxes alone"])
 @pytest.mark.parametrize(("arm", "few"), [("puma560", 7), ("ur5", 6)])
 def test_a_feasible_case_is_never_proved(arm, few, newton, seed):
@@ -154,8 +153,7 @@ def _spline(surface, pose):
 APART = [4, *range(5, 30), 30]
 
 
-@sampled
-@pytest.mark.parametrize("number", spread(APART, 2))
+@sampled("number", spread(APART, 2))
 def test_a_case_that_falls_apart_does_so_whatever_its_surface_is_made_of(number):
     problem = stored("puma560", feasible=False)[number]
     robot, _, task = case("puma560", problem)

@@ -139,8 +139,7 @@ def beside_the_curve(robot, cells, task, q):
     return off, np.linalg.norm(axes + sign * normal, axis=1), normal
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(1, all=10))
+@sampled("seed", seeds(1, all=10))
 @pytest.mark.parametrize("rolled", [False, True], ids=["free", "rolled"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_segment_that_is_accepted_holds_everywhere(kind, rolled, seed):

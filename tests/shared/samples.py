@@ -1,6 +1,7 @@
 """How much is drawn at random: a little in `make test`, everything in `make campaign`."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ EVERYTHING = False  # said by --samples=all, before tests are collected
 
 
 def seeds(few: int, all: int) -> Sequence[int]:
-    """Seeds to draw from, as in `@sampled @pytest.mark.parametrize("seed", seeds(4, all=200))`."""
+    """Seeds to draw from, as in `@sampled("seed", seeds(4, all=200))`."""
     return range(all if EVERYTHING else few)
 
 
@@ -20,5 +21,8 @@ def spread(items: Sequence, few: int) -> Sequence:
     return [items[k] for k in np.linspace(0, len(items) - 1, few).astype(int)]
 
 
-sampled = pytest.mark.sampled
-"""Marks tests of which a campaign runs more."""
+def sampled(names: Any, values: Sequence | None = None, **more: Any) -> Any:
+    """`pytest.mark.parametrize` of a test of which a campaign runs more; or the mark alone."""
+    if values is None:
+        return pytest.mark.sampled(names)
+    return lambda test: pytest.mark.sampled(pytest.mark.parametrize(names, values, **more)(test))

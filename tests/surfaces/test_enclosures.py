@@ -66,8 +66,7 @@ def test_every_function_is_asked():
     assert {*UFUNCS} | {*FUNCTIONS} == {*FORMULAS}
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(1, all=150))
+@sampled("seed", seeds(1, all=150))
 @pytest.mark.parametrize("function", FORMULAS, ids=lambda f: f.__name__)
 def test_formulas_over_boxes_hold_their_values(function, seed):
     formula, rng = FORMULAS[function], np.random.default_rng(seed)

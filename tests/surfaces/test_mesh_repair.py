@@ -13,7 +13,6 @@ from surfaces.meshes.normals import blended
 from surfaces.meshes.repair.cleaning import clean
 from surfaces.meshes.repair.degenerate import weld_distance, welded
 from surfaces.meshes.repair.mesh_notes import notes_of
-from surfaces.meshes.repair.orientation import one_fan_each
 from surfaces.meshes.triangle_mesh import TriangleMesh
 
 V, F = w.cube()
@@ -83,25 +82,6 @@ def test_a_flip_never_makes_an_edge_twice():
     assert any("dropped" in note for note in notes_of(mesh))
 
 
-def test_fans_are_parted_and_nothing_moves():
-    """Three cones with one tip between them."""
-    parts, faces = [np.zeros((1, 3))], []
-    angle = 2 * np.pi * np.arange(6) / 6
-    ring = np.stack([0.3 * np.cos(angle), 0.3 * np.sin(angle), 0 * angle + 1], axis=1)
-    for k in range(3):
-        parts.append(ring @ Rotation.from_rotvec([0, 2.0 * k, 0]).as_matrix().T)
-        first = 1 + 6 * k
-        faces += [[0, first + j, first + (j + 1) % 6] for j in range(6)]
-    vertices, faces = np.concatenate(parts), np.array(faces)
-    parted, numbers, added = one_fan_each(vertices, faces)
-    assert added == 2
-    assert np.array_equal(parted[numbers], vertices[faces])
-    assert (numbers[:6, 0] == 0).all()  # the first keeps the old vertex
-    mesh = clean(vertices, faces)
-    w.assert_clean(mesh)
-    assert sorted(np.bincount(mesh.pieces)) == [6, 6, 6]
-
-
 def vertex_normals(mesh):
     """(F, 3, 3) at the corners of faces, one for each vertex."""
     alike = np.repeat(mesh.face_normals[:, None], 3, axis=1)
@@ -160,9 +140,8 @@ def battered(rng):
     return vertices, faces[np.sort(rng.permutation(len(faces))[: rng.integers(1, len(faces) + 1)])]
 
 
-@sampled
 @pytest.mark.parametrize("make", [knotted, battered])
-@pytest.mark.parametrize("seed", seeds(4, all=100))
+@sampled("seed", seeds(4, all=100))
 def test_any_arrays_are_refused_or_made_clean(make, seed):
     """With no more area than there was, and none lost without a word."""
     rng, taken = np.random.default_rng(seed), 0

@@ -13,8 +13,7 @@ CUBE = clean(*w.cube(0.2))
 HILLY = clean(*w.hilly())
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(10, all=200))
+@sampled("seed", seeds(10, all=200))
 def test_the_two_sides_of_a_cut_make_up_the_whole(seed):
     rng, mesh = np.random.default_rng(seed), (CUBE, HILLY)[seed % 2]
     middle = mesh.vertices.mean(axis=0) + rng.normal(0, 0.03, 3)

@@ -1,8 +1,11 @@
 """Poses in place of a surface: their cells, the curves and paths between them, and their bounds."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from bounds import holds
+from part_walks import survivors
 
 from coverable import SurfaceError, poses
 from surfaces.places.offset_surfaces import offset_surface
@@ -116,25 +119,13 @@ def test_paths_of_places_bend_no_more_than_is_said(height):
 def test_parts_hold_every_place_of_every_curve(neighbours):
     cells = drawn(1, neighbours=neighbours)
     parts = cells.surface.parts(1e-3, 0.01)
-    finest = np.flatnonzero(parts.children[:, 0] < 0)
-    assert parts.radius[finest, 0].max() <= 1e-9
-    assert parts.radius[finest, 1].max() <= 0.01
-    points, normals = cells.trace(cells.pairs, np.linspace(0.0, 1.0, 23))
-    places = np.concatenate([points, normals], axis=2).reshape(-1, 6)
-    held = np.zeros(len(places), dtype=bool)
-    most = 0.0
-    # On a curve x_2 changes nothing; x_1 is where the point is nearest.
-    for k in finest.tolist():
-        centre, slope = parts.centre[k], parts.slopes[k, 0]
-        assert not parts.slopes[k, 1].any()
-        x = np.clip((places - centre)[:, :3] @ slope[:3] / (slope[:3] @ slope[:3]), -1.0, 1.0)
-        off = places - centre - x[:, None] * slope
-        on = np.linalg.norm(off[:, :3], axis=1) <= parts.radius[k, 0] + 1e-9
-        used = np.linalg.norm(off[:, 3:], axis=1) / parts.radius[k, 1]
-        held |= on & (used <= 1.0 + 1e-9)
-        most = max(most, used[on & (used <= 1.0)].max(initial=0.0))
-    assert held.all()
-    assert most > 0.8
+    finest = parts.children[:, 0] < 0
+    assert (parts.radius[finest] <= [1e-9, 0.01]).all()
+    points, normals = (values.reshape(-1, 3) for values in cells.trace(cells.pairs, DENSE))
+    wide = replace(parts, radius=parts.radius + 1e-12)  # rounding between two ways to a place
+    assert survivors(wide, points, normals).all()
+    less = wide.radius * np.where(finest[:, None], [1.0, 0.8], 1.0)
+    assert not survivors(replace(parts, radius=less), points, normals).all()
 
 
 def test_poses_without_bounds_say_so():

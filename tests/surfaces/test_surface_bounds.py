@@ -6,13 +6,13 @@ import math
 import numpy as np
 import pytest
 from bounds import holds
-from part_walks import at_parameters, boxes_of, lost, pieces_of, residuals, spread, walk
+from part_walks import boxes_of, lost
 from random_surfaces import KINDS, random_surface
 from samples import sampled, seeds
 from smooth_probes import POSE
 from specimens import EXTREME, FACETED, SMOOTH
 
-from coverable import cylinder, hyperboloid, plane, sphere
+from coverable import cylinder, hyperboloid, sphere
 from coverable.errors import ArgumentError
 
 PATCHES = {**SMOOTH, **EXTREME}
@@ -27,42 +27,25 @@ def patch(request):
 
 @pytest.fixture(scope="module")
 def tree(patch):
-    """Its parts, and off (K, 81, 2): how far points and normals of their boxes are off the models;
-    and the least (K, 2) that any affine model of the same places could be off."""
+    """Its parts, and off (K, 81, 2): how far points and normals in their boxes are off models."""
     parts = patch.parts(FLAT, STRAIGHT, MOST)
     low, high = boxes_of(patch, parts)
     u, v = np.moveaxis((low + high)[:, None] / 2.0 + GRID * (high - low)[:, None] / 2.0, 2, 0)
     values = np.concatenate([patch.point(u, v), patch.normal(u, v)], axis=2)
     models = parts.centre[:, None] + np.einsum("gc,kcd->kgd", GRID, parts.slopes)
-    best = np.column_stack([np.ones(len(GRID)), GRID])
-    best = best @ np.linalg.pinv(best)
-    least = values - np.einsum("gh,khd->kgd", best, values)
-    off, least = (np.linalg.norm(a.reshape(*a.shape[:2], 2, 3), axis=3)
-                  for a in (values - models, least))  # fmt: skip
-    return parts, off, least.max(axis=1)
+    return parts, np.linalg.norm((values - models).reshape(*values.shape[:2], 2, 3), axis=3)
 
 
 def test_parts_hold_all_their_places_and_smaller_radii_would_not(patch, tree):
-    parts, off, _ = tree
+    parts, off = tree
     assert patch.kind != "plane" or parts.radius.max() < 2e-12
     for k in (0, 1):
         flat = parts.radius[:, k].max() < 1e-11
         holds(parts.radius[:, k, None], off[..., k], used=0.0 if flat else 0.8)
 
 
-def test_the_finest_parts_are_near_the_least_possible(patch, tree):
-    """No affine model leaves much less than what is stated of small parts."""
-    parts, _, least = tree
-    rounding = 3e-14 * np.abs(parts.centre).max() + 1e-11
-    for k in (0, 1):
-        small = parts.radius[:, k] < (0.02, 0.2)[k] * min(1.0, parts.radius[0, k])
-        known = (parts.children[:, 0] < 0) & small & (least[:, k] > 100.0 * rounding)
-        ratio = (parts.radius[known, k] - rounding) / least[known, k]
-        assert not known.any() or np.median(ratio) <= 3.5
-
-
 def test_the_tree_is_one_and_is_cut_as_asked(patch, tree):
-    parts, *_ = tree
+    parts, _ = tree
     inner = parts.children[:, 0] >= 0
     children = parts.children[inner]
     assert np.sort(children.ravel()).tolist() == list(range(1, len(parts)))
@@ -80,28 +63,12 @@ def test_the_tree_is_one_and_is_cut_as_asked(patch, tree):
 
 @pytest.mark.parametrize("name", [n for n, s in FACETED.items() if s.kind == "piecewise"])
 def test_parts_of_joined_surfaces_hold_their_places(name):
-    surface = FACETED[name]
-    parts = surface.parts(FLAT, STRAIGHT, MOST)
-    finest = parts.children[:, 0] < 0
-    assert (parts.radius[finest] <= [FLAT, STRAIGHT]).all() or len(parts) + 2 > MOST
+    surface, rng = FACETED[name], np.random.default_rng(1)
     assert any(surface.turned) == (name == "turned over")
-    above = np.full(len(parts), -1)
-    above[parts.children[~finest]] = np.flatnonzero(~finest)[:, None]
-    for k, (piece, sign) in enumerate(pieces_of(surface)):
-        u, v = spread(piece, 2000)
-        first = np.full(len(u), len(surface.charts) - 1 + k)
-        places = piece.point(u, v), sign * piece.normal(u, v)
-        used = walk(parts, first, at_parameters(piece, u, v)[1], *places)
-        assert max(used.points, used.normals) <= 1.0
-        over = above[first[0]]
-        while over >= 0:  # parts above several pieces are balls
-            held = residuals(parts, np.full(len(u), over), np.zeros((len(u), 2)), *places)
-            assert (held <= parts.radius[over]).all()
-            over = above[over]
+    assert not any(lost(surface, rng) for _ in range(5))
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(3, all=300))
+@sampled("seed", seeds(3, all=300))
 @pytest.mark.parametrize("kind", KINDS)
 def test_random_surfaces_lie_in_their_parts(kind, seed):
     rng = np.random.default_rng([seed, *map(ord, kind)])
@@ -109,8 +76,7 @@ def test_random_surfaces_lie_in_their_parts(kind, seed):
     assert not lost(surface, rng), surface
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(1, all=100))
+@sampled("seed", seeds(1, all=100))
 def test_models_over_any_boxes_hold_their_places_and_hardly_less_would(patch, seed):
     """Points, normals and u directions: 10^6 places of each patch, of all sizes of boxes."""
     rng, ends = np.random.default_rng(seed), np.array([patch.u_range, patch.v_range])
@@ -235,13 +201,3 @@ def test_the_max_curvature_is_the_largest_of_many_directions(name):
     best = np.max(rates, axis=(0, 2))
     assert (best <= cells.max_curvature * (1 + 1e-3) + 1e-6).all()
     assert (best >= cells.max_curvature * 0.97 - 1e-6).all()
-
-
-def test_parallel_surfaces_bend_as_their_formulas_say():
-    """1 / (R + h) on a sphere; nothing on a plane."""
-    dome = SMOOTH["dome"].cells(9, 10)
-    for height in (-0.5, -0.005, 0.0, 0.3):
-        bent = dome.curves.curvature(height)
-        assert bent.max() == pytest.approx(1.0 / (1.0 + height), rel=1e-4)
-        assert dome.parallel_curvature(height).max() == pytest.approx(1.0 / (1.0 + height), rel=0.1)
-    assert plane((0, 1), (0, 1)).cells(3, 3).curves.curvature(0.1).max() < 1e-12

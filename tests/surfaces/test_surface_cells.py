@@ -7,13 +7,10 @@ import pickle
 import numpy as np
 import pytest
 from bounds import holds
-from hypothesis import given
-from hypothesis import strategies as st
 from specimens import ALL, SMOOTH, cells_of
 
 from coverable import SurfaceError, cylinder, plane, sphere, torus
 from coverable.kernels import allocating_entry
-from surfaces.adjacency import grid_neighbours
 from surfaces.patches import closed_form_kernels
 
 cell_at, closest_on_patch, wrap = map(
@@ -124,23 +121,6 @@ def test_neighbours_run_clockwise_and_links_name_their_pairs(name):
     owner = np.repeat(np.arange(len(grid)), np.diff(indptr))
     pair = grid.pairs[grid.neighbours.links]
     np.testing.assert_array_equal(np.sort(np.column_stack([owner, indices]), axis=1), pair)
-
-
-@given(
-    rows=st.integers(0, 6), columns=st.integers(0, 7),
-    closed=st.tuples(st.booleans(), st.booleans()), poles=st.tuples(st.booleans(), st.booleans()),
-)  # fmt: skip
-def test_neighbourhood_is_symmetric_without_self_or_repeats(rows, columns, closed, poles):
-    if any(poles):  # a pole means that the columns close around it and the rows end
-        closed = (False, True)
-    found = grid_neighbours(rows, columns, closed, poles)
-    around = [found.of(k).tolist() for k in range(rows * columns)]
-    for k, indices in enumerate(around):
-        assert k not in indices
-        assert len(set(indices)) == len(indices)
-        assert all(k in around[other] for other in indices)
-    pairs = found.pairs.tolist()
-    assert pairs == sorted([i, j] for i, js in enumerate(around) for j in js if i < j)
 
 
 def test_grids_without_cells_with_one_and_with_a_million():

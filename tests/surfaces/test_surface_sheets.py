@@ -12,7 +12,7 @@ from smooth_probes import POSE
 from specimens import EXTREME
 from triangle_probes import least_distances
 
-from coverable import SurfaceError, cylinder, plane, poses, sphere
+from coverable import SurfaceError, plane, poses, sphere
 from coverable.errors import ArgumentError
 from surfaces.sheet import sheet_of
 
@@ -44,8 +44,7 @@ def distances(surface, wanted, depth, rng, most=600, count=80):
     return far, sheet.deviation + 1e-12 * np.abs(sheet.triangles).max()
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(3, all=100))
+@sampled("seed", seeds(3, all=100))
 @pytest.mark.parametrize("thick", [False, True])
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_place_is_further_from_its_sheet_than_stated(kind, thick, seed):
@@ -67,14 +66,6 @@ def test_few_triangles_of_extreme_surfaces_are_as_near_as_stated(name, most):
     tiles = sheet_of(EXTREME[name], 1e-4, most).own.reshape(-1, 2, 3, 3)
     looks = np.cross(tiles[:, :, 1] - tiles[:, :, 0], tiles[:, :, 2] - tiles[:, :, 0])
     assert ((looks[:, 0] * looks[:, 1]).sum(axis=1) >= 0.0).all()
-
-
-@pytest.mark.parametrize("wanted", [1e-3, 1e-5])
-def test_the_deviation_is_used_and_kept(wanted):
-    surface = cylinder(0.5, (-60, 60), (0.0, 0.9))
-    far, stated = distances(surface, wanted, 0.0, np.random.default_rng(1), 100_000, 400)
-    holds(stated, far, used=0.5)
-    assert stated <= wanted + 1e-9
 
 
 def test_layers_of_a_thick_sheet_leave_no_more_between_them_than_stated():

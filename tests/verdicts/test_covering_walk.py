@@ -49,8 +49,7 @@ def test_a_grid_of_eight_neighbours_takes_few_detours():
         assert len(visits(graph, nu * nv)) <= 1.15 * nu * nv + 1
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(5, all=60))
+@sampled("seed", seeds(5, all=60))
 def test_random_trees_and_graphs(seed):
     """A tree of n nodes takes at most twice its edges; more edges never hurt a valid walk."""
     rng = np.random.default_rng(seed)
@@ -61,8 +60,7 @@ def test_random_trees_and_graphs(seed):
     assert len(visits(tree, n, rng=rng)) <= 2 * (n - 1) + 1
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(3, all=40))
+@sampled("seed", seeds(3, all=40))
 def test_several_nodes_over_one_cell(seed):
     """Cells, not nodes, have to be visited: some nodes are left out, no cell is."""
     rng = np.random.default_rng(seed)

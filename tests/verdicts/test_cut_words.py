@@ -67,8 +67,7 @@ def test_a_deep_tree_is_said_without_deep_calls() -> None:
     assert "and 297 more" in sentence(tree, PUMA, CELLS)
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(2, all=20))
+@sampled("seed", seeds(2, all=20))
 def test_configurations_are_parted_by_the_last_cut_that_both_meet(seed: int) -> None:
     """Against walking down the tree by hand."""
     rng = np.random.default_rng(seed)

@@ -93,8 +93,7 @@ def test_the_referee_says_what_is_wrong():
     assert [fault.split(":")[0] for fault in faults] == ["clearance"]
 
 
-@sampled
-@pytest.mark.parametrize("name", spread(names("paper"), 1))
+@sampled("name", spread(names("paper"), 1))
 def test_the_papers_cases_have_their_known_answers(name):
     best = {"paper 4d": 60, "paper 4f": 6}.get(name, 90)
     assert puma_oracle.solve(paper_case(name)) == Answer(best == 90, best, best)
@@ -132,8 +131,7 @@ def test_every_ur5_configuration_is_found_from_its_tool_and_two_wrist_angles():
         assert np.abs(off).max(axis=-1).min() < 1e-6
 
 
-@sampled
-@pytest.mark.parametrize(("arm", "oracle"), [("puma560", puma_oracle), ("ur5", ur5_oracle)])
+@sampled(("arm", "oracle"), [("puma560", puma_oracle), ("ur5", ur5_oracle)])
 def test_stored_answers_are_the_oracles(arm, oracle):
     problems, robot = read(arm), load_robot(arm)
     for number in spread(range(len(problems)), 2):
@@ -145,8 +143,7 @@ def test_stored_answers_are_the_oracles(arm, oracle):
             np.testing.assert_allclose(mine, theirs, atol=1e-12)
 
 
-@sampled
-@pytest.mark.parametrize("file", STORED)
+@sampled("file", STORED)
 def test_few_stored_problems_are_left_undecided_or_unproved(file):
     """That no answer is wrong, and no more cells are covered than there are, the table holds."""
     found = [verdict_of(name) for name in spread(stored(file), STORED[file])]

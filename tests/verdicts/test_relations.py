@@ -52,8 +52,7 @@ def test_one_question_asked_otherwise_has_one_answer(one, other):
     assert one.covered.tolist() == other.covered.tolist()
 
 
-@sampled
-@pytest.mark.parametrize(("one", "other"), spread(NEARLY, 3))
+@sampled(("one", "other"), spread(NEARLY, 3))
 def test_cells_that_lie_elsewhere_cover_as_much(one, other):
     one, other = verdict_of(one), verdict_of(other)
     assert (one.answer, one.evidence) == (other.answer, other.evidence)
@@ -77,8 +76,7 @@ def no_less(narrow, wide):
     assert not reached & {cause.cell for cause in lost if cause.proved}
 
 
-@sampled
-@pytest.mark.parametrize(("narrow", "wide"), spread(LESS, 8))
+@sampled(("narrow", "wide"), spread(LESS, 8))
 def test_a_question_that_asks_less_loses_nothing(narrow, wide):
     no_less(verdict_of(narrow), verdict_of(wide))
     assert verdict_of(wide).statistics["fk"] <= 5 * verdict_of(narrow).statistics["fk"] + 2000
@@ -103,8 +101,7 @@ def wider(tables, what, rng):
     return tables | {"robot": robot, "task": task}
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(1, all=3))
+@sampled("seed", seeds(1, all=3))
 @pytest.mark.parametrize("what", ["limit", "cone", "tolerance"])
 @pytest.mark.parametrize("name", spread(PROBLEMS, 2))
 def test_what_is_wider_loses_nothing(name, what, seed):
@@ -112,8 +109,7 @@ def test_what_is_wider_loses_nothing(name, what, seed):
     no_less(verdict_of(name), check(*built(wider(tables_of(name), what, rng))))
 
 
-@sampled
-@pytest.mark.parametrize("name", spread(PROBLEMS, 2))
+@sampled("name", spread(PROBLEMS, 2))
 def test_finer_cells_lose_only_new_ones(name):
     """Three times finer both ways: every centre is one of the finer centres."""
     q, coarse = question(name), verdict_of(name)
@@ -137,8 +133,7 @@ def same(one, other):
         assert plain.faults_of(other) == []
 
 
-@sampled
-@pytest.mark.parametrize("name", [*spread(PROBLEMS, 2), "beside a post", "torus"])
+@sampled("name", [*spread(PROBLEMS, 2), "beside a post", "torus"])
 def test_moving_all_by_one_rigid_motion_changes_nothing(name):
     q, angles, shift = question(name), (0.4, -0.7, 1.9), np.array([0.5, -1.0, 0.3])
     motion = pin.SE3(rotation_from_rpy(*angles), shift)
@@ -156,8 +151,7 @@ def test_moving_all_by_one_rigid_motion_changes_nothing(name):
     same(verdict_of(name), check(robot, surface.cells(*q.cells.shape), task))
 
 
-@sampled
-@pytest.mark.parametrize("name", spread(PROBLEMS, 2))
+@sampled("name", spread(PROBLEMS, 2))
 def test_a_mirror_changes_nothing(name):
     """In the plane y = 0: turns run the other way, and one parameter of the surface does."""
     q, tables = question(name), tables_of(name)

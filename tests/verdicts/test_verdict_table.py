@@ -56,8 +56,7 @@ def every(verdict):
     return np.ones(len(verdict.cells), dtype=bool)
 
 
-@sampled
-@pytest.mark.parametrize("name", TABLE)
+@sampled("name", TABLE)
 def test_the_answer_is_the_stored_one(name, request):
     """And costs no more than 1.5 times as many evaluations of the arm as when it was stored."""
     verdict = verdict_of(name)
@@ -73,8 +72,7 @@ def test_the_answer_is_the_stored_one(name, request):
     assert work <= 1.5 * answers[name][-1] + 100
 
 
-@sampled
-@pytest.mark.parametrize("name", ALL)
+@sampled("name", ALL)
 def test_the_truth_is_found(name):
     """By closed forms, by a motion that was there first, or by hand."""
     answer, truth = verdict_of(name).answer, known(name)
@@ -90,8 +88,7 @@ def test_the_truth_is_found(name):
     assert (answer is Answer.UNDECIDED) == undecided or truth is None or truth.startswith("not ")
 
 
-@sampled
-@pytest.mark.parametrize("name", ALL)
+@sampled("name", ALL)
 def test_the_verdict_fits_together(name):
     verdict = verdict_of(name)
     covered = set(np.flatnonzero(verdict.covered).tolist())
@@ -117,8 +114,7 @@ def test_the_verdict_fits_together(name):
         assert apart == set().union(*components) - covered
 
 
-@sampled
-@pytest.mark.parametrize("name", [name for name in ALL if name not in names("undecided")])
+@sampled("name", [name for name in ALL if name not in names("undecided")])
 def test_what_it_rests_on_holds(name):
     """By the judges and by the referee; the certificate bounds what the referee measures."""
     verdict = verdict_of(name)
@@ -226,8 +222,7 @@ def moved_row(verdict, form, asked):
     return None
 
 
-@sampled
-@pytest.mark.parametrize("name", WORSE)
+@sampled("name", WORSE)
 def test_a_motion_a_little_worse_is_refused(name):
     """By the judge along the surface, by that along the cells' curves, and by the referee."""
     if not feasible(name):
@@ -256,8 +251,7 @@ def test_every_way_to_be_worse_is_tried():
     }  # fmt: skip
 
 
-@sampled
-@pytest.mark.parametrize("name", spread([n for n in WALKED if n not in names("poses")], 24))
+@sampled("name", spread([n for n in WALKED if n not in names("poses")], 24))
 def test_the_edges_of_its_graph_are_motions_that_judge_and_referee_accept(name):
     """The search has certified each; where judge and search differ, one of them is wrong."""
     verdict = verdict_of(name)
@@ -288,8 +282,7 @@ def test_the_edges_of_its_graph_are_motions_that_judge_and_referee_accept(name):
         assert referee.judge(arm, form, asked, motion, pair, marks, per_segment=some) == []
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(1, all=3))
+@sampled("seed", seeds(1, all=3))
 @pytest.mark.parametrize("name", [n for n in spread(WALKED, 8) if n not in names("undecided")])
 def test_the_seed_does_not_decide(name, seed):
     asked, first = question(name), verdict_of(name)
@@ -299,15 +292,13 @@ def test_the_seed_does_not_decide(name, seed):
         assert plain.faults_of(other, surface=form_of(name), per_segment=6) == []
 
 
-@sampled
-@pytest.mark.parametrize("name", names("hard"))
+@sampled("name", names("hard"))
 def test_what_was_once_answered_wrongly_is_right_with_any_seed(name):
     for seed in seeds(1, all=10):
         assert verdict_of(name, seed or None).answer == known(name)
 
 
-@sampled
-@pytest.mark.parametrize("name", spread(names("dear walls"), 1))
+@sampled("name", spread(names("dear walls"), 1))
 def test_walls_that_take_longer(name):
     """Feasible, or short of it by a cell or two, and then what is in the way is named."""
     verdict = verdict_of(name)

@@ -77,8 +77,7 @@ def case_at(case, quantity, value):
 ASKED = ["plate", "stiff wrist", "deep plate", "4d"] + ["4a", "5e", "dome"] * EVERYTHING
 
 
-@sampled
-@pytest.mark.parametrize("name", ASKED)
+@sampled("name", ASKED)
 def test_what_is_said_of_a_side_is_what_a_verdict_says(name):
     """Feasible sides are, with a motion that holds all of the changed case; proved ones are not."""
     case, sides = given_case(name), 0
@@ -147,24 +146,6 @@ def test_the_cone_a_stiff_wrist_needs_is_that_of_the_geometry():
         explain(STIFF.with_limits(limits), WALL.cells(3, 3), Task(0.0, 10)), "cone"
     )
     assert wider.feasible.value < found.feasible.value
-
-
-def test_a_ring_that_a_stop_cuts_in_two_needs_joint1_to_pass_it():
-    """Every cell is reached, forwards or backwards, yet no motion turns from one to the other.
-
-    Forwards joint1 stands at the azimuth less the offset, so the far end of the ring asks for 145
-    degrees; backwards, as the mirror image, for the same in the other direction.
-    """
-    arm = PUMA.with_limits({"joint1": np.radians([-100.0, 100.0])})
-    ring = coverable.cylinder(0.6, (20, 160), (0.2, 0.3)).cells(4, 1)
-    explanation = explain(arm, ring, Task(0.02, 40))
-    assert explanation.verdict.evidence is Evidence.PROOF
-    needed = np.degrees(ring.u).max() - math.degrees(math.asin(0.1 / 0.58))
-    for name, sign in (("joint1 upper limit", 1.0), ("joint1 lower limit", -1.0)):
-        found = threshold_of(explanation, name)
-        assert abs(sign * math.degrees(found.feasible.value) - needed) <= 0.2
-    assert len(explanation.dropped.cells) == 4 - explanation.verdict.n_covered
-    assert explanation.dropped.waypoints is not None
 
 
 def test_a_standoff_that_lifts_the_tool_helps():

@@ -48,8 +48,7 @@ def assert_partition(found, covers):
     assert found.bound <= len(found)
 
 
-@sampled
-@pytest.mark.parametrize("block", seeds(3, all=20))
+@sampled("block", seeds(3, all=20))
 def test_random_tables_against_brute_force(block):
     rng = np.random.default_rng(block)
     for seed in range(40 * block, 40 * block + 40):

@@ -173,8 +173,7 @@ def held():
     return {}
 
 
-@sampled
-@pytest.mark.parametrize("number", seeds(len(KINDS), all=200))
+@sampled("number", seeds(len(KINDS), all=200))
 def test_what_is_called_feasible_is_right_over_the_surface(number, held):
     """The motion and its trajectory; and one that comes down by three tolerances is refused."""
     case = drawn(number)

@@ -15,7 +15,6 @@ from samples import sampled, seeds, spread
 import coverable
 from coverable import PathError, Task, check, coverage_path, cylinder, load_robot, plane, replay
 from feasibility.paths.ladder import joint_route
-from feasibility.paths.metrics import revisiting
 from feasibility.paths.motion_graph import MotionGraph, joint_length
 from feasibility.paths.order import ORDERS, closed_sides, grid_order
 from feasibility.paths.winding import unwound
@@ -81,8 +80,7 @@ def tube(name):
     return check(load_robot(arm), ring.cells(12, 6), Task(standoff=standoff, cone_deg=cone))
 
 
-@sampled
-@pytest.mark.parametrize(("name", "order"), spread([*product(TUBES, ORDERS)], 6))
+@sampled(("name", "order"), spread([*product(TUBES, ORDERS)], 6))
 def test_a_closed_surface_is_not_gone_over_twice(name, order):
     """Some joint cannot turn on where the surface does: the path begins there."""
     verdict = tube(name)
@@ -145,11 +143,6 @@ def _singular_value(robot, q, step=1e-6):
     return smallest
 
 
-def test_segments_that_lead_to_a_known_cell():
-    walk = Walk(q=np.zeros((8, 2)), cell=np.array([0, -1, 1, -1, 0, 0, -1, 2]))
-    assert revisiting(walk).tolist() == [False, False, True, True, True, False, False]
-
-
 def test_some_cells_only_of_a_feasible_surface_or_of_one_that_is_not():
     verdict = verdict_of("4d")
     path = coverage_path(verdict, "rows", only=np.flatnonzero(verdict.covered).tolist())
@@ -178,8 +171,7 @@ def hand_made(rng, cells, nodes, density, wide=3.0):
     return graph, verdict.cells
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(10, all=200))
+@sampled("seed", seeds(10, all=200))
 def test_nodes_are_chosen_for_the_least_travel(seed):
     graph, cells = hand_made(np.random.default_rng(seed), cells=5, nodes=3, density=1.0)
     nodes = joint_route(graph, cells, np.arange(5), wind=False).nodes

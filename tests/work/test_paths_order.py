@@ -61,8 +61,7 @@ def test_grids_that_close_on_themselves():
         assert all(closed_sides(cells) == sides for cells in grids)
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(8, all=200))
+@sampled("seed", seeds(8, all=200))
 def test_an_improved_tour_has_no_better_neighbour(seed):
     """Of those with a part turned round, or a part of up to three moved elsewhere."""
     rng = np.random.default_rng(seed)

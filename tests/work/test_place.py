@@ -99,8 +99,7 @@ def case_at(name, pose):
     return case_of(name).with_overrides(sets).build()
 
 
-@sampled
-@pytest.mark.parametrize(("name", "seed"), [*MOVED[:2], *spread(MOVED, 2)[2:]])
+@sampled(("name", "seed"), [*MOVED[:2], *spread(MOVED, 2)[2:]])
 def test_a_surface_moved_away_is_put_back(name, seed):
     """Infeasible where it was moved to; in the region around there is a place, and check agrees."""
     away = moved_away(name, seed)
