@@ -77,22 +77,6 @@ def test_no_point_moves_or_leaves_its_chord_further(step):
         holds(bound, truth, 0.6)
 
 
-@pytest.mark.parametrize("turn", [0.1, 1.0])
-def test_a_lever_that_is_longer_in_the_middle_than_at_the_ends(turn):
-    """Folded, stretched, folded again: the first joint carries a point further halfway."""
-    robot, rng, bounds, truths = planar_arm([0.3, 0.3]), np.random.default_rng(0), [], []
-    tip = np.array([[0.3, 0.0, 0.0]])
-    for bend in np.linspace(0.1, 3.1, 16):
-        rows = np.array([[0.0, -bend], [turn, bend]])
-        bounds.append(bends(robot, rows, 0, 2, tip[0], 0.0)[:2])
-        truths.append(how_far(robot, rows, np.zeros((1, 2)), 0, 2, tip, rng)[:2])
-        q = np.linspace(0.0, 1.0, 2001)[:, None] * (rows[1] - rows[0]) + rows[0]
-        way = np.linalg.norm(np.diff(seen(robot, q, 0, 2, tip)[:, 0], axis=0), axis=1).sum()
-        truths[-1][1] = way  # no less than what it moves, and what a share of the way needs
-    for column, used in ((0, 0.55), (1, 0.8)):
-        holds(np.array(bounds)[:, column], np.array(truths)[:, column], used)
-
-
 def test_joints_that_deviate_move_a_point_by_their_levers():
     """Two links in line: 0.6 m and 0.3 m from the axes, both joints off by 0.1 rad."""
     robot, tip = planar_arm([0.3, 0.3]), np.array([[0.3, 0.0, 0.0]])

@@ -1,6 +1,7 @@
 """The judge of the roll: its bounds hold where they are sampled, and both judges obey them."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,13 +20,14 @@ from feasibility.certification.rolls.bounds import (
     vectors_of,
 )
 from feasibility.certification.rolls.held import Held
+from feasibility.certification.rolls.roll_box_models import Directions, reference_parts
 from feasibility.certification.surface_replay import replay_over_surface
 from feasibility.roll import Roll
 from feasibility.targets.references import u_directions
 from feasibility.verdict import Walk
 from robots.kinematics import Kinematics, reference_axes
 from surfaces.places.offset_surfaces import offset_surface
-from surfaces.places.places import Places
+from surfaces.places.places import PlacePaths, Places
 
 S = np.linspace(0.0, 1.0, 101)[:, None]
 X, Y, Z = np.eye(3)
@@ -121,6 +123,56 @@ def test_references_bend_no_more_than_is_said(kind):
         assert (off <= most + 1e-7).all()
         used.append((off / most)[off > 1e-4].max(initial=0.0))
     assert kind != "dome" or max(used) > 0.3
+
+
+@pytest.mark.parametrize("kind", ["fixed", "u", "square"])
+def test_the_bounds_of_references_are_those_of_the_lemma(kind):
+    """A second reading of `rolls.held`, term by term: also of terms that others outweigh."""
+    rng, half = np.random.default_rng(8), np.radians(85.0)
+    for _ in range(12):
+        b = unit(-Z + 0.1 * rng.normal(size=(4, 3)))
+        e = np.tile(X, (4, 1)) if kind == "fixed" else unit(X + 0.1 * rng.normal(size=(4, 3)))
+        b[2], e[2] = b[1], e[1]
+        aside, own = rng.uniform(0.001, 0.02, (2, 3))
+        offset = SimpleNamespace(
+            tangents=lambda places, e=e: e[places.x[:, 0].astype(int)],
+            tangent_deviations=lambda one, other, own=own: own[one.x[:, 0].astype(int)],
+            square=kind == "square",
+        )
+        roll = Roll(0.1, half)
+        held = Held(offset, 1.0, None, X if kind == "fixed" else None, roll)
+        at = np.array([0.0, 0.4, 0.4, 1.0])
+        number = np.stack([np.arange(4.0), np.zeros(4)], axis=1)[None]
+        off, chart = np.stack([0.0 * aside, aside], axis=1)[None], np.zeros((1, 4), dtype=np.int64)
+        path = PlacePaths(at[None], np.zeros((1, 4, 3)), b[None], off, chart, number)
+        t = unit(e - (e * b).sum(axis=1, keepdims=True) * b)
+        u = np.cross(b, t)
+        x, axes = unit(X + 0.1 * rng.normal(size=(2, 3))), unit(-Z + 0.1 * rng.normal(size=(2, 3)))
+        y, second, worst = np.cross(axes, x), rng.uniform(0.01, 0.05), []
+        known = held.references_along(path, path.normals)
+        for k in (0, 2):
+            d_b = aside[k]
+            directions = Directions.between(b[k : k + 1], b[k + 1 : k + 2], np.array([d_b]))
+            r_e = np.zeros(1) if kind == "fixed" else 0.5 * own[k : k + 1]
+            reference = Directions.between(e[k : k + 1], e[k + 1 : k + 2], r_e)
+            d_t = 2.0 * reference_parts(directions, reference, kind == "square").radius[0]
+            of_u = 2.0 * np.linalg.norm(b[k + 1] - b[k]) * np.linalg.norm(t[k + 1] - t[k])
+            assert d_t == pytest.approx(own[k]) or kind != "square"
+            assert known.beside[0, k] == pytest.approx(2.0 * d_t + d_b)
+            assert known.second_u[0, k] == pytest.approx(of_u)
+            one, other = ([(1.0 - s) * v[0] + s * v[1] for v in (x, y)] for s in at[k : k + 2])
+            ends = (*one, t[k], u[k]), (*other, t[k + 1], u[k + 1])
+            dx, dy, dt, du = (last - first for first, last in zip(*ends, strict=True))
+            most = 2.0 * np.hypot(dt @ dx + du @ dy, du @ dx - dt @ dy)
+            most += (at[k + 1] - at[k]) ** 2 * second + np.sqrt(2.0) * of_u
+            z0 = vectors_of(*one, t[k], u[k], roll)[None]
+            z1 = vectors_of(*other, t[k + 1], u[k + 1], roll)[None]
+            unknown = np.array([[s * (1.0 - s) / 2.0 * second for s in at[k : k + 2]]])
+            unknown += np.sqrt(2.0) * (2.0 * d_t + d_b)
+            worst.append(largest_off(z0, z1, np.array([most]), unknown, half)[0])
+        ends = [tuple(np.split(one, 2)) for one in (x, axes)]
+        found = held.rolls_between(*ends, np.array([second]), path, path.normals)
+        assert found[0] == pytest.approx(max(worst), abs=1e-7)
 
 
 REFERENCES = {

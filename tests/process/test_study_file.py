@@ -70,13 +70,6 @@ def test_samples_are_a_sobol_sequence_in_the_ranges() -> None:
     assert keys(SAMPLED.replace("count = 50", "count = 64"))[:50] == keys(SAMPLED)
 
 
-def test_steps_are_even_and_end_where_they_should() -> None:
-    text = 'base.case = "paper/4a"\nvary."task.cone_deg" = { from = 45, to = 10.1, steps = 7 }'
-    values = [task.parameters["task.cone_deg"] for task in read_study(text).tasks]
-    assert values == pytest.approx(np.linspace(45, 10.1, 7), abs=1e-12)
-    assert (values[0], values[-1]) == (45, 10.1)
-
-
 def test_the_base_is_a_case_with_keys_replaced(tmp_path) -> None:
     (tmp_path / "mine.toml").write_text(load_case("paper/5a").to_toml())
     text = (

@@ -226,15 +226,6 @@ def test_a_joint_that_moves_both_is_held_and_a_note_says_so(cell):
     assert not [note for note in asked_for.notes if "'rail'" in note]
 
 
-def test_a_locked_table_leaves_the_reach_of_the_arm(cell):
-    table = {"turn": (0.7, 0.7), "tilt": (0.3, 0.3), "rail": (0.5, 0.5)}
-    robot = load_robot(cell, tool_frame="tool0", surface_link="jig", limits=table)
-    assert np.isclose(robot.reach, load_robot("ur5").reach)
-    q = np.array([random_q(robot, np.random.default_rng(k)) for k in range(100)])
-    points, _ = Kinematics(robot).tools(q)
-    assert (robot.distance_from_base(points) <= robot.reach + 1e-12).all()
-
-
 RAIL = Axis("rail", "prismatic", (1, 0, 0), limits=(-1.0, 1.5), position=(0, -1, 0.3),
             rpy_deg=tuple(np.degrees([0, 0.1, 0.2])), max_velocity=0.7)  # fmt: skip
 TILT = Axis("tilt", "revolute", (0, 1, 0.1), limits=(-1.0, 1.2), position=(0.7, 0, 0.4),

@@ -595,15 +595,6 @@ class Scene:
             found.append(least)
         return np.array(found)
 
-    def touching(self, q: ArrayLike) -> NDArray[np.bool_]:
-        """(pairs,) which bodies share a point at one configuration."""
-        import fcl
-
-        frames, asked = self._frames(np.atleast_2d(q)), fcl.CollisionRequest()
-        touch = lambda a, b, _: fcl.collide(a, b, asked, fcl.CollisionResult())  # noqa: E731
-        pairs = range(len(self.pairs))
-        return np.array([any(touch(*two) for two in self._shapes(k, frames)) for k in pairs])
-
     def _shapes(self, k: int, frames: Mapping[str, Floats]) -> Iterator[tuple[Any, Any, float]]:
         """Each shape of a pair's first body with each of its second; how far they stand out."""
         for one, other in product(*(self.bodies[name] for name in self.pairs[k][:2])):

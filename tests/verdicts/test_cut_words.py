@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from asked import question
-from samples import sampled, seeds
 
 from coverable import load_robot, plane
 from feasibility.cut_tree import Cut, CutTree, Leaf
@@ -65,24 +64,6 @@ def test_a_deep_tree_is_said_without_deep_calls() -> None:
     tree = CutTree(node)
     assert len(lines(tree, PUMA, CELLS)) == 6001
     assert "and 297 more" in sentence(tree, PUMA, CELLS)
-
-
-@sampled("seed", seeds(2, all=20))
-def test_configurations_are_parted_by_the_last_cut_that_both_meet(seed: int) -> None:
-    """Against walking down the tree by hand."""
-    rng = np.random.default_rng(seed)
-    for _ in range(50):
-        q, other = np.radians(rng.uniform(-180.0, 180.0, (2, 6)))
-        low, beyond = q[2] > np.radians(-82.0), other[2] > np.radians(-82.0)
-        joint, value = (1, 12.5) if low else (4, 0.04)
-        if low != beyond:
-            expected = THREE.root
-        elif (q[joint] > np.radians(value)) != (other[joint] > np.radians(value)):
-            expected = THREE.root.above if low else THREE.root.below
-        else:
-            expected = None
-        assert THREE.parting(q, other) is expected
-        assert THREE.parting(other, q) is expected
 
 
 def test_opened_joints_are_wound_into_one_turn() -> None:

@@ -1,6 +1,5 @@
 """Moves between patches that keep clear: found, certified, and judged by a library of their own."""
 
-import math
 from dataclasses import replace
 from functools import cache
 
@@ -68,22 +67,6 @@ def test_the_move_between_two_patches_goes_around_the_post():
     for patch in division.patches:
         assert patch.accepted
         assert collision_replay(robot, bodies, patch.walk.q).accepted
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_ways_around_are_found_from_any_seed_and_straight_ones_stay(seed):
-    division = behind()
-    (move,) = division.moves
-    robot, bodies = division.robot, bodies_of(division)
-    space = FreeSpace(robot, collision_buffer(bodies, robot))
-    rows = free_motion(space, move.start, move.end, seed)
-    np.testing.assert_array_equal(rows[[0, -1]], [move.start, move.end])
-    assert collision_replay(robot, bodies, rows).accepted
-    # Folding up and back is enough: it does not wander.
-    assert np.abs(np.diff(rows, axis=0)).sum() < 8 * math.pi
-    near = move.start + 0.05
-    straight = free_motion(FreeSpace(robot, space.buffer), move.start, near, seed)
-    np.testing.assert_array_equal(straight, [move.start, near])
 
 
 def test_a_move_that_is_not_found_is_refused_and_said():

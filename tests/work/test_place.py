@@ -1,6 +1,5 @@
 """Placements: found where there are some, and again by `check`; refused where a bound shows it."""
 
-import csv
 import json
 import math
 from dataclasses import replace
@@ -322,27 +321,6 @@ def test_a_map_tells_what_single_placements_tell():
     assert chart.share.max() == 1.0 > chart.share.min()
     with pytest.raises(PlacementError, match="z: does not vary"):
         placement_map(evaluator, region, chart.held, axes=("x", "z"))
-
-
-def test_the_command_answers_with_places_that_check_accepts(tmp_path):
-    """Infeasible where it stands; what `place` answers, `check` accepts, from the same shell."""
-    case = tmp_path / "plate.toml"
-    case.write_text(PLATE + "surface.rpy_deg = [0, 0, 0]\n")
-    small = ("--set", "surface.cells=[3,3]")
-    assert run_coverable("check", case, "--set", "surface.position=[0.6, 0, 0.3]").status == 1
-    asked = "place", case, *small, "--x", -0.2, 0.6, "--count", 8, "--json"
-    files = "--csv", tmp_path / "p.csv", "--map", tmp_path / "p.svg", "--out", tmp_path / "p.study"
-    told = json.loads(run_coverable(*asked, *files, "--workers", 0).out)
-    assert told["answer"] == "feasible"
-    for found in told["placements"]:
-        sets = [f"surface.position={found['position']}", f"surface.rpy_deg={found['rpy_deg']}"]
-        options = [part for text in sets for part in ("--set", text)]
-        assert run_coverable("check", case, *small, *options).status == 0
-    lines = list(csv.DictReader((tmp_path / "p.csv").read_text("utf-8").splitlines()))
-    shares = [float(line["share"]) for line in lines]
-    assert shares == sorted(shares, reverse=True)
-    assert "<svg" in (tmp_path / "p.svg").read_text("utf-8")
-    assert told["map"]["axes"] == ["x", "y"]
 
 
 ANGLES = st.floats(-180.0, 180.0)

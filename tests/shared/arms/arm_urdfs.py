@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from coverable import Robot, list_robots, load_robot
 
 FREE = (-float("inf"), float("inf"))
+RIGHT_ANGLES = (-np.pi / 2, 0.0, np.pi / 2, np.pi)
 
 # Six unlike arms: of 6 and 7 joints, continuous ones, a tool axis other than z, on a held body.
 SIX = ("puma560", "ur5", "panda", "kinova", "talos_arm", "baxter_left")
@@ -55,26 +56,28 @@ def arm(joints: Sequence[str], more: str = "") -> str:
     return f'<robot name="test_arm">{links}{"".join(joints)}{more}</robot>'
 
 
-def random_arm(rng: np.random.Generator) -> str:
-    """A serial chain of 1 to 9 joints of every kind, with any axes, origins and limits."""
-    n = int(rng.integers(1, 10))
+def random_joints(
+    rng: np.random.Generator, least: int = 1, most: int = 8
+) -> tuple[list[str], tuple[float, ...]]:
+    """Joints of every kind, some at right angles, a fixed one at the end; and a tool axis."""
+    n = int(rng.integers(least, most + 1))
+    square = rng.random() < 0.5
     joints = []
     for i in range(1, n + 1):
-        kinds = ["revolute", "continuous", "prismatic"] + ["fixed"] * (i > 1)
-        lower = float(rng.uniform(-4, 3))
-        joints.append(
-            joint(
-                i,
-                str(rng.choice(kinds)),
-                rng.uniform(-0.5, 0.5, 3),
-                rng.uniform(-np.pi, np.pi, 3),
-                # Close to a coordinate axis now and then: the rotation onto it must not lose that.
-                rng.normal(size=3) if rng.random() < 0.7 else [1e-7, 0, 1] * rng.normal(size=3),
-                (lower, lower + float(rng.uniform(0.1, 3))),
-            )
-        )
-    joints[0] = joint(1, "revolute", axis=(0, 0, -1)) if "fixed" in joints[0] else joints[0]
-    return arm(joints)
+        kind = str(rng.choice(["revolute", "continuous", "prismatic"], p=[0.6, 0.15, 0.25]))
+        lower = float(rng.uniform(-4.0, 1.0))
+        place = np.zeros(3) if rng.random() < 0.33 else rng.uniform(-0.5, 0.5, 3)
+        turn = rng.choice(RIGHT_ANGLES, 3) if square else rng.uniform(-np.pi, np.pi, 3)
+        axis = (0, 0, 1) if square else rng.normal(size=3)
+        limits = FREE if kind == "continuous" else (lower, lower + float(rng.uniform(1.0, 7.0)))
+        joints.append(joint(i, kind, place, turn, axis, limits))
+    offset = np.zeros(3) if rng.random() < 0.3 else rng.uniform(-0.2, 0.2, 3)
+    joints.append(joint(n + 1, "fixed", offset))
+    return joints, (0.0, 0.0, 1.0) if square else tuple(rng.normal(size=3))
+
+
+def random_arm(rng: np.random.Generator) -> str:
+    return arm(random_joints(rng)[0])
 
 
 def load_text(folder: Path, text: str, **options: object) -> Robot:

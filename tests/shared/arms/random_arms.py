@@ -1,7 +1,7 @@
 """Random arms, surfaces and straight joint segments, and dense sampling by Pinocchio."""
 
 import numpy as np
-from arm_urdfs import FREE, arm, joint
+from arm_urdfs import RIGHT_ANGLES, arm, joint, random_joints
 from asked import question
 from numpy.typing import NDArray
 
@@ -11,7 +11,6 @@ from robots.urdf.checked_urdf import checked_tree
 from robots.urdf.xml import parse_xml
 
 Floats = NDArray[np.float64]
-RIGHT_ANGLES = (-np.pi / 2, 0.0, np.pi / 2, np.pi)
 
 
 def robot_of(joints: list[str], approach_axis: tuple[float, ...] = (0.0, 0.0, 1.0)) -> Robot:
@@ -21,21 +20,7 @@ def robot_of(joints: list[str], approach_axis: tuple[float, ...] = (0.0, 0.0, 1.
 
 
 def random_arm(rng: np.random.Generator, least: int = 3, most: int = 8) -> Robot:
-    n = int(rng.integers(least, most + 1))
-    square = rng.random() < 0.5
-    joints = []
-    for i in range(1, n + 1):
-        kind = str(rng.choice(["revolute", "continuous", "prismatic"], p=[0.6, 0.15, 0.25]))
-        lower = float(rng.uniform(-4.0, 1.0))
-        place = np.zeros(3) if rng.random() < 0.33 else rng.uniform(-0.5, 0.5, 3)
-        turn = rng.choice(RIGHT_ANGLES, 3) if square else rng.uniform(-np.pi, np.pi, 3)
-        axis = (0, 0, 1) if square else rng.normal(size=3)
-        limits = FREE if kind == "continuous" else (lower, lower + float(rng.uniform(1.0, 7.0)))
-        joints.append(joint(i, kind, place, turn, axis, limits))
-    offset = np.zeros(3) if rng.random() < 0.3 else rng.uniform(-0.2, 0.2, 3)
-    joints.append(joint(n + 1, "fixed", offset))
-    along = (0.0, 0.0, 1.0) if square else tuple(rng.normal(size=3))
-    return robot_of(joints, along)
+    return robot_of(*random_joints(rng, least, most))
 
 
 def planar_arm(links: int = 3, limits: tuple[float, float] = (-2.8, 2.8)) -> Robot:
