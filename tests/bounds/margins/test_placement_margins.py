@@ -119,7 +119,8 @@ def test_what_a_ball_allows_is_solved_for():
     ).all()
 
 
-@sampled("seed", seeds(1, all=40))
+@sampled
+@pytest.mark.parametrize("seed", seeds(1, all=40))
 @pytest.mark.parametrize("name", [*SIX, "on a rail"])
 def test_bounds_along_stretches(name, seed):
     """Against dense samples, of motions with steps of up to 20 deg, and balls of up to 5 cm."""
@@ -418,7 +419,8 @@ def case_of(seed):
     raise AssertionError("no feasible case was found")
 
 
-@sampled("seed", seeds(6, all=300))
+@sampled
+@pytest.mark.parametrize("seed", seeds(6, all=300))
 def test_a_part_that_stands_as_far_off_as_is_claimed_is_reached(seed):
     """And `check` never calls it infeasible there, with the motion to begin from."""
     made, rng = case_of(seed), np.random.default_rng([seed, 1])
@@ -433,7 +435,8 @@ def test_a_part_that_stands_as_far_off_as_is_claimed_is_reached(seed):
     assert again.answer != "infeasible"
 
 
-@sampled("seed", seeds(3, all=60))
+@sampled
+@pytest.mark.parametrize("seed", seeds(3, all=60))
 def test_a_share_of_what_bodies_may_move_leaves_them_clear(seed):
     """Whatever joints deviate by, bodies by python-fcl, and the part that comes nearer."""
     made, rng = case_of(3 * seed + 1), np.random.default_rng(seed)
