@@ -11,18 +11,10 @@ from random_arms import between, finite_limits, random_arm, robot_of
 from samples import sampled, seeds
 
 from coverable import Task, cylinder, mesh, plane
+from feasibility.certification import lever_bounds
 from feasibility.certification.cells_reached import at_targets, cells_reached
 from feasibility.certification.jacobians import jacobians
-from feasibility.certification.lever_bounds import (
-    largest_levers,
-    lever_bounds,
-    levers_along,
-    longest_levers,
-    peaks,
-    second_derivative_bound,
-    second_derivatives,
-    stretched_length,
-)
+from feasibility.certification.lever_bounds import levers_along, longest_levers, peaks
 from feasibility.certification.refusals import exact_faults, limits
 from feasibility.certification.stretches import Judge
 from feasibility.certification.surface_replay import less_deviations
@@ -63,7 +55,7 @@ def test_a_stretched_arm_bends_as_much_as_is_said(count):
     robot = links(count)
     levers = jacobians(Kinematics(robot), np.zeros((1, count))).levers
     assert levers[0] == pytest.approx(np.arange(count, 0, -1))
-    bound = second_derivative_bound(levers, steps, robot.prismatic)
+    bound = lever_bounds.second_derivative_bound(levers, steps, robot.prismatic)
     holds(bound, (np.cumsum(steps, axis=1) ** 2).sum(axis=1), 1.0 - 1e-9)
 
 
@@ -72,13 +64,14 @@ def test_a_slide_on_a_turning_arm_bends_by_twice_the_turn():
     robot = robot_of([joint(1), joint(2), joint(3, "prismatic", axis=(1, 0, 0))])
     steps, none = np.array([[0.3, 0.4, 0.5]]), np.zeros((1, 3))
     levers = jacobians(Kinematics(robot), none).levers
-    holds(second_derivative_bound(levers, steps, robot.prismatic), 2 * 0.5 * 0.7, 1.0 - 1e-9)
+    found = lever_bounds.second_derivative_bound(levers, steps, robot.prismatic)
+    holds(found, 2 * 0.5 * 0.7, 1.0 - 1e-9)
 
 
 def test_joints_that_do_not_run_evenly_bend_the_way_by_that_as_well():
     """On a circle |p''|^2 = r^2 (q'^4 + q''^2)."""
     rate, own, levers = np.array([[0.7]]), np.array([[2.0]]), np.full((2, 1), 0.4)
-    found = second_derivatives(rate, np.array([False]), levers, np.inf, own)
+    found = lever_bounds.second_derivatives(rate, np.array([False]), levers, np.inf, own)
     holds(found, 0.4 * np.hypot(0.7**2, 2.0), 0.8)
 
 
@@ -91,7 +84,7 @@ def test_levers_grow_as_joints_behind_turn(turn):
         here, first, last = (jacobians(Kinematics(elbow), q).levers for q in ends)
         truth = np.abs(1.0 + np.exp(1j * (middle + turn * (2.0 * S - 1.0)))).max()
         half = np.array([[0.0, turn]])
-        in_box = largest_levers(here, half, elbow.prismatic, np.inf)[0, 0]
+        in_box = lever_bounds.largest_levers(here, half, elbow.prismatic, np.inf)[0, 0]
         along = levers_along(2.0 * half, elbow.prismatic, first, last, np.inf)[0, 0]
         assert min(in_box, along) >= truth - 1e-9
         assert truth > 1.9 or max(in_box, along) < 1.2 * truth + turn
@@ -112,7 +105,7 @@ def test_levers_and_bends_hold_along_segments_and_over_boxes(seed):
     for truth, path, cap in ((at.levers, at.points, np.inf), (at.sines, at.axes, 1.0)):
         found = levers_along(steps, slides, truth[:1], truth[-1:], cap)
         assert (truth[:, turns] <= found[0, turns] * (1.0 + 1e-9) + 1e-12).all()
-        bent = second_derivatives(steps, slides, truth[[0, -1]], cap)[0]
+        bent = lever_bounds.second_derivatives(steps, slides, truth[[0, -1]], cap)[0]
         seen = np.linalg.norm(np.diff(path, n=2, axis=0), axis=1).max() * 400.0**2
         assert seen <= bent * (1.0 + 1e-3) + 1e-8
 
@@ -126,7 +119,7 @@ def test_levers_and_bends_hold_along_segments_and_over_boxes(seed):
     for value, columns, caps in (("points", "point", longest), ("axes", "axis", np.ones(robot.n))):
         slopes = getattr(here, columns)
         off = getattr(there, value) - getattr(here, value) - d @ slopes[0].T
-        bounds = lever_bounds(np.linalg.norm(slopes, axis=1), half[None], slides, caps)
+        bounds = lever_bounds.lever_bounds(np.linalg.norm(slopes, axis=1), half[None], slides, caps)
         assert (np.linalg.norm(off, axis=1) <= 0.5 * bounds.second + 1e-12).all()
         seen = np.linalg.norm(getattr(there, columns), axis=1)[:, turns]
         assert (seen <= np.minimum(bounds.largest[:, turns], caps[turns]) + 1e-9).all()
@@ -138,7 +131,8 @@ def test_slides_behind_a_joint_lengthen_its_lever_by_their_further_end():
          joint(3, "prismatic", axis=(1, 0, 0), limits=(-0.25, 0.5))]
     )  # fmt: skip
     assert longest_levers(robot, robot.lower, robot.upper)[0] == pytest.approx(1.0 + 3.0 + 0.5)
-    assert [stretched_length(robot, without=j) for j in (1, 2)] == pytest.approx([1.5, 4.0])
+    without = [lever_bounds.stretched_length(robot, without=j) for j in (1, 2)]
+    assert without == pytest.approx([1.5, 4.0])
 
 
 def flat(kind):

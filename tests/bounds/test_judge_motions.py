@@ -6,15 +6,7 @@ import numpy as np
 import pytest
 from capsule_arms import at as placed
 from capsule_arms import bodies_of, pair
-from gantry import (
-    SURFACES,
-    configurations,
-    gantry,
-    marks_of,
-    places_along,
-    raster,
-    tools_of,
-)  # fmt: skip
+from gantry import SURFACES, configurations, gantry, marks_of, places_along, raster, tools_of
 from referee import Facets
 from referee import evenly as dense
 

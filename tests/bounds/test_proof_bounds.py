@@ -14,16 +14,12 @@ from scipy.spatial.transform import Rotation
 from specimens import cells_of
 
 from coverable import Task, cone, cylinder, hyperboloid, load_robot, plane, sphere, torus
-from feasibility.certification.cut_proofs import linear_models
+from feasibility.certification.cut_proofs import linear_models, parts_agreement
 from feasibility.certification.cut_proofs.box_cutting import cut, smaller
 from feasibility.certification.cut_proofs.cut_region import JointRegion
 from feasibility.certification.cut_proofs.empty_region import Claim, Emptiness
 from feasibility.certification.cut_proofs.linear_models import ArmModel, Boxes, target_parts
-from feasibility.certification.cut_proofs.parts_agreement import (
-    disagreement,
-    on_a_finest_part,
-    places,
-)
+from feasibility.certification.cut_proofs.parts_agreement import disagreement, places
 from feasibility.certification.overlaps.everywhere import Deepest
 from feasibility.roll import projected, roll_of
 from robots.kinematics import Kinematics, reference_axes
@@ -296,7 +292,7 @@ def test_a_part_that_is_missing_or_a_little_off_is_noticed(off):
         axis=np.array([-1, -1]),
     )
     points, normals = places(cells, 300)
-    held = on_a_finest_part(np.concatenate([points, normals], axis=1), halves)
+    held = parts_agreement.on_a_finest_part(np.concatenate([points, normals], axis=1), halves)
     np.testing.assert_array_equal(held, points[:, 0] <= 0.5)
     lifted = replace(parts, centre=parts.centre + off * np.append(Z, [0, 0, 0]))
     assert "lie on no part" in disagreement(cells, lifted)

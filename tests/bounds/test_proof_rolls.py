@@ -1,6 +1,7 @@
 """Models of the roll over boxes, which proofs rest on: samples, and a second reading of them."""
 
 import numpy as np
+import pytest
 from referee import unit
 
 from coverable import Task, load_robot, sphere
@@ -75,3 +76,58 @@ def test_all_joints_together_turn_the_reference_axis():
     alone = sum(radii(one) - none for one in np.eye(6))
     assert (alone > 1e-6).all()
     assert (radii(np.ones(6)) - none >= 0.999 * alone).all()
+
+
+def lengths(vectors):
+    return sum(float(np.linalg.norm(vector)) for vector in vectors)
+
+
+def test_radii_are_those_of_the_lemma():
+    """A second reading of `rolls.box_models`, term by term: also of terms that others outweigh."""
+    rng, root = np.random.default_rng(7), np.sqrt(3.0)
+    for number in range(10):
+        r, b = unit(rng.normal(size=3)), 1.02 * unit(rng.normal(size=3))
+        slopes, r_b = 0.02 * rng.normal(size=(2, 3)), rng.uniform(1e-3, 1e-2)
+        e = r + 0.02 * (number % 2) * rng.normal(size=3)
+        de, r_e = (number % 2) * 0.02 * rng.normal(size=(2, 3)), (number % 2) * 0.01
+        model = Directions(b[None], slopes[None], np.array([r_b]))
+        held = reference_parts(model, Directions(e[None], de[None], np.array([r_e])))
+        shortest = np.linalg.norm(b) - lengths(slopes) - r_b
+        beta, off = lengths(slopes) / shortest, r_b / shortest
+        own, most = lengths(de), max(np.linalg.norm(e), 1.0) + lengths(de) + r_e
+        h = np.linalg.norm(np.cross(e, unit(b))) - most * (beta + off) - own - r_e
+        if h < 0.1:
+            continue
+        curved = most * (2.0 * 2.0 / root * beta**2 + 2.0 * beta**2) + 4.0 * own * beta
+        bent = curved / h + 2.0 / root * ((most * beta + own) / h) ** 2
+        assert held.radius[0] == pytest.approx(0.5 * bent + (most * off + r_e) / h)
+
+        t, k, r_t = held.centre[0], held.slopes[0], float(held.radius[0])
+        half = rng.uniform(0.2, 1.0, 2)
+        x = unit(rng.normal(size=3))
+        y, columns = unit(np.cross(x, rng.normal(size=3))), 0.3 * rng.normal(size=(1, 6, 2, 3))
+        second, moves = rng.uniform(0.0, 0.1, (2, 1, 2))
+        tool = roll_box_models.ToolModel(np.stack([x, y])[None], columns, second, moves)
+        values, both = np.stack([b, t])[None], np.stack([slopes, k], axis=1)[None]
+        target = roll_box_models.TargetModel(values, both, half[None], np.array([[r_b, r_t]]))
+        roll = Roll(rng.uniform(-3, 3), rng.uniform(0.1, 1.5))
+        found = roll_models(tool, target, roll)
+        spans = [lengths(half[:, None] * one) for one in (slopes, k)]
+        size_b, size_t = (float(np.linalg.norm(one)) for one in (b, t))
+        r_u = (
+            (size_b + spans[0]) * r_t + (size_t + spans[1]) * r_b + r_b * r_t + spans[0] * spans[1]
+        )
+        u = np.cross(b, t)
+        du = [np.cross(slopes[i], t) + np.cross(b, k[i]) for i in (0, 1)]
+        for end, sign in enumerate((1.0, -1.0)):
+            c, s = (sign * f(roll.middle + sign * roll.half) for f in (np.cos, np.sin))
+            p, q = s * t - c * u, c * t + s * u
+            moved = [
+                lengths(half[i] * (one * k[i] + other * du[i]) for i in (0, 1))
+                for one, other in ((s, -c), (c, s))
+            ]
+            radius = 1.0 + (abs(s) + abs(c)) * (r_t + r_u)
+            for one, v in enumerate((p, q)):
+                radius += 0.5 * second[0, one] * np.linalg.norm(v) + moves[0, one] * moved[one]
+            assert found.radius[0, end] == pytest.approx(min(radius, 4.0), abs=1e-7)
+            assert found.residual[0, end] == pytest.approx(x @ p + y @ q - 1.0)

@@ -9,23 +9,14 @@ from arm_urdfs import joint
 from numpy.typing import NDArray
 from random_arms import planar_arm, robot_of
 from samples import sampled, spread
-from scipy.spatial.transform import Rotation
 from search_kernels import Clearance
 
 from coverable import Collision, Obstacle, Robot, load_robot, sphere
 from coverable.kernels import entry
 from feasibility.collisions.asked_bodies import gather
 from feasibility.collisions.kernels import link_frames
-from feasibility.collisions.kernels.box_tree import box_tree, moved
 from feasibility.collisions.kernels.tables import (
-    AXES,
-    FIRST,
     GROUPS,
-    HALF,
-    LAST,
-    LEFT,
-    MIDDLE,
-    RIGHT,
     row,
     views,
 )
@@ -326,26 +317,6 @@ def test_no_point_moves_further_nor_leaves_its_chord_further_than_bounded():
     assert used["delta"] > 0.5
 
 
-def test_a_lever_that_is_longer_in_the_middle_than_at_the_ends():
-    """Folded, stretched, folded again: the first joint carries the tip further halfway."""
-    robot, tip = planar_arm(2, (-3.1, 3.1)), Polytope("tip", 2, np.array([[LENGTH, 0.0, 0.0]]), 0.0)
-    wall = Polytope("wall", 0, np.array([[9.0, 0.0, 0.0]]), 0.1)
-    pairs = Pair("tip", "wall", 0.0), Pair("l1", "wall", 0.0)
-    buffer = Clearance(robot, of_polytopes([wall, stick("l1", 1), tip], pairs)).buffer
-    tables, used = views(buffer), 0.0
-    for bend in np.linspace(0.5, 3.1, 14):
-        for turn in (1.0, 3.0):
-            q0, q1 = np.array([0.0, -bend]), np.array([turn, bend])
-            tables.configurations[:2] = q0, q1
-            for slot in (0, 1):
-                place_bodies(buffer, np.int64(slot))
-            place_group(buffer, row(buffer, GROUPS, np.int64(2)), np.int64(0), np.int64(1))
-            way = _moved(robot, tip, 0, q0, q1)[0]
-            assert way <= tables.reach[2, 0] + 1e-12
-            used = max(used, way / tables.reach[2, 0])
-    assert used > 0.7
-
-
 def _moved(robot, body, inner, q0, q1):
     """How far vertices move, seen from a joint, and how far they leave their chords."""
     data, track = robot.model.createData(), []
@@ -358,29 +329,3 @@ def _moved(robot, body, inner, q0, q1):
     chord = (1.0 - s) * track[0] + s * track[-1]
     length = np.linalg.norm(np.diff(track, axis=0), axis=2).sum(axis=0)
     return length.max(), np.linalg.norm(track - chord, axis=2).max()
-
-
-def held(tree, node):
-    """The corners of all triangles under a node, whose box has to hold them."""
-    each = tree.nodes[node]
-    own = tree.corners[int(each[FIRST]) : int(each[LAST])]
-    if each[LEFT] < 0:
-        assert len(own) == 3
-        corners = own
-    else:
-        corners = np.concatenate([held(tree, int(each[side])) for side in (LEFT, RIGHT)])
-    along = np.abs((corners - each[MIDDLE : MIDDLE + 3]) @ each[AXES:HALF].reshape(3, 3).T)
-    assert (along <= each[HALF:]).all()
-    return corners
-
-
-@pytest.mark.parametrize("size", [1e-3, 1.0])
-@pytest.mark.parametrize("count", [1, 37])
-def test_boxes_of_a_moved_tree_hold_the_moved_triangles(count, size):
-    rng = np.random.default_rng(count)
-    triangles = size * (rng.normal(size=(count, 1, 3)) + 0.1 * rng.normal(size=(count, 3, 3)))
-    turn, shift = Rotation.random(random_state=rng).as_matrix(), np.array([3.0, -2.0, 0.5])
-    found = held(moved(box_tree(triangles), turn, shift), 0)
-    carried = (triangles @ turn.T + shift).reshape(-1, 3)
-    assert np.abs(found[:, None] - carried[None]).max(axis=2).min(axis=0).max() < 1e-14
-    assert len(found) == 3 * count

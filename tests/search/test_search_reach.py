@@ -4,18 +4,10 @@ from functools import cache
 
 import numpy as np
 import pytest
+import random_arms
 from arm_urdfs import FREE, joint
 from plain import tools
-from random_arms import (
-    planar_arm,
-    rail_arm,
-    random_arm,
-    random_configuration,
-    random_turn,
-    robot_of,
-    tilted,
-    turn_onto,
-)
+from random_arms import planar_arm, rail_arm, random_arm, random_configuration, robot_of
 from search_kernels import ruled
 
 from coverable import Task, load_robot, plane
@@ -29,7 +21,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 def one_target(point, approach, rng):
     """One cell whose target, without a standoff, is a point and an approach direction."""
-    turn = turn_onto(UP, -approach, rng)
+    turn = random_arms.turn_onto(UP, -approach, rng)
     return plane((-0.01, 0.01), (-0.01, 0.01), side="outside").moved(turn, point).cells(1, 1)
 
 
@@ -59,7 +51,7 @@ def covered(rng, robot, task):
     (point,), (axis,) = tools(robot, q[None])
     offset = rng.normal(size=3)
     offset *= 0.999 * task.tolerance / np.linalg.norm(offset)
-    return q, point + offset, tilted(axis, 0.9999 * task.cone, rng)
+    return q, point + offset, random_arms.tilted(axis, 0.9999 * task.cone, rng)
 
 
 @pytest.mark.parametrize("name", [*MADE, "random"])
@@ -95,7 +87,7 @@ def test_beyond_reach_is_proved(name, most):
     rng, robot = np.random.default_rng(5), some_arm(name)
     shoulder = robot.model.jointPlacements[1].translation
     for _ in range(10):
-        direction = random_turn(rng)[0]
+        direction = random_arms.random_turn(rng)[0]
         if name == "planar":
             direction = np.array([*direction[:2], 0.0]) / np.linalg.norm(direction[:2])
         cells = one_target(shoulder + 1.02 * robot.reach * direction, -direction, rng)

@@ -4,21 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import random_arms
 from arm_urdfs import joint
 from bounds import holds
 from plain import tools
-from random_arms import (
-    between,
-    deviation,
-    planar_arm,
-    random_arm,
-    random_configuration,
-    random_surface,
-    random_turn,
-    robot_of,
-    tilted,
-    turn_onto,
-)
+from random_arms import between, deviation, random_arm, random_configuration, robot_of, tilted
 from samples import sampled, seeds
 from scipy.spatial.transform import Rotation
 from search_kernels import Motions
@@ -90,7 +80,7 @@ def two_cells(surface, parameters):
 
 def surface_segment(rng, robot, kind, task, offsets, longest, onto):
     """A segment that starts near a random target surface, its axis at some share of the cone."""
-    surface = random_surface(rng, kind)
+    surface = random_arms.random_surface(rng, kind)
     u, v = (rng.uniform(*span) * 0.9 for span in (surface.u_range, surface.v_range))
     sign, normal = surface.side_sign, surface.normal(u, v)
     target = surface.point(u, v) + sign * task.standoff * normal
@@ -100,7 +90,7 @@ def surface_segment(rng, robot, kind, task, offsets, longest, onto):
     approach = tilted(axis, share * min(task.cone, 3.1), rng)
     offset = rng.normal(size=3)
     offset *= rng.choice(offsets) * task.tolerance / np.linalg.norm(offset)
-    turn = turn_onto(-sign * normal, approach, rng)
+    turn = random_arms.turn_onto(-sign * normal, approach, rng)
     surface = surface.moved(turn, point + offset - turn @ target)
     q1 = q0 + rng.normal(size=robot.n) * 10.0 ** rng.uniform(-3.0, longest)
     (away,), _ = tools(robot, q1[None])
@@ -206,7 +196,7 @@ def test_the_cone_holds_at_the_tool_point_s_own_place_on_the_surface():
 def test_nothing_that_is_not_a_number_passes():
     """NaN or infinity in a joint, or a surface that folds, never certifies a segment."""
     q, up = np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.0, 1.0])
-    motions = Motions(planar_arm(3), None, Task(0.0, 100, 1.0))
+    motions = Motions(random_arms.planar_arm(3), None, Task(0.0, 100, 1.0))
     there = motions.at_rest(q, q, np.zeros(3), up)
     assert there.holds
     assert there.chord == pytest.approx(np.sqrt(2.0))
@@ -220,7 +210,7 @@ def test_nothing_that_is_not_a_number_passes():
 def random_frame(rng, size):
     """A cubic b and t (4, 3) each, near unit vectors at right angles, that turn by about `size`."""
     cubics = np.zeros((2, 4, 3))
-    cubics[:, 0] = random_turn(rng)[:2]
+    cubics[:, 0] = random_arms.random_turn(rng)[:2]
     cubics[:, 1:] = rng.normal(size=(2, 3, 3)) * size * 10.0 ** rng.uniform(-2, 0, (2, 3, 1))
     return cubics
 

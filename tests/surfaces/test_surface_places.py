@@ -156,6 +156,34 @@ def test_paths_bend_no_more_than_is_said(named, height):
     assert some_known[short].mean() > 0.9 or name in ("ridge", "can")
 
 
+def test_normals_along_creases_bend_as_each_term_says():
+    """v is the sum of w_c (own_c + t (crease_c - own_c)), t from the weight on the crease."""
+    surface, rng = FACETED["ridge"], np.random.default_rng(6)
+    face = rng.choice(np.flatnonzero(surface.on_crease.sum(axis=1) == 2), 200)
+    on = surface.on_crease[face]
+    ends = []
+    for _ in range(2):
+        w = rng.dirichlet((1, 1, 1), 200) * np.where(on, 1.0, 0.03)
+        ends.append(w / w.sum(axis=1, keepdims=True))
+    level = [np.clip((w * on).sum(axis=1), 0.9, 1.0) for w in ends]
+    inner = [np.isclose((w * on).sum(axis=1), x) for w, x in zip(ends, level, strict=True)]
+    own = surface.corner_normals[face]
+    turn = surface.crease_normals[face] - own
+    (o, p), (g, h) = ([np.einsum("kc,kci->ki", w, part) for w in ends] for part in (own, turn))
+    rate = np.abs(level[1] - level[0]) / 0.1
+    off, most = np.linalg.norm(h - g, axis=1), np.linalg.norm([g, h], axis=2).max(axis=0)
+    slope = np.linalg.norm(p - o, axis=1) + rate * most + off
+    share = (0.5 * (level[0] + level[1]) - 0.9) / 0.1
+    middle = np.linalg.norm(0.5 * (o + p + share[:, None] * (g + h)), axis=1)
+    least = middle - 0.5 * slope  # |d2/ds2 (g / |g|)| from |g|, |g'| and |g''|
+    expected = (2.0 * rate * off / least + 2.0 / np.sqrt(3.0) * (slope / least) ** 2) / 8.0
+    start, end = (Places(face, w[:, 1:]) for w in ends)
+    found = offset_surface(surface, 0.0).paths(start, end).deviations[:, 2, 1]
+    known = inner[0] & inner[1] & (middle > 0.5 * slope)
+    assert known.sum() > 50
+    np.testing.assert_allclose(found[known], expected[known], rtol=1e-7)
+
+
 @pytest.mark.parametrize("height", [0.0, -0.05])
 def test_paths_begin_and_end_where_they_should_and_do_not_jump(named, height):
     _, surface = named

@@ -13,26 +13,8 @@ from hypothesis import strategies as st
 from jobs import PLATE, run_coverable
 from samples import sampled, spread
 
-from coverable import (
-    Answer,
-    Case,
-    CauseKind,
-    Collision,
-    Evidence,
-    Obstacle,
-    Pose,
-    Region,
-    Search,
-    Task,
-    ToolShape,
-    check,
-    evaluator_here,
-    load_robot,
-    open_workers,
-    place,
-    placement_map,
-    plane,
-)
+import coverable
+from coverable import Answer, Evidence, Pose, Region, Search, check, evaluator_here, place, plane
 from feasibility.division.one_motion import motion_over
 from feasibility.placement.reach_bound import Reach
 from feasibility.placement.region import AXES, PlacementError, moved_cells
@@ -72,7 +54,7 @@ MOVED = [("ur5 plate", 3), ("puma560 pipe", 21), ("ur5 pipe", 8), ("panda plate"
 
 @cache
 def case_of(name):
-    return Case.from_toml(TEXTS[name], name=name)
+    return coverable.Case.from_toml(TEXTS[name], name=name)
 
 
 @cache
@@ -129,7 +111,7 @@ def test_a_region_far_away_is_refused_by_the_bound_alone():
         region = region_about(Pose.of_values(far))
         found = place(*setup[:3], region, setup.search, evaluator=nobody)
         assert (found.answer, found.evidence) == (Answer.INFEASIBLE, Evidence.PROOF)
-        assert (found.cause, found.found) == (CauseKind.OUT_OF_REACH, ())
+        assert (found.cause, found.found) == (coverable.CauseKind.OUT_OF_REACH, ())
 
 
 def test_what_check_does_not_say_is_no_answer():
@@ -176,17 +158,21 @@ ROOM = WALL_AT - 0.5 - RADIUS - CLEARANCE
 
 def test_no_place_is_feasible_whose_motion_would_not_stay_clear():
     cells = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0.0, 0.0, 0.3)).cells(1, 2)
-    wall = Obstacle.halfspace("wall", position=(WALL_AT, 0.0, 0.0), rpy_deg=(0.0, -90.0, 0.0))
-    asked = Collision(
-        self_=False, clearance=CLEARANCE, scene=(wall,), tool=(ToolShape.sphere(RADIUS),),
+    wall = coverable.Obstacle.halfspace(
+        "wall", position=(WALL_AT, 0.0, 0.0), rpy_deg=(0.0, -90.0, 0.0)
+    )
+    asked = coverable.Collision(
+        self_=False, clearance=CLEARANCE, scene=(wall,), tool=(coverable.ToolShape.sphere(RADIUS),),
         allow=(("tool", "surface"),),
     )  # fmt: skip
     region = Region.around(Pose.of_surface(cells.surface), {"x": (0.0, 2.0 * ROOM)})
-    beside = Task(0.02, 30, 0.001, collision=asked)
-    found = place(load_robot("ur5"), cells, beside, region, count=6, rounds=0, keep=3)
+    beside = coverable.Task(0.02, 30, 0.001, collision=asked)
+    found = place(coverable.load_robot("ur5"), cells, beside, region, count=6, rounds=0, keep=3)
     assert max(trial.pose.position[0] for trial in found.trials) > ROOM + 0.001
     assert max(trial.pose.position[0] for trial in found.found) <= ROOM + 0.001
-    free = evaluator_here(load_robot("ur5"), cells, replace(beside, collision=None), Search())
+    free = evaluator_here(
+        coverable.load_robot("ur5"), cells, replace(beside, collision=None), Search()
+    )
     (trial,) = free([Pose((ROOM + 0.05, 0.0, 0.3), (0.0, 0.0, 0.0))], False)
     assert trial.feasible
 
@@ -295,7 +281,7 @@ def test_who_tries_placements_changes_nothing_and_what_fails_is_undecided():
     region = region_about(moved_away("ur5 plate", 3))
     ask, number = {"count": 8, "rounds": 1, "keep": 1}, len(setup.cells)
     here = place(*setup[:3], region, setup.search, **ask)
-    with open_workers(1) as workers:
+    with coverable.open_workers(1) as workers:
         there = evaluator_of_study(case, number, workers)
         found = place(*setup[:3], region, setup.search, evaluator=there, **ask)
         assert told(found.trials) == told(here.trials)
@@ -310,7 +296,7 @@ def test_a_map_tells_what_single_placements_tell():
     setup = setup_of("panda plate")
     evaluator, own = evaluator_here(*setup), Pose.of_surface(setup.cells.surface)
     region = Region.around(own, {"x": (0.3, 1.2), "y": (-0.3, 0.3), "yaw_deg": (-40, 40)})
-    chart = placement_map(evaluator, region, own, shape=(3, 2, 2))
+    chart = coverable.placement_map(evaluator, region, own, shape=(3, 2, 2))
     assert chart.axes == ("x", "y", "yaw_deg")
     for index in np.ndindex(3, 2, 2):
         values = chart.held.values
@@ -320,7 +306,7 @@ def test_a_map_tells_what_single_placements_tell():
         assert (chart.share[index], chart.margin[index]) == (trial.share, trial.margin)
     assert chart.share.max() == 1.0 > chart.share.min()
     with pytest.raises(PlacementError, match="z: does not vary"):
-        placement_map(evaluator, region, chart.held, axes=("x", "z"))
+        coverable.placement_map(evaluator, region, chart.held, axes=("x", "z"))
 
 
 ANGLES = st.floats(-180.0, 180.0)
