@@ -2,14 +2,11 @@
 
 from itertools import pairwise
 
-import arm_urdfs
 import numpy as np
 import pytest
 from bounds import holds
-from capsule_arms import at, bodies_of, box_mesh, fork, pair, planar_arm, wall_at
+from capsule_arms import at, bodies_of, box_mesh, fork, pair, planar_arm
 from mesh_patches import of_patch
-from plain import triangles_of_grid
-from random_arms import robot_of
 
 from coverable import Obstacle, load_robot, sphere
 from feasibility.certification.collisions.collision_replay import Couples, collision_replay
@@ -148,36 +145,6 @@ def test_no_bound_is_above_a_distance(step):
                     spare.append((truth + COAL - one.low[int(first)], truth + COAL - found))
     assert np.min(spare) >= 0.0
     assert (np.quantile(spare, 0.1, axis=0) < 0.1).all()
-
-
-@pytest.mark.parametrize("kind", ["ball", "box", "triangles", "half space"])
-@pytest.mark.parametrize(
-    ("first", "last", "off", "nearest"),
-    [(-0.3, 0.3, 0.0, 1.0), (np.pi / 2, np.pi / 2, 0.05, np.sin(0.05)), (0.2, 0.0, 0.0, 1.0)],
-    ids=["bulges", "deviates", "approaches"],
-)
-def test_a_ball_on_a_circle_comes_as_near_as_is_said(kind, first, last, off, nearest):
-    """A ball of 0.1 m goes round at 1 m, up to x = `nearest`; the wall is 0.05 m beyond."""
-    robot = robot_of([arm_urdfs.joint(1), arm_urdfs.joint(2, "fixed", (1, 0, 0))])
-    x, y = nearest + 0.15, np.sqrt(1.0 - nearest**2)
-    soups, walls = [], [Obstacle("wall", Sphere(0.2), at(x + 0.2, y))]
-    if kind == "box":
-        walls = [Obstacle("wall", Box((0.4, 1.0, 1.0)), at(x + 0.2, y))]
-    if kind == "half space":
-        walls = [wall_at(x)]
-    if kind == "triangles":
-        side = np.linspace(-0.5, 0.5, 9)
-        corners = np.array([[x, y + b, c] for b in side for c in side]).reshape(9, 9, 3)
-        walls, soups = [], [Soup("wall", triangles_of_grid(corners), 0.0, False)]
-    solid, rows = Solid("link1", 1, at(1.0), Sphere(0.1)), [[first], [last]]
-    (one,) = pairings(robot, rows, solid, walls, np.array([[off]]), 0.01, soups)
-    assert one.low[0] <= 0.05 + 1e-9
-    assert kind != "ball" or one.low[0] >= 0.04
-    n = np.array([[-1.0, 0.0, 0.0]])
-    assert 0.04 <= one.parted(np.array([[0.0, 1.0]]), n)[0] <= 0.05 + 1e-9
-    one.certify(0.05)
-    assert one.refused is None
-    assert 0.04 <= one.bound <= 0.05 + 1e-9
 
 
 def dome(count):

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -18,10 +17,8 @@ from feasibility.certification.cut_proofs.proof_verification import verify_proof
 from feasibility.certification.overlaps.depths import depths, planes_around, points_inside
 from feasibility.certification.overlaps.every_pose import never_clear
 from feasibility.collisions.problem_bodies import Bodies, Pair
-from feasibility.collisions.shapes import HalfSpace
 from feasibility.cut_tree import CutTree, Leaf
 from robots.shapes.bodies import Solid, Triangles
-from robots.shapes.coal_shapes import coal_shape
 from robots.shapes.solids import checked_triangles
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
@@ -241,36 +238,3 @@ def test_balls_around_points_are_inside(shape):
         assert away[1].max() < 1e-9
     else:
         assert inside(shape, points).all()
-
-
-@pytest.mark.parametrize(
-    "shape", [*PRIMITIVES, HalfSpace(), BLOCK, ROUND], ids=lambda one: type(one).__name__
-)
-def test_no_point_is_said_to_be_deeper_than_it_is(shape):
-    """All of a ball as large as the depth is inside; coal finds the body as near as is said."""
-    rng = np.random.default_rng(1)
-    corners = shape.vertices if isinstance(shape, Triangles) else np.array([[0.15], [-0.15]])
-    x = rng.uniform(corners.min(axis=0) - 0.02, corners.max(axis=0) + 0.02, (150, 3))
-    found = depths(shape, x)
-    deep, outside = found > 0.0, ~inside(shape, x)
-    assert min(deep.sum(), outside.sum()) >= 3
-    assert not found[outside].max() > 0.0
-    balls = np.column_stack([x, found])[deep][:20]
-    assert inside(shape, np.concatenate([around(rng, ball) for ball in balls])).all()
-    if isinstance(shape, Triangles):
-        assert np.isinf(found[outside]).all()
-        return
-    away = np.array([_by_coal(shape, point) for point in x[outside]])
-    np.testing.assert_allclose(-found[outside], away, atol=1e-5)
-
-
-def _by_coal(shape, point):
-    """m, of a point from a body that it is not in."""
-    if isinstance(shape, HalfSpace):
-        return float(point[2])
-    asked, ball = (
-        coal.DistanceRequest(True, True),
-        (coal.Sphere(1e-4), coal.Transform3s(np.eye(3), point)),
-    )
-    body = coal_shape(shape), coal.Transform3s.Identity()
-    return coal.distance(*ball, *body, asked, coal.DistanceResult()) + 1e-4

@@ -3,13 +3,11 @@
 from collections import Counter
 from dataclasses import replace
 
-import mesh_patches
 import numpy as np
 import pinocchio as pin
 import pytest
 import trimesh
 from arm_urdfs import random_q
-from mesh_writers import stl
 from plain import arm_of
 from samples import sampled, seeds
 from scipy.spatial import ConvexHull
@@ -19,7 +17,6 @@ from robots.kinematics import Kinematics
 from robots.shapes.bodies import Triangles
 from robots.shapes.link_pairs import link_pairs
 from robots.shapes.links import link_shapes
-from robots.shapes.sampling import PairSampling, random_configurations, with_crude_links_cut
 from robots.shapes.solids import checked_triangles, solid_faces
 from robots.urdf.checked_urdf import check_urdf
 from robots.urdf.link_shapes import Cylinder
@@ -39,7 +36,6 @@ LINKS = (
 BOX = '<{0}><origin xyz="0 0 0.1"/><geometry><box size="0.1 0.1 0.1"/></geometry></{0}>'
 MESH = '<{0}><geometry><mesh filename="{1}"/></geometry></{0}>'
 COLLISION, VISUAL = BOX.format("collision"), BOX.format("visual")
-BALL = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
 
 
 def three(folder, base=COLLISION, arm=COLLISION, hand=COLLISION, mark=""):
@@ -197,53 +193,6 @@ def test_triangles_that_are_no_body_are_refused(approved):
     approved("bad_triangles", "\n".join(lines))
 
 
-def grid(height):
-    x, y, faces = mesh_patches.grid(19, 19)
-    return 0.01 * np.column_stack([19 * x, 19 * y, height(19 * x, 19 * y)]), faces
-
-
-def two(one, other):
-    return np.concatenate([one, other]), np.concatenate([FACES, 4 + FACES])
-
-
-# Bodies, and whether they are closed.
-ODD = {
-    "one triangle": (CORNERS, FACES[:1], False), "flat": (*grid(lambda x, y: 0 * x), False),
-    "all but flat": (*grid(lambda x, y: 1e-9 * x * y), False),
-    "a hair thick": (CORNERS * [1, 1, 1e-12], FACES, False),
-    "a needle": (CORNERS * [1, 1e-9, 1e-9], FACES, False), "tiny": (CORNERS * 1e-7, FACES, True),
-    "inside out": (CORNERS, FACES[:, ::-1], True),
-    "every face twice": (CORNERS, np.concatenate([FACES, FACES]), False),
-    "degenerate": (CORNERS, np.concatenate([FACES, [[0, 0, 1], [2, 2, 2]]]), True),
-    "unused vertices": (np.concatenate([CORNERS, 5 + CORNERS]), FACES, True),
-    "small and large": (*two(1e-6 * CORNERS, 10 * CORNERS), True),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", ODD)
-def test_odd_bodies_have_hulls_that_coal_takes(name, tmp_path):
-    """coal's own hull ends the process for flat points; here pairs are tested with each body."""
-    vertices, faces, closed = ODD[name]
-    (tmp_path / "odd.stl").write_bytes(stl(vertices, faces))
-    odd = MESH.format("collision", "odd.stl")
-    links = f'<link name="a">{BALL}</link><link name="b">{odd}</link><link name="c">{BALL}</link>'
-    joints = "".join(
-        f'<joint name="{a}{b}" type="continuous"><parent link="{a}"/><child link="{b}"/>'
-        '<origin xyz="0 0 0.5"/><axis xyz="1 0 0"/></joint>'
-        for a, b in ("ab", "bc")
-    )
-    (tmp_path / "arm.urdf").write_text(f'<robot name="odd">{links}{joints}</robot>')
-    robot = load_robot(str(tmp_path / "arm.urdf"))
-    for fineness in ("hulls", "pieces"):
-        shapes = link_shapes(robot, fineness)
-        assert (shapes.notes, shapes.unchecked) == ((), ())
-        assert_held(shapes)
-        pairs = link_pairs(robot, shapes)
-        assert {out.why for out in pairs.left_out} == {"adjacent"}
-        assert pairs.checked == (("a", "c"),)
-    assert shapes.solids[1].geometry.closed is closed
-
-
 CUBE = trimesh.creation.box((1.0, 2.0, 3.0))
 TURNED = np.concatenate([CUBE.faces[:1, ::-1], CUBE.faces[1:]])
 SOLIDS = {
@@ -278,27 +227,3 @@ def test_tangled_bodies_look_outwards():
     body = checked_triangles(both, np.where(turned, faces[:, ::-1], faces))
     assert body.closed
     assert trimesh.Trimesh(body.vertices, body.faces).volume == pytest.approx(12.0)
-
-
-def test_l_shaped_links_are_cut_from_the_start_and_then_meet_as_rarely_as_they_do():
-    robot = load_robot("ur5")
-    hulls = link_shapes(robot)
-    cut = with_crude_links_cut(robot, hulls, link_pairs(robot, hulls).checked)
-    before, after = (Counter(b.owner for b in s.polytopes) for s in (hulls, cut))
-    more = {owner for owner in after if after[owner] > before[owner]}
-    assert {"base_link", "upper_arm_link", "forearm_link"} <= more
-    assert "ee_link" not in more
-    assert cut.solids == hulls.solids
-    q = random_configurations(robot)[200:600]  # others than those that were looked at
-    for two in (("base_link", "upper_arm_link"), ("forearm_link", "wrist_2_link")):
-        crude, fine, exact = (
-            PairSampling(robot, bodies).collisions([two], q).mean()
-            for bodies in (hulls.polytopes, cut.polytopes, cut.solids)
-        )
-        assert crude > exact + 0.2
-        assert exact <= fine < exact + 0.05
-    assert with_crude_links_cut(robot, hulls, ()) is hulls
-    for name in ("panda", "puma560"):  # whose hulls do
-        robot = load_robot(name)
-        hulls = link_shapes(robot)
-        assert with_crude_links_cut(robot, hulls, link_pairs(robot, hulls).checked) is hulls

@@ -6,20 +6,16 @@ from itertools import count
 import numpy as np
 import pytest
 from cut_attempts import nothing, prove, proved_wrongly
-from mesh_patches import of_patch
-from random_cases import built, read, surface_of
+from random_cases import built, read
 from samples import sampled, seeds, spread
-from scipy.interpolate import make_interp_spline
 
 import coverable
-from coverable import bspline, cylinder, hyperboloid, mesh, piecewise, plane, revolution, sphere
 from feasibility.cut_tree import Cut, Leaf
 from feasibility.roadmap.branch_and_bound.branching import branch_and_bound
 from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.cuts.gaps import components_of
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions.arrays import arrays_of
-from surfaces.meshes.triangle_mesh import TriangleMesh
 
 
 def stored(arm, feasible):
@@ -107,68 +103,3 @@ def test_a_roadmap_without_nodes_has_no_components():
     robot, cells, task = case("puma560", stored("puma560", feasible=False)[12])
     exploration = Exploration(robot, cells, arrays_of(robot, cells, task), 0)
     assert components_of(exploration.roadmap) == []
-
-
-# the same surfaces as splines, meshes, pieces and revolutions: cells are the same to 1e-5 m
-
-
-def remade(problem):
-    """Cells of the same surface by kind; only those of the mesh are its own."""
-    nu, nv = problem.cells
-    pose = {"side": problem.side, "position": problem.position, "rpy_deg": problem.rpy_deg}
-    kinds = {"plane": plane, "sphere": sphere, "cylinder": cylinder, "hyperboloid": hyperboloid}
-    surface, make, (low, high) = surface_of(problem), kinds[problem.kind], problem.v
-    middle = low + (nv // 2 / nv if nv > 1 else 0.5) * (high - low)
-    halves = [make(*problem.size, problem.u, ends) for ends in ((low, middle), (middle, high))]
-    counts = [(nu, max(nv // 2, 1)), (nu, max(nv - nv // 2, 1))]
-    made = {
-        "piecewise": piecewise(halves, **pose).cells(counts),
-        "bspline": _spline(surface, pose).cells(nu, nv),
-    }
-    corners = of_patch(make(*problem.size, problem.u, problem.v, side=problem.side), 30, 30)
-    sides = np.diff(corners.vertices[corners.faces], axis=1)
-    if np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).min() > 1e-9:  # else a pole
-        made["mesh"] = mesh(TriangleMesh(*corners), **pose).cells(count=nu * nv)
-    if problem.kind == "sphere":
-        polar = np.radians(np.linspace(problem.u[1], problem.u[0], 41))
-        profile = problem.size[0] * np.column_stack([np.sin(polar), np.cos(polar)])
-        profile[np.abs(profile[:, 0]) < 1e-9, 0] = 0.0
-        made["revolution"] = revolution(profile, problem.v, **pose).cells(nu, nv)
-    return made
-
-
-def _spline(surface, pose):
-    """Through points of the surface; its parameters are even where those are."""
-    t = np.linspace(0.0, 1.0, 13)
-    u, v = (np.linspace(*ends, 13) for ends in (surface.u_range, surface.v_range))
-    along = make_interp_spline(t, surface.local_point(*np.meshgrid(u, v, indexing="ij")), 3)
-    points = np.moveaxis(make_interp_spline(t, np.moveaxis(along.c, 1, 0), 3).c, 1, 0)
-    made = bspline(points, (3, 3), (along.t, along.t), **pose)
-    middle = (np.array(sum(ends) / 2.0) for ends in (surface.u_range, surface.v_range))
-    if made.local_normal(np.array(0.5), np.array(0.5)) @ surface.local_normal(*middle) < 0.0:
-        made = bspline(points[::-1], (3, 3), (along.t, along.t), **pose)
-    return made
-
-
-APART = [4, *range(5, 30), 30]
-
-
-@sampled("number", spread(APART, 2))
-def test_a_case_that_falls_apart_does_so_whatever_its_surface_is_made_of(number):
-    problem = stored("puma560", feasible=False)[number]
-    robot, _, task = case("puma560", problem)
-    for kind, cells in remade(problem).items():
-        proof = prove(robot, cells, task).tree
-        # A mesh has cells of its own, and a truth of its own.
-        assert proof is not None or (kind == "mesh" and number not in (4, 30)), problem.kind
-
-
-def test_a_feasible_case_is_never_proved_whatever_its_surface_is_made_of():
-    rng, refused = np.random.default_rng(5), 0
-    for problem in stored("puma560", feasible=True)[::28]:
-        robot, _, task = case("puma560", problem)
-        for kind, cells in remade(problem).items():
-            outcome = proved_wrongly(robot, cells, task, rng)
-            assert outcome is not True, (problem.kind, kind)
-            refused += outcome is False
-    assert refused >= 2

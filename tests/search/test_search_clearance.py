@@ -269,26 +269,6 @@ def test_what_is_inside_a_closed_body_collides():
         assert one_pair(stick("l1", 1), soup=aside).clear(0.0, 0.0)
 
 
-def test_the_push_is_the_gradient_of_the_nearest_distance():
-    rng, checked = np.random.default_rng(5), 0
-    while checked < 6:
-        robot = serial_arm(rng, "RPRR")
-        clearance = Clearance(robot, of_polytopes(hulls(rng, 4), (Pair("b4", "b0", 0.0),)))
-        for q in rng.uniform(-1.0, 1.0, (20, 4)):
-            if 0.005 < clearance.bounds(q)[0] < 0.045:
-                share, step = clearance.push(q, 0.01)
-                assert 0.0 < share < 1.0
-                assert np.linalg.norm(step) <= 0.01 + 1e-12
-                ends = [[clearance.bounds(q + way * e)[0] for way in (1, -1)] for e in
-                        1e-5 * np.eye(4)]  # fmt: skip
-                rates = np.diff(ends, axis=1)[:, 0] / -2e-5
-                cosine = rates @ step / np.linalg.norm(rates) / np.linalg.norm(step)
-                assert cosine > 0.8  # its direction is good to a tenth of the distance
-                checked += 1
-    ball = Polytope("ball", 0, np.array([[2.0, 0.0, 0.0]]), 0.1)
-    assert one_pair(stick("l1", 1), ball).push(np.array([0.5]), 0.1) == (0.0, 0.0)
-
-
 def test_no_point_moves_further_nor_leaves_its_chord_further_than_bounded():
     """M and delta of every group, seen from every joint before it, against 20 samples."""
     rng, used = np.random.default_rng(2), {"M": 0.0, "delta": 0.0}

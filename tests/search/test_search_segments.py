@@ -8,12 +8,11 @@ import random_arms
 from arm_urdfs import joint
 from bounds import holds
 from plain import tools
-from random_arms import between, deviation, random_arm, random_configuration, robot_of, tilted
+from random_arms import between, deviation, planar_arm, random_arm, random_configuration, robot_of
 from samples import sampled, seeds
-from scipy.spatial.transform import Rotation
 from search_kernels import Motions
 
-from coverable import Task, load_robot, sphere
+from coverable import Task, sphere
 from coverable.kernels import entry
 from feasibility.roadmap.motions import roll_kernels, segment_bound
 from feasibility.roll import Roll, projected, roll_of
@@ -57,6 +56,20 @@ def test_second_derivatives_bound_the_sag_of_every_segment():
         assert np.median(truth[some] / bound[some]) > 0.15
 
 
+def test_levers_hold_where_they_are_longer_in_the_middle_than_at_the_ends():
+    """Folded, stretched, folded again: the lever of the first joint peaks halfway."""
+    robot, bounds, truths = planar_arm(2, (-3.1, 3.1)), [], []
+    motions, s, h = Motions(robot), np.linspace(0.01, 0.99, 99)[:, None], 1e-4
+    for bend in np.linspace(0.05, 3.1, 30):
+        for turn in (0.01, 0.1, 1.0, 3.0):
+            q0, q1 = np.array([0.0, -bend]), np.array([turn, bend])
+            before, at, behind = (tools(robot, q0 + t * (q1 - q0))[0] for t in (s - h, s, s + h))
+            second = np.linalg.norm(before - 2.0 * at + behind, axis=1) / h**2
+            truths.append(second.max())
+            bounds.append(motions.sag(q0, q1)[0] * (1.0 + 1e-6) + 1e-6)
+    holds(bounds, truths, 0.9)
+
+
 def test_peak_is_the_largest_value():
     """Against 2,001 points of the parabola, for random ones; exactly at its corner cases."""
     rng, s = np.random.default_rng(2), np.linspace(0.0, 1.0, 2001)
@@ -87,7 +100,7 @@ def surface_segment(rng, robot, kind, task, offsets, longest, onto):
     q0 = random_configuration(robot, rng)
     (point,), (axis,) = tools(robot, q0[None])
     share = rng.random() if onto is not None else rng.uniform(0.5, 1.0)
-    approach = tilted(axis, share * min(task.cone, 3.1), rng)
+    approach = random_arms.tilted(axis, share * min(task.cone, 3.1), rng)
     offset = rng.normal(size=3)
     offset *= rng.choice(offsets) * task.tolerance / np.linalg.norm(offset)
     turn = random_arms.turn_onto(-sign * normal, approach, rng)
@@ -196,7 +209,7 @@ def test_the_cone_holds_at_the_tool_point_s_own_place_on_the_surface():
 def test_nothing_that_is_not_a_number_passes():
     """NaN or infinity in a joint, or a surface that folds, never certifies a segment."""
     q, up = np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.0, 1.0])
-    motions = Motions(random_arms.planar_arm(3), None, Task(0.0, 100, 1.0))
+    motions = Motions(planar_arm(3), None, Task(0.0, 100, 1.0))
     there = motions.at_rest(q, q, np.zeros(3), up)
     assert there.holds
     assert there.chord == pytest.approx(np.sqrt(2.0))
@@ -205,33 +218,6 @@ def test_nothing_that_is_not_a_number_passes():
     assert motions.at_rest(q, q + 1e-3, np.zeros(3), up).holds
     motions.arrays = motions.arrays._replace(curvature=np.inf)
     assert not motions.at_rest(q, q + 1e-3, np.zeros(3), up).holds
-
-
-def random_frame(rng, size):
-    """A cubic b and t (4, 3) each, near unit vectors at right angles, that turn by about `size`."""
-    cubics = np.zeros((2, 4, 3))
-    cubics[:, 0] = random_arms.random_turn(rng)[:2]
-    cubics[:, 1:] = rng.normal(size=(2, 3, 3)) * size * 10.0 ** rng.uniform(-2, 0, (2, 3, 1))
-    return cubics
-
-
-def frame_along(cubics, s):
-    """Unit b (k, 3), and t made a unit vector across it."""
-    b, t = (s[:, None] ** np.arange(4) @ cubic for cubic in cubics)
-    b = b / np.linalg.norm(b, axis=1)[:, None]
-    t = t - (t * b).sum(axis=1)[:, None] * b
-    return b, t / np.linalg.norm(t, axis=1)[:, None]
-
-
-def bounds_of(cubics):
-    """The arguments of `frame_rates` for cubics of b and t, by 400 samples."""
-    s = np.linspace(0.0, 1.0, 401)
-    powers = s[:, None] ** np.arange(4)
-    (b, t), right = (powers @ cubic for cubic in cubics), frame_along(cubics, s)
-    slope = np.linalg.norm(powers[:, :3] @ (cubics[1, 1:] * [[1], [2], [3]]), axis=1).max()
-    ends = [np.linalg.norm(powers[:, :2] @ (c[2:] * [[2], [6]]), axis=1).max() for c in cubics]
-    off, aside = (np.linalg.norm(c - r, axis=1).max() for c, r in zip((b, t), right, strict=True))
-    return np.linalg.norm(b[-1] - b[0]), ends[0], slope, ends[1], off, aside
 
 
 @pytest.mark.parametrize("turn", [0.1, 2.0, 2.0 * np.pi, 4.0 * np.pi])
@@ -258,37 +244,3 @@ def test_two_joints_across_the_tool_axis_turn_the_roll_as_fast_as_is_said(size):
     chord = np.linalg.norm(axes - b, axis=1).max()
     _, most = Motions(robot, None, task).roll_rates(q0, q1, (0.0, 0.0, 0.0), chord)
     holds(most * (1.0 + 1e-6) + 1e-9, second.max(), 0.7)
-
-
-@pytest.mark.parametrize("name", ["puma560", "ur5", "panda", "random"])
-def test_second_derivatives_bound_the_sag_of_roll(name):
-    """Steps up to 0.6 rad a joint, tilts to 60 deg, frames at rest or turning."""
-    rng, used = np.random.default_rng(sum(name.encode())), []
-    task = Task(0.0, 90, roll_deg=(-10, 10), roll_reference=(1, 0, 0))
-    for number in range(80):
-        if number == 0 or (name == "random" and number % 4 == 0):
-            robot = random_arm(rng) if name == "random" else load_robot(name)
-            motions = Motions(robot, None, task)
-        q0 = random_configuration(robot, rng)
-        step = rng.normal(size=robot.n) * 10.0 ** rng.uniform(-2.0, -0.3)
-        step *= rng.random(robot.n) < rng.choice([0.4, 1.0])
-        q1 = q0 + np.clip(step, -0.6, 0.6)
-        s, q = between(q0, q1, 24)
-        (_, axes), x = tools(robot, q), references(robot, q)
-        cubics = random_frame(rng, 0.0 if rng.random() < 0.4 else 10.0 ** rng.uniform(-2, -0.8))
-        onto = Rotation.align_vectors(tilted(axes[0], rng.uniform(0.0, 1.0), rng), cubics[0, 0])[0]
-        cubics = onto.apply(cubics.reshape(-1, 3)).reshape(2, 4, 3)
-        b, t = frame_along(cubics, s)
-        chord = np.linalg.norm(axes - b, axis=1).max() * (1.0 + 1e-3)
-        rate, most = motions.roll_rates(q0, q1, frame_rates(*bounds_of(cubics)), chord)
-        if not (chord < 1.3 and most < np.inf):
-            continue
-        psi = np.unwrap(roll_of(x, axes, t, b))
-        sag = np.abs(psi - (1.0 - s) * psi[0] - s * psi[-1])
-        allowed = 0.5 * most * s * (1.0 - s)
-        assert (sag <= allowed + 1e-9).all()
-        assert np.abs(psi - psi[0]).max() <= rate + 1e-9
-        if most > 1e-4:
-            used.append((sag[1:-1] / allowed[1:-1]).max())
-    assert len(used) > 35
-    assert max(used) > 0.35

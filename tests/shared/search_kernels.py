@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from coverable import Cells, Robot, Task, plane
 from coverable.kernels import entry
-from feasibility.collisions.kernels.clearance import blamed, clearance_gradient, segment_clear
+from feasibility.collisions.kernels.clearance import blamed, segment_clear
 from feasibility.collisions.kernels.memory import collision_buffer, configuration_bounds
 from feasibility.collisions.problem_bodies import Bodies
 from feasibility.roadmap.branch_and_bound import box_bounds, box_contraction
@@ -48,11 +48,6 @@ class Clearance:
     def bounds(self, q: Any) -> Floats:
         """(P,) m, lower bounds of the distances of all pairs."""
         return configuration_bounds(self.buffer, np.array(q, dtype=float).reshape(self.n))
-
-    def push(self, q: Floats, length: float) -> tuple[float, Floats]:
-        """How much something presses (0: nothing is near), and a step away from it."""
-        step = np.zeros(self.n)
-        return clearance_gradient(self.buffer, q, step, length), step
 
     def blamed(self) -> int:
         """The pair for which the last segment was refused."""

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from approved import refused
 from samples import sampled, seeds
-from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from coverable import SurfaceError
@@ -32,29 +31,6 @@ def test_cleaning_again_moving_and_scaling_change_nothing_more(name):
         assert np.array_equal(here.faces, there.faces)
         assert there.area == pytest.approx(scale**2 * here.area, rel=1e-9)
         assert len(notes_of(here)) == len(notes_of(there))
-
-
-def test_everything_at_once_gives_the_surface_back():
-    """Soup, shuffled, jittered, partly flipped, with repeats, points and strangers thrown in."""
-    rng, (vertices, faces) = np.random.default_rng(11), UNCLEAN["wavy"]
-    true = clean(vertices, faces)
-    soup = vertices[faces].reshape(-1, 3) + rng.uniform(-1.5e-8, 1.5e-8, (3 * len(faces), 3))
-    triangles = np.arange(len(soup)).reshape(-1, 3)
-    triangles = np.concatenate([triangles, triangles[:7, ::-1], triangles[:5, [0, 0, 1]]])
-    turned = rng.random(len(triangles)) < 0.3
-    triangles[turned] = triangles[turned][:, ::-1]
-    soup = np.concatenate([soup, [[np.nan] * 3, [7, 7, 7]]])
-    mesh = clean(soup, rng.permutation(triangles))
-    w.assert_clean(mesh)
-    assert (len(mesh.faces), len(mesh.vertices)) == (len(faces), len(vertices))
-    assert cKDTree(vertices).query(mesh.vertices)[0].max() < 4e-8
-    assert mesh.area == pytest.approx(true.area, rel=1e-5)
-    where = cKDTree(vertices[faces].mean(axis=1)).query(mesh.vertices[mesh.faces].mean(axis=1))[1]
-    assert sorted(where) == list(range(len(faces)))
-    assert np.abs(mesh.face_normals - true.face_normals[where]).max() < 1e-4
-    expected = ("no face uses", "others were joined", "two corners", "7 faces (", "turned over")
-    assert all(sum(words in note for note in notes_of(mesh)) == 1 for words in expected)
-    assert len(notes_of(mesh)) == 5
 
 
 @pytest.mark.parametrize("dimension", [1, 2, 3])

@@ -15,7 +15,7 @@ from samples import sampled, seeds, spread
 import coverable
 from coverable import PathError, Task, check, coverage_path, cylinder, load_robot, plane, replay
 from feasibility.paths.ladder import joint_route
-from feasibility.paths.motion_graph import MotionGraph, joint_length
+from feasibility.paths.motion_graph import MotionGraph
 from feasibility.paths.order import ORDERS, closed_sides, grid_order
 from feasibility.paths.winding import unwound
 from feasibility.roadmap.motions.arrays import arrays_of
@@ -211,29 +211,6 @@ def test_detours_go_through_known_motions_to_every_cell():
                 assert (less.nodes, less.revisited) == ([], np.inf)
                 assert less.stuck == found.stuck[: len(less.stuck)] != []
                 given_up += 1
-
-
-def test_a_detour_is_the_cheapest():
-    """20 rad, what a detour as long as the arm costs."""
-    rng, found = np.random.default_rng(5), 0
-    for _ in range(40):
-        graph, cells = hand_made(rng, cells=5, nodes=4, density=0.15, wide=1.0)
-        weighted = nx.empty_graph(len(graph.cell))
-        for x, y in graph.edges.edges:
-            apart = np.linalg.norm(cells.centres[graph.cell[x]] - cells.centres[graph.cell[y]])
-            cost = joint_length(graph.motion(x, y)) + 20.0 * apart / graph.arrays.scale
-            weighted.add_edge(x, y, weight=cost)
-        lengths = [
-            nx.dijkstra_path_length(weighted, x, y)
-            for x, y in product(graph.over[0], graph.over[4])
-            if nx.has_path(weighted, x, y)
-        ]
-        if lengths:
-            nodes = joint_route(graph, cells, np.array([0, 4]), wind=False).nodes
-            length = nx.path_weight(weighted, nodes, "weight")
-            assert length == pytest.approx(min(lengths), rel=1e-12)
-            found += 1
-    assert found > 10
 
 
 @pytest.mark.parametrize(("share", "over"), [(0.8, [0, 1, 2, 3]), (1.2, [0, 1, 2, 1, 2, 3])])

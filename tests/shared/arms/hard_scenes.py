@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -218,34 +217,3 @@ def behind_a_wall(name: str, seed: int) -> tuple[Robot, Cells, Task]:
     wall = Obstacle.box("wall", (thick, 5.0, 5.0), place, (0.0, rng.uniform(-8.0, 8.0), 0.0))
     asked = Collision(clearance=CLEARANCE, scene=(wall,))
     return robot, plate.cells(1, 1), Task(0.02, float(rng.uniform(5, 25)), 0.001, collision=asked)
-
-
-class ClearBox(NamedTuple):
-    """A box of joints around a configuration that is clear, whose tool is at a target."""
-
-    robot: Robot
-    bodies: Bodies
-    task: Task
-    point: np.ndarray
-    approach: np.ndarray
-    q: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
-
-
-def clear_box(name: str, seed: int, asked_for: bool = True) -> ClearBox | None:
-    """A random one, near objects; None where the configuration collides, if that is asked for."""
-    rng, robot = np.random.default_rng([seed, 4]), arm(name)
-    q = rng.uniform(*within_a_turn(robot))
-    around = Kinematics(robot).joints(q[None]).points[0, int(rng.integers(2, robot.n + 1))]
-    around = around + rng.normal(scale=0.25, size=3)
-    scene = tuple(random_object(rng, f"object{i}", around) for i in range(2))
-    asked = Collision(surface=False, clearance=float(rng.choice([0.0, 0.005])), scene=scene)
-    task = Task(0.02, float(rng.uniform(1.0, 60.0)), 0.001, collision=asked)
-    bodies = gather(robot, PLATE, asked, task.standoff)
-    if asked_for and not ForeignScene(robot, bodies).is_clear(q):
-        return None
-    point, approach = covered_target(rng, robot, q, task.cone_deg)
-    half = 10.0 ** rng.uniform(-3.0, -0.3) * rng.uniform(0.1, 1.0, robot.n)
-    middle = q + half * rng.uniform(-1.0, 1.0, robot.n)
-    return ClearBox(robot, bodies, task, point, approach, q, middle - half, middle + half)

@@ -1,45 +1,71 @@
-"""The live page in a real browser, by mouse and keyboard: `make test-browser`.
+"""Pages in a real browser, by mouse and keyboard: `make test-browser`.
 
 It needs the extra `browser` (playwright) and a Chromium, which `CHROMIUM` names or the path holds.
 Without them it fails.
 """
 
+import io
+import os
 import re
+import shutil
 import time
 
 import numpy as np
+import pinocchio as pin
 import pytest
-from live_pages import PATIENCE_MS, chromium, painted, pixels
-from playwright.sync_api import expect
+from PIL import Image
+from playwright.sync_api import expect, sync_playwright
+from scipy.spatial.transform import Rotation
 
-from feasibility.cases.case import Case
+from coverable import Case, Live, check, load_case, view
 from feasibility.live.controls import SURFACE
-from feasibility.live.serving import Live
 from feasibility.reports.verdict import SENTENCES
 from feasibility.viewer.live_server import LiveView
 
 PLATE = """
-[robot]
-name = "ur5"
-
-[surface]
-kind = "plane"
-u = [0.35, 0.65]
-v = [-0.2, 0.2]
-position = [0, 0, 0.1]
-side = "outside"
-cells = [6, 8]
-
-[task]
-standoff = 0.02
-cone_deg = 20
+robot.name = "ur5"
+surface = { kind = "plane", u = [0.35, 0.65], v = [-0.2, 0.2], position = [0, 0, 0.1], \
+side = "outside", cells = [6, 8] }
+task = { standoff = 0.02, cone_deg = 20 }
 """
+ASK = """(time) => {
+  const slider = document.getElementById("time");
+  slider.value = time;
+  slider.dispatchEvent(new Event("input"));
+  const rows = [...document.querySelectorAll("#readout tr")];
+  const joint = viewer.scene_tree.find(["robot", "joint joint1"]).object.quaternion;
+  return [document.getElementById("seconds").textContent,
+          rows.map((row) => parseFloat(row.cells[1].textContent)),
+          [joint.x, joint.y, joint.z, joint.w]];
+}"""
+PATIENCE_MS = 120_000
+NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
 
 @pytest.fixture(scope="module")
 def browser():
-    with chromium() as opened:
+    """The browser that CHROMIUM names, or that is on the path."""
+    path = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
+    if path is None:
+        pytest.fail("there is no Chromium on the path, and CHROMIUM names none")
+    flags = ["--use-gl=angle", "--use-angle=swiftshader", "--disable-dev-shm-usage"]
+    root = ["--no-sandbox"] if os.geteuid() == 0 else []
+    with sync_playwright() as tools:
+        opened = tools.chromium.launch(executable_path=path, args=[*flags, *root])
         yield opened
+        opened.close()
+
+
+def pixels(page):
+    """The picture, (height, width, 3), 0 to 255."""
+    canvas = page.locator("canvas").first
+    return np.asarray(Image.open(io.BytesIO(canvas.screenshot())).convert("RGB")).astype(int)
+
+
+def painted(page):
+    """How many pixels of the picture are green, as covered cells are."""
+    red, green, blue = np.moveaxis(pixels(page), 2, 0)
+    return int(((green > red + 20) & (green > blue + 10)).sum())
 
 
 @pytest.fixture(scope="module")
@@ -130,3 +156,23 @@ def test_a_notebook_shows_the_page_over_a_picture_that_outlives_it(browser):
             page.close()
     finally:
         live.close()
+
+
+def test_the_slider_moves_the_arm_and_the_readout(browser, tmp_path):
+    verdict = check(*load_case("paper/4a", ["surface.cells=[4, 5]"]).build())
+    drawn = view(verdict, play=False)
+    page = browser.new_page(viewport={"width": 900, "height": 640})
+    page.goto(drawn.save_html(tmp_path / "view.html").as_uri())
+    page.wait_for_function("window.viewer !== undefined", timeout=PATIENCE_MS)
+    assert painted(page) > 10, "the start"
+    end = drawn.readout.times[-1]
+    for second in (0.0, 1.3, 4.7):
+        share, values, quaternion = page.evaluate(ASK, second)
+        q = drawn.motion.at(np.array([second]))[0]
+        assert np.allclose(values[:6], np.degrees(q), atol=0.6)
+        assert share == f"{100 * second / end:.0f} %"
+        data = verdict.robot.model.createData()
+        pin.forwardKinematics(verdict.robot.model, data, q)
+        turn = Rotation.from_quat(quaternion).as_matrix()
+        assert np.allclose(turn, data.liMi[1].rotation, atol=0.02)
+    page.close()
