@@ -4,12 +4,11 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-import pytest
 from page_outline import points_of
 from scipy.spatial.transform import Rotation
 
 import coverable
-from coverable import Answer, Evidence, Pose, cylinder, load_robot, plane, sphere, view_placements
+from coverable import Answer, Evidence, Pose, load_robot, plane, view_placements
 from feasibility.placement.trials import Trial
 from feasibility.studies.run import Row
 from feasibility.studies.stored import bits_of
@@ -115,18 +114,3 @@ def test_whole_shares_are_feasible_only_where_that_was_said():
         ("failed", {"verdict": "undecided", "evidence": "budget", "message": "died"}, Class.FAILED),
     ):
         assert class_of_row(Row({}, status, result, 0.1)) is kind
-
-
-@pytest.mark.parametrize(("cells", "expected"), [
-    (CELLS, 2 * (0.3 + 0.2)),
-    (cylinder(0.3, angle_deg=(0, 360), height=(0.0, 0.5)).cells(24, 3), 4 * np.pi * 0.3),
-    # Closed: three sections, each a full circle.
-    (sphere(0.4, polar_deg=(0, 180), azimuth_deg=(0, 360)).cells(12, 24), 6 * np.pi * 0.4),
-])  # fmt: skip
-def test_an_outline_is_the_rim_or_three_sections(cells, expected):
-    """By its length, without the stroke that shows the tool's side."""
-    lines, surface = outline(cells), cells.surface
-    heights = surface.closest(lines.reshape(-1, 3) @ surface.rotation.T + surface.position).height
-    ends = lines[np.abs(heights.reshape(-1, 2)[:, 1]) <= 0.02]
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()
-    assert length == pytest.approx(expected, rel=0.05)

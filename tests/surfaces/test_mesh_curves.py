@@ -45,7 +45,7 @@ def plain(name):
 
 
 # Meshes and how many cells; then by how much their curves say that they deviate at most, m.
-SMOOTH = {name: (plain(name), 60, 0.05) for name in ("sheet", "dome", "shell", "horn", "hood")}
+SMOOTH = {name: (plain(name), 60, 0.05) for name in ("sheet", "dome", "hood")}
 SMOOTH |= {
     "holed": (plain("holed"), 20, 0.01), "slivers": (plain("slivers"), 60, 0.05),
     "squares": (lambda: squares(0.02, 3), 20, 0.025), "corner": (corner, 20, 0.05),

@@ -42,7 +42,7 @@ def meshes():
         "a triangle": mesh(triangle, **POSE),
         "sheet": mesh(plain("sheet", n=10), **POSE),
         "dome": mesh(plain("dome", nu=20, nv=25), side="inside"),
-        "horn": mesh(plain("horn", nu=24, nv=20), **POSE),
+        "hood": mesh(plain("hood", nu=24, nv=20), **POSE),
         "box": mesh(plain("box"), **POSE),
         "box of cells": mesh(plain("box"), **POSE).cells(count=8).surface,
         "rough": mesh(rough(), **POSE),
@@ -158,7 +158,7 @@ def places(surface, count=2000, seed=4):
     return face, weights / weights.sum(axis=1, keepdims=True)
 
 
-@pytest.mark.parametrize("name", ["dome", "horn", "box of cells", "rough cells"])
+@pytest.mark.parametrize("name", ["dome", "hood", "box of cells", "rough cells"])
 def test_every_place_reaches_a_finest_part_and_with_smaller_radii_some_do_not(name):
     """And so do nearest places of points above, with the normals that motions are judged by."""
     surface = meshes()[name]

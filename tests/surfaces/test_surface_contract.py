@@ -227,21 +227,6 @@ def test_areas_are_those_of_fine_triangles_and_add_up(smooth):
     assert total == pytest.approx(fine, rel=2e-5 if smooth.kind in NETS else 1e-7)
 
 
-BELL = math.pi * (math.sqrt(3) + math.asinh(math.sqrt(2)) / math.sqrt(2))
-AREAS = [
-    (sphere(2.0, (0, 60), (0, 360)), 2 * math.pi * 2.0 * 1.0, 1e-14),  # cap of height 1
-    (hyperboloid(1.0, 1.0, (0, 360), (0, 1)), BELL, 1e-14),
-    (hyperboloid(0.5, 5e5, (0, 360), (0, 2)), 2 * math.pi * (1 + 2 / 3 * 4e-12), 1e-14),
-    (ellipsoid((1.0, 1.0, 1e-5), (0, 180), (0, 360)), 2 * math.pi, 1e-8),  # a flat disc's two sides
-    (ellipsoid((1e-4, 1e-4, 1.0), (0, 180), (0, 360)), math.pi**2 * 1e-4, 1e-7),  # and a needle
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("surface", "area", "rel"), AREAS)
-def test_known_areas(surface, area, rel):
-    assert float(surface.area(*surface.u_range, *surface.v_range)) == pytest.approx(area, rel=rel)
-
-
 @pytest.mark.parametrize("name", ALL)
 def test_seams_and_poles(name):
     surface = ALL[name]

@@ -13,7 +13,7 @@ from asked import question, verdict_of
 from random_arms import robot_of
 
 import coverable
-from coverable import CauseKind, Search, Task, ToolShape, check, cylinder, load_robot, plane, sphere
+from coverable import CauseKind, Search, Task, ToolShape, check, load_robot, plane, sphere
 from feasibility.roadmap.causes import diagnosis
 from feasibility.roadmap.motions.arrays import arrays_of
 from feasibility.roadmap.motions.working_memory import work_for
@@ -164,22 +164,6 @@ def test_of_many_pairs_the_one_in_the_way_is_named_with_its_distance():
 
 
 # Cells that another motion covers.
-
-
-def test_a_stop_in_the_middle_disconnects():
-    """Both sides of a ring are reached, by two motions; which is proved or not, and said."""
-    ring = cylinder(0.6, (-180, 180), (0.2, 0.3))
-    elbow = np.radians([-180.0, math.degrees(-math.atan2(0.7, 0.1))])
-    arm = PUMA.with_limits({"joint1": np.radians([-100.0, 100.0]), "joint3": elbow})
-    verdict = check(arm, ring.cells(16, 1), Task(0.02, 40))
-    assert not verdict.feasible
-    apart = [cause for cause in verdict.causes if cause.kind is CauseKind.DISCONNECTED]
-    reached = {int(k) for component in verdict.components for k in component}
-    assert {cause.cell for cause in apart} == reached - set(np.flatnonzero(verdict.covered))
-    for cause in apart:
-        size = int(number(r"covers (\d+) of 16", cause.detail))
-        holding = [c for c in verdict.components if cause.cell in c.tolist()]
-        assert size == max(len(component) for component in holding)
 
 
 @pytest.mark.parametrize("name", ["puma560 262", "puma560 268"])

@@ -74,20 +74,6 @@ def dome(nu: int = 40, nv: int = 50) -> Mesh:
     return bent(shape, nu, nv)
 
 
-def shell(nu: int = 50, nv: int = 30) -> Mesh:
-    return bent(lambda u, v: (0.5 * np.cos(2.8 * u), 0.5 * np.sin(2.8 * u), 0.9 * v), nu, nv)
-
-
-def horn(nu: int = 50, nv: int = 40) -> Mesh:
-    """Part of a hyperboloid of one sheet."""
-
-    def shape(u, v):
-        radius = 0.3 * np.sqrt(1.0 + (v / 0.6) ** 2)
-        return radius * np.cos(3.0 * u), radius * np.sin(3.0 * u), v
-
-    return bent(shape, nu, nv)
-
-
 def hood(nu: int = 60, nv: int = 50) -> Mesh:
     """A car-hood-like patch: crowned, with a rib and waves."""
 
@@ -183,7 +169,7 @@ def used(mesh: Mesh) -> Mesh:
 
 CONNECTED: dict[str, Callable[[], Mesh]] = {
     each.__name__: each
-    for each in (sheet, dome, shell, horn, hood, blade, box, holed, slivers, scattered, wedge)
+    for each in (sheet, dome, hood, blade, box, holed, slivers, scattered, wedge)
 }
 """Each in one piece."""
 
