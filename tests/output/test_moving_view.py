@@ -1,13 +1,11 @@
 """The arm in a view moves like Pinocchio's, the world stands still, its server lets nobody in."""
 
-import itertools
 import socket
 import sys
 import urllib.error
 import urllib.request
 from dataclasses import replace
 
-import networkx as nx
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -102,23 +100,6 @@ def test_the_readout_is_what_pinocchio_says(verdict, drawn):
         distance = 1.0 - np.linalg.norm(away)  # inside a dome of 1 m
         angle = np.degrees(np.arccos(tool.rotation @ robot.approach_axis @ away / (1 - distance)))
         assert np.allclose(columns[6:, k], [1e3 * distance, angle], atol=0.1)
-
-
-def test_without_a_witness_the_longest_path_of_the_tree_is_one_motion():
-    case = load_case("paper/4a", ["search.method=greedy", "surface.cells=[2, 2]",
-                                  "search.step_deg=1"])  # fmt: skip
-    found = check(*case.build())
-    cells = motion.longest_path(found.tree, found.cells.centres)
-    assert cells[0] == found.start
-    assert all(found.tree.has_edge(a, b) for a, b in itertools.pairwise(cells))
-    walk = motion.walk_along(found.graph, cells)
-    for cell in cells:
-        assert (np.abs(walk - found.graph.nodes[cell]["q"]).max(axis=1) < 1e-9).any()
-    tree = nx.DiGraph([(0, 1), (0, 5), (5, 6), (6, 7)])
-    centres = np.arange(8.0)[:, None] * [1.0, 0.0, 0.0]
-    for place, longest in ((3.0, [0, 5, 6, 7]), (9.0, [0, 1])):
-        centres[1] = [place, 0.0, 0.0]
-        assert motion.longest_path(tree, centres) == longest
 
 
 @pytest.fixture(scope="module")

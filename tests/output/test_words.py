@@ -15,9 +15,9 @@ import coverable
 from coverable import Answer, Evidence, check, list_robots, load_case, load_motion, load_result
 from coverable.errors import at_least, at_most
 from feasibility.cases.keys import all_keys
-from feasibility.collisions.words import CHECKABLE, UNCHECKED
+from feasibility.collisions.words import UNCHECKED
 from feasibility.cut_words import place_of
-from feasibility.reports import changes, comparison, division, path, study, too_late
+from feasibility.reports import changes, division, path
 from feasibility.reports import explanation as explained
 from feasibility.reports import verdict as report
 from feasibility.results.trajectory_files import as_csv, as_json_text, from_csv
@@ -151,35 +151,6 @@ def test_a_motion_across_a_cut_opens_it(commands, side):
     assert said in " ".join(explained.as_text(made, "x").split())
     bare = replace(made, thresholds=(Threshold(cone, replace(found, witness=None), None),))
     assert explained.as_json(bare, "x")["thresholds"][0]["opens"] is None
-
-
-@pytest.mark.parametrize("asked", [(), ("self=true",), ("self=false",), ("clearance=0.01",)])
-def test_comparisons_studies_and_late_answers_say_what_the_case_asks_for(asked):
-    settings = [f"collision.{one}" for one in asked]
-    case = load_case("paper/4a", settings)
-    names = [] if case.collision is None else list(case.collision.checked)
-    assert names == [name for name in ("self", "surface") if asked and asked != (f"{name}=false",)]
-    found = coverable.Comparison("x", (), divided=False, critical=False, collision=case.collision)
-    assert comparison.as_json(found)["collisions"] == names
-    assert too_late.as_json(case, "late", 1.0)["collisions"] == names
-    said = too_late.as_text(case, "late").lower()
-    assert (UNCHECKED in " ".join(said.split())) == (not names)
-    assert all(CHECKABLE[name].split()[-1] in said for name in names)
-
-
-def test_a_study_says_what_all_its_cases_check():
-    def of(*lines):
-        return coverable.read_study("\n".join(['base.case = "paper/4a"', *lines]))
-
-    mixed = of('vary."collision.surface" = [true, false]', 'vary."collision.self" = [true]')
-    none = of('vary."task.cone_deg" = [30, 40]')
-    alike = of('vary."collision.clearance" = [0.0, 0.01]')
-    assert study.as_json(mixed, [])["collisions"] == ["self"]
-    assert "in 1 of 2 cases collisions are checked with the arm itself" in study.as_text(mixed, [])
-    assert study.as_json(alike, [])["collisions"] == ["self", "surface"]
-    assert UNCHECKED not in study.as_text(alike, [])
-    assert study.as_json(none, [])["collisions"] == []
-    assert UNCHECKED in study.as_html(none, []).lower()
 
 
 def test_trajectories_say_it_in_their_header_and_are_read_back(commands, plate, tmp_path):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from bounds import holds
 from part_walks import survivors
+from specimens import TILTED, drawn
 
 from coverable import SurfaceError, poses
 from surfaces.places.offset_surfaces import offset_surface
@@ -14,16 +15,7 @@ from surfaces.places.places import Places
 LINE = np.array([[0.4, 0.0, 0.3], [0.4, 0.1, 0.3], [0.4, 0.2, 0.3], [0.4, 0.2, 0.3]])
 UP = np.tile([0.0, 0.0, 2.0], (4, 1))
 TURNED = np.array([[0.0, 0.0, 1.0], [0.6, 0.0, 0.8], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-TILTED = {"position": (1.0, 2.0, 3.0), "rpy_deg": (20.0, -30.0, 50.0)}
 DENSE = np.linspace(0.0, 1.0, 41)
-
-
-def drawn(seed, count=25, **more):
-    """A toolpath that wanders and tilts, placed askew."""
-    rng = np.random.default_rng(seed)
-    points = np.cumsum(rng.normal(0.0, 0.05, (count, 3)), axis=0)
-    normals = np.array([0.0, 0.0, 2.0]) + rng.normal(0.0, 1.0, (count, 3))
-    return poses(points, normals, **TILTED, **more)
 
 
 def test_each_pose_is_a_cell_where_it_is_placed():
@@ -80,39 +72,6 @@ def test_places_follow_the_curves_and_tell_turns_on_the_spot_apart():
     points, directions = spot.at(there)
     found = spot.nearest(points, points - spot.least_look * directions, 1e-3)
     np.testing.assert_allclose(found.x[2:, 0], share[2:], atol=1e-9)
-
-
-@pytest.mark.parametrize("height", [0.0, 0.02, -0.05])
-def test_paths_of_places_bend_no_more_than_is_said(height):
-    """Over one pose or none; none leads two curves further in one step."""
-    rng = np.random.default_rng(4)
-    cells = drawn(2, tangents=np.cross(rng.normal(size=(25, 3)), rng.normal(size=(25, 3))))
-    offset = offset_surface(cells.surface, height)
-    x, chart = rng.uniform(0, 1, (2, 300, 2)) * [1, 0], rng.integers(0, 24, 300)
-    after = np.minimum(chart + rng.integers(0, 2, 300), 23)
-    paths = offset.paths(Places(chart, x[0]), Places(after, x[1]))
-    assert np.isfinite(paths.deviations).all()
-    stated, found, aside, turned = [], [], [], []
-    for piece in (0, 2):
-        some = paths.share[:, piece + 1] > paths.share[:, piece]
-        one, other = (paths.place(piece + k).of(some) for k in (0, 1))
-        assert (one.chart == other.chart).all()
-        line = one.x[None] + DENSE[:, None, None] * (other.x - one.x)
-        dense = Places(np.tile(one.chart, 41), line.reshape(-1, 2))
-        values = np.stack(offset.at(dense), axis=1).reshape(41, -1, 2, 3)
-        ends = values[[0]] + DENSE[:, None, None, None] * (values[[-1]] - values[[0]])
-        found.append(np.linalg.norm(values - ends, axis=3).max(axis=0))
-        stated.append(paths.deviations[some, piece])
-        aside.append(offset.tangent_deviations(one, other))
-        ways = offset.tangents(dense).reshape(41, -1, 3)
-        line = ways[[0]] + DENSE[:, None, None] * (ways[[-1]] - ways[[0]])
-        turned.append(np.linalg.norm(ways - line, axis=2).max(axis=0))
-    stated, found = np.concatenate(stated), np.concatenate(found)
-    holds(stated[:, 1], found[:, 1], used=0.95, tiny=1e-9)
-    holds(stated[:, 0], found[:, 0], used=0.0, tiny=1e-9)  # offset points run straight
-    holds(np.concatenate(aside), np.concatenate(turned), used=0.95, tiny=1e-9)
-    far = offset.paths(Places(chart[:1], x[0, :1]), Places((chart[:1] + 12) % 24, x[0, :1]))
-    assert np.isinf(far.deviations).any()
 
 
 @pytest.mark.parametrize("neighbours", ["order", 0.3])

@@ -5,7 +5,7 @@ import pytest
 from bounds import holds
 from part_walks import pieces_of
 from random_surfaces import random_surface
-from specimens import EGG, FACETED, SMOOTH, VASE, quarter_turn, turned
+from specimens import EGG, FACETED, SMOOTH, VASE, drawn, quarter_turn, turned
 
 import coverable
 from coverable import bspline, ellipsoid, hyperboloid, piecewise, plane, revolution, sphere, torus
@@ -53,6 +53,7 @@ SURFACES = {
     ),
     "half pipe": half_pipe(),
     "formula": SMOOTH["formula"],
+    "poses": drawn(2, tangents=np.random.default_rng(4).normal(size=(25, 3))).surface,
     **FACETED,
 }  # fmt: skip
 
@@ -80,6 +81,9 @@ def pairs(surface, count, rng):
     """Pairs of places near to each other, at many scales."""
     if surface.kind == "mesh":
         return on_mesh(surface, count, rng)
+    if surface.kind == "poses":  # on one curve or on two
+        x, chart = rng.uniform(0, 1, (2, count, 2)) * [1, 0], rng.integers(0, 24, count)
+        return Places(chart, x[0]), Places(np.minimum(chart + rng.integers(0, 2, count), 23), x[1])
     patches = [patch for patch, _ in pieces_of(surface)]
     chart = rng.integers(0, len(patches), count)
     low, high = (
@@ -142,7 +146,9 @@ def test_paths_bend_no_more_than_is_said(named, height):
         found.append(sagging(offset, one.of(known), other.of(known)))
         some_known |= known
     stated, found = np.concatenate(stated), np.concatenate(found)
-    curved = surface.kind not in ("plane", "mesh", "piecewise")
+    if name == "poses":
+        holds(stated[..., 1], found[..., 1], used=0.95, tiny=2e-10)
+    curved = surface.kind not in ("plane", "mesh", "piecewise", "poses")
     for k in (0, 1):
         holds(stated[..., k], found[..., k], used=0.0, tiny=2e-10)
         # Beside the surface the heights count alike on both sides, though one bends less.
@@ -205,7 +211,7 @@ def test_paths_begin_and_end_where_they_should_and_do_not_jump(named, height):
         assert (jumps[known] <= 2e-4).all()
     assert known.any() or surface.kind not in ("mesh", "piecewise")
     # No path is the long way round a seam.
-    if surface.kind not in ("mesh", "piecewise", "bspline"):
+    if surface.kind not in ("mesh", "piecewise", "bspline", "poses"):
         for axis, period in enumerate(surface.periods):
             legs = np.abs(path.x[:, [1, 3], axis] - path.x[:, [0, 2], axis])
             assert not period or (legs <= 0.5 * period + 1e-9).all()

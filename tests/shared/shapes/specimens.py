@@ -147,7 +147,16 @@ FACETED = {
         [plane((0.0, 0.2), (0.0, 0.2)), plane((0.0, 0.2), (0.0, 0.2), rpy_deg=(180, 0, 180))]
     ),
 }  # fmt: skip
+TILTED = {"position": (1.0, 2.0, 3.0), "rpy_deg": (20.0, -30.0, 50.0)}
 ALL = {**SMOOTH, **FACETED}
+
+
+def drawn(seed, count=25, **more):
+    """A toolpath that wanders and tilts, placed askew."""
+    rng = np.random.default_rng(seed)
+    points = np.cumsum(rng.normal(0.0, 0.05, (count, 3)), axis=0)
+    normals = np.array([0.0, 0.0, 2.0]) + rng.normal(0.0, 1.0, (count, 3))
+    return coverable.poses(points, normals, **TILTED, **more)
 
 
 def cells_of(surface, nu, nv):
