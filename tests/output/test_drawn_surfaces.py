@@ -13,7 +13,6 @@ from page_outline import faces_of, points_of
 
 import coverable
 from coverable import Task, check, load_result, load_robot, mesh, plot_sides, sphere, view
-from feasibility.viewer import cell_meshes as cell_shapes
 from feasibility.viewer import verdict_scene
 from feasibility.viewer.cell_meshes import make_display_mesh
 from feasibility.viewer.cut_sides import sides_of
@@ -61,19 +60,6 @@ def areas_of(vertices, faces):
 
 def objects(commands):
     return {c["path"]: c for c in commands if c["type"] == "set_object"}
-
-
-def test_each_cell_is_filled_by_its_own_triangles(cells):
-    for k in range(COUNT):
-        drawn = cell_shapes.patch(cells, np.array([k]))
-        assert areas_of(drawn.vertices, drawn.faces).sum() == pytest.approx(cells.areas[k])
-        assert set(cells.locate(drawn.vertices[drawn.faces].mean(axis=1)).tolist()) == {k}
-        a, b, c = np.moveaxis(drawn.vertices[drawn.faces], 1, 0)
-        looks = np.cross(b - a, c - a)
-        assert ((looks * drawn.normals[drawn.faces[:, 0]]).sum(axis=1) > 0.0).all()
-        np.testing.assert_allclose(np.linalg.norm(drawn.normals, axis=1), 1.0, atol=1e-12)
-    whole = cell_shapes.patch(cells, np.arange(COUNT))
-    assert len(whole.vertices) == len(cells.surface.mesh.vertices), "triangles share corners"
 
 
 def test_a_fine_mesh_is_thinned_and_its_cells_keep_their_areas():

@@ -3,79 +3,17 @@
 import numpy as np
 import pytest
 from arm_urdfs import FREE, joint
-from bounds import holds
 from plain import tools
 from random_arms import QUESTIONS, planar_arm, robot_of
 from search_kernels import assert_walked
 
-from coverable import Search, Task, check, cylinder, plane, replay, sphere
-from coverable.arrays import unit_along
+from coverable import Search, Task, check, plane, replay
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions.arrays import arrays_of
 from feasibility.roadmap.rounds import explore
 from feasibility.roadmap.search import close
 from feasibility.roadmap.walk import covering_walk
-from feasibility.roll import projected
-from feasibility.targets.curves import target_curves
 from feasibility.verdict import Walk
-
-DOME = sphere(1.0, (10, 90), (10, 180), rpy_deg=(30, 0, 20), position=(1, 2, 3)).cells(4, 5)
-PIPE = cylinder(0.2, (0, 360), (0, 1), side="outside", rpy_deg=(0, 50, 0)).cells(6, 3)
-TASKS = {
-    "along u": Task(0.01, 20, roll_deg=(-15, 15)),
-    "along z": Task(0.01, 20, roll_deg=(-15, 15), roll_reference=(0.3, 0.2, 1)),
-    "held upright": Task(0.01, 20, roll_deg=(0, 0), approach=(0.2, 0.1, -1)),
-    "all fixed": Task(0.01, 20, roll_deg=(0, 5), approach=(0, 0, -2), roll_reference=(1, 2, 0)),
-}
-
-
-def along(first, cubics, curves, t):
-    """Piece, and value, first and second derivatives by t (k, 3) of cubics at t of curves (k,)."""
-    count = np.diff(first)[curves]
-    piece = np.minimum((t * count).astype(int), count - 1)
-    s, c = (t * count - piece)[:, None], cubics[first[curves] + piece].swapaxes(0, 1)
-    values = c[0] + s * (c[1] + s * (c[2] + s * c[3]))
-    slopes = (c[1] + s * (2.0 * c[2] + s * 3.0 * c[3])) * count[:, None]
-    bends = (2.0 * c[2] + 6.0 * s * c[3]) * count[:, None] ** 2
-    return first[curves] + piece, (values, slopes, bends)
-
-
-def frames_over(task, surface, u, v):
-    """Approach directions and references (k, 3) over places, by the definition."""
-    approach = -surface.side_sign * surface.normal(u, v)
-    if task.approach is not None:
-        approach = np.tile(surface.rotation @ unit_along(task.approach), (len(u), 1))
-    along_u = surface.tangent(u, v)
-    if task.roll_reference is not None:
-        along_u = np.tile(surface.rotation @ unit_along(task.roll_reference), (len(u), 1))
-    return approach, projected(along_u, approach)[0]
-
-
-@pytest.mark.parametrize("cells", [DOME, PIPE], ids=["dome", "pipe"])
-@pytest.mark.parametrize("name", TASKS)
-def test_frames_follow_the_surface_within_their_bounds_and_turn_no_faster(name, cells):
-    task, surface, rng = TASKS[name], cells.surface, np.random.default_rng(5)
-    found = target_curves(cells, task)
-    curves, t = rng.integers(0, len(cells.pairs), 2000), rng.random(2000)
-    piece, (value, slope, bend) = along(found.first, found.frames.cubics, curves, t)
-    _, (b, _, _) = along(found.first, found.cubics[:, :, 3:], curves, t)
-    closest = surface.closest(cells.curves.at(curves, t)[0])
-    approach, right = frames_over(task, surface, closest.u, closest.v)
-    assert np.linalg.norm(b - approach, axis=1).max() <= found.deviations[:, 1].max() + 1e-12
-    off = np.linalg.norm(value - right, axis=1)
-    assert (off <= found.frames.deviations[curves] + 2 * found.deviations[curves, 1] + 1e-8).all()
-    bounds = found.frames.derivative_bounds[piece]
-    for truth, bound in ((slope, bounds[:, 0]), (bend, bounds[:, 1])):
-        holds(bound + 1e-9, np.linalg.norm(truth, axis=1), 0.9 if bound.max() > 1e-6 else 0.0)
-    # Beside a centre, on the target surface, in any direction.
-    cell = rng.integers(0, len(cells), 500)
-    x = np.column_stack([cells.u, cells.v])[cell]
-    moved = [*x.T], [*(x + 1e-4 * rng.normal(size=x.shape)).T]
-    height = surface.side_sign * task.standoff
-    ends = [surface.point(*uv) + height * surface.normal(*uv) for uv in moved]
-    refs = [frames_over(task, surface, *uv)[1] for uv in moved]
-    step, turn = (np.linalg.norm(two[1] - two[0], axis=1) for two in (ends, refs))
-    assert (turn <= found.frames.centre_curvature * step + 1e-8).all()
 
 
 @pytest.mark.parametrize("short", [0.3, 0.99, 1.01])

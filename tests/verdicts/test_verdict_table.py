@@ -7,6 +7,7 @@ little worse are refused by the judges. Some stored problems of the oracles are 
 import json
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from types import SimpleNamespace
 
 import networkx as nx
@@ -14,18 +15,7 @@ import numpy as np
 import plain
 import pytest
 import referee
-from asked import (
-    HERE,
-    QUESTIONS,
-    STORED,
-    counted,
-    form_of,
-    known,
-    names,
-    question,
-    stored,
-    verdict_of,
-)
+from asked import QUESTIONS, STORED, counted, form_of, known, names, question, stored, verdict_of
 from samples import sampled, seeds, spread
 
 from coverable import Answer, CauseKind, Evidence, Search, check, replay, verify
@@ -43,7 +33,7 @@ ALL = TABLE + OTHERS
 WALKED = [name for name in ALL if name not in names("greedy")]
 WORSE = [name for name in WALKED if name not in names("ends")]
 WORSE = sorted({*spread(WORSE, 18), *names("rolls"), *names("bodies")} - {"4a within 15 degrees"})
-ANSWERS = HERE / "answers.json"
+ANSWERS = Path(__file__).parents[1] / "questions" / "answers.json"
 SAMPLES = {"hood": 6}  # between rows, where the referee's formula is slow
 
 

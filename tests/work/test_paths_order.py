@@ -10,15 +10,8 @@ from path_cases import verdict_of
 from samples import sampled, seeds
 
 from coverable import PathError, coverage_path, cylinder, mesh, plane, sphere
-from feasibility.paths.order import (
-    GRID_ORDERS,
-    ORDERS,
-    closed_sides,
-    grid_order,
-    route,
-    route_length,
-    step_lengths,
-)
+from feasibility.paths import order as orders
+from feasibility.paths.order import ORDERS, grid_order, route, route_length, step_lengths
 from feasibility.paths.two_opt import improved, tour_length
 from surfaces.meshes.triangle_mesh import TriangleMesh
 
@@ -27,7 +20,7 @@ SHAPES = {(0, 3): [(False, False)], (1, 5): [(False, False)], (5, 1): [(False, F
 """Of each which sides may close on themselves."""
 
 
-@pytest.mark.parametrize("order", GRID_ORDERS)
+@pytest.mark.parametrize("order", orders.GRID_ORDERS)
 @pytest.mark.parametrize("shape", SHAPES, ids=str)
 def test_grid_orders_step_from_cell_to_the_next_wherever_they_begin(order, shape):
     """Over the seam only of a grid that closes there."""
@@ -58,7 +51,7 @@ def test_grids_that_close_on_themselves():
         ],
     }
     for sides, grids in closed.items():
-        assert all(closed_sides(cells) == sides for cells in grids)
+        assert all(orders.closed_sides(cells) == sides for cells in grids)
 
 
 @sampled("seed", seeds(8, all=200))
@@ -119,7 +112,7 @@ def test_the_shortest_order_of_cells_in_two_pieces_names_each_once():
 def test_cells_of_a_mesh_have_the_shortest_order_alone():
     cells = mesh(TriangleMesh(*sheet(12))).cells(12)
     assert sorted(route(cells, "shortest").tolist()) == list(range(len(cells)))
-    for order in GRID_ORDERS:
+    for order in orders.GRID_ORDERS:
         for ask in (
             lambda order=order: route(cells, order),
             lambda order=order: coverage_path(SimpleNamespace(cells=cells), order),  # asks no arm
