@@ -31,19 +31,16 @@ CASE = """
     task = { standoff = 0.02, cone_deg = 30 }
 """
 GREEDY = ("search.method=greedy", "search.step_deg=0.5", "search.moves=all", "task.tolerance=0.02")
-FLOOD = '[{ name = "flood", kind = "box", size = [0.3, 0.3, 0.1], position = [0.5, 0, 0.37] }]'
+FLOOD = 'collision.scene=[{ name = "flood", kind = "box", size = [0.3, 0.3, 0.1], '
+FLOOD += "position = [0.5, 0, 0.37] }]"
+UNTIL = "search.time_limit=2"
 IMPOSSIBLE = {
     "standoff": ["task.standoff=2.5"],
     "tolerance": ["surface.position=[0, 0, 1.5]"],
     "cone": ["task.approach=[0, 0, 1]"],
     "roll": ["task.roll_deg=[70, 75]"],
     "limits": ["robot.limits_deg.elbow_joint=[-1, 1]"],
-    "collisions": [
-        "collision.self=false",
-        "collision.surface=false",
-        "search.time_limit=2",
-        f"collision.scene={FLOOD}",
-    ],
+    "collisions": ["collision.self=false", "collision.surface=false", UNTIL, FLOOD],
     "start": ["robot.start_deg=[0, -90, 90, 90, 90, -160]"],
     "speed": ["task.speed=3.0"],
     "distance from singularities": ["task.min_manipulability=0.9"],

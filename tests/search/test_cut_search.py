@@ -13,9 +13,6 @@ import coverable
 from feasibility.cut_tree import Cut, Leaf
 from feasibility.roadmap.branch_and_bound.branching import branch_and_bound
 from feasibility.roadmap.branch_and_bound.ruling import Ruling
-from feasibility.roadmap.cuts.gaps import components_of
-from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.motions.arrays import arrays_of
 
 
 def stored(arm, feasible):
@@ -76,13 +73,6 @@ def test_a_feasible_case_is_never_proved(arm, few, newton, seed):
     assert True not in wrong
 
 
-def test_the_same_seed_proves_alike():
-    problem = case("puma560", stored("puma560", feasible=False)[4])
-    one, other = (prove(*problem, seed=3) for _ in range(2))
-    assert one.tree == other.tree
-    assert one.attempt.boxes == other.attempt.boxes
-
-
 def test_a_budget_is_kept_and_ticks_may_end_an_attempt():
     problem = case("ur5", stored("ur5", feasible=False)[2])
     proving = prove(*problem, budget=200, attempts=2)
@@ -97,9 +87,3 @@ def test_a_budget_is_kept_and_ticks_may_end_an_attempt():
     with pytest.raises(KeyboardInterrupt):
         proving.prover.attempt(proving.components, 100_000, tick)
     assert 0 < proving.prover.attempt(proving.components, 500, nothing).boxes <= 500
-
-
-def test_a_roadmap_without_nodes_has_no_components():
-    robot, cells, task = case("puma560", stored("puma560", feasible=False)[12])
-    exploration = Exploration(robot, cells, arrays_of(robot, cells, task), 0)
-    assert components_of(exploration.roadmap) == []
