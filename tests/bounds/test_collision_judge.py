@@ -197,6 +197,13 @@ def test_what_balls_part_has_to_be_as_far_as_is_needed(needed):
     assert found.min_clearance == pytest.approx(0.01, abs=1e-6)
 
 
+@pytest.mark.parametrize("needed", [0.59, 0.61])
+def test_balls_that_may_be_off_are_that_much_nearer(needed):
+    """0.7 m apart, and the slide up to 0.1 m off its line."""
+    bodies = sliding(Sphere(0.1), Sphere(0.1), needed, at(0.9))
+    assert judged(SLIDE, bodies, [0.0], [1e-4], off=[0.1]).accepted == (needed < 0.6)
+
+
 @pytest.mark.parametrize("shape", [Sphere(0.1), fork()], ids=["ball", "mesh"])
 @pytest.mark.parametrize("less", [1e-3, 1e-6])
 def test_what_cannot_be_decided_is_refused(shape, less):

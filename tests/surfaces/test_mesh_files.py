@@ -221,6 +221,7 @@ OTHERS = {
     "fan.glb": (strip_scene(6), 1.0, 2, 4),
     "caps.off": (w.off(*w.chain_of_caps()), 0.01 + 0.1 * np.hypot(0.1, 0.03), 8, 7),
     "needle.off": (w.off([*P, (0.15, -1e-8, 0)], [*G, (0, 12, 9)]), 0.06, 12, 12),
+    "mostly_up.off": (w.off(P, [*G[:3, ::-1], *G[3:]]), 0.06, 12, 12),
     "bow_tie.off": (w.off(*w.bow_tie()), 0.01, 2, 6),
     "pieces.stl": (w.stl(*w.stacked((V, F), (SECOND, TRAY))), CUBE * 11 / 6, 22, 16),
     "ring.stl": (w.stl(*w.strip(twisted=False)), 0.864 * np.sin(np.pi / 12), 48, 48),

@@ -12,6 +12,7 @@ from surfaces.meshes.normals import blended
 from surfaces.meshes.repair.cleaning import clean
 from surfaces.meshes.repair.degenerate import weld_distance, welded
 from surfaces.meshes.repair.mesh_notes import notes_of
+from surfaces.meshes.repair.orientation import one_fan_each
 from surfaces.meshes.triangle_mesh import TriangleMesh
 
 V, F = w.cube()
@@ -56,6 +57,14 @@ def test_a_flip_never_makes_an_edge_twice():
     mesh = clean(vertices, [[0, 1, 3], [0, 2, 1], [0, 3, 2], [1, 2, 3]])
     w.assert_clean(mesh)
     assert any("dropped" in note for note in notes_of(mesh))
+
+
+def test_the_first_fan_of_several_keeps_their_vertex():
+    vertices, faces = map(np.array, w.bow_tie())
+    parted, numbers, added = one_fan_each(vertices, faces)
+    assert added == 1
+    assert (parted[numbers] == vertices[faces]).all()
+    assert (numbers[0] == faces[0]).all()
 
 
 def vertex_normals(mesh):
