@@ -177,15 +177,15 @@ class Certificate:
     """How often the tool waits while the arm changes its posture; None as for the speed."""
     corners: int | None = None
     """At how many rows the tool's path turns sharply; None as for the speed."""
-    margin: Callable[[float | None], PlacementMargin | None] | PlacementMargin | None = field(
+    margin: Callable[..., PlacementMargin | None] | PlacementMargin | None = field(
         default=None, compare=False, repr=False
     )
-    """The placement margin, or what finds it by `min_clearance`."""
+    """The placement margin, or what finds it."""
 
     @cached_property
     def placement_margin(self) -> PlacementMargin | None:
         """Where the surface may stand; found when first read. None where that is not known."""
-        return self.margin(self.min_clearance) if callable(self.margin) else self.margin
+        return self.margin() if callable(self.margin) else self.margin
 
     def __getstate__(self) -> dict[str, Any]:
         """What is pickled: the margin as it is found."""

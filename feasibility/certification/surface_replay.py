@@ -128,13 +128,13 @@ def replay_over_surface(
     certificate = Certificate(
         len(rows), error, angle_of(chord), margin, max_roll=None if task.roll is None else roll
     )
+    if len(cells) and not faults:
+        certificate = replace(certificate, margin=margin_of(robot, cells, task, rows, found.room))
     if bodies is not None:
         certificate, hit = _among(bodies, robot, rows, certificate)
         faults += hit
-    if len(cells) and not faults:
-        certificate = replace(certificate, margin=margin_of(robot, cells, task, rows, found.room))
-        short = margin_fault(task, certificate)
-        faults += [MotionFault(-1, 0.0, short)] if short else []
+    short = "" if faults else margin_fault(task, certificate)
+    faults += [MotionFault(-1, 0.0, short)] if short else []
     return MotionReplay(certificate, tuple(faults), at)
 
 

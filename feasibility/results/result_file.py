@@ -300,7 +300,7 @@ def _with_margin(
     if certificate is None or witness is None:
         return certificate
 
-    def found(apart: float | None) -> PlacementMargin | None:
+    def found() -> PlacementMargin | None:
         from feasibility.certification.motion_replay import replay
 
         needed = np.ones(len(cells), dtype=bool)

@@ -14,9 +14,11 @@ import plain
 import referee
 from scipy.spatial.transform import Rotation
 
-from feasibility.certification import displacement_balls as lemma
+from feasibility.certification import placement_margin as lemma
 from feasibility.certification import surface_replay
+from feasibility.certification.displaced_bodies import Nearer
 from feasibility.certification.motion_replay import replay
+from robots.kinematics import Kinematics
 
 USED = Counter()
 """The largest share of each bound that a displacement needed."""
@@ -42,8 +44,13 @@ def turned(rotations, vectors):
     return np.einsum("kij,kj->ki", rotations, vectors)
 
 
+def given(robot, task, pivot):
+    """What the bounds of a motion need to know besides it."""
+    return lemma.Given(robot, task, pivot, Kinematics(robot))
+
+
 def margin_and_balls(robot, cells, task, walk):
-    """The margin of a motion, and the bounds along it that it is made of."""
+    """The margin of a motion, the bounds along it that it is made of, and couples of bodies."""
     asked, real = [], surface_replay.margin_of
     surface_replay.margin_of = lambda *given: asked.append(given) or real(*given)
     try:
@@ -52,9 +59,9 @@ def margin_and_balls(robot, cells, task, walk):
         surface_replay.margin_of = real
     assert found.accepted, found.refusal
     *_, q, room = asked[0]
-    case = lemma.Given(robot, task, cells.centres.mean(axis=0))
-    balls = lemma.Balls.join(*lemma.balls_along(case, q, room))
-    return found.certificate.placement_margin, balls
+    balls = lemma.balls_along(given(robot, task, cells.centres.mean(axis=0)), q, room)
+    pairings = getattr(found.certificate.margin, "args", ((),))[0]
+    return found.certificate.placement_margin, balls, pairings
 
 
 def displaced(arm, cells, walk, margin, balls, rng, count):
@@ -63,7 +70,7 @@ def displaced(arm, cells, walk, margin, balls, rng, count):
     np.testing.assert_allclose(pivot, cells.centres.mean(axis=0), atol=1e-12)
     share = np.where(rng.random(count) < 0.6, np.round(share), share)
     last = len(balls.row) - 1
-    weak = np.argsort(balls.positions)[np.minimum(rng.exponential(4, count), last).astype(int)]
+    weak = np.argsort(balls.triangle[:, 0])[np.minimum(rng.exponential(4, count), last).astype(int)]
     at, part = np.where(rng.random(count) < 0.5, weak, rng.integers(0, last + 1, count)), None
     if cells.surface.kind == "poses":  # directions between poses are not known here
         begin = np.flatnonzero((balls.share[:, 0] == 0.0) & (walk.cell[balls.row] >= 0))
@@ -122,7 +129,7 @@ def use(name, truth, bound):
 
 def attack(arm, robot, cells, task, walk, rng, count):
     """Displace, solve and judge; the margin."""
-    margin, balls = margin_and_balls(robot, cells, task, walk)
+    margin, balls, pairings = margin_and_balls(robot, cells, task, walk)
     if margin.position == 0.0 and margin.angle == 0.0:
         return margin
     here = displaced(arm, cells, walk, margin, balls, rng, count)
@@ -131,7 +138,7 @@ def attack(arm, robot, cells, task, walk, rng, count):
     y = 2 * here.rho / (ball.slope + root)
     use("ball", np.linalg.norm(here.v, axis=1), y)
     use("joints", np.abs(here.q - here.nominal), ball.moves * y[:, None])
-    tilted = np.linalg.norm(here.tool[1] - here.before[1], axis=1)
+    tilted = referee.angles_between(here.tool[1], here.before[1])
     use("tilt", tilted, ball.tilts[:, 0] * y + 0.5 * ball.tilts[:, 1] * y**2)
     assert ((here.q >= robot.lower) & (here.q <= robot.upper)).all()
     if task.min_manipulability is not None:
@@ -157,7 +164,32 @@ def attack(arm, robot, cells, task, walk, rng, count):
     scene = plain.scene_of(robot, cells, task)
     if scene is not None and scene.pairs:
         stays_clear(scene, here, rng)
+    if pairings:
+        come_nearer(robot, cells, task, pairings, margin, balls, here, rng)
     return margin
+
+
+def come_nearer(robot, cells, task, pairings, margin, balls, here, rng):
+    """Any two points of two bodies, by no more than is allowed for them."""
+    moved = balls.moved(margin.position, margin.angle)
+    beside = {"surface", *(one.name for one in task.collision.scene)}
+    bodies = Nearer(robot, pairings, beside, np.array(margin.pivot))
+    bound = bodies.by(moved, margin.position, margin.angle)[:, here.ball.row]
+    before, after = (Kinematics(robot).joints(q) for q in (here.nominal, here.q))
+    for k, one in enumerate(pairings):
+        ends = []
+        for body in (one.a, one.b):
+            points = body.corners[rng.integers(0, len(body.corners), len(here.q))]
+            at = [turned(f.rotations[:, body.joint], points) + f.points[:, body.joint]
+                  for f in (before, after)]  # fmt: skip
+            if body is one.a and body.joint == 0 and beside & set(one.names):
+                goes = rng.random(len(points)) < (2.0 if "surface" in one.names else 0.5)
+                along = turned(here.placement[:, :3, :3], points) + here.placement[:, :3, 3]
+                at[1] = np.where(goes[:, None], along, points)
+            ends.append(at)
+        apart = [np.linalg.norm(a - b, axis=1) for a, b in zip(*ends, strict=True)]
+        kind = "part" if bodies.goes[k] else "arm"
+        use(kind, apart[0] - apart[1], np.where(one.a.half_space, np.inf, bound[k]))
 
 
 def stays_clear(scene, here, rng):

@@ -7,15 +7,15 @@ and shares no code with the search (`feasibility.collisions` holds its kernels).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import dataclass, field, replace
+from functools import lru_cache, partial
 
 import numpy as np
 
 from coverable.arrays import Array
 from coverable.errors import ArgumentError
 from feasibility.certification.collisions.judged_shapes import Body, body_of_soup
-from feasibility.certification.collisions.motion import ArmMotion, Chords
+from feasibility.certification.collisions.motion import ArmMotion
 from feasibility.certification.collisions.pairing import ROUNDING, Pairing
 from feasibility.certification.faults import Judged, MotionFault
 from feasibility.collisions.problem_bodies import Bodies, Pair
@@ -53,11 +53,15 @@ class CollisionReplay(Judged):
     """One for each pair that comes too near, the nearest first; none when it is accepted."""
     calls: int
     """How often it was asked how far apart two bodies are, for what is certified."""
+    pairings: tuple[Pairing, ...] = field(default=(), compare=False, repr=False)
+    """All couples of bodies, as they were judged."""
 
     def added_to(self, certificate: Certificate) -> Certificate:
         """The certificate of the same motion, with what was found."""
+        margin = certificate.margin if self.accepted else None
         return replace(
             certificate,
+            margin=partial(margin, self.pairings) if callable(margin) else None,
             min_clearance=self.min_clearance,
             measured_clearance=self.measured_clearance,
             nearest_pair=self.nearest_pair,
@@ -86,15 +90,13 @@ class Couples:
         if empty:
             raise ArgumentError(f"pairs name what has no body: {', '.join(empty)}")
         couples = [
-            (number, *((b, a) if b.joint < a.joint or b.half_space else (a, b)))
-            for number, pair in enumerate(bodies.pairs)
+            (pair, *((b, a) if b.joint < a.joint or b.half_space else (a, b)))
+            for pair in bodies.pairs
             for a in of[pair.first]
             for b in of[pair.second]
         ]
-        couples.sort(key=lambda one: _outermost(bodies.pairs[one[0]], *one[1:]))
-        self.pairs = [bodies.pairs[number] for number, _, _ in couples]
-        self.numbers = np.array([number for number, _, _ in couples], dtype=np.intp)
-        """(c,) index of each couple's pair in those of the problem."""
+        couples.sort(key=lambda one: _outermost(*one))
+        self.pairs = [pair for pair, _, _ in couples]
         self.couples = [(a, b) for _, a, b in couples]
         """The one nearer to the root first, or a half space."""
         self.bodies = list(dict.fromkeys(body for couple in self.couples for body in couple))
@@ -102,40 +104,30 @@ class Couples:
         self.which = [index[b] for _, b in self.couples]
         """Index of the second of each couple in `bodies`."""
 
-    def along(self, motion: ArmMotion, raised: Array | None = None) -> list[Pairing]:
+    def along(self, motion: ArmMotion) -> list[Pairing]:
         """Every couple along a motion, with what balls around both say of it.
 
         The centre of b keeps to its chords but for delta; see `motion`.
 
         Args:
             motion: of the arm.
-            raised: (pairs, m - 1) m, what each pair of the problem needs besides its clearance.
         """
-        chords, found = self._chords(motion), list[Pairing]()
-        known = zip(self.pairs, self.numbers, self.couples, self.which, strict=True)
-        for pair, number, (a, b), j in known:
+        joints = np.array([body.joint for body in self.bodies], dtype=np.intp)
+        centres, balls = np.stack([b.centre for b in self.bodies]), [b.ball for b in self.bodies]
+        # A half space, whose ball has no end, is at rest.
+        chords = motion.chords(joints, centres, np.where(np.isfinite(balls), balls, 0.0))
+        found = list[Pairing]()
+        for pair, (a, b), j in zip(self.pairs, self.couples, self.which, strict=True):
             delta, moved, off = (one[a.joint, :, j] for one in chords)
             seen = a.joint, b.joint
             straight = motion.chord_lengths(*seen, b.centre, b.ball) + 4.0 * delta
-            off = off if raised is None else off + raised[number]
             rotations, points = motion.poses(*seen)
             ahead = rotations @ b.centre + points - a.centre
             away = _least_norms(ahead[:-1], ahead[1:]) - a.ball - b.ball - a.deviation
             low = away - b.deviation - delta - off - ROUNDING
             bends = delta, np.minimum(moved, straight), off
-            found.append(Pairing((a, b), motion, pair.clearance, low, bends))
+            found.append(Pairing((a, b), motion, pair, low, bends))
         return found
-
-    def nearer(self, motion: ArmMotion) -> list[Array]:
-        """(m - 1,) m, how much nearer each couple may come by what the motion deviates."""
-        off = self._chords(motion).deviation
-        return [off[a.joint, :, j] for (a, _), j in zip(self.couples, self.which, strict=True)]
-
-    def _chords(self, motion: ArmMotion) -> Chords:
-        joints = np.array([body.joint for body in self.bodies], dtype=np.intp)
-        centres, balls = np.stack([b.centre for b in self.bodies]), [b.ball for b in self.bodies]
-        # A half space, whose ball has no end, is at rest.
-        return motion.chords(joints, centres, np.where(np.isfinite(balls), balls, 0.0))
 
 
 @lru_cache(maxsize=KEPT)
@@ -149,7 +141,6 @@ def collision_replay(
     bodies: Bodies,
     q: Array,
     deviations: Array | None = None,
-    raised: Array | None = None,
 ) -> CollisionReplay:
     """Judge a motion that is straight in joint space between its rows.
 
@@ -159,11 +150,9 @@ def collision_replay(
         q: (m, n) rows, rad or m, unwrapped. Values that are not finite refuse.
         deviations: (m - 1, n) bounds on how far each joint is from the straight lines, for motions
             that are curved between rows; none by default.
-        raised: (p, m - 1) m, by which each of `bodies.pairs` has to be further apart than its
-            clearance along each segment; it is taken off what is certified. Nothing by default.
 
     Raises:
-        ArgumentError: the bodies are malformed, or q, deviations or raised have other shapes.
+        ArgumentError: the bodies are malformed, or q or deviations have other shapes.
     """
     rows = np.ascontiguousarray(q, dtype=float)
     if rows.ndim != 2 or rows.shape[1] != robot.n:
@@ -173,12 +162,9 @@ def collision_replay(
         raise ArgumentError(
             f"deviations must have a row for each segment, got {np.shape(deviations)}"
         )
-    if raised is not None and np.shape(raised) != (len(bodies.pairs), segments):
-        raise ArgumentError(f"raised must have shape (pairs, m - 1), got {np.shape(raised)}")
     finite = np.isfinite(rows).all(axis=1)
-    for more in (deviations, None if raised is None else raised.T):
-        if more is not None:
-            finite[:-1] &= np.isfinite(more).all(axis=1)
+    if deviations is not None:
+        finite[:-1] &= np.isfinite(deviations).all(axis=1)
     if not finite.all():
         row = int(np.argmin(finite))
         fault = CollisionFault(row, 0.0, "a joint value is not finite", ("", ""), np.nan)
@@ -187,9 +173,9 @@ def collision_replay(
     if not len(rows) or not bodies.pairs:
         return CollisionReplay(None, None, None, (), 0)
     if len(rows) == 1:  # an arm at rest: a motion that goes nowhere
-        rows, deviations, raised = np.repeat(rows, 2, axis=0), None, None
+        rows, deviations = np.repeat(rows, 2, axis=0), None
     motion = ArmMotion(robot, rows, deviations)
-    return _judged(couples.pairs, couples.along(motion, raised))
+    return _judged(couples.pairs, couples.along(motion))
 
 
 def _judged(pairs: list[Pair], pairings: list[Pairing]) -> CollisionReplay:
@@ -218,6 +204,7 @@ def _judged(pairs: list[Pair], pairings: list[Pairing]) -> CollisionReplay:
         measured_clearance=measured,
         faults=tuple(sorted(faults.values(), key=lambda fault: _decided(fault.distance))),
         calls=calls,
+        pairings=tuple(pairings),
     )
 
 

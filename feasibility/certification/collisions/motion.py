@@ -62,37 +62,42 @@ class ArmMotion:
         if list(robot.model.parents)[1:] != list(range(robot.n)):
             raise ArgumentError(f"robot {robot.name!r}: its joints form no serial chain")
         self.q, self._prismatic, self._kinematics = q, robot.prismatic, Kinematics(robot)
-        self._steps = np.abs(np.diff(q, axis=0))
-        none = np.zeros_like(self._steps)
+        self.steps = np.abs(np.diff(q, axis=0))
+        none = np.zeros_like(self.steps)
         self.deviations: Array = none if deviations is None else np.abs(deviations)
         self.frames = self._kinematics.joints(q)
         self._seen = dict[tuple[int, int], tuple[Array, Array]]()
 
     def chords(self, joints: NDArray[np.intp], centres: Array, balls: Array) -> Chords:
         """How balls about `centres` (B, 3) with radii `balls` (B,), m, on `joints` (B,) move."""
-        n, twists = self.q.shape[1], self._kinematics.twists(self.q)
-        found = Chords(*np.zeros((3, n + 1, len(self._steps), len(joints))))
-        turns = np.where(self._prismatic, 0.0, self._steps)
+        n = self.q.shape[1]
+        found = Chords(*np.zeros((3, n + 1, len(self.steps), len(joints))))
+        turns = np.where(self._prismatic, 0.0, self.steps)
         turned = np.cumsum(turns, axis=1) - turns
-        middles = self.middles(joints, centres)
-        second, first, off = np.zeros((3, len(self._steps), len(joints)))
+        levers = self.levers(self.middles(joints, centres)) + balls
+        second, first, off = np.zeros((3, len(self.steps), len(joints)))
         for j in range(n - 1, -1, -1):
             behind = joints > j
-            d, ahead, e = (x[:, j, None] for x in (self._steps, turned, self.deviations))
+            d, ahead, e = (x[:, j, None] for x in (self.steps, turned, self.deviations))
             if self._prismatic[j]:
                 second += behind * 2.0 * d * ahead
                 first += behind * d
                 off += behind * e
             else:
-                linear, angular = twists[:, None, :3, j], twists[:, None, 3:, j]
-                levers = np.linalg.norm(linear + np.cross(angular, middles), axis=2) + balls
-                mean = 0.5 * (levers[:-1] + levers[1:] + first)
+                mean = 0.5 * (levers[j, :-1] + levers[j, 1:] + first)
                 second += behind * mean * d * (d + 2.0 * ahead)
                 first += behind * mean * d
                 off += behind * (mean + off) * e
             found.delta[j] = np.maximum(second - 2.0 * ahead * first, 0.0) / 8.0
             found.moved[j], found.deviation[j] = first, off
         return found
+
+    def levers(self, points: Array) -> Array:
+        """(n, m, B) m, how far points (m, B, 3) are from each joint's axis, if it turns."""
+        twists = self._kinematics.twists(self.q).transpose(1, 2, 0)[:, :, :, None]
+        (u, v, w), (x, y, z) = twists[3:], points.transpose(2, 0, 1)
+        moved = v * z - w * y, w * x - u * z, u * y - v * x
+        return np.asarray(np.sqrt(sum((a + b) ** 2 for a, b in zip(twists, moved, strict=False))))
 
     def middles(self, joints: NDArray[np.intp], centres: Array) -> Array:
         """(m, B, 3) m, where points `centres` (B, 3) of `joints` (B,) are at the rows."""

@@ -31,6 +31,7 @@ from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.collisions.inside import one_inside_other
 from feasibility.certification.collisions.judged_shapes import COAL, Body
 from feasibility.certification.collisions.motion import ArmMotion
+from feasibility.collisions.problem_bodies import Pair
 
 ROUNDING = 1e-9  # [m] of placements, and what keeps distances from vanishing
 ENOUGH = 0.82  # [1] share of the least distance met, that will do where less is needed
@@ -49,7 +50,7 @@ class Pairing:
     """Two bodies along one motion, and what is known of their distance."""
 
     def __init__(
-        self, bodies: tuple[Body, Body], motion: ArmMotion, needed: float, low: Array,
+        self, bodies: tuple[Body, Body], motion: ArmMotion, pair: Pair, low: Array,
         bends: tuple[Array, Array, Array],
     ) -> None:  # fmt: skip
         """Begin with what balls say.
@@ -57,12 +58,12 @@ class Pairing:
         Args:
             bodies: a and b; b is on the same joint or one behind, but for a half space.
             motion: of the arm.
-            needed: m, their clearance.
+            pair: whose bodies they are, and their clearance.
             low: (m - 1,) m, lower bounds of their distance along each segment.
-            bends: `Chords` of b seen from a, (m - 1,) each; the last one with all else that their
-                distance may be less by along each segment.
+            bends: `Chords` of b seen from a, (m - 1,) each.
         """
-        (self.a, self.b), self.motion, self.needed, self.low = bodies, motion, needed, low
+        (self.a, self.b), self.motion, self.low = bodies, motion, low
+        self.names, self.needed = (pair.first, pair.second), pair.clearance
         self._delta, moved, self._off = bends
         self._rows, self.way = np.arange(len(low) + 1.0), np.append(0.0, np.cumsum(moved))
         """(m,) m, that no point has moved further since the first row."""
@@ -75,7 +76,9 @@ class Pairing:
         """m, measured there; NaN where that was not decided."""
         self.inside = False
         """Is one wholly within the other there?"""
-        self._aim, self._hulls_part, self._met = needed, True, 0.0
+        self._aim, self._hulls_part, self.met = self.needed, True, 0.0
+        self._weights = np.ones(len(low))
+        """(m - 1,) times `_aim`, m, is aimed at along each segment."""
 
     @property
     def bound(self) -> float:
@@ -112,7 +115,7 @@ class Pairing:
         parts = np.array_split(self.low, min(PARTS, last))
         begin = np.cumsum([0, *map(len, parts)])[:-1]
         rows = [float(k + np.argmin(part)) for k, part in zip(begin, parts, strict=True)]
-        also = self._met if also is None else also
+        also = self.met if also is None else also
         times = np.append(rows, also if finest < 1.0 else np.floor(also))
         step = 2.0 ** math.ceil(math.log2(last / len(parts)))
         found = self.measured(times)
@@ -141,8 +144,7 @@ class Pairing:
         open_ = np.flatnonzero(~(self.low >= self._aim))
         if not len(open_) or self._begins_inside():
             return
-        runs = np.arange(1, len(open_)) if self.convex else np.flatnonzero(np.diff(open_) > 1) + 1
-        ends = np.array([(run[0], run[-1] + 1.0) for run in np.split(open_, runs)])
+        ends = self._runs(open_)
         while len(ends) and self.refused is None:
             ends = self._cut(ends)
             if self.calls > EASY[0] + EASY[1] * len(self._rows):
@@ -150,6 +152,42 @@ class Pairing:
             if self.calls > most[0] + most[1] * len(self._rows) and len(ends):
                 self._refuse(float(ends[0].mean()), math.nan)
         self.low[open_] = np.maximum(self.low[open_], self._aim)
+
+    def look_closer(self, row: int, more: Array, share: float, calls: float) -> None:
+        """Raise `low` of an accepted motion, over what is needed, to a share of `more` (m - 1,) m.
+
+        By a plane that parts hulls at a row, and by so many calls at most. Where less is met, and
+        after half of them, to a lesser share.
+        """
+        needed, most = self.needed, self.calls + calls
+        rotations, points = self.motion.poses(self.a.joint, self.b.joint)
+        (apart,), n = self._gaps(rotations[[row]], points[[row]])
+        if apart > 0.0:
+            self._raised(math.inf, n)
+        if (self.low - needed >= share * more).all():
+            return
+        times = np.array([row, self.met])
+        over = (self.measured(times) - needed) / more[times.astype(np.intp).clip(0, len(more) - 1)]
+        self._aim, self._weights = min(share, ENOUGH * float(over.min())), more
+        self.low, self._off, self.needed = self.low - needed, self._off + needed, -math.inf
+        open_ = np.flatnonzero(~(self.low >= self._aim * more))
+        ends, little = self._runs(open_), LITTLE * self._aim
+        while len(ends) and self._aim > 0.0 and self.calls + len(ends) <= most:
+            ends = self._cut(ends)
+            if self.calls > most - 0.5 * calls:
+                self._aim = min(self._aim, little)
+        if len(ends) == 0:
+            self.low[open_] = np.maximum(self.low[open_], self._aim * more[open_])
+        self.low, self._off, self.needed = self.low + needed, self._off - needed, needed
+        self._weights = np.ones(len(more))
+
+    def _runs(self, segments: Ints) -> Array:
+        """(k, 2) rows from where to where segments in order follow each other; each for planes."""
+        borders = np.arange(1, len(segments))
+        if not self.convex:
+            borders = borders[np.diff(segments) > 1]
+        runs = [run for run in np.split(segments, borders) if len(run)]
+        return np.array([(run[0], run[-1] + 1.0) for run in runs]).reshape(-1, 2)
 
     def _part(self, wanted: float) -> None:
         """Raise the bounds of segments by planes between the hulls, up to what is wanted (m).
@@ -183,7 +221,8 @@ class Pairing:
     def _cut(self, ends: Array) -> Array:
         """What is left to certify of stretches from row to row (k, 2), in parts; may refuse."""
         way = np.interp(ends, self._rows, self.way)
-        half, off = 0.5 * (way[:, 1] - way[:, 0]), self._most_off(ends)
+        half, off = 0.5 * (way[:, 1] - way[:, 0]), self._most(self._off, ends)
+        weights = self._most(self._weights, ends)
         within = np.floor(ends[:, 0]) + 1.0 >= ends[:, 1]
 
         def at(share: Array, some: Any) -> Array:
@@ -197,21 +236,24 @@ class Pairing:
         poses = self.motion.poses(self.a.joint, self.b.joint, middle)
         parts = np.full(len(ends), 2)
         if not self.convex:
-            parts = self._parts_by_coal(self.b.placed(*poses), middle, half, off)
+            parts = self._parts_by_coal(self.b.placed(*poses), middle, half, off, weights)
         some = (parts > 0) & within & self._hulls_part
         if some.any() and self.refused is None:
             apart, n = self._gaps(*(one[some] for one in poses))
             apart -= off[some] + ROUNDING
             if not (self.convex and self._near(apart, middle[some])):
-                self._hulls_part = self.convex or bool((apart >= self._aim).any())
-                clear = self.parted(ends[some], n) >= self._aim
-                clear |= apart - half[some] >= self._aim
+                aims = self._aim * weights[some]
+                self._hulls_part = self.convex or bool((apart >= aims).any())
+                clear = self.parted(ends[some], n) >= aims
+                clear |= apart - half[some] >= aims
                 parts[some] = np.where(clear, 0, parts[some])
         cut = np.repeat(np.arange(len(ends)), parts)
         number = np.arange(len(cut)) - np.repeat(np.cumsum(parts) - parts, parts)
         return np.column_stack([at((number + k) / parts[cut], cut) for k in (0, 1)])
 
-    def _parts_by_coal(self, places: list[Any], middle: Array, half: Array, off: Array) -> Ints:
+    def _parts_by_coal(
+        self, places: list[Any], middle: Array, half: Array, off: Array, weights: Array
+    ) -> Ints:
         """(k,) in how many parts to look at stretches again, by places in their middles.
 
         None of those that coal calls far enough apart; of others at least as many as will be
@@ -222,12 +264,12 @@ class Pairing:
         meets = self.a.meets(self.b)
         for k, place in enumerate(places):
             self.calls += 1
-            found = meets(place, self._aim + float(half[k] + bodies[k]))
+            found = meets(place, float(self._aim * weights[k] + half[k] + bodies[k]))
             if found is not None:
                 spare = found - float(bodies[k])
                 if self._near(np.array([spare - 2.0 * COAL]), middle[[k]]):
                     break
-                room = max(spare - self._aim, half[k] / MOST_PARTS)
+                room = max(spare - self._aim * weights[k], half[k] / MOST_PARTS)
                 parts[k] = max(2, math.ceil(half[k] / room)) if room > 0.0 else 2
         return parts
 
@@ -236,13 +278,14 @@ class Pairing:
 
         They are less all that is taken off.
         """
-        worst = int(np.argmin(spare))
+        weights = self._weights[np.minimum(times.astype(np.intp), len(self._weights) - 1)]
+        worst = int(np.argmin(spare / weights))
         if not spare[worst] >= self.needed:
             self._refuse(*self.least_measured(DEEPEST, float(times[worst])))
             return True
-        limit = max(self.needed, ENOUGH * float(spare[worst]))
+        limit = max(self.needed, ENOUGH * float(spare[worst] / weights[worst]))
         if limit < self._aim:
-            self._aim, self._met = limit, float(times[worst])
+            self._aim, self.met = limit, float(times[worst])
         return False
 
     def _gaps(self, rotations: Array, points: Array) -> tuple[Array, Array]:
@@ -295,11 +338,11 @@ class Pairing:
         turned = np.einsum("ki,kij->kj", np.broadcast_to(n, points.shape), rotations)
         return np.asarray((points * n).sum(axis=1) - self.b.highest(-turned))
 
-    def _most_off(self, ends: Array) -> Array:
-        """(k,) m, the most of `_off` on stretches (k, 2)."""
+    def _most(self, values: Array, ends: Array) -> Array:
+        """(k,) the most of values (m - 1,) of segments on stretches (k, 2)."""
         first, last = np.floor(ends[:, 0]).astype(np.intp), np.ceil(ends[:, 1]).astype(np.intp)
         borders = np.column_stack([first, np.maximum(last, first + 1)]).ravel()
-        return np.asarray(np.maximum.reduceat(np.append(self._off, 0.0), borders)[::2])
+        return np.asarray(np.maximum.reduceat(np.append(values, 0.0), borders)[::2])
 
     def _begins_inside(self) -> bool:
         """Is one body inside the other at the first row? Refuses then."""

@@ -14,7 +14,7 @@ import samples
 from arm_urdfs import SIX, joint
 from asked import question
 from bounds import holds
-from displaced_parts import USED, attack, derivative, margin_and_balls, singular
+from displaced_parts import USED, attack, derivative, given, singular
 from random_arms import planar_arm, robot_of
 from samples import sampled, seeds
 from scipy.spatial.transform import Rotation
@@ -41,8 +41,9 @@ from coverable import (
     verify,
 )  # fmt: skip
 from coverable.errors import ArgumentError
-from feasibility.certification import displaced_bodies, placement_margin
-from feasibility.certification import displacement_balls as lemma
+from feasibility.certification import displaced_bodies
+from feasibility.certification import placement_margin as lemma
+from feasibility.certification.collisions.collision_replay import collision_replay
 from feasibility.collisions.asked_bodies import gather
 from feasibility.task import PlacementError
 from feasibility.verdict import Bound, Walk
@@ -61,13 +62,12 @@ def twice(levers, steps, slides):
     return sum((1 + (i < j)) * levers[:, j] * steps[i] * steps[j] for i, j in pairs)
 
 
-def ball_along(robot, q, size, least=None):
+def ball_along(robot, q, size, least=None, cone=9.0):
     """The bounds of a stretch between two configurations (2, n), for balls of a size."""
-    case = lemma.Given(robot, Task(0.0, 30.0, min_manipulability=least), np.ones(3))
+    case = given(robot, Task(0.0, 30.0, min_manipulability=least), np.ones(3))
     ends, one, size = lemma.ends_of(case, q), np.array([0]), np.array([size])
-    room, whole = np.full((1, 2), 9.0), np.array([[0.0, 1.0]])
-    parts = lemma.Parts(one, whole, ends.of(one), ends.of(one + 1), room)
-    return lemma.balls_of(case, parts, size, size)
+    at, room = (one, np.array([[0.0, 1.0]])), np.full((1, 2), cone)
+    return lemma.balls_of(case, at, ends.of(one), ends.of(one + 1), room, size, size)
 
 
 def test_the_largest_lever_of_a_stretch_counts():
@@ -86,6 +86,10 @@ def test_the_largest_lever_of_a_stretch_counts():
         levers = np.linalg.norm(derivative(arm, there, which), axis=1)
         bound = ball.tilts[:, 1] if which else ball.second
         holds(bound, twice(levers, ball.moves[0], robot.prismatic), 0.5)
+    narrow, wide = (
+        ball_along(robot, np.stack(2 * [middle]), 0.0, cone=c).tilts for c in (1.6, 9.0)
+    )
+    np.testing.assert_allclose(narrow, wide * 0.8 / np.sin(0.8))  # chords of angles up to 1.6
 
 
 def test_what_a_ball_allows_is_solved_for():
@@ -102,14 +106,13 @@ def test_what_a_ball_allows_is_solved_for():
     for turn in (np.zeros(k), 1.0 / far):  # rad for each metre that is reached
         limit, cone, roll, other = ball.allowed(turn).T
         np.testing.assert_array_equal([limit, other], caps.T)
-        tilted = 2.0 * np.arcsin(0.5 * (tilts[:, 0] * cone + 0.5 * tilts[:, 1] * cone**2))
-        holds(room[:, 0], tilted + turn * f(cone), 0.9999)
+        tilted = tilts[:, 0] * cone + 0.5 * tilts[:, 1] * cone**2
+        np.testing.assert_allclose(tilted + turn * f(cone), room[:, 0])
         np.testing.assert_allclose(turns * roll + turn * f(roll), room[:, 1])
         y = np.minimum.reduce([limit, cone, roll, other])
         np.testing.assert_allclose(ball.reached(turn), f(y))
-    np.testing.assert_array_equal(ball.positions, ball.reached(0.0))
-    np.testing.assert_allclose(ball.angles, f(y) / far)
-    small = 0.5 * min(ball.positions.min(), 0.01)
+    np.testing.assert_allclose(ball.triangle, np.stack([ball.reached(0.0), f(y) / far], axis=1))
+    small = 0.5 * min(ball.triangle[:, 0].min(), 0.01)
     y = ball.moved(small, 0.0) / moves
     np.testing.assert_allclose([f(each) for each in y.T], small)
     y = ball.moved(0.0, small) / moves
@@ -228,6 +231,7 @@ def test_there_is_none_without_a_way_to_follow():
     found = replay(robot, line, Task(0.0, 30.0), walk, np.ones(2, dtype=bool))
     margin = found.certificate.placement_margin
     assert (margin.position, margin.angle, margin.bound_by) == (0.0, 0.0, Bound.SINGULAR)
+    assert ball_along(robot, q[[0, 0]], 0.0).slope == pytest.approx(0.0, abs=1e-6)
     begun = replace(slides(), start=PLATE.centres[0])
     margin = margin_of_slides(begun)
     assert (margin.position, margin.angle, margin.bound_by) == (0.0, 0.0, Bound.START)
@@ -260,10 +264,10 @@ def test_the_last_row_counts_for_the_last_segment():
     """And a cell's own approach direction where its target is passed."""
     q, room = PLATE.centres[[0, 1, 3, 2]], np.full((4, 2), 0.5)
     room[3, 0] = 0.01
-    margin = placement_margin.placement_margin(slides(), PLATE, Task(0.0, 30.0), q, room, 0.0)
+    margin = lemma.placement_margin(slides(), PLATE, Task(0.0, 30.0), q, room)
     assert margin.angle == pytest.approx(0.01, rel=1e-6)
     q[3, 2] = 0.996  # [m], of 1
-    margin = placement_margin.placement_margin(slides(), PLATE, Task(0.0, 30.0), q, room, 0.0)
+    margin = lemma.placement_margin(slides(), PLATE, Task(0.0, 30.0), q, room)
     assert margin.position == pytest.approx(0.004, rel=1e-6)
 
 
@@ -278,57 +282,6 @@ def test_the_singular_value_is_kept():
     margin = attack(arm, robot, cells, asked, walk, rng, 300)
     assert 0.0 < margin.position < 0.5 * free.position
     assert margin.bound_by is Bound.SINGULAR
-
-
-def test_bodies_come_nearer_by_what_the_displacement_needs(monkeypatch):
-    """What a point of the part moves, or of the tool as it turns, and the arm, is allowed for."""
-    robot, cells, task = question("plate")[2:5]
-    scene = (Obstacle.box("box", (0.1, 0.1, 0.1), (0.5, 0.5, 0.8)),
-             Obstacle.halfspace("floor", (0, 0, -0.5)))  # fmt: skip
-    task = replace(task, collision=Collision(clearance=0.001, scene=scene))
-    asked, real = [], displaced_bodies.clear_share
-    monkeypatch.setattr(
-        displaced_bodies, "clear_share", lambda *given: asked.append(given) or real(*given)
-    )
-    verdict = check(robot, cells, task)
-    margin = verdict.certificate.placement_margin
-    found, balls = margin_and_balls(robot, cells, replace(task, collision=None), verdict.witness)
-    _, bodies, q, moved, raised, still, apart = asked[-1]
-    assert apart == verdict.certificate.min_clearance
-    part = placement_margin.SHARES[len(asked) - 1]
-    shift, turn, pivot = part * found.position, part * found.angle, np.array(margin.pivot)
-    assert margin.position == pytest.approx(real(*asked[-1]).share * shift, rel=1e-6)
-    for row in range(len(q) - 1):
-        most = balls.of(balls.row == row).moved(shift, turn).max(axis=0)
-        np.testing.assert_allclose(moved[row], most, rtol=1e-6)
-    rng, more = np.random.default_rng(4), {}
-    for pair, each in zip(bodies.pairs, raised, strict=True):
-        more.setdefault(pair.second, {})[pair.first] = each
-    (sheet,) = (soup for soup in bodies.soups if soup.owner == "surface")
-    corners = scene[0].placement[:3, 3] + np.array(list(np.ndindex(2, 2, 2))) * 0.1 - 0.05
-    on_tool = {pair.first for pair, one in zip(bodies.pairs, still, strict=True) if one}
-    tool = robot.model.frames[robot.tool_frame_id].placement.translation
-    assert on_tool
-    for name in on_tool:  # on the surface, turned about the tool point
-        of = [body for body in bodies.polytopes if body.owner == name]
-        assert {body.joint for body in of} == {robot.n}
-        reach = max(np.linalg.norm(b.vertices - tool, axis=1).max() + b.radius for b in of)
-        np.testing.assert_allclose(
-            more["surface"].pop(name), (turn + moved.sum(axis=1)) * reach, rtol=1e-6
-        )
-    for name, points in (("surface", sheet.triangles.reshape(-1, 3)), ("box", corners)):
-        arms = points[np.linalg.norm(points - pivot, axis=1).argmax()] - pivot
-        across = referee.unit(np.cross(arms, rng.normal(size=(50, 3))))
-        turned = Rotation.from_rotvec(turn * across).apply(arms) - arms
-        most = max(np.linalg.norm(turned, axis=1).max(), shift)
-        holds(np.unique(list(more.pop(name).values())), most, 0.99)
-    tips = plain.arm_of(robot).tool(q)[0]
-    floor = np.array(list(more.pop("floor").values()))
-    assert (floor >= turn * np.linalg.norm(tips - pivot, axis=1).max()).all()
-    assert not np.concatenate([each for some in more.values() for each in some.values()]).any()
-    displaced_bodies.displaced_share(robot, bodies, q, pivot, (0.01, 0.0), moved, apart)
-    shifted = zip(bodies.pairs, asked[-1][4], strict=True)
-    assert {each.max() for pair, each in shifted if pair.second in ("box", "floor")} == {0.01}
 
 
 # -- random cases ---------------------------------------------------------------------------------
@@ -441,20 +394,19 @@ def test_a_share_of_what_bodies_may_move_leaves_them_clear(seed):
     """Whatever joints deviate by, bodies by python-fcl, and the part that comes nearer."""
     made, rng = case_of(3 * seed + 1), np.random.default_rng(seed)
     robot, cells, task, walk = (getattr(made.verdict, name) for name in CASE)
-    q, bodies = walk.q, gather(robot, cells.surface, task.collision, task.standoff)
-    off = rng.uniform(0.0, 0.1, (len(q) - 1, robot.n))
-    raised = rng.uniform(0.0, 0.02, (len(bodies.pairs), 1)) + np.zeros(len(off))
-    still, apart = np.zeros(len(raised), dtype=bool), made.verdict.certificate.min_clearance
-    found = displaced_bodies.clear_share(robot, bodies, q, off, raised, still, apart)
-    assert 0.0 <= found.share <= 1.0
+    bodies = gather(robot, cells.surface, task.collision, task.standoff)
+    pairings = collision_replay(robot, bodies, walk.q).pairings
     scene = plain.scene_of(robot, cells, task)
-    extra = {(p.first, p.second): each[0] for p, each in zip(bodies.pairs, raised, strict=True)}
-    needed = np.array([pair[2] + found.share * extra[pair[:2]] for pair in scene.pairs])
+    more = {one.names: rng.uniform(0.0, 0.05) * rng.random(len(walk.q) - 1) for one in pairings}
+    nearer = np.stack([more[one.names] for one in pairings])
+    found = displaced_bodies.clear_share(pairings, nearer, rng.choice([0, 10, 100, 10_000]))
+    assert 0.0 <= found.share <= 1.0
+    needed = np.array([pair[2] for pair in scene.pairs])
     for _ in range(60 if samples.EVERYTHING else 20):
-        row, time = rng.integers(len(off)), rng.random()
-        at = q[row] + time * (q[row + 1] - q[row])
-        at = at + found.share * off[row] * rng.choice([-1.0, 1.0], robot.n)
-        assert (scene.distances(at) >= needed - 1e-6).all()
+        row, time = rng.integers(len(walk.q) - 1), rng.random()
+        at = walk.q[row] + time * (walk.q[row + 1] - walk.q[row])
+        over = found.share * np.array([more[pair[:2]][row] for pair in scene.pairs])
+        assert (scene.distances(at) >= needed + over - 1e-6).all()
 
 
 @sampled
