@@ -91,7 +91,7 @@ from feasibility.viewer.viewer import show as show
 from feasibility.viewer.viewer import view as view
 from robots.as_yourdfpy import as_yourdfpy as as_yourdfpy
 from robots.errors import RobotError as RobotError
-from robots.library import list_robots as list_robots
+from robots.known_arms import list_robots as list_robots
 from robots.library import load_robot as load_robot
 from robots.robot import Robot as Robot
 from robots.urdf.axes import Axis as Axis

@@ -1,10 +1,4 @@
-"""Robots by name: the built-in ones, the arms of example-robot-data, and any URDF file.
-
-`library.toml` gives for each name the URDF, the tool's link, the axis along which the tool points
-and the joints on the chain that are held. example-robot-data is only read as files: its arms are
-found through the metadata of the installed distribution. `catalogue.toml` gives the same of arms
-whose files `robots.catalogue` fetches when they are first loaded; what it holds comes last.
-"""
+"""Robots by name, and from any URDF file: `load_robot`."""
 
 from __future__ import annotations
 
@@ -12,11 +6,8 @@ import math
 import os
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cache
-from importlib.metadata import PackageNotFoundError, distribution
+from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,83 +16,17 @@ from numpy.typing import ArrayLike
 from robots.arguments import Mounting, check_arguments
 from robots.errors import RobotError
 from robots.joint_selection import suggestion
+from robots.known_arms import RobotInfo, fetched, library, named
 
 if TYPE_CHECKING:
     from robots.robot import Robot
     from robots.urdf.axes import Axis
 
-HERE = Path(__file__).parent
-DATA = "example-robot-data"
 BRING_YOUR_OWN = (
     'Any other arm comes as a URDF: urdf = "my_arm.urdf" in a case, load_robot("my_arm.urdf") in '
     "Python. The maker's ROS description package has one, often as my_arm.urdf.xacro, which is "
     "read too: pip install 'coverable[xacro]'"
 )
-
-
-@dataclass(frozen=True, slots=True)
-class RobotInfo:
-    """What the library knows about one arm before its URDF is read."""
-
-    name: str
-    source: str
-    """'coverable' for a built-in robot, else the distribution that holds the URDF."""
-    description: str
-    urdf: str
-    """Path of the URDF file."""
-    tool_frame: str
-    approach_axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    """In the tool frame: where a tool mounted on the flange points."""
-    lock: Mapping[str, float] = field(default_factory=dict)
-    """Joints on the chain to the tool that are held by default, rad or m."""
-    limits: str | None = None
-    """Path of a file of named limit sets."""
-    package_dirs: tuple[str, ...] = ()
-    group: str = "manipulator"
-    """What carries it: one of `GROUPS`."""
-    licence: str = ""
-    """Of its files."""
-    payload: float | None = None
-    """kg, by its maker."""
-    note: str = ""
-    """What whoever uses it should know."""
-    xacro_args: Mapping[str, str] = field(default_factory=dict)
-    module: str = ""
-    """Of an arm that is fetched: its description in the catalogue; its `urdf` is empty then."""
-    joints: int | None = None
-    """Of an arm that is fetched: how many are free."""
-    reach: float | None = None
-    """m, of an arm that is fetched, by its maker."""
-
-
-CAPSULES = "its bodies are capsules of estimated radius, not the maker's housing"
-SUFFIX = "_description"  # which names in the catalogue may have
-LICENCES = {"coverable": "BSD-2-Clause", DATA: "BSD-3-Clause"}
-GROUPS = {
-    "manipulator": "manipulators",
-    "industrial": "industrial arms, with capsules of estimated radius for bodies",
-    "humanoid": "arms of humanoids and of robots on wheels",
-    "legged": "arms on legged robots",
-    "catalogue": "arms of robot_descriptions (coverable[arms]), fetched when they are first loaded",
-}
-"""Kinds of robots whose arms the library has, manipulators first, and what they are called."""
-
-
-def list_robots(catalogue: bool = False) -> tuple[RobotInfo, ...]:
-    """Every robot that `load_robot` knows by name, manipulators first; reads no URDF.
-
-    Args:
-        catalogue: also those that are fetched when they are first loaded, last.
-
-    Example:
-        >>> [info.name for info in list_robots()][:3]
-        ['puma560', 'ur3', 'ur3_limited']
-        >>> [info.name for info in list_robots(catalogue=True) if info.module][:2]
-        ['ur3e', 'ur5e']
-    """
-    order = tuple(GROUPS)
-    known = (*_library().values(), *(_catalogue().values() if catalogue else ()))
-    return tuple(sorted(known, key=lambda info: order.index(info.group)))
 
 
 def load_robot(
@@ -187,7 +112,7 @@ def flange_axis(name: str | None, tool_frame: str | None = None) -> tuple[float,
         >>> flange_axis("ur5"), flange_axis("kinova")
         ((0.0, 0.0, 1.0), (1, 0, 0))
     """
-    info = _named(name or "")
+    info = named(name or "")
     return (0.0, 0.0, 1.0) if info is None else _approach_axis(info, tool_frame)
 
 
@@ -255,7 +180,7 @@ def find_robot(name_or_path: str | os.PathLike[str]) -> RobotInfo:
     Raises:
         RobotError: the name is unknown, or the arm cannot be fetched.
     """
-    known = _named(name_or_path) if isinstance(name_or_path, str) else None
+    known = named(name_or_path) if isinstance(name_or_path, str) else None
     if known is not None:
         return _fetched(known) if known.module else known
     path = os.fspath(name_or_path)
@@ -264,15 +189,9 @@ def find_robot(name_or_path: str | os.PathLike[str]) -> RobotInfo:
         return _unknown(path)
     raise RobotError(
         f"there is no robot {path!r} in the library; "
-        f"{suggestion(path, [*_library(), *_catalogue()])} (`coverable robots` lists them all). "
+        f"{suggestion(path, [*library(), *fetched()])} (`coverable robots` lists them all). "
         f"{BRING_YOUR_OWN}"
     )
-
-
-def _named(name: str) -> RobotInfo | None:
-    """What is known of a name, in the catalogue with or without its ending; None of another."""
-    library, catalogue = _library(), _catalogue()
-    return library.get(name) or catalogue.get(name) or catalogue.get(name.removesuffix(SUFFIX))
 
 
 def _fetched(info: RobotInfo) -> RobotInfo:
@@ -308,57 +227,6 @@ def joint_kinds(
     args = {**info.xacro_args, **xacro_args}
     checked = check_urdf(info.urdf, package_dirs=folders, xacro_args=args)
     return {joint.name: joint.kind for joint in checked.joints if joint.moves}
-
-
-@cache
-def _library() -> Mapping[str, RobotInfo]:
-    """The entries of library.toml with their paths filled in."""
-    share, entries = _data_folder(), {}
-    table = tomllib.loads((HERE / "library.toml").read_text(encoding="utf-8"))
-    for name, entry in table.items():
-        built_in = entry["source"] == "coverable"
-        root = HERE if built_in else share / DATA / "robots"
-        entries[name] = RobotInfo(
-            name=name,
-            source=entry["source"],
-            description=entry["description"],
-            urdf=str(root / entry["urdf"]),
-            tool_frame=entry["tool_frame"],
-            approach_axis=tuple(entry.get("approach_axis", (0.0, 0.0, 1.0))),
-            lock=MappingProxyType(entry.get("lock", {})),
-            limits=str(HERE / entry["limits"]) if "limits" in entry else None,
-            package_dirs=() if built_in else (str(share),),
-            group=entry.get("group", "manipulator"),
-            licence=LICENCES[entry["source"]],
-            payload=entry.get("payload"),
-            note=CAPSULES if entry.get("group") == "industrial" else "",
-        )
-    return MappingProxyType(entries)
-
-
-@cache
-def _catalogue() -> Mapping[str, RobotInfo]:
-    """The entries of catalogue.toml; nothing is fetched for it."""
-    table = tomllib.loads((HERE / "catalogue.toml").read_text(encoding="utf-8"))
-    entries = {}
-    for name, entry in table.items():
-        module = entry.pop("module", name.removesuffix(SUFFIX)) + SUFFIX
-        given = {"source": "robot_descriptions", "urdf": "", "group": "catalogue", **entry}
-        axis = tuple(entry.get("approach_axis", (0.0, 0.0, 1.0)))
-        entries[name] = RobotInfo(name, **given | {"approach_axis": axis}, module=module)
-    return MappingProxyType(entries)
-
-
-def _data_folder() -> Path:
-    """The folder that `package://example-robot-data/...` is relative to."""
-    try:
-        files = distribution(DATA).files or ()
-    except PackageNotFoundError as error:
-        raise RobotError(f"the package {DATA} is not installed; pip install {DATA}") from error
-    for file in files:
-        if file.parts[-1] == "package.xml" and file.parts[-2] == DATA:
-            return Path(str(file.locate())).resolve().parent.parent
-    raise RobotError(f"the installed package {DATA} holds no robots; it should be 6.0 or later")
 
 
 def _limit_sets(path: Path) -> dict[str, dict[str, tuple[float, float]]]:

@@ -12,7 +12,7 @@ from feasibility.cli.command_parts import add_command, json_text
 from feasibility.cli.console import print_out
 
 if TYPE_CHECKING:
-    from robots.library import RobotInfo
+    from robots.known_arms import RobotInfo
     from robots.robot import Robot
 
 WIDE = 240  # columns of a file, so that nothing is wrapped
@@ -89,7 +89,8 @@ def robot_rows(names: Sequence[str] = ()) -> list[dict[str, Any]]:
     Raises:
         RobotError: a name is unknown, or its arm cannot be fetched.
     """
-    from robots.library import find_robot, list_robots, load_robot
+    from robots.known_arms import list_robots
+    from robots.library import find_robot, load_robot
 
     if names:
         return [_robot_row(find_robot(name), load_robot(name)) for name in names]
@@ -151,7 +152,7 @@ def cases_table(rows: Sequence[dict[str, Any]]) -> str:
 
 def robots_table(rows: Sequence[dict[str, Any]]) -> str:
     """The robots for people, by group."""
-    from robots.library import GROUPS
+    from robots.known_arms import GROUPS
 
     tables = []
     for group, title in GROUPS.items():

@@ -24,7 +24,7 @@ from feasibility.results.trajectory_files import as_csv, as_json_text, from_csv
 from feasibility.sensitivity.quantities import Kind, Quantity
 from feasibility.sensitivity.thresholds import Finding, Threshold
 from feasibility.verdict import Cause, CauseKind, Certificate, Walk
-from robots.library import GROUPS
+from robots.known_arms import GROUPS
 
 
 @pytest.mark.parametrize("digits", [1, 3, 4])

@@ -7,32 +7,29 @@ import subprocess
 import numpy as np
 import pytest
 from approved import refused
-from jobs import run_coverable
+from arm_urdfs import arm, joint
+from jobs import PLATE, run_coverable
 
 from coverable import as_yourdfpy, list_robots, load_robot
 from robots.catalogue import source
 from robots.library import flange_axis
 
-URL = "https://github.com/UniversalRobots/Universal_Robots_ROS2_Description.git"
+ARM = "ur10e_description"
 PACKAGE = "<package><name>ur_description</name></package>"
-# From the base outwards: origins and turns as a UR10e has them.
-JOINTS = (
-    (".0 0 .181", "0 0 0"), ("0 0 0", "1.5708 0 0"), ("-.613 0 0", "0 0 0"),
-    ("-.572 0 .174", "0 0 0"), ("0 -.12 0", "1.5708 0 0"), ("0 .117 0", "1.5708 3.1416 3.1416"),
-)  # fmt: skip
+TOOL0 = (
+    '<link name="tool0"/><joint name="end" type="fixed"><parent link="l6"/><child link="tool0"/>'
+    "</joint>"
+)
+TURN = np.pi / 2
+JOINTS = [  # as a UR10e has them
+    joint(1, xyz=(0, 0, 0.181)), joint(2, rpy=(TURN, 0, 0)), joint(3, xyz=(-0.613, 0, 0)),
+    joint(4, xyz=(-0.572, 0, 0.174)), joint(5, xyz=(0, -0.12, 0), rpy=(TURN, 0, 0)),
+    joint(6, xyz=(0, 0.117, 0), rpy=(TURN, np.pi, np.pi)),
+]  # fmt: skip
 XACRO = """<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="$(arg name)">
 <xacro:arg name="ur_type" default=""/><xacro:arg name="name" default="ur"/>
 <xacro:include filename="$(find ur_description)/urdf/inc/$(arg ur_type).xacro"/></robot>"""
-CASE = """robot.name = "ur10e"
-task = { standoff = 0.02, cone_deg = 30 }
-[surface]
-kind = "plane"
-u = [0.5, 0.6]
-v = [0, 0.1]
-cells = [1, 2]
-position = [0, 0, 0.3]
-side = "outside"
-"""
+CASE = PLATE.replace('"ur5"', '"ur10e"').replace("[3, 4]", "[1, 2]")
 
 
 def git(folder, *words):
@@ -46,40 +43,34 @@ def redirected(tmp_path, monkeypatch):
     """The repository of the UR arms, as git finds it in this environment."""
     far = tmp_path / "far"
     (far / "urdf/inc").mkdir(parents=True)
-    links = [f'<link name="{name}"/>' for name in ("tool0", *map("l{}".format, range(7)))]
-    joints = [
-        f'<joint name="j{k}" type="revolute"><parent link="l{k}"/><child link="l{k + 1}"/><axis '
-        f'xyz="0 0 1"/><origin xyz="{xyz}" rpy="{rpy}"/><limit lower="-6" upper="6"/></joint>'
-        for k, (xyz, rpy) in enumerate(JOINTS)
-    ]
-    joints += ['<joint name="t" type="fixed"><parent link="l6"/><child link="tool0"/></joint>']
     (far / "package.xml").write_text(PACKAGE)
     (far / "urdf/ur.urdf.xacro").write_text(XACRO)
-    (far / "urdf/inc/ur10e.xacro").write_text(f"<robot>{''.join(links + joints)}</robot>")
+    (far / "urdf/inc/ur10e.xacro").write_text(arm(JOINTS, TOOL0))
     git(far, "init", "-q")
     git(far, "add", ".")
     git(far, "commit", "-qm", "all")
     monkeypatch.setenv("ROBOT_DESCRIPTION_COMMIT", git(far, "rev-parse", "HEAD"))
     monkeypatch.setenv("ROBOT_DESCRIPTIONS_CACHE", str(tmp_path / "cache"))
-    for key, value in (("COUNT", "1"), ("KEY_0", f"url.{far}.insteadOf"), ("VALUE_0", URL)):
+    url = source(ARM).url
+    for key, value in (("COUNT", "1"), ("KEY_0", f"url.{far}.insteadOf"), ("VALUE_0", url)):
         monkeypatch.setenv(f"GIT_CONFIG_{key}", value)
     return far
 
 
 def test_a_case_is_decided_with_an_arm_that_is_fetched_for_it(redirected, tmp_path):
-    place = source("ur10e_description")
-    assert (place.url, place.is_here) == (URL, False)
+    place = source(ARM)
+    assert not place.is_here
     (tmp_path / "case.toml").write_text(CASE)
     first = run_coverable("check", tmp_path / "case.toml", "--json", "--save", tmp_path / "found")
-    fetched = f"fetching {URL} at {place.commit[:12]} into {place.folder}, once"
+    fetched = f"fetching {place.url} at {place.commit[:12]} into {place.folder}, once"
     assert (first.status, first.err.count(fetched), place.is_here) == (0, 1, True)
     assert json.loads(first.out)["verdict"] == "feasible"
     again = run_coverable("verify", tmp_path / "found", "--json")
     assert (again.status, "fetching" in again.err) == (0, False)
-    arm, same = load_robot("ur10e"), load_robot("ur10e_description")
-    assert (arm.name, arm.urdf, arm.n) == (same.name, same.urdf, 6)
-    assert arm.urdf == str(place.folder / "urdf" / "ur.urdf.xacro")
-    tool = as_yourdfpy(arm, np.zeros(6)).get_transform("tool0")
+    robot, same = load_robot("ur10e"), load_robot(ARM)
+    assert (robot.name, robot.urdf, robot.n) == (same.name, same.urdf, 6)
+    assert robot.urdf == str(place.folder / "urdf" / "ur.urdf.xacro")
+    tool = as_yourdfpy(robot, np.zeros(6)).get_transform("tool0")
     np.testing.assert_allclose(tool[:3, 3], [-1.185, -0.291, 0.061], atol=1e-4)
     row = next(row for row in json.loads(run_coverable("robots", "--json").out)["robots"]
                if row["name"] == "ur10e")  # fmt: skip
@@ -95,7 +86,7 @@ def test_what_is_said_where_it_cannot_be_fetched_and_a_half_clone_is_finished(
     (tmp_path / "case.toml").write_text(CASE)
     assert run_coverable("check", tmp_path / "case.toml").err.count("fetching") == 1
     assert "does not appear to be a git repository" in said
-    assert f"git clone {URL} {source('ur10e_description').folder}" in said
+    assert f"git clone {source(ARM).url} {source(ARM).folder}" in said
     shutil.move(away, redirected)  # what the first attempt left is a repository without a commit
     assert load_robot("ur10e").n == 6
     monkeypatch.setenv("ROBOT_DESCRIPTIONS_CACHE", str(tmp_path / "another"))
