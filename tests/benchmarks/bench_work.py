@@ -7,17 +7,10 @@ import mesh_patches
 import pytest
 
 import coverable
-from coverable import load_case, parallel_passes, path, plan_passes, run_tasks, trajectory
+from coverable import load_case, parallel_passes, path, plan_passes, trajectory
 from surfaces.meshes.triangle_mesh import TriangleMesh
 
 PAPER = [f"paper/{figure}{letter}" for figure in "45" for letter in "abcdef"]
-STUDY = """
-base.case = "paper/4a"
-count = 200
-[vary]
-"surface.position" = { x = { range = [-0.1, 0.1] }, z = { range = [-0.1, 0.1] } }
-"surface.rpy_deg" = { yaw = { range = [-20, 20] } }
-"""
 
 
 @pytest.mark.parametrize("name", [name for name in PAPER if name[-1] in "abc"])
@@ -56,21 +49,3 @@ def bench_explain(name: str, measured: Callable[..., Any]) -> None:
     """What would make a case feasible; goal: 15 verdicts in the middle, 40 at most."""
     asked = load_case(name).build()[:3]
     measured(lambda: coverable.explain(*asked), 2, FK=lambda found: int(found.evaluations))
-
-
-@pytest.mark.parametrize("reach", [0.3, 1.5])
-def bench_place(reach: float, measured: Callable[..., Any]) -> None:
-    """64 placements of 4c within a box around its own."""
-    robot, cells, task, search = load_case("paper/4c").build()
-    ranges = {"x": (-reach, reach), "y": (-reach, reach), "yaw_deg": (-90.0, 90.0)}
-    region = coverable.Region.around(coverable.Pose.of_surface(cells.surface), ranges)
-    measured(lambda: coverable.place(robot, cells, task, region, search, count=64), 2,
-             answer=lambda found: str(found.answer))  # fmt: skip
-
-
-@pytest.mark.parametrize("workers", [0, 1, 2])
-def bench_study(workers: int, measured: Callable[..., Any]) -> None:
-    """200 placements of 4a. Run with --benchmark-timer=time.perf_counter to see the speed-up."""
-    tasks = coverable.read_study(STUDY).tasks
-    with coverable.open_workers(workers) as crew:
-        measured(lambda: run_tasks(tasks, crew), 2, placements=len)

@@ -111,20 +111,6 @@ def test_capped_is_not_exhausted_and_memory_grows_without_changing_the_answer():
     assert (many.outcome, many.checked) == (Outcome.CAPPED, 60_000)
 
 
-def test_no_cells_one_cell_and_cells_out_of_reach():
-    for shape, count in (((0, 3), 0), ((1, 1), 1)):
-        verdict = greedy_check(PUMA, sphere(1.0, (40, 50), (80, 90)).cells(*shape), Task(0.005, 45))
-        assert verdict.answer is Answer.FEASIBLE
-        assert verdict.n_covered == len(verdict.covered) == count
-        assert (verdict.graph.number_of_edges(), verdict.causes) == (0, ())
-    far = sphere(1.0, (10, 90), (10, 180), position=(9, 0, 0)).cells(3, 3)
-    verdict = greedy_check(PUMA, far, Task(0.005, 45), greedy())
-    assert (verdict.answer, verdict.n_covered, verdict.tree) == (Answer.INFEASIBLE, 0, None)
-    assert "no configuration was found" in verdict.message
-    assert {(c.kind, c.proved) for c in verdict.causes} == {(CauseKind.OUT_OF_REACH, True)}
-    assert len(verdict.causes) == 9
-
-
 def test_time_limits_coarse_steps_and_bad_starts_are_said():
     slow = greedy(step_deg=0.001, time_limit=0.05)
     verdict = greedy_check(PUMA, DOME.cells(30, 30), Task(0.005, 45), slow)

@@ -3,7 +3,6 @@
 import mesh_patches
 import numpy as np
 import pytest
-from mesh_patches import can, roof
 
 from coverable import Task, mesh
 from feasibility.targets.blocked import blocked_curves
@@ -51,8 +50,6 @@ SMOOTH |= {
     "squares": (lambda: squares(0.02, 3), 20, 0.025), "corner": (corner, 20, 0.05),
 }  # fmt: skip
 ROUGH = {name: (plain(name), 60, np.inf) for name in ("blade", "scattered")}  # not all are usable
-CREASED = {"roof 40": lambda: roof(40), "roof 90": lambda: roof(90), "roof 140": lambda: roof(140),
-           "box": box, "can": can}  # fmt: skip
 
 
 def off(cells, which, count=200):
@@ -92,26 +89,3 @@ def test_curves_deviate_by_no_more_than_they_say(name):
 def test_an_exactly_flat_mesh_is_neither_creased_nor_rough(seed, size, count):
     cells = mesh(squares(size, seed), position=(0.5, 0, 0.2)).cells(count)
     assert blocked_curves(cells, Task(standoff=0.005, cone_deg=1)) == ""
-
-
-@pytest.mark.parametrize("name", CREASED)
-def test_creased_curves_are_smooth_in_time_and_stay_on_the_surface(name):
-    """In four parts, at rest between them."""
-    cells = mesh(CREASED[name]()).cells(60)
-    curves = cells.curves
-    which = np.flatnonzero(curves.creased)
-    assert len(which) >= 5
-    for k in which:
-        cubics = curves.cubics[curves.first[k] : curves.first[k + 1]]
-        slopes = cubics[:, 1] + 2.0 * cubics[:, 2] + 3.0 * cubics[:, 3]
-        np.testing.assert_allclose(cubics.sum(axis=1)[:-1], cubics[1:, 0], atol=1e-12)
-        np.testing.assert_allclose(slopes[:-1], cubics[1:, 1], atol=1e-9)
-        rests = len(cubics) // 4 * np.arange(1, 4)
-        assert np.abs(cubics[rests, 1]).max() < 1e-12
-        assert np.abs(slopes[rests - 1]).max() < 1e-12
-    assert np.flatnonzero(curves.rests).size == 6 * len(which)
-    away, turned, said, bent = off(cells, which)
-    assert (away <= said + 1e-9).all()
-    good = bent < 0.01
-    assert good.mean() > 0.7
-    assert (turned[good] <= 1.1 * bent[good]).all()

@@ -17,7 +17,6 @@ import coverable
 from coverable import Collision, PathError, Task, check, coverage_path, motion_limits, trajectory
 from feasibility.certification.collisions.collision_replay import collision_replay
 from feasibility.collisions.asked_bodies import gather
-from feasibility.timing.fastest_speeds import Rows, fastest_speeds
 from feasibility.timing.limits_used import past_limits
 from feasibility.timing.path_timing import within_limits
 from feasibility.timing.smooth_curve import control_points
@@ -83,31 +82,6 @@ def test_joint_limits_that_the_path_touches_are_nowhere_passed(name):
     # The limits are touched, or nearly so: the test would see a motion that passes them.
     assert min((least - path.robot.lower).min(), (path.robot.upper - most).min()) < 1e-6
     assert coverable.replay(path.robot, path.cells, path.task, run.walk, path.needed).accepted
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_speeds_are_those_of_one_linear_program(seed):
-    """Where accelerations count for more than bends, the fastest profile has the largest x at every
-    place at once, so the largest sum too.
-    """
-    from scipy.optimize import linprog
-
-    rng, m, r = np.random.default_rng(seed), 12, 5
-    most = rng.uniform(0.5, 4.0, m)
-    d = rng.normal(size=(m - 1, r))
-    c = -d * rng.uniform(0.2, 3.0, (m - 1, r))
-    d[rng.random((m - 1, r)) < 0.2] = 0.0
-    x = fastest_speeds(most, Rows.of(c, d))
-    rows, at = np.zeros((m - 1, r, m)), np.arange(m - 1)
-    rows[at, :, at], rows[at, :, at + 1] = c, d
-    rows = rows.reshape(-1, m)
-    most[[0, -1]] = 0.0
-    best = linprog(
-        -np.ones(m), np.vstack([rows, -rows]), np.ones(2 * len(rows)), bounds=[(0, b) for b in most]
-    )
-    assert (np.abs(rows @ x) <= 1.0 + 1e-9).all()
-    assert ((x >= 0.0) & (x <= most)).all()
-    assert x == pytest.approx(best.x, abs=1e-7)
 
 
 def test_a_motion_takes_hardly_longer_than_toppra_says():
