@@ -169,7 +169,8 @@ class Nearer:
     def _seen(self, moved: Array, before: bool) -> tuple[Array, Array]:
         """(n + 1, m - 1, B) m, how far points of bodies are moved as seen from every joint.
 
-        By the e_j, and along each segment. Bodies are on that joint or behind it, or before it.
+        By the e_j, and along each segment. Bodies are on that joint or behind it, or before it. As
+        joints deviate one by one, that furthest from a body first, levers are those of the motion.
         """
         n, steps = moved.shape[1], self.motion.steps
         off, way = np.zeros((2, n + 1, len(moved), len(self.joints)))
@@ -178,9 +179,8 @@ class Nearer:
             some = self.joints <= j if before else self.joints > j
             levers = self.levers[j] + self.balls
             mean = 0.5 * (levers[:-1] + levers[1:] + last[1])
-            by = [np.ones(1), np.ones(1)] if self.slides[j] else [mean + last[0], mean]
-            last[0] += some * by[0] * moved[:, j, None]
-            last[1] += some * by[1] * steps[:, j, None]
+            lever = some * (1.0 if self.slides[j] else mean)
+            last += lever * np.stack([moved[:, j, None], steps[:, j, None]])
             off[j + before], way[j + before] = last
         return off, way
 

@@ -49,6 +49,11 @@ def given(robot, task, pivot):
     return lemma.Given(robot, task, pivot, Kinematics(robot))
 
 
+def placed(frames, joint, points):
+    """(k, 3) points on a joint, each in its own one of the frames."""
+    return turned(frames.rotations[:, joint], points) + frames.points[:, joint]
+
+
 def margin_and_balls(robot, cells, task, walk):
     """The margin of a motion, the bounds along it that it is made of, and couples of bodies."""
     asked, real = [], surface_replay.margin_of
@@ -174,14 +179,16 @@ def come_nearer(robot, cells, task, pairings, margin, balls, here, rng):
     moved = balls.moved(margin.position, margin.angle)
     beside = {"surface", *(one.name for one in task.collision.scene)}
     bodies = Nearer(robot, pairings, beside, np.array(margin.pivot))
-    bound = bodies.by(moved, margin.position, margin.angle)[:, here.ball.row]
+    bound = bodies.by(moved, margin.position, margin.angle)
+    for one, each in zip(pairings, bound, strict=True):
+        assert (one.low - one.needed >= each - 1e-9).all()
+    bound = bound[:, here.ball.row]
     before, after = (Kinematics(robot).joints(q) for q in (here.nominal, here.q))
     for k, one in enumerate(pairings):
         ends = []
         for body in (one.a, one.b):
             points = body.corners[rng.integers(0, len(body.corners), len(here.q))]
-            at = [turned(f.rotations[:, body.joint], points) + f.points[:, body.joint]
-                  for f in (before, after)]  # fmt: skip
+            at = [placed(frames, body.joint, points) for frames in (before, after)]
             if body is one.a and body.joint == 0 and beside & set(one.names):
                 goes = rng.random(len(points)) < (2.0 if "surface" in one.names else 0.5)
                 along = turned(here.placement[:, :3, :3], points) + here.placement[:, :3, 3]

@@ -14,7 +14,7 @@ import samples
 from arm_urdfs import SIX, joint
 from asked import question
 from bounds import holds
-from displaced_parts import USED, attack, derivative, given, singular
+from displaced_parts import USED, attack, derivative, given, placed, singular, turned
 from random_arms import planar_arm, robot_of
 from samples import sampled, seeds
 from scipy.spatial.transform import Rotation
@@ -47,6 +47,7 @@ from feasibility.certification.collisions.collision_replay import collision_repl
 from feasibility.collisions.asked_bodies import gather
 from feasibility.task import PlacementError
 from feasibility.verdict import Bound, Walk
+from robots.kinematics import Kinematics
 from surfaces.meshes.triangle_mesh import TriangleMesh
 
 # -- the bounds of stretches, one by one ----------------------------------------------------------
@@ -76,8 +77,8 @@ def test_the_largest_lever_of_a_stretch_counts():
     arm = plain.arm_of(robot)
     ((x, y, _),), *_ = arm.tool(middle)
     middle[0] += np.radians(225.0) - np.arctan2(y, x)
-    for which, k, turned in ((0, 2, 1.5), (1, 4, 0.3), (2, 0, 0.5)):
-        way = turned * np.eye(6)[k]
+    for which, k, size in ((0, 2, 1.5), (1, 4, 0.3), (2, 0, 0.5)):
+        way = size * np.eye(6)[k]
         ball = ball_along(robot, np.stack([middle - way, middle + way]), 0.0)
         there = middle + np.linspace(-1.0, 1.0, 21)[:, None] * way
         if which == 2:
@@ -269,6 +270,8 @@ def test_the_last_row_counts_for_the_last_segment():
     q[3, 2] = 0.996  # [m], of 1
     margin = lemma.placement_margin(slides(), PLATE, Task(0.0, 30.0), q, room)
     assert margin.position == pytest.approx(0.004, rel=1e-6)
+    task = Task(0.0, 30.0, collision=Collision())  # and bodies were not judged
+    assert lemma.placement_margin(slides(), PLATE, task, q, room) is None
 
 
 @sampled
@@ -399,7 +402,7 @@ def test_a_share_of_what_bodies_may_move_leaves_them_clear(seed):
     scene = plain.scene_of(robot, cells, task)
     more = {one.names: rng.uniform(0.0, 0.05) * rng.random(len(walk.q) - 1) for one in pairings}
     nearer = np.stack([more[one.names] for one in pairings])
-    found = displaced_bodies.clear_share(pairings, nearer, rng.choice([0, 10, 100, 10_000]))
+    found = displaced_bodies.clear_share(pairings, nearer, rng.choice([0, 10, 100, 1000]))
     assert 0.0 <= found.share <= 1.0
     needed = np.array([pair[2] for pair in scene.pairs])
     for _ in range(60 if samples.EVERYTHING else 20):
@@ -407,6 +410,47 @@ def test_a_share_of_what_bodies_may_move_leaves_them_clear(seed):
         at = walk.q[row] + time * (walk.q[row + 1] - walk.q[row])
         over = found.share * np.array([more[pair[:2]][row] for pair in scene.pairs])
         assert (scene.distances(at) >= needed + over - 1e-6).all()
+
+
+@sampled
+@pytest.mark.parametrize("seed", seeds(1, all=20))
+@pytest.mark.parametrize("follows", [False, True])
+@pytest.mark.parametrize("what", ["shift", "turn", "joints", "all"])
+def test_points_of_two_bodies_come_no_nearer_than_is_said(what, follows, seed):
+    """Joints deviate and the part is displaced: anyhow, or so that the tool point follows it."""
+    made, rng = case_of(3 * seed + 1), np.random.default_rng(seed)
+    robot, cells, task, walk = (getattr(made.verdict, name) for name in CASE)
+    bodies, k = gather(robot, cells.surface, task.collision, task.standoff), 300
+    pairings = collision_replay(robot, bodies, walk.q).pairings
+    on = {name: 1.0 if what in (name, "all") else 0.0 for name in ("shift", "turn", "joints")}
+    moved = on["joints"] * rng.uniform(0.0, 0.1, (len(walk.q) - 1, robot.n))
+    shift, turn, pivot = 0.02 * on["shift"], 0.05 * on["turn"], cells.centres.mean(axis=0)
+    nearer = displaced_bodies.Nearer(robot, pairings, {"surface", "box"}, pivot)
+    nearer.over &= follows
+    bound = nearer.by(moved, 1e3 if follows else shift, turn)
+    row, share = rng.integers(0, len(moved), k), np.round(rng.random((k, 1)), 1)
+    q = walk.q[row] + share * np.diff(walk.q, axis=0)[row]
+    there = q + rng.choice([-1.0, 1.0], q.shape) * moved[row]
+    before, after = (Kinematics(robot).joints(each) for each in (q, there))
+    part = np.round(rng.random((k, 1))) if what == "all" else 1.0  # displaced by one or the other
+    about, along = referee.unit(rng.normal(size=(2, k, 3)))
+    g = Rotation.from_rotvec(turn * part * about).as_matrix()
+    part = 1.0 if what == "shift" else 1.0 - part
+    move = pivot - turned(g, np.tile(pivot, (k, 1))) + shift * part * along
+    if follows:
+        move = made.arm.tool(there)[0] - turned(g, made.arm.tool(q)[0])
+    used = []
+    for one, most, over, goes in zip(pairings, bound, nearer.over, nearer.goes, strict=True):
+        if one.a.half_space or over != follows:
+            continue
+        a, b = (each.corners[rng.integers(0, len(each.corners), k)] for each in (one.a, one.b))
+        at = [placed(f, one.a.joint, a) for f in (before, after)]
+        at[1] = turned(g, a) + move if goes else at[1]
+        apart = at[0] - placed(before, one.b.joint, b), at[1] - placed(after, one.b.joint, b)
+        truth = np.subtract(*(np.linalg.norm(each, axis=1) for each in apart))
+        assert (truth <= most[row] + 1e-9).all()
+        used.append(np.max(truth[most[row] > 1e-6] / most[row][most[row] > 1e-6], initial=0.0))
+    assert max(used) >= {"shift": 0.9, "turn": 0.3, "joints": 0.3, "all": 0.3}[what] or follows
 
 
 @sampled
