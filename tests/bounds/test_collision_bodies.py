@@ -7,12 +7,14 @@ from foreign_clearances import distance_from_hull
 
 from coverable import Axis, Collision, Obstacle, ToolShape, load_robot, plane
 from coverable.errors import ArgumentError
+from feasibility.certification.collisions.collision_replay import collision_replay
 from feasibility.collisions.asked_bodies import gather
 from feasibility.collisions.outer_bodies import polytopes_of, soup_of, tool_solids
 from feasibility.collisions.shapes import HalfSpace
 from feasibility.collisions.words import TOOL
 from robots.shapes.bodies import Triangles
 from robots.shapes.links import outer_bodies
+from surfaces.surface import rotation_from_rpy
 
 UR5 = load_robot("ur5")
 PLATE = plane((0.4, 0.6), (-0.1, 0.1), position=(0.0, 0.0, 0.3), side="outside")
@@ -241,3 +243,30 @@ def test_corners_are_welded_and_what_is_no_solid_is_a_sheet_that_says_so():
     sheet = Obstacle("part", Triangles(solid.vertices, solid.faces[:-1], True), np.eye(4))
     assert not sheet.geometry.closed
     assert "taken as a sheet" in sheet.notes[0]
+
+
+@pytest.mark.parametrize("angle", [0.7, -2.0])
+def test_a_moving_world_is_as_near_as_one_at_rest(angle):
+    """The judge, on the arm with its table, and on the arm alone beside the turned part."""
+    shelf = Obstacle.box("shelf", (0.4, 0.3, 0.02), (0.5, -0.2, 0.75), (0, 10, 20))
+    floor = Obstacle.halfspace("floor", position=(0, 0, -0.3))
+    turn = np.eye(4)
+    turn[:3, :3], turn[:3, 3] = rotation_from_rpy(0, 0, angle), TABLE.position
+    peg = Obstacle("peg", PEG.geometry, turn @ PEG.placement)
+    free, ends = load_robot("ur5", axes=[TABLE]), ((-0.2, 0.2), (-0.15, 0.15))
+    part = plane(*ends, position=(0, 0, 0.02))
+    turned = plane(*ends, position=(0.6, 0.1, 0.22), rpy_deg=(0, 0, np.degrees(angle)))
+    one = bodies_of(free, 0.1, part, scene=(shelf, floor, PEG))
+    other = bodies_of(UR5, 0.1, turned, scene=(shelf, floor, peg))
+    assert [seat.obstacle.name for seat in one.carried] == ["shelf", "floor"]
+    assert [thing.name for thing in one.scene] == ["peg"]
+    hits = 0
+    for q in np.random.default_rng(3).uniform(-1.6, 1.6, (12, 6)):
+        here = collision_replay(free, one, np.array([[angle, *q]]))
+        there = collision_replay(UR5, other, q[None])
+        assert here.accepted == there.accepted
+        hits += not here.accepted
+        if here.accepted:
+            assert here.nearest_pair == there.nearest_pair
+            assert abs(here.min_clearance - there.min_clearance) < 1e-5
+    assert 0 < hits < 12

@@ -73,23 +73,6 @@ def test_a_fine_mesh_is_thinned_and_its_cells_keep_their_areas():
 
 
 @pytest.mark.parametrize("kind", ["on_mesh", "on_grid"])
-def test_edges_run_from_target_to_target_at_the_standoff(kind, request):
-    verdict = request.getfixturevalue(kind)
-    cells = verdict.cells
-    lines, points = verdict_scene.edge_lines(verdict), verdict.task.targets(cells).points
-    assert len(lines) == verdict.graph.number_of_edges() > 20
-    rows = {tuple(pair): k for k, pair in enumerate(cells.pairs.tolist())}
-    for pair, line in zip(verdict.graph.edges, lines, strict=True):
-        np.testing.assert_allclose(line[[0, -1]], points[list(pair)], atol=1e-9)
-        off = np.array([0.0, 0.0])  # facets of a mesh are not its normals
-        if kind == "on_mesh":
-            off = np.array(cells.curves.deviations[rows[tuple(sorted(pair))]])
-        height = cells.surface.closest(line).height
-        allowed = off @ [1.0, 0.005] + 1e-5
-        assert np.abs(height + 0.005).max() <= allowed, "on the tool's side, not through it"
-
-
-@pytest.mark.parametrize("kind", ["on_mesh", "on_grid"])
 def test_missed_cells_have_the_colour_of_their_cause(kind, request):
     verdict = request.getfixturevalue(kind)
     drawn = view(verdict)

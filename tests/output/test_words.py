@@ -17,7 +17,7 @@ from coverable.errors import at_least, at_most
 from feasibility.cases.keys import all_keys
 from feasibility.collisions.words import UNCHECKED
 from feasibility.cut_words import place_of
-from feasibility.reports import changes, division, path
+from feasibility.reports import changes, division, path, study
 from feasibility.reports import explanation as explained
 from feasibility.reports import verdict as report
 from feasibility.results.trajectory_files import as_csv, as_json_text, from_csv
@@ -222,3 +222,18 @@ def test_robots_and_cases_list_all_there_are(ask):
     cases = json.loads(ask("cases", "--json").out)["cases"]
     assert [row["name"] for row in cases] == list(coverable.builtin_cases())
     assert cases[0]["cells"] == [9, 10]
+
+
+def test_a_study_says_what_all_its_cases_check():
+    def of(*lines):
+        return coverable.read_study("\n".join(['base.case = "paper/4a"', *lines]))
+
+    mixed = of('vary."collision.surface" = [true, false]', 'vary."collision.self" = [true]')
+    none = of('vary."task.cone_deg" = [30, 40]')
+    alike = of('vary."collision.clearance" = [0.0, 0.01]')
+    assert study.as_json(mixed, [])["collisions"] == ["self"]
+    assert "in 1 of 2 cases collisions are checked with the arm itself" in study.as_text(mixed, [])
+    assert study.as_json(alike, [])["collisions"] == ["self", "surface"]
+    assert UNCHECKED not in study.as_text(alike, [])
+    assert study.as_json(none, [])["collisions"] == []
+    assert UNCHECKED in study.as_html(none, []).lower()

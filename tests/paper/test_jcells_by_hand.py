@@ -8,9 +8,8 @@ from arm_urdfs import joint
 from random_arms import robot_of
 
 import coverable
-from coverable import Answer, CauseKind, Evidence, Task, greedy_check, load_robot, plane, sphere
+from coverable import Answer, CauseKind, Evidence, Task, greedy_check, load_robot, sphere
 from feasibility.paper.continuity import JSpace, Outcome
-from feasibility.paper.jcell_steps import Steps
 
 PUMA = load_robot("puma560", limits="set-1")
 
@@ -19,14 +18,6 @@ def planar_arm(low=-3.1, high=3.1):
     """Two links of 1 m in the xy plane; the tool axis is +x of the second."""
     turning = joint(1, limits=(low, high)), joint(2, xyz=(1, 0, 0), limits=(-3.1, 3.1))
     return robot_of([*turning, joint(3, "fixed", (1, 0, 0))], (1.0, 0.0, 0.0))
-
-
-def gantry(x=(-2.0, 2.0)):
-    """Three prismatic joints along x, y and z; the tool axis is +z, so tool point = q."""
-    ranges = x, (-2.0, 2.0), (-2.0, 2.0)
-    return robot_of(
-        [joint(i + 1, "prismatic", axis=np.eye(3)[i], limits=ranges[i]) for i in range(3)]
-    )
 
 
 def greedy(**settings):
@@ -73,23 +64,6 @@ def test_shoulder_limit_cuts_the_arc_where_it_stands(last):
     assert kinds == {(CauseKind.DISCONNECTED, False)}
 
 
-@pytest.mark.parametrize("moves", ["single", "all"])
-def test_gantry_over_a_plane(moves):
-    """Every move is a translation, so each of the 8 neighbours can be entered from each cell."""
-    cells, arm = plane((0, 0.4), (0, 0.3), side="inside").cells(4, 3), gantry()
-    verdict = greedy_check(arm, cells, Task(0.05, 30), greedy(step_deg=0.2, moves=moves))
-    assert verdict.answer is Answer.FEASIBLE
-    assert edges(verdict.graph) == {tuple(pair) for pair in cells.pairs.tolist()}
-    assert verdict.statistics["capped"] == 0
-    assert verdict.certificate.max_angle == 0.0
-    step = Steps.of(arm, cells, Task(0.05, 30), greedy(step_deg=0.2)).size
-    np.testing.assert_allclose(step, math.radians(0.2) * arm.reach)
-    # x <= 0.25: cells of the third column of four are touched, those of the fourth are not.
-    verdict = greedy_check(gantry((-1.0, 0.25)), cells, Task(0.05, 30), greedy(step_deg=0.2))
-    assert verdict.covered.tolist() == [True] * 9 + [False] * 3
-    assert edges(verdict.graph) == {(i, j) for i, j in cells.pairs.tolist() if j < 9}
-
-
 DOME = sphere(1.0, (10, 90), (10, 180))
 
 
@@ -109,6 +83,15 @@ def test_capped_is_not_exhausted_and_memory_grows_without_changing_the_answer():
     few, many = called(a, k, 50), called(a, k, 60_000)
     assert (few.outcome, few.checked, len(few.jcells)) == (Outcome.CAPPED, 50, 0)
     assert (many.outcome, many.checked) == (Outcome.CAPPED, 60_000)
+
+
+def test_cells_out_of_reach_are_proved_to_be():
+    far = sphere(1.0, (10, 90), (10, 180), position=(9, 0, 0)).cells(3, 3)
+    verdict = greedy_check(PUMA, far, Task(0.005, 45), greedy())
+    assert (verdict.answer, verdict.n_covered, verdict.tree) == (Answer.INFEASIBLE, 0, None)
+    assert "no configuration was found" in verdict.message
+    assert {(c.kind, c.proved) for c in verdict.causes} == {(CauseKind.OUT_OF_REACH, True)}
+    assert len(verdict.causes) == 9
 
 
 def test_time_limits_coarse_steps_and_bad_starts_are_said():

@@ -7,12 +7,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from jobs import PLATE, run_coverable, verdict_named
-from samples import sampled, seeds, spread
+from samples import spread
 
-from coverable import Store, load_result
+from coverable import load_result
 from feasibility.interrupts import at_leave, leave_at_once, raised
 from feasibility.safe_files import write_whole
 
@@ -78,7 +77,7 @@ def test_at_any_call_of_a_command_that_writes_files(tmp_path):
 
         assert forked(work, folder.parent / "said") == (130, INTERRUPTED), call
         for file in folder.iterdir():
-            whole_result = file.suffix == ".result" and is_whole(file)
+            whole_result = file.suffix == ".result" and load_result(file).verdict.feasible
             assert whole_result or file.read_bytes() == known[file.name], (call, file)
 
 
@@ -198,65 +197,3 @@ def test_in_an_import_it_waits_until_the_module_is_whole(tmp_path):
     (tmp_path / "imported_when_interrupted.py").write_text("\n".join(lines))
     done = process(IMPORT, tmp_path)
     assert (done.returncode, done.stdout, done.stderr) == (0, "True\n", "")
-
-
-AT_EVENT = """
-import os, signal, sys
-left, begun = int(sys.argv.pop(1)), False
-def interrupt(event, about):
-    global left, begun
-    begun = begun or event == "exec" and about[0].co_filename.endswith("coverable/command.py")
-    if begun:
-        left -= 1
-        if left == 0:
-            os.killpg(0, signal.SIGINT)
-sys.addaudithook(interrupt)
-from coverable.command import run
-run()
-"""  # Ctrl-C, to the whole group as from a terminal, at the n-th event from our first one on
-STUDY = 'base.case = "plate.toml"\nvary."task.cone_deg" = [20, 30, 40, 50, 60, 70]\n'
-RANGE = ("--x", "0.3", "0.5", "--count", "8")
-TABLES = ("--csv", "p.csv", "--map", "p.png", "--html", "p.html")
-COMMANDS = {
-    "check": ("plate.toml", "--witness", "a.csv", "--save", "a.result", "--html", "a.html"),
-    "path": ("plate.toml", "--out", "b.csv", "--out", "b.json", "--html", "b.html"),
-    "divide": ("plate.toml", "--html", "c.html"),
-    "explain": ("plate.toml", "--html", "d.html"),
-    "place": ("plate.toml", "--workers", "0", "--out", "p.study", *RANGE, *TABLES),
-    "study": ("s.toml", "--workers", "2", "--out", "s.study", "--csv", "s.csv", "--html", "s.html"),
-    "compare": ("plate.toml", "--robots", "ur5,panda", "--csv", "r.csv", "--html", "r.html"),
-}
-
-
-def is_whole(file: Path) -> bool:
-    data = file.read_bytes()
-    ends = {".html": b"</html>", ".png": b"IEND\xaeB`\x82", ".json": b"}", ".csv": b""}
-    if file.suffix in ends:
-        newline = file.suffix != ".csv" or data.endswith(b"\n")
-        return newline and data.rstrip().endswith(ends[file.suffix])
-    if file.suffix == ".result":
-        return load_result(file).verdict.feasible
-    with Store(file) as store:
-        return len(store) >= 0
-
-
-# Not in a plain run: which event is the n-th depends on what Python finds compiled.
-@sampled("number", seeds(0, all=200))
-def test_at_a_random_event(number, tmp_path):
-    """Files and imports, most of them: a command has some ten thousand such events."""
-    rng = np.random.default_rng([20260713, number])
-    command = list(COMMANDS)[(number * 4) % len(COMMANDS)]
-    (tmp_path / "plate.toml").write_text(PLATE)
-    (tmp_path / "s.toml").write_text(STUDY)
-    event = int(rng.integers(1, 40_000))
-    done = process(
-        AT_EVENT, event, command, *COMMANDS[command], cwd=tmp_path, start_new_session=True,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
-    )  # fmt: skip
-    assert done.returncode in (130, 0, 1), done.stderr  # or it has fewer events
-    assert (done.returncode == 130) == done.stderr.endswith(INTERRUPTED)
-    assert "Traceback" not in done.stderr
-    assert "leaked" not in done.stderr
-    left = {file.name for file in tmp_path.iterdir()} - {"plate.toml", "s.toml"}
-    assert left <= {part for part in COMMANDS[command] if "." in part and part[0].isalpha()}
-    assert [name for name in left if not is_whole(tmp_path / name)] == []

@@ -128,6 +128,7 @@ def test_every_point_of_a_solid_is_in_one_of_its_pieces(angle):
 
 
 def test_what_is_convex_stays_in_one_piece():
-    made = trimesh.creation
-    for body in (made.box((0.1, 0.2, 0.9)), made.icosphere(3), made.cone(1, 2)):
+    made, flat = trimesh.creation, [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]
+    sheet = trimesh.Trimesh(flat, [[0, 1, 2], [1, 3, 2]])
+    for body in (made.box((0.1, 0.2, 0.9)), made.icosphere(3), made.cone(1, 2), sheet):
         assert len(pieces_of(bodies(body))) == 1

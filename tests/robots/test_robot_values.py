@@ -122,3 +122,15 @@ def test_reach_follows_the_limits_of_slides(tmp_path):
     assert robot.reach == pytest.approx(4.0)  # drawn back by 5 m
     assert robot.with_limits({"j2": (-1, 0.5)}).reach == pytest.approx(1.5)
     assert robot.with_limits({"j2": (0, np.inf)}).reach == np.inf
+
+
+@pytest.mark.parametrize("limits", [(0.0, 0.1), (-0.1, 0.02)])
+def test_reach_of_many_slides_in_a_row_is_still_a_bound(limits, tmp_path):
+    joints = [
+        joint(i, "prismatic", xyz=(0.1, 0, 0), axis=(1, i % 3, 0), limits=limits)
+        for i in range(1, 14)
+    ]
+    robot = load_text(tmp_path, arm(joints))
+    assert furthest(robot, 50) <= robot.reach < 4.0
+    for ends in (robot.lower, robot.upper):
+        assert robot.distance_from_base(Kinematics(robot).tool(ends)[0]) <= robot.reach

@@ -9,7 +9,7 @@ from asked import question
 from samples import EVERYTHING, sampled
 
 import coverable
-from coverable import Obstacle, Search, Task, ToolShape, check, explain, replay
+from coverable import Obstacle, Search, Task, ToolShape, check, explain, load_case, replay
 from feasibility.sensitivity.quantities import Kind
 from feasibility.verdict import Walk
 
@@ -121,3 +121,12 @@ def test_a_motion_found_beside_a_case_is_tried_on_the_case_itself():
         limits[q.kind is Kind.UPPER] = side.value
         arm = robot.with_limits({robot.joint_names[q.joint]: limits})
         assert check(arm, cells, task, Search(seed=7), seeds=side.witness).feasible, q.name
+
+
+def test_a_search_ends_after_so_many_evaluations_on_any_machine():
+    """As at the deadline: undecided, and why cells are missed can still be read."""
+    robot, cells, task, _ = load_case("paper/5f").with_overrides(["task.standoff=0.505"]).build()
+    verdict = check(robot, cells, task, Search(evaluations=30_000))
+    assert verdict.answer is coverable.Answer.UNDECIDED
+    assert 30_000 < verdict.statistics["fk"] < 100_000
+    assert len(verdict.causes) == len(cells) - verdict.n_covered
