@@ -187,3 +187,28 @@ def test_the_most_that_joints_deviate_along_a_stretch_counts(more):
     slide, rows = planar_arm([0.1], ["prismatic"]), np.array([[-0.3], [0.2999], [0.3]])
     found = collision_replay(slide, bodies, rows, np.array([[0.0], [more]]))
     assert found.accepted == (more < 0.1)
+
+
+@pytest.mark.parametrize("calls", [4, 40, 4000])
+def test_a_closer_look_certifies_no_more_than_there_is(calls):
+    """A bar in a dome, asked for other distances along each segment, with few calls and many."""
+    rng, raised = np.random.default_rng(calls), 0
+    robot = planar_arm([0.3, 0.4, 0.1], ["revolute", "revolute", "prismatic"])
+    walk = np.cumsum(rng.normal(size=(90, 3)) * [0.08, 0.08, 0.02], axis=0)
+    walk += [0.6, 0.3, 0.2]
+    solid, soup = Solid("tool", 3, at(0.05), SHAPES[0]), Soup("surface", dome(20), 0.0, False)
+    for start in range(0, 90, 6):
+        rows = walk[start : start + 6]
+        q = np.concatenate([np.linspace(*ends, 15) for ends in pairwise(rows)])
+        ((one,), (fine,)) = (
+            pairings(robot, each, solid, [], None, 0.0, [soup]) for each in (rows, q)
+        )
+        truth = fine.measured(np.arange(len(q), dtype=float)).reshape(-1, 15).min(axis=1)
+        one.certify(0.0)
+        if one.refused is not None:
+            continue
+        before, more = one.low.min(), truth * rng.uniform(0.3, 1.5, len(truth))
+        one.look_closer(int(np.argmin(one.low / more)), more, 1.0, calls)
+        assert (one.low <= truth + 1e-6).all()
+        raised += one.low.min() > before
+    assert raised or calls == 4

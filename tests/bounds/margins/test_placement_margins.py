@@ -43,7 +43,8 @@ from coverable import (
 from coverable.errors import ArgumentError
 from feasibility.certification import displaced_bodies
 from feasibility.certification import placement_margin as lemma
-from feasibility.certification.collisions.collision_replay import collision_replay
+from feasibility.certification.collisions.collision_replay import collision_replay, couples_of
+from feasibility.certification.collisions.motion import ArmMotion
 from feasibility.collisions.asked_bodies import gather
 from feasibility.task import PlacementError
 from feasibility.verdict import Bound, Walk
@@ -421,15 +422,16 @@ def test_points_of_two_bodies_come_no_nearer_than_is_said(what, follows, seed):
     made, rng = case_of(3 * seed + 1), np.random.default_rng(seed)
     robot, cells, task, walk = (getattr(made.verdict, name) for name in CASE)
     bodies, k = gather(robot, cells.surface, task.collision, task.standoff), 300
-    pairings = collision_replay(robot, bodies, walk.q).pairings
+    rows = walk.q[0] + np.cumsum(rng.uniform(-0.4, 0.4, (5, robot.n)), axis=0)
+    pairings = couples_of(bodies).along(ArmMotion(robot, rows))
     on = {name: 1.0 if what in (name, "all") else 0.0 for name in ("shift", "turn", "joints")}
-    moved = on["joints"] * rng.uniform(0.0, 0.1, (len(walk.q) - 1, robot.n))
+    moved = on["joints"] * rng.uniform(0.0, 0.1, (4, robot.n))
     shift, turn, pivot = 0.02 * on["shift"], 0.05 * on["turn"], cells.centres.mean(axis=0)
     nearer = displaced_bodies.Nearer(robot, pairings, {"surface", "box"}, pivot)
     nearer.over &= follows
     bound = nearer.by(moved, 1e3 if follows else shift, turn)
     row, share = rng.integers(0, len(moved), k), np.round(rng.random((k, 1)), 1)
-    q = walk.q[row] + share * np.diff(walk.q, axis=0)[row]
+    q = rows[row] + share * np.diff(rows, axis=0)[row]
     there = q + rng.choice([-1.0, 1.0], q.shape) * moved[row]
     before, after = (Kinematics(robot).joints(each) for each in (q, there))
     part = np.round(rng.random((k, 1))) if what == "all" else 1.0  # displaced by one or the other
