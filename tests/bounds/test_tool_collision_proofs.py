@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -11,7 +10,6 @@ from capsule_arms import at
 from hard_scenes import ARMS, CELLS, UR5, Over, a_plate, arm, bracket, planted_over, random_over
 from random_arms import planar_arm
 from samples import sampled, seeds, spread
-from scipy.spatial.transform import Rotation
 
 import coverable
 from coverable import CauseKind, Collision, Evidence, Obstacle, Task, ToolShape, check, cylinder
@@ -19,10 +17,8 @@ from feasibility.certification.cut_proofs.proof_verification import verify_proof
 from feasibility.certification.overlaps.depths import depths, planes_around, points_inside
 from feasibility.certification.overlaps.every_pose import never_clear
 from feasibility.collisions.problem_bodies import Bodies, Pair
-from feasibility.collisions.shapes import HalfSpace
 from feasibility.cut_tree import CutTree, Leaf
 from robots.shapes.bodies import Solid, Triangles
-from robots.shapes.coal_shapes import coal_shape
 from robots.shapes.solids import checked_triangles
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
@@ -117,27 +113,6 @@ def test_a_tool_may_lean_as_far_as_the_cone_and_no_further(lean, turn):
     scene = over(slab, cone_deg=lean, tool=ball)
     assert scene.proved(100_000).confirmed == (lean < 45.0)
     assert scene.clear_pose(3000, np.random.default_rng(0)) == (lean > 45.0)
-
-
-@pytest.mark.parametrize("angle", [0, 90, 180, 270])
-@pytest.mark.parametrize("wide", [0.006, 0.002])
-def test_a_hole_at_the_border_of_the_cone_is_found(angle, wide):
-    """A ball of 4 mm, 0.2 m behind the tool point, fits into a hole of 6 mm, and not of 2 mm."""
-    turn = Rotation.from_euler("z", angle, True)
-    hole, middle = (0.2 * pin.exp3(0.5 * turn.apply(tilt))[:, 2] for tilt in
-                    ([0.93, 0.06, 0.0], [0.5, 0.5, 0.0]))  # fmt: skip
-    x = middle - hole * (middle @ hole) / (hole @ hole)
-    x /= np.linalg.norm(x)
-    frame = np.column_stack([x, np.cross(hole / 0.2, x), hole / 0.2])
-    blocks = []
-    for k, way in ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)):
-        size, place = np.array([0.8, 0.8, 0.3]), np.zeros(3)
-        size[k], place[k] = 0.4, way * (wide + 0.2)
-        stands = at(*(TARGET + hole + frame @ place), frame)
-        blocks.append(Obstacle(f"block {len(blocks)}", Box(tuple(size.tolist())), stands))
-    ball = ToolShape.sphere(0.004, position=(0.0, 0.0, -0.2))
-    scene = over(*blocks, cone_deg=np.degrees(0.5), tool=ball)
-    assert scene.proved(100_000).confirmed == (wide < 0.003)
 
 
 def test_meshes_are_solids_with_dents_or_sheets():
@@ -263,36 +238,3 @@ def test_balls_around_points_are_inside(shape):
         assert away[1].max() < 1e-9
     else:
         assert inside(shape, points).all()
-
-
-@pytest.mark.parametrize(
-    "shape", [*PRIMITIVES, HalfSpace(), BLOCK, ROUND], ids=lambda one: type(one).__name__
-)
-def test_no_point_is_said_to_be_deeper_than_it_is(shape):
-    """All of a ball as large as the depth is inside; coal finds the body as near as is said."""
-    rng = np.random.default_rng(1)
-    corners = shape.vertices if isinstance(shape, Triangles) else np.array([[0.15], [-0.15]])
-    x = rng.uniform(corners.min(axis=0) - 0.02, corners.max(axis=0) + 0.02, (150, 3))
-    found = depths(shape, x)
-    deep, outside = found > 0.0, ~inside(shape, x)
-    assert min(deep.sum(), outside.sum()) >= 3
-    assert not found[outside].max() > 0.0
-    balls = np.column_stack([x, found])[deep][:20]
-    assert inside(shape, np.concatenate([around(rng, ball) for ball in balls])).all()
-    if isinstance(shape, Triangles):
-        assert np.isinf(found[outside]).all()
-        return
-    away = np.array([_by_coal(shape, point) for point in x[outside]])
-    np.testing.assert_allclose(-found[outside], away, atol=1e-5)
-
-
-def _by_coal(shape, point):
-    """m, of a point from a body that it is not in."""
-    if isinstance(shape, HalfSpace):
-        return float(point[2])
-    asked, ball = (
-        coal.DistanceRequest(True, True),
-        (coal.Sphere(1e-4), coal.Transform3s(np.eye(3), point)),
-    )
-    body = coal_shape(shape), coal.Transform3s.Identity()
-    return coal.distance(*ball, *body, asked, coal.DistanceResult()) + 1e-4

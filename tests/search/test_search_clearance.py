@@ -15,11 +15,7 @@ from coverable import Collision, Obstacle, Robot, load_robot, sphere
 from coverable.kernels import entry
 from feasibility.collisions.asked_bodies import gather
 from feasibility.collisions.kernels import link_frames
-from feasibility.collisions.kernels.tables import (
-    GROUPS,
-    row,
-    views,
-)
+from feasibility.collisions.kernels.tables import GROUPS, row, views
 from feasibility.collisions.problem_bodies import Bodies, Pair, Soup
 from robots.shapes.bodies import Polytope
 

@@ -185,27 +185,6 @@ def test_over_many_triangles_distances_are_taken_on_a_copy():
         assert np.abs(np.min(lines, axis=0) / found.spacing - 1.0).max() <= 0.02
 
 
-@pytest.mark.parametrize("degrees", [20, 150])
-@pytest.mark.parametrize("name", ["plate", "cap"])
-def test_oblique_passes_stay_parallel_beyond_the_ends_of_the_first(name, degrees):
-    """Straight on the plate, and on the sphere circles about one great circle, to their ends.
-
-    (On the arch the first pass is the section with a plane, no straight line when laid flat.)
-    """
-    found = parallel_passes(SURFACES[name], 0.03, math.radians(degrees), step=0.004)
-    assert not any("kinks" in note for note in found.notes)
-    rows = [
-        np.concatenate([unrolled(name, each.points) for each in row]) for row in by_level(found)
-    ]
-    line = rows[len(rows) // 2]
-    along, _, least = np.linalg.svd(line - line.mean(axis=0))[2][[0, 1, -1]]
-    across = np.cross([0.0, 0.0, 1.0], along)
-    heights = [0.4 * np.arcsin(x @ least / 0.4) if name == "cap" else x @ across for x in rows]
-    assert max(map(np.ptp, heights)) <= 0.02 * found.spacing
-    gaps = np.abs(np.diff([height.mean() for height in heights]))
-    assert np.abs(gaps / found.spacing - 1.0).max() <= 0.02
-
-
 @pytest.mark.parametrize("source", [7, 2**32 - 1])
 def test_vertices_that_distances_do_not_reach_take_theirs_from_their_neighbours(
     source, monkeypatch

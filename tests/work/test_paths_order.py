@@ -9,7 +9,7 @@ from mesh_patches import sheet
 from path_cases import verdict_of
 from samples import sampled, seeds
 
-from coverable import PathError, coverage_path, cylinder, mesh, plane, sphere
+from coverable import PathError, coverage_path, cylinder, mesh, plane
 from feasibility.paths import order as orders
 from feasibility.paths.order import ORDERS, grid_order, route, route_length, step_lengths
 from feasibility.paths.two_opt import improved, tour_length
@@ -38,20 +38,6 @@ def test_grid_orders_step_from_cell_to_the_next_wherever_they_begin(order, shape
     i, j = np.divmod(grid_order(order, *shape), shape[1])
     inwards = np.minimum(np.minimum(i, shape[0] - 1 - i), np.minimum(j, shape[1] - 1 - j))
     assert (np.diff({"rows": i, "columns": j, "spiral": inwards}[order]) >= 0).all()
-
-
-def test_grids_that_close_on_themselves():
-    closed = {
-        (True, False): [cylinder(0.5, (0, 360), (0, 1)).cells(3, 2)],
-        (False, True): [sphere(0.5, (k, 90), (0, 360)).cells(3, 8) for k in (0, 20)],
-        (False, False): [
-            cylinder(0.5, (0, 350), (0, 1)).cells(9, 2),
-            cylinder(0.5, (0, 360), (0, 1)).cells(2, 3),
-            plane((0, 1), (0, 1)).cells(3, 3),
-        ],
-    }
-    for sides, grids in closed.items():
-        assert all(orders.closed_sides(cells) == sides for cells in grids)
 
 
 @sampled("seed", seeds(8, all=200))
