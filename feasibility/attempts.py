@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from feasibility.found import Found
 from feasibility.problem import Problem
 from feasibility.search_settings import Search
 from feasibility.task import PlacementError
-from feasibility.verdict import Replay, Walk
+from feasibility.verdict import Replay
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -135,7 +135,10 @@ def _attempt(
     except OutOfTime:
         found = _nothing(problem, clock)
     if asked is not None:
-        found = replace(found, proof=None, replay=found.replay and partial(_replayed, asked, found))
+        walk = found.motion
+        found = replace(
+            found, proof=None, replay=None if walk is None else partial(asked.replayed, walk)
+        )
         problem = asked
     searched = time.monotonic()
     try:
@@ -146,14 +149,6 @@ def _attempt(
         found = replace(found, unfinished=NOT_REPLAYED.format(clock.limit))
     search_s = searched - float(np.fmax(called, clock.loaded))
     return Attempt(problem, found, replayed, search_s, time.monotonic() - searched)
-
-
-def _replayed(problem: Problem, found: Found) -> Replay:
-    """The replay of a motion over all cells that was found for another problem."""
-    from feasibility.certification.motion_replay import replay
-
-    needed, walk = np.ones(len(problem.cells), dtype=bool), found.motion
-    return replay(problem.robot, problem.cells, problem.task, cast("Walk", walk), needed)
 
 
 def _in_pieces(problem: Problem, clock: Clock) -> Problem | None:

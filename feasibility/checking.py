@@ -76,14 +76,12 @@ def check(
         >>> verdict.feasible, verdict.n_covered
         (True, 9)
     """
-    from feasibility.speed.requirements import check_requirements
-
     search = Search() if search is None else search
     settings = (search, "search", Search, "a Search, such as Search(seed=1)")
     if collision is not None and isinstance(task, Task):
         task = replace(task, collision=collision)
     problem = Problem.of(robot, cells, task, settings)
-    check_requirements(robot, task, search)
+    _refuse_impossible(robot, task, search)
     method: Method
     if search.method == "greedy":
         if seeds is not None:
@@ -98,6 +96,14 @@ def check(
     clock = Clock(search.time_limit, progress) if clock is None else clock
     verdict = _decided(problem, search, clock.allow(search.evaluations), method)
     return _all_judged(_measured(_at_rates(verdict, clock), clock))
+
+
+def _refuse_impossible(robot: Robot, task: Task, search: Search) -> None:
+    """Refuse a speed or a home, where one is given, that this arm cannot have."""
+    if task.requires_rates or task.home_deg is not None:
+        from feasibility.speed.requirements import check_requirements
+
+        check_requirements(robot, task, search)
 
 
 def _all_judged(verdict: Verdict) -> Verdict:
@@ -154,11 +160,10 @@ def greedy_check(
             demands what only the complete search knows.
     """
     from feasibility.paper.greedy import greedy_search
-    from feasibility.speed.requirements import check_requirements
 
     search = Search(method="greedy") if search is None else search
     problem = Problem.of(robot, cells, task)
-    check_requirements(robot, task, search)
+    _refuse_impossible(robot, task, search)
     clock = Clock(search.time_limit, progress)
     method = partial(greedy_search, start=robot.start if start is None else start)
     return _all_judged(_measured(_decided(problem, search, clock, method), clock))

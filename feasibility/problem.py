@@ -15,6 +15,7 @@ from surfaces.surface import Surface
 
 if TYPE_CHECKING:
     from feasibility.collisions.problem_bodies import Bodies, Pair
+    from feasibility.verdict import Replay, Walk
 
 HELD = 0.3  # [m] lever by which a shift of the tool turns a joint, about
 NARROWER = 0.9  # [1] of tolerance, cone and roll, when the replay refuses what just kept to them
@@ -131,6 +132,12 @@ class Problem:
         problem = replace(self, task=task, searched=searched)
         cut = problem.bodies
         return problem if cut and len(cut.polytopes) > len(bodies.polytopes) else None
+
+    def replayed(self, walk: Walk) -> Replay:
+        """The independent replay of a motion, which has to visit every cell."""
+        from feasibility.certification.motion_replay import replay
+
+        return replay(self.robot, self.cells, self.task, walk, np.ones(len(self.cells), dtype=bool))
 
     @property
     def within(self) -> str:

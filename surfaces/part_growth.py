@@ -11,7 +11,7 @@ import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
 from coverable.errors import ArgumentError
-from surfaces.parts import PartModels, SurfaceParts, around
+from surfaces.parts import PartModels, SurfaceParts
 
 Rows = Ints | Mask
 
@@ -202,6 +202,35 @@ def _joined(roots: PartModels) -> _Top:
     every = PartModels(*(np.concatenate([np.zeros_like(a[1:]), a]) for a in roots))
     for number in range(count - 2, -1, -1):
         one, other = (every.rows(children[[number], side]) for side in (0, 1))
-        for array, value in zip(every, around(one, other), strict=True):
+        for array, value in zip(every, _around(one, other), strict=True):
             array[number] = value[0]
     return _Top(every.rows(np.arange(count - 1)), children)
+
+
+def _around(one: PartModels, other: PartModels) -> PartModels:
+    """Models of k parts that hold all of two others each: balls around them."""
+    balls = [_balls(models) for models in (one, other)]
+    (a, ra), (b, rb) = balls
+    centre, radius = np.empty((len(a), 6)), np.empty((len(a), 2))
+    for column, some in ((0, slice(0, 3)), (1, slice(3, 6))):
+        apart = np.linalg.norm(b[:, some] - a[:, some], axis=1)
+        p, q = ra[:, column], rb[:, column]
+        # From the far end of one ball to that of the other; or the larger one where it holds both.
+        size = np.maximum((apart + p + q) / 2.0, np.maximum(p, q))
+        with np.errstate(invalid="ignore"):
+            share = np.clip((size - p) / np.maximum(apart, 1e-300), 0.0, 1.0)
+        share = np.nan_to_num(share)
+        middle = a[:, some] + share[:, None] * (b[:, some] - a[:, some])
+        to_a, to_b = (np.linalg.norm(middle - end[:, some], axis=1) for end in (a, b))
+        centre[:, some], radius[:, column] = middle, np.maximum(to_a + p, to_b + q)
+    flat = np.zeros((len(centre), 2, 6))
+    return PartModels(centre, flat, radius, np.zeros((len(centre), 2, 2))).guarded()
+
+
+def _balls(models: PartModels) -> tuple[Array, Array]:
+    """Centres (k, 6), and radii (k, 2) of the balls that hold the points, and the normals."""
+    reach = [
+        np.linalg.norm(models.slopes[..., some], axis=2).sum(axis=1)
+        for some in (slice(0, 3), slice(3, 6))
+    ]
+    return models.centre, models.radius + np.stack(reach, axis=1)

@@ -21,16 +21,8 @@ from feasibility.cases.surface_reading import (
     read_surface,
 )
 from feasibility.cases.table_reader import CaseError, Section, table_words
-from feasibility.cases.toml import (
-    TomlError,
-    as_read,
-    make_absolute,
-    make_relative,
-    override,
-    parse_toml,
-    toml_document,
-)
-from feasibility.safe_files import FileError, read_text, shown_path
+from feasibility.cases.toml import TomlError, as_read, parse_toml
+from feasibility.read_files import FileError, read_text, shown_path
 from feasibility.search_settings import Search
 from feasibility.task import PlacementError, Task, check_footprint
 
@@ -167,6 +159,8 @@ class Case:
 
     def to_toml(self) -> str:
         """The case as text that `from_toml` reads back as an equal case; paths are absolute."""
+        from feasibility.cases.toml_text import toml_document
+
         return toml_document(self.to_tables())
 
     def as_written(self) -> str:
@@ -177,7 +171,9 @@ class Case:
         """
         if self.source is None:
             return self.to_toml()
+        from feasibility.cases.toml_changes import make_relative
         from feasibility.cases.toml_edits import differences, edited
+        from feasibility.cases.toml_text import toml_document
 
         text, folder = self.source
         with suppress(CaseError):  # the file alone may be no case
@@ -210,6 +206,8 @@ class Case:
         Raises:
             CaseError: with everything that is wrong.
         """
+        from feasibility.cases.toml_changes import make_absolute
+
         try:
             tables = parse_toml(text)
         except TomlError as error:
@@ -299,8 +297,11 @@ def _from_tables(
 ) -> Case:
     """Apply overrides, which the description then names, and check everything."""
     faults: list[Fault] = []
-    for setting in overrides:
-        override(tables, setting, faults)
+    if overrides:
+        from feasibility.cases.toml_changes import override
+
+        for setting in overrides:
+            override(tables, setting, faults)
     for title in tables:
         if title not in TABLES:
             guess = close(title, TABLES)

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 from coverable.errors import MISSING
-from feasibility.cases.surface_building import CHOICE, SURFACE_NAMES
+from feasibility.cases.surface_building import SURFACE_NAMES
+from feasibility.cases.surface_files import CHOICE
 from feasibility.cases.table_reader import Section
 from surfaces.meshes.selection import checked_box, checked_cone, checked_plane
 from surfaces.meshes.sources import metres_per_unit

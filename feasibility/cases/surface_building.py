@@ -1,9 +1,9 @@
-"""From the values of a [surface] table to a surface and its cells; files are read here."""
+"""From the values of a [surface] table to a patch, and from a surface to its cells."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Final
 
@@ -12,11 +12,10 @@ import numpy as np
 from coverable.errors import MISSING, Fault
 from feasibility.cases.keys import own_keys
 from feasibility.cases.table_reader import CaseError, with_example
-from feasibility.safe_files import shown_path
+from feasibility.read_files import shown_path
 
 AUTO: Final = "auto"
 FILES = ("bspline", "grid", "poses", "mesh", "step")  # kinds of surface that may be a file
-CHOICE = ("faces", "colour", "deviation")  # keys of STEP files that say what of them is read
 MOST_CELLS = 1_000_000  # the graph of a verdict takes some kilobytes a cell
 MOST_MESH_CELLS = 20_000  # as `surfaces.meshes.cells` has it
 WIDTH = 0.65  # [1] of the footprint: the corners of a square are 0.46 of it from its centre
@@ -68,8 +67,8 @@ def faults_of(
         raise CaseError(faults) from error
 
 
-def build_surface(kind: str, values: Values, pose: Values, place: str = "surface") -> Any:
-    """Build a surface, of poses their cells.
+def build_patch(kind: str, values: Values, pose: Values, place: str = "surface") -> Any:
+    """Build a patch from its numbers; a control net may be in a file.
 
     Args:
         kind: of surface.
@@ -80,12 +79,6 @@ def build_surface(kind: str, values: Values, pose: Values, place: str = "surface
     Raises:
         CaseError: the values describe no surface, or the file cannot be used.
     """
-    make = {"grid": _grid, "poses": _poses, "mesh": _mesh, "step": _step, "piecewise": _pieces}
-    return make.get(kind, _patch)(kind, values, pose, place)
-
-
-def _patch(kind: str, values: Values, pose: Values, place: str) -> Any:
-    """A patch from its numbers; a control net may be in a file."""
     import coverable
 
     file, keys = values.get("file"), own_keys(kind)
@@ -111,92 +104,8 @@ def _patch(kind: str, values: Values, pose: Values, place: str) -> Any:
         raise CaseError(faults) from error
 
 
-def _grid(kind: str, values: Values, pose: Values, place: str) -> Any:
-    from surfaces.fitted.grid_file import read_grid
-    from surfaces.fitted.point_grid import grid
-
-    with faults_of(place, file=values["file"]):
-        return grid(read_grid(values["file"], values["units"]), **pose)
-
-
-def _poses(kind: str, values: Values, pose: Values, place: str) -> Any:
-    from surfaces.toolpaths.given import poses
-    from surfaces.toolpaths.pose_file import read_poses
-
-    with faults_of(place, file=values["file"], own=("neighbours",)):
-        points = read_poses(values["file"], values["units"])._asdict()
-        return poses(**points, neighbours=values.get("neighbours", "order"), **pose)
-
-
-def _mesh(kind: str, values: Values, pose: Values, place: str) -> Any:
-    from surfaces.meshes.selection import take_faces
-    from surfaces.meshes.sources import read_mesh
-
-    with faults_of(place, file=values["file"]):
-        triangles = read_mesh(values["file"], values.get("scale"))
-    if "faces" in values:
-        with faults_of(place, "faces"):
-            triangles = take_faces(triangles, values["faces"])
-    return _part(triangles, values, pose, place)
-
-
-def _step(kind: str, values: Values, pose: Values, place: str) -> Any:
-    from surfaces.step_files.step_surface import step_triangles
-
-    choice = {key: values[key] for key in CHOICE if key in values}
-    if "facing" in values and not {"faces", "colour"} & set(choice):
-        choice["faces"] = "all"
-    with faults_of(place, file=values["file"], own=CHOICE):
-        triangles = step_triangles(values["file"], **choice)
-    return _part(triangles, values, pose, place)
-
-
-def _part(triangles: Any, values: Values, pose: Values, place: str) -> Any:
-    """The mesh of what box, cut and facing leave of triangles, in this order."""
-    from surfaces.meshes.mesh_surface import mesh
-    from surfaces.meshes.selection import cut_box, cut_plane, faces_within_cone
-
-    parts: dict[str, Callable[[Any], Any]] = {
-        "box": lambda box: cut_box(triangles, *box),
-        "cut": lambda cut: cut_plane(triangles, cut["point"], cut["normal"]),
-        "facing": lambda at: faces_within_cone(triangles, at["direction"], at["within_deg"]),
-    }
-    for key, take in parts.items():
-        if key in values:
-            with faults_of(place, key):
-                triangles = take(values[key])
-    with faults_of(place):
-        return mesh(triangles, **pose)
-
-
-def _pieces(kind: str, values: Values, pose: Values, place: str) -> Any:
-    from surfaces.piecewise.piecewise_surface import piecewise
-
-    patches = [
-        build_surface(piece.kind, piece.values, piece.pose, f"{place}.pieces[{k}]")
-        for k, piece in enumerate(values["pieces"])
-    ]
-    with faults_of(place):
-        return piecewise(patches, gap=values.get("gap"), **pose)
-
-
-def smooth_mesh(surface: Any, smoothing: tuple[float, float]) -> Any:
-    """A copy of a mesh, smoothed over a length for a tolerance (m).
-
-    Raises:
-        CaseError: it cannot be smoothed so.
-    """
-    from surfaces.meshes.smoothing import smoothed
-    from surfaces.surface import SurfaceError
-
-    try:
-        return smoothed(surface, *smoothing)
-    except SurfaceError as error:
-        raise CaseError(Fault("task.smooth", str(error))) from error
-
-
 def cut_surface(made: Any, cells: Any, values: Values, footprint: Footprint | None) -> Any:
-    """What `build_surface` made, cut into cells.
+    """A surface, as it was built, cut into cells.
 
     Raises:
         CaseError: it cannot be cut so.

@@ -18,9 +18,8 @@ from feasibility.cases.surface_building import (
     MOST_CELLS,
     MOST_MESH_CELLS,
     Footprint,
-    build_surface,
+    build_patch,
     cut_surface,
-    smooth_mesh,
 )
 from feasibility.cases.table_reader import (
     DEG,
@@ -125,13 +124,21 @@ class SurfacePart:
         side = {} if self.side is None else {"side": self.side}
         return {**side, "position": self.position, "rpy_deg": self.rpy_deg}
 
+    def _made(self) -> Any:
+        """The surface, of poses their cells."""
+        if self.kind in PATCHES and self.kind != "grid":
+            return build_patch(self.kind, self.values, self.pose)
+        from feasibility.cases.surface_files import built
+
+        return built(self.kind, self.values, self.pose)
+
     def build(self) -> Surface:
         """Build the surface; its file, if it has one, is read.
 
         Raises:
             CaseError: the numbers or the file describe no surface.
         """
-        made = build_surface(self.kind, self.values, self.pose)
+        made = self._made()
         return made.surface if self.kind == "poses" else made
 
     def cut(
@@ -148,8 +155,10 @@ class SurfacePart:
         Raises:
             CaseError: there is no such surface, or it cannot be cut so.
         """
-        made = build_surface(self.kind, self.values, self.pose)
+        made = self._made()
         if smoothing is not None and self.kind in MESHES:
+            from feasibility.cases.surface_files import smooth_mesh
+
             made = smooth_mesh(made, smoothing)
         return cut_surface(made, self.cells, self.values, footprint)
 
@@ -215,7 +224,7 @@ def _read(section: Section, known: tuple[str, ...], whole: bool) -> SurfacePart 
         section.fault("side", f"is missing; {needs} {words}")
     if kind in PATCHES and kind != "grid" and "file" not in values and section.is_table:
         try:
-            build_surface(kind, values, pose, section.name)
+            build_patch(kind, values, pose, section.name)
         except CaseError as error:
             section.faults += error.faults
     else:

@@ -14,18 +14,15 @@ from robots.robot import Robot
 OFF, TILTED, ROLLED, NEAR = range(4)  # rows of `Judge.beyond`
 
 
-def limits(robot: Robot, rows: Array) -> tuple[float, list[MotionFault]]:
-    """The smallest distance from a limit, and the worst row that passes one; limits are convex."""
+def past_limit(robot: Robot, rows: Array) -> MotionFault:
+    """The worst row that passes a limit; there is one."""
     margins = np.minimum(rows - robot.lower, robot.upper - rows)
-    least = float(margins.min(initial=np.inf))
-    if least >= 0.0:
-        return least, []
     row, joint = np.unravel_index(np.argmin(margins), margins.shape)
-    slides = robot.prismatic[joint]
+    least, slides = float(margins[row, joint]), robot.prismatic[joint]
     by = f"{-1e3 * least:.4g} mm" if slides else f"{-np.degrees(least):.4g} deg"
     text = f"{robot.joint_names[joint]} passes its limit by {by}"
     others = int((margins < 0.0).any(axis=1).sum()) - 1
-    return least, [MotionFault(int(row), 0.0, text + _others(others, "row"))]
+    return MotionFault(int(row), 0.0, text + _others(others, "row"))
 
 
 def exact_faults(judge: Judge, wrong: Samples, noun: str) -> list[MotionFault]:

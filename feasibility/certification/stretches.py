@@ -33,12 +33,10 @@ from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.bisection import Stretches
 from feasibility.certification.jacobians import Jacobians
 from feasibility.certification.lever_bounds import peaks, second_derivatives
-from feasibility.certification.rolls.bounds import CLOSE_TO_ZERO as ROLL_CLOSE
-from feasibility.certification.rolls.bounds import frame_second_derivatives
-from feasibility.certification.rolls.held import Held
 from feasibility.certification.rows import Rows
+from feasibility.certification.tool_directions import ROLL_CLOSE, Held
 from feasibility.task import Task
-from robots.kinematics import Kinematics, reference_axes
+from robots.kinematics import Kinematics
 from robots.robot import Robot
 from surfaces.cells import Cells
 from surfaces.places.places import OffsetSurface, Places
@@ -119,7 +117,7 @@ class Judge:
         """
         self.robot, self.task, self.offset, self._curves = robot, task, offset, curves
         self._kinematics = Kinematics(robot)
-        self._held = Held.of(task, cells, offset)
+        self._held = _held(task, cells, offset)
 
     def sampled(self, row: Ints, share: Array, q: Array) -> Samples:
         """Samples at configurations q (k, n)."""
@@ -127,8 +125,7 @@ class Judge:
 
     def reference_axes(self, q: Array) -> Array:
         """(k, 3) of configurations (k, n); 0 where the roll is free."""
-        free = self.task.roll is None
-        return np.zeros((len(q), 3)) if free else reference_axes(self.robot, q)
+        return self._held.axes_x(self.robot, q)
 
     def compared(self, row: Ints, share: Array, points: Array, axes: Array, x: Array) -> Samples:
         """Samples of known tool points, axes and reference axes (k, 3).
@@ -169,10 +166,8 @@ class Judge:
         second = [
             second_derivatives(steps, slides, poses.levers, np.inf),
             second_derivatives(steps, slides, poses.sines, 1.0),
-            np.zeros(len(steps)),
+            self._held.second_derivatives(self.robot, rows, at.axes, at.x),
         ]
-        if self.task.roll is not None:
-            second[2] = frame_second_derivatives(self.robot, rows, at.axes, at.x)
         row, none = np.arange(len(steps)), np.zeros(len(steps))
         ends = at.of(row), at.of(row + 1)
         return SampledStretches(row, none, none + 1.0, *ends, np.stack(second, axis=1))
@@ -208,6 +203,17 @@ class Judge:
     def within(self, one: Samples | Bounds) -> Mask:
         """(k,) inside tolerance, cone and roll, apart from a mesh's triangles; NaN is not."""
         return np.asarray((self.beyond(one) <= 0.0).all(axis=0))
+
+
+def _held(task: Task, cells: Cells, offset: OffsetSurface) -> Held:
+    """How the tool is to be held; what judges a roll is loaded where there is a range of it."""
+    free = Held.of(task, cells, offset)
+    if task.roll is None:
+        return free
+    from feasibility.certification.rolls.held import HeldRoll
+
+    reference = task.fixed_reference(cells)
+    return HeldRoll(free.offset, free.sign, free.approach, reference, task.roll)
 
 
 def beyond(task: Task, error: Array, chord: Array, roll: Array) -> Array:

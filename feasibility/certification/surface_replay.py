@@ -7,11 +7,7 @@ direction b(x), and the roll about it, where that is limited, in its range; and 
 cell is reached at some instant. Curves between cells play no part, nor does what the motion says of
 where it is.
 
-Between rows, bounds are used (`stretches`). A stretch that they do not accept is halved: they fall
-to a quarter, and one exact configuration is added. What is wrong at an exact configuration is
-refused, and so is what is still open after many halvings.
-
-Along poses that follow a surface the same has to hold over that surface (`followed`).
+Rows and what is between them are judged in `tool_along`, along poses in `pose_replay`.
 
 Where bodies are given, they have to stay clear of each other too (`collisions`).
 """
@@ -19,27 +15,20 @@ Where bodies are given, they have to stay clear of each other too (`collisions`)
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple, TypeGuard
+from typing import TYPE_CHECKING, TypeGuard
 
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
-from feasibility.certification.bisection import bisected
-from feasibility.certification.cells_reached import (
-    Reached,
-    cells_reached,
-    in_order,
-    missed_text,
-)
+from feasibility.certification.cells_reached import cells_reached, missed_text
+from feasibility.certification.deviations import less_deviations, too_vague
 from feasibility.certification.faults import Judged, MotionFault
-from feasibility.certification.jacobians import jacobians
 from feasibility.certification.placement_margin import margin_fault, margin_of
-from feasibility.certification.refusals import exact_faults, limits, open_fault
-from feasibility.certification.stretches import Bounds, Judge, SampledStretches, Samples
+from feasibility.certification.stretches import Judge
+from feasibility.certification.tool_along import less_room, tool_along
 from feasibility.cone import angle_of
 from feasibility.task import Task
 from feasibility.verdict import Certificate
-from robots.kinematics import Kinematics
 from robots.robot import Robot
 from surfaces.cells import Cells
 from surfaces.places.offset_surfaces import offset_surface
@@ -48,10 +37,6 @@ from surfaces.surface import Surface
 if TYPE_CHECKING:
     from feasibility.collisions.problem_bodies import Bodies
     from surfaces.toolpaths.pose_surface import PoseSurface
-
-LEVELS = 26  # halvings of a segment between two rows
-MOST_SAMPLES = 1_000_000  # configurations looked at between rows
-ENOUGH = 1000  # wrong configurations, after which no more are looked for
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -98,7 +83,7 @@ def replay_over_surface(
         unknown = Certificate(len(rows) if rows.ndim else 0, np.nan, np.nan, np.nan)
         return MotionReplay(unknown, (fault,), nowhere)
     surface = _surface_of(cells, task, working)
-    vague = _too_vague(task, surface)
+    vague = too_vague(task, surface)
     if vague:
         return MotionReplay(Certificate(len(rows), np.nan, np.nan, np.nan), tuple(vague), nowhere)
     curves = None if working is not None or marks is None else _marked_curves(cells, marks)
@@ -106,10 +91,12 @@ def replay_over_surface(
     judge = Judge(robot, less_deviations(task, surface), offset, cells, curves)
     margin, faults = limits(robot, rows)
     if working is None:
-        found = _tool_along(judge, rows, cells, marks)
+        found = tool_along(judge, rows, cells, marks)
         reached = cells_reached(robot, cells, task, rows, found.samples, marks)
     else:
-        found, reached = _tool_at_work(judge, rows, cells, surface, working)
+        from feasibility.certification.pose_replay import tool_at_work
+
+        found, reached = tool_at_work(judge, rows, cells, surface, working)
         needed = _at_work(cells) if needed is None else needed
     faults += found.faults
     at = reached.cells
@@ -121,9 +108,11 @@ def replay_over_surface(
 
         faults += order_of_places(offset, found.samples, task.effective_tolerance)
         if not faults:
-            found = _with_what_follows(found, judge, rows, cells, surface)
+            from feasibility.certification.pose_replay import with_what_follows
+
+            found = with_what_follows(found, judge, rows, cells, surface)
             faults += found.faults
-    _less_room(found.room, task, reached.row[at], reached.chord[at], reached.roll[at])
+    less_room(found.room, task, reached.row[at], reached.chord[at], reached.roll[at])
     error, chord, roll = found.most.tolist()
     certificate = Certificate(
         len(rows), error, angle_of(chord), margin, max_roll=None if task.roll is None else roll
@@ -138,6 +127,16 @@ def replay_over_surface(
     return MotionReplay(certificate, tuple(faults), at)
 
 
+def limits(robot: Robot, rows: Array) -> tuple[float, list[MotionFault]]:
+    """The smallest distance from a limit, and the worst row that passes one; limits are convex."""
+    least = float(np.minimum(rows - robot.lower, robot.upper - rows).min(initial=np.inf))
+    if least >= 0.0:
+        return least, []
+    from feasibility.certification.refusals import past_limit
+
+    return least, [past_limit(robot, rows)]
+
+
 def _marked_curves(cells: Cells, marks: Ints) -> Ints | None:
     """The curve between poses that each row is said to be on; None where cells are no poses."""
     if not _is_of_poses(cells.surface):
@@ -145,30 +144,6 @@ def _marked_curves(cells: Cells, marks: Ints) -> Ints | None:
     from feasibility.certification.toolpath_order import curves_of_marks
 
     return curves_of_marks(cells, marks)
-
-
-def _among(
-    bodies: Bodies, robot: Robot, rows: Array, certificate: Certificate
-) -> tuple[Certificate, tuple[MotionFault, ...]]:
-    """The certificate with what was measured between bodies, and where these are too near."""
-    from feasibility.certification.collisions.collision_replay import collision_replay
-
-    clear = collision_replay(robot, bodies, rows)
-    return clear.added_to(certificate), clear.faults
-
-
-def _less_room(room: Array, task: Task, row: Ints, chord: Array, roll: Array) -> None:
-    """Take what is left of cone and roll behind rows (k,), where it is less, into `room` (m, 2)."""
-    if task.cone < np.pi:
-        angle = 2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0))
-        np.minimum.at(room[:, 0], row, np.maximum(task.cone - angle, 0.0))
-    if task.roll is not None:
-        np.minimum.at(room[:, 1], row, np.maximum(task.roll.half - roll, 0.0))
-
-
-def _is_of_poses(surface: Surface) -> TypeGuard[PoseSurface]:
-    """Are there poses alone, or poses over a surface?"""
-    return surface.kind == "poses"
 
 
 def _surface_of(cells: Cells, task: Task, working: Mask | None) -> Surface:
@@ -187,180 +162,19 @@ def _at_work(cells: Cells) -> Mask | None:
     return cells.surface.working if _is_of_poses(cells.surface) else None
 
 
-def _tool_at_work(
-    judge: Judge, rows: Array, cells: Cells, surface: Surface, working: Mask
-) -> tuple[_Along, Reached]:
-    """What is found where the tool works, and the cells that are reached there.
-
-    Where it does not, it must not go through the surface.
-    """
-    from feasibility.certification.followed import lifted_faults
-
-    most, faults, samples = np.zeros(3), list[MotionFault](), list[Samples]()
-    reached, room = Reached.none(len(cells)), np.full((len(rows), 2), np.inf)
-    turns = np.flatnonzero(np.diff(working)) + 1
-    for part in np.split(np.arange(len(rows)), turns):
-        if len(part) and working[part[0]]:
-            found = _tool_along(judge, rows[part])
-            most = np.maximum(most, found.most)
-            faults += [replace(each, row=each.row + part[0]) for each in found.faults]
-            samples.append(replace(found.samples, row=found.samples.row + part[0]))
-            room[part] = found.room
-            some = cells_reached(judge.robot, cells, judge.task, rows[part], found.samples)
-            new = some.cells & (some.chord < reached.chord)
-            reached.row[new] = some.row[new] + part[0]
-            reached.chord[new], reached.roll[new] = some.chord[new], some.roll[new]
-    lifted = np.flatnonzero(~(working[:-1] & working[1:])).astype(float)
-    kinematics, tolerance = Kinematics(judge.robot), judge.task.effective_tolerance
-    faults += lifted_faults(surface.wall, rows, (lifted, lifted + 1.0), kinematics, tolerance)
-    none = judge.sampled(np.zeros(0, dtype=np.int64), np.zeros(0), rows[:0])
-    return _Along(most, faults, Samples.join(none, *samples), room), reached
+def _is_of_poses(surface: Surface) -> TypeGuard[PoseSurface]:
+    """Are there poses alone, or poses over a surface?"""
+    return surface.kind == "poses"
 
 
-class _Along(NamedTuple):
-    """What is found of tool point, axis and roll along a motion."""
+def _among(
+    bodies: Bodies, robot: Robot, rows: Array, certificate: Certificate
+) -> tuple[Certificate, tuple[MotionFault, ...]]:
+    """The certificate with what was measured between bodies, and where these are too near."""
+    from feasibility.certification.collisions.collision_replay import collision_replay
 
-    most: Array
-    """(3,) bounds: m, how far the tool point is off; of |a - b|; rad of the roll."""
-    faults: list[MotionFault]
-    samples: Samples
-    """In the order of the motion, all rows among them."""
-    room: Array
-    """(m, 2) rad, how much of cone and roll is left at least from each row to the next; inf where
-    they are free, or the tool does not work."""
-
-
-def _tool_along(
-    judge: Judge, rows: Array, cells: Cells | None = None, marks: Ints | None = None
-) -> _Along:
-    """Judge tool point, axis and roll at all rows and between them."""
-    poses, x = jacobians(Kinematics(judge.robot), rows), judge.reference_axes(rows)
-    count = np.arange(len(rows))
-    at_rows = judge.compared(count, np.zeros(len(rows)), poses.points, poses.axes, x)
-    if marks is not None and cells is not None:
-        at_rows = _at_marks(judge, cells, marks, at_rows)
-    good = judge.within(at_rows)
-    faults = exact_faults(judge, at_rows.of(~good), "row")
-    stretches = judge.between_rows(rows, poses, at_rows).of(good[:-1] & good[1:])
-    most, room = np.zeros(3), np.full((len(rows), 2), np.inf)
-    more, between = _between(judge, rows, stretches, most, room)
-    samples = in_order(Samples.join(at_rows, *between))
-    np.maximum(most, _most(judge, samples), out=most)
-    _less_room(room, judge.task, samples.row, samples.chord, samples.roll)
-    return _Along(most, faults + more, samples, room)
-
-
-def _with_what_follows(
-    found: _Along, judge: Judge, rows: Array, cells: Cells, surface: PoseSurface
-) -> _Along:
-    """What is found along poses, and of what follows the surface under them over that, too.
-
-    What is lifted, or beyond the border, must not go through the surface.
-    """
-    if surface.under is None or surface.working is None:
-        return found
-    from feasibility.certification.followed import followed_parts, lifted_faults, off_surface
-
-    task = less_deviations(judge.task, surface.under)
-    over = Judge(judge.robot, task, offset_surface(surface.under, judge.offset.height), cells)
-    followed, most, room = surface.followed, found.most, found.room
-    at = off_surface(followed, found.samples)
-    kinematics, tolerance = Kinematics(judge.robot), judge.task.effective_tolerance
-    faults = lifted_faults(surface.under.wall, rows, at, kinematics, tolerance)
-    faults += _too_vague(judge.task, surface.under)
-    for part in followed_parts(judge, followed, rows, found.samples):
-        one = _tool_along(over, part.q)
-        most = np.maximum(most, one.most)
-        faults += [part.placed(fault) for fault in one.faults]
-        np.minimum.at(room, part.row, one.room)
-    return _Along(most, faults, found.samples, room)
-
-
-def _at_marks(judge: Judge, cells: Cells, marks: Ints, at: Samples) -> Samples:
-    """The samples at all rows, over their marked cells where the places found will not do."""
-    bad = np.flatnonzero(~judge.within(at) & (marks >= 0))
-    if not len(bad):
-        return at
-    aims = judge.task.targets(cells).points[marks[bad]]
-    places = judge.offset.nearest(aims, aims, 0.0)
-    some = at.of(bad)
-    tried = judge.over(places, some.row, some.share, some.points, some.axes, some.x)
-    row = np.arange(len(marks))
-    better = judge.within(tried)
-    row[bad[better]] = len(marks) + np.flatnonzero(better)
-    return Samples.join(at, tried).of(row)
-
-
-def less_deviations(task: Task, surface: Surface) -> Task:
-    """The task less what the surface may deviate from the one meant."""
-    off, leans = surface.deviations
-    if not (off or leans):
-        return task
-    tolerance = task.effective_tolerance - off - task.standoff * leans
-    cone_deg = task.cone_deg - _turn_deg(leans)
-    return replace(task, tolerance=max(tolerance, 1e-12), cone_deg=max(cone_deg, 0.0))
-
-
-def _turn_deg(leans: float) -> float:
-    """Angle between unit vectors that are so far apart."""
-    return float(np.degrees(2.0 * np.arcsin(min(leans / 2.0, 1.0))))
-
-
-def _too_vague(task: Task, surface: Surface) -> list[MotionFault]:
-    """Faults of all motions: nothing is left of tolerance or cone, so the best would be wrong."""
-    off, leans = surface.deviations
-    faults = []
-    if off + task.standoff * leans >= task.effective_tolerance:
-        known = f"targets on the surface are known to {1e3 * (off + task.standoff * leans):.4g} mm"
-        allowed = f"{1e3 * task.effective_tolerance:g} mm are allowed"
-        faults.append(MotionFault(-1, 0.0, f"{known} only, {allowed}"))
-    if _turn_deg(leans) > task.cone_deg:
-        known = f"its normals are known to {_turn_deg(leans):.4g} deg only"
-        text = f"{known}, {task.cone_deg:g} deg are allowed"
-        faults.append(MotionFault(-1, 0.0, text))
-    return faults
-
-
-def _most(judge: Judge, one: Samples | Bounds) -> Array:
-    """(3,) the most of how far tool points are off (m), of |a - b| and of the roll (rad).
-
-    Nearer to a mesh's triangles than the standoff they are off, too; further from them they are off
-    by no more than from their targets.
-    """
-    off = np.maximum(one.error, judge.task.standoff - one.facets)
-    return np.array([np.max(each, initial=0.0) for each in (off, one.chord, one.roll)])
-
-
-def _between(
-    judge: Judge, rows: Array, stretches: SampledStretches, most: Array, room: Array
-) -> tuple[list[MotionFault], list[Samples]]:
-    """Judge stretches whose ends are good, halved as needed: what is wrong, and what was looked at.
-
-    What is known where they are right goes into `most` and `room`, see `_Along`.
-    """
-    samples, wrong = list[Samples](), list[Samples]()
-
-    def decided(left: SampledStretches) -> Mask:
-        bounds = judge.bounds(left)
-        good = judge.within(bounds)
-        right = bounds.of(good)
-        np.maximum(most, _most(judge, right), out=most)
-        _less_room(room, judge.task, left.row[good], right.chord, right.roll)
-        return good
-
-    def halves(left: SampledStretches) -> SampledStretches:
-        middle = judge.middles(rows, left)
-        good = judge.within(middle)
-        samples.append(middle)
-        if not good.all():
-            wrong.append(middle.of(~good))
-        good &= sum(len(part.row) for part in wrong) <= ENOUGH
-        return left.of(good).halves(middle.of(good))
-
-    left = bisected(stretches, decided, halves, LEVELS, MOST_SAMPLES)
-    if wrong:
-        return exact_faults(judge, Samples.join(*wrong), "place"), samples
-    return [open_fault(judge, left, judge.bounds(left))] if len(left.row) else [], samples
+    clear = collision_replay(robot, bodies, rows)
+    return clear.added_to(certificate), clear.faults
 
 
 def _malformed(robot: Robot, rows: Array) -> MotionFault | None:

@@ -1,4 +1,4 @@
-"""Commands on one case: `coverable check`, `show`, `live`, `divide` and `explain`."""
+"""Further commands on one case: `coverable show`, `live`, `divide` and `explain`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from coverable.errors import CoverableError
 from feasibility.cli.command_parts import (
     STATUS,
     add_case,
@@ -15,48 +14,26 @@ from feasibility.cli.command_parts import (
     add_html,
     json_text,
     open_case,
-    write_text,
 )
 from feasibility.cli.console import print_err, print_out
+from feasibility.cli.output_files import write_text
 from feasibility.interrupts import raised
-from feasibility.safe_files import check_writable, shown_path
+from feasibility.safe_files import check_writable
 
 if TYPE_CHECKING:
-    from feasibility.cli.command_parts import OpenCase
     from feasibility.sensitivity.thresholds import Explanation
-    from feasibility.verdict import Walk
     from feasibility.viewer.live_server import Served
 
-INSIDE = "-"  # in place of a file: in the object that is printed
-STATUSES = "exit status: 0 feasible, 1 infeasible, 3 undecided, 2 bad input, 130 interrupted"
 LATER_STATUSES = """exit status: as of `coverable check`; divide: 0 every cell is in a patch,
 1 cells are left out, 3 undecided"""
 WHY_COMPLETE = {
     "divide": "a division needs 'complete': the greedy search keeps one motion only",
-    "seeds": "--seeds needs 'complete': the greedy search has a start, and no seeds",
     "explain": "thresholds need 'complete': a greedy search that fails depends on its start",
 }
 
 
 def add(subcommands: argparse._SubParsersAction) -> None:
     """Add the commands."""
-    parser = add_command(
-        subcommands, "check", check, add_case, add_html,
-        help="decide one case",
-        description="Decide one case, and report the evidence for the answer.",
-        epilog=STATUSES,
-    )  # fmt: skip
-    parser.add_argument(
-        "--witness",
-        metavar="FILE",
-        help="write the covering motion as CSV (feasible only); with --json, - puts it into the "
-        "object",
-    )
-    parser.add_argument("--save", metavar="RESULT", help="write a result file for `coverable show`")
-    parser.add_argument(
-        "--seeds", metavar="MOTION",
-        help="begin the search from a motion over this surface, or one nearby: CSV as of --witness",
-    )  # fmt: skip
     parser = subcommands.add_parser(
         "show",
         help="look at a result that `check --save` wrote, or at the faces of a STEP file",
@@ -107,63 +84,6 @@ def _add_browser(parser: argparse.ArgumentParser) -> None:
         "--no-browser", dest="browser", action="store_false",
         help="only print the address of the page",
     )  # fmt: skip
-
-
-def check(args: argparse.Namespace, began: float) -> int:
-    """`coverable check CASE`: run the search, print the verdict, write the files asked for."""
-    within = args.witness == INSIDE
-    if within and not args.json:
-        raise CoverableError("--witness -: goes with --json; give the name of a file without it")
-    witness = None if within else args.witness
-    outputs = {"--save": args.save, "--html": args.html, "--witness": witness}
-    with open_case(args, began, outputs) as opened:
-        from feasibility.checking import check as run
-        from feasibility.reports import verdict as report
-
-        case, seeds = opened.case, _seeds(args, opened)
-        loaded = opened.so_far()
-        verdict = run(*opened.setup, seeds=seeds, clock=opened.clock)
-        verdict.causes  # noqa: B018 - looked into within the time limit
-        verdict.treated  # noqa: B018 - measured within the time limit
-    if args.json:
-        found = report.as_json(verdict, loaded)
-        print_out(json_text(found | ({"witness": report.witness_json(verdict)} if within else {})))
-    else:
-        print_out(report.as_text(verdict, case, loaded))
-    if args.save is not None:
-        from feasibility.results.result_file import save_result
-
-        save_result(verdict, case, args.save)
-        print_err(f"result: {shown_path(args.save)} (`coverable show` opens it)")
-    if args.html is not None:
-        from feasibility.viewer.viewer import view
-
-        write_text(args.html, view(verdict, case.name).html(), "view")
-    if witness is not None:
-        motion = report.as_csv(verdict)
-        if motion is None:
-            why = "has no stored motion" if verdict.feasible else f"is {verdict.answer}"
-            print_err(f"--witness: nothing written to {shown_path(witness)}: this case {why}")
-        else:
-            write_text(witness, motion, "witness")
-    return STATUS[str(verdict.answer)]
-
-
-def _seeds(args: argparse.Namespace, opened: OpenCase) -> Walk | None:
-    """The motion of `--seeds`, without its marks: it may be of another case."""
-    if args.seeds is None:
-        return None
-    import numpy as np
-
-    from coverable.errors import Fault
-    from feasibility.cases.table_reader import CaseError
-    from feasibility.results.motion_file import load_motion
-    from feasibility.verdict import Walk
-
-    if opened.case.search.method != "complete":
-        raise CaseError(Fault("search.method", WHY_COMPLETE["seeds"]), opened.case.name)
-    motion = load_motion(args.seeds, opened.setup.robot)
-    return Walk(q=motion.q, cell=np.full(len(motion.q), -1))
 
 
 def show(args: argparse.Namespace, began: float) -> int:

@@ -1,4 +1,4 @@
-"""What commands have in common: arguments, the case they work on, the files they write.
+"""What commands have in common: arguments, and the case they work on.
 
 Each module of commands has a function `add(subcommands)` that declares the arguments of its
 commands beside the functions that run them, as `run(arguments, began)` with the time at which the
@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -18,7 +17,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from feasibility.cli.console import Bar, print_err
-from feasibility.safe_files import FileError, check_writable, shown_path, write_whole
+from feasibility.read_files import shown_path
 from feasibility.search_settings import Progress
 
 if TYPE_CHECKING:
@@ -165,7 +164,10 @@ def open_case(
         from feasibility.notices import CUTTING, MORE, compiling_notice
 
         case = load_case(args.case, args.settings)
-        check_outputs(outputs, args.case)
+        if any(outputs.values()):
+            from feasibility.cli.output_files import check_outputs
+
+            check_outputs(outputs, args.case)
         if only_complete and case.search.method != "complete":
             raise CaseError(Fault("search.method", only_complete), case.name)
         check_case(case)
@@ -202,44 +204,6 @@ def command_clock(
 
     make: MakeClock = getattr(args, "clock", None) or Clock
     return make(limit, progress).begin(time.monotonic() - (time.perf_counter() - began))
-
-
-def check_outputs(outputs: Mapping[str, str | None], given: str = "") -> None:
-    """Refuse outputs that cannot be written or would replace the input, before the work.
-
-    Args:
-        outputs: files by their flag, None where there is none.
-        given: what is read: a file, or the name of a built-in case.
-
-    Raises:
-        FileError: with everything that is wrong.
-    """
-    faults, taken = [], dict[str, str]()
-    for flag, path in outputs.items():
-        if path is None:
-            continue
-        try:
-            check_writable(path)
-        except FileError as error:
-            faults.append(f"{flag} {error}")
-        place = os.path.realpath(path)
-        if place in taken and os.path.realpath(os.devnull) != place:
-            faults.append(f"{flag} {shown_path(path)}: is also the file of {taken[place]}")
-        taken[place] = flag
-        if os.path.isfile(given) and os.path.exists(path) and os.path.samefile(given, path):
-            faults.append(f"{flag} {shown_path(path)}: is the input file; give another name")
-    if faults:
-        raise FileError(faults)
-
-
-def write_text(path: str, text: str, what: str) -> None:
-    """Write a file, and report it on stderr as `what`.
-
-    Raises:
-        FileError: the file cannot be written.
-    """
-    write_whole(path, lambda stream: stream.write(text.encode()))
-    print_err(f"{what}: {shown_path(path)}")
 
 
 def json_text(value: dict[str, Any]) -> str:

@@ -21,7 +21,8 @@ from feasibility.interrupts import INTERRUPTED, MESSAGE, enforcing, leave_at_onc
 
 TRACEBACK = "COVERABLE_TRACEBACK"
 MODULES = {
-    "case_commands": ("check", "show", "live", "divide", "explain"),
+    "check": ("check",),
+    "case_commands": ("show", "live", "divide", "explain"),
     "path": ("path",),
     "verify": ("verify",),
     "study_compare": ("study", "compare"),

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coverable.errors import CoverableError, Fault
-from feasibility.cli.command_parts import STATUS, json_text, numbers, positive, write_text
+from feasibility.cli.command_parts import STATUS, json_text, numbers, positive
 from feasibility.cli.console import print_err, print_out
+from feasibility.cli.output_files import write_text
 from feasibility.cli.programs import period_of, write_programs
-from feasibility.safe_files import shown_path
+from feasibility.read_files import shown_path
 
 if TYPE_CHECKING:
     from feasibility.cli.command_parts import OpenCase

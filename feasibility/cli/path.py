@@ -14,12 +14,12 @@ from feasibility.cli.command_parts import (
     json_text,
     open_case,
     positive,
-    write_text,
 )
 from feasibility.cli.console import print_err, print_out
+from feasibility.cli.output_files import write_text
 from feasibility.cli.passes import add_passes, check_passes, in_runs, passes_asked
 from feasibility.cli.programs import add_programs, check_programs, period_of, write_programs
-from feasibility.safe_files import shown_path
+from feasibility.read_files import shown_path
 
 if TYPE_CHECKING:
     from feasibility.cases.case import Case

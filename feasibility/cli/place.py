@@ -19,11 +19,12 @@ from feasibility.cli.command_parts import (
     json_text,
     open_case,
     positive,
-    write_text,
 )
 from feasibility.cli.console import print_err, print_out, with_rate
+from feasibility.cli.output_files import write_text
 from feasibility.interrupts import INTERRUPTED, MESSAGE, raised
-from feasibility.safe_files import shown_path, write_whole
+from feasibility.read_files import shown_path
+from feasibility.safe_files import write_whole
 
 if TYPE_CHECKING:
     from feasibility.cli.command_parts import OpenCase

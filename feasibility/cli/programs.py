@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from coverable.errors import CoverableError, Fault, alternatives
 from feasibility.cli.command_parts import numbers
 from feasibility.cli.console import print_err
-from feasibility.safe_files import shown_path
+from feasibility.read_files import shown_path
 
 if TYPE_CHECKING:
     from feasibility.cases.case import Case

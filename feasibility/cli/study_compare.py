@@ -12,13 +12,12 @@ from feasibility.cli.command_parts import (
     add_csv,
     add_html,
     add_workers,
-    check_outputs,
     json_text,
-    write_text,
 )
 from feasibility.cli.console import Bar, print_err, print_out, with_rate
+from feasibility.cli.output_files import check_outputs, write_text
 from feasibility.interrupts import at_leave
-from feasibility.safe_files import shown_path
+from feasibility.read_files import shown_path
 
 if TYPE_CHECKING:
     from feasibility.studies.file import Study

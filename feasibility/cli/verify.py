@@ -15,7 +15,7 @@ from feasibility.cli.command_parts import (
 )
 from feasibility.cli.console import Bar, print_out
 from feasibility.cli.passes import add_layout, check_passes, places_asked
-from feasibility.safe_files import shown_path
+from feasibility.read_files import shown_path
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

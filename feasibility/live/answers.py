@@ -20,6 +20,7 @@ from feasibility.collisions.asked_bodies import said_of
 from feasibility.live.quick_search import quick_search
 from feasibility.problem import Problem
 from feasibility.reports import verdict as report
+from feasibility.reports.missed_cells import causes_listed
 from feasibility.verdict import Verdict
 from feasibility.viewer.areas.margin_along import margin_layers
 from feasibility.viewer.areas.treated_map import area_layers
@@ -149,7 +150,7 @@ def certified(case: Case, setup: Setup, watch: Watch) -> Answer:
         paint=tuple(_painted(verdict)),
         parts=tuple(_parts(verdict, motion)),
         rows=(*rows, ("collisions", said_of(verdict.robot, verdict.task.collision))),
-        causes=tuple(report.causes_listed(verdict.causes, cells, hint="")),
+        causes=tuple(causes_listed(verdict.causes, cells, hint="")),
         q=motion.walk[0] if motion else None if known is None or not len(known) else known[0],
         motion=motion,
     )

@@ -47,6 +47,7 @@ from robots.robot import Robot
 from surfaces.cell_triangles import Triangulation, triangulation
 from surfaces.cells import Cells
 from surfaces.patches.grid_cells import GridCells
+from surfaces.patches.normal_bounds import bounds_of
 from surfaces.patches.patch import ClosedFormPatch
 from surfaces.piecewise.piece_cells import PieceCells
 
@@ -165,7 +166,7 @@ def _margins_of_patch(
 ) -> tuple[float, float]:
     """Sag (m) and turn between J-cells over a closed form."""
     d, da, length, _ = step
-    bounds = surface.bounds(height, tolerance)
+    bounds = bounds_of(surface, height, tolerance)
     if not math.isfinite(d + bounds.curvature + bounds.second_derivative):
         return math.inf, math.inf  # the offset surface folds, or a rail has no end
     return (

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from coverable.errors import alternatives
-from feasibility.safe_files import FileError, shown_path
+from feasibility.read_files import FileError, shown_path
 
 
 @dataclass(frozen=True, slots=True)

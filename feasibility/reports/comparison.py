@@ -8,8 +8,9 @@ from dataclasses import asdict
 from typing import Any
 
 from feasibility.collisions.words import checked, checked_words
+from feasibility.reports.objects_and_csv import MARGINS, csv_text
 from feasibility.reports.pages import COLOURS, page, table
-from feasibility.reports.text_and_tables import MARGINS, aligned, bodiless, csv_text, percent
+from feasibility.reports.text_and_tables import aligned, bodiless, percent
 from feasibility.sensitivity.quantities import LEAST_CONE_DEG
 from feasibility.studies.robot_comparison import Arm, Comparison
 from feasibility.version import version

@@ -9,14 +9,8 @@ from typing import Any
 from coverable.errors import counted
 from feasibility.collisions.asked_bodies import said_of
 from feasibility.collisions.words import checked
-from feasibility.reports.text_and_tables import (
-    aligned,
-    certificate_json,
-    clearance_json,
-    smooth_json,
-    smooth_text,
-    summary,
-)
+from feasibility.reports.objects_and_csv import certificate_json, clearance_json, smooth_json
+from feasibility.reports.text_and_tables import aligned, smooth_text, summary
 from feasibility.runs.pass_runs import Interruption, PassRuns
 from feasibility.runs.planning import PlannedPasses
 from feasibility.timing.sampled_trajectory import Trajectory

@@ -14,18 +14,16 @@ from feasibility.collisions.words import checked
 from feasibility.entry.ends import Ends
 from feasibility.paths.coverage import CoveragePath
 from feasibility.paths.metrics import PathFigures
+from feasibility.reports.objects_and_csv import certificate_json, clearance_json, smooth_json
 from feasibility.reports.pass_runs import passes_json, passes_text
 from feasibility.reports.text_and_tables import (
-    certificate_json,
-    clearance_json,
     clearance_text,
     placement_text,
     roll_text,
-    smooth_json,
     smooth_text,
     summary,
 )
-from feasibility.reports.verdict import as_json as verdict_json
+from feasibility.reports.verdict_json import as_json as verdict_json
 from feasibility.results.plain import plain
 from feasibility.timing.limits_used import used
 from feasibility.timing.sampled_trajectory import Trajectory

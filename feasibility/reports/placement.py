@@ -14,8 +14,10 @@ from feasibility.placement.placements import Placements
 from feasibility.placement.region import AXES, Pose
 from feasibility.placement.stations import StationPlan
 from feasibility.placement.trials import Trial
-from feasibility.reports.text_and_tables import aligned, csv_text, summary
-from feasibility.reports.verdict import CAUSES, EVIDENCE
+from feasibility.reports.missed_cells import CAUSES
+from feasibility.reports.objects_and_csv import csv_text
+from feasibility.reports.text_and_tables import aligned, summary
+from feasibility.reports.verdict import EVIDENCE
 from feasibility.verdict import Answer, CauseKind, Evidence
 from feasibility.version import version
 

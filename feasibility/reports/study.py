@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 from coverable.errors import counted
 from feasibility.cases.collision_table import CollisionPart, ObjectPart
 from feasibility.collisions.words import CHECKABLE, UNCHECKED, checked, checked_words
+from feasibility.reports.objects_and_csv import MARGINS, csv_text
 from feasibility.reports.pages import COLOURS, framed, page, table
 from feasibility.reports.study_plot import are_numbers, charts, short, worded
-from feasibility.reports.text_and_tables import MARGINS, aligned, bodiless, csv_text, percent
+from feasibility.reports.text_and_tables import aligned, bodiless, percent
 from feasibility.studies.file import Study
 from feasibility.studies.run import Row, StudyTask
 from feasibility.studies.study_outcome import merit

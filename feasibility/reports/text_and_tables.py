@@ -1,25 +1,20 @@
-"""Parts that several answers share: wrapped texts, tables, JSON objects, CSV."""
+"""Parts that several answers share as text: wrapped lines, tables, what a replay measured."""
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import re
 import textwrap
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from coverable.arrays import Array
 from coverable.errors import at_least, at_most, counted, listed
-from feasibility.results.plain import plain
+from feasibility.reports.measured import limit_margin_deg, seconds
 from feasibility.task import Task
-from feasibility.verdict import Bound, Cause, Certificate, PlacementMargin, Walk
+from feasibility.verdict import Bound, Certificate
 from robots.robot import Robot
-from surfaces.cells import Cells
 from surfaces.surface import Surface
 
 if TYPE_CHECKING:
@@ -27,7 +22,6 @@ if TYPE_CHECKING:
     from robots.shapes.link_pairs import LeftOut
 
 WIDTH = 100  # columns
-MARGINS = ("limit_deg", "limit_m", "cone_deg", "reach_m", "placement_m")
 BUILT = ("adjacent", "rigid")  # reasons that lie in how the arm is built
 _UNIT = re.compile(r"(?<=\d) (?=(?:deg|mm|m2|m/s|m|s)\b|%)")
 _UNBROKEN = "\u00a0"  # textwrap breaks at plain blanks only
@@ -50,15 +44,6 @@ def filled(head: str, text: str) -> str:
         break_on_hyphens=False,
     )
     return wrapped.replace(_UNBROKEN, " ")
-
-
-def smooth_json(surface: Surface) -> dict[str, Any]:
-    """Of a smoothed copy, over which length, how far off, and what became of that."""
-    made = surface.smoothing
-    if made is None:
-        return {}
-    counted = made.counted
-    return {"smooth": {"length_m": made.length, "off_m": made.off, "taken_off_tolerance": counted}}
 
 
 def smooth_text(surface: Surface) -> str:
@@ -89,80 +74,12 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.1f} %"
 
 
-def csv_text(rows: Iterable[Iterable[Any]]) -> str:
-    """Rows as CSV; None is an empty field."""
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
-    return text.getvalue()
-
-
-def walk_csv(robot: Robot, walk: Walk) -> str:
-    """A motion as CSV: `cell`, empty between centres, then one column per joint, rad or m.
-
-    Numbers are written so that they read back as the same numbers.
-    """
-    rows = zip(walk.cell.tolist(), walk.q.tolist(), strict=True)
-    lines = (["" if cell < 0 else cell, *map(repr, q)] for cell, q in rows)
-    return csv_text([["cell", *robot.joint_names], *lines])
-
-
-def causes_json(causes: Iterable[Cause], cells: Cells) -> list[dict[str, Any]]:
-    """Why each missed cell is missed."""
-    return [
-        {
-            "cell": list(cells.unravel(cause.cell)),
-            "cause": str(cause.kind),
-            "proved": bool(cause.proved),
-            "detail": cause.detail,
-            **({} if cause.pair is None else {"pair": list(cause.pair)}),
-            **({} if cause.clearance is None else {"clearance_m": float(cause.clearance)}),
-        }
-        for cause in causes
-    ]
-
-
-def left_out_json(one: LeftOut) -> dict[str, Any]:
-    """A pair that is not checked."""
-    found: dict[str, Any] = {"pair": [one.first, one.second], "why": one.why}
-    return found if one.rate is None else {**found, "rate": float(one.rate)}
-
-
 def left_out_text(pairs: Sequence[LeftOut]) -> str:
     """Pairs that are not checked in one line: those of the arm's build counted, others named."""
     built = Counter(one.why for one in pairs if one.why in BUILT)
     parts = [f"{number} {why}" for why, number in built.items()]
     parts += [f"{one.first} and {one.second} ({one.why})" for one in pairs if one.why not in BUILT]
     return "; ".join(parts)
-
-
-def certificate_json(certificate: Certificate) -> dict[str, Any]:
-    """What the replay of a motion measured; null where it measured nothing."""
-    found = {
-        "waypoints": int(certificate.waypoints),
-        "max_position_error_m": plain(float(certificate.max_position_error)),
-        "max_angle_deg": plain(math.degrees(certificate.max_angle)),
-    }
-    if certificate.max_roll is not None:
-        found["max_roll_deg"] = plain(math.degrees(certificate.max_roll))
-    if certificate.stops_in_place is not None:
-        found["max_speed_m_per_s"] = plain(certificate.max_speed)
-        found["stops_in_place"], found["corners"] = certificate.stops_in_place, certificate.corners
-    if certificate.min_singular_value is not None:
-        found["min_singular_value"] = plain(float(certificate.min_singular_value))
-    return found | {"placement_margin": placement_json(certificate.placement_margin)}
-
-
-def placement_json(margin: PlacementMargin | None) -> dict[str, Any] | None:
-    """Where the surface may stand; null where that is not known."""
-    if margin is None:
-        return None
-    return {
-        "position_m": float(margin.position),
-        "angle_deg": math.degrees(margin.angle),
-        "pivot": list(margin.pivot),
-        "bound_by": margin.bound_by,
-        "cell": list(margin.cell),
-    }
 
 
 def placement_text(certificate: Certificate | None) -> str:
@@ -192,34 +109,6 @@ def widening(certificate: Certificate | None) -> str:
         return ""
     wider = WIDER[margin.bound_by].format(what=margin.what)
     return f"{placement_text(certificate)}; {wider} would widen it"
-
-
-def measured_json(
-    robot: Robot, certificate: Certificate | None, q: Array | None
-) -> dict[str, Any] | None:
-    """What the replay of a motion q (m, n) measured, with limits and clearance; null without one.
-
-    The margins of prismatic joints are not among these.
-    """
-    if certificate is None:
-        return None
-    margin = plain(limit_margin_deg(robot, certificate, q))
-    found = {**certificate_json(certificate), "min_limit_margin_deg": margin}
-    return found | clearance_json(certificate)
-
-
-def limit_margin_deg(robot: Robot, certificate: Certificate, q: Array | None) -> float:
-    """Least distance of a revolute joint from its limits, degrees; inf without such limits.
-
-    The certificate's own margin mixes radians and metres where an arm has prismatic joints. Limits
-    are convex, so the waypoints q (m, n) decide.
-    """
-    if not robot.prismatic.any() and not math.isnan(certificate.min_limit_margin):
-        return math.degrees(certificate.min_limit_margin)
-    if q is None or q.ndim != 2 or q.shape[1] != robot.n:
-        return math.inf
-    margins = np.minimum(q - robot.lower, robot.upper - q)[:, ~robot.prismatic]
-    return math.degrees(float(margins.min(initial=np.inf)))
 
 
 def certificate_text(
@@ -281,22 +170,6 @@ def roll_text(certificate: Certificate, task: Task) -> str:
     return f"roll within {at_most(most, 4)} deg of {middle:.4g} deg (allowed {half:g})"
 
 
-def clearance_json(certificate: Certificate | CollisionReplay) -> dict[str, Any]:
-    """How near which pair came along a motion; no keys where collisions were not checked.
-
-    `min_clearance_m` is certified, `measured_clearance_m` the least that coal measured: the truth
-    lies between the two.
-    """
-    if certificate.min_clearance is None:
-        return {}
-    pair = certificate.nearest_pair
-    return {
-        "min_clearance_m": plain(float(certificate.min_clearance)),
-        "measured_clearance_m": plain(certificate.measured_clearance),
-        "nearest_pair": None if pair is None else list(pair),
-    }
-
-
 def clearance_text(certificate: Certificate | CollisionReplay) -> str:
     """How near which pair came along a motion; empty where that was not looked at."""
     if certificate.min_clearance is None or certificate.nearest_pair is None:
@@ -318,21 +191,6 @@ def bodiless(results: Iterable[Sequence[str]]) -> str:
     names = list(dict.fromkeys(name for unchecked in results for name in unchecked))
     remedy = "([[collision.tool]] gives a tool its body)"
     return f"; without a body, so not checked: {listed(names, 8)} {remedy}" if names else ""
-
-
-def seconds(
-    timing: Mapping[str, float], middle: Iterable[str], before_s: float
-) -> dict[str, float]:
-    """The times of an answer to microseconds; what passed before it began is loading.
-
-    Args:
-        timing: in seconds, by key.
-        middle: keys between `load_s` and `total_s`; zero where `timing` has none.
-        before_s: seconds of imports and files before.
-    """
-    found = {key: float(timing.get(key, 0.0)) for key in ("load_s", *middle, "total_s")}
-    found |= {key: found[key] + before_s for key in ("load_s", "total_s")}
-    return {key: round(value, 6) for key, value in found.items()}
 
 
 def seconds_text(timing: Mapping[str, float], phases: Mapping[str, str], before_s: float) -> str:

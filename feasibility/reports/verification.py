@@ -11,12 +11,11 @@ from coverable.arrays import Mask
 from coverable.errors import counted
 from feasibility.collisions.asked_bodies import said_of
 from feasibility.collisions.words import checked, checked_words
+from feasibility.reports.objects_and_csv import measured_json, smooth_json
 from feasibility.reports.proof import proof_json
 from feasibility.reports.text_and_tables import (
     certificate_text,
-    measured_json,
     placement_text,
-    smooth_json,
     smooth_text,
     summary,
 )

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from coverable.errors import CoverableError, shown
 from coverable.files import size
-from feasibility.safe_files import FileError, read_regular, shown_path, write_whole
+from feasibility.read_files import FileError, read_regular, shown_path
+from feasibility.safe_files import write_whole
 
 TEXT_MEMBER = "meta.json"
 LARGEST_FILE = 512 << 20  # bytes, as it lies on the disk

@@ -22,8 +22,8 @@ import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
 from coverable.errors import Fault, close, number_in, printable, shown
+from feasibility.read_files import FileError, read_text, shown_path
 from feasibility.results.trajectory_files import COMMENT, WORKING
-from feasibility.safe_files import FileError, read_text, shown_path
 from robots.robot import Robot
 
 CAP = 64 << 20  # bytes

@@ -18,6 +18,7 @@ from coverable.arrays import Array
 from coverable.errors import CoverableError, shown
 from feasibility.cases.case import Case, Setup
 from feasibility.cases.table_reader import CaseError
+from feasibility.read_files import FileError
 from feasibility.results.archive import Archive, ArchiveError, Fields, write_archive
 from feasibility.results.proof_arrays import pack_proof, unpack_proof
 from feasibility.results.result_arrays import (
@@ -39,7 +40,6 @@ from feasibility.results.result_rows import (
     read_left_out,
     read_names,
 )
-from feasibility.safe_files import FileError
 from feasibility.verdict import (
     Answer,
     Certificate,

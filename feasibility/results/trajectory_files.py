@@ -18,7 +18,8 @@ import numpy as np
 
 from coverable.errors import ArgumentError, Checks, CoverableError, Fault
 from feasibility.collisions.words import listed_words
-from feasibility.safe_files import FileError, read_text, shown_path, write_whole
+from feasibility.read_files import FileError, read_text, shown_path
+from feasibility.safe_files import write_whole
 from feasibility.timing.sampled_trajectory import Trajectory
 
 MOST_SAMPLES = 1_000_000

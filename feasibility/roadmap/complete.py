@@ -3,35 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from coverable.errors import ArgumentError, Checks, Fault
 from feasibility.clock import Clock, OutOfTime
-from feasibility.collisions.kernels.clearance import blamed, segment_clear
+from feasibility.collisions.kernels.clearance import blamed
 from feasibility.found import Found
 from feasibility.notices import REASONS, compiling_notice
 from feasibility.problem import Problem
-from feasibility.roadmap.exploration import Exploration, wound
+from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.search import close, exploration_of, seed_middle
 from feasibility.roadmap.walk import covering_walk
 from feasibility.roadmap.warmup import warm_up
 from feasibility.search_settings import Search
 from feasibility.verdict import Cause, Replay, Walk
-from robots.kinematics import Kinematics
 
 if TYPE_CHECKING:
     import networkx as nx
 
-    from feasibility.collisions.problem_bodies import Bodies
-    from feasibility.roadmap.forward.ordered_run import OrderedRun
     from feasibility.roadmap.proving import Proving
-
-IN_PLACE = 0.1  # [1] share of the tolerance within which a tool point stays over a pose
 
 
 def complete_search(
@@ -59,7 +51,9 @@ def complete_search(
         OutOfTime: a command's time ran out before the search began.
     """
     if seeds is not None:
-        _check_seeds(problem, seeds)
+        from feasibility.roadmap.seeds import check_seeds
+
+        check_seeds(problem, seeds)
     begin = None
     if problem.robot.start is not None:
         from feasibility.targets.starting import start_cell
@@ -91,17 +85,23 @@ def _search(
     late, known, run = "", None, None
     try:
         if seeds is not None and judging:
+            from feasibility.roadmap.seeds import known_motion
+
             with clock.enforced():
-                known = _known(problem, seeds)
+                known = known_motion(problem, seeds)
         if begin is not None and known is None:
-            _begin(exploration, begin, problem.bodies)
+            from feasibility.roadmap.seeds import begin_at_start
+
+            begin_at_start(exploration, begin, problem.bodies)
         ruled_out = False
         if suspects:
             from feasibility.roadmap.rounds import suspect
 
             ruled_out = suspect(exploration, suspects)
         if seeds is not None and not (search.early and known is not None) and not ruled_out:
-            _seed_cells(exploration, seeds)
+            from feasibility.roadmap.seeds import seed_cells
+
+            seed_cells(exploration, seeds)
         done = known is not None or ruled_out or exploration.complete
         if not done and not seed_middle(exploration):
             from feasibility.roadmap.proving import Proving, between_rounds
@@ -120,80 +120,7 @@ def _search(
     exploration.clock = Clock()  # graph and causes are made later, when somebody reads them
     judged = None if seeds is None or known is None else (seeds, known)
     found = _found(problem, exploration, proving, late, judged)
-    return found if run is None else _in_order(found, run, problem, exploration)
-
-
-def _check_seeds(problem: Problem, seeds: Walk) -> None:
-    """Refuse a motion of another arm, or over other cells.
-
-    Raises:
-        ArgumentError: it is one.
-    """
-    n, total = problem.robot.n, len(problem.cells)
-    checks = Checks("seeds")
-    if seeds.q.ndim != 2 or seeds.q.shape[1] != n or not np.isfinite(seeds.q).all():
-        checks.wrong("q", seeds.q.shape, f"must be (m, {n}) finite numbers, one column per joint")
-    if seeds.cell.shape != seeds.q.shape[:1] or (seeds.cell >= total).any():
-        checks.wrong("cell", seeds.cell.shape, f"must be (m,) cells below {total}, or negative")
-    checks.done()
-
-
-def _known(problem: Problem, seeds: Walk) -> Replay | None:
-    """The replay of the seeds, where they cover all cells already, marked and accepted."""
-    marked = np.isin(np.arange(len(problem.cells)), seeds.cell)
-    start = problem.robot.start
-    if start is not None and not (len(seeds.q) and np.array_equal(seeds.q[0], start)):
-        return None
-    found = _replayed(problem, seeds) if marked.all() else None
-    return found if found is not None and found.accepted else None
-
-
-def _begin(exploration: Exploration, cell: int, bodies: Bodies | None) -> None:
-    """Begin the search at the arm's start, which is over a cell.
-
-    Raises:
-        ArgumentError: bodies are nearer to each other there than they may be; or it is not over the
-            first pose of a toolpath.
-    """
-    if exploration.cells.in_order and cell != 0:
-        what = f"is over pose {cell}; a toolpath is run from its first pose, so begin there"
-        raise ArgumentError([Fault("start", what)])
-    arrays, start = exploration.arrays, np.array(exploration.robot.start)
-    if bodies is not None and not segment_clear(arrays.collisions, start, start) > 0.0:
-        raise ArgumentError([Fault("start", _collides(exploration, bodies, start))])
-    exploration.begin_at(cell, start)
-
-
-def _collides(exploration: Exploration, bodies: Bodies, start: NDArray[np.float64]) -> str:
-    """Why a start (n,) is refused: for the shapes, or for the bodies around them alone."""
-    from feasibility.certification.collisions.collision_replay import collision_replay
-
-    judged = collision_replay(exploration.robot, bodies, start[None])
-    if not judged.accepted:
-        found = "; ".join(fault.text for fault in judged.faults)
-        return f"collides, or is too near ({found}); choose another start"
-    pair = bodies.pairs[int(blamed(exploration.arrays.collisions))]
-    return (
-        f"is clear, but the convex bodies that the search puts around {pair.first} and "
-        f"{pair.second} are larger than their shapes, and collide; choose another start"
-    )
-
-
-def _seed_cells(exploration: Exploration, seeds: Walk) -> None:
-    """Seed the cells that a known motion passes, as long as the best component misses some.
-
-    Where it has no marks, the rows with the tool point nearest to each cell are taken.
-    """
-    rows = {int(seeds.cell[row]): row for row in np.flatnonzero(seeds.cell >= 0)[::-1].tolist()}
-    if not rows and len(seeds.q):
-        tips, _ = Kinematics(exploration.robot).tools(seeds.q)
-        for cell, point in enumerate(exploration.arrays.points):
-            rows[cell] = int(np.linalg.norm(tips - point, axis=1).argmin())
-    for cell, row in rows.items():
-        if exploration.complete:
-            return
-        if not exploration.covered[cell]:
-            exploration.add_seeds(cell, wound(exploration.arrays, seeds.q[row])[None])
+    return found if run is None else run.added_to(found, problem, exploration)
 
 
 def _found(
@@ -235,7 +162,7 @@ def _found(
         },
         motion=walk,
         hindered=_hindered(exploration),
-        replay=None if walk is None else lambda: known or _replayed(problem, walk),
+        replay=None if walk is None else lambda: known or problem.replayed(walk),
         accepted="One continuous motion of {waypoints} waypoints visits every cell centre; "
         f"Pinocchio's replay holds it {problem.within}, between waypoints too.",
         refused="A motion over every cell was found, but the independent replay refuses it: "
@@ -268,32 +195,3 @@ def _causes(problem: Problem, exploration: Exploration) -> tuple[Cause, ...]:
 
     with compiling_notice(notice=REASONS):
         return causes_of(exploration, proof_of(exploration), problem.pairs)
-
-
-def _in_order(found: Found, run: OrderedRun, problem: Problem, exploration: Exploration) -> Found:
-    """The same of a toolpath, all of whose poses one component covers."""
-    from feasibility.roadmap.forward.ordered_run import changes_in_place
-
-    total, walk = len(problem.cells), run.walk
-    counts = {**found.counts, "fk": int(exploration.work.counts[0])}
-    if walk is None:
-        return replace(
-            found, counts=counts, covered=run.covered(total), unfinished="",
-            exhausted=run.failed_words(total), make_causes=lambda: run.causes(total),
-        )  # fmt: skip
-    near = IN_PLACE * problem.task.effective_tolerance
-    counts["in_place"] = changes_in_place(problem.robot, exploration.arrays.points, walk, near)
-    return replace(
-        found, counts=counts, start=0, motion=walk, replay=partial(_replayed, problem, walk),
-        accepted=f"One motion of {{waypoints}} waypoints runs the {total} poses in order, without "
-        f"going back; {counts['in_place']} times it changes the posture in place. Pinocchio's "
-        f"replay holds it {problem.within}, between waypoints too.",
-    )  # fmt: skip
-
-
-def _replayed(problem: Problem, walk: Walk) -> Replay:
-    """Replay the walk: it must visit every cell, whatever the search recorded as covered."""
-    from feasibility.certification.motion_replay import replay
-
-    needed = np.ones(len(problem.cells), dtype=bool)
-    return replay(problem.robot, problem.cells, problem.task, walk, needed)

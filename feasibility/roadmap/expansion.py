@@ -1,4 +1,4 @@
-"""How the roadmap grows: seeds, spreading over the surface, self-motions, closing pairs, bridges.
+"""How the roadmap grows: seeds, spreading over the surface, closing pairs; see `connecting`, too.
 
 The motions are those of `feasibility.roadmap.motions`, compiled and certified; here is which of
 them are tried, and what comes of them.
@@ -13,7 +13,7 @@ import numpy as np
 
 from coverable.arrays import Array, Ints
 from feasibility.roadmap.graph import Blocked, Roadmap
-from feasibility.roadmap.motions.aiming import aim, look_at, stand_still
+from feasibility.roadmap.motions.aiming import look_at
 from feasibility.roadmap.motions.arrays import SearchArrays
 from feasibility.roadmap.motions.off_target import project_near_cell
 from feasibility.roadmap.motions.projection import PROJECTION_STEPS
@@ -22,9 +22,7 @@ from feasibility.roadmap.motions.tracking import track
 from feasibility.roadmap.motions.working_memory import NEXT, Work, place
 
 MOST_FAILURES = 12  # failed connections after which a pair of components is left alone
-PATIENCE = 60  # the same for `explore_self_motions`
 MOST_RIVALS = 6  # other components that a new configuration tries to join, the nearest first
-AIM_STEPS = 30  # Newton steps that project a random configuration
 UNTRIED, JOINED, APART = range(3)
 """Of a pair of neighbouring cells: no motion was looked for, there is one, none was found."""
 
@@ -157,34 +155,6 @@ class Grower:
             code, joint = self.work.stop_reason.tolist()
             roadmap.blocked[cell] = Blocked(code, joint, own)
 
-    def explore_self_motions(self, cell: int, guesses: Array) -> None:
-        """Explore the self-motion manifold over one cell, and join the components it connects.
-
-        A rapidly exploring random tree for each component: the node nearest to a random
-        configuration of the manifold moves towards it as far as it can, and from there tries to
-        join the other components. New nodes are queued, because they may reach a neighbouring cell
-        that the old ones could not.
-        """
-        roadmap = self.roadmap
-        for guess in guesses:
-            goal, passed = guess.copy(), set[int]()
-            if not project_near_cell(self.arrays, self.work, cell, goal, AIM_STEPS):
-                continue
-            for _ in range(MOST_RIVALS):
-                node = roadmap.nearest(cell, goal, passed)
-                if node is None:
-                    break
-                own = roadmap.root_of(node)
-                passed.add(own)
-                motion, _ = self.connect(cell, roadmap.q[node], goal)
-                if len(motion) < 2:
-                    continue
-                new = self.add_node(cell, motion[-1], own)
-                roadmap.add_edge(node, new, motion)
-                joined = self.join(cell, motion[-1], own, PATIENCE)
-                if joined is not None:
-                    roadmap.add_edge(new, *joined)
-
     def close_pairs(self, pairs: Ints, state: Ints, root: int) -> None:
         """Connect every two neighbouring cells inside one component by a motion of their own.
 
@@ -221,34 +191,3 @@ class Grower:
             return False
         roadmap.add_edge(a, self.add_node(roadmap.cell[b], motion[-1], root), motion)
         return True
-
-    def bridge(self, x: int, y: int, curve: int, share: float) -> bool:
-        """Try to connect two nodes over neighbouring cells at a point of the curve between them.
-
-        Two sheets of configurations (two flips of a wrist, say) may touch only where the arm passes
-        a singularity, and the target of that singularity may lie between the centres. So both nodes
-        are tracked to that point, and a self-motion is tried there.
-
-        Args:
-            x, y: the nodes.
-            curve: the curve between their cells.
-            share: parameter of the point on it, in [0, 1].
-
-        Returns:
-            True when an edge was added.
-        """
-        roadmap = self.roadmap
-        starts = (0.0, 1.0) if roadmap.cell[x] < roadmap.cell[y] else (1.0, 0.0)
-        there = self.track(curve, (starts[0], share), roadmap.q[x])
-        back = None if there is None else self.track(curve, (starts[1], share), roadmap.q[y])
-        if there is None or back is None:
-            return False
-        aim(self.arrays, self.work, curve, share)
-        stand_still(self.arrays, self.work)
-        between, reached = connect(self.arrays, self.work, there[-1], back[-1])
-        if not reached:
-            between, reached = connect(self.arrays, self.work, back[-1], there[-1])
-            between = np.vstack([between[-2::-1], back[-1]])
-        if reached:
-            roadmap.add_edge(x, y, np.vstack([there, between, back[-2::-1], roadmap.q[y]]))
-        return reached

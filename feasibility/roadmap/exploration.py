@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -24,12 +24,8 @@ from surfaces.cells import Cells
 if TYPE_CHECKING:
     from feasibility.cut_tree import CutTree
     from feasibility.roadmap.blockers import Blockers
-    from feasibility.roadmap.branch_and_bound.branching import Boxes
 
 BUDGET = 8_000  # evaluations of the arm between two checks of the clock
-GUESSES = 4  # of one `explore_self_motions`
-BRIDGES = 6  # pairs of nodes that one round tries to bridge
-NARROWEST, WIDEST = 0.1, 0.9  # [1] of the curve between two centres: where a bridge is tried
 
 
 @dataclass
@@ -132,21 +128,6 @@ class Exploration:
         return not bool(self.covered[self.reached].all())
 
     @property
-    def improvable(self) -> bool:
-        """Could motions along the curves between centres gain anything?
-
-        Not where some component covers all that is reached of each part of the surface, as these
-        curves join it: over a sharp crease, or from one piece to another that it does not touch,
-        there is no motion.
-        """
-        reached = self.reached
-        if self.parts.max(initial=0) == 0:
-            return self.apart
-        cover = self.roadmap.covers(self.roots())
-        parts = [(self.parts == part) & reached for part in range(self.parts.max() + 1)]
-        return not all(cover[:, part].all(axis=1).any() for part in parts if part.any())
-
-    @property
     def n_edges(self) -> int:
         """Neighbouring pairs of cells with a motion between them, found by `close`."""
         return int((self.pairs == JOINED).sum())
@@ -244,28 +225,6 @@ class Exploration:
                 break
         return found
 
-    def explore_self_motions(self, cell: int) -> None:
-        """Explore the self-motion manifold over one cell and spread the new nodes."""
-        self.grower.explore_self_motions(cell, self.guesses(GUESSES))
-        self.spread()
-
-    def bridge(self, one: int, other: int, most: int = BRIDGES) -> None:
-        """Try to bridge two components between cell centres, the nearest nodes first."""
-        tries = 0
-        nodes = self.roadmap.nearest_neighbours(self.cells.pairs, one, other)
-        for x, y in nodes[: 2 * most * (1 + self.rounds)]:
-            if self.tried.get((x, y), 0) > self.rounds // 4:
-                continue
-            self.tried[x, y] = self.tried.get((x, y), 0) + 1
-            share = float(self.rng.uniform(NARROWEST, WIDEST))
-            curve = self.curve(self.roadmap.cell[x], self.roadmap.cell[y])
-            if self.grower.bridge(x, y, curve, share):
-                self.spread()
-                return
-            tries += 1
-            if tries == most:
-                return
-
     def curve(self, cell: int, other: int) -> int:
         """The curve between two neighbouring cells."""
         return dict(self.neighbours[cell])[other]
@@ -283,52 +242,3 @@ class Exploration:
             if roadmap.cell[y] in beside and roadmap.root_of(x) == root:
                 state[beside[roadmap.cell[y]]] = JOINED
         self.grower.close_pairs(self.cells.pairs, state, root)
-
-    def border(self, component: int) -> Ints:
-        """Cells of a component with a neighbour that it does not cover."""
-        inside = self.covers(component)
-        indptr, indices = self.cells.neighbours
-        owners = np.repeat(np.arange(len(self.cells)), np.diff(indptr))
-        return np.unique(owners[inside[owners] & ~inside[indices]])
-
-    def tool_collides(self, cell: int) -> bool:
-        """Is it proved that the tool collides in every pose over a cell? Sets its ruling."""
-        tick = partial(self.tick, "proving that the tool collides")
-        if self.blockers is None or not self.blockers.tool_collides(self.arrays, cell, tick):
-            return False
-        self.rulings[cell] = Ruling.PROVED
-        return True
-
-    def prove_collisions(self, cell: int) -> None:
-        """Try to prove that something of the arm collides wherever the tool is over a cell."""
-        if self.blockers is None:
-            return
-        text, left = "proving that the arm collides", self.blockers.left
-        if self.blockers.arm_collides(self.arrays, self.work, cell, partial(self.tick, text)):
-            self.rulings[cell] = Ruling.PROVED
-        self.tick(text, left - self.blockers.left)
-
-    def rule(self, cell: int, boxes: Boxes, most: int) -> Ruling:
-        """Branch and bound on one cell; a configuration that it finds becomes a seed."""
-        from feasibility.roadmap.branch_and_bound.branching import rule
-
-        ruling, examined = Ruling.OPEN, int(boxes.counts[1])
-        while ruling is Ruling.OPEN and boxes.counts[1] < most:
-            budget = self.clock.affordable(min(most, BUDGET))
-            ruling, q = rule(self.arrays, self.work, cell, boxes, budget)
-            self.tick("proving cells out of reach")
-        self.boxes += int(boxes.counts[1]) - examined
-        self.rulings[cell] = ruling
-        # A box left undecided is mostly at the border of the tolerance: a good start for Newton.
-        # (Boxes of a prismatic joint without limits have no middle.)
-        if ruling in (Ruling.REACHED, Ruling.UNKNOWN) and np.isfinite(q).all():
-            self.add_seeds(cell, wound(self.arrays, q)[None])
-        return ruling
-
-
-def wound(arrays: SearchArrays, q: Array) -> Array:
-    """(n,) the same placement of the arm, with windings that bring joints inside their limits."""
-    turn = np.where(arrays.chain.prismatic, 0.0, 2.0 * np.pi)
-    q = q + turn * np.ceil(np.maximum(arrays.lower - q, 0.0) / (2.0 * np.pi))
-    q = q - turn * np.ceil(np.maximum(q - arrays.upper, 0.0) / (2.0 * np.pi))
-    return np.clip(q, arrays.lower, arrays.upper)  # rounding

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from feasibility.roadmap.exploration import Exploration, wound
+from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.refinement import COARSE, FINE, refine
 from feasibility.roadmap.rounds import restart
+from feasibility.roadmap.seeds import wound
 from feasibility.task import Task
 from surfaces.surface import SurfaceError
 

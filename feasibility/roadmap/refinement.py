@@ -16,6 +16,7 @@ import numpy as np
 
 from coverable.arrays import Array, Ints
 from feasibility.clock import Clock
+from feasibility.roadmap.connecting import bridge, improvable
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import Roadmap
 from feasibility.roadmap.motions.arrays import arrays_of
@@ -60,14 +61,14 @@ def _search_over(exploration: Exploration, task: Task, finer: Finer) -> None:
     arrays = arrays_of(exploration.robot, finer.cells, task)
     arrays = arrays._replace(off_target_cost=exploration.arrays.off_target_cost)
     fine = Exploration(exploration.robot, finer.cells, arrays, exploration.seed)
-    if not exploration.improvable and fine.parts.max() == exploration.parts.max():
+    if not improvable(exploration) and fine.parts.max() == exploration.parts.max():
         return  # the finer curves pass where the others do not either
     fine.clock = _Budget(exploration, fine)
     origin = _copy_nodes(exploration, fine, finer.same)
     try:
         fine.spread()
         idle = 0 if _take_over(exploration, fine, finer.same, origin) else 1
-        while exploration.apart and fine.improvable and idle <= BRIDGING_ROUNDS + ROUNDS:
+        while exploration.apart and improvable(fine) and idle <= BRIDGING_ROUNDS + ROUNDS:
             fine.rounds += 1
             if idle > BRIDGING_ROUNDS:
                 improve(fine, fine.roots()[:MOST])
@@ -111,7 +112,7 @@ def _bridge(fine: Exploration) -> None:
         one, other = (fine.roadmap.root(root) for root in (a, b))
         if one != other:
             fine.tick("bridging components in finer cells")
-            fine.bridge(one, other, BRIDGES)
+            bridge(fine, one, other, BRIDGES)
 
 
 def _copy_nodes(exploration: Exploration, fine: Exploration, same: Ints) -> dict[int, int]:

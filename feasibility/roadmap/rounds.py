@@ -13,17 +13,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from coverable.arrays import Ints
+from feasibility.roadmap.branch_and_bound.branching import Boxes, root_box
+from feasibility.roadmap.branch_and_bound.branching import rule as examine_cell
 from feasibility.roadmap.branch_and_bound.ruling import Ruling
+from feasibility.roadmap.connecting import border, bridge, explore_self_motions, improvable
 from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.rulings import prove_collisions, rule, tool_collides
 from feasibility.roadmap.search import PIVOT_SEEDS, seed_middle
-
-if TYPE_CHECKING:
-    from feasibility.roadmap.branch_and_bound.branching import Boxes
 
 TOP = 5  # components that a round works on
 RESTARTS = 6  # cells seeded anew before a search counts as exhausted
@@ -67,16 +67,14 @@ def go_on(exploration: Exploration, between: Between | None) -> None:
 
 def suspect(exploration: Exploration, cells: Collection[int]) -> bool:
     """Is one of a few cells proved uncoverable, by what is cheapest to try?"""
-    from feasibility.roadmap.branch_and_bound.branching import root_box, rule
-
     arrays, robot = exploration.arrays, exploration.robot
     distance = robot.distance_from_base(arrays.points[list(cells)])
     for cell, away in zip(cells, distance.tolist(), strict=True):
         if away > robot.reach + arrays.tolerance:
             exploration.rulings[cell] = Ruling.PROVED
-        elif not exploration.tool_collides(cell):
+        elif not tool_collides(exploration, cell):
             boxes = root_box(arrays)
-            ruled, _ = rule(arrays, exploration.work, cell, boxes, FIRST_BOXES)
+            ruled, _ = examine_cell(arrays, exploration.work, cell, boxes, FIRST_BOXES)
             exploration.boxes += int(boxes.counts[1])
             if ruled is Ruling.PROVED:
                 exploration.rulings[cell] = ruled
@@ -87,8 +85,6 @@ def suspect(exploration: Exploration, cells: Collection[int]) -> bool:
 
 def _unreached(exploration: Exploration) -> None:
     """Step 7: a ruling on every cell that no component has reached."""
-    from feasibility.roadmap.branch_and_bound.branching import root_box
-
     distance = exploration.robot.distance_from_base(exploration.arrays.points)
     beyond = distance > exploration.robot.reach + exploration.arrays.tolerance
     for cell in np.flatnonzero(beyond).tolist():
@@ -106,17 +102,17 @@ def _unreached(exploration: Exploration) -> None:
             break
         if exploration.early and exploration.proved:
             return
-        if exploration.tool_collides(cell):
+        if tool_collides(exploration, cell):
             continue
         boxes = root_box(exploration.arrays)
-        if exploration.rule(cell, boxes, FIRST_BOXES) is Ruling.OPEN:
+        if rule(exploration, cell, boxes, FIRST_BOXES) is Ruling.OPEN:
             if exploration.add_seeds(cell, exploration.guesses(NEWTON_STARTS)) == 0:
                 open_boxes[cell] = boxes
         elif exploration.rulings[cell] is Ruling.UNKNOWN:
             exploration.add_seeds(cell, exploration.guesses(NEWTON_STARTS))
     for cell, boxes in open_boxes.items():
         if not exploration.reached[cell]:
-            exploration.rule(cell, boxes, MORE_BOXES)
+            rule(exploration, cell, boxes, MORE_BOXES)
     if exploration.proved:
         return
     _at_the_target(exploration)
@@ -127,7 +123,7 @@ def _unreached(exploration: Exploration) -> None:
     left = [cell for cell in open_boxes if not exploration.reached[cell]]
     left = [cell for cell in left if exploration.rulings[cell] is Ruling.OPEN]
     for cell in sorted(left, key=lambda cell: -distance[cell])[:DEEP_CELLS]:
-        if exploration.rule(cell, open_boxes[cell], DEEP_BOXES) is Ruling.PROVED:
+        if rule(exploration, cell, open_boxes[cell], DEEP_BOXES) is Ruling.PROVED:
             return
 
 
@@ -137,8 +133,6 @@ def _at_the_target(exploration: Exploration) -> None:
     Up to here the cone had to hold at the tool point's own closest point on the surface too. Where
     the tool point is off its target by much of the tolerance, that may leave nothing of the cone.
     """
-    from feasibility.roadmap.branch_and_bound.branching import root_box
-
     left = [
         cell
         for cell, ruling in exploration.rulings.items()
@@ -151,7 +145,7 @@ def _at_the_target(exploration: Exploration) -> None:
         if not exploration.reached[cell]:
             exploration.add_seeds(cell, exploration.guesses(NEWTON_STARTS))
         if not exploration.reached[cell]:
-            exploration.rule(cell, root_box(exploration.arrays), MORE_BOXES)
+            rule(exploration, cell, root_box(exploration.arrays), MORE_BOXES)
 
 
 def _where_the_arm_collides(exploration: Exploration) -> None:
@@ -167,7 +161,7 @@ def _where_the_arm_collides(exploration: Exploration) -> None:
         if ruling in (Ruling.REACHED, Ruling.UNKNOWN) and not exploration.reached[cell]
     ]
     for cell in evenly(np.array(open_, dtype=np.int64))[:ARM_CELLS].tolist():
-        exploration.prove_collisions(cell)
+        prove_collisions(exploration, cell)
 
 
 def evenly(cells: Ints) -> Ints:
@@ -189,7 +183,7 @@ def _rounds(exploration: Exploration, between: Between | None) -> None:
         roots = exploration.roots()
         if not roots or not exploration.apart:
             return  # the best component covers every cell that any component covers
-        if exploration.improvable:
+        if improvable(exploration):
             _round(exploration, roots[:TOP])
         exploration.rounds += 1
         idle += 1
@@ -227,9 +221,9 @@ def improve(exploration: Exploration, components: list[int]) -> None:
         if exploration.complete:
             return
         exploration.tick("exploring self-motions at borders")
-        border = exploration.border(component)
-        if len(border):
-            exploration.explore_self_motions(int(rng.choice(border)))
+        edge = border(exploration, component)
+        if len(edge):
+            explore_self_motions(exploration, int(rng.choice(edge)))
     for a in range(len(components)):
         for b in range(a):
             one, other = (exploration.roadmap.root(components[k]) for k in (a, b))
@@ -237,12 +231,12 @@ def improve(exploration: Exploration, components: list[int]) -> None:
             if one == other or (len(components) > 3 and rng.random() > 0.3):
                 continue
             exploration.tick("bridging components")
-            exploration.bridge(one, other)
+            bridge(exploration, one, other)
             shared = np.flatnonzero(exploration.covers(one) & exploration.covers(other))
             if exploration.complete:
                 return
             if len(shared):
-                exploration.explore_self_motions(int(rng.choice(shared)))
+                explore_self_motions(exploration, int(rng.choice(shared)))
 
 
 def restart(exploration: Exploration) -> None:

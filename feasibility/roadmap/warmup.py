@@ -58,11 +58,12 @@ def _look_for_reasons() -> None:
     from feasibility.roadmap.motions.arrays import arrays_of
     from feasibility.roadmap.proving import Proving
     from feasibility.roadmap.rounds import explore
+    from feasibility.roadmap.rulings import rule
 
     robot, cells, task = _two_cells((0.7, 0.72))
     exploration = Exploration(robot, cells, arrays_of(robot, cells, task), 0)
     explore(exploration)
-    exploration.rule(0, root_box(exploration.arrays), 1)
+    rule(exploration, 0, root_box(exploration.arrays), 1)
     Proving(exploration, task).attempt(1)
     diagnose(exploration, 0)
     robot, cells, task = _two_cells((5.0, 5.02))

@@ -9,7 +9,7 @@ import numpy as np
 
 from coverable.arrays import Mask
 from coverable.errors import counted
-from feasibility.certification.surface_replay import less_deviations
+from feasibility.certification.deviations import less_deviations
 from feasibility.checking import check
 from feasibility.clock import Clock
 from feasibility.search_settings import Search

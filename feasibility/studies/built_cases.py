@@ -16,7 +16,8 @@ from coverable.files import stamps
 from feasibility.cases.case import TABLES, Case
 from feasibility.cases.robot_table import read_robot
 from feasibility.cases.surface_reading import read_surface
-from feasibility.cases.toml import parse_toml, toml_document
+from feasibility.cases.toml import parse_toml
+from feasibility.cases.toml_text import toml_document
 from feasibility.clock import Clock
 from feasibility.studies.case_files import files_of_arm
 from feasibility.studies.pool import Tables

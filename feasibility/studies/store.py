@@ -18,7 +18,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from coverable.files import FileFault, open_regular
-from feasibility.safe_files import FileError, check_writable, shown_path
+from feasibility.read_files import FileError, shown_path
+from feasibility.safe_files import check_writable
 from feasibility.studies.stored import json_object
 
 MAGIC = b"SQLite format 3\0"

@@ -42,6 +42,7 @@ def cause_counts(verdict: Verdict) -> CauseCounts:
         kinds = [cause.kind for cause in verdict.causes]
         return CauseCounts(_counted(kinds), len(kinds))
     from feasibility.roadmap.causes.diagnosis import cause_of
+    from feasibility.roadmap.rulings import tool_collides
     from feasibility.roadmap.search import exploration_of
 
     robot, cells, task = verdict.robot, verdict.cells, verdict.task
@@ -56,7 +57,7 @@ def cause_counts(verdict: Verdict) -> CauseCounts:
     pairs = () if bodies is None else bodies.pairs
     few = lost[np.unique(np.linspace(0, len(lost) - 1, EXAMINED).round().astype(np.int64))]
     for cell in few.tolist():
-        exploration.tool_collides(cell)
+        tool_collides(exploration, cell)
     examined = [cause_of(exploration, cell, pairs) for cell in few.tolist()]
     away = np.linalg.norm(cells.centres[lost][:, None] - cells.centres[few], axis=2)  # (L, E)
     kinds += [examined[int(k)].kind for k in away.argmin(axis=1)]

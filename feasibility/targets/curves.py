@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
-from feasibility.targets.direction_cubics import approach_curves
 from feasibility.task import Task
 from surfaces.cells import Cells
 from surfaces.places.offset_surfaces import offset_surface
@@ -157,14 +156,17 @@ def _target_curves(cells: Cells, task: Task) -> TargetCurves:
     if cells.surface.mean_edge_length > 0.0:
         _see_facets(cells, standoff, tolerance, deviations)
     curvature, at_centre = _normal_curvature(cells, standoff, tolerance)
-    others = approach_curves(cells, task)
-    if others is not None:  # the target stays on the normal, but the tool is held otherwise
+    along_normals = task.along_normals(cells)
+    if not along_normals:  # the target stays on the normal, but the tool is held otherwise
+        from feasibility.targets.direction_cubics import approach_curves
+
+        others = approach_curves(cells, task)
         cubics[..., 3:] = others.cubics
         derivative_bounds[:, 1] = others.derivative_bounds[:, 1]
         deviations[:, 1] = others.deviations
         curvature, at_centre = np.zeros_like(curvature), 0.0
     derivative_bounds[np.repeat(folded, np.diff(curves.first))] = np.inf
-    if len(cells.pairs) and others is None:
+    if len(cells.pairs) and along_normals:
         ends = np.concatenate([curves.first[:-1][~folded], curves.first[1:][~folded] - 1])
         at_centre = float(curvature[ends].max(initial=0.0))
     frames = None

@@ -69,17 +69,15 @@ def _derivative_bounds(cubics: Array, counts: Ints) -> Array:
     return ROUNDING * both
 
 
-def approach_curves(cells: Cells, task: Task) -> DirectionCurves | None:
-    """The approach direction along the curves where it is not the normal; None where it is."""
+def approach_curves(cells: Cells, task: Task) -> DirectionCurves:
+    """The approach direction along the curves where it is not the normal."""
     fixed = task.fixed_approach(cells)
-    if fixed is not None:
-        pieces, curves = len(cells.curves.cubics), len(cells.curves)
-        cubics = np.zeros((pieces, 4, 3))
-        cubics[:, 0] = fixed
-        return DirectionCurves(cubics, np.zeros((pieces, 2)), np.zeros(curves))
-    if cells.approaches is None or task.along_normals(cells):
-        return None
-    from surfaces.toolpaths.arcs import arc_at
+    if fixed is None:
+        from surfaces.toolpaths.arcs import arc_at
 
-    ends = cells.approaches[cells.pairs]
-    return fitted(cells, lambda curve, t: arc_at(ends[curve, 0], ends[curve, 1], t)[0], ends)
+        ends = task.approaches(cells)[cells.pairs]
+        return fitted(cells, lambda curve, t: arc_at(ends[curve, 0], ends[curve, 1], t)[0], ends)
+    pieces, curves = len(cells.curves.cubics), len(cells.curves)
+    cubics = np.zeros((pieces, 4, 3))
+    cubics[:, 0] = fixed
+    return DirectionCurves(cubics, np.zeros((pieces, 2)), np.zeros(curves))

@@ -21,12 +21,12 @@ from robots.urdf.link_shapes import (
     read_collisions,
     read_visuals,
 )
-from robots.urdf.mesh_folders import MeshFolders
 from robots.urdf.tree import read_links, read_tree, refuse_other_formats
 from robots.urdf.xml import Faults, Node, UrdfError, is_xacro, parse_xml, read_bytes, shown
 
 if TYPE_CHECKING:
     from robots.urdf.axes import Axis
+    from robots.urdf.mesh_folders import MeshFolders
 
 MAX_WARNINGS = 100
 
@@ -153,9 +153,17 @@ def checked_tree(
     joints = read_tree(robot, links, faults)
     if faults.errors:
         raise UrdfError(faults.errors, path)
-    mesh_folders = MeshFolders(base_dir, folders)
-    visuals, visual_faults = read_visuals(robot, mesh_folders, faults)
-    collisions = read_collisions(robot, mesh_folders, faults)
+    places: list[MeshFolders] = []  # one, once a mesh is named
+
+    def resolve(name: str) -> str:
+        if not places:
+            from robots.urdf.mesh_folders import MeshFolders
+
+            places.append(MeshFolders(base_dir, folders))
+        return places[0].resolve(name)
+
+    visuals, visual_faults = read_visuals(robot, resolve, faults)
+    collisions = read_collisions(robot, resolve, faults)
     parents = {joint.parent for joint in joints}
     root = next(iter(set(links) - {joint.child for joint in joints}))
     names = (root, *(joint.child for joint in joints))
@@ -175,5 +183,5 @@ def checked_tree(
         collisions=collisions,
         warnings=(*faults.warnings[:MAX_WARNINGS], *more),
         package_dirs=folders,
-        mesh_paths=tuple(mesh_folders.tried),
+        mesh_paths=tuple(path for place in places for path in place.tried),
     )

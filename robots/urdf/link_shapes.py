@@ -17,7 +17,6 @@ import numpy as np
 from coverable.arrays import Array
 from coverable.errors import Fault, listed, worded
 from robots.poses import about_fixed_axes
-from robots.urdf.mesh_folders import MeshFolders
 from robots.urdf.xml import BadValue, Faults, Node, Triple, numbers, shown, triple
 
 
@@ -63,6 +62,8 @@ class Sphere:
 
 
 Geometry = MeshFile | Box | Cylinder | Capsule | Sphere
+Resolve = Callable[[str], str]
+"""The file that a mesh name refers to, see `MeshFolders.resolve`."""
 
 
 def mesh_paths(shapes: Iterable[LinkShape]) -> list[str]:
@@ -70,7 +71,7 @@ def mesh_paths(shapes: Iterable[LinkShape]) -> list[str]:
     return [shape.geometry.path for shape in shapes if isinstance(shape.geometry, MeshFile)]
 
 
-def read_shape(node: Node, folders: MeshFolders) -> tuple[Array, Geometry]:
+def read_shape(node: Node, resolve: Resolve) -> tuple[Array, Geometry]:
     """The frame (4, 4) m of a shape in its link's frame, write-protected, and the shape.
 
     Raises:
@@ -83,7 +84,7 @@ def read_shape(node: Node, folders: MeshFolders) -> tuple[Array, Geometry]:
     try:
         xyz = triple(origin_node, "xyz", (0.0, 0.0, 0.0))
         rpy = triple(origin_node, "rpy", (0.0, 0.0, 0.0))
-        geometry = _geometry(shapes[0], folders)
+        geometry = _geometry(shapes[0], resolve)
     except KeyError as missing:
         raise _unusable(shapes[0].tag, f"has no {missing.args[0]}") from None
     origin = np.eye(4)
@@ -93,7 +94,7 @@ def read_shape(node: Node, folders: MeshFolders) -> tuple[Array, Geometry]:
     return origin, geometry
 
 
-def _geometry(shape: Node, folders: MeshFolders) -> Geometry:
+def _geometry(shape: Node, resolve: Resolve) -> Geometry:
     if shape.tag == "mesh":
         name = shape.attributes["filename"]
         x, y, z = triple(shape, "scale", (1.0, 1.0, 1.0))
@@ -101,7 +102,7 @@ def _geometry(shape: Node, folders: MeshFolders) -> Geometry:
             what = "has scale 0; write factors that are not zero"
             raise BadValue(Fault(f"mesh {shown(name)}", what))
         try:
-            return MeshFile(folders.resolve(name), (x, y, z))
+            return MeshFile(resolve(name), (x, y, z))
         except BadValue as bad:
             raise BadValue(Fault(f"mesh {shown(name, 200)}", str(bad))) from None
     if shape.tag == "box":
@@ -170,7 +171,7 @@ class CollisionShapes:
 
 
 def read_visuals(
-    robot: Node, folders: MeshFolders, faults: Faults
+    robot: Node, resolve: Resolve, faults: Faults
 ) -> tuple[tuple[LinkShape, ...], tuple[ShapeFault, ...]]:
     """Every visual that can be drawn, and the others; these become warnings too, one a reason."""
     colours = {
@@ -188,7 +189,7 @@ def read_visuals(
         return rgba
 
     nodes = [(link, node) for link in robot.all("link") for node in link.all("visual")]
-    visuals, unusable = _read(nodes, folders, colour)
+    visuals, unusable = _read(nodes, resolve, colour)
     if len(nodes) > MAX_SHAPES:
         faults.warnings.append(f"not drawn: {len(nodes) - MAX_SHAPES:,} shapes over {MAX_SHAPES:,}")
     problems: dict[str, dict[str, str]] = {}  # reason -> shape -> shape and its first link
@@ -202,7 +203,7 @@ def read_visuals(
     return visuals, unusable
 
 
-def read_collisions(robot: Node, folders: MeshFolders, faults: Faults) -> CollisionShapes:
+def read_collisions(robot: Node, resolve: Resolve, faults: Faults) -> CollisionShapes:
     """Every collision shape, what is wrong with others, and the links that are meant to have none.
 
     A <link> with the attribute collision="none" is left without collision shapes on purpose, so
@@ -211,13 +212,13 @@ def read_collisions(robot: Node, folders: MeshFolders, faults: Faults) -> Collis
     links = robot.all("link")
     without = [link for link in links if _is_without(link, faults)]
     nodes = [(link, node) for link in links for node in link.all("collision")]
-    shapes, unusable = _read(nodes, folders)
+    shapes, unusable = _read(nodes, resolve)
     return CollisionShapes(shapes, unusable, tuple(link.attributes["name"] for link in without))
 
 
 def _read(
     nodes: Sequence[tuple[Node, Node]],
-    folders: MeshFolders,
+    resolve: Resolve,
     colour: Callable[[Node], Rgba | None] = lambda node: None,
 ) -> tuple[tuple[LinkShape, ...], tuple[ShapeFault, ...]]:
     """The shapes of some nodes, each with its link, and what is wrong with the others."""
@@ -225,7 +226,7 @@ def _read(
     for link, node in nodes[:MAX_SHAPES]:
         name = link.attributes["name"]
         try:
-            shapes.append(LinkShape(name, *read_shape(node, folders), colour(node)))
+            shapes.append(LinkShape(name, *read_shape(node, resolve), colour(node)))
         except BadValue as bad:
             unusable.append(ShapeFault(name, node.line, bad.faults[0]))
     too_many = Fault("", f"there are more than {MAX_SHAPES:,} shapes")

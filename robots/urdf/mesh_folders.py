@@ -14,7 +14,6 @@ import re
 import stat
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
-from itertools import accumulate
 from pathlib import Path
 
 from coverable.errors import listed
@@ -182,11 +181,3 @@ class MeshFolders:
             )
         seen = f" ({seen_words(list(self.seen))})" if name.startswith(_IN_PACKAGE) else ""
         raise BadValue(f"is not found; add the folder above its package to package_dirs{seen}")
-
-
-def leaves_package(name: str) -> bool:
-    """True for a package:// name that climbs out of its package with '..'."""
-    if not name.startswith(_IN_PACKAGE):
-        return False
-    parts = name.split("://", 1)[1].replace("\\", "/").split("/")
-    return min(accumulate({"": 0, ".": 0, "..": -1}.get(part, 1) for part in parts)) < 0

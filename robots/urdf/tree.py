@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import replace
+from itertools import accumulate
 
 from coverable.errors import close_matches
 from robots.urdf.joints import JointInfo, read_joint
-from robots.urdf.mesh_folders import leaves_package
 from robots.urdf.xml import Faults, Node, UrdfError, name_of, shown
 
 # Native readers recurse along a chain: 4,000 links overflow a stack of 8 MB, 250 one of 0.5 MB.
@@ -75,7 +75,7 @@ def read_links(robot: Node, faults: Faults) -> dict[str, Node]:
             links[name] = node
         shapes = [shape for visual in node.all("visual") for shape in visual.all("geometry")]
         for mesh in (mesh for shape in shapes for mesh in shape.all("mesh")):
-            if leaves_package(mesh.attributes.get("filename", "")):
+            if _leaves_package(mesh.attributes.get("filename", "")):
                 faults.error(
                     mesh,
                     f"link {shown(name or '?')}: mesh {shown(mesh.attributes['filename'])} "
@@ -210,3 +210,11 @@ def _mimic_fault(joint: JointInfo, by_name: dict[str, JointInfo]) -> str | None:
         seen.add(leader.name)
         follower = leader
     return None
+
+
+def _leaves_package(name: str) -> bool:
+    """True for a package:// name that climbs out of its package with '..'."""
+    if not name.startswith(("package://", "model://")):
+        return False
+    parts = name.split("://", 1)[1].replace("\\", "/").split("/")
+    return min(accumulate({"": 0, ".": 0, "..": -1}.get(part, 1) for part in parts)) < 0

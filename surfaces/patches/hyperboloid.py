@@ -16,11 +16,8 @@ from numpy.typing import ArrayLike
 
 from coverable.arrays import Array
 from surfaces.arguments import ORIGIN, Checks
-from surfaces.patches.normal_bounds import CurvatureSlices
 from surfaces.patches.patch import ClosedFormPatch
 from surfaces.surface import Side
-
-SLICES = 512  # over which the curvatures are bounded
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -67,39 +64,6 @@ class Hyperboloid(ClosedFormPatch):
             return z * self.waist * (np.hypot(1.0, x) + ratio) / 2.0
 
         return np.asarray((u1 - u0) * (integral(v1) - integral(v0)))
-
-    def curvature_slices(self, margin: float) -> CurvatureSlices:
-        """Interval bounds on each of many slices of z: rigorous, not sampled.
-
-        d kappa_2 / ds = -b^2 z r / g^4 and d kappa_1 / ds = 3 s^2 waist^2 b^2 z r / g^6, where
-        b^2 = s^2 (1 + s^2); r and g grow with |z|. Outward normals from z and -z meet in the plane
-        z = 0 at height g / s^2, which is never beyond the meridian's centre of curvature; inward
-        normals meet on the axis, at the centre of curvature 1 / kappa_2.
-        """
-        square = (self.waist / self.flare) ** 2
-        growth = square * (1.0 + square)
-        # Equal steps of asinh(b z / waist): fine at the waist, where the curvatures change fastest.
-        scale = self.waist / math.sqrt(growth)
-        low, high = self.v_range[0] - margin, self.v_range[1] + margin
-        steps = np.linspace(math.asinh(low / scale), math.asinh(high / scale), SLICES + 1)
-        edges = scale * np.sinh(steps)
-        edges[0], edges[-1] = low, high
-        a, b = np.abs(edges[:-1]), np.abs(edges[1:])
-        far = np.maximum(a, b)
-        near = np.where(edges[:-1] * edges[1:] <= 0.0, 0.0, np.minimum(a, b))
-        g_near = np.hypot(self.waist, math.sqrt(growth) * near)
-        g_far = np.hypot(self.waist, math.sqrt(growth) * far)
-        dent = square * self.waist**2
-        lever = growth * far * self._radius(far)
-        return CurvatureSlices(
-            meridian_low=-dent / g_near**3,
-            meridian_high=-dent / g_far**3,
-            parallel_low=1.0 / g_far,
-            parallel_high=1.0 / g_near,
-            meridian_slope=3.0 * dent * lever / g_near**6,
-            parallel_slope=lever / g_near**4,
-            reach=g_near / square,
-        )
 
 
 def hyperboloid(

@@ -27,7 +27,12 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.arrays import Array
+from surfaces.patches.cylinder import Cylinder
+from surfaces.patches.hyperboloid import Hyperboloid
+from surfaces.patches.patch import ClosedFormPatch
+from surfaces.patches.sphere import Sphere
 
+SLICES = 512  # over which the curvatures of a hyperboloid are bounded
 ROUNDING = 1.0 + 1e-12  # covers the rounding of the few operations below
 
 
@@ -68,6 +73,58 @@ class CurvatureSlices(NamedTuple):
         """One slice of constant curvatures (1/m)."""
         k1, k2, zero = np.array([meridian]), np.array([parallel]), np.zeros(1)
         return CurvatureSlices(k1, k1, k2, k2, zero, zero, np.full(1, np.inf))
+
+
+def bounds_of(patch: ClosedFormPatch, height: float, slack: float = 0.0) -> NormalBounds:
+    """Bounds on how fast the normal turns near the parallel surface at a signed height (m).
+
+    They hold at every point whose closest point lies on the patch and whose height differs from
+    `height` by at most `slack` (m); see `normal_bounds`.
+    """
+    return normal_bounds(_slices_of(patch, abs(slack)), height, abs(slack))
+
+
+def _slices_of(patch: ClosedFormPatch, margin: float) -> CurvatureSlices:
+    """Bounds on the curvatures of a patch, widened by `margin` where it has open ends."""
+    if isinstance(patch, Hyperboloid):
+        return _of_hyperboloid(patch, margin)
+    if isinstance(patch, Sphere):
+        return CurvatureSlices.constant(1.0 / patch.radius, 1.0 / patch.radius)
+    return CurvatureSlices.constant(0.0, 1.0 / patch.radius if isinstance(patch, Cylinder) else 0.0)
+
+
+def _of_hyperboloid(patch: Hyperboloid, margin: float) -> CurvatureSlices:
+    """Interval bounds on each of many slices of z: rigorous, not sampled.
+
+    d kappa_2 / ds = -b^2 z r / g^4 and d kappa_1 / ds = 3 s^2 waist^2 b^2 z r / g^6, where
+    b^2 = s^2 (1 + s^2); r and g grow with |z|. Outward normals from z and -z meet in the plane
+    z = 0 at height g / s^2, which is never beyond the meridian's centre of curvature; inward
+    normals meet on the axis, at the centre of curvature 1 / kappa_2.
+    """
+    square = (patch.waist / patch.flare) ** 2
+    growth = square * (1.0 + square)
+    # Equal steps of asinh(b z / waist): fine at the waist, where the curvatures change fastest.
+    scale = patch.waist / math.sqrt(growth)
+    low, high = patch.v_range[0] - margin, patch.v_range[1] + margin
+    steps = np.linspace(math.asinh(low / scale), math.asinh(high / scale), SLICES + 1)
+    edges = scale * np.sinh(steps)
+    edges[0], edges[-1] = low, high
+    a, b = np.abs(edges[:-1]), np.abs(edges[1:])
+    far = np.maximum(a, b)
+    near = np.where(edges[:-1] * edges[1:] <= 0.0, 0.0, np.minimum(a, b))
+    g_near = np.hypot(patch.waist, math.sqrt(growth) * near)
+    g_far = np.hypot(patch.waist, math.sqrt(growth) * far)
+    dent = square * patch.waist**2
+    lever = growth * far * np.hypot(patch.waist, far * (patch.waist / patch.flare))
+    return CurvatureSlices(
+        meridian_low=-dent / g_near**3,
+        meridian_high=-dent / g_far**3,
+        parallel_low=1.0 / g_far,
+        parallel_high=1.0 / g_near,
+        meridian_slope=3.0 * dent * lever / g_near**6,
+        parallel_slope=lever / g_near**4,
+        reach=g_near / square,
+    )
 
 
 def normal_bounds(slices: CurvatureSlices, height: float, slack: float) -> NormalBounds:

@@ -25,7 +25,6 @@ from surfaces.patches.box_models import (
     vectors_over,
 )
 from surfaces.patches.enclosures import Enclosure, enclosed
-from surfaces.patches.normal_bounds import CurvatureSlices, NormalBounds, normal_bounds
 from surfaces.surface import TURN_TOLERANCE, ClosestPoint, Surface, SurfaceError, points_of
 
 if TYPE_CHECKING:
@@ -272,10 +271,6 @@ class ClosedFormPatch(Patch):
     code: ClassVar[int]
     """The number that `closed_form_kernels` dispatches on."""
 
-    @abstractmethod
-    def curvature_slices(self, margin: float) -> CurvatureSlices:
-        """Bounds on the curvatures of the patch, widened by `margin` where it has open ends."""
-
     def closest(self, points: ArrayLike) -> ClosestPoint:
         """The points of the surface closest to `points` (..., 3) m; see `ClosestPoint`.
 
@@ -307,14 +302,6 @@ class ClosedFormPatch(Patch):
             closed=(bool(self.u_closed), bool(self.v_closed)),
             cells=(int(nu), int(nv)),
         )
-
-    def bounds(self, height: float, slack: float = 0.0) -> NormalBounds:
-        """Bounds on how fast the normal turns near the parallel surface at a signed height.
-
-        They hold at every point whose closest point lies on the patch and whose height differs from
-        `height` by at most `slack` (m); see `normal_bounds`.
-        """
-        return normal_bounds(self.curvature_slices(abs(slack)), height, abs(slack))
 
 
 class LocalClosestPoints(NamedTuple):

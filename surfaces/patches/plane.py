@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 from coverable.arrays import Array
 from surfaces.arguments import ORIGIN, Checks
-from surfaces.patches.normal_bounds import CurvatureSlices
 from surfaces.patches.patch import ClosedFormPatch
 from surfaces.surface import Side
 
@@ -37,10 +36,6 @@ class Plane(ClosedFormPatch):
         """(u1 - u0) (v1 - v0)."""
         u0, u1, v0, v1 = (np.asarray(value, float) for value in (u0, u1, v0, v1))
         return np.asarray((u1 - u0) * (v1 - v0))
-
-    def curvature_slices(self, margin: float) -> CurvatureSlices:
-        """Flat both ways."""
-        return CurvatureSlices.constant(0.0, 0.0)
 
 
 def plane(

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 from coverable.arrays import Array
 from surfaces.arguments import ORIGIN, Checks
-from surfaces.patches.normal_bounds import CurvatureSlices
 from surfaces.patches.patch import ClosedFormPatch
 from surfaces.surface import Side
 
@@ -46,10 +45,6 @@ class Sphere(ClosedFormPatch):
         u0, u1, v0, v1 = (np.asarray(value, float) for value in (u0, u1, v0, v1))
         drop = 2.0 * np.sin((u0 + u1) / 2.0) * np.sin((u1 - u0) / 2.0)
         return np.asarray(self.radius**2 * drop * (v1 - v0))
-
-    def curvature_slices(self, margin: float) -> CurvatureSlices:
-        """1/R both ways."""
-        return CurvatureSlices.constant(1.0 / self.radius, 1.0 / self.radius)
 
 
 def unit_sphere(u: Array, v: Array) -> Array:

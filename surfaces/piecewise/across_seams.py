@@ -11,7 +11,8 @@ import numpy as np
 from coverable.arrays import Array, Ints, Mask
 from surfaces.adjacency import grid_neighbours
 from surfaces.cells import Cells
-from surfaces.curve_fitting import CurveFit, Legs
+from surfaces.curve_fitting import CurveFit
+from surfaces.curves_over_corners import Legs, over_corners
 from surfaces.piecewise.edges import SMOOTH
 from surfaces.piecewise.seams import Border, contacts, sides_of
 
@@ -230,7 +231,7 @@ def fit_round_edges(fit: CurveFit, surface: Piecewise, touching: SeamPairs, piec
         corners = np.broadcast_to(at.crossings[:, None], at.normals.shape)
         ends = np.concatenate([corners, at.normals], axis=2)
         legs = _legs(fit, surface, curves, of, ends, at.crossings, 0.0)
-        fit.over_corners(curves, legs, away)
+        over_corners(fit, curves, legs, away)
 
 
 def fit_over_inner(
@@ -261,7 +262,7 @@ def fit_over_inner(
         lean = 0.5 * np.linalg.norm(normals[:, 0] - normals[:, 1], axis=1)
         ends = np.concatenate([feet, normals], axis=2)
         legs = _legs(fit, surface, curves, of, ends, target, height)
-        taken = fit.over_corners(curves, legs, np.linalg.norm(off, axis=2).max(axis=1))
+        taken = over_corners(fit, curves, legs, np.linalg.norm(off, axis=2).max(axis=1))
         fit.leans[curves[taken]] = lean[taken]
 
 

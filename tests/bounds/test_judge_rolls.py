@@ -14,9 +14,10 @@ from samples import sampled, seeds
 from coverable import Task, cylinder, replay, sphere
 from feasibility.certification.rolls import bounds
 from feasibility.certification.rolls.bounds import frame_second_derivatives, largest_off, vectors_of
-from feasibility.certification.rolls.held import Held
+from feasibility.certification.rolls.held import HeldRoll
 from feasibility.certification.rolls.roll_box_models import Directions, reference_parts
 from feasibility.certification.surface_replay import replay_over_surface
+from feasibility.certification.tool_directions import Held
 from feasibility.roll import Roll
 from feasibility.targets.references import u_directions
 from feasibility.verdict import Walk
@@ -93,7 +94,9 @@ def test_references_bend_no_more_than_is_said(kind):
     surface = surface or sphere(1.0, (20, 160), (-180, 180))
     offset, along = offset_surface(surface, 0.0), None if kind == "by u" else (1.0, 0.0, 0.0)
     task = Task(0.0, 90, roll_deg=(-80.0, 80.0), roll_reference=along)
-    held = Held.of(task, surface.cells(2, 2), offset)
+    free = Held.of(task, surface.cells(2, 2), offset)
+    reference = task.fixed_reference(surface.cells(2, 2))
+    held = HeldRoll(offset, free.sign, free.approach, reference, task.roll)
     middle = [np.pi / 2, 0.0] if kind != "tube" else [0.4, 0.0]
     way = 10.0 ** rng.uniform(-3, -1.3, (count, 1)) * rng.normal(size=(count, 2))
     beside = np.linalg.norm(way, axis=1, keepdims=True) * rng.uniform(0.7, 3.0, (count, 1))
@@ -135,7 +138,7 @@ def test_the_bounds_of_references_are_those_of_the_lemma(kind):
             square=kind == "square",
         )
         roll = Roll(0.1, half)
-        held = Held(offset, 1.0, None, X if kind == "fixed" else None, roll)
+        held = HeldRoll(offset, 1.0, None, X if kind == "fixed" else None, roll)
         at = np.array([0.0, 0.4, 0.4, 1.0])
         number = np.stack([np.arange(4.0), np.zeros(4)], axis=1)[None]
         off, chart = np.stack([0.0 * aside, aside], axis=1)[None], np.zeros((1, 4), dtype=np.int64)

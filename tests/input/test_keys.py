@@ -15,7 +15,8 @@ from coverable import Case, CaseError, Collision, Search
 from coverable.errors import MISSING, Fault
 from feasibility.cases.collision_table import CollisionPart
 from feasibility.cases.keys import Key, all_keys, keys_of, kinds
-from feasibility.cases.toml import as_read, toml_document
+from feasibility.cases.toml import as_read
+from feasibility.cases.toml_text import toml_document
 
 Tables = dict[str, Any]
 WRONG = datetime.date(2026, 1, 1)  # no key takes a date

@@ -10,7 +10,7 @@ from bad_input import SLIDER
 from readers import sound_trajectory
 
 from coverable import Robot, Trajectory, load_motion, load_robot, load_trajectory, save_trajectory
-from feasibility.safe_files import FileError
+from feasibility.read_files import FileError
 
 ROWS = np.array([[0.1, -1.2, 1.3, -0.4, -1.5, 0.6], [0.2, -1.1, 1.2, -0.3, -1.4, 0.7]])
 PUMA = load_robot("puma560")

@@ -17,9 +17,10 @@ from readers import TREE, members, packed
 
 from coverable import Case, Evidence, check, load_case, load_result, save_result, view
 from feasibility.cut_tree import CutTree, Leaf
+from feasibility.read_files import FileError
 from feasibility.results.plain import plain
 from feasibility.results.result_file import ResultError
-from feasibility.safe_files import FileError, write_whole
+from feasibility.safe_files import write_whole
 from feasibility.verdict import Verdict
 from feasibility.version import version
 

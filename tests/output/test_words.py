@@ -20,6 +20,7 @@ from feasibility.cut_words import place_of
 from feasibility.reports import changes, division, path, study
 from feasibility.reports import explanation as explained
 from feasibility.reports import verdict as report
+from feasibility.reports.verdict_json import as_json
 from feasibility.results.trajectory_files import as_csv, as_json_text, from_csv
 from feasibility.sensitivity.quantities import Kind, Quantity
 from feasibility.sensitivity.thresholds import Finding, Threshold
@@ -85,7 +86,7 @@ def test_causes_are_grouped_and_the_largest_group_comes_first(plate, approved):
         said = f"{missed}\n" if kind == "collision" else missed.splitlines()[1].strip()
         hints = (" ".join(line.split()[:2]) for line in tries.splitlines()[1:])
         texts.append(f"{kind}: {said}\n  to try: {'; '.join(hints)}")
-        cells = [row["cell"] for row in report.as_json(made)["uncovered"]]
+        cells = [row["cell"] for row in as_json(made)["uncovered"]]
         assert cells == [[1, 2], [0, 0], [0, 1], [0, 2], [1, 0]]
     approved("causes", "\n".join(texts))
 
@@ -97,7 +98,7 @@ def test_over_no_cells_there_is_nothing_to_cover_and_without_limits_no_margin(pl
     assert text.startswith("feasible: there are no cells, so there is nothing to cover")
     assert "motion" not in text
     free = replace(verdict, certificate=Certificate(2, 0.0, 0.0, math.inf))
-    found = json.loads(json.dumps(report.as_json(free), allow_nan=False))
+    found = json.loads(json.dumps(as_json(free), allow_nan=False))
     assert found["certificate"]["min_limit_margin_deg"] is None
 
 

@@ -10,7 +10,7 @@ from mesh_writers import stl_of
 
 from coverable import Case, CaseError, Pose, Store, load_case, open_workers, run_tasks
 from feasibility.cases.case import TABLES
-from feasibility.cases.toml import toml_document
+from feasibility.cases.toml_text import toml_document
 from feasibility.placement.trials import evaluator_of_study
 from feasibility.studies.built_cases import case_of, cut_of
 from feasibility.studies.run import StudyTask

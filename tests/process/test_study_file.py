@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from coverable import Case, CaseError, load_case, load_study, read_study
-from feasibility.cases.toml import as_read, toml_document
+from feasibility.cases.toml import as_read
+from feasibility.cases.toml_text import toml_document
 
 GRID = """
 base.case = "paper/4a"

@@ -13,7 +13,7 @@ from jobs import case_named, run_coverable
 
 from coverable import Pose, Store, compare, load_case, open_workers, run_tasks
 from feasibility.placement.trials import evaluator_of_study
-from feasibility.safe_files import FileError
+from feasibility.read_files import FileError
 from feasibility.studies.run import StudyTask
 from feasibility.studies.store import Record, StoreError
 

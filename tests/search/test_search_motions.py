@@ -8,6 +8,7 @@ from random_arms import QUESTIONS, planar_arm, robot_of
 from search_kernels import assert_walked
 
 from coverable import Search, Task, check, plane, replay
+from feasibility.roadmap.connecting import explore_self_motions
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions.arrays import arrays_of
 from feasibility.roadmap.rounds import explore
@@ -63,7 +64,7 @@ def test_every_motion_that_a_search_stores_holds_and_the_walk_takes_them_alone(n
     explore(exploration)
     for cell in range(0, len(cells), 3):
         exploration.add_seeds(cell, exploration.guesses(3))
-        exploration.explore_self_motions(cell)
+        explore_self_motions(exploration, cell)
     close(exploration)
     roadmap = exploration.roadmap
     assert len(roadmap.edges) >= len(cells) - 1

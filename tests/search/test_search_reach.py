@@ -15,6 +15,7 @@ from feasibility.roadmap.branch_and_bound.branching import root_box
 from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions.arrays import arrays_of
+from feasibility.roadmap.rulings import rule
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -146,7 +147,7 @@ def test_what_branch_and_bound_finds_is_seeded_at_its_winding(limits):
     for angle in np.radians([-170.0, -90.0, -10.0, 5.0, 95.0, 175.0]):
         cells = one_target(at_angle(angle), UP, rng)
         exploration = Exploration(robot, cells, arrays_of(robot, cells, Task(0.0, 180, 1e-2)), 0)
-        outcome = exploration.rule(0, root_box(exploration.arrays), 2000)
+        outcome = rule(exploration, 0, root_box(exploration.arrays), 2000)
         assert outcome in (Ruling.REACHED, Ruling.UNKNOWN)
         assert exploration.reached[0]
 

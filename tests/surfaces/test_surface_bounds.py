@@ -14,6 +14,8 @@ from specimens import EXTREME, FACETED, SMOOTH
 
 from coverable import hyperboloid, sphere
 from coverable.errors import ArgumentError
+from surfaces.patches.normal_bounds import bounds_of
+from surfaces.patches.patch import ClosedFormPatch
 
 PATCHES = {**SMOOTH, **EXTREME}
 FLAT, STRAIGHT, MOST = 2e-3, 0.05, 400
@@ -114,7 +116,7 @@ WAISTS = {
     "round": hyperboloid(0.7, 0.4, (0, 90), (0.3, 0.5)),
     "fan": hyperboloid(0.1, 0.02, (0, 90), (0.2, 0.4)),
 }
-BENT = {**{name: p for name, p in SMOOTH.items() if hasattr(p, "bounds")}, **WAISTS}
+BENT = {**{name: p for name, p in SMOOTH.items() if isinstance(p, ClosedFormPatch)}, **WAISTS}
 
 
 def turning(surface, height, slack, count=8000):
@@ -130,7 +132,7 @@ def turning(surface, height, slack, count=8000):
     tilt = rng.uniform(-1.5, 1.5, (count // 2, 1))
     ways[: count // 2] += tilt * surface.normal(u, v)[: count // 2]
     ways /= np.linalg.norm(ways, axis=1)[:, None]
-    step = 1e-3 / max(surface.bounds(height, slack).curvature, 1.0)
+    step = 1e-3 / max(bounds_of(surface, height, slack).curvature, 1.0)
     after, here, before = (surface.closest(points + s * step * ways).normal for s in (1, 0, -1))
     return (
         np.linalg.norm(after - before, axis=1) / (2 * step),
@@ -143,12 +145,12 @@ def turning(surface, height, slack, count=8000):
 def test_normals_turn_no_faster_than_is_said(name, share):
     surface = BENT[name]
     if surface.kind == "plane":
-        flat = surface.bounds(-5.0, 1.0)
+        flat = bounds_of(surface, -5.0, 1.0)
         assert flat.curvature == flat.second_derivative == 0.0
         return
-    radius = 1.0 / surface.bounds(0.0).curvature
+    radius = 1.0 / bounds_of(surface, 0.0).curvature
     height, slack = share[0] * radius, share[1] * radius
-    bounds = surface.bounds(height, slack)
+    bounds = bounds_of(surface, height, slack)
     if math.isinf(bounds.curvature):
         assert surface.kind == "hyperboloid"  # bends both ways, so normals meet on either side
         assert math.isinf(bounds.second_derivative)
@@ -159,7 +161,7 @@ def test_normals_turn_no_faster_than_is_said(name, share):
     holds(bounds.curvature * (1 + 1e-5), first, used=0.93 * tight, tiny=1e-9)
     least = 0.7 if surface.kind == "hyperboloid" else 0.93
     holds(bounds.second_derivative * (1 + 1e-4), second, used=least * tight, tiny=1e-6)
-    wider = surface.bounds(height, slack + 0.01 * radius)
+    wider = bounds_of(surface, height, slack + 0.01 * radius)
     assert wider.curvature >= bounds.curvature
     assert wider.second_derivative >= bounds.second_derivative
 

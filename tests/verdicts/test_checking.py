@@ -14,7 +14,7 @@ from jobs import EndingClock
 import coverable
 from coverable import Answer, Evidence, Search, Verdict, check, load_result, save_result, verify
 from coverable.errors import ArgumentError
-from feasibility.reports.verdict import as_json
+from feasibility.reports.verdict_json import as_json
 from feasibility.roadmap.exploration import BUDGET
 from feasibility.roadmap.warmup import warm_up
 

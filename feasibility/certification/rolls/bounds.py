@@ -24,12 +24,12 @@ import numpy as np
 from coverable.arrays import Array, Mask
 from feasibility.certification.jacobians import cross, lengths
 from feasibility.certification.lever_bounds import peaks, second_derivatives
+from feasibility.certification.tool_directions import ROLL_CLOSE
 from feasibility.roll import Roll
 from robots.kinematics import Kinematics
 from robots.robot import Robot
 
 ROUNDS = 24  # halvings of the angle that is looked for
-CLOSE_TO_ZERO = 1e-9  # [1], [rad]: u directions are known by differences to about this
 ROOT = float(np.sqrt(2.0))
 
 
@@ -85,7 +85,7 @@ def largest_off(z0: Array, z1: Array, second: Array, unknown: Array, half: float
     def holds(angle: Array, sign: float) -> Mask:
         ends = [np.sin(angle) * z[:, 0] - sign * np.cos(angle) * z[:, 1] for z in (z0, z1)]
         low = peaks(unknown[:, 0] - ends[0], unknown[:, 1] - ends[1], second)
-        return np.asarray(low <= CLOSE_TO_ZERO)
+        return np.asarray(low <= ROLL_CLOSE)
 
     most = np.full(len(z0), min(half, 0.5 * np.pi))
     within = holds(most, 1.0) & holds(most, -1.0)

@@ -1,11 +1,10 @@
-"""How a task wants the tool held over places of a surface: approach and reference direction.
+"""How a task wants the tool held where its roll is limited: approach and reference direction.
 
 Along a straight piece of a path of places b differs from a straight line by at most d_b
 (`PlacePaths`). The reference e is fixed, or the u direction, which differs from a straight line by
-a known amount, too (`OffsetSurface.tangent_deviations`). What that says of t,
-`box_models.reference_parts` knows, as over boxes: t is within a radius r_t of a straight line, and
-within d_t = 2 r_t of that between its ends. The product u = b x t has D_u = 2 |db| |dt|, and
-d_u = d_b + d_t on top.
+a known amount, too (`OffsetSurface.tangent_deviations`). What that says of t, `reference_parts`
+knows, as over boxes: t is within a radius r_t of a straight line, and within d_t = 2 r_t of that
+between its ends. The product u = b x t has D_u = 2 |db| |dt|, and d_u = d_b + d_t on top.
 """
 
 from __future__ import annotations
@@ -18,6 +17,7 @@ import numpy as np
 from coverable.arrays import Array
 from feasibility.certification.rolls.bounds import (
     ROOT,
+    frame_second_derivatives,
     largest_off,
     off_middle,
     products_of_changes,
@@ -25,10 +25,11 @@ from feasibility.certification.rolls.bounds import (
     vectors_of,
 )
 from feasibility.certification.rolls.roll_box_models import Directions, reference_parts
+from feasibility.certification.tool_directions import Held
 from feasibility.roll import Roll, projected
-from feasibility.task import Task
-from surfaces.cells import Cells
-from surfaces.places.places import OffsetSurface, PlacePaths, Places
+from robots.kinematics import reference_axes
+from robots.robot import Robot
+from surfaces.places.places import PlacePaths, Places
 
 FIRST, LAST = 0, 2  # pieces of a path; in the middle one the place changes sides, on the spot
 
@@ -45,40 +46,21 @@ class ReferencesAlong(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Held:
+class HeldRoll(Held):
     """Approach and reference directions over the places of one surface."""
 
-    offset: OffsetSurface
-    sign: float
-    """The approach is this times the outward normal, unless it is fixed."""
-    approach: Array | None
-    """(3,) where it is one direction."""
     reference: Array | None
     """(3,) where it is one direction; else the u direction."""
-    roll: Roll | None
-    """None where it is free."""
+    roll: Roll
+    """Its range."""
 
-    @staticmethod
-    def of(task: Task, cells: Cells, offset: OffsetSurface) -> Held:
-        """What `task` wants over the surface of `cells`, or that under them, by its `offset`."""
-        return Held(
-            offset,
-            -cells.surface.side_sign,
-            task.fixed_approach(cells),
-            task.fixed_reference(cells),
-            task.roll,
-        )
+    def axes_x(self, robot: Robot, q: Array) -> Array:
+        """See `Held.axes_x`."""
+        return reference_axes(robot, q)
 
-    def approaches(self, normals: Array) -> Array:
-        """Approach directions (..., 3) where the surface has these normals."""
-        if self.approach is None:
-            return self.sign * normals
-        return np.where(np.isnan(normals), np.nan, self.approach)
-
-    def deviations(self, path: PlacePaths) -> Array:
-        """d_b (k, 3) of the pieces of paths."""
-        off = path.deviations[..., 1]
-        return off if self.approach is None else np.zeros_like(off)
+    def second_derivatives(self, robot: Robot, q: Array, axes: Array, x: Array) -> Array:
+        """See `Held.second_derivatives`."""
+        return frame_second_derivatives(robot, q, axes, x)
 
     def _references(self, places: Places, approaches: Array) -> tuple[Array, Array]:
         """t (k, 3) and h (k,) at places."""
@@ -87,15 +69,7 @@ class Held:
         return projected(np.broadcast_to(self.reference, approaches.shape), approaches)
 
     def rolls(self, x: Array, axes: Array, approaches: Array, places: Places) -> Array:
-        """(k,) rad, how far rolls are off the middle of their range; 0 where it is free.
-
-        Args:
-            x, axes: (k, 3) of the tool.
-            approaches: (k, 3) at the places.
-            places: k of them.
-        """
-        if self.roll is None:
-            return np.zeros(len(x))
+        """See `Held.rolls`."""
         references, _ = self._references(places, approaches)
         return off_middle(roll_vectors(x, axes, references, approaches, self.roll))
 
@@ -107,17 +81,7 @@ class Held:
         path: PlacePaths,
         approaches: Array,
     ) -> Array:
-        """(k,) rad, bounds on that along stretches; inf where the roll may leave its range.
-
-        Args:
-            x, axes: (k, 3) of the tool at both ends.
-            second: (k,) D_x + D_y along the stretch.
-            path: of places.
-            approaches: (k, 4, 3) at its four places.
-        """
-        count = len(second)
-        if self.roll is None:
-            return np.zeros(count)
+        """See `Held.rolls_between`."""
         references, second_u, beside = self.references_along(path, approaches)
         share = path.share[..., None]
         ends = x, tuple(map(np.cross, axes, x))

@@ -13,11 +13,16 @@ it, by self-motions of what a run reaches there, each followed ahead as far as i
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from coverable.arrays import Array, Mask
+from feasibility.found import Found
+from feasibility.problem import Problem
+from feasibility.roadmap.connecting import explore_self_motions
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import Roadmap
 from feasibility.roadmap.walk import route_walk
@@ -25,6 +30,7 @@ from feasibility.verdict import Cause, CauseKind, Walk
 from robots.kinematics import Kinematics
 from robots.robot import Robot
 
+IN_PLACE = 0.1  # [1] share of the tolerance within which a tool point stays over a pose
 CHANGE_COST = 1e6  # [waypoints] that a change of posture in place counts as
 IDLE_ROUNDS = 8  # rounds without gain after which no run is found
 MOST_ROUNDS = 60
@@ -64,6 +70,24 @@ class OrderedRun(NamedTuple):
         )
         missed = range(self.furthest + 1, poses)
         return tuple(Cause(pose, CauseKind.DISCONNECTED, False, detail) for pose in missed)
+
+    def added_to(self, found: Found, problem: Problem, exploration: Exploration) -> Found:
+        """What was found of a toolpath, all of whose poses one component covers, with the run."""
+        total, walk = len(problem.cells), self.walk
+        counts = {**found.counts, "fk": int(exploration.work.counts[0])}
+        if walk is None:
+            return replace(
+                found, counts=counts, covered=self.covered(total), unfinished="",
+                exhausted=self.failed_words(total), make_causes=lambda: self.causes(total),
+            )  # fmt: skip
+        near = IN_PLACE * problem.task.effective_tolerance
+        counts["in_place"] = changes_in_place(problem.robot, exploration.arrays.points, walk, near)
+        return replace(
+            found, counts=counts, start=0, motion=walk, replay=partial(problem.replayed, walk),
+            accepted=f"One motion of {{waypoints}} waypoints runs the {total} poses in order, "
+            f"without going back; {counts['in_place']} times it changes the posture in place. "
+            f"Pinocchio's replay holds it {problem.within}, between waypoints too.",
+        )  # fmt: skip
 
 
 class Layers(NamedTuple):
@@ -173,7 +197,7 @@ def _try_more(exploration: Exploration, best: Layers) -> None:
     known = len(exploration.roadmap.cell)
     exploration.add_seeds(0, exploration.guesses(SEEDS))
     for cell in sorted({max(best.furthest - back, 0) for back in BACK}):
-        exploration.explore_self_motions(cell)
+        explore_self_motions(exploration, cell)
     ahead = _layers(exploration).ahead
     for node in range(known, len(exploration.roadmap.cell)):
         if node in ahead:

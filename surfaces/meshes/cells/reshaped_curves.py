@@ -21,14 +21,8 @@ import numpy as np
 from coverable.arrays import Array, Ints
 from surfaces.cell_curves import PLACES, slopes_of
 from surfaces.cells import Cells
-from surfaces.curve_fitting import (
-    BLOCK,
-    ENOUGH,
-    PIECES,
-    SAMPLES,
-    CurveFit,
-    fit_between_centres,
-)
+from surfaces.curve_fitting import BLOCK, PIECES, CurveFit, fit_between_centres
+from surfaces.curves_over_corners import ENOUGH, SAMPLES, over_corners
 from surfaces.meshes.mesh_surface import MeshSurface
 from surfaces.meshes.normals import sharp_edges
 
@@ -80,7 +74,7 @@ def fit_over_creases(fit: CurveFit, creases: Creases, shares: Shares) -> None:
             found.append(_along(cells, pairs, border, corners[rows], second))
         return found
 
-    fit.over_corners(curves, legs)
+    over_corners(fit, curves, legs)
 
 
 def _along(cells: Cells, pairs: Ints, start: Array, stop: Array, share: Array) -> Array:

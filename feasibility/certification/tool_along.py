@@ -1,0 +1,138 @@
+"""The tool along a motion over one surface: at all rows, and between them by bisection.
+
+Between rows, bounds are used (`stretches`). A stretch that they do not accept is halved: they fall
+to a quarter, and one exact configuration is added. What is wrong at an exact configuration is
+refused, and so is what is still open after many halvings.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from coverable.arrays import Array, Ints, Mask
+from feasibility.certification.bisection import bisected
+from feasibility.certification.cells_reached import in_order
+from feasibility.certification.faults import MotionFault
+from feasibility.certification.jacobians import jacobians
+from feasibility.certification.stretches import Bounds, Judge, SampledStretches, Samples
+from feasibility.task import Task
+from robots.kinematics import Kinematics
+from surfaces.cells import Cells
+
+LEVELS = 26  # halvings of a segment between two rows
+MOST_SAMPLES = 1_000_000  # configurations looked at between rows
+ENOUGH = 1000  # wrong configurations, after which no more are looked for
+
+
+class Along(NamedTuple):
+    """What is found of tool point, axis and roll along a motion."""
+
+    most: Array
+    """(3,) bounds: m, how far the tool point is off; of |a - b|; rad of the roll."""
+    faults: list[MotionFault]
+    samples: Samples
+    """In the order of the motion, all rows among them."""
+    room: Array
+    """(m, 2) rad, how much of cone and roll is left at least from each row to the next; inf where
+    they are free, or the tool does not work."""
+
+
+def tool_along(
+    judge: Judge, rows: Array, cells: Cells | None = None, marks: Ints | None = None
+) -> Along:
+    """Judge tool point, axis and roll at all rows and between them."""
+    poses, x = jacobians(Kinematics(judge.robot), rows), judge.reference_axes(rows)
+    count = np.arange(len(rows))
+    at_rows = judge.compared(count, np.zeros(len(rows)), poses.points, poses.axes, x)
+    if marks is not None and cells is not None:
+        at_rows = _at_marks(judge, cells, marks, at_rows)
+    good = judge.within(at_rows)
+    faults = _said(judge, at_rows.of(~good), "row")
+    stretches = judge.between_rows(rows, poses, at_rows).of(good[:-1] & good[1:])
+    most, room = np.zeros(3), np.full((len(rows), 2), np.inf)
+    more, between = _between(judge, rows, stretches, most, room)
+    samples = in_order(Samples.join(at_rows, *between))
+    np.maximum(most, _most(judge, samples), out=most)
+    less_room(room, judge.task, samples.row, samples.chord, samples.roll)
+    return Along(most, faults + more, samples, room)
+
+
+def _said(judge: Judge, wrong: Samples, noun: str) -> list[MotionFault]:
+    """Faults of configurations that are wrong; what words them is loaded where there are any."""
+    if not len(wrong.row):
+        return []
+    from feasibility.certification.refusals import exact_faults
+
+    return exact_faults(judge, wrong, noun)
+
+
+def _at_marks(judge: Judge, cells: Cells, marks: Ints, at: Samples) -> Samples:
+    """The samples at all rows, over their marked cells where the places found will not do."""
+    bad = np.flatnonzero(~judge.within(at) & (marks >= 0))
+    if not len(bad):
+        return at
+    aims = judge.task.targets(cells).points[marks[bad]]
+    places = judge.offset.nearest(aims, aims, 0.0)
+    some = at.of(bad)
+    tried = judge.over(places, some.row, some.share, some.points, some.axes, some.x)
+    row = np.arange(len(marks))
+    better = judge.within(tried)
+    row[bad[better]] = len(marks) + np.flatnonzero(better)
+    return Samples.join(at, tried).of(row)
+
+
+def _between(
+    judge: Judge, rows: Array, stretches: SampledStretches, most: Array, room: Array
+) -> tuple[list[MotionFault], list[Samples]]:
+    """Judge stretches whose ends are good, halved as needed: what is wrong, and what was looked at.
+
+    What is known where they are right goes into `most` and `room`, see `Along`.
+    """
+    samples, wrong = list[Samples](), list[Samples]()
+
+    def decided(left: SampledStretches) -> Mask:
+        bounds = judge.bounds(left)
+        good = judge.within(bounds)
+        right = bounds.of(good)
+        np.maximum(most, _most(judge, right), out=most)
+        less_room(room, judge.task, left.row[good], right.chord, right.roll)
+        return good
+
+    def halves(left: SampledStretches) -> SampledStretches:
+        middle = judge.middles(rows, left)
+        good = judge.within(middle)
+        samples.append(middle)
+        if not good.all():
+            wrong.append(middle.of(~good))
+        good &= sum(len(part.row) for part in wrong) <= ENOUGH
+        return left.of(good).halves(middle.of(good))
+
+    left = bisected(stretches, decided, halves, LEVELS, MOST_SAMPLES)
+    if wrong:
+        return _said(judge, Samples.join(*wrong), "place"), samples
+    if not len(left.row):
+        return [], samples
+    from feasibility.certification.refusals import open_fault
+
+    return [open_fault(judge, left, judge.bounds(left))], samples
+
+
+def _most(judge: Judge, one: Samples | Bounds) -> Array:
+    """(3,) the most of how far tool points are off (m), of |a - b| and of the roll (rad).
+
+    Nearer to a mesh's triangles than the standoff they are off, too; further from them they are off
+    by no more than from their targets.
+    """
+    off = np.maximum(one.error, judge.task.standoff - one.facets)
+    return np.array([np.max(each, initial=0.0) for each in (off, one.chord, one.roll)])
+
+
+def less_room(room: Array, task: Task, row: Ints, chord: Array, roll: Array) -> None:
+    """Take what is left of cone and roll behind rows (k,), where it is less, into `room` (m, 2)."""
+    if task.cone < np.pi:
+        angle = 2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0))
+        np.minimum.at(room[:, 0], row, np.maximum(task.cone - angle, 0.0))
+    if task.roll is not None:
+        np.minimum.at(room[:, 1], row, np.maximum(task.roll.half - roll, 0.0))
