@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from feasibility.clock import Clock
-from feasibility.paper.continuity import JSpace, Outcome
+from feasibility.paper.continuity import CallOutcome, JSpace
 from feasibility.paper.tree_and_graph import Tree
 from surfaces.cells import Cells
 
@@ -52,9 +52,9 @@ def _try_edge(tree: Tree, cell: int, neighbour: int, clock: Clock) -> bool:
     tree.calls += 1
     tree.checked += found.checked
     tree.fk += found.fk
-    tree.capped += found.outcome is Outcome.CAPPED
-    tree.complete = found.outcome is not Outcome.OUT_OF_TIME and not clock.out_of_time
-    if found.outcome is not Outcome.FOUND:
+    tree.capped += found.outcome is CallOutcome.CAPPED
+    tree.complete = found.outcome is not CallOutcome.OUT_OF_TIME and not clock.out_of_time
+    if found.outcome is not CallOutcome.FOUND:
         return False
     tree.edges[cell, neighbour] = found.jcells
     if neighbour in tree.jcell:

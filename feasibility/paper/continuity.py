@@ -32,7 +32,7 @@ MOST_JCELLS = 20_000_000  # of one call, whatever its cap: about 1 GB
 FAR = 2**30  # offset that stands for "no limit": 100,000 degrees at the smallest step
 
 
-class Outcome(StrEnum):
+class CallOutcome(StrEnum):
     """How a call of Algorithm 1 ended."""
 
     FOUND = "found"
@@ -49,7 +49,7 @@ class Outcome(StrEnum):
 class Continuity:
     """What one call of Algorithm 1 found."""
 
-    outcome: Outcome
+    outcome: CallOutcome
     jcells: NDArray[np.int32]
     """(k, n) offsets of the path from the J-cell it began at to the first in the target cell; no
     rows unless found."""
@@ -180,16 +180,16 @@ class JSpace:
             if state != jcells.RUNNING:
                 break
             if clock is not None and clock.out_of_time:
-                return self._result(Outcome.OUT_OF_TIME)
-        ended = {jcells.FOUND: Outcome.FOUND, jcells.EXHAUSTED: Outcome.EXHAUSTED}
-        return self._result(ended.get(int(state), Outcome.CAPPED))
+                return self._result(CallOutcome.OUT_OF_TIME)
+        ended = {jcells.FOUND: CallOutcome.FOUND, jcells.EXHAUSTED: CallOutcome.EXHAUSTED}
+        return self._result(ended.get(int(state), CallOutcome.CAPPED))
 
-    def _result(self, outcome: Outcome) -> Continuity:
+    def _result(self, outcome: CallOutcome) -> Continuity:
         """Read the result of the call out of the working memory."""
         memory = self._memory
         counters = memory.counters
         path = np.empty((0, memory.nodes.shape[1]), dtype=np.int32)
-        if outcome is Outcome.FOUND:
+        if outcome is CallOutcome.FOUND:
             stack = memory.stack_node[: counters[jcells.DEPTH] + 1]
             path = memory.nodes[np.append(stack, counters[jcells.NODES] - 1)]
         return Continuity(

@@ -17,7 +17,7 @@ import numpy as np
 from coverable.arrays import Array, Ints, Mask
 
 
-class Edge(NamedTuple):
+class RoadmapEdge(NamedTuple):
     """A motion from one node to another, which can be run backwards too."""
 
     x: int
@@ -54,7 +54,7 @@ class Roadmap:
         """(n,) how much each joint moves the tool there, see `self_motion.effects`."""
         self.component: list[int] = []
         """The component that each node was made in."""
-        self.edges: list[Edge] = []
+        self.edges: list[RoadmapEdge] = []
         self.over: list[list[int]] = [[] for _ in range(cells)]
         """The nodes over each cell."""
         self.reached = np.zeros(cells, dtype=bool)
@@ -120,8 +120,8 @@ class Roadmap:
         return node
 
     def add_edge(self, x: int, y: int, motion: Array) -> int:
-        """Join two nodes by a motion (k, n), see `Edge`; returns the root of both."""
-        self.edges.append(Edge(x, y, motion))
+        """Join two nodes by a motion (k, n), see `RoadmapEdge`; returns the root of both."""
+        self.edges.append(RoadmapEdge(x, y, motion))
         a, b = self.root_of(x), self.root_of(y)
         if a == b:
             return a

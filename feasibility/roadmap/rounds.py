@@ -17,7 +17,7 @@ from collections.abc import Callable, Collection
 import numpy as np
 
 from coverable.arrays import Ints
-from feasibility.roadmap.branch_and_bound.branching import Boxes, root_box
+from feasibility.roadmap.branch_and_bound.branching import BoxStack, root_box
 from feasibility.roadmap.branch_and_bound.branching import rule as examine_cell
 from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.connecting import border, bridge, explore_self_motions, improvable
@@ -91,7 +91,7 @@ def _unreached(exploration: Exploration) -> None:
         exploration.rulings[cell] = Ruling.PROVED
     if exploration.early and exploration.proved:
         return
-    open_boxes: dict[int, Boxes] = {}
+    open_boxes: dict[int, BoxStack] = {}
     in_vain = 0
     for cell in evenly(np.flatnonzero(~exploration.reached & ~beyond)).tolist():
         if exploration.reached[cell]:

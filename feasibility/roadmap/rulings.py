@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from feasibility.roadmap.branch_and_bound.branching import Boxes
+from feasibility.roadmap.branch_and_bound.branching import BoxStack
 from feasibility.roadmap.branch_and_bound.branching import rule as examine_cell
 from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.exploration import BUDGET, Exploration
@@ -39,7 +39,7 @@ def prove_collisions(exploration: Exploration, cell: int) -> None:
     tick(left - blockers.left)
 
 
-def rule(exploration: Exploration, cell: int, boxes: Boxes, most: int) -> Ruling:
+def rule(exploration: Exploration, cell: int, boxes: BoxStack, most: int) -> Ruling:
     """Branch and bound on one cell; a configuration that it finds becomes a seed."""
     ruling, examined = Ruling.OPEN, int(boxes.counts[1])
     while ruling is Ruling.OPEN and boxes.counts[1] < most:

@@ -9,7 +9,7 @@ from random_arms import robot_of
 
 import coverable
 from coverable import Answer, CauseKind, Evidence, Task, greedy_check, load_robot, sphere
-from feasibility.paper.continuity import JSpace, Outcome
+from feasibility.paper.continuity import CallOutcome, JSpace
 
 PUMA = load_robot("puma560", limits="set-1")
 
@@ -79,10 +79,10 @@ def test_capped_is_not_exhausted_and_memory_grows_without_changing_the_answer():
 
     ends = [(a, k) for a in verdict.tree for k in cells.neighbours.of(a).tolist()
             if not verdict.graph.has_edge(a, k)]  # fmt: skip
-    a, k = next(pair for pair in ends if called(*pair, 60_000).outcome is Outcome.CAPPED)
+    a, k = next(pair for pair in ends if called(*pair, 60_000).outcome is CallOutcome.CAPPED)
     few, many = called(a, k, 50), called(a, k, 60_000)
-    assert (few.outcome, few.checked, len(few.jcells)) == (Outcome.CAPPED, 50, 0)
-    assert (many.outcome, many.checked) == (Outcome.CAPPED, 60_000)
+    assert (few.outcome, few.checked, len(few.jcells)) == (CallOutcome.CAPPED, 50, 0)
+    assert (many.outcome, many.checked) == (CallOutcome.CAPPED, 60_000)
 
 
 def test_cells_out_of_reach_are_proved_to_be():

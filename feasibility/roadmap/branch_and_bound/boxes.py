@@ -12,7 +12,7 @@ from feasibility.roadmap.motions.arrays import SearchArrays
 STACK = 512  # most boxes on the stack; depth first, so their number grows with the depth only
 
 
-class Places(NamedTuple):
+class PlaceParts(NamedTuple):
     """Where the tool may be: target points and approach directions, part by part.
 
     The fields are those of `surfaces.SurfaceParts`, of the target surface. Compiled code reads them
@@ -33,13 +33,13 @@ class Places(NamedTuple):
     """(K,) the parameter that is halved, or -1."""
 
 
-def place_at_rest(arrays: SearchArrays, cell: int) -> Places:
+def place_at_rest(arrays: SearchArrays, cell: int) -> PlaceParts:
     """The target of a cell's centre."""
     limited = bool(arrays.roll[1] < np.inf)
     toward = np.zeros(3)
     if limited:
         toward = toward_middle(arrays.approaches[cell], arrays.references[cell], arrays.roll[0])
-    return Places(
+    return PlaceParts(
         centre=np.concatenate([arrays.points[cell], arrays.approaches[cell], toward])[None],
         slopes=np.zeros((1, 2, 9)),
         radius=np.array([[0.0, 0.0, 0.0 if limited else np.inf]]),
@@ -54,7 +54,7 @@ def toward_middle(approach: Array, reference: Array, middle: float) -> Array:
     return np.asarray(turned, dtype=np.float64)
 
 
-class Boxes(NamedTuple):
+class BoxStack(NamedTuple):
     """A stack of boxes to be examined; m is n joints, or n + 2 with the parameters of a part."""
 
     low: Array
@@ -62,7 +62,7 @@ class Boxes(NamedTuple):
     high: Array
     """(STACK, m)"""
     part: Ints
-    """(STACK,) index into the `Places`."""
+    """(STACK,) index into the `PlaceParts`."""
     weight: Array
     """(STACK,) share of the first box: each half of a box has half of its share."""
     counts: Ints
@@ -123,7 +123,7 @@ def box_work(n: int, parameters: int) -> BoxWork:
     )
 
 
-def box_of(low: Array, high: Array, parameters: int = 0) -> Boxes:
+def box_of(low: Array, high: Array, parameters: int = 0) -> BoxStack:
     """A stack with one box: the joints from low to high (n,), and all of part 0.
 
     Args:
@@ -131,7 +131,7 @@ def box_of(low: Array, high: Array, parameters: int = 0) -> Boxes:
         parameters: 2 where the place on the part is free, 0 for a target at rest.
     """
     m = len(low) + parameters
-    boxes = Boxes(
+    boxes = BoxStack(
         np.empty((STACK, m)),
         np.empty((STACK, m)),
         np.zeros(STACK, dtype=np.int64),

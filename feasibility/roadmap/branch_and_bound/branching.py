@@ -18,8 +18,8 @@ from coverable.kernels import allocating_entry, kernel
 from feasibility.roadmap.branch_and_bound.box_bounds import static_levers
 from feasibility.roadmap.branch_and_bound.box_contraction import THINNEST, shrink
 from feasibility.roadmap.branch_and_bound.boxes import (
-    Boxes,
-    Places,
+    BoxStack,
+    PlaceParts,
     box_of,
     box_work,
     place_at_rest,
@@ -35,7 +35,7 @@ DIRECTIONS = np.array(
 DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1)[:, None]
 
 
-def root_box(arrays: SearchArrays) -> Boxes:
+def root_box(arrays: SearchArrays) -> BoxStack:
     """One box that holds every configuration inside the limits, up to full turns."""
     low, high = arrays.lower.copy(), arrays.upper.copy()
     turns = ~arrays.chain.prismatic & (high - low >= 2.0 * np.pi)
@@ -115,8 +115,8 @@ def branch_and_bound(arrays, work, places, boxes, most, directions, space, found
 
     Args:
         arrays, work: the `SearchArrays` and the `Work`.
-        places: the `Places` of the target.
-        boxes: the `Boxes` on the stack; start from `box_of` or `root_box`.
+        places: the `PlaceParts` of the target.
+        boxes: the `BoxStack` on the stack; start from `box_of` or `root_box`.
         most: boxes to examine before returning OPEN.
         directions: (k, 3) unit directions for the cuts.
         space: the `BoxWork`.
@@ -158,7 +158,7 @@ def branch_and_bound(arrays, work, places, boxes, most, directions, space, found
 
 
 def rule(
-    arrays: SearchArrays, work: Work, cell: int, boxes: Boxes, most: int
+    arrays: SearchArrays, work: Work, cell: int, boxes: BoxStack, most: int
 ) -> tuple[Ruling, Array]:
     """Examine up to `most` more boxes for one cell.
 
@@ -170,7 +170,7 @@ def rule(
 
 
 def examine(
-    arrays: SearchArrays, work: Work, places: Places, boxes: Boxes, most: int
+    arrays: SearchArrays, work: Work, places: PlaceParts, boxes: BoxStack, most: int
 ) -> tuple[Ruling, Array]:
     """Examine up to `most` more boxes; as `rule`, wherever the tool may be."""
     n = len(arrays.lower)

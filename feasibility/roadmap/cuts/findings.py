@@ -15,9 +15,9 @@ import numpy as np
 from coverable.arrays import Array, Mask
 from coverable.kernels import entry
 from feasibility.roadmap.branch_and_bound.boxes import place_at_rest
-from feasibility.roadmap.branch_and_bound.branching import Places
+from feasibility.roadmap.branch_and_bound.branching import PlaceParts
 from feasibility.roadmap.branch_and_bound.roll_bounds import unturned
-from feasibility.roadmap.cuts.regions import Region, folded
+from feasibility.roadmap.cuts.regions import JointRegion, folded
 from feasibility.roadmap.cuts.statements import Statement
 from feasibility.roadmap.motions.aiming import stand_still
 from feasibility.roadmap.motions.arrays import SearchArrays, with_free_roll
@@ -37,7 +37,7 @@ NEWTON_STEPS = np.int64(16)  # of a try: most that succeed need fewer, and the r
 class ProvedCut(NamedTuple):
     """In the region the tool is nowhere on the surface with q_j = t."""
 
-    region: Region
+    region: JointRegion
     joint: int
     """j"""
     value: float
@@ -47,16 +47,16 @@ class ProvedCut(NamedTuple):
 class ProvedLeaf(NamedTuple):
     """In the region the cell cannot be covered."""
 
-    region: Region
+    region: JointRegion
     cell: int
 
 
 @dataclass(eq=False)
-class Findings:
+class CutFindings:
     """What is known of the motion set of `arrays` over `places`."""
 
     arrays: SearchArrays
-    places: Places
+    places: PlaceParts
     rng: np.random.Generator
     newton: bool
     work: Work = field(init=False)
@@ -84,14 +84,14 @@ class Findings:
 
     # -- points of the motion set --------------------------------------------------------------
 
-    def look_around(self, limits: Region) -> None:
+    def look_around(self, limits: JointRegion) -> None:
         """More points of the motion set inside the limits, unless there are enough."""
         if self.newton and len(self.samples) < MOST_SAMPLES:
             targets = random_targets(self.places, SAMPLES, self.rng)
             q = projected(self.over_places, self.work, limits, targets, SAMPLES, self.rng)
             self.samples = np.vstack([self.samples, q])
 
-    def on_cut(self, on: Region) -> bool:
+    def on_cut(self, on: JointRegion) -> bool:
         """Is the tool found on the surface in the region of a cut? It is kept, and a seed."""
         if not self.newton:
             return False
@@ -100,7 +100,7 @@ class Findings:
         self.keep(q)
         return len(q) > 0
 
-    def covers(self, region: Region, cell: int) -> bool:
+    def covers(self, region: JointRegion, cell: int) -> bool:
         """Is a configuration of the region found that covers a cell? It is kept, and a seed."""
         if not self.newton:
             return False
@@ -129,7 +129,7 @@ class Findings:
         self.uncovered.clear()
         self.on_cuts.clear()
 
-    def samples_in(self, region: Region, opened: dict[int, float]) -> Array:
+    def samples_in(self, region: JointRegion, opened: dict[int, float]) -> Array:
         """(k, n) those in a region, with opened joints inside their turn."""
         q = folded(self.samples, opened)
         return q[region.inside(q)]
@@ -141,7 +141,7 @@ class Findings:
 
     # -- statements ----------------------------------------------------------------------------
 
-    def statement(self, region: Region, cell: int = -1) -> Statement:
+    def statement(self, region: JointRegion, cell: int = -1) -> Statement:
         """'In the region the tool is nowhere on the surface', or not over a cell, as left."""
         key = (region.low.tobytes(), region.high.tobytes(), cell)
         if key not in self.unfinished:
@@ -154,7 +154,7 @@ class Findings:
             self.unfinished[key] = Statement(region, places, parameters)
         return self.unfinished[key]
 
-    def known_leaf(self, region: Region, missed: Mask) -> int | None:
+    def known_leaf(self, region: JointRegion, missed: Mask) -> int | None:
         """A cell of `missed` (N,) that is proved already for the region."""
         proved = (f.cell for f in self.leaves if missed[f.cell] and f.region.holds(region))
         return next(proved, None)
@@ -182,7 +182,7 @@ def _project_rows(arrays, work, targets, q, enough, hit):  # type: ignore[no-unt
 def projected(
     arrays: SearchArrays,
     work: Work,
-    region: Region,
+    region: JointRegion,
     targets: Array,
     enough: int,
     rng: np.random.Generator,
@@ -192,7 +192,7 @@ def projected(
     Args:
         arrays, work: of the search.
         region: one turn of it takes the place of the limits.
-        targets: (k, 9) as `Places.centre`.
+        targets: (k, 9) as `PlaceParts.centre`.
         enough: hits after which no more are tried.
         rng: draws the guesses.
 
@@ -208,7 +208,7 @@ def projected(
     return q[region.inside(q)]
 
 
-def random_targets(places: Places, k: int, rng: np.random.Generator) -> Array:
+def random_targets(places: PlaceParts, k: int, rng: np.random.Generator) -> Array:
     """(k, 9) targets at random places of the surface, up to the radius of the finest parts."""
     finest = np.flatnonzero(places.children[:, 0] < 0)
     part = rng.choice(finest, k)

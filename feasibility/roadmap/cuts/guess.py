@@ -16,9 +16,9 @@ import numpy as np
 from coverable.arrays import Array, Mask
 from feasibility.cut_tree import Cut, Leaf
 from feasibility.roadmap.branch_and_bound.ruling import Ruling
-from feasibility.roadmap.cuts.findings import Findings, ProvedCut, ProvedLeaf
+from feasibility.roadmap.cuts.findings import CutFindings, ProvedCut, ProvedLeaf
 from feasibility.roadmap.cuts.gaps import Component, JointGap, gaps
-from feasibility.roadmap.cuts.regions import Region
+from feasibility.roadmap.cuts.regions import JointRegion
 from feasibility.roadmap.cuts.statements import Budget, Statement
 
 CANDIDATES = 8  # cuts proved in turns
@@ -46,7 +46,7 @@ class OpenGap(NamedTuple):
 class _GuessedLeaf:
     """A region in which all known components miss the same cells."""
 
-    region: Region
+    region: JointRegion
     statements: dict[int, Statement] = field(default_factory=dict)
     """By cell."""
     cell: int | None = None
@@ -76,7 +76,7 @@ class _Guess(NamedTuple):
 class Guessing:
     """One guess at a tree."""
 
-    findings: Findings
+    findings: CutFindings
     budget: Budget
     joints: tuple[int, ...]
     """Those that cuts may go through."""
@@ -86,7 +86,7 @@ class Guessing:
     boxes_left: float = np.inf
     """An estimate of what the proof still needs, where only boxes are missing."""
 
-    def tree(self, region: Region, components: list[Component]) -> Cut | Leaf | None:
+    def tree(self, region: JointRegion, components: list[Component]) -> Cut | Leaf | None:
         """The tree of a region, proved; None where none was found."""
         guess = self._node(region, components, DEEPEST)
         if guess is None:
@@ -96,7 +96,7 @@ class Guessing:
         return _proved(guess) if proved else None
 
     def _node(
-        self, region: Region, components: list[Component], depth: int
+        self, region: JointRegion, components: list[Component], depth: int
     ) -> _Guess | _GuessedLeaf | None:
         """The cuts of a region, proved, above leaves that are not; None where there are none."""
         inside = [c for c in components if region.inside(c.q).any()]
@@ -113,7 +113,7 @@ class Guessing:
         one, other = (self._node(side, inside, depth - 1) for side in region.sides(*split))
         return None if one is None or other is None else _Guess(split, one, other)
 
-    def _cut(self, region: Region, inside: list[Component]) -> Split | None:
+    def _cut(self, region: JointRegion, inside: list[Component]) -> Split | None:
         """A cut between components inside the region."""
         known = self._known(region, inside)
         if known is not None:
@@ -129,15 +129,15 @@ class Guessing:
         self._note_open_gaps(region, inside)
         return None
 
-    def _through(self, region: Region, found: list[JointGap]) -> Split | None:
+    def _through(self, region: JointRegion, found: list[JointGap]) -> Split | None:
         """The first proved cut through the middles of some gaps."""
         candidates = ((gap.joint, gap.middle, region.on(gap.joint, gap.middle)) for gap in found)
         return first_proved(self.findings, self.budget, candidates)
 
-    def _samples(self, region: Region) -> Array:
+    def _samples(self, region: JointRegion) -> Array:
         return self.findings.samples_in(region, self.opened)
 
-    def _known(self, region: Region, inside: list[Component]) -> Split | None:
+    def _known(self, region: JointRegion, inside: list[Component]) -> Split | None:
         """A cut proved earlier that parts the components here."""
         for known in self.findings.cuts:
             if known.region.holds(region):
@@ -146,7 +146,7 @@ class Guessing:
                     return known.joint, known.value
         return None
 
-    def _note_open_gaps(self, region: Region, inside: list[Component]) -> None:
+    def _note_open_gaps(self, region: JointRegion, inside: list[Component]) -> None:
         """Keep the gaps of a region through which no cut was proved."""
         samples = self._samples(region)
         seen = set()
@@ -160,7 +160,7 @@ class Guessing:
 
 
 def first_proved(
-    findings: Findings, budget: Budget, candidates: Iterable[tuple[int, float, Region]]
+    findings: CutFindings, budget: Budget, candidates: Iterable[tuple[int, float, JointRegion]]
 ) -> Split | None:
     """The first of some cuts on which the tool is proved to be nowhere.
 
@@ -186,7 +186,7 @@ def first_proved(
             findings.keep(settled.found[None])  # or nearly so, where the ruling is UNKNOWN
 
 
-def _guessed_leaf(findings: Findings, region: Region, cover: Mask) -> _GuessedLeaf:
+def _guessed_leaf(findings: CutFindings, region: JointRegion, cover: Mask) -> _GuessedLeaf:
     """The leaf of a region whose components cover `cover` (N,) and no more.
 
     Its cells are those that Newton does not reach either, the furthest from `cover` first.
@@ -199,7 +199,7 @@ def _guessed_leaf(findings: Findings, region: Region, cover: Mask) -> _GuessedLe
     return leaf
 
 
-def _prove_leaves(findings: Findings, budget: Budget, leaves: list[_GuessedLeaf]) -> bool:
+def _prove_leaves(findings: CutFindings, budget: Budget, leaves: list[_GuessedLeaf]) -> bool:
     """Prove one cell of each leaf, in turns; False when one cannot be, or the budget is spent."""
     for most in TURNS:
         left = [leaf for leaf in leaves if leaf.cell is None]
@@ -212,7 +212,7 @@ def _prove_leaves(findings: Findings, budget: Budget, leaves: list[_GuessedLeaf]
     return False
 
 
-def _go_on(findings: Findings, budget: Budget, leaf: _GuessedLeaf, most: int) -> None:
+def _go_on(findings: CutFindings, budget: Budget, leaf: _GuessedLeaf, most: int) -> None:
     """Go on with the cells of one leaf; a configuration that refutes one is a seed."""
     statements, end = list(leaf.statements.values()), budget.spent + most
     while True:

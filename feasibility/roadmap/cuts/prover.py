@@ -14,11 +14,11 @@ import numpy as np
 
 from coverable.arrays import Array
 from feasibility.cut_tree import Cut, CutTree, Leaf
-from feasibility.roadmap.branch_and_bound.branching import Places
-from feasibility.roadmap.cuts.findings import Findings
+from feasibility.roadmap.branch_and_bound.branching import PlaceParts
+from feasibility.roadmap.cuts.findings import CutFindings
 from feasibility.roadmap.cuts.gaps import Component, openings
 from feasibility.roadmap.cuts.guess import Guessing, OpenGap, first_proved
-from feasibility.roadmap.cuts.regions import Region, folded, limits_of, turn_from, wide_joints
+from feasibility.roadmap.cuts.regions import JointRegion, folded, limits_of, turn_from, wide_joints
 from feasibility.roadmap.cuts.statements import Budget
 from feasibility.roadmap.motions.arrays import SearchArrays
 
@@ -49,16 +49,16 @@ class Prover:
     """Proofs about one search: the motion set of `arrays` over a target surface."""
 
     arrays: SearchArrays
-    places: Places
+    places: PlaceParts
     rng: np.random.Generator
     newton: bool = True
     """Whether guesses are tried by Newton before branch and bound."""
-    findings: Findings = field(init=False)
+    findings: CutFindings = field(init=False)
     opened: dict[int, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Nothing is known yet."""
-        self.findings = Findings(self.arrays, self.places, self.rng, self.newton)
+        self.findings = CutFindings(self.arrays, self.places, self.rng, self.newton)
 
     def attempt(
         self, components: list[Component], boxes: int, tick: Callable[[], None]
@@ -93,7 +93,7 @@ class Prover:
         return ProofAttempt(None, budget.spent, seeds, tuple(open_gaps), float(boxes_left))
 
     def _root(
-        self, guess: Guessing, limits: Region, components: list[Component]
+        self, guess: Guessing, limits: JointRegion, components: list[Component]
     ) -> Cut | Leaf | None:
         """The root of a tree, with one turn of each joint that is opened."""
         region = limits
@@ -102,7 +102,7 @@ class Prover:
         return guess.tree(region, [c._replace(q=folded(c.q, guess.opened)) for c in components])
 
     def _plans(
-        self, budget: Budget, limits: Region, components: list[Component]
+        self, budget: Budget, limits: JointRegion, components: list[Component]
     ) -> Iterator[tuple[dict[int, float], tuple[int, ...]]]:
         """Which joints to open, at which t, and which ones cuts may go through.
 
@@ -127,7 +127,7 @@ class Prover:
             yield free, (*narrow, *bounded, *free)
 
     def _open(
-        self, budget: Budget, limits: Region, components: list[Component], wide: list[int]
+        self, budget: Budget, limits: JointRegion, components: list[Component], wide: list[int]
     ) -> None:
         """Open wide joints where that is possible."""
         for joint in wide:

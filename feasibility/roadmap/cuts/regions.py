@@ -16,14 +16,14 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.arrays import Array, Mask
-from feasibility.roadmap.branch_and_bound.branching import Boxes, Places, box_of
+from feasibility.roadmap.branch_and_bound.branching import BoxStack, PlaceParts, box_of
 from feasibility.roadmap.motions.arrays import SearchArrays
 
 TURN = 2.0 * np.pi
 WIDE = 1.5 * TURN  # [rad] range from which on windings cost more than they gain
 
 
-class Region(NamedTuple):
+class JointRegion(NamedTuple):
     """Configurations low <= q <= high."""
 
     low: Array
@@ -33,13 +33,13 @@ class Region(NamedTuple):
     revolute: Mask
     """(n,) joints that turn, rather than slide."""
 
-    def sides(self, joint: int, value: float) -> tuple[Region, Region]:
+    def sides(self, joint: int, value: float) -> tuple[JointRegion, JointRegion]:
         """What a cut q_j = value leaves on either side: q_j <= value, and q_j >= value."""
         high, low = self.high.copy(), self.low.copy()
         high[joint], low[joint] = min(high[joint], value), max(low[joint], value)
         return self._replace(high=high), self._replace(low=low)
 
-    def on(self, joint: int, value: float) -> Region:
+    def on(self, joint: int, value: float) -> JointRegion:
         """The part of the region with q_j = value."""
         below, above = self.sides(joint, value)
         return above._replace(high=below.high)
@@ -48,7 +48,7 @@ class Region(NamedTuple):
         """(k,) which configurations (k, n) lie in the region."""
         return np.asarray(((self.low <= q) & (q <= self.high)).all(axis=1))
 
-    def holds(self, other: Region) -> bool:
+    def holds(self, other: JointRegion) -> bool:
         """Does this region hold another?"""
         return bool((self.low <= other.low).all() and (self.high >= other.high).all())
 
@@ -57,7 +57,7 @@ class Region(NamedTuple):
         """Is nothing left of an interval?"""
         return not bool((self.low <= self.high).all())
 
-    def over_one_turn(self) -> Region:
+    def over_one_turn(self) -> JointRegion:
         """The region with no more than one turn of any joint: what the tool can do is the same."""
         wide = self.revolute & (self.high - self.low >= TURN)
         start = np.where(np.isfinite(self.low), self.low, -np.pi)
@@ -69,13 +69,13 @@ class Region(NamedTuple):
         """Has every interval two ends?"""
         return bool(np.isfinite(self.low).all() and np.isfinite(self.high).all())
 
-    def boxes(self, parameters: int) -> Boxes:
+    def boxes(self, parameters: int) -> BoxStack:
         """A stack of one box, see `box_of`: the region, with one turn for several."""
         box = self.over_one_turn()
         return box_of(box.low, box.high, parameters)
 
 
-def limits_of(arrays: SearchArrays, places: Places) -> Region:
+def limits_of(arrays: SearchArrays, places: PlaceParts) -> JointRegion:
     """The region inside the limits; slides without ends are bounded where that is simple."""
     low, high = arrays.lower.copy(), arrays.upper.copy()
     slides = np.flatnonzero(arrays.chain.prismatic & ~(np.isfinite(low) & np.isfinite(high)))
@@ -90,7 +90,7 @@ def limits_of(arrays: SearchArrays, places: Places) -> Region:
             + ends[np.isfinite(ends)].sum()
         ) * (1.0 + 1e-9)
         low[slides], high[slides] = np.maximum(low[slides], -far), np.minimum(high[slides], far)
-    return Region(low, high, ~arrays.chain.prismatic)
+    return JointRegion(low, high, ~arrays.chain.prismatic)
 
 
 def wide_joints(arrays: SearchArrays) -> list[int]:
@@ -99,7 +99,7 @@ def wide_joints(arrays: SearchArrays) -> list[int]:
     return [int(j) for j in np.flatnonzero(wide)]
 
 
-def turn_from(region: Region, joint: int, t: float) -> Region:
+def turn_from(region: JointRegion, joint: int, t: float) -> JointRegion:
     """The region with one turn of a joint, from t."""
     low, high = region.low.copy(), region.high.copy()
     low[joint], high[joint] = t, t + TURN

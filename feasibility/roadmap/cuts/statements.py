@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from coverable.arrays import Array
-from feasibility.roadmap.branch_and_bound.branching import Boxes, Places, examine
+from feasibility.roadmap.branch_and_bound.branching import BoxStack, PlaceParts, examine
 from feasibility.roadmap.branch_and_bound.ruling import Ruling
-from feasibility.roadmap.cuts.regions import Region
+from feasibility.roadmap.cuts.regions import JointRegion
 from feasibility.roadmap.motions.arrays import SearchArrays
 from feasibility.roadmap.motions.working_memory import Work
 
@@ -76,14 +76,14 @@ class Budget:
 class Statement:
     """'In this region the tool is at none of these places', and how far its proof has come."""
 
-    region: Region
-    places: Places
+    region: JointRegion
+    places: PlaceParts
     parameters: int
     """2 on a surface, 0 at a target at rest."""
     ruling: Ruling = Ruling.OPEN
     found: Array = field(default_factory=lambda: np.empty(0))
     """(n,) the configuration that refutes it, where REACHED; nearly so where UNKNOWN."""
-    boxes: Boxes = field(init=False)
+    boxes: BoxStack = field(init=False)
 
     def __post_init__(self) -> None:
         """Start with all of the region."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from coverable.arrays import Array, unit_along
 from feasibility.roadmap.branch_and_bound.boxes import toward_middle
-from feasibility.roadmap.branch_and_bound.branching import Places
+from feasibility.roadmap.branch_and_bound.branching import PlaceParts
 from feasibility.targets.target_parts import target_parts
 from feasibility.task import Task
 from surfaces.parts import SurfaceParts
@@ -20,7 +20,7 @@ LEAST = 0.05  # [1] sine of the reference's angle to the approach below which ro
 ROUNDING = 1e-12  # [1]
 
 
-def places_on(surface: Surface, task: Task) -> Places:
+def places_on(surface: Surface, task: Task) -> PlaceParts:
     """The places that the tool may be at over a surface.
 
     What is proved holds for the surface itself; how fine the parts are only decides what can be.
@@ -35,7 +35,7 @@ def places_on(surface: Surface, task: Task) -> Places:
         approach=None if isinstance(task.approach, str) else task.approach,
     )
     toward, change, radius = _toward(surface, task, parts)
-    return Places(
+    return PlaceParts(
         centre=np.hstack([parts.centre, toward]),
         slopes=np.concatenate([parts.slopes, change], axis=2),
         radius=np.column_stack([parts.radius, radius]),
