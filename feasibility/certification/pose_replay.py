@@ -18,6 +18,8 @@ from feasibility.certification.faults import MotionFault
 from feasibility.certification.followed import followed_parts, lifted_faults, off_surface
 from feasibility.certification.stretches import Judge, Samples
 from feasibility.certification.tool_along import Along, tool_along
+from feasibility.certification.toolpath_order import order_of_places
+from feasibility.task import Task
 from robots.kinematics import Kinematics
 from surfaces.cells import Cells
 from surfaces.places.offset_surfaces import offset_surface
@@ -55,7 +57,24 @@ def tool_at_work(
     return Along(most, faults, Samples.join(none, *samples), room), reached
 
 
-def with_what_follows(
+def along_poses(
+    found: Along,
+    judge: Judge,
+    rows: Array,
+    cells: Cells,
+    surface: PoseSurface,
+    task: Task,
+    right: bool,
+) -> tuple[Along, list[MotionFault]]:
+    """What is found along poses, and its faults; over what they follow too, where all is right."""
+    faults = order_of_places(judge.offset, found.samples, task.effective_tolerance)
+    if faults or not right:
+        return found, faults
+    found = _with_what_follows(found, judge, rows, cells, surface)
+    return found, found.faults
+
+
+def _with_what_follows(
     found: Along, judge: Judge, rows: Array, cells: Cells, surface: PoseSurface
 ) -> Along:
     """What is found along poses, and of what follows the surface under them over that, too.

@@ -104,14 +104,10 @@ def replay_over_surface(
     if len(missed):
         faults.append(MotionFault(-1, 0.0, missed_text(cells, task, missed, found.samples)))
     if _is_of_poses(surface):
-        from feasibility.certification.toolpath_order import order_of_places
+        from feasibility.certification.pose_replay import along_poses
 
-        faults += order_of_places(offset, found.samples, task.effective_tolerance)
-        if not faults:
-            from feasibility.certification.pose_replay import with_what_follows
-
-            found = with_what_follows(found, judge, rows, cells, surface)
-            faults += found.faults
+        found, more = along_poses(found, judge, rows, cells, surface, task, not faults)
+        faults += more
     less_room(found.room, task, reached.row[at], reached.chord[at], reached.roll[at])
     error, chord, roll = found.most.tolist()
     certificate = Certificate(

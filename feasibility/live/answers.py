@@ -20,7 +20,7 @@ from feasibility.collisions.asked_bodies import said_of
 from feasibility.live.quick_search import quick_search
 from feasibility.problem import Problem
 from feasibility.reports import verdict as report
-from feasibility.reports.missed_cells import causes_listed
+from feasibility.reports.shortfalls import causes_listed
 from feasibility.verdict import Verdict
 from feasibility.viewer.areas.margin_along import margin_layers
 from feasibility.viewer.areas.treated_map import area_layers

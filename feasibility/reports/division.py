@@ -14,11 +14,20 @@ from feasibility.collisions.words import checked
 from feasibility.cut_words import lines as proof_lines
 from feasibility.division.division import Apart, Division, SubPatch
 from feasibility.division.reconfiguration import Reconfiguration
-from feasibility.reports.measured import seconds
-from feasibility.reports.missed_cells import causes_listed
-from feasibility.reports.objects_and_csv import causes_json, certificate_json, clearance_json
-from feasibility.reports.proof import proof_json
-from feasibility.reports.text_and_tables import clearance_text, filled, seconds_text, summary
+from feasibility.reports.objects_and_csv import (
+    causes_json,
+    certificate_json,
+    clearance_json,
+    proof_json,
+)
+from feasibility.reports.shortfalls import causes_listed
+from feasibility.reports.text_and_tables import (
+    clearance_text,
+    filled,
+    seconds,
+    seconds_text,
+    summary,
+)
 from feasibility.results.plain import plain
 from feasibility.version import version
 from surfaces.cells import Cells

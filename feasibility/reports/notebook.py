@@ -8,8 +8,8 @@ from collections import Counter
 
 from coverable.errors import counted
 from feasibility.collisions.asked_bodies import said_of
-from feasibility.reports.missed_cells import CAUSES
 from feasibility.reports.pages import table
+from feasibility.reports.shortfalls import CAUSES
 from feasibility.reports.verdict import SENTENCES, rows_of
 from feasibility.verdict import Verdict
 from feasibility.viewer.viewer import view

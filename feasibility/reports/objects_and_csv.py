@@ -9,7 +9,8 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from coverable.arrays import Array
-from feasibility.reports.measured import limit_margin_deg
+from feasibility.cut_tree import Cut, CutTree, Leaf
+from feasibility.reports.text_and_tables import limit_margin_deg
 from feasibility.results.plain import plain
 from feasibility.verdict import Cause, Certificate, PlacementMargin, Walk
 from robots.robot import Robot
@@ -128,3 +129,31 @@ def walk_csv(robot: Robot, walk: Walk) -> str:
     rows = zip(walk.cell.tolist(), walk.q.tolist(), strict=True)
     lines = (["" if cell < 0 else cell, *map(repr, q)] for cell, q in rows)
     return csv_text([["cell", *robot.joint_names], *lines])
+
+
+def proof_json(tree: CutTree | None, robot: Robot, cells: Cells) -> dict[str, Any] | None:
+    """The tree as JSON; null where there is none.
+
+    A cut has its joint and `value_deg` (`value_m` of one that slides), and what is below and above
+    it. A leaf names its cell.
+    """
+    if tree is None:
+        return None
+    return {
+        "kind": tree.kind,
+        "opened": {robot.joint_names[joint]: float(value) for joint, value in tree.opened},
+        "tree": _node(tree.root, robot, cells),
+    }
+
+
+def _node(node: Cut | Leaf, robot: Robot, cells: Cells) -> dict[str, Any]:
+    """One node and those under it; trees are shallow, as the search and result files have them."""
+    if isinstance(node, Leaf):
+        return {"cell": list(cells.unravel(node.cell))}
+    sides = {
+        "below": _node(node.below, robot, cells),
+        "above": _node(node.above, robot, cells),
+    }
+    slides = bool(robot.prismatic[node.joint])
+    key, value = ("value_m", node.value) if slides else ("value_deg", math.degrees(node.value))
+    return {"joint": robot.joint_names[node.joint], key: float(value), **sides}

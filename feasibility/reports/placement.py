@@ -14,8 +14,8 @@ from feasibility.placement.placements import Placements
 from feasibility.placement.region import AXES, Pose
 from feasibility.placement.stations import StationPlan
 from feasibility.placement.trials import Trial
-from feasibility.reports.missed_cells import CAUSES
 from feasibility.reports.objects_and_csv import csv_text
+from feasibility.reports.shortfalls import CAUSES
 from feasibility.reports.text_and_tables import aligned, summary
 from feasibility.reports.verdict import EVIDENCE
 from feasibility.verdict import Answer, CauseKind, Evidence

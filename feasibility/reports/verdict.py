@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 from feasibility.cases.case import Case
 from feasibility.collisions.asked_bodies import said_of
-from feasibility.reports.measured import message_of
 from feasibility.reports.text_and_tables import (
     certificate_text,
     left_out_text,
+    message_of,
     placement_text,
     seconds_text,
     smooth_text,
@@ -18,7 +18,7 @@ from feasibility.reports.text_and_tables import (
 from feasibility.verdict import Answer, Evidence, Verdict
 
 if TYPE_CHECKING:
-    from feasibility.reports.treating import Treating
+    from feasibility.reports.shortfalls import Treating
 
 PHASES = {"search_s": "search", "certify_s": "certificate"}
 
@@ -72,7 +72,7 @@ def as_text(verdict: Verdict, case: Case, before_s: float = 0.0) -> str:
     if verdict.answer is Answer.FEASIBLE:
         hints += _hints(verdict)
     else:
-        from feasibility.reports.missed_cells import causes_listed, hints_of
+        from feasibility.reports.shortfalls import causes_listed, hints_of
 
         groups = list(causes_listed(verdict.causes, verdict.cells))
         lines += ["", "Not covered:", *groups] if groups else []
@@ -118,7 +118,7 @@ def _treating(verdict: Verdict) -> Treating | None:
     """What is said of the area that a motion treats, where the task has a footprint."""
     if verdict.task.footprint is None:
         return None
-    from feasibility.reports.treating import Treating
+    from feasibility.reports.shortfalls import Treating
 
     return Treating(verdict)
 

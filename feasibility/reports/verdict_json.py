@@ -5,14 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 from feasibility.collisions.words import checked
-from feasibility.reports.measured import message_of, seconds
 from feasibility.reports.objects_and_csv import (
     causes_json,
     left_out_json,
     measured_json,
+    proof_json,
     smooth_json,
     walk_csv,
 )
+from feasibility.reports.text_and_tables import message_of, seconds
 from feasibility.verdict import Answer, Verdict, Walk
 from feasibility.version import version
 
@@ -38,7 +39,7 @@ def as_json(verdict: Verdict, before_s: float = 0.0) -> dict[str, Any]:
         "collisions": checked(verdict.task.collision),
         "unchecked_links": list(verdict.unchecked_links),
         "pairs_left_out": [left_out_json(one) for one in verdict.pairs_left_out],
-        "proof": _proof(verdict),
+        "proof": proof_json(verdict.proof, verdict.robot, verdict.cells),
         "treated": _treated(verdict),
         **smooth_json(verdict.cells.surface),
         "timing": seconds(verdict.timing, PHASES, before_s),
@@ -57,15 +58,6 @@ def _treated(verdict: Verdict) -> dict[str, Any] | None:
     from feasibility.treated.treated_words import treated_json
 
     return treated_json(verdict.treated)
-
-
-def _proof(verdict: Verdict) -> dict[str, Any] | None:
-    """The proof as JSON, where there is one."""
-    if verdict.proof is None:
-        return None
-    from feasibility.reports.proof import tree_json
-
-    return tree_json(verdict.proof, verdict.robot, verdict.cells)
 
 
 def witness_json(verdict: Verdict) -> dict[str, Any] | None:

@@ -11,8 +11,7 @@ from coverable.arrays import Mask
 from coverable.errors import counted
 from feasibility.collisions.asked_bodies import said_of
 from feasibility.collisions.words import checked, checked_words
-from feasibility.reports.objects_and_csv import measured_json, smooth_json
-from feasibility.reports.proof import proof_json
+from feasibility.reports.objects_and_csv import measured_json, proof_json, smooth_json
 from feasibility.reports.text_and_tables import (
     certificate_text,
     placement_text,
