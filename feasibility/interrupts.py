@@ -67,59 +67,10 @@ def at_leave(act: Callable[[], object]) -> Iterator[None]:
 
 
 @contextmanager
-def unfinished(path: str) -> Iterator[None]:
-    """Remove a file at the end of the block, if it is still there, however the block ends."""
-
-    def remove() -> None:
-        with suppress(FileNotFoundError):
-            os.unlink(path)
-
-    with at_leave(remove):
-        try:
-            yield
-        finally:
-            remove()
-
-
-@contextmanager
-def raised() -> Iterator[Callable[[], None]]:
-    """Let the first Ctrl-C in the block raise KeyboardInterrupt; the second one ends the process.
-
-    Where Ctrl-C is ignored, or has a handler of someone else's, it is left alone.
-
-    Returns:
-        What raises it again, if it was dropped or came during an import: to be called now and then.
-    """
-    heard = False
-
-    def hear(number: int, frame: FrameType | None) -> None:
-        nonlocal heard
-        if heard:
-            leave()
-        heard = True
-        if not _importing(frame):
-            raise KeyboardInterrupt
-
-    def again() -> None:
-        if heard:
-            raise KeyboardInterrupt
-
-    before = signal.getsignal(signal.SIGINT)
-    if before not in (signal.default_int_handler, leave) or not _in_main_thread():
-        yield again
-        return
-    signal.signal(signal.SIGINT, hear)
-    try:
-        yield again
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
-@contextmanager
 def enforcing() -> Iterator[None]:
     """Enforce time limits in the block, as in a command: by the alarm of this process."""
     global _enforcing
-    if not _in_main_thread():
+    if not in_main_thread():
         yield
         return
     before, was = signal.signal(signal.SIGALRM, _ring), _enforcing
@@ -142,7 +93,7 @@ def limited(left: Callable[[], float], error: type[Exception]) -> Iterator[None]
         left: seconds until then; it may grow meanwhile.
         error: what to raise.
     """
-    if not _enforcing or not _in_main_thread():
+    if not _enforcing or not in_main_thread():
         yield
         return
     limit = _Limit(left, error)
@@ -160,7 +111,7 @@ def limited(left: Callable[[], float], error: type[Exception]) -> Iterator[None]
 def _ring(number: int, frame: FrameType | None) -> None:
     """Raise the error of the outermost limit that is reached, unless a module is being imported."""
     late = next((limit for limit in _limits if limit.left() <= 0.0), None)
-    if late is None or _importing(frame):
+    if late is None or importing(frame):
         _wake()
         return
     late.reached = True
@@ -174,12 +125,12 @@ def _wake() -> None:
     signal.setitimer(signal.ITIMER_REAL, min([*waits, LONGEST]) if waits else 0.0, LONGEST)
 
 
-def _in_main_thread() -> bool:
+def in_main_thread() -> bool:
     """Signals are heard there alone."""
     return threading.current_thread() is threading.main_thread()
 
 
-def _importing(frame: FrameType | None) -> bool:
+def importing(frame: FrameType | None) -> bool:
     """Is a module being imported there?"""
     while frame is not None and frame.f_globals.get("__name__") != IMPORTER:
         frame = frame.f_back

@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import secrets
 import stat
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
 from coverable.files import reason
-from feasibility.interrupts import unfinished
+from feasibility.interrupts import at_leave
 from feasibility.read_files import FileError, shown_path
 
 
@@ -61,7 +62,7 @@ def write_whole(path: str | os.PathLike[str], write: Callable[[IO[bytes]], objec
     temporary = os.fspath(file.with_name(f".{file.name[:40]}.{secrets.token_hex(8)}"))
     try:
         mode = _mode(file)
-        with unfinished(temporary):
+        with _unfinished(temporary):
             with open(temporary, "xb", opener=None if mode is None else _private) as stream:
                 write(stream)
                 stream.flush()
@@ -72,6 +73,21 @@ def write_whole(path: str | os.PathLike[str], write: Callable[[IO[bytes]], objec
     except OSError as error:
         raise FileError(f"cannot be written: {reason(error)}", shown_path(path)) from error
     return Path(path)
+
+
+@contextmanager
+def _unfinished(path: str) -> Iterator[None]:
+    """Remove a file at the end of the block, if it is still there, however the block ends."""
+
+    def remove() -> None:
+        with suppress(FileNotFoundError):
+            os.unlink(path)
+
+    with at_leave(remove):
+        try:
+            yield
+        finally:
+            remove()
 
 
 def _private(path: str, flags: int) -> int:

@@ -16,8 +16,8 @@ from feasibility.cli.command_parts import (
     open_case,
 )
 from feasibility.cli.console import print_err, print_out
+from feasibility.cli.first_interrupt import raised
 from feasibility.cli.output_files import write_text
-from feasibility.interrupts import raised
 from feasibility.safe_files import check_writable
 
 if TYPE_CHECKING:

@@ -21,8 +21,9 @@ from feasibility.cli.command_parts import (
     positive,
 )
 from feasibility.cli.console import print_err, print_out, with_rate
+from feasibility.cli.first_interrupt import raised
 from feasibility.cli.output_files import write_text
-from feasibility.interrupts import INTERRUPTED, MESSAGE, raised
+from feasibility.interrupts import INTERRUPTED, MESSAGE
 from feasibility.read_files import shown_path
 from feasibility.safe_files import write_whole
 

@@ -24,10 +24,11 @@ from feasibility.reports.explanation_words import (
     rates_sentence,
     row_of,
     what_it_opens,
+    widening,
 )
 from feasibility.reports.objects_and_csv import walk_csv
 from feasibility.reports.pages import framed, page, table
-from feasibility.reports.text_and_tables import aligned, filled, widening
+from feasibility.reports.text_and_tables import aligned, filled
 from feasibility.results.plain import plain
 from feasibility.sensitivity.quantities import Quantity
 from feasibility.sensitivity.thresholds import (

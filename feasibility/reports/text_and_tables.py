@@ -92,26 +92,6 @@ def placement_text(certificate: Certificate | None) -> str:
     return f"a motion exists wherever the part stands {margin}" if some else str(margin)
 
 
-WIDER = {
-    Bound.LIMIT: "a wider limit of {what}",
-    Bound.CONE: "a wider cone",
-    Bound.ROLL: "a wider range of the roll",
-    Bound.SINGULAR: "another place of the part, further from singularities (coverable place)",
-    Bound.CLEARANCE: "less clearance of {what}, or a place further from what is in the way",
-    Bound.START: "a motion that may begin elsewhere (without robot.start)",
-}
-"""What would widen a placement margin."""
-
-
-def widening(certificate: Certificate | None) -> str:
-    """The placement margin, and what would widen it; empty where it is not known."""
-    margin = None if certificate is None else certificate.placement_margin
-    if margin is None:
-        return ""
-    wider = WIDER[margin.bound_by].format(what=margin.what)
-    return f"{placement_text(certificate)}; {wider} would widen it"
-
-
 def certificate_text(
     robot: Robot,
     certificate: Certificate,

@@ -12,7 +12,8 @@ from jobs import PLATE, run_coverable, verdict_named
 from samples import spread
 
 from coverable import load_result
-from feasibility.interrupts import at_leave, leave_at_once, raised
+from feasibility.cli.first_interrupt import raised
+from feasibility.interrupts import at_leave, leave_at_once
 from feasibility.safe_files import write_whole
 
 INTERRUPTED = "coverable: interrupted\n"
@@ -181,7 +182,7 @@ def test_at_the_end_of_the_process():
 
 IMPORT = """
 import sys
-from feasibility.interrupts import raised
+from feasibility.cli.first_interrupt import raised
 sys.path.insert(0, sys.argv[1])
 try:
     with raised() as again:
