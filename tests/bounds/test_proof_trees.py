@@ -13,7 +13,7 @@ from proof_cases import elbow, elbow_case, free_elbow_case, rail_case, split, st
 from random_arms import robot_of
 from samples import EVERYTHING, sampled, seeds
 
-from coverable import Task, bspline, load_robot, mesh, piecewise, plane
+from coverable import Task, bspline, load_robot, mesh, piecewise, plane, poses
 from feasibility.certification.cut_proofs.proof_verification import verify_on, verify_proof
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from robots.kinematics import Kinematics
@@ -256,6 +256,12 @@ def test_surfaces_whose_bounds_miss_them_prove_nothing():
     assert verify_on(*case, own).accepted
     for parts in (smaller, shifted):
         assert "the surface's bounds do not hold the surface" in verify_on(*case, parts).refusal
+
+
+def test_where_a_surface_has_no_bounds_nothing_is_proved():
+    cells = poses([[0.9, 0, 0], [1, 0, 0]], [[0, 0, 1]] * 2, approaches=[[0, 0, -1]] * 2)
+    found = verified(elbow_case(), Leaf(0), cells=cells)
+    assert "the surface has no bounds to prove anything with" in found.refusal
 
 
 TABLE = plane((0.35, 0.55), (-0.1, 0.1), side="outside", position=(0, 0, 0.2)).cells(1, 1)

@@ -147,6 +147,8 @@ def test_every_joint_every_demand_and_every_motion_is_judged(known):
     q = load_motion(known[1], robot).q
     begun = replace(robot, start=q[0])
     assert verify(begun, cells, task, q).holds
+    with pytest.raises(ValueError, match="working must be an array"):
+        verify(begun, cells, task, q, working=np.ones(3))
     for off in 1e-3 * np.eye(robot.n):
         assert not verify(replace(robot, start=q[0] + off), cells, task, q).holds
     much = replace(task, footprint=0.005, coverage=0.99)
