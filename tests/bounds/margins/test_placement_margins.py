@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import cache, partial
 from types import SimpleNamespace
 
+import capsule_arms
 import numpy as np
 import plain
 import pytest
@@ -49,6 +50,8 @@ from feasibility.collisions.asked_bodies import gather
 from feasibility.task import PlacementError
 from feasibility.verdict import Bound, Walk
 from robots.kinematics import Kinematics
+from robots.shapes.bodies import Solid
+from robots.urdf.link_shapes import Sphere
 from surfaces.meshes.triangle_mesh import TriangleMesh
 
 # -- the bounds of stretches, one by one ----------------------------------------------------------
@@ -453,6 +456,17 @@ def test_points_of_two_bodies_come_no_nearer_than_is_said(what, follows, seed):
         assert (truth <= most[row] + 1e-9).all()
         used.append(np.max(truth[most[row] > 1e-6] / most[row][most[row] > 1e-6], initial=0.0))
     assert max(used) >= {"shift": 0.9, "turn": 0.3, "joints": 0.3, "all": 0.3}[what] or follows
+
+
+def test_levers_of_bodies_grow_along_a_segment():
+    """The elbow is straight between its ends, and the tip furthest from the axis."""
+    robot, q = capsule_arms.planar_arm([0.5, 0.5]), np.array([[0.0, -1.0], [0.0, 1.0]])
+    tip = Solid("tool", 2, capsule_arms.at(0.5), Sphere(0.01))
+    ball = Obstacle.sphere("ball", 0.01, (0.0, 10.0, 0.0))
+    bodies = capsule_arms.bodies_of([tip], [ball], [capsule_arms.pair("tool", "ball", 0.0)])
+    pairings = couples_of(bodies).along(ArmMotion(robot, q))
+    nearer = displaced_bodies.Nearer(robot, pairings, set(), np.zeros(3))
+    holds(nearer.by(np.array([[0.1, 0.0]]), 0.0, 0.0), 2.0 * np.sin(0.05), 0.5)
 
 
 @sampled
