@@ -72,6 +72,13 @@ def test_a_cut_is_true_where_the_arm_comes_nowhere(q2):
     assert found.accepted == (abs(q2) < 1.0), found.refusal
 
 
+def test_a_cut_is_false_where_a_motion_goes_through_it():
+    """Elbow up alone: both leaves are true, and the middle of the strip is reached on the cut."""
+    robot = elbow(q1=proof_cases.ACROSS + 0.3).with_limits({"j2": (1.0, 2.5)})
+    found = verified(elbow_case(), split(-proof_cases.ACROSS, 4, 0, 0), robot=robot)
+    assert "the cut j1 = -47.2 deg is wrong: the tool can be on the surface" in found.refusal
+
+
 def test_a_cell_out_of_reach_is_a_leaf_alone():
     """Also where the slide has no limits: it is bounded by what the arm can reach."""
     high, near = rail_case(y=0.6), rail_case()

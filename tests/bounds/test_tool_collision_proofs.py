@@ -14,7 +14,7 @@ from samples import sampled, seeds, spread
 import coverable
 from coverable import CauseKind, Collision, Evidence, Obstacle, Task, ToolShape, check, cylinder
 from feasibility.certification.cut_proofs.proof_verification import verify_proof
-from feasibility.certification.overlaps.depths import depths, planes_around, points_inside
+from feasibility.certification.overlaps.depths import Balls, depths, planes_around, points_inside
 from feasibility.certification.overlaps.every_pose import never_clear
 from feasibility.collisions.problem_bodies import Bodies, Pair
 from feasibility.cut_tree import CutTree, Leaf
@@ -164,16 +164,20 @@ def test_a_crate_that_swallows_the_target_is_a_proof():
         assert not verify_proof(UR5, CELLS, freed, CutTree(Leaf(0))).accepted
 
 
-@pytest.mark.parametrize("gap", [None, *np.linspace(-np.pi, np.pi, 9)])
-def test_one_gap_at_any_roll_is_enough(gap):
-    """A ball goes round the tool axis, through a wall that leaves out one direction."""
+@pytest.mark.parametrize(("radius", "edge"), [(0.05, 0.1), (0.001, 0.2989995)])
+@pytest.mark.parametrize("gap", [None, *np.linspace(-3.0, 3.1, 9)])
+def test_one_gap_at_any_roll_is_enough(gap, radius, edge):
+    """A ball goes round the tool axis, through a wall that leaves out one direction.
+
+    The smaller one is clear over a fifth of a degree, and more boxes wait than fit in a batch.
+    """
     # The tool axis of the arm is x of the last joint, and the tip 0.3 m along it.
-    tool = Solid("tool", 2, at(0.3, 0.0, 0.3), Sphere(0.05))
+    tool = Solid("tool", 2, at(0.3, 0.0, 0.3), Sphere(radius))
     turn = pin.exp3(np.array([0.0, 0.0, gap or 0.0]))
-    wall = at(*(turn @ [-0.4 if gap is not None else 0.0, 0.0, 0.0]), turn)
-    scene = (Obstacle("wall", Box((1.0, 1.0, 0.2)), wall),)
+    wall = at(*(turn @ [edge - 0.5 if gap is not None else 0.0, 0.0, 0.0]), turn)
+    scene = (Obstacle("wall", Box((1.0, 1.0, 4.0 * radius)), wall),)
     bodies = Bodies((tool,), (), (), scene, (Pair("tool", "wall", 0.0),))
-    asked = planar_arm(2), bodies, 0.0, 1e-3, np.zeros(3), np.array([0.0, 0.0, 1.0])
+    asked = planar_arm(2), bodies, 0.0, 1e-4 * radius, np.zeros(3), np.array([0.0, 0.0, 1.0])
     assert never_clear(*asked).confirmed == (gap is None)
     assert not never_clear(*asked, most=1).confirmed
 
@@ -238,3 +242,9 @@ def test_balls_around_points_are_inside(shape):
         assert away[1].max() < 1e-9
     else:
         assert inside(shape, points).all()
+
+
+def test_a_place_is_as_deep_in_balls_as_in_the_best_of_them():
+    balls = Balls(np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]), np.array([0.05, 0.2]))
+    found = depths(balls, np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [-0.3, 0.0, 0.0]]))
+    np.testing.assert_allclose(found, [0.1, 0.2, -0.2])

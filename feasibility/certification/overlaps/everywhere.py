@@ -7,10 +7,11 @@ at the middle of a box shows that they come nearer than the clearance c all over
 
 M being how far the point can move in the box, seen from the other body. With x the point, v_k + w_k
 x its velocity by joint k (Pinocchio's), and h_k the half widths, M = sum_k m_k over the joints
-between the two, where m_k = min(h_k, 2) (|v_k + w_k x| + sum of m_l behind k) if joint k turns, and
-h_k if it slides: the joints are moved one by one, the last first. Or else, where the tool point p
-is within e of a place T, the point is as far from T + x - p as that difference changes, and e:
-joints beyond i move p, those up to i turn the difference.
+between the two, where m_k = min(h_k, 2) |v_k + w_k x| if joint k turns, and h_k if it slides: the
+joints are moved one by one, the first first, so that those behind k are still at the middle, and
+those before it have carried its axis along with the point. Or else, where the tool point p is
+within e of a place T, the point is as far from T + x - p as that difference changes, and e: joints
+beyond i move p, those up to i turn the difference.
 """
 
 from __future__ import annotations
@@ -169,33 +170,22 @@ class Overlapping:
 
     def _steps(self, boxes: _Middles, x: Array, joint: int) -> list[Array]:
         """By how much (m, k) each joint up to one moves points of that one, seen from before it."""
-        steps, moved = list[Array](), np.zeros(x.shape[:2])
-        for k in range(joint - 1, -1, -1):
-            steps.append(self._step(boxes, k, x, moved))
-            moved = moved + steps[-1]
-        return steps[::-1]
+        return [self._step(boxes, k, x) for k in range(joint)]
 
     def _steps_from_tool(self, boxes: _Middles, x: Array, joint: int) -> list[Array]:
         """By how much (m, k) each joint changes the difference of points and the tool point."""
         tool, steps = boxes.tool[:, None], list[Array]()
-        moved = np.zeros(x.shape[:2])
-        for k in range(self._robot.n - 1, -1, -1):
-            if k >= joint:
-                step = self._step(boxes, k, tool, moved)
-            elif self._robot.prismatic[k]:
-                step = np.zeros(x.shape[:2])
-            else:
-                turning = _length_of_cross(boxes.angular[:, k, None], x - tool)
-                step = np.minimum(boxes.half[:, k, None], 2.0) * (turning + moved)
-            steps.append(step)
-            moved = moved + step
-        return steps[::-1]
+        for k in range(joint):
+            turning = _length_of_cross(boxes.angular[:, k, None], x - tool)  # none by a slide
+            steps.append(np.minimum(boxes.half[:, k, None], 2.0) * turning)
+        beyond = [self._step(boxes, k, tool) for k in range(joint, self._robot.n)]
+        return steps + [np.broadcast_to(step, x.shape[:2]) for step in beyond]
 
-    def _step(self, boxes: _Middles, k: int, x: Array, moved: Array) -> Array:
-        """m_k of points that the joints behind k have moved so far."""
+    def _step(self, boxes: _Middles, k: int, x: Array) -> Array:
+        """m_k of points (m, k, 3)."""
         if self._robot.prismatic[k]:
-            return np.broadcast_to(boxes.half[:, k, None], moved.shape)
-        lever = _length_of_cross(boxes.angular[:, k, None], x, boxes.linear[:, k, None]) + moved
+            return np.broadcast_to(boxes.half[:, k, None], x.shape[:2])
+        lever = _length_of_cross(boxes.angular[:, k, None], x, boxes.linear[:, k, None])
         return np.asarray(np.minimum(boxes.half[:, k, None], 2.0) * lever)
 
 
