@@ -105,6 +105,7 @@ from surfaces.meshes.selection import cut_box as cut_box
 from surfaces.meshes.selection import cut_plane as cut_plane
 from surfaces.meshes.selection import faces_within_cone as faces_within_cone
 from surfaces.meshes.selection import take_faces as take_faces
+from surfaces.meshes.triangle_mesh import TriangleMesh as TriangleMesh
 from surfaces.passes.parallel import parallel_passes as parallel_passes
 from surfaces.passes.toolpath import pass_toolpath as pass_toolpath
 from surfaces.patches.cone import cone as cone

@@ -1,6 +1,8 @@
 """What newcomers read is true: the README's code runs, its commands exist, its table holds."""
 
 import base64
+import doctest
+import inspect
 import io
 import json
 import os
@@ -11,6 +13,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+import webbrowser
 from pathlib import Path
 from typing import Any
 
@@ -181,6 +184,25 @@ def test_the_front_door_is_true() -> None:
 def test_the_reference_lists_each_public_name_once() -> None:
     listed = re.findall(r"^\.\. auto\w+:: coverable\.(\w+)$", WRITTEN["reference"], re.M)
     assert sorted([*listed, "__version__"]) == dir(coverable)
+
+
+def test_every_public_name_has_an_example_that_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In the reference, where examples follow each other, or in its docstring."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(webbrowser, "open", lambda url: False)
+    pages = re.findall(r"^```pycon\n(.*?)^```$", WRITTEN["reference"], re.MULTILINE | re.DOTALL)
+    shown = "".join(pages)
+    for name in dir(coverable):
+        one = getattr(coverable, name)
+        parts = [one, *vars(one).values()] if inspect.isclass(one) else [one]
+        own = any(">>>" in str(getattr(part, "__doc__", "")) for part in parts)
+        assert own or re.search(rf"\b{name}\b", shown) or name == "__version__", name
+    examples = doctest.DocTestParser().get_doctest(shown, {}, "reference", None, None)
+    said: list[str] = []
+    doctest.DocTestRunner().run(examples, out=said.append)
+    assert not said, "".join(said)
 
 
 def test_make_help_names_every_target() -> None:
