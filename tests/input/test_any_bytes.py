@@ -89,7 +89,7 @@ def test_the_good_file_is_read(name: str, tmp_path: Path) -> None:
     READERS[name].sound(found, tmp_path)
 
 
-@samples.sampled
+@pytest.mark.sampled
 @pytest.mark.parametrize("name", READERS)
 def test_nothing_else_gets_through(name: str, tmp_path: Path) -> None:
     @settings(

@@ -21,8 +21,6 @@ def spread(items: Sequence, few: int) -> Sequence:
     return [items[k] for k in np.linspace(0, len(items) - 1, few).astype(int)]
 
 
-def sampled(names: Any, values: Sequence | None = None, **more: Any) -> Any:
-    """`pytest.mark.parametrize` of a test of which a campaign runs more; or the mark alone."""
-    if values is None:
-        return pytest.mark.sampled(names)
+def sampled(names: Any, values: Sequence, **more: Any) -> Any:
+    """`pytest.mark.parametrize` of a test of which a campaign runs more."""
     return lambda test: pytest.mark.sampled(pytest.mark.parametrize(names, values, **more)(test))

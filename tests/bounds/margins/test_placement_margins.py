@@ -20,27 +20,8 @@ from random_arms import planar_arm, robot_of
 from samples import sampled, seeds
 from scipy.spatial.transform import Rotation
 
-from coverable import (
-    Axis,
-    Collision,
-    Obstacle,
-    Search,
-    Task,
-    check,
-    cone,
-    cylinder,
-    ellipsoid,
-    hyperboloid,
-    load_robot,
-    mesh,
-    plane,
-    poses,
-    replay,
-    revolution,
-    sphere,
-    torus,
-    verify,
-)  # fmt: skip
+import coverable
+from coverable import Axis, Collision, Task, check, cone, load_robot, plane, poses, replay, verify
 from coverable.errors import ArgumentError
 from feasibility.certification import displaced_bodies
 from feasibility.certification import placement_margin as lemma
@@ -127,8 +108,7 @@ def test_what_a_ball_allows_is_solved_for():
     ).all()
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(1, all=40))
+@sampled("seed", seeds(1, all=40))
 @pytest.mark.parametrize("name", [*SIX, "on a rail"])
 def test_bounds_along_stretches(name, seed):
     """Against dense samples, of motions with steps of up to 20 deg, and balls of up to 5 cm."""
@@ -201,7 +181,7 @@ def margin_of_slides(robot, **task):
     return found.certificate.placement_margin
 
 
-@sampled
+@pytest.mark.sampled
 def test_slides_follow_as_far_as_they_reach():
     """Each moves as far as the part at most, the tool never tilts, and rolls as the part turns."""
     free = margin_of_slides(slides())
@@ -278,7 +258,7 @@ def test_the_last_row_counts_for_the_last_segment():
     assert lemma.placement_margin(slides(), PLATE, task, q, room) is None
 
 
-@sampled
+@pytest.mark.sampled
 def test_the_singular_value_is_kept():
     robot, cells, task = question("plate")[2:5]
     verdict, rng = check(robot, cells, task), np.random.default_rng(5)
@@ -298,17 +278,17 @@ ARMS = ("ur5", "puma560", "panda", "kinova", "xarm7", "z1", "on a rail", "over a
 OUT = {"side": "outside"}
 KINDS = {
     "plane": plane((-0.08, 0.08), (-0.06, 0.06), **OUT),
-    "sphere": sphere(0.4, (78, 102), (-12, 12), **OUT),
-    "cylinder": cylinder(0.3, (-15, 15), (-0.07, 0.07), **OUT),
-    "hyperboloid": hyperboloid(0.3, 0.4, (-15, 15), (-0.07, 0.07), **OUT),
+    "sphere": coverable.sphere(0.4, (78, 102), (-12, 12), **OUT),
+    "cylinder": coverable.cylinder(0.3, (-15, 15), (-0.07, 0.07), **OUT),
+    "hyperboloid": coverable.hyperboloid(0.3, 0.4, (-15, 15), (-0.07, 0.07), **OUT),
     "cone": cone(0.3, 0.3, (-15, 15), (-0.07, 0.07), **OUT),
-    "torus": torus(0.4, 0.2, (-12, 12), (-20, 20), **OUT),
-    "ellipsoid": ellipsoid((0.3, 0.4, 0.5), (75, 105), (-15, 15), **OUT),
-    "revolution": revolution([(0.3, -0.1), (0.35, 0.0), (0.3, 0.1)], (-15, 15), **OUT),
+    "torus": coverable.torus(0.4, 0.2, (-12, 12), (-20, 20), **OUT),
+    "ellipsoid": coverable.ellipsoid((0.3, 0.4, 0.5), (75, 105), (-15, 15), **OUT),
+    "revolution": coverable.revolution([(0.3, -0.1), (0.35, 0.0), (0.3, 0.1)], (-15, 15), **OUT),
     "mesh": None, "poses": None,
 }  # fmt: skip
 CASE = ("robot", "cells", "task", "witness")
-EFFORT = Search(evaluations=40_000, early=True)
+EFFORT = coverable.Search(evaluations=40_000, early=True)
 
 
 def corners():
@@ -327,7 +307,7 @@ def cells_at(kind, rotation, shift):
         normals = referee.unit(np.stack([1 + 0 * way, 0.8 * way, 0 * way], 1))
         return poses(points @ rotation.T + shift, normals @ rotation.T)
     if kind == "mesh":
-        return mesh(corners(), **OUT).moved(rotation, shift).cells(count=5)
+        return coverable.mesh(corners(), **OUT).moved(rotation, shift).cells(count=5)
     return KINDS[kind].moved(rotation, shift).cells(2, 3)
 
 
@@ -366,7 +346,7 @@ def case_of(seed):
             asked = {"roll_deg": (psi - wide, psi + wide), "roll_reference": tuple(across)}
         if seed % 3 == 1:
             beside = point + 0.25 * referee.unit(np.cross(axis, rng.normal(size=3)))
-            scene = (Obstacle.box("box", (0.04, 0.05, 0.06), tuple(beside)),)
+            scene = (coverable.Obstacle.box("box", (0.04, 0.05, 0.06), tuple(beside)),)
             scene = () if robot.surface_link else scene
             asked = {"collision": Collision(clearance=0.002, scene=scene, surface=bool(seed % 2))}
         try:
@@ -379,8 +359,7 @@ def case_of(seed):
     raise AssertionError("no feasible case was found")
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(6, all=300))
+@sampled("seed", seeds(6, all=300))
 def test_a_part_that_stands_as_far_off_as_is_claimed_is_reached(seed):
     """And `check` never calls it infeasible there, with the motion to begin from."""
     made, rng = case_of(seed), np.random.default_rng([seed, 1])
@@ -395,8 +374,7 @@ def test_a_part_that_stands_as_far_off_as_is_claimed_is_reached(seed):
     assert again.answer != "infeasible"
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(3, all=60))
+@sampled("seed", seeds(3, all=60))
 def test_a_share_of_what_bodies_may_move_leaves_them_clear(seed):
     """Whatever joints deviate by, bodies by python-fcl, and the part that comes nearer."""
     made, rng = case_of(3 * seed + 1), np.random.default_rng(seed)
@@ -416,8 +394,7 @@ def test_a_share_of_what_bodies_may_move_leaves_them_clear(seed):
         assert (scene.distances(at) >= needed + over - 1e-6).all()
 
 
-@sampled
-@pytest.mark.parametrize("seed", seeds(1, all=20))
+@sampled("seed", seeds(1, all=20))
 @pytest.mark.parametrize("follows", [False, True])
 @pytest.mark.parametrize("what", ["shift", "turn", "joints", "all"])
 def test_points_of_two_bodies_come_no_nearer_than_is_said(what, follows, seed):
@@ -462,14 +439,14 @@ def test_levers_of_bodies_grow_along_a_segment():
     """The elbow is straight between its ends, and the tip furthest from the axis."""
     robot, q = capsule_arms.planar_arm([0.5, 0.5]), np.array([[0.0, -1.0], [0.0, 1.0]])
     tip = Solid("tool", 2, capsule_arms.at(0.5), Sphere(0.01))
-    ball = Obstacle.sphere("ball", 0.01, (0.0, 10.0, 0.0))
+    ball = coverable.Obstacle.sphere("ball", 0.01, (0.0, 10.0, 0.0))
     bodies = capsule_arms.bodies_of([tip], [ball], [capsule_arms.pair("tool", "ball", 0.0)])
     pairings = couples_of(bodies).along(ArmMotion(robot, q))
     nearer = displaced_bodies.Nearer(robot, pairings, set(), np.zeros(3))
     holds(nearer.by(np.array([[0.1, 0.0]]), 0.0, 0.0), 2.0 * np.sin(0.05), 0.5)
 
 
-@sampled
+@pytest.mark.sampled
 @pytest.mark.skipif(
     not samples.EVERYTHING, reason="of the few cases in make test some bounds are never met"
 )
