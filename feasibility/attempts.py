@@ -16,7 +16,7 @@ from feasibility.found import Found
 from feasibility.problem import Problem
 from feasibility.search_settings import Search
 from feasibility.task import PlacementError
-from feasibility.verdict import Replay
+from feasibility.verdict import Bound, Replay
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -62,6 +62,12 @@ class Attempt(NamedTuple):
         return np.inf if margin is None else margin.share(error)
 
     @property
+    def lacks_room(self) -> bool:
+        """Is all but the margin of the placement met, which something else than bodies bounds?"""
+        margin = None if self.replayed is None else self.replayed.certificate.placement_margin
+        return margin is not None and margin.bound_by is not Bound.CLEARANCE
+
+    @property
     def decided(self) -> bool:
         """Is there a motion that was accepted, or a proof?"""
         return self.accepted or self.found.proof is not None
@@ -80,7 +86,7 @@ def attempts_at(
         if begun is not problem:
             return _with_these_shapes(begun, search, clock, method), START_IN_PIECES
     tried = _with_these_shapes(problem, search, clock, method)
-    if tried[0].decided or not tried[0].found.hindered:
+    if tried[0].decided or tried[0].lacks_room or not tried[0].found.hindered:
         return tried, ""
     finer = _in_pieces(problem, clock)
     if finer is None:

@@ -26,6 +26,7 @@ from mesh_writers import GOOD
 import coverable
 from coverable import Evidence, load_motion, load_result, read_net, read_poses, save_result
 from coverable.errors import CoverableError
+from coverable.files import read_regular
 from coverable.meshes.collada import read_collada
 from coverable.meshes.collada_child import answer
 from coverable.meshes.raw_mesh import MeshError
@@ -145,7 +146,7 @@ def parts_of(path: Path) -> Any:
 
 def collada_parts(path: Path) -> Any:
     """Without a process for each file: what that does is done here."""
-    data = path.read_bytes()
+    data = read_regular(path, 1 << 20, "a mesh")
     (found,) = read_collada([data], lambda *_: Ended(answer(data, 1000)))
     if isinstance(found, MeshError):
         raise found
