@@ -1,7 +1,8 @@
 """Compiled functions, kept on disk for as long as no code of kernels changes.
 
 `entry` is for functions that Python calls, and `kernel` for those that only these call: called
-from Python, one runs as plain, slow Python. What makes arrays is `allocating_entry` or
+from Python, one runs as plain, slow Python. `inlined` ones are written into their callers: a call
+hands on every number of a named tuple of arrays. What makes arrays is `allocating_entry` or
 `allocating`: numba counts references there, and refuses to compile what should count and does not.
 A division by zero gives inf or NaN, which no comparison in the search accepts.
 
@@ -120,6 +121,7 @@ def _kept(compiling: Callable[..., Any], function: Any) -> Any:
 _COUNTED: dict[str, Any] = {"error_model": "numpy", "_nrt": True, "no_cfunc_wrapper": True}
 _UNCOUNTED = _COUNTED | {"_nrt": False}
 kernel: Callable[[Any], Any] = register_jitable(**_UNCOUNTED)
+inlined: Callable[[Any], Any] = register_jitable(**_UNCOUNTED, forceinline=True)
 allocating: Callable[[Any], Any] = register_jitable(**_COUNTED)
 entry: Callable[[Any], Any] = partial(_kept, partial(njit, **_UNCOUNTED))
 allocating_entry: Callable[[Any], Any] = partial(_kept, partial(njit, **_COUNTED))

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from coverable.arrays import Array
-from coverable.kernels import entry, kernel
+from coverable.kernels import entry, inlined, kernel
 from feasibility.roadmap.motions.aiming import aim, bounds_between
 from feasibility.roadmap.motions.arrays import FOLD, LONG, SINGULAR, STOPPED, SearchArrays
 from feasibility.roadmap.motions.off_target import STEPS_FROM_NEAR, project_off_target
@@ -76,7 +76,7 @@ def span_of(arrays, work, curve, begin, end):
     return np.sqrt(dx * dx + dy * dy + dz * dz) / arrays.scale
 
 
-@kernel
+@inlined
 def _step_from(arrays, work, q, dt, off_target):
     """Project q, with its secondary step, onto the target ahead; `work.trial` is the result.
 
