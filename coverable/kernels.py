@@ -49,9 +49,7 @@ def is_safe(found: os.stat_result, code: os.stat_result, user: int) -> bool:
 
     It belongs to the user, to root, or to whom the code belongs; nobody else may write there, but
     for a group that may write to the code too; or nobody may change what is another's, as in /tmp.
-
-    Args:
-        found, code, user: whose the folder is, and who may write; the code's likewise; who asks.
+    `found` is of the folder.
     """
     same_group = code.st_mode & stat.S_IWGRP and found.st_gid == code.st_gid
     others = stat.S_IWOTH if same_group else stat.S_IWOTH | stat.S_IWGRP
