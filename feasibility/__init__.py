@@ -19,7 +19,7 @@ How a verdict comes about; wherever a step has a number, it is one of these.
 4. `attempts.py` calls a method: that of the paper (`paper/greedy.py`, Algorithm 2 over 1), or the
    complete one, steps 5 to 9; again with a narrower task where step 10 narrowly refuses its motion.
 5. `roadmap/complete.py` hands arm, curves and bodies to the compiled kernels as arrays
-   (`roadmap/motions/arrays.py`).
+   (`roadmap/motions/search_arrays.py`).
 6. Guesses over a cell in the middle (`roadmap/search.py`) are projected onto eqs. (5) to (7)
    (`roadmap/motions/projection.py`) and pushed clear (`roadmap/moving_clear.py`). From each a
    component grows over the surface (`roadmap/expansion.py`) along motions

@@ -21,7 +21,7 @@ from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.causes.diagnosis import cause_of, causes_of, diagnose
 from feasibility.roadmap.causes.disconnection import disconnected
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.motions.arrays import SearchArrays, within
+from feasibility.roadmap.motions.search_arrays import SearchArrays, within
 from feasibility.roadmap.rounds import explore
 from feasibility.roadmap.search import exploration_of
 from feasibility.roadmap.warmup import warm_up

@@ -17,7 +17,7 @@ from feasibility.notices import compiling_notice
 from feasibility.paper.greedy import greedy_search
 from feasibility.problem import Problem
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.motions.arrays import arrays_of
+from feasibility.roadmap.motions.search_arrays import arrays_of
 from feasibility.roadmap.rounds import evenly, improve
 from feasibility.roadmap.search import seed_middle
 from feasibility.roadmap.warmup import warm_up

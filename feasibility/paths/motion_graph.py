@@ -17,7 +17,7 @@ import numpy as np
 
 from coverable.arrays import Array, Ints
 from feasibility.roadmap.motions.aiming import look_at
-from feasibility.roadmap.motions.arrays import SearchArrays, arrays_of
+from feasibility.roadmap.motions.search_arrays import SearchArrays, arrays_of
 from feasibility.roadmap.motions.self_motion import connect
 from feasibility.roadmap.motions.tracking import track
 from feasibility.roadmap.motions.working_memory import Work, work_for

@@ -12,9 +12,9 @@ from feasibility.certification.overlaps.every_pose import PoseCheck, never_clear
 from feasibility.collisions.asked_bodies import gather
 from feasibility.collisions.problem_bodies import Bodies
 from feasibility.roadmap.branch_and_bound.branching import root_box
-from feasibility.roadmap.motions.arrays import SearchArrays
 from feasibility.roadmap.motions.off_target import project_near_cell
 from feasibility.roadmap.motions.projection import PROJECTION_STEPS
+from feasibility.roadmap.motions.search_arrays import SearchArrays
 from feasibility.roadmap.motions.working_memory import Work
 from feasibility.task import Task
 from robots.robot import Robot

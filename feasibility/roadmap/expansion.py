@@ -14,9 +14,9 @@ import numpy as np
 from coverable.arrays import Array, Ints
 from feasibility.roadmap.graph import Blocked, Roadmap
 from feasibility.roadmap.motions.aiming import look_at
-from feasibility.roadmap.motions.arrays import SearchArrays
 from feasibility.roadmap.motions.off_target import project_near_cell
 from feasibility.roadmap.motions.projection import PROJECTION_STEPS
+from feasibility.roadmap.motions.search_arrays import SearchArrays
 from feasibility.roadmap.motions.self_motion import SETTLE_STEPS, connect, effects, settle
 from feasibility.roadmap.motions.tracking import track
 from feasibility.roadmap.motions.working_memory import NEXT, Work, place

@@ -19,7 +19,7 @@ from feasibility.clock import Clock
 from feasibility.roadmap.connecting import bridge, improvable
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import Roadmap
-from feasibility.roadmap.motions.arrays import arrays_of
+from feasibility.roadmap.motions.search_arrays import arrays_of
 from feasibility.roadmap.rounds import improve
 from feasibility.task import Task
 from surfaces.cells import Finer

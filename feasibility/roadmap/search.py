@@ -16,7 +16,7 @@ import numpy as np
 
 from feasibility.clock import Clock
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.motions.arrays import arrays_of
+from feasibility.roadmap.motions.search_arrays import arrays_of
 from feasibility.roadmap.motions.self_motion import margin_shares
 from feasibility.task import Task
 from robots.robot import Robot

@@ -11,7 +11,7 @@ from feasibility.collisions.kernels.clearance import blamed, segment_clear
 from feasibility.collisions.problem_bodies import Bodies
 from feasibility.problem import Problem
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.motions.arrays import SearchArrays
+from feasibility.roadmap.motions.search_arrays import SearchArrays
 from feasibility.verdict import Replay, Walk
 from robots.kinematics import Kinematics
 

@@ -38,7 +38,7 @@ def _explore_two_cells() -> None:
     """Cover two cells in one motion, and replay it."""
     from feasibility.certification.motion_replay import replay
     from feasibility.roadmap.exploration import Exploration
-    from feasibility.roadmap.motions.arrays import arrays_of
+    from feasibility.roadmap.motions.search_arrays import arrays_of
     from feasibility.roadmap.search import close, seed_middle
     from feasibility.roadmap.walk import covering_walk
 
@@ -55,7 +55,7 @@ def _look_for_reasons() -> None:
     from feasibility.roadmap.branch_and_bound.branching import root_box
     from feasibility.roadmap.causes.diagnosis import diagnose
     from feasibility.roadmap.exploration import Exploration
-    from feasibility.roadmap.motions.arrays import arrays_of
+    from feasibility.roadmap.motions.search_arrays import arrays_of
     from feasibility.roadmap.proving import Proving
     from feasibility.roadmap.rounds import explore
     from feasibility.roadmap.rulings import rule

@@ -9,7 +9,7 @@ import numpy as np
 from coverable.arrays import Array
 from feasibility.collisions.problem_bodies import Pair
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.motions.arrays import (
+from feasibility.roadmap.motions.search_arrays import (
     COLLISION,
     CONE,
     FOLD,

@@ -13,7 +13,7 @@ from search_kernels import contracted
 from coverable import Task, cone, cylinder, hyperboloid, load_robot, plane, sphere, torus
 from feasibility.roadmap.branch_and_bound.boxes import place_at_rest
 from feasibility.roadmap.cuts.target_places import places_on
-from feasibility.roadmap.motions.arrays import arrays_of
+from feasibility.roadmap.motions.search_arrays import arrays_of
 from feasibility.roll import projected, roll_of
 
 ARMS = {

@@ -10,7 +10,7 @@ from search_kernels import assert_walked
 from coverable import Search, Task, check, plane, replay
 from feasibility.roadmap.connecting import explore_self_motions
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.motions.arrays import arrays_of
+from feasibility.roadmap.motions.search_arrays import arrays_of
 from feasibility.roadmap.rounds import explore
 from feasibility.roadmap.search import close
 from feasibility.roadmap.walk import covering_walk

@@ -14,7 +14,7 @@ from coverable import Task, load_robot, plane
 from feasibility.roadmap.branch_and_bound.branching import root_box
 from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.motions.arrays import arrays_of
+from feasibility.roadmap.motions.search_arrays import arrays_of
 from feasibility.roadmap.rulings import rule
 
 UP = np.array([0.0, 0.0, 1.0])

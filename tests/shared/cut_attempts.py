@@ -12,7 +12,7 @@ from feasibility.roadmap.cuts.regions import limits_of, turn_from
 from feasibility.roadmap.cuts.statements import Budget, Statement
 from feasibility.roadmap.cuts.target_places import places_on
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.motions.arrays import arrays_of
+from feasibility.roadmap.motions.search_arrays import arrays_of
 from feasibility.roadmap.rounds import improve
 from feasibility.roadmap.search import seed_middle
 from feasibility.roadmap.seeds import wound

@@ -17,8 +17,8 @@ from feasibility.roadmap.branch_and_bound.branching import DIRECTIONS, root_box,
 from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.motions import aiming, projection, segment_bound
 from feasibility.roadmap.motions.aiming import aim, stand_still
-from feasibility.roadmap.motions.arrays import arrays_of
 from feasibility.roadmap.motions.off_target import project_near_cell
+from feasibility.roadmap.motions.search_arrays import arrays_of
 from feasibility.roadmap.motions.working_memory import place, work_for
 
 Floats = NDArray[np.float64]

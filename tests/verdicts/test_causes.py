@@ -15,7 +15,7 @@ from random_arms import robot_of
 import coverable
 from coverable import CauseKind, Search, Task, ToolShape, check, load_robot, plane, sphere
 from feasibility.roadmap.causes import diagnosis
-from feasibility.roadmap.motions.arrays import arrays_of
+from feasibility.roadmap.motions.search_arrays import arrays_of
 from feasibility.roadmap.motions.working_memory import work_for
 
 PUMA = load_robot("puma560", limits="set-1")

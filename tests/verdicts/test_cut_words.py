@@ -9,7 +9,7 @@ from feasibility.cut_tree import Cut, CutTree, Leaf
 from feasibility.cut_words import lines, nowhere, place_of, sentence, what_opens
 from feasibility.problem import Problem
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.motions.arrays import arrays_of
+from feasibility.roadmap.motions.search_arrays import arrays_of
 from feasibility.roadmap.outcome import unfinished_words
 from feasibility.roadmap.proving import Proving
 from feasibility.roadmap.rounds import explore

@@ -14,7 +14,7 @@ from feasibility.collisions.kernels.memory import collision_buffer
 from feasibility.division.between_patches import clear_moves
 from feasibility.division.free_motion import FreeSpace, free_motion
 from feasibility.division.reconfiguration import Reconfiguration
-from feasibility.roadmap.motions.arrays import arrays_of
+from feasibility.roadmap.motions.search_arrays import arrays_of
 from robots.kinematics import Kinematics
 
 UR5 = load_robot("ur5")

@@ -18,7 +18,7 @@ from feasibility.paths.ladder import joint_route
 from feasibility.paths.motion_graph import MotionGraph
 from feasibility.paths.order import ORDERS, closed_sides, grid_order
 from feasibility.paths.winding import unwound
-from feasibility.roadmap.motions.arrays import arrays_of
+from feasibility.roadmap.motions.search_arrays import arrays_of
 from feasibility.roadmap.motions.working_memory import work_for
 from feasibility.verdict import Walk
 from robots.kinematics import Kinematics

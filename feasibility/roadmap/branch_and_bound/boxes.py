@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.arrays import Array, Ints
-from feasibility.roadmap.motions.arrays import SearchArrays
+from feasibility.roadmap.motions.search_arrays import SearchArrays
 
 STACK = 512  # most boxes on the stack; depth first, so their number grows with the depth only
 

@@ -26,7 +26,7 @@ from feasibility.roadmap.branch_and_bound.boxes import (
 )
 from feasibility.roadmap.branch_and_bound.roll_bounds import length_of
 from feasibility.roadmap.branch_and_bound.ruling import Ruling
-from feasibility.roadmap.motions.arrays import SearchArrays
+from feasibility.roadmap.motions.search_arrays import SearchArrays
 from feasibility.roadmap.motions.working_memory import Work, put
 
 DIRECTIONS = np.array(

@@ -31,8 +31,8 @@ from feasibility.roadmap.causes.disconnection import disconnected
 from feasibility.roadmap.causes.relaxed import STARTS, other_rolls, solutions, with_cone
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions.aiming import look_at
-from feasibility.roadmap.motions.arrays import SearchArrays, with_free_roll
 from feasibility.roadmap.motions.linear_steps import cholesky_solve
+from feasibility.roadmap.motions.search_arrays import SearchArrays, with_free_roll
 from feasibility.roadmap.motions.self_motion import connect
 from feasibility.roadmap.motions.working_memory import NEXT, place, put
 from feasibility.roadmap.rounds import evenly

@@ -7,7 +7,7 @@ from feasibility.cut_tree import CutTree
 from feasibility.cut_words import nowhere
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import Blocked
-from feasibility.roadmap.motions.arrays import (
+from feasibility.roadmap.motions.search_arrays import (
     COLLISION,
     CONE,
     FOLD,

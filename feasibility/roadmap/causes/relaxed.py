@@ -9,8 +9,8 @@ import numpy as np
 
 from coverable.arrays import Array
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.motions.arrays import SearchArrays, with_free_roll
 from feasibility.roadmap.motions.projection import PROJECTION_STEPS, project_onto_cell
+from feasibility.roadmap.motions.search_arrays import SearchArrays, with_free_roll
 from feasibility.roadmap.motions.working_memory import Work
 from feasibility.roll import Roll, roll_of
 from robots.kinematics import Kinematics, reference_axes

@@ -20,8 +20,8 @@ from feasibility.roadmap.branch_and_bound.roll_bounds import unturned
 from feasibility.roadmap.cuts.regions import JointRegion, folded
 from feasibility.roadmap.cuts.statements import Statement
 from feasibility.roadmap.motions.aiming import stand_still
-from feasibility.roadmap.motions.arrays import SearchArrays, with_free_roll
 from feasibility.roadmap.motions.projection import PROJECTION_SLACK, project
+from feasibility.roadmap.motions.search_arrays import SearchArrays, with_free_roll
 from feasibility.roadmap.motions.working_memory import NEXT, Work, place, work_for
 from robots.chain import tool
 

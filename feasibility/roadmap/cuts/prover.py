@@ -20,7 +20,7 @@ from feasibility.roadmap.cuts.gaps import Component, openings
 from feasibility.roadmap.cuts.guess import Guessing, OpenGap, first_proved
 from feasibility.roadmap.cuts.regions import JointRegion, folded, limits_of, turn_from, wide_joints
 from feasibility.roadmap.cuts.statements import Budget
-from feasibility.roadmap.motions.arrays import SearchArrays
+from feasibility.roadmap.motions.search_arrays import SearchArrays
 
 MOST_SEEDS = 12  # handed back by an attempt
 

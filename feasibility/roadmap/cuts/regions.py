@@ -17,7 +17,7 @@ import numpy as np
 
 from coverable.arrays import Array, Mask
 from feasibility.roadmap.branch_and_bound.branching import BoxStack, PlaceParts, box_of
-from feasibility.roadmap.motions.arrays import SearchArrays
+from feasibility.roadmap.motions.search_arrays import SearchArrays
 
 TURN = 2.0 * np.pi
 WIDE = 1.5 * TURN  # [rad] range from which on windings cost more than they gain

@@ -14,7 +14,7 @@ from coverable.arrays import Array
 from feasibility.roadmap.branch_and_bound.branching import BoxStack, PlaceParts, examine
 from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.cuts.regions import JointRegion
-from feasibility.roadmap.motions.arrays import SearchArrays
+from feasibility.roadmap.motions.search_arrays import SearchArrays
 from feasibility.roadmap.motions.working_memory import Work
 
 BATCH = 4000  # boxes between two ticks

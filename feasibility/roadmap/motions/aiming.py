@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from coverable.kernels import entry, kernel
-from feasibility.roadmap.motions.arrays import NEAR_COST
 from feasibility.roadmap.motions.roll_kernels import frame_rates, level
+from feasibility.roadmap.motions.search_arrays import NEAR_COST
 
 # [1] share of a piece by which the curve's point closest to a waypoint may lie off the one aimed at
 BESIDE = 0.05

@@ -11,9 +11,9 @@ import numpy as np
 
 from coverable.kernels import entry, kernel
 from feasibility.roadmap.motions.aiming import look_at
-from feasibility.roadmap.motions.arrays import CONE, LIMIT, ROLL, SINGULAR
 from feasibility.roadmap.motions.linear_steps import least_step
 from feasibility.roadmap.motions.roll_kernels import roll_gradient
+from feasibility.roadmap.motions.search_arrays import CONE, LIMIT, ROLL, SINGULAR
 from feasibility.roadmap.motions.working_memory import HERE, NEXT, OF_CONE, OF_ROLL, place
 from robots.chain import jacobians
 

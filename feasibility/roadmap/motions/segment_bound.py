@@ -50,8 +50,8 @@ import numpy as np
 
 from coverable.kernels import kernel
 from feasibility.collisions.kernels.clearance import blamed, segment_clear
-from feasibility.roadmap.motions.arrays import COLLISION, CONE, ROLL
 from feasibility.roadmap.motions.roll_kernels import TURN
+from feasibility.roadmap.motions.search_arrays import COLLISION, CONE, ROLL
 from feasibility.roadmap.motions.working_memory import HERE, NEXT, cone_used, roll_lost
 
 

@@ -13,7 +13,6 @@ from coverable.arrays import Array
 from coverable.kernels import entry, kernel
 from feasibility.collisions.kernels.clearance import clearance_gradient
 from feasibility.roadmap.motions.aiming import look_at
-from feasibility.roadmap.motions.arrays import SearchArrays
 from feasibility.roadmap.motions.off_target import STEPS_FROM_NEAR, project_off_target
 from feasibility.roadmap.motions.projection import (
     PROJECTION_STEPS,
@@ -21,6 +20,7 @@ from feasibility.roadmap.motions.projection import (
     project,
     project_onto_cell,
 )
+from feasibility.roadmap.motions.search_arrays import SearchArrays
 from feasibility.roadmap.motions.segment_bound import segment_holds
 from feasibility.roadmap.motions.working_memory import (
     HERE,

@@ -17,9 +17,9 @@ import numpy as np
 from coverable.arrays import Array
 from coverable.kernels import entry, inlined, kernel
 from feasibility.roadmap.motions.aiming import aim, bounds_between
-from feasibility.roadmap.motions.arrays import FOLD, LONG, SINGULAR, STOPPED, SearchArrays
 from feasibility.roadmap.motions.off_target import STEPS_FROM_NEAR, project_off_target
 from feasibility.roadmap.motions.projection import linearise, project
+from feasibility.roadmap.motions.search_arrays import FOLD, LONG, SINGULAR, STOPPED, SearchArrays
 from feasibility.roadmap.motions.segment_bound import segment_holds
 from feasibility.roadmap.motions.self_motion import CONE_SLACK, margin_objective
 from feasibility.roadmap.motions.working_memory import (
