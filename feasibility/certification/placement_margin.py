@@ -296,7 +296,7 @@ def placement_margin(
     middle = tuple(case.pivot.tolist())
     if robot.start is not None:  # the motion has to begin there, wherever the part stands
         return PlacementMargin(0.0, 0.0, middle, Bound.START, _cell(case, cells, q[0]))
-    if task.collision is not None and pairings is None:
+    if pairings is None and task.collision is not None and task.collision.checked:
         return None
     if len(q) == 1:
         q, room = np.repeat(q, 2, axis=0), np.repeat(room, 2, axis=0)

@@ -30,7 +30,7 @@ from coverable.files import read_regular
 from coverable.meshes.collada import read_collada
 from coverable.meshes.collada_child import answer
 from coverable.meshes.raw_mesh import MeshError
-from coverable.meshes.robot_files import MeshFiles
+from coverable.meshes.robot_files import MeshFiles, largest_file
 from coverable.processes import Ended
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from robots.pinocchio_model import chain_model
@@ -146,10 +146,13 @@ def parts_of(path: Path) -> Any:
 
 def collada_parts(path: Path) -> Any:
     """Without a process for each file: what that does is done here."""
-    data = read_regular(path, 1 << 20, "a mesh")
-    (found,) = read_collada([data], lambda *_: Ended(answer(data, 1000)))
-    if isinstance(found, MeshError):
-        raise found
+    try:
+        data = read_regular(path, largest_file(path), "a mesh of a robot")
+        (found,) = read_collada([data], lambda *_: Ended(answer(data, 1000)))
+        if isinstance(found, MeshError):
+            raise found
+    except CoverableError as fault:
+        raise MeshError(f"{path.name}: {fault}") from fault
     return found
 
 
