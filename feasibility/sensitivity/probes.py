@@ -281,14 +281,24 @@ class Prober:
             if not self.judged(((quantity, bad),)).accepted:
                 sides = self.finding(quantity, good), self.finding(quantity, bad)
                 return Threshold(quantity, *sides)
-            way = 1 if bad > good else -1
-            failed = [k for k, one in self._along(quantity).items() if one.walk is None]
-            ahead = [k for k in failed if (k - bad) * way > 0]
-            good, bad = bad, min(ahead, key=lambda k: abs(k - bad)) if ahead else quantity.last
-            if not ahead and good != bad and self._holds(quantity, bad):
-                good = bad if self._accepted(quantity, bad) else good
-            if good == bad:
-                return Threshold(quantity, self.finding(quantity, good), None)
+            return self._by_check(quantity, bad, 1 if bad > good else -1, most)
+
+    def _by_check(self, quantity: Quantity, good: int, way: int, most: int) -> Threshold:
+        """The threshold where `check` alone finds more than searches from the motions known."""
+
+        def accepted(k: int) -> bool:
+            return self.judged(((quantity, k),)).accepted
+
+        failed = [k for k, one in self._along(quantity).items() if one.walk is None]
+        ahead = sorted((k for k in failed if (k - good) * way > 0), key=lambda k: abs(k - good))
+        for k in (*ahead, quantity.last):
+            if not accepted(k):
+                good, bad = last_true(accepted, good, k, most)
+                return Threshold(
+                    quantity, self.finding(quantity, good), self.finding(quantity, bad)
+                )
+            good = k
+        return Threshold(quantity, self.finding(quantity, good), None)
 
     def _as_far(self, quantity: Quantity, good: int, bad: int) -> int:
         """The value nearest to `bad` for which the motion found at `good` does as it is."""
