@@ -133,10 +133,10 @@ def live(args: argparse.Namespace, began: float) -> int:
 def _serve(name: str, page: Served, in_browser: bool) -> int:
     """Serve a page until Ctrl-C; returns the exit status."""
     with page, raised():
-        if in_browser:
-            page.open()
-        print_err(f"{name}: {page.url} (served until Ctrl-C)")
         try:
+            if in_browser:
+                page.open()
+            print_err(f"{name}: {page.url} (served until Ctrl-C)")
             page.wait()
         except KeyboardInterrupt:
             print_err("")
