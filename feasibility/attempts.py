@@ -16,7 +16,7 @@ from feasibility.found import Found
 from feasibility.problem import Problem
 from feasibility.search_settings import Search
 from feasibility.task import PlacementError
-from feasibility.verdict import Bound, Replay
+from feasibility.verdict import Bound, PlacementMargin, Replay
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -56,16 +56,19 @@ class Attempt(NamedTuple):
         """Was a motion over all cells accepted?"""
         return self.replayed is not None and self.replayed.accepted
 
+    @property
+    def margin(self) -> PlacementMargin | None:
+        """That of the placement, where it is known."""
+        return None if self.replayed is None else self.replayed.certificate.placement_margin
+
     def left(self, error: PlacementError) -> float:
         """The share of its margin that an error of the placement uses; inf where there is none."""
-        margin = None if self.replayed is None else self.replayed.certificate.placement_margin
-        return np.inf if margin is None else margin.share(error)
+        return np.inf if self.margin is None else self.margin.share(error)
 
     @property
     def lacks_room(self) -> bool:
         """Is all but the margin of the placement met, which something else than bodies bounds?"""
-        margin = None if self.replayed is None else self.replayed.certificate.placement_margin
-        return margin is not None and margin.bound_by is not Bound.CLEARANCE
+        return self.margin is not None and self.margin.bound_by is not Bound.CLEARANCE
 
     @property
     def decided(self) -> bool:
@@ -105,7 +108,7 @@ def _with_these_shapes(
     first = _attempt(problem, search, clock, method)
     if first.replayed is None or not first.replayed.narrowly_refused:
         return [first]
-    if first.replayed.certificate.placement_margin is not None:
+    if first.margin is not None:
         return _with_room(first, search, clock, method)
     # The replay measures the deviation between its samples, and may find a little more.
     narrower = _attempt(problem.narrowed, search, clock, method)

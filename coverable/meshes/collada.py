@@ -16,7 +16,7 @@ from coverable.processes import Ended, Limits, folder_of, run_apart
 
 CHILD = Path(__file__).with_name("collada_child.py")
 LIBRARIES = ("trimesh", "collada", "numpy")
-MOST_TRIANGLES = 1_500_000  # of a file, each instance counted
+MOST_TRIANGLES = 1_500_000  # of a robot, and so of a file, each instance counted
 MOST_SECONDS = 8  # of processor time, for all files; those of a UR arm take 1
 PATIENCE = 300.0  # s, for a machine that is busy with other things
 MEMORY = 1 << 30  # bytes of address space; a million triangles take two thirds of it
@@ -35,20 +35,23 @@ def read_collada(
         run: what runs the process that reads them.
     """
     library = sorted({folder for name in LIBRARIES if (folder := folder_of(name))})
-    job = {"library": library, "sizes": list(map(len, files)), "most": MOST_TRIANGLES}
-    given = b"".join([json.dumps(job).encode(), b"\n", *files])
+    zipped = [zipfile.is_zipfile(io.BytesIO(data)) for data in files]  # which pycollada unpacks
+    plain = [data for data, packed in zip(files, zipped, strict=True) if not packed]
+    job = {"library": library, "sizes": list(map(len, plain)), "most": MOST_TRIANGLES}
+    given = b"".join([json.dumps(job).encode(), b"\n", *plain])
     ended = run(CHILD, given, PATIENCE, Limits(MEMORY, MOST_SECONDS, OUTPUT))
     written, found = io.BytesIO(ended.written), list[list[RawMesh] | MeshError]()
     broken = "takes too long, or too much memory, to read; thin the mesh"
-    for data in files:
+    for packed in zipped:
+        if packed:
+            found.append(MeshError("is a zip archive; unpack it first"))
+            continue
         try:
             found.append(_parts(written))
         except (ValueError, TypeError, KeyError):
             found.append(MeshError(broken))
             broken = "was not read, as another mesh of the robot took all the time"
             written = io.BytesIO()
-        if zipfile.is_zipfile(io.BytesIO(data)):
-            found[-1] = MeshError("is a zip archive; unpack it first")
     return found
 
 

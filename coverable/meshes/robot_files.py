@@ -14,11 +14,10 @@ import numpy as np
 
 from coverable.errors import CoverableError
 from coverable.files import read_regular
-from coverable.meshes.collada import read_collada
+from coverable.meshes.collada import MOST_TRIANGLES, read_collada
 from coverable.meshes.mesh_file import read_parts
 from coverable.meshes.raw_mesh import MeshError, RawMesh
 
-MOST_TRIANGLES = 1_500_000  # of a robot, each use of a file counted
 MOST_BYTES = 256 << 20  # of .dae files that are read together; the last may exceed it
 MOST_SECONDS = 8.0  # of processor time, for a picture
 

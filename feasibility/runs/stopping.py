@@ -9,25 +9,17 @@ import numpy as np
 from coverable.arrays import Array
 from feasibility.collisions.problem_bodies import Pair
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.motions.search_arrays import (
-    COLLISION,
-    CONE,
-    FOLD,
-    LIMIT,
-    LONG,
-    ROLL,
-    SINGULAR,
-)
+from feasibility.roadmap.motions import search_arrays as stop
 from feasibility.roadmap.motions.tracking import track
 from feasibility.speed.motion_rates import motion_rates
 from feasibility.task import Task
 
 WORDS = {
-    CONE: "the tool axis would leave the cone",
-    ROLL: "the roll of the tool would leave its range",
-    SINGULAR: "the arm comes to a singularity",
-    LONG: "the motion takes too many steps",
-    FOLD: "the surface is creased, or its offset folds",
+    stop.CONE: "the tool axis would leave the cone",
+    stop.ROLL: "the roll of the tool would leave its range",
+    stop.SINGULAR: "the arm comes to a singularity",
+    stop.LONG: "the motion takes too many steps",
+    stop.FOLD: "the surface is creased, or its offset folds",
 }
 
 
@@ -75,10 +67,10 @@ def where_it_stops(
 def _words(exploration: Exploration, code: int, joint: int, pairs: tuple[Pair, ...]) -> str:
     """A reason that tracking stopped."""
     names = exploration.robot.joint_names
-    if code == LIMIT:
+    if code == stop.LIMIT:
         which = names[joint] if 0 <= joint < len(names) else "a joint"
         return f"{which} comes to its limit"
-    if code == COLLISION:
+    if code == stop.COLLISION:
         if not 0 <= joint < len(pairs):
             return "bodies come too near to each other"
         return f"{pairs[joint].first} and {pairs[joint].second} come too near to each other"

@@ -7,15 +7,7 @@ from feasibility.cut_tree import CutTree
 from feasibility.cut_words import nowhere
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import Blocked
-from feasibility.roadmap.motions.search_arrays import (
-    COLLISION,
-    CONE,
-    FOLD,
-    LIMIT,
-    LONG,
-    ROLL,
-    SINGULAR,
-)
+from feasibility.roadmap.motions import search_arrays as stop
 from feasibility.verdict import Cause, CauseKind
 
 
@@ -38,15 +30,15 @@ def disconnected(
         return Cause(cell, CauseKind.DISCONNECTED, True, f"{detail}; {parted}")
     code, joint, stopped = roadmap.blocked.get(cell, Blocked(-1, -1, -1))
     name = robot.joint_names[joint] if joint < robot.n else ""
-    met = pairs[joint] if code == COLLISION and 0 <= joint < len(pairs) else None
+    met = pairs[joint] if code == stop.COLLISION and 0 <= joint < len(pairs) else None
     reason = {
-        LIMIT: f"{name} stops at its limit" if joint >= 0 else "a joint stops at its limit",
-        CONE: "the tool axis stops at the boundary of the cone",
-        ROLL: "the roll of the tool stops at the end of its range",
-        SINGULAR: "the arm stops at a singularity",
-        COLLISION: _stopped_by(met),
-        LONG: "the motion takes too many steps",
-        FOLD: "the surface is creased, or its offset folds",
+        stop.LIMIT: f"{name} stops at its limit" if joint >= 0 else "a joint stops at its limit",
+        stop.CONE: "the tool axis stops at the boundary of the cone",
+        stop.ROLL: "the roll of the tool stops at the end of its range",
+        stop.SINGULAR: "the arm stops at a singularity",
+        stop.COLLISION: _stopped_by(met),
+        stop.LONG: "the motion takes too many steps",
+        stop.FOLD: "the surface is creased, or its offset folds",
     }.get(code)
     if reason and roadmap.root(stopped) == exploration.best:
         detail += f"; on the way there from the covered cells {reason}"
