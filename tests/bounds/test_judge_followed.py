@@ -9,7 +9,7 @@ from arm_urdfs import joint
 from gantry import configurations, gantry, raster
 from random_arms import robot_of
 
-from coverable import Task, cylinder, mesh, parametric, plane, poses
+from coverable import Task, cylinder, mesh, parametric, plane, poses, verify
 from feasibility.certification.followed import lifted_faults
 from feasibility.certification.surface_replay import replay_over_surface
 from robots.kinematics import Kinematics
@@ -132,6 +132,7 @@ def test_poses_over_a_surface_are_right_over_it_where_they_follow(name):
     found = replay_over_surface(gantry(), cells, TASK, q, marks=marks)
     assert found.accepted == (not word), found.refusal
     assert word in found.refusal
+    assert verify(gantry(), cells, TASK, q, marks=marks[::-1]).holds == (not word)
 
 
 @pytest.mark.parametrize(
