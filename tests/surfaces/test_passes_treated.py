@@ -106,7 +106,7 @@ def test_no_face_is_treated_more_or_less_than_is_said_of_it(seed):
 
 
 def test_the_back_of_a_thin_part_is_not_treated_through_it():
-    """A sheet that is folded to 4 mm, so its back is joined with the front; a footprint of 40 mm."""
+    """A sheet folded to 4 mm, so that its back is joined with its front; a footprint of 40 mm."""
     x, y, _ = PLATE.vertices.T
     folded = np.column_stack([0.3 - abs(x - 0.3), y, np.where(x > 0.3, -0.004, 0.0)])
     both = WorkingMesh(folded, PLATE.faces)
