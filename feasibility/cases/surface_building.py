@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from coverable.errors import MISSING, Fault
+from coverable.errors import MISSING, Fault, worded
 from feasibility.cases.keys import own_keys
 from feasibility.cases.table_reader import CaseError, with_example
 from feasibility.read_files import shown_path
@@ -59,8 +59,7 @@ def faults_of(
             fault = fault._replace(key=fault.key or key)
             renamed = with_example(fault.renamed(names), keys)
             if file is not None and renamed.key.partition("[")[0] not in own:
-                what = f"{fault.key} {fault.message}".strip()
-                faults.append(Fault(f"{place}.file", what, shown_path(file)))
+                faults.append(Fault(f"{place}.file", worded(fault), shown_path(file)))
             else:
                 at = shown_path(file) if file is not None and not kind else ""
                 faults.append(renamed._replace(place=at or renamed.place).renamed({}, place))

@@ -10,8 +10,6 @@ finite number, and values that can only be degrees.
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import os
 from collections.abc import Sequence
@@ -21,15 +19,19 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
-from coverable.errors import Fault, close, number_in, printable, shown
+from coverable.columns import FLAG, NUMBER, WHOLE_OR_NOTHING, Kind, read_columns
+from coverable.errors import CoverableError, Fault, close, printable
 from feasibility.read_files import FileError, read_text, shown_path
-from feasibility.results.trajectory_files import COMMENT, WORKING
+from feasibility.results.trajectory_files import WORKING
 from robots.robot import Robot
 
 CAP = 64 << 20  # bytes
 MOST_ROWS = 1_000_000
 MOST_COLUMNS = 1000
-CELL, DIGITS = "cell", 10
+CELL = "cell"
+NO_MARK = -2.0
+MARK = Kind("", lambda word: NO_MARK if math.isnan(one := WHOLE_OR_NOTHING.value(word)) else one)
+"""The cell of a row; what is no such number makes the column one that is not used."""
 LEFT_ASIDE = (CELL, "time", "t", "tool_speed", "time_from_start", "index", "row", "waypoint")
 DERIVED = ("_velocity", "_acceleration", "_effort")
 SLACK = 1e-6  # rad or m, beyond limits, of values that are taken for another unit
@@ -40,7 +42,6 @@ UNITS = (
 )  # fmt: skip
 """Kinds of joints: what a unit that people confuse is worth, how far (rad, m) beyond its limits a
 value is no wrong turn, the names of both units, and the remedy."""
-DELIMITERS = (",", ";", "\t")
 
 
 class Motion(NamedTuple):
@@ -68,77 +69,46 @@ def load_motion(path: str | os.PathLike[str], robot: Robot) -> Motion:
         raise FileError("JSON is written only; give the motion as CSV", name)
     text = read_text(path, CAP, "a joint motion (.csv)")
     try:
-        return _from_csv(text, robot, name)
-    except csv.Error as error:
-        raise FileError(f"is not CSV: {error}", name) from error
+        return _from_csv(text, robot)
+    except CoverableError as error:
+        raise FileError(error.faults, name) from error
 
 
-def _from_csv(text: str, robot: Robot, name: str) -> Motion:
+def _from_csv(text: str, robot: Robot) -> Motion:
     """See `load_motion`."""
-    first = next((line for line in text.splitlines() if not line.startswith(COMMENT)), "")
-    delimiter = max(DELIMITERS, key=first.count)
-    lines = csv.reader(io.StringIO(text), delimiter=delimiter, strict=True)
-    rows = [
-        (lines.line_num, row) for row in lines
-        if any(word.strip() for word in row) and not row[0].startswith(COMMENT)
-    ]  # fmt: skip
-    if not rows:
-        raise FileError("is empty; expected a line of joint names, then a row a waypoint", name)
-    place, head = f"line {rows[0][0]}", [word.strip() for word in rows[0][1]]
-    if not any(math.isnan(number_in(word)) for word in head):
-        expected = f"expected a first line of joint names: {', '.join(robot.joint_names)}"
-        raise FileError(f"begins with numbers; {expected}", name)
-    if len(head) > MOST_COLUMNS or len(rows) - 1 > MOST_ROWS:
-        most = f"{MOST_ROWS:,} rows and {MOST_COLUMNS:,} columns"
-        raise FileError(f"has more than {most}", name)
-    columns, faults = _columns(head, robot, place)
-    if faults:
-        raise FileError(faults, name)
-    if len(rows) == 1:
-        raise FileError("has no rows", name)
-    q = np.full((len(rows) - 1, robot.n), np.nan)
-    at_work = head.index(WORKING) if head.count(WORKING) == 1 else None
-    working = np.ones(len(q), dtype=bool)
-    for k, (line, row) in enumerate(rows[1:]):
-        if len(row) != len(head):
-            what = f"has {len(row)} fields, not the {len(head)} of the first line"
-            faults.append(Fault("", what, f"line {line}"))
-            continue
-        for joint, (column, in_degrees) in enumerate(columns):
-            value = number_in(row[column])
-            if not math.isfinite(value):
-                what = f"{head[column]} is {shown(row[column].strip())}, no finite number"
-                faults.append(Fault("", what, f"line {line}"))
-            q[k, joint] = math.radians(value) if in_degrees else value
-        if at_work is not None:
-            working[k] = row[at_work].strip() == "1"
-            if row[at_work].strip() not in ("0", "1"):
-                faults.append(Fault("", f"expected 0 or 1 as {WORKING}", f"line {line}"))
-    if faults:
-        raise FileError(faults, name)
-    marks = _marks(head, [row for _, row in rows[1:]])
-    used = {column for column, _ in columns} | {at_work}
-    used |= set() if marks is None else {head.index(CELL)}
-    unused = [word for column, word in enumerate(head) if column not in used]
+    lines = read_columns(text, MOST_ROWS, f"joint names: {', '.join(robot.joint_names)}")
+    head = lines.head
+    if len(head) > MOST_COLUMNS:
+        raise FileError(f"has more than {MOST_COLUMNS:,} columns")
+    joints = _columns(head, robot, lines.place)
+    working, cell = (
+        head.index(word) if head.count(word) == 1 and word not in robot.joint_names else None
+        for word in (WORKING, CELL)
+    )
+    kinds = {column: NUMBER for column, _ in joints}
+    kinds |= {} if working is None else {working: FLAG}
+    kinds |= {} if cell is None else {cell: MARK}
+    values = dict(zip(kinds, lines.numbers(kinds).T, strict=True))
+    if cell is not None and (values[cell] == NO_MARK).any():
+        del values[cell]
+    rows = [np.radians(values[at]) if in_degrees else values[at] for at, in_degrees in joints]
+    q = _checked(np.stack(rows, axis=1), robot)
+    unused = [word for at, word in enumerate(head) if at not in values]
     notes = [f"not used: {', '.join(map(printable, unused))}"] if unused else []
-    found = _checked(q, robot, name, tuple(notes))
-    return found._replace(working=None if at_work is None else working, marks=marks)
+    return Motion(
+        q=q,
+        notes=(*notes, *_turns(q, robot)),
+        working=None if working is None else values[working] == 1.0,
+        marks=values[cell].astype(np.int64) if cell in values else None,
+    )
 
 
-def _marks(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Ints | None:
-    """The cells that rows are said to be at; None where that is not said in whole numbers."""
-    if head.count(CELL) != 1:
-        return None
-    words = [row[head.index(CELL)].strip() for row in rows]
-    if not all(word == "" or (word.isdecimal() and len(word) < DIGITS) for word in words):
-        return None
-    return np.array([-1 if word == "" else int(word) for word in words], dtype=np.int64)
+def _columns(head: Sequence[str], robot: Robot, place: str) -> list[tuple[int, bool]]:
+    """For each joint its column, and whether that is in degrees.
 
-
-def _columns(
-    head: Sequence[str], robot: Robot, place: str = "line 1"
-) -> tuple[list[tuple[int, bool]], list[Fault]]:
-    """For each joint its column, and whether that is in degrees; and all faults, at `place`."""
+    Raises:
+        FileError: with all faults of the header, which stands at `place`.
+    """
     faults, places = [], dict[str, list[tuple[int, bool]]]()
     degrees = {
         f"{joint}_deg": joint
@@ -163,8 +133,8 @@ def _columns(
     if faults:
         names = ", ".join(robot.joint_names)
         faults.append(Fault("", f"expected a column for each of {names}"))
-        return [], faults
-    return [places[joint][0] for joint in robot.joint_names], []
+        raise FileError(faults)
+    return [places[joint][0] for joint in robot.joint_names]
 
 
 def _is_aside(word: str, robot: Robot) -> bool:
@@ -173,8 +143,8 @@ def _is_aside(word: str, robot: Robot) -> bool:
     return word in (*LEFT_ASIDE, WORKING) or word in derived
 
 
-def _checked(q: Array, robot: Robot, name: str, notes: tuple[str, ...]) -> Motion:
-    """The motion, unless its values are in other units.
+def _checked(q: Array, robot: Robot) -> Array:
+    """The values, unless they are in other units.
 
     They are where one is far beyond its limits, and all of the same kind of joint would be inside
     them in the other unit. Joints without limits say nothing.
@@ -191,10 +161,9 @@ def _checked(q: Array, robot: Robot, name: str, notes: tuple[str, ...]) -> Motio
             limits = f"{low[column]:.4g} .. {high[column]:.4g} {unit}"
             raise FileError(
                 f"holds {taken}, it seems: {joint} is {values[row, column]:g} where its limits are "
-                f"{limits}, and all values would fit as {taken}; {remedy.format(joint=joint)}",
-                name,
+                f"{limits}, and all values would fit as {taken}; {remedy.format(joint=joint)}"
             )
-    return Motion(q, (*notes, *_turns(q, robot)))
+    return q
 
 
 def _turns(q: Array, robot: Robot) -> list[str]:

@@ -9,14 +9,14 @@ from __future__ import annotations
 import csv
 import io
 import json
-import math
 import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from coverable.errors import ArgumentError, Checks, CoverableError, Fault
+from coverable.columns import COMMENT, FLAG, NUMBER, WHOLE_OR_NOTHING, read_columns
+from coverable.errors import CoverableError, Fault
 from feasibility.collisions.words import listed_words
 from feasibility.read_files import FileError, read_text, shown_path
 from feasibility.safe_files import write_whole
@@ -27,7 +27,6 @@ MOST_JOINTS = 64
 CAP = 64 << 20  # [bytes] largest file that is read
 FORMAT = "coverable trajectory 1"
 WORKING = "working"  # the column, or the list, that says where the tool works
-COMMENT = "#"  # begins the lines of a CSV that hold no numbers
 ARRAYS = {
     "time": "time", "positions": "q", "velocities": "dq", "accelerations": "ddq",
     "tool_speed": "tool_speed",
@@ -114,51 +113,27 @@ def from_csv(text: str) -> Trajectory:
     """Read what `as_csv` wrote.
 
     Raises:
-        ArgumentError: it is something else.
+        CoverableError: it is something else.
     """
-    try:
-        lines = csv.reader(io.StringIO(text), strict=True)
-        rows = [
-            (lines.line_num, row) for row in lines if not (row and row[0].startswith(COMMENT))
-        ]  # fmt: skip
-    except csv.Error as error:
-        raise ArgumentError(f"is not CSV: {error}") from error
-    head = rows[0][1] if rows else []
+    lines = read_columns(text, MOST_SAMPLES, "columns", delimiters=",")
+    head = lines.head
     with_work = head[-1:] == [WORKING]
-    head = head[: len(head) - with_work]
-    n = (len(head) - 3) // 3
+    n = (len(head) - with_work - 3) // 3
     joints = tuple(head[1 : 1 + max(n, 0)])
-    if n < 1 or n > MOST_JOINTS or head != _columns(joints):
-        raise ArgumentError(
-            f"line {rows[0][0] if rows else 1}: expected the columns time, the joints, their "
-            "velocities (joint_velocity), their accelerations (joint_acceleration), tool_speed, "
-            "cell"
+    if n < 1 or n > MOST_JOINTS or head[: len(head) - with_work] != _columns(joints):
+        text = (
+            "expected the columns time, the joints, their velocities (joint_velocity), their "
+            "accelerations (joint_acceleration), tool_speed, cell"
         )
-    if len(rows) - 1 > MOST_SAMPLES:
-        raise ArgumentError(f"has more than {MOST_SAMPLES:,} samples")
-    checks = Checks("")
-    table = np.full((len(rows) - 1, len(head) - 1), math.nan)
-    cells = np.full(len(rows) - 1, -1, dtype=np.int64)
-    working = np.ones(len(rows) - 1, dtype=bool)
-    width = len(head) + with_work
-    for k, (line, row) in enumerate(rows[1:]):
-        if len(row) != width:
-            checks.keep(Fault("", f"expected {width} columns, found {len(row)}", f"line {line}"))
-            continue
-        if with_work and row[-1] not in ("0", "1"):
-            checks.keep(Fault("", f"expected 0 or 1 as {WORKING}", f"line {line}"))
-        working[k] = not with_work or row.pop() == "1"
-        try:
-            table[k] = [float(word) for word in row[:-1]]
-            cells[k] = int(row[-1]) if row[-1] else -1
-        except (ValueError, OverflowError):
-            text = "expected numbers, and a whole number or nothing as cell"
-            checks.keep(Fault("", text, f"line {line}"))
-    checks.done()
-    columns = np.split(table, np.cumsum([1, n, n, n]), axis=1)
+        raise CoverableError(Fault("", text, lines.place))
+    kinds = dict.fromkeys(range(3 * n + 2), NUMBER) | {3 * n + 2: WHOLE_OR_NOTHING}
+    values = lines.numbers(kinds | ({3 * n + 3: FLAG} if with_work else {}))
+    time, q, dq, ddq, speed, cell, work = np.split(
+        values, np.cumsum([1, n, n, n, 1, 1]), axis=1
+    )  # fmt: skip
     return Trajectory(
-        joints, columns[0][:, 0], columns[1], columns[2], columns[3], columns[4][:, 0], cells,
-        working=working if with_work else None,
+        joints, time[:, 0], q, dq, ddq, speed[:, 0], cell[:, 0].astype(np.int64),
+        working=work[:, 0] == 1.0 if with_work else None,
     )  # fmt: skip
 
 

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import math
 import os
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import NamedTuple
 
 from coverable.arrays import Array
-from coverable.errors import CoverableError, Fault, number_in
+from coverable.columns import NUMBER, read_columns
+from coverable.errors import CoverableError, Fault
 from coverable.files import read_text, shown_name
 from surfaces.arguments import Checks
 from surfaces.surface import SurfaceError
@@ -20,7 +16,6 @@ from surfaces.toolpaths.given import MOST_POSES
 MOST_BYTES = 16 << 20
 UNITS = {"m": 1.0, "mm": 1e-3}
 GROUPS = {"points": "xyz", "normals": "nx ny nz", "approaches": "ax ay az", "tangents": "tx ty tz"}
-MOST_FAULTS = 5  # lines that are named
 
 
 class PoseFile(NamedTuple):
@@ -55,14 +50,12 @@ def read_poses(path: str | os.PathLike[str], units: str = "m") -> PoseFile:
     checks.done()
     try:
         text = read_text(path, MOST_BYTES, "a list of poses (.csv)")
-        rows = csv.reader(io.StringIO(text, newline=""), strict=True)
-        columns = _columns([word.strip().lower() for word in next(rows, [])])
-        values = _values(rows, sum(len(group) for group in columns.values()))
-    except csv.Error as error:
-        raise SurfaceError(f"is no CSV: {error}", name) from error
+        lines = read_columns(text, MOST_POSES, "x,y,z,nx,ny,nz")
+        columns = _columns([word.lower() for word in lines.head])
+        values = lines.numbers({at: NUMBER for group in columns.values() for at in group})
     except CoverableError as error:
         raise SurfaceError(error.faults, name) from error
-    found = {group: values[:, at] for group, at in columns.items()}
+    found = {group: values[:, 3 * k : 3 * k + 3] for k, group in enumerate(columns)}
     found["points"] = scale * found["points"]
     return PoseFile(**found)
 
@@ -96,31 +89,3 @@ def _columns(header: list[str]) -> dict[str, list[int]]:
         for group, words in wanted.items()
         if words[0] in header
     }
-
-
-def _values(lines: Any, width: int) -> Array:
-    """(N, width) the numbers of all lines.
-
-    Raises:
-        SurfaceError: with the first lines that are wrong.
-    """
-    found: list[list[float]] = []
-    faults: list[Fault] = []
-    for line in lines:
-        if not line:
-            continue
-        numbers, where = [number_in(word) for word in line], f"line {lines.line_num}"
-        wrong = [word for word, x in zip(line, numbers, strict=True) if not math.isfinite(x)]
-        if len(line) != width:
-            faults.append(Fault(where, f"must hold {width} numbers, got {len(line)}"))
-        elif wrong:
-            faults.append(Fault(where, f"{wrong[0][:40]!r} is not a finite number"))
-        found.append(numbers)
-        if len(faults) >= MOST_FAULTS:
-            break
-        if len(found) > MOST_POSES:
-            faults.append(Fault("", f"holds more than {MOST_POSES:,} poses; split the list"))
-            break
-    if faults:
-        raise SurfaceError(faults)
-    return np.array(found, dtype=float).reshape(len(found), width)

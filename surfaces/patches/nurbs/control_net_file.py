@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
-import math
 import os
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from coverable.errors import number_in
+import numpy as np
+
+from coverable.columns import NUMBER, WHOLE, read_columns
+from coverable.errors import CoverableError, Fault
 from coverable.files import read_text, shown_name
 from surfaces.patches.nurbs.nurbs_checks import MOST_POINTS
 from surfaces.surface import SurfaceError
@@ -55,7 +55,9 @@ def read_net(path: str | os.PathLike[str], what: str = "a control net (.json or 
         return _from_json(text) if suffix == ".json" else _from_csv(text)
     except RecursionError as error:
         raise SurfaceError("is nested too deep for a control net", name) from error
-    except (ValueError, csv.Error) as error:
+    except CoverableError as error:
+        raise SurfaceError(error.faults, name) from error
+    except ValueError as error:
         raise SurfaceError(str(error), name) from error
 
 
@@ -86,49 +88,23 @@ def _refused(constant: str) -> float:
 
 def _from_csv(text: str) -> NetFile:
     """The grid of a CSV file."""
-    lines = csv.reader(io.StringIO(text, newline=""), strict=True)
-    header = [name.strip().lower() for name in next(lines, [])]
+    lines = read_columns(text, MOST_POINTS, ",".join(_COLUMNS))
+    header = [name.lower() for name in lines.head]
     rational = header == [*_COLUMNS, "weight"]
     if not rational and header != _COLUMNS:
         raise ValueError(f"must begin with the header {','.join(_COLUMNS)} or ...,z,weight")
-    points: dict[tuple[int, int], list[float]] = {}
-    for line in lines:
-        if not line:
-            continue
-        where = f"line {lines.line_num}"
-        if len(line) != len(header):
-            raise ValueError(f"{where} must hold {len(header)} numbers, got {len(line)}")
-        place = (_index(line[0], where), _index(line[1], where))
-        if place in points:
-            raise ValueError(f"{where} gives the point of row {place[0]}, column {place[1]} again")
-        points[place] = [_number(word, where) for word in line[2:]]
-        if len(points) > MOST_POINTS:
-            raise ValueError(f"holds more than {MOST_POINTS:,} points; use a coarser net")
-    rows = 1 + max((i for i, _ in points), default=-1)
-    columns = 1 + max((j for _, j in points), default=-1)
-    if len(points) < rows * columns:
-        i, j = next((i, j) for i in range(rows) for j in range(columns) if (i, j) not in points)
-        raise ValueError(
-            f"must hold all {rows} x {columns} points, but row {i}, column {j} is missing"
-        )
-    grid = [[points[i, j] for j in range(columns)] for i in range(rows)]
-    return NetFile(
-        points=[[point[:3] for point in row] for row in grid],
-        weights=[[point[3] for point in row] for row in grid] if rational else None,
-    )
-
-
-def _index(word: str, where: str) -> int:
-    """A row or a column."""
-    word = word.strip()
-    if not (word.isascii() and word.isdigit() and len(word) <= 6):
-        raise ValueError(f"{where}: a row or column must be a whole number >= 0, got {word[:40]!r}")
-    return int(word)
-
-
-def _number(word: str, where: str) -> float:
-    """A finite number."""
-    number = number_in(word)
-    if not math.isfinite(number):
-        raise ValueError(f"{where}: {word[:40]!r} is not a finite number")
-    return number
+    values = lines.numbers({k: WHOLE if k < 2 else NUMBER for k in range(len(header))})
+    rows: dict[tuple[int, int], int] = {}
+    faults = []
+    for k, (i, j) in enumerate(values[:, :2].astype(np.int64).tolist()):
+        if rows.setdefault((i, j), k) != k:
+            text = f"gives the point of row {i}, column {j} again"
+            faults.append(Fault("", text, f"line {lines.lines[k]}"))
+    m, n = 1 + max(i for i, _ in rows), 1 + max(j for _, j in rows)
+    if not faults and len(rows) < m * n:
+        i, j = next((i, j) for i in range(m) for j in range(n) if (i, j) not in rows)
+        faults = [Fault("", f"must hold all {m} x {n} points, but row {i}, column {j} is missing")]
+    if faults:
+        raise CoverableError(faults)
+    grid = values[[[rows[i, j] for j in range(n)] for i in range(m)]]
+    return NetFile(grid[..., 2:5].tolist(), weights=grid[..., 5].tolist() if rational else None)
