@@ -79,7 +79,7 @@ from feasibility.viewer.figures import plot_map as plot_map
 from feasibility.viewer.figures import plot_sides as plot_sides
 from feasibility.viewer.figures import plot_transition as plot_transition
 from feasibility.viewer.figures import unrolled_edges as unrolled_edges
-from feasibility.viewer.passes.pass_view import view_passes as view_passes
+from feasibility.viewer.pass_view import view_passes as view_passes
 from feasibility.viewer.path_and_division import view_division as view_division
 from feasibility.viewer.path_and_division import view_path as view_path
 from feasibility.viewer.placement_view import view_placements as view_placements

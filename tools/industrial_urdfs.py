@@ -1,4 +1,4 @@
-"""Write the URDFs of robots/industrial from its table of published figures.
+"""Write the URDFs of robots/arms from its table of published figures.
 
     python tools/industrial_urdfs.py
 
@@ -13,9 +13,9 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-FOLDER = Path(__file__).parent.parent / "robots" / "industrial"
+FOLDER = Path(__file__).parent.parent / "robots" / "arms"
 HEAD = """<?xml version="1.0"?>
-<!-- Written by `python tools/industrial_urdfs.py`; change arms.toml, not this file. -->
+<!-- Written by `python tools/industrial_urdfs.py`; change industrial.toml, not this file. -->
 <!-- The capsules are estimates, and not the maker's housing. Kinematics: {sources}. -->
 """
 Axis = tuple[float, float, float]
@@ -94,7 +94,7 @@ def _joint(
 
 def main() -> None:
     """Write them all."""
-    table = tomllib.loads((FOLDER / "arms.toml").read_text(encoding="utf-8"))
+    table = tomllib.loads((FOLDER / "industrial.toml").read_text(encoding="utf-8"))
     for name, arm in table.items():
         (FOLDER / f"{name}.urdf").write_text(urdf(name, arm), encoding="utf-8")
 

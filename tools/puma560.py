@@ -8,7 +8,7 @@ One row becomes one URDF joint about z, whose origin is that transform at theta_
 xyz = (a, -d sin(alpha), d cos(alpha)), rpy = (alpha, 0, 0). So every link frame of the URDF *is*
 the DH frame of that link, and the URDF's root link carries frame 0.
 
-`python tools/puma560.py` writes `robots/puma560/puma560.urdf` anew; a test compares the two.
+`python tools/puma560.py` writes `robots/arms/puma560.urdf` anew; a test compares the two.
 """
 
 from __future__ import annotations
@@ -244,7 +244,7 @@ PUMA560_COMMENT = (
 
 
 def puma560_urdf() -> str:
-    """Return the text of `robots/puma560/puma560.urdf`; limits are those of the paper's set 1."""
+    """Return the text of `robots/arms/puma560.urdf`; limits are those of the paper's set 1."""
     limits = [(-180.0, 180.0)] * len(PUMA560_ROWS)
     return dh_urdf(
         "puma560",

@@ -171,8 +171,7 @@ class Case:
         """
         if self.source is None:
             return self.to_toml()
-        from feasibility.cases.toml_changes import make_relative
-        from feasibility.cases.toml_edits import differences, edited
+        from feasibility.cases.toml_edits import differences, edited, make_relative
         from feasibility.cases.toml_text import toml_document
 
         text, folder = self.source
@@ -206,7 +205,7 @@ class Case:
         Raises:
             CaseError: with everything that is wrong.
         """
-        from feasibility.cases.toml_changes import make_absolute
+        from feasibility.cases.toml_edits import make_absolute
 
         try:
             tables = parse_toml(text)
@@ -298,7 +297,7 @@ def _from_tables(
     """Apply overrides, which the description then names, and check everything."""
     faults: list[Fault] = []
     if overrides:
-        from feasibility.cases.toml_changes import override
+        from feasibility.cases.toml_edits import override
 
         for setting in overrides:
             override(tables, setting, faults)

@@ -107,7 +107,7 @@ def show(args: argparse.Namespace, began: float) -> int:
 
 def _show_faces(args: argparse.Namespace) -> int:
     """The faces of a STEP file with their numbers."""
-    from feasibility.viewer.faces.faces_view import faces_page
+    from feasibility.viewer.faces_view import faces_page
     from feasibility.viewer.live_server import LiveView
     from surfaces.step_files.step_surface import face_words, step_parts
 

@@ -180,7 +180,7 @@ def in_runs(args: argparse.Namespace, opened: OpenCase, along: PlannedPasses) ->
     _write(args, found, timed)
     write_programs(args, opened, along, *timed, numbered=True)
     if args.html is not None:
-        from feasibility.viewer.passes.pass_view import view_passes
+        from feasibility.viewer.pass_view import view_passes
 
         drawn = view_passes(along, found.runs, treated, case=opened.case.name)
         write_text(args.html, drawn.html(), "view")

@@ -171,7 +171,7 @@ def _view(
     limits: MotionLimits,
 ) -> View:
     """The picture of a path over cells, or along passes."""
-    from feasibility.viewer.passes.pass_view import view_passes
+    from feasibility.viewer.pass_view import view_passes
     from feasibility.viewer.path_and_division import view_path
 
     if along is None:

@@ -18,11 +18,10 @@ from feasibility.collisions.asked_bodies import gather
 from feasibility.live.controls import STEP
 from feasibility.live.drawing import Scene
 from feasibility.viewer import robot_visuals
-from feasibility.viewer.frames.standing_world import GROUP, carried
-from feasibility.viewer.frames.triads import triads
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.obstacles import HULLS, hull_layers, scene_layers, tool_layers
-from feasibility.viewer.readout import distance_and_angle
+from feasibility.viewer.playback import distance_and_angle
+from feasibility.viewer.stage import GROUP, carried, triads
 from feasibility.viewer.threejs import Command, safe_name, transform
 from feasibility.viewer.verdict_scene import Layer
 from feasibility.viewer.viewer import View

@@ -31,7 +31,7 @@ from coverable.errors import Fault, listed, shown
 from feasibility.cases.case import TABLES, load_case, read_document
 from feasibility.cases.table_reader import CaseError, Section
 from feasibility.cases.toml import TomlError, as_read, parse_toml, toml_key
-from feasibility.cases.toml_changes import make_absolute
+from feasibility.cases.toml_edits import make_absolute
 from feasibility.read_files import shown_path
 from feasibility.studies.combinations import cause_of, faults_of, put, tasks_of
 from feasibility.studies.pool import Tables

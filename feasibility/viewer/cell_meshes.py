@@ -1,4 +1,4 @@
-"""Shapes for drawing E-cells: filled patches, borders, and marks at their centres.
+"""Shapes for drawing E-cells: filled patches, borders, marks at their centres, the sides of a cut.
 
 The triangles of a mesh are joined at their corners, and thinned if too many. Thinning merges
 vertices that lie close together, but only where they touch the same cells: so the drawn cells keep
@@ -13,7 +13,11 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
+from feasibility.cut_tree import Cut, Leaf
+from feasibility.cut_words import place_of
+from feasibility.verdict import Verdict
 from feasibility.viewer.meshes import merge_vertices, split_at_creases
+from feasibility.viewer.threejs import Colour
 from surfaces.cells import Cells, CellTriangles
 from surfaces.meshes.cells.mesh_cells import MeshCells
 from surfaces.meshes.triangle_mesh import half_edge_ends, half_edges
@@ -181,3 +185,59 @@ def _kinds(faces: Ints, labels: Ints, on_border: Mask) -> Ints:
     alone = number > 2  # where borders meet
     kind[alone] = -1 - np.flatnonzero(alone)
     return np.unique(kind, return_inverse=True)[1].reshape(-1).astype(np.int64)
+
+
+BELOW, ABOVE, BOTH = range(3)
+COLOURS: tuple[Colour, ...] = ((0.00, 0.45, 0.70), (0.90, 0.60, 0.00), (0.72, 0.75, 0.78))
+LOST: Colour = (0.84, 0.12, 0.12)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Sides:
+    """Where the cells are reached."""
+
+    labels: Ints
+    """(N,) `BELOW`, `ABOVE`, `BOTH`; -1 where no motion was found that reaches the cell."""
+    lost: tuple[int, ...]
+    """Cells that are proved uncoverable in one of the proof's regions each."""
+    names: tuple[str, str, str]
+    """What the labels mean, with the number of cells."""
+    lost_name: str
+    """The same for `lost`."""
+
+
+def sides_of(verdict: Verdict) -> Sides | None:
+    """The sides of the first cut of a verdict's proof; None without a cut or known motions.
+
+    All of a motion is on one side. So each of the components found is, and the cells that it
+    covers are reached there.
+    """
+    proof = verdict.proof
+    if proof is None or not isinstance(proof.root, Cut) or verdict.postures is None:
+        return None
+    cut = proof.root
+    reached = np.zeros((2, len(verdict.cells)), dtype=bool)
+    for q, cells in zip(verdict.postures, verdict.components, strict=True):
+        (_, above), *_ = proof.path_to(q)
+        reached[int(above), cells] = True
+    labels = np.full(len(verdict.cells), -1, dtype=np.int64)
+    labels[reached[0]] = BELOW
+    labels[reached[1]] = ABOVE
+    labels[reached.all(axis=0)] = BOTH
+    counts = [int((labels == k).sum()) for k in range(3)]
+    place = place_of(cut, verdict.robot)
+    # Empty entries are left out.
+    upper = "above it only" if counts[BELOW] else f"above {place} only"
+    words = (f"below {place} only", upper, "on both sides")
+    named = [f"{word} ({count})" for word, count in zip(words, counts, strict=True)]
+    lost = tuple(dict.fromkeys(leaf.cell for leaf in proof.leaves()))
+    return Sides(labels, lost, (named[0], named[1], named[2]), _lost_name(verdict, cut, lost))
+
+
+def _lost_name(verdict: Verdict, cut: Cut, lost: tuple[int, ...]) -> str:
+    """Which cells are lost, and on which side where there are two sides only."""
+    below, above = cut.below, cut.above
+    if isinstance(below, Leaf) and isinstance(above, Leaf) and len(lost) == 2:
+        cells = [list(verdict.cells.unravel(cell)) for cell in lost]
+        return f"proved: {cells[0]} not below, {cells[1]} not above"
+    return f"proved: lost in one region or another ({len(lost)})"

@@ -19,7 +19,7 @@ from feasibility.placement.map import PlacementMap
 from feasibility.placement.placements import Placements
 from feasibility.placement.region import AXES
 from feasibility.verdict import Verdict
-from feasibility.viewer.cut_sides import COLOURS, LOST, sides_of
+from feasibility.viewer.cell_meshes import COLOURS, LOST, sides_of
 from feasibility.viewer.threejs import Colour
 from feasibility.viewer.verdict_scene import CENTRES, EDGES, MISSED, START, missed_groups
 from robots.kinematics import Kinematics

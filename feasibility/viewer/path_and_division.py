@@ -17,12 +17,12 @@ from coverable.errors import counted
 from feasibility.treated.area import TreatedArea
 from feasibility.treated.treated_words import share_words
 from feasibility.viewer import robot_visuals, threejs
-from feasibility.viewer.areas.treated_map import painted_layers
 from feasibility.viewer.cell_meshes import cell_size
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.meshes import tubes
 from feasibility.viewer.playback import Playback, paced, timed
 from feasibility.viewer.threejs import Colour
+from feasibility.viewer.treated_map import painted_layers
 from feasibility.viewer.verdict_scene import (
     TRAIL,
     Layer,

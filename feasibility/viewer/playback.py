@@ -1,10 +1,14 @@
-"""The motion that a view plays: the witness, or one path of the search tree, in even time."""
+"""The motion that a view plays, in even time, and what is read beside its slider.
+
+It is the witness, or one path of the search tree; read are joint values, distance and angle of the
+tool, and the clearance.
+"""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import networkx as nx
@@ -14,12 +18,15 @@ from coverable.arrays import Array
 from coverable.errors import ArgumentError
 from feasibility.verdict import Verdict
 from feasibility.viewer import threejs
+from feasibility.viewer.html_page import Readout
 from feasibility.viewer.robot_visuals import ROBOT, joint_paths, joint_placements
 from robots.kinematics import Kinematics
 from robots.robot import Robot
+from surfaces.cells import Cells
 
 if TYPE_CHECKING:
     from feasibility.timing.sampled_trajectory import Trajectory
+
 
 KEY_FRAMES = 400
 SAMPLES = 3_000  # of a trajectory that are drawn, at most
@@ -171,3 +178,49 @@ def quaternions(rotations: Array) -> Array:
     turns = Rotation.from_matrix(rotations).as_quat()
     flips = np.concatenate([[1.0], np.where((turns[1:] * turns[:-1]).sum(axis=1) < 0, -1.0, 1.0)])
     return turns * np.cumprod(flips)[:, None]
+
+
+def readout_of(robot: Robot, cells: Cells, motion: Playback) -> Readout:
+    """The values of a motion at its key frames, between which the page interpolates.
+
+    The distance is that of the tool point from the surface on its working side (mm), the angle
+    the one between the tool axis and the normal there (deg).
+
+    Args:
+        robot: the arm.
+        cells: what it works on.
+        motion: what the view plays.
+    """
+    times = key_times(motion)
+    q = motion.at(times)
+    slides = robot.prismatic
+    values = q * np.where(slides, 1e3, 180.0 / np.pi)
+    units = ["mm" if each else "deg" for each in slides.tolist()]
+    names, columns = list(robot.joint_names), list(values.T)
+    if len(cells):
+        names, units = [*names, "distance", "angle"], [*units, "mm", "deg"]
+        columns += [*distance_and_angle(robot, cells, q)]
+    rows = zip(names, units, [np.round(column, 2).tolist() for column in columns], strict=True)
+    return Readout(tuple(np.round(times, 4).tolist()), tuple(rows), motion.there_and_back)
+
+
+def with_nearest(readout: Readout, distances: list[float], names: tuple[str, ...]) -> Readout:
+    """The same with the distance of the nearest pair of bodies, and who they are.
+
+    Args:
+        readout: the other values.
+        distances: mm, at each of its times.
+        names: the pair at each of its times.
+    """
+    rows = (*readout.rows, ("clearance", "mm", distances))
+    return replace(readout, rows=rows, nearest=names)
+
+
+def distance_and_angle(robot: Robot, cells: Cells, q: Array) -> Array:
+    """(2, k): mm from the surface on its working side, and degrees from the normal there."""
+    points, axes = Kinematics(robot).tools(q)
+    closest = cells.surface.closest(points)
+    side = cells.surface.side_sign
+    cosine = -side * (axes * closest.normal).sum(axis=1)  # the tool points at the surface
+    angle = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    return np.stack([1e3 * side * closest.height, angle])

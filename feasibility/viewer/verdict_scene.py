@@ -17,8 +17,17 @@ from coverable.arrays import Array, Ints
 from coverable.errors import counted
 from feasibility.verdict import Cause, CauseKind, Verdict
 from feasibility.viewer import threejs
-from feasibility.viewer.cell_meshes import FULL_DETAIL, borders, cell_size, marks, patch
-from feasibility.viewer.cut_sides import COLOURS, LOST, Sides, sides_of
+from feasibility.viewer.cell_meshes import (
+    COLOURS,
+    FULL_DETAIL,
+    LOST,
+    Sides,
+    borders,
+    cell_size,
+    marks,
+    patch,
+    sides_of,
+)
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.meshes import tubes
 from feasibility.viewer.playback import Playback

@@ -27,18 +27,27 @@ from feasibility.safe_files import write_whole
 from feasibility.task import Task
 from feasibility.verdict import Verdict
 from feasibility.viewer import robot_visuals, threejs
-from feasibility.viewer.areas.margin_along import margin_layers
-from feasibility.viewer.areas.treated_map import area_layers
-from feasibility.viewer.frames.standing_world import carried, root_in_world, world_tracks
-from feasibility.viewer.frames.triads import triads
 from feasibility.viewer.html_page import Camera, Entry, Legend, Readout, page
 from feasibility.viewer.live_server import LiveView
-from feasibility.viewer.nearest_pair import draw_nearest
-from feasibility.viewer.obstacles import HULLS, hull_layers, points_of, scene_layers, tool_layers
-from feasibility.viewer.playback import Playback, animate, key_times, motion_of
-from feasibility.viewer.readout import readout_of, with_nearest
-from feasibility.viewer.stage import camera_on, ground
+from feasibility.viewer.obstacles import (
+    HULLS,
+    draw_nearest,
+    hull_layers,
+    points_of,
+    scene_layers,
+    tool_layers,
+)
+from feasibility.viewer.playback import (
+    Playback,
+    animate,
+    key_times,
+    motion_of,
+    readout_of,
+    with_nearest,
+)
+from feasibility.viewer.stage import camera_on, carried, ground, root_in_world, triads, world_tracks
 from feasibility.viewer.threejs import Command
+from feasibility.viewer.treated_map import area_layers, margin_layers
 from feasibility.viewer.verdict_scene import Layer, layers, trail
 from robots.robot import Robot
 from surfaces.cells import Cells

@@ -17,8 +17,8 @@ from robots.robot import Robot
 from robots.shapes.bodies import Polytope, Solid
 from robots.shapes.links import LinkShapes
 from robots.shapes.sampling import Pair, PairSampling, random_configurations
+from robots.urdf.elements import UrdfError
 from robots.urdf.srdf import DisabledPairs, read_srdf
-from robots.urdf.xml import UrdfError
 
 Why = Literal["rigid", "adjacent", "always", "allowed", "srdf"]
 FIRST_LOOK = 30  # configurations after which most pairs are known not to collide always

@@ -20,8 +20,8 @@ from coverable.arrays import Array
 from coverable.errors import MISSING, Checks, Fault, shown
 from robots.errors import RobotError
 from robots.poses import FURTHEST_BASE, matrix_of
+from robots.urdf.elements import MAX_LENGTH, MAX_NAME, UrdfError
 from robots.urdf.joints import JointInfo
-from robots.urdf.xml import MAX_LENGTH, MAX_NAME, UrdfError
 
 CARRIES = ("base", "surface")
 KINDS = ("revolute", "prismatic")

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from coverable.arrays import Array
+from robots.urdf.elements import Faults, Node, UrdfError, is_xacro, parse_xml, read_bytes, shown
 from robots.urdf.joints import JointInfo
 from robots.urdf.link_shapes import (
     CollisionShapes,
@@ -22,7 +23,6 @@ from robots.urdf.link_shapes import (
     read_visuals,
 )
 from robots.urdf.tree import read_links, read_tree, refuse_other_formats
-from robots.urdf.xml import Faults, Node, UrdfError, is_xacro, parse_xml, read_bytes, shown
 
 if TYPE_CHECKING:
     from robots.urdf.axes import Axis
@@ -118,7 +118,7 @@ def _root_of(
 ) -> Node:
     """The first element of a file; lines are those of the expanded text."""
     if is_xacro(path):
-        from robots.urdf.expansion.xacro_files import expanded
+        from robots.urdf.xacro_files import expanded
 
         called = f"{path} (expanded)"
         found = expanded(path, tuple(map(os.fsdecode, package_dirs)), xacro_args)

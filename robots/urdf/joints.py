@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from coverable.errors import close_matches
-from robots.urdf.xml import (
+from robots.urdf.elements import (
     MAX_LENGTH,
     BadValue,
     Faults,

@@ -17,7 +17,7 @@ import numpy as np
 from coverable.arrays import Array
 from coverable.errors import Fault, listed, worded
 from robots.poses import about_fixed_axes
-from robots.urdf.xml import BadValue, Faults, Node, Triple, numbers, shown, triple
+from robots.urdf.elements import BadValue, Faults, Node, Triple, numbers, shown, triple
 
 
 @dataclass(frozen=True, slots=True)

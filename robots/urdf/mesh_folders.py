@@ -18,7 +18,7 @@ from pathlib import Path
 
 from coverable.errors import listed
 from coverable.files import FileFault, read_regular
-from robots.urdf.xml import BadValue, UrdfError, parse_xml
+from robots.urdf.elements import BadValue, UrdfError, parse_xml
 
 PACKAGE_LEVELS = 5  # how far above the URDF a package.xml is looked for
 DEPTH = 4  # how far below a folder of package_dirs

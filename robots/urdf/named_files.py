@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from coverable.files import Remembered
 from robots.urdf.checked_urdf import check_urdf
-from robots.urdf.xml import is_xacro
+from robots.urdf.elements import is_xacro
 
 
 class _Named(NamedTuple):
@@ -39,7 +39,7 @@ def files_named_by(
     """
     path, read = os.path.abspath(path), tuple[str, ...]()
     if is_xacro(path):
-        from robots.urdf.expansion.xacro_files import expanded
+        from robots.urdf.xacro_files import expanded
 
         read = expanded(path, tuple(package_dirs), xacro_args).files
     found = dict.fromkeys(read)

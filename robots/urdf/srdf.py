@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 
-from robots.urdf.xml import Faults, UrdfError, is_xacro, name_of, parse_xml, read_bytes
+from robots.urdf.elements import Faults, UrdfError, is_xacro, name_of, parse_xml, read_bytes
 
 TAKEN = ("Adjacent", "Default", "Always", "User")
 """Reasons that are accepted. "Never" is a guess from samples, so it is not."""
@@ -34,7 +34,7 @@ def read_srdf(path: str | os.PathLike[str]) -> DisabledPairs:
     name = os.fsdecode(path)
     text: str | bytes
     if is_xacro(name):
-        from robots.urdf.expansion.xacro_files import expanded
+        from robots.urdf.xacro_files import expanded
 
         text = expanded(name).text
     else:

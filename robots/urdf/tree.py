@@ -7,8 +7,8 @@ from dataclasses import replace
 from itertools import accumulate
 
 from coverable.errors import close_matches
+from robots.urdf.elements import Faults, Node, UrdfError, name_of, shown
 from robots.urdf.joints import JointInfo, read_joint
-from robots.urdf.xml import Faults, Node, UrdfError, name_of, shown
 
 # Native readers recurse along a chain: 4,000 links overflow a stack of 8 MB, 250 one of 0.5 MB.
 MAX_LINKS = 1000

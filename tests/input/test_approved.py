@@ -12,7 +12,7 @@ from readers import READERS, of_bad
 from coverable import bspline, load_case, read_net
 from coverable.errors import CoverableError
 from robots.urdf.checked_urdf import check_urdf
-from robots.urdf.expansion.xacro_files import Caps, expanded
+from robots.urdf.xacro_files import Caps, expanded
 
 TABLES = tuple(sorted(path.stem for path in bad_input.TABLES.glob("*.toml")))
 BAD = [(reader, name) for reader in TABLES for name in bad_input.bad(reader)]

@@ -16,9 +16,9 @@ from yourdfpy import URDF
 from coverable.errors import CoverableError
 from robots.pinocchio_model import chain_model
 from robots.urdf.checked_urdf import CheckedUrdf, check_urdf
+from robots.urdf.elements import UrdfError
 from robots.urdf.link_shapes import MeshFile
 from robots.urdf.srdf import read_srdf
-from robots.urdf.xml import UrdfError
 
 SHARE = next(
     Path(str(file.locate())).parents[1]

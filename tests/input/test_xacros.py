@@ -12,11 +12,11 @@ import pytest
 from coverable import RobotError, load_case, load_robot
 from coverable.errors import CoverableError
 from robots.shapes.links import link_shapes
+from robots.urdf import xacro_child, xacro_files
 from robots.urdf.checked_urdf import check_urdf
-from robots.urdf.expansion import child, xacro_files
-from robots.urdf.expansion.xacro_files import expanded
+from robots.urdf.elements import UrdfError
 from robots.urdf.srdf import read_srdf
-from robots.urdf.xml import UrdfError
+from robots.urdf.xacro_files import expanded
 
 GOOD = Path(__file__).with_name("good")
 HEAD = '<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">'
@@ -132,13 +132,13 @@ ESCAPES = (
 
 
 def test_an_expression_has_no_built_in_names_and_no_way_to_them() -> None:
-    assert child.evaluate(" max(a, 2) ** 2 ", {"max": max, "a": 3}) == 9
+    assert xacro_child.evaluate(" max(a, 2) ** 2 ", {"max": max, "a": 3}) == 9
     for name in ("open", "exec", "getattr", "print"):
         with pytest.raises(NameError):
-            child.evaluate(name, {})
+            xacro_child.evaluate(name, {})
     for expression in ESCAPES:
-        with pytest.raises(child.Refused):
-            child.evaluate(expression, {"a": 1, "str": str})
+        with pytest.raises(xacro_child.Refused):
+            xacro_child.evaluate(expression, {"a": 1, "str": str})
 
 
 def test_the_gate_holds_without_the_other_fences(tmp_path: Path) -> None:
@@ -158,8 +158,8 @@ def test_the_gate_holds_without_the_other_fences(tmp_path: Path) -> None:
     ]  # fmt: skip
     program = f"""
 import gc, os, socket, subprocess, sys
-sys.path.insert(0, {str(Path(child.__file__).parent)!r})
-from child import Gate, Refused
+sys.path.insert(0, {str(Path(xacro_child.__file__).parent)!r})
+from xacro_child import Gate, Refused
 sys.addaudithook(Gate([{os.path.join(os.path.realpath(tmp_path), "")!r}], 100))
 for attempt in {attempts!r}:
     try:

@@ -14,8 +14,7 @@ from page_outline import faces_of, points_of
 import coverable
 from coverable import Task, check, load_result, load_robot, mesh, plot_sides, sphere, view
 from feasibility.viewer import verdict_scene
-from feasibility.viewer.cell_meshes import make_display_mesh
-from feasibility.viewer.cut_sides import sides_of
+from feasibility.viewer.cell_meshes import make_display_mesh, sides_of
 from feasibility.viewer.figures import plot_causes, plot_graph
 
 COUNT = 24

@@ -15,9 +15,9 @@ from scipy.spatial.transform import Rotation
 import coverable
 from coverable import Axis, Collision, Obstacle, check, load_case, load_robot, plane, view
 from feasibility.viewer import playback as motion
-from feasibility.viewer.frames.standing_world import GROUP
 from feasibility.viewer.live_server import LiveView
 from feasibility.viewer.robot_visuals import joint_paths
+from feasibility.viewer.stage import GROUP
 from feasibility.viewer.viewer import compose, show
 from robots.kinematics import Kinematics
 

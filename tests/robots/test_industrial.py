@@ -66,8 +66,8 @@ def test_the_flange_is_where_another_source_has_it_to_a_tenth_of_a_millimetre(na
 
 def test_the_urdfs_are_those_that_the_tool_writes():
     tool = runpy.run_path(str(ROOT / "tools" / "industrial_urdfs.py"), run_name="tool")
-    folder = ROOT / "robots" / "industrial"
-    table = tomllib.loads((folder / "arms.toml").read_text())
+    folder = ROOT / "robots" / "arms"
+    table = tomllib.loads((folder / "industrial.toml").read_text())
     assert list(table) == list(OTHERS)
     for name, arm in table.items():
         assert (folder / f"{name}.urdf").read_text() == tool["urdf"](name, arm)

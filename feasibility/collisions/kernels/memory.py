@@ -1,21 +1,95 @@
-"""The memory of the compiled clearance of an arm: what search kernels are given, and Python asks.
+"""The compiled clearance of an arm: its memory, which search kernels are given, and its C function.
 
 How a segment is certified: `segments.py`.
 """
 
 from __future__ import annotations
 
+from functools import cache
+from typing import Any
+
 import numpy as np
+from numba import types
+from numba.core import event
 from numpy.typing import ArrayLike
 
 from coverable.arrays import Array
+from coverable.kernels import callback, kernel
 from feasibility.collisions.kernels import tables as T
-from feasibility.collisions.kernels.function import with_address
-from feasibility.collisions.kernels.kernel_calls import MEASURE, call
+from feasibility.collisions.kernels.distances import of_item
+from feasibility.collisions.kernels.kernel_calls import MEASURE, PUSH, call
 from feasibility.collisions.kernels.packing import packed
-from feasibility.collisions.kernels.tables import views
+from feasibility.collisions.kernels.push import push
+from feasibility.collisions.kernels.segments import segment_holds_clear, slot_of_start
+from feasibility.collisions.kernels.tables import ADDRESS, row, rows_of, views
 from feasibility.collisions.problem_bodies import Bodies
+from feasibility.notices import COLLISIONS, compiling_notice
 from robots.robot import Robot
+
+
+@kernel
+def measure(m):  # type: ignore[no-untyped-def]
+    """Bound every item at the configuration in `asked`, in the slot that is returned."""
+    here = slot_of_start(m)
+    for k in range(rows_of(m, T.ITEMS)):
+        item = row(m, T.ITEMS, k)
+        m[item + T.BOUND + here] = of_item(m, item, here, here, np.inf, np.inf, -np.inf)
+    return np.float64(here)
+
+
+@kernel
+def _run(memory: Array, what: int) -> float:
+    """The C function: the memory is a plain pointer in there."""
+    if what == PUSH:
+        result: float = push(memory)
+    elif what == MEASURE:
+        result = measure(memory)
+    else:
+        result = segment_holds_clear(memory)
+    return result
+
+
+@cache
+def _compiled() -> Any:
+    """The C function, compiled or loaded; it lives as long as the process."""
+    signature = types.float64(types.CPointer(types.float64), types.int64)
+    whole = _WholeCompilation()
+    with compiling_notice(notice=COLLISIONS), event.install_listener("numba:compile", whole):
+        function = callback(signature)(_run)
+    whole.end()
+    return function
+
+
+class _WholeCompilation(event.Listener):
+    """Makes one compilation, for whoever listens, of the C function and all kernels inside.
+
+    numba tells of the kernels alone, and the function takes as long again. There is none where it
+    is loaded.
+    """
+
+    def __init__(self) -> None:
+        """It has not begun."""
+        self.begun = False
+
+    def on_start(self, about: Any) -> None:
+        """The first kernel begins to be compiled."""
+        if not self.begun:
+            self.begun = True
+            event.start_event("numba:compile")
+
+    def on_end(self, about: Any) -> None:
+        """A kernel has been compiled."""
+
+    def end(self) -> None:
+        """The function is there."""
+        if self.begun:
+            event.end_event("numba:compile")
+
+
+def with_address(memory: Array) -> Array:
+    """The same array, which now can be called in this process."""
+    memory.view(np.int64)[ADDRESS] = _compiled().address
+    return memory
 
 
 def collision_buffer(bodies: Bodies, robot: Robot) -> Array:

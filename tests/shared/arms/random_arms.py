@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from coverable import Axis, Robot, Surface, Task, cylinder, hyperboloid, load_robot, plane, sphere
 from robots.from_urdf import robot_from_urdf
 from robots.urdf.checked_urdf import checked_tree
-from robots.urdf.xml import parse_xml
+from robots.urdf.elements import parse_xml
 
 Floats = NDArray[np.float64]
 

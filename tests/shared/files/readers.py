@@ -35,8 +35,8 @@ from coverable.processes import Ended
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from robots.pinocchio_model import chain_model
 from robots.urdf.checked_urdf import CheckedUrdf, check_urdf
-from robots.urdf.expansion.xacro_files import expanded
 from robots.urdf.srdf import read_srdf
+from robots.urdf.xacro_files import expanded
 from surfaces.meshes.sources import read_mesh
 
 SRDF = (

@@ -20,15 +20,41 @@ from feasibility.timing.speed_limits import MotionLimits
 from feasibility.treated.area import TreatedArea
 from feasibility.treated.treated_words import share_words
 from feasibility.viewer import robot_visuals
-from feasibility.viewer.areas.treated_map import painted_layers, surface_layer
-from feasibility.viewer.passes.digits import GAP, WIDTH, digit_lines
 from feasibility.viewer.path_and_division import painting, trail_pieces
 from feasibility.viewer.playback import Playback, paced, timed
+from feasibility.viewer.treated_map import painted_layers, surface_layer
 from feasibility.viewer.verdict_scene import MISSED, OUTLINES, PATCHES, Layer, drawn_lines
 from feasibility.viewer.viewer import View, compose, titled
 from robots.robot import Robot
 from surfaces.passes.pass_stretches import Pass
 from surfaces.passes.triangulation import working_mesh
+
+WIDTH = 0.5  # [1] of the height
+GAP = 0.25  # [1] of the height, between digits
+_CORNERS = {"a": (0, 2), "b": (1, 2), "c": (0, 1), "d": (1, 1), "e": (0, 0), "f": (1, 0)}
+_DIGITS = (
+    "abfeca", "bf", "abdcef", "abdcdfe", "acdbf", "bacdfe", "bacefdc", "abf", "cabfecd", "dcabfe",
+)  # fmt: skip
+"""Strokes from corner to corner: top a b, middle c d, bottom e f."""
+
+
+def digit_lines(number: int, origin: Array, along: Array, up: Array) -> list[Array]:
+    """Polylines (k, 3) m of a number.
+
+    Args:
+        number: at least 0.
+        origin: (3,) m, where its lower left corner is.
+        along: (3,) unit, the direction in which it is read.
+        up: (3,) m, the height of a digit.
+    """
+    height = float(np.linalg.norm(up))
+    lines = []
+    for place, digit in enumerate(str(number)):
+        corners = np.array([_CORNERS[name] for name in _DIGITS[int(digit)]], dtype=float)
+        x = (WIDTH * corners[:, 0] + place * (WIDTH + GAP)) * height
+        lines.append(origin + x[:, None] * along + 0.5 * corners[:, 1:] * up)
+    return lines
+
 
 THIN = 0.03  # [1] of the distance between passes: radius of their lines
 TALL = 0.5  # [1] of it: height of their numbers

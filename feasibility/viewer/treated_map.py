@@ -1,19 +1,22 @@
-"""The treated area as a heat map of how often the tool comes by, and what is untreated in red."""
+"""Colours along a motion: how often the tool comes by, what is untreated, the local margin."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from coverable.arrays import Ints
 from feasibility.treated.area import TreatedArea
+from feasibility.verdict import Verdict
 from feasibility.viewer import threejs
+from feasibility.viewer.cell_meshes import cell_size, marks
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.playback import Playback
 from feasibility.viewer.threejs import Colour, Command
-from feasibility.viewer.verdict_scene import SURFACE, Layer, mesh_layer
+from feasibility.viewer.verdict_scene import SURFACE, Layer, hidden, lines_layer, mesh_layer
+from robots.kinematics import Kinematics
 from surfaces.passes.welded_triangles import WorkingMesh
 
 UNTREATED: Colour = (0.84, 0.12, 0.12)
@@ -127,3 +130,33 @@ def _faces(mesh: WorkingMesh, which: Ints, lift: Any, colour: Colour, path: str)
     corners = (mesh.corners[which] + lift[which][:, None]).reshape(-1, 3)
     faces = np.arange(len(corners)).reshape(-1, 3)
     return threejs.mesh_object(path, corners, faces, colour, opacity=0.9, lit=False)
+
+
+BANDS: tuple[tuple[float, Colour], ...] = (
+    (1.5, (0.84, 0.12, 0.12)),
+    (3.0, (0.90, 0.60, 0.00)),
+    (np.inf, (0.00, 0.62, 0.45)),
+)
+"""Times the least margin, up to which the path has a colour."""
+LEAST: Colour = (0.84, 0.12, 0.12)
+MARK = 0.1  # [1] of a cell's width, of the mark where the margin is least
+
+
+def margin_layers(verdict: Verdict) -> Iterator[Layer]:
+    """The tool's path in colours, by how far the part may be shifted there, and the least place."""
+    margin = None if verdict.certificate is None else verdict.certificate.placement_margin
+    if margin is None or margin.along is None or verdict.witness is None:
+        return
+    points = Kinematics(verdict.robot).tools(verdict.witness.q)[0]
+    ends, low = np.stack([points[:-1], points[1:]], axis=1), 0.0
+    for times, colour in BANDS:
+        high = times * float(margin.along.min())
+        some = (margin.along >= low) & (margin.along < high)
+        if some.any():
+            to = f"{1e3 * low:.3g} mm and more" if high == np.inf else f"up to {1e3 * high:.3g} mm"
+            label, path = f"tool path: the part may be off {to}", f"/margin/{times:g} times"
+            yield hidden(lines_layer(label, colour, path, ends[some]))
+        low = high
+    least = ends[[int(np.argmin(margin.along))]].mean(axis=1)
+    dot = marks(least, MARK * cell_size(verdict.cells))
+    yield mesh_layer("least room for the part", LEAST, "/margin/least", *dot, lit=False)

@@ -8,11 +8,10 @@ from numpy.linalg import norm
 from coverable.arrays import Array, Ints
 from coverable.errors import counted
 from feasibility.viewer import threejs
-from feasibility.viewer.frames.triads import triad
 from feasibility.viewer.html_page import Entry, Legend, page
 from feasibility.viewer.meshes import GREY, tubes
-from feasibility.viewer.passes.digits import digit_lines
-from feasibility.viewer.stage import framing
+from feasibility.viewer.pass_view import digit_lines
+from feasibility.viewer.stage import framing, triad
 from feasibility.viewer.verdict_scene import OUTLINES
 from surfaces.step_files.step_surface import StepFace, StepParts
 

@@ -1,8 +1,8 @@
 """xacro files into URDF, through the package xacro of the extra `coverable[xacro]`.
 
 A xacro file is a program: it includes files, evaluates Python and may never end. It runs in a
-process of its own (`child`), without environment, with caps on memory, processor time and output,
-and reads nothing but the folders that its meshes may come from too.
+process of its own (`xacro_child`), without environment, with caps on memory, processor time and
+output, and reads nothing but the folders that its meshes may come from too.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from typing import Any, NamedTuple
 from coverable.errors import Fault
 from coverable.files import Remembered
 from coverable.processes import Limits, folder_of, run_apart
+from robots.urdf.elements import MAX_BYTES, UrdfError, read_bytes
 from robots.urdf.mesh_folders import MeshFolders, seen_words
-from robots.urdf.xml import MAX_BYTES, UrdfError, read_bytes
 
 EXTRA = "needs the extra: pip install 'coverable[xacro]'"
-CHILD = Path(__file__).with_name("child.py")
+CHILD = Path(__file__).with_name("xacro_child.py")
 
 
 class Caps(NamedTuple):

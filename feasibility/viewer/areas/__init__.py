@@ -1,1 +1,0 @@
-"""Pictures of areas: treated once, more often or not at all."""

@@ -1,1 +1,0 @@
-"""The picture of a STEP file: its faces with their numbers."""

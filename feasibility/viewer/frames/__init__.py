@@ -1,1 +1,0 @@
-"""Frames in a picture: world, base and TCP as triads, and a world that stands still."""

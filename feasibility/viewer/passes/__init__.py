@@ -1,1 +1,0 @@
-"""Pictures of passes over a surface, numbered, with what they treat."""

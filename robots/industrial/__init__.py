@@ -1,1 +1,0 @@
-"""Industrial arms: their URDFs, written by `tools/industrial_urdfs.py` from `arms.toml`."""

@@ -1,1 +1,0 @@
-"""xacro files into the URDF that they stand for, in a process of its own."""
