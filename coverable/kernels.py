@@ -12,8 +12,6 @@ stamps, and fails where one has moved. And as they are machine code, their folde
 alone, and nobody else can put another in its place.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import shutil

@@ -1,3 +1,1 @@
-"""The paper's method, readable beside the paper: J-cells, Algorithm 1, Algorithm 2, tree T,
-graph G.
-"""
+"""The paper's method, readable beside the paper: J-cells, Algorithms 1 and 2, tree T, graph G."""

@@ -13,7 +13,7 @@ from coverable.arrays import Array, Ints
 from coverable.errors import ArgumentError
 from feasibility.clock import Clock
 from feasibility.paper import algorithm_1 as jcells
-from feasibility.paper.jcell_grid import Grid, cell_of, place_tool, rolls_within
+from feasibility.paper.jcell_grid import Grid, cell_of, place_tool
 from feasibility.paper.jcell_steps import Steps
 from feasibility.search_settings import Search
 from feasibility.task import Task
@@ -57,8 +57,6 @@ class Continuity:
     """(k, n) their configurations, rad or m."""
     checked: int
     """J-cells evaluated."""
-    fk: float
-    """Forward kinematics computed, in chains: joint frames placed, divided by n."""
 
 
 class JSpace:
@@ -112,17 +110,13 @@ class JSpace:
         self._grid = Grid(
             origin=origin,
             step=size,
-            sine=np.sin(size),
-            cosine=np.cos(size),
             lowest=-_last_offset(-origin, size, -robot.lower),
             highest=_last_offset(origin, size, robot.upper),
             moves_all=search.moves == "all",
             side=float(cells.surface.side_sign),
             height=float(cells.surface.side_sign) * task.standoff,
-            tolerance=_least(margin) if triangles is None else np.append(margin, _least(margin)),
-            cone_cosine=-_least(-cosine)
-            if triangles is None
-            else np.append(cosine, -_least(-cosine)),
+            tolerance=np.append(margin, margin.min(initial=np.inf)),
+            cone_cosine=np.append(cosine, cosine.max(initial=-np.inf)),
             approach=np.empty(0) if approach is None else approach,
             roll=self.steps.roll,
             reference=np.empty(0) if reference is None else reference,
@@ -148,15 +142,11 @@ class JSpace:
         offsets = np.asarray(jcell, dtype=np.int32)
         if (offsets < self._grid.lowest).any() or (offsets > self._grid.highest).any():
             return -1
-        tool, grid = np.empty(6), self._grid
-        place_tool(self._chain, grid, offsets, tool, np.empty(3))
-        limits = grid.side, grid.height, grid.tolerance, grid.cone_cosine, grid.approach
-        cell = int(cell_of(*self._place, *limits, tool))
-        if cell >= 0 and grid.roll[1] < np.inf:
-            within = rolls_within(self._chain, *self._place, grid, offsets, tool)
-            cell = cell if within else -1
+        placed = self._memory.placed
+        place_tool(self._chain, self._grid, offsets, self._memory.q, placed)
+        cell = int(cell_of(*self._place, self._grid, placed[-3:]))
         on_border = cell == len(self._cells)
-        return int(self._cells.locate(tool[None, :3])[0]) if on_border else cell
+        return int(self._cells.locate(placed[-3:-2])[0]) if on_border else cell
 
     def continuity(
         self, jcell: ArrayLike, target_cell: int, clock: Clock | None = None
@@ -197,13 +187,7 @@ class JSpace:
             jcells=path,
             q=self.q(path),
             checked=int(counters[jcells.NODES]) - 1,
-            fk=float(counters[jcells.PLACED]) / memory.nodes.shape[1],
         )
-
-
-def _least(values: Array) -> float:
-    """The least; inf of none."""
-    return float(values.min(initial=np.inf))
 
 
 def _last_offset(origin: Array, step: Array, upper: Array) -> Ints:
@@ -217,10 +201,14 @@ def _last_offset(origin: Array, step: Array, upper: Array) -> Ints:
 def _memory(n: int, most: int) -> jcells.Memory:
     """Empty working memory for `most` J-cells of n joints, all of which may be on the stack."""
     return jcells.Memory(
-        counters=np.zeros(5, dtype=np.int64),
+        counters=np.zeros(4, dtype=np.int64),
         table=np.zeros(1 << (2 * most).bit_length(), dtype=np.int64),
         nodes=np.empty((most, n), dtype=np.int32),
         stack_node=np.empty(most, dtype=np.int64),
         stack_next=np.empty(most, dtype=np.int64),
-        stack_tool=np.empty((most, 7)),
+        stack_away=np.empty(most),
+        offsets=np.empty(n, dtype=np.int64),
+        delta=np.empty(n, dtype=np.int64),
+        q=np.empty(n),
+        placed=np.empty((2 * n + 3, 3)),
     )

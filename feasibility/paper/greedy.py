@@ -4,8 +4,7 @@ What the greedy search finds depends on where it starts, and its "no" speaks for
 "Feasible" rests on tree T, which is one continuous motion, and not on the connectivity of G.
 """
 
-from __future__ import annotations
-
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +14,7 @@ from coverable.errors import ArgumentError, counted
 from feasibility.clock import Clock
 from feasibility.found import Found
 from feasibility.notices import GREEDY, compiling_notice
-from feasibility.paper.algorithm_2 import tree_search
-from feasibility.paper.continuity import JSpace
+from feasibility.paper.continuity import CallOutcome, JSpace
 from feasibility.paper.jcell_steps import Steps
 from feasibility.paper.starts import candidates
 from feasibility.paper.tree_and_graph import Tree, graph_of, tree_of
@@ -24,6 +22,59 @@ from feasibility.paper.tree_replay import Path, replay_tree
 from feasibility.problem import Problem
 from feasibility.search_settings import Search
 from feasibility.verdict import Cause, CauseKind, Replay
+from surfaces.cells import Cells
+
+
+def tree_search(space: JSpace, cells: Cells, start: int, clock: Clock | None = None) -> Tree:
+    """Algorithm 2: grow T and G from the start configuration of `space`, which lies over `start`.
+
+    The recursion of the paper's TREESEARCH is the list `waiting`: the cells from ec_1 to the one in
+    hand, each with those of its neighbours, clockwise, that are still to be tried. A pair that
+    failed from one side is tried again from the other, as printed.
+
+    Args:
+        space: the J-cells around jc_1.
+        cells: the E-cells.
+        start: flat index of ec_1.
+        clock: when to give up; it reports how many cells are touched, after each new one.
+    """
+    clock = Clock() if clock is None else clock
+    tree = Tree(space, start)
+    tree.jcell[start] = np.zeros(len(space.start), dtype=np.int32)
+    waiting: list[tuple[int, Iterator[int]]] = [(start, iter(cells.neighbours.of(start).tolist()))]
+    while waiting:
+        cell, neighbours = waiting[-1]
+        entered = next((k for k in neighbours if _try_edge(tree, cell, k, clock)), None)
+        if not tree.complete:
+            break
+        if entered is None:
+            waiting.pop()
+            continue
+        waiting.append((entered, iter(cells.neighbours.of(entered).tolist())))
+        clock.report(len(tree.jcell), len(cells), "greedy search")
+    return tree
+
+
+def _try_edge(tree: Tree, cell: int, neighbour: int, clock: Clock) -> bool:
+    """Call Algorithm 1 for one pair that has no edge yet; True when it leads to a new cell of T."""
+    if not tree.complete or (cell, neighbour) in tree.edges or (neighbour, cell) in tree.edges:
+        return False
+    if (min(cell, neighbour), max(cell, neighbour)) in tree.space.steps.barred:
+        return False
+    found = tree.space.continuity(tree.jcell[cell], neighbour, clock)
+    tree.calls += 1
+    tree.checked += found.checked
+    tree.capped += found.outcome is CallOutcome.CAPPED
+    tree.complete = found.outcome is not CallOutcome.OUT_OF_TIME and not clock.out_of_time
+    if found.outcome is not CallOutcome.FOUND:
+        return False
+    tree.edges[cell, neighbour] = found.jcells
+    if neighbour in tree.jcell:
+        return False
+    tree.jcell[neighbour] = found.jcells[-1]
+    tree.parent[neighbour] = cell
+    return True
+
 
 KNOWS_NO_COLLISIONS = (
     "the greedy search, which is the paper's, knows no collisions: leave out [collision], or take "
@@ -45,7 +96,6 @@ class _Run:
     trees: int = 0
     calls: int = 0
     checked: int = 0
-    fk: float = 0.0
     capped: int = 0
     complete: bool = True
 
@@ -54,7 +104,6 @@ class _Run:
         self.trees += 1
         self.calls += tree.calls
         self.checked += tree.checked
-        self.fk += tree.fk
         self.capped += tree.capped
         self.complete &= tree.complete
         self.best = max(self.best, tree, key=lambda one: (len(one.jcell), len(one.edges)))
@@ -142,7 +191,7 @@ def _found(problem: Problem, search: Search, steps: Steps, run: _Run) -> Found:
             "starts": run.trees,
             "calls": run.calls,
             "checked": run.checked,
-            "fk": round(run.fk),
+            "fk": run.checked + run.calls,
             "capped": run.capped,
             "best_calls": best.calls,
             "best_capped": best.capped,

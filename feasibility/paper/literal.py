@@ -2,7 +2,7 @@
 
 To be read with the paper in hand. The names are its own: q, jc, ec, p, T, G, CONT, TREESEARCH.
 Nothing is compiled and nothing is kept between calls, so it is slow: a reference for small cases,
-which the compiled search of `algorithm_1.py` and `algorithm_2.py` agrees with, call by call.
+which the compiled search of `algorithm_1.py` and `greedy.py` agrees with, call by call.
 
 Where the paper's text is not definite, it is read like this:
 
@@ -14,8 +14,6 @@ Where the paper's text is not definite, it is read like this:
 - An E-cell is entered once the surface point below the tool lies in it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Self
@@ -25,10 +23,10 @@ from numpy.typing import ArrayLike
 
 from coverable.arrays import Array
 from coverable.errors import ArgumentError
-from feasibility.paper.exact_rolls import rolls_at
 from feasibility.paper.jcell_grid import HAIR
 from feasibility.paper.jcell_steps import Steps
 from feasibility.paper.starts import candidates
+from feasibility.paper.tree_replay import rolls_at
 from feasibility.search_settings import Search
 from feasibility.task import Task
 from robots.kinematics import Kinematics

@@ -11,8 +11,6 @@ and the alignment, inside the limits. It is followed straight from one towards t
 branches joined only by a detour count as two; that costs time, never an answer.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -45,8 +45,6 @@ class Tree:
     """Calls of Algorithm 1."""
     checked: int = 0
     """J-cells evaluated."""
-    fk: float = 0.0
-    """Forward kinematics computed, in chains."""
     capped: int = 0
     """Calls that stopped at the cap: unknown, not "no"."""
     complete: bool = True

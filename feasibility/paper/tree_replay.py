@@ -1,10 +1,8 @@
 """Replay of the greedy search's paths by Pinocchio, J-cell by J-cell.
 
-Nothing of the search is used here: tool points come from Pinocchio, not from the compiled chain,
-and what is checked are the paper's definitions, on the surface itself.
+Nothing of the search is used here: tool points and rolls come from Pinocchio, not from the compiled
+chain, and what is checked are the paper's definitions, on the surface itself.
 """
-
-from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,16 +12,48 @@ import numpy as np
 from coverable.arrays import Array, Mask
 from feasibility.certification.surface_replay import replay_over_surface
 from feasibility.cone import angle_of
-from feasibility.paper.exact_rolls import approaches_at, rolls_at
 from feasibility.paper.jcell_steps import Steps
 from feasibility.paper.tree_and_graph import corners, there_and_back
+from feasibility.roll import projected, roll_of
 from feasibility.search_settings import Search
+from feasibility.targets.references import u_directions
 from feasibility.task import Task
 from feasibility.verdict import Certificate, Replay, Verdict
-from robots.kinematics import Kinematics
+from robots.kinematics import Kinematics, reference_axes
 from robots.robot import Robot
 from surfaces.cells import Cells
 from surfaces.patches.grid_cells import GridCells
+
+
+def approaches_at(cells: Cells, task: Task, points: Array) -> Array:
+    """(k, 3) approach directions b under tool points (k, 3) m: eq. (3)."""
+    fixed = task.fixed_approach(cells)
+    if fixed is not None:
+        return np.broadcast_to(fixed, points.shape)
+    return -cells.surface.side_sign * cells.surface.closest(points).normal
+
+
+def rolls_at(kinematics: Kinematics, cells: Cells, task: Task, q: Array) -> Array:
+    """(k,) rad, the angles about b from the reference direction on the surface to the TCP's.
+
+    NaN where the surface has no reference direction.
+
+    Args:
+        kinematics: of the arm.
+        cells: its surface counts.
+        task: whose approach and reference count.
+        q: (k, n) configurations, rad or m.
+    """
+    points, axes = kinematics.tools(q)
+    reference = task.fixed_reference(cells)
+    if reference is None:
+        reference = u_directions(cells.surface, points)
+    if reference is None:
+        return np.full(len(q), np.nan)
+    b = approaches_at(cells, task, points)
+    x = reference_axes(kinematics.robot, q)
+    return roll_of(x, axes, projected(reference, b)[0], b)
+
 
 SAME = 1e-9  # [rad], [m], [1]: rounding allowed where two computations of one number meet
 

@@ -1,7 +1,5 @@
 """Cells that collisions keep the arm from, proved by the judge: by the tool alone, or by boxes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 

@@ -14,7 +14,7 @@ from feasibility.found import Found
 from feasibility.notices import REASONS, compiling_notice
 from feasibility.problem import Problem
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.search import close, exploration_of, seed_middle
+from feasibility.roadmap.search import exploration_of, seed_middle
 from feasibility.roadmap.walk import covering_walk
 from feasibility.roadmap.warmup import warm_up
 from feasibility.search_settings import Search
@@ -110,9 +110,9 @@ def _search(
             proving = Proving(exploration, problem.task)
             go_on(exploration, partial(between_rounds, proving, problem.searched))
         if not search.early or problem.cells.in_order:
-            close(exploration)
+            exploration.close_pairs(exploration.pairs, exploration.best)
         if problem.cells.in_order and exploration.complete and known is None:
-            from feasibility.roadmap.forward.ordered_run import run_in_order
+            from feasibility.roadmap.ordered_run import run_in_order
 
             run = run_in_order(exploration)
     except OutOfTime:

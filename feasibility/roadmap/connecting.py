@@ -1,7 +1,5 @@
 """What may join components: self-motions over one cell, and bridges between two."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from coverable.arrays import Ints

@@ -4,8 +4,6 @@ The motions are those of `feasibility.roadmap.motions`, compiled and certified; 
 them are tried, and what comes of them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -36,8 +34,6 @@ class Grower:
     roadmap: Roadmap
     tick: Callable[[str], None]
     """Called with what is being done, again and again; what it raises ends that."""
-
-    # -- motions -------------------------------------------------------------------------------
 
     def track(
         self, curve: int, ends: tuple[float, float], q: Array, goal: Array | None = None
@@ -86,8 +82,6 @@ class Grower:
             if own is not None:
                 roadmap.count_failure(own, rival)
         return None
-
-    # -- growing -------------------------------------------------------------------------------
 
     def seed(self, cell: int, guess: Array) -> bool:
         """Project a guess (n,) onto the constraints over a cell; False where that fails.

@@ -83,8 +83,6 @@ class Exploration:
         self.pairs = np.zeros(len(self.cells.pairs), dtype=np.int64)
         self._told = self._next_look = 0
 
-    # -- reading the roadmap -------------------------------------------------------------------
-
     @cached_property
     def parts(self) -> Ints:
         """(N,) which part of the surface each cell is in, as the curves join them."""
@@ -129,7 +127,7 @@ class Exploration:
 
     @property
     def n_edges(self) -> int:
-        """Neighbouring pairs of cells with a motion between them, found by `close`."""
+        """Neighbouring pairs of cells with a motion between them, see `close_pairs`."""
         return int((self.pairs == JOINED).sum())
 
     def roots(self) -> list[int]:
@@ -153,8 +151,6 @@ class Exploration:
         roadmap, root = self.roadmap, self.roadmap.root(component)
         nodes = reversed(roadmap.over[int(roadmap.cover[root].argmax())])
         return next(roadmap.q[node].copy() for node in nodes if roadmap.root_of(node) == root)
-
-    # -- growing it ----------------------------------------------------------------------------
 
     def tick(self, text: str, more: int = 0) -> None:
         """Report progress, and stop when the time is up.

@@ -6,8 +6,6 @@ the nodes that one continuous motion can visit. A component that covers every ce
 motion; the cells that the best component does not cover are the missed ones.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Sequence
 from typing import NamedTuple

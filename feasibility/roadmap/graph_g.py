@@ -26,20 +26,9 @@ def graph_of(exploration: Exploration) -> nx.Graph:
     mine = np.flatnonzero(roadmap.roots_of_nodes() == best)
     for x in mine[::-1].tolist():  # a cell's first node counts
         graph.nodes[roadmap.cell[x]]["q"] = roadmap.q[x].copy()
-    for (i, j), e in pair_edges(exploration).items():
-        motion = roadmap.motion(e)
-        if roadmap.cell[roadmap.edges[e].x] != i:
-            motion = motion[::-1]
-        graph.add_edge(i, j, motion=motion)
-    return graph
-
-
-def pair_edges(exploration: Exploration) -> dict[tuple[int, int], int]:
-    """One edge of the best component for each connected pair of cells."""
-    roadmap = exploration.roadmap
-    edges: dict[tuple[int, int], int] = {}
     for e, (x, y, _) in enumerate(roadmap.edges):
-        i, j = sorted((roadmap.cell[x], roadmap.cell[y]))
-        if i != j and roadmap.root_of(x) == exploration.best:
-            edges.setdefault((i, j), e)
-    return edges
+        i, j = roadmap.cell[x], roadmap.cell[y]
+        if i != j and roadmap.root_of(x) == best and not graph.has_edge(i, j):  # the first counts
+            motion = roadmap.motion(e)
+            graph.add_edge(i, j, motion=motion if i < j else motion[::-1])
+    return graph

@@ -1,7 +1,5 @@
 """Configurations over a cell that collide, moved clear where that is possible."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from coverable.kernels import entry

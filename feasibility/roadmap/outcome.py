@@ -1,24 +1,20 @@
 """What a search that found no covering motion may say: proof, left untried, or exhausted."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from feasibility.cut_tree import CutTree, Leaf
+from feasibility.cut_words import joint_value, sentence
 from feasibility.problem import Problem
 from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.exploration import Exploration
-
-if TYPE_CHECKING:
-    from feasibility.cut_tree import CutTree
-    from feasibility.roadmap.proving import Proving
+from feasibility.roadmap.proving import Proving
+from feasibility.targets.blocked import blocked_curves, smoothing_offer
 
 
 def proof_of(exploration: Exploration) -> CutTree | None:
     """The first cell that is proved uncoverable, or the cut tree; None where there is neither."""
-    from feasibility.cut_tree import CutTree, Leaf
-
     rulings = exploration.rulings.items()
     cell = next((cell for cell, ruling in rulings if ruling is Ruling.PROVED), None)
     return exploration.cut_tree if cell is None else CutTree(Leaf(cell))
@@ -45,8 +41,6 @@ def outcome_of(
 
 def proved_words(problem: Problem, exploration: Exploration, examined: int, proof: CutTree) -> str:
     """What is proved: which cells cannot be covered, or which cuts part them (by boxes)."""
-    from feasibility.cut_words import sentence
-
     best = f"the best single motion covers {exploration.n_covered} of {len(problem.cells)}"
     if proof.kind == "cut":
         return (
@@ -78,8 +72,6 @@ def unfinished_words(
     problem: Problem, exploration: Exploration, proving: Proving | None, late: str
 ) -> str:
     """What is known to be left untried; empty where nothing is. `late`: the limit that ran out."""
-    from feasibility.targets.blocked import blocked_curves, smoothing_offer
-
     total = len(problem.cells)
     if late:
         return (
@@ -108,8 +100,6 @@ def unfinished_words(
         return ""
     if proving.starved and not proving.alarmed:
         return ""
-    from feasibility.cut_words import joint_value
-
     kept = [gap for gap in proving.open_gaps if gap.points > 0]
     where = ""
     if kept:

@@ -6,23 +6,21 @@ found on every cut between two components, the two may well be joined by a motio
 found: the verdict says so, and such a search does not count as exhausted.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from feasibility.roadmap.cuts.gaps import components_of
+from feasibility.roadmap.cuts.guess import OpenGap
+from feasibility.roadmap.cuts.prover import Prover
+from feasibility.roadmap.cuts.target_places import places_on
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.refinement import COARSE, FINE, refine
 from feasibility.roadmap.rounds import restart
 from feasibility.roadmap.seeds import wound
+from feasibility.targets.blocked import blocked_curves
 from feasibility.task import Task
 from surfaces.surface import SurfaceError
-
-if TYPE_CHECKING:
-    from feasibility.roadmap.cuts.guess import OpenGap
-    from feasibility.roadmap.cuts.prover import Prover
 
 FIRST, SECOND, THIRD, LAST = 1, 4, 8, 16  # rounds without gain
 FEW_CUT_BOXES, MORE_CUT_BOXES = 20_000, 200_000
@@ -73,13 +71,10 @@ class Proving:
 
     def _attempt(self, budget: int) -> bool:
         """One attempt; True when its seeds made the search grow."""
-        from feasibility.roadmap.cuts.gaps import components_of
-
         exploration = self.exploration
         prover = self._ready()
         if prover is None:
             return False
-
         work, told = prover.findings.work, int(prover.findings.work.counts[0])
 
         def tick() -> None:
@@ -104,10 +99,6 @@ class Proving:
         Over a sharp seam between pieces the targets jump. A tool may well go round in an arc, which
         is not certified, nor ruled out: that nothing is on the surface in between proves nothing.
         """
-        from feasibility.roadmap.cuts.prover import Prover
-        from feasibility.roadmap.cuts.target_places import places_on
-        from feasibility.targets.blocked import blocked_curves
-
         if self._prover is None and not self.unable:
             self.unable = blocked_curves(self.exploration.cells, self.task)
             if self.unable:

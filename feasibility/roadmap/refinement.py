@@ -7,8 +7,6 @@ the finer curves. Where two are joined, or one reaches a cell that it had missed
 an edge of the roadmap itself.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from itertools import combinations
 

@@ -10,8 +10,6 @@
    gained nothing.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection
 
 import numpy as np

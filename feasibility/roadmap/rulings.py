@@ -1,7 +1,5 @@
 """Rulings on cells: proved uncoverable, or reached by a configuration that becomes a seed."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np
@@ -15,10 +13,8 @@ from feasibility.roadmap.seeds import wound
 
 def tool_collides(exploration: Exploration, cell: int) -> bool:
     """Is it proved that the tool collides in every pose over a cell? Sets its ruling."""
-    blockers, tick = (
-        exploration.blockers,
-        partial(exploration.tick, "proving that the tool collides"),
-    )
+    blockers = exploration.blockers
+    tick = partial(exploration.tick, "proving that the tool collides")
     if blockers is None or not blockers.tool_collides(exploration.arrays, cell, tick):
         return False
     exploration.rulings[cell] = Ruling.PROVED
@@ -27,13 +23,10 @@ def tool_collides(exploration: Exploration, cell: int) -> bool:
 
 def prove_collisions(exploration: Exploration, cell: int) -> None:
     """Try to prove that something of the arm collides wherever the tool is over a cell."""
-    blockers, tick = (
-        exploration.blockers,
-        partial(exploration.tick, "proving that the arm collides"),
-    )
+    blockers = exploration.blockers
     if blockers is None:
         return
-    left = blockers.left
+    tick, left = partial(exploration.tick, "proving that the arm collides"), blockers.left
     if blockers.arm_collides(exploration.arrays, exploration.work, cell, tick):
         exploration.rulings[cell] = Ruling.PROVED
     tick(left - blockers.left)

@@ -10,8 +10,6 @@ A verdict with a witness or a proof does not depend on the order or on chance; w
 verdict is "exhausted", and its message says what was tried.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from feasibility.clock import Clock
@@ -72,13 +70,3 @@ def seed_middle(exploration: Exploration) -> bool:
         if exploration.complete:
             return True
     return False
-
-
-def close(exploration: Exploration) -> None:
-    """Try to connect every neighbouring pair of cells of the best component (graph G's edges).
-
-    Raises:
-        OutOfTime: the deadline passed.
-    """
-    if exploration.roadmap.cell:
-        exploration.close_pairs(exploration.pairs, exploration.best)

@@ -1,7 +1,5 @@
 """What a search is given to begin with: the arm's start, or a motion over cells like these."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -4,8 +4,6 @@ The walk goes to the nearest cell that it has not visited, and among equally nea
 Warnsdorff's rule. The witness repeats stored edges.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

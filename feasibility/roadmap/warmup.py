@@ -1,7 +1,5 @@
 """The kernels of the complete search, loaded ahead of the work."""
 
-from __future__ import annotations
-
 from feasibility.task import Task
 from robots.robot import Robot
 from surfaces.cells import Cells
@@ -39,13 +37,13 @@ def _explore_two_cells() -> None:
     from feasibility.certification.motion_replay import replay
     from feasibility.roadmap.exploration import Exploration
     from feasibility.roadmap.motions.search_arrays import arrays_of
-    from feasibility.roadmap.search import close, seed_middle
+    from feasibility.roadmap.search import seed_middle
     from feasibility.roadmap.walk import covering_walk
 
     robot, cells, task = _two_cells((0.7, 0.72))
     exploration = Exploration(robot, cells, arrays_of(robot, cells, task), 0)
     seed_middle(exploration)
-    close(exploration)
+    exploration.close_pairs(exploration.pairs, exploration.best)
     walk = covering_walk(exploration.roadmap, exploration.best)
     replay(robot, cells, task, walk, exploration.covered)
 

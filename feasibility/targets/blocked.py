@@ -1,7 +1,5 @@
 """Curves between cell centres that no motion can be certified along, whatever the arm: in words."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from coverable.arrays import Mask

@@ -1,7 +1,5 @@
 """Cubics of unit directions along cell curves; approach directions that are no normals."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

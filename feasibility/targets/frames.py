@@ -1,7 +1,5 @@
 """The reference direction of the roll along cell curves, with bounds on how fast it turns."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

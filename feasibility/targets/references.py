@@ -4,8 +4,6 @@ One direction all over the surface, or the direction in which u grows; between p
 are known at the poses alone, directions in between, along the arc from one tangent to the next.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import NamedTuple
 

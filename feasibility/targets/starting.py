@@ -1,7 +1,5 @@
 """Where a motion begins that has a start: over which cell, or how far from the nearest one."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from coverable.errors import ArgumentError, Fault

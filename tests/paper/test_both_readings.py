@@ -7,8 +7,8 @@ from samples import sampled, spread
 
 import coverable
 from coverable import Search, Task, cylinder, hyperboloid, piecewise, plane, sphere, torus
-from feasibility.paper.algorithm_2 import tree_search
 from feasibility.paper.continuity import JSpace
+from feasibility.paper.greedy import tree_search
 from feasibility.paper.literal import LiteralSearch
 
 PUMA = coverable.load_robot("puma560", limits="set-1")

@@ -67,8 +67,7 @@ def test_shoulder_limit_cuts_the_arc_where_it_stands(last):
 DOME = sphere(1.0, (10, 90), (10, 180))
 
 
-def test_capped_is_not_exhausted_and_memory_grows_without_changing_the_answer():
-    """A call of 60,000 J-cells outgrows its first memory; the same J-cells come out."""
+def test_capped_is_not_exhausted():
     cells = sphere(1.0, (10, 90), (10, 180), position=(0.005, 0, 0)).cells(9, 10)
     task = Task(0.005, 10)
     verdict = greedy_check(PUMA, cells, task, greedy(starts=1, cap=2000))
@@ -80,9 +79,8 @@ def test_capped_is_not_exhausted_and_memory_grows_without_changing_the_answer():
     ends = [(a, k) for a in verdict.tree for k in cells.neighbours.of(a).tolist()
             if not verdict.graph.has_edge(a, k)]  # fmt: skip
     a, k = next(pair for pair in ends if called(*pair, 60_000).outcome is CallOutcome.CAPPED)
-    few, many = called(a, k, 50), called(a, k, 60_000)
+    few = called(a, k, 50)
     assert (few.outcome, few.checked, len(few.jcells)) == (CallOutcome.CAPPED, 50, 0)
-    assert (many.outcome, many.checked) == (CallOutcome.CAPPED, 60_000)
 
 
 def test_cells_out_of_reach_are_proved_to_be():

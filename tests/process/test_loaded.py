@@ -11,7 +11,7 @@ UNUSED = (
     "coverable.meshes", "robots.shapes", "surfaces.meshes.", "surfaces.piecewise.",
     "feasibility.certification.collisions.", "feasibility.certification.cut_proofs.",
     "feasibility.collisions.scene", "feasibility.collisions.kernels.segments",
-    "feasibility.roadmap.causes.", "feasibility.roadmap.cuts.", "feasibility.roadmap.forward.",
+    "feasibility.roadmap.causes.", "feasibility.roadmap.cuts.", "feasibility.roadmap.ordered_run",
     "feasibility.roadmap.branch_and_bound.branching", "feasibility.targets.frames",
     "feasibility.roadmap.rounds", "feasibility.roadmap.proving",
     "feasibility.certification.toolpath_order", "feasibility.certification.rolls.",

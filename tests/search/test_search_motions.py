@@ -12,7 +12,6 @@ from feasibility.roadmap.connecting import explore_self_motions
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions.search_arrays import arrays_of
 from feasibility.roadmap.rounds import explore
-from feasibility.roadmap.search import close
 from feasibility.roadmap.walk import covering_walk
 from feasibility.verdict import Walk
 
@@ -65,7 +64,7 @@ def test_every_motion_that_a_search_stores_holds_and_the_walk_takes_them_alone(n
     for cell in range(0, len(cells), 3):
         exploration.add_seeds(cell, exploration.guesses(3))
         explore_self_motions(exploration, cell)
-    close(exploration)
+    exploration.close_pairs(exploration.pairs, exploration.best)
     roadmap = exploration.roadmap
     assert len(roadmap.edges) >= len(cells) - 1
     for edge, (x, y, _) in enumerate(roadmap.edges):

@@ -28,7 +28,7 @@ bounds_between, project = entry(aiming.bounds_between), entry(projection.project
 segment_holds = entry(segment_bound.segment_holds)
 second_derivatives = entry(segment_bound.second_derivatives)
 roll_derivatives = entry(segment_bound.roll_derivatives)
-static_levers, shrink = entry(box_bounds.static_levers), entry(box_contraction.shrink)
+reach, shrink = entry(box_bounds.reach), entry(box_contraction.shrink)
 
 
 class Clearance:
@@ -76,6 +76,12 @@ class Motions:
         place(self.arrays, self.work, 0, q0)
         place(self.arrays, self.work, 1, q1)
         return second_derivatives(self.arrays, self.work, q0, q1)
+
+    def reach(self, q: Floats, half: Floats, which: int) -> tuple[float, float, Floats]:
+        """How far tool point (0) or axis (1) get in a box about q, to both orders; and J."""
+        rows = np.zeros((3, len(q)))
+        place(self.arrays, self.work, 1, q)
+        return *reach(self.arrays, self.work, which, half, rows, np.zeros(len(q))), rows
 
     def roll_off(self, q: Floats, t: float = 0.0) -> float:
         """Roll at a configuration over a curve's target at t, off the middle of its range, rad."""
@@ -159,8 +165,7 @@ def contracted(
 ) -> tuple[bool, Floats, Floats]:
     """Is something left of a box of joints and x in a part of the surface, and what?"""
     n = len(arrays.lower)
-    low, high, space = low.copy(), high.copy(), box_work(n, len(low) - n)
-    static_levers(arrays, space.longest)
+    low, high, space = low.copy(), high.copy(), box_work(len(low))
     code, _ = shrink(arrays, work_for(n), places, part, DIRECTIONS, space, low, high)
     return code != 1, low, high
 

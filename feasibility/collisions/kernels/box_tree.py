@@ -4,8 +4,6 @@ Each box is turned into the main directions of its triangles' corners, so that o
 piece of surface is thin. The triangles are halved at the median along the longest direction.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +11,6 @@ import numpy as np
 from coverable.arrays import Array, Ints
 from feasibility.collisions.kernels import tables as T
 
-Whole = Ints
 CORNERS = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 OUTWARD = 1e-12  # relative: boxes hold their corners in spite of rounding
 
@@ -84,13 +81,13 @@ def moved(tree: BoxTree, rotation: Array, position: Array) -> BoxTree:
     return BoxTree(nodes, corners)
 
 
-def _runs(starts: Whole, sizes: Whole) -> Whole:
+def _runs(starts: Ints, sizes: Ints) -> Ints:
     """All places of consecutive runs, one after the other."""
     ends = np.cumsum(sizes)
     return np.asarray(np.arange(ends[-1]) + np.repeat(starts - (ends - sizes), sizes))
 
 
-def _boxes(points: Array, sizes: Whole) -> Array:
+def _boxes(points: Array, sizes: Ints) -> Array:
     """(m, 15) middle, axes as rows (the longest first) and half sides; three points a triangle."""
     at = np.concatenate([[0], np.cumsum(3 * sizes)[:-1]])
     owner = np.repeat(np.arange(len(sizes)), 3 * sizes)
@@ -113,7 +110,7 @@ def _corners(boxes: Array) -> Array:
     return np.asarray(middle + sides @ axes)
 
 
-def _sorted_along(triangles: Array, held: Whole, sizes: Whole, boxes: Array) -> Whole:
+def _sorted_along(triangles: Array, held: Ints, sizes: Ints, boxes: Array) -> Ints:
     """The triangles of each node, sorted along its longest direction."""
     node = np.repeat(np.arange(len(sizes)), sizes)
     centres = triangles[held].mean(axis=1)

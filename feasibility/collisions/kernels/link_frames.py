@@ -14,8 +14,6 @@ r_j <= (r_j(0) + r_j(1) + sum_{k>j} r_k |d_k|) / 2. A distance from a line is co
 capsule around a body it is largest at one of the capsule's ends.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from coverable.kernels import kernel

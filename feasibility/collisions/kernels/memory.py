@@ -1,9 +1,8 @@
-"""The compiled clearance of an arm: its memory, which search kernels are given, and its C function.
+"""The memory of the compiled clearance of an arm, and the function that works on it.
 
-How a segment is certified: `segments.py`.
+The memory is what search kernels are given, and what Python asks; the function is a C function,
+loaded or compiled where bodies are checked. How a segment is certified: `segments.py`.
 """
-
-from __future__ import annotations
 
 from functools import cache
 from typing import Any
@@ -16,8 +15,8 @@ from numpy.typing import ArrayLike
 from coverable.arrays import Array
 from coverable.kernels import callback, kernel
 from feasibility.collisions.kernels import tables as T
+from feasibility.collisions.kernels.clearance import MEASURE, PUSH, call
 from feasibility.collisions.kernels.distances import of_item
-from feasibility.collisions.kernels.kernel_calls import MEASURE, PUSH, call
 from feasibility.collisions.kernels.packing import packed
 from feasibility.collisions.kernels.push import push
 from feasibility.collisions.kernels.segments import segment_holds_clear, slot_of_start

@@ -1,7 +1,5 @@
 """Bodies and an arm as the tables of the compiled clearance."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import NamedTuple
 

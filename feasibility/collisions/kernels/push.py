@@ -5,8 +5,6 @@ of a pair changes by d distance / dq_j = n . (z_j x (p - o_j)) for a joint j tha
 them, n . z_j for one that slides. Joints ahead of the first body move both alike.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from coverable.kernels import kernel

@@ -12,8 +12,6 @@ d0 - M, or what the swept hull is away, is the next segment's d0: a pair far apa
 subtraction a segment.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from coverable.kernels import kernel

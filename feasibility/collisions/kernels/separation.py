@@ -13,8 +13,6 @@ Bodies that were nearest at some vertices are mostly nearest there again after a
 loop begins with these, and one direction is enough then.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from coverable.kernels import kernel

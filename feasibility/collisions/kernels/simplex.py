@@ -7,8 +7,6 @@ may pick one that is not quite the closest: `separation.py` trusts no more than 
 direction.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from coverable.kernels import kernel

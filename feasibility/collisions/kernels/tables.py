@@ -11,8 +11,6 @@ The reason for this plainness: numba passes each array as seven numbers and coun
 which made the same kernels, given the tables as arrays, take three times as long to compile.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ the polytope itself along its thinnest; a few directions more where the node is 
 polytope and the bound is needed. The triangle that was nearest the last time is asked first.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from coverable.kernels import kernel

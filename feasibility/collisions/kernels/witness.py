@@ -1,7 +1,5 @@
 """Where two bodies are nearest, as the last `separation` left it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from coverable.kernels import kernel

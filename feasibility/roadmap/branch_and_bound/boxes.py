@@ -1,7 +1,5 @@
 """Boxes of joint values, and of places on a surface: what branch and bound works on."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -70,57 +68,31 @@ class BoxStack(NamedTuple):
 
 
 class BoxWork(NamedTuple):
-    """Working memory for boxes of m intervals; q, middle and half are those of the present box."""
+    """Working memory for boxes of m intervals, n of them of joints; of the present box.
 
-    q: Array
-    """(n,)"""
+    The first axis of length 3 is for the tool's point, its axis and its reference axis.
+    """
+
     middle: Array
     """(m,)"""
     half: Array
     """(m,)"""
-    lever: Array
-    """(n,) m, the largest over the box."""
-    sine: Array
-    """(n,)"""
-    longest: Array
-    """(n,)"""
-    point_rows: Array
-    """(3, m) derivatives of tool point less target point."""
-    axis_rows: Array
-    """(3, m) derivatives of tool axis less approach direction."""
-    reference_rows: Array
-    """(3, m) the same of the reference axis less where it is to point."""
-    reference_sine: Array
-    """(n,)"""
-    toward: Array
-    """(3,) where the reference axis is to point, at the box's centre."""
     gap: Array
-    """(3, 3) of tool point, axis and reference axis at the box's centre."""
+    """(3, 3) m, 1, 1: where each is to be, at the middle, less where it is there."""
+    rows: Array
+    """(3, 3, m) derivatives of where each is less where it is to be."""
+    lever: Array
+    """(3, m) their lengths."""
     most: Array
     """(3,) how far rows times d may be from these gaps; inf where that says nothing."""
     row: Array
     """(m,)"""
 
 
-def box_work(n: int, parameters: int) -> BoxWork:
-    """Working memory for boxes of n joints and some parameters."""
-    m = n + parameters
-    return BoxWork(
-        q=np.zeros(n),
-        middle=np.zeros(m),
-        half=np.zeros(m),
-        lever=np.zeros(n),
-        sine=np.zeros(n),
-        longest=np.zeros(n),
-        point_rows=np.zeros((3, m)),
-        axis_rows=np.zeros((3, m)),
-        reference_rows=np.zeros((3, m)),
-        reference_sine=np.zeros(n),
-        toward=np.zeros(3),
-        gap=np.zeros((3, 3)),
-        most=np.zeros(3),
-        row=np.zeros(m),
-    )
+def box_work(m: int) -> BoxWork:
+    """Working memory for boxes of m intervals."""
+    shapes = m, m, (3, 3), (3, 3, m), (3, m), 3, m
+    return BoxWork(*(np.zeros(shape) for shape in shapes))
 
 
 def box_of(low: Array, high: Array, parameters: int = 0) -> BoxStack:

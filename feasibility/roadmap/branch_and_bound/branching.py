@@ -9,13 +9,11 @@ box may be handed to them.
 the tool alike. Proofs concern the centre of a cell, with its tolerance and its cone.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from coverable.arrays import Array
 from coverable.kernels import allocating_entry, kernel
-from feasibility.roadmap.branch_and_bound.box_bounds import static_levers
+from feasibility.roadmap.branch_and_bound.box_bounds import rolls_over
 from feasibility.roadmap.branch_and_bound.box_contraction import THINNEST, shrink
 from feasibility.roadmap.branch_and_bound.boxes import (
     BoxStack,
@@ -24,7 +22,6 @@ from feasibility.roadmap.branch_and_bound.boxes import (
     box_work,
     place_at_rest,
 )
-from feasibility.roadmap.branch_and_bound.roll_bounds import length_of
 from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.motions.search_arrays import SearchArrays
 from feasibility.roadmap.motions.working_memory import Work, put
@@ -49,33 +46,26 @@ def _split(arrays, places, part, driver, space, low, high):  # type: ignore[no-u
 
     The one with most effect on the constraint that is closest to ruling the box out.
     """
-    n, m = space.q.shape[0], low.shape[0]
-    for_point, for_axis = (1.0 / arrays.scale, 0.05) if driver == 0 else (0.05 / arrays.scale, 1.0)
-    for_roll = 0.0
-    if arrays.roll[1] < np.inf and places.radius[part, 2] < np.inf:
-        for_roll = 1.0 if driver == 2 else 0.05
-        for_axis = for_axis if driver < 2 else 0.05
-    worst, largest = -1, 0.0
-    for j in range(n):
-        width = high[j] - low[j]
-        if width > THINNEST:
-            move = (for_point * space.lever[j] + for_axis * space.sine[j]) * width
-            move += for_roll * space.reference_sine[j] * width
-            if move > largest:
-                worst, largest = j, move
-    for i in range(m - n):
-        width = high[n + i] - low[n + i]
-        slope = length_of(places.slopes[part, i, :3]) * width
-        turn = length_of(places.slopes[part, i, 3:6]) * width
-        move = for_point * slope + for_axis * turn
-        if max(slope, turn) > THINNEST and move > largest:
-            worst, largest = n + i, move
+    n, m = arrays.lower.shape[0], low.shape[0]
+    worst, largest, off = -1, 0.0, 0.0
+    for j in range(m):
+        move, width = 0.0, high[j] - low[j]
+        for which in range(3 if rolls_over(arrays, places, part) else 2):
+            move += _weight(arrays, which, driver) * space.lever[which, j] * width
+        thickness = width if j < n else max(space.lever[0, j], space.lever[1, j]) * width
+        if thickness > THINNEST and move > largest:
+            worst, largest = j, move
     if places.children[part, 0] < 0:
         return worst
-    off = for_point * places.radius[part, 0] + for_axis * places.radius[part, 1]
-    if for_roll > 0.0:
-        off += for_roll * places.radius[part, 2]
+    for which in range(3 if rolls_over(arrays, places, part) else 2):
+        off += _weight(arrays, which, driver) * places.radius[part, which]
     return m if worst < 0 or worst >= n or 2.0 * off > largest else worst
+
+
+@kernel
+def _weight(arrays, which, driver):  # type: ignore[no-untyped-def]
+    """What a change of tool point (1/m), axis or reference axis counts, beside the driver's."""
+    return (1.0 if which == driver else 0.05) / (arrays.scale if which == 0 else 1.0)
 
 
 @kernel
@@ -125,7 +115,6 @@ def branch_and_bound(arrays, work, places, boxes, most, directions, space, found
     """
     n, m = found.shape[0], boxes.low.shape[1]
     low, high = np.empty(m), np.empty(m)
-    static_levers(arrays, space.longest)
     for _ in range(most):
         if boxes.counts[0] == 0:
             return 1
@@ -139,7 +128,7 @@ def branch_and_bound(arrays, work, places, boxes, most, directions, space, found
         if code == 1:
             continue
         if code == 2:
-            put(found, space.q)
+            put(found, space.middle[:n])
             return 2
         worst = _split(arrays, places, part, driver, space, low, high)
         if code == 3 or worst < 0 or boxes.counts[0] + 2 > boxes.low.shape[0]:
@@ -175,6 +164,6 @@ def examine(
     """Examine up to `most` more boxes; as `rule`, wherever the tool may be."""
     n = len(arrays.lower)
     found = np.empty(n)
-    space = box_work(n, boxes.low.shape[1] - n)
+    space = box_work(boxes.low.shape[1])
     code = branch_and_bound(arrays, work, places, boxes, most, DIRECTIONS, space, found)
     return Ruling(code), found

@@ -1,7 +1,5 @@
 """What branch and bound says of a cell."""
 
-from __future__ import annotations
-
 from enum import IntEnum
 
 

@@ -1,7 +1,5 @@
 """Cells that the arm reaches inside limits and cone, but only where it collides."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -14,8 +14,6 @@ is disconnected: the detail says what that component covers and what stops the m
 with a valid configuration that the search had not found, as after a search that was stopped early.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Why the best motion misses a cell that another one covers: where it stopped, or a proved cut."""
 
-from __future__ import annotations
-
 from feasibility.collisions.problem_bodies import Pair
 from feasibility.cut_tree import CutTree
 from feasibility.cut_words import nowhere

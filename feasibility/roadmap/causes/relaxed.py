@@ -3,8 +3,6 @@
 Where the range of the roll alone prevents a cell: at which rolls the arm has it.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from coverable.arrays import Array

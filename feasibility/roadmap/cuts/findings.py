@@ -5,8 +5,6 @@ proved rests on them: they show where a cut cannot be, and give the search motio
 know.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -14,9 +12,9 @@ import numpy as np
 
 from coverable.arrays import Array, Mask
 from coverable.kernels import entry
+from feasibility.roadmap.branch_and_bound.box_bounds import unturned
 from feasibility.roadmap.branch_and_bound.boxes import place_at_rest
 from feasibility.roadmap.branch_and_bound.branching import PlaceParts
-from feasibility.roadmap.branch_and_bound.roll_bounds import unturned
 from feasibility.roadmap.cuts.regions import JointRegion, folded
 from feasibility.roadmap.cuts.statements import Statement
 from feasibility.roadmap.motions.aiming import stand_still

@@ -8,8 +8,6 @@ place the tool alike. Where it can nowhere be at t + 2 pi k, one turn from t is 
 windings, and a motion stays inside its own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import NamedTuple
 

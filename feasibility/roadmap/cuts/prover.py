@@ -5,8 +5,6 @@ refutes a guess are configurations that the search did not know: they are handed
 was proved is kept for the next attempt, and so is every proof that was not finished.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 

@@ -1,13 +1,16 @@
-"""The target surface as branch and bound reads it: part by part, fine enough for the task."""
+"""The target surface as branch and bound reads it: part by part, fine enough for the task.
 
-from __future__ import annotations
+f and n of a part follow one model with the same x, so the target point T = f + s d n follows that
+of f, shifted by s d times that of n, within r_f + d r_n; and b = -s n that of n.
+"""
+
+from functools import lru_cache
 
 import numpy as np
 
 from coverable.arrays import Array, unit_along
 from feasibility.roadmap.branch_and_bound.boxes import toward_middle
 from feasibility.roadmap.branch_and_bound.branching import PlaceParts
-from feasibility.targets.target_parts import target_parts
 from feasibility.task import Task
 from surfaces.parts import SurfaceParts
 from surfaces.surface import Surface
@@ -20,31 +23,42 @@ LEAST = 0.05  # [1] sine of the reference's angle to the approach below which ro
 ROUNDING = 1e-12  # [1]
 
 
+# A search is often run again; surfaces are values, compared by identity.
+@lru_cache(maxsize=4)
+def _parts(surface: Surface, standoff: float, flat: float, straight: float) -> SurfaceParts:
+    """The parts of a surface, of whose finest target points and directions are no further off."""
+    bent = min(straight, flat / (2.0 * standoff)) if standoff > 0.0 else straight
+    return surface.parts(flat - standoff * bent, bent, MOST_PARTS)
+
+
 def places_on(surface: Surface, task: Task) -> PlaceParts:
     """The places that the tool may be at over a surface.
 
     What is proved holds for the surface itself; how fine the parts are only decides what can be.
     """
-    chord = min(task.cone_chord, 2.0)
-    parts = target_parts(
-        surface,
-        task.standoff,
-        flat=FLAT * task.effective_tolerance,
-        straight=max(STRAIGHT * chord, STRAIGHTEST),
-        most=MOST_PARTS,
-        approach=None if isinstance(task.approach, str) else task.approach,
-    )
-    toward, change, radius = _toward(surface, task, parts)
+    straight = max(STRAIGHT * min(task.cone_chord, 2.0), STRAIGHTEST)
+    found = _parts(surface, task.standoff, FLAT * task.effective_tolerance, straight)
+    centre, slopes, radius = found.centre.copy(), found.slopes.copy(), found.radius.copy()
+    for array in (centre, slopes):
+        array[..., :3] += surface.side_sign * task.standoff * array[..., 3:]
+        array[..., 3:] *= -surface.side_sign
+    radius[:, 0] += task.standoff * radius[:, 1]
+    if task.approach is not None and not isinstance(task.approach, str):
+        centre[..., 3:] = surface.rotation @ unit_along(task.approach)
+        slopes[..., 3:] = radius[:, 1] = 0.0
+    toward, change, off = _toward(surface, task, centre, slopes, radius[:, 1])
     return PlaceParts(
-        centre=np.hstack([parts.centre, toward]),
-        slopes=np.concatenate([parts.slopes, change], axis=2),
-        radius=np.column_stack([parts.radius, radius]),
-        children=np.array(parts.children),
-        axis=np.array(parts.axis),
+        centre=np.hstack([centre, toward]),
+        slopes=np.concatenate([slopes, change], axis=2),
+        radius=np.column_stack([radius, off]),
+        children=np.array(found.children),
+        axis=np.array(found.axis),
     )
 
 
-def _toward(surface: Surface, task: Task, parts: SurfaceParts) -> tuple[Array, Array, Array]:
+def _toward(
+    surface: Surface, task: Task, centre: Array, slopes: Array, off: Array
+) -> tuple[Array, Array, Array]:
     """Where the tool's reference axis is to point on each part: centre, slopes and radius.
 
     With one reference r all over the surface: t = P r / |P r|, P = 1 - b b^T. Along a unit b whose
@@ -57,26 +71,26 @@ def _toward(surface: Surface, task: Task, parts: SurfaceParts) -> tuple[Array, A
     The radius is inf where roll is free, where its reference is the u direction, and where h is
     small: nothing is known there.
     """
-    count = len(parts.centre)
+    count = len(centre)
     nothing = np.zeros((count, 3)), np.zeros((count, 2, 3)), np.full(count, np.inf)
     if task.roll is None or task.roll_reference is None:
         return nothing
     r = surface.rotation @ unit_along(task.roll_reference)
-    length = np.linalg.norm(parts.centre[:, 3:], axis=1)
-    turns = np.linalg.norm(parts.slopes[..., 3:], axis=2).sum(axis=1)
+    length = np.linalg.norm(centre[:, 3:], axis=1)
+    turns = np.linalg.norm(slopes[..., 3:], axis=2).sum(axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        b = parts.centre[:, 3:] / length[:, None]
+        b = centre[:, 3:] / length[:, None]
         # Of the chord between two lengths of the model of b, each within its radius of 1.
-        ends = np.minimum(length, 1.0 - parts.radius[:, 1])
+        ends = np.minimum(length, 1.0 - off)
         speed = turns / np.sqrt(np.maximum(ends**2 - 0.25 * turns**2, 0.0))
         # b is within its radius of the model, and so is the model of a unit vector.
-        deviation = 2.2 * parts.radius[:, 1] + ROUNDING
+        deviation = 2.2 * off + ROUNDING
         away = np.minimum(np.abs(b @ r) + speed + deviation, 1.0)
         h = np.sqrt(1.0 - away * away)
         along = (b @ r)[:, None]
         t = (r - along * b) / np.sqrt(1.0 - along * along)
         s = np.cross(b, t)
-        g = parts.slopes[..., 3:] / length[:, None, None]
+        g = slopes[..., 3:] / length[:, None, None]
         g -= (g * b[:, None]).sum(axis=2, keepdims=True) * b[:, None]
         about = -(along / np.sqrt(1.0 - along * along))[:, None] * (g * s[:, None]).sum(
             axis=2, keepdims=True

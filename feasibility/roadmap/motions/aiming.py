@@ -1,7 +1,5 @@
 """Where the tool is to be: the kernels that set the target of a step, and what it may use."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from coverable.kernels import entry, kernel

@@ -1,7 +1,5 @@
 """Least steps: the shortest corrections that linear rows ask for, inside the joint limits."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from coverable.kernels import allocating, kernel

@@ -5,8 +5,6 @@ means within it. Where the projection onto the exact target fails, the tool poin
 to it as limits and cone allow.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from coverable.kernels import entry, kernel

@@ -5,8 +5,6 @@ joints that would pass a limit are held at it. Cone and roll are rows of a step 
 violated, or would be. The first step follows a secondary objective in the free directions.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from coverable.kernels import entry, kernel

@@ -14,8 +14,6 @@ which is singular only where a = -b. With om and Om the angular velocities of to
 so that the derivative by a revolute joint is z_j . k, and 0 by a prismatic one.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from coverable.kernels import kernel

@@ -44,8 +44,6 @@ They are principal values: a full turn between them is ruled out by its own test
 by less than is left of a turn, (turn + |Om|) / cos(theta / 2) < 2 pi - |psi1 - psi0|.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from coverable.kernels import kernel

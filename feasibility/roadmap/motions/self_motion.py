@@ -5,8 +5,6 @@ directions (roll, tilt, redundancy) move. A motion that `connect` returns is cer
 made, see `feasibility.roadmap.motions.segment_bound`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from coverable.arrays import Array

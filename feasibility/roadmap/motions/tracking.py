@@ -10,8 +10,6 @@ segment obeys every constraint between its ends too; otherwise it is shortened. 
 short enough, the tool point may leave its target, within the tolerance.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from coverable.arrays import Array

@@ -3,8 +3,6 @@
 Slot 0 is where the arm is, slot 1 where it tries to go.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

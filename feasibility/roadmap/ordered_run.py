@@ -11,8 +11,6 @@ from the furthest pose that a run reaches: other configurations over it and over
 it, by self-motions of what a run reaches there, each followed ahead as far as it goes.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple

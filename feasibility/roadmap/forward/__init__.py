@@ -1,1 +1,0 @@
-"""Motions over a toolpath in its order: forward only, with changes of posture in place."""
