@@ -105,6 +105,7 @@ def loses(known, rng):
     y = np.concatenate([known.q, known.x[k]])
     width = 10.0 ** rng.uniform(-4.0, 0.5) * 10.0 ** rng.uniform(-1.0, 0.0, n + 2)
     width[rng.random(n + 2) < 0.1] = 0.0
+    width[:n] *= rng.choice([1.0, 1e-3])  # or else what the place adds is never seen
     share = np.clip(rng.uniform(-0.2, 1.2, n + 2), 0.0, 1.0)
     low, high = y - share * width, y + (1.0 - share) * width
     low[n:], high[n:] = np.maximum(low[n:], -1.0), np.minimum(high[n:], 1.0)
