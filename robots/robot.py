@@ -282,7 +282,13 @@ class Robot:
                 f"{', '.join(self.joint_names)}; got shape {table.shape}",
                 f"robot {self.name!r}",
             )
-        return replace(self, lower=table[:, 0], upper=table[:, 1])
+        made = replace(self, lower=table[:, 0], upper=table[:, 1])
+        # The chain has no limits, and nor has the reach of joints that turn, all of them: to work
+        # them out again takes longer than some searches.
+        turn = ~self.prismatic & (self.lower < self.upper) & (made.lower < made.upper)
+        known = ("chain", "_reach") if turn.all() else ("chain",)
+        vars(made).update({name: vars(self)[name] for name in known if name in vars(self)})
+        return made
 
     def _limits_by_name(self, limits: Mapping[str, ArrayLike]) -> Array:
         """The present limits (n, 2) with those of some joints replaced."""

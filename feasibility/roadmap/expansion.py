@@ -17,7 +17,7 @@ from feasibility.roadmap.motions.projection import PROJECTION_STEPS
 from feasibility.roadmap.motions.search_arrays import SearchArrays
 from feasibility.roadmap.motions.self_motion import SETTLE_STEPS, connect, effects, settle
 from feasibility.roadmap.motions.tracking import track
-from feasibility.roadmap.motions.working_memory import NEXT, Work, place
+from feasibility.roadmap.motions.working_memory import Work
 
 MOST_FAILURES = 12  # failed connections after which a pair of components is left alone
 MOST_RIVALS = 6  # other components that a new configuration tries to join, the nearest first
@@ -48,9 +48,8 @@ class Grower:
 
     def add_node(self, cell: int, q: Array, root: int) -> int:
         """Add a node to a root component, and queue it; returns its number."""
-        place(self.arrays, self.work, NEXT, q)
         effect = np.empty(len(q))
-        effects(self.arrays, self.work, NEXT, effect)
+        effects(self.arrays, self.work, q, effect)
         return self.roadmap.add_node(cell, q.copy(), effect, root)
 
     def join(

@@ -28,7 +28,7 @@ from surfaces.cells import Cells
 
 NEARBY = (1 / 8, 1 / 4, 1 / 2, 1)  # [1] of the way to its end: values of what is not monotone
 ALL_ALONG = (1 / 32, 1 / 16, 1 / 8, 3 / 16, 1 / 4, 3 / 8, 1 / 2, 5 / 8, 3 / 4, 7 / 8, 1)
-MARGINS, REMEDIES = 4, 8  # halvings, at most, towards what is not feasible, or no longer is
+MARGINS, REMEDIES = 16, 256  # parts of a stretch that a threshold is found to, of both kinds
 SUSPECTS = 3  # cells that a search looks at first
 SEEDED = 0.5  # [1] of the effort of a search without a known motion
 
@@ -36,28 +36,25 @@ Steps = tuple[tuple[Quantity, int], ...]
 """Quantities, and how many steps each is from the value given."""
 
 
-def last_true(holds: Callable[[int], bool], good: int, bad: int, most: int = 64) -> tuple[int, int]:
+def last_true(holds: Callable[[int], bool], good: int, bad: int, least: int = 1) -> tuple[int, int]:
     """The last whole number before `bad`, seen from `good`, for which `holds` is true.
 
     Args:
         holds: called for numbers strictly between the two ends.
         good: where it is known to be true.
         bad: where it is known to be false; above or below `good`.
-        most: halvings of what is between them, after which it is left at that.
+        least: how near the two are to be brought by halving.
 
     Returns:
-        Two neighbouring numbers, or as near as so many halvings bring them: where it holds, and
-        where it does not.
+        Two numbers, at most `least` apart: where it holds, and where it does not.
 
     Example:
         >>> last_true(lambda k: k <= 37, 0, 100)
         (37, 38)
-        >>> last_true(lambda k: k >= -5, 10, -90, most=3)
+        >>> last_true(lambda k: k >= -5, 10, -90, least=13)
         (-3, -15)
     """
-    for _ in range(most):
-        if abs(bad - good) <= 1:
-            break
+    while abs(bad - good) > least:
         middle = (good + bad) // 2
         good, bad = (middle, bad) if holds(middle) else (good, middle)
     return good, bad
@@ -268,10 +265,10 @@ class Prober:
             good: where it is feasible, as `check` says.
             bad: where no motion was found.
         """
-        most = MARGINS if self.verdict.feasible else REMEDIES
+        stop = bad
         while True:
             sure, good = good, self._as_far(quantity, good, bad)
-            good, bad = last_true(partial(self._holds, quantity), good, bad, most)
+            good, bad = self._narrowed(quantity, good, bad)
             good = self._as_far(quantity, good, bad)
             if not self._accepted(quantity, good):
                 good, bad = sure, good
@@ -281,22 +278,45 @@ class Prober:
             if not self.judged(((quantity, bad),)).accepted:
                 sides = self.finding(quantity, good), self.finding(quantity, bad)
                 return Threshold(quantity, *sides)
-            return self._by_check(quantity, bad, 1 if bad > good else -1, most)
+            return self._by_check(quantity, bad, stop)
 
-    def _by_check(self, quantity: Quantity, good: int, way: int, most: int) -> Threshold:
-        """The threshold where `check` alone finds more than searches from the motions known."""
+    def _narrowed(self, quantity: Quantity, good: int, bad: int) -> tuple[int, int]:
+        """The two ends nearer to each other, as far as searches from the nearest motions lead.
+
+        Of a margin `good` is where a motion was found to end, mostly near the threshold: from there
+        on steps begin small, and double.
+        """
+        least = self._resolution(bad - good)
+        step = least if bad > good else -least
+        while self.verdict.feasible and abs(bad - good) > abs(step):
+            if not self._holds(quantity, good + step):
+                bad = good + step
+                break
+            good, step = good + step, 2 * step
+        return last_true(partial(self._holds, quantity), good, bad, least)
+
+    def _resolution(self, stretch: int) -> int:
+        """Steps, how near to a threshold on a stretch both sides are to be."""
+        return math.ceil(abs(stretch) / (MARGINS if self.verdict.feasible else REMEDIES))
+
+    def _by_check(self, quantity: Quantity, good: int, stop: int) -> Threshold:
+        """The threshold where `check` alone finds more than searches from the motions known.
+
+        Args:
+            quantity: what is varied.
+            good: where `check` alone finds a motion.
+            stop: further on, where none was found by a search.
+        """
+        last = quantity.last if self.verdict.feasible else 0
 
         def accepted(k: int) -> bool:
             return self.judged(((quantity, k),)).accepted
 
-        failed = [k for k, one in self._along(quantity).items() if one.walk is None]
-        ahead = sorted((k for k in failed if (k - good) * way > 0), key=lambda k: abs(k - good))
-        for k in (*ahead, quantity.last):
+        for k in dict.fromkeys((stop, last)):
             if not accepted(k):
-                good, bad = last_true(accepted, good, k, most)
-                return Threshold(
-                    quantity, self.finding(quantity, good), self.finding(quantity, bad)
-                )
+                good, bad = last_true(accepted, good, k, self._resolution(k - good))
+                sides = self.finding(quantity, good), self.finding(quantity, bad)
+                return Threshold(quantity, *sides)
             good = k
         return Threshold(quantity, self.finding(quantity, good), None)
 

@@ -9,6 +9,7 @@ with the others opened, and with a second shift.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Sequence
 
 from feasibility.sensitivity.probes import REMEDIES, Prober, Steps, last_true
@@ -90,4 +91,4 @@ def _smaller(prober: Prober, steps: Steps, quantity: Quantity, k: int) -> Steps:
         seeds = found.walk or seeds
         return found.walk is not None
 
-    return changed(last_true(holds, k, 0, REMEDIES)[0])
+    return changed(last_true(holds, k, 0, math.ceil(k / REMEDIES))[0])

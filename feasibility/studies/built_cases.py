@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import time
 from collections.abc import Mapping
@@ -23,16 +22,14 @@ from feasibility.studies.case_files import files_of_arm
 from feasibility.studies.pool import Tables
 from robots.library import flange_axis
 from robots.robot import Robot
-from surfaces.arguments import check_pose
 from surfaces.cells import Cells
-from surfaces.surface import SurfaceError, rotation_from_rpy
+from surfaces.surface import rotation_from_rpy
 
 if TYPE_CHECKING:
     from surfaces.meshes.cells.mesh_cells import MeshCells
 
 HOME = {"position": (0.0, 0.0, 0.0), "rpy_deg": (0.0, 0.0, 0.0)}
-CASES_KEPT = 32  # that one worker keeps, with the surface at home
-ROBOTS_KEPT = 32
+ROBOTS_KEPT = 32  # that one worker keeps
 MESHES_KEPT = 4
 TOOL = ("tcp", "approach_axis", "reference_axis")
 
@@ -44,28 +41,7 @@ def case_of(tables: Tables) -> Case:
         CaseError: with everything that is wrong.
     """
     chosen = {title: tables[title] for title in TABLES if title in tables}
-    surface = chosen.get("surface")
-    pose = _pose(surface) if isinstance(surface, Mapping) else None
-    if not isinstance(surface, Mapping) or pose is None:
-        return Case.from_toml(toml_document(chosen))
-    home = _at_home(json.dumps({**chosen, "surface": {**surface, **HOME}}, default=str))
-    return replace(home, surface=replace(home.surface, **pose))
-
-
-def _pose(surface: Mapping[str, Any]) -> dict[str, Any] | None:
-    """Where the surface stands; None where that is not said, or wrong."""
-    pose = {key: surface[key] for key in HOME if surface.get(key) is not None}
-    try:
-        check_pose(**pose)
-    except SurfaceError:
-        return None
-    return {key: tuple(map(float, pose.get(key, value))) for key, value in HOME.items()}
-
-
-@lru_cache(maxsize=CASES_KEPT)
-def _at_home(tables: str) -> Case:
-    """The case of some tables, as JSON; without what is wrong nothing is kept."""
-    return Case.from_toml(toml_document(json.loads(tables)))
+    return Case.from_toml(toml_document(chosen))
 
 
 def clock_of(case: Case) -> Clock:

@@ -8,11 +8,9 @@ import pytest
 from bad_input import sheet
 from mesh_writers import stl_of
 
-from coverable import Case, CaseError, Pose, Store, load_case, open_workers, run_tasks
-from feasibility.cases.case import TABLES
-from feasibility.cases.toml_text import toml_document
+from coverable import Case, Pose, Store, open_workers, run_tasks
 from feasibility.placement.trials import evaluator_of_study
-from feasibility.studies.built_cases import case_of, cut_of
+from feasibility.studies.built_cases import cut_of
 from feasibility.studies.run import StudyTask
 
 XACRO = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
@@ -140,32 +138,6 @@ def test_what_cannot_be_read_is_left_to_the_task(folder: Path, kind: str, fault:
         (row,) = run_tasks([StudyTask(case.to_tables(), {})], workers)
     assert row.status == "failed"
     assert file.name in row.result["message"]
-
-
-def by_itself(tables) -> Case:
-    return Case.from_toml(toml_document({t: tables[t] for t in TABLES if t in tables}))
-
-
-def read(how, tables):
-    try:
-        case = how(tables)
-    except CaseError as error:
-        return str(error)
-    return case, case.to_toml()
-
-
-def test_a_placed_case_is_the_case_read_by_itself() -> None:
-    tables = load_case("paper/5e").to_tables()
-    surface = {k: v for k, v in tables["surface"].items() if k not in ("position", "rpy_deg")}
-    before = case_of(tables).to_toml()
-    for pose in (
-        {"position": [0.1, 2, -0.3], "rpy_deg": [10, 20.5, -170]}, {"position": (0.0, 0.0, 1.0)},
-        {"rpy_deg": [0, 0, 90]}, {}, {"position": [0, 0]}, {"rpy_deg": [0, 0, float("nan")]},
-        {"position": ["0", 0, 0]}, {"rpy_deg": 3.0}, {"position": [0, 0, 1e300]},
-    ):  # fmt: skip
-        given = {**tables, "surface": {**surface, **pose}}
-        assert read(case_of, {**given, "placement": {"pose": 1}}) == read(by_itself, given)
-        assert case_of(tables).to_toml() == before
 
 
 def test_a_mesh_cut_once_and_placed_is_the_mesh_cut_in_place(tmp_path) -> None:

@@ -205,7 +205,7 @@ def test_bisection_ends_beside_a_failure_whatever_the_answers(size, data):
 
         assert last_true(holds, 0, sign * size) == (sign * turn, sign * (turn + 1))
         assert len(asked) <= math.ceil(math.log2(size))
-        good, bad = last_true(holds, 0, sign * size, most=2)
+        good, bad = last_true(holds, 0, sign * size, least=math.ceil(size / 4))
         assert sign * good <= turn < sign * bad
         assert abs(bad - good) <= math.ceil(size / 4)
     for ends in ((0, size), (size, 0)):

@@ -7,6 +7,7 @@ to it as limits and cone allow.
 
 import numpy as np
 
+from coverable.arrays import Array
 from coverable.kernels import entry, kernel
 from feasibility.roadmap.motions.linear_steps import least_step
 from feasibility.roadmap.motions.projection import (
@@ -17,10 +18,12 @@ from feasibility.roadmap.motions.projection import (
     project_onto_cell,
     roll_change,
 )
+from feasibility.roadmap.motions.search_arrays import SearchArrays
 from feasibility.roadmap.motions.working_memory import (
     NEXT,
     OF_CONE,
     OF_ROLL,
+    Work,
     cone_used,
     off_target,
     place,
@@ -110,8 +113,14 @@ def _weighted_rows(arrays, work, goal, roll_goal):
 
 
 @entry
-def project_near_cell(arrays, work, cell, q, most):
+def _project_off_target(arrays, work, q, most):  # type: ignore[no-untyped-def]
+    """`project_off_target` for Python."""
+    return project_off_target(arrays, work, q, most)
+
+
+def project_near_cell(
+    arrays: SearchArrays, work: Work, cell: int, q: Array, most: np.int64
+) -> bool:
     """`project_onto_cell`, or failing that, to within the tolerance of the cell's centre."""
-    if project_onto_cell(arrays, work, cell, q, most):
-        return True
-    return project_off_target(arrays, work, q, STEPS)
+    onto = project_onto_cell(arrays, work, cell, q, most)
+    return bool(onto or _project_off_target(arrays, work, q, STEPS))

@@ -7,7 +7,7 @@ violated, or would be. The first step follows a secondary objective in the free 
 
 import numpy as np
 
-from coverable.kernels import entry, kernel
+from coverable.kernels import entry, inlined, kernel
 from feasibility.roadmap.motions.aiming import look_at
 from feasibility.roadmap.motions.linear_steps import least_step
 from feasibility.roadmap.motions.roll_kernels import roll_gradient
@@ -234,7 +234,7 @@ def move(arrays, work, q):
     place(arrays, work, NEXT, q)
 
 
-@kernel
+@inlined
 def project(arrays, work, q, slack, before, most):
     """Project q (in place) onto the constraints over `work.target`; slot 1 holds the result.
 

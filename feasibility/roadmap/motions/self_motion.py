@@ -39,23 +39,24 @@ SETTLE_STEPS = np.int64(40)  # of `settle`
 
 
 @entry
-def effects(arrays, work, slot, out):  # type: ignore[no-untyped-def]
-    """How much a radian (or metre) of each joint moves the tool: lever over scale, plus sine.
+def effects(arrays, work, q, out):  # type: ignore[no-untyped-def]
+    """How much a radian (or metre) of each joint moves the tool at q: lever over scale, plus sine.
 
     Joint differences weighted in this way measure how much a motion moves the tool: the free roll
     of a wrist, or opposite turns of two joints about a common axis at a singularity, weigh little.
     Where roll is limited, a joint that turns it weighs by as much; so windings are far apart.
     """
+    place(arrays, work, NEXT, q)
     for j in range(out.shape[0]):
         if arrays.chain.prismatic[j]:
             out[j] = 1.0 / arrays.scale
             continue
-        zx, zy, zz = work.axes[slot, j, 0], work.axes[slot, j, 1], work.axes[slot, j, 2]
-        x = work.point[slot, 0] - work.origins[slot, j, 0]
-        y = work.point[slot, 1] - work.origins[slot, j, 1]
-        z = work.point[slot, 2] - work.origins[slot, j, 2]
+        zx, zy, zz = work.axes[NEXT, j, 0], work.axes[NEXT, j, 1], work.axes[NEXT, j, 2]
+        x = work.point[NEXT, 0] - work.origins[NEXT, j, 0]
+        y = work.point[NEXT, 1] - work.origins[NEXT, j, 1]
+        z = work.point[NEXT, 2] - work.origins[NEXT, j, 2]
         r = (zy * z - zz * y) ** 2 + (zz * x - zx * z) ** 2 + (zx * y - zy * x) ** 2
-        x, y, z = work.axis[slot, 0], work.axis[slot, 1], work.axis[slot, 2]
+        x, y, z = work.axis[NEXT, 0], work.axis[NEXT, 1], work.axis[NEXT, 2]
         s = (zy * z - zz * y) ** 2 + (zz * x - zx * z) ** 2 + (zx * y - zy * x) ** 2
         out[j] = np.sqrt(r) / arrays.scale + np.sqrt(s)
         if arrays.roll[1] < np.inf:

@@ -13,7 +13,7 @@ short enough, the tool point may leave its target, within the tolerance.
 import numpy as np
 
 from coverable.arrays import Array
-from coverable.kernels import entry, inlined, kernel
+from coverable.kernels import entry, kernel
 from feasibility.roadmap.motions.aiming import aim, bounds_between
 from feasibility.roadmap.motions.off_target import STEPS_FROM_NEAR, project_off_target
 from feasibility.roadmap.motions.projection import linearise, project
@@ -74,7 +74,7 @@ def span_of(arrays, work, curve, begin, end):
     return np.sqrt(dx * dx + dy * dy + dz * dz) / arrays.scale
 
 
-@inlined
+@kernel
 def _step_from(arrays, work, q, dt, off_target):
     """Project q, with its secondary step, onto the target ahead; `work.trial` is the result.
 
