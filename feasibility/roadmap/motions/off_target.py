@@ -113,13 +113,13 @@ def _weighted_rows(arrays, work, goal, roll_goal):
 
 
 @entry
-def _project_off_target(arrays, work, q, most):  # type: ignore[no-untyped-def]
+def _project_off_target(arrays, work, q, most):
     """`project_off_target` for Python."""
     return project_off_target(arrays, work, q, most)
 
 
 def project_near_cell(
-    arrays: SearchArrays, work: Work, cell: int, q: Array, most: np.int64
+    arrays: SearchArrays, work: Work, cell: int, q: Array, most: int | np.int64
 ) -> bool:
     """`project_onto_cell`, or failing that, to within the tolerance of the cell's centre."""
     onto = project_onto_cell(arrays, work, cell, q, most)
