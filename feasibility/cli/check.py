@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from coverable.errors import CoverableError
@@ -37,7 +38,8 @@ def add(subcommands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--witness",
         metavar="FILE",
-        help="write the covering motion as CSV (feasible only); with --json, - puts it into the "
+        help="write the covering motion as CSV, or for a name in .compas as the JSON of "
+        "compas_fab (feasible only); with --json, - puts it into the "
         "object",
     )
     parser.add_argument("--save", metavar="RESULT", help="write a result file for `coverable show`")
@@ -91,9 +93,9 @@ def _write(args: argparse.Namespace, witness: str | None, verdict: Verdict, case
 
         write_text(args.html, view(verdict, case.name).html(), "view")
     if witness is not None:
-        from feasibility.reports.verdict_json import as_csv
+        from feasibility.reports.verdict_json import motion_text
 
-        motion = as_csv(verdict)
+        motion = motion_text(verdict, Path(witness).suffix)
         if motion is None:
             why = "has no stored motion" if verdict.feasible else f"is {verdict.answer}"
             print_err(f"--witness: nothing written to {shown_path(witness)}: this case {why}")

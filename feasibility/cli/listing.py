@@ -22,7 +22,13 @@ HEADINGS = ["robot", "joints", "reach", "payload", "from", "licence", "files"]
 
 def add(subcommands: argparse._SubParsersAction) -> None:
     """Add the commands."""
-    add_command(subcommands, "cases", cases, help="list the built-in cases")
+    parser = add_command(
+        subcommands, "cases", cases, help="list the built-in cases, or make one of a REACH study"
+    )
+    parser.add_argument(
+        "study", metavar="STUDY", nargs="?",
+        help="a study of REACH (.yaml): print the case that asks for its targets in one motion",
+    )  # fmt: skip
     parser = add_command(subcommands, "robots", robots, help="list the robots by name")
     parser.add_argument(
         "names", metavar="NAME", nargs="*",
@@ -37,7 +43,13 @@ def add(subcommands: argparse._SubParsersAction) -> None:
 
 
 def cases(args: argparse.Namespace, began: float) -> int:
-    """`coverable cases`: the built-in cases."""
+    """`coverable cases [STUDY]`: the built-in cases, or that of a REACH study."""
+    if args.study is not None:
+        from feasibility.studies.reach_study import reach_case
+
+        text = reach_case(args.study)
+        print_out(json_text({"case": text}) if args.json else text.rstrip())
+        return 0
     rows = case_rows()
     print_out(json_text({"cases": rows}) if args.json else cases_table(rows))
     return 0

@@ -195,5 +195,5 @@ def _write(args: argparse.Namespace, found: PassRuns, timed: list[Trajectory]) -
         for number, run in enumerate(timed, start=1):
             file = Path(out)
             numbered = file.with_name(f"{file.stem}_{number}{file.suffix}")
-            save_trajectory(numbered, run)
+            save_trajectory(numbered, run, found.robot)
             print_err(f"trajectory {number} of {len(found.runs)}: {shown_path(str(numbered))}")

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from feasibility.treated.area import TreatedArea
     from feasibility.verdict import Verdict
     from feasibility.viewer.viewer import View
+    from robots.robot import Robot
 
 ORDERS = ("rows", "columns", "spiral", "shortest", "given")
 STATUSES = "exit status: as of `coverable check`"
@@ -78,8 +79,8 @@ def _add_timing(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--out", metavar="FILE", action="append", default=[],
-        help="write the trajectory; .csv, .json, or .yaml like a ROS JointTrajectory; can be "
-        "repeated",
+        help="write the trajectory; .csv, .json, .yaml like a ROS JointTrajectory, or "
+        ".compas, the JSON of compas_fab; can be repeated",
     )  # fmt: skip
 
 
@@ -153,7 +154,7 @@ def path(args: argparse.Namespace, began: float) -> int:
     else:
         print_out(report.as_text(found, run, limits, *known))
     short = report.short_words(treated, opened.setup.task.coverage)
-    _write(args, run)
+    _write(args, run, found.robot)
     write_programs(args, opened, along, run)
     if args.html is not None:
         write_text(args.html, _view(opened, along, found, treated, run, limits).html(), "view")
@@ -216,7 +217,7 @@ def _approach(args: argparse.Namespace, task: Task) -> float | None:
     return APPROACH
 
 
-def _write(args: argparse.Namespace, run: Trajectory) -> None:
+def _write(args: argparse.Namespace, run: Trajectory, robot: Robot) -> None:
     """Write the wanted trajectories, and report them on stderr.
 
     Raises:
@@ -225,5 +226,5 @@ def _write(args: argparse.Namespace, run: Trajectory) -> None:
     for out in args.out:
         from feasibility.results.trajectory_files import save_trajectory
 
-        save_trajectory(out, run)
+        save_trajectory(out, run, robot)
         print_err(f"trajectory: {shown_path(out)}")

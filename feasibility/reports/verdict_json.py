@@ -87,11 +87,15 @@ def _walk(verdict: Verdict) -> Walk | None:
     return tree_walk(verdict) if verdict.method == "greedy" else verdict.witness
 
 
-def as_csv(verdict: Verdict) -> str | None:
-    """The covering motion as CSV, see `walk_csv`; None where there is none.
+def motion_text(verdict: Verdict, ending: str = ".csv") -> str | None:
+    """The covering motion as CSV, see `walk_csv`, or .compas, see `as_compas`; None without one.
 
     That of a greedy search follows its tree, which enters the cells but need not pass their
     centres, see `tree_walk`.
     """
     walk = _walk(verdict)
-    return None if walk is None else walk_csv(verdict.robot, walk)
+    if walk is None or ending.lower() != ".compas":
+        return None if walk is None else walk_csv(verdict.robot, walk)
+    from feasibility.results.compas_json import as_compas
+
+    return as_compas(verdict.robot, walk)

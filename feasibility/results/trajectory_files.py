@@ -1,7 +1,8 @@
 """Trajectories as files: CSV, JSON, and YAML shaped like a ROS `trajectory_msgs/JointTrajectory`.
 
-CSV is read back as the same numbers; JSON and YAML are written for other programs alone. Files are
-untrusted: they are read with a cap, as plain text, and every number is checked.
+CSV is read back as the same numbers; JSON (ours, and that of compas_fab) and YAML are written for
+other programs alone. Files are untrusted: they are read with a cap, as plain text, and every number
+is checked.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from feasibility.collisions.words import listed_words
 from feasibility.read_files import FileError, read_text, shown_path
 from feasibility.safe_files import write_whole
 from feasibility.timing.sampled_trajectory import Trajectory
+from robots.robot import Robot
 
 MOST_SAMPLES = 1_000_000
 MOST_JOINTS = 64
@@ -35,13 +37,29 @@ ARRAYS = {
 _SHAPES = {"velocities": "_velocity", "accelerations": "_acceleration"}
 
 
-def save_trajectory(path: str | os.PathLike[str], trajectory: Trajectory) -> Path:
-    """Write a trajectory; the file's ending says how: .csv, .json, .yaml or .yml.
+def save_trajectory(
+    path: str | os.PathLike[str], trajectory: Trajectory, robot: Robot | None = None
+) -> Path:
+    """Write a trajectory; the file's ending says how: .csv, .json, .yaml, .yml or .compas.
+
+    Args:
+        path: of the file; .compas is the JSON of compas_fab, see `as_compas`.
+        trajectory: what is written.
+        robot: the arm, which .compas needs.
 
     Raises:
-        FileError: another ending, or the file cannot be written.
+        FileError: another ending, the file cannot be written, or its ending needs the arm.
     """
-    text = _of_ending(path, {"csv": as_csv, "json": as_json_text, "yaml": as_yaml})(trajectory)
+    writers = {"csv": as_csv, "json": as_json_text, "yaml": as_yaml, "compas": None}
+    write = _of_ending(path, writers)
+    if write is not None:
+        text = write(trajectory)
+    elif robot is None:
+        raise FileError("of compas_fab it needs the arm: give robot=", shown_path(path))
+    else:
+        from feasibility.results.compas_json import as_compas
+
+        text = as_compas(robot, trajectory)
     return write_whole(path, lambda stream: stream.write(text.encode()))
 
 
@@ -49,9 +67,9 @@ def check_ending(path: str | os.PathLike[str]) -> None:
     """Refuse a file whose ending says no format.
 
     Raises:
-        FileError: another ending than .csv, .json, .yaml or .yml.
+        FileError: another ending than .csv, .json, .yaml, .yml or .compas.
     """
-    _of_ending(path, {"csv": None, "json": None, "yaml": None})
+    _of_ending(path, dict.fromkeys(("csv", "json", "yaml", "compas")))
 
 
 def load_trajectory(path: str | os.PathLike[str]) -> Trajectory:
@@ -61,7 +79,7 @@ def load_trajectory(path: str | os.PathLike[str]) -> Trajectory:
         FileError: there is no such file, or it is not such a trajectory: all faults, with places.
     """
     name = shown_path(path)
-    if not _of_ending(path, {"csv": True, "json": False, "yaml": False}):
+    if not _of_ending(path, {"csv": True, "json": False, "yaml": False, "compas": False}):
         raise FileError("JSON and YAML are written only; load the trajectory from CSV", name)
     text = read_text(path, CAP, "a trajectory (.csv)")
     try:
@@ -76,7 +94,8 @@ def _of_ending(path: str | os.PathLike[str], known: dict[str, Any]) -> Any:
     ending = "yaml" if ending == "yml" else ending
     if ending not in known:
         raise FileError(
-            "expected a name that ends in .csv, .json or .yaml (a trajectory)", shown_path(path)
+            "expected a name that ends in .csv, .json, .yaml or .compas (a trajectory)",
+            shown_path(path),
         )
     return known[ending]
 

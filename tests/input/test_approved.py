@@ -36,7 +36,7 @@ def read(reader: str, name: str, folder: Path) -> str:
     if one.good == "set":
         load_case("paper/4a", list(map(bad_input.many, one.change))).build()
         return ""
-    files = {"net": name, "trajectory": name, "case": "case.toml"}
+    files = {"net": name, "trajectory": name, "poses": name, "case": "case.toml"}
     path = folder / (files.get(reader) or READERS[reader].file)
     path.write_bytes(of_bad(reader, name))
     if reader == "case":

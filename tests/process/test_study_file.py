@@ -5,10 +5,13 @@ import json
 
 import numpy as np
 import pytest
+from bad_input import goods
+from mesh_writers import GOOD
 
-from coverable import Case, CaseError, load_case, load_study, read_study
+from coverable import Case, CaseError, CoverableError, load_case, load_study, read_study
 from feasibility.cases.toml import as_read
 from feasibility.cases.toml_text import toml_document
+from feasibility.studies.reach_study import reach_case
 
 GRID = """
 base.case = "paper/4a"
@@ -29,6 +32,26 @@ sampler = "sobol"
 count = 50
 seed = 3
 """
+
+
+def test_a_study_of_reach_is_a_case(tmp_path) -> None:
+    good, file = goods("poses"), tmp_path / "b" / "reach.yaml"
+    file.parent.mkdir()
+    file.write_text(good["study"])
+    (tmp_path / "package.xml").write_text("<package><name>parts</name></package>")
+    (tmp_path / "b" / "a.pcd").write_text(good["cloud"])
+    with pytest.raises(CoverableError, match=r"names package://parts/a\.ply; .*seen: parts"):
+        reach_case(file)
+    (tmp_path / "a.ply").write_bytes(GOOD["little.ply"])
+    case = Case.from_toml(reach_case(file), base_dir=file.parent)
+    asked = case.to_tables()["collision"]
+    assert (asked["clearance"], asked["scene"][0]["name"]) == (0.01, "part")
+    assert asked["allow"] == (("tool0", "part"), ("wrist_3_link", "part"))
+    assert case.to_tables()["surface"]["neighbours"] == 250.0  # twice as far as the next
+    for bad in (good["study"].replace("b/a.pcd", "package.xml"), "pcd: a.pcd"):
+        file.write_text(bad)
+        with pytest.raises(CoverableError, match=r"a file in \.pcd|no study of REACH"):
+            reach_case(file)
 
 
 def keys(text: str, folder=None) -> list[str]:

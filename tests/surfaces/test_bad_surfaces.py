@@ -176,7 +176,7 @@ def test_bad_formulas_grids_pieces_and_poses(approved):
     approved("bad_others", "\n".join(f"{name}: {refused(make)}" for name, make in OTHERS.items()))
 
 
-NET, POSES = "row,column,x,y,z\n", "x,y,z,nx,ny,nz\n"
+NET = "row,column,x,y,z\n"
 TABLE = NET + "".join(f"{i},{j},{i},{j},0\n" for i in range(4) for j in range(5))
 
 
@@ -195,12 +195,7 @@ FILES = {
         "complex.npy": npy(np.zeros((2, 2, 3), dtype=complex)),
         "cut.npy": npy(np.zeros((2, 2, 3)))[:-8], "hole.csv": TABLE.replace("1,1,", "1,9,", 1),
     },
-    coverable.read_poses: {
-        "empty.csv": "", "few.csv": "x,y,z\n1,2,3\n", "half.csv": POSES[:-1] + ",ax\n",
-        "foreign.csv": POSES[:-1] + ",w\n", "many.csv": POSES + "0,0,0,0,0,1\n" * 20_001,
-        "lines.csv": POSES + "1,2,3,0,0,1\n1,2,3\n1,2,x,0,0,1\n",
-        "nan.csv": POSES + "1,2,3\n1,2,nan,0,0,1\n",
-    },
+    coverable.read_poses: {},  # as for nets: tests/input/bad/poses.toml
 }  # fmt: skip
 
 

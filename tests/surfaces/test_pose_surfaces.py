@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bad_input import goods
 from bounds import holds
 from part_walks import survivors
 from specimens import TILTED, drawn
 
-from coverable import SurfaceError, poses
+from coverable import SurfaceError, poses, read_poses
 from surfaces.places.offset_surfaces import offset_surface
 from surfaces.places.places import Places
 
@@ -27,6 +28,21 @@ def test_each_pose_is_a_cell_where_it_is_placed():
     np.testing.assert_allclose(cells.tangents, np.tile(turn[:, 0], (4, 1)), atol=1e-12)
     assert cells.pairs.tolist() == [[0, 1], [1, 2], [2, 3]]
     assert cells.in_order
+
+
+def test_poses_of_noether_and_of_clouds(tmp_path):
+    good = goods("poses")
+    (tmp_path / "a.yaml").write_text(good["noether"])
+    (tmp_path / "a.pcd").write_text(good["cloud"])
+    head, _, rows = good["cloud"].partition("ascii\n")
+    table = np.array([row.split() for row in rows.splitlines()], dtype="<f4")
+    (tmp_path / "b.PCD").write_bytes(f"{head}binary\n".encode() + table.tobytes())
+    turned = read_poses(tmp_path / "a.yaml", "mm")  # the second one by a quarter about x
+    for file, way in (("a.yaml", -1), ("a.pcd", 1), ("b.PCD", 1)):
+        given = read_poses(tmp_path / file, "mm")
+        np.testing.assert_allclose(given.points, [[0.4, 0, 0.3], [0.4, 0.125, 0.3]], atol=1e-15)
+        np.testing.assert_allclose(given.normals, [[0, 0, 1], [0, way, 0]], atol=1e-15)
+    np.testing.assert_allclose(turned.tangents, [[1, 0, 0], [1, 0, 0]], atol=1e-15)
 
 
 def test_within_a_radius_poses_of_one_side_are_neighbours():

@@ -125,7 +125,6 @@ GOOD_CASE = goods("case")["sphere"]
 """A small case of the paper's sphere."""
 
 SLIDER = TABLES.with_name("good").joinpath("slider.urdf").read_text()
-POSES = "x,y,z,nx,ny,nz\n400,0,300,0,0,1\n400,100,300,0,0,1\n400,150,300,0,0,1\n"
 NET_POINTS = [[[0.1 * i, 0.1 * j, 0.01 * i * j] for j in range(3)] for i in range(3)]
 
 
@@ -143,7 +142,7 @@ def sheet(width: float = 0.2, count: int = 5) -> np.ndarray:
 
 def lay_out(folder: Path) -> Path:
     """Write the files that bad cases name, good ones and bad ones."""
-    flat = sheet()
+    flat, poses = sheet(), goods("poses")["csv"]
     nan = flat.copy()
     nan[1, 1, 1] = np.nan
     side = 2.0 * sheet(100.0, 1)
@@ -154,10 +153,10 @@ def lay_out(folder: Path) -> Path:
         "gripper.urdf": (TABLES.with_name("good") / "gripper.urdf").read_text(),
         "panda.srdf": '<robot name="panda"><disable_collisions link1="panda_link1" '
         'link2="panda_link2" reason="Adjacent"/></robot>',
-        "toolpath.csv": POSES,
-        "nan.csv": POSES.replace("0,0,1\n400,100", "0,0,0\n400,nan"),
-        "zero.csv": POSES.replace("0,0,1\n400,100", "0,0,0\n400,100"),
-        "one.csv": "".join(POSES.splitlines(keepends=True)[:2]),
+        "toolpath.csv": poses,
+        "nan.csv": poses.replace("0,0,1\n400,100", "0,0,0\n400,nan"),
+        "zero.csv": poses.replace("0,0,1\n400,100", "0,0,0\n400,100"),
+        "one.csv": "".join(poses.splitlines(keepends=True)[:2]),
         "broken.xacro": "<robot><link></robot>",
     }
     meshes = {

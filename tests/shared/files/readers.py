@@ -300,8 +300,9 @@ READERS = {
     "net as JSON": Reader("net.json", read_net, _text("net", "json"), sound_net),
     "net as CSV": Reader("net.csv", read_net, bad_input.net_csv, sound_net),
     "grid": Reader("grid.npy", coverable.read_grid, lambda: npy(GRID), sound_grid),
-    "poses": Reader("poses.csv", lambda path: read_poses(path, "mm"), bad_input.POSES.encode,
-                    sound_poses),
+    **{kind: Reader(file, lambda path: read_poses(path, "mm"), _text("poses", good), sound_poses)
+       for kind, file, good in (("poses", "poses.csv", "csv"), ("noether", "a.yaml", "noether"),
+                                ("cloud", "a.pcd", "cloud"))},
     **{file: Reader(file, lambda path: read_mesh(path, 1.0), lambda file=file: GOOD[file],
                     sound_mesh) for file in GOOD},
     "GLB of a robot": Reader("part.glb", parts_of, hostile.glb, sound_parts),
