@@ -1,6 +1,7 @@
 # make demo   set up .venv and decide paper/4a        make bench  the table of speeds
 # make test   set up .venv and run every check        make clean  remove what was made
 # make lint   style and types alone                   make distclean   the same, and .venv
+# make versions LIST=oldest   the paper's cases and some tests with the versions of tools/versions/oldest.txt, or newest.txt
 # make docs   the pages as a site, in out/docs
 # make campaign NAME=oracle   the same tests with all that takes too long for make test; all without NAME
 # make bench BENCH=old.json   the same, with figures in that file and not in out/bench.json
@@ -17,7 +18,7 @@ IS_RECENT := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
 unexport PYTHONDONTWRITEBYTECODE
 
 .DELETE_ON_ERROR:
-.PHONY: help demo docs test test-browser lint kernels greedy collected bench bench-compare campaign mutants clean distclean
+.PHONY: help demo docs test test-browser versions lint kernels greedy collected bench bench-compare campaign mutants clean distclean
 
 help:
 	@sed -n '/^#/!q; s/^# //p' Makefile
@@ -75,6 +76,18 @@ test: .venv/installed
 docs: .venv/installed
 	$(BIN)/python docs/figures.py
 	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going -b html docs out/docs
+
+# A fresh environment of its own, with kernels of its own; the twelve cases are among the tests.
+LIST := oldest
+versions: ENV := out/versions-$(LIST)
+versions:
+	rm -rf $(ENV)
+	$(or $(PYTHON),python3) -m venv $(ENV)
+	$(ENV)/bin/python -m pip install --quiet -e . -c tools/versions/$(LIST).txt pytest hypothesis python-fcl
+	NUMBA_CACHE_DIR=$(CURDIR)/$(ENV) $(ENV)/bin/python -m pytest -q \
+	    tests/test_docs.py::test_complete_columns_of_the_table tests/paper tests/robots/test_kinematics.py \
+	    tests/surfaces/test_mesh_readers.py tests/surfaces/test_surface_contract.py tests/input/test_cases.py \
+	    tests/input/test_results.py tests/output/test_pages.py tests/verdicts/test_checking.py
 
 # Installs nothing: it needs the extra `browser`, and a Chromium on the path or named by CHROMIUM.
 test-browser:
