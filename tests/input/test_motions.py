@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -102,23 +103,22 @@ def test_what_is_written_is_read_back(seed: int, tmp_path: Path) -> None:
     assert np.array_equal(told["positions"], run.q)
     with pytest.raises(FileError, match="are written only; load the trajectory from CSV"):
         load_trajectory(tmp_path / "run.json")
-    for name in ("run.txt", "run"):
-        with pytest.raises(FileError, match=r"ends in \.csv, \.json, \.yaml or \.compas"):
-            save_trajectory(tmp_path / name, run)
-
-
-def test_compas_fab_reads_points_in_its_words(tmp_path: Path) -> None:
-    (tmp_path / "slider.urdf").write_text(SLIDER)
-    robot, run = load_robot(str(tmp_path / "slider.urdf")), small_run(k=3, n=2)
-    with pytest.raises(FileError, match="needs the arm"):
-        save_trajectory(tmp_path / "run.compas", run)
-    told = json.loads(save_trajectory(tmp_path / "run.compas", run, robot).read_text("utf-8"))
+    robot = SimpleNamespace(joint_names=run.joint_names, prismatic=np.arange(1 + seed) == 0)
+    told = json.loads(save_trajectory(tmp_path / "a.compas", run, robot).read_text("utf-8"))
     assert told["dtype"] == "compas_fab.robots/JointTrajectory"
     for k, point in enumerate(told["data"]["points"]):
         seconds, rest = point["time_from_start"].values()
         assert seconds + 1e-9 * rest == pytest.approx(run.time[k], abs=1e-9)
-        point = {key: point[key] for key in ("joint_types", "joint_values", "velocities")}
-        assert list(point.values()) == [[2, 0], run.q[k].tolist(), run.dq[k].tolist()]
+        assert point["joint_types"] == [2] + [0] * seed
+        assert (point["joint_values"], point["velocities"]) == (
+            run.q[k].tolist(),
+            run.dq[k].tolist(),
+        )
+    with pytest.raises(FileError, match="needs the arm"):
+        save_trajectory(tmp_path / "a.compas", run)
+    for name in ("run.txt", "run"):
+        with pytest.raises(FileError, match=r"ends in \.csv, \.json, \.yaml or \.compas"):
+            save_trajectory(tmp_path / name, run)
 
 
 def test_yaml_is_what_ros_reads(tmp_path: Path) -> None:

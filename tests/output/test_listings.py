@@ -1,9 +1,6 @@
 """FANUC and Yaskawa programs, read back by small readers of the formats' descriptions.
 
-TP: `/PROG NAME`, `/ATTR`, `/MN` with lines `number:instruction ;`, `/POS` with `P[n]{ GP1: ... };`;
-`J P[n] T msec CNT100` goes there in T ms. INFORM: `/JOB`, `//POS` with as many `Cnnnnn=` rows of
-pulses as `///NPOS` says, each used by one move of `//INST`, from NOP to END; `VJ` is the share (%)
-of the largest speed of the axis that takes longest.
+A TP move takes T msec; VJ of INFORM is the share (%) of the speed of the axis that takes longest.
 """
 
 import re
@@ -16,8 +13,6 @@ from timed_motions import TURN, UR5, motion
 
 from coverable import ProgramSettings, save_program
 from feasibility.programs import listings
-from feasibility.programs.controller_axes import ProgramError, check_program
-from feasibility.programs.controllers import language_of
 from robots.kinematics import Kinematics
 
 PULSES = (1341.4, 1341.4, 1000.0, 811.0, 800.5, 452.2)
@@ -119,14 +114,6 @@ def test_fanuc_has_samples_times_and_j3_from_the_horizontal(tmp_path, fanuc):
     save_program(tmp_path / "b.ls", fanuc, run, settings=plain)
     _, _, _, axes = read_tp((tmp_path / "b.ls").read_bytes().decode("ascii"))
     assert np.abs(axes - run.q * TURN).max() <= 5.1e-5
-
-
-def test_fanuc_needs_two_parallel_axes_for_that(tmp_path):
-    crossed = [joint(k, axis=(0, 0, 1) if k % 2 else (0, 1, 0)) for k in range(1, 7)]
-    robot = load_text(tmp_path, arm(crossed), tool_frame="l6")
-    with pytest.raises(ProgramError, match=r"j2 and j3 have no parallel axes; .*--j3-from-upper"):
-        check_program(language_of("a.ls"), robot)
-    check_program(language_of("a.ls"), robot, ProgramSettings(j3_from_horizontal=False))
 
 
 def test_yaskawa_has_pulses_and_shares_of_the_largest_speeds(tmp_path):

@@ -116,6 +116,9 @@ def test_rounding_leaves_no_joint_outside_its_limits():
     ("a.mod", replace(UR5, surface_link="upper_arm_link"), "order of its axes"),
     ("a.ls", IRB, "external axes are not written in TP yet; there are"),
     ("a.jbi", UR5, "pulses_per_deg is missing"),
+    ("a.ls", load_robot("panda", lock={"panda_joint1": 0.0}),
+     "panda_joint3 and panda_joint4 have no parallel axes; where it is counted from the upper arm, "
+     "say --j3-from-upper-arm"),
 ])  # fmt: skip
 def test_other_arms_are_refused_with_a_sentence(file, robot, said):
     with pytest.raises(ProgramError, match=re.escape(said)):
