@@ -77,14 +77,15 @@ docs: .venv/installed
 	$(BIN)/python docs/figures.py
 	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going -b html docs out/docs
 
-# A fresh environment of its own, with kernels of its own; the twelve cases are among the tests.
+# A fresh environment of its own, with kernels of its own; the twelve cases are among the tests. Old libraries may warn of
+# new ones that they use.
 LIST := oldest
 versions: ENV := out/versions-$(LIST)
 versions:
 	rm -rf $(ENV)
 	$(or $(PYTHON),python3) -m venv $(ENV)
 	$(ENV)/bin/python -m pip install --quiet -e . -c tools/versions/$(LIST).txt pytest hypothesis python-fcl
-	NUMBA_CACHE_DIR=$(CURDIR)/$(ENV) $(ENV)/bin/python -m pytest -q \
+	NUMBA_CACHE_DIR=$(CURDIR)/$(ENV) $(ENV)/bin/python -m pytest -q -W default::DeprecationWarning \
 	    tests/test_docs.py::test_complete_columns_of_the_table tests/paper tests/robots/test_kinematics.py \
 	    tests/surfaces/test_mesh_readers.py tests/surfaces/test_surface_contract.py tests/input/test_cases.py \
 	    tests/input/test_results.py tests/output/test_pages.py tests/verdicts/test_checking.py

@@ -128,15 +128,13 @@ def test_yaml_is_what_ros_reads(tmp_path: Path) -> None:
     q[1] = [1e-5, -1e16, -0.0]  # YAML 1.1 takes 1e-05 for text
     run = replace(run, q=q)
     message = yaml.safe_load(save_trajectory(tmp_path / "run.yml", run).read_text("utf-8"))
-    assert set(message) == {"joint_names", "points"}
-    assert message["joint_names"] == list(run.joint_names)
-    assert len(message["points"]) == 4
-    for k, point in enumerate(message["points"]):
-        arrays = {"positions": run.q, "velocities": run.dq, "accelerations": run.ddq}
-        assert set(point) == {*arrays, "time_from_start"}
-        for name, array in arrays.items():
-            assert all(isinstance(value, float) for value in point[name])
-            assert point[name] == array[k].tolist()
-        start = point["time_from_start"]
-        assert 0 <= start["nanosec"] < 10**9
-        assert start["sec"] + 1e-9 * start["nanosec"] == pytest.approx(run.time[k], abs=1e-9)
+    assert message.pop("joint_names") == list(run.joint_names)
+    arrays = {"positions": run.q, "velocities": run.dq, "accelerations": run.ddq}
+    starts = [point.pop("time_from_start") for point in message["points"]]
+    rows = [{name: array[k].tolist() for name, array in arrays.items()} for k in range(4)]
+    assert message == {"points": rows}
+        type(x) is float for point in message["points"] for row in point.values() for x in row
+    )
+    whole = [start["sec"] * 10**9 + start["nanosec"] for start in starts]
+    assert whole == [round(time * 1e9) for time in run.time.tolist()]
+    assert all(0 <= start["nanosec"] < 10**9 for start in starts)
