@@ -4,8 +4,6 @@ Where the standoff is 0, the pairs of tool and surface are not checked while a p
 Between patches they are, but for the lift itself: the tool is drawn back along its own axis.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 

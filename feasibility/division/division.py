@@ -1,7 +1,5 @@
 """The answer to "how many motions, then?": patches, their walks, and the moves between them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any

@@ -6,8 +6,6 @@ certified between its ends too, by the compiled clearance of the search. The eff
 lines that are tried, so the same question always has the same answer.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The motion behind a component that a search found, found again and replayed."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from typing import NamedTuple
 

@@ -10,8 +10,6 @@ gets walks of some of them, each from several starts, and the itinerary picks th
 the arm has to move least.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@ two of k cells can be covered by one motion, each pair by a cut tree of its own,
 covers one of them at most.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

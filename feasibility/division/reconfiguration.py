@@ -11,8 +11,6 @@ because limits are convex. Where collisions are checked, `between_patches` leads
 obstacles.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise, permutations

@@ -9,8 +9,6 @@ one, and cells covered by the same components need one row only. HiGHS then solv
 milliseconds.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@ grow over the surface, all at the same speed, from the cells that only one of th
 so most patches are in one piece.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """How a surface is divided: `divide` collects components, shares the cells out, and walks them."""
 
-from __future__ import annotations
-
 import time
 from typing import NamedTuple
 

@@ -6,8 +6,6 @@ to and from home is a straight line of the joints, or leads around obstacles; al
 the limits, and judged like any motion where collisions are checked.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

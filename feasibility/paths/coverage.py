@@ -9,8 +9,6 @@ An arm whose joint has to turn with the surface cannot always go on over its sea
 stuck is where it had better begin.
 """
 
-from __future__ import annotations
-
 import math
 import operator
 from collections.abc import Iterable
@@ -67,7 +65,7 @@ class CoveragePath(Protected):
     def of(
         robot: Robot, cells: Cells, task: Task, order: Order, walk: Walk, needed: Mask,
         certificate: Certificate,
-    ) -> CoveragePath:  # fmt: skip
+    ) -> "CoveragePath":  # fmt: skip
         """A motion that the replay has accepted, measured."""
         figures = figures_of(robot, cells, task, walk, certificate, needed)
         return CoveragePath(robot, cells, task, order, needed, walk, certificate, figures)

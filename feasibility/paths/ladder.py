@@ -6,8 +6,6 @@ to be run one turn of a joint earlier (`windings`); else the cheapest path throu
 leads on, over cells that are then visited again.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -44,7 +42,7 @@ class _State:
     """rad, travel of the joints until here."""
     nodes: tuple[int, ...]
     """Nodes from the last state on, the last one is `node`."""
-    before: _State | None
+    before: "_State | None"
 
     @property
     def onward(self) -> tuple[int, ...]:

@@ -1,7 +1,5 @@
 """The figures of a path: lengths on the surface, travel of the joints, and margins."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

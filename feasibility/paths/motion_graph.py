@@ -5,8 +5,6 @@ neighbouring cells, or over one cell. The graph begins with what a verdict holds
 graph and its witness); a path adds what it tracks. Every motion can be run backwards.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -55,7 +53,7 @@ class MotionGraph:
     _known: dict[tuple[int, bytes], int] = field(default_factory=dict)
 
     @staticmethod
-    def of(arrays: SearchArrays, work: Work, cells: Cells) -> MotionGraph:
+    def of(arrays: SearchArrays, work: Work, cells: Cells) -> "MotionGraph":
         """A graph over cells, without nodes."""
         pairs = {(int(i), int(j)): k for k, (i, j) in enumerate(cells.pairs.tolist())}
         return MotionGraph(arrays, work, pairs)
@@ -94,7 +92,7 @@ class MotionGraph:
             cell += [-1] * (len(q[-1]) - 1) + [self.cell[y]]
         return Walk(q=np.vstack(q), cell=np.array(cell, dtype=np.int64))
 
-    def copy(self) -> MotionGraph:
+    def copy(self) -> "MotionGraph":
         """A graph that can grow on its own; the motions themselves are shared."""
         return replace(
             self,

@@ -6,8 +6,6 @@ that touch costs the distance of their centres; cells that do not touch are join
 path over others, which are then visited again.
 """
 
-from __future__ import annotations
-
 from typing import Literal, get_args
 
 import numpy as np

@@ -4,8 +4,6 @@ G. A. Croes, A method for solving traveling-salesman problems, Operations Resear
 I. Or, Traveling salesman-type combinatorial problems (1976).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from coverable.arrays import Array, Ints

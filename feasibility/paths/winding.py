@@ -1,7 +1,5 @@
 """The same motion with joints some full turns away, where a shop would have them."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from coverable.arrays import Array

@@ -1,7 +1,5 @@
 """A search for placements in progress: differential evolution over the poses of a region."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """A map of placements: covered share and margin over two or three axes of a region."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

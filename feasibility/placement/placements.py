@@ -11,8 +11,6 @@
 The poses tried depend on the region, the counts and the seed alone, not on the evaluator.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace

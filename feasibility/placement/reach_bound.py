@@ -11,8 +11,6 @@ rotations that follow each other add up at most). Then for every pose in the box
 Boxes for which this leaves a target in reach are halved, until none is left or too many are.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -56,7 +54,7 @@ class Reach:
     """m."""
 
     @staticmethod
-    def of(robot: Robot, cells: Cells, task: Task) -> Reach:
+    def of(robot: Robot, cells: Cells, task: Task) -> "Reach":
         """The targets of a task on these cells, in the surface's frame."""
         surface = cells.surface
         return Reach(

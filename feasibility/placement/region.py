@@ -1,7 +1,5 @@
 """Where a surface may stand: one pose of its frame, and regions of poses."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -46,13 +44,13 @@ class Pose(NamedTuple):
         return np.array([*self.position, *self.rpy_deg])
 
     @staticmethod
-    def of_values(values: Sequence[float] | Array) -> Pose:
+    def of_values(values: Sequence[float] | Array) -> "Pose":
         """The pose with six numbers in the order of `AXES`."""
         x, y, z, roll, pitch, yaw = (float(value) for value in values)
         return Pose((x, y, z), (roll, pitch, yaw))
 
     @staticmethod
-    def of_surface(surface: Surface) -> Pose:
+    def of_surface(surface: Surface) -> "Pose":
         """Where a surface stands. Standing upright (pitch +-90 degrees) it is given roll 0."""
         r = surface.rotation
         flat = math.hypot(r[0, 0], r[1, 0])
@@ -107,7 +105,7 @@ class Region:
             raise PlacementError(faults, "region")
 
     @staticmethod
-    def around(pose: Pose, ranges: Mapping[str, Any]) -> Region:
+    def around(pose: Pose, ranges: Mapping[str, Any]) -> "Region":
         """The region with the ranges given by name; all else stays as at `pose`.
 
         Args:

@@ -6,8 +6,6 @@ by components, solved to the proven optimum (see `feasibility.division`). Among 
 stations with larger components are not preferred: how many is what costs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

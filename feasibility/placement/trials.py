@@ -1,7 +1,5 @@
 """One placement of a surface tried: `check` with the surface there, in full or with less effort."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

@@ -15,8 +15,6 @@ An axis that carries arm or part (`[[robot.axis]]`), or a joint that slides, bec
 axis where the language has them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Languages of robot controllers, and by which names of files they are chosen."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass
 from pathlib import Path

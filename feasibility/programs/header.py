@@ -1,7 +1,5 @@
 """The comment at the head of a program: what it is of, its axes, the frames of tool and part."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ Both controllers hold so many lines in a program, so that a long motion becomes 
 main program calls in their order.
 """
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Sequence
 from datetime import datetime

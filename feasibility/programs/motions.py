@@ -5,8 +5,6 @@ with its time. How a controller goes from point to point is its own affair: the 
 the less it matters.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """When the tool works along a trajectory: not where it is lifted, nor over holes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import groupby
 

@@ -1,7 +1,5 @@
 """Programs as files. Times are those of the trajectory, whose samples the replay has judged."""
 
-from __future__ import annotations
-
 import os
 import re
 from functools import partial

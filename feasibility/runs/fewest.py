@@ -7,8 +7,6 @@ and between two stations it may stay lifted, which leaves the piece between them
 runs are a shortest path by (undone length, runs, cuts inside a pass, waypoints), in that order.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """What of passes is left out by all runs, and why."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

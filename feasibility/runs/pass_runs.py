@@ -1,7 +1,5 @@
 """Passes that no single motion runs: cut where they cannot be run, with the cause of each cut."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Passes over a surface and their verdict: in one direction, or in the best of several."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """What stops an arm that goes on along passes."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

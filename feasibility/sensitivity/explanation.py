@@ -1,7 +1,5 @@
 """What would make a case feasible, and how large the margins of a feasible one are."""
 
-from __future__ import annotations
-
 import time
 from contextlib import suppress
 from dataclasses import replace

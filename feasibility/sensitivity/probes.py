@@ -5,8 +5,6 @@ says: of the feasible side, from that motion; of the other side with none known,
 effort, unless it is proved.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -79,7 +77,7 @@ class Look(NamedTuple):
         return self.certificate is not None
 
     @classmethod
-    def of_search(cls, found: Found) -> Look:
+    def of_search(cls, found: Found) -> "Look":
         """What a search says by itself."""
         undecided = Evidence.BUDGET if found.unfinished or found.motion else Evidence.EXHAUSTED
         evidence = Evidence.PROOF if found.proof is not None else undecided
@@ -87,7 +85,7 @@ class Look(NamedTuple):
         return cls(evidence, found.motion, found.proof, covered, int(found.counts["fk"]))
 
     @classmethod
-    def of_verdict(cls, verdict: Verdict) -> Look:
+    def of_verdict(cls, verdict: Verdict) -> "Look":
         """What `check` says."""
         return cls(
             verdict.evidence, verdict.witness, verdict.proof, verdict.n_covered,

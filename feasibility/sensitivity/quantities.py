@@ -1,7 +1,5 @@
 """Quantities of a case that are varied one at a time."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from enum import StrEnum

@@ -4,8 +4,6 @@ A threshold lies between two values of one quantity at which the verdicts differ
 with its evidence.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from coverable.arrays import Ints, Protected

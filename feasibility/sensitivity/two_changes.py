@@ -6,8 +6,6 @@ be put back is needed. A shift of the surface, which may do harm too, is tried i
 with the others opened, and with a second shift.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterator, Sequence

@@ -4,8 +4,6 @@ A motion that is too slow somewhere joins nothing: components fall apart into wh
 As `check` does at a speed, more motions are made first, from every configuration that is known.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The largest speed of the tool, and how near singularities a motion comes: figures to explain."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What some motions allow: speed of the tool, and distance from singularities."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

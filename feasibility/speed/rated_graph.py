@@ -4,8 +4,6 @@ More motions are made from cell to cell, from every known configuration, whateve
 speed: so what is found at one speed is found at every lower one, too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Speed, singularities and home in a task: checked before anything is searched."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from coverable.errors import ArgumentError, Fault

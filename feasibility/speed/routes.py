@@ -1,7 +1,5 @@
 """One motion over all cells out of some of the motions that are known."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 
 import networkx as nx

@@ -6,8 +6,6 @@ known and more that are made (`rated_graph`). What is found is replayed like any
 nothing is found proves nothing: the answer is undecided then.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Cases as tables, checked and built: what many of them share is made once in each worker."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Mapping
@@ -139,7 +137,7 @@ def _cut(
     smoothing: tuple[float, float] | None,
     changed: int,
     size: int,
-) -> MeshCells:
+) -> "MeshCells":
     """The cells of the mesh of a [surface] table, written as a document."""
     part = read_surface(parse_toml(table)["surface"], [])
     if part is None:

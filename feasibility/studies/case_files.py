@@ -1,7 +1,5 @@
 """The files that a case depends on: those that it names, and those that these name in turn."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 

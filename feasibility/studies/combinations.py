@@ -1,7 +1,5 @@
 """The tasks of a study: every combination of what varies, each a case written in full."""
 
-from __future__ import annotations
-
 import copy
 import itertools
 import json

@@ -1,7 +1,5 @@
 """Tasks of a study on a Dask cluster. Each worker needs coverable; one thread each is best."""
 
-from __future__ import annotations
-
 import gc
 from collections import deque
 from collections.abc import Sequence

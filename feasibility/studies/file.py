@@ -17,8 +17,6 @@ seed = 0
 ```
 """
 
-from __future__ import annotations
-
 import copy
 import os
 from collections.abc import Mapping, Sequence

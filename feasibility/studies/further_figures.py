@@ -1,7 +1,5 @@
 """What may be wanted of a case besides its verdict: the motions it takes, the smallest cone."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

@@ -4,8 +4,6 @@ Each of these has a pipe of its own, so that what dies with one of them is one t
 again. They are started afresh (spawn): a forked one would share locks of Pinocchio and numba.
 """
 
-from __future__ import annotations
-
 import json
 import multiprocessing
 import os
@@ -54,7 +52,7 @@ class Reply:
     seconds: float
 
     @classmethod
-    def of(cls, index: int, done: Done) -> Reply:
+    def of(cls, index: int, done: Done) -> "Reply":
         """The reply to a task that was done."""
         text, failure, seconds = done
         return cls(index, None if text is None else json.loads(text), failure, seconds)

@@ -1,7 +1,5 @@
 """One case for several arms: a study over robots."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
@@ -87,7 +85,7 @@ def compare(
     *,
     divide: bool = True,
     critical: bool = False,
-    store: Store | None = None,
+    store: "Store | None" = None,
     progress: Progress | None = None,
 ) -> Comparison:
     """The same case for several arms, each mounted where the case's arm is: on its base and axes.

@@ -1,7 +1,5 @@
 """A study: many cases decided, each kept under a key of its content."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import time

@@ -5,8 +5,6 @@ the process, what was kept before stays. A file that no study has written is ref
 or a trigger in it would be a program that runs when rows are read.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import os

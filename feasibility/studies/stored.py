@@ -3,8 +3,6 @@
 What a file holds is not trusted: no value of another type or outside its range is taken over.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """What a study keeps of one verdict: plain numbers and words, computed where the task runs."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Mapping

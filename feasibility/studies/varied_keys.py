@@ -1,7 +1,5 @@
 """The [vary] table of a study: which keys of the case take which values."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

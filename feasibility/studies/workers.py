@@ -1,7 +1,5 @@
 """Workers opened: this process, processes of this machine, or a Dask cluster."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager

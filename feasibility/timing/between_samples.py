@@ -7,8 +7,6 @@ is run: as long as that part is at most 2 |b - a|, the motion runs along it with
 and is off the line by the rest of q'' alone.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from coverable.arrays import Array

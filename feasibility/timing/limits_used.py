@@ -5,8 +5,6 @@ parabolas and places are cubics, largest at the ends or where they turn. The too
 `PLACES` of each piece, and twice what a parabola through them may be higher is allowed for.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

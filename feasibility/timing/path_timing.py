@@ -8,8 +8,6 @@ left is mended by running all of it slower. Entry and exit are parts of the same
 is replayed like any witness, as straight lines between samples and as the spline.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

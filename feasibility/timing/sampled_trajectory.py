@@ -6,8 +6,6 @@ velocities and accelerations, or cubics of positions and velocities: both are th
 since its pieces have these very values at their ends, and no other cubic or quintic has.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,7 +90,7 @@ class Trajectory:
         return faults
 
     @staticmethod
-    def through(robot: Robot, time: Array, q: Array, cell: Ints) -> Trajectory:
+    def through(robot: Robot, time: Array, q: Array, cell: Ints) -> "Trajectory":
         """The motion through joints q (k, n) at times (k,) s, k at least 2."""
         motion = CubicSpline(time, q, bc_type="clamped")
         dq, ddq = motion(time, 1) + 0.0, motion(time, 2) + 0.0

@@ -12,8 +12,6 @@ is made sharper until the independent replay accepts the curve from cell to cell
 centre must leave the tool within tolerance and cone of its target, which is tried beforehand.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What joints and tool may do, and how fast the tool is."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ the tool's speed are inside their limits at all places of the grid. Whether they
 a controller runs its samples, is judged later, by what comes of it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -42,7 +40,7 @@ class TimedCurve:
         """Seconds from start to end."""
         return float(self.time[-1])
 
-    def slowed(self, times: float) -> TimedCurve:
+    def slowed(self, times: float) -> "TimedCurve":
         """The same motion, so many times slower."""
         return replace(self, x=self.x / times**2, time=self.time * times)
 
@@ -86,7 +84,7 @@ class CurveBounds:
     """(m - 1, 2 n) what (dk/dt)^2 at both ends of a piece adds to accelerations there."""
 
     @staticmethod
-    def of(robot: Robot, curve: Curve) -> CurveBounds:
+    def of(robot: Robot, curve: Curve) -> "CurveBounds":
         """Of a curve."""
         count = int(np.clip(MOST_PLACES // curve.pieces, COARSEST, FINEST))
         grid = np.linspace(0.0, curve.pieces, count * curve.pieces + 1)

@@ -1,7 +1,5 @@
 """How much of a surface a certified motion treats, measured on the surface itself."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from typing import NamedTuple

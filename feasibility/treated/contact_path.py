@@ -6,8 +6,6 @@ along a straight line in joint space is at most reach (sum of |dq|)^2 for joints
 are put in until that is less than `SAG`.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a demanded coverage makes of an answer."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING
 
 from feasibility.task import Task
@@ -14,7 +12,7 @@ if TYPE_CHECKING:
 NOT_MEASURED = "No motion along which the treated area could be measured is known."
 
 
-def with_coverage(decision: Decision, task: Task, found: TreatedArea | None) -> Decision:
+def with_coverage(decision: Decision, task: Task, found: "TreatedArea | None") -> Decision:
     """A feasible answer remains only where enough of the area is treated for certain.
 
     Nothing follows from one motion that treats too little: another may treat more. And a cell
@@ -31,7 +29,7 @@ def with_coverage(decision: Decision, task: Task, found: TreatedArea | None) -> 
     return decision._replace(message=f"{decision.message} {words}")
 
 
-def shortfall(task: Task, found: TreatedArea | None) -> str:
+def shortfall(task: Task, found: "TreatedArea | None") -> str:
     """What is missing of the coverage that a task requires; empty where nothing is."""
     if task.coverage is None or (found is not None and found.lower >= task.coverage):
         return ""
