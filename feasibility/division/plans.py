@@ -8,19 +8,23 @@ covers more. Some rounds in a row without gain end it.
 Several components may cover the cells of a patch; they differ in how the arm holds itself. A patch
 gets walks of some of them, each from several starts, and the itinerary picks those between which
 the arm has to move least.
+
+Each cell is in exactly one patch. How few components have all the cells is a set cover, solved to
+the proven optimum. Patches then grow over the surface, all at the same speed, from the cells that
+only one of these components has; so most patches are in one piece.
 """
 
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from coverable.arrays import Array, Mask
+from coverable.arrays import Array, Ints, Mask, Protected
 from feasibility.division.between_patches import clear_moves
 from feasibility.division.division import Plan, SubPatch
 from feasibility.division.reconfiguration import itinerary
 from feasibility.division.set_covering import set_cover
-from feasibility.division.sharing import TIME_LIMIT, fewest_patches, pieces_in
 from feasibility.roadmap.expansion import UNTRIED
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.rounds import improve
@@ -28,6 +32,86 @@ from feasibility.roadmap.walk import Links, links_of, patch_walk
 from feasibility.speed.motion_rates import replay_at_rates
 from feasibility.task import Task
 from feasibility.verdict import Walk
+from surfaces.adjacency import components
+
+TIME_LIMIT = 10.0  # [s]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Partition(Protected):
+    """Each cell in exactly one patch, each patch inside one component."""
+
+    rows: Ints
+    """(P,) the component of each patch, a row of the table; the largest patch first."""
+    patch: Ints
+    """(N,) the patch of each cell; -1 for cells that nothing covers."""
+    bound: int
+    """No partition has fewer patches."""
+
+    def __len__(self) -> int:
+        """Number of patches."""
+        return len(self.rows)
+
+
+def fewest_patches(covers: Mask, pairs: Ints, time_limit: float = TIME_LIMIT) -> Partition:
+    """Share cells out among as few components as possible.
+
+    Args:
+        covers: (K, N) True where component k covers cell c.
+        pairs: (M, 2) cells that touch.
+        time_limit: s; running out leaves a gap between the number of patches and its bound.
+
+    Example:
+        >>> covers = np.array([[1, 1, 0], [0, 1, 1]], dtype=bool)
+        >>> found = fewest_patches(covers, np.array([[0, 1], [1, 2]]))
+        >>> len(found), found.bound, found.patch.tolist()
+        (2, 2, [0, 0, 1])
+    """
+    chosen = set_cover(covers[:, covers.any(axis=0)], time_limit)
+    rows = np.array(chosen.rows, dtype=np.int64)
+    label = _grown(covers[rows], pairs)
+    names, first, sizes = np.unique(label[label >= 0], return_index=True, return_counts=True)
+    order = np.lexsort((first, -sizes))  # the largest first, then the one that begins first
+    rank = np.full(len(rows) + 1, -1, dtype=np.int64)  # the last one is that of label -1
+    rank[names[order]] = np.arange(len(names))
+    return Partition(rows[names[order]], rank[label], chosen.bound)
+
+
+def _grown(covers: Mask, pairs: Ints) -> Ints:
+    """(N,) a row of `covers` (K, N) for each cell that one has, -1 elsewhere.
+
+    Labels grow from the cells that have no choice. What no label grows into is begun by the row
+    that has most of it.
+    """
+    label = np.full(covers.shape[1], -1, dtype=np.int64)
+    alone = covers.sum(axis=0) == 1
+    label[alone] = np.nonzero(covers[:, alone].T)[1]
+    near: list[list[int]] = [[] for _ in label]
+    for i, j in pairs.tolist():
+        near[i].append(j)
+        near[j].append(i)
+    queue = deque(np.flatnonzero(label >= 0).tolist())
+    while True:
+        while queue:
+            i = queue.popleft()
+            for j in near[i]:
+                if label[j] < 0 and covers[label[i], j]:
+                    label[j] = label[i]
+                    queue.append(j)
+        free = covers & (label < 0)
+        if not free.any():
+            return label
+        k = int(free.sum(axis=1).argmax())
+        first = int(free[k].argmax())
+        label[first] = k
+        queue.append(first)
+
+
+def pieces_in(cells: Mask, pairs: Ints) -> int:
+    """Number of pieces that cells (N,) make; pairs (M, 2) are of cells that touch."""
+    piece = components(pairs[cells[pairs].all(axis=1)], len(cells))
+    return len(np.unique(piece[cells]))
+
 
 MOST_COMPONENTS = 4  # components that walks of one patch are made of
 MOST_NEAR = 3  # starts of one component's walks that are near other patches

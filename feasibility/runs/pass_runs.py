@@ -20,8 +20,14 @@ from feasibility.roadmap.search import exploration_of
 from feasibility.roadmap.walk import route_walk
 from feasibility.roadmap.warmup import warm_up
 from feasibility.runs.fewest import Run, Stations, fewest_runs
-from feasibility.runs.left_out import Gap, along_stretch, gaps_of, place_words
-from feasibility.runs.stopping import RunStop, where_it_stops
+from feasibility.runs.left_out import (
+    Gap,
+    RunStop,
+    along_stretch,
+    gaps_of,
+    place_words,
+    where_it_stops,
+)
 from feasibility.speed.fast_motions import keep_fast_motions
 from feasibility.speed.motion_rates import replay_at_rates
 from feasibility.task import Task

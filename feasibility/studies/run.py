@@ -10,7 +10,7 @@ from typing import Any
 
 from coverable.files import FileFault, open_regular, stamps
 from feasibility.search_settings import Progress
-from feasibility.studies.case_files import files_of
+from feasibility.studies.built_cases import files_of
 from feasibility.studies.pool import Reply, Tables, Work, Workers
 from feasibility.studies.store import Record, Status, Store
 from feasibility.studies.stored import outcome_fault

@@ -4,6 +4,13 @@ Between samples the joints move on the cubic spline through them that is at rest
 twice continuously differentiable. A ROS `joint_trajectory_controller` makes quintics of positions,
 velocities and accelerations, or cubics of positions and velocities: both are this spline again,
 since its pieces have these very values at their ends, and no other cubic or quintic has.
+
+How far it is from the straight lines between samples: on a stretch with samples a and b at its
+ends let q'' be the second derivative by the share t of the stretch. Both the motion and the
+straight line a + t (b - a) go through a and b, so they are at most max |q''| / 8 apart, joint by
+joint. What of q'' points along b - a only changes how fast the line is run: as long as that part is
+at most 2 |b - a|, the motion runs along it without going back, and is off the line by the rest of
+q'' alone.
 """
 
 from dataclasses import dataclass
@@ -13,10 +20,28 @@ from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from coverable.arrays import Array, Ints, Mask
 from coverable.errors import ArgumentError
-from feasibility.timing.between_samples import deviations
 from feasibility.timing.speed_limits import tool_slopes
 from feasibility.verdict import Walk
 from robots.robot import Robot
+
+ROUNDING = 1e-12  # [rad] or [m]
+
+
+def deviations(q: Array, seconds: Array) -> Array:
+    """(m - 1, n) how far each joint may be from the straight lines between m samples.
+
+    Args:
+        q: (m, n) rad or m.
+        seconds: (k, m - 1, n) values by the square of a stretch, between which q'' stays.
+    """
+    ahead = np.diff(q, axis=0)
+    length = np.sqrt((ahead**2).sum(axis=1, keepdims=True))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        along = np.where(length > 0.0, ahead / length, 0.0)
+    share = (seconds * along).sum(axis=2, keepdims=True)
+    onwards = np.abs(share).max(axis=0) <= 2.0 * length
+    beside = np.where(onwards, seconds - share * along, seconds)
+    return np.asarray(np.abs(beside).max(axis=0) / 8.0 + ROUNDING)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

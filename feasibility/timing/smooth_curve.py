@@ -21,7 +21,7 @@ from coverable.arrays import Array, Ints
 from feasibility.certification.motion_replay import replay
 from feasibility.paths.order import PathError
 from feasibility.task import Task
-from feasibility.timing.between_samples import deviations
+from feasibility.timing.sampled_trajectory import deviations
 from feasibility.verdict import Walk
 from robots.kinematics import Kinematics
 from robots.robot import Robot

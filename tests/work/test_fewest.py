@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from samples import sampled, seeds
 
-from feasibility.division.sharing import fewest_patches
+from feasibility.division.plans import fewest_patches
 from feasibility.placement.stations import fewest_stations
 
 
