@@ -2,7 +2,8 @@
 
 Each joint j is within e_j of the motion that was accepted. Two bodies, on the joints a and b behind
 it, come nearer by no more than both are moved as seen from any joint k from a to b: what joints up
-to k move the first, those behind k the second. The part, and what is at rest beside it, may be
+to k move the first, those behind k the second. Joints deviate one by one, that furthest from a body
+first, so that levers are those of the motion. The part, and what is at rest beside it, may be
 displaced, or stay: that moves two points towards each other by D, or Theta times the distance from
 the pivot of either, at most.
 
@@ -13,7 +14,7 @@ turns: Theta, and e_j of the joints up to k that turn.
 All of these are convex in (D, Theta): a share of a margin takes no more than that share of them. So
 where two bodies are at least d apart along a segment, c is needed, and they may come nearer by x, a
 share (d - c) / x of it does no harm. d is what the judge of collisions has certified of the motion;
-only pairs that do not allow all of it are looked at again.
+only of pairs that do not allow all of it planes are tried, and coal is asked again.
 """
 
 from __future__ import annotations
@@ -31,9 +32,9 @@ from feasibility.task import Task
 from robots.robot import Robot
 from surfaces.cells import Cells
 
-SHARES = (0.4, 1.0)  # [1] of a margin that bodies are asked about: less takes less of them
-FEW, SHARE_OF_CALLS = 20, 0.08  # coal calls, or as many for each that the judge needed, ...
-MOST_CALLS = 0.6  # [1] ... of which a couple gets this share of what is left
+LESS, WIDER = 0.2, 1.5  # [1] of a margin, asked about next: so much, or times what is known
+SHARE_OF_CALLS = 0.08  # coal calls for each that the judge needed, ...
+FEW, MOST_CALLS = 20, 0.8  # ... no less, of which a couple gets this share of what is left
 HUGE = 1e6  # [m] the radius of a half space
 LEAST = 1e-12  # [m] so that nothing is divided by 0
 
@@ -67,14 +68,14 @@ def displaced_share(
     scene = () if task.collision is None else task.collision.scene
     beside = {SURFACE, *(one.name for one in scene)}
     nearer = Nearer(robot, pairings, beside, cells.centres.mean(axis=0))
-    found, asked = ClearShare(0.0, None, 0), sum(one.calls for one in pairings)
-    last = asked + max(FEW, SHARE_OF_CALLS * asked)
-    for some in SHARES:
+    found, some = ClearShare(0.0, None, 0), 1.0
+    for calls in (0.0, SHARE_OF_CALLS * sum(one.calls for one in pairings)):
         part = some * most[0], some * most[1]
-        calls = last - sum(one.calls for one in pairings)
         clear = clear_share(pairings, nearer.by(moved(*part), *part), calls)
-        found = clear._replace(share=max(found.share, some * clear.share))
-        if clear.pair is not None:
+        share = max(found.share, some * clear.share)
+        found = (found if clear.pair is None else clear)._replace(share=share)
+        some = min(max(LESS, WIDER * share), 1.0)
+        if share == 1.0:
             break
     return found
 
@@ -82,16 +83,19 @@ def displaced_share(
 def clear_share(pairings: Sequence[Pairing], nearer: Array, calls: float) -> ClearShare:
     """The share of `nearer` (c, m - 1) m that couples may come nearer by, as far as known.
 
-    So many calls of coal find out more, of what allows least.
+    Of those that allow least planes find out more, or so many calls of coal.
     """
-    found, more = ClearShare(1.0, None, 0), np.maximum(nearer, LEAST)
+    found, more, coal = ClearShare(1.0, None, 0), np.maximum(nearer, LEAST), calls > 0.0
     shares, rows = _shares(pairings, more)
     for k in np.argsort(shares).tolist():
         one, share, row = pairings[k], float(shares[k]), int(rows[k])
-        if share < found.share:
-            calls += one.calls
-            one.look_closer(row, more[k], found.share, MOST_CALLS * calls)
-            calls -= one.calls
+        if share < found.share and (calls >= FEW or not coal):
+            before = one.calls
+            if coal:
+                one.look_closer(row, found.share * more[k], MOST_CALLS * calls)
+                calls -= one.calls - before
+            else:
+                one.part_at(row, one.needed + found.share * more[k])
             (share,), (row,) = (each.tolist() for each in _shares([one], more[[k]]))
         if share < found.share:
             found = ClearShare(share, one.names, row)
@@ -101,8 +105,7 @@ def clear_share(pairings: Sequence[Pairing], nearer: Array, calls: float) -> Cle
 def _shares(pairings: Sequence[Pairing], more: Array) -> tuple[Array, Array]:
     """(c,) the share of `more` that couples allow, and the segments that allow no more."""
     over = np.stack([one.low - one.needed for one in pairings])
-    shares = np.where(over >= more, 1.0, over / more)
-    shares = np.where(np.isnan(shares), 0.0, shares.clip(0.0, 1.0))
+    shares = np.minimum(np.fmax(over / more, 0.0), 1.0)  # 0 where that is NaN
     rows = shares.argmin(axis=1)
     return shares[np.arange(len(rows)), rows], rows
 
@@ -121,26 +124,50 @@ class Nearer:
             beside: names of what is displaced with the part, if it is at rest.
             pivot: (3,) m, about which the part turns.
         """
-        self.motion, self.slides = pairings[0].motion, robot.prismatic
+        motion, self.slides = pairings[0].motion, robot.prismatic
         bodies = list(dict.fromkeys(body for one in pairings for body in (one.a, one.b)))
-        tool = robot.model.frames[robot.tool_frame_id].placement.translation
-        self.joints = np.array([body.joint for body in bodies] + [robot.n])
-        self.balls = np.array([min(body.ball, HUGE) for body in bodies] + [0.0])
-        """(B,) m, about the centres of all bodies, and of the tool point."""
-        centres = np.vstack([*(body.centre for body in bodies), tool])
-        self.middles = self.motion.middles(self.joints, centres)
-        self.levers = self.motion.levers(self.middles)
         index = {body: k for k, body in enumerate(bodies)}
         self.first = np.array([index[one.a] for one in pairings])
         self.second = np.array([index[one.b] for one in pairings])
-        goes = [bool(beside & set(one.names)) and one.a.joint == 0 for one in pairings]
-        self.goes = np.array(goes)
-        self.over = np.array([SURFACE in one.names and goes[k] for k, one in enumerate(pairings)])
-        self.far = np.array([_furthest(one.a, pivot) for one in pairings])
-        self.reach = np.array(
-            [_furthest(one.b, tool) if one.b.joint == robot.n else np.inf for one in pairings]
-        )
-        self.pivot = pivot
+        tool = robot.model.frames[robot.tool_frame_id].placement.translation
+        centres = np.vstack([*(body.centre for body in bodies), tool])
+        self.joints = np.array([body.joint for body in bodies] + [robot.n])
+        balls = np.array([min(body.ball, HUGE) + body.deviation for body in bodies] + [0.0])
+        """(B,) m, about the centres of all bodies, and of the tool point."""
+        middles, slides = motion.middles(self.joints, centres), self.slides[:, None, None]
+        levers = motion.levers(middles) + balls
+        most = np.where(slides, 1.0, np.maximum(levers[:, :-1], levers[:, 1:]))
+        way = self._sums(most * motion.steps.T[:, :, None])
+        between = np.where(np.arange(robot.n)[:, None, None] < self.joints, way[1:], way[:-1])
+        mean = 0.5 * (levers[:, :-1] + levers[:, 1:] + between)
+        self.levers = np.where(slides, 1.0, mean)
+        """(n, m - 1, B) m, the largest along each segment, of points of each body."""
+        self.goes, self.over = np.array([
+            (one.a.joint == 0) & np.array([bool(beside & {*one.names}), SURFACE in one.names])
+            for one in pairings
+        ]).T  # fmt: skip
+        self.far = self._apart(middles, pivot, way[0], balls)
+        """(m - 1, c) m, of the second ones from the pivot, at most."""
+        self.size = (np.linalg.norm(centres - pivot, axis=1) + balls)[self.first]
+        """(c,) m, of what is at rest from there."""
+        self.reach = self._apart(middles, middles[:, [-1]], way[self.joints, :, -1].T, balls)
+        """(m - 1, c) m, of the second ones from the tool point, at most."""
+        ends = {body: _furthest(body, tool) for body in bodies if body.joint == robot.n}
+        np.minimum(self.reach, [ends.get(one.b, np.inf) for one in pairings], out=self.reach)
+
+    def _sums(self, each: Array) -> Array:
+        """(n + 1, m - 1, B) sums over the joints from every one up to each body's, or back.
+
+        Of values (n, m - 1, B) of all joints.
+        """
+        sums = np.zeros((len(each) + 1, *each.shape[1:]))
+        np.cumsum(each, axis=0, out=sums[1:])
+        return np.asarray(np.abs(sums - sums[self.joints, :, np.arange(len(self.joints))].T))
+
+    def _apart(self, middles: Array, points: Array, way: Array, balls: Array) -> Array:
+        """(m - 1, c) m, how far the second ones are at most from points that go such ways."""
+        away = np.linalg.norm(middles - points, axis=2)
+        return np.asarray(0.5 * (away[:-1] + away[1:] + way) + balls)[:, self.second]
 
     def by(self, moved: Array, shift: float, turn: float) -> Array:
         """(c, m - 1) m, how much nearer they come at most.
@@ -150,50 +177,23 @@ class Nearer:
             shift, turn: m and rad, how far the part is displaced.
         """
         a, b = self.joints[self.first], self.joints[self.second]
-        (behind, far), (before, _) = self._seen(moved, False), self._seen(moved, True)
+        off = self._sums(self.levers * moved.T[:, :, None])  # as seen from every joint
         found = np.full((len(moved), len(a)), np.inf)
         for k in range(int(b.max()) + 1):
-            both = before[k][:, self.first] + behind[k][:, self.second]
+            both = off[k][:, self.first] + off[k][:, self.second]
             np.minimum(found, both, out=found, where=(a <= k) & (k <= b))
         # The part, and what is beside it.
-        away = self._apart(self.pivot, far[0], self.second) + behind[0][:, self.second]
-        found += self.goes * np.maximum(shift, turn * np.minimum(self.far, away))
+        away = np.minimum(self.size, self.far + off[0][:, self.second])
+        found += self.goes * np.maximum(shift, turn * away)
         # The part, as seen from the tool point.
-        tool, turned = len(self.joints) - 1, np.where(self.slides, 0.0, moved)
-        turned = turn + np.column_stack([0.0 * turned[:, :1], np.cumsum(turned, axis=1)])
-        away = self._apart(self.middles[:, [tool]], far[b, :, tool].T, self.second)
-        away = behind[b, :, tool].T + turned[:, b] * np.minimum(away, self.reach)
+        turned = np.cumsum(np.where(self.slides, 0.0, moved), axis=1)
+        turned = turn + np.column_stack([0.0 * turned[:, 0], turned])[:, b]
+        away = off[b, :, -1].T + turned * self.reach
         np.minimum(found, away, out=found, where=self.over)
         return found.T
 
-    def _seen(self, moved: Array, before: bool) -> tuple[Array, Array]:
-        """(n + 1, m - 1, B) m, how far points of bodies are moved as seen from every joint.
 
-        By the e_j, and along each segment. Bodies are on that joint or behind it, or before it. As
-        joints deviate one by one, that furthest from a body first, levers are those of the motion.
-        """
-        n, steps = moved.shape[1], self.motion.steps
-        off, way = np.zeros((2, n + 1, len(moved), len(self.joints)))
-        last = np.zeros((2, *off.shape[1:]))
-        for j in range(n) if before else reversed(range(n)):
-            some = self.joints <= j if before else self.joints > j
-            levers = self.levers[j] + self.balls
-            mean = 0.5 * (levers[:-1] + levers[1:] + last[1])
-            lever = some * (1.0 if self.slides[j] else mean)
-            last += lever * np.stack([moved[:, j, None], steps[:, j, None]])
-            off[j + before], way[j + before] = last
-        return off, way
-
-    def _apart(self, points: Array, moved: Array, which: Array) -> Array:
-        """(m - 1, c) m, the largest distance of bodies from points that move by so much."""
-        apart = np.linalg.norm(self.middles[:, which] - points, axis=2)
-        moved = moved if moved.shape[1] == len(which) else moved[:, which]
-        return 0.5 * (apart[:-1] + apart[1:] + moved) + self.balls[which]
-
-
-def _furthest(body: Body, pivot: Array) -> float:
-    """m, of any of a body's points from the pivot."""
-    if body.half_space:
-        return np.inf
-    away = np.linalg.norm(body.corners - pivot, axis=1).max()
+def _furthest(body: Body, point: Array) -> float:
+    """m, of any of a body's points from another one."""
+    away = np.linalg.norm(body.corners - point, axis=1).max()
     return float(away + body.radius + body.circle + body.deviation)

@@ -50,20 +50,20 @@ def largest_levers(levers: Array, half: Array, prismatic: Mask, cap: Array | flo
 
 
 def second_derivative_bound(largest: Array, steps: Array, prismatic: Mask) -> Array:
-    """(m,) D, from L_j and the changes of joints (m, n), h_j or d_j."""
+    """(..., ) D, from L_j and the changes of joints (..., n), h_j or d_j."""
     turns = np.where(prismatic, 0.0, steps)
-    before = np.cumsum(turns, axis=1) - turns
-    return np.asarray((largest * steps * (turns + 2.0 * before)).sum(axis=1))
+    before = np.cumsum(turns, axis=-1) - turns
+    return np.asarray((largest * steps * (turns + 2.0 * before)).sum(axis=-1))
 
 
 def column_changes(largest: Array, steps: Array, prismatic: Mask) -> Array:
-    """(m, n) how far each column of the Jacobian moves at most, from L_j and the steps (m, n).
+    """(..., n) how far each column of the Jacobian moves at most, from L_j and the steps.
 
     Column j turns with the joints up to j, and is changed by what those behind j move.
     """
-    own = np.cumsum(np.where(prismatic, 0.0, steps), axis=1)
+    own = np.cumsum(np.where(prismatic, 0.0, steps), axis=-1)
     moved = largest * steps
-    behind = np.cumsum(moved[:, ::-1], axis=1)[:, ::-1] - moved
+    behind = np.cumsum(moved[..., ::-1], axis=-1)[..., ::-1] - moved
     # A joint that slides keeps its direction unless joints before it turn.
     return np.asarray(largest * own + np.where(prismatic, 0.0, behind))
 

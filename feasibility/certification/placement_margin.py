@@ -6,21 +6,28 @@ continuous motion q_g(t) whose tool point runs along g(p(q(t))): so its distance
 surface, the cells it reaches and the tolerance it uses are exactly those of q(t). Joints stay
 inside their limits, the tool inside cone and roll, bodies clear, singularities as far as asked.
 
+**Levers.** Change the joints of a configuration c by at most d_j, one by one from the base on. When
+j moves, those behind it have not, so the tool point moves by at most r_j d_j, r_j its lever at c;
+column j of its Jacobian J by at most r_j for each of what joints up to j turn, and by what those
+behind it move: `column_changes` at c, without any growth of levers. Times the d_j these sum to
+M = `second_derivative_bound` at c: if |v| <= y moves joint j by at most d_j y, the derivative by v
+changes by at most M y, the tool point is M y^2 / 2 off its linear model. The axis likewise.
+
 **Lemma** (Newton and Kantorovich), on a straight stretch q(s), s from 0 to 1, with the joint
-changes h_j. J is the tool point's Jacobian, A that of the axis, P about a right inverse of J at
-both ends and straight between, with |JP - I| <= eps there; d_j bounds the norms of its rows, N
-those of P, T those of AP, at both ends. J and A change by at most C and C_a along the stretch. As P
-is a mean of both,
+changes h_j. A is the Jacobian of the axis, P about a right inverse of J at both ends and straight
+between, with |JP - I| <= eps there; d_j bounds the norms of its rows, N those of P, T those of AP,
+at both ends. J and A change by at most s C and s C_a from one end, (1 - s) C and (1 - s) C_a from
+the other. As P is a mean of both,
 
     |J(s) P(s) - I| <= kappa = eps + N C / 2,    |A(s) P(s)| <= T' = T + N C_a / 2.
 
-Over all configurations q(s) + P(s) v, |v| <= y, the second derivatives of tool point and axis by v
-are at most M and M_a: `lever_bounds` with the steps d_j over a box of the half widths h_j / 2 +
-y d_j about both ends. Let f(y) = (1 - kappa) y - M y^2 / 2 and |g p - p| <= rho. **If** rho <= f(y)
-and M y < 1 - kappa, exactly one v with |v| <= y has p(q(s) + P(s) v) = g p(q(s)): with B the
-derivative JP at v = 0, v -> v - B^-1 (p(q + P v) - g p) maps the ball into itself, as it takes v to
-at most (rho + M y^2 / 2) / (1 - kappa), and is a contraction there. All of it is continuous in t,
-so v is; stretches that meet share P, and the smaller of their balls holds both of their v. QED
+M and M_a are those of the largest levers along the stretch: no lever is over half of what those at
+both ends and the way of all behind it sum to. Let f(y) = (1 - kappa) y - M y^2 / 2, |g p - p| at
+most rho. **If** rho <= f(y) and M y < 1 - kappa, exactly one v with |v| <= y has p(q(s) + P(s) v) =
+g p(q(s)): with B the derivative JP at v = 0, v -> v - B^-1 (p(q + P v) - g p) maps the ball into
+itself, as it takes v to at most (rho + M y^2 / 2) / (1 - kappa), and is a contraction there. All of
+it is continuous in t, so v is; stretches that meet share P, and the smaller of their balls holds
+both of their v. QED
 
 So joint j moves by e_j = d_j y at most, the axis by x = T' y + M_a y^2 / 2, which is an angle of at
 most x c / 2 sin(c / 2) while it is inside c. The part turns the approach direction by at most
@@ -29,10 +36,9 @@ roll is the twist about the approach: turning the tool, then the part, by w in a
 most w / cos(swing / 2), the swing inside the cone all the while; w is at most Theta + sum of e_j of
 the joints that turn. The singular value falls by at most the change of the Jacobian.
 
-**Triangle.** With the bounds of one ball as constants, f is concave, and all that is required of y
-is convex in (y, Theta). So where y_1 will do for (D, 0), and y_2 for (0, Theta), means of both do
-between: for whatever has position / D + angle / Theta <= 1. `displaced_bodies` says which share of
-it bodies allow.
+**Triangle.** f is concave, and all that is required of y is convex in (y, Theta). So where y_1 will
+do for (D, 0), and y_2 for (0, Theta), means of both do between: for whatever has position / D +
+angle / Theta <= 1. `displaced_bodies` says which share of it bodies allow.
 """
 
 from __future__ import annotations
@@ -46,11 +52,7 @@ import numpy as np
 
 from coverable.arrays import Array, Ints
 from feasibility.certification.jacobians import jacobians, smallest_singular
-from feasibility.certification.lever_bounds import (
-    column_changes,
-    largest_levers,
-    second_derivative_bound,
-)
+from feasibility.certification.lever_bounds import column_changes, second_derivative_bound
 from feasibility.certification.rows import Rows
 from feasibility.task import PlacementError, Task
 from feasibility.verdict import Bound, Certificate, PlacementMargin
@@ -61,7 +63,7 @@ from surfaces.cells import Cells
 if TYPE_CHECKING:
     from feasibility.certification.collisions.pairing import Pairing
 
-CLOSE = 0.95  # [1] of the least room at a configuration: stretches with so much are not cut, ...
+CLOSE = 0.94  # [1] of the least room at a row: stretches with so much are not cut, ...
 CLOSER = 0.97  # [1] ... others into as many pieces as should have this much
 ROUNDS = 3  # of cutting what has less
 PIECES = 32  # most, that a stretch is cut into at once
@@ -69,7 +71,7 @@ MOST = 10.0  # [m] no larger ball is tried
 LEAST = 1e-12  # [m], [rad] so that nothing is divided by 0
 FREE = 1e9  # [rad] room for what is free
 BELOW = 1.0 - 1e-9  # [1] of what is found is claimed: rounding
-DAMPED = 1e-10  # [1] of the largest squared singular value: so a right inverse exists everywhere
+DAMPED = 1e-10  # [1] of all squared singular values: so a right inverse exists everywhere
 BOUNDS = (Bound.LIMIT, Bound.CONE, Bound.ROLL, Bound.SINGULAR)
 
 
@@ -89,7 +91,7 @@ class Ends(Rows):
     q: Array
     points: Array
     levers: Array
-    sines: Array
+    """(k, 2, n) r_j, and those of the axis, sines."""
     rows: Array
     """(k, n) norms of the rows of P."""
     norms: Array
@@ -162,19 +164,18 @@ def ends_of(case: Given, q: Array) -> Ends:
     """What has to be known of configurations q (k, n)."""
     at = jacobians(case.kinematics, q)
     back = at.point.transpose(0, 2, 1)
-    squares, vectors = np.linalg.eigh(at.point @ back)
-    inverse = 1.0 / (np.maximum(squares, 0.0) + DAMPED * squares[:, 2:] + LEAST**2)
-    right = back @ (vectors * inverse[:, None]) @ vectors.transpose(0, 2, 1)
+    square = at.point @ back
+    least = DAMPED * square.trace(axis1=1, axis2=2) + LEAST**2
+    right = back @ np.linalg.inv(square + least[:, None, None] * np.eye(3))
     off, turned = at.point @ right - np.eye(3), at.axis @ right
-    gram = turned @ turned.transpose(0, 2, 1)  # of rank 2: the axis keeps its length
-    trace, square = gram.trace(axis1=1, axis2=2), (gram**2).sum(axis=(1, 2))
-    most = 0.5 * (trace + np.sqrt(np.maximum(2.0 * square - trace**2, 0.0)))
-    norms = [np.sqrt(inverse[:, 0]), np.sqrt((off**2).sum(axis=(1, 2))), np.sqrt(most)]
+    values = np.linalg.eigvalsh(np.stack([square, turned @ turned.transpose(0, 2, 1)]))
+    norm = 1.0 / (np.maximum(values[0, :, 0], 0.0) + least)
+    norms = np.sqrt(np.stack([norm, (off**2).sum(axis=(1, 2)), values[1, :, 2]], axis=1))
     sigma = np.full(len(q), np.inf)
     if case.task.min_manipulability is not None:
         sigma = smallest_singular(at, case.robot.length_unit)
-    rows = np.sqrt((right**2).sum(axis=2))
-    return Ends(q, at.points, at.levers, at.sines, rows, np.stack(norms, axis=1) / BELOW, sigma)
+    levers = np.stack([at.levers, at.sines], axis=1)
+    return Ends(q, at.points, levers, np.sqrt((right**2).sum(axis=2)), norms / BELOW, sigma)
 
 
 def left_to_limits(robot: Robot, a: Array, b: Array) -> Array:
@@ -183,96 +184,85 @@ def left_to_limits(robot: Robot, a: Array, b: Array) -> Array:
     return np.maximum(np.minimum(low - robot.lower, robot.upper - high), 0.0)
 
 
-def _norms(columns: Array) -> Array:
-    """(k,) bounds of the norms of matrices with columns of these lengths (k, n)."""
-    return np.asarray(np.sqrt((columns**2).sum(axis=1)))
+def _changes(robot: Robot, levers: Array, steps: Array) -> Array:
+    """(k, 2) how far J and A change at most while joints move by steps (k, n); levers (k, 2, n)."""
+    columns = column_changes(levers, steps[:, None], robot.prismatic)
+    return np.asarray(np.sqrt((columns**2).sum(axis=2)))
 
 
-def _falls(robot: Robot, levers: list[Array], steps: Array) -> Array:
-    """(k,) how far the singular value falls at most while joints move by steps (k, n)."""
-    point, axis = (_norms(column_changes(one, steps, robot.prismatic)) for one in levers)
-    return np.hypot(point / robot.length_unit, axis)
+def _fall(robot: Robot, changes: Array) -> Array:
+    """(k,) how far the singular value falls at most."""
+    return np.hypot(changes[:, 0] / robot.length_unit, changes[:, 1])
 
 
-def best_balls(case: Given, at: tuple[Ints, Array], a: Ends, b: Ends, room: Array) -> Balls:
-    """Balls that reach about as far as any does."""
-    none, free = np.zeros(len(room)), np.full(len(room), MOST)
-    guess = balls_of(case, at, a, b, room, none, free)  # it holds for |v| = 0 alone
-    size = guess.allowed(0.0).min(axis=1)
-    return balls_of(case, at, a, b, room, size, size)
-
-
-def balls_of(
-    case: Given, at: tuple[Ints, Array], a: Ends, b: Ends, room: Array, size: Array, most: Array
-) -> Balls:
-    """What holds for |v| <= size (k,), m, along stretches from a to b; y may be `most` (k,).
+def balls_of(case: Given, at: tuple[Ints, Array], a: Ends, b: Ends, room: Array) -> Balls:
+    """What holds along stretches from a to b.
 
     Args:
         case: what is given.
         at: `row` and `share` of the balls.
         a, b: of the stretches.
         room: (k, 2) rad, what is left of cone and roll along them.
-        size, most: see above.
     """
-    robot, asked, slides = case.robot, case.task.min_manipulability or 0.0, case.robot.prismatic
+    robot, slides = case.robot, case.robot.prismatic
     steps, moves = np.abs(b.q - a.q), np.maximum(a.rows, b.rows)
-    ends = (np.maximum(a.levers, b.levers), np.inf), (np.maximum(a.sines, b.sines), 1.0)
-    along, within = (
-        [largest_levers(levers, half, slides, cap) for levers, cap in ends]
-        for half in (0.5 * steps, 0.5 * steps + size[:, None] * moves)
-    )
-    norm, off, turned = np.maximum(a.norms, b.norms).T
-    changes = [_norms(column_changes(levers, steps, slides)) for levers in along]
-    slope = np.maximum(1.0 - off - 0.5 * norm * changes[0], 0.0)
-    second, bend = (second_derivative_bound(levers, moves, slides) for levers in within)
-    lemma = np.where(slope > 0.0, solved(second, 0.0, BELOW * slope), 0.0)
+    levers, (norm, off, turned) = np.maximum(a.levers, b.levers), np.maximum(a.norms, b.norms).T
+    changes, way = _changes(robot, levers, steps), levers * steps[:, None]
+    behind = np.cumsum(way[..., ::-1], axis=2)[..., ::-1] - way
+    along = np.where(slides, levers, 0.5 * (a.levers + b.levers + behind))
+    along[:, 1] = np.minimum(along[:, 1], 1.0)
+    second, bend = second_derivative_bound(along, moves[:, None], slides).T
+    slope = np.maximum(1.0 - off - 0.5 * norm * changes[:, 0], 0.0)
+    lemma = np.minimum(BELOW * slope / np.maximum(second, LEAST), MOST)
     limits = solved(moves, 0.0, left_to_limits(robot, a.q, b.q)).min(axis=1)
-    if asked:
-        spare = 0.5 * (a.sigma + b.sigma - _falls(robot, along, steps)) - asked
-        rest = solved(_falls(robot, within, moves), 0.0, np.maximum(spare, 0.0))
-        lemma = np.minimum(lemma, rest)
+    if case.task.min_manipulability is not None:
+        least = 0.5 * (a.sigma + b.sigma - _fall(robot, changes)) - case.task.min_manipulability
+        falls = _fall(robot, _changes(robot, along, moves))
+        lemma = np.minimum(lemma, solved(falls, 0.0, np.maximum(least, 0.0)))
     far = np.maximum(*(np.linalg.norm(end.points - case.pivot, axis=1) for end in (a, b)))
-    far = np.maximum(far + 0.5 * (along[0] * steps).sum(axis=1), LEAST)
-    wide = np.where(room[:, 0] < np.pi, 0.5 * room[:, 0], LEAST)
-    wide = np.maximum(wide, LEAST) / np.sin(np.maximum(wide, LEAST))
-    tilts = wide[:, None] * np.stack([turned + 0.5 * norm * changes[1], bend], axis=1)
+    far = np.maximum(far + 0.5 * way[:, 0].sum(axis=1), LEAST)
+    wide = np.maximum(np.where(room[:, 0] < np.pi, 0.5 * room[:, 0], LEAST), LEAST)
+    chord = np.stack([turned + 0.5 * norm * changes[:, 1], bend], axis=1)
+    tilts = (wide / np.sin(wide))[:, None] * chord
     roll = np.cos(0.5 * min(case.task.cone, 0.5 * np.pi))
     room = np.minimum(room, FREE) * [1.0, roll]
     room[room[:, 0] >= np.pi, 0] = FREE
     turns = np.where(slides, 0.0, moves).sum(axis=1)
-    caps = np.stack([limits, np.minimum(lemma, most)], axis=1)
+    caps = np.stack([limits, lemma], axis=1)
     return Balls(*at, slope, second, tilts, moves, turns, caps, room, far)
 
 
 def balls_along(case: Given, q: Array, room: Array) -> Balls:
-    """Of a whole motion q (m, n), in stretches with little less room than configurations have.
+    """Of a whole motion q (m, n), in stretches with little less room than there is at rows.
 
     Others are cut into as many pieces as would do if one over the room grew with their length.
     """
-    row, share = np.arange(len(q) - 1), np.tile([0.0, 1.0], (len(q) - 1, 1))
-    first, ends, found = row, ends_of(case, q), list[Balls]()
-    most = np.full(2, np.inf)
+    row, ends, found = np.arange(len(q) - 1), ends_of(case, q), list[Balls]()
+    share = np.tile([0.0, 1.0], (len(row), 1))
+    a, b = np.concatenate([row, row, row + 1]), np.concatenate([row + 1, row, row + 1])
+    at = np.tile(row, 3), np.tile(share, (3, 1))
+    made = balls_of(case, at, ends.of(a), ends.of(b), room[at[0]])
+    whole, *both = np.split(np.maximum(made.triangle, LEAST), 3)
+    here, made = np.minimum(*both), made.of(row)
+    most = here.min(axis=0)
     for left in reversed(range(ROUNDS)):
-        count, a = len(row), np.tile(first, 2)
-        at = np.tile(row, 2), np.vstack([share[:, [0, 0]], share])
-        both = np.append(first, first + 1)
-        made = best_balls(case, at, ends.of(a), ends.of(both), room[at[0]])
-        here, there = np.split(np.maximum(made.triangle, LEAST), 2)
-        most = np.minimum(most, here.min(axis=0))
-        good = (there >= CLOSE * most).all(axis=1) | (left == 0)
-        found.append(made.of(slice(count, None)).of(good))
+        good = (whole >= CLOSE * most).all(axis=1) | (left == 0)
+        found.append(made.of(good))
         if good.all():
             break
-        here, there = here[~good], there[~good]
+        row, share, here, whole = (one[~good] for one in (row, share, here, whole))
         spare = np.maximum(here / (CLOSER * most) - 1.0, 1.0 / CLOSER - 1.0)
-        pieces = np.ceil(((here / there - 1.0) / spare).max(axis=1)).clip(2, PIECES).astype(np.intp)
-        cut = np.repeat(np.arange(len(pieces)), pieces + 1)
+        pieces = ((here / whole - 1.0) / spare).max(axis=1)
+        pieces = np.ceil(pieces).clip(2, PIECES).astype(np.intp)
+        cut = np.repeat(np.arange(len(row)), pieces + 1)
         number = np.arange(len(cut)) - (np.cumsum(pieces + 1) - pieces - 1)[cut]
-        (low, high), row = share[~good][cut].T, row[~good][cut]
+        (low, high), row, here = share[cut].T, row[cut], here[cut]
         part = low + (high - low) * number / pieces[cut]
         ends = ends_of(case, q[row] + part[:, None] * (q[row + 1] - q[row]))
-        first = np.flatnonzero(number < pieces[cut])
-        row, share = row[first], np.column_stack([part[first], part[first + 1]])
+        k = np.flatnonzero(number < pieces[cut])
+        row, share, here = row[k], np.column_stack([part[k], part[k + 1]]), here[k]
+        made = balls_of(case, (row, share), ends.of(k), ends.of(k + 1), room[row])
+        whole = np.maximum(made.triangle, LEAST)
     return Balls.join(*found)
 
 
@@ -306,7 +296,7 @@ def placement_margin(
     np.minimum.at(along, balls.row, reach[:, 0])
     worst = int(np.argmin(reach[:, 0]))
     row, what = int(balls.row[worst]), ""
-    bound_by = BOUNDS[int(np.argmin(balls.allowed(0.0)[worst]))]
+    bound_by = BOUNDS[int(np.argmin(balls.of(slice(worst, worst + 1)).allowed(0.0)))]
     if bound_by is Bound.LIMIT:
         left = left_to_limits(robot, q[row], q[row + 1])
         what = robot.joint_names[int(np.argmin(solved(balls.moves[worst], 0.0, left)))]

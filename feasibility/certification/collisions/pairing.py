@@ -153,29 +153,29 @@ class Pairing:
                 self._refuse(float(ends[0].mean()), math.nan)
         self.low[open_] = np.maximum(self.low[open_], self._aim)
 
-    def look_closer(self, row: int, more: Array, share: float, calls: float) -> None:
-        """Raise `low` of an accepted motion, over what is needed, to a share of `more` (m - 1,) m.
-
-        By a plane that parts hulls at a row, and by so many calls at most. Where less is met, and
-        after half of them, to a lesser share.
-        """
-        needed, most = self.needed, self.calls + calls
+    def part_at(self, row: int, wanted: Array) -> None:
+        """Raise `low` to what is wanted (m - 1,) m, as far as a plane does that parts at a row."""
         rotations, points = self.motion.poses(self.a.joint, self.b.joint)
         (apart,), n = self._gaps(rotations[[row]], points[[row]])
         if apart > 0.0:
-            self._raised(math.inf, n)
-        if (self.low - needed >= share * more).all():
-            return
+            self._raised(wanted, n)
+
+    def look_closer(self, row: int, more: Array, calls: float) -> None:
+        """Raise `low` of an accepted motion to `more` (m - 1,) m over what is needed.
+
+        By so many calls at most. Where less is met, and after half of them, to less of that.
+        """
+        needed, most = self.needed, self.calls + calls
         times = np.array([row, self.met])
         over = (self.measured(times) - needed) / more[times.astype(np.intp).clip(0, len(more) - 1)]
-        self._aim, self._weights = min(share, ENOUGH * float(over.min())), more
+        self._aim, self._weights = min(1.0, ENOUGH * float(over.min())), more
         self.low, self._off, self.needed = self.low - needed, self._off + needed, -math.inf
         open_ = np.flatnonzero(~(self.low >= self._aim * more))
-        ends, little = self._runs(open_), LITTLE * self._aim
+        ends = self._runs(open_)
         while len(ends) and self._aim > 0.0 and self.calls + len(ends) <= most:
             ends = self._cut(ends)
             if self.calls > most - 0.5 * calls:
-                self._aim = min(self._aim, little)
+                self._aim *= LITTLE
         if len(ends) == 0:
             self.low[open_] = np.maximum(self.low[open_], self._aim * more[open_])
         self.low, self._off, self.needed = self.low + needed, self._off - needed, needed
@@ -210,7 +210,7 @@ class Pairing:
             failures = 0 if tried[worst] else failures + 1
             tried[worst] = True
 
-    def _raised(self, wanted: float, n: Array) -> Mask:
+    def _raised(self, wanted: float | Array, n: Array) -> Mask:
         """(m - 1,) which segments have what is wanted (m), with planes across n (m - 1 or 1, 3)."""
         some = np.flatnonzero(~(self.low >= wanted))
         ends = np.column_stack([some, some + 1.0])

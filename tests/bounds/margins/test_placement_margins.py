@@ -48,12 +48,12 @@ def twice(levers, steps, slides):
     return sum((1 + (i < j)) * levers[:, j] * steps[i] * steps[j] for i, j in pairs)
 
 
-def ball_along(robot, q, size, least=None, cone=9.0):
-    """The bounds of a stretch between two configurations (2, n), for balls of a size."""
+def ball_along(robot, q, least=None, cone=9.0):
+    """The bounds of a stretch between two configurations (2, n)."""
     case = given(robot, Task(0.0, 30.0, min_manipulability=least), np.ones(3))
-    ends, one, size = lemma.ends_of(case, q), np.array([0]), np.array([size])
+    ends, one = lemma.ends_of(case, q), np.array([0])
     at, room = (one, np.array([[0.0, 1.0]])), np.full((1, 2), cone)
-    return lemma.balls_of(case, at, ends.of(one), ends.of(one + 1), room, size, size)
+    return lemma.balls_of(case, at, ends.of(one), ends.of(one + 1), room)
 
 
 def test_the_largest_lever_of_a_stretch_counts():
@@ -64,7 +64,7 @@ def test_the_largest_lever_of_a_stretch_counts():
     middle[0] += np.radians(225.0) - np.arctan2(y, x)
     for which, k, size in ((0, 2, 1.5), (1, 4, 0.3), (2, 0, 0.5)):
         way = size * np.eye(6)[k]
-        ball = ball_along(robot, np.stack([middle - way, middle + way]), 0.0)
+        ball = ball_along(robot, np.stack([middle - way, middle + way]))
         there = middle + np.linspace(-1.0, 1.0, 21)[:, None] * way
         if which == 2:
             holds(ball.far, np.linalg.norm(arm.tool(there)[0] - np.ones(3), axis=1), 0.5)
@@ -72,9 +72,7 @@ def test_the_largest_lever_of_a_stretch_counts():
         levers = np.linalg.norm(derivative(arm, there, which), axis=1)
         bound = ball.tilts[:, 1] if which else ball.second
         holds(bound, twice(levers, ball.moves[0], robot.prismatic), 0.5)
-    narrow, wide = (
-        ball_along(robot, np.stack(2 * [middle]), 0.0, cone=c).tilts for c in (1.6, 9.0)
-    )
+    narrow, wide = (ball_along(robot, np.stack(2 * [middle]), cone=c).tilts for c in (1.6, 9.0))
     np.testing.assert_allclose(narrow, wide * 0.8 / np.sin(0.8))  # chords of angles up to 1.6
 
 
@@ -126,7 +124,7 @@ def test_bounds_along_stretches(name, seed):
         way = 0.35 * rng.random() ** 3 * referee.unit(rng.normal(size=robot.n))
         q = np.stack([start, start + way])
         least = singular(robot, arm, q).min()
-        ball = ball_along(robot, q, size, 0.9 * least)
+        ball = ball_along(robot, q, 0.9 * least)
         if not ball.slope > 0.2:
             continue
         inverse = np.linalg.pinv(derivative(arm, q))
@@ -135,9 +133,9 @@ def test_bounds_along_stretches(name, seed):
         np.testing.assert_allclose(ball.turns, d[~slides].sum(), rtol=1e-5)
         mean = np.einsum("ks,kij->sij", [1.0 - share, share], inverse)
         rows, v = start + share[:, None] * way, referee.unit(rng.normal(size=(2, 9, 3)))[..., None]
-        there, step = rows + (mean @ (size * v[0]))[..., 0], (1e-4 * mean @ v[1])[..., 0]
+        moved, step = (mean @ (size * v[0]))[..., 0], (1e-4 * mean @ v[1])[..., 0]
         for which in (0, 1):
-            along, off = derivative(arm, rows, which), derivative(arm, there, which)
+            along, off = derivative(arm, rows, which), derivative(arm, rows + moved, which)
             change = 0.5 * spectral(inverse).max() * spectral((along[0] - along[-1])[None])
             if which == 0:
                 note("kappa", 1.0 - ball.slope, spectral(along @ mean - np.eye(3)))
@@ -146,8 +144,12 @@ def test_bounds_along_stretches(name, seed):
                 note("first", ball.tilts[:, 0], spectral(along @ mean))
                 note("first", ball.tilts[:, 0], spectral(along[[0, -1]] @ inverse).max() + change)
             name, bound = ("bend", ball.tilts[:, 1]) if which else ("second", ball.second)
-            note(name, bound, twice(norm(off), d, slides))
-            back, here, ahead = (arm.tool(there + h * step)[which] for h in (-1, 0, 1))
+            note(name, bound, twice(norm(along), d, slides))
+            note(name, bound * size, spectral((off - along) @ mean))
+            here, there = (arm.tool(each)[which] for each in (rows, rows + moved))
+            linear = (along @ moved[..., None])[..., 0]
+            note(name, 0.5 * bound * size**2, norm(there - here - linear))
+            back, here, ahead = (arm.tool(rows + h * step)[which] for h in (-1, 0, 1))
             note(name, bound, norm(back - 2.0 * here + ahead) / 1e-8)
         note("far", ball.far, norm(arm.tool(rows)[0] - np.ones(3)))
         if ball.caps[0, 1] > 0.0:
@@ -216,7 +218,7 @@ def test_there_is_none_without_a_way_to_follow():
     found = replay(robot, line, Task(0.0, 30.0), walk, np.ones(2, dtype=bool))
     margin = found.certificate.placement_margin
     assert (margin.position, margin.angle, margin.bound_by) == (0.0, 0.0, Bound.SINGULAR)
-    assert ball_along(robot, q[[0, 0]], 0.0).slope == pytest.approx(0.0, abs=1e-6)
+    assert ball_along(robot, q[[0, 0]]).slope == pytest.approx(0.0, abs=1e-6)
     begun = replace(slides(), start=PLATE.centres[0])
     margin = margin_of_slides(begun)
     assert (margin.position, margin.angle, margin.bound_by) == (0.0, 0.0, Bound.START)
