@@ -1,16 +1,23 @@
 """What is built on a verdict: paths, passes, placements, studies, live pages."""
 
+import time
 from collections.abc import Callable
 from typing import Any
 
+import asked
 import mesh_patches
+import numpy as np
 import pytest
 
 import coverable
 from coverable import load_case, parallel_passes, path, plan_passes, trajectory
+from feasibility.certification.motion_replay import replay
 from surfaces.meshes.triangle_mesh import TriangleMesh
 
 PAPER = [f"paper/{figure}{letter}" for figure in "45" for letter in "abcdef"]
+
+BODIES = ("clear of itself", "beside a post", "over a floor with a tool", "beside a hull",
+          "a wall 4a", "a wall 4c", "a wall 4e", "a wall 5e")  # fmt: skip
 
 
 @pytest.mark.parametrize("name", [name for name in PAPER if name[-1] in "abc"])
@@ -49,3 +56,20 @@ def bench_explain(name: str, measured: Callable[..., Any]) -> None:
     """What would make a case feasible; goal: 15 verdicts in the middle, 40 at most."""
     asked = load_case(name).build()[:3]
     measured(lambda: coverable.explain(*asked), 2, FK=lambda found: int(found.evaluations))
+
+
+@pytest.mark.parametrize("name", BODIES)
+def bench_margin(name: str, measured: Callable[..., Any]) -> None:
+    """A motion among bodies, certified with its placement margin; goal: a fifth of it for that."""
+    robot, cells, task, search = asked.question(name)[2:]
+    walk, certified, margin = coverable.check(robot, cells, task, search).witness, [], []
+
+    def work() -> None:
+        began = time.process_time()
+        found = replay(robot, cells, task, walk, np.ones(len(cells), dtype=bool)).certificate
+        certified.append(time.process_time() - began)
+        assert found.placement_margin is not None
+        margin.append(time.process_time() - began - certified[-1])
+
+    share = {"margin / certified %": lambda _: round(100.0 * min(margin) / min(certified))}
+    measured(work, 9, **share)

@@ -15,7 +15,6 @@ import referee
 from scipy.spatial.transform import Rotation
 
 from feasibility.certification import placement_margin as lemma
-from feasibility.certification import surface_replay
 from feasibility.certification.displaced_bodies import Nearer
 from feasibility.certification.motion_replay import replay
 from robots.kinematics import Kinematics
@@ -56,16 +55,12 @@ def placed(frames, joint, points):
 
 def margin_and_balls(robot, cells, task, walk):
     """The margin of a motion, the bounds along it that it is made of, and couples of bodies."""
-    asked, real = [], surface_replay.margin_of
-    surface_replay.margin_of = lambda *given: asked.append(given) or real(*given)
-    try:
-        found = replay(robot, cells, task, walk, np.ones(len(cells), dtype=bool))
-    finally:
-        surface_replay.margin_of = real
+    found = replay(robot, cells, task, walk, np.ones(len(cells), dtype=bool))
     assert found.accepted, found.refusal
-    *_, q, room = asked[0]
+    kept = found.certificate.margin
+    pairings = getattr(kept, "args", ((),))[0]
+    *_, q, room = getattr(kept, "func", kept).__wrapped__.args
     balls = lemma.balls_along(given(robot, task, cells.centres.mean(axis=0)), q, room)
-    pairings = getattr(found.certificate.margin, "args", ((),))[0]
     return found.certificate.placement_margin, balls, pairings
 
 
@@ -170,33 +165,12 @@ def attack(arm, robot, cells, task, walk, rng, count):
     if scene is not None and scene.pairs:
         stays_clear(scene, here, rng)
     if pairings:
-        come_nearer(robot, cells, task, pairings, margin, balls, here, rng)
+        beside = {"surface", *(one.name for one in task.collision.scene)}
+        bodies = Nearer(robot, pairings, beside, np.array(margin.pivot))
+        most = bodies.by(balls.moved(margin.position, margin.angle), margin.position, margin.angle)
+        for one, each in zip(pairings, most, strict=True):
+            assert (one.low - one.needed >= each - 1e-9).all()
     return margin
-
-
-def come_nearer(robot, cells, task, pairings, margin, balls, here, rng):
-    """Any two points of two bodies, by no more than is allowed for them."""
-    moved = balls.moved(margin.position, margin.angle)
-    beside = {"surface", *(one.name for one in task.collision.scene)}
-    bodies = Nearer(robot, pairings, beside, np.array(margin.pivot))
-    bound = bodies.by(moved, margin.position, margin.angle)
-    for one, each in zip(pairings, bound, strict=True):
-        assert (one.low - one.needed >= each - 1e-9).all()
-    bound = bound[:, here.ball.row]
-    before, after = (Kinematics(robot).joints(q) for q in (here.nominal, here.q))
-    for k, one in enumerate(pairings):
-        ends = []
-        for body in (one.a, one.b):
-            points = body.corners[rng.integers(0, len(body.corners), len(here.q))]
-            at = [placed(frames, body.joint, points) for frames in (before, after)]
-            if body is one.a and body.joint == 0 and beside & set(one.names):
-                goes = rng.random(len(points)) < (2.0 if "surface" in one.names else 0.5)
-                along = turned(here.placement[:, :3, :3], points) + here.placement[:, :3, 3]
-                at[1] = np.where(goes[:, None], along, points)
-            ends.append(at)
-        apart = [np.linalg.norm(a - b, axis=1) for a, b in zip(*ends, strict=True)]
-        kind = "part" if bodies.goes[k] else "arm"
-        use(kind, apart[0] - apart[1], np.where(one.a.half_space, np.inf, bound[k]))
 
 
 def stays_clear(scene, here, rng):
