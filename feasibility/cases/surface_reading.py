@@ -48,7 +48,7 @@ MOST_PIECES = 200  # as `surfaces.piecewise` has it
 UNITS = ("m", "mm")
 OWN_FORMULA = (
     "a surface of your own formula g(u, v) is given by points of it, as a grid, by triangles, as a "
-    "mesh, or in Python by surfaces.parametric(g, u, v)"
+    "mesh, or in Python by coverable.parametric(g, u, v)"
 )
 FACES = "where the faces look to", "behind the faces"
 SIDES = {

@@ -55,10 +55,10 @@ def smooth_text(surface: Surface) -> str:
 def summary(head: str, rows: Iterable[tuple[str, str]], said: str, width: int = 12) -> list[str]:
     """The answer in one line, an empty line, and named rows; rows without text are left out.
 
-    The last row is what is `said` of collisions.
+    The last row is what is `said` of collisions. Names have `width` - 1 letters at most.
     """
     rows = [*rows, ("note", said)]
-    return [head, "", *(filled(f"  {name:<{width}}", text) for name, text in rows if text)]
+    return [head, "", *(filled(f"  {name:<{width - 1}} ", text) for name, text in rows if text)]
 
 
 def aligned(table: Sequence[Sequence[str]], justify: str = "<") -> list[str]:

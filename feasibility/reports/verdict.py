@@ -84,7 +84,7 @@ def as_text(verdict: Verdict, case: Case, before_s: float = 0.0) -> str:
 
 
 def rows_of(verdict: Verdict) -> list[tuple[str, str]]:
-    """What every report of a verdict has: names, and a text each that may be empty."""
+    """Rows of command, notebook and live page: names, and a text each that may be empty."""
     treating = _treating(verdict)
     evidence = _evidence(verdict) if treating is None else treating.evidence(_evidence(verdict))
     return [

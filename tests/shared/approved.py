@@ -4,6 +4,7 @@
 to the next is masked first.
 """
 
+import difflib
 import re
 from pathlib import Path
 
@@ -43,12 +44,10 @@ class Approved:
         if self.accept:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, "utf-8")
-        known = (
-            path.read_text("utf-8")
-            if path.is_file()
-            else "(nothing: run pytest --accept, and read it)"
-        )
-        assert text == known, f"not what {path.name} has approved"
+        known = path.read_text("utf-8") if path.is_file() else ""
+        changes = difflib.unified_diff(known.splitlines(), text.splitlines(), n=0, lineterm="")
+        told = f"not what {path} has approved; pytest --accept writes it, git shows it, read it"
+        assert text == known, "\n".join([told, *changes])
 
 
 @pytest.fixture

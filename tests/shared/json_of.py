@@ -25,7 +25,7 @@ def agree(value: Any, expected: Any, path: str = "$") -> None:
         assert not isinstance(value, float) or math.isfinite(value), f"{path}: {value!r}"
     elif isinstance(expected, dict):
         assert isinstance(value, dict), f"{path}: {value!r}"
-        assert list(value) == list(map(str, expected)), f"{path}: {list(value)}"
+        assert list(value) == list(map(str, expected)), f"{path}: {list(value)} not {[*expected]}"
         for key, inner in expected.items():
             agree(value[str(key)], inner, f"{path}.{key}")
     elif isinstance(expected, list):

@@ -1,7 +1,7 @@
 """One contract for every kind of surface: geometry against formulas and brute force.
 
 Each property is written once and asked of all specimens (`tests/shared/shapes/specimens.py`). A
-new kind is one row there, and one in `random_surfaces.py`.
+new kind is one row there, and one in `random_surfaces.py`; the referee needs its formula, too.
 """
 
 import math
@@ -57,6 +57,7 @@ def test_points_normals_and_u_directions_are_those_of_the_formula(smooth):
     """The referee's, who writes formulas once more and knows nothing of the product's."""
     u, v = some(smooth)
     form = form_of(smooth)
+    assert form is not None, "its formula goes into tests/shared/referee.py, its name into plain.py"
     expected, at, n = form.at(u, v), smooth.point(u, v), smooth.normal(u, v)
     fitted, net = smooth.kind == "parametric", smooth.kind in ("bspline", "parametric")
     off = np.linalg.norm(expected.points - at, axis=1)
