@@ -6,6 +6,7 @@ nothing of the project; it has no environment, and caps on memory, processor tim
 
 from __future__ import annotations
 
+import os
 import resource
 import runpy
 import signal
@@ -66,7 +67,8 @@ def run_apart(script: Path, given: bytes, waiting: float, limits: Limits) -> End
         if done.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
             return Ended(b"", too_slow=True)
         written.seek(0)
-        return Ended(written.read(limits.output))
+        there = os.fstat(written.fileno()).st_size  # room is taken for all that read() is asked for
+        return Ended(written.read(min(there, limits.output)))
 
 
 def folder_of(package: str) -> str | None:
