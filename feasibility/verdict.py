@@ -122,8 +122,7 @@ class PlacementMargin:
     what: str = ""
     """The joint whose limit that is, or the two bodies."""
     along: Array | None = None
-    """(m - 1,) m, how far the surface may be shifted for each segment of the motion, bodies left
-    aside; None of a verdict that was loaded."""
+    """(m - 1,) m, how far the surface may be shifted for each segment; None with a start."""
 
     def share(self, error: PlacementError) -> float:
         """The share of the margin that an error of the placement uses: up to 1 it is certified."""

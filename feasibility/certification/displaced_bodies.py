@@ -42,11 +42,10 @@ LEAST = 1e-12  # [m] so that nothing is divided by 0
 class ClearShare(NamedTuple):
     """How much of a margin bodies allow."""
 
-    share: float
+    along: Array
+    """(m - 1,) share that they allow along each segment."""
     pair: tuple[str, str] | None
-    """What allows no more; None where all is allowed."""
-    row: int
-    """Where that is."""
+    """What allows no more than the least of these; None where all is allowed."""
 
 
 def displaced_share(
@@ -68,16 +67,15 @@ def displaced_share(
     scene = () if task.collision is None else task.collision.scene
     beside = {SURFACE, *(one.name for one in scene)}
     nearer = Nearer(robot, pairings, beside, cells.centres.mean(axis=0))
-    found, some = ClearShare(0.0, None, 0), 1.0
+    along, some, pair = np.zeros(len(pairings[0].low)), 1.0, None
     for calls in (0.0, SHARE_OF_CALLS * sum(one.calls for one in pairings)):
         part = some * most[0], some * most[1]
         clear = clear_share(pairings, nearer.by(moved(*part), *part), calls)
-        share = max(found.share, some * clear.share)
-        found = (found if clear.pair is None else clear)._replace(share=share)
-        some = min(max(LESS, WIDER * share), 1.0)
-        if share == 1.0:
+        along, pair = np.maximum(along, some * clear.along), clear.pair or pair
+        some = min(max(LESS, WIDER * float(along.min())), 1.0)
+        if clear.pair is None:
             break
-    return found
+    return ClearShare(along, pair)
 
 
 def clear_share(pairings: Sequence[Pairing], nearer: Array, calls: float) -> ClearShare:
@@ -85,29 +83,27 @@ def clear_share(pairings: Sequence[Pairing], nearer: Array, calls: float) -> Cle
 
     Of those that allow least planes find out more, or so many calls of coal.
     """
-    found, more, coal = ClearShare(1.0, None, 0), np.maximum(nearer, LEAST), calls > 0.0
-    shares, rows = _shares(pairings, more)
-    for k in np.argsort(shares).tolist():
-        one, share, row = pairings[k], float(shares[k]), int(rows[k])
-        if share < found.share and (calls >= FEW or not coal):
+    more, coal = np.maximum(nearer, LEAST), calls > 0.0
+    shares, least, pair = _shares(pairings, more), 1.0, None
+    for k in np.argsort(shares.min(axis=1)).tolist():
+        one, row = pairings[k], int(shares[k].argmin())
+        if shares[k, row] < least and (calls >= FEW or not coal):
             before = one.calls
             if coal:
-                one.look_closer(row, found.share * more[k], MOST_CALLS * calls)
+                one.look_closer(row, least * more[k], MOST_CALLS * calls)
                 calls -= one.calls - before
             else:
-                one.part_at(row, one.needed + found.share * more[k])
-            (share,), (row,) = (each.tolist() for each in _shares([one], more[[k]]))
-        if share < found.share:
-            found = ClearShare(share, one.names, row)
-    return found
+                one.part_at(row, one.needed + least * more[k])
+            shares[k] = _shares([one], more[[k]])
+        if shares[k].min() < least:
+            least, pair = float(shares[k].min()), one.names
+    return ClearShare(shares.min(axis=0), pair)
 
 
-def _shares(pairings: Sequence[Pairing], more: Array) -> tuple[Array, Array]:
-    """(c,) the share of `more` that couples allow, and the segments that allow no more."""
+def _shares(pairings: Sequence[Pairing], more: Array) -> Array:
+    """(c, m - 1) the share of `more` that couples allow along each segment; 0 where that is NaN."""
     over = np.stack([one.low - one.needed for one in pairings])
-    shares = np.minimum(np.fmax(over / more, 0.0), 1.0)  # 0 where that is NaN
-    rows = shares.argmin(axis=1)
-    return shares[np.arange(len(rows)), rows], rows
+    return np.asarray(np.minimum(np.fmax(over / more, 0.0), 1.0))
 
 
 class Nearer:

@@ -305,9 +305,10 @@ def placement_margin(
         from feasibility.certification.displaced_bodies import displaced_share
 
         clear = displaced_share(robot, cells, task, pairings, (position, angle), balls.moved)
-        position, angle = clear.share * position, clear.share * angle
+        along, share = np.minimum(along, clear.along * position), float(clear.along.min())
+        position, angle = share * position, share * angle
         if clear.pair is not None:
-            row, bound_by, what = clear.row, Bound.CLEARANCE, " and ".join(clear.pair)
+            row, bound_by, what = int(along.argmin()), Bound.CLEARANCE, " and ".join(clear.pair)
     return PlacementMargin(
         position, angle, middle, bound_by, _cell(case, cells, q[row]), what, along
     )

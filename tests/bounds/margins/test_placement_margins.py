@@ -387,12 +387,12 @@ def test_a_share_of_what_bodies_may_move_leaves_them_clear(seed):
     more = {one.names: rng.uniform(0.0, 0.05) * rng.random(len(walk.q) - 1) for one in pairings}
     nearer = np.stack([more[one.names] for one in pairings])
     found = displaced_bodies.clear_share(pairings, nearer, rng.choice([0, 10, 100, 1000]))
-    assert 0.0 <= found.share <= 1.0
+    assert ((found.along >= 0.0) & (found.along <= 1.0)).all()
     needed = np.array([pair[2] for pair in scene.pairs])
     for _ in range(60 if samples.EVERYTHING else 20):
         row, time = rng.integers(len(walk.q) - 1), rng.random()
         at = walk.q[row] + time * (walk.q[row + 1] - walk.q[row])
-        over = found.share * np.array([more[pair[:2]][row] for pair in scene.pairs])
+        over = found.along[row] * np.array([more[pair[:2]][row] for pair in scene.pairs])
         assert (scene.distances(at) >= needed + over - 1e-6).all()
 
 
