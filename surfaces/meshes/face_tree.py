@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.arrays import Array, Ints
-from coverable.kernels import allocating_entry, entry, kernel
+from coverable.kernels import allocating_entry, kernel
 from surfaces.meshes.closest_on_triangle import on_triangle
 
 LEAF = 2  # triangles in a leaf, at most
@@ -41,15 +41,24 @@ class FaceTree(NamedTuple):
     @staticmethod
     def of(corners: Array) -> FaceTree:
         """The tree over triangles (F, 3, 3) m, cut at medians along the widest axis."""
-        count = len(corners)
         depth = 0
-        while count > LEAF << depth:
+        while len(corners) > LEAF << depth:
             depth += 1
-        corners, order = np.ascontiguousarray(corners), np.arange(count)
-        _sort_by_halves(corners.mean(axis=1), depth, order)
-        corners = corners[order]
-        boxes = np.empty(((2 << depth) - 1, 6))
-        _boxes_around(corners, depth, boxes)
+        levels = [(np.arange(1 << level) * len(corners)) >> level for level in range(depth + 1)]
+        order, places = np.arange(len(corners)), corners.mean(axis=1)
+        for starts in levels[:-1]:
+            low, high = (find.reduceat(places[order], starts) for find in (np.fmin, np.fmax))
+            row, axis = np.arange(len(starts)), (high - low).argmax(axis=1)
+            width = np.maximum((high - low)[row, axis], 1e-300)
+            node = np.repeat(row, np.diff(starts, append=len(order)))
+            along = (places[order, axis[node]] - low[node, axis[node]]) / width[node]
+            order = order[np.argsort(node + 0.999 * along)]
+        corners = np.ascontiguousarray(corners[order])
+        low, high = corners.min(axis=1), corners.max(axis=1)
+        ends = [
+            [np.fmin.reduceat(low, starts), np.fmax.reduceat(high, starts)] for starts in levels
+        ]
+        boxes = np.concatenate([np.hstack(one) for one in ends])
         same = SAME * max(float(np.abs(corners).max()), 1e-300)
         scratch = np.empty(depth + 1, dtype=np.int64), np.empty(depth + 1)
         return FaceTree(corners, order, boxes, depth, same, *scratch)
@@ -135,87 +144,3 @@ def nearest_faces(tree, points, faces, weights):  # type: ignore[no-untyped-def]
             faces[i] = tree.order[near]
         else:
             faces[i], weights[i] = -1, np.nan
-
-
-@kernel
-def _widest_axis(places, order, begin, end):  # type: ignore[no-untyped-def]
-    """The axis along which places order[begin:end] spread most."""
-    widest, axis = -1.0, 0
-    for k in range(3):
-        low, high = np.inf, -np.inf
-        for i in range(begin, end):
-            value = places[order[i], k]
-            low, high = min(low, value), max(high, value)
-        if high - low > widest:
-            widest, axis = high - low, k
-    return axis
-
-
-@kernel
-def _part(places, order, begin, end, middle, axis):  # type: ignore[no-untyped-def]
-    """Swap order[begin:end] until none before `middle` is further along the axis than one after.
-
-    Hoare's selection (1961), with the median of three as pivot; of equal numbers it swaps some too,
-    so that many of them take no longer.
-    """
-    low, high = begin, end - 1
-    while low < high:
-        a, b, c = (
-            places[order[low], axis],
-            places[order[(low + high) >> 1], axis],
-            places[order[high], axis],
-        )
-        pivot = max(min(a, b), min(max(a, b), c))
-        i, j = low, high
-        while i <= j:
-            while places[order[i], axis] < pivot:
-                i += 1
-            while places[order[j], axis] > pivot:
-                j -= 1
-            if i <= j:
-                order[i], order[j] = order[j], order[i]
-                i, j = i + 1, j - 1
-        if middle <= j:
-            high = j
-        elif middle >= i:
-            low = i
-        else:
-            return
-
-
-@entry
-def _sort_by_halves(places, depth, order):  # type: ignore[no-untyped-def]
-    """Sort triangles so that the runs of each level are halves of those of the level above.
-
-    Args:
-        places: (F, 3) m, finite, a point of each triangle.
-        depth: levels below the first.
-        order: (F,) numbers of the triangles; sorted.
-    """
-    count = order.shape[0]
-    for level in range(depth):
-        for node in range(1 << level):
-            begin, end = (node * count) >> level, ((node + 1) * count) >> level
-            middle = ((2 * node + 1) * count) >> (level + 1)
-            axis = _widest_axis(places, order, begin, end)
-            _part(places, order, begin, end, middle, axis)
-
-
-@entry
-def _boxes_around(corners, depth, boxes):  # type: ignore[no-untyped-def]
-    """Write the boxes of all nodes, (2^(d + 1) - 1, 6) m, around sorted triangles (F, 3, 3) m."""
-    count = corners.shape[0]
-    first_leaf = (1 << depth) - 1
-    for node in range(boxes.shape[0] - 1, -1, -1):
-        for k in range(3):
-            low, high = np.inf, -np.inf
-            if node < first_leaf:
-                one, other = 2 * node + 1, 2 * node + 2
-                low = min(boxes[one, k], boxes[other, k])
-                high = max(boxes[one, k + 3], boxes[other, k + 3])
-            else:
-                leaf = node - first_leaf
-                for f in range((leaf * count) >> depth, ((leaf + 1) * count) >> depth):
-                    for c in range(3):
-                        low, high = min(low, corners[f, c, k]), max(high, corners[f, c, k])
-            boxes[node, k], boxes[node, k + 3] = low, high

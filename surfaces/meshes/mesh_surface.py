@@ -158,33 +158,24 @@ class MeshSurface(Surface):
 
     def normals_at(self, face: Ints, weights: Array) -> Array:
         """(..., 3) unit normals in the root frame at places of faces, by their weights."""
-        weights = np.asarray(weights)
-        rows = np.ascontiguousarray(face).reshape(-1), weights.reshape(-1, 3)
-        return (self._local_normals(*rows) @ self.rotation.T).reshape(weights.shape)
+        return np.asarray(self._local_normals(face, weights) @ self.rotation.T)
 
     def _local_normals(self, face: Ints, weights: Array) -> Array:
-        """(k, 3) unit normals in the own frame at places of faces (k,), by their weights (k, 3)."""
-        from surfaces.meshes.places_on_faces import normals_on_faces
-
-        normals = np.empty((len(face), 3))
-        places = np.ascontiguousarray(face), np.ascontiguousarray(weights)
-        normals_on_faces(self.corner_normals, self.crease_normals, self.on_crease, *places, normals)
-        return normals
+        """(..., 3) unit normals in the own frame at places of faces, by their weights."""
+        own, share = self.corner_normals[face], self.crease_share(face, weights)
+        turned = own + share[..., None, None] * (self.crease_normals[face] - own)
+        return unit(np.einsum("...c,...ci->...i", weights, turned))
 
     def _over(self, points: Array, face: Ints, weights: Array) -> tuple[Array, Array, Array]:
         """Normals (k, 3) at places of faces (k,); what leads from there to points (k, 3) m.
 
         All in the own frame: vectors (k, 3) m, and their lengths (k,), negative inwards.
         """
-        from surfaces.meshes.places_on_faces import heights_over_faces
-
         normals = self._local_normals(face, weights)
-        off, heights = np.empty_like(normals), np.empty(len(normals))
-        places = np.ascontiguousarray(points), np.ascontiguousarray(face)
-        heights_over_faces(
-            self.face_balls[0], *places, np.ascontiguousarray(weights), normals, off, heights
-        )
-        return normals, off, heights
+        off = points - np.einsum("kc,kci->ki", weights, self.face_balls[0][face])
+        outwards = np.einsum("ki,ki->k", off, normals)
+        lengths = np.sqrt(np.einsum("ki,ki->k", off, off))
+        return normals, off, np.where(outwards < 0.0, -lengths, lengths)
 
     def crease_share(self, face: Ints, weights: Array) -> Array:
         """(...,) how far the normal has turned to that on the crease: 0 off its strip, 1 on it."""

@@ -169,20 +169,33 @@ class MeshCells(Cells):
 
         Of the two cells of each pair and of those that touch both.
         """
-        from surfaces.meshes.cells.closest_in_cells import put_on_cells
+        from surfaces.meshes.face_tree import FaceTree
 
-        surface = self.surface
-        local = np.ascontiguousarray((points - surface.position) @ surface.rotation)
-        faces = np.empty(points.shape[:2], dtype=np.int64)
-        weights = np.empty((*points.shape[:2], 3))
         members, indptr = self.members
-        pairs = np.ascontiguousarray(pairs)
-        near_indptr, near = self.neighbours
-        put_on_cells(
-            surface.face_tree, *surface.face_balls, self.labels, members, indptr,
-            near, near_indptr, pairs, local, faces, weights,
-        )  # fmt: skip
+        local = (points - self.surface.position) @ self.surface.rotation
+        found, at = self.surface.face_tree.nearest(local.reshape(-1, 3))
+        faces, weights = found.reshape(local.shape[:2]), at.reshape(local.shape)
+        # The face of all that is nearest is mostly one of theirs. Where it is not, as where another
+        # part of the mesh is close, a tree of theirs is asked.
+        label, one, other = self.labels[faces], pairs[:, :1], pairs[:, 1:]
+        theirs = (label == one) | (label == other) | (faces < 0)
+        theirs |= self._touching(label, one) & self._touching(label, other)
+        corners = self.surface.face_balls[0]
+        for row in np.flatnonzero(~theirs.all(axis=1)):
+            near, beside = (set(self.neighbours.of(k).tolist()) for k in pairs[row])
+            cells = {*pairs[row].tolist(), *(near & beside)}
+            own = np.sort(np.concatenate([members[indptr[k] : indptr[k + 1]] for k in cells]))
+            away = np.flatnonzero(~theirs[row])
+            found, weights[row, away] = FaceTree.of(corners[own]).nearest(local[row, away])
+            faces[row, away] = own[found]
         return faces, weights
+
+    def _touching(self, one: Ints, other: Ints) -> Mask:
+        """Which cells share a border with others, both broadcast."""
+        keys = self.pairs[:, 0] * len(self) + self.pairs[:, 1]
+        wanted = np.minimum(one, other) * len(self) + np.maximum(one, other)
+        at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+        return np.asarray(keys[at] == wanted) if len(keys) else np.zeros(wanted.shape, dtype=bool)
 
     @cached_property
     def members(self) -> tuple[Ints, Ints]:
