@@ -18,15 +18,17 @@ from typing import NamedTuple
 import numpy as np
 
 from surfaces.adjacency import components
+from surfaces.meshes.cells.subdivision import subdivide
 from surfaces.meshes.mesh_surface import MeshSurface
-from surfaces.meshes.triangle_mesh import doubled_areas
-from surfaces.passes.edge_flips import delaunay
-from surfaces.passes.welded_triangles import WorkingMesh, border_edges, cut_at_middles, edges_of
+from surfaces.meshes.triangle_mesh import areas_of, doubled_areas
+from surfaces.passes.welded_triangles import WorkingMesh, border_edges
 from surfaces.patches.patch import Patch
 from surfaces.piecewise.piecewise_surface import Piecewise
 from surfaces.surface import Surface, SurfaceError
 
 MOST_FACES = 2_000_000
+SHAPE = 4.0  # edge^2 / area of triangles: 2.3 in an equilateral one
+FINER = 8.0  # than its area says: so many of them there may be of a mesh
 SAMPLES = 65  # along each parameter, to see how long its lines are
 MOST_EXACT = 50_000  # faces up to which distances are measured on the surface itself
 COPIED = 20_000  # faces of the copy
@@ -45,7 +47,9 @@ def working_mesh(surface: Surface, edge: float) -> WorkingMesh:
     """
     if isinstance(surface, MeshSurface):
         placed = surface.mesh.vertices @ surface.rotation.T + surface.position
-        return _divided(WorkingMesh(placed, surface.mesh.faces), edge)
+        fewest = float(areas_of(placed, surface.mesh.faces).sum()) / MOST_FACES * FINER
+        fine = subdivide(placed, surface.mesh.faces, max(edge**2 / SHAPE, fewest))
+        return WorkingMesh(fine.vertices, fine.faces)
     if isinstance(surface, Patch):
         return _welded(_grid(surface, edge, 1.0), 0.0)
     if isinstance(surface, Piecewise):
@@ -191,23 +195,3 @@ def _with_points_on_edges(mesh: WorkingMesh, put: dict[tuple[int, int], list[int
 def _first_cut(face: list[int], put: dict[tuple[int, int], list[int]]) -> int | None:
     """The first side of a face on which further vertices lie."""
     return next((k for k in range(3) if (face[k], face[(k + 1) % 3]) in put), None)
-
-
-def _divided(mesh: WorkingMesh, edge: float) -> WorkingMesh:
-    """A mesh whose edges longer than `edge` m are cut, the longest first.
-
-    Flat parts of CAD files come as long thin triangles, of which cutting alone would make far more
-    than their area needs; between the cuts their edges are flipped (Lawson's).
-    """
-    longest = float(mesh.longest_edges.max())
-    while longest > edge and 4 * len(mesh.faces) <= MOST_FACES:
-        longest = max(0.5 * longest, edge)
-        mesh = delaunay(_halved(mesh, longest))
-    return mesh
-
-
-def _halved(mesh: WorkingMesh, edge: float) -> WorkingMesh:
-    """Every edge longer than `edge` m cut in its middle, and the faces with it."""
-    edges = edges_of(mesh.faces)
-    lengths = np.linalg.norm(np.diff(mesh.vertices[edges.ends], axis=1)[:, 0], axis=1)
-    return cut_at_middles(mesh, edges, lengths > edge).mesh
