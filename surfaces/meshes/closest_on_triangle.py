@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable.kernels import kernel
+from coverable.kernels import allocating_entry, kernel
 
 THIN = 1e-4  # [1], square of the sine of the first corner's angle
 
@@ -125,3 +125,11 @@ def _on_thin_triangle(corners, f, x, y, z, weights):  # type: ignore[no-untyped-
             least = away
             weights[i], weights[j], weights[k] = wi, wj, wk
     return least if least < np.inf else np.nan
+
+
+@allocating_entry
+def on_each(corners, points, squares, weights):  # type: ignore[no-untyped-def]
+    """`on_triangle` for a point (F, 3) m of each triangle; fills squares (F,) and weights."""
+    for f in range(corners.shape[0]):
+        x, y, z = points[f, 0], points[f, 1], points[f, 2]
+        squares[f] = on_triangle(corners, f, x, y, z, weights[f])

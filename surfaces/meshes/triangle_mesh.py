@@ -215,3 +215,11 @@ def sum_by(labels: Ints, values: Array, count: int) -> Array:
     if values.ndim == 1:
         return np.bincount(labels, weights=values, minlength=count).astype(float)
     return np.column_stack([sum_by(labels, column, count) for column in values.T])
+
+
+def least_by(labels: Ints, values: Array, same: Array | float = 0.0) -> Ints:
+    """(N,) for each label the first row whose value (F,) is the least, or within `same` of it."""
+    least = np.full(int(labels.max()) + 1, np.inf)
+    np.minimum.at(least, labels, values)
+    rows = np.flatnonzero(values <= (least + same)[labels])
+    return np.asarray(rows[np.unique(labels[rows], return_index=True)[1]])

@@ -9,12 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask, Protected
-from coverable.kernels import allocating, allocating_entry
+from coverable.kernels import allocating_entry
 from surfaces.adjacency import Neighbours
-from surfaces.meshes.closest_on_triangle import on_triangle
-from surfaces.meshes.triangle_mesh import edge_partners, sum_by
+from surfaces.meshes.closest_on_triangle import on_each
+from surfaces.meshes.triangle_mesh import edge_partners, least_by, sum_by
 
 _INSIDE = 0.25  # of sqrt(area): as far from the border as this is well inside (a disc has 0.56)
+_SAME = 1e-12  # of the area: squares of distances that differ by less are equal, the first counts
 _DEEP = 0.8  # of the greatest distance to the border: as good as the greatest
 
 
@@ -72,79 +73,34 @@ def centre_points(mesh: LabelledFaces, areas: Array) -> FacePoints:
     middles = corners.mean(axis=1)
     total = sum_by(labels, areas, count)
     centroids = sum_by(labels, areas[:, None] * middles, count) / total[:, None]
-    order = np.argsort(labels, kind="stable")
-    indptr = np.searchsorted(labels[order], np.arange(count + 1))
-    chosen = np.empty(count, dtype=np.int64)
-    weights = np.empty((count, 3))
-    _choose(corners, middles, mesh.border, order, indptr, centroids, total, chosen, weights)
+    squares, at = np.empty(len(labels)), np.empty((len(labels), 3))
+    on_each(corners, centroids[labels], squares, at)
+    chosen = least_by(labels, squares, _SAME * total)
+    weights = at[chosen]
     points = np.einsum("nk,nkc->nc", weights, corners[chosen])
+    face, k = np.nonzero(mesh.border)
+    ends = np.stack([corners[face, k], corners[face, (k + 1) % 3]], axis=1)
+    inside = np.full(count, math.inf)
+    np.minimum.at(inside, labels[face], _to_segments(points[labels[face]], *ends.swapaxes(0, 1)))
+    for n in np.flatnonzero(inside < _INSIDE**2 * total).tolist():
+        own = np.flatnonzero(labels == n)
+        depths = np.full(len(own), math.inf)
+        for start, end in ends[labels[face] == n]:
+            depths = np.minimum(depths, _to_segments(middles[own], start, end))
+        if inside[n] < depths.max() / 4.0:
+            own = own[depths >= _DEEP**2 * depths.max() - _SAME * total[n]]
+            off = ((middles[own] - centroids[n]) ** 2).sum(axis=1)
+            chosen[n] = own[np.argmax(off <= off.min() + _SAME * total[n])]
+            weights[n], points[n] = 1.0 / 3.0, middles[chosen[n]]
     return FacePoints(points, chosen, weights)
 
 
-@allocating
-def _to_segment(p, a, b):  # type: ignore[no-untyped-def]
-    """The squared distance of p from the segment a-b, m^2."""
-    along, length = 0.0, 0.0
-    for k in range(3):
-        along += (p[k] - a[k]) * (b[k] - a[k])
-        length += (b[k] - a[k]) ** 2
-    t = min(max(along / length, 0.0), 1.0) if length > 0.0 else 0.0
-    square = 0.0
-    for k in range(3):
-        square += (a[k] + t * (b[k] - a[k]) - p[k]) ** 2
-    return square
-
-
-@allocating
-def _depth(p, corners, border, members):  # type: ignore[no-untyped-def]
-    """The squared distance of p from the border of a cell; inf where it has none."""
-    least = math.inf
-    for face in members:
-        for k in range(3):
-            if border[face, k]:
-                square = _to_segment(p, corners[face, k], corners[face, (k + 1) % 3])
-                least = min(least, square)
-    return least
-
-
-@allocating_entry
-def _choose(corners, middles, border, order, indptr, centroids, total, chosen, weights):  # type: ignore[no-untyped-def]
-    """Write each cell's face and the place on it; see `centre_points`."""
-    here = np.empty(3)
-    point = np.empty(3)
-    for n in range(indptr.shape[0] - 1):
-        members = order[indptr[n] : indptr[n + 1]]
-        resolution = 1e-12 * total[n]  # of squared distances: the first of equal ones is taken
-        nearest = math.inf
-        for face in members:
-            x, y, z = centroids[n, 0], centroids[n, 1], centroids[n, 2]
-            square = on_triangle(corners, face, x, y, z, here)
-            if square < nearest - resolution:
-                nearest, chosen[n] = square, face
-                weights[n] = here
-        for k in range(3):
-            point[k] = 0.0
-            for c in range(3):
-                point[k] += weights[n, c] * corners[chosen[n], c, k]
-        inside = _depth(point, corners, border, members)
-        if inside >= _INSIDE**2 * total[n]:
-            continue
-        depths = np.empty(members.shape[0])
-        for m in range(members.shape[0]):
-            depths[m] = _depth(middles[members[m]], corners, border, members)
-        deepest = depths.max()
-        if inside >= deepest / 4.0:
-            continue
-        nearest = math.inf
-        for m in range(members.shape[0]):
-            if depths[m] < _DEEP**2 * deepest - resolution:
-                continue
-            square = 0.0
-            for k in range(3):
-                square += (middles[members[m], k] - centroids[n, k]) ** 2
-            if square < nearest - resolution:
-                nearest, chosen[n] = square, members[m]
-                weights[n, :] = 1.0 / 3.0
+def _to_segments(points: Array, start: Array, end: Array) -> Array:
+    """(k,) m^2, squared distances of points from segments, both (k, 3) m or one of either."""
+    along = end - start
+    share = ((points - start) * along).sum(axis=-1) / (along * along).sum(axis=-1)
+    off = start + np.clip(share, 0.0, 1.0)[:, None] * along - points
+    return np.asarray((off * off).sum(axis=1))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -243,23 +199,18 @@ def clockwise_neighbours(borders: SharedBorders, centres: Array, normals: Array)
         centres: (N, 3) m.
         normals: (N, 3) unit normals at the centres.
     """
-    count = len(centres)
-    owner = np.concatenate([borders.pairs[:, 0], borders.pairs[:, 1]])
-    other = np.concatenate([borders.pairs[:, 1], borders.pairs[:, 0]])
+    owner, other = np.concatenate([borders.pairs, borders.pairs[:, ::-1]]).T
     middle = np.concatenate([borders.midpoints, borders.midpoints])
     # Angles from the direction of the lowest neighbour, which so comes first.
     order = np.lexsort((other, owner))
     owner, other, middle = owner[order], other[order], middle[order]
-    indptr = np.zeros(count + 1, dtype=np.int64)
-    np.cumsum(np.bincount(owner, minlength=count), out=indptr[1:])
+    lowest = np.searchsorted(owner, owner)
     away = middle - centres[owner]
-    first = away[indptr[:-1][owner]]
-    normal = normals[owner]
+    first, normal = away[lowest], normals[owner]
     ahead = np.einsum("ij,ij->i", first, away) - (
         np.einsum("ij,ij->i", first, normal) * np.einsum("ij,ij->i", away, normal)
     )
     right = np.einsum("ij,ij->i", normal, np.cross(away, first))
     angle = np.arctan2(right, ahead) % (2.0 * np.pi)
-    angle[indptr[:-1][owner] == np.arange(len(owner))] = -1.0
-    order = np.lexsort((other, angle, owner))
-    return Neighbours(indptr, other[order])
+    angle[lowest == np.arange(len(owner))] = -1.0
+    return Neighbours.listed(owner, other, angle, len(centres))

@@ -14,6 +14,7 @@ import numpy as np
 
 from coverable.arrays import Array, Ints
 from coverable.kernels import allocating, allocating_entry
+from surfaces.meshes.triangle_mesh import least_by, sum_by
 
 DETOUR = 1.35
 """Over flat ground, steps from face to face are at most about this much longer than the straight
@@ -242,8 +243,9 @@ def flood(across, step, centre, seeds, anchors, offsets, labels):  # type: ignor
                 size += 1
 
 
-@allocating_entry
-def recentre(centre, normal, area, labels, seeds, anchors):  # type: ignore[no-untyped-def]
+def recentre(
+    centre: Array, normal: Array, area: Array, labels: Ints, seeds: Ints, anchors: Array
+) -> None:
     """Move each seed to the face nearest to its cell's centroid, and its anchor to the centroid.
 
     Args:
@@ -254,33 +256,12 @@ def recentre(centre, normal, area, labels, seeds, anchors):  # type: ignore[no-u
         seeds: (N,) written.
         anchors: (N, 3) written: the centroid, put onto the plane of the seed.
     """
-    anchors[:] = 0.0
-    areas = np.zeros(seeds.shape[0])
-    for face in range(labels.shape[0]):
-        n = labels[face]
-        areas[n] += area[face]
-        for k in range(3):
-            anchors[n, k] += area[face] * centre[face, k]
-    for n in range(seeds.shape[0]):
-        for k in range(3):
-            anchors[n, k] /= areas[n]
-    best = np.full(seeds.shape[0], np.int64(1) << 60)
-    for face in range(labels.shape[0]):
-        n = labels[face]
-        dx = centre[face, 0] - anchors[n, 0]
-        dy = centre[face, 1] - anchors[n, 1]
-        dz = centre[face, 2] - anchors[n, 2]
-        key = units(math.sqrt(dx * dx + dy * dy + dz * dz))
-        if key < best[n]:
-            best[n] = key
-            seeds[n] = face
-    for n in range(seeds.shape[0]):
-        face = seeds[n]
-        height = 0.0
-        for k in range(3):
-            height += (centre[face, k] - anchors[n, k]) * normal[face, k]
-        for k in range(3):
-            anchors[n, k] += height * normal[face, k]
+    sums = sum_by(labels, area[:, None] * centre, len(seeds))
+    anchors[:] = sums / sum_by(labels, area, len(seeds))[:, None]
+    off = np.linalg.norm(centre - anchors[labels], axis=1)
+    seeds[:] = least_by(labels, np.floor(off * _FINE + 0.347))
+    heights = ((centre[seeds] - anchors) * normal[seeds]).sum(axis=1)
+    anchors += heights[:, None] * normal[seeds]
 
 
 @allocating_entry
