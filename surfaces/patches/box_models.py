@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.arrays import Array, Ints
-from surfaces.parts import ABSOLUTE, RELATIVE, PartModels
+from surfaces.parts import PartModels
 from surfaces.patches import bernstein
 from surfaces.patches.enclosure_functions import Enclosure
 
@@ -75,16 +75,6 @@ class VectorModel(NamedTuple):
         by_axis = [each[:, 0].sum(axis=0) + mixed, each[0].sum(axis=0) + mixed]
         return VectorModel(centre + shift, slopes, radius, np.stack(by_axis, axis=1), twist)
 
-    def guarded(self) -> VectorModel:
-        """The same with room for rounding; see `PartModels.guarded`."""
-        known = np.isfinite(self.radius) & np.isfinite(self.centre).all(axis=1)
-        known &= np.isfinite(self.slopes).all(axis=(1, 2))
-        radius = np.where(known, self.radius * (1.0 + RELATIVE) + ABSOLUTE, np.inf)
-        centre = np.where(known[:, None], self.centre, 0.0)
-        return self._replace(
-            centre=centre, slopes=np.where(known[:, None, None], self.slopes, 0.0), radius=radius
-        )
-
 
 def _lengths(vectors: Array) -> Array:
     return np.asarray(np.sqrt(np.einsum("...d,...d->...", vectors, vectors)))
@@ -106,16 +96,6 @@ def _in_plane(slopes: Array, twist: Array) -> Array:
     return np.asarray(np.einsum("ks,ksd->kd", shares, slopes))
 
 
-def models_of(points: VectorModel, normals: VectorModel) -> PartModels:
-    """Both in one."""
-    return PartModels(
-        np.concatenate([points.centre, normals.centre], axis=-1),
-        np.concatenate([points.slopes, normals.slopes], axis=-1),
-        np.stack([points.radius, normals.radius], axis=-1),
-        np.stack([points.along, normals.along], axis=-1),
-    )
-
-
 def over_boxes(
     formula: Formula, low: Array, high: Array, twisted: bool = False
 ) -> tuple[PartModels, Array]:
@@ -130,17 +110,11 @@ def over_boxes(
     with np.errstate(all="ignore"):  # what is not known is infinite
         variables = (Enclosure.variable(low[:, axis], high[:, axis], axis) for axis in (0, 1))
         points, normals = formula(*variables)
-        of_points = VectorModel.of(points, twisted)
-        return models_of(of_points, VectorModel.of(normals)), of_points.twist
-
-
-def vectors_over(
-    formula: Callable[[Enclosure, Enclosure], Enclosure], low: Array, high: Array
-) -> VectorModel:
-    """Models of vectors over boxes of parameters (k, 2), likewise."""
-    with np.errstate(all="ignore"):
-        variables = (Enclosure.variable(low[:, axis], high[:, axis], axis) for axis in (0, 1))
-        return VectorModel.of(formula(*variables))
+        one = VectorModel.of(points, twisted)
+        other = one if normals is points else VectorModel.of(normals)
+    joined = [np.concatenate(two, axis=-1) for two in zip(one[:2], other[:2], strict=True)]
+    beside = [np.stack(two, axis=-1) for two in zip(one[2:4], other[2:4], strict=True)]
+    return PartModels(*joined, *beside), one.twist
 
 
 class Pieces(NamedTuple):

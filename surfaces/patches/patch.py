@@ -17,13 +17,7 @@ from numpy.typing import ArrayLike
 
 from coverable.arrays import Array, Ints, Mask
 from surfaces.parts import MOST_PARTS, PartModels, SurfaceParts
-from surfaces.patches.box_models import (
-    Pieces,
-    VectorModel,
-    models_of,
-    over_boxes,
-    vectors_over,
-)
+from surfaces.patches.box_models import Formula, Pieces, over_boxes
 from surfaces.patches.enclosures import Enclosure, enclosed
 from surfaces.surface import TURN_TOLERANCE, ClosestPoint, Surface, SurfaceError, points_of
 
@@ -141,11 +135,15 @@ class Patch(Surface):
         self, low: Array, high: Array, twisted: bool = False
     ) -> tuple[PartModels, Array]:
         """Models over boxes of parameters (k, 2) in the own frame, and t; see `twisted_models`."""
+        return self._models(self.local_enclosures, low, high, twisted)
+
+    def _models(
+        self, formula: Formula, low: Array, high: Array, twisted: bool = False
+    ) -> tuple[PartModels, Array]:
+        """Those of a formula, which is smooth between `breaks`."""
         pieces = Pieces.of(self.breaks, low, high)
         cut = len(pieces.box) > len(low)
-        found, twist = over_boxes(
-            self.local_enclosures, pieces.low, pieces.high, twisted and not cut
-        )
+        found, twist = over_boxes(formula, pieces.low, pieces.high, twisted and not cut)
         if cut:
             return pieces.merged(found, low, high), np.zeros((len(low), 3))
         return found, twist
@@ -173,18 +171,14 @@ class Patch(Surface):
         found, twist = self.local_models(low, high, twisted=True)
         return found.placed(self.rotation, self.position), twist @ self.rotation.T
 
-    def tangent_models(self, low: Array, high: Array) -> VectorModel:
-        """Models of the unit directions in which u grows, over boxes (k, 2), in the root frame."""
-        pieces = Pieces.of(self.breaks, low, high)
-        found = vectors_over(self.local_tangents, pieces.low, pieces.high)
-        if len(pieces.box) > len(low):
-            both = pieces.merged(models_of(found, found), low, high)
-            found = VectorModel(
-                both.centre[:, 3:], both.slopes[..., 3:], both.radius[:, 1], both.along[..., 1],
-                np.zeros((len(low), 3)),
-            )  # fmt: skip
-        turned = self.rotation.T
-        return found._replace(centre=found.centre @ turned, slopes=found.slopes @ turned)
+    def tangent_models(self, low: Array, high: Array) -> PartModels:
+        """Models of the unit directions in which u grows, in place of normals, likewise."""
+
+        def both(u: Enclosure, v: Enclosure) -> tuple[Enclosure, Enclosure]:
+            found = self.local_tangents(u, v)
+            return found, found
+
+        return self._models(both, low, high)[0].placed(self.rotation, self.position)
 
     def parts(self, flat: float, straight: float, most: int = MOST_PARTS) -> SurfaceParts:
         """See `Surface.parts`."""

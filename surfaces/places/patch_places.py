@@ -86,7 +86,7 @@ class PatchPlaces(OffsetSurface):
         one, other = start.x[some], end.x[some]
         try:
             low, high = np.minimum(one, other), np.maximum(one, other)
-            found[some] = 2.0 * _known(self.patch.tangent_models(low, high).radius)
+            found[some] = 2.0 * _known(self.patch.tangent_models(low, high).radius[:, 1])
         except SurfaceError:
             found[some] = _measured(lambda x: self.patch.tangent(x[..., 0], x[..., 1]), one, other)
         return found

@@ -91,9 +91,9 @@ def test_models_over_any_boxes_hold_their_places_and_hardly_less_would(patch, se
     small, tiny = (half <= 0.02 * np.ptp(ends, axis=1)).all(axis=1), np.abs(ends).max() * 1e-14
     inner = (np.abs(x) < 0.99).all(axis=2)  # u directions are differences
     for k, values in enumerate((patch.point(u, v), patch.normal(u, v), patch.tangent(u, v))):
-        some, model = slice(3 * k, 3 * k + 3), both if k < 2 else along
-        centre, slopes = (a[..., some] if k < 2 else a for a in (model.centre, model.slopes))
-        radius = model.radius[:, k] if k < 2 else model.radius
+        half_of, model = min(k, 1), both if k < 2 else along
+        some, radius = slice(3 * half_of, 3 * half_of + 3), model.radius[:, half_of]
+        centre, slopes = model.centre[..., some], model.slopes[..., some]
         off = values - centre[:, None] - np.einsum("kgc,kcd->kgd", x, slopes)
         off = np.linalg.norm(off, axis=2) * (inner if k == 2 else 1.0)
         off[~np.isfinite(radius)] = 0.0
