@@ -100,10 +100,7 @@ def _models(
     patch: Patch, low: Array, high: Array, sign: float, twisted: bool
 ) -> tuple[PartModels, Array]:
     """The models over boxes of parameters, in the root frame, and t."""
-    if not twisted:
-        models = patch.placed_models(low, high, sign).guarded()
-        return models, np.zeros_like(models.centre[:, :3])
-    found, twist = patch.twisted_models(low, high)
+    found, twist = patch.placed_models(low, high, sign, twisted)
     models = found.guarded()
     known = np.isfinite(models.radius[:, 0]) & np.isfinite(twist).all(axis=1)
     return models, np.where(known[:, None], twist, 0.0)

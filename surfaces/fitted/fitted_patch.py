@@ -42,14 +42,11 @@ class FittedPatch(SplinePatch):
         """See `Surface.deviations`."""
         return self.off
 
-    def placed_models(self, low: Array, high: Array, sign: float = 1.0) -> PartModels:
+    def placed_models(
+        self, low: Array, high: Array, sign: float = 1.0, twisted: bool = False
+    ) -> tuple[PartModels, Array]:
         """Of the surface meant: those of the spline, wider by what it may deviate."""
-        found = SplinePatch.placed_models(self, low, high, sign)
-        return found._replace(radius=found.radius + np.array(self.off))
-
-    def twisted_models(self, low: Array, high: Array) -> tuple[PartModels, Array]:
-        """Likewise."""
-        found, twist = SplinePatch.twisted_models(self, low, high)
+        found, twist = SplinePatch.placed_models(self, low, high, sign, twisted)
         return found._replace(radius=found.radius + np.array(self.off)), twist
 
 

@@ -134,7 +134,7 @@ class Patch(Surface):
     def local_models(
         self, low: Array, high: Array, twisted: bool = False
     ) -> tuple[PartModels, Array]:
-        """Models over boxes of parameters (k, 2) in the own frame, and t; see `twisted_models`."""
+        """Models over boxes of parameters (k, 2) in the own frame, and t; see `placed_models`."""
         return self._models(self.local_enclosures, low, high, twisted)
 
     def _models(
@@ -157,19 +157,18 @@ class Patch(Surface):
         ends = np.array([self.u_range, self.v_range])
         return ends[None, :, 0] - 2.0 * EDGE, ends[None, :, 1] + 2.0 * EDGE
 
-    def placed_models(self, low: Array, high: Array, sign: float = 1.0) -> PartModels:
-        """Models over boxes of parameters in the root frame; sign -1.0 turns normals over."""
-        found, _ = self.local_models(low, high)
-        return found.placed(self.rotation, self.position, sign)
+    def placed_models(
+        self, low: Array, high: Array, sign: float = 1.0, twisted: bool = False
+    ) -> tuple[PartModels, Array]:
+        """Models over boxes of parameters in the root frame; sign -1.0 turns normals over.
 
-    def twisted_models(self, low: Array, high: Array) -> tuple[PartModels, Array]:
-        """The same with closer points, + x_1 x_2 t; see `VectorModel`.
+        Twisted, those of points are closer, + x_1 x_2 t; see `VectorModel`.
 
         Returns:
             The models, and t (k, 3) m in the root frame; zero where there is no closer model.
         """
-        found, twist = self.local_models(low, high, twisted=True)
-        return found.placed(self.rotation, self.position), twist @ self.rotation.T
+        found, twist = self.local_models(low, high, twisted)
+        return found.placed(self.rotation, self.position, sign), twist @ self.rotation.T
 
     def tangent_models(self, low: Array, high: Array) -> PartModels:
         """Models of the unit directions in which u grows, in place of normals, likewise."""
@@ -189,7 +188,7 @@ class Patch(Surface):
         return grown(roots, flat, straight, most)
 
     def _root_models(self, root: Ints, low: Array, high: Array) -> PartModels:
-        return self.placed_models(low, high)
+        return self.placed_models(low, high)[0]
 
     def point(self, u: ArrayLike, v: ArrayLike) -> Array:
         """Points (..., 3) m of the surface in the root frame."""

@@ -147,7 +147,7 @@ class Piecewise(Surface):
         def bounds(root: Ints, low: Array, high: Array) -> PartModels:
             some = [np.flatnonzero(owner[root] == k) for k in range(len(roots))]
             models = [
-                patch.placed_models(low[rows], high[rows], sign)
+                patch.placed_models(low[rows], high[rows], sign)[0]
                 for (patch, sign), rows in zip(self.charts, some, strict=True)
                 if len(rows)
             ]

@@ -86,9 +86,10 @@ def test_a_grid_runs_through_its_points_and_near_the_surface_they_are_of(name):
 def test_models_are_wider_by_what_a_spline_deviates():
     found = parametric(*EQUAL["torus"][:3])
     further = replace(found, off=(1e-3 + found.off[0], 1e-2 + found.off[1]))
-    for name in ("placed_models", "twisted_models"):
-        one, other = (getattr(each, name)(*each.part_roots) for each in (found, further))
-        one, other = (each[0] if name == "twisted_models" else each for each in (one, other))
+    for twisted in (False, True):
+        one, other = (
+            each.placed_models(*each.part_roots, 1.0, twisted)[0] for each in (found, further)
+        )
         np.testing.assert_allclose(other.radius - one.radius, [[1e-3, 1e-2]])
 
 
