@@ -55,7 +55,10 @@ def _needed(prober: Prober, steps: Steps, removable: Steps) -> Steps:
     needed = steps
     for step in removable:
         rest = tuple(other for other in needed if other is not step)
-        if len(needed) > 1 and prober.at(rest, prober.at(needed).walk).walk:
+        if len(needed) < 2:
+            break
+        # A motion that uses all of them may lead to none with fewer, and a search alone to one.
+        if prober.at(rest, prober.at(needed).walk).walk or prober.judged(rest).walk:
             needed = rest
     return needed
 
