@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -33,6 +33,8 @@ class Problem:
     task: Task
     searched: Task
     """The task that the search keeps to: `task`, or a little less than it, see `narrowed`."""
+    tried: dict[Any, Any] = field(default_factory=dict)
+    """Proofs that one attempt looked for and the next need not, see `roadmap/blockers.py`."""
 
     @classmethod
     def of(cls, robot: Robot, cells: Cells, task: Task, *others: Given) -> Problem:
@@ -116,7 +118,7 @@ class Problem:
         searched = replace(
             task, cone_deg=(1.0 - cone) * task.cone_deg, roll_deg=roll_deg, collision=collision
         )
-        return replace(self, robot=robot.with_limits(limits), searched=searched)
+        return replace(self, robot=robot.with_limits(limits), searched=searched, tried={})
 
     @property
     def in_pieces(self) -> Problem | None:

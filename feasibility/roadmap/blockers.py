@@ -22,6 +22,9 @@ POSE_BOXES, ALL_POSE_BOXES = 4_000, 20_000  # of tilt and roll, of one cell and 
 ARM_BOXES, ALL_ARM_BOXES = 30_000, 40_000  # of joint values
 GUESSES = 30  # at a configuration over the cell, of which none may be seen to be clear
 
+Tried = tuple[int, tuple[tuple[str, str], ...]]
+"""A cell, and the pairs of bodies that count."""
+
 
 @dataclass(eq=False)
 class Blockers:
@@ -31,7 +34,10 @@ class Blockers:
     task: Task
     bodies: Bodies
     collisions: ArmCollisions
-    left: int
+    tried: dict[Tried, tuple[int, ArmCheck]]
+    """What boxes of joint values said, and how many were allowed. The shapes are those of the
+    judge, so it holds for the same arm with its links cut into pieces, too."""
+    left: int = ALL_ARM_BOXES
     """Boxes of joint values that may still be looked at."""
     poses_left: int = ALL_POSE_BOXES
     """Boxes of tilt and roll that may still be looked at."""
@@ -78,19 +84,24 @@ class Blockers:
         found = [q for q in guesses if project_near_cell(arrays, work, cell, q, PROJECTION_STEPS)]
         if not found or self.collisions.any_clear(np.array(found), cell):
             return ArmCheck(False, 0)
-        return self.collisions.check(cell, tick, min(ARM_BOXES, self.left))
+        which = cell, tuple((pair.first, pair.second) for pair in self.bodies.pairs)
+        most = min(ARM_BOXES, self.left)
+        if which not in self.tried or self.tried[which][0] < most:
+            self.tried[which] = most, self.collisions.check(cell, tick, most)
+        return self.tried[which][1]
 
 
 def blockers_of(
-    robot: Robot, cells: Cells, task: Task, boxes: int = ALL_ARM_BOXES
+    robot: Robot, cells: Cells, task: Task, tried: dict[Tried, tuple[int, ArmCheck]] | None = None
 ) -> Blockers | None:
     """What may keep an arm from cells of a surface; None where collisions are not checked.
 
     Args:
         robot, cells, task: the problem.
-        boxes: of joint values that may be looked at for all its cells.
+        tried: what another attempt at this problem has tried; filled here.
     """
     bodies = gather(robot, cells.surface, task.collision, task.standoff)
     if bodies is None:
         return None
-    return Blockers(robot, task, bodies, ArmCollisions(robot, cells, task, bodies), boxes)
+    known = {} if tried is None else tried
+    return Blockers(robot, task, bodies, ArmCollisions(robot, cells, task, bodies), known)

@@ -78,8 +78,9 @@ def _search(
         problem.cells.curves  # noqa: B018 - part of the cells, made once
     clock.start()
     exploration = exploration_of(
-        problem.robot, problem.cells, problem.task, search.seed, clock, problem.searched
-    )
+        problem.robot, problem.cells, problem.task, search.seed, clock, problem.searched,
+        problem.tried,
+    )  # fmt: skip
     exploration.early = search.early
     proving: Proving | None = None
     late, known, run = "", None, None

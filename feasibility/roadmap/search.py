@@ -10,6 +10,8 @@ A verdict with a witness or a proof does not depend on the order or on chance; w
 verdict is "exhausted", and its message says what was tried.
 """
 
+from typing import Any
+
 import numpy as np
 
 from feasibility.clock import Clock
@@ -30,12 +32,14 @@ def exploration_of(
     seed: int,
     clock: Clock | None = None,
     searched: Task | None = None,
+    tried: dict[Any, Any] | None = None,
 ) -> Exploration:
     """An exploration that has not begun, with proofs that collisions keep the arm from cells.
 
     Args:
         robot, cells, task, seed, clock: of the search.
         searched: the task that it keeps to, where that is narrower than `task`.
+        tried: of an attempt before, with links of other shapes; what is tried now is added.
 
     Raises:
         OutOfTime: the deadline passed.
@@ -47,7 +51,7 @@ def exploration_of(
     if len(arrays.collisions):
         from feasibility.roadmap.blockers import blockers_of
 
-        blockers = blockers_of(robot, cells, task)
+        blockers = blockers_of(robot, cells, task, tried)
     return Exploration(robot, cells, arrays, seed, clock, blockers)
 
 
