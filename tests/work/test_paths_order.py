@@ -40,6 +40,10 @@ def test_grid_orders_step_from_cell_to_the_next_wherever_they_begin(order, shape
     assert (np.diff({"rows": i, "columns": j, "spiral": inwards}[order]) >= 0).all()
 
 
+def test_a_side_of_two_rows_does_not_close():
+    assert orders.closed_sides(plane((0, 1), (0, 1), "outside").cells(2, 2)) == (False, False)
+
+
 @sampled("seed", seeds(8, all=200))
 def test_an_improved_tour_has_no_better_neighbour(seed):
     """Of those with a part turned round, or a part of up to three moved elsewhere."""
