@@ -15,6 +15,7 @@ from samples import sampled, seeds, spread
 import coverable
 from coverable import PathError, Task, check, coverage_path, cylinder, load_robot, plane, replay
 from feasibility.paths.ladder import joint_route
+from feasibility.paths.metrics import revisiting
 from feasibility.paths.motion_graph import MotionGraph
 from feasibility.paths.order import ORDERS, closed_sides, grid_order
 from feasibility.paths.winding import unwound
@@ -105,6 +106,11 @@ def test_where_no_motion_leads_on_all_until_there_is_run_a_turn_earlier():
     assert found.stuck == []
     assert found.revisited == 0.0
     assert graph.walk(found.nodes).q == pytest.approx(np.vstack([q[0] + q[2] - q[1], q[2:]]))
+
+
+def test_what_leads_to_a_cell_visited_before_is_revisited():
+    walk = Walk(np.zeros((5, 1)), np.array([0, 1, -1, 0, 2]))
+    assert revisiting(walk).tolist() == [False, True, True, False]
 
 
 @pytest.mark.parametrize("name", ["4c", "5c", *PATCHES])
