@@ -29,6 +29,8 @@ class Language:
     """Decimals of times in s."""
     period: float = 0.1
     """s between points, by default."""
+    frame: str = "X Y Z Rx Ry Rz"
+    """What mm and degrees (about axes as they stand) of a frame are called; see `frame_words`."""
 
 
 def _numbered(name: str) -> tuple[str, ...]:
@@ -43,7 +45,7 @@ RAPID = Language(
     "RAPID", "mod", "ABB", tuple(f"eax_{letter}" for letter in "abcdef"), _numbered("rax_{}")
 )
 KRL = Language("KRL", "src", "KUKA", _numbered("E{}"), _numbered("A{}"))
-TP = Language("TP", "ls", "FANUC", (), _numbered("J{}"), time_digits=3)
+TP = Language("TP", "ls", "FANUC", (), _numbered("J{}"), time_digits=3, frame="X Y Z W P R")
 INFORM = Language("INFORM", "jbi", "Yaskawa", (), tuple("SLURBT"), "pulses", 0)
 LANGUAGES = (URSCRIPT, RAPID, KRL, TP, INFORM)
 

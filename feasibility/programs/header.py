@@ -10,7 +10,7 @@ from coverable.arrays import Array
 from coverable.errors import counted
 from feasibility.collisions.words import listed_words
 from feasibility.programs.controller_axes import AxisMap
-from feasibility.programs.controllers import INFORM, KRL, RAPID, TP, URSCRIPT, Language
+from feasibility.programs.controllers import KRL, RAPID, URSCRIPT, Language
 from feasibility.timing.sampled_trajectory import Trajectory
 from feasibility.version import version
 from robots.robot import Robot
@@ -38,8 +38,7 @@ def frame_words(language: Language, frame: Array) -> str:
         return f"[[{','.join(mm)}],[{','.join(quaternion)}]]"
     if language is KRL:
         return "{" + _named("X Y Z A B C", [*mm, *reversed(fixed)], ", ") + "}"
-    names = {TP: "X Y Z W P R", INFORM: "X Y Z Rx Ry Rz"}[language]
-    return f"{_named(names, [*mm, *fixed], ' ')} (mm, deg)"
+    return f"{_named(language.frame, [*mm, *fixed], ' ')} (mm, deg)"
 
 
 def head(
