@@ -57,5 +57,5 @@ def test_no_kernel_that_counts_no_references_returns_an_array() -> None:
         for overload in found.overloads.values():
             seen += 1
             assert not holds_arrays(overload.signature.return_type), name
-    assert counting > 5
+    assert counting > 1
     assert seen > 5  # those that were called from Python
