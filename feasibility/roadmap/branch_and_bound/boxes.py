@@ -91,8 +91,7 @@ class BoxWork(NamedTuple):
 
 def box_work(m: int) -> BoxWork:
     """Working memory for boxes of m intervals."""
-    shapes = m, m, (3, 3), (3, 3, m), (3, m), 3, m
-    return BoxWork(*(np.zeros(shape) for shape in shapes))
+    return BoxWork(*(np.zeros(shape) for shape in (m, m, (3, 3), (3, 3, m), (3, m), 3, m)))
 
 
 def box_of(low: Array, high: Array, parameters: int = 0) -> BoxStack:

@@ -46,19 +46,26 @@ def _split(arrays, places, part, driver, space, low, high):  # type: ignore[no-u
 
     The one with most effect on the constraint that is closest to ruling the box out.
     """
-    n, m = arrays.lower.shape[0], low.shape[0]
+    n, m, moves = arrays.lower.shape[0], low.shape[0], space.row
     worst, largest, off = -1, 0.0, 0.0
     for j in range(m):
-        move, width = 0.0, high[j] - low[j]
-        for which in range(3 if rolls_over(arrays, places, part) else 2):
-            move += _weight(arrays, which, driver) * space.lever[which, j] * width
-        thickness = width if j < n else max(space.lever[0, j], space.lever[1, j]) * width
-        if thickness > THINNEST and move > largest:
-            worst, largest = j, move
+        moves[j] = 0.0
+    for which in range(3 if rolls_over(arrays, places, part) else 2):
+        weight, behind = _weight(arrays, which, driver), 0.0
+        for j in range(m - 1, -1, -1):
+            far = space.lever[which, j]
+            if j < n:  # a turn moves what the joints behind it have moved, too
+                far += 0.0 if arrays.chain.prismatic[j] else behind
+                far = far if which == 0 else min(far, 1.0)
+                behind += far * space.half[j]
+            moves[j] += weight * far * (high[j] - low[j])
+        off += weight * places.radius[part, which]
+    for j in range(m):
+        thickness = 1.0 if j < n else max(space.lever[0, j], space.lever[1, j])
+        if thickness * (high[j] - low[j]) > THINNEST and moves[j] > largest:
+            worst, largest = j, moves[j]
     if places.children[part, 0] < 0:
         return worst
-    for which in range(3 if rolls_over(arrays, places, part) else 2):
-        off += _weight(arrays, which, driver) * places.radius[part, which]
     return m if worst < 0 or worst >= n or 2.0 * off > largest else worst
 
 

@@ -80,8 +80,6 @@ class CutFindings:
         self.over_places = with_free_roll(self.arrays) if left_out else self.arrays
         self.samples = np.empty((0, n))
 
-    # -- points of the motion set --------------------------------------------------------------
-
     def look_around(self, limits: JointRegion) -> None:
         """More points of the motion set inside the limits, unless there are enough."""
         if self.newton and len(self.samples) < MOST_SAMPLES:
@@ -136,8 +134,6 @@ class CutFindings:
         """The cell whose target point is nearest to the tool point."""
         point, _ = tool(self.arrays.chain, q)
         return int(np.argmin(np.linalg.norm(self.arrays.points - point, axis=1)))
-
-    # -- statements ----------------------------------------------------------------------------
 
     def statement(self, region: JointRegion, cell: int = -1) -> Statement:
         """'In the region the tool is nowhere on the surface', or not over a cell, as left."""
