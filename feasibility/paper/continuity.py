@@ -1,10 +1,7 @@
 """Continuity between neighbouring E-cells, from Python: one arm, one start, one call at a time."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,10 +17,6 @@ from feasibility.task import Task
 from robots.robot import Robot
 from surfaces.cells import Cells
 from surfaces.patches.grid_cells import GridCells
-
-if TYPE_CHECKING:
-    from surfaces.patches.closed_form_kernels import PatchKernel
-    from surfaces.triangle_kernel import TriangleKernel
 
 CAP = 20_000  # J-cells of one call at the step below, unless the search says otherwise
 CAP_STEP_DEG = 0.01
@@ -98,7 +91,7 @@ class JSpace:
         self.steps = Steps.of(robot, cells, task, search) if steps is None else steps
         size, triangles = self.steps.size, self.steps.triangles
         self._chain, self._cells = robot.chain, cells
-        self._place: tuple[PatchKernel | None, TriangleKernel | None] = (
+        self._place = (
             cells.patch_kernel if triangles is None and isinstance(cells, GridCells) else None,
             None if triangles is None else triangles.kernel,
         )

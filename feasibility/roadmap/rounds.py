@@ -39,16 +39,12 @@ MOST_RULED = 500  # cells examined in a row without reaching any; on a fine grid
 NEWTON_STARTS = 25
 
 
-Between = Callable[[int], None]
-"""Called after so many rounds without gain, to try something else."""
-
-
-def explore(exploration: Exploration, between: Between | None = None) -> None:
+def explore(exploration: Exploration, between: Callable[[int], None] | None = None) -> None:
     """Run the search to its end, from step 6 on; the exploration holds the result.
 
     Args:
         exploration: the search.
-        between: what to try between rounds, see `Between`.
+        between: called after so many rounds without gain, to try something else.
 
     Raises:
         OutOfTime: the deadline passed; the exploration holds what was found until then.
@@ -57,7 +53,7 @@ def explore(exploration: Exploration, between: Between | None = None) -> None:
         go_on(exploration, between)
 
 
-def go_on(exploration: Exploration, between: Between | None) -> None:
+def go_on(exploration: Exploration, between: Callable[[int], None] | None) -> None:
     """`explore`, from step 7 on."""
     _unreached(exploration)
     _rounds(exploration, between)
@@ -168,7 +164,7 @@ def evenly(cells: Ints) -> Ints:
     return cells[np.argsort(np.modf(golden * np.arange(len(cells)))[0], kind="stable")]
 
 
-def _rounds(exploration: Exploration, between: Between | None) -> None:
+def _rounds(exploration: Exploration, between: Callable[[int], None] | None) -> None:
     """Step 8: rounds of seeding and exploring, until some in a row have gained nothing.
 
     What is gained are cells of the largest components. A small component that is found, joins
