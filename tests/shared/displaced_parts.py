@@ -43,11 +43,6 @@ def turned(rotations, vectors):
     return np.einsum("kij,kj->ki", rotations, vectors)
 
 
-def given(robot, task, pivot):
-    """What the bounds of a motion need to know besides it."""
-    return lemma.Given(robot, task, pivot, Kinematics(robot))
-
-
 def placed(frames, joint, points):
     """(k, 3) points on a joint, each in its own one of the frames."""
     return turned(frames.rotations[:, joint], points) + frames.points[:, joint]
@@ -60,7 +55,8 @@ def margin_and_balls(robot, cells, task, walk):
     kept = found.certificate.margin
     pairings = getattr(kept, "args", ((),))[0]
     *_, q, room = getattr(kept, "func", kept).__wrapped__.args
-    balls = lemma.balls_along(given(robot, task, cells.centres.mean(axis=0)), q, room)
+    case = lemma.Given(robot, task, cells.centres.mean(axis=0), Kinematics(robot))
+    balls = lemma.balls_along(case, q, room)
     return found.certificate.placement_margin, balls, pairings
 
 
