@@ -57,7 +57,9 @@ class Mutant(NamedTuple):
         elif self.old == self.new:
             yield f"{self}: changes nothing"
         for test in self.tests:
-            if not (root / test.split("::")[0]).exists():
+            file, _, name = test.partition("::")
+            text = (root / file).read_text("utf-8") if (root / file).exists() else ""
+            if f"def {name.partition('[')[0]}" not in text:
                 yield f"{self}: there are no tests {test}"
 
     def put_into(self, root: Path) -> None:
