@@ -2,6 +2,7 @@
 
 import math
 from functools import cached_property
+from itertools import pairwise
 
 import networkx as nx
 import numpy as np
@@ -11,6 +12,7 @@ from mesh_patches import CONNECTED, PATCHES, Mesh, bent, box, grid, islands, joi
 from samples import sampled, spread
 
 from coverable import mesh
+from surfaces.meshes.cells.borders import LabelledFaces, outlines
 from surfaces.meshes.cells.clustering import cells_for, cluster_faces
 from surfaces.meshes.cells.mesh_cells import MeshCells
 from surfaces.meshes.cells.properties import coarse, figures
@@ -48,6 +50,7 @@ class Cut:
             np.add.at(normals, self.faces[:, k], self.vectors)
         self.normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
         self.figures = figures(self.vertices, self.faces, self.normals, self.labels)
+        self.outlines = outlines(LabelledFaces.of(self.vertices, self.faces, self.labels))
 
     @cached_property
     def border(self):
@@ -148,10 +151,8 @@ def test_borders_are_shared_and_outlines_close(cut):
         mean = np.average((starts + stops) / 2, axis=0, weights=weights)
         nearest = to_segments(mean[None], starts, stops)[0]
         assert np.linalg.norm(middle - mean) == pytest.approx(nearest, abs=2e-6 * total)
-    lines = cut.figures.outlines
-    for loop, cell in enumerate(lines.cells.tolist()):
-        chain = lines.vertices[lines.starts[loop] : lines.starts[loop + 1]].tolist()
-        for edge in zip(chain, chain[1:] + chain[:1], strict=True):
+    for cell, lines in enumerate(cut.outlines):
+        for edge in (edge for line in lines for edge in pairwise(line.tolist())):
             assert edge not in walked
             walked[edge] = cell
     # Every border edge of each cell, each once, with the cell on its left.
@@ -178,8 +179,9 @@ def test_neighbours_go_clockwise(cut):
 
 
 def test_a_closed_cell_has_no_border():
-    found = Cut(box(), count=1).figures
-    assert found.outlines.of(0) == []
+    closed = Cut(box(), count=1)
+    found = closed.figures
+    assert closed.outlines == [[]]
     assert len(found.borders.pairs) == len(found.neighbours.of(0)) == 0
     assert np.isfinite(found.centres).all()
     assert np.isfinite(found.flatness).all()

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from coverable.arrays import Array, Ints, Mask, Protected
-from coverable.kernels import allocating_entry
+from coverable.arrays import Array, Ints, Mask
 from surfaces.adjacency import Neighbours
 from surfaces.meshes.closest_on_triangle import on_each
 from surfaces.meshes.triangle_mesh import edge_partners, least_by, sum_by
@@ -103,27 +101,6 @@ def _to_segments(points: Array, start: Array, end: Array) -> Array:
     return np.asarray((off * off).sum(axis=1))
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Outlines(Protected):
-    """The closed border lines of cells, counter-clockwise seen from outside, holes clockwise."""
-
-    points: Array
-    """(K, 3) m, the corners of all loops, one loop after the other."""
-    vertices: Ints
-    """(K,) which vertex of the mesh each is."""
-    starts: Ints
-    """(L + 1,) where each loop begins, and the end of the last."""
-    cells: Ints
-    """(L,) the cell of each loop, in rising order; a cell has several if it has holes, and none
-    if it is a closed surface."""
-
-    def of(self, cell: int) -> list[Array]:
-        """The loops of a cell as closed polylines (n + 1, 3) m: the last point is the first."""
-        first, last = np.searchsorted(self.cells, [cell, cell + 1])
-        bounds = zip(self.starts[first:last], self.starts[first + 1 : last + 1], strict=True)
-        return [np.concatenate([self.points[a:b], self.points[a : a + 1]]) for a, b in bounds]
-
-
 class SharedBorders(NamedTuple):
     """Pairs of cells that share a border. Cells that touch in single points share none."""
 
@@ -135,41 +112,31 @@ class SharedBorders(NamedTuple):
     """(M, 3) m, the place on each border that is nearest to its mean."""
 
 
-def outlines(mesh: LabelledFaces) -> Outlines:
-    """The border lines of all cells."""
-    border = mesh.border
-    order = np.argsort(mesh.labels, kind="stable")
-    chain, starts, cells = _loops(
-        mesh.faces, mesh.partner, mesh.labels, border, order, int(border.sum())
-    )
-    return Outlines(mesh.vertices[chain], chain, starts, cells)
+def outlines(mesh: LabelledFaces) -> list[list[Ints]]:
+    """Of each cell its closed border lines, as vertices (n + 1,): the last is the first.
+
+    Counter-clockwise seen from outside, holes clockwise; a closed surface has none.
+    """
+    border, partner = mesh.border.ravel(), mesh.partner.ravel()
+    halves = np.flatnonzero(border)
+    following = _ahead(halves)
+    while len(inner := np.flatnonzero(~border[following])):  # turning about their vertex
+        following[inner] = _ahead(partner[following[inner]])
+    after = dict(zip(halves.tolist(), following.tolist(), strict=True))
+    found: list[list[Ints]] = [[] for _ in range(int(mesh.labels.max()) + 1)]
+    for first in halves.tolist():
+        if first in after:
+            line, half = [first], after.pop(first)
+            while half != first:
+                line.append(half)
+                half = after.pop(half)
+            found[mesh.labels[first // 3]].append(mesh.faces.ravel()[[*line, first]])
+    return found
 
 
-@allocating_entry
-def _loops(faces, partner, labels, border, order, total):  # type: ignore[no-untyped-def]
-    """Follow each border edge to the next one of the same cell, turning about their vertex."""
-    chain = np.empty(total, dtype=np.int64)
-    starts = np.empty(total + 1, dtype=np.int64)
-    cells = np.empty(total, dtype=np.int64)
-    seen = np.zeros(border.shape, dtype=np.bool_)
-    size, loops = 0, 0
-    for position in range(order.shape[0]):
-        for k in range(3):
-            face, edge = order[position], k
-            if not border[face, edge] or seen[face, edge]:
-                continue
-            starts[loops], cells[loops] = size, labels[face]
-            loops += 1
-            while not seen[face, edge]:
-                seen[face, edge] = True
-                chain[size] = faces[face, edge]
-                size += 1
-                edge = (edge + 1) % 3
-                while not border[face, edge]:
-                    across = partner[face, edge]
-                    face, edge = across // 3, (across % 3 + 1) % 3
-    starts[loops] = size
-    return chain, starts[: loops + 1], cells[:loops]
+def _ahead(halves: Ints) -> Ints:
+    """The next half-edges of the same faces."""
+    return halves - halves % 3 + (halves + 1) % 3
 
 
 def shared_borders(mesh: LabelledFaces) -> SharedBorders:

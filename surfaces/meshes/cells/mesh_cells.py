@@ -75,7 +75,7 @@ class MeshCells(Cells):
 
     @cached_property
     def figures(self) -> Figures:
-        """What is known of each cell: flatness, borders, outlines; in the surface's own frame."""
+        """What is known of each cell: flatness and borders; in the surface's own frame."""
         return _figures(self.surface, self.labels)
 
     @property
@@ -242,12 +242,13 @@ class MeshCells(Cells):
 
     def unrolled(self) -> Unrolled:
         """See `Cells.unrolled`: seen along the mean normal, from the outside."""
-        rotation, position = self.surface.rotation, self.surface.position
-        none = np.empty((0, 3))  # of a cell that is a closed surface
-        loops = (
-            max(self.figures.outlines.of(k), key=_length, default=none) for k in range(len(self))
-        )
-        return self.seen_from_outside(loop @ rotation.T + position for loop in loops)
+        from surfaces.meshes.cells.borders import LabelledFaces, outlines
+
+        surface, none = self.surface, np.empty((0, 3))  # of a cell that is a closed surface
+        points = surface.mesh.vertices @ surface.rotation.T + surface.position
+        labelled = LabelledFaces.of(surface.mesh.vertices, surface.mesh.faces, self.labels)
+        lines = ([points[line] for line in some] for some in outlines(labelled))
+        return self.seen_from_outside(max(some, key=_length, default=none) for some in lines)
 
     def unravel(self, k: int) -> tuple[int]:
         """See `Cells.unravel`: the cell's number."""

@@ -11,11 +11,9 @@ from coverable.arrays import Array, Ints, Mask, Protected
 from surfaces.adjacency import Neighbours
 from surfaces.meshes.cells.borders import (
     LabelledFaces,
-    Outlines,
     SharedBorders,
     centre_points,
     clockwise_neighbours,
-    outlines,
     shared_borders,
 )
 from surfaces.meshes.triangle_mesh import doubled_areas, sum_by
@@ -47,8 +45,6 @@ class Figures(Protected):
     """Neighbouring pairs, and the border they share."""
     neighbours: Neighbours
     """Each cell's neighbours, clockwise seen from the normal's tip, the lowest index first."""
-    outlines: Outlines
-    """The cells' border lines."""
 
 
 def figures(vertices: Array, faces: Ints, vertex_normals: Array, labels: Ints) -> Figures:
@@ -92,7 +88,6 @@ def figures(vertices: Array, faces: Ints, vertex_normals: Array, labels: Ints) -
         crease=crease,
         borders=borders,
         neighbours=clockwise_neighbours(borders, places.points, normals),
-        outlines=outlines(mesh),
     )
 
 
