@@ -35,6 +35,6 @@ How a verdict comes about; wherever a step has a number, it is one of these.
     (`certification/motion_replay.py`), and coal its bodies (`certification/collisions/`).
 11. `checking.py` words the answer (`verdict.py`). What else is demanded (`demands.py`) is judged
     last, as speeds in `certification/rates/`; what nobody judged makes the answer undecided.
-12. `reports/verdict.py` prints it, or `reports/verdict_json.py`; graph G (`roadmap/graph_g.py`) and
-    the cause of each missed cell (`roadmap/causes/diagnosis.py`) are made when first read.
+12. `reports/verdict.py` prints it, or `reports/verdict_json.py`; graph G (`roadmap/complete.py`)
+    and the cause of each missed cell (`roadmap/causes/diagnosis.py`) are made when first read.
 """

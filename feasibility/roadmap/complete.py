@@ -169,16 +169,31 @@ def _found(
         refused="A motion over every cell was found, but the independent replay refuses it: "
         "{refusal}.",
         **said,
-        make_graph=partial(_graph, exploration),
+        make_graph=partial(graph_of, exploration),
         make_causes=lambda: _causes(problem, exploration),
     )
 
 
-def _graph(exploration: Exploration) -> nx.Graph:
-    """Graph G, made when it is first read."""
-    from feasibility.roadmap.graph_g import graph_of
+def graph_of(exploration: Exploration) -> nx.Graph:
+    """Graph G of the best component: every cell, and one motion for each connected pair.
 
-    return graph_of(exploration)
+    Nodes carry what `cell_graph` gives them, and `q` (n,), a configuration over the cell's
+    centre, None for cells that the component misses. Edges carry `motion` (k, n), from the smaller
+    cell index to the larger.
+    """
+    from feasibility.cell_graph import cell_graph
+
+    roadmap, best = exploration.roadmap, exploration.best
+    graph = cell_graph(exploration.cells, exploration.covered)
+    mine = np.flatnonzero(roadmap.roots_of_nodes() == best)
+    for x in mine[::-1].tolist():  # a cell's first node counts
+        graph.nodes[roadmap.cell[x]]["q"] = roadmap.q[x].copy()
+    for e, (x, y, _) in enumerate(roadmap.edges):
+        i, j = roadmap.cell[x], roadmap.cell[y]
+        if i != j and roadmap.root_of(x) == best and not graph.has_edge(i, j):  # the first counts
+            motion = roadmap.motion(e)
+            graph.add_edge(i, j, motion=motion if i < j else motion[::-1])
+    return graph
 
 
 def _hindered(exploration: Exploration) -> bool:
