@@ -100,6 +100,26 @@ def test_the_tool_gets_no_further_in_a_box_than_levers_in_its_middle_say(name):
         holds(bound, truth, 0.99)
 
 
+def test_no_box_loses_the_roll_of_a_place_in_it():
+    """Where a target at rest has the roll of one place, that place stays in the box, and others go."""
+    rng, lost, cut = np.random.default_rng(5), 0, 0
+    task = Task(0.0, 60, roll_deg=(-1, 1), roll_reference=(1, 0, 0))
+    for _ in range(100):
+        robot = random_arm(rng)
+        box, n = Motions(robot, task=task), robot.n
+        box.turn_range(0.0, 1e-9)
+        for _ in range(60):
+            q, half = random_configuration(robot, rng), 10.0 ** rng.uniform(-2.0, 0.0, n)
+            half[rng.random(n) < 0.5] = 0.0
+            d = half * np.clip(rng.uniform(-2.0, 2.0, n), -1.0, 1.0)
+            b = tools(robot, q[None])[1][0] + rng.choice([1e-3, 0.1]) * rng.normal(size=3)
+            low, high = box.cut_by_roll(q, half, d, b / np.linalg.norm(b))
+            lost += bool((low > d + 1e-9).any() or (high < d - 1e-9).any())
+            cut += bool((low > -half).any() or (high < half).any())
+    assert lost == 0
+    assert cut >= 2000
+
+
 @pytest.mark.parametrize(
     ("name", "most"), [("puma560", 20_000), ("planar", 2000), ("free joints", 20_000)]
 )

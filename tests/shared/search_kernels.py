@@ -18,6 +18,7 @@ from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.motions import aiming, projection, segment_bound
 from feasibility.roadmap.motions.aiming import aim, stand_still
 from feasibility.roadmap.motions.off_target import project_near_cell
+from feasibility.roadmap.motions.roll_kernels import level, roll_off_middle
 from feasibility.roadmap.motions.search_arrays import arrays_of
 from feasibility.roadmap.motions.working_memory import place, work_for
 
@@ -29,6 +30,7 @@ segment_holds = entry(segment_bound.segment_holds)
 second_derivatives = entry(segment_bound.second_derivatives)
 roll_derivatives = entry(segment_bound.roll_derivatives)
 reach, shrink = entry(box_bounds.reach), entry(box_contraction.shrink)
+contract_roll = entry(box_bounds.contract_roll)
 
 
 class Clearance:
@@ -82,6 +84,20 @@ class Motions:
         rows = np.zeros((3, len(q)))
         place(self.arrays, self.work, 1, q)
         return *reach(self.arrays, self.work, which, half, rows, np.zeros(len(q))), rows
+
+    def cut_by_roll(self, q: Floats, half: Floats, d: Floats, b: Floats) -> list[Floats]:
+        """Ends that are left of a box about q, where the roll over a target along b is as at q + d."""
+        low, high, work, sines = -half, half.copy(), self.work, np.zeros(len(q))
+        work.target[1:] = b, b[[1, 2, 0]]
+        level(work.target)
+        place(self.arrays, work, 1, q + d)
+        wanted = roll_off_middle(work.target, work.axis[1], work.reference[1], 0.0)
+        place(self.arrays, work, 1, q)
+        off = roll_off_middle(work.target, work.axis[1], work.reference[1], wanted)
+        work.error[1, 1:] = np.linalg.norm(work.axis[1] - b), off
+        reach(self.arrays, work, 1, half, np.zeros((3, len(q))), sines)
+        contract_roll(self.arrays, work, half, sines, np.zeros(len(q)), low, high)
+        return [low, high]
 
     def roll_off(self, q: Floats, t: float = 0.0) -> float:
         """Roll at a configuration over a curve's target at t, off the middle of its range, rad."""
