@@ -101,7 +101,7 @@ def test_the_tool_gets_no_further_in_a_box_than_levers_in_its_middle_say(name):
 
 
 def test_no_box_loses_the_roll_of_a_place_in_it():
-    """Where a target at rest has the roll of one place, that place stays in the box, and others go."""
+    """Where a target has the roll of one place, that place stays in the box, and others go."""
     rng, lost, cut = np.random.default_rng(5), 0, 0
     task = Task(0.0, 60, roll_deg=(-1, 1), roll_reference=(1, 0, 0))
     for _ in range(100):

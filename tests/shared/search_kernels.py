@@ -86,7 +86,7 @@ class Motions:
         return *reach(self.arrays, self.work, which, half, rows, np.zeros(len(q))), rows
 
     def cut_by_roll(self, q: Floats, half: Floats, d: Floats, b: Floats) -> list[Floats]:
-        """Ends that are left of a box about q, where the roll over a target along b is as at q + d."""
+        """Ends left of a box about q where the roll over a target along b is as at q + d."""
         low, high, work, sines = -half, half.copy(), self.work, np.zeros(len(q))
         work.target[1:] = b, b[[1, 2, 0]]
         level(work.target)
