@@ -19,7 +19,14 @@ from feasibility.checking import greedy_check as greedy_check
 from feasibility.collisions.scene import Obstacle as Obstacle
 from feasibility.collisions.scene import ToolShape as ToolShape
 from feasibility.collisions.settings import Collision as Collision
+from feasibility.demands.area import TreatedArea as TreatedArea
+from feasibility.demands.treated_words import treated_words as treated_words
 from feasibility.division.division import Division as Division
+from feasibility.division.pass_planning import PlannedPasses as PlannedPasses
+from feasibility.division.pass_planning import plan_best_passes as plan_best_passes
+from feasibility.division.pass_planning import plan_passes as plan_passes
+from feasibility.division.pass_runs import PassRuns as PassRuns
+from feasibility.division.pass_runs import pass_runs as pass_runs
 from feasibility.division.surface_division import divide as divide
 from feasibility.live.serving import Live as Live
 from feasibility.live.serving import live as live
@@ -43,11 +50,6 @@ from feasibility.results.result_file import load_result as load_result
 from feasibility.results.result_file import save_result as save_result
 from feasibility.results.trajectory_files import load_trajectory as load_trajectory
 from feasibility.results.trajectory_files import save_trajectory as save_trajectory
-from feasibility.runs.pass_runs import PassRuns as PassRuns
-from feasibility.runs.pass_runs import pass_runs as pass_runs
-from feasibility.runs.planning import PlannedPasses as PlannedPasses
-from feasibility.runs.planning import plan_best_passes as plan_best_passes
-from feasibility.runs.planning import plan_passes as plan_passes
 from feasibility.search_settings import Search as Search
 from feasibility.sensitivity.explanation import explain as explain
 from feasibility.sensitivity.thresholds import Explanation as Explanation
@@ -63,8 +65,6 @@ from feasibility.task import Task as Task
 from feasibility.timing.path_timing import trajectory as trajectory
 from feasibility.timing.sampled_trajectory import Trajectory as Trajectory
 from feasibility.timing.speed_limits import motion_limits as motion_limits
-from feasibility.treated.area import TreatedArea as TreatedArea
-from feasibility.treated.treated_words import treated_words as treated_words
 from feasibility.verdict import Answer as Answer
 from feasibility.verdict import Cause as Cause
 from feasibility.verdict import CauseKind as CauseKind
@@ -96,6 +96,8 @@ from robots.library import load_robot as load_robot
 from robots.robot import Robot as Robot
 from robots.urdf.axes import Axis as Axis
 from surfaces.cells import Cells as Cells
+from surfaces.fitted.bspline import bspline as bspline
+from surfaces.fitted.control_net_file import read_net as read_net
 from surfaces.fitted.formula import parametric as parametric
 from surfaces.fitted.grid_file import read_grid as read_grid
 from surfaces.fitted.point_grid import grid as grid
@@ -105,6 +107,8 @@ from surfaces.meshes.selection import cut_box as cut_box
 from surfaces.meshes.selection import cut_plane as cut_plane
 from surfaces.meshes.selection import faces_within_cone as faces_within_cone
 from surfaces.meshes.selection import take_faces as take_faces
+from surfaces.meshes.step_surface import step as step
+from surfaces.meshes.step_surface import step_faces as step_faces
 from surfaces.meshes.triangle_mesh import TriangleMesh as TriangleMesh
 from surfaces.passes.parallel import parallel_passes as parallel_passes
 from surfaces.passes.toolpath import pass_toolpath as pass_toolpath
@@ -112,8 +116,6 @@ from surfaces.patches.cone import cone as cone
 from surfaces.patches.cylinder import cylinder as cylinder
 from surfaces.patches.ellipsoid import ellipsoid as ellipsoid
 from surfaces.patches.hyperboloid import hyperboloid as hyperboloid
-from surfaces.patches.nurbs.bspline import bspline as bspline
-from surfaces.patches.nurbs.control_net_file import read_net as read_net
 from surfaces.patches.patch import Patch as Patch
 from surfaces.patches.plane import plane as plane
 from surfaces.patches.revolution import revolution as revolution
@@ -121,8 +123,6 @@ from surfaces.patches.sphere import sphere as sphere
 from surfaces.patches.torus import torus as torus
 from surfaces.piecewise.piecewise_surface import Piecewise as Piecewise
 from surfaces.piecewise.piecewise_surface import piecewise as piecewise
-from surfaces.step_files.step_surface import step as step
-from surfaces.step_files.step_surface import step_faces as step_faces
 from surfaces.surface import Surface as Surface
 from surfaces.surface import SurfaceError as SurfaceError
 from surfaces.toolpaths.given import poses as poses

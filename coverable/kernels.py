@@ -32,8 +32,9 @@ CODE = (  # files of kernels, of all that they name, and of the named tuples tha
     "coverable/kernels.py", "robots/chain.py", "surfaces/triangle_kernel.py",
     "surfaces/meshes/*.py", "surfaces/meshes/cells/*.py", "surfaces/patches/closed_form_kernels.py",
     "feasibility/paper/*.py", "feasibility/collisions/kernels/*.py",
-    "feasibility/roadmap/branch_and_bound/*.py", "feasibility/roadmap/causes/diagnosis.py",
-    "feasibility/roadmap/moving_clear.py", "feasibility/roadmap/cuts/findings.py",
+    "feasibility/roadmap/proofs/box*.py", "feasibility/roadmap/proofs/branching.py",
+    "feasibility/roadmap/proofs/ruling.py", "feasibility/roadmap/proofs/findings.py",
+    "feasibility/roadmap/causes/diagnosis.py", "feasibility/roadmap/moving_clear.py",
     "feasibility/roadmap/motions/*.py", "feasibility/timing/fastest_speeds.py",
     "feasibility/viewer/painter.py",
 )  # fmt: skip

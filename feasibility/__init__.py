@@ -26,15 +26,16 @@ How a verdict comes about; wherever a step has a number, it is one of these.
    (`roadmap/motions/tracking.py`), each of whose segments is certified
    (`roadmap/motions/segment_bound.py`, `collisions/kernels/segments.py`). Mostly that is all.
 7. `roadmap/rounds.py`: cells that nothing reaches are seeded, or proved uncoverable
-   (`roadmap/rulings.py`): by `roadmap/branch_and_bound/`, and with bodies by the judge, which
-   `roadmap/blockers.py` asks (`certification/overlaps/`).
+   (`roadmap/rulings.py`): by branch and bound (`roadmap/proofs/branching.py`), and with bodies by
+   the judge (`certification/collisions/everywhere.py`), which `roadmap/blockers.py` asks.
 8. Rounds of more guesses, self-motions and bridges (`roadmap/connecting.py`); where they gain
    nothing, a proof by cuts (`roadmap/proving.py`), finer cells (`roadmap/refinement.py`).
 9. One component over all cells becomes one motion (`roadmap/walk.py`).
 10. Pinocchio replays it over the surface itself, between waypoints too
     (`certification/motion_replay.py`), and coal its bodies (`certification/collisions/`).
-11. `checking.py` words the answer (`verdict.py`). What else is demanded (`demands.py`) is judged
-    last, as speeds in `certification/rates/`; what nobody judged makes the answer undecided.
+11. `checking.py` words the answer (`verdict.py`). What else is demanded
+    (`demands/every_demand.py`) is judged last, as speeds in `certification/rate_replay.py`; what
+    nobody judged makes the answer undecided.
 12. `reports/verdict.py` prints it, or `reports/verdict_json.py`; graph G (`roadmap/complete.py`)
     and the cause of each missed cell (`roadmap/causes/diagnosis.py`) are made when first read.
 """

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.clock import Clock, OutOfTime
-from feasibility.found import Found
 from feasibility.problem import Problem
+from feasibility.search_result import SearchResult
 from feasibility.search_settings import Search
 from feasibility.task import PlacementError
 from feasibility.verdict import Bound, PlacementMargin, Replay
@@ -39,14 +39,14 @@ NOT_IN_PIECES = " (With the links cut into convex pieces no more was found: {} o
 HELD_BACK = ((0.2, 0.0), (0.2, 1.5), (0.4, 1.5), (0.6, 3.0))
 """Shares of the cone, and multiples of the error of the placement, that are held back in turn."""
 
-Method = Callable[[Problem, Search, Clock], Found]
+Method = Callable[[Problem, Search, Clock], SearchResult]
 
 
 class Attempt(NamedTuple):
     """One search, and the replay of the motion that it found."""
 
     problem: Problem
-    found: Found
+    found: SearchResult
     replayed: Replay | None
     search_s: float
     certify_s: float
@@ -189,7 +189,7 @@ def _is_clear(problem: Problem, q: NDArray[np.float64]) -> bool:
     return bool(segment_clear(collision_buffer(bodies, problem.robot), q, q) > 0.0)
 
 
-def _nothing(problem: Problem, clock: Clock) -> Found:
+def _nothing(problem: Problem, clock: Clock) -> SearchResult:
     """What a search found whose time ran out before it began."""
     covered = np.zeros(len(problem.cells), dtype=bool)
 
@@ -198,7 +198,7 @@ def _nothing(problem: Problem, clock: Clock) -> Found:
 
         return cell_graph(problem.cells, covered)
 
-    return Found(
+    return SearchResult(
         covered=covered,
         components=(),
         start=None,

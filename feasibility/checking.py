@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from coverable.errors import ArgumentError
 from feasibility.attempts import Method, attempts_at
 from feasibility.clock import Clock, OutOfTime
-from feasibility.demands import OF_TREE, RATES, further, unjudged
+from feasibility.demands.every_demand import OF_TREE, RATES, further, unjudged
 from feasibility.problem import Problem
 from feasibility.search_settings import Progress, Search
 from feasibility.task import Task
@@ -23,8 +23,8 @@ from surfaces.cells import Cells
 
 if TYPE_CHECKING:
     from feasibility.collisions.settings import Collision
-    from feasibility.found import Found
-    from feasibility.treated.area import TreatedArea
+    from feasibility.demands.area import TreatedArea
+    from feasibility.search_result import SearchResult
 
 NO_CELLS = "There are no cells, so there is nothing to cover; the arm was not looked at."
 
@@ -101,7 +101,7 @@ def check(
 def _refuse_impossible(robot: Robot, task: Task, search: Search) -> None:
     """Refuse a speed or a home, where one is given, that this arm cannot have."""
     if task.requires_rates or task.home_deg is not None:
-        from feasibility.speed.requirements import check_requirements
+        from feasibility.demands.requirements import check_requirements
 
         check_requirements(robot, task, search)
 
@@ -128,7 +128,7 @@ def _at_rates(verdict: Verdict, clock: Clock) -> Verdict:
     """The verdict at the speed, and as far from singularities, as the task asks."""
     if not verdict.task.requires_rates:
         return verdict
-    from feasibility.speed.verdict_at_speed import at_rates
+    from feasibility.demands.verdict_at_speed import at_rates
 
     began = time.monotonic()
     found = at_rates(verdict, clock)
@@ -209,7 +209,7 @@ def _decided(problem: Problem, search: Search, clock: Clock, method: Method) -> 
     )
 
 
-def _causes(found: Found, clock: Clock) -> tuple[Cause, ...]:
+def _causes(found: SearchResult, clock: Clock) -> tuple[Cause, ...]:
     """Why cells are missed; nothing where the time ran out before that was looked into."""
     try:
         with clock.enforced():
@@ -226,7 +226,7 @@ def _measured(verdict: Verdict, clock: Clock) -> Verdict:
     if task.coverage is None:
         return replace(verdict, treated=deferred(lambda: _treated(verdict, clock)))
     treated = _treated(verdict, clock)
-    from feasibility.treated.decision import with_coverage
+    from feasibility.demands.decision import with_coverage
 
     said = Decision(verdict.answer, verdict.evidence, verdict.message)
     decision = with_coverage(said, task, treated)
@@ -238,7 +238,7 @@ def _measured(verdict: Verdict, clock: Clock) -> Verdict:
 
 def _treated(verdict: Verdict, clock: Clock) -> TreatedArea | None:
     """What the motion treats; None where there is no motion, or no time to measure it."""
-    from feasibility.treated.area import treated_by_walk
+    from feasibility.demands.area import treated_by_walk
 
     if verdict.witness is None:
         return None
@@ -249,7 +249,7 @@ def _treated(verdict: Verdict, clock: Clock) -> TreatedArea | None:
         return None
 
 
-def _answer(problem: Problem, found: Found, replayed: Replay | None) -> Decision:
+def _answer(problem: Problem, found: SearchResult, replayed: Replay | None) -> Decision:
     """Answer, evidence, and the sentences that say what was done."""
     if len(problem.cells) == 0:
         return Decision(Answer.FEASIBLE, Evidence.WITNESS, NO_CELLS)

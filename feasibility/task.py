@@ -95,7 +95,7 @@ class Task:
 
     speed: float | None = None
     """m/s, of the tool relative to the surface: what the joints' velocity limits have to allow all
-    along the motion, but where it stops (`feasibility.certification.rates`). None for any."""
+    along the motion, but where it stops (`feasibility.certification.rate_replay`). None for any."""
     min_manipulability: float | None = None
     """What the smallest singular value along the motion has to be at least: of the Jacobian of tool
     point (over the arm's reach) and approach axis, a pure number. None for any."""

@@ -283,7 +283,7 @@ class Verdict:
     pairs_left_out: tuple[LeftOut, ...] = ()
     """Pairs that are not checked, and why."""
     treated: Any = None
-    """What the motion that was found treats, a `feasibility.treated.TreatedArea`; None unless the
+    """What the motion that was found treats, a `demands.area.TreatedArea`; None unless the
     task has a footprint and a motion was accepted. Measured when first read."""
     statistics: Mapping[str, Any] = field(default_factory=dict)
     """Counts of work done (FK evaluations, calls, proofs), for benchmarks and the curious."""

@@ -25,7 +25,7 @@ from feasibility.clock import Clock, OutOfTime
 from feasibility.collisions.asked_bodies import said_of
 from feasibility.collisions.settings import Collision
 from feasibility.cut_tree import CutTree
-from feasibility.demands import BY_REPLAY, NAMES, OF_TREE, further, unjudged
+from feasibility.demands.every_demand import BY_REPLAY, NAMES, OF_TREE, further, unjudged
 from feasibility.problem import Problem
 from feasibility.results.result_file import Result
 from feasibility.search_settings import Search
@@ -35,7 +35,7 @@ from robots.robot import Robot
 from surfaces.cells import Cells
 
 if TYPE_CHECKING:
-    from feasibility.treated.area import TreatedArea
+    from feasibility.demands.area import TreatedArea
 
 NOT_IN_TIME = (
     "not verified in time: the limit of {:g} s ran out; --set search.time_limit=... gives more time"

@@ -11,7 +11,7 @@ from feasibility.cases.surface_files import CHOICE
 from feasibility.cases.table_reader import Section
 from surfaces.meshes.selection import checked_box, checked_cone, checked_plane
 from surfaces.meshes.sources import metres_per_unit
-from surfaces.step_files.step_surface import checked_choice
+from surfaces.meshes.step_surface import checked_choice
 
 
 def check_key(section: Section, kind: str, key: str, values: dict[str, Any]) -> None:

@@ -90,7 +90,7 @@ def build_patch(kind: str, values: Values, pose: Values, place: str = "surface")
     try:
         with faults_of(place, "", kind, file, {**values, **pose}):
             if file is not None:  # what the case says replaces what the file says
-                from surfaces.patches.nurbs.control_net_file import read_net
+                from surfaces.fitted.control_net_file import read_net
 
                 arguments.pop("points", None)
                 arguments = read_net(file)._asdict() | arguments

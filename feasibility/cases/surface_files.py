@@ -42,7 +42,7 @@ def _mesh(values: Values, pose: Values, place: str) -> Any:
 
 
 def _step(values: Values, pose: Values, place: str) -> Any:
-    from surfaces.step_files.step_surface import step_triangles
+    from surfaces.meshes.step_surface import step_triangles
 
     choice = {key: values[key] for key in CHOICE if key in values}
     if "facing" in values and not {"faces", "colour"} & set(choice):

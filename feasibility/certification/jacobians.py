@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from coverable.arrays import Array
-from feasibility.certification.rows import Rows
+from feasibility.certification.bisection import Rows
 from robots.kinematics import Kinematics
 
 

@@ -47,7 +47,7 @@ def replay(
     """
     disorder = _malformed(cells, walk)
     if cells.in_order and not disorder:
-        from feasibility.certification.toolpath_order import order_of_marks
+        from feasibility.certification.pose_replay import order_of_marks
 
         disorder = order_of_marks(cells, walk)
     if disorder:

@@ -51,9 +51,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from coverable.arrays import Array, Ints
+from feasibility.certification.bisection import Rows
 from feasibility.certification.jacobians import jacobians, smallest_singular
 from feasibility.certification.lever_bounds import column_changes, second_derivative_bound
-from feasibility.certification.rows import Rows
 from feasibility.task import PlacementError, Task
 from feasibility.verdict import Bound, Certificate, PlacementMargin
 from robots.kinematics import Kinematics

@@ -12,7 +12,7 @@ part that goes with a piece
     |p - T| <= (1 - t) e0 + t e1 + t (1 - t) / 2 w^2 D_p + d_T    or 4 t (1 - t) d_T
 
 with e0 and e1 bounds of |p - T| at its ends: there p is known to s (1 - s) / 2 D_p. The same holds
-for |a - b|, and for the roll what `certification.rolls` says. Nothing else is assumed of the
+for |a - b|, and for the roll what `certification.roll_held` says. Nothing else is assumed of the
 surface: not that closest points are unique, nor that they move continuously.
 
 **On a mesh** the normals of targets are interpolated, and the tool point has to keep its distance
@@ -30,10 +30,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
-from feasibility.certification.bisection import Stretches
+from feasibility.certification.bisection import Rows, Stretches
 from feasibility.certification.jacobians import Jacobians
 from feasibility.certification.lever_bounds import peaks, second_derivatives
-from feasibility.certification.rows import Rows
 from feasibility.certification.tool_directions import ROLL_CLOSE, Held
 from feasibility.task import Task
 from robots.kinematics import Kinematics
@@ -210,7 +209,7 @@ def _held(task: Task, cells: Cells, offset: OffsetSurface) -> Held:
     free = Held.of(task, cells, offset)
     if task.roll is None:
         return free
-    from feasibility.certification.rolls.held import HeldRoll
+    from feasibility.certification.roll_held import HeldRoll
 
     reference = task.fixed_reference(cells)
     return HeldRoll(free.offset, free.sign, free.approach, reference, task.roll)

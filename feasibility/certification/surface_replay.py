@@ -21,8 +21,7 @@ import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.cells_reached import cells_reached, missed_text
-from feasibility.certification.deviations import less_deviations, too_vague
-from feasibility.certification.faults import Judged, MotionFault
+from feasibility.certification.faults import Judged, MotionFault, less_deviations, too_vague
 from feasibility.certification.placement_margin import margin_fault, margin_of
 from feasibility.certification.stretches import Judge
 from feasibility.certification.tool_along import less_room, tool_along
@@ -137,7 +136,7 @@ def _marked_curves(cells: Cells, marks: Ints) -> Ints | None:
     """The curve between poses that each row is said to be on; None where cells are no poses."""
     if not _is_of_poses(cells.surface):
         return None
-    from feasibility.certification.toolpath_order import curves_of_marks
+    from feasibility.certification.pose_replay import curves_of_marks
 
     return curves_of_marks(cells, marks)
 

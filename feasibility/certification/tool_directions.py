@@ -1,6 +1,6 @@
 """How a task wants the tool held over places of a surface: its approach direction.
 
-Here the roll about that is free; where it is limited, `rolls/held.py` says what has to hold of it.
+Here the roll about that is free; where it is limited, `roll_held.py` says what has to hold of it.
 """
 
 from __future__ import annotations

@@ -109,7 +109,7 @@ def _show_faces(args: argparse.Namespace) -> int:
     """The faces of a STEP file with their numbers."""
     from feasibility.viewer.faces_view import faces_page
     from feasibility.viewer.live_server import LiveView
-    from surfaces.step_files.step_surface import face_words, step_parts
+    from surfaces.meshes.step_surface import face_words, step_parts
 
     parts = step_parts(args.result)
     for face in parts.faces:

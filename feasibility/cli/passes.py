@@ -16,8 +16,8 @@ from feasibility.read_files import shown_path
 
 if TYPE_CHECKING:
     from feasibility.cli.command_parts import OpenCase
-    from feasibility.runs.pass_runs import PassRuns
-    from feasibility.runs.planning import PlannedPasses
+    from feasibility.division.pass_planning import PlannedPasses
+    from feasibility.division.pass_runs import PassRuns
     from feasibility.task import Task
     from feasibility.timing.sampled_trajectory import Trajectory
     from surfaces.passes.parallel import Passes
@@ -126,7 +126,7 @@ def places_asked(args: argparse.Namespace, surface: Surface, task: Task) -> Pose
     Raises:
         CoverableError: the direction is none.
     """
-    from feasibility.runs.planning import tool_way
+    from feasibility.division.pass_planning import tool_way
     from surfaces.passes.toolpath import places_along
 
     if args.passes.strip() == BEST:
@@ -137,7 +137,7 @@ def places_asked(args: argparse.Namespace, surface: Surface, task: Task) -> Pose
 
 def passes_asked(args: argparse.Namespace, opened: OpenCase) -> PlannedPasses:
     """Plan the passes that the arguments describe, and look for one motion along all of them."""
-    from feasibility.runs.planning import plan_best_passes, plan_passes
+    from feasibility.division.pass_planning import plan_best_passes, plan_passes
 
     robot, cells, task, search = opened.setup
     opened.progress(0, None, "planning passes")
@@ -155,8 +155,8 @@ def passes_asked(args: argparse.Namespace, opened: OpenCase) -> PlannedPasses:
 
 def in_runs(args: argparse.Namespace, opened: OpenCase, along: PlannedPasses) -> int:
     """Passes that no single motion is known to run: cut them, and say why; the verdict's status."""
+    from feasibility.division.pass_runs import pass_runs
     from feasibility.reports import pass_runs as report
-    from feasibility.runs.pass_runs import pass_runs
     from feasibility.timing.path_timing import trajectory
 
     verdict = along.verdict

@@ -24,12 +24,12 @@ from feasibility.read_files import shown_path
 if TYPE_CHECKING:
     from feasibility.cases.case import Case
     from feasibility.cli.command_parts import OpenCase
+    from feasibility.demands.area import TreatedArea
+    from feasibility.division.pass_planning import PlannedPasses
     from feasibility.paths.coverage import CoveragePath
-    from feasibility.runs.planning import PlannedPasses
     from feasibility.task import Task
     from feasibility.timing.sampled_trajectory import Trajectory
     from feasibility.timing.speed_limits import MotionLimits
-    from feasibility.treated.area import TreatedArea
     from feasibility.verdict import Verdict
     from feasibility.viewer.viewer import View
     from robots.robot import Robot
@@ -112,10 +112,10 @@ def path(args: argparse.Namespace, began: float) -> int:
     with open_case(args, began, outputs, WHY_COMPLETE, check_case) as opened:
         from feasibility.checking import check
         from feasibility.clock import OutOfTime
-        from feasibility.entry.ends import ends_of
+        from feasibility.demands.motion_rates import path_rates
+        from feasibility.division.ends import ends_of
         from feasibility.paths.coverage import coverage_path
         from feasibility.reports import path as report
-        from feasibility.speed.motion_rates import path_rates
         from feasibility.timing.path_timing import trajectory
         from feasibility.timing.speed_limits import motion_limits
         from feasibility.verdict import Answer, Walk
@@ -184,7 +184,7 @@ def _treated(
     opened: OpenCase, along: PlannedPasses | None, found: CoveragePath
 ) -> TreatedArea | None:
     """What the path treats; None where the task has no footprint."""
-    from feasibility.treated.area import treated_by_walk
+    from feasibility.demands.area import treated_by_walk
 
     if along is not None:
         return along.treated(found.walk)

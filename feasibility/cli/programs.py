@@ -14,8 +14,8 @@ from feasibility.read_files import shown_path
 if TYPE_CHECKING:
     from feasibility.cases.case import Case
     from feasibility.cli.command_parts import OpenCase
+    from feasibility.division.pass_planning import PlannedPasses
     from feasibility.programs.controller_axes import ProgramSettings
-    from feasibility.runs.planning import PlannedPasses
     from feasibility.timing.sampled_trajectory import Trajectory
 
 PERIOD = 0.02  # [s] between samples

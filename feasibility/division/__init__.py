@@ -1,1 +1,1 @@
-"""The fewest patches that cover a surface, and the joint moves between them."""
+"""The fewest patches or runs of passes that cover a surface, and the moves between them."""

@@ -5,11 +5,11 @@ from typing import NamedTuple
 
 from coverable.arrays import Mask
 from feasibility.clock import Clock, OutOfTime
+from feasibility.demands.motion_rates import replay_at_rates
 from feasibility.roadmap.rounds import explore
 from feasibility.roadmap.search import exploration_of
 from feasibility.roadmap.walk import covering_walk
 from feasibility.search_settings import Search
-from feasibility.speed.motion_rates import replay_at_rates
 from feasibility.task import Task
 from feasibility.verdict import Walk
 from robots.robot import Robot

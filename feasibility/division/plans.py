@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask, Protected
+from feasibility.demands.motion_rates import replay_at_rates
 from feasibility.division.between_patches import clear_moves
 from feasibility.division.division import Plan, SubPatch
 from feasibility.division.reconfiguration import itinerary
@@ -29,7 +30,6 @@ from feasibility.roadmap.expansion import UNTRIED
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.rounds import improve
 from feasibility.roadmap.walk import Links, links_of, patch_walk
-from feasibility.speed.motion_rates import replay_at_rates
 from feasibility.task import Task
 from feasibility.verdict import Walk
 from surfaces.adjacency import components

@@ -12,10 +12,10 @@ import numpy as np
 from coverable.arrays import Ints, Mask
 from feasibility.cut_tree import CutTree
 from feasibility.division.division import Apart
-from feasibility.roadmap.cuts.gaps import components_of
-from feasibility.roadmap.cuts.prover import Prover
-from feasibility.roadmap.cuts.target_places import places_on
 from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.proofs.gaps import components_of
+from feasibility.roadmap.proofs.prover import Prover
+from feasibility.roadmap.proofs.target_places import places_on
 from feasibility.task import Task
 
 ATTEMPTS = 4  # at a proof, each with the configurations that refuted the one before

@@ -9,23 +9,23 @@ from coverable.arrays import Ints
 from coverable.errors import ArgumentError, counted
 from feasibility.clock import Clock, OutOfTime
 from feasibility.collisions.problem_bodies import Pair
-from feasibility.demands import OF_EACH, further, unjudged
+from feasibility.demands.every_demand import OF_EACH, further, unjudged
+from feasibility.demands.fast_motions import keep_fast_motions
+from feasibility.demands.requirements import check_requirements, required_words
 from feasibility.division.division import Division, Plan
 from feasibility.division.plans import collect_components, plan_of
 from feasibility.division.proved_bound import ProvedBound, prove_apart
 from feasibility.notices import compiling_notice
 from feasibility.problem import Problem
-from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.causes.diagnosis import cause_of, causes_of, diagnose
 from feasibility.roadmap.causes.disconnection import disconnected
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions.search_arrays import SearchArrays, within
+from feasibility.roadmap.proofs.ruling import Ruling
 from feasibility.roadmap.rounds import explore
 from feasibility.roadmap.search import exploration_of
 from feasibility.roadmap.warmup import warm_up
 from feasibility.search_settings import Progress, Search
-from feasibility.speed.fast_motions import keep_fast_motions
-from feasibility.speed.requirements import check_requirements, required_words
 from feasibility.targets.blocked import blocked_curves
 from feasibility.task import Task
 from feasibility.verdict import Cause

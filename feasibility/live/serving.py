@@ -163,7 +163,7 @@ def _guarded(secret: str) -> Iterator[None]:
             given, path = request.path[1 : 1 + len(secret)], request.path[1 + len(secret) :]
             known = secrets.compare_digest(given.encode(), secret.encode())
             if not known or host != here or origin not in (None, f"http://{here}"):
-                return Response(HTTPStatus.NOT_FOUND, "Not Found", Headers())
+                return Response(HTTPStatus.NOT_FOUND, "Not SearchResult", Headers())
             request.path = path or "/"
             answer = process_request(connection, request)
             if answer is not None:

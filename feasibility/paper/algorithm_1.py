@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from coverable.arrays import Array, Ints
 from coverable.kernels import entry, kernel
-from feasibility.paper.jcell_grid import HAIR, cell_of, distance, neighbour, place_tool
+from feasibility.paper.jcell_grid import ROUNDING, cell_of, distance, neighbour, place_tool
 
 RUNNING, FOUND, EXHAUSTED, CAPPED = 0, 1, 2, 3  # what a call is doing: counters[STATE]
 STATE, DEPTH, NODES, CALL = 0, 1, 2, 3  # places in `Memory.counters`
@@ -155,7 +155,7 @@ def extend_search(chain, patch_kernel, triangles, grid, target, target_cell, bud
                 state = FOUND
                 break
             nearer = distance(tool, target)
-            deeper = cell >= 0 and nearer < away - HAIR
+            deeper = cell >= 0 and nearer < away - ROUNDING
         memory.stack_next[depth] = number
         if state != EXHAUSTED:
             break

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 
 from coverable.errors import ArgumentError, counted
 from feasibility.clock import Clock
-from feasibility.found import Found
 from feasibility.notices import GREEDY, compiling_notice
 from feasibility.paper.continuity import CallOutcome, JSpace
 from feasibility.paper.jcell_steps import Steps
@@ -20,6 +19,7 @@ from feasibility.paper.starts import candidates
 from feasibility.paper.tree_and_graph import Tree, graph_of, tree_of
 from feasibility.paper.tree_replay import Path, replay_tree
 from feasibility.problem import Problem
+from feasibility.search_result import SearchResult
 from feasibility.search_settings import Search
 from feasibility.verdict import Cause, CauseKind, Replay
 from surfaces.cells import Cells
@@ -111,7 +111,7 @@ class _Run:
 
 def greedy_search(
     problem: Problem, search: Search, clock: Clock, start: ArrayLike | None = None
-) -> Found:
+) -> SearchResult:
     """The paper's search: one tree T that touches every cell is a covering motion.
 
     To touch a cell is to enter it; its centre need not be visited, so no motion over the centres is
@@ -158,7 +158,7 @@ def greedy_search(
     return _found(problem, search, steps, run)
 
 
-def _found(problem: Problem, search: Search, steps: Steps, run: _Run) -> Found:
+def _found(problem: Problem, search: Search, steps: Steps, run: _Run) -> SearchResult:
     """The best tree, and its wording."""
     cells, best, count = problem.cells, run.best, len(problem.cells)
     settings = (
@@ -182,7 +182,7 @@ def _found(problem: Problem, search: Search, steps: Steps, run: _Run) -> Found:
             f"The time limit of {search.time_limit:g} s ran out ({settings}); "
             f"{_touched(run, count)}."
         )
-    return Found(
+    return SearchResult(
         covered=np.isin(np.arange(count), list(best.jcell)),
         components=(np.array(sorted(best.jcell), dtype=np.int64),) if best.jcell else (),
         start=best.start,

@@ -14,7 +14,9 @@ from robots.chain import frames
 from surfaces.patches.closed_form_kernels import cell_at, closest_on_patch, u_direction
 from surfaces.triangle_kernel import cell_under, u_direction_under
 
-HAIR = 1e-12  # [m], [1]: required beyond the task, so that another rounding of the same q agrees
+ROUNDING = (
+    1e-12  # [m], [1]: required beyond the task, so that another rounding of the same q agrees
+)
 
 
 class Grid(NamedTuple):
@@ -91,18 +93,18 @@ def cell_of(patch_kernel, triangles, grid, tool):
         cell = cell_at(patch_kernel, u, v)
         if limited and along_u:
             tx, ty, tz = u_direction(patch_kernel, u, v)
-    if cell < 0 or not abs(over - grid.height) <= grid.tolerance[cell] - HAIR:
+    if cell < 0 or not abs(over - grid.height) <= grid.tolerance[cell] - ROUNDING:
         return -1
     bx, by, bz = -grid.side * nx, -grid.side * ny, -grid.side * nz
     if grid.approach.shape[0] == 3:
         bx, by, bz = grid.approach[0], grid.approach[1], grid.approach[2]
-    if not tool[1, 0] * bx + tool[1, 1] * by + tool[1, 2] * bz >= grid.cone_cosine[cell] + HAIR:
+    if not tool[1, 0] * bx + tool[1, 1] * by + tool[1, 2] * bz >= grid.cone_cosine[cell] + ROUNDING:
         return -1
     if limited:
         if not along_u:
             tx, ty, tz = grid.reference[0], grid.reference[1], grid.reference[2]
         off = _roll(tool, bx, by, bz, tx, ty, tz) - grid.roll[0]
-        if not abs(np.arctan2(np.sin(off), np.cos(off))) <= grid.roll[1] - HAIR:
+        if not abs(np.arctan2(np.sin(off), np.cos(off))) <= grid.roll[1] - ROUNDING:
             return -1
     return cell
 

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from coverable.arrays import Array
 from coverable.errors import ArgumentError
-from feasibility.paper.jcell_grid import HAIR
+from feasibility.paper.jcell_grid import ROUNDING
 from feasibility.paper.jcell_steps import Steps
 from feasibility.paper.starts import candidates
 from feasibility.paper.tree_replay import rolls_at
@@ -145,11 +145,11 @@ class LiteralSearch:
         below, side, b = cells.surface.closest(p), cells.surface.side_sign, self.b
         b = -side * below.normal if b is None else b
         error = abs(float(below.height) - side * task.standoff)
-        feasible = error <= steps.tolerance - steps.sag[ec] - HAIR  # eq. (5)
-        feasible &= float(a @ b) >= steps.cone_cosine[ec] + HAIR  # inequality (7)
+        feasible = error <= steps.tolerance - steps.sag[ec] - ROUNDING  # eq. (5)
+        feasible &= float(a @ b) >= steps.cone_cosine[ec] + ROUNDING  # inequality (7)
         if feasible and task.roll is not None:  # eq. (6)
             off = task.roll.off(rolls_at(self.kinematics, cells, task, q[None]))
-            feasible = abs(float(off[0])) <= steps.roll[1] - HAIR
+            feasible = abs(float(off[0])) <= steps.roll[1] - ROUNDING
         return (ec if feasible else -1), p
 
     def algorithm_1(self, jc: JCell, ec_T: int) -> tuple[JCell, ...]:
@@ -179,7 +179,7 @@ class LiteralSearch:
                 continue
             if ec_N == ec_T:
                 return (jc, jc_N)
-            if np.linalg.norm(p_N - p_T) < np.linalg.norm(p - p_T) - HAIR:
+            if np.linalg.norm(p_N - p_T) < np.linalg.norm(p - p_T) - ROUNDING:
                 path = self.CONT(jc_N, p_N, ec_T, checked)
                 if path:
                     return (jc, *path)

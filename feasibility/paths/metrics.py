@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask, Protected
-from feasibility.certification.rates.segment_rates import smallest_singular_values
+from feasibility.certification.segment_rates import smallest_singular_values
 from feasibility.task import Task
 from feasibility.verdict import Certificate, Walk
 from robots.kinematics import Kinematics

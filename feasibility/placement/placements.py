@@ -20,7 +20,7 @@ from typing import Any
 from coverable.errors import Checks, Fault, at_least, counted
 from feasibility.clock import Clock
 from feasibility.collisions.asked_bodies import said_of
-from feasibility.demands import refuse_start
+from feasibility.demands.every_demand import refuse_start
 from feasibility.notices import compiling_notice
 from feasibility.placement.evolution import INTERRUPTED, Evolution, distinct
 from feasibility.placement.reach_bound import Beyond, Reach

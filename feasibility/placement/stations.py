@@ -13,7 +13,7 @@ import numpy as np
 
 from coverable.arrays import Ints, Mask, Protected
 from feasibility.clock import Clock
-from feasibility.demands import OF_EACH, unjudged
+from feasibility.demands.every_demand import OF_EACH, unjudged
 from feasibility.division.one_motion import motion_over
 from feasibility.division.set_covering import set_cover
 from feasibility.placement.placements import COUNT, Placements

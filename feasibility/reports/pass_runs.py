@@ -9,13 +9,13 @@ from typing import Any
 from coverable.errors import counted
 from feasibility.collisions.asked_bodies import said_of
 from feasibility.collisions.words import checked
+from feasibility.demands.area import TreatedArea
+from feasibility.demands.treated_words import treated_json, treated_words
+from feasibility.division.pass_planning import PlannedPasses
+from feasibility.division.pass_runs import Interruption, PassRuns
 from feasibility.reports.objects_and_csv import certificate_json, clearance_json, smooth_json
 from feasibility.reports.text_and_tables import aligned, smooth_text, summary
-from feasibility.runs.pass_runs import Interruption, PassRuns
-from feasibility.runs.planning import PlannedPasses
 from feasibility.timing.sampled_trajectory import Trajectory
-from feasibility.treated.area import TreatedArea
-from feasibility.treated.treated_words import treated_json, treated_words
 from feasibility.version import version
 from surfaces.passes.parallel import Passes
 

@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 
 from coverable.errors import at_least, at_most, counted
-from feasibility.certification.rates.rate_replay import RateReplay
+from feasibility.certification.rate_replay import RateReplay
 from feasibility.collisions.asked_bodies import said_of
 from feasibility.collisions.words import checked
-from feasibility.entry.ends import Ends
+from feasibility.demands.area import TreatedArea
+from feasibility.demands.treated_words import share_words, treated_json, treated_words
+from feasibility.division.ends import Ends
 from feasibility.paths.coverage import CoveragePath
 from feasibility.paths.metrics import PathFigures
 from feasibility.reports.objects_and_csv import certificate_json, clearance_json, smooth_json
@@ -28,8 +30,6 @@ from feasibility.results.plain import plain
 from feasibility.timing.limits_used import used
 from feasibility.timing.sampled_trajectory import Trajectory
 from feasibility.timing.speed_limits import MotionLimits
-from feasibility.treated.area import TreatedArea
-from feasibility.treated.treated_words import share_words, treated_json, treated_words
 from feasibility.verdict import Verdict
 from feasibility.version import version
 from robots.robot import Robot

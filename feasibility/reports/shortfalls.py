@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from coverable.errors import counted
 from feasibility.cases.case import Case
 from feasibility.cases.surface_reading import OWN_KEYS
-from feasibility.treated.treated_words import share_words, treated_words
+from feasibility.demands.treated_words import share_words, treated_words
 from feasibility.verdict import Answer, Cause, CauseKind, Verdict
 from surfaces.cells import Cells
 

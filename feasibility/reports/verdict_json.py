@@ -55,7 +55,7 @@ def _treated(verdict: Verdict) -> dict[str, Any] | None:
     """What the motion treats, where that was measured."""
     if verdict.treated is None:
         return None
-    from feasibility.treated.treated_words import treated_json
+    from feasibility.demands.treated_words import treated_json
 
     return treated_json(verdict.treated)
 

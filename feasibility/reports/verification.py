@@ -11,6 +11,7 @@ from coverable.arrays import Mask
 from coverable.errors import counted
 from feasibility.collisions.asked_bodies import said_of
 from feasibility.collisions.words import checked, checked_words
+from feasibility.demands.treated_words import treated_json, treated_words
 from feasibility.reports.objects_and_csv import measured_json, proof_json, smooth_json
 from feasibility.reports.text_and_tables import (
     certificate_text,
@@ -18,7 +19,6 @@ from feasibility.reports.text_and_tables import (
     smooth_text,
     summary,
 )
-from feasibility.treated.treated_words import treated_json, treated_words
 from feasibility.verifying import NOT_IN_TIME, Verification
 from feasibility.version import version
 from surfaces.cells import Cells

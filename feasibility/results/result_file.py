@@ -52,8 +52,8 @@ from feasibility.verdict import (
 from feasibility.version import version
 
 if TYPE_CHECKING:
+    from feasibility.demands.area import TreatedArea
     from feasibility.task import Task
-    from feasibility.treated.area import TreatedArea
     from robots.robot import Robot
     from surfaces.cells import Cells
 
@@ -318,6 +318,6 @@ def _postures(fields: Fields, archive: Archive, count: int, n: int) -> Array | N
 
 def _treated(robot: Robot, cells: Cells, task: Task, witness: Walk) -> TreatedArea | None:
     """What the motion treats; what measures it is imported only then."""
-    from feasibility.treated.area import treated_by_walk
+    from feasibility.demands.area import treated_by_walk
 
     return treated_by_walk(robot, cells, task, witness)

@@ -5,15 +5,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from feasibility.certification.collisions.every_pose import PoseCheck, never_clear
 from feasibility.certification.cut_proofs.arm_collisions import ArmCheck, ArmCollisions
-from feasibility.certification.overlaps.every_pose import PoseCheck, never_clear
 from feasibility.collisions.asked_bodies import gather
 from feasibility.collisions.problem_bodies import Bodies
-from feasibility.roadmap.branch_and_bound.branching import root_box
 from feasibility.roadmap.motions.off_target import project_near_cell
 from feasibility.roadmap.motions.projection import PROJECTION_STEPS
 from feasibility.roadmap.motions.search_arrays import SearchArrays
 from feasibility.roadmap.motions.working_memory import Work
+from feasibility.roadmap.proofs.branching import root_box
 from feasibility.task import Task
 from robots.robot import Robot
 from surfaces.cells import Cells

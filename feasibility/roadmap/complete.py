@@ -10,13 +10,13 @@ import numpy as np
 
 from feasibility.clock import Clock, OutOfTime
 from feasibility.collisions.kernels.clearance import blamed
-from feasibility.found import Found
 from feasibility.notices import REASONS, compiling_notice
 from feasibility.problem import Problem
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.search import exploration_of, seed_middle
 from feasibility.roadmap.walk import covering_walk
 from feasibility.roadmap.warmup import warm_up
+from feasibility.search_result import SearchResult
 from feasibility.search_settings import Search
 from feasibility.verdict import Cause, Replay, Walk
 
@@ -33,7 +33,7 @@ def complete_search(
     seeds: Walk | None = None,
     suspects: Collection[int] = (),
     judging: bool = True,
-) -> Found:
+) -> SearchResult:
     """Search until one component of the roadmap covers every cell, or rounds gain nothing more.
 
     Args:
@@ -71,7 +71,7 @@ def _search(
     begin: int | None,
     suspects: Collection[int],
     judging: bool,
-) -> Found:
+) -> SearchResult:
     """`complete_search`, from a cell that the arm's start is over."""
     with clock.enforced():  # loading kernels takes a second or two
         warm_up()
@@ -130,7 +130,7 @@ def _found(
     proving: Proving | None,
     late: str,
     judged: tuple[Walk, Replay] | None = None,
-) -> Found:
+) -> SearchResult:
     """The best component, and the sentences about it.
 
     `late` says which limit ran out, if one did; `judged` is a known motion that covers all cells.
@@ -146,7 +146,7 @@ def _found(
         from feasibility.roadmap.outcome import outcome_of
 
         said = outcome_of(problem, exploration, proving, late)
-    return Found(
+    return SearchResult(
         covered=exploration.covered if walk is None else np.ones(total, dtype=bool),
         components=tuple(np.flatnonzero(exploration.covers(r)) for r in exploration.roots()),
         postures=np.array([exploration.posture(r) for r in exploration.roots()]).reshape(

@@ -12,11 +12,11 @@ import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
 from feasibility.clock import Clock
-from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.expansion import JOINED, Grower
 from feasibility.roadmap.graph import Roadmap
 from feasibility.roadmap.motions.search_arrays import SearchArrays, passable
 from feasibility.roadmap.motions.working_memory import Work, work_for
+from feasibility.roadmap.proofs.ruling import Ruling
 from robots.robot import Robot
 from surfaces.adjacency import components
 from surfaces.cells import Cells

@@ -18,12 +18,12 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.arrays import Array, Mask
-from feasibility.found import Found
 from feasibility.problem import Problem
 from feasibility.roadmap.connecting import explore_self_motions
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import Roadmap
 from feasibility.roadmap.walk import route_walk
+from feasibility.search_result import SearchResult
 from feasibility.verdict import Cause, CauseKind, Walk
 from robots.kinematics import Kinematics
 from robots.robot import Robot
@@ -69,7 +69,9 @@ class OrderedRun(NamedTuple):
         missed = range(self.furthest + 1, poses)
         return tuple(Cause(pose, CauseKind.DISCONNECTED, False, detail) for pose in missed)
 
-    def added_to(self, found: Found, problem: Problem, exploration: Exploration) -> Found:
+    def added_to(
+        self, found: SearchResult, problem: Problem, exploration: Exploration
+    ) -> SearchResult:
         """What was found of a toolpath, all of whose poses one component covers, with the run."""
         total, walk = len(problem.cells), self.walk
         counts = {**found.counts, "fk": int(exploration.work.counts[0])}

@@ -7,8 +7,8 @@ import numpy as np
 from feasibility.cut_tree import CutTree, Leaf
 from feasibility.cut_words import joint_value, sentence
 from feasibility.problem import Problem
-from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.proofs.ruling import Ruling
 from feasibility.roadmap.proving import Proving
 from feasibility.targets.blocked import blocked_curves, smoothing_offer
 
@@ -23,7 +23,7 @@ def proof_of(exploration: Exploration) -> CutTree | None:
 def outcome_of(
     problem: Problem, exploration: Exploration, proving: Proving | None, late: str
 ) -> dict[str, Any]:
-    """The fields of `Found` that say why no motion was found.
+    """The fields of `SearchResult` that say why no motion was found.
 
     Args:
         problem, exploration: what was searched.

@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from feasibility.roadmap.cuts.gaps import components_of
-from feasibility.roadmap.cuts.guess import OpenGap
-from feasibility.roadmap.cuts.prover import Prover
-from feasibility.roadmap.cuts.target_places import places_on
 from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.proofs.gaps import components_of
+from feasibility.roadmap.proofs.guess import OpenGap
+from feasibility.roadmap.proofs.prover import Prover
+from feasibility.roadmap.proofs.target_places import places_on
 from feasibility.roadmap.refinement import COARSE, FINE, refine
 from feasibility.roadmap.rounds import restart
 from feasibility.roadmap.seeds import wound

@@ -15,11 +15,11 @@ from collections.abc import Callable, Collection
 import numpy as np
 
 from coverable.arrays import Ints
-from feasibility.roadmap.branch_and_bound.branching import BoxStack, root_box
-from feasibility.roadmap.branch_and_bound.branching import rule as examine_cell
-from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.connecting import border, bridge, explore_self_motions, improvable
 from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.proofs.branching import BoxStack, root_box
+from feasibility.roadmap.proofs.branching import rule as examine_cell
+from feasibility.roadmap.proofs.ruling import Ruling
 from feasibility.roadmap.rulings import prove_collisions, rule, tool_collides
 from feasibility.roadmap.search import PIVOT_SEEDS, seed_middle
 

@@ -4,10 +4,10 @@ from functools import partial
 
 import numpy as np
 
-from feasibility.roadmap.branch_and_bound.branching import BoxStack
-from feasibility.roadmap.branch_and_bound.branching import rule as examine_cell
-from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.exploration import BUDGET, Exploration
+from feasibility.roadmap.proofs.branching import BoxStack
+from feasibility.roadmap.proofs.branching import rule as examine_cell
+from feasibility.roadmap.proofs.ruling import Ruling
 from feasibility.roadmap.seeds import wound
 
 

@@ -50,10 +50,10 @@ def _explore_two_cells() -> None:
 
 def _look_for_reasons() -> None:
     """Rule cells out, cut, and say why they are missed."""
-    from feasibility.roadmap.branch_and_bound.branching import root_box
     from feasibility.roadmap.causes.diagnosis import diagnose
     from feasibility.roadmap.exploration import Exploration
     from feasibility.roadmap.motions.search_arrays import arrays_of
+    from feasibility.roadmap.proofs.branching import root_box
     from feasibility.roadmap.proving import Proving
     from feasibility.roadmap.rounds import explore
     from feasibility.roadmap.rulings import rule

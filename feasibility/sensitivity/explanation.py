@@ -9,7 +9,10 @@ import numpy as np
 from coverable.errors import ArgumentError
 from feasibility.checking import check
 from feasibility.clock import Clock, OutOfTime
-from feasibility.demands import refuse_start
+from feasibility.demands.decision import shortfall
+from feasibility.demands.every_demand import refuse_start
+from feasibility.demands.largest import rate_figures
+from feasibility.demands.requirements import check_requirements
 from feasibility.division.one_motion import motion_over
 from feasibility.division.surface_division import divide
 from feasibility.search_settings import Progress, Search
@@ -17,10 +20,7 @@ from feasibility.sensitivity.probes import Prober
 from feasibility.sensitivity.quantities import Kind, Quantity, Variant, quantities
 from feasibility.sensitivity.thresholds import Dropped, Explanation, Threshold
 from feasibility.sensitivity.two_changes import changes_together
-from feasibility.speed.largest import rate_figures
-from feasibility.speed.requirements import check_requirements
 from feasibility.task import Task
-from feasibility.treated.decision import shortfall
 from feasibility.verdict import Evidence, Verdict, Walk
 from robots.robot import Robot
 from surfaces.cells import Cells

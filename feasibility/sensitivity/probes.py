@@ -15,9 +15,9 @@ from coverable.errors import counted
 from feasibility.checking import check
 from feasibility.clock import Clock, OutOfTime
 from feasibility.cut_tree import CutTree
-from feasibility.found import Found
 from feasibility.problem import Problem
 from feasibility.roadmap.complete import complete_search
+from feasibility.search_result import SearchResult
 from feasibility.search_settings import Search
 from feasibility.sensitivity.quantities import Kind, Quantity, Variant
 from feasibility.sensitivity.thresholds import Finding, Threshold
@@ -77,7 +77,7 @@ class Look(NamedTuple):
         return self.certificate is not None
 
     @classmethod
-    def of_search(cls, found: Found) -> "Look":
+    def of_search(cls, found: SearchResult) -> "Look":
         """What a search says by itself."""
         undecided = Evidence.BUDGET if found.unfinished or found.motion else Evidence.EXHAUSTED
         evidence = Evidence.PROOF if found.proof is not None else undecided

@@ -7,8 +7,8 @@ with its evidence.
 from dataclasses import dataclass
 
 from coverable.arrays import Ints, Protected
+from feasibility.demands.largest import RateFigures
 from feasibility.sensitivity.quantities import Quantity
-from feasibility.speed.largest import RateFigures
 from feasibility.verdict import Answer, Evidence, Verdict, Walk
 
 

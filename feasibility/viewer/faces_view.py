@@ -13,7 +13,7 @@ from feasibility.viewer.meshes import GREY, tubes
 from feasibility.viewer.pass_view import digit_lines
 from feasibility.viewer.stage import framing, triad
 from feasibility.viewer.verdict_scene import OUTLINES
-from surfaces.step_files.step_surface import StepFace, StepParts
+from surfaces.meshes.step_surface import StepFace, StepParts
 
 MOST_LINES = 40  # of the legend, the largest faces
 TALL, SMALLEST, LARGEST = 0.5, 0.03, 0.1  # [1] a digit, of a face's width; of the whole part

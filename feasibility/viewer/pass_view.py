@@ -13,12 +13,12 @@ import numpy as np
 
 from coverable.arrays import Array
 from coverable.errors import counted
+from feasibility.demands.area import TreatedArea
+from feasibility.demands.treated_words import share_words
+from feasibility.division.pass_planning import PlannedPasses
 from feasibility.paths.coverage import CoveragePath
-from feasibility.runs.planning import PlannedPasses
 from feasibility.timing.sampled_trajectory import Trajectory
 from feasibility.timing.speed_limits import MotionLimits
-from feasibility.treated.area import TreatedArea
-from feasibility.treated.treated_words import share_words
 from feasibility.viewer import robot_visuals
 from feasibility.viewer.path_and_division import painting, trail_pieces
 from feasibility.viewer.playback import Playback, paced, timed

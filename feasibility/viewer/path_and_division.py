@@ -14,8 +14,8 @@ import numpy as np
 
 from coverable.arrays import Array
 from coverable.errors import counted
-from feasibility.treated.area import TreatedArea
-from feasibility.treated.treated_words import share_words
+from feasibility.demands.area import TreatedArea
+from feasibility.demands.treated_words import share_words
 from feasibility.viewer import robot_visuals, threejs
 from feasibility.viewer.cell_meshes import cell_size
 from feasibility.viewer.html_page import Entry

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from coverable.arrays import Ints
-from feasibility.treated.area import TreatedArea
+from feasibility.demands.area import TreatedArea
 from feasibility.verdict import Verdict
 from feasibility.viewer import threejs
 from feasibility.viewer.cell_meshes import cell_size, marks

@@ -25,7 +25,7 @@ from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
 MOST_VERTICES = 64
 CLOSE_ENOUGH = 1e-4  # [m]: no vertex is added for less
-HAIR = 1e-5  # [m] a body without thickness is given this much to each side
+HALF_THICKNESS = 1e-5  # [m] a body without thickness is given this much to each side
 ROUNDING = 1e-12  # of a body's width: what hull and distances may be wrong by
 PRISM_EXCESS = 3e-4  # [m] the corners of a prism around a cylinder stand out by at most this ...
 FACETS = 3  # of a hull, that a distance is taken from at first; four is the least a hull has
@@ -90,7 +90,7 @@ def outer_hull(points: Array) -> Hull:
     Where the hull has more vertices, the one furthest outside is added to those kept until there
     are enough, or none is further outside than `CLOSE_ENOUGH`; the radius is then an upper bound on
     the distance of any point from the hull of those kept. Flat points are first given a thickness
-    of `HAIR` to each side, which Qhull needs.
+    of `HALF_THICKNESS` to each side, which Qhull needs.
 
     Args:
         points: (k, 3) m, finite, at least one.
@@ -143,8 +143,10 @@ def thickened(points: Array) -> Array:
     centred = points - points.mean(axis=0)
     axes = np.linalg.svd(centred.T @ centred)[0].T  # rows
     for axis in axes:
-        if np.ptp(points @ axis) < HAIR:
-            points = np.concatenate([points + HAIR * axis, points - HAIR * axis])
+        if np.ptp(points @ axis) < HALF_THICKNESS:
+            points = np.concatenate(
+                [points + HALF_THICKNESS * axis, points - HALF_THICKNESS * axis]
+            )
     return points
 
 

@@ -1,1 +1,1 @@
-"""Spline surfaces fitted to what users have: a formula of their own, or a grid of points."""
+"""Splines: B-spline and NURBS patches, and those fitted to a formula or to a grid of points."""

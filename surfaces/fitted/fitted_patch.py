@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from coverable.arrays import Array
+from surfaces.fitted.bspline import SplinePatch
+from surfaces.fitted.nurbs import SplineMap
 from surfaces.parts import PartModels
-from surfaces.patches.nurbs.bspline import SplinePatch
-from surfaces.patches.nurbs.nurbs import SplineMap
 
 Flags = tuple[bool, bool]
 

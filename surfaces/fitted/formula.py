@@ -25,8 +25,8 @@ from surfaces.fitted.fitted_patch import (
     poles_of,
     spline_through,
 )
-from surfaces.patches.nurbs.nurbs import SplineMap
-from surfaces.patches.nurbs.nurbs_checks import regularity_faults
+from surfaces.fitted.nurbs import SplineMap
+from surfaces.fitted.nurbs_checks import regularity_faults
 from surfaces.surface import Side, SurfaceError
 
 DEGREE = 5

@@ -14,7 +14,7 @@ from coverable.arrays import Array
 from coverable.errors import CoverableError
 from coverable.files import read_regular, shown_name
 from surfaces.arguments import Checks
-from surfaces.patches.nurbs.control_net_file import read_net
+from surfaces.fitted.control_net_file import read_net
 from surfaces.surface import SurfaceError
 
 MOST_BYTES = 16 << 20

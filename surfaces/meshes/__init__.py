@@ -1,1 +1,1 @@
-"""Triangle meshes as surfaces with a continuous normal."""
+"""Triangle meshes as surfaces with a continuous normal, repaired, and faces of STEP files."""

@@ -71,7 +71,7 @@ class MeshSurface(Surface):
     @property
     def notes(self) -> tuple[str, ...]:
         """What was repaired in the mesh, and what to know about it."""
-        from surfaces.meshes.repair.mesh_notes import notes_of
+        from surfaces.meshes.mesh_notes import notes_of
 
         made = self.smoothing
         return (*notes_of(self.mesh), *([] if made is None else [made.words()]))

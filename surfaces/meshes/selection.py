@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from coverable.arrays import Array, Ints, Mask, unit_along
 from coverable.errors import Fault, shown
 from surfaces.arguments import Checks
-from surfaces.meshes.repair.degenerate import weld_distance
-from surfaces.meshes.repair.orientation import one_fan_each
+from surfaces.meshes.degenerate import weld_distance
+from surfaces.meshes.orientation import one_fan_each
 from surfaces.meshes.triangle_mesh import TriangleMesh
 from surfaces.surface import SurfaceError
 
@@ -32,7 +32,7 @@ def cut_plane(mesh: TriangleMesh, point: ArrayLike, normal: ArrayLike) -> Triang
         SurfaceError: bad numbers, or nothing is left.
 
     Example:
-        >>> from surfaces.meshes.repair.cleaning import clean
+        >>> from surfaces.meshes.cleaning import clean
         >>> mesh = clean([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
         >>> cut_plane(mesh, point=(0, 0.5, 0), normal=(0, 1, 0))
         TriangleMesh(1 faces, 0.125 m^2, 0.5 x 0.5 x 0 m)

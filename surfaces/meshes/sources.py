@@ -12,7 +12,7 @@ from coverable.files import shown_name
 from coverable.meshes.mesh_file import read_raw
 from coverable.meshes.raw_mesh import MeshError
 from surfaces.arguments import Checks
-from surfaces.meshes.repair.cleaning import clean
+from surfaces.meshes.cleaning import clean
 from surfaces.meshes.triangle_mesh import TriangleMesh
 from surfaces.surface import SurfaceError
 

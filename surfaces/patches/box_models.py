@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.arrays import Array, Ints
+from surfaces import bernstein
+from surfaces.enclosure_functions import Enclosure
 from surfaces.parts import PartModels
-from surfaces.patches import bernstein
-from surfaces.patches.enclosure_functions import Enclosure
 
 Formula = Callable[[Enclosure, Enclosure], tuple[Enclosure, Enclosure]]
 """u and v -> points and normals."""

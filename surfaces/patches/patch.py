@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from coverable.arrays import Array, Ints, Mask
+from surfaces.enclosures import Enclosure, enclosed
 from surfaces.parts import MOST_PARTS, PartModels, SurfaceParts
 from surfaces.patches.box_models import Formula, Pieces, over_boxes
-from surfaces.patches.enclosures import Enclosure, enclosed
 from surfaces.surface import TURN_TOLERANCE, ClosestPoint, Surface, SurfaceError, points_of
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ class Patch(Surface):
         Raises:
             SurfaceError: see `local_enclosures`.
         """
-        from surfaces.patches.slopes import Slope
+        from surfaces.slopes import Slope
 
         def ahead(u: Enclosure, v: Enclosure) -> Any:
             zero = np.zeros(u.shape)

@@ -10,9 +10,9 @@ import numpy as np
 
 from coverable.arrays import Array, Mask, Protected
 from coverable.errors import Fault
+from surfaces.enclosures import Enclosure
 from surfaces.patches.closest_on_patch import ClosestPointSearch, Jet
-from surfaces.patches.enclosures import Enclosure
-from surfaces.patches.slopes import Slope
+from surfaces.slopes import Slope
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline

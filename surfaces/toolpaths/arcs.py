@@ -16,10 +16,10 @@ import numpy as np
 
 from coverable.arrays import Array, Ints
 from surfaces.cell_curves import CellCurves
+from surfaces.enclosures import Enclosure
 from surfaces.part_growth import Boxes, grown
 from surfaces.parts import PartModels, SurfaceParts
 from surfaces.patches.box_models import over_boxes
-from surfaces.patches.enclosures import Enclosure
 
 PIECE = math.radians(15.0)
 ROUNDING = 1.0 + 1e-12  # covers the rounding of the few operations on derivative bounds

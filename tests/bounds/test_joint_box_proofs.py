@@ -11,8 +11,8 @@ from samples import sampled, seeds, spread
 from search_kernels import Motions
 
 from coverable import Answer, CauseKind, Evidence, Obstacle, check
+from feasibility.certification.collisions.everywhere import Overlapping
 from feasibility.certification.cut_proofs.proof_verification import verify_proof
-from feasibility.certification.overlaps.everywhere import Overlapping
 from feasibility.collisions.asked_bodies import gather
 from feasibility.collisions.shapes import HalfSpace
 from feasibility.cut_tree import CutTree, Leaf

@@ -13,8 +13,8 @@ from coverable import Task, load_robot, plane
 from coverable.errors import ArgumentError
 from feasibility.certification.jacobians import jacobians
 from feasibility.certification.lever_bounds import levers_along, second_derivatives
-from feasibility.certification.rates.rate_replay import check_rates, in_place, replay_rates
-from feasibility.certification.rates.segment_rates import (
+from feasibility.certification.rate_replay import check_rates, in_place, replay_rates
+from feasibility.certification.segment_rates import (
     fastest_anywhere,
     segment_rates,
     smallest_singular_values,

@@ -5,10 +5,10 @@ import pytest
 from referee import unit
 
 from coverable import Task, load_robot, sphere
+from feasibility.certification import roll_box_models
 from feasibility.certification.cut_proofs import linear_models
 from feasibility.certification.cut_proofs.linear_models import Allowed, ArmModel, target_parts
-from feasibility.certification.rolls import roll_box_models
-from feasibility.certification.rolls.roll_box_models import Directions, reference_parts, roll_models
+from feasibility.certification.roll_box_models import Directions, reference_parts, roll_models
 from feasibility.roll import Roll, projected
 from robots.kinematics import Kinematics, reference_axes
 

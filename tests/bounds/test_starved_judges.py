@@ -20,15 +20,15 @@ from coverable import Obstacle, Task, parametric, plane
 from feasibility.certification.collisions.collision_replay import Couples, collision_replay
 from feasibility.certification.collisions.motion import ArmMotion
 from feasibility.certification.jacobians import jacobians
-from feasibility.certification.rates.rate_replay import in_place
-from feasibility.certification.rates.segment_rates import segment_rates
-from feasibility.certification.rolls.bounds import largest_off
-from feasibility.certification.rolls.roll_box_models import TargetModel, ToolModel, roll_models
+from feasibility.certification.rate_replay import in_place
+from feasibility.certification.roll_bounds import largest_off
+from feasibility.certification.roll_box_models import TargetModel, ToolModel, roll_models
+from feasibility.certification.segment_rates import segment_rates
 from feasibility.certification.stretches import Judge
 from feasibility.certification.surface_replay import replay_over_surface
 from feasibility.collisions.problem_bodies import Soup
+from feasibility.demands.area import treated_by_walk
 from feasibility.roll import Roll
-from feasibility.treated.area import treated_by_walk
 from feasibility.verdict import Walk
 from robots.kinematics import Kinematics
 from robots.shapes.bodies import Solid, Triangles

@@ -10,12 +10,12 @@ from capsule_arms import at, bodies_of, capsule_links, pair, planar_arm
 from proof_cases import elbow_case
 
 from coverable import Collision, Obstacle, Task, ToolShape, load_robot, plane, sphere
+from feasibility.certification.collisions.every_pose import never_clear
+from feasibility.certification.collisions.everywhere import Overlapping
 from feasibility.certification.cut_proofs import linear_models
 from feasibility.certification.cut_proofs.box_exclusion import contract, separated
 from feasibility.certification.cut_proofs.linear_models import ArmModel, Boxes, target_parts
 from feasibility.certification.cut_proofs.proof_verification import verify_on
-from feasibility.certification.overlaps.every_pose import never_clear
-from feasibility.certification.overlaps.everywhere import Overlapping
 from feasibility.collisions.asked_bodies import gather
 from robots.kinematics import Kinematics
 from robots.shapes.bodies import Solid

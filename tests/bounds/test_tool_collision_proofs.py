@@ -13,9 +13,9 @@ from samples import sampled, seeds, spread
 
 import coverable
 from coverable import CauseKind, Collision, Evidence, Obstacle, Task, ToolShape, check, cylinder
+from feasibility.certification.collisions.depths import Balls, depths, planes_around, points_inside
+from feasibility.certification.collisions.every_pose import never_clear
 from feasibility.certification.cut_proofs.proof_verification import verify_proof
-from feasibility.certification.overlaps.depths import Balls, depths, planes_around, points_inside
-from feasibility.certification.overlaps.every_pose import never_clear
 from feasibility.collisions.problem_bodies import Bodies, Pair
 from feasibility.cut_tree import CutTree, Leaf
 from robots.shapes.bodies import Solid, Triangles

@@ -19,11 +19,11 @@ import coverable
 from coverable import check, load_case, load_motion, open_workers, pass_runs, trajectory, verify
 from feasibility.cli.main import _parser
 from feasibility.collisions.words import UNCHECKED
-from feasibility.entry.ends import ends_of
+from feasibility.demands.area import treated_by_walk
+from feasibility.demands.motion_rates import path_rates
+from feasibility.division.ends import ends_of
 from feasibility.placement.trials import evaluator_of_study
-from feasibility.speed.motion_rates import path_rates
 from feasibility.timing.limits_used import used
-from feasibility.treated.area import treated_by_walk
 from feasibility.verdict import Walk
 
 CHOICES = re.compile(r"\(choose from .*?\)")  # each version of Python has other quotes

@@ -11,7 +11,7 @@ import coverable
 from coverable import Pose, Region, load_case, load_motion, load_result, place, station_plan, verify
 from feasibility.cases.keys import all_keys
 from feasibility.cli.main import _parser
-from feasibility.demands import DEMANDS, further
+from feasibility.demands.every_demand import DEMANDS, further
 from feasibility.verdict import Walk
 
 CASE = """
@@ -82,7 +82,9 @@ def test_every_key_is_a_demand_with_a_judge_or_has_a_reason_to_be_none():
         if key.table.partition(".")[0] in ("robot", "task", "collision"):
             names = f"{key.table}.{key.name}", f"{key.table}.*", f"{key.table.partition('.')[0]}.*"
             known = [name for name in names if name in judged or name in NO_DEMANDS]
-            assert known, f"{names[0]}: who judges it (feasibility/demands.py), or why nobody?"
+            assert known, (
+                f"{names[0]}: who judges it (feasibility/demands/every_demand.py), or why nobody?"
+            )
     (commands,) = (action for action in _parser()._actions if action.choices)
     assert set(commands.choices) == JUDGING | set(OTHERS)
 

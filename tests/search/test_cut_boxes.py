@@ -11,9 +11,9 @@ from samples import sampled, seeds
 from search_kernels import contracted
 
 from coverable import Task, cone, cylinder, hyperboloid, load_robot, plane, sphere, torus
-from feasibility.roadmap.branch_and_bound.boxes import place_at_rest
-from feasibility.roadmap.cuts.target_places import places_on
 from feasibility.roadmap.motions.search_arrays import arrays_of
+from feasibility.roadmap.proofs.boxes import place_at_rest
+from feasibility.roadmap.proofs.target_places import places_on
 from feasibility.roll import projected, roll_of
 
 ARMS = {

@@ -11,8 +11,8 @@ from samples import sampled, seeds, spread
 
 import coverable
 from feasibility.cut_tree import Cut, Leaf
-from feasibility.roadmap.branch_and_bound.branching import branch_and_bound
-from feasibility.roadmap.branch_and_bound.ruling import Ruling
+from feasibility.roadmap.proofs.branching import branch_and_bound
+from feasibility.roadmap.proofs.ruling import Ruling
 
 
 def stored(arm, feasible):

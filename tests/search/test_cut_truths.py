@@ -8,8 +8,8 @@ from random_arms import robot_of
 
 from coverable import Task, cylinder, plane
 from feasibility.cut_tree import Cut, Leaf
-from feasibility.roadmap.branch_and_bound.ruling import Ruling
-from feasibility.roadmap.cuts.regions import limits_of
+from feasibility.roadmap.proofs.regions import limits_of
+from feasibility.roadmap.proofs.ruling import Ruling
 
 ANY_AXIS = Task(0.0, 180.0, 1e-3)
 

@@ -12,10 +12,10 @@ from random_arms import planar_arm, rail_arm, random_arm, random_configuration, 
 from search_kernels import Motions, ruled
 
 from coverable import Task, load_robot, plane
-from feasibility.roadmap.branch_and_bound.branching import root_box
-from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions.search_arrays import arrays_of
+from feasibility.roadmap.proofs.branching import root_box
+from feasibility.roadmap.proofs.ruling import Ruling
 from feasibility.roadmap.rulings import rule
 
 UP = np.array([0.0, 0.0, 1.0])

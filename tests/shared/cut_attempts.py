@@ -5,14 +5,14 @@ from typing import NamedTuple
 import numpy as np
 
 from feasibility.cut_tree import Cut, Leaf
-from feasibility.roadmap.branch_and_bound.boxes import place_at_rest
-from feasibility.roadmap.cuts.gaps import Component, components_of
-from feasibility.roadmap.cuts.prover import Prover
-from feasibility.roadmap.cuts.regions import limits_of, turn_from
-from feasibility.roadmap.cuts.statements import Budget, Statement
-from feasibility.roadmap.cuts.target_places import places_on
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions.search_arrays import arrays_of
+from feasibility.roadmap.proofs.boxes import place_at_rest
+from feasibility.roadmap.proofs.gaps import Component, components_of
+from feasibility.roadmap.proofs.prover import Prover
+from feasibility.roadmap.proofs.regions import limits_of, turn_from
+from feasibility.roadmap.proofs.statements import Budget, Statement
+from feasibility.roadmap.proofs.target_places import places_on
 from feasibility.roadmap.rounds import improve
 from feasibility.roadmap.search import seed_middle
 from feasibility.roadmap.seeds import wound

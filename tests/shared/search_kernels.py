@@ -11,16 +11,16 @@ from coverable.kernels import entry
 from feasibility.collisions.kernels.clearance import blamed, segment_clear
 from feasibility.collisions.kernels.memory import collision_buffer, configuration_bounds
 from feasibility.collisions.problem_bodies import Bodies
-from feasibility.roadmap.branch_and_bound import box_bounds, box_contraction
-from feasibility.roadmap.branch_and_bound.boxes import box_work
-from feasibility.roadmap.branch_and_bound.branching import DIRECTIONS, root_box, rule
-from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.motions import aiming, projection, segment_bound
 from feasibility.roadmap.motions.aiming import aim, stand_still
 from feasibility.roadmap.motions.off_target import project_near_cell
 from feasibility.roadmap.motions.roll_kernels import level, roll_off_middle
 from feasibility.roadmap.motions.search_arrays import arrays_of
 from feasibility.roadmap.motions.working_memory import place, work_for
+from feasibility.roadmap.proofs import box_bounds, box_contraction
+from feasibility.roadmap.proofs.boxes import box_work
+from feasibility.roadmap.proofs.branching import DIRECTIONS, root_box, rule
+from feasibility.roadmap.proofs.ruling import Ruling
 
 Floats = NDArray[np.float64]
 

@@ -6,10 +6,10 @@ from bounds import holds
 from samples import sampled, seeds
 
 from coverable import Patch, SurfaceError
-from surfaces.patches import bernstein
+from surfaces import bernstein
+from surfaces.enclosure_functions import FUNCTIONS, UFUNCS, Enclosure
 from surfaces.patches.box_models import VectorModel, over_boxes
-from surfaces.patches.enclosure_functions import FUNCTIONS, UFUNCS, Enclosure
-from surfaces.patches.slopes import Slope
+from surfaces.slopes import Slope
 
 Z = np.array([1.0, 2.0, 3.0])
 # Of u and v in 0.2 .. 2, and over what they are smooth.

@@ -15,7 +15,7 @@ import pytest
 from approved import refused
 from mesh_writers import GOOD, nested_scene
 
-from surfaces.meshes.repair.mesh_notes import notes_of
+from surfaces.meshes.mesh_notes import notes_of
 from surfaces.meshes.sources import read_mesh
 
 V, F = w.cube()

@@ -11,7 +11,7 @@ from mesh_writers import GOOD
 from scipy.spatial import cKDTree
 
 from coverable import mesh
-from surfaces.meshes.repair.mesh_notes import notes_of
+from surfaces.meshes.mesh_notes import notes_of
 from surfaces.meshes.sources import read_mesh
 from surfaces.meshes.triangle_mesh import TriangleMesh
 

@@ -8,11 +8,11 @@ from samples import sampled, seeds
 from scipy.spatial.transform import Rotation
 
 from coverable import SurfaceError
+from surfaces.meshes.cleaning import clean
+from surfaces.meshes.degenerate import weld_distance, welded
+from surfaces.meshes.mesh_notes import notes_of
 from surfaces.meshes.normals import blended
-from surfaces.meshes.repair.cleaning import clean
-from surfaces.meshes.repair.degenerate import weld_distance, welded
-from surfaces.meshes.repair.mesh_notes import notes_of
-from surfaces.meshes.repair.orientation import one_fan_each
+from surfaces.meshes.orientation import one_fan_each
 from surfaces.meshes.triangle_mesh import TriangleMesh
 
 V, F = w.cube()

@@ -7,7 +7,7 @@ from approved import refused
 from samples import sampled, seeds
 
 from coverable import cut_box, cut_plane, faces_within_cone, take_faces
-from surfaces.meshes.repair.cleaning import clean
+from surfaces.meshes.cleaning import clean
 
 CUBE = clean(*w.cube(0.2))
 HILLY = clean(*w.hilly())

@@ -15,9 +15,9 @@ from approved import refused
 from coverable import Case, SurfaceError, mesh, step, step_faces
 from coverable.processes import Ended, Limits, folder_of, run_apart
 from feasibility.cli.main import main
-from surfaces.step_files import step_process
-from surfaces.step_files.step_process import Caps
-from surfaces.step_files.step_surface import step_parts, step_triangles
+from surfaces.meshes import step_process
+from surfaces.meshes.step_process import Caps
+from surfaces.meshes.step_surface import step_parts, step_triangles
 
 SIZE = (0.2, 0.1, 0.05)  # m
 ROUND = 0.01  # [m], radius of the one edge that is round

@@ -19,7 +19,7 @@ from samples import sampled, spread
 import coverable
 from coverable import Search, Task, check, divide, load_case, load_robot, plane, replay, sphere
 from feasibility.certification.cut_proofs.proof_verification import verify_proof
-from feasibility.certification.rates.rate_replay import replay_rates
+from feasibility.certification.rate_replay import replay_rates
 from feasibility.cut_tree import Leaf
 from feasibility.division.reconfiguration import itinerary
 from feasibility.verdict import CauseKind, Walk

@@ -10,9 +10,9 @@ from samples import sampled, seeds
 
 import coverable
 from coverable import Task, load_robot, parallel_passes, pass_runs, plan_passes, plane, verify
-from feasibility.certification.rates.rate_replay import replay_rates
+from feasibility.certification.rate_replay import replay_rates
 from feasibility.clock import Clock
-from feasibility.runs.fewest import Stations, fewest_runs
+from feasibility.division.fewest_runs import Stations, fewest_runs
 from surfaces.passes.toolpath import PassPlaces
 
 

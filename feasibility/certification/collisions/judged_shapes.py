@@ -175,15 +175,15 @@ def _hull_of(mesh: Triangles) -> tuple[Any, Array, float]:
     from scipy.spatial import QhullError
 
     points = mesh.vertices[np.unique(mesh.faces)]
-    hair = MERGED * (1.0 + float(np.abs(points).max()))
+    rounding = MERGED * (1.0 + float(np.abs(points).max()))
     middle = points.mean(axis=0)
     _, spread, axes = np.linalg.svd(points - middle, full_matrices=False)
     if spread[-1] > FLAT * spread[0]:
         try:
-            return (*coal_hull(points), hair)
+            return (*coal_hull(points), rounding)
         except (QhullError, RuntimeError):  # coal takes at most 255 edges at a corner
             pass
     along = (points - middle) @ axes.T
     ends = np.stack([along.min(axis=0), along.max(axis=0)])
     box = np.stack(np.meshgrid(*ends.T), axis=-1).reshape(-1, len(axes)) @ axes + middle
-    return None, box, hair
+    return None, box, rounding

@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.arrays import Array
+from feasibility.certification.collisions.everywhere import Overlapping
 from feasibility.certification.cut_proofs.cut_region import JointRegion
 from feasibility.certification.cut_proofs.empty_region import Claim, Emptiness
 from feasibility.certification.cut_proofs.linear_models import Allowed, ArmModel, cell_parts
 from feasibility.certification.cut_proofs.refutation import Refuter
 from feasibility.certification.lever_bounds import out_of_line
-from feasibility.certification.overlaps.everywhere import Overlapping
 from feasibility.collisions.problem_bodies import Bodies
 from feasibility.task import Task
 from robots.robot import Robot

@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
+from feasibility.certification.collisions.everywhere import Overlapping
 from feasibility.certification.cut_proofs.box_cutting import smaller
 from feasibility.certification.cut_proofs.box_exclusion import (
     contract,
@@ -36,7 +37,6 @@ from feasibility.certification.cut_proofs.linear_models import (
     Parts,
 )
 from feasibility.certification.cut_proofs.refutation import Refuter
-from feasibility.certification.overlaps.everywhere import Overlapping
 
 BATCH = 2048  # boxes at a time
 FIRST_TRY = 300  # boxes after which a refutation is first tried

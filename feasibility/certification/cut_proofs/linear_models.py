@@ -23,16 +23,16 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.arrays import Array, Ints
+from feasibility.certification.bisection import Rows
 from feasibility.certification.jacobians import Jacobians, cross, jacobians, lengths
 from feasibility.certification.lever_bounds import lever_bounds, longest_levers
-from feasibility.certification.rolls.roll_box_models import (
+from feasibility.certification.roll_box_models import (
     Directions,
     TargetModel,
     ToolModel,
     reference_parts,
     roll_models,
 )
-from feasibility.certification.rows import Rows
 from feasibility.roll import Roll
 from feasibility.task import Targets, Task
 from robots.kinematics import Kinematics, reference_axes

@@ -9,8 +9,8 @@ tool on the surface, within tolerance and cone, and its roll in the range,
     no q in the region of a leaf has the tool at its cell's target, and held likewise.
 
 A tree of one leaf proves its claim too where the tool collides in every pose within tolerance and
-cone of the cell's target, whatever the arm does (`feasibility.certification.overlaps`). And where
-bodies are to stay clear of each other, M and leaves hold only what is clear.
+cone of the cell's target, whatever the arm does (`collisions/every_pose.py`). And where bodies are
+to stay clear of each other, M and leaves hold only what is clear.
 
 Both say that a region is empty, which `empty_region` proves by bounds (`linear_models`,
 `box_exclusion`). A joint that the tree opens at t is to have no q in M at any
@@ -27,6 +27,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from feasibility.certification.collisions.every_pose import PoseCheck, never_clear
+from feasibility.certification.collisions.everywhere import Overlapping
 from feasibility.certification.cut_proofs.cut_region import TURN, JointRegion
 from feasibility.certification.cut_proofs.empty_region import Claim, Emptiness, Outcome
 from feasibility.certification.cut_proofs.linear_models import (
@@ -40,8 +42,6 @@ from feasibility.certification.cut_proofs.parts_agreement import disagreement
 from feasibility.certification.cut_proofs.refutation import Refuter
 from feasibility.certification.cut_proofs.tree_shape import malformed
 from feasibility.certification.lever_bounds import out_of_line, stretched_length
-from feasibility.certification.overlaps.every_pose import PoseCheck, never_clear
-from feasibility.certification.overlaps.everywhere import Overlapping
 from feasibility.collisions.asked_bodies import gather
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from feasibility.cut_words import joint_value

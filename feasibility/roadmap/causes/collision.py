@@ -9,11 +9,11 @@ from coverable.arrays import Array
 from feasibility.certification.cut_proofs.arm_collisions import ArmCheck
 from feasibility.collisions.kernels.memory import configuration_bounds
 from feasibility.collisions.problem_bodies import Pair
-from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions.off_target import project_near_cell
 from feasibility.roadmap.motions.projection import PROJECTION_STEPS
 from feasibility.roadmap.moving_clear import moved_clear
+from feasibility.roadmap.proofs.ruling import Ruling
 from feasibility.verdict import Cause, CauseKind
 
 GUESSES = 60  # random configurations that are projected onto the cell

@@ -23,7 +23,6 @@ from coverable.kernels import allocating_entry
 from feasibility.collisions.problem_bodies import Pair
 from feasibility.cone import angle_of
 from feasibility.cut_tree import CutTree
-from feasibility.roadmap.branch_and_bound.ruling import Ruling
 from feasibility.roadmap.causes.collision import colliding, proved_collision
 from feasibility.roadmap.causes.disconnection import disconnected
 from feasibility.roadmap.causes.relaxed import STARTS, other_rolls, solutions, with_cone
@@ -33,6 +32,7 @@ from feasibility.roadmap.motions.linear_steps import cholesky_solve
 from feasibility.roadmap.motions.search_arrays import SearchArrays, with_free_roll
 from feasibility.roadmap.motions.self_motion import connect
 from feasibility.roadmap.motions.working_memory import NEXT, place, put
+from feasibility.roadmap.proofs.ruling import Ruling
 from feasibility.roadmap.rounds import evenly
 from feasibility.verdict import Cause, CauseKind
 from robots.chain import jacobians

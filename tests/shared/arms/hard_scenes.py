@@ -12,7 +12,7 @@ from foreign_clearances import ForeignScene
 
 import coverable
 from coverable import Axis, Cells, Collision, Obstacle, Robot, Task, ToolShape, load_robot, plane
-from feasibility.certification.overlaps.every_pose import PoseCheck, never_clear
+from feasibility.certification.collisions.every_pose import PoseCheck, never_clear
 from feasibility.collisions.asked_bodies import gather
 from feasibility.collisions.problem_bodies import Bodies
 from robots.kinematics import Kinematics

@@ -1,0 +1,243 @@
+"""Boxes of joint values in which two bodies overlap everywhere.
+
+A point of body i that is r deep in it and s deep in another one
+at the middle of a box shows that they come nearer than the clearance c all over the box if
+
+    r + s + c > M,
+
+M being how far the point can move in the box, seen from the other body. With x the point, v_k + w_k
+x its velocity by joint k (Pinocchio's), and h_k the half widths, M = sum_k m_k over the joints
+between the two, where m_k = min(h_k, 2) |v_k + w_k x| if joint k turns, and h_k if it slides: the
+joints are moved one by one, the first first, so that those behind k are still at the middle, and
+those before it have carried its axis along with the point. Or else, where the tool point p is
+within e of a place T, the point is as far from T + x - p as that difference changes, and e: joints
+beyond i move p, those up to i turn the difference.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from coverable.arrays import Array, Ints
+from feasibility.certification.bisection import Rows
+from feasibility.certification.collisions.collision_replay import collision_replay
+from feasibility.certification.collisions.depths import Balls, depths, points_inside
+from feasibility.collisions.problem_bodies import Bodies
+from robots.kinematics import Kinematics
+from robots.robot import Robot
+from robots.shapes.bodies import Triangles
+
+GUARD = 1e-7  # [m] that an overlap has to be larger by
+
+
+class _Points(NamedTuple):
+    """Points of a body that moves."""
+
+    joint: int
+    places: Array
+    """(k, 3) m, in the frame of the joint."""
+    deep: Array
+    """(k,) m"""
+
+
+class _Inside(NamedTuple):
+    """A body that has a known inside."""
+
+    joint: int
+    """0 at rest."""
+    shape: object
+    placement: Array
+    """(4, 4) in the frame of the joint."""
+
+
+class _Couples(NamedTuple):
+    """Points, and the bodies that they may be inside."""
+
+    points: _Points
+    bodies: list[tuple[_Inside, int]]
+    """Each with the index of the pair, whose clearance it has to have."""
+
+
+class Deepest(NamedTuple):
+    """Of m boxes, the point that is nearest to ruling each out."""
+
+    ratio: Array
+    """(m,) how far it moves in the box by how far it may; below 1 the box is ruled out, inf where
+    nothing overlaps at its middle."""
+    effect: Array
+    """(m, n) m, how far each joint moves it."""
+    pair: Ints
+    """(m,) which pair it is; -1 for none."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Middles(Rows):
+    """Of m boxes, their half widths and what Pinocchio says of the arm at their middles."""
+
+    half: Array
+    """(m, n)"""
+    rotations: Array
+    """(m, n + 1, 3, 3)"""
+    origins: Array
+    """(m, n + 1, 3) m"""
+    linear: Array
+    """(m, n, 3) v_k"""
+    angular: Array
+    """(m, n, 3) w_k"""
+    tool: Array
+    """(m, 3) m"""
+    target: Array
+    """(m, 3) m"""
+    off: Array
+    """(m,) m, how far the tool point may be from the target in the box."""
+
+
+class Overlapping:
+    """Finds boxes in which bodies of one problem overlap everywhere."""
+
+    def __init__(self, robot: Robot, bodies: Bodies) -> None:
+        """Place points in the bodies of all pairs that are checked."""
+        self._robot, self._bodies, self._kinematics = robot, bodies, Kinematics(robot)
+        self._couples = _couples(bodies)
+
+    def deepest(self, low: Array, high: Array, target: Array, off: Array) -> Deepest:
+        """What of m boxes is nearest to being too near all over, with the tool at its target.
+
+        Args:
+            low, high: (m, n) rad or m.
+            target: (m, 3) m, where the tool point is to be in each.
+            off: (m,) m, how far it may be from there.
+        """
+        m, n = low.shape
+        found = Deepest(np.full(m, np.inf), np.zeros((m, n)), np.full(m, -1))
+        if not m:
+            return found
+        q = 0.5 * (low + high)
+        frames, twists = self._kinematics.joints(q), self._kinematics.twists(q).transpose(0, 2, 1)
+        tool, _ = self._kinematics.tools(q)
+        boxes = _Middles(
+            0.5 * (high - low), frames.rotations, frames.points, twists[..., :3], twists[..., 3:],
+            tool, target, off,
+        )  # fmt: skip
+        hits = np.zeros(len(self._couples), dtype=int)
+        for k, couples in enumerate(self._couples):
+            left = np.flatnonzero(found.ratio >= 1.0)
+            if not len(left):
+                break
+            one = self._overlap(couples, boxes.of(left))
+            nearer = one.ratio < found.ratio[left]
+            for mine, other in zip(found, one, strict=True):
+                mine[left[nearer]] = other[nearer]
+            hits[k] = (one.ratio < 1.0).sum()
+        order = np.argsort(-hits, kind="stable")
+        self._couples = [self._couples[k] for k in order]
+        return found
+
+    def clear(self, q: Array) -> bool:
+        """Does the judge of collisions find all pairs apart at a configuration (n,)?"""
+        return collision_replay(self._robot, self._bodies, np.array([q, q])).accepted
+
+    def _overlap(self, couples: _Couples, boxes: _Middles) -> Deepest:
+        """What points of one body say of m boxes."""
+        points, n = couples.points, self._robot.n
+        turned = points.places @ boxes.rotations[:, points.joint].transpose(0, 2, 1)
+        x = turned + boxes.origins[:, points.joint, None]
+        steps = self._steps(boxes, x, points.joint)
+        from_tool = self._steps_from_tool(boxes, x, points.joint)
+        shifted = x + (boxes.target - boxes.tool)[:, None]
+        rows = np.arange(len(x))
+        found = Deepest(np.full(len(x), np.inf), np.zeros((len(x), n)), np.full(len(x), -1))
+        for body, pair in couples.bodies:
+            kept = points.deep + self._bodies.pairs[pair].clearance - GUARD
+            seen = [(x, steps, body.joint, np.zeros((len(x), 1)))]
+            if body.joint == 0:
+                seen.append((shifted, from_tool, 0, boxes.off[:, None]))
+            for places, moves, first, off in seen:
+                over = kept + _depths(body, boxes, places, kept.max(initial=0.0)) - off
+                ratio = np.full(over.shape, np.inf)
+                np.divide(sum(moves[first:]), over, out=ratio, where=over > 0.0)
+                best = ratio.argmin(axis=1)
+                (nearer,) = np.nonzero(ratio[rows, best] < found.ratio)
+                best = best[nearer]
+                found.ratio[nearer], found.pair[nearer] = ratio[nearer, best], pair
+                found.effect[nearer] = 0.0
+                for j in range(first, len(moves)):
+                    found.effect[nearer, j] = moves[j][nearer, best]
+        return found
+
+    def _steps(self, boxes: _Middles, x: Array, joint: int) -> list[Array]:
+        """By how much (m, k) each joint up to one moves points of that one, seen from before it."""
+        return [self._step(boxes, k, x) for k in range(joint)]
+
+    def _steps_from_tool(self, boxes: _Middles, x: Array, joint: int) -> list[Array]:
+        """By how much (m, k) each joint changes the difference of points and the tool point."""
+        tool, steps = boxes.tool[:, None], list[Array]()
+        for k in range(joint):
+            turning = _length_of_cross(boxes.angular[:, k, None], x - tool)  # none by a slide
+            steps.append(np.minimum(boxes.half[:, k, None], 2.0) * turning)
+        beyond = [self._step(boxes, k, tool) for k in range(joint, self._robot.n)]
+        return steps + [np.broadcast_to(step, x.shape[:2]) for step in beyond]
+
+    def _step(self, boxes: _Middles, k: int, x: Array) -> Array:
+        """m_k of points (m, k, 3)."""
+        if self._robot.prismatic[k]:
+            return np.broadcast_to(boxes.half[:, k, None], x.shape[:2])
+        lever = _length_of_cross(boxes.angular[:, k, None], x, boxes.linear[:, k, None])
+        return np.asarray(np.minimum(boxes.half[:, k, None], 2.0) * lever)
+
+
+def _length_of_cross(a: Array, b: Array, more: Array | None = None) -> Array:
+    """(m, k) lengths of a x b + more (m, k, 3); `np.cross` takes several times as long."""
+    x = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
+    y = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
+    z = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    if more is not None:
+        x, y, z = x + more[..., 0], y + more[..., 1], z + more[..., 2]
+    return np.asarray(np.sqrt(x * x + y * y + z * z))
+
+
+def _depths(body: _Inside, boxes: _Middles, x: Array, near: float) -> Array:
+    """(m, k) m, how deep points (m, k, 3) are in a body at least; further out than `near`, -inf."""
+    own = (x - boxes.origins[:, body.joint, None]) @ boxes.rotations[:, body.joint]
+    own = (own - body.placement[:3, 3]) @ body.placement[:3, :3]
+    found, rows = np.full(x.shape[:2], -np.inf), np.ones(len(x), dtype=bool)
+    if isinstance(body.shape, Balls):  # these take long
+        centre = body.shape.centres[0]
+        wide = (np.linalg.norm(body.shape.centres - centre, axis=1) + body.shape.radii).max()
+        rows = np.linalg.norm(own - centre, axis=2).min(axis=1) <= wide + near
+    deep = depths(body.shape, own[rows])
+    if deep is not None:
+        found[rows] = deep
+    return found
+
+
+def _couples(bodies: Bodies) -> list[_Couples]:
+    """The points of every body that moves, with all bodies with an inside that it may not meet."""
+    held: list[tuple[str, int, object, Array]]
+    held = [(one.owner, one.joint, one.geometry, one.placement) for one in bodies.solids]
+    held += [(one.name, 0, one.geometry, one.placement) for one in bodies.scene]
+    inside = dict[str, list[_Inside]]()
+    for owner, joint, shape, placement in held:
+        shapes = [shape] if depths(shape, np.zeros(3)) is not None else []
+        if isinstance(shape, Triangles) and joint > 0:
+            shapes.append(Balls.among(*points_inside(shape)))
+        inside.setdefault(owner, []).extend(
+            _Inside(joint, one, np.asarray(placement)) for one in shapes
+        )
+    found = []
+    for solid in bodies.solids:
+        inside_of = [
+            (body, k)
+            for k, pair in enumerate(bodies.pairs)
+            for one, other in ((pair.first, pair.second), (pair.second, pair.first))
+            for body in (inside.get(other, ()) if one == solid.owner else ())
+            if solid.joint > body.joint
+        ]
+        if inside_of:
+            places, deep = points_inside(solid.geometry)
+            places = places @ solid.placement[:3, :3].T + solid.placement[:3, 3]
+            found.append(_Couples(_Points(solid.joint, places, deep), inside_of))
+    return found

@@ -1,1 +1,0 @@
-"""The judge of speeds and of the distance from singularities, between waypoints too."""

@@ -1,1 +1,0 @@
-"""The judge of the roll: bounds between exact configurations, along curves and over a surface."""

@@ -1,0 +1,202 @@
+"""How much of a surface a certified motion treats, measured on the surface itself."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from coverable.arrays import Array, Ints, Protected
+from feasibility.demands.contact_path import ContactPath, contacts_along, contacts_on
+from feasibility.task import Task
+from feasibility.verdict import Walk
+from robots.robot import Robot
+from surfaces.adjacency import components
+from surfaces.cells import Cells
+from surfaces.passes.tool_lines import ToolLines, visits
+from surfaces.passes.toolpath import PassPlaces
+from surfaces.passes.treated_share import Treated, treated_share
+from surfaces.passes.triangulation import working_mesh
+from surfaces.passes.welded_triangles import WorkingMesh
+from surfaces.surface import Surface
+from surfaces.toolpaths.pose_surface import PoseSurface
+
+FINE = 0.5  # [1] of the footprint's radius: edges of the triangles that are measured on
+ACROSS = 60  # edges along the surface's extent, at least: triangles cut the corners of curved parts
+MOST_COUNTED = 20_000  # faces on which visits are counted
+OPEN = 0.5  # [1] a face of which at least this share is untreated for certain belongs to a region
+LEAST = 1e-6  # [1] of the whole area: smaller regions are not listed
+
+
+class UntreatedRegion(NamedTuple):
+    """A connected part of the surface that the tool does not treat."""
+
+    centre: Array
+    """(3,) m, in the root frame: a place of the surface in its middle."""
+    area: float
+    """m^2."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class TreatedArea(Protected):
+    """What a tool treats along a motion: everything within half a footprint of its contacts."""
+
+    footprint: tuple[float, float]
+    """m, along the path and across it."""
+    area: float
+    """m^2, of the whole surface."""
+    lower: float
+    """[1] at least this share of it is treated."""
+    upper: float
+    """[1] and at most this."""
+    twice: float
+    """[1] share that the tool comes by more than once, about."""
+    untreated: tuple[UntreatedRegion, ...]
+    """What is left out for certain, the largest region first."""
+    mesh: WorkingMesh
+    """The surface as it was measured, for pictures."""
+    shares: Array
+    """(F,) the treated share of each of its faces, at least."""
+    lines: ToolLines
+    """The path on the surface below the tool point."""
+    notes: tuple[str, ...] = ()
+    """What to know, one sentence each."""
+
+    def times(self, which: Ints | slice = slice(None)) -> Ints:
+        """(k,) how often the tool comes by some faces, all by default."""
+        normals = self.mesh.doubled_areas[which]
+        middles = self.mesh.corners[which].mean(axis=1)
+        return visits(middles, normals, self.lines, 0.5 * min(self.footprint))
+
+
+def treated_by_walk(robot: Robot, cells: Cells, task: Task, *walks: Walk) -> TreatedArea | None:
+    """What motions over cells treat together; None without a footprint.
+
+    Over poses it is the surface under them, where that is known, and where the tool works on it.
+    """
+    surface = cells.surface.wall
+    if task.disc is None or surface is None or not sum(len(walk.q) for walk in walks):
+        return None
+    if isinstance(cells.surface, PoseSurface):
+        walks = tuple(part for walk in walks for part in _at_work(cells.surface, walk))
+    found = [contacts_on(surface, robot, walk) for walk in walks]
+    return _measured(surface, task.disc, _joined(found))
+
+
+def _at_work(surface: PoseSurface, walk: Walk) -> list[Walk]:
+    """The parts of a motion along poses in which the tool works."""
+    works = surface.works(walk.cell)
+    parts = np.split(np.arange(len(works)), np.flatnonzero(np.diff(works)) + 1)
+    return [Walk(walk.q[part], walk.cell[part]) for part in parts if works[part[0]]]
+
+
+def treated_by_passes(
+    surface: Surface, places: PassPlaces, robot: Robot, task: Task, walks: tuple[Walk, ...]
+) -> TreatedArea | None:
+    """What motions, marked at the poses of passes, treat; None without a footprint."""
+    if task.disc is None:
+        return None
+    height = surface.side_sign * task.standoff
+    found = [contacts_along(places, robot, walk, height) for walk in walks]
+    return _measured(surface, task.disc, _joined(found))
+
+
+def _joined(found: list[ContactPath]) -> ContactPath:
+    """Several paths as one, their stretches numbered on."""
+    lines, first = [each.lines for each in found], 0
+    stretch = []
+    for each in lines:
+        stretch.append(each.stretch + first)
+        first += int(each.stretch.max(initial=-1)) + 1
+    return ContactPath(
+        ToolLines(
+            np.concatenate([np.zeros((0, 3)), *(each.points for each in lines)]),
+            np.concatenate([np.zeros((0, 3)), *(each.normals for each in lines)]),
+            np.concatenate([np.zeros(0, dtype=np.int64), *stretch]),
+        ),
+        max((each.off for each in found), default=0.0),
+    )
+
+
+def _measured(
+    surface: Surface, footprint: tuple[float, float], contacts: ContactPath
+) -> TreatedArea:
+    """The bracket: an ellipse holds the disc of its smaller axis, and lies in that of its larger.
+
+    The disc is a ball about each contact, see `surfaces.passes.treated_share`.
+    """
+    inner, outer = 0.5 * min(footprint), 0.5 * max(footprint)
+    mesh = _mesh_of(surface.wall or surface, FINE * inner)  # not a smoothed copy
+    doubled = mesh.doubled_areas
+    normals = doubled / np.maximum(np.linalg.norm(doubled, axis=1), 1e-300)[:, None]
+    off = contacts.off
+    small = treated_share(mesh, normals, contacts.lines, inner, off=off)
+    large = treated_share(mesh, normals, contacts.lines, outer, off=off) if outer > inner else small
+    found = TreatedArea(
+        footprint=footprint,
+        area=small.area,
+        lower=small.lower,
+        upper=large.upper,
+        twice=0.0,
+        untreated=_untreated_regions(large),
+        mesh=small.mesh,
+        shares=small.shares,
+        lines=contacts.lines,
+        notes=_notes(surface, small, footprint),
+    )
+    return _with_twice(found)
+
+
+def _untreated_regions(found: Treated) -> tuple[UntreatedRegion, ...]:
+    """The regions that are untreated for certain, the largest first."""
+    mesh = found.mesh
+    faces = np.flatnonzero(found.most <= 1.0 - OPEN)
+    if not len(faces):
+        return ()
+    corners = mesh.faces[faces]
+    used, of = np.unique(corners, return_inverse=True)
+    of = of.reshape(-1, 3)
+    joined = np.concatenate([of[:, [0, 1]], of[:, [1, 2]]]).astype(np.int64)
+    part = components(joined, len(used))[of[:, 0]]
+    middles = mesh.corners[faces].mean(axis=1)
+    areas = mesh.areas[faces] * (1.0 - found.most[faces])
+    regions = []
+    for number in np.unique(part):
+        own = part == number
+        mean = np.average(middles[own], axis=0, weights=areas[own])
+        nearest = np.linalg.norm(middles[own] - mean, axis=1).argmin()
+        regions.append(UntreatedRegion(middles[own][nearest], float(areas[own].sum())))
+    listed = (each for each in regions if each.area >= LEAST * found.area)
+    return tuple(sorted(listed, key=lambda each: -each.area))
+
+
+def _with_twice(found: TreatedArea) -> TreatedArea:
+    """With the share that the tool comes by more than once, counted on some of the faces."""
+    every = max(1, -(-len(found.shares) // MOST_COUNTED))
+    some = np.arange(0, len(found.shares), every)
+    weight = found.mesh.areas[some]
+    again = found.times(some) > 1
+    return replace(found, twice=float((weight * again).sum() / weight.sum()))
+
+
+def _mesh_of(surface: Surface, edge: float) -> WorkingMesh:
+    """Triangles fine enough for the footprint, and for a curved surface."""
+    coarse = working_mesh(surface, np.inf)
+    extent = float(np.linalg.norm(np.ptp(coarse.vertices, axis=0)))
+    return working_mesh(surface, min(edge, extent / ACROSS))
+
+
+def _notes(surface: Surface, found: Treated, footprint: tuple[float, float]) -> tuple[str, ...]:
+    """What to know about a share."""
+    notes = []
+    if 0.25 * math.pi * footprint[0] * footprint[1] >= found.area:
+        notes.append("the footprint is larger than the whole surface")
+    if footprint[0] != footprint[1]:
+        notes.append(
+            "of an ellipse the share is at least that of the disc inside it, and at most that of "
+            "the disc around it"
+        )
+    error, _ = (surface.wall or surface).deviations
+    if error > 0.0:
+        notes.append(f"the surface is known to {1e3 * error:.2g} mm")
+    return tuple(notes)

@@ -1,0 +1,161 @@
+"""What a case demands of the arm's motion: one list, each demand with its keys and its judge.
+
+"Feasible" and "holds" are said where every demand of the case was judged. How the tool is held, the
+limits of the joints, and that bodies stay clear, the replay of a motion judges (`certification`);
+all else is judged by `further`. What has no judge of something asks `unjudged`, and refuses, or
+does not say it. So a demand that is new in the list is not forgotten anywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from coverable.errors import ArgumentError, Fault
+from feasibility.certification.faults import Judged, MotionFault
+from feasibility.task import Task
+from feasibility.verdict import Walk
+from robots.robot import Robot
+from surfaces.cells import Cells
+
+if TYPE_CHECKING:
+    from feasibility.demands.area import TreatedArea
+
+AT_START = 1e-9  # [rad] or [m]: a first row this near to the start is at it
+
+
+@dataclass(frozen=True, slots=True)
+class Findings(Judged):
+    """What was found of motions that the replay accepted."""
+
+    faults: tuple[MotionFault, ...] = ()
+    """What they do not hold of the case's demands; none where they hold all."""
+    treated: TreatedArea | None = None
+    """What they treat together; None where no coverage is required."""
+
+
+Judge = Callable[[Robot, Cells, Task, Sequence[Walk]], Findings]
+
+
+@dataclass(frozen=True, slots=True)
+class Demand:
+    """One thing that a case may demand."""
+
+    name: str
+    """What answers call it."""
+    keys: tuple[str, ...]
+    """Of the case file, which say it; "collision.*" stands for all of a table."""
+    asked: Callable[[Robot, Task], bool] = lambda robot, task: True
+    """Does this case demand it?"""
+    judge: Judge | None = None
+    """Of motions one after the other that the replay accepted; None where it is the replay that
+    judges it."""
+    together: bool = False
+    """Do several motions hold it together? Otherwise each of them has to."""
+
+
+def _at_start(robot: Robot, cells: Cells, task: Task, walks: Sequence[Walk]) -> Findings:
+    """Does the first motion begin at the arm's start?"""
+    off = np.inf if robot.start is None else float(np.abs(walks[0].q[0] - robot.start).max())
+    if off <= AT_START:
+        return Findings()
+    return Findings((MotionFault(0, 0.0, f"it begins {off:.3g} rad or m off the start"),))
+
+
+def _at_rates(robot: Robot, cells: Cells, task: Task, walks: Sequence[Walk]) -> Findings:
+    """Does each motion keep the speed, and its distance from singularities?"""
+    from feasibility.certification.rate_replay import check_rates, replay_rates
+
+    check_rates(robot, task)
+    found = [replay_rates(robot, cells, task, walk).refusals for walk in walks]
+    return Findings(tuple(MotionFault(-1, 0.0, text) for texts in found for text in texts))
+
+
+def _treating(robot: Robot, cells: Cells, task: Task, walks: Sequence[Walk]) -> Findings:
+    """Do the motions treat enough of the area?"""
+    from feasibility.demands.area import treated_by_walk
+    from feasibility.demands.decision import shortfall
+
+    treated = treated_by_walk(robot, cells, task, *walks)
+    short = shortfall(task, treated)
+    return Findings((MotionFault(-1, 0.0, short),) if short else (), treated)
+
+
+DEMANDS = (
+    Demand("standoff", ("task.standoff",)),
+    Demand("tolerance", ("task.tolerance",)),
+    Demand("cone", ("task.cone_deg", "task.approach")),
+    Demand(
+        "roll", ("task.roll_deg", "task.roll_reference"), lambda robot, task: task.roll is not None
+    ),
+    Demand("limits", ("robot.limits", "robot.limits_deg", "robot.limits_m")),
+    Demand("collisions", ("collision.*",), lambda robot, task: task.collision is not None),
+    Demand(
+        "start", ("robot.start", "robot.start_deg"), lambda robot, task: robot.start is not None,
+        _at_start, together=True,
+    ),
+    Demand("speed", ("task.speed",), lambda robot, task: task.speed is not None, _at_rates),
+    Demand(
+        "distance from singularities", ("task.min_manipulability",),
+        lambda robot, task: task.min_manipulability is not None, _at_rates,
+    ),
+    Demand(
+        "placement error", ("task.placement_error",),
+        lambda robot, task: task.placement_error is not None,
+    ),
+    Demand(
+        "coverage", ("task.coverage",), lambda robot, task: task.coverage is not None,
+        _treating, together=True,
+    ),
+)  # fmt: skip
+NAMES = tuple(demand.name for demand in DEMANDS)
+BY_REPLAY = tuple(demand.name for demand in DEMANDS if demand.judge is None)
+TOGETHER = tuple(demand.name for demand in DEMANDS if demand.together)
+OF_EACH = tuple(demand.name for demand in DEMANDS if not demand.together)
+RATES = ("speed", "distance from singularities")
+OF_TREE = ("standoff", "tolerance", "cone", "roll", "limits", "start")
+"""What the replay of the paper's tree judges, which knows nothing of the others."""
+
+
+def asked_of(robot: Robot, task: Task) -> tuple[Demand, ...]:
+    """What a case demands."""
+    return tuple(demand for demand in DEMANDS if demand.asked(robot, task))
+
+
+def unjudged(robot: Robot, task: Task, judged: Collection[str]) -> tuple[str, ...]:
+    """Names of what a case demands, less what is judged."""
+    return tuple(demand.name for demand in asked_of(robot, task) if demand.name not in judged)
+
+
+def further(
+    robot: Robot, cells: Cells, task: Task, walks: Sequence[Walk], judged: Collection[str] = ()
+) -> Findings:
+    """Judge what the replay does not, of motions that it accepted.
+
+    Args:
+        robot, cells, task: the case.
+        walks: one motion, or several that are run one after the other.
+        judged: names of demands that were judged before.
+
+    Raises:
+        ArgumentError: the speed cannot be judged of this arm.
+    """
+    wanted = [demand.judge for demand in asked_of(robot, task) if demand.name not in judged]
+    found = [judge(robot, cells, task, walks) for judge in dict.fromkeys(wanted) if judge]
+    treated = [one.treated for one in found if one.treated is not None]
+    faults = tuple(fault for one in found for fault in one.faults)
+    return Findings(faults, treated[0] if treated else None)
+
+
+def refuse_start(robot: Robot, why: str) -> None:
+    """Refuse an arm that has to begin somewhere, where that cannot be judged.
+
+    Raises:
+        ArgumentError: it has a start.
+    """
+    if robot.start is not None:
+        expected = "leave it out (--set robot.start= or robot.start_deg=)"
+        raise ArgumentError(Fault("start", f"is given, {why}", expected=expected), "robot")

@@ -1,0 +1,81 @@
+"""What is left of a search at a speed, or at a distance from singularities.
+
+A motion that is too slow somewhere joins nothing: components fall apart into what the others join.
+As `check` does at a speed, more motions are made first, from every configuration that is known.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from feasibility.clock import OutOfTime
+from feasibility.demands.rated_graph import Edge, RatedGraph, grow
+from feasibility.paths.motion_graph import MotionGraph
+from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.graph import Roadmap
+from feasibility.task import Task
+from feasibility.verdict import Cause, CauseKind
+from surfaces.adjacency import components
+
+
+def keep_fast_motions(exploration: Exploration, task: Task) -> dict[int, Cause]:
+    """Leave only motions in a search that hold what a task requires, and only cells that they join.
+
+    A cell to which no such motion leads is in no component any more: that the arm can hold still
+    over it is not enough. A single cell is kept where there is nothing else.
+
+    Args:
+        exploration: a search, which is changed; its clock's time counts.
+        task: with a speed or a least singular value.
+
+    Returns:
+        Cells that lose their last component, and why.
+    """
+    reached = exploration.reached
+    rated = _rated(exploration, task)
+    exploration.roadmap = _roadmap_of(rated.graph, rated.enough, len(exploration.cells))
+    lost = np.flatnonzero(reached & ~exploration.reached).tolist()
+    cell = rated.graph.cell
+    best = rated.fastest_to_cells((x, y) for x, y in rated.rated if cell[x] != cell[y])
+    kind, none = CauseKind.DISCONNECTED, "no motion leads to it"
+    return {c: Cause(c, kind, False, rated.fault(best[c]) if c in best else none) for c in lost}
+
+
+def _rated(exploration: Exploration, task: Task) -> RatedGraph:
+    """The motions of a search, and more of them, rated."""
+    roadmap, cells = exploration.roadmap, exploration.cells
+    graph = MotionGraph.of(exploration.arrays, exploration.work, cells)
+    for edge, (x, y, _) in enumerate(roadmap.edges):
+        motion = roadmap.motion(edge)
+        ends = graph.node(roadmap.cell[x], motion[0]), graph.node(roadmap.cell[y], motion[-1])
+        graph.join(*ends, motion)
+    rated = RatedGraph(exploration.robot, cells, task, graph)
+    try:
+        grow(rated, exploration.clock)
+    except OutOfTime:
+        rated.rate()
+    return rated
+
+
+def _roadmap_of(graph: MotionGraph, edges: Sequence[Edge], cells: int) -> Roadmap:
+    """A roadmap of some motions, with each connected part of their nodes as a component."""
+    ends = np.array(edges, dtype=np.int64).reshape(-1, 2)
+    over = np.array(graph.cell, dtype=np.int64)
+    if cells > 1:  # without parts over one cell alone
+        part = components(ends, len(over))
+        several = np.zeros(int(part.max(initial=-1)) + 1, dtype=bool)
+        several[part[ends[over[ends[:, 0]] != over[ends[:, 1]], 0]]] = True
+        ends = ends[several[part[ends[:, 0]]]]
+    nodes, of = np.unique(ends, return_inverse=True)
+    component = components(of.reshape(-1, 2).astype(np.int64), len(nodes)).tolist()
+    roadmap, number = Roadmap(cells), dict[int, int]()
+    for _ in range(max(component, default=-1) + 1):
+        roadmap.add_component()
+    for node, root in zip(nodes.tolist(), component, strict=True):
+        q = graph.q[node]
+        number[node] = roadmap.add_node(graph.cell[node], q, np.zeros_like(q), root)
+    for x, y in ends.tolist():
+        roadmap.add_edge(number[x], number[y], graph.motion(x, y)[1:])
+    roadmap.largest = int(np.argmax([*roadmap.size, 0]))
+    roadmap.queue.clear()
+    return roadmap

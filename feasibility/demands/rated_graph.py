@@ -1,0 +1,120 @@
+"""The motions that a verdict knows, each with the speed and the singular values it allows.
+
+More motions are made from cell to cell, from every known configuration, whatever the required
+speed: so what is found at one speed is found at every lower one, too.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from feasibility.clock import Clock
+from feasibility.demands.motion_rates import motion_rates, too_slow_words
+from feasibility.paths.motion_graph import MotionGraph, join_self_motions, motion_graph_of, step_to
+from feasibility.task import Task
+from feasibility.verdict import Verdict
+from robots.robot import Robot
+from surfaces.cells import Cells
+
+Edge = tuple[int, int]
+"""Two nodes, the lower index first."""
+
+MOST_STEPS = 20_000  # attempts from a configuration to a cell beside it
+
+
+@dataclass(frozen=True, slots=True)
+class Rated:
+    """What one motion between two configurations allows."""
+
+    speed: float
+    """m/s, lower bound."""
+    sigma: float
+    """Lower bound of the smallest singular value."""
+    joint: int
+    """The joint that allows no more speed."""
+    share: float
+    """m/s allowed over that joint's limit: v / share is what the joint needs for v."""
+
+
+@dataclass
+class RatedGraph:
+    """Nodes, motions, and what they allow."""
+
+    robot: Robot
+    cells: Cells
+    task: Task
+    graph: MotionGraph
+    rated: dict[Edge, Rated] = field(default_factory=dict)
+
+    def rate(self) -> None:
+        """Rate the motions that are not yet rated, all at once."""
+        new = [(min(x, y), max(x, y)) for x, y in self.graph.edges.edges]
+        new = [edge for edge in new if edge not in self.rated]
+        if not new:
+            return
+        motions = [np.asarray(self.graph.motion(*edge)) for edge in new]
+        found = motion_rates(self.robot, self.cells, self.task, motions)
+        for k, edge in enumerate(new):
+            self.rated[edge] = Rated(
+                float(found.speed[k]), float(found.sigma[k]), int(found.joint[k]),
+                float(found.share[k]),
+            )  # fmt: skip
+
+    def holding(self, speed: float, sigma: float) -> list[Edge]:
+        """The motions that allow both."""
+        return [e for e, r in self.rated.items() if r.speed >= speed and r.sigma >= sigma]
+
+    @property
+    def enough(self) -> list[Edge]:
+        """The motions that hold what the task requires."""
+        return self.holding(self.task.speed or -np.inf, self.task.min_manipulability or -np.inf)
+
+    def fastest_to_cells(self, edges: Iterable[Edge]) -> dict[int, Edge]:
+        """The fastest of some motions to each cell that they lead to."""
+        best = dict[int, Edge]()
+        for edge in edges:
+            for cell in {self.graph.cell[node] for node in edge}:
+                if cell not in best or self.rated[edge].speed > self.rated[best[cell]].speed:
+                    best[cell] = edge
+        return best
+
+    def fault(self, edge: Edge, where: str = "") -> str:
+        """Why a motion does not hold what the task requires; `where` as in `too_slow_words`."""
+        one, speed = self.rated[edge], self.task.speed
+        if speed is not None and one.speed < speed:
+            return too_slow_words(self.robot, one.joint, one.share, speed, where)
+        return (
+            f"singular values fall to {one.sigma:.3g} on the motion to it; "
+            f"{self.task.min_manipulability:g} is required"
+        )
+
+
+def rated_graph(verdict: Verdict) -> RatedGraph:
+    """The motions of a verdict of the complete search, rated."""
+    graph = RatedGraph(verdict.robot, verdict.cells, verdict.task, motion_graph_of(verdict))
+    graph.rate()
+    return graph
+
+
+def grow(rated: RatedGraph, clock: Clock) -> None:
+    """Make more motions from every known configuration to the cells beside it, and over its own.
+
+    Raises:
+        OutOfTime: the deadline passed.
+    """
+    graph, cells = rated.graph, rated.cells
+    beside: dict[int, list[int]] = {}
+    for i, j in cells.pairs.tolist():
+        beside.setdefault(i, []).append(j)
+        beside.setdefault(j, []).append(i)
+    left = MOST_STEPS
+    for x in range(len(graph.cell)):
+        clock.tick(0, None, "looking for faster motions")
+        join_self_motions(graph, x)
+        for cell in beside.get(graph.cell[x], []):
+            step_to(graph, x, cell)
+        left -= len(beside.get(graph.cell[x], []))
+        if left <= 0:
+            break
+    rated.rate()

@@ -1,0 +1,162 @@
+"""What stops an arm that goes on along passes; what of them all runs leave out, and why."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from coverable.arrays import Array, Mask
+from feasibility.collisions.problem_bodies import Pair
+from feasibility.demands.motion_rates import motion_rates
+from feasibility.roadmap.causes.diagnosis import cause_of
+from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.motions import search_arrays as stop
+from feasibility.roadmap.motions.tracking import track
+from feasibility.task import Task
+from feasibility.verdict import Cause
+from surfaces.passes.toolpath import PassPlaces
+
+WORDS = {
+    stop.CONE: "the tool axis would leave the cone",
+    stop.ROLL: "the roll of the tool would leave its range",
+    stop.SINGULAR: "the arm comes to a singularity",
+    stop.LONG: "the motion takes too many steps",
+    stop.FOLD: "the surface is creased, or its offset folds",
+}
+
+
+class RunStop(NamedTuple):
+    """Where a motion along poses ends."""
+
+    pose: int
+    """The last pose that it reaches."""
+    cause: str
+    """Why it does not reach the next one; empty where it reaches the last."""
+
+
+def where_it_stops(
+    exploration: Exploration,
+    task: Task,
+    pose: int,
+    q: Array,
+    pairs: tuple[Pair, ...],
+) -> RunStop:
+    """Follow the poses from a configuration q (n,) over one of them, as far as it goes.
+
+    Speed and singular values count where the task limits them; `pairs` are the bodies that had to
+    stay clear of each other.
+    """
+    first, cause, motions = pose, "", list[Array]()
+    while pose < len(exploration.cells) - 1:
+        curve = exploration.curve(pose, pose + 1)
+        motion = track(exploration.arrays, exploration.work, curve, 0.0, 1.0, q)
+        if motion is None:
+            code, joint = (int(value) for value in exploration.work.stop_reason)
+            cause = _words(exploration, code, joint, pairs)
+            break
+        motions.append(np.vstack([q, motion]))
+        q = motion[-1]
+        pose += 1
+    if task.requires_rates:
+        rates = motion_rates(exploration.robot, exploration.cells, task, motions)
+        slow = np.flatnonzero(~rates.enough(task))
+        if len(slow):
+            which = int(slow[0])
+            return RunStop(first + which, rates.words(exploration.robot, task, which))
+    return RunStop(pose, cause)
+
+
+def _words(exploration: Exploration, code: int, joint: int, pairs: tuple[Pair, ...]) -> str:
+    """A reason that tracking stopped."""
+    names = exploration.robot.joint_names
+    if code == stop.LIMIT:
+        which = names[joint] if 0 <= joint < len(names) else "a joint"
+        return f"{which} comes to its limit"
+    if code == stop.COLLISION:
+        if not 0 <= joint < len(pairs):
+            return "bodies come too near to each other"
+        return f"{pairs[joint].first} and {pairs[joint].second} come too near to each other"
+    return WORDS.get(code, "no motion is found")
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """Places of passes in a row on which no run works."""
+
+    stretches: tuple[int, ...]
+    """Which stretches they are on, in order."""
+    length: float
+    """m, of passes."""
+    cause: str
+    """Why, at the first of these places that is not reached."""
+    proved: bool
+    """Is that proved?"""
+
+
+def gaps_of(
+    exploration: Exploration,
+    task: Task,
+    places: PassPlaces,
+    pieces: Array,
+    worked: Mask,
+    pairs: tuple[Pair, ...],
+    slow: Mapping[int, Cause],
+) -> tuple[Gap, ...]:
+    """What is left out, in order.
+
+    Args:
+        exploration, task, places: a finished search, its task, the poses of the passes.
+        pieces: (N - 1,) m, of passes between poses.
+        worked: (N - 1,) on which of them a run works.
+        pairs: of bodies that had to stay clear of each other.
+        slow: poses to which no motion leads at the required speed and singular values.
+    """
+    left = (pieces > 0.0) & ~worked
+    # What lies between two passes belongs to the gap if it is not worked on either.
+    open_ = ~worked
+    ends = np.flatnonzero(np.diff(np.concatenate([[0], open_.astype(np.int8), [0]])))
+    found = []
+    for first, last in ends.reshape(-1, 2).tolist():
+        length = float(pieces[first:last][left[first:last]].sum())
+        if length > 0.0:
+            own = places.stretch[first : last + 1][np.append(left[first:last], False)]
+            stretches = tuple(dict.fromkeys(own.tolist()))
+            poses = range(first, last + 1)
+            cause, proved = _why(exploration, task, places, poses, pairs, slow)
+            found.append(Gap(stretches, length, cause, proved))
+    return tuple(found)
+
+
+def _why(
+    exploration: Exploration,
+    task: Task,
+    places: PassPlaces,
+    poses: range,
+    pairs: tuple[Pair, ...],
+    slow: Mapping[int, Cause],
+) -> tuple[str, bool]:
+    """Why the first of some poses is not reached, and whether that is proved."""
+    for pose in poses:
+        if not exploration.reached[pose]:
+            cause = slow.get(pose) or cause_of(exploration, pose, pairs)
+            return f"{place_words(places, pose)}: {cause.detail}", cause.proved
+    node = exploration.roadmap.over[poses[0]][-1]
+    stop = where_it_stops(exploration, task, poses[0], exploration.roadmap.q[node], pairs)
+    if not stop.cause:
+        return "", False
+    return f"{place_words(places, stop.pose)}: {stop.cause}", False
+
+
+def along_stretch(places: PassPlaces, pose: int) -> float:
+    """m, from the beginning of the stretch that a pose belongs to."""
+    first = int(np.flatnonzero(places.stretch == places.stretch[pose])[0])
+    return float(np.linalg.norm(np.diff(places.points[first : pose + 1], axis=0), axis=1).sum())
+
+
+def place_words(places: PassPlaces, pose: int) -> str:
+    """Where a pose is on the passes."""
+    stretch = int(places.stretch[pose])
+    if stretch < 0:
+        return "on the way to the next pass"
+    return f"{1e3 * along_stretch(places, pose):.0f} mm along stretch {stretch + 1}"

@@ -1,0 +1,207 @@
+"""Passes that no single motion runs: cut where they cannot be run, with the cause of each cut."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from feasibility.clock import Clock, OutOfTime
+from feasibility.collisions.problem_bodies import Pair
+from feasibility.demands.fast_motions import keep_fast_motions
+from feasibility.demands.motion_rates import replay_at_rates
+from feasibility.division.between_patches import clear_moves
+from feasibility.division.fewest_runs import Run, Stations, fewest_runs
+from feasibility.division.left_out import (
+    Gap,
+    RunStop,
+    along_stretch,
+    gaps_of,
+    place_words,
+    where_it_stops,
+)
+from feasibility.division.plans import collect_components, connect_pairs
+from feasibility.division.reconfiguration import Reconfiguration
+from feasibility.paths.coverage import CoveragePath
+from feasibility.paths.winding import unwound
+from feasibility.problem import Problem
+from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.rounds import explore
+from feasibility.roadmap.search import exploration_of
+from feasibility.roadmap.walk import route_walk
+from feasibility.roadmap.warmup import warm_up
+from feasibility.task import Task
+from robots.robot import Robot
+from surfaces.passes.toolpath import PassPlaces
+from surfaces.toolpaths.pose_cells import PoseCells
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Interruption:
+    """Where the tool has to be lifted, and the arm to take another configuration."""
+
+    pose: int
+    """The last pose of the run that ends here."""
+    next_pose: int
+    """The first pose of the next run: the same one, or one further on."""
+    stretch: int
+    """Which stretch of a pass the run ends on; -1 between two."""
+    along: float
+    """m, from the beginning of that stretch."""
+    cause: str
+    """Why no known configuration goes on: what stops it, and where."""
+    move: Reconfiguration
+    """From the last configuration of one run to the first of the next."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class PassRuns:
+    """Passes in as few runs as the configurations known allow."""
+
+    robot: Robot
+    task: Task
+    places: PassPlaces
+    runs: tuple[CoveragePath, ...]
+    """One certified motion each, in order."""
+    cuts: tuple[Interruption, ...]
+    """Between one run and the next."""
+    gaps: tuple[Gap, ...]
+    """What no run works on, and why."""
+    refusals: tuple[str, ...]
+    """Why the independent replay refuses runs that were left out for it."""
+
+    @property
+    def left_out(self) -> float:
+        """m, of passes that no run covers."""
+        return sum(gap.length for gap in self.gaps)
+
+    def stretches_of(self, run: CoveragePath) -> list[int]:
+        """The stretches that a run works on, in order."""
+        own = self.places.stretch[run.needed]
+        return list(dict.fromkeys(own[own >= 0].tolist()))
+
+
+def pass_runs(
+    robot: Robot,
+    cells: PoseCells,
+    task: Task,
+    places: PassPlaces,
+    seed: int = 0,
+    clock: Clock | None = None,
+) -> PassRuns:
+    """Run passes in the fewest motions that the configurations found allow.
+
+    As little as can be is left out; then the motions are as few as can be, over the configurations
+    that the search finds, and cut between passes rather than inside one. At a speed, or a distance
+    from singularities, only motions count that hold it.
+
+    Args:
+        robot, cells, task: the question; cells are the poses of `surfaces.passes.pass_toolpath`.
+        places: the same poses, with their stretches.
+        seed, clock: of the search.
+
+    Raises:
+        OutOfTime: the time ran out before the search began.
+    """
+    clock = Clock() if clock is None else clock
+    warm_up()
+    clock.start()
+    exploration = exploration_of(robot, cells, task, seed, clock)
+    try:
+        explore(exploration)
+        collect_components(exploration)
+        for root in exploration.roots():
+            connect_pairs(exploration, root, exploration.covers(root))
+    except OutOfTime:
+        pass  # what was found until then counts
+    slow = keep_fast_motions(exploration, task) if task.requires_rates else {}
+    stations = _stations(exploration, places)
+    runs, refusals = _replayed(exploration, task, fewest_runs(stations))
+    worked = np.zeros(len(stations.pieces), dtype=bool)
+    for path in runs:
+        own = np.flatnonzero(path.needed)
+        worked[own[0] : own[-1]] = True
+    exploration.clock = Clock()
+    pairs = Problem.of(robot, cells, task).pairs
+    return PassRuns(
+        robot=robot,
+        task=task,
+        places=places,
+        runs=tuple(runs),
+        cuts=_cuts(exploration, task, places, runs, pairs),
+        gaps=gaps_of(exploration, task, places, stations.pieces, worked, pairs, slow),
+        refusals=tuple(refusals),
+    )
+
+
+def _stations(exploration: Exploration, places: PassPlaces) -> Stations:
+    """What a search found, as stations along the toolpath."""
+    roadmap = exploration.roadmap
+    over = np.array(roadmap.cell, dtype=np.int64)
+    edges = list(enumerate(roadmap.edges, start=1))
+    there = [(x, y, number, len(motion)) for number, (x, y, motion) in edges]
+    back = [(y, x, -number, rows) for x, y, number, rows in there]
+    steps = np.array(there + back, dtype=np.int64).reshape(-1, 4)
+    ahead = over[steps[:, 1]] - over[steps[:, 0]]
+    same = places.stretch[1:] == places.stretch[:-1]
+    inside = same & (places.stretch[1:] >= 0)
+    lengths = np.linalg.norm(np.diff(places.points, axis=0), axis=1)
+    return Stations(over, steps[(ahead == 0) | (ahead == 1)], lengths * inside, inside)
+
+
+def _replayed(
+    exploration: Exploration, task: Task, found: Sequence[Run]
+) -> tuple[list[CoveragePath], list[str]]:
+    """The runs that the independent replay accepts, and why it refuses the others."""
+    robot, cells = exploration.robot, exploration.cells
+    runs, refusals = list[CoveragePath](), list[str]()
+    for run in found:
+        walk = route_walk(exploration.roadmap, run.nodes[0], run.route)
+        walk = unwound(robot, task, walk)
+        needed = np.zeros(len(cells), dtype=bool)
+        needed[walk.cell[walk.cell >= 0]] = True
+        certificate, refusal = replay_at_rates(robot, cells, task, walk, needed)
+        if refusal:
+            refusals.append(refusal)
+        else:
+            path = CoveragePath.of(robot, cells, task, "given", walk, needed, certificate)
+            runs.append(path)
+    return runs, refusals
+
+
+def _cuts(
+    exploration: Exploration,
+    task: Task,
+    places: PassPlaces,
+    runs: Sequence[CoveragePath],
+    pairs: tuple[Pair, ...],
+) -> tuple[Interruption, ...]:
+    """What lies between the runs."""
+    robot, cells = exploration.robot, exploration.cells
+    moves = [
+        Reconfiguration(robot.joint_names, robot.prismatic, a.walk.q[-1], b.walk.q[0])
+        for a, b in pairwise(runs)
+    ]
+    clear = clear_moves(robot, cells, task, exploration.arrays.collisions, moves)
+    found = []
+    for before, after, move in zip(runs, runs[1:], clear, strict=False):
+        pose, following = int(before.visits[-1]), int(after.visits[0])
+        stop = where_it_stops(exploration, task, pose, move.start, pairs)
+        found.append(
+            Interruption(
+                pose=pose,
+                next_pose=following,
+                stretch=int(places.stretch[pose]),
+                along=along_stretch(places, pose),
+                cause=_cause_words(places, stop),
+                move=move,
+            )
+        )
+    return tuple(found)
+
+
+def _cause_words(places: PassPlaces, stop: RunStop) -> str:
+    """What stops an arm that goes on, and where."""
+    if not stop.cause:
+        return "another configuration gets further"
+    return f"{stop.cause}, {place_words(places, stop.pose)}"

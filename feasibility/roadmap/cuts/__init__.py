@@ -1,1 +1,0 @@
-"""Cut proofs: no single motion covers every cell. Trees of cuts are guessed, and then proved."""

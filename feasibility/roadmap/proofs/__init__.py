@@ -1,0 +1,1 @@
+"""What the search proves: boxes of joint values without a solution, cuts that no motion crosses."""

@@ -1,1 +1,0 @@
-"""The share of the surface that a certified motion treats, and what it leaves untreated."""

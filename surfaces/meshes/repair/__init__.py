@@ -1,1 +1,0 @@
-"""Any triangles into a clean oriented 2-manifold, every repair reported."""

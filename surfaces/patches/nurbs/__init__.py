@@ -1,1 +1,0 @@
-"""B-spline and NURBS patches, and the control nets that they are read from."""
