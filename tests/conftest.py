@@ -46,10 +46,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_ignore_collect(collection_path: Path) -> bool | None:
-    """What tests share holds no examples, and need not be imported to look for them.
-
-    One such file is a script because its libraries should not be loaded beside Pinocchio's.
-    """
+    """What tests share holds no examples, and need not be imported to look for them."""
     asking = collection_path.name.startswith(("test_", "bench_"))
     shared = collection_path.suffix == ".py" and not asking
     return True if shared else None

@@ -40,11 +40,7 @@ def of_verdict(verdict: Verdict) -> dict[str, object]:
 
 @pytest.fixture
 def measured(benchmark: Any, fk_us: float) -> Callable[..., Any]:
-    """measured(ask, rounds, **counts): the least processor time, and what `ask` returned.
-
-    The first call loads and compiles, and does not count. Counts are those of a verdict where `ask`
-    returns one; more of them may be given as functions of what it returned.
-    """
+    """measured(ask, rounds, **counts): the least processor time, and what `ask` returned."""
 
     def measure(ask: Callable[[], T], rounds: int = 5, **counts: Callable[[T], object]) -> T:
         found = benchmark.pedantic(ask, rounds=rounds, warmup_rounds=1)

@@ -110,9 +110,6 @@ def test_what_is_allowed_is_left_out_and_names_that_are_nothing_are_refused_at_o
     assert all(name in text for name in ("link9", "shelve", "hand", "collision.allow[0]"))
 
 
-# a base inside something: no motion changes it
-
-
 def test_pairs_of_what_the_world_a_table_and_a_forearm_carry():
     part = plane((-0.2, 0.2), (-0.15, 0.15))
     bodies = bodies_of(load_robot("ur5", axes=[TABLE]), 0.1, part, scene=(SHELF, PEG))

@@ -1,7 +1,4 @@
-"""Any bytes in any file: one error with its faults, or a value that is sound and comes back.
-
-`tests/shared/files/readers.py` has the readers, their good files, and what a sound value is.
-"""
+"""Any bytes in any file: one error with its faults, or a value that is sound and comes back."""
 
 import os
 import re

@@ -12,7 +12,6 @@ from coverable import Case, CaseError, Search, Task, load_case
 from feasibility.cases.robot_table import RobotPart
 
 GOOD = Path(__file__).with_name("good")
-# Table II: position and cone; Table I by name; Table III by kind.
 
 
 def test_settings_replace_add_and_remove_keys_and_tables() -> None:
@@ -108,9 +107,6 @@ def test_limits_frames_and_axes_come_through(tmp_path: Path) -> None:
     np.testing.assert_allclose(posed.tcp[:3], tcp, atol=1e-12)
     np.testing.assert_allclose(posed.base[:3], [*base, [0, 0, 1, 0.8]], atol=1e-12)
     np.testing.assert_allclose(posed.reference_axis, [0, 1, 0])
-
-
-# the edges of TOML that is read: 16 brackets, keys of 8 parts, 50,000 keys
 
 
 @pytest.mark.parametrize("text", [

@@ -128,15 +128,11 @@ opened: list[str] = []
 sys.addaudithook(lambda event, facts: opened.append(str(facts[0])) if event == "open" else None)
 
 
-def hostile_robot(folder, visuals):
-    return str(folder / write(folder, "arm.urdf", urdf(visuals)))
-
-
 def test_a_mesh_that_is_used_often_is_read_once(tmp_path):
     names = [write(tmp_path, f"{k}.stl", hostile.stl(k + 1)) for k in range(3)]
     broken = write(tmp_path, "broken.stl", b"")
     shapes = "".join(visual(name) for name in (*names, broken) * 300)
-    robot = load_robot(hostile_robot(tmp_path, shapes))
+    robot = load_robot(tmp_path / write(tmp_path, "arm.urdf", urdf(shapes)))
     opened.clear()
     (note,) = draw(robot).notes
     own = [Path(name).name for name in opened if name.endswith(".stl")]
@@ -151,7 +147,7 @@ def test_the_triangles_of_all_shapes_together_are_capped(tmp_path, monkeypatch):
     monkeypatch.setattr(robot_files, "MOST_TRIANGLES", 60_000)
     mesh = visual(write(tmp_path, "large.stl", hostile.stl(4_000)))
     ball = '<visual><geometry><sphere radius="0.1"/></geometry></visual>'
-    drawing = draw(load_robot(hostile_robot(tmp_path, mesh * 18 + ball)))
+    drawing = draw(load_robot(tmp_path / write(tmp_path, "arm.urdf", urdf(mesh * 18 + ball))))
     (note,) = drawing.notes
     assert "link base and 3 more: the robot's shapes have more than 60,000" in note
     assert 0 < sum(len(faces_of(command)) for command in drawing.commands) <= 4 * 4 * TRIANGLES

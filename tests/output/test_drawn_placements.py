@@ -1,7 +1,6 @@
 """Pictures of poses: each that was tried is drawn where it was, in the colour of its share."""
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 from page_outline import points_of
@@ -19,11 +18,7 @@ from feasibility.viewer.threejs import hex_colour
 PLATE = plane((-0.15, 0.15), (-0.1, 0.1), position=(0.5, 0, 0.2), side="outside")
 CELLS = PLATE.cells(3, 2)
 TASK = coverable.Task(standoff=0.02, cone_deg=30)
-
-
-@cache
-def ur5():
-    return load_robot("ur5")
+UR5 = load_robot("ur5")
 
 
 def poses(count, seed=0):
@@ -50,7 +45,7 @@ def fabricated(*extra):
     ]
     region = coverable.Region.around(Pose.of_surface(PLATE), {"x": (0.2, 0.9)})
     return coverable.Placements(
-        ur5(), CELLS, TASK, region, Answer.INFEASIBLE, Evidence.EXHAUSTED, "", (), tuple(trials),
+        UR5, CELLS, TASK, region, Answer.INFEASIBLE, Evidence.EXHAUSTED, "", (), tuple(trials),
         None, statistics={"bound": 11},
     )  # fmt: skip
 
@@ -58,20 +53,6 @@ def fabricated(*extra):
 EXPECTED = {
     Class.WHOLE: 2, Class.MOST: 2, Class.HALF: 3, Class.SOME: 4, Class.LITTLE: 5, Class.FAILED: 3,
 }  # fmt: skip
-
-
-def objects(commands):
-    """Path -> corners of every object."""
-    return {c["path"]: points_of(c) for c in commands if c["type"] == "set_object"}
-
-
-def colour_of(view, path):
-    (command,) = (c for c in view.commands if c["type"] == "set_object" and c["path"] == path)
-    return command["object"]["materials"][0]["color"]
-
-
-def classes_of(view):
-    return {e.label: e for e in view.legend.entries if e.path and e.path.startswith("/poses/")}
 
 
 def turned(points, pose):
@@ -87,14 +68,17 @@ def test_every_class_is_in_the_legend_and_every_pose_a_dot_where_the_surface_was
     middle = (lines.min(axis=(0, 1)) + lines.max(axis=(0, 1))) / 2
     for times in (1, 30):
         view = view_placements(replace(asked, trials=asked.trials * times))
-        entries = classes_of(view)
+        drawn = {c["path"]: c for c in view.commands if c["type"] == "set_object"}
+        classes = (e for e in view.legend.entries if (e.path or "").startswith("/poses/"))
+        entries = {entry.label: entry for entry in classes}
         assert list(entries) == [f"{kind} ({number * times})" for kind, number in EXPECTED.items()]
         kinds = [pose_layers.class_of_trial(trial) for trial in asked.trials]
         for kind, entry in zip(EXPECTED, entries.values(), strict=True):
-            assert colour_of(view, entry.path) == hex_colour(entry.colour)
+            (material,) = drawn[entry.path]["object"]["materials"]
+            assert material["color"] == hex_colour(entry.colour)
             assert not entry.shown, "dots are off at first"
             poses = [t.pose for t, k in zip(asked.trials, kinds, strict=True) if k is kind] * times
-            got = objects(view.commands)[entry.path].reshape(len(poses), 6, 3)
+            got = points_of(drawn[entry.path]).reshape(len(poses), 6, 3)
             want = np.concatenate([turned(middle, pose) for pose in poses])
             np.testing.assert_allclose(got.mean(axis=1), want, atol=2e-5)
             assert np.ptp(got, axis=1).max() < 0.05

@@ -17,8 +17,7 @@ from feasibility.viewer import verdict_scene
 from feasibility.viewer.cell_meshes import make_display_mesh, sides_of
 from feasibility.viewer.figures import plot_causes, plot_graph
 
-COUNT = 24
-MISSED = {2, 3, 7, 11, 15, 20}
+MISSED = {"mesh": {2, 3, 7, 11, 15, 20}, "grid": {5, 6, 13, 14, 15, 22}}
 DOME = sphere(radius=1.0, polar_deg=(10, 90), azimuth_deg=(10, 180), side="inside")
 
 
@@ -32,33 +31,18 @@ def dome(u, v):
     return DOME.point(np.radians(10 + 80 * u), np.radians(10 + 170 * v))
 
 
-@pytest.fixture(scope="module")
-def puma():
-    return load_robot("puma560", limits="set-1")
-
-
-@pytest.fixture(scope="module")
-def cells():
-    return mesh(triangles(30, 40, dome), side="inside").cells(count=COUNT)
-
-
-@pytest.fixture(scope="module")
-def on_mesh(puma, cells):
-    return missing(check(puma, cells, Task(0.005, 45)), MISSED)
-
-
-@pytest.fixture(scope="module")
-def on_grid(puma):
-    return missing(check(puma, DOME.cells(5, 6), Task(0.005, 45)), {5, 6, 13, 14, 15, 22})
+@pytest.fixture(scope="module", params=MISSED)
+def verdict(request):
+    cells = DOME.cells(5, 6)
+    if request.param == "mesh":
+        cells = mesh(triangles(30, 40, dome), side="inside").cells(count=24)
+    robot = load_robot("puma560", limits="set-1")
+    return missing(check(robot, cells, Task(0.005, 45)), MISSED[request.param])
 
 
 def areas_of(vertices, faces):
     a, b, c = np.moveaxis(vertices[faces], 1, 0)
     return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2.0
-
-
-def objects(commands):
-    return {c["path"]: c for c in commands if c["type"] == "set_object"}
 
 
 def test_a_fine_mesh_is_thinned_and_its_cells_keep_their_areas():
@@ -71,11 +55,9 @@ def test_a_fine_mesh_is_thinned_and_its_cells_keep_their_areas():
     assert len(display.borders()) > 10
 
 
-@pytest.mark.parametrize("kind", ["on_mesh", "on_grid"])
-def test_missed_cells_have_the_colour_of_their_cause(kind, request):
-    verdict = request.getfixturevalue(kind)
+def test_missed_cells_have_the_colour_of_their_cause(verdict):
     drawn = view(verdict)
-    shown = objects(drawn.commands)
+    shown = {c["path"]: c for c in drawn.commands if c["type"] == "set_object"}
     entries = {entry.path: entry for entry in drawn.legend.entries}
     seen, kinds = {}, {cause.cell: cause.kind for cause in verdict.causes}
     for path in (path for path in shown if path.startswith("/cells/")):
@@ -112,13 +94,11 @@ def collections(figure, kind):
     return [part for part in figure.axes[0].collections if type(part) is kind]
 
 
-@pytest.mark.parametrize("kind", ["on_mesh", "on_grid"])
-def test_the_flat_graph_and_causes_show_every_cell_once(kind, request):
-    verdict = request.getfixturevalue(kind)
+def test_the_flat_graph_and_causes_show_every_cell_once(verdict):
     cells = verdict.cells
     flat = (
         cells.unrolled().centres
-        if kind == "on_mesh"
+        if cells.surface.kind == "mesh"
         else (np.degrees(np.column_stack([cells.v, cells.u])))
     )
     figure = plot_graph(verdict)

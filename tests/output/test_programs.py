@@ -130,8 +130,7 @@ LIFT = 0.022  # [m] over the plate: standoff and tolerance, and no more
 
 
 def states(text, move):
-    """For each move whether the tool is on while it is made, and the numbers of those after which
-    it is switched."""
+    """For each move whether the tool is on; and the numbers of those after which it is switched."""
     lines = [line.strip() for line in text.splitlines()]
     on, found, switches, count = False, [], [], 0
     for line in lines:

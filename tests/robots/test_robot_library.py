@@ -92,14 +92,6 @@ def tree(edges):
     return f'<robot name="arm">{links}{joints}</robot>'
 
 
-def fixed(*edges):
-    rest = [(parent, child, child in ("left", "right")) for parent, child in edges]
-    return [("base_link", "upper", True), ("upper", "wrist", True), *rest]
-
-
-# As makers write them: what hangs on the arm, and the link that is taken.
-
-
 def random_tree(rng):
     count = rng.randint(3, 10)
     names = [f"l{k}" for k in range(count)]
@@ -231,7 +223,8 @@ def test_what_is_refused_by_name_frame_and_lock(approved, tmp_path):
         {f"panda_joint{i}": -0.07 * (i == 4) for i in range(1, 8)},
     )]  # fmt: skip
     lines = [f"{name} {options}: {refused(load_robot, name, **options)}" for name, options in asked]
-    forked = tree(fixed(("upper", "side"), ("wrist", "end")))
+    turning = [("base_link", "upper", True), ("upper", "wrist", True)]
+    forked = tree([*turning, ("upper", "side", False), ("wrist", "end", False)])
     for options in ({}, {"tool_frame": "sid"}, {"tool_frame": "base_link"}):
         lines.append(f"fork {options}: {refused(load_text, tmp_path, forked, **options)}")
     approved("bad_loads", "\n".join(lines).replace(load_robot("panda").urdf, "PANDA"))

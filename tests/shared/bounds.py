@@ -11,9 +11,8 @@ def holds(bound: ArrayLike, truth: ArrayLike, used: float = 0.97, tiny: float = 
 
     Args:
         bound: what is claimed; inf where nothing is, which counts as no use of it.
-        truth: what samples show, of the same shape or one that fits to it.
-        used: the least share of a bound that some truth has to be. A bound of 1 / used of what is
-            claimed would be wrong. 0 where samples cannot come near.
+        truth: what samples show, of a shape that fits to it.
+        used: the least share of a bound that some truth has to be; 0 where none comes near.
         tiny: room for rounding, in the unit of both.
     """
     __tracebackhide__ = True

@@ -170,10 +170,7 @@ def attack(arm, robot, cells, task, walk, rng, count):
 
 
 def stays_clear(scene, here, rng):
-    """Bodies, by python-fcl: all pairs of a few displacements, and the nearest ones of all.
-
-    What is at rest beside the part goes with it, or not.
-    """
+    """Bodies, by python-fcl: all pairs of a few displacements, and the nearest ones of all."""
     needed = np.array([pair[2] for pair in scene.pairs])
     spare = np.min([scene.distances(q) - needed for q in here.nominal[:5]], axis=0)
     near, seen = np.flatnonzero((spare < NEAR) | (np.argsort(np.argsort(spare)) < 3)), copy(scene)

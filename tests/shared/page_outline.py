@@ -128,10 +128,7 @@ class Page(HTMLParser):
 
 
 def scene_outline(commands: Any) -> dict[str, str]:
-    """The box of each object by path, those that only differ in a number at the end together.
-
-    The arm, the ground and frames, which are drawn alike everywhere, are left out.
-    """
+    """The box of each object by path but arm, ground and frames; numbered ones are one box."""
     corners: dict[str, list[np.ndarray]] = {}
     for one in commands:
         if one["type"] == "set_object" and not re.match(ALIKE, one["path"]):

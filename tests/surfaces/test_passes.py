@@ -60,10 +60,7 @@ def inwards(found):
 @pytest.mark.parametrize("direction", [0.0, HALF, 0.4])
 @pytest.mark.parametrize("name", SURFACES)
 def test_the_pitch_holds_on_the_surface(name, direction):
-    """From each outer pass to its inner neighbour, towards the first pass, within 2 %.
-
-    What lies beyond the inner pass's ends is for the test of oblique passes.
-    """
+    """From each outer pass to its inner neighbour, towards the first pass, within 2 %."""
     found = parallel_passes(SURFACES[name], 0.03, direction, step=0.004)
     assert found.spacing <= 0.03
     checked = 0

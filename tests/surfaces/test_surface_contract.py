@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from plain import surface_of
 from referee import Form
-from smooth_probes import extrapolated_area, least_distances, same_surface
+from smooth_probes import extrapolated_area, least_distances, random_parameters, same_surface
 from specimens import ALL, CLOSED, POLES, SMOOTH, cells_of
 
 from coverable import bspline, cone, cylinder, ellipsoid, hyperboloid, plane, poses, sphere, torus
@@ -37,11 +37,6 @@ def form_of(surface):
     )  # fmt: skip
 
 
-def some(surface, count=400, seed=7):
-    rng = np.random.default_rng(seed)
-    return rng.uniform(*surface.u_range, count), rng.uniform(*surface.v_range, count)
-
-
 def reach(surface):
     """m, within which every point has one closest point."""
     cells = surface.cells(20, 20)
@@ -55,7 +50,7 @@ def reach(surface):
 
 def test_points_normals_and_u_directions_are_those_of_the_formula(smooth):
     """The referee's, who writes formulas once more and knows nothing of the product's."""
-    u, v = some(smooth)
+    u, v = random_parameters(smooth)
     form = form_of(smooth)
     assert form is not None, "its formula goes into tests/shared/referee.py, its name into plain.py"
     expected, at, n = form.at(u, v), smooth.point(u, v), smooth.normal(u, v)
@@ -86,7 +81,7 @@ def test_shapes_broadcast(smooth):
 
 
 def test_closest_finds_back_where_points_were_put(smooth):
-    u, v = some(smooth)
+    u, v = random_parameters(smooth)
     h = np.random.default_rng(1).uniform(-1, 1, len(u)) * reach(smooth)
     n, foot = smooth.normal(u, v), smooth.point(u, v)
     found = smooth.closest(foot + h[:, None] * n)
@@ -102,8 +97,8 @@ def test_closest_finds_back_where_points_were_put(smooth):
 def test_no_place_is_nearer_than_the_closest(smooth):
     """By a search without slopes over the patch; a closed form may find places beyond it."""
     rng = np.random.default_rng(3)
-    at = smooth.point(*some(smooth, 12))
-    size = float(np.ptp(smooth.point(*some(smooth)), axis=0).max())
+    at = smooth.point(*random_parameters(smooth, 12))
+    size = float(np.ptp(smooth.point(*random_parameters(smooth)), axis=0).max())
     points = np.concatenate(
         [
             at + rng.normal(scale=0.4 * size, size=(12, 3)),
@@ -263,11 +258,10 @@ def test_moved_and_pickled_surfaces_are_the_same(name):
         assert bounds_of(moved, 0.01) == bounds_of(surface, 0.01)
 
 
-# Made in another way; equal to it; to within, m.
 def test_a_part_of_a_spline_is_the_whole_within_its_range_and_weights_of_one_change_nothing():
     net = SMOOTH["hood"].net.points
     whole, part = bspline(net, (2, 4)), bspline(net, (2, 4), u=(0.1, 0.85), v=(0.3, 0.9))
-    u, v = some(part, 200)
+    u, v = random_parameters(part, 200)
     assert (part.point(u, v) == whole.point(u, v)).all()
     assert (part.normal(u, v) == whole.normal(u, v)).all()
     beyond = whole.point(0.05, 0.5) + 0.01 * whole.normal(0.05, 0.5)

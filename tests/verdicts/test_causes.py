@@ -163,9 +163,6 @@ def test_of_many_pairs_the_one_in_the_way_is_named_with_its_distance():
         assert cause.clearance < 0.05
 
 
-# Cells that another motion covers.
-
-
 @pytest.mark.parametrize("name", ["puma560 262", "puma560 268"])
 def test_of_several_motions_over_a_missed_cell_the_largest_is_named(name):
     verdict = verdict_of(name)

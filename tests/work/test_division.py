@@ -36,10 +36,7 @@ def disconnected_problem(number):
 
 
 def assert_division(division):
-    """Disjoint patches, walks that a replay accepts, moves that lead from one to the next.
-
-    Every other cell has a cause.
-    """
+    """Disjoint patches, walks that a replay accepts, moves between them, causes of the rest."""
     robot, cells, task, plan = division.robot, division.cells, division.task, division.plan
     taken, touching = np.zeros(len(cells), dtype=int), nx.Graph(cells.pairs.tolist())
     touching.add_nodes_from(range(len(cells)))

@@ -31,12 +31,8 @@ def write_part(
 ) -> None:
     """A box from the origin to `size`, its edge along z at the origin round and red, the rest grey.
 
-    Args:
-        path: of the file.
-        size: m, of the box.
-        radius: m, of the edge.
-        unit: of the file, as STEP calls it.
-        placed: an assembly of two of it, the second turned by 90 degrees about z and 1 m up.
+    In metres, and in the file in `unit`. `placed` is an assembly of two of it, the second turned by
+    90 degrees about z and 1 m up.
     """
     box = BRepPrimAPI_MakeBox(*(1e3 * length for length in size)).Shape()
     fillet = BRepFilletAPI_MakeFillet(box)

@@ -118,8 +118,7 @@ def holed(n: int = 60) -> Mesh:
 
 
 def slivers() -> Mesh:
-    """A cylinder as CAD programs export it: two triangles for each strip, 40 times longer than
-    wide."""
+    """A cylinder as CAD programs export it: strips of two triangles, 40 times longer than wide."""
     return bent(lambda u, v: (0.2 * np.cos(6 * u), 0.2 * np.sin(6 * u), 0.9 * v), 50, 1)
 
 

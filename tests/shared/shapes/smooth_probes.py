@@ -5,8 +5,8 @@ import numpy as np
 POSE = {"position": (0.3, -1.2, 0.7), "rpy_deg": (25.0, -40.0, 110.0)}
 
 
-def random_parameters(surface, count, seed=7):
-    rng = np.random.default_rng(seed)
+def random_parameters(surface, count=400):
+    rng = np.random.default_rng(7)
     return rng.uniform(*surface.u_range, count), rng.uniform(*surface.v_range, count)
 
 
@@ -18,7 +18,7 @@ def triangle_area(surface, count):
     return sum(np.linalg.norm(half, axis=-1).sum() for half in halves) / 2
 
 
-def extrapolated_area(surface, count=24):
+def extrapolated_area(surface, count):
     """Richardson's table on three triangulations, whose errors fall with h^2 and h^4."""
     a, b, c = (triangle_area(surface, n * count) for n in (1, 2, 4))
     ab, bc = b + (b - a) / 3, c + (c - b) / 3
