@@ -129,13 +129,31 @@ class Judge:
     def compared(self, row: Ints, share: Array, points: Array, axes: Array, x: Array) -> Samples:
         """Samples of known tool points, axes and reference axes (k, 3).
 
-        The second guess is where the tool looks.
+        The second guess is where the tool looks. Over a hollow that is about as round as the
+        standoff a tool point is near to the targets of several places. Where its axis does not fit
+        to the nearest, the one that the tool looks at may be right.
         """
         tolerance = self.task.effective_tolerance
-        look = max(self.task.standoff, self.offset.least_look)
+        ahead = points + max(self.task.standoff, self.offset.least_look) * axes
         only = None if self._curves is None else self._curves[row]
-        places = self.offset.nearest(points, points + look * axes, tolerance, only)
-        return self.over(places, row, share, points, axes, x)
+        places = self.offset.nearest(points, ahead, tolerance, only)
+        found = self.over(places, row, share, points, axes, x)
+        bad = np.flatnonzero(~self.within(found) & (found.error <= tolerance))
+        if not len(bad):
+            return found
+        some = None if only is None else only[bad]
+        seen = self.offset.nearest(ahead[bad], ahead[bad], np.inf, some)
+        for places in (self.offset.approached(points[bad], seen), seen):
+            found = self.corrected(found, bad, places)
+        return found
+
+    def corrected(self, found: Samples, bad: Ints, places: Places) -> Samples:
+        """Samples, but some (k,) of them over other places, where they are right there."""
+        some = found.of(bad)
+        tried = self.over(places, some.row, some.share, some.points, some.axes, some.x)
+        which, better = np.arange(len(found.row)), self.within(tried)
+        which[bad[better]] = len(found.row) + np.flatnonzero(better)
+        return Samples.join(found, tried).of(which)
 
     def over(
         self, places: Places, row: Ints, share: Array, points: Array, axes: Array, x: Array

@@ -74,13 +74,7 @@ def _at_marks(judge: Judge, cells: Cells, marks: Ints, at: Samples) -> Samples:
     if not len(bad):
         return at
     aims = judge.task.targets(cells).points[marks[bad]]
-    places = judge.offset.nearest(aims, aims, 0.0)
-    some = at.of(bad)
-    tried = judge.over(places, some.row, some.share, some.points, some.axes, some.x)
-    row = np.arange(len(marks))
-    better = judge.within(tried)
-    row[bad[better]] = len(marks) + np.flatnonzero(better)
-    return Samples.join(at, tried).of(row)
+    return judge.corrected(at, bad, judge.offset.nearest(aims, aims, 0.0))
 
 
 def _between(

@@ -19,6 +19,8 @@ from surfaces.surface import SurfaceError
 
 SAMPLES = np.linspace(0.0, 1.0, 9)  # of a line, where no model is known
 MEASURED = 2.0  # times what is measured counts there
+DIFFERENCE = 1e-5  # [1] of a range of parameters
+STEPS, LONGEST = 8, 0.1  # of Newton's, [1] of a range
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +51,19 @@ class PatchPlaces(OffsetSurface):
         found = self.patch.closest(points)
         u, v = np.clip(found.u, *self.patch.u_range), np.clip(found.v, *self.patch.v_range)
         return Places(np.zeros(len(u), dtype=np.int64), np.stack([u, v], axis=-1))
+
+    def approached(self, points: Array, start: Places) -> Places:
+        """See `OffsetSurface.approached`: Gauss and Newton's steps, by differences."""
+        low, high = np.transpose([self.patch.u_range, self.patch.v_range])
+        x, by, most = start.x, np.diag(DIFFERENCE * (high - low)), LONGEST * (high - low)
+        for _ in range(STEPS):
+            back, ahead = (np.clip(x[:, None] + way, low, high) for way in (-by, by))
+            off = self.placed(ahead)[0] - self.placed(back)[0]
+            rates = off / np.diagonal(ahead - back, axis1=1, axis2=2)[..., None]
+            off = points - self.placed(x)[0]
+            step = np.einsum("ki,kij->kj", off, np.linalg.pinv(rates))
+            x = np.clip(x + np.clip(step, -most, most), low, high)
+        return Places(start.chart, x)
 
     def paths(self, start: Places, end: Places) -> PlacePaths:
         """See `OffsetSurface.paths`."""

@@ -147,6 +147,14 @@ class OffsetSurface(ABC):
             only: (k,) between poses, the curve that each is on, where that is known.
         """
 
+    def approached(self, points: Array, start: Places) -> Places:
+        """Places whose offset points are nearer to points (k, 3) m than those of a start, if known.
+
+        Not the nearest of all, but those that the start leads to.
+        """
+        del points
+        return start
+
     @property
     def bends_evenly(self) -> bool:
         """Are `PlacePaths.deviations` from bounds of second derivatives?"""

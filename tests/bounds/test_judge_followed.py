@@ -135,6 +135,18 @@ def test_poses_over_a_surface_are_right_over_it_where_they_follow(name):
     assert verify(gantry(), cells, TASK, q, marks=marks[::-1]).holds == (not word)
 
 
+@pytest.mark.parametrize(("off", "accepted"), [(5e-4, True), (1.1e-3, False)])
+def test_in_a_hollow_as_round_as_the_standoff_is_the_place_that_the_tool_looks_at(off, accepted):
+    """Targets lie 49 mm over a pipe of 50 mm: beside one the nearest is that of 26 deg further."""
+    hollow = cylinder(0.05, (-130, -50), (0.0, 0.1), side="inside", rpy_deg=(90, 0, 0)).cells(5, 1)
+    turn = np.radians(np.linspace(-123.0, -57.0, 67))
+    axes = np.column_stack([np.cos(turn), 0 * turn, np.sin(turn)])
+    points = 1e-3 * axes + off * np.cross(axes, [0, 1, 0]) + [0, -0.05, 0]
+    task = Task(0.049, 5, tolerance=1e-3)
+    found = replay_over_surface(gantry(), hollow, task, configurations(points, axes))
+    assert found.accepted == accepted, found.refusal
+
+
 @pytest.mark.parametrize(
     ("deviation", "off", "accepted"),
     [(4e-4, 5e-4, True), (6e-4, 5e-4, False), (9e-4, 0.0, True), (1.1e-3, 0.0, False)],

@@ -1,5 +1,6 @@
 """`check` itself: the same question has the same answer; budgets, progress and interruption."""
 
+import math
 import pickle
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -223,3 +224,18 @@ def test_links_are_cut_into_pieces_only_where_hulls_are_in_the_way():
     problem = Problem.of(*question("beside a hull")[2:5])
     assert problem.in_pieces.tried is problem.tried  # what the judge's shapes say holds there, too
     assert problem.held_back(0.1, PlacementError(0.01, 0.0), 1.0).tried is not problem.tried
+
+
+def test_over_hollows_as_round_as_the_standoff_the_replay_follows_the_motion():
+    rng = np.random.default_rng(16)
+    away, turn = rng.uniform(0.4, 0.75), rng.uniform(0, math.tau)
+    position = [away * math.cos(turn), away * math.sin(turn), rng.uniform(-0.2, 0.4)]
+    tilt = rng.uniform(-40, 40, 3).tolist()
+    x, y = np.meshgrid(*[np.linspace(-0.2, 0.2, 6)] * 2, indexing="ij")
+    z = 0.06 * rng.normal(size=(6, 6)) * rng.uniform(0.2, 1)
+    net, weights = np.stack([x, y, z], axis=2), rng.uniform(0.5, 2, (6, 6))
+    patch = coverable.bspline(
+        net, (3, 3), None, weights, side="outside", position=position, rpy_deg=tilt
+    )
+    task = coverable.Task(standoff=0.05, cone_deg=float(rng.uniform(5, 60)))
+    assert check(coverable.load_robot("puma560"), patch.cells(5, 5), task).feasible
