@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-PUMA560_URDF = Path(__file__).parents[1] / "robots" / "puma560" / "puma560.urdf"
+PUMA560_URDF = Path(__file__).parents[1] / "robots" / "arms" / "puma560.urdf"
 
 
 @dataclass(frozen=True, slots=True)

@@ -90,7 +90,8 @@ class Roadmap:
 
     def covers(self, roots: Sequence[int]) -> Mask:
         """(K, N) the cells that each of some root components covers."""
-        return np.array([self.cover[root] for root in roots]).reshape(len(roots), len(self.over))
+        found = np.array([self.cover[root] for root in roots], dtype=bool)  # also of none
+        return found.reshape(len(roots), len(self.over))
 
     def add_component(self) -> int:
         """A component without nodes."""

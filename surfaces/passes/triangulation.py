@@ -40,13 +40,15 @@ def working_mesh(surface: Surface, edge: float) -> WorkingMesh:
 
     Args:
         surface: a patch, a piecewise surface or a mesh.
-        edge: m > 0.
+        edge: m > 0; inf for as few as there are.
 
     Raises:
         SurfaceError: the kind is another, or it would take more than `MOST_FACES` triangles.
     """
     if isinstance(surface, MeshSurface):
         placed = surface.mesh.vertices @ surface.rotation.T + surface.position
+        if edge == np.inf:
+            return WorkingMesh(placed, surface.mesh.faces)
         fewest = float(areas_of(placed, surface.mesh.faces).sum()) / MOST_FACES * FINER
         fine = subdivide(placed, surface.mesh.faces, max(edge**2 / SHAPE, fewest))
         return WorkingMesh(fine.vertices, fine.faces)
