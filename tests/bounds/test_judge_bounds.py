@@ -242,10 +242,8 @@ def test_a_row_is_at_fault_where_it_is_not_within_one_of_its_margins(name, value
 
 def test_what_is_not_known_at_an_end_is_not_known_between():
     """No NaN in, no acceptance out: of error, tilt or distance from triangles, at either end."""
-    judge, rows = (
-        judged(turning(), flat("triangles"), Task(0.0, 180, 0.4)),
-        np.array([[0.0], [0.1]]),
-    )
+    judge = judged(turning(), flat("triangles"), Task(0.0, 180, 0.4))
+    rows = np.array([[0.0], [0.1]])
     at = judge.sampled(np.arange(2), np.zeros(2), rows)
     whole = judge.between_rows(rows, jacobians(Kinematics(judge.robot), rows), at)
     assert judge.within(judge.bounds(whole)).all()

@@ -154,10 +154,8 @@ def test_in_a_hollow_as_round_as_the_standoff_is_the_place_that_the_tool_looks_a
 def test_what_the_surface_under_poses_deviates_by_is_taken_off(deviation, off, accepted):
     """Also where the tool is exactly right."""
     floor = parametric(lambda u, v: (u, v, 0 * u), (-0.5, 0.5), (-0.5, 0.5), **OUT)
-    feet, up = (
-        np.linspace(-0.2, 0.2, 5)[:, None] * [1.0, 0.0, 0.0],
-        np.tile([0.0, 0.0, 1.0], (5, 1)),
-    )
+    feet = np.linspace(-0.2, 0.2, 5)[:, None] * [1.0, 0.0, 0.0]
+    up = np.tile([0.0, 0.0, 1.0], (5, 1))
     cells = over(replace(floor, off=(deviation, 0)), feet, up, np.ones(5))
     q, marks = straight(cells)
     q[:, 2] += off

@@ -212,11 +212,8 @@ def test_robots_and_cases_list_all_there_are(ask):
     assert list(rows) == names
     limits = [rows[name]["joints"][0]["limits_deg"] for name in ("puma560", "kinova")]
     assert limits == [[-180.0, 180.0], None]
-    assert (rows["ur20"]["joints"], rows["ur20"]["reach_m"], rows["ur20"]["here"]) == (
-        None,
-        1.75,
-        False,
-    )
+    far = rows["ur20"]
+    assert (far["joints"], far["reach_m"], far["here"]) == (None, 1.75, False)
     two = ask("robots", "puma560", "kinova").out
     for words in ("-180..180", "set-1, set-2, set-3, set-4", "free, 47..313, 19..341, free"):
         assert words in two

@@ -15,8 +15,6 @@ from coverable.kernels import CODE, ROOT, is_safe
 
 PACKAGES = ("robots", "surfaces", "feasibility")
 
-# Which files are read: a kernel is machine code, so only where nobody else can write.
-
 ME, OTHER, SYSTEM, GROUP, USERS = 1000, 1001, 0, 100, 200
 
 

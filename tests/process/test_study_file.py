@@ -163,7 +163,5 @@ def test_every_fault_is_told_with_its_place(approved, tmp_path) -> None:
         told.append(f"{text}\n-> {caught.value}")
     approved("faulty_studies", "\n\n".join(told))
     (tmp_path / "latin.toml").write_bytes(b"a = '\xff'")
-    (tmp_path / "large.toml").write_bytes(b"#" * 300_000)
-    for name in ("none.toml", ".", "latin.toml", "large.toml"):
-        with pytest.raises(CaseError, match=r"no such file|is a folder|UTF-8|larger than"):
-            load_study(tmp_path / name)
+    with pytest.raises(CaseError, match="UTF-8"):
+        load_study(tmp_path / "latin.toml")

@@ -189,12 +189,8 @@ def _as_file(tables: dict[str, Any], how: dict[str, Any]) -> dict[str, Any]:
         )
         points = local.at(*(part.ravel() for part in np.meshgrid(u, v, indexing="ij"))).points
         np.save(path.with_suffix(".npy"), points.reshape(len(u), len(v), 3))
-        made |= {
-            "kind": "grid",
-            "file": f"{path.stem}.npy",
-            "units": "m",
-            "cells": surface["cells"],
-        }
+        made |= {"kind": "grid", "file": f"{path.stem}.npy", "units": "m"}
+        made["cells"] = surface["cells"]
     else:
         nu, nv = surface["cells"]
         places, order = local.centres(nu, nv), np.arange(nu * nv).reshape(nu, nv)

@@ -107,7 +107,6 @@ def test_pieces_are_numbered_by_area():
     assert clean(*w.stacked(*parts)).pieces.tolist() == [2] * 12 + [0] * 12 + [1] * 12
 
 
-# Border lines: holes, and open ends where a piece has more than one.
 def knotted(rng):
     """Faces between points of a small grid: many are straight, doubled or meet in bundles."""
     count = int(rng.integers(3, 12))

@@ -99,12 +99,8 @@ def test_no_place_is_nearer_than_the_closest(smooth):
     rng = np.random.default_rng(3)
     at = smooth.point(*random_parameters(smooth, 12))
     size = float(np.ptp(smooth.point(*random_parameters(smooth)), axis=0).max())
-    points = np.concatenate(
-        [
-            at + rng.normal(scale=0.4 * size, size=(12, 3)),
-            smooth.position + np.outer([0.11, 0.4], smooth.rotation[:, 2] * size),
-        ]
-    )
+    above = smooth.position + np.outer([0.11, 0.4], smooth.rotation[:, 2] * size)
+    points = np.concatenate([at + rng.normal(scale=0.4 * size, size=(12, 3)), above])
     found = smooth.closest(points)
     foot = smooth.point(found.u, found.v)
     away = np.linalg.norm(points - foot, axis=1)

@@ -69,10 +69,8 @@ def test_the_referee_says_what_is_wrong():
     q, marks = verdict.witness.q, verdict.witness.cell
     arm = plain.arm_of(verdict.robot)
     narrow = replace(arm, limits=np.column_stack([arm.limits[:, 0], q.max(axis=0) - 1e-9]))
-    form, asked = (
-        plain.surface_of(verdict.cells.surface),
-        plain.asked_of(verdict.task, verdict.cells),
-    )
+    form = plain.surface_of(verdict.cells.surface)
+    asked = plain.asked_of(verdict.task, verdict.cells)
     aims = plain.targets_of(verdict.cells, verdict.task)
     for made, said in (
         ((narrow, form, asked, q, aims, marks), "limits"),

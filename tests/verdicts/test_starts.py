@@ -34,8 +34,7 @@ def started(anywhere):
     """In the middle of the motion that is found without a start, a little off the target."""
     walk = anywhere.witness
     row = np.flatnonzero(walk.cell == 5)[0]
-    start = walk.q[row] + 2e-4
-    return replace(UR5, start=start)
+    return replace(UR5, start=walk.q[row] + 2e-4)
 
 
 def test_the_motion_begins_at_the_start(anywhere, started):

@@ -1,7 +1,4 @@
-"""Motions along passes over random surfaces, before a referee that shares nothing with the product.
-
-The tool is where Pinocchio says; the surfaces are formulas and triangles of the referee.
-"""
+"""Motions along passes over random surfaces, before a referee with nothing of the product."""
 
 import math
 from dataclasses import dataclass

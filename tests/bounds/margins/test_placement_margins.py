@@ -66,11 +66,8 @@ def ball_along(robot, q, least=None, cone=9.0):
 
 def test_the_furthest_place_of_a_stretch_counts():
     """The pivot is behind the arm, and nearer to both ends; angles are those of their chords."""
-    robot, middle, way = (
-        load_robot("ur5"),
-        np.array([0.3, -1.2, 0, 0.4, 0.3, 0]),
-        0.5 * np.eye(6)[0],
-    )
+    robot, way = load_robot("ur5"), 0.5 * np.eye(6)[0]
+    middle = np.array([0.3, -1.2, 0, 0.4, 0.3, 0])
     arm = plain.arm_of(robot)
     ((x, y, _),), *_ = arm.tool(middle)
     middle[0] += np.radians(225.0) - np.arctan2(y, x)

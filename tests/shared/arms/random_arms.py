@@ -36,11 +36,9 @@ def rail_arm(base: str, stroke: tuple[float, float] = (-0.5, 0.8)) -> Robot:
     return load_robot(base, axes=[Axis("rail", "prismatic", (0, 1, 0), limits=stroke)])
 
 
-def finite_limits(robot: Robot, far: float = 2.0 * np.pi) -> tuple[Floats, Floats]:
-    return (
-        np.where(np.isfinite(robot.lower), robot.lower, -far),
-        np.where(np.isfinite(robot.upper), robot.upper, far),
-    )
+def finite_limits(robot: Robot) -> tuple[Floats, Floats]:
+    low = np.where(np.isfinite(robot.lower), robot.lower, -2.0 * np.pi)
+    return low, np.where(np.isfinite(robot.upper), robot.upper, 2.0 * np.pi)
 
 
 def random_configuration(robot: Robot, rng: np.random.Generator) -> Floats:

@@ -26,10 +26,7 @@ def motion(robot):
 
 
 def interpolated(run, degree, places):
-    """q, dq and ddq (m, n) between samples as a controller goes, at so many places of each.
-
-    Quintics go through q, dq and ddq of both ends, cubics through q and dq: by scipy.
-    """
+    """q, dq, ddq (m, n) at places between samples: quintics through these, cubics without ddq."""
     sides = run.q, run.dq, run.ddq
     curve = BPoly.from_derivatives(run.time, np.stack(sides[: (degree + 1) // 2], axis=1))
     share = np.linspace(0.0, 1.0, places, endpoint=False)

@@ -54,10 +54,7 @@ def stacked(*parts):
 
 
 def chain_of_caps():
-    """Two triangles that share an edge, cut apart by caps on it: faces with no area.
-
-    Three corners lie on that edge, fanned, so that caps lie behind caps.
-    """
+    """Two triangles, and on the edge that they share a fan of caps: faces with no area."""
     vertices = [[0, 0, 0], [0.2, 0, 0], [0.1, 0.1, 0], [0.1, -0.1, 0.03]]
     vertices += [[0.05, 0, 0], [0.1, 0, 0], [0.15, 0, 0]]
     upper = [[0, 4, 2], [4, 5, 2], [5, 6, 2], [6, 1, 2]]
