@@ -12,7 +12,7 @@ from surfaces.meshes.cleaning import clean
 from surfaces.meshes.degenerate import weld_distance, welded
 from surfaces.meshes.mesh_notes import notes_of
 from surfaces.meshes.normals import blended
-from surfaces.meshes.orientation import one_fan_each
+from surfaces.meshes.orientation import one_fan_each, oriented
 from surfaces.meshes.triangle_mesh import TriangleMesh
 
 V, F = w.cube()
@@ -49,6 +49,14 @@ def test_a_crowd_of_vertices_is_thinned_and_none_moves_far(dimension):
     assert np.ptp(left, axis=0)[:dimension].min() > 2e-6
     # Every box of a grid keeps one at most.
     assert len(left) <= (2 + 3e-6 / (distance / np.sqrt(12))) ** dimension
+
+
+def test_what_the_larger_area_says_is_outside_is():
+    faces = np.array(F)
+    faces[:3] = faces[:3, ::-1]
+    found, turned = oriented(np.array(V), faces)
+    assert turned == 3
+    assert (found == F).all()
 
 
 def test_a_flip_never_makes_an_edge_twice():
