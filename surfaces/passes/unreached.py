@@ -20,7 +20,7 @@ from surfaces.surface import SurfaceError
 
 REMEDY = "measure between section planes (--by planes), which needs no way over the surface"
 TRIES = 4  # of pygeodesic where it fails
-HAIR = 1e-9  # [1] of the extent
+JITTER = 1e-9  # [1] of the extent
 
 
 class Reached(NamedTuple):
@@ -49,9 +49,9 @@ def exact_distances(mesh: WorkingMesh, sources: Ints) -> tuple[Array, Ints]:
     from pygeodesic.geodesic import PyGeodesicAlgorithmExact
 
     rng = np.random.default_rng(0)
-    hair = HAIR * float(np.ptp(mesh.vertices, axis=0).max())
+    jitter = JITTER * float(np.ptp(mesh.vertices, axis=0).max())
     for k in range(TRIES):
-        off = min(k, 1) * hair * rng.uniform(-1.0, 1.0, mesh.vertices.shape)
+        off = min(k, 1) * jitter * rng.uniform(-1.0, 1.0, mesh.vertices.shape)
         algorithm = PyGeodesicAlgorithmExact(mesh.vertices + off, mesh.faces.astype(np.int32))
         try:
             found, index = algorithm.geodesicDistances(sources.astype(np.int32), None)
