@@ -243,3 +243,11 @@ def test_edges():
     assert late.verdict.answer is Answer.UNDECIDED
     assert not any(t.feasible for t in late.thresholds)
     assert len(late.left_out) == 21 - len(late.thresholds) > 0
+
+
+def test_where_check_alone_goes_further_than_from_known_motions_it_leads():
+    case = load_case("paper/4a")
+    found = explain(*case.build()[:3], case.search).thresholds
+    least = {one.quantity.name: one.feasible.value for one in found}
+    assert least["joint1 upper limit"] <= math.radians(30)  # 166 deg without
+    assert least["joint5 upper limit"] <= math.radians(-80)  # 46 deg without
