@@ -49,7 +49,7 @@ class Held:
         return np.zeros((len(q), 3))
 
     def second_derivatives(self, robot: Robot, q: Array, axes: Array, x: Array) -> Array:
-        """(m - 1,) D_x + D_y between rows q (m, n), see `rolls.bounds`; 0 where none counts."""
+        """(m - 1,) D_x + D_y between rows q (m, n), see `roll_bounds`; 0 where none counts."""
         return np.zeros(max(len(q) - 1, 0))
 
     def rolls(self, x: Array, axes: Array, approaches: Array, places: Places) -> Array:

@@ -152,7 +152,6 @@ class OffsetSurface(ABC):
 
         Not the nearest of all, but those that the start leads to.
         """
-        del points
         return start
 
     @property

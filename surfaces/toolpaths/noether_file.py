@@ -28,6 +28,8 @@ def noether_poses(text: str) -> dict[str, Array]:
     Raises:
         SurfaceError: it is something else; the first line that is wrong is named.
     """
+    from scipy.spatial.transform import Rotation
+
     rows: list[dict[str, float]] = [{}]
     for place, line in enumerate(text.splitlines(), start=1):
         words = [word for word in _MARKS.split(line.partition("#")[0]) if word not in ("", "-")]
@@ -50,14 +52,8 @@ def noether_poses(text: str) -> dict[str, Array]:
     largest = np.abs(turns).max(axis=1, keepdims=True)
     if not (largest > 0.0).all():
         raise SurfaceError("holds a quaternion of zeros, which is no direction")
-    turns = turns / largest
-    w, x, y, z = (turns / np.linalg.norm(turns, axis=1, keepdims=True)).T
-    along = [w * w + x * x - y * y - z * z, 2 * (x * y + w * z), 2 * (x * z - w * y)]
-    outward = [2 * (x * z + w * y), 2 * (y * z - w * x), w * w - x * x - y * y + z * z]
-    return {
-        "points": table[:, :3], "normals": np.stack(outward, axis=1),
-        "tangents": np.stack(along, axis=1),
-    }  # fmt: skip
+    axes = Rotation.from_quat(np.roll(turns / largest, -1, axis=1)).as_matrix()
+    return {"points": table[:, :3], "normals": axes[:, :, 2], "tangents": axes[:, :, 0]}
 
 
 def _fault(line: int, text: str) -> SurfaceError:
