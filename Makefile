@@ -71,7 +71,6 @@ collected: .venv/installed
 test: .venv/installed
 	@$(MAKE) --no-print-directory --jobs=2 kernels lint greedy collected
 	COVERABLE_FEW=1 $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder --nbmake --nbmake-timeout=900
-	@$(MAKE) --no-print-directory docs
 
 docs: .venv/installed
 	$(BIN)/python docs/figures.py

@@ -55,7 +55,7 @@ def add(subcommands: argparse._SubParsersAction) -> None:
         "shown as a case file.",
         allow_abbrev=False,
     )
-    parser.set_defaults(run=live, command="live", json=False)
+    parser.set_defaults(run=live, json=False)
     add_case(parser)
     _add_browser(parser)
     parser = add_command(

@@ -49,7 +49,7 @@ def add_command(
     """
     parser: argparse.ArgumentParser = subcommands.add_parser(name, allow_abbrev=False, **texts)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.set_defaults(run=run, command=name)
+    parser.set_defaults(run=run)
     for add in arguments:
         add(parser)
     return parser

@@ -63,7 +63,7 @@ def _parser(command: str = "") -> argparse.ArgumentParser:
         allow_abbrev=False,
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
-    subcommands = parser.add_subparsers(metavar="COMMAND", required=True)
+    subcommands = parser.add_subparsers(metavar="COMMAND", dest="command", required=True)
     for module in [name for name, words in MODULES.items() if command in words] or MODULES:
         import_module(f"feasibility.cli.{module}").add(subcommands)
     return parser
@@ -84,7 +84,11 @@ def main(argv: Sequence[str] | None = None, clock: MakeClock | None = None) -> i
         with enforcing():
             prepare()
             words = sys.argv[1:] if argv is None else argv
-            args = _parser(next(iter(words), "")).parse_args(words)
+            parser = _parser(next(iter(words), ""))
+            args, unknown = parser.parse_known_args(words)
+            if unknown:
+                parser.prog = f"coverable {args.command}"  # whose help names what there is
+                parser.error(f"unrecognized arguments: {' '.join(unknown)}")
             args.clock = clock
             try:
                 return int(args.run(args, began))
