@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from coverable.arrays import Ints
+from coverable.errors import at_least
 from feasibility.demands.area import TreatedArea
 from feasibility.verdict import Verdict
 from feasibility.viewer import threejs
@@ -148,15 +149,14 @@ def margin_layers(verdict: Verdict) -> Iterator[Layer]:
     if margin is None or margin.along is None or verdict.witness is None:
         return
     points = Kinematics(verdict.robot).tools(verdict.witness.q)[0]
-    ends, low = np.stack([points[:-1], points[1:]], axis=1), 0.0
+    ends = np.stack([points[:-1], points[1:]], axis=1)
+    low = least = float(margin.along.min())
     for times, colour in BANDS:
-        high = times * float(margin.along.min())
-        some = (margin.along >= low) & (margin.along < high)
+        some = (margin.along >= low) & (margin.along < times * least)
         if some.any():
-            to = f"{1e3 * low:.3g} mm and more" if high == np.inf else f"up to {1e3 * high:.3g} mm"
-            label, path = f"tool path: the part may be off {to}", f"/margin/{times:g} times"
-            yield hidden(lines_layer(label, colour, path, ends[some]))
-        low = high
-    least = ends[[int(np.argmin(margin.along))]].mean(axis=1)
-    dot = marks(least, MARK * cell_size(verdict.cells))
+            label = f"tool path: the part may be off by {at_least(1e3 * low, 3)} mm"
+            yield hidden(lines_layer(label, colour, f"/margin/{times:g} times", ends[some]))
+        low = times * least
+    place = ends[[int(np.argmin(margin.along))]].mean(axis=1)
+    dot = marks(place, MARK * cell_size(verdict.cells))
     yield mesh_layer("least room for the part", LEAST, "/margin/least", *dot, lit=False)
