@@ -1,27 +1,29 @@
 """How far a tool moves over a box of joints, or along a motion, and how far off its linear model.
 
-**Lemma.** Let L_j be at least the lever r_j of joint j, the distance of the tool point from its
-axis, everywhere in the box, and h_j its half width. Then for every d in the box
+**Lemma.** Let r_j be the lever of joint j at the centre c of a box, the distance of the tool point
+from its axis, and h_j the half width. Then for every d in the box p(c + d) is within
+sum_j r_j h_j of p(c), and
 
-    |p(c + d) - p(c) - J d| <= D / 2,    D = sum_j L_j h_j (h_j + 2 sum_{i before j} h_i),
+    |p(c + d) - p(c) - J d| <= D / 2,    D = sum_j r_j h_j (h_j + 2 sum_{i before j} h_i),
 
-the sums over revolute joints; a prismatic j adds 2 h_j sum_{i before j} h_i. *Proof.* Joint i turns
-all that joint j >= i does, so d2p/dq_i dq_j = z_i x (z_j x (p - o_j)), at most r_j long; z_i x z_j,
-at most 1, if j slides; 0 if i slides. So g(s) = p(c + s d) has |g''| <= D, and Taylor's formula
-g(1) = g(0) + g'(0) + int_0^1 (1 - s) g''(s) ds bounds the remainder by D / 2. The axis likewise:
-s_j = |z_j x a| in place of r_j, and nothing from joints that slide. *Levers:* r_j depends on the
-joints behind j alone. Change these one by one, the last first: joint k moves the tool point by at
-most 2 sin(h_k / 2) L_k, not more than min(h_k, 2) L_k, or by h_k if it slides; so
-L_j = r_j(c) + sum_{k behind j} min(h_k, 2) L_k. A distance to a line changes by no more than the
-point does. QED
+the sums over revolute joints; a prismatic j adds h_j to the first one, and to D what a lever of 1
+would without its own turn, 2 h_j sum_{i before j} h_i. *Proof.* Change the joints one by one, the
+first first. Those behind j are where they are at c when j is changed, so it moves the tool point by
+R v: v is what it would do at c, and R what the joints before j turn by, at most the sum of their
+h_i. |v| <= r_j h_j, and v is J_j d_j up to r_j d_j^2 / 2; |R v - v| is at most that sum times |v|.
+QED The axis likewise: s_j = |z_j x a| in place of r_j, and nothing from joints that slide.
 
-Along a segment q(s), s from 0 to 1, with |q'| <= d, |p''| <= D with d in place of h. Every place of
-it is within d / 2 of one of its ends, so the larger lever at the two takes the place of r_j(c).
+**Along a segment** q(s), s from 0 to 1, with |q'| <= d, |p''| <= D with d in place of h and L_j in
+place of r_j, where no lever on the segment is longer than L_j: for i before j,
+d2p/dq_i dq_j = z_i x (z_j x (p - o_j)), at most r_j long; z_i x z_j, at most 1, if j slides; 0 if i
+slides. *Levers:* r_j depends on the joints behind j alone. Change these one by one, the last first:
+joint k moves the tool point by at most 2 sin(h_k / 2) L_k, not more than min(h_k, 2) L_k, or by h_k
+if it slides; so L_j = r_j(c) + sum_{k behind j} min(h_k, 2) L_k. A distance to a line changes by no
+more than the point does. Every place of the segment is within d / 2 of one of its ends, so the
+larger lever at the two takes the place of r_j(c).
 """
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 
@@ -29,28 +31,8 @@ from coverable.arrays import Array, Mask
 from robots.robot import Robot
 
 
-def largest_levers(levers: Array, half: Array, prismatic: Mask, cap: Array | float) -> Array:
-    """(m, n) L_j of the lemma.
-
-    Args:
-        levers: (m, n) r_j or s_j at the centres; of a prismatic joint 1 for points, 0 for axes.
-        half: (m, n) h_j, rad or m.
-        prismatic: (n,) which joints slide.
-        cap: what no lever exceeds anywhere, of each joint (n,) or of all.
-    """
-    largest, behind = np.array(levers), np.zeros(len(levers))
-    caps = np.broadcast_to(cap, levers.shape[1])
-    for j in range(levers.shape[1] - 1, -1, -1):
-        turned = half[:, j]
-        if not prismatic[j]:
-            largest[:, j] = np.minimum(levers[:, j] + behind, caps[j])
-            turned = np.minimum(turned, 2.0)
-        behind = behind + largest[:, j] * turned
-    return largest
-
-
 def second_derivative_bound(largest: Array, steps: Array, prismatic: Mask) -> Array:
-    """(..., ) D, from L_j and the changes of joints (..., n), h_j or d_j."""
+    """(..., ) D, from r_j or L_j (..., n) and the changes of joints (..., n), h_j or d_j."""
     turns = np.where(prismatic, 0.0, steps)
     before = np.cumsum(turns, axis=-1) - turns
     return np.asarray((largest * steps * (turns + 2.0 * before)).sum(axis=-1))
@@ -68,26 +50,26 @@ def column_changes(largest: Array, steps: Array, prismatic: Mask) -> Array:
     return np.asarray(largest * own + np.where(prismatic, 0.0, behind))
 
 
-class LeverBounds(NamedTuple):
-    """Bounds over boxes of joints."""
-
-    largest: Array
-    """(m, n) L_j, of every lever."""
-    second: Array
-    """(m,) D."""
-
-
-def lever_bounds(levers: Array, half: Array, prismatic: Mask, cap: Array | float) -> LeverBounds:
-    """L_j and D over boxes; see `largest_levers`."""
-    largest = largest_levers(levers, half, prismatic, cap)
-    return LeverBounds(largest, second_derivative_bound(largest, half, prismatic))
-
-
 def levers_along(
     steps: Array, prismatic: Mask, first: Array, last: Array, cap: Array | float
 ) -> Array:
-    """(m, n) L_j along m segments with |q'| <= steps (m, n), from the levers at both ends."""
-    return largest_levers(np.maximum(first, last), 0.5 * steps, prismatic, cap)
+    """(m, n) L_j along m segments.
+
+    Args:
+        steps: (m, n) bounds on |q'|, rad or m.
+        prismatic: (n,) which joints slide.
+        first, last: (m, n) r_j or s_j at both ends; of a prismatic joint 1 for points, 0 for axes.
+        cap: what no lever exceeds anywhere, of each joint (n,) or of all.
+    """
+    largest, behind = np.maximum(first, last), np.zeros(len(first))
+    caps = np.broadcast_to(cap, largest.shape[1])
+    for j in range(largest.shape[1] - 1, -1, -1):
+        turned = 0.5 * steps[:, j]
+        if not prismatic[j]:
+            largest[:, j] = np.minimum(largest[:, j] + behind, caps[j])
+            turned = np.minimum(turned, 2.0)
+        behind = behind + largest[:, j] * turned
+    return largest
 
 
 def second_derivatives(

@@ -25,7 +25,7 @@ import numpy as np
 from coverable.arrays import Array, Ints
 from feasibility.certification.bisection import Rows
 from feasibility.certification.jacobians import Jacobians, cross, jacobians, lengths
-from feasibility.certification.lever_bounds import lever_bounds, longest_levers
+from feasibility.certification.lever_bounds import longest_levers, second_derivative_bound
 from feasibility.certification.roll_box_models import (
     Directions,
     TargetModel,
@@ -116,7 +116,7 @@ class Allowed(NamedTuple):
     @staticmethod
     def by(task: Task, arm: ArmModel) -> Allowed:
         """What a task allows an arm."""
-        length = max(TYPICAL * float(arm.caps.max()), 1e-3)
+        length = max(TYPICAL * arm.longest, 1e-3)
         # A wider range leaves out too little for boxes to show it; so does what is proved without.
         roll = task.roll if task.roll is not None and task.roll.half <= 0.5 * np.pi else None
         return Allowed(task.effective_tolerance, min(task.cone_chord, ANY_AXIS), length, roll)
@@ -161,11 +161,11 @@ class Models(Rows):
     high: Array
     """(m, n + 2)"""
     reach: Array
-    """(m, n + 2) m, by how much each variable can change the residual, at most."""
+    """(m, n + 2) m, by how much each variable can change the residual, about, for cutting boxes."""
 
 
 class ArmModel:
-    """Pinocchio's view of one arm, and the levers that no configuration exceeds."""
+    """Pinocchio's view of one arm, and a lever (m) that none exceeds."""
 
     def __init__(self, robot: Robot, low: Array, high: Array) -> None:
         """Work with joints inside low .. high (n,), both finite."""
@@ -173,7 +173,7 @@ class ArmModel:
         self.kinematics = Kinematics(robot)
         self.prismatic = robot.prismatic
         self.n = robot.n
-        self.caps = longest_levers(robot, low, high)
+        self.longest = float(longest_levers(robot, low, high).max())
 
     def models(self, boxes: Boxes, parts: Parts, allowed: Allowed) -> Models:
         """The linear model of every box."""
@@ -186,11 +186,11 @@ class ArmModel:
         target = parts.centre[boxes.part] * weights
         target = target + (centre[:, n:, None] * slopes).sum(axis=1)
         h = half[:, :n]
-        of_point = lever_bounds(at_centre.levers, h, self.prismatic, self.caps)
-        of_axis = lever_bounds(at_centre.sines, h, self.prismatic, 1.0)
+        levers, sines = at_centre.levers, at_centre.sines
+        of_point, of_axis = (second_derivative_bound(r, h, self.prismatic) for r in (levers, sines))
         radius = np.empty((len(boxes), 2))
-        radius[:, 0] = allowed.position + parts.radius[boxes.part, 0] + 0.5 * of_point.second
-        radius[:, 1] = allowed.axis + parts.radius[boxes.part, 1] + 0.5 * of_axis.second
+        radius[:, 0] = allowed.position + parts.radius[boxes.part, 0] + 0.5 * of_point
+        radius[:, 1] = allowed.axis + parts.radius[boxes.part, 1] + 0.5 * of_axis
         radius = (radius + GUARD) * [1.0, length]
         made = Models(
             residual=tool - target,
@@ -200,7 +200,7 @@ class ArmModel:
             high=boxes.high - centre,
             reach=np.concatenate(
                 [
-                    (of_point.largest + length * of_axis.largest) * h,
+                    (levers + length * sines) * h,
                     np.linalg.norm(slopes, axis=2) * half[:, n:],
                 ],
                 axis=1,
@@ -227,14 +227,14 @@ class ArmModel:
         both = np.stack([x, np.cross(axes, x)], axis=1)
         angular = self.kinematics.twists(q)[:, 3:]
         turned = [cross(angular, both[:, k]) for k in (0, 1)]
-        bounds = [lever_bounds(lengths(one), half, self.prismatic, 1.0) for one in turned]
+        sines = [lengths(one) for one in turned]
         columns = np.stack(turned, axis=1).transpose(0, 3, 1, 2)
-        moves = [np.minimum((bound.largest * half).sum(axis=1), 2.0) for bound in bounds]
-        seconds = np.column_stack([bound.second for bound in bounds])
-        tool = ToolModel(both, columns, seconds, np.column_stack(moves))
+        moves = [np.minimum((one * half).sum(axis=1), 2.0) for one in sines]
+        seconds = [second_derivative_bound(one, half, self.prismatic) for one in sines]
+        tool = ToolModel(both, columns, np.column_stack(seconds), np.column_stack(moves))
         found = roll_models(tool, at, allowed.roll)
         reach = made.reach.copy()
-        reach[:, :n] += length * (bounds[0].largest + bounds[1].largest) * half
+        reach[:, :n] += length * (sines[0] + sines[1]) * half
         return replace(
             made,
             residual=np.concatenate([made.residual, length * found.residual], axis=1),
