@@ -27,9 +27,7 @@ class CellTriangles(NamedTuple):
     vertices: Array
     """(V, 3) m, in the root frame."""
     faces: Ints
-    """(F, 3)"""
-    normals: Array
-    """(V, 3) outward unit normals."""
+    """(F, 3) counterclockwise seen from outside."""
 
 
 class Unrolled(NamedTuple):
@@ -228,7 +226,7 @@ class Cells(Protected, ABC):
 
     @abstractmethod
     def triangles(self, which: Ints, samples: int = 8, inset: float = 0.0) -> CellTriangles:
-        """Triangles that fill some cells, smooth where the surface bends.
+        """Triangles that fill some cells.
 
         Args:
             which: (k,) flat indices.

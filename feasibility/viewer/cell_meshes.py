@@ -1,13 +1,14 @@
 """Shapes for drawing E-cells: filled patches, borders, marks at their centres, the sides of a cut.
 
-The triangles of a mesh are joined at their corners, and thinned if too many. Thinning merges
-vertices that lie close together, but only where they touch the same cells: so the drawn cells keep
-their neighbours, and their borders are lines between corners of the mesh.
+The triangles of a mesh are thinned if too many: vertices that lie close together are merged, but
+only where they touch the same cells. So the drawn cells keep their neighbours, and their borders
+are lines between corners of the mesh.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -16,16 +17,18 @@ from coverable.arrays import Array, Ints, Mask
 from feasibility.cut_tree import Cut, Leaf
 from feasibility.cut_words import place_of
 from feasibility.verdict import Verdict
-from feasibility.viewer.meshes import merge_vertices, split_at_creases
+from feasibility.viewer.meshes import merge_vertices
 from feasibility.viewer.threejs import Colour
 from surfaces.cells import Cells, CellTriangles
 from surfaces.meshes.cells.mesh_cells import MeshCells
-from surfaces.meshes.triangle_mesh import half_edge_ends, half_edges
+from surfaces.meshes.normals import sharp_edges
+from surfaces.meshes.triangle_mesh import half_edge_ends
+from surfaces.passes.welded_triangles import WorkingMesh, border_edges, twin_sides
 
 FULL_DETAIL = 1_500  # cells; more are drawn without centre marks, and edges as plain lines
 BUDGET = 30_000  # triangles
 COARSER = 1.25  # from one spacing to the next
-WIDEST = 0.3  # [1] of a cell's width, beyond which no vertices are merged
+WIDEST = 1.0  # [1] of a cell's width, beyond which no vertices are merged
 
 
 def patch(cells: Cells, which: Ints, inset: float = 0.0) -> CellTriangles:
@@ -60,53 +63,30 @@ def cell_size(cells: Cells) -> float:
     return float(np.sqrt(cells.areas.mean())) if len(cells) else 0.0
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class DisplayMesh:
+class DisplayMesh(NamedTuple):
     """Triangles to draw, and the cell of each."""
 
-    vertices: Array
-    """(V, 3) m, in the root frame; all are vertices of the mesh."""
-    normals: Array
-    """(V, 3) outward unit normals."""
-    faces: Ints
-    """(F, 3)"""
+    mesh: WorkingMesh
     labels: Ints
     """(F,) cell of each face."""
-    places: Ints
-    """(V,) equal for vertices that share a place, where normals differ."""
-    on_border: Mask
-    """(V,) vertices on the border of the mesh."""
-
-    def __post_init__(self) -> None:
-        """Write-protect the arrays."""
-        for field in fields(self):
-            getattr(self, field.name).flags.writeable = False
 
     def fill(self, which: Ints, centres: Array, inset: float = 0.0) -> CellTriangles:
         """The triangles of some cells (k,), shrunk towards their centres by a share `inset`."""
         mine = np.isin(self.labels, which)
-        labels = np.repeat(self.labels[mine], 3)
-        corner = self.faces[mine].ravel()
+        labels, corner = np.repeat(self.labels[mine], 3), self.mesh.faces[mine].ravel()
         # Cells that shrink part at their common vertices.
-        key = corner if inset == 0.0 else labels * len(self.vertices) + corner
+        key = corner if inset == 0.0 else labels * len(self.mesh.vertices) + corner
         _, first, faces = np.unique(key, return_index=True, return_inverse=True)
-        vertices = self.vertices[corner[first]]
-        return CellTriangles(
-            vertices=vertices + inset * (centres[labels[first]] - vertices),
-            faces=faces.reshape(-1, 3).astype(np.int64),
-            normals=self.normals[corner[first]],
-        )
+        vertices = self.mesh.vertices[corner[first]]
+        vertices = vertices + inset * (centres[labels[first]] - vertices)
+        return CellTriangles(vertices, faces.reshape(-1, 3).astype(np.int64))
 
     def borders(self) -> Array:
         """(k, 2, 3) m: edges between triangles of different cells, and on the mesh's border."""
-        halves = half_edges(self.places[self.faces])
-        owner = np.repeat(self.labels, 3)[halves.order]
-        apart = np.minimum.reduceat(owner, halves.starts) != np.maximum.reduceat(
-            owner, halves.starts
-        )
-        single = halves.counts == 1
-        drawn = half_edge_ends(self.faces, halves.order[halves.starts])
-        return self.vertices[drawn[apart | (single & self.on_border[drawn].all(axis=1))]]
+        faces, sides = self.mesh.faces, twin_sides(self.mesh.faces)
+        apart = sides[self.labels[sides[:, 0] // 3] != self.labels[sides[:, 1] // 3], 0]
+        ends = np.concatenate([half_edge_ends(faces, apart), border_edges(faces)])
+        return np.asarray(self.mesh.vertices[ends])
 
 
 _display_meshes: WeakKeyDictionary[MeshCells, DisplayMesh] = WeakKeyDictionary()
@@ -125,41 +105,26 @@ def make_display_mesh(cells: MeshCells, budget: int = BUDGET) -> DisplayMesh:
     More are left where cells are so many that each would be drawn by too few.
     """
     surface = cells.surface.wall  # not a smoothed copy of it
-    mesh = surface.mesh
-    on_border = np.zeros(len(mesh.vertices), dtype=bool)
-    on_border[mesh.edges.border_vertices] = True
-    faces, labels = mesh.faces, cells.labels
-    if len(mesh.faces) > budget:
-        faces, labels = _thinned(cells, on_border, budget)
-        normals = np.zeros_like(mesh.vertices)
-        for k in range(3):
-            np.add.at(normals, mesh.faces[:, k], surface.corner_normals[:, k])
-        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-        corner_normals = normals[faces]
-    else:
-        corner_normals = surface.corner_normals
-    corner, flat = faces.ravel(), corner_normals.reshape(-1, 3)
-    first, faces = split_at_creases(corner, flat)
-    return DisplayMesh(
-        vertices=mesh.vertices[corner[first]] @ surface.rotation.T + surface.position,
-        normals=flat[first] @ surface.rotation.T,
-        faces=faces,
-        labels=np.array(labels),
-        places=corner[first],
-        on_border=on_border[corner[first]],
-    )
+    vertices, faces, labels = surface.mesh.vertices, surface.mesh.faces, cells.labels
+    if len(faces) > budget:
+        faces, labels = _thinned(cells, budget)
+    placed = vertices @ surface.rotation.T + surface.position
+    return DisplayMesh(WorkingMesh(placed, faces).compact(), labels)
 
 
-def _thinned(cells: MeshCells, on_border: Mask, budget: int) -> tuple[Ints, Ints]:
+def _thinned(cells: MeshCells, budget: int) -> tuple[Ints, Ints]:
     """Merge vertices at a wider and wider spacing, until few enough faces (F, 3) are left.
 
     Returns:
         The faces, and the cell (F,) of each.
     """
     mesh = cells.surface.wall.mesh
-    kinds = _kinds(mesh.faces, cells.labels, on_border)
+    on_edge = np.zeros(len(mesh.vertices), dtype=bool)
+    on_edge[mesh.edges.border_vertices] = True
+    on_edge[mesh.edges.vertices[sharp_edges(mesh)]] = True
+    kinds = _kinds(mesh.faces, cells.labels, on_edge)
     widest = WIDEST * np.sqrt(cells.areas.mean())
-    spacing = min(cells.surface.mean_edge_length * np.sqrt(len(mesh.faces) / budget), widest)
+    spacing = min(3.0 * cells.surface.mean_edge_length * np.sqrt(len(mesh.faces) / budget), widest)
     merged = merge_vertices(mesh.vertices, mesh.faces, spacing, kinds)
     while len(merged.faces) > budget and spacing * COARSER <= widest:
         spacing *= COARSER
@@ -173,15 +138,18 @@ def _thinned(cells: MeshCells, on_border: Mask, budget: int) -> tuple[Ints, Ints
     )
 
 
-def _kinds(faces: Ints, labels: Ints, on_border: Mask) -> Ints:
-    """(V,) equal for vertices that may be merged: in one cell, or on one border of two cells."""
+def _kinds(faces: Ints, labels: Ints, on_edge: Mask) -> Ints:
+    """(V,) equal for vertices that may be merged: in one cell, or on one border of two cells.
+
+    Those on the border of the mesh or on a crease stay there.
+    """
     count = int(labels.max()) + 1
     touching = np.unique(faces.ravel() * count + np.repeat(labels, 3))
     vertex, cell = np.divmod(touching, count)
-    first = np.searchsorted(vertex, np.arange(len(on_border)))
+    first = np.searchsorted(vertex, np.arange(len(on_edge)))
     number = np.diff(np.append(first, len(vertex)))
     low, high = cell[first], cell[first + number - 1]
-    kind = 2 * (low * count + high) + on_border
+    kind = 2 * (low * count + high) + on_edge
     alone = number > 2  # where borders meet
     kind[alone] = -1 - np.flatnonzero(alone)
     return np.unique(kind, return_inverse=True)[1].reshape(-1).astype(np.int64)

@@ -1,4 +1,4 @@
-"""Triangles as they are drawn: merged where close, split at creases, shaded."""
+"""Triangles as they are drawn: few enough, and split at creases."""
 
 from __future__ import annotations
 
@@ -13,10 +13,13 @@ from coverable.arrays import Array, Ints
 from coverable.meshes.raw_mesh import RawMesh
 from feasibility.viewer.threejs import Colour
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
+from surfaces.adjacency import components
+from surfaces.meshes.degenerate import weld_distance, welded
 from surfaces.meshes.triangle_mesh import doubled_areas
+from surfaces.passes.welded_triangles import WorkingMesh, twin_sides
 
 CREASE = 0.7  # [rad]: edges sharper than this keep a visible edge (40 degrees)
-DEGREE = 57.0  # [1/rad] normals that agree to about a degree are one
+FINEST, COARSEST = 1e-3, 0.1  # [1] of the largest mesh's size: how far they are merged where many
 GREY: Colour = (0.72, 0.74, 0.77)
 
 
@@ -42,56 +45,71 @@ class Merged(NamedTuple):
 
 
 def merge_vertices(
-    vertices: Array, faces: Ints, spacing: float, kinds: Ints | None = None
+    vertices: Array, faces: Ints, distance: float, kinds: Ints | None = None
 ) -> Merged:
-    """Merge vertices in one box of a grid into that which is nearest to their mean.
+    """Merge vertices that lie close together into that which is nearest to their mean.
 
-    Faces that collapse, and all but one of those with the same corners, go.
+    Faces that lose their area go.
 
     Args:
         vertices: (V, 3) m.
         faces: (F, 3) indices of vertices.
-        spacing: width of the boxes, m.
+        distance: m, how far a vertex may move at most.
         kinds: (V,) only vertices of one kind are merged; all where None.
     """
-    if not len(faces):
-        return Merged(faces, np.arange(0))
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
-    width = max(spacing, float((high - low).max()) / 2**20)
-    boxes = np.rint((vertices - low) / width).astype(np.int64)
-    group = _numbered((boxes[:, 0] << 42) + (boxes[:, 1] << 21) + boxes[:, 2])
+    group = welded(vertices, distance)
     if kinds is not None:
-        group = _numbered(group * (int(kinds.max()) + 1) + kinds)
+        group = group * (int(kinds.max()) + 1) + kinds
+    group = np.unique(group, return_inverse=True)[1].reshape(-1)
     size = np.bincount(group)
     mean = np.column_stack([np.bincount(group, axis) / size for axis in vertices.T])
-    off = np.linalg.norm(vertices - mean[group], axis=1)
-    order = np.argsort(off, kind="stable")[::-1]
+    order = np.argsort(-np.linalg.norm(vertices - mean[group], axis=1), kind="stable")
     chosen = np.empty(len(size), dtype=np.int64)
     chosen[group[order]] = order  # the last one written, the nearest, stays
     corners = chosen[group][faces]
-    proper = np.flatnonzero((corners != np.roll(corners, 1, axis=1)).all(axis=1))
-    ordered = np.sort(corners[proper], axis=1)
-    # As whole numbers, which sort ten times faster than rows.
-    key = ordered[:, 0] * len(vertices) + ordered[:, 1]
-    key = (key if len(vertices) < 2**21 else _numbered(key)) * len(vertices) + ordered[:, 2]
-    kept = proper[np.sort(np.unique(key, return_index=True)[1])]
+    kept = np.flatnonzero(doubled_areas(vertices, corners).any(axis=1))
     return Merged(corners[kept], kept)
 
 
-def split_at_creases(corners: Ints, normals: Array) -> tuple[Ints, Ints]:
-    """Split each vertex by the normals of its corners; those that agree become one again.
+def joined(vertices: Array, faces: Ints, distance: float | None = None) -> tuple[Array, Ints]:
+    """Faces (F, 3) of vertices (V, 3) m that are merged up to a distance, m.
+
+    By default those are merged that lie in one place. Vertices of no face go.
+    """
+    if not len(faces):
+        return vertices[:0], faces
+    distance = weld_distance(vertices) if distance is None else distance
+    return WorkingMesh(vertices, merge_vertices(vertices, faces, distance).faces).compact()
+
+
+def split_at_creases(vertices: Array, faces: Ints) -> tuple[Array, Ints]:
+    """Part the faces around each vertex where they meet at a crease.
+
+    The normals at vertices are means over the faces that share them: so round parts look round and
+    edges stay sharp.
 
     Args:
-        corners: (3 F,) vertex of each corner of each face.
-        normals: (3 F, 3) unit normal of each.
+        vertices: (V, 3) m.
+        faces: (F, 3) indices of vertices.
 
     Returns:
-        (V',) a corner for each vertex of the result, and (F, 3) faces of these vertices.
+        (V', 3) m and (F, 3).
     """
-    rounded = np.rint(DEGREE * normals).astype(np.int64) + 64
-    key = (((corners << 7) + rounded[:, 0] << 7) + rounded[:, 1] << 7) + rounded[:, 2]
-    _, first, faces = np.unique(key, return_index=True, return_inverse=True)
-    return first, faces.reshape(-1, 3).astype(np.int64)
+    normals = _unit(doubled_areas(vertices, faces))
+    sides = twin_sides(faces)
+    one, other = normals[sides // 3].transpose(1, 0, 2)
+    a, b = sides[np.einsum("ij,ij->i", one, other) > np.cos(CREASE)].T
+    # The corners at either end of such an edge belong together.
+    pairs = np.concatenate([np.stack([a, _next(b)], 1), np.stack([_next(a), b], 1)])
+    _, first, corners = np.unique(
+        components(pairs, faces.size), return_index=True, return_inverse=True
+    )
+    return vertices[faces.ravel()[first]], corners.reshape(-1, 3).astype(np.int64)
+
+
+def _next(corners: Ints) -> Ints:
+    """The corner 3 f + k that follows another one in its face."""
+    return corners - corners % 3 + (corners + 1) % 3
 
 
 def drawn(part: RawMesh, scale: Array, colour: Colour | None) -> Mesh:
@@ -133,69 +151,34 @@ def solid_mesh(
 def thinned(meshes: Sequence[Mesh], budget: int) -> list[Mesh]:
     """Merge vertices that lie close together until all meshes have at most `budget` triangles.
 
-    Vertices within one box of a grid become that which is nearest to their mean, and triangles that
-    collapse go. The grid starts at 0.01 mm (which only joins what is equal) and coarsens by half,
-    or faster where there is far too much, from 0.4 mm to 2 cm. It goes on only while there is four
-    times the budget, as with parts of kilometres, in shares of each mesh's width. Meshes that use
-    less than a quarter of an even share of the budget are left as they are, so that small parts do
-    not vanish beside large ones.
+    First only what is equal, then further and further from each other, up to `COARSEST`. Meshes
+    that use less than a quarter of an even share of the budget are left as they are, so that small
+    parts do not vanish beside large ones.
 
     Returns:
         As many meshes as were given, in their order; some may have lost all their triangles.
     """
-    result = [_merged(mesh, 1e-5) for mesh in meshes]  # [m]
-    spacing = 4e-4  # [m]
+    result = [_merged(mesh) for mesh in meshes]
     small = budget / (4 * max(len(meshes), 1))
-    while _triangles(result) > budget and spacing <= 2e-2:
-        result = [mesh if len(mesh.faces) < small else _merged(mesh, spacing) for mesh in result]
-        spacing *= 3.0 if _triangles(result) > 4 * budget else 1.5
-    share = 1 / 128
-    while _triangles(result) > 4 * budget and share <= 0.5:
-        result = [
-            mesh if len(mesh.faces) < small else _merged(mesh, share * float(np.ptp(mesh.vertices)))
-            for mesh in result
-        ]
-        share *= 2.0
+    size = max((float(np.ptp(mesh.vertices)) for mesh in result if len(mesh.faces)), default=0.0)
+    distance = FINEST * size
+    while (total := sum(len(mesh.faces) for mesh in result)) > budget:
+        if distance > COARSEST * size:
+            break
+        result = [mesh if len(mesh.faces) < small else _merged(mesh, distance) for mesh in result]
+        distance *= max(1.15, (total / budget) ** 0.3)
     return result
-
-
-def _triangles(meshes: Sequence[Mesh]) -> int:
-    """How many triangles there are in all."""
-    return sum(len(mesh.faces) for mesh in meshes)
-
-
-def shaded(mesh: Mesh) -> tuple[Mesh, Array]:
-    """Split the vertices at creases, and give each its normal.
-
-    A corner's normal is the mean, weighted by area, of those faces around its vertex that lean
-    away from its own face by less than `CREASE`: round parts look round and edges stay sharp.
-
-    Returns:
-        The mesh with its vertices split, and (V, 3) unit normals.
-    """
-    areas = doubled_areas(mesh.vertices, mesh.faces)
-    units = _unit(areas)
-    flat = mesh.faces.reshape(-1)  # vertex of each corner
-    face = np.repeat(np.arange(len(mesh.faces)), 3)
-    order = np.argsort(flat, kind="stable")
-    _, first, count = np.unique(flat[order], return_index=True, return_counts=True)
-    # Every ordered pair of corners that share a vertex.
-    pairs = count**2
-    group = np.repeat(np.arange(len(count)), pairs)
-    within = np.arange(pairs.sum()) - np.repeat(np.cumsum(pairs) - pairs, pairs)
-    left = order[first[group] + within // count[group]]
-    right = order[first[group] + within % count[group]]
-    alike = np.einsum("ij,ij->i", units[face[left]], units[face[right]]) > np.cos(CREASE)
-    around = areas[face[right[alike]]].T
-    normals = _unit(np.column_stack([np.bincount(left[alike], x, len(flat)) for x in around]))
-    kept, faces = split_at_creases(flat, normals)
-    split = replace(mesh, vertices=mesh.vertices[flat[kept]], faces=faces)
-    return split, normals[kept]
 
 
 def moved(mesh: Mesh, matrix: Array) -> Mesh:
     """The same mesh, placed by a homogeneous (4, 4) matrix."""
     return replace(mesh, vertices=mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3])
+
+
+def _merged(mesh: Mesh, distance: float | None = None) -> Mesh:
+    """See `joined`."""
+    vertices, faces = joined(mesh.vertices, mesh.faces, distance)
+    return replace(mesh, vertices=vertices, faces=faces)
 
 
 def tubes(lines: Sequence[Array], radius: float, sides: int = 5) -> tuple[Array, Ints]:
@@ -238,20 +221,6 @@ def _without_repeats(lines: Sequence[Array]) -> list[Array]:
     return np.split(points[kept], left[:-1])
 
 
-def _merged(mesh: Mesh, spacing: float) -> Mesh:
-    """Merge the vertices within each box of a grid, and drop triangles that collapse."""
-    faces = merge_vertices(mesh.vertices, mesh.faces, spacing).faces
-    faces = faces[doubled_areas(mesh.vertices, faces).any(axis=1)]  # no normal, nothing to see
-    used = np.zeros(len(mesh.vertices), dtype=bool)
-    used[faces] = True
-    return replace(mesh, vertices=mesh.vertices[used], faces=(np.cumsum(used) - 1)[faces])
-
-
 def _unit(vectors: Array, least: float = 1e-300) -> Array:
     """Vectors (..., 3) at length 1; those shorter than `least` stay short."""
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), least))
-
-
-def _numbered(keys: Ints) -> Ints:
-    """Equal keys as equal numbers from 0."""
-    return np.unique(keys, return_inverse=True)[1].reshape(-1).astype(np.int64)

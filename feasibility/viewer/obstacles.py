@@ -22,8 +22,8 @@ from feasibility.viewer.meshes import (
     Mesh,
     as_mesh,
     moved,
-    shaded,
     solid_mesh,
+    split_at_creases,
     thinned,
     tubes,
 )
@@ -136,10 +136,8 @@ def _hull(body: Polytope) -> Mesh | None:
 
 def _command(path: str, mesh: Mesh) -> Command:
     """The command that draws a mesh with its creases."""
-    split, normals = shaded(mesh)
-    return threejs.mesh_object(
-        path, split.vertices, split.faces, mesh.colour, normals=normals, opacity=mesh.opacity
-    )
+    shape = split_at_creases(mesh.vertices, mesh.faces)
+    return threejs.mesh_object(path, *shape, mesh.colour, opacity=mesh.opacity)
 
 
 def _edges(mesh: Mesh) -> Array:

@@ -128,11 +128,7 @@ def _part(scene: dict[str, Any], places: Sequence[Array]) -> _Part:
         return _Part(points, None, colours, 1.0)
     faces = numbers_of(data["index"]).reshape(-1, 3).astype(np.int64)
     if material["type"] != "MeshBasicMaterial":
-        if "normal" in attributes:
-            normals = numbers_of(attributes["normal"]).reshape(-1, 3) @ place[:3, :3].T
-        else:
-            normals = _normals(points, faces)
-        colours = colours * _light(normals)[:, None]
+        colours = colours * _light(_normals(points, faces))[:, None]
     on_top = not material.get("depthTest", True)
     return _Part(points, faces, np.minimum(colours, 1.0), float(material["opacity"]), on_top)
 

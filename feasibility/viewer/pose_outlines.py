@@ -18,7 +18,7 @@ from feasibility.placement.region import Pose, moved_cells
 from feasibility.placement.trials import Trial
 from feasibility.viewer import threejs
 from feasibility.viewer.cell_meshes import marks, patch
-from feasibility.viewer.meshes import tubes
+from feasibility.viewer.meshes import joined, tubes
 from feasibility.viewer.playback import Playback
 from feasibility.viewer.threejs import Colour
 from feasibility.viewer.verdict_scene import (
@@ -31,8 +31,8 @@ from feasibility.viewer.verdict_scene import (
     mesh_layer,
     trail,
 )
-from surfaces.adjacency import components
-from surfaces.cells import Cells, CellTriangles
+from surfaces.cells import Cells
+from surfaces.passes.welded_triangles import border_edges
 
 if TYPE_CHECKING:
     from feasibility.placement.stations import StationPlan
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 MOST = 96  # segments of one outline
 FINEST = 8  # pieces that a cell's side is cut into, at most
-ALIKE = 1e-6  # [1] of the surface's size: corners nearer than this are one
+ALIKE = 1e-6  # [1] of the surface's size: cells whose distances from the middle differ by less
 SMALL = 0.5  # [1] of the surface's size: a smaller boundary does not show where the surface lies
 STROKE = 0.12  # [1] of the surface's size: the stroke that points to the working side
 MOST_DRAWN = 200  # feasible poses drawn; of more, as many spread evenly over their ranks
@@ -202,11 +202,11 @@ def outline(cells: Cells) -> Array:
     """
     if len(cells) == 0:
         return np.empty((0, 2, 3))
-    triangles = _triangles(cells)
-    size = _size(triangles.vertices)
-    lines = _boundary(triangles, ALIKE * size)
+    vertices, faces = _triangles(cells)
+    size = _size(vertices)
+    lines = vertices[border_edges(faces)]
     if len(lines) == 0 or _size(lines.reshape(-1, 3)) < SMALL * size:
-        lines = np.concatenate([lines, _sections(triangles)])
+        lines = np.concatenate([lines, _sections(vertices, faces)])
     return np.concatenate([_thinned(lines, size / MOST), _stroke(cells, STROKE * size)])
 
 
@@ -215,13 +215,13 @@ def placed(points: Array, pose: Pose) -> Array:
     return points @ pose.rotation.T + np.array(pose.position)
 
 
-def _triangles(cells: Cells) -> CellTriangles:
-    """A few triangles of all cells, in the surface's frame."""
+def _triangles(cells: Cells) -> tuple[Array, Ints]:
+    """A few triangles of all cells, in the surface's frame: (V, 3) m and (F, 3)."""
     every = np.arange(len(cells))
     pieces = int(np.clip(MOST // (2 * sum(cells.shape)), 1, FINEST))
     grid = len(cells.shape) > 1
-    found = cells.triangles(every, pieces) if grid else patch(cells, every)
-    return found._replace(vertices=_in_own_frame(cells, found.vertices))
+    vertices, faces = cells.triangles(every, pieces) if grid else patch(cells, every)
+    return joined(_in_own_frame(cells, vertices), faces)
 
 
 def _in_own_frame(cells: Cells, points: Array) -> Array:
@@ -234,26 +234,11 @@ def _size(points: Array) -> float:
     return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
-def _boundary(triangles: CellTriangles, near: float) -> Array:
-    """(k, 2, 3) m: edges of one triangle only; corners nearer than `near` (m) are one."""
-    from scipy.spatial import cKDTree
-
-    vertices = triangles.vertices
-    pairs = cKDTree(vertices).query_pairs(near, output_type="ndarray")
-    place = components(pairs, len(vertices))
-    faces = place[triangles.faces]
-    edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    edges = edges[edges[:, 0] != edges[:, 1]]  # a side may have shrunk to a point, as at a pole
-    found, number = np.unique(edges, axis=0, return_counts=True)
-    _, first = np.unique(place, return_index=True)
-    return np.asarray(vertices[first[found[number == 1]]])
-
-
-def _sections(triangles: CellTriangles) -> Array:
+def _sections(vertices: Array, faces: Ints) -> Array:
     """(k, 2, 3) m: where the three planes through the middle cut the surface."""
     import trimesh
 
-    body = trimesh.Trimesh(triangles.vertices, triangles.faces, process=False)
+    body = trimesh.Trimesh(vertices, faces, process=False)
     # Slightly off the middle: a plane through corners cuts along edges, or nothing.
     share = np.array([0.5003, 0.4998, 0.5001])
     middle = body.bounds[0] + share * np.ptp(body.bounds, axis=0)

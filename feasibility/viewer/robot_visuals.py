@@ -7,7 +7,6 @@ turns every joint about its own axis between two key frames, and the links keep 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -25,8 +24,8 @@ from feasibility.viewer.meshes import (
     as_mesh,
     drawn,
     moved,
-    shaded,
     solid_mesh,
+    split_at_creases,
     thinned,
 )
 from robots.errors import RobotError
@@ -129,7 +128,7 @@ def _draw(robot: Robot) -> Drawing:
 
 
 def _drawing(robot: Robot, parts: dict[tuple[int, str], list[Mesh]], notes: list[str]) -> Drawing:
-    """Thin, shade and name the parts of all links."""
+    """Thin and name the parts of all links."""
     owned = [(key, mesh) for key, group in parts.items() for mesh in _joined(group)]
     fewer = thinned([mesh for _, mesh in owned], TRIANGLES)
     paths = joint_paths(robot)
@@ -139,13 +138,14 @@ def _drawing(robot: Robot, parts: dict[tuple[int, str], list[Mesh]], notes: list
     for number, (((joint, link), _), mesh) in enumerate(zip(owned, fewer, strict=True)):
         if len(mesh.faces) == 0:
             continue
-        mesh, normals = shaded(mesh)
+        vertices, faces = split_at_creases(mesh.vertices, mesh.faces)
         if joint == world.parentJoint:
-            heights = mesh.vertices @ upwards[:3] + upwards[3]
+            heights = vertices @ upwards[:3] + upwards[3]
             lowest = min(lowest, float(heights.min()))
         path = f"{paths[joint]}/link {threejs.safe_name(link)}/part {number}"
-        looks: dict[str, Any] = {"normals": normals, "opacity": mesh.opacity}
-        commands.append(threejs.mesh_object(path, mesh.vertices, mesh.faces, mesh.colour, **looks))
+        commands.append(
+            threejs.mesh_object(path, vertices, faces, mesh.colour, opacity=mesh.opacity)
+        )
     return Drawing(tuple(commands), lowest, tuple(notes))
 
 

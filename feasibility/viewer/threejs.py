@@ -2,8 +2,8 @@
 
 The page understands a handful of commands, each a MessagePack map: put an object at a path of the
 scene tree, place it, set a property, play an animation. They are written here directly, so that a
-scene can be packed into a file without any server, with vertex normals (which meshcat's Python
-classes cannot send) and without random identifiers: the same scene gives the same bytes.
+scene can be packed into a file without any server, and without random identifiers: the same scene
+gives the same bytes.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Command = dict[str, Any]
 Colour = tuple[float, float, float]
 """Red, green, blue, each 0 to 1."""
 
-_EXTENSION = {"int8": 0x11, "uint16": 0x14, "uint32": 0x16, "float32": 0x17}
+_EXTENSION = {"uint16": 0x14, "uint32": 0x16, "float32": 0x17}
 _GRID = 2.0**16  # [1/m]: positions are rounded to 15 um, which lets them compress
 _DOUBLE_SIDED = 2
 _PING_PONG = 2202  # three.js: there and back
@@ -49,19 +49,17 @@ def mesh_object(
     faces: ArrayLike,
     colour: Colour,
     *,
-    normals: ArrayLike | None = None,
     opacity: float = 1.0,
     lit: bool = True,
     on_top: bool = False,
 ) -> Command:
-    """Triangles of one colour, visible from both sides.
+    """Triangles of one colour, visible from both sides; normals are means over the faces around.
 
     Args:
         path: where in the scene tree.
         vertices: (V, 3) m.
         faces: (F, 3) indices of vertices.
         colour: of all triangles.
-        normals: (V, 3) unit; averaged over the faces by the page where not given.
         opacity: 1 hides what is behind.
         lit: shaded by the lights; False shows the plain colour.
         on_top: seen through whatever is before it.
@@ -72,9 +70,6 @@ def mesh_object(
         "attributes": {"position": _positions(vertices)},
         "index": _array(index.reshape(-1), 1, "uint16" if small else "uint32"),
     }
-    if normals is not None:
-        rounded = np.rint(np.asarray(normals) * 127.0)
-        data["attributes"]["normal"] = {**_array(rounded, 3, "int8"), "normalized": True}
     material = {
         "type": "MeshPhongMaterial" if lit else "MeshBasicMaterial",
         "color": hex_colour(colour),

@@ -29,7 +29,7 @@ from feasibility.viewer.cell_meshes import (
     sides_of,
 )
 from feasibility.viewer.html_page import Entry
-from feasibility.viewer.meshes import tubes
+from feasibility.viewer.meshes import joined, split_at_creases, tubes
 from feasibility.viewer.playback import Playback
 from feasibility.viewer.threejs import Colour, Command
 from surfaces.cells import Cells
@@ -138,12 +138,11 @@ def cells_layers(cells: Cells) -> list[Layer]:
     count, path = len(cells), "/surface/patch"
     if count == 0:
         return [Layer((), Entry("surface", SURFACE, path))]
-    vertices, faces, normals = patch(cells, np.arange(count))
-    looks = {"normals": normals, "opacity": 0.45}
+    shape = split_at_creases(*joined(*patch(cells, np.arange(count))))
     grid = f" ({' x '.join(map(str, cells.shape))})" if len(cells.shape) > 1 else ""
     label, path_of_lines = counted(count, "cell") + grid, "/surface/cell outlines"
     parts = [
-        mesh_layer("surface", SURFACE, path, vertices, faces, **looks),
+        mesh_layer("surface", SURFACE, path, *shape, opacity=0.45),
         lines_layer(label, OUTLINES, path_of_lines, borders(cells)),
     ]
     if count <= FULL_DETAIL:
@@ -198,8 +197,8 @@ def filled(
     inset: float = 0.06,
 ) -> Layer:
     """Some cells filled with a colour, smaller by `inset` of their size."""
-    vertices, faces, _ = patch(cells, which, inset=inset)
-    return mesh_layer(label, colour, path, vertices, faces, opacity=0.85, lit=False)
+    shape = patch(cells, which, inset=inset)
+    return mesh_layer(label, colour, path, *shape, opacity=0.85, lit=False)
 
 
 def drawn_lines(

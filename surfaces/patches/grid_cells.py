@@ -225,7 +225,7 @@ class GridCells(Cells):
         looks = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         if (looks * normals[faces[:, 0]]).sum() < 0.0:  # counterclockwise seen from outside
             faces = faces[:, ::-1]
-        return CellTriangles(vertices, faces, normals)
+        return CellTriangles(vertices, faces)
 
     def unrolled(self) -> Unrolled:
         """See `Cells.unrolled`: v to the right and u down, as cells are numbered."""

@@ -217,20 +217,16 @@ class PieceCells(Cells):
         """See `Cells.triangles`; cell by cell in the given order."""
         which = np.asarray(which, dtype=np.int64)
         corners, faces = (samples + 1) ** 2, 2 * samples**2  # of one cell
-        vertices, normals = np.empty((2, len(which), corners, 3))
+        vertices = np.empty((len(which), corners, 3))
         triangles = np.empty((len(which), faces, 3), dtype=np.int64)
         for k, grid in enumerate(self.grids):
             some = np.flatnonzero(self.piece[which] == k)
             part = grid.triangles(which[some] - self.first[k], samples, inset)
             vertices[some] = part.vertices.reshape(-1, corners, 3)
-            sign = self.surface.signs[k]
-            normals[some] = sign * part.normals.reshape(-1, corners, 3)
             shift = corners * (some - np.arange(len(some)))
-            outwards = part.faces[:, :: int(sign)]
+            outwards = part.faces[:, :: int(self.surface.signs[k])]
             triangles[some] = outwards.reshape(-1, faces, 3) + shift[:, None, None]
-        return CellTriangles(
-            vertices.reshape(-1, 3), triangles.reshape(-1, 3), normals.reshape(-1, 3)
-        )
+        return CellTriangles(vertices.reshape(-1, 3), triangles.reshape(-1, 3))
 
     def unrolled(self) -> Unrolled:
         """See `Cells.unrolled`: seen along the mean normal, from the outside."""

@@ -133,8 +133,7 @@ class PoseCells(Cells):
         centres = self.centres[which, None]
         corners = centres + (1.0 - inset) * (self._tiles[which] - centres)
         faces = 4 * np.arange(len(corners))[:, None, None] + _HALVES
-        normals = np.repeat(self.normals[which], 4, axis=0)
-        return CellTriangles(corners.reshape(-1, 3), faces.reshape(-1, 3), normals)
+        return CellTriangles(corners.reshape(-1, 3), faces.reshape(-1, 3))
 
     def unrolled(self) -> Unrolled:
         """See `Cells.unrolled`: seen along the mean normal, from the outside."""

@@ -234,11 +234,7 @@ class MeshCells(Cells):
         corners = corners + surface.position
         centre = self.centres[self.labels[faces]][:, None]
         corners = corners + inset * (centre - corners)
-        return CellTriangles(
-            vertices=corners.reshape(-1, 3),
-            faces=np.arange(3 * len(faces)).reshape(-1, 3),
-            normals=(surface.corner_normals[faces] @ surface.rotation.T).reshape(-1, 3),
-        )
+        return CellTriangles(corners.reshape(-1, 3), np.arange(3 * len(faces)).reshape(-1, 3))
 
     def unrolled(self) -> Unrolled:
         """See `Cells.unrolled`: seen along the mean normal, from the outside."""
