@@ -21,46 +21,6 @@ if TYPE_CHECKING:
 LIMITS = (Kind.LOWER, Kind.UPPER)
 
 
-def key(quantity: Quantity) -> str:
-    """The key of the case file that holds a quantity.
-
-    Such as 'task.cone_deg', 'robot.limits_deg.joint1', 'surface.position'.
-    """
-    if quantity.kind in LIMITS:
-        unit = "deg" if quantity.unit == "rad" else "m"
-        return f"robot.limits_{unit}.{toml_key(joint(quantity))}"
-    return {
-        Kind.CONE: "task.cone_deg",
-        Kind.ROLL: "task.roll_deg",
-        Kind.TILT: "task.approach",
-        Kind.STANDOFF: "task.standoff",
-        Kind.SHIFT: "surface.position",
-        Kind.CLEARANCE: "collision.clearance",
-        Kind.TOOL_CLEARANCE: "collision.tool_clearance",
-        Kind.WITHOUT: "collision.scene" if quantity.obstacle else "collision",
-    }[quantity.kind]
-
-
-def joint(quantity: Quantity) -> str:
-    """The joint whose limit a quantity is."""
-    return quantity.name.rsplit(" ", 2)[0]
-
-
-def label(quantity: Quantity) -> str:
-    """The key, and which of its numbers: 'robot.limits_deg.joint1 (upper)', '... (-y)'."""
-    if quantity.kind is Kind.WITHOUT:
-        return f"{key(quantity)} {quantity.name}" if quantity.obstacle else quantity.name
-    which = {
-        Kind.LOWER: "lower",
-        Kind.UPPER: "upper",
-        Kind.SHIFT: quantity.name.removeprefix("shift along "),
-        Kind.ROLL: "half its range",
-        Kind.TILT: quantity.name.removeprefix("approach "),
-        Kind.STANDOFF: quantity.name.removesuffix(" standoff"),
-    }.get(quantity.kind)
-    return f"{key(quantity)} ({which})" if which else key(quantity)
-
-
 def shown(quantity: Quantity, value: float, feasible: bool | None = None) -> str:
     """A value with the case file's unit: degrees to two digits, or metres to five.
 
@@ -87,10 +47,10 @@ def worded(change: Change) -> str:
     quantity = change.quantity
     value = shown(quantity, change.value, True)
     if quantity.kind is Kind.WITHOUT:
-        return label(quantity)
+        return quantity.label
     if quantity.kind is Kind.SHIFT:
-        return f"{label(quantity)} by {value}"
-    return f"{label(quantity)} {value} ({shown(quantity, quantity.given)} now)"
+        return f"{quantity.label} by {value}"
+    return f"{quantity.label} {value} ({shown(quantity, quantity.given)} now)"
 
 
 def settings(changes: Sequence[Change], verdict: Verdict, case: Case | None = None) -> list[str]:
@@ -102,13 +62,13 @@ def settings(changes: Sequence[Change], verdict: Verdict, case: Case | None = No
         case: the case; without one, its limits are taken to be given joint by joint, if at all.
     """
     found = []
-    ends = {name: (low, high) for name, low, high in _limits(verdict.robot)}
+    ends = _limits(verdict.robot)
     position = np.array(verdict.cells.surface.position)
     for change in changes:
         quantity, value = change.quantity, number(change.quantity, change.value, True)
         if quantity.kind in LIMITS:
-            low, high = ends[joint(quantity)]
-            ends[joint(quantity)] = (value, high) if quantity.kind is Kind.LOWER else (low, value)
+            low, high = ends[quantity.joint]
+            ends[quantity.joint] = (value, high) if quantity.kind is Kind.LOWER else (low, value)
         elif quantity.kind is Kind.SHIFT:
             position = position + change.value * np.array(quantity.axis)
         elif quantity.kind is Kind.ROLL:
@@ -120,12 +80,12 @@ def settings(changes: Sequence[Change], verdict: Verdict, case: Case | None = No
         elif quantity.kind is Kind.WITHOUT:
             found += _scene_without(quantity.obstacle, case)
         else:
-            found.append(f"{key(quantity)}={value}")
+            found.append(f"{quantity.key}={value}")
     limits = [change.quantity for change in changes if change.quantity.kind in LIMITS]
     if any(change.quantity.kind is Kind.SHIFT for change in changes):
         found.append(f"surface.position=[{', '.join(f'{x:.10g}' for x in position.tolist())}]")
     if limits and (case is None or (not case.robot.limits and _by_name(case))):
-        pairs = {key(q): ends[joint(q)] for q in limits}
+        pairs = {q.key: ends[q.joint] for q in limits}
         return found + [f"{name}=[{low}, {high}]" for name, (low, high) in pairs.items()]
     return found + (_every_limit(verdict.robot, ends) if limits else [])
 
@@ -150,24 +110,21 @@ def _by_name(case: Case) -> bool:
     return not isinstance(case.robot.limits_deg, tuple)
 
 
-def _every_limit(robot: Robot, ends: dict[str, tuple[str, str]]) -> list[str]:
+def _every_limit(robot: Robot, ends: list[tuple[str, str]]) -> list[str]:
     """All limits, in place of a set by name or of a list."""
     tables: dict[str, list[str]] = {"deg": [], "m": []}
-    for name, slides in zip(robot.joint_names, robot.prismatic.tolist(), strict=True):
-        low, high = ends[name]
+    slides = robot.prismatic.tolist()
+    for name, slide, (low, high) in zip(robot.joint_names, slides, ends, strict=True):
         if "inf" not in (low.strip("-"), high):
-            tables["m" if slides else "deg"].append(f"{toml_key(name)} = [{low}, {high}]")
+            tables["m" if slide else "deg"].append(f"{toml_key(name)} = [{low}, {high}]")
     given = [
         f"robot.limits_{unit}={{ {', '.join(rows)} }}" for unit, rows in tables.items() if rows
     ]
     return ["robot.limits=", *given]
 
 
-def _limits(robot: Robot) -> list[tuple[str, str, str]]:
-    """Name and limits of each joint, in degrees or metres."""
+def _limits(robot: Robot) -> list[tuple[str, str]]:
+    """The limits of each joint, in degrees or metres."""
     scale = np.where(robot.prismatic, 1.0, 180.0 / math.pi)
-    lower, upper = (np.round(scale * ends, 9).tolist() for ends in (robot.lower, robot.upper))
-    return [
-        (name, f"{low:.12g}", f"{high:.12g}")
-        for name, low, high in zip(robot.joint_names, lower, upper, strict=True)
-    ]
+    pairs = np.round(np.stack([robot.lower, robot.upper], axis=1) * scale[:, None], 9).tolist()
+    return [(f"{low:.12g}", f"{high:.12g}") for low, high in pairs]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from feasibility.collisions.asked_bodies import said_of
 from feasibility.collisions.words import checked
-from feasibility.reports.changes import key, settings, worded
+from feasibility.reports.changes import settings, worded
 from feasibility.reports.explanation_words import (
     SEEDED,
     best_changes,
@@ -253,7 +253,7 @@ def _change(change: Change) -> dict[str, Any]:
     quantity = change.quantity
     return {
         "quantity": quantity.name,
-        "key": key(quantity),
+        "key": quantity.key,
         **_number(quantity, "given", quantity.given),
         **_number(quantity, "value", change.value),
     }
@@ -283,7 +283,7 @@ def _threshold(threshold: Threshold, verdict: Verdict) -> dict[str, Any]:
         found |= _number(quantity, "resolution", threshold.resolution)
     return {
         "quantity": quantity.name,
-        "key": key(quantity),
+        "key": quantity.key,
         "kind": str(quantity.kind),
         **found,
         "feasible": _finding(quantity, threshold.feasible),

@@ -10,7 +10,7 @@ import numpy as np
 
 from coverable.errors import at_least, counted
 from feasibility.cut_words import what_opens
-from feasibility.reports.changes import LIMITS, label, shown, worded
+from feasibility.reports.changes import LIMITS, shown, worded
 from feasibility.reports.text_and_tables import placement_text
 from feasibility.sensitivity.quantities import Kind, Quantity
 from feasibility.sensitivity.thresholds import Change, Explanation, Finding, Threshold
@@ -41,7 +41,8 @@ def helpful(explanation: Explanation) -> list[Threshold]:
     Of a feasible case those with the least to spare; of another those that ask for the least.
     """
     found = [t for t in explanation.thresholds if t.feasible is not None and t.quantity.unit]
-    return sorted((t for t in found if matters(t, explanation.verdict)), key=lambda t: t.effort)
+    said = (t for t in found if matters(t, explanation.verdict))
+    return sorted(said, key=lambda t: (t.turns_away, t.effort))
 
 
 def matters(threshold: Threshold, verdict: Verdict) -> bool:
@@ -55,14 +56,15 @@ def matters(threshold: Threshold, verdict: Verdict) -> bool:
 
 
 def best_changes(explanation: Explanation) -> tuple[Change, ...]:
-    """What makes a case feasible with the least effort: one change, or two; empty if none does."""
+    """What makes a case feasible with the least effort: one change, or two; empty if none does.
+
+    A cone that lets the tool point away from the surface is none that anybody wants.
+    """
     if explanation.verdict.feasible:
         return ()
-    for threshold in helpful(explanation):
-        if threshold.feasible is not None:
-            return (Change(threshold.quantity, threshold.feasible.value),)
-    for threshold in explanation.thresholds:
-        if threshold.quantity.obstacle and threshold.feasible is not None:
+    objects = [t for t in explanation.thresholds if t.quantity.obstacle]
+    for threshold in (*helpful(explanation), *objects):
+        if threshold.feasible is not None and not threshold.turns_away:
             return (Change(threshold.quantity, threshold.feasible.value),)
     return () if explanation.pair is None else explanation.pair.changes
 
@@ -80,11 +82,13 @@ def headline(explanation: Explanation) -> str:
     if changes:
         one = "One change makes it feasible" if len(changes) == 1 else "Two changes together do"
         return f"{verdict.answer}. {one}: {' and '.join(map(worded, changes))}."
+    why = "No change was found to help" if explanation.thresholds else "Nothing was looked at"
+    if helpful(explanation):
+        why += ", but for a cone in which the tool may point away from the surface"
     if dropped is not None and dropped.waypoints is not None:
         rest = len(verdict.cells) - len(dropped.cells)
         without = f"without {counted(len(dropped.cells), 'cell')} one motion covers the other"
-        return f"{verdict.answer}. No change was found to help; {without} {rest:,}."
-    why = "No change was found to help" if explanation.thresholds else "Nothing was looked at"
+        return f"{verdict.answer}. {why}; {without} {rest:,}."
     if verdict.covered.all() and verdict.treated is not None:
         why = "No change was looked for: a motion covers every cell, but treats too little"
     return f"{verdict.answer}. {why}."
@@ -105,14 +109,14 @@ def row_of(threshold: Threshold) -> ThresholdRow:
     now = "-" if quantity.kind is Kind.SHIFT else shown(quantity, quantity.given)
     if found is None:
         return ThresholdRow(
-            label(quantity), now, "-", "" if other is None else _against(quantity, other)
+            quantity.label, now, "-", "" if other is None else _against(quantity, other)
         )
     value = shown(quantity, found.value, True)
     beyond = FURTHEST if other is None and found.value == quantity.end else ""
     if other is not None:
         beyond = _against(quantity, other)
     mark = f" {SEEDED}" if found.unaided is False else ""
-    return ThresholdRow(label(quantity), now, value + mark, beyond)
+    return ThresholdRow(quantity.label, now, value + mark, beyond)
 
 
 def idle_limits(explanation: Explanation) -> str:
@@ -194,13 +198,13 @@ def _in_short(verdict: Verdict, group: Sequence[Threshold]) -> Iterator[str]:
     for threshold in group:
         quantity = threshold.quantity
         if quantity.kind not in (*LIMITS, Kind.SHIFT):
-            yield f"{label(quantity)} to {shown(quantity, quantity.end)}"
+            yield f"{quantity.label} to {shown(quantity, quantity.end)}"
     limits = [t.quantity for t in group if t.quantity.kind in LIMITS]
     if limits:
         yield f"wider limits of {', '.join(_joints(verdict, limits))}"
     shifts = [t.quantity for t in group if t.quantity.kind is Kind.SHIFT]
     if shifts:
-        axes = ", ".join(q.name.removeprefix("shift along ") for q in shifts)
+        axes = ", ".join(q.which for q in shifts)
         yield f"surface.position {axes} by up to {shown(shifts[0], shifts[0].end)}"
 
 
@@ -208,8 +212,7 @@ def _joints(verdict: Verdict, limits: Iterable[Quantity]) -> list[str]:
     """Joints with the sides of their limits: 'joint1', 'joint2 (upper)'."""
     sides: dict[int, list[str]] = {}
     for quantity in limits:
-        side = "lower" if quantity.kind is Kind.LOWER else "upper"
-        sides.setdefault(quantity.joint, []).append(side)
+        sides.setdefault(quantity.joint, []).append(quantity.which)
     names = verdict.robot.joint_names
     return [names[j] + ("" if len(both) == 2 else f" ({both[0]})") for j, both in sides.items()]
 

@@ -154,7 +154,9 @@ def _ask_alone(prober: Prober, done: list[Threshold]) -> None:
     helping = [k for k, found in enumerate(done) if found.feasible is not None]
     if not helping:
         return
-    least = min(helping, key=lambda k: (not done[k].quantity.unit, done[k].effort))
+    least = min(
+        helping, key=lambda k: (not done[k].quantity.unit, done[k].turns_away, done[k].effort)
+    )
     quantity, side = done[least].quantity, done[least].feasible
     if side is not None:
         changed = quantity.applied(prober.given, quantity.steps_to(side.value))

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.arrays import unit_along
+from feasibility.cases.toml import toml_key
 from feasibility.collisions.settings import Collision
 from feasibility.task import Task
 from robots.robot import Robot
@@ -42,6 +43,7 @@ class Kind(StrEnum):
     """One object of the scene, or collisions altogether, as if not there."""
 
 
+BOTH_WAYS = (Kind.TILT, Kind.STANDOFF, Kind.SHIFT)  # neither way allows more
 OF_COLLISIONS = (Kind.CLEARANCE, Kind.TOOL_CLEARANCE, Kind.WITHOUT)
 
 
@@ -78,6 +80,17 @@ class Quantity:
     in the surface's."""
     obstacle: str = ""
     """What is left out: the name of an object, or nothing for all collisions."""
+    key: str = ""
+    """The key of the case file that holds it: 'task.cone_deg', 'robot.limits_deg.joint1'."""
+    which: str = ""
+    """Which of the key's numbers it is, such as 'upper' or '-y'; empty where there is one."""
+
+    @property
+    def label(self) -> str:
+        """The key, and which of its numbers: 'robot.limits_deg.joint1 (upper)', '... (-y)'."""
+        if self.kind is Kind.WITHOUT:
+            return f"{self.key} {self.name}" if self.obstacle else self.name
+        return f"{self.key} ({self.which})" if self.which else self.key
 
     @property
     def last(self) -> int:
@@ -191,7 +204,7 @@ def quantities(variant: Variant, widen: bool) -> tuple[Quantity, ...]:
     task = variant.task
     widest = 180.0 if task.roll is None else 90.0
     end = math.radians(widest if widen else min(task.cone_deg, LEAST_CONE_DEG))
-    found = [Quantity(Kind.CONE, "cone", "rad", task.cone, end, ANGLE_STEP_DEG, True)]
+    found = [_number(Kind.CONE, "cone", "rad", task.cone, end, "task.cone_deg")]
     found += _of_directions(task, widen)
     limits = [
         _limit(variant.robot, joint, kind, widen)
@@ -200,18 +213,28 @@ def quantities(variant: Variant, widen: bool) -> tuple[Quantity, ...]:
     ]
     of_collisions = _of_collisions(task, widen)
     found += of_collisions or limits
-    for name, end in (("smaller standoff", 0.0), ("larger standoff", task.standoff + FURTHEST)):
-        found.append(Quantity(Kind.STANDOFF, name, "m", task.standoff, end, LENGTH_STEP, False))
+    for which, end in (("smaller", 0.0), ("larger", task.standoff + FURTHEST)):
+        ends = task.standoff, end
+        found.append(
+            _number(Kind.STANDOFF, f"{which} standoff", "m", *ends, "task.standoff", which)
+        )
     for index, letter in enumerate("xyz"):
         for sign in (1.0, -1.0):
             x, y, z = (sign if index == k else 0.0 for k in range(3))
-            name = f"shift along {'+' if sign > 0 else '-'}{letter}"
-            found.append(
-                Quantity(Kind.SHIFT, name, "m", 0.0, FURTHEST, LENGTH_STEP, False, -1, (x, y, z))
-            )
+            which, key = f"{'+' if sign > 0 else '-'}{letter}", "surface.position"
+            shift = _number(Kind.SHIFT, f"shift along {which}", "m", 0.0, FURTHEST, key, which)
+            found.append(replace(shift, axis=(x, y, z)))
     if of_collisions:  # limits come last where the time may run out: places matter more there
         found += limits
     return tuple(q for q in found if math.isfinite(q.given) and q.last > 0)
+
+
+def _number(
+    kind: Kind, name: str, unit: str, given: float, end: float, key: str, which: str = ""
+) -> Quantity:
+    """An angle or a length; see `Quantity`."""
+    step, monotone = ANGLE_STEP_DEG if unit == "rad" else LENGTH_STEP, kind not in BOTH_WAYS
+    return Quantity(kind, name, unit, given, end, step, monotone, key=key, which=which)
 
 
 def _of_directions(task: Task, widen: bool) -> list[Quantity]:
@@ -220,7 +243,8 @@ def _of_directions(task: Task, widen: bool) -> list[Quantity]:
     if task.roll is not None:
         least = min(task.roll.half, math.radians(LEAST_ROLL_DEG))
         end = math.pi if widen else least
-        found.append(Quantity(Kind.ROLL, "roll", "rad", task.roll.half, end, ANGLE_STEP_DEG, True))
+        half, key = task.roll.half, "task.roll_deg"
+        found.append(_number(Kind.ROLL, "roll", "rad", half, end, key, "half its range"))
     if task.approach is None or isinstance(task.approach, str):
         return found
     b = unit_along(task.approach)
@@ -230,11 +254,10 @@ def _of_directions(task: Task, widen: bool) -> list[Quantity]:
             square = sign * (axis - (axis @ b) * b)
             x, y, z = (square / np.linalg.norm(square)).tolist()
             letter = "xyz"[int(np.argmax(axis))]
-            name = f"approach tilted to {'+' if sign > 0 else '-'}{letter}"
-            end = math.radians(MOST_TILT_DEG)
-            found.append(
-                Quantity(Kind.TILT, name, "rad", 0.0, end, ANGLE_STEP_DEG, False, -1, (x, y, z))
-            )
+            which = f"tilted to {'+' if sign > 0 else '-'}{letter}"
+            end, key = math.radians(MOST_TILT_DEG), "task.approach"
+            tilt = _number(Kind.TILT, f"approach {which}", "rad", 0.0, end, key, which)
+            found.append(replace(tilt, axis=(x, y, z)))
     return found
 
 
@@ -249,19 +272,20 @@ def _of_collisions(task: Task, widen: bool) -> list[Quantity]:
         return []
     given = settings.clearance
     end = 0.0 if widen else max(given, MOST_CLEARANCE)
-    found = [Quantity(Kind.CLEARANCE, "clearance", "m", given, end, LENGTH_STEP, True)]
+    found = [_number(Kind.CLEARANCE, "clearance", "m", given, end, "collision.clearance")]
     if settings.surface and task.standoff > 0.0:
         given = settings.tool_clearance
         end = 0.0 if widen else max(given, task.standoff)
-        found.append(
-            Quantity(Kind.TOOL_CLEARANCE, "tool clearance", "m", given, end, LENGTH_STEP, True)
-        )
+        key = "collision.tool_clearance"
+        found.append(_number(Kind.TOOL_CLEARANCE, "tool clearance", "m", given, end, key))
     if widen:
-        left_out = [("without collisions", "")]
-        left_out += [(f"without {one.name}", one.name) for one in settings.scene[:MOST_OBJECTS]]
+        every = Quantity(
+            Kind.WITHOUT, "without collisions", "", 0.0, 1.0, 1.0, True, key="collision"
+        )
+        found.append(every)
         found += [
-            Quantity(Kind.WITHOUT, name, "", 0.0, 1.0, 1.0, True, obstacle=obstacle)
-            for name, obstacle in left_out
+            replace(every, name=f"without {one.name}", obstacle=one.name, key="collision.scene")
+            for one in settings.scene[:MOST_OBJECTS]
         ]
     return found
 
@@ -292,13 +316,10 @@ def _limit(robot: Robot, joint: int, kind: Kind, widen: bool) -> Quantity:
         outwards = _within_turn(robot, joint, given, outwards)
     step = LENGTH_STEP if slides else math.radians(ANGLE_STEP_DEG)
     inwards = max(opposite - step, given), min(opposite + step, given)
-    return Quantity(
-        kind=kind,
-        name=f"{robot.joint_names[joint]} {'lower' if kind is Kind.LOWER else 'upper'} limit",
-        unit="m" if slides else "rad",
-        given=given,
-        end=outwards if widen else inwards[kind is Kind.UPPER],
-        step=LENGTH_STEP if slides else ANGLE_STEP_DEG,
-        monotone=True,
-        joint=joint,
+    name, which = robot.joint_names[joint], "lower" if kind is Kind.LOWER else "upper"
+    end = outwards if widen else inwards[kind is Kind.UPPER]
+    unit, key = ("m", "limits_m") if slides else ("rad", "limits_deg")
+    key = f"robot.{key}.{toml_key(name)}"
+    return replace(
+        _number(kind, f"{name} {which} limit", unit, given, end, key, which), joint=joint
     )

@@ -4,12 +4,15 @@ A threshold lies between two values of one quantity at which the verdicts differ
 with its evidence.
 """
 
+import math
 from dataclasses import dataclass
 
 from coverable.arrays import Ints, Protected
 from feasibility.demands.largest import RateFigures
-from feasibility.sensitivity.quantities import Quantity
+from feasibility.sensitivity.quantities import Kind, Quantity
 from feasibility.verdict import Answer, Evidence, Verdict, Walk
+
+ACROSS = math.radians(90.0)  # [rad] from the normal: beyond, the tool points away
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +81,12 @@ class Threshold:
         """The share of its range that a change needs, or that a margin leaves, 0..1."""
         span = abs(self.quantity.end - self.quantity.given)
         return self.margin / span if self.feasible is not None and span > 0.0 else 1.0
+
+    @property
+    def turns_away(self) -> bool:
+        """Is it a cone in which the tool may point away from the surface, where it may not now?"""
+        cone, found = self.quantity.kind is Kind.CONE, self.feasible
+        return cone and found is not None and self.quantity.given <= ACROSS < found.value
 
     @property
     def ruled_out(self) -> bool:

@@ -63,6 +63,23 @@ def test_feasible_values_allow_more_and_others_less_by_a_digit_at_most(kind, val
         assert 0.0 < more < digit
 
 
+@pytest.mark.parametrize(("given", "others"), [(3, False), (3, True), (100, False)])
+def test_no_cone_that_lets_the_tool_point_away_is_proposed(plate, given, others):
+    cone = Quantity(Kind.CONE, "cone", "rad", math.radians(given), math.pi, 0.1, True, key="cone")
+    shift = Quantity(Kind.SHIFT, "shift", "m", 0.0, 0.5, 0.001, False, key="place")
+    found = Finding(math.radians(120), Answer.FEASIBLE, Evidence.WITNESS, "a motion")
+    all_ = [Threshold(cone, found, None)]
+    all_ += [Threshold(shift, replace(found, value=0.499), None)] if others else []
+    verdict = replace(plate[1], answer=Answer.INFEASIBLE)
+    made = coverable.Explanation(verdict, tuple(all_), (), None, 0, 0.0)
+    said = " ".join(explained.as_text(made, "x").split())
+    assert ("place by 0.499 m" in said) == others
+    assert ("but for a cone in which the tool may point away" in said) == (
+        given < 90 and not others
+    )
+    assert ("feasible: cone 120 deg (100 deg now)" in said) == (given > 90)
+
+
 @pytest.fixture(scope="module")
 def plate(commands):
     case = load_case(commands.folder / "plate.toml")
