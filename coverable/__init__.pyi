@@ -128,7 +128,6 @@ from surfaces.surface import SurfaceError as SurfaceError
 from surfaces.toolpaths.given import poses as poses
 from surfaces.toolpaths.pose_file import read_poses as read_poses
 
-comparison_chart = feasibility.reports.comparison.chart
 comparison_text = feasibility.reports.comparison.as_text
 division_text = feasibility.reports.division.as_text
 explanation_text = feasibility.reports.explanation.as_text

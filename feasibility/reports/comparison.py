@@ -1,4 +1,4 @@
-"""A comparison of arms as text, JSON, CSV, and as one page with a table and a chart."""
+"""A comparison of arms as text, JSON, CSV, and as one page."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 from feasibility.collisions.words import checked, checked_words
 from feasibility.reports.objects_and_csv import MARGINS, csv_text
-from feasibility.reports.pages import COLOURS, page, table
+from feasibility.reports.pages import COLOURS, bar, page, table
 from feasibility.reports.text_and_tables import aligned, bodiless, percent
 from feasibility.sensitivity.quantities import LEAST_CONE_DEG
 from feasibility.studies.robot_comparison import Arm, Comparison
@@ -17,7 +17,7 @@ from feasibility.version import version
 
 Column = tuple[str, Callable[[Arm], str]]
 
-ROW, BAR, LABEL = 30, 460, 130  # px: height of a row, length of a full bar, width for names
+COVERED = 2  # column
 NOTE = """Bars: share of the area that one continuous motion covers. "Feasible" is said only with a
 motion that an independent replay accepted."""
 
@@ -116,35 +116,13 @@ def headline(comparison: Comparison) -> str:
 
 
 def as_html(comparison: Comparison) -> str:
-    """One self-contained page: headline, bars of the covered share, table."""
+    """One self-contained page: headline, and the table with bars of the covered share."""
     heads = columns(comparison)
-    lines = [[html.escape(text(arm)) for _, text in heads] for arm in comparison.ranked]
-    body = f"<p>{html.escape(headline(comparison))}.</p>\n{chart(comparison)}\n"
+    lines = []
+    for arm in comparison.ranked:
+        cells = [html.escape(text(arm)) for _, text in heads]
+        cells[COVERED] += bar((arm.share, COLOURS[arm.verdict], arm.message))
+        lines.append(cells)
+    body = f"<p>{html.escape(headline(comparison))}.</p>\n"
     body += table((html.escape(name) for name, _ in heads), lines)
     return page(f"Robots compared: {comparison.case}", body, NOTE, _said(comparison))
-
-
-def chart(comparison: Comparison) -> str:
-    """The covered share of each arm as bars, an SVG element."""
-    arms = comparison.ranked
-    height = ROW * len(arms) + 26
-    width = LABEL + BAR + 90
-    parts = [
-        f'<svg class="bars" role="img" aria-label="covered share of the area by robot" '
-        f'viewBox="0 0 {width} {height}" width="{width}" height="{height}">'
-    ]
-    for tick in (0, 25, 50, 75, 100):
-        x = LABEL + BAR * tick / 100
-        parts.append(
-            f'<line x1="{x:g}" y1="0" x2="{x:g}" y2="{ROW * len(arms)}" stroke="#d1d5db"/>'
-            f'<text x="{x:g}" y="{height - 8}" text-anchor="middle" class="tick">{tick} %</text>'
-        )
-    for k, arm in enumerate(arms):
-        top, length = ROW * k + 5, max(BAR * arm.share, 0.0)
-        parts.append(
-            f'<text x="{LABEL - 8}" y="{top + 14}" text-anchor="end">{html.escape(arm.robot)}'
-            f'</text><rect x="{LABEL}" y="{top}" width="{length:.2f}" height="{ROW - 10}" '
-            f'fill="{COLOURS[arm.verdict]}"><title>{html.escape(arm.message)}</title></rect>'
-            f'<text x="{LABEL + length + 6:.2f}" y="{top + 14}">{percent(arm.share)}</text>'
-        )
-    return "".join([*parts, "</svg>"])

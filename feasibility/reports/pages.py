@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 FILE = Path(__file__).with_name("page") / "report.html"
 # Colours that most colour-blind people can tell apart.
 COLOURS = {"feasible": "#1b7f5c", "infeasible": "#c05621", "undecided": "#6b7280"}
+PLAIN = "#4b7fb3"
 
 
 def page(title: str, body: str, note: str, collision: Asked | str | None) -> str:
@@ -47,6 +48,16 @@ def framed(view: View, title: str) -> str:
         f'<iframe srcdoc="{inner}" title="{name}" loading="lazy"></iframe>\n'
         f'<img class="printed" src="data:image/png;base64,{picture}" alt="{name}">\n'
     )
+
+
+def bar(*parts: tuple[float, str, str]) -> str:
+    """Shares of 1 in one bar, each with its colour, and a text where the mouse is."""
+    inner = "".join(
+        f'<b style="width: {100.0 * min(max(share, 0.0), 1.0):.1f}%; background: {colour}" '
+        f'title="{html.escape(text, quote=True)}"></b>'
+        for share, colour, text in parts
+    )
+    return f'<span class="bar">{inner}</span>'
 
 
 def table(heads: Iterable[str], lines: Iterable[Iterable[str]]) -> str:

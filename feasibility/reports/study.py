@@ -12,7 +12,7 @@ from coverable.errors import counted
 from feasibility.cases.collision_table import CollisionPart, ObjectPart
 from feasibility.collisions.words import CHECKABLE, UNCHECKED, checked, checked_words
 from feasibility.reports.objects_and_csv import MARGINS, csv_text
-from feasibility.reports.pages import COLOURS, framed, page, table
+from feasibility.reports.pages import COLOURS, PLAIN, bar, framed, page, table
 from feasibility.reports.study_plot import are_numbers, charts, short, worded
 from feasibility.reports.text_and_tables import aligned, bodiless, percent
 from feasibility.studies.file import Study
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from feasibility.viewer.viewer import View
 
 COLUMNS = ("verdict", "evidence", "cells", "covered", "share", "edges", "pairs")
-BAR = 640  # px
 MOST = 10  # best rows that are listed, and values of a key up to which each has a line
 NOTE = """Share: of the area, in one continuous motion. "Feasible" is said only with a motion
 that an independent replay accepted."""
@@ -102,7 +101,9 @@ def as_html(study: Study, rows: Sequence[Row], poses: View | None = None) -> str
     parts = [f"<p>{html.escape(study.description)}</p>\n"] if study.description else []
     parts += [f"<p>{html.escape(headline(study, rows))}</p>\n", _verdict_bar(rows)]
     if found := causes(rows):
-        lines = [[html.escape(cause), str(n), _bar(n / len(rows))] for cause, n in found]
+        lines = [
+            [html.escape(cause), str(n), bar((n / len(rows), PLAIN, ""))] for cause, n in found
+        ]
         parts.append("<h2>Why cells are missed</h2>\n")
         parts.append(table(["cause of most missed cells", "cases", ""], lines))
     if failed := failures(rows):
@@ -161,28 +162,18 @@ def _settings(task: StudyTask) -> CollisionPart | None:
 
 def _verdict_bar(rows: Sequence[Row]) -> str:
     """How many cases have each verdict, as one bar."""
-    parts, keys, x = [], [], 0.0
-    for verdict, number in counts(rows).items():
-        width = BAR * number / max(len(rows), 1)
-        if number:
-            parts.append(
-                f'<rect x="{x:.2f}" y="0" width="{width:.2f}" height="22" '
-                f'fill="{COLOURS[verdict]}"><title>{number} {verdict}</title></rect>'
-            )
-            colour = f"background: {COLOURS[verdict]}"
-            keys.append(f'<span><i style="{colour}"></i>{number} {verdict}</span>')
-        x += width
-    return (
-        f'<svg role="img" aria-label="{html.escape(verdicts_text(rows))}" '
-        f'viewBox="0 0 {BAR} 22" width="{BAR}" height="22">{"".join(parts)}</svg>\n'
-        f'<p class="keys">{"".join(keys)}</p>\n'
+    found = [(number, verdict) for verdict, number in counts(rows).items() if number]
+    parts = [(n / len(rows), COLOURS[verdict], f"{n} {verdict}") for n, verdict in found]
+    keys = "".join(
+        f'<span><i style="background: {colour}"></i>{text}</span>' for _, colour, text in parts
     )
+    return f'<div class="wide">{bar(*parts)}</div>\n<p class="keys">{keys}</p>\n'
 
 
 def _by_value(label: str, groups: dict[str, list[Row]]) -> str:
     """One line for each value of a key."""
     (_, *heads), *lines = group_table(label, groups)
-    bars = [_bar(best_share(group) or 0.0) for group in groups.values()]
+    bars = [bar((best_share(group) or 0.0, PLAIN, "")) for group in groups.values()]
     rows = [[*_escaped(line), bar] for line, bar in zip(lines, bars, strict=True)]
     name = html.escape(worded(label))
     return f"<h2>By {name}</h2>\n" + table([name, *heads, ""], rows)
@@ -191,13 +182,6 @@ def _by_value(label: str, groups: dict[str, list[Row]]) -> str:
 def _escaped(cells: Sequence[str]) -> list[str]:
     """Plain texts as HTML."""
     return [html.escape(cell) for cell in cells]
-
-
-def _bar(share: float) -> str:
-    """A share of 1 as a bar."""
-    return (
-        f'<span class="bar"><b style="width: {100.0 * min(max(share, 0.0), 1.0):.1f}%"></b></span>'
-    )
 
 
 def headline(study: Study, rows: Sequence[Row]) -> str:
