@@ -81,7 +81,8 @@ def _unreached(exploration: Exploration) -> None:
     """Step 7: a ruling on every cell that no component has reached."""
     distance = exploration.robot.distance_from_base(exploration.arrays.points)
     beyond = distance > exploration.robot.reach + exploration.arrays.tolerance
-    for cell in np.flatnonzero(beyond).tolist():
+    # The furthest first: the proof names it, and who proves it again looks at the fewest boxes.
+    for cell in np.argsort(-distance, kind="stable")[: beyond.sum()].tolist():
         exploration.rulings[cell] = Ruling.PROVED
     if exploration.early and exploration.proved:
         return
