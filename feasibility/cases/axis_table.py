@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from coverable.errors import MISSING, is_number
-from feasibility.cases.table_reader import ORIGIN, Pair, Section, Triple, frozen
+from feasibility.cases.table_reader import Section, frozen
 
 if TYPE_CHECKING:
     from robots.urdf.axes import Axis
@@ -17,39 +16,11 @@ KEYS = {"kind": "type", "limits": "limits_m", "max_velocity": "max_velocity_m"}
 """Keys of arguments that are called otherwise in Python, of an axis that slides."""
 
 
-@dataclass(frozen=True, slots=True)
-class AxisPart:
-    """One entry of `robot.axis`; its fields are its keys."""
-
-    name: str
-    type: Literal["revolute", "prismatic"]
-    carries: Literal["base", "surface"]
-    axis: Triple = (0.0, 0.0, 1.0)
-    limits_deg: Pair | None = None
-    limits_m: Pair | None = None
-    position: Triple = ORIGIN
-    """m"""
-    rpy_deg: Triple = ORIGIN
-    max_velocity_deg: float | None = None
-    """deg/s"""
-    max_velocity_m: float | None = None
-    """m/s"""
-
-    def table(self) -> dict[str, Any]:
-        """The keys that say something."""
-        values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
-        return {key: value for key, value in values.items() if value is not None}
-
-    def build(self) -> Axis:
-        """The axis, in rad and m."""
-        return _axis(self.table())
-
-
-def _axis(values: Mapping[str, Any]) -> Axis:
-    """The axis of some values as they are written.
+def axis_of(values: Mapping[str, Any]) -> Axis:
+    """The axis of an entry as it is written.
 
     Raises:
-        RobotError: with everything that is wrong with them.
+        RobotError: with everything that is wrong with it.
     """
     from robots.urdf.axes import Axis
 
@@ -62,7 +33,7 @@ def _axis(values: Mapping[str, Any]) -> Axis:
     return Axis(kind=values.get("type", MISSING), **kept)
 
 
-def read_axes(section: Section) -> tuple[AxisPart, ...]:
+def read_axes(section: Section) -> tuple[Mapping[str, Any], ...]:
     """The entries of `robot.axis` without faults."""
     entries = section.take("axis").get("axis", [])
     if not isinstance(entries, list):
@@ -72,11 +43,11 @@ def read_axes(section: Section) -> tuple[AxisPart, ...]:
     return tuple(axis for axis in found if axis is not None)
 
 
-def _read(section: Section, k: int, entry: Any) -> AxisPart | None:
+def _read(section: Section, k: int, entry: Any) -> dict[str, Any] | None:
     """One entry; None where it has faults."""
     before = len(section.faults)
     found = Section(f"{section.name}.axis[{k}]", entry, section.faults)
-    values = found.take(*(item.name for item in fields(AxisPart)))
+    values = found.take(*found.keys)
     slides = values.get("type") == "prismatic"
     unit, other = ("m", "deg") if slides else ("deg", "m")
     for key in ("limits", "max_velocity"):
@@ -85,5 +56,5 @@ def _read(section: Section, k: int, entry: Any) -> AxisPart | None:
             found.fault(f"{key}_{other}", f"is of no use for an axis that {says}; use {key}_{unit}")
     found.refuse_others()
     keys = {argument: key.replace("_m", f"_{unit}") for argument, key in KEYS.items()}
-    found.make(_axis, {"values": {"name": MISSING, "carries": MISSING} | values}, keys)
-    return None if len(section.faults) > before else AxisPart(**frozen(values))
+    found.make(axis_of, {"values": {"name": MISSING, "carries": MISSING} | values}, keys)
+    return None if len(section.faults) > before else dict(frozen(values))

@@ -26,19 +26,6 @@ NAMES = {"self_": "self"}
 
 
 @dataclass(frozen=True, slots=True)
-class ObjectPart:
-    """One entry of `collision.scene` or `collision.tool`."""
-
-    kind: str
-    values: Mapping[str, Any]
-    """Its other keys; arrays as tuples, paths absolute."""
-
-    def table(self) -> dict[str, Any]:
-        """The entry as a table."""
-        return {"kind": self.kind, **self.values}
-
-
-@dataclass(frozen=True, slots=True)
 class CollisionPart:
     """The [collision] table of a case; its fields are those of `Collision`, paths absolute."""
 
@@ -52,8 +39,9 @@ class CollisionPart:
     srdf: str | None = None
     shapes: str = "hulls"
     thickness: float = 0.0
-    scene: tuple[ObjectPart, ...] = ()
-    tool: tuple[ObjectPart, ...] = ()
+    scene: tuple[Mapping[str, Any], ...] = ()
+    """As they are written, paths absolute; those of `tool`, too."""
+    tool: tuple[Mapping[str, Any], ...] = ()
 
     @property
     def checked(self) -> tuple[str, ...]:
@@ -67,7 +55,7 @@ class CollisionPart:
             {"pair": (first, second), "value": value} for first, second, value in self.clearances
         )
         for key in MAKERS:
-            values[key] = tuple(part.table() for part in values[key])
+            values[key] = tuple(map(dict, values[key]))
         return {
             NAMES.get(key, key): value for key, value in values.items() if value not in (None, ())
         }
@@ -84,7 +72,8 @@ class CollisionPart:
             made = []
             for k, part in enumerate(values[key]):
                 try:
-                    made.append(getattr(make, part.kind)(**part.values))
+                    own = {name: value for name, value in part.items() if name != "kind"}
+                    made.append(getattr(make, part["kind"])(**own))
                 except CoverableError as error:
                     place = f"collision.{key}[{k}]"
                     faults += [fault.renamed({}, place) for fault in error.faults]
@@ -97,7 +86,7 @@ class CollisionPart:
 class _Entry(NamedTuple):
     """One object, as it is written and as it is checked."""
 
-    part: ObjectPart
+    part: Mapping[str, Any]
     stand_in: Obstacle | ToolShape
     """The object; where it is a mesh, another in its place."""
 
@@ -207,4 +196,4 @@ def _object(section: Section, key: str, k: int, entry: Any) -> _Entry | None:
         stand_in = found.make(getattr(make, kind), needed | values | pose)
     if stand_in is None or len(section.faults) > before:
         return None
-    return _Entry(ObjectPart(kind, frozen(values)), cast("Obstacle | ToolShape", stand_in))
+    return _Entry({"kind": kind, **frozen(values)}, cast("Obstacle | ToolShape", stand_in))

@@ -24,7 +24,6 @@ from feasibility.cases.table_reader import (
 )
 
 if TYPE_CHECKING:
-    from feasibility.cases.axis_table import AxisPart
     from robots.errors import RobotError
     from robots.robot import Robot
 
@@ -64,8 +63,8 @@ class RobotPart:
     base: PosePart | None = None
     """Of the URDF's root link in the world."""
     reference_axis: Triple | None = None
-    axis: tuple[AxisPart, ...] = ()
-    """From the world outwards."""
+    axis: tuple[Mapping[str, Any], ...] = ()
+    """From the world outwards, as they are written."""
     start: tuple[float, ...] | None = None
     """rad or m, in the order of the free joints."""
     start_deg: tuple[float, ...] | None = None
@@ -78,7 +77,7 @@ class RobotPart:
         values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
         for key in POSES:
             values[key] = None if values[key] is None else values[key]._asdict()
-        values["axis"] = tuple(axis.table() for axis in self.axis)
+        values["axis"] = tuple(map(dict, self.axis))
         return {key: value for key, value in values.items() if value not in (None, (), {})}
 
     def build(self, surface_link: str | None = None) -> Robot:
@@ -94,7 +93,11 @@ class RobotPart:
         from robots.errors import RobotError
         from robots.library import load_robot
 
-        source = self.urdf or self.name or ""
+        source, axes = self.urdf or self.name or "", []
+        if self.axis:
+            from feasibility.cases.axis_table import axis_of
+
+            axes = list(map(axis_of, self.axis))
         try:
             robot = load_robot(
                 source,
@@ -106,7 +109,7 @@ class RobotPart:
                 tcp=self.tcp,
                 base=self.base,
                 reference_axis=self.reference_axis,
-                axes=[axis.build() for axis in self.axis],
+                axes=axes,
                 surface_link=surface_link,
                 xacro_args=self.xacro_args or None,
             )
@@ -140,7 +143,7 @@ class RobotPart:
         from robots.errors import RobotError
         from robots.library import joint_kinds
 
-        axes = {axis.name: axis.type for axis in self.axis}
+        axes = {axis["name"]: axis["type"] for axis in self.axis}
         try:
             source = self.urdf or self.name or ""
             return axes | joint_kinds(source, self.package_dirs, self.xacro_args)
@@ -266,7 +269,7 @@ def _part(section: Section) -> RobotPart:
     return part
 
 
-def _axes(section: Section) -> tuple[AxisPart, ...]:
+def _axes(section: Section) -> tuple[Mapping[str, Any], ...]:
     """Those that arm or surface are mounted on, without faults."""
     if not section.has("axis"):
         return ()

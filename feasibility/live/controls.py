@@ -67,16 +67,16 @@ class Controls:
         found: dict[str, Path] = {SURFACE: ("surface",), BASE: ("robot", "base")}
         found[TCP] = ("robot", "tcp")
         for number, axis in enumerate(self.case.robot.axis):
-            found[f"axis {axis.name}"] = ("robot", "axis", number)
+            found[f"axis {axis['name']}"] = ("robot", "axis", number)
         scene = () if self.case.collision is None else self.case.collision.scene
         for number, one in enumerate(scene):
-            found[f"object {one.values['name']}"] = ("collision", "scene", number)
+            found[f"object {one['name']}"] = ("collision", "scene", number)
         return found
 
     @cached_property
     def in_root_frame(self) -> list[str]:
         """Those of them whose poses are in the frame that the picture is drawn in."""
-        carried = {axis.carries for axis in self.case.robot.axis}
+        carried = {axis["carries"] for axis in self.case.robot.axis}
         tables, found = self.case.to_tables(), [SURFACE]
         for group, path in self.poses.items():
             free = group == BASE and "base" not in carried

@@ -94,8 +94,7 @@ def _scene_without(name: str, case: Case | None) -> list[str]:
     """The scene of a case without one object; nothing where the case is not known."""
     if case is None or case.collision is None or not name:
         return []
-    tables = [one.table() for one in case.collision.scene]
-    rows = [_inline(table) for table in tables if table["name"] != name]
+    rows = [_inline(one) for one in case.collision.scene if one["name"] != name]
     return [f"collision.scene=[{', '.join(rows)}]"]
 
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from coverable.errors import counted
-from feasibility.cases.collision_table import CollisionPart, ObjectPart
+from feasibility.cases.collision_table import CollisionPart
 from feasibility.collisions.words import CHECKABLE, UNCHECKED, checked, checked_words
 from feasibility.reports.objects_and_csv import MARGINS, csv_text
 from feasibility.reports.pages import COLOURS, PLAIN, bar, framed, page, table
@@ -156,7 +156,7 @@ def _settings(task: StudyTask) -> CollisionPart | None:
         surface=table.get("surface", True),
         clearance=float(table.get("clearance", 0.0)),
         tool_clearance=float(table.get("tool_clearance", 0.0)),
-        scene=tuple(ObjectPart(one["kind"], one) for one in table.get("scene", ())),
+        scene=tuple(table.get("scene", ())),
     )
 
 

@@ -68,7 +68,7 @@ def test_paths_are_relative_to_the_case_file(
         assert moved.robot.package_dirs == (str(folder / "meshes"),)
         assert moved.collision is not None
         assert moved.collision.srdf == str(folder / "a.srdf")
-        assert moved.collision.scene[0].values["file"] == str(folder / "b.stl")
+        assert moved.collision.scene[0]["file"] == str(folder / "b.stl")
     other = case.with_overrides(["surface.file=other.stl", "robot.urdf=x.urdf"])
     assert other.surface.values["file"] == str(elsewhere / "other.stl")
     assert other.robot.urdf == str(elsewhere / "x.urdf")
