@@ -2,6 +2,8 @@
 
 import math
 import re
+import subprocess
+import sys
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -13,6 +15,7 @@ from specimens import EQUAL, ball, ring, sampled
 
 import coverable
 from coverable import check, grid, load_robot, parallel_passes, parametric, piecewise, view
+from feasibility.cases.keys import KEYS
 from feasibility.certification.surface_replay import replay_over_surface
 from surfaces.places.offset_surfaces import offset_surface
 from surfaces.places.places import Places
@@ -145,6 +148,28 @@ def test_the_class_of_the_page_needs_no_more_than_its_formulas(names):
     far = replace(screw, position=np.array([3.0, 0.0, 0.0])).cells(2, 2)
     assert str(check(robot, far, task).evidence) == "proof"
     assert parallel_passes(screw, 0.05).count > 3
+
+
+OF_A_CASE = """
+import coverable; from pathlib import Path; from feasibility.cases import keys
+keys.KEYS, coverable.helicoid = Path("keys.toml"), helicoid
+text = "task = { standoff = 0.02, cone_deg = 60 } ; robot.name = 'puma560' ; [surface]"
+text += "; kind = 'helicoid' ; rise = 0.1 ; u_deg = [-57, 57] ; v = [0.1, 0.3] ; cells = [6, 4]"
+case = coverable.Case.from_toml(f"{text} ; position = [0.3, 0, 0.2]".replace(";", "\\n"))
+assert coverable.Case.from_toml(case.to_toml()) == case
+assert coverable.check(*case.build()).feasible
+case.with_overrides(["surface.rise=-0.1"])
+"""
+
+
+def test_the_class_of_the_page_has_keys_by_rows_of_a_table(tmp_path):
+    page = PAGE.read_text("utf-8")
+    found = {kind: "".join(re.findall(rf"^```{kind}\n(.*?)^```$", page, re.M | re.S))
+             for kind in ("python", "toml")}  # fmt: skip
+    (tmp_path / "keys.toml").write_text(KEYS.read_text("utf-8") + found["toml"])
+    command = [sys.executable, "-c", found["python"] + OF_A_CASE]
+    said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False).stderr
+    assert "surface.rise: must be a finite number > 0 (metres), got -0.1" in said
 
 
 def test_a_kind_that_cannot_be_followed_is_measured(names):
