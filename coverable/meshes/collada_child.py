@@ -89,7 +89,7 @@ def answer(data: bytes, most: int) -> bytes:
             arrays += [np.asarray(vertices, "<f8").tobytes(), np.asarray(faces, "<i8").tobytes()]
     except Refused as error:
         fault = str(error)
-    except MemoryError:
+    except (MemoryError, SystemError):  # the latter from within lxml or NumPy, out of memory too
         fault = "takes too much memory to read; thin the mesh"
     except Exception as error:  # noqa: BLE001 - of any library
         fault = f"cannot be read as a mesh: {error!r}"

@@ -24,6 +24,10 @@ from surfaces.sheet import sheet_of
 PAGE = Path(__file__).parents[2] / "docs" / "own_surfaces.md"
 
 
+def blocks(kind):
+    return re.findall(rf"^```{kind}\n(.*?)^```$", PAGE.read_text("utf-8"), re.M | re.S)
+
+
 @pytest.mark.parametrize("name", EQUAL)
 def test_a_formula_makes_the_patch_that_it_is_equal_to(name):
     formula, u, v, patch = EQUAL[name]
@@ -99,7 +103,7 @@ def test_models_are_wider_by_what_a_spline_deviates():
 @pytest.fixture(scope="module")
 def names():
     found = {}
-    for block in re.findall(r"^```python\n(.*?)^```$", PAGE.read_text("utf-8"), re.M | re.S):
+    for block in blocks("python"):
         exec(compile(block, PAGE.name, "exec", dont_inherit=True), found)
     return found
 
@@ -151,23 +155,20 @@ def test_the_class_of_the_page_needs_no_more_than_its_formulas(names):
 
 
 OF_A_CASE = """
-import coverable; from pathlib import Path; from feasibility.cases import keys
-keys.KEYS, coverable.helicoid = Path("keys.toml"), helicoid
-text = "task = { standoff = 0.02, cone_deg = 60 } ; robot.name = 'puma560' ; [surface]"
-text += "; kind = 'helicoid' ; rise = 0.1 ; u_deg = [-57, 57] ; v = [0.1, 0.3] ; cells = [6, 4]"
-case = coverable.Case.from_toml(f"{text} ; position = [0.3, 0, 0.2]".replace(";", "\\n"))
-assert coverable.Case.from_toml(case.to_toml()) == case
+import pathlib; from feasibility.cases import keys
+keys.KEYS, coverable.helicoid = pathlib.Path("keys.toml"), helicoid
+case = coverable.load_case("case.toml")
+assert coverable.Case.from_toml(case.to_toml()).surface == case.surface
 assert coverable.check(*case.build()).feasible
 case.with_overrides(["surface.rise=-0.1"])
 """
 
 
 def test_the_class_of_the_page_has_keys_by_rows_of_a_table(tmp_path):
-    page = PAGE.read_text("utf-8")
-    found = {kind: "".join(re.findall(rf"^```{kind}\n(.*?)^```$", page, re.M | re.S))
-             for kind in ("python", "toml")}  # fmt: skip
-    (tmp_path / "keys.toml").write_text(KEYS.read_text("utf-8") + found["toml"])
-    command = [sys.executable, "-c", found["python"] + OF_A_CASE]
+    rows, case = blocks("toml")
+    (tmp_path / "keys.toml").write_text(KEYS.read_text("utf-8") + rows)
+    (tmp_path / "case.toml").write_text(case)
+    command = [sys.executable, "-c", "\n".join([*blocks("python"), OF_A_CASE])]
     said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False).stderr
     assert "surface.rise: must be a finite number > 0 (metres), got -0.1" in said
 

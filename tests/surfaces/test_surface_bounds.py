@@ -99,7 +99,7 @@ def test_models_over_any_boxes_hold_their_places_and_hardly_less_would(patch, se
         off[~np.isfinite(radius)] = 0.0
         holds(radius[:, None], off, used=0.0, tiny=(tiny, tiny, 1e-7)[k])
         large = small & (radius > (1e-9, 1e-9, 1e-5)[k]) & np.isfinite(radius)
-        if large.sum() > 5:
+        if large.sum() > 9:  # in fewer boxes 40 places each may all be off the worst ones
             holds(radius[large, None], off[large], used=0.9)
 
 
