@@ -1,13 +1,13 @@
 """Numbers, nets, grids, poses and files that make no surface: what is said of each is approved."""
 
 import csv
-import io
 import json
 import math
 
 import numpy as np
 import pytest
 from approved import refused
+from readers import npy
 from smooth_probes import same_surface
 from specimens import WEIGHTS, ball, hood, sampled
 
@@ -177,17 +177,9 @@ def test_bad_formulas_grids_pieces_and_poses(approved):
 
 NET = "row,column,x,y,z\n"
 TABLE = NET + "".join(f"{i},{j},{i},{j},0\n" for i in range(4) for j in range(5))
-
-
-def npy(array, **options):
-    stream = io.BytesIO()
-    np.save(stream, array, **options)
-    return stream.getvalue()
-
-
 GRIDS = {  # nets and poses: tests/input/bad; what is no file: tests/input/test_any_bytes.py
     "a.txt": "", "a.npy": "", "flat.npy": npy(np.zeros((3, 3))),
-    "object.npy": npy(np.array([{}], dtype=object), allow_pickle=True),
+    "object.npy": npy(np.array([{}], dtype=object), True),
     "pairs.npy": npy(np.zeros((3, 3, 2))), "header.csv": "x,y\n1,2\n",
     "complex.npy": npy(np.zeros((2, 2, 3), dtype=complex)),
     "cut.npy": npy(np.zeros((2, 2, 3)))[:-8], "hole.csv": TABLE.replace("1,1,", "1,9,", 1),

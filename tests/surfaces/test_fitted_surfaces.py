@@ -103,8 +103,7 @@ def test_models_are_wider_by_what_a_spline_deviates():
 @pytest.fixture(scope="module")
 def names():
     found = {}
-    for block in blocks("python"):
-        exec(compile(block, PAGE.name, "exec", dont_inherit=True), found)
+    exec(compile("\n".join(blocks("python")), PAGE.name, "exec", dont_inherit=True), found)
     return found
 
 
