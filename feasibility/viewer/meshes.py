@@ -153,10 +153,11 @@ def thinned(meshes: Sequence[Mesh], budget: int) -> list[Mesh]:
 
     First only what is equal, then further and further from each other, up to `COARSEST`. Meshes
     that use less than a quarter of an even share of the budget are left as they are, so that small
-    parts do not vanish beside large ones.
+    parts do not vanish beside large ones. Of a mesh that would lose all its triangles, as far apart
+    as they are, as many are taken.
 
     Returns:
-        As many meshes as were given, in their order; some may have lost all their triangles.
+        As many meshes as were given, in their order.
     """
     result = [_merged(mesh) for mesh in meshes]
     small = budget / (4 * max(len(meshes), 1))
@@ -167,6 +168,11 @@ def thinned(meshes: Sequence[Mesh], budget: int) -> list[Mesh]:
             break
         result = [mesh if len(mesh.faces) < small else _merged(mesh, distance) for mesh in result]
         distance *= max(1.15, (total / budget) ** 0.3)
+    for k, mesh in enumerate(meshes):
+        if len(result[k].faces) == 0:
+            some = mesh.faces[:: int(len(mesh.faces) / small) + 1]
+            vertices, faces = WorkingMesh(mesh.vertices, some).compact()
+            result[k] = replace(mesh, vertices=vertices, faces=faces)
     return result
 
 
