@@ -5,15 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.linalg import norm
 
-from coverable.arrays import Array, Ints
+from coverable.arrays import Array
 from coverable.errors import counted
 from feasibility.viewer import threejs
 from feasibility.viewer.html_page import Entry, Legend, page
 from feasibility.viewer.meshes import GREY, tubes
 from feasibility.viewer.pass_view import digit_lines
-from feasibility.viewer.stage import framing, triad
+from feasibility.viewer.stage import BACKDROP, framing, triad
 from feasibility.viewer.verdict_scene import OUTLINES
 from surfaces.meshes.step_surface import StepFace, StepParts
+from surfaces.passes.welded_triangles import border_edges
 
 MOST_LINES = 40  # of the legend, the largest faces
 TALL, SMALLEST, LARGEST = 0.5, 0.03, 0.1  # [1] a digit, of a face's width; of the whole part
@@ -37,13 +38,7 @@ def faces_page(parts: StepParts, name: str) -> str:
     largest = {
         face.number for face in sorted(parts.faces, key=lambda face: -face.area)[:MOST_LINES]
     }
-    commands = [
-        threejs.set_property("/Background", "top_color", [1.0, 1.0, 1.0]),
-        threejs.set_property("/Background", "bottom_color", [0.93, 0.95, 0.97]),
-        threejs.set_property("/Grid", "visible", False),
-        threejs.set_property("/Axes", "visible", False),
-        triad("/frame", np.eye(4), 0.2 * size),
-    ]
+    commands = [*BACKDROP, triad("/frame", np.eye(4), 0.2 * size)]
     entries = []
     for face in parts.faces:
         own = parts.triangles[parts.owner == face.number]
@@ -58,7 +53,7 @@ def faces_page(parts: StepParts, name: str) -> str:
         tall = float(np.clip(TALL * width, smallest, LARGEST * size))
         digits = tubes(_number(face, tall, OFF * size), THICK * tall)
         commands.append(threejs.mesh_object(f"/numbers/{face.number}", *digits, INK, lit=False))
-    borders = points[_borders(parts)].reshape(-1, 3)
+    borders = points[border_edges(parts.triangles)].reshape(-1, 3)
     commands.append(threejs.segments("/borders", borders, OUTLINES))
     entries += [Entry("borders", OUTLINES, "/borders"), Entry("numbers", INK, "/numbers")]
     text = 'in a case: faces = [3, 7], faces = "all" or colour = "#ff0000"'
@@ -77,15 +72,6 @@ def _colour(face: StepFace) -> threejs.Colour:
     return red, green, blue
 
 
-def _borders(parts: StepParts) -> Ints:
-    """(k, 2) edges that belong to one triangle of a face alone."""
-    edges = np.sort(
-        np.concatenate([parts.triangles[:, [i, (i + 1) % 3]] for i in range(3)]), axis=1
-    )
-    every, counts = np.unique(edges, axis=0, return_counts=True)
-    return np.asarray(every[counts == 1])
-
-
 def _number(face: StepFace, tall: float, off: float) -> list[Array]:
     """The number of a face as lines before its middle, upright where it can be.
 
@@ -95,11 +81,8 @@ def _number(face: StepFace, tall: float, off: float) -> list[Array]:
         off: m, from the face.
     """
     normal = np.array(face.normal) if any(face.normal) else VIEWED
-    digits = len(str(face.number))
     up = np.array([0.0, 0.0, 1.0]) if abs(normal[2]) < 0.9 else -VIEWED * [1.0, 1.0, 0.0]
     up = up - (up @ normal) * normal
     up = up / norm(up)
     along = np.cross(up, normal)
-    wide = (0.75 * digits - 0.25) * tall
-    middle = np.array(face.centre) + off * normal
-    return digit_lines(face.number, middle - 0.5 * (wide * along + tall * up), along, tall * up)
+    return digit_lines(face.number, np.array(face.centre) + off * normal, along, tall * up)

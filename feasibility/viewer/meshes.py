@@ -11,7 +11,7 @@ import numpy as np
 
 from coverable.arrays import Array, Ints
 from coverable.meshes.raw_mesh import RawMesh
-from feasibility.viewer.threejs import Colour
+from feasibility.viewer.threejs import Colour, Command, mesh_object
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 from surfaces.adjacency import components
 from surfaces.meshes.degenerate import weld_distance, welded
@@ -174,6 +174,12 @@ def thinned(meshes: Sequence[Mesh], budget: int) -> list[Mesh]:
             vertices, faces = WorkingMesh(mesh.vertices, some).compact()
             result[k] = replace(mesh, vertices=vertices, faces=faces)
     return result
+
+
+def mesh_command(path: str, mesh: Mesh) -> Command:
+    """The command that draws a mesh with its creases."""
+    shape = split_at_creases(mesh.vertices, mesh.faces)
+    return mesh_object(path, *shape, mesh.colour, opacity=mesh.opacity)
 
 
 def moved(mesh: Mesh, matrix: Array) -> Mesh:

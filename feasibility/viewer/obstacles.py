@@ -21,9 +21,9 @@ from feasibility.viewer.meshes import (
     CREASE,
     Mesh,
     as_mesh,
+    mesh_command,
     moved,
     solid_mesh,
-    split_at_creases,
     thinned,
     tubes,
 )
@@ -57,7 +57,7 @@ def scene_layers(bodies: Bodies, robot: Robot) -> list[Layer]:
         name = threejs.safe_name(seat.obstacle.name)
         path = f"{groups[seat.joint] if seat.joint else ''}/scene/{number} {name}"
         lines = threejs.segments(f"{path}/edges", _edges(mesh), EDGES)
-        drawn = (_command(f"{path}/body", mesh), lines)
+        drawn = (mesh_command(f"{path}/body", mesh), lines)
         parts.append(Layer(drawn, Entry(seat.obstacle.name, SCENE, path)))
     if len(parts) <= MOST_ENTRIES:
         return parts
@@ -72,7 +72,7 @@ def tool_layers(bodies: Bodies, robot: Robot) -> list[Layer]:
         return []
     path = f"{joint_paths(robot)[solids[0].joint]}/mounted tool"
     commands = tuple(
-        _command(f"{path}/{number}", moved(_shape(solid.geometry, TOOLS, 1.0), solid.placement))
+        mesh_command(f"{path}/{number}", moved(_shape(solid.geometry, TOOLS, 1.0), solid.placement))
         for number, solid in enumerate(solids)
     )
     return [Layer(commands, Entry("mounted tool", TOOLS, path))]
@@ -87,7 +87,7 @@ def hull_layers(bodies: Bodies, robot: Robot) -> list[Layer]:
         mesh = None if body.owner in scene else _hull(body)
         if mesh is not None:
             path = f"{paths[body.joint]}/body {number} of {threejs.safe_name(body.owner)}"
-            commands.append(_command(path, mesh))
+            commands.append(mesh_command(path, mesh))
     if not commands:
         return []
     label = f"convex bodies of the search ({len(commands)})"
@@ -132,12 +132,6 @@ def _hull(body: Polytope) -> Mesh | None:
         return as_mesh(trimesh.convex.convex_hull(points), CONVEX, SHEER)
     except (ValueError, trimesh.convex.QhullError):
         return None
-
-
-def _command(path: str, mesh: Mesh) -> Command:
-    """The command that draws a mesh with its creases."""
-    shape = split_at_creases(mesh.vertices, mesh.faces)
-    return threejs.mesh_object(path, *shape, mesh.colour, opacity=mesh.opacity)
 
 
 def _edges(mesh: Mesh) -> Array:

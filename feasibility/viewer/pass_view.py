@@ -38,17 +38,18 @@ _DIGITS = (
 """Strokes from corner to corner: top a b, middle c d, bottom e f."""
 
 
-def digit_lines(number: int, origin: Array, along: Array, up: Array) -> list[Array]:
+def digit_lines(number: int, middle: Array, along: Array, up: Array) -> list[Array]:
     """Polylines (k, 3) m of a number.
 
     Args:
         number: at least 0.
-        origin: (3,) m, where its lower left corner is.
+        middle: (3,) m, of the number.
         along: (3,) unit, the direction in which it is read.
         up: (3,) m, the height of a digit.
     """
-    height = float(np.linalg.norm(up))
-    lines = []
+    height, lines = float(np.linalg.norm(up)), []
+    wide = (len(str(number)) * (WIDTH + GAP) - GAP) * height
+    origin = middle - 0.5 * (wide * along + up)
     for place, digit in enumerate(str(number)):
         corners = np.array([_CORNERS[name] for name in _DIGITS[int(digit)]], dtype=float)
         x = (WIDTH * corners[:, 0] + place * (WIDTH + GAP)) * height
@@ -170,5 +171,4 @@ def _number(each: Pass, along: PlannedPasses) -> list[Array]:
     reading = np.cross(up, side * each.normals[0])
     name, height = each.level + 1, TALL * spacing
     middle = each.points[0] - (BEFORE * spacing + 0.5 * height) * heading
-    wide = (len(str(name)) * (WIDTH + GAP) - GAP) * height
-    return digit_lines(name, middle - 0.5 * (wide * reading + height * up), reading, height * up)
+    return digit_lines(name, middle, reading, height * up)

@@ -32,6 +32,7 @@ from feasibility.viewer.verdict_scene import (
     trail,
 )
 from surfaces.cells import Cells
+from surfaces.meshes.degenerate import welded
 from surfaces.passes.welded_triangles import border_edges
 
 if TYPE_CHECKING:
@@ -207,7 +208,7 @@ def outline(cells: Cells) -> Array:
     lines = vertices[border_edges(faces)]
     if len(lines) == 0 or _size(lines.reshape(-1, 3)) < SMALL * size:
         lines = np.concatenate([lines, _sections(vertices, faces)])
-    return np.concatenate([_thinned(lines, size / MOST), _stroke(cells, STROKE * size)])
+    return np.concatenate([_thinned(lines, 2.0 * size / MOST), _stroke(cells, STROKE * size)])
 
 
 def placed(points: Array, pose: Pose) -> Array:
@@ -246,17 +247,13 @@ def _sections(vertices: Array, faces: Ints) -> Array:
     return np.concatenate([np.reshape(cut, (-1, 2, 3)) for cut in cuts])
 
 
-def _thinned(lines: Array, spacing: float) -> Array:
-    """At most `MOST` of some segments: ends in one box of a grid become one, at their mean."""
-    result = lines
+def _thinned(lines: Array, distance: float) -> Array:
+    """At most `MOST` of some segments: ends within a distance, m, of each other become one."""
+    points, result = lines.reshape(-1, 3), lines
     while len(result) > MOST:
-        boxes = np.floor(lines.reshape(-1, 3) / spacing).astype(np.int64)
-        _, box, number = np.unique(boxes, axis=0, return_inverse=True, return_counts=True)
-        box = box.reshape(-1)
-        means = np.column_stack([np.bincount(box, x) / number for x in lines.reshape(-1, 3).T])
-        ends = np.unique(np.sort(box.reshape(-1, 2), axis=1), axis=0)
-        result = means[ends[ends[:, 0] != ends[:, 1]]]
-        spacing *= 1.25
+        ends = np.unique(np.sort(welded(points, distance).reshape(-1, 2), axis=1), axis=0)
+        result = points[ends[ends[:, 0] != ends[:, 1]]]
+        distance *= 1.25
     return result
 
 

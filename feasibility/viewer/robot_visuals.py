@@ -23,9 +23,9 @@ from feasibility.viewer.meshes import (
     Mesh,
     as_mesh,
     drawn,
+    mesh_command,
     moved,
     solid_mesh,
-    split_at_creases,
     thinned,
 )
 from robots.errors import RobotError
@@ -138,14 +138,11 @@ def _drawing(robot: Robot, parts: dict[tuple[int, str], list[Mesh]], notes: list
     for number, (((joint, link), _), mesh) in enumerate(zip(owned, fewer, strict=True)):
         if len(mesh.faces) == 0:
             continue
-        vertices, faces = split_at_creases(mesh.vertices, mesh.faces)
         if joint == world.parentJoint:
-            heights = vertices @ upwards[:3] + upwards[3]
+            heights = mesh.vertices @ upwards[:3] + upwards[3]
             lowest = min(lowest, float(heights.min()))
         path = f"{paths[joint]}/link {threejs.safe_name(link)}/part {number}"
-        commands.append(
-            threejs.mesh_object(path, vertices, faces, mesh.colour, opacity=mesh.opacity)
-        )
+        commands.append(mesh_command(path, mesh))
     return Drawing(tuple(commands), lowest, tuple(notes))
 
 

@@ -138,6 +138,12 @@ def triads(robot: Robot) -> list[threejs.Command]:
     return [*drawn, threejs.mesh_object(path, *rod, SKELETON)]
 
 
+BACKDROP = (
+    threejs.set_property("/Background", "top_color", [1.0, 1.0, 1.0]),
+    threejs.set_property("/Background", "bottom_color", [0.93, 0.95, 0.97]),
+    threejs.set_property("/Grid", "visible", False),
+    threejs.set_property("/Axes", "visible", False),
+)
 THICKNESS = 0.12  # [1] of the reach: by how much links may stand out beyond their joints
 STILL = np.eye(4)
 FRAMED = 0.34  # [rad]: half the angle that arm and surface fill, of a lens of 42 degrees
@@ -161,10 +167,7 @@ def ground(robot: Robot, cells: Cells, floor: float, place: Array = STILL) -> li
     z = min(floor, float(box[:, 2].min(initial=0.0)))
     ends = [[(x, -half, z), (x, half, z), (-half, x, z), (half, x, z)] for x in lines]
     return [
-        threejs.set_property("/Background", "top_color", [1.0, 1.0, 1.0]),
-        threejs.set_property("/Background", "bottom_color", [0.93, 0.95, 0.97]),
-        threejs.set_property("/Grid", "visible", False),
-        threejs.set_property("/Axes", "visible", False),
+        *BACKDROP,
         threejs.segments("/ground", np.reshape(ends, (-1, 3)), (0.78, 0.80, 0.83)),
         triad("/root frame", np.eye(4), 0.25 * size),
     ]

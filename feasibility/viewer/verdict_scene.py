@@ -122,12 +122,7 @@ def layers(verdict: Verdict) -> list[Layer]:
 
 def side_layers(cells: Cells, sides: Sides) -> list[Layer]:
     """Cells in the colour of the side of a cut on which they are reached, and those proved lost."""
-    parts = []
-    for label, (name, colour) in enumerate(zip(sides.names, COLOURS, strict=True)):
-        which = np.flatnonzero(sides.labels == label)
-        if len(which):
-            path = f"/cut/{threejs.safe_name(name)}"
-            parts.append(filled(cells, which, colour, path, name))
+    parts = patch_layers(cells, sides.labels, sides.names, COLOURS, "/cut")
     lost = np.array(sides.lost, dtype=np.int64)
     dots = marks(cells.centres[lost], LOST_SIZE * cell_size(cells))
     return [*parts, mesh_layer(sides.lost_name, LOST, "/cut/proved", *dots, lit=False)]
@@ -170,21 +165,27 @@ def _frames(verdict: Verdict) -> Iterator[Layer]:
         yield lines_layer(label, REFERENCE, path, ends)
 
 
-def patch_layers(cells: Cells, labels: Ints, names: Sequence[str]) -> list[Layer]:
+def patch_layers(
+    cells: Cells,
+    labels: Ints,
+    names: Sequence[str],
+    colours: Sequence[Colour] = PATCHES,
+    root: str = "/patches",
+) -> list[Layer]:
     """Cells filled with one colour for each label.
 
     Args:
         cells: the cells.
         labels: (N,) which of `names` each cell belongs to; -1 for none.
         names: one for each colour.
+        colours: which are used in turn.
+        root: where in the scene tree.
     """
     parts = []
     for k, name in enumerate(names):
-        which = np.flatnonzero(labels == k)
-        if len(which) == 0:
-            continue
-        path = f"/patches/{threejs.safe_name(name)}"
-        parts.append(filled(cells, which, PATCHES[k % len(PATCHES)], path, name))
+        which, path = np.flatnonzero(labels == k), f"{root}/{threejs.safe_name(name)}"
+        if len(which):
+            parts.append(filled(cells, which, colours[k % len(colours)], path, name))
     return parts
 
 
