@@ -5,23 +5,37 @@ over the surface itself; where it is lifted, or beyond the border, it must not g
 height of a point over a surface changes by no more than the point moves; so on a straight line
 between two points d apart, with the heights a and b, it is at least (a + b - d) / 2. Between two
 configurations the tool point bends off such a line by less, the more they are halved.
+
+`on_the_way` is of motions from cell to cell of one patch. Where the offset surface folds, by less
+than the tolerance, the places nearest to a tool jump, and the tool need not be right over any of
+both for long; over the places on the straight way from centre to centre, passed in order while the
+tool goes along, it may be right all along.
 """
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
+from feasibility.certification.bisection import bisected
 from feasibility.certification.faults import MotionFault
-from feasibility.certification.stretches import Judge, Samples
+from feasibility.certification.stretches import Judge, SampledStretches, Samples
 from robots.kinematics import Kinematics
+from surfaces.cells import Cells
+from surfaces.places.patch_places import PatchPlaces
+from surfaces.places.places import Places
 from surfaces.surface import Surface
 
 HALVINGS = 30  # to where a motion leaves what it follows
 LEVELS = 20  # halvings of what is lifted, until it is clear of the surface
 BEYOND, LONG = 2e-3, 0.02  # [m] so close points are looked at, beyond the border and elsewhere
+STEPS, PARTS = 256, 8  # of the way from centre to centre, of a motion from row to row
+STEEP = 8  # power of what a place costs, so that the worst counts most
+HALVED, MOST = 12, 100_000  # how often what lies on the way is halved, and how much of it
 BENT = 1.01  # [1] the way between two points that are so close, compared with the straight line
 
 
@@ -163,3 +177,125 @@ def _heights(surface: Surface, points: Array) -> Array:
     if isinstance(surface, MeshSurface):
         over = ~surface.beyond_border(*surface.nearest(points))
     return np.where(over, surface.side_sign * at.height, np.nan)
+
+
+def on_the_way(
+    judge: Judge,
+    rows: Array,
+    cells: Cells,
+    marks: Ints,
+    at_rows: Samples,
+    of_segment: Array,
+    doubtful: Ints,
+    decided: Callable[[SampledStretches], Mask],
+) -> tuple[Mask, list[Samples]]:
+    """Judge parts of a motion from mark to mark over straight ways between their cells' centres.
+
+    Any places would do for `Judge.bounds`; these pass in order. Where such parts begin or end, the
+    tool stands while the place goes on to, or comes from, that of the rest; where it cannot, the
+    next part is judged so, too.
+
+    Args:
+        judge: of the motion.
+        rows: (m, n) the motion, rad or m.
+        cells: the cells.
+        marks: (m,) at which cell's target a row is said to be, -1 at none.
+        at_rows: samples at all rows, as the rest has them.
+        of_segment: (m - 1, 3) see `SampledStretches`.
+        doubtful: (k,) rows at which, or behind which, something is wrong or open.
+        decided: (k,) which stretches bounds show to be right; see `bisected`.
+
+    Returns:
+        (m,) behind which rows the motion is right so, and at the last, if it is behind the one
+        before; and the samples there. Nothing, unless all that is doubtful is right.
+    """
+    nothing, patch = np.zeros(len(rows), dtype=bool), judge.offset
+    runs = list(itertools.pairwise(np.flatnonzero(marks >= 0).tolist()))
+    wanted = {k for k, run in enumerate(runs) if _within(doubtful, *run)}
+    found = dict[int, Samples]()
+    if not isinstance(patch, PatchPlaces):
+        return nothing, []
+
+    def right(at: Samples) -> bool:
+        """Is a motion right from sample to sample?"""
+        start, end, wrong = at.of(slice(-1)), at.of(slice(1, None)), [not judge.within(at).all()]
+        row = np.minimum(start.row, len(rows) - 2)
+        low, high = (each.share + (each.row - row) for each in (start, end))
+
+        def halves(left: SampledStretches) -> SampledStretches:
+            some = judge.middles(rows, left)
+            half = np.full(len(some.row), 0.5)
+            middle = _over(judge, patch.between(left.start.places, left.end.places, half), some)
+            wrong.append(not judge.within(middle).all())
+            return left.halves(middle)
+
+        stretches = SampledStretches(row, low, high, start, end, of_segment[row])
+        return not any(wrong) and not len(bisected(stretches, decided, halves, HALVED, MOST).row)
+
+    while wanted - found.keys():
+        k = min(wanted - found.keys())
+        ends = cells.centres[marks[list(runs[k])]]
+        found[k] = at = _in_order(judge, patch, rows, ends, np.arange(*runs[k]))
+        if not right(at):
+            return nothing, []
+        for other, row, end in ((k - 1, runs[k][0], 0), (k + 1, runs[k][1], len(at.row) - 1)):
+            if other in wanted or row in (0, len(rows) - 1):
+                continue
+            there = at.of(np.array([end]))
+            if not right(Samples.join(there, at_rows.of(np.array([row])))):
+                if not 0 <= other < len(runs):
+                    return nothing, []
+                wanted.add(other)
+    for k in found:
+        nothing[slice(*runs[k])] = True
+    nothing[-1] = nothing[-2]
+    return nothing, list(found.values())
+
+
+def _within(numbers: Ints, low: int, high: int) -> bool:
+    """Is one of some numbers from low to high?"""
+    return bool(((numbers >= low) & (numbers <= high)).any())
+
+
+def _in_order(
+    judge: Judge, patch: PatchPlaces, rows: Array, centres: Array, numbers: Ints
+) -> Samples:
+    """The motion behind rows (k,) over places on the straight way between two centres (2, 3) m.
+
+    Both go on by turns, as keeps them near to each other.
+    """
+    ends, share = patch.closest(centres), np.linspace(0.0, 1.0, STEPS + 1)
+    way = patch.between(*(ends.of(np.full(len(share), k)) for k in (0, 1)), share)
+    row = np.append(np.repeat(numbers, PARTS), numbers[-1])
+    parts = np.append(np.tile(np.arange(PARTS) / PARTS, len(numbers)), 1.0)
+    q = rows[row] + parts[:, None] * (rows[row + 1] - rows[row])
+    at = judge.sampled(row, parts, q)
+    target, approaches = judge.targets(way)
+    off = np.linalg.norm(at.points[:, None] - target, axis=2) / judge.task.effective_tolerance
+    chord = max(judge.task.cone_chord, 1e-9)
+    lean = np.linalg.norm(at.axes[:, None] - approaches, axis=2) / chord
+    k, m = _by_turns(np.minimum(np.maximum(off, lean), 10.0) ** STEEP)
+    return _over(judge, way.of(m), at.of(k))
+
+
+def _over(judge: Judge, places: Places, at: Samples) -> Samples:
+    """Samples over other places."""
+    return judge.over(places, at.row, at.share, at.points, at.axes, at.x)
+
+
+def _by_turns(costs: Array) -> tuple[Ints, Ints]:
+    """Numbers k and m that rise from the first to the last of costs (K, M), with the least sum."""
+    least = costs.cumsum(axis=1)
+    for k in range(1, len(costs)):
+        before = np.minimum(least[k - 1], np.append(np.inf, least[k - 1, :-1])).tolist()
+        own = np.inf
+        for m, cost in enumerate(costs[k].tolist()):
+            least[k, m] = own = cost + min(before[m], own)
+    k, m = len(costs) - 1, costs.shape[1] - 1
+    found = [(k, m)]
+    while k or m:
+        choices = [(k - 1, m - 1), (k - 1, m), (k, m - 1)]
+        k, m = min((one for one in choices if min(one) >= 0), key=lambda one: least[one])
+        found.append((k, m))
+    numbers = np.array(found[::-1])
+    return numbers[:, 0], numbers[:, 1]

@@ -7,6 +7,7 @@ refused, and so is what is still open after many halvings.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -48,15 +49,43 @@ def tool_along(
     at_rows = judge.compared(count, np.zeros(len(rows)), poses.points, poses.axes, x)
     if marks is not None and cells is not None:
         at_rows = _at_marks(judge, cells, marks, at_rows)
-    good = judge.within(at_rows)
-    faults = _said(judge, at_rows.of(~good), "row")
-    stretches = judge.between_rows(rows, poses, at_rows).of(good[:-1] & good[1:])
+    good, every = judge.within(at_rows), judge.between_rows(rows, poses, at_rows)
     most, room = np.zeros(3), np.full((len(rows), 2), np.inf)
-    more, between = _between(judge, rows, stretches, most, room)
-    samples = in_order(Samples.join(at_rows, *between))
+
+    def decided(left: SampledStretches) -> Mask:
+        bounds = judge.bounds(left)
+        good = judge.within(bounds)
+        right = bounds.of(good)
+        np.maximum(most, _most(judge, right), out=most)
+        less_room(room, judge.task, left.row[good], right.chord, right.roll)
+        return good
+
+    left, between = _between(judge, rows, every.of(good[:-1] & good[1:]), decided)
+    samples = Samples.join(at_rows, *between)
+    if marks is not None and cells is not None and len(rows) > 1:
+        wrong = ~judge.within(samples)
+        if (wrong.any() or len(left.row)) and wrong.sum() <= ENOUGH:  # or some were not looked at
+            from feasibility.certification.followed import on_the_way
+
+            doubtful = np.append(samples.row[wrong], left.row)
+            right, more = on_the_way(
+                judge, rows, cells, marks, at_rows, every.of_segment, doubtful, decided
+            )
+            before = right[np.maximum(samples.row - 1, 0)] | (samples.share > 0.0)
+            samples = Samples.join(samples.of(~(wrong & right[samples.row] & before)), *more)
+            left = left.of(~right[left.row])
+    wrong, rough = ~judge.within(samples), samples.share > 0.0
+    faults = _said(judge, samples.of(wrong & ~rough), "row")
+    if (wrong & rough).any():
+        faults += _said(judge, samples.of(wrong & rough), "place")
+    elif len(left.row):
+        from feasibility.certification.refusals import open_fault
+
+        faults.append(open_fault(judge, left, judge.bounds(left)))
+    samples = in_order(samples)
     np.maximum(most, _most(judge, samples), out=most)
     less_room(room, judge.task, samples.row, samples.chord, samples.roll)
-    return Along(most, faults + more, samples, room)
+    return Along(most, faults, samples, room)
 
 
 def _said(judge: Judge, wrong: Samples, noun: str) -> list[MotionFault]:
@@ -78,39 +107,23 @@ def _at_marks(judge: Judge, cells: Cells, marks: Ints, at: Samples) -> Samples:
 
 
 def _between(
-    judge: Judge, rows: Array, stretches: SampledStretches, most: Array, room: Array
-) -> tuple[list[MotionFault], list[Samples]]:
-    """Judge stretches whose ends are good, halved as needed: what is wrong, and what was looked at.
-
-    What is known where they are right goes into `most` and `room`, see `Along`.
-    """
-    samples, wrong = list[Samples](), list[Samples]()
-
-    def decided(left: SampledStretches) -> Mask:
-        bounds = judge.bounds(left)
-        good = judge.within(bounds)
-        right = bounds.of(good)
-        np.maximum(most, _most(judge, right), out=most)
-        less_room(room, judge.task, left.row[good], right.chord, right.roll)
-        return good
+    judge: Judge,
+    rows: Array,
+    stretches: SampledStretches,
+    decided: Callable[[SampledStretches], Mask],
+) -> tuple[SampledStretches, list[Samples]]:
+    """Halve stretches whose ends are good, as needed: those still open, and what was looked at."""
+    samples, wrong = list[Samples](), [0]
 
     def halves(left: SampledStretches) -> SampledStretches:
         middle = judge.middles(rows, left)
         good = judge.within(middle)
         samples.append(middle)
-        if not good.all():
-            wrong.append(middle.of(~good))
-        good &= sum(len(part.row) for part in wrong) <= ENOUGH
+        wrong[0] += int((~good).sum())
+        good &= wrong[0] <= ENOUGH
         return left.of(good).halves(middle.of(good))
 
-    left = bisected(stretches, decided, halves, LEVELS, MOST_SAMPLES)
-    if wrong:
-        return _said(judge, Samples.join(*wrong), "place"), samples
-    if not len(left.row):
-        return [], samples
-    from feasibility.certification.refusals import open_fault
-
-    return [open_fault(judge, left, judge.bounds(left))], samples
+    return bisected(stretches, decided, halves, LEVELS, MOST_SAMPLES), samples
 
 
 def _most(judge: Judge, one: Samples | Bounds) -> Array:

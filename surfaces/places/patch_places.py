@@ -65,13 +65,26 @@ class PatchPlaces(OffsetSurface):
             x = np.clip(x + np.clip(step, -most, most), low, high)
         return Places(start.chart, x)
 
-    def paths(self, start: Places, end: Places) -> PlacePaths:
-        """See `OffsetSurface.paths`."""
+    def between(self, start: Places, end: Places, share: Array) -> Places:
+        """See `OffsetSurface.between`."""
+        x = start.x + share[:, None] * self._step(start, end)
+        ranges = (self.patch.u_range, self.patch.v_range)
+        for axis, (period, (low, _)) in enumerate(zip(self.patch.periods, ranges, strict=True)):
+            if period:
+                x[:, axis] = low + np.mod(x[:, axis] - low, period)
+        return Places(start.chart, x)
+
+    def _step(self, start: Places, end: Places) -> Array:
+        """(k, 2) from place to place, the shorter way round."""
         step = end.x - start.x
         for axis, period in enumerate(self.patch.periods):
             if period:
                 step[:, axis] -= period * np.round(step[:, axis] / period)
-        stop = start.x + step
+        return step
+
+    def paths(self, start: Places, end: Places) -> PlacePaths:
+        """See `OffsetSurface.paths`."""
+        stop = start.x + self._step(start, end)
         ends = self.placed(start.x), self.placed(end.x)
         off = self._deviations(start.x, stop)
         return PlacePaths.straight(ends, off, start, Places(end.chart, stop))
