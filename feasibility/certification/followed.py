@@ -17,6 +17,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -35,6 +36,7 @@ LEVELS = 20  # halvings of what is lifted, until it is clear of the surface
 BEYOND, LONG = 2e-3, 0.02  # [m] so close points are looked at, beyond the border and elsewhere
 STEPS, PARTS = 256, 8  # of the way from centre to centre, of a motion from row to row
 STEEP = 8  # power of what a place costs, so that the worst counts most
+LONGEST = 500  # rows from mark to mark that are looked at so
 HALVED, MOST = 12, 100_000  # how often what lies on the way is halved, and how much of it
 BENT = 1.01  # [1] the way between two points that are so close, compared with the straight line
 
@@ -213,25 +215,10 @@ def on_the_way(
     runs = list(itertools.pairwise(np.flatnonzero(marks >= 0).tolist()))
     wanted = {k for k, run in enumerate(runs) if _within(doubtful, *run)}
     found = dict[int, Samples]()
-    if not isinstance(patch, PatchPlaces):
+    long = any(runs[k][1] - runs[k][0] > LONGEST for k in wanted)
+    if long or not isinstance(patch, PatchPlaces):
         return nothing, []
-
-    def right(at: Samples) -> bool:
-        """Is a motion right from sample to sample?"""
-        start, end, wrong = at.of(slice(-1)), at.of(slice(1, None)), [not judge.within(at).all()]
-        row = np.minimum(start.row, len(rows) - 2)
-        low, high = (each.share + (each.row - row) for each in (start, end))
-
-        def halves(left: SampledStretches) -> SampledStretches:
-            some = judge.middles(rows, left)
-            half = np.full(len(some.row), 0.5)
-            middle = _over(judge, patch.between(left.start.places, left.end.places, half), some)
-            wrong.append(not judge.within(middle).all())
-            return left.halves(middle)
-
-        stretches = SampledStretches(row, low, high, start, end, of_segment[row])
-        return not any(wrong) and not len(bisected(stretches, decided, halves, HALVED, MOST).row)
-
+    right = partial(_right, judge, patch, rows, of_segment, decided)
     while wanted - found.keys():
         k = min(wanted - found.keys())
         ends = cells.centres[marks[list(runs[k])]]
@@ -242,14 +229,40 @@ def on_the_way(
             if other in wanted or row in (0, len(rows) - 1):
                 continue
             there = at.of(np.array([end]))
-            if not right(Samples.join(there, at_rows.of(np.array([row])))):
-                if not 0 <= other < len(runs):
-                    return nothing, []
-                wanted.add(other)
+            if right(Samples.join(there, at_rows.of(np.array([row])))):
+                continue
+            if not 0 <= other < len(runs) or runs[other][1] - runs[other][0] > LONGEST:
+                return nothing, []
+            wanted.add(other)
     for k in found:
         nothing[slice(*runs[k])] = True
     nothing[-1] = nothing[-2]
     return nothing, list(found.values())
+
+
+def _right(
+    judge: Judge,
+    patch: PatchPlaces,
+    rows: Array,
+    of_segment: Array,
+    decided: Callable[[SampledStretches], Mask],
+    at: Samples,
+) -> bool:
+    """Is a motion right from sample to sample, over the straight ways between their places?"""
+    start, end, wrong = at.of(slice(-1)), at.of(slice(1, None)), [not judge.within(at).all()]
+    row = np.minimum(start.row, len(rows) - 2)
+    low, high = (each.share + (each.row - row) for each in (start, end))
+
+    def halves(left: SampledStretches) -> SampledStretches:
+        some = judge.middles(rows, left)
+        half = np.full(len(some.row), 0.5)
+        middle = _over(judge, patch.between(left.start.places, left.end.places, half), some)
+        wrong.append(not judge.within(middle).all())
+        return left.halves(middle)
+
+    stretches = SampledStretches(row, low, high, start, end, of_segment[row])
+    left = bisected(stretches, decided, halves, HALVED, MOST)
+    return not any(wrong) and not len(left.row)
 
 
 def _within(numbers: Ints, low: int, high: int) -> bool:
