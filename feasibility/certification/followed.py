@@ -278,7 +278,8 @@ def _in_order(
     Both go on by turns, as keeps them near to each other.
     """
     ends, share = patch.closest(centres), np.linspace(0.0, 1.0, STEPS + 1)
-    way = patch.between(*(ends.of(np.full(len(share), k)) for k in (0, 1)), share)
+    first, last = (ends.of(np.full(len(share), k)) for k in (0, 1))
+    way = patch.between(first, last, share)
     row = np.append(np.repeat(numbers, PARTS), numbers[-1])
     parts = np.append(np.tile(np.arange(PARTS) / PARTS, len(numbers)), 1.0)
     q = rows[row] + parts[:, None] * (rows[row + 1] - rows[row])
