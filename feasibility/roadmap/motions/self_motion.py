@@ -235,6 +235,7 @@ def margin_shares(arrays: SearchArrays, work: Work, cell: int, guesses: Array) -
     return margins
 
 
+@np.errstate(divide="ignore", invalid="ignore")  # of a cone or a roll without room nothing is free
 def _margin(arrays: SearchArrays, work: Work, q: Array) -> float:
     """What the tightest constraint leaves free where `settle` has ended."""
     half = 0.5 * (arrays.upper - arrays.lower)
