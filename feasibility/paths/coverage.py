@@ -11,7 +11,7 @@ stuck is where it had better begin.
 
 import math
 import operator
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import networkx as nx
@@ -123,16 +123,31 @@ def coverage_path(
     check_run(cells, order)
     needed = _needed(verdict, only)
     robot, task = verdict.robot, verdict.task
-    if cells.in_order:
-        walk = _run(verdict, needed)
-    else:
-        found = _least_revisiting(motion_graph_of(verdict), cells, order, needed)
-        walk = found.graph.walk(_from_start(found, robot.start))
-    walk = unwound(robot, task, walk)
-    replayed = replay(robot, cells, task, walk, needed)
-    if not replayed.accepted:
-        raise PathError(f"the independent replay refuses the path: {replayed.refusal}")
-    return CoveragePath.of(robot, cells, task, order, walk, needed, replayed.certificate)
+    refusal = ""
+    for walk in _tried(verdict, order, needed):
+        walk = unwound(robot, task, walk)
+        replayed = replay(robot, cells, task, walk, needed)
+        if replayed.accepted:
+            return CoveragePath.of(robot, cells, task, order, walk, needed, replayed.certificate)
+        refusal = refusal or replayed.refusal
+    raise PathError(f"the independent replay refuses the path: {refusal}")
+
+
+def _tried(verdict: Verdict, order: Order, needed: Mask) -> Iterator[Walk]:
+    """Motions over cells in an order: of all that are known, then of those of the witness alone.
+
+    The witness has the margins that were asked for; other motions may be shorter and have less.
+
+    Raises:
+        PathError: no motion leads from cell to cell.
+    """
+    if verdict.cells.in_order:
+        yield _run(verdict, needed)
+        return
+    for alone in (False, True)[: 1 + verdict.feasible]:
+        graph = motion_graph_of(verdict, witness_alone=alone)
+        found = _least_revisiting(graph, verdict.cells, order, needed)
+        yield found.graph.walk(_from_start(found, verdict.robot.start))
 
 
 def _from_start(found: JointRoute, start: Array | None) -> list[int]:

@@ -119,18 +119,22 @@ def joint_length(motion: Motion) -> float:
     return float(np.sqrt((np.diff(motion, axis=0) ** 2).sum(axis=1)).sum())
 
 
-def motion_graph_of(verdict: Verdict) -> MotionGraph:
-    """The motions that a verdict holds: those of its graph, and those of its witness."""
+def motion_graph_of(verdict: Verdict, *, witness_alone: bool = False) -> MotionGraph:
+    """The motions that a verdict holds: those of its graph, and those of its witness.
+
+    Those of the witness alone make a graph that does not grow.
+    """
     arrays = arrays_of(verdict.robot, verdict.cells, verdict.task)
     graph = MotionGraph.of(arrays, work_for(verdict.robot.n), verdict.cells)
-    for first, last, motion in _motions(verdict):
+    graph.grows = not witness_alone
+    for first, last, motion in _motions(verdict, witness_alone):
         graph.join(graph.node(first, motion[0]), graph.node(last, motion[-1]), motion)
     return graph
 
 
-def _motions(verdict: Verdict) -> Iterator[tuple[int, int, Motion]]:
+def _motions(verdict: Verdict, witness_alone: bool) -> Iterator[tuple[int, int, Motion]]:
     """First cell, last cell and waypoints of each motion of a verdict."""
-    for i, j, motion in verdict.graph.edges(data="motion"):
+    for i, j, motion in () if witness_alone else verdict.graph.edges(data="motion"):
         low, high = (int(i), int(j)) if i < j else (int(j), int(i))
         yield low, high, np.ascontiguousarray(motion, dtype=float)
     walk = verdict.witness

@@ -84,8 +84,7 @@ def test_levers_grow_as_joints_behind_turn(turn):
         ends = [np.array([[0.0, middle + way * turn]]) for way in (-1.0, 1.0)]
         first, last = (jacobians(Kinematics(elbow), q).levers for q in ends)
         truth = np.abs(1.0 + np.exp(1j * (middle + turn * (2.0 * S - 1.0)))).max()
-        steps = np.array([[0.0, 2.0 * turn]])
-        along = levers_along(steps, elbow.prismatic, first, last, np.inf)[0, 0]
+        along = levers_along(np.array([[0, 2 * turn]]), elbow.prismatic, first, last, np.inf)[0, 0]
         assert along >= truth - 1e-9
         assert truth > 1.9 or along < 1.2 * truth + turn
 

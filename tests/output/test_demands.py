@@ -22,17 +22,13 @@ CASE = """
     robot.limits_deg.wrist_1_joint = [40, 130]
     robot.limits_deg.wrist_2_joint = [60, 140]
     robot.limits_deg.wrist_3_joint = [-200, -120]
-    surface.kind = "plane"
-    surface.u = [0.4, 0.6]
-    surface.v = [-0.1, 0.1]
-    surface.cells = [2, 2]
-    surface.position = [0, 0, 0.3]
-    surface.side = "outside"
+    surface = { kind = "plane", u = [0.4, 0.6], v = [-0.1, 0.1], cells = [2, 2], \
+position = [0, 0, 0.3], side = "outside" }
     task = { standoff = 0.02, cone_deg = 30 }
 """
 GREEDY = ("search.method=greedy", "search.step_deg=0.5", "search.moves=all", "task.tolerance=0.02")
-FLOOD = 'collision.scene=[{ name = "flood", kind = "box", size = [0.3, 0.3, 0.1], '
-FLOOD += "position = [0.5, 0, 0.37] }]"
+BOX = 'name = "flood", kind = "box", size = [0.3, 0.3, 0.1], position = [0.5, 0, 0.37]'
+FLOOD = f"collision.scene=[{{ {BOX} }}]"
 UNTIL = "search.time_limit=2"
 IMPOSSIBLE = {
     "standoff": ["task.standoff=2.5"],

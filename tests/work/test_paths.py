@@ -3,6 +3,7 @@
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise, product
+from pathlib import Path
 
 import networkx as nx
 import numpy as np
@@ -28,6 +29,7 @@ ASKED = [
     *product(("4a", "4e", "5c", *PATCHES), ORDERS),
     *((name, BEST[name]) for name in FEASIBLE if name not in ("4a", "4e", "5c")),
 ]
+MARGIN = Path(__file__).with_name("demanded_margin.toml")
 UR5 = load_robot("ur5")  # whose joints turn by a turn either way
 
 
@@ -41,6 +43,11 @@ def accepted(verdict, walk, needed=None):
     faults = faults_of(verdict, walk.q, walk.cell)
     assert [fault for fault in faults if every or not fault.startswith("coverage")] == []
     return found.certificate
+
+
+def test_a_path_keeps_the_margin_that_is_demanded():
+    path = coverage_path(check(*coverable.load_case(MARGIN).build()))
+    assert path.certificate.placement_margin.position >= path.task.placement_error.position
 
 
 def beginnings(cells, order):
