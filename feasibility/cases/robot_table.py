@@ -28,6 +28,12 @@ if TYPE_CHECKING:
     from robots.robot import Robot
 
 POSES = ("tcp", "base")
+UNITS = {
+    "limits_deg": ("degrees", "slides", "limits_m"),
+    "limits_m": ("metres", "turns", "limits_deg"),
+    "start_deg": ("degrees", "slides", "start"),
+}
+"""The unit of a key, the joints that it is not for, and the key for these."""
 URDF_ENDINGS = (".urdf", ".xml", ".xacro")
 
 
@@ -116,22 +122,11 @@ class RobotPart:
         except RobotError as error:
             units = self._wrong_units(self._kinds_alone())
             raise RobotError((*error.faults, *units), error.source) from error
-        in_order = robot.joint_names if isinstance(self.limits_deg, tuple) else ()
         kinds = dict(zip(robot.joint_names, robot.joint_kinds, strict=True))
-        faults = self._wrong_units(kinds, in_order)
-        faults += self._start_in_degrees(robot)
-        if faults:
+        if faults := self._wrong_units(kinds, robot.joint_names):
             raise RobotError(faults, f"robot {robot.name!r}")
         start = self.start if self.start_deg is None else tuple(map(math.radians, self.start_deg))
         return robot if start is None else _starting_at(robot, start, self.start_deg is not None)
-
-    def _start_in_degrees(self, robot: Robot) -> list[Fault]:
-        """Degrees for joints that slide."""
-        return [
-            Fault("start_deg", f"gives degrees for joint {joint!r}, which slides; use start")
-            for joint, kind in zip(robot.joint_names, robot.joint_kinds, strict=True)
-            if kind == "prismatic" and self.start_deg is not None
-        ]
 
     def _kinds_alone(self) -> dict[str, str]:
         """The kinds of all moving joints, by name; none where the URDF itself is at fault.
@@ -154,20 +149,17 @@ class RobotPart:
         """Degrees for joints that slide, metres for joints that turn.
 
         Args:
-            kinds: of joints, by name.
-            in_order: the joints of a list `limits_deg`.
+            kinds: of joints, by name; others are left aside.
+            in_order: the joints that a list is for.
         """
-        by_name = self.limits_deg if isinstance(self.limits_deg, Mapping) else {}
-        faults = [
-            Fault("limits_deg", f"gives degrees for joint {joint!r}, which slides; use limits_m")
-            for joint in (*in_order, *by_name)
-            if kinds.get(joint) == "prismatic"
-        ]
-        return faults + [
-            Fault("limits_m", f"gives metres for joint {joint!r}, which turns; use limits_deg")
-            for joint in self.limits_m or ()
-            if kinds.get(joint, "prismatic") != "prismatic"
-        ]
+        faults = []
+        for key, (unit, wrong, remedy) in UNITS.items():
+            given = getattr(self, key) or ()
+            for joint in given if isinstance(given, Mapping) else in_order if given else ():
+                if joint in kinds and (kinds[joint] == "prismatic") == (wrong == "slides"):
+                    text = f"gives {unit} for joint {joint!r}, which {wrong}; use {remedy}"
+                    faults.append(Fault(key, text))
+        return faults
 
     def _limits(self) -> str | list[Pair] | dict[str, Pair] | None:
         """The limits as `load_robot` takes them, rad or m."""
