@@ -14,7 +14,7 @@ the tool there, and whether it can, does not matter.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -87,6 +87,8 @@ def never_clear(
         return PoseCheck(False, 0)
     tool, looked, used = _Tool(robot, point, approach, tolerance), 0, set[int]()
     cone = min(cone, np.pi)
+    # Sheets have thousands of points, and tool and objects few.
+    order = sorted(range(len(pairs)), key=lambda i: not pairs[i].moving)
     waiting = np.array([[0.0, 0.0, cone, 0.0, np.pi]])  # tilts u, v +- half; roll +- wide
     while len(waiting):
         boxes, waiting = waiting[-BATCH:], waiting[:-BATCH]
@@ -94,19 +96,37 @@ def never_clear(
         if looked > most:
             return PoseCheck(False, looked)
         tick()
-        found = tool.measured(boxes, pairs)
+        found = tool.measured(boxes, pairs, order)
         if ((found.over <= 0.0) & (np.hypot(boxes[:, 0], boxes[:, 1]) <= cone)).any():
             return PoseCheck(False, looked)  # nor would a smaller box be ruled out
         open_ = found.ratio >= 1.0
         used |= set(found.best[~open_].tolist())
+        order.sort(key=lambda i: i not in used)
         waiting = np.concatenate([waiting, _parts(boxes[open_], found.by_tilt[open_], cone)])
-    some = tool.measured(_all_over(cone), pairs)
-    k = int(some.over.argmin())
-    first = pairs[int(some.nearest[k])].pair
-    blamed = [first, *(pairs[i].pair for i in sorted(used))]
-    distance = first.clearance - float(some.over[k]) - tolerance
+    over, nearest = _at_best(tool, cone, pairs)
+    blamed = [pairs[nearest].pair, *(pairs[i].pair for i in sorted(used))]
     named = dict.fromkeys((pair.first, pair.second) for pair in blamed)
-    return PoseCheck(True, looked, tuple(named), distance)
+    return PoseCheck(True, looked, tuple(named), blamed[0].clearance - over - tolerance)
+
+
+def _at_best(tool: _Tool, cone: float, pairs: list[ToolPair]) -> tuple[float, int]:
+    """By how much (m) bodies are too near in the best of some poses all over the cone, and which.
+
+    With one pair alone it is no more: only poses that could be the best are measured with all.
+    """
+    poses, least, nearest, known = _all_over(cone), np.inf, 0, set[int]()
+    at_least = np.full(len(poses), -np.inf)
+    while at_least.min() < least:
+        k = int(at_least.argmin())
+        found = tool.measured(poses[k : k + 1], pairs, range(len(pairs)), whole=True)
+        over, i = float(found.over[0]), int(found.nearest[0])
+        if over < least:
+            least, nearest = over, i
+        if i not in known:
+            known.add(i)
+            at_least = np.maximum(at_least, tool.measured(poses, pairs, [i], whole=True).over)
+        at_least[k] = np.inf
+    return least, nearest
 
 
 class _Tool:
@@ -121,38 +141,50 @@ class _Tool:
         self._onto = pin.Quaternion.FromTwoVectors(self._axis, approach).toRotationMatrix()
         self._plane = pin.Quaternion.FromTwoVectors(up, approach).toRotationMatrix()[:, :2]
 
-    def measured(self, boxes: Array, pairs: list[ToolPair]) -> _Measured:
-        """What is known of boxes (k, 5), a few at a time where pairs have many points."""
+    def measured(
+        self, boxes: Array, pairs: list[ToolPair], order: Sequence[int], whole: bool = False
+    ) -> _Measured:
+        """What is known of boxes (k, 5), a few at a time where pairs have many points.
+
+        Pairs are taken in this order; boxes that one rules out are not asked about the others,
+        unless `whole`.
+        """
         some = max(1, MOST_POINTS // max(len(pair.points) for pair in pairs))
         parts = [
-            self._measured(boxes[first : first + some], pairs)
+            self._measured(boxes[first : first + some], pairs, order, whole)
             for first in range(0, len(boxes), some)
         ]
         return _Measured(*map(np.concatenate, zip(*parts, strict=True)))
 
-    def _measured(self, boxes: Array, pairs: list[ToolPair]) -> _Measured:
+    def _measured(
+        self, boxes: Array, pairs: list[ToolPair], order: Sequence[int], whole: bool
+    ) -> _Measured:
         """`measured` of all at once."""
         rotations = np.array([self._rotation(*box[[0, 1, 3]]) for box in boxes])
-        rows, over, ratio, by_tilt = np.arange(len(boxes)), [], [], []
-        for pair in pairs:
-            inside, own = pair.overlaps(rotations, self._point - rotations @ self._tip)
+        places, count = self._point - rotations @ self._tip, len(boxes)
+        over, ratio = np.full(count, -np.inf), np.full(count, np.inf)
+        by_tilt, best, nearest = (np.zeros(count, kind) for kind in (bool, int, int))
+        for i in order:
+            rows = np.flatnonzero((ratio >= 1.0) | whole)
+            if not len(rows):
+                break
+            inside, own = pairs[i].overlaps(rotations[rows], places[rows])
             away = own - self._tip
             size = np.einsum("...i,...i->...", away, away)
             beside = np.sqrt(np.maximum(size - (away @ self._axis) ** 2, 0.0))
-            tilting = np.sqrt(2.0 * size) * boxes[:, 2:3]
-            rolling = beside * boxes[:, 4:]
+            tilting = np.sqrt(2.0 * size) * boxes[rows, 2:3]
+            rolling = beside * boxes[rows, 4:]
             spare = inside - self._tolerance
             times = np.divide(tilting + rolling, spare, out=np.full(spare.shape, np.inf),
                               where=spare > 0.0)  # fmt: skip
-            best = times.argmin(axis=1)
-            over.append(spare.max(axis=1))
-            ratio.append(times[rows, best])
-            by_tilt.append(np.broadcast_to(tilting > rolling, spare.shape)[rows, best])
-        best, nearest = np.argmin(ratio, axis=0), np.argmax(over, axis=0)
-        return _Measured(
-            np.max(over, axis=0), np.min(ratio, axis=0), np.array(by_tilt)[best, rows], best,
-            nearest,
-        )  # fmt: skip
+            at = np.arange(len(rows)), times.argmin(axis=1)
+            # Where nothing is too near, any point tells how to cut.
+            better = (times[at] < ratio[rows]) | (i == order[0])
+            more = spare.max(axis=1) > over[rows]
+            over[rows[more]], nearest[rows[more]] = spare.max(axis=1)[more], i
+            ratio[rows[better]], best[rows[better]] = times[at][better], i
+            by_tilt[rows[better]] = np.broadcast_to(tilting > rolling, spare.shape)[at][better]
+        return _Measured(over, ratio, by_tilt, best, nearest)
 
     def _rotation(self, u: float, v: float, roll: float) -> Array:
         """(3, 3) of the last joint, tilted and rolled about the approach direction."""
