@@ -54,7 +54,8 @@ def ends_of(path: CoveragePath, approach: float) -> Ends:
         approach: m, how far the tool is drawn back along the approach direction.
 
     Raises:
-        PathError: the tool cannot be drawn back, a body is too near, or no move home is found.
+        PathError: the tool cannot be drawn back, or would go through the surface; a body is too
+            near; or no move home is found.
     """
     q, cell = path.walk.q, path.walk.cell
     marks = np.flatnonzero(cell >= 0)
@@ -64,6 +65,10 @@ def ends_of(path: CoveragePath, approach: float) -> Ends:
         _move(path, q[row], int(cell[mark]), approach, what)
         for row, mark, what in ((0, marks[0], "entry"), (-1, marks[-1], "exit"))
     )
+    for rows, what in ((into, "entry"), (out, "exit")):
+        through = path.through_surface(rows)
+        if through:
+            raise PathError(f"{what}: {through}; give another --approach, or task.home_deg")
     home = path.task.home_deg is not None
     return Ends(approach=approach, entry=into[::-1], exit=out, from_home=home)
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from coverable.arrays import Array, Ints, Mask, Protected
 from coverable.errors import listed
+from feasibility.certification.followed import lifted_faults
 from feasibility.certification.motion_replay import replay
 from feasibility.paths.ladder import FEW, JointRoute, joint_route
 from feasibility.paths.metrics import PathFigures, figures_of
@@ -37,6 +38,7 @@ from feasibility.paths.order import (
 from feasibility.paths.winding import unwound
 from feasibility.task import Task
 from feasibility.verdict import Answer, Certificate, Verdict, Walk
+from robots.kinematics import Kinematics
 from robots.robot import Robot
 from surfaces.cells import Cells
 
@@ -74,6 +76,21 @@ class CoveragePath(Protected):
     def visits(self) -> Ints:
         """Flat indices of cells in the order in which the path passes their centres."""
         return self.walk.cell[self.walk.cell >= 0]
+
+    def through_surface(self, q: Array, working: Mask | None = None) -> str:
+        """Where the tool point of another motion goes through the surface, or may; empty: nowhere.
+
+        Args:
+            q: (k, n) rad or m, rows that straight lines join.
+            working: (k,) where the tool works; between two such rows nothing is looked at.
+        """
+        lifted = np.arange(len(q) - 1.0)
+        if working is not None:
+            lifted = lifted[~(working[:-1] & working[1:])]
+        kinematics, tolerance = Kinematics(self.robot), self.task.effective_tolerance
+        ends = lifted, lifted + 1.0
+        found = lifted_faults(self.cells.surface.wall, q, ends, kinematics, tolerance)
+        return "; ".join(fault.text for fault in found)
 
     def __repr__(self) -> str:
         """One line: cells, order and lengths."""

@@ -233,7 +233,8 @@ def _off_surface(path: CoveragePath, run: Trajectory) -> str:
         replayed = replay(robot, path.cells, tool_alone, Walk(q, walk.cell[part]), path.needed)
         if not replayed.accepted:
             return replayed.refusal
-    return ""
+    working = _working(path, run)
+    return "" if working is None else path.through_surface(run.q, working)
 
 
 def _collisions(path: CoveragePath, run: Trajectory) -> str:
