@@ -40,16 +40,11 @@ def verdict(request):
     return missing(check(robot, cells, Task(0.005, 45)), MISSED[request.param])
 
 
-def areas_of(vertices, faces):
-    a, b, c = np.moveaxis(vertices[faces], 1, 0)
-    return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2.0
-
-
 def test_a_fine_mesh_is_thinned_and_its_cells_keep_their_areas():
     fine = mesh(triangles(70, 60, dome), side="inside").cells(count=6)
     display = make_display_mesh(fine, budget=2_000)
     assert len(display.labels) <= 2_000 < len(fine.labels)
-    area = np.bincount(display.labels, areas_of(*display.mesh), 6)
+    area = np.bincount(display.labels, display.mesh.areas, 6)
     np.testing.assert_allclose(area, fine.areas, rtol=0.06)
     assert area.sum() == pytest.approx(fine.areas.sum(), rel=0.005)
     assert len(display.borders()) > 10

@@ -62,7 +62,8 @@ class Window:
         page = self.page
         wanted = kinds or ("feasible", "infeasible", "undecided", "error")
         until(lambda: page.answered == page.number and page.answer.kind in wanted)
-        return page.answer
+        with page.changed:  # until all of it is drawn
+            return page.answer
 
     def close(self):
         self.socket.close()
