@@ -20,6 +20,7 @@ only of pairs that do not allow all of it planes are tried, and coal is asked ag
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -83,18 +84,20 @@ def clear_share(pairings: Sequence[Pairing], nearer: Array, calls: float) -> Cle
 
     Of those that allow least planes find out more, or so many calls of coal.
     """
-    more, coal = np.maximum(nearer, LEAST), calls > 0.0
-    shares, least, pair = _shares(pairings, more), 1.0, None
-    for k in np.argsort(shares.min(axis=1)).tolist():
+    more = np.maximum(nearer, LEAST)
+    shares, pair = _shares(pairings, more), None
+    known, least = shares.min(axis=1), 1.0
+    for k in np.argsort(known).tolist():
+        if known[k] >= least:
+            break
         one, row = pairings[k], int(shares[k].argmin())
-        if shares[k, row] < least and (calls >= FEW or not coal):
-            before = one.calls
-            if coal:
-                one.look_closer(row, least * more[k], MOST_CALLS * calls)
-                calls -= one.calls - before
-            else:
-                one.part_at(row, one.needed + least * more[k])
-            shares[k] = _shares([one], more[[k]])
+        if calls == 0.0:
+            one.part_at(row, one.needed + least * more[k])
+        elif calls >= FEW:
+            calls += one.calls
+            one.look_closer(row, least * more[k], MOST_CALLS * (calls - one.calls))
+            calls -= one.calls
+        shares[k] = _shares([one], more[k])
         if shares[k].min() < least:
             least, pair = float(shares[k].min()), one.names
     return ClearShare(shares.min(axis=0), pair)
@@ -102,7 +105,8 @@ def clear_share(pairings: Sequence[Pairing], nearer: Array, calls: float) -> Cle
 
 def _shares(pairings: Sequence[Pairing], more: Array) -> Array:
     """(c, m - 1) the share of `more` that couples allow along each segment; 0 where that is NaN."""
-    over = np.stack([one.low - one.needed for one in pairings])
+    needed = np.array([one.needed for one in pairings])[:, None]
+    over = np.array([one.low for one in pairings]) - needed
     return np.asarray(np.minimum(np.fmax(over / more, 0.0), 1.0))
 
 
@@ -126,22 +130,20 @@ class Nearer:
         self.first = np.array([index[one.a] for one in pairings])
         self.second = np.array([index[one.b] for one in pairings])
         tool = robot.model.frames[robot.tool_frame_id].placement.translation
-        centres = np.vstack([*(body.centre for body in bodies), tool])
-        self.joints = np.array([body.joint for body in bodies] + [robot.n])
-        balls = np.array([min(body.ball, HUGE) + body.deviation for body in bodies] + [0.0])
+        centres = np.array([*(body.centre for body in bodies), tool])
+        self.joints = np.array([*(body.joint for body in bodies), robot.n])
+        balls = np.array([*(min(body.ball, HUGE) + body.deviation for body in bodies), 0.0])
         """(B,) m, about the centres of all bodies, and of the tool point."""
         middles, slides = motion.middles(self.joints, centres), self.slides[:, None, None]
         levers = motion.levers(middles) + balls
         most = np.where(slides, 1.0, np.maximum(levers[:, :-1], levers[:, 1:]))
         way = self._sums(most * motion.steps.T[:, :, None])
         between = np.where(np.arange(robot.n)[:, None, None] < self.joints, way[1:], way[:-1])
-        mean = 0.5 * (levers[:, :-1] + levers[:, 1:] + between)
-        self.levers = np.where(slides, 1.0, mean)
+        self.levers = np.where(slides, 1.0, 0.5 * (levers[:, :-1] + levers[:, 1:] + between))
         """(n, m - 1, B) m, the largest along each segment, of points of each body."""
-        self.goes, self.over = np.array([
-            (one.a.joint == 0) & np.array([bool(beside & {*one.names}), SURFACE in one.names])
-            for one in pairings
-        ]).T  # fmt: skip
+        rests = [one.a.joint == 0 and not beside.isdisjoint(one.names) for one in pairings]
+        self.goes, self.over = np.array(rests), np.array([SURFACE in one.names for one in pairings])
+        self.over &= self.goes
         self.far = self._apart(middles, pivot, way[0], balls)
         """(m - 1, c) m, of the second ones from the pivot, at most."""
         self.size = (np.linalg.norm(centres - pivot, axis=1) + balls)[self.first]
@@ -157,8 +159,8 @@ class Nearer:
         Of values (n, m - 1, B) of all joints.
         """
         sums = np.zeros((len(each) + 1, *each.shape[1:]))
-        np.cumsum(each, axis=0, out=sums[1:])
-        return np.asarray(np.abs(sums - sums[self.joints, :, np.arange(len(self.joints))].T))
+        each.cumsum(axis=0, out=sums[1:])
+        return np.abs(sums - sums[self.joints, :, np.arange(len(self.joints))].T)
 
     def _apart(self, middles: Array, points: Array, way: Array, balls: Array) -> Array:
         """(m - 1, c) m, how far the second ones are at most from points that go such ways."""
@@ -172,21 +174,18 @@ class Nearer:
             moved: (m - 1, n) rad or m, e_j of each segment.
             shift, turn: m and rad, how far the part is displaced.
         """
-        a, b = self.joints[self.first], self.joints[self.second]
         off = self._sums(self.levers * moved.T[:, :, None])  # as seen from every joint
-        found = np.full((len(moved), len(a)), np.inf)
-        for k in range(int(b.max()) + 1):
-            both = off[k][:, self.first] + off[k][:, self.second]
-            np.minimum(found, both, out=found, where=(a <= k) & (k <= b))
+        found = reduce(np.minimum, (one[:, self.first] + one[:, self.second] for one in off))
         # The part, and what is beside it.
         away = np.minimum(self.size, self.far + off[0][:, self.second])
         found += self.goes * np.maximum(shift, turn * away)
         # The part, as seen from the tool point.
-        turned = np.cumsum(np.where(self.slides, 0.0, moved), axis=1)
-        turned = turn + np.column_stack([0.0 * turned[:, 0], turned])[:, b]
-        away = off[b, :, -1].T + turned * self.reach
+        turned = np.zeros((len(moved), len(self.slides) + 1))
+        np.where(self.slides, 0.0, moved).cumsum(axis=1, out=turned[:, 1:])
+        b = self.joints[self.second]
+        away = off[b, :, -1].T + (turn + turned[:, b]) * self.reach
         np.minimum(found, away, out=found, where=self.over)
-        return found.T
+        return np.asarray(found.T)
 
 
 def _furthest(body: Body, point: Array) -> float:
