@@ -31,7 +31,6 @@ from feasibility.certification.collisions.pairing import Pairing
 from feasibility.collisions.words import SURFACE
 from feasibility.task import Task
 from robots.robot import Robot
-from surfaces.cells import Cells
 
 LESS, WIDER = 0.2, 1.5  # [1] of a margin, asked about next: so much, or times what is known
 SHARE_OF_CALLS = 0.08  # coal calls for each that the judge needed, ...
@@ -51,8 +50,8 @@ class ClearShare(NamedTuple):
 
 def displaced_share(
     robot: Robot,
-    cells: Cells,
     task: Task,
+    pivot: Array,
     pairings: tuple[Pairing, ...],
     most: tuple[float, float],
     moved: Callable[[float, float], Array],
@@ -60,21 +59,23 @@ def displaced_share(
     """A share of a margin with which bodies stay clear along a motion, and why not with more.
 
     Args:
-        robot, cells, task: the case.
+        robot, task: the case.
+        pivot: (3,) m, about which the part turns.
         pairings: all couples of bodies along the motion, as they were judged.
         most: m and rad, the margin without bodies.
         moved: (m - 1, n) rad or m, e_j of each segment with the part so far off.
     """
     scene = () if task.collision is None else task.collision.scene
     beside = {SURFACE, *(one.name for one in scene)}
-    nearer = Nearer(robot, pairings, beside, cells.centres.mean(axis=0))
+    nearer = Nearer(robot, pairings, beside, pivot)
     along, some, pair = np.zeros(len(pairings[0].low)), 1.0, None
-    for calls in (0.0, SHARE_OF_CALLS * sum(one.calls for one in pairings)):
+    calls = SHARE_OF_CALLS * sum(one.calls for one in pairings)
+    for allowed in (0.0, calls):
         part = some * most[0], some * most[1]
-        clear = clear_share(pairings, nearer.by(moved(*part), *part), calls)
+        clear = clear_share(pairings, nearer.by(moved(*part), *part), allowed)
         along, pair = np.maximum(along, some * clear.along), clear.pair or pair
         some = min(max(LESS, WIDER * float(along.min())), 1.0)
-        if clear.pair is None:
+        if clear.pair is None or (some == 1.0 and calls < FEW):
             break
     return ClearShare(along, pair)
 

@@ -50,6 +50,19 @@ def column_changes(largest: Array, steps: Array, prismatic: Mask) -> Array:
     return np.asarray(largest * own + np.where(prismatic, 0.0, behind))
 
 
+def column_bends(largest: Array, steps: Array, prismatic: Mask) -> Array:
+    """(..., n) what |J_j''| of each column is at most along a segment, from L_j and the steps.
+
+    Of three joints the third derivative is z_a x (z_b x (z_c x (p - o_c))), c the last of them: as
+    long as the lever of c at most, and 0 if a or b slides.
+    """
+    turns = np.where(prismatic, 0.0, steps)
+    own = np.cumsum(turns, axis=-1)
+    moved = largest * steps * (2.0 * own - turns)
+    behind = np.cumsum(moved[..., ::-1], axis=-1)[..., ::-1] - moved
+    return np.asarray(largest * own**2 + np.where(prismatic, 0.0, behind))
+
+
 def levers_along(
     steps: Array, prismatic: Mask, first: Array, last: Array, cap: Array | float
 ) -> Array:

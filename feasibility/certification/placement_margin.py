@@ -15,14 +15,16 @@ changes by at most M y, the tool point is M y^2 / 2 off its linear model. The ax
 
 **Lemma** (Newton and Kantorovich), on a straight stretch q(s), s from 0 to 1, with the joint
 changes h_j. A is the Jacobian of the axis, P about a right inverse of J at both ends and straight
-between, with |JP - I| <= eps there; d_j bounds the norms of its rows, N those of P, T those of AP,
-at both ends. J and A change by at most s C and s C_a from one end, (1 - s) C and (1 - s) C_a from
-the other. As P is a mean of both,
+between, with |JP - I| <= eps and |AP| <= T there; d_j bounds the norms of its rows at both ends, and
+so between them. These change by g_j in all, columns of J at the rate c_j at most (`column_changes`)
+and that by b_j (`column_bends`); those of A likewise. Whatever is at most so much at both ends is
+in between more by at most an eighth of its second derivative. As P'' = 0, and products of matrices
+are sums over columns and rows,
 
-    |J(s) P(s) - I| <= kappa = eps + N C / 2,    |A(s) P(s)| <= T' = T + N C_a / 2.
+    |J(s) P(s) - I| <= kappa = eps + sum_j (b_j d_j + 2 c_j g_j) / 8,    |A(s) P(s)| <= T' likewise.
 
-M and M_a are those of the largest levers along the stretch: no lever is over half of what those at
-both ends and the way of all behind it sum to. Let f(y) = (1 - kappa) y - M y^2 / 2, |g p - p| at
+All of them, M and M_a too, are those of the largest levers along the stretch: no lever is over half
+of what those at both ends and the way of all behind it sum to. Let f(y) = (1 - kappa) y - M y^2 / 2, |g p - p| at
 most rho. **If** rho <= f(y) and M y < 1 - kappa, exactly one v with |v| <= y has p(q(s) + P(s) v) =
 g p(q(s)): with B the derivative JP at v = 0, v -> v - B^-1 (p(q + P v) - g p) maps the ball into
 itself, as it takes v to at most (rho + M y^2 / 2) / (1 - kappa), and is a contraction there. All of
@@ -52,8 +54,12 @@ import numpy as np
 
 from coverable.arrays import Array, Ints
 from feasibility.certification.bisection import Rows
-from feasibility.certification.jacobians import jacobians, smallest_singular
-from feasibility.certification.lever_bounds import column_changes, second_derivative_bound
+from feasibility.certification.jacobians import Jacobians, jacobians, smallest_singular
+from feasibility.certification.lever_bounds import (
+    column_bends,
+    column_changes,
+    second_derivative_bound,
+)
 from feasibility.task import PlacementError, Task
 from feasibility.verdict import Bound, Certificate, PlacementMargin
 from robots.kinematics import Kinematics
@@ -63,16 +69,15 @@ from surfaces.cells import Cells
 if TYPE_CHECKING:
     from feasibility.certification.collisions.pairing import Pairing
 
-CLOSE = 0.94  # [1] of the least room at a row: stretches with so much are not cut, ...
-CLOSER = 0.97  # [1] ... others into as many pieces as should have this much
-ROUNDS = 3  # of cutting what has less
-PIECES = 32  # most, that a stretch is cut into at once
+CLOSE = 0.94  # [1] of the least room at a row: stretches with less are cut
+ROUNDS = 3  # of cutting, after which they are taken as they are
+PIECES = 4  # that a stretch is cut into
 MOST = 10.0  # [m] no larger ball is tried
 LEAST = 1e-12  # [m], [rad] so that nothing is divided by 0
 FREE = 1e9  # [rad] room for what is free
 BELOW = 1.0 - 1e-9  # [1] of what is found is claimed: rounding
 DAMPED = 1e-10  # [1] of all squared singular values: so a right inverse exists everywhere
-BOUNDS = (Bound.LIMIT, Bound.CONE, Bound.ROLL, Bound.SINGULAR)
+BOUNDS = (Bound.LIMIT, Bound.SINGULAR, Bound.CONE, Bound.ROLL)
 
 
 class Given(NamedTuple):
@@ -81,21 +86,22 @@ class Given(NamedTuple):
     robot: Robot
     task: Task
     pivot: Array
-    kinematics: Kinematics
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Ends(Rows):
-    """k configurations at which stretches begin or end."""
+    """k configurations at which stretches begin or end; or (2, k) of them, where some end too."""
 
     q: Array
     points: Array
     levers: Array
     """(k, 2, n) r_j, and those of the axis, sines."""
+    right: Array
+    """(k, n, 3) P."""
     rows: Array
-    """(k, n) norms of the rows of P."""
+    """(k, n) norms of its rows."""
     norms: Array
-    """(k, 3) N, eps and T."""
+    """(k, 2) eps and T."""
     sigma: Array
     """(k,) the smallest singular value; inf where it does not matter."""
 
@@ -111,12 +117,10 @@ class Balls(Rows):
     """(k,) 1 - kappa."""
     second: Array
     """(k,) M."""
-    tilts: Array
-    """(k, 2) T' and M_a, times c / 2 sin(c / 2)."""
+    turns: Array
+    """(k, 2, 2) T' and M_a, times c / 2 sin(c / 2); sum of d_j of the joints that turn, and 0."""
     moves: Array
     """(k, n) d_j."""
-    turns: Array
-    """(k,) sum of d_j of the joints that turn."""
     caps: Array
     """(k, 2) m, what y may be for limits, and for singularities and the lemma itself."""
     room: Array
@@ -125,30 +129,32 @@ class Balls(Rows):
     """(k,) m, r."""
 
     def allowed(self, turn: Array | float) -> Array:
-        """(k, 4) m, y by `BOUNDS`, with the part turned by so many rad for each metre of f(y)."""
-        (first, bend), (cone, roll) = self.tilts.T, self.room.T
-        swing = solved(first + turn * self.slope, bend - turn * self.second, cone)
-        twist = solved(self.turns + turn * self.slope, -turn * self.second, roll)
-        return np.stack([self.caps[:, 0], swing, twist, self.caps[:, 1]], axis=1)
+        """(..., k, 4) m, y by `BOUNDS`, with the part turned by (..., k) rad a metre of f(y)."""
+        part = np.asarray(turn)[..., None]
+        first = self.turns[..., 0] + part * self.slope[:, None]
+        angles = solved(first, self.turns[..., 1] - part * self.second[:, None], self.room)
+        return np.concatenate([np.broadcast_to(self.caps, angles.shape), angles], axis=-1)
 
     def reached(self, turn: Array | float) -> Array:
-        """(k,) m, f of the least of these."""
-        y = self.allowed(turn).min(axis=1)
+        """(..., k) m, f of the least of these."""
+        y = self.allowed(turn).min(axis=-1)
         return np.asarray(self.slope * y - 0.5 * self.second * y**2)
 
     @property
     def triangle(self) -> Array:
         """(k, 2) D where Theta = 0, m, and Theta where D = 0, rad."""
-        angle = np.minimum(self.reached(1.0 / self.far) / self.far, np.pi)
-        return np.stack([self.reached(0.0), angle], axis=1)
+        shift, turn = self.reached(np.stack([0.0 * self.far, 1.0 / self.far]))
+        return np.stack([shift, np.minimum(turn / self.far, np.pi)], axis=1)
+
+    @property
+    def first(self) -> Ints:
+        """(m - 1,) which is the first one behind each row."""
+        return np.flatnonzero(np.diff(self.row, prepend=-1))
 
     def moved(self, position: float, angle: float) -> Array:
         """(m - 1, n) rad or m, e_j from each row to the next, for such a triangle."""
-        rho = np.maximum(position, angle * self.far)
-        found = np.zeros((int(self.row.max()) + 1, self.moves.shape[1]))
-        y = solved(self.slope, -self.second, rho)
-        np.maximum.at(found, self.row, self.moves * y[:, None])
-        return found
+        y = solved(self.slope, -self.second, np.maximum(position, angle * self.far))
+        return np.maximum.reduceat(self.moves * y[:, None], self.first)
 
 
 def solved(a: Array, b: Array | float, c: Array) -> Array:
@@ -160,110 +166,97 @@ def solved(a: Array, b: Array | float, c: Array) -> Array:
     return np.minimum(np.where(reached, MOST, 2.0 * c / np.where(reached, 1.0, below)), MOST)
 
 
-def ends_of(case: Given, q: Array) -> Ends:
-    """What has to be known of configurations q (k, n)."""
-    at = jacobians(case.kinematics, q)
+def ends_of(case: Given, q: Array, at: Jacobians | None = None) -> Ends:
+    """What has to be known of configurations q (k, n), whose Jacobians may be known."""
+    at = jacobians(Kinematics(case.robot), q) if at is None else at
     back = at.point.transpose(0, 2, 1)
     square = at.point @ back
     least = DAMPED * square.trace(axis1=1, axis2=2) + LEAST**2
     right = back @ np.linalg.inv(square + least[:, None, None] * np.eye(3))
     off, turned = at.point @ right - np.eye(3), at.axis @ right
-    values = np.linalg.eigvalsh(np.stack([square, turned @ turned.transpose(0, 2, 1)]))
-    norm = 1.0 / (np.maximum(values[0, :, 0], 0.0) + least)
-    norms = np.sqrt(np.stack([norm, (off**2).sum(axis=(1, 2)), values[1, :, 2]], axis=1))
+    most = np.linalg.eigvalsh(turned @ turned.transpose(0, 2, 1))[:, 2]
+    norms = np.sqrt(np.stack([(off**2).sum(axis=(1, 2)), most], axis=1)) / BELOW
     sigma = np.full(len(q), np.inf)
     if case.task.min_manipulability is not None:
         sigma = smallest_singular(at, case.robot.length_unit)
     levers = np.stack([at.levers, at.sines], axis=1)
-    return Ends(q, at.points, levers, np.sqrt((right**2).sum(axis=2)), norms / BELOW, sigma)
+    return Ends(q, at.points, levers, right, np.sqrt((right**2).sum(axis=2)), norms, sigma)
 
 
-def left_to_limits(robot: Robot, a: Array, b: Array) -> Array:
-    """(..., n) rad or m, from both limits to straight lines between a and b."""
-    low, high = np.minimum(a, b), np.maximum(a, b)
+def left_to_limits(robot: Robot, ends: Array) -> Array:
+    """(..., n) rad or m, from both limits to straight lines between ends (2, ..., n)."""
+    low, high = ends.min(axis=0), ends.max(axis=0)
     return np.maximum(np.minimum(low - robot.lower, robot.upper - high), 0.0)
 
 
-def _changes(robot: Robot, levers: Array, steps: Array) -> Array:
-    """(k, 2) how far J and A change at most while joints move by steps (k, n); levers (k, 2, n)."""
-    columns = column_changes(levers, steps[:, None], robot.prismatic)
-    return np.asarray(np.sqrt((columns**2).sum(axis=2)))
-
-
-def _fall(robot: Robot, changes: Array) -> Array:
-    """(k,) how far the singular value falls at most."""
-    return np.hypot(changes[:, 0] / robot.length_unit, changes[:, 1])
-
-
-def balls_of(case: Given, at: tuple[Ints, Array], a: Ends, b: Ends, room: Array) -> Balls:
-    """What holds along stretches from a to b.
+def balls_of(case: Given, row: Ints, share: Array, ends: Ends, room: Array) -> Balls:
+    """What holds along stretches.
 
     Args:
         case: what is given.
-        at: `row` and `share` of the balls.
-        a, b: of the stretches.
-        room: (k, 2) rad, what is left of cone and roll along them.
+        row, share: of the balls.
+        ends: (2, k) where they begin and end.
+        room: (m - 1, 2) rad, what is left of cone and roll along the motion.
     """
-    robot, slides = case.robot, case.robot.prismatic
-    steps, moves = np.abs(b.q - a.q), np.maximum(a.rows, b.rows)
-    levers, (norm, off, turned) = np.maximum(a.levers, b.levers), np.maximum(a.norms, b.norms).T
-    changes, way = _changes(robot, levers, steps), levers * steps[:, None]
+    robot, slides, least = case.robot, case.robot.prismatic, case.task.min_manipulability
+    steps, moves = np.abs(ends.q[1] - ends.q[0]), ends.rows.max(axis=0)
+    off, turned = ends.norms.max(axis=0).T
+    way = ends.levers.max(axis=0) * steps[:, None]
     behind = np.cumsum(way[..., ::-1], axis=2)[..., ::-1] - way
-    along = np.where(slides, levers, 0.5 * (a.levers + b.levers + behind))
-    along[:, 1] = np.minimum(along[:, 1], 1.0)
-    second, bend = second_derivative_bound(along, moves[:, None], slides).T
-    slope = np.maximum(1.0 - off - 0.5 * norm * changes[:, 0], 0.0)
+    levers = np.where(slides, ends.levers[0], 0.5 * (ends.levers.sum(axis=0) + behind))
+    levers[:, 1] = np.minimum(levers[:, 1], 1.0)
+    rates = column_changes(levers, steps[:, None], slides)
+    bends = column_bends(levers, steps[:, None], slides)
+    change = np.sqrt(((ends.right[1] - ends.right[0]) ** 2).sum(axis=2))
+    between = 0.125 * (bends * moves[:, None] + 2.0 * rates * change[:, None]).sum(axis=2)
+    second, bend = second_derivative_bound(levers, moves[:, None], slides).T
+    slope = np.maximum(1.0 - off - between[:, 0], 0.0)
     lemma = np.minimum(BELOW * slope / np.maximum(second, LEAST), MOST)
-    limits = solved(moves, 0.0, left_to_limits(robot, a.q, b.q)).min(axis=1)
-    if case.task.min_manipulability is not None:
-        least = 0.5 * (a.sigma + b.sigma - _fall(robot, changes)) - case.task.min_manipulability
-        falls = _fall(robot, _changes(robot, along, moves))
-        lemma = np.minimum(lemma, solved(falls, 0.0, np.maximum(least, 0.0)))
-    far = np.maximum(*(np.linalg.norm(end.points - case.pivot, axis=1) for end in (a, b)))
-    far = np.maximum(far + 0.5 * way[:, 0].sum(axis=1), LEAST)
+    limits = solved(moves, 0.0, left_to_limits(robot, ends.q)).min(axis=1)
+    if least is not None:
+        both = np.stack([rates, column_changes(levers, moves[:, None], slides)])
+        fall, falls = np.sqrt((both**2 / [[robot.length_unit**2], [1.0]]).sum(axis=(2, 3)))
+        spare = np.maximum(0.5 * (ends.sigma.sum(axis=0) - fall) - least, 0.0)
+        lemma = np.minimum(lemma, solved(falls, 0.0, spare))
+    far = np.linalg.norm(ends.points - case.pivot, axis=2).max(axis=0)
+    far += 0.125 * second_derivative_bound(levers[:, 0], steps, slides) + LEAST
+    room = np.minimum(room[row], FREE) * [1.0, np.cos(0.5 * min(case.task.cone, 0.5 * np.pi))]
     wide = np.maximum(np.where(room[:, 0] < np.pi, 0.5 * room[:, 0], LEAST), LEAST)
-    chord = np.stack([turned + 0.5 * norm * changes[:, 1], bend], axis=1)
-    tilts = (wide / np.sin(wide))[:, None] * chord
-    roll = np.cos(0.5 * min(case.task.cone, 0.5 * np.pi))
-    room = np.minimum(room, FREE) * [1.0, roll]
     room[room[:, 0] >= np.pi, 0] = FREE
-    turns = np.where(slides, 0.0, moves).sum(axis=1)
+    chord = wide / np.sin(wide)
+    turns = np.stack([
+        chord * (turned + between[:, 1]), chord * bend,
+        np.where(slides, 0.0, moves).sum(axis=1), 0.0 * bend,
+    ], axis=1).reshape(-1, 2, 2)  # fmt: skip
     caps = np.stack([limits, lemma], axis=1)
-    return Balls(*at, slope, second, tilts, moves, turns, caps, room, far)
+    return Balls(row, share, slope, second, turns, moves, caps, room, far)
 
 
-def balls_along(case: Given, q: Array, room: Array) -> Balls:
-    """Of a whole motion q (m, n), in stretches with little less room than there is at rows.
-
-    Others are cut into as many pieces as would do if one over the room grew with their length.
-    """
-    row, ends, found = np.arange(len(q) - 1), ends_of(case, q), list[Balls]()
+def balls_along(case: Given, q: Array, room: Array, at: Jacobians | None = None) -> Balls:
+    """Of a whole motion q (m, n), in stretches with little less room than there is at rows."""
+    row, ends, found = np.arange(len(q) - 1), ends_of(case, q, at), list[Balls]()
     share = np.tile([0.0, 1.0], (len(row), 1))
-    a, b = np.concatenate([row, row, row + 1]), np.concatenate([row + 1, row, row + 1])
-    at = np.tile(row, 3), np.tile(share, (3, 1))
-    made = balls_of(case, at, ends.of(a), ends.of(b), room[at[0]])
-    whole, *both = np.split(np.maximum(made.triangle, LEAST), 3)
-    here, made = np.minimum(*both), made.of(row)
-    most = here.min(axis=0)
-    for left in reversed(range(ROUNDS)):
-        good = (whole >= CLOSE * most).all(axis=1) | (left == 0)
-        found.append(made.of(good))
-        if good.all():
+    pairs = np.array([[row, row, row + 1], [row + 1, row, row + 1]]).reshape(2, -1)
+    made = balls_of(case, np.tile(row, 3), np.tile(share, (3, 1)), ends.of(pairs), room)
+    reach, made = made.triangle, made.of(slice(len(row)))
+    most, reach = reach[len(row) :].min(axis=0), reach[: len(row)]
+    for _ in range(ROUNDS):
+        bad = (reach < CLOSE * most).any(axis=1)
+        if not bad.any():
             break
-        row, share, here, whole = (one[~good] for one in (row, share, here, whole))
-        spare = np.maximum(here / (CLOSER * most) - 1.0, 1.0 / CLOSER - 1.0)
-        pieces = ((here / whole - 1.0) / spare).max(axis=1)
-        pieces = np.ceil(pieces).clip(2, PIECES).astype(np.intp)
-        cut = np.repeat(np.arange(len(row)), pieces + 1)
-        number = np.arange(len(cut)) - (np.cumsum(pieces + 1) - pieces - 1)[cut]
-        (low, high), row, here = share[cut].T, row[cut], here[cut]
-        part = low + (high - low) * number / pieces[cut]
-        ends = ends_of(case, q[row] + part[:, None] * (q[row + 1] - q[row]))
-        k = np.flatnonzero(number < pieces[cut])
-        row, share, here = row[k], np.column_stack([part[k], part[k + 1]]), here[k]
-        made = balls_of(case, (row, share), ends.of(k), ends.of(k + 1), room[row])
-        whole = np.maximum(made.triangle, LEAST)
-    return Balls.join(*found)
+        found.append(made.of(~bad))
+        part, row = np.linspace(*share[bad].T, PIECES + 1, axis=1), row[bad, None]
+        between = q[row] + part[..., None] * (q[row + 1] - q[row])
+        k = np.arange(part.size).reshape(part.shape)
+        pairs = np.stack([k[:, :-1], k[:, 1:]]).reshape(2, -1)
+        row, share = np.repeat(row, PIECES), part.ravel()[pairs].T
+        ends = ends_of(case, between.reshape(-1, q.shape[1]))
+        made = balls_of(case, row, share, ends.of(pairs), room)
+        reach = made.triangle
+    if not found:
+        return made
+    made = Balls.join(*found, made)
+    return made.of(np.argsort(made.row, kind="stable"))
 
 
 def placement_margin(
@@ -272,6 +265,7 @@ def placement_margin(
     task: Task,
     q: Array,
     room: Array,
+    at: Jacobians | None = None,
     pairings: tuple[Pairing, ...] | None = None,
 ) -> PlacementMargin | None:
     """The margin of an accepted motion; see the module. None where bodies were not judged.
@@ -280,44 +274,43 @@ def placement_margin(
         robot, cells, task: the case.
         q: (m, n) the motion, m >= 1, rad or m.
         room: (m, 2) rad, what is left of cone and roll from each row to the next; inf where free.
+        at: m Jacobians at its rows, where they are known.
         pairings: all couples of bodies along the motion, as they were judged.
     """
-    case = Given(robot, task, cells.centres.mean(axis=0), Kinematics(robot))
-    middle = tuple(case.pivot.tolist())
+    case = Given(robot, task, cells.centres.mean(axis=0))
+    middle, at = tuple(case.pivot.tolist()), at or jacobians(Kinematics(robot), q)
+
+    def cell_at(row: int) -> tuple[int, ...]:  # the one whose target is nearest to the tool
+        off = np.linalg.norm(task.targets(cells).points - at.points[row], axis=1)
+        return cells.unravel(int(off.argmin()))
+
     if robot.start is not None:  # the motion has to begin there, wherever the part stands
-        return PlacementMargin(0.0, 0.0, middle, Bound.START, _cell(case, cells, q[0]))
+        return PlacementMargin(0.0, 0.0, middle, Bound.START, cell_at(0))
     if pairings is None and task.collision is not None and task.collision.checked:
         return None
     if len(q) == 1:
         q, room = np.repeat(q, 2, axis=0), np.repeat(room, 2, axis=0)
+        at = at.of(np.array([0, 0]))
     room = np.vstack([room[:-2], room[-2:].min(axis=0)])  # the last row ends the last segment
-    balls = balls_along(case, q, room)
-    reach, along = balls.triangle, np.full(len(q) - 1, np.inf)
-    np.minimum.at(along, balls.row, reach[:, 0])
+    balls = balls_along(case, q, room, at)
+    reach = balls.triangle
+    along = np.minimum.reduceat(reach[:, 0], balls.first)
     worst = int(np.argmin(reach[:, 0]))
     row, what = int(balls.row[worst]), ""
-    bound_by = BOUNDS[int(np.argmin(balls.of(slice(worst, worst + 1)).allowed(0.0)))]
+    bound_by = BOUNDS[int(balls.allowed(0.0)[worst].argmin())]
     if bound_by is Bound.LIMIT:
-        left = left_to_limits(robot, q[row], q[row + 1])
+        left = left_to_limits(robot, q[row : row + 2])
         what = robot.joint_names[int(np.argmin(solved(balls.moves[worst], 0.0, left)))]
     position, angle = (BELOW * reach.min(axis=0)).tolist()
     if pairings and position > 0.0:
         from feasibility.certification.displaced_bodies import displaced_share
 
-        clear = displaced_share(robot, cells, task, pairings, (position, angle), balls.moved)
+        clear = displaced_share(robot, task, case.pivot, pairings, (position, angle), balls.moved)
         along, share = np.minimum(along, clear.along * position), float(clear.along.min())
         position, angle = share * position, share * angle
         if clear.pair is not None:
             row, bound_by, what = int(along.argmin()), Bound.CLEARANCE, " and ".join(clear.pair)
-    return PlacementMargin(
-        position, angle, middle, bound_by, _cell(case, cells, q[row]), what, along
-    )
-
-
-def _cell(case: Given, cells: Cells, q: Array) -> tuple[int, ...]:
-    """The cell whose target is nearest to the tool at q (n,)."""
-    off = case.task.targets(cells).points - case.kinematics.tool(q)[0]
-    return cells.unravel(int(np.linalg.norm(off, axis=1).argmin()))
+    return PlacementMargin(position, angle, middle, bound_by, cell_at(row), what, along)
 
 
 def margin_fault(task: Task, certificate: Certificate) -> str:
@@ -332,7 +325,7 @@ def margin_fault(task: Task, certificate: Certificate) -> str:
 
 
 def margin_of(
-    robot: Robot, cells: Cells, task: Task, q: Array, room: Array
+    robot: Robot, cells: Cells, task: Task, q: Array, room: Array, at: Jacobians | None
 ) -> Callable[..., PlacementMargin | None]:
     """`placement_margin` of a motion by its `pairings`, found once, when it is first asked for."""
-    return cache(partial(placement_margin, robot, cells, task, q, room))
+    return cache(partial(placement_margin, robot, cells, task, q, room, at))

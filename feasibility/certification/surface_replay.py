@@ -113,7 +113,8 @@ def replay_over_surface(
         len(rows), error, angle_of(chord), margin, max_roll=None if task.roll is None else roll
     )
     if len(cells) and not faults:
-        certificate = replace(certificate, margin=margin_of(robot, cells, task, rows, found.room))
+        margin_later = margin_of(robot, cells, task, rows, found.room, found.poses)
+        certificate = replace(certificate, margin=margin_later)
     if bodies is not None:
         certificate, hit = _among(bodies, robot, rows, certificate)
         faults += hit
