@@ -15,21 +15,21 @@ changes by at most M y, the tool point is M y^2 / 2 off its linear model. The ax
 
 **Lemma** (Newton and Kantorovich), on a straight stretch q(s), s from 0 to 1, with the joint
 changes h_j. A is the Jacobian of the axis, P about a right inverse of J at both ends and straight
-between, with |JP - I| <= eps and |AP| <= T there; d_j bounds the norms of its rows at both ends, and
-so between them. These change by g_j in all, columns of J at the rate c_j at most (`column_changes`)
-and that by b_j (`column_bends`); those of A likewise. Whatever is at most so much at both ends is
-in between more by at most an eighth of its second derivative. As P'' = 0, and products of matrices
-are sums over columns and rows,
+between, with |JP - I| <= eps and |AP| <= T there. d_j bounds the norms of its rows, which change by
+g_j in all; columns of J change at the rate c_j at most (`column_changes`), and that by b_j
+(`column_bends`); those of A likewise. Whatever is no more than so much at both ends is in between
+no more than that and an eighth of its second derivative. P'' = 0, and products of matrices are sums
+over columns and rows:
 
     |J(s) P(s) - I| <= kappa = eps + sum_j (b_j d_j + 2 c_j g_j) / 8,    |A(s) P(s)| <= T' likewise.
 
-All of them, M and M_a too, are those of the largest levers along the stretch: no lever is over half
-of what those at both ends and the way of all behind it sum to. Let f(y) = (1 - kappa) y - M y^2 / 2, |g p - p| at
-most rho. **If** rho <= f(y) and M y < 1 - kappa, exactly one v with |v| <= y has p(q(s) + P(s) v) =
-g p(q(s)): with B the derivative JP at v = 0, v -> v - B^-1 (p(q + P v) - g p) maps the ball into
-itself, as it takes v to at most (rho + M y^2 / 2) / (1 - kappa), and is a contraction there. All of
-it is continuous in t, so v is; stretches that meet share P, and the smaller of their balls holds
-both of their v. QED
+All of these, M and M_a are those of the largest levers along the stretch: no lever is over half of
+what those at both ends and the way of all behind it sum to. Let f(y) = (1 - kappa) y - M y^2 / 2,
+|g p - p| at most rho. **If** rho <= f(y) and M y < 1 - kappa, exactly one v with |v| <= y has
+p(q(s) + P(s) v) = g p(q(s)): with B the derivative JP at v = 0, v -> v - B^-1 (p(q + P v) - g p)
+maps the ball into itself, as it takes v to at most (rho + M y^2 / 2) / (1 - kappa), and is a
+contraction there. All of it is continuous in t, so v is; stretches that meet share P, and the
+smaller of their balls holds both of their v. QED
 
 So joint j moves by e_j = d_j y at most, the axis by x = T' y + M_a y^2 / 2, which is an angle of at
 most x c / 2 sin(c / 2) while it is inside c. The part turns the approach direction by at most
@@ -45,9 +45,7 @@ angle / Theta <= 1. `displaced_bodies` says which share of it bodies allow.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -245,7 +243,8 @@ def balls_along(case: Given, q: Array, room: Array, at: Jacobians | None = None)
         if not bad.any():
             break
         found.append(made.of(~bad))
-        part, row = np.linspace(*share[bad].T, PIECES + 1, axis=1), row[bad, None]
+        (low, high), row = share[bad].T, row[bad, None]
+        part = np.linspace(low, high, PIECES + 1, axis=1)
         between = q[row] + part[..., None] * (q[row + 1] - q[row])
         k = np.arange(part.size).reshape(part.shape)
         pairs = np.stack([k[:, :-1], k[:, 1:]]).reshape(2, -1)
@@ -278,10 +277,10 @@ def placement_margin(
         pairings: all couples of bodies along the motion, as they were judged.
     """
     case = Given(robot, task, cells.centres.mean(axis=0))
-    middle, at = tuple(case.pivot.tolist()), at or jacobians(Kinematics(robot), q)
+    middle, poses = tuple(case.pivot.tolist()), at or jacobians(Kinematics(robot), q)
 
     def cell_at(row: int) -> tuple[int, ...]:  # the one whose target is nearest to the tool
-        off = np.linalg.norm(task.targets(cells).points - at.points[row], axis=1)
+        off = np.linalg.norm(task.targets(cells).points - poses.points[row], axis=1)
         return cells.unravel(int(off.argmin()))
 
     if robot.start is not None:  # the motion has to begin there, wherever the part stands
@@ -290,9 +289,9 @@ def placement_margin(
         return None
     if len(q) == 1:
         q, room = np.repeat(q, 2, axis=0), np.repeat(room, 2, axis=0)
-        at = at.of(np.array([0, 0]))
+        poses = poses.of(np.array([0, 0]))
     room = np.vstack([room[:-2], room[-2:].min(axis=0)])  # the last row ends the last segment
-    balls = balls_along(case, q, room, at)
+    balls = balls_along(case, q, room, poses)
     reach = balls.triangle
     along = np.minimum.reduceat(reach[:, 0], balls.first)
     worst = int(np.argmin(reach[:, 0]))
@@ -322,10 +321,3 @@ def margin_fault(task: Task, certificate: Certificate) -> str:
         return ""
     asked = f"{1e3 * error.position:g} mm and {error.angle_deg:g} deg off its place"
     return f"the part may stand {asked}; certified is {margin}"
-
-
-def margin_of(
-    robot: Robot, cells: Cells, task: Task, q: Array, room: Array, at: Jacobians | None
-) -> Callable[..., PlacementMargin | None]:
-    """`placement_margin` of a motion by its `pairings`, found once, when it is first asked for."""
-    return cache(partial(placement_margin, robot, cells, task, q, room, at))

@@ -15,6 +15,7 @@ Where bodies are given, they have to stay clear of each other too (`collisions`)
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from typing import TYPE_CHECKING, TypeGuard
 
 import numpy as np
@@ -22,7 +23,7 @@ import numpy as np
 from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.cells_reached import cells_reached, missed_text
 from feasibility.certification.faults import Judged, MotionFault, less_deviations, too_vague
-from feasibility.certification.placement_margin import margin_fault, margin_of
+from feasibility.certification.placement_margin import margin_fault, placement_margin
 from feasibility.certification.stretches import Judge
 from feasibility.certification.tool_along import less_room, tool_along
 from feasibility.cone import angle_of
@@ -113,8 +114,8 @@ def replay_over_surface(
         len(rows), error, angle_of(chord), margin, max_roll=None if task.roll is None else roll
     )
     if len(cells) and not faults:
-        margin_later = margin_of(robot, cells, task, rows, found.room, found.poses)
-        certificate = replace(certificate, margin=margin_later)
+        margin_of = partial(placement_margin, robot, cells, task, rows, found.room, found.poses)
+        certificate = replace(certificate, margin=cache(margin_of))  # found when it is asked for
     if bodies is not None:
         certificate, hit = _among(bodies, robot, rows, certificate)
         faults += hit

@@ -57,7 +57,10 @@ def test_a_stretched_arm_bends_as_much_as_is_said(count):
     levers = jacobians(Kinematics(robot), np.zeros((1, count))).levers
     assert levers[0] == pytest.approx(np.arange(count, 0, -1))
     bound = lever_bounds.second_derivative_bound(levers, steps, robot.prismatic)
-    holds(bound, (np.cumsum(steps, axis=1) ** 2).sum(axis=1), 1.0 - 1e-9)
+    each = np.cumsum(steps, axis=1) ** 2
+    holds(bound, each.sum(axis=1), 1.0 - 1e-9)
+    bends = lever_bounds.column_bends(levers, steps, robot.prismatic)
+    holds(bends, np.cumsum(each[:, ::-1], axis=1)[:, ::-1], 1.0 - 1e-9)
 
 
 def test_a_slide_on_a_turning_arm_bends_by_twice_the_turn():
@@ -67,6 +70,8 @@ def test_a_slide_on_a_turning_arm_bends_by_twice_the_turn():
     levers = jacobians(Kinematics(robot), none).levers
     found = lever_bounds.second_derivative_bound(levers, steps, robot.prismatic)
     holds(found, 2 * 0.5 * 0.7, 1.0 - 1e-9)
+    bends = lever_bounds.column_bends(levers, steps, robot.prismatic)
+    holds(bends, [[2 * 0.5 * 0.7, 2 * 0.5 * 0.7, 0.7**2]], 1.0 - 1e-9)
 
 
 def test_joints_that_do_not_run_evenly_bend_the_way_by_that_as_well():

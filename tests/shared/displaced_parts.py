@@ -17,7 +17,6 @@ from scipy.spatial.transform import Rotation
 from feasibility.certification import placement_margin as lemma
 from feasibility.certification.displaced_bodies import Nearer
 from feasibility.certification.motion_replay import replay
-from robots.kinematics import Kinematics
 
 USED = Counter()
 """The largest share of each bound that a displacement needed."""
@@ -54,8 +53,8 @@ def margin_and_balls(robot, cells, task, walk):
     assert found.accepted, found.refusal
     kept = found.certificate.margin
     pairings = getattr(kept, "args", ((),))[0]
-    *_, q, room = getattr(kept, "func", kept).__wrapped__.args
-    case = lemma.Given(robot, task, cells.centres.mean(axis=0), Kinematics(robot))
+    *_, q, room, _ = getattr(kept, "func", kept).__wrapped__.args
+    case = lemma.Given(robot, task, cells.centres.mean(axis=0))
     balls = lemma.balls_along(case, q, room)
     return found.certificate.placement_margin, balls, pairings
 
@@ -135,7 +134,8 @@ def attack(arm, robot, cells, task, walk, rng, count):
     use("ball", np.linalg.norm(here.v, axis=1), y)
     use("joints", np.abs(here.q - here.nominal), ball.moves * y[:, None])
     tilted = referee.angles_between(here.tool[1], here.before[1])
-    use("tilt", tilted, ball.tilts[:, 0] * y + 0.5 * ball.tilts[:, 1] * y**2)
+    tilt, roll = (ball.turns @ np.array([y, 0.5 * y**2]).T[..., None])[..., 0].T
+    use("tilt", tilted, tilt)
     assert ((here.q >= robot.lower) & (here.q <= robot.upper)).all()
     if task.min_manipulability is not None:
         least, asked = singular(robot, arm, here.q), np.full(count, task.min_manipulability)
@@ -153,7 +153,7 @@ def attack(arm, robot, cells, task, walk, rng, count):
         off, tilt = kept.off, kept.tilt
         assert (kept.roll <= 1e-9).all()
         if asked.roll is not None:
-            rolled = (here.theta + ball.turns * y) / np.cos(0.5 * min(task.cone, 0.5 * np.pi))
+            rolled = (here.theta + roll) / np.cos(0.5 * min(task.cone, 0.5 * np.pi))
             use("roll", np.maximum(kept.roll - before.roll, 0.0), rolled)
     assert (off <= asked.tolerance + 1e-9).all()
     assert (tilt <= asked.cone + 1e-9).all()
