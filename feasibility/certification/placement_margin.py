@@ -67,7 +67,7 @@ from surfaces.cells import Cells
 if TYPE_CHECKING:
     from feasibility.certification.collisions.pairing import Pairing
 
-CLOSE = 0.94  # [1] of the least room at a row: stretches with less are cut
+CLOSE = 0.95  # [1] of the least room at a row: stretches with less are cut
 ROUNDS = 3  # of cutting, after which they are taken as they are
 PIECES = 4  # that a stretch is cut into
 MOST = 10.0  # [m] no larger ball is tried
