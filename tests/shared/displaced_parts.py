@@ -127,6 +127,7 @@ def attack(arm, robot, cells, task, walk, rng, count):
     margin, balls, pairings = margin_and_balls(robot, cells, task, walk)
     if margin.position == 0.0 and margin.angle == 0.0:
         return margin
+    np.testing.assert_allclose(margin.along.min(), margin.position, rtol=1e-6)
     here = displaced(arm, cells, walk, margin, balls, rng, count)
     ball = here.ball
     root = np.sqrt(np.maximum(ball.slope**2 - 2 * ball.second * here.rho, 0))

@@ -113,9 +113,10 @@ def test_what_a_ball_allows_is_solved_for():
     np.testing.assert_allclose([f(each) for each in y.T], small)
     y = ball.moved(0.0, small) / moves
     np.testing.assert_allclose([f(each) for each in y.T], np.tile(small * far, (6, 1)))
-    assert (
-        ball.moved(small, small) >= np.maximum(ball.moved(small, 0.0), ball.moved(0.0, small))
-    ).all()
+    one, other, both = (ball.moved(*each) for each in ((small, 0), (0, small), (small, small)))
+    assert (both >= np.maximum(one, other)).all()
+    parts = replace(ball, row=np.arange(k) // 2).moved(small, small)
+    np.testing.assert_array_equal(parts, np.maximum(both[::2], both[1::2]))
 
 
 @sampled("seed", seeds(1, all=40))
