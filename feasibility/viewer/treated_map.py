@@ -16,7 +16,15 @@ from feasibility.viewer.cell_meshes import cell_size, marks
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.playback import Playback
 from feasibility.viewer.threejs import Colour, Command
-from feasibility.viewer.verdict_scene import SURFACE, Layer, hidden, lines_layer, mesh_layer
+from feasibility.viewer.verdict_scene import (
+    SURFACE,
+    TRAIL_POINTS,
+    Layer,
+    drawn_lines,
+    hidden,
+    lines_layer,
+    mesh_layer,
+)
 from robots.kinematics import Kinematics
 from surfaces.passes.welded_triangles import WorkingMesh
 
@@ -140,6 +148,8 @@ BANDS: tuple[tuple[float, Colour], ...] = (
 )
 """Times the least margin, up to which the path has a colour."""
 LEAST: Colour = (0.84, 0.12, 0.12)
+WIDE = 0.04  # [1] of a cell's width, the radius of that path: edges of G are thinner
+NOTHING = 1e-6  # [m] colours are for multiples of the least margin, or of this
 MARK = 0.1  # [1] of a cell's width, of the mark where the margin is least
 
 
@@ -149,14 +159,20 @@ def margin_layers(verdict: Verdict) -> Iterator[Layer]:
     if margin is None or margin.along is None or verdict.witness is None:
         return
     points = Kinematics(verdict.robot).tools(verdict.witness.q)[0]
-    ends = np.stack([points[:-1], points[1:]], axis=1)
-    low = least = float(margin.along.min())
+    size, worst = cell_size(verdict.cells), int(np.argmin(margin.along))
+    low = float(margin.along[worst])
+    least = max(low, NOTHING)
     for times, colour in BANDS:
         some = (margin.along >= low) & (margin.along < times * least)
         if some.any():
             label = f"tool path: the part may be off by {at_least(1e3 * low, 3)} mm"
-            yield hidden(lines_layer(label, colour, f"/margin/{times:g} times", ends[some]))
+            which, path = np.flatnonzero(some), f"/margin/{times:g} times"
+            runs = np.split(which, np.flatnonzero(np.diff(which) > 1) + 1)
+            lines = [points[run[0] : run[-1] + 2] for run in runs]
+            if len(points) > TRAIL_POINTS:
+                yield hidden(lines_layer(label, colour, path, points[which[:, None] + [0, 1]]))
+            else:
+                yield hidden(drawn_lines(lines, WIDE * size, colour, path, label))
         low = times * least
-    place = ends[[int(np.argmin(margin.along))]].mean(axis=1)
-    dot = marks(place, MARK * cell_size(verdict.cells))
+    dot = marks(points[[worst, worst + 1]].mean(axis=0, keepdims=True), MARK * size)
     yield mesh_layer("least room for the part", LEAST, "/margin/least", *dot, lit=False)
