@@ -70,8 +70,7 @@ def replay_over_surface(
         q: (m, n) rows, rad or m, unwrapped.
         needed: (N,) cells that have to be reached; all by default.
         bodies: what has to stay clear of what; None where collisions are not checked.
-        marks: (m,) the cell whose target a row is said to be at, -1 at none: over which places the
-            motion may be, to be tried first.
+        marks: (m,) the cell whose target a row is said to be at, -1 at none: places to try first.
         working: (m,) at which rows the tool works: between two of them it has to be right over the
             surface, or over that under poses, whose curves then do not count; elsewhere it may be
             anywhere but through that. Everywhere by default.
