@@ -16,12 +16,9 @@ from feasibility.verdict import Walk
 
 CASE = """
     robot.name = "ur5"
-    robot.limits_deg.shoulder_pan_joint = [-60, 40]
-    robot.limits_deg.shoulder_lift_joint = [-100, -20]
-    robot.limits_deg.elbow_joint = [20, 120]
-    robot.limits_deg.wrist_1_joint = [40, 130]
-    robot.limits_deg.wrist_2_joint = [60, 140]
-    robot.limits_deg.wrist_3_joint = [-200, -120]
+    robot.limits_deg = { shoulder_pan_joint = [-60, 40], shoulder_lift_joint = [-100, -20], \
+elbow_joint = [20, 120], wrist_1_joint = [40, 130], wrist_2_joint = [60, 140], \
+wrist_3_joint = [-200, -120] }
     surface = { kind = "plane", u = [0.4, 0.6], v = [-0.1, 0.1], cells = [2, 2], \
 position = [0, 0, 0.3], side = "outside" }
     task = { standoff = 0.02, cone_deg = 30 }

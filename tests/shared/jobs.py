@@ -15,14 +15,9 @@ from feasibility.clock import Clock, OutOfTime
 
 PLATE = """
 robot.name = "ur5"
-surface.kind = "plane"
-surface.u = [0.4, 0.6]
-surface.v = [-0.1, 0.1]
-surface.cells = [3, 4]
-surface.position = [0, 0, 0.3]
-surface.side = "outside"
-task.standoff = 0.02
-task.cone_deg = 30
+surface = { kind = "plane", u = [0.4, 0.6], v = [-0.1, 0.1], cells = [3, 4], \
+position = [0, 0, 0.3], side = "outside" }
+task = { standoff = 0.02, cone_deg = 30 }
 """
 TEXTS = {
     "plate": PLATE,  # feasible
@@ -30,11 +25,7 @@ TEXTS = {
     "long plate": PLATE.replace("0.6]", "2.4]").replace("[3, 4]", "[4, 2]"),
     "greedy dome": """
 robot = { name = "puma560", limits = "set-1" }
-surface.kind = "sphere"
-surface.radius = 1
-surface.u_deg = [40, 60]
-surface.v_deg = [60, 90]
-surface.cells = [2, 3]
+surface = { kind = "sphere", radius = 1, u_deg = [40, 60], v_deg = [60, 90], cells = [2, 3] }
 task = { standoff = 0.005, cone_deg = 45 }
 search = { method = "greedy", step_deg = 0.05 }
 """,

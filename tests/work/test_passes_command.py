@@ -16,12 +16,8 @@ from surfaces.toolpaths.pose_cells import PoseCells
 UR5 = coverable.load_robot("ur5")
 PANEL = """
 robot.name = "ur5"
-surface.kind = "plane"
-surface.u = [0.0, {wide}]
-surface.v = [0.0, 0.2]
-surface.cells = [2, 2]
-surface.position = [0.4, -0.1, 0.2]
-surface.side = "outside"
+surface = {{ kind = "plane", u = [0.0, {wide}], v = [0.0, 0.2], cells = [2, 2], \
+position = [0.4, -0.1, 0.2], side = "outside" }}
 task.standoff = 0.02
 task.cone_deg = 20
 """
