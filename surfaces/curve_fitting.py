@@ -112,7 +112,7 @@ class CurveFit:
         begin = 2.0 * joined[:, 2]
         ends = begin, begin + 6.0 * joined[:, 3]
         sizes = [[np.sqrt(_squares(end[:, half])) for half in HALVES] for end in ends]
-        bounds = np.max(sizes, axis=0).T
+        bounds: Array = np.max(sizes, axis=0).T
         bounds *= ROUNDING * square
         return CellCurves(first, joined, bounds, self.deviations, rests, self.leans)
 

@@ -109,8 +109,8 @@ class Enclosure(NDArrayOperatorsMixin):
     def sum(self, axis: int = -1, keepdims: bool = False) -> Enclosure:
         """Along coordinates."""
         axis = _of_coordinates(axis, self.ndim)
-        net = self.net.sum(axis=axis, keepdims=keepdims)
-        return Enclosure(net, self.radius.sum(axis=axis, keepdims=keepdims))
+        added = [each.sum(axis=axis, keepdims=True) for each in (self.net, self.radius)]
+        return Enclosure(*(added if keepdims else [each.squeeze(axis) for each in added]))
 
     def lower(self, most: int = KEPT) -> Enclosure:
         """The same; of more coefficients than `most` few are kept, the others count as radius."""

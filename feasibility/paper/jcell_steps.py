@@ -157,8 +157,8 @@ def _step_bounds(robot: Robot, size: Array, together: bool) -> _StepBounds:
     reach = np.where(prismatic, 1.0, lever)
     point = size * np.where(prismatic, 2.0 * before, lever * (size + 2.0 * before))
     axis = angle * (angle + 2.0 * before)
-    total = np.sum if together else np.max
-    return _StepBounds(*(float(total(part)) for part in (point, axis, reach * size, angle)))
+    parts = (point, axis, reach * size, angle)
+    return _StepBounds(*(float(part.sum() if together else part.max()) for part in parts))
 
 
 def _margins_of_patch(
