@@ -22,7 +22,6 @@ from functools import partial
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
-from feasibility.certification.bisection import bisected
 from feasibility.certification.faults import MotionFault
 from feasibility.certification.stretches import Judge, SampledStretches, Samples
 from robots.kinematics import Kinematics
@@ -37,7 +36,6 @@ BEYOND, LONG = 2e-3, 0.02  # [m] so close points are looked at, beyond the borde
 STEPS, PARTS = 256, 8  # of the way from centre to centre, of a motion from row to row
 STEEP = 8  # power of what a place costs, so that the worst counts most
 LONGEST = 500  # rows from mark to mark that are looked at so
-HALVED, MOST = 12, 100_000  # how often what lies on the way is halved, and how much of it
 BENT = 1.01  # [1] the way between two points that are so close, compared with the straight line
 
 
@@ -218,7 +216,7 @@ def on_the_way(
     long = any(runs[k][1] - runs[k][0] > LONGEST for k in wanted)
     if long or not isinstance(patch, PatchPlaces):
         return nothing, []
-    right = partial(_right, judge, patch, rows, of_segment, decided)
+    right = partial(_right, judge, rows, of_segment, decided)
     while wanted - found.keys():
         k = min(wanted - found.keys())
         ends = cells.centres[marks[list(runs[k])]]
@@ -242,27 +240,17 @@ def on_the_way(
 
 def _right(
     judge: Judge,
-    patch: PatchPlaces,
     rows: Array,
     of_segment: Array,
     decided: Callable[[SampledStretches], Mask],
     at: Samples,
 ) -> bool:
     """Is a motion right from sample to sample, over the straight ways between their places?"""
-    start, end, wrong = at.of(slice(-1)), at.of(slice(1, None)), [not judge.within(at).all()]
+    start, end = at.of(slice(-1)), at.of(slice(1, None))
     row = np.minimum(start.row, len(rows) - 2)
     low, high = (each.share + (each.row - row) for each in (start, end))
-
-    def halves(left: SampledStretches) -> SampledStretches:
-        some = judge.middles(rows, left)
-        half = np.full(len(some.row), 0.5)
-        middle = _over(judge, patch.between(left.start.places, left.end.places, half), some)
-        wrong.append(not judge.within(middle).all())
-        return left.halves(middle)
-
     stretches = SampledStretches(row, low, high, start, end, of_segment[row])
-    left = bisected(stretches, decided, halves, HALVED, MOST)
-    return not any(wrong) and not len(left.row)
+    return bool(judge.within(at).all() and decided(stretches).all())
 
 
 def _within(numbers: Ints, low: int, high: int) -> bool:
