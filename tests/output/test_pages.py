@@ -33,7 +33,7 @@ def test_the_outline_of_a_page(commands, approved, command, name):
     if command == "check":
         program = page.block("program").decode()
         assert set(re.findall(r"https?://[\w./]+", program)) <= {"http://www.w3.org/1999/xhtml"}
-    outline = page.outline().replace(version(), "VERSION")
+    outline = re.sub(r"\d+ evalu", "# evalu", page.outline()).replace(version(), "VERSION")
     approved(f"pages/{command} {name}", outline)
 
 
