@@ -12,6 +12,7 @@ stuck is where it had better begin.
 import math
 import operator
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 
 import networkx as nx
@@ -161,10 +162,16 @@ def _tried(verdict: Verdict, order: Order, needed: Mask) -> Iterator[Walk]:
     if verdict.cells.in_order:
         yield _run(verdict, needed)
         return
-    for alone in (False, True)[: 1 + verdict.feasible]:
+
+    def walk(alone: bool) -> Walk:
         graph = motion_graph_of(verdict, witness_alone=alone)
         found = _least_revisiting(graph, verdict.cells, order, needed)
-        yield found.graph.walk(_from_start(found, verdict.robot.start))
+        return found.graph.walk(_from_start(found, verdict.robot.start))
+
+    yield walk(alone=False)
+    if verdict.feasible:
+        with suppress(PathError):  # then it is said why the first one is refused
+            yield walk(alone=True)
 
 
 def _from_start(found: JointRoute, start: Array | None) -> list[int]:

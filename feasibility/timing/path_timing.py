@@ -107,10 +107,10 @@ def trajectory(
         run = within_limits(robot, parts, limits, period * share)
         if past_limits(robot, run).max(initial=0.0) <= MENDED:
             run = held_inside(robot, run)
+        run = replace(run, working=_working(path, run))
         refusal = _refusal(path, run)
         if not refusal:
-            names = tuple(checked(task.collision))
-            return replace(run, collisions=names, working=_working(path, run))
+            return replace(run, collisions=tuple(checked(task.collision)))
     raise PathError(f"the independent replay refuses the timed motion: {refusal}")
 
 
@@ -233,8 +233,7 @@ def _off_surface(path: CoveragePath, run: Trajectory) -> str:
         replayed = replay(robot, path.cells, tool_alone, Walk(q, walk.cell[part]), path.needed)
         if not replayed.accepted:
             return replayed.refusal
-    working = _working(path, run)
-    return "" if working is None else path.through_surface(run.q, working)
+    return "" if run.working is None else path.through_surface(run.q, run.working)
 
 
 def _collisions(path: CoveragePath, run: Trajectory) -> str:
