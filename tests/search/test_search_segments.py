@@ -132,13 +132,14 @@ def beside_the_curve(robot, cells, task, q):
 @pytest.mark.parametrize("rolled", [False, True], ids=["free", "rolled"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_segment_that_is_accepted_holds_everywhere(kind, rolled, seed):
-    """120 segments at either side of random surfaces in any pose, 30 samples on each.
+    """120 segments or more at either side of random surfaces in any pose, 30 samples on each.
 
-    Ranges of roll of 0.5 to 300 deg about a random reference, over the curve and the own foot. A
-    fair part is accepted, and some use half of what is allowed beyond the ends' errors.
+    Ranges of roll of 0.5 to 300 deg. Goes on until 20 hold and one needs half of what it may.
     """
     rng, passed, worst = np.random.default_rng([KINDS.index(kind), rolled, seed]), 0, 0.0
-    for number in range(120):
+    for number in range(1200):
+        if number >= 120 and passed > 20 and (rolled or worst > 0.5):
+            return
         if number % 20 == 0:
             robot = random_arm(rng)
         cone_deg = float(rng.choice([2, 20, 60, 90] if rolled else [2, 20, 60, 120, 179, 180]))
@@ -171,8 +172,7 @@ def test_a_segment_that_is_accepted_holds_everywhere(kind, rolled, seed):
         ends = max(off[0], off[-1])
         if held.off - ends > 1e-7:
             worst = max(worst, (off.max() - ends) / (held.off - ends))
-    assert passed > 20
-    assert worst > 0.5 or rolled
+    pytest.fail(f"{passed} hold, and need {worst:.2f} of what they may")
 
 
 def roll_off_middles(cells, task, most, axes, x):

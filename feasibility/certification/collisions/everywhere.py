@@ -201,8 +201,9 @@ def _length_of_cross(a: Array, b: Array, more: Array | None = None) -> Array:
 
 def _depths(body: _Inside, boxes: _Middles, x: Array, near: float) -> Array:
     """(m, k) m, how deep points (m, k, 3) are in a body at least; further out than `near`, -inf."""
-    own = (x - boxes.origins[:, body.joint, None]) @ boxes.rotations[:, body.joint]
-    own = (own - body.placement[:3, 3]) @ body.placement[:3, :3]
+    turned, shift = boxes.rotations[:, body.joint], body.placement[:3, 3]
+    middle = boxes.origins[:, body.joint] + turned @ shift
+    own = (x - middle[:, None]) @ (turned @ body.placement[:3, :3])
     found, rows = np.full(x.shape[:2], -np.inf), np.ones(len(x), dtype=bool)
     if isinstance(body.shape, Balls):  # these take long
         centre = body.shape.centres[0]
