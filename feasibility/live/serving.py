@@ -33,6 +33,7 @@ ADDRESS = "127.0.0.1"
 MOST_CELLS = 20_000  # that a page paints anew with each answer
 MOST_PAGES = 8
 DIM = 0.4  # [1] of the light around, so that the colours of cells stay what they are
+AROUND = 0.7  # [1] of light on what is turned away from it
 TOO_FINE = "has {:,} cells; a live page takes at most {:,}: cut the surface more coarsely for it"
 TOO_MANY = f"{MOST_PAGES} pages of this case are open already; close one of them, and load this one"
 EXTRA = "a live page needs the extra: pip install 'coverable[live]'"
@@ -84,6 +85,7 @@ class Live(Served):
         self._server.gui.main_panel.dock_right()
         self._server.scene.configure_default_lights(True, cast_shadow=False)
         self._server.scene.configure_environment_map("city", environment_intensity=DIM)
+        self._server.scene.add_light_ambient("/light", intensity=AROUND)
         self._server.on_client_connect(self._open)
         self._server.on_client_disconnect(self._leave)
         super().__init__(f"http://{ADDRESS}:{self._server.get_port()}/{secret}/", self._end)
