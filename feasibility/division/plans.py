@@ -138,12 +138,19 @@ class _Option:
     """Their configurations."""
 
 
-def plan_of(exploration: Exploration, task: Task, left: float = np.inf) -> Plan:
+def plan_of(
+    exploration: Exploration, task: Task, left: float = np.inf, asked: Exploration | None = None
+) -> Plan:
     """Walks for the fewest patches, in the best order, each replayed, and moves between them.
 
-    `left` are seconds for the proof that they are the fewest.
+    Args:
+        exploration: what was found.
+        task: that they are replayed for.
+        left: seconds for the proof that they are the fewest.
+        asked: of the arm and the bodies that are asked about, where a search held something back.
     """
-    robot, cells = exploration.robot, exploration.cells
+    asked = exploration if asked is None else asked
+    robot, cells = asked.robot, asked.cells
     roots, covers = cover_table(exploration)
     partition = fewest_patches(covers, cells.pairs, min(TIME_LIMIT, max(left, LEAST_SECONDS)))
     if len(partition) == 0:
@@ -164,7 +171,7 @@ def plan_of(exploration: Exploration, task: Task, left: float = np.inf) -> Plan:
                 refusal=refusal,
             )
         )
-    moves = clear_moves(robot, cells, task, exploration.arrays.collisions, chosen.moves)
+    moves = clear_moves(robot, cells, task, asked.arrays.collisions, chosen.moves)
     return Plan(tuple(patches), moves, partition.bound)
 
 

@@ -1,12 +1,14 @@
 """How a surface is divided: `divide` collects components, shares the cells out, and walks them."""
 
 import time
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from coverable.arrays import Ints
 from coverable.errors import ArgumentError, counted
+from feasibility.attempts import HELD_BACK
 from feasibility.clock import Clock, OutOfTime
 from feasibility.collisions.problem_bodies import Pair
 from feasibility.demands.every_demand import OF_EACH, further, unjudged
@@ -27,7 +29,7 @@ from feasibility.roadmap.search import exploration_of
 from feasibility.roadmap.warmup import warm_up
 from feasibility.search_settings import Progress, Search
 from feasibility.targets.blocked import blocked_curves
-from feasibility.task import Task
+from feasibility.task import PlacementError, Task
 from feasibility.verdict import Cause
 from robots.robot import Robot
 from surfaces.cells import Cells
@@ -158,10 +160,37 @@ def _shared(
                 plan = plan_of(exploration, task, clock.left)
                 missing = np.flatnonzero(plan.patch_of(total) < 0)
                 shared = shared._replace(plan=plan, missing=missing)
+                shared = shared._replace(plan=_with_room(exploration, task, clock, plan))
             causes = _causes(exploration, task, shared.missing, ended, slow)
             return shared._replace(causes=causes, lacking=_lacking(exploration, task, shared))
     except OutOfTime:
         return shared._replace(late=True)
+
+
+def _with_room(exploration: Exploration, task: Task, clock: Clock, plan: Plan) -> Plan:
+    """A plan for the same cells whose motions leave room for the error of the placement.
+
+    Where none is found, or none is needed, it is the plan that is known.
+
+    Raises:
+        OutOfTime: the deadline passed.
+    """
+    robot, cells = exploration.robot, exploration.cells
+    if plan.accepted or task.placement_error is None or robot.start is not None:
+        return plan
+    error, problem = PlacementError(*task.placement_error), Problem.of(robot, cells, task)
+    covered = plan.patch_of(len(cells)) >= 0
+    for cone, times in HELD_BACK:
+        held = problem.held_back(cone, error, times)
+        found = exploration_of(held.robot, cells, held.searched, exploration.seed, clock)
+        explore(found)
+        collect_components(found)
+        if task.requires_rates:
+            keep_fast_motions(found, task)
+        other = plan_of(found, task, clock.left, exploration)
+        if other.accepted and (other.patch_of(len(cells)) >= 0)[covered].all():
+            return replace(other, bound=plan.bound)
+    return plan
 
 
 def _lacking(exploration: Exploration, task: Task, shared: _Shared) -> str:

@@ -45,9 +45,10 @@ def accepted(verdict, walk, needed=None):
     return found.certificate
 
 
-def test_a_path_keeps_the_margin_that_is_demanded():
-    path = coverage_path(check(*coverable.load_case(MARGIN).build()))
-    assert path.certificate.placement_margin.position >= path.task.placement_error.position
+def test_a_path_and_a_division_keep_the_margin_that_is_demanded():
+    case = coverable.load_case(MARGIN).build()
+    for one in coverage_path(check(*case)), *coverable.divide(*case[:3]).patches:
+        assert one.certificate.placement_margin.position >= case[2].placement_error.position
 
 
 def beginnings(cells, order):
@@ -91,12 +92,11 @@ def tube(name):
 @sampled(("name", "order"), spread([*product(TUBES, ORDERS)], 6))
 def test_a_closed_surface_is_not_gone_over_twice(name, order):
     """Some joint cannot turn on where the surface does: the path begins there."""
-    verdict = tube(name)
-    path = coverage_path(verdict, order)
-    accepted(verdict, path.walk)
+    path = coverage_path(tube(name), order)
+    accepted(tube(name), path.walk)
     assert path.figures.revisited_share <= 0.01
     if order != "shortest":
-        assert list(dict.fromkeys(path.visits.tolist())) in beginnings(verdict.cells, order)
+        assert list(dict.fromkeys(path.visits.tolist())) in beginnings(path.cells, order)
 
 
 def test_where_no_motion_leads_on_all_until_there_is_run_a_turn_earlier():
