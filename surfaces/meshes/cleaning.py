@@ -48,8 +48,7 @@ def clean(vertices: ArrayLike, faces: ArrayLike, history: Sequence[str] = ()) ->
     distance = weld_distance(points)
     corners = _weld(points, corners, distance, notes)
     corners = _drop_repeated(points, corners, notes)
-    corners = _drop_thin_at_non_manifold(points, corners, distance, notes)
-    _refuse_non_manifold(points, corners)
+    corners = _manifold(points, corners, distance, notes)
     corners, turned = oriented(points, corners)
     if turned:
         notes.append(
@@ -177,11 +176,14 @@ def _drop_repeated(points: Array, corners: Ints, notes: list[str]) -> Ints:
     return corners[~repeated]
 
 
-def _drop_thin_at_non_manifold(
-    points: Array, corners: Ints, distance: float, notes: list[str]
-) -> Ints:
-    """Drop faces without area from non-manifold edges, those with more than two faces."""
+def _manifold(points: Array, corners: Ints, distance: float, notes: list[str]) -> Ints:
+    """Drop faces without area from edges with more than two faces, and refuse where that is not it.
+
+    Such edges leave open on which side of which face the tool works.
+    """
     halves = half_edges(corners)
+    if (halves.counts <= 2).all():
+        return corners
     bad = np.zeros(len(corners), bool)
     bad[halves.order[np.repeat(halves.counts, halves.counts) > 2] // 3] = True
     bad &= thin(points, corners, distance)
@@ -190,21 +192,18 @@ def _drop_thin_at_non_manifold(
             f"{counted(int(bad.sum()), 'face')} thinner than {distance:.2g} m dropped from "
             "edges with more than two faces"
         )
-    return _kept(corners, ~bad, notes)
-
-
-def _refuse_non_manifold(points: Array, corners: Ints) -> None:
-    """More than two faces on an edge leave open on which side of which face the tool works."""
+    corners = _kept(corners, ~bad, notes)
     halves = half_edges(corners)
-    bad = halves.counts > 2
-    if bad.any():
-        first = int(bad.argmax())
+    crowded = halves.counts > 2
+    if crowded.any():
+        first = int(crowded.argmax())
         a, b = points[half_edge_ends(corners, halves.order[halves.starts[first]])]
         raise SurfaceError(
-            f"{counted(int(bad.sum()), 'edge')} with more than two faces; the first runs from "
+            f"{counted(int(crowded.sum()), 'edge')} with more than two faces; the first runs from "
             f"{place(a)} to {place(b)} and has {halves.counts[first]}; keep only the surface "
             "to be covered: remove inner walls and doubled parts, and export it again"
         )
+    return corners
 
 
 def _kept(corners: Ints, kept: Mask, notes: list[str]) -> Ints:

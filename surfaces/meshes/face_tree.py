@@ -39,29 +39,29 @@ class FaceTree(NamedTuple):
     """(d + 1,) scratch: m^2, squares of their distances."""
 
     @staticmethod
-    def of(corners: Array) -> FaceTree:
-        """The tree over triangles (F, 3, 3) m, cut at medians along the widest axis."""
+    def of(corners: Array, order: Ints | None = None) -> FaceTree:
+        """The tree over triangles (F, 3, 3) m, by default cut at medians along the widest axis.
+
+        Args:
+            corners: the triangles.
+            order: (F,) them in an order in which neighbours are close, where one is known.
+        """
         depth = 0
         while len(corners) > LEAF << depth:
             depth += 1
-        levels = [(np.arange(1 << level) * len(corners)) >> level for level in range(depth + 1)]
-        order, places = np.arange(len(corners)), corners.mean(axis=1)
-        for starts in levels[:-1]:
-            low, high = (find.reduceat(places[order], starts) for find in (np.fmin, np.fmax))
-            row, axis = np.arange(len(starts)), (high - low).argmax(axis=1)
-            width = np.maximum((high - low)[row, axis], 1e-300)
-            node = np.repeat(row, np.diff(starts, append=len(order)))
-            along = (places[order, axis[node]] - low[node, axis[node]]) / width[node]
-            order = order[np.argsort(node + 0.999 * along)]
+        if order is None:
+            order = _cut_at_medians(corners.mean(axis=1), depth)
         corners = np.ascontiguousarray(corners[order])
-        low, high = corners.min(axis=1), corners.max(axis=1)
-        ends = [
-            [np.fmin.reduceat(low, starts), np.fmax.reduceat(high, starts)] for starts in levels
-        ]
-        boxes = np.concatenate([np.hstack(one) for one in ends])
+        (a, b, c), starts = corners.swapaxes(0, 1), _starts(len(corners), depth)
+        low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+        levels = [np.hstack([np.fmin.reduceat(low, starts), np.fmax.reduceat(high, starts)])]
+        for _ in range(depth):
+            one, other = levels[-1][::2], levels[-1][1::2]
+            low, high = np.fmin(one[:, :3], other[:, :3]), np.fmax(one[:, 3:], other[:, 3:])
+            levels.append(np.hstack([low, high]))
         same = SAME * max(float(np.abs(corners).max()), 1e-300)
         scratch = np.empty(depth + 1, dtype=np.int64), np.empty(depth + 1)
-        return FaceTree(corners, order, boxes, depth, same, *scratch)
+        return FaceTree(corners, order, np.concatenate(levels[::-1]), depth, same, *scratch)
 
     def nearest(self, points: Array) -> tuple[Ints, Array]:
         """Triangles (k,), and weights (k, 3) on them, of the places nearest to points (k, 3) m.
@@ -72,6 +72,29 @@ class FaceTree(NamedTuple):
         weights = np.empty((len(points), 3))
         nearest_faces(self, np.ascontiguousarray(points), faces, weights)
         return faces, weights
+
+
+def _starts(count: int, level: int) -> Ints:
+    """(2^level,) where the runs of the nodes of a level begin."""
+    return np.asarray((np.arange(1 << level) * count) >> level)
+
+
+def _cut_at_medians(places: Array, depth: int) -> Ints:
+    """The order of places (F, 3) m after so many cuts across the widest axis of each run."""
+    order = each = np.arange(len(places))
+    for level in range(depth):
+        starts = _starts(len(places), level)
+        low, high = (find.reduceat(places, starts) for find in (np.fmin, np.fmax))
+        row, axis, size = (
+            each[: len(starts)],
+            (high - low).argmax(axis=1),
+            np.diff(starts, append=len(places)),
+        )
+        width = np.maximum((high - low)[row, axis], 1e-300)
+        along = places[each, np.repeat(axis, size)] - np.repeat(low[row, axis], size)
+        rank = np.argsort(np.repeat(row, size) + 0.999 * (along / np.repeat(width, size)))
+        order, places = order[rank], places[rank]
+    return order
 
 
 @kernel

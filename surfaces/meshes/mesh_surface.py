@@ -214,8 +214,8 @@ class MeshSurface(Surface):
             before[faces] = weights @ smoothing.vertices[self.mesh.faces[parent]]
             smoothing = smoothing._replace(vertices=before)
         mesh = TriangleMesh(vertices, faces, self.mesh.history)
-        own = blended(vertices, faces, normals, sectors(mesh))
-        crease = blended(vertices, faces, normals, faces)
+        parts, crease = sectors(mesh), blended(vertices, faces, normals, faces)
+        own = crease if parts is mesh.faces else blended(vertices, faces, normals, parts)
         return MeshSurface(self.rotation, self.position, self.side, mesh, own, crease, smoothing)
 
     @cached_property

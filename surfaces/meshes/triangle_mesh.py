@@ -101,8 +101,8 @@ class TriangleMesh(Protected):
 
 def doubled_areas(vertices: Array, faces: Ints) -> Array:
     """(F, 3) m^2: the normals of the faces, as long as twice their areas."""
-    corners = vertices[faces]
-    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    a, b, c = (vertices[corner] for corner in faces.T)
+    return np.cross(b - a, c - a)
 
 
 def areas_of(vertices: Array, faces: Ints) -> Array:
@@ -150,8 +150,7 @@ def half_edges(faces: Ints) -> HalfEdges:
 
 def half_edge_ends(faces: Ints, halves: Ints) -> Ints:
     """(..., 2) the vertices from which and to which half-edges run."""
-    face, corner = np.divmod(halves, 3)
-    return np.stack([faces[face, corner], faces[face, (corner + 1) % 3]], axis=-1)
+    return np.stack([faces.ravel()[halves], np.roll(faces, -1, axis=1).ravel()[halves]], axis=-1)
 
 
 def piece_numbers(pairs: Ints, areas: Array) -> Ints:

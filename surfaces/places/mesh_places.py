@@ -66,9 +66,16 @@ class MeshPlaces(OffsetSurface):
         """
         from surfaces.meshes.face_tree import FaceTree  # compiled: loaded when it is needed
 
-        face, weights = cut_faces(self.surface.on_crease, SLICES)
+        surface = self.surface
+        face, weights = cut_faces(surface.on_crease, SLICES)
         corners = Places(np.repeat(face, 3), weights.reshape(-1, 3)[:, 1:])
-        return FaceTree.of(self.at(corners)[0].reshape(-1, 3, 3)), corners
+        whole = surface.face_balls[0] + self.height * surface.crease_normals
+        offset = (whole @ surface.rotation.T + surface.position)[face]
+        cut = (weights != np.eye(3)).any(axis=(1, 2))
+        offset[cut] = self.at(corners.of(np.repeat(cut, 3)))[0].reshape(-1, 3, 3)
+        # Cut as the faces themselves are, which are about as near to each other.
+        rank = np.argsort(surface.face_tree.order)
+        return FaceTree.of(offset, np.argsort(rank[face], kind="stable")), corners
 
     def nearest(
         self, points: Array, ahead: Array, within: float, only: Ints | None = None
