@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from coverable.arrays import Array
 from surfaces.arguments import ORIGIN, Checks
+from surfaces.enclosures import Enclosure
 from surfaces.patches.patch import ClosedFormPatch
 from surfaces.surface import Side
 
@@ -38,6 +39,11 @@ class Sphere(ClosedFormPatch):
     def local_point_and_normal(self, u: Array, v: Array) -> tuple[Array, Array]:
         """The sines and cosines once."""
         normal = unit_sphere(u, v)
+        return self.radius * normal, normal
+
+    def local_enclosures(self, u: Enclosure, v: Enclosure) -> tuple[Enclosure, Enclosure]:
+        """Likewise."""
+        normal = self._enclosed(self.local_normal, u, v)
         return self.radius * normal, normal
 
     def area(self, u0: ArrayLike, u1: ArrayLike, v0: ArrayLike, v1: ArrayLike) -> Array:
