@@ -337,9 +337,8 @@ def _norm(x: Enclosure, ord: Any = None, axis: Any = None, keepdims: bool = Fals
 
 def _cross(a: Any, b: Any) -> Enclosure:
     a, b = enclosed(a), enclosed(b)
-    pairs = ((1, 2), (2, 0), (0, 1))
-    parts = [a[..., i] * b[..., j] - a[..., j] * b[..., i] for i, j in pairs]
-    return _stack(parts, axis=-1)
+    second, third = [1, 2, 0], [2, 0, 1]
+    return a[..., second] * b[..., third] - a[..., third] * b[..., second]
 
 
 FUNCTIONS |= {

@@ -86,16 +86,17 @@ def _beside(
 ) -> tuple[Array, Array, Array]:
     """The middles (k, 3) of the pieces of a line, and how far a tool is off along them: m, rad."""
     base, offset = offset_surface(surface, 0.0), offset_surface(surface, height)
-    start, ahead = points[:-1], np.diff(points, axis=0)
+    start, ahead, share = points[:-1], np.diff(points, axis=0), SHARES[:, None, None]
+    over = (start + share * ahead).reshape(-1, 3)
+    target, normal = offset.at(base.nearest(over, over, np.inf))
     ends = points + height * normals
-    off, leans = np.zeros((2, len(ahead)))
-    for share in SHARES.tolist():
-        over = start + share * ahead
-        target, normal = offset.at(base.nearest(over, over, np.inf))
-        tool = ends[:-1] + share * np.diff(ends, axis=0)
-        arc, _ = arc_at(normals[:-1], normals[1:], np.full(len(ahead), share))
-        off = np.maximum(off, np.linalg.norm(tool - target, axis=1))
-        leans = np.maximum(leans, np.linalg.norm(arc - normal, axis=1))
+    tool = (ends[:-1] + share * np.diff(ends, axis=0)).reshape(-1, 3)
+    first, last = (np.tile(some, (len(SHARES), 1)) for some in (normals[:-1], normals[1:]))
+    arc, _ = arc_at(first, last, np.repeat(SHARES, len(ahead)))
+    off, leans = (
+        np.linalg.norm(apart, axis=1).reshape(len(SHARES), -1).max(axis=0)
+        for apart in (tool - target, arc - normal)
+    )
     return start + 0.5 * ahead, off, leans
 
 

@@ -21,7 +21,7 @@ from coverable.arrays import Array, Ints, Mask
 _MOST_STEPS = 60
 _MOST_HALVINGS = 40
 _MOST_RIVALS = 8  # valleys tried for one point, besides the nearest sample's
-_BLOCK = 1_000_000  # pairs of a point and a sample held at a time, about
+_BLOCK = 50_000  # pairs of a point and a sample held at a time, about: what a cache holds
 _STILL = 1e-14  # of the box's width: a step this short ends a descent
 _EPSILON = float(np.finfo(float).eps)
 
