@@ -34,8 +34,8 @@ class _Compiling:
         self.lock = threading.Lock()
 
     def listen(self) -> None:
-        """Hear of compilations from now on, once numba is there."""
-        if self.known or "numba" not in sys.modules:
+        """Hear of compilations from now on, once numba is there: an alarm may ring as it loads."""
+        if self.known or not hasattr(sys.modules.get("numba"), "njit"):
             return
         from numba.core import event
 

@@ -57,8 +57,9 @@ def contacts_along(places: PassPlaces, robot: Robot, walk: Walk, height: float) 
     after = np.minimum(before + 1, last)
     a, b = pose[before], pose[after]
     normals, _ = arc_at(places.normals[a], places.normals[b], _share(places.points, a, b, points))
-    own = known & (places.stretch[a] >= 0) & (places.stretch[b] >= 0)
-    contacts, stretch = (points - height * normals)[own], places.stretch[a][own]
+    of = places.at_work
+    own = known & (of[a] >= 0) & (of[b] >= 0)
+    contacts, stretch = (points - height * normals)[own], of[a][own]
     rows = np.flatnonzero(own)
     # A new number where something lies between two contacts, so that they are not joined.
     part = np.cumsum(np.diff(rows, prepend=rows[:1]) > 1)

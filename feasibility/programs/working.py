@@ -25,9 +25,7 @@ def working_places(places: PassPlaces, stretches: Sequence[Pass]) -> Ints:
     """
     levels = np.array([each.level for each in stretches])
     lifted = places.stretch == LIFTED
-    # On the way to the next stretch it goes on as on the one before.
-    known = np.where(places.stretch >= 0, np.arange(len(lifted)), 0)
-    stretch = np.where(lifted, 0, places.stretch[np.maximum.accumulate(known)])
+    stretch = np.where(lifted, 0, places.at_work)
     onto = (np.diff(stretch, prepend=stretch[:1]) != 0) & ~lifted
     hole = onto & (levels[stretch] == np.roll(levels[stretch], 1))
     begins = hole | (np.diff(lifted.astype(np.int64), prepend=1) < 0)

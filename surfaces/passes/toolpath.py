@@ -43,6 +43,12 @@ class PassPlaces(NamedTuple):
     """(N,) False where the tool is lifted, and beyond the border."""
 
     @property
+    def at_work(self) -> Ints:
+        """(N,) `stretch`, on the way along the surface that of the one before; -1 if lifted."""
+        known = np.where(self.stretch == BETWEEN, 0, np.arange(len(self.stretch)))
+        return self.stretch[np.maximum.accumulate(known)]
+
+    @property
     def lifts(self) -> int:
         """How often the tool is lifted between stretches."""
         return int((self.stretch == LIFTED).sum()) // 2

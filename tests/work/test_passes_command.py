@@ -28,7 +28,7 @@ CASES = {
         robot.name = "ur5"
         surface = { kind = "cylinder", radius = 0.15, u_deg = [50, 130], v = [0.0, 0.3],
             position = [0.5, 0.15, 0.0], rpy_deg = [90, 0, 0], side = "outside", cells = [4, 4] }
-        task = { standoff = 0.0, cone_deg = 30, tolerance = 0.0005 }
+        task = { standoff = 0.0, cone_deg = 30, tolerance = 0.0005, footprint = 0.01 }
     """.replace("\n            ", " "),
     "round": """
         robot.name = "ur5"
@@ -90,7 +90,7 @@ def test_verify_accepts_what_path_has_certified(path, tmp_path, more):
     """Between the passes it once went 2.3 mm into the part."""
     out, laid = tmp_path / "run.csv", ["--passes", "90", "--pitch", "0.06"]
     status, said, _ = path("pipe", *laid, *more, "--out", out)
-    assert status == 0
+    assert (status, "treated 20.0" in said) == (0, more in ([], ["--approach", "0.03"]))
     assert ("the tool is lifted 3 times" in said) == ("--one-way" in more)
     assert ("beyond the border by up to 20 mm" in said) == ("--overrun" in more)
     status, said, _ = path("pipe", out, *laid, command="verify")
