@@ -42,8 +42,10 @@ def open_regular(
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | getattr(os, "O_CLOEXEC", 0))
     except FileNotFoundError as error:
         raise FileFault(f"there is no such file; expected {what}") from error
-    except (OSError, ValueError) as error:  # ValueError: a NUL byte in the name
+    except OSError as error:
         raise FileFault(f"cannot be opened: {reason(error)}") from error
+    except ValueError as error:  # a NUL byte, or half of a character
+        raise FileFault("cannot be opened: no file can have that name") from error
     status = os.fstat(handle)
     fault = ""
     if stat.S_ISDIR(status.st_mode):

@@ -115,7 +115,7 @@ SPECIAL = {
     "circle": "cannot be opened: too many levels of symbolic links",
     "beyond": "cannot be opened: not a directory",
     "missing": "there is no such file; expected a",
-    "NUL": "cannot be opened: embedded null",
+    "NUL": "no file can have that name",
     "long": "cannot be opened: file name too long",
 }
 

@@ -113,7 +113,8 @@ def branch_and_bound(arrays, work, places, boxes, most, directions, space, found
     Args:
         arrays, work: the `SearchArrays` and the `Work`.
         places: the `PlaceParts` of the target.
-        boxes: the `BoxStack` on the stack; start from `box_of` or `root_box`.
+        boxes: what is not ruled out yet; start from `box_of` or `root_box`. None may be left out of
+            a proof: the one that ends it stays, too.
         most: boxes to examine before returning OPEN.
         directions: (k, 3) unit directions for the cuts.
         space: the `BoxWork`.
@@ -125,23 +126,24 @@ def branch_and_bound(arrays, work, places, boxes, most, directions, space, found
     for _ in range(most):
         if boxes.counts[0] == 0:
             return 1
-        boxes.counts[0] -= 1
+        top = boxes.counts[0] - 1  # a box stays on the stack until it is ruled out, or halved
         boxes.counts[1] += 1
-        top = boxes.counts[0]
         put(low, boxes.low[top])
         put(high, boxes.high[top])
         part, weight = boxes.part[top], boxes.weight[top]
         code, driver = shrink(arrays, work, places, part, directions, space, low, high)
         if code == 1:
+            boxes.counts[0] = top
             continue
         if code == 2:
             put(found, space.middle[:n])
             return 2
         worst = _split(arrays, places, part, driver, space, low, high)
-        if code == 3 or worst < 0 or boxes.counts[0] + 2 > boxes.low.shape[0]:
+        if code == 3 or worst < 0 or top + 2 > boxes.low.shape[0]:
             for j in range(n):
                 found[j] = 0.5 * (low[j] + high[j])
             return 3
+        boxes.counts[0] = top
         if worst == m:
             _push_children(places, boxes, part, weight, n, low, high)
             continue
