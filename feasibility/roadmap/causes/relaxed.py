@@ -33,7 +33,9 @@ def solutions(arrays: SearchArrays, work: Work, cell: int, guesses: Array, most:
 
 def with_cone(arrays: SearchArrays, cone_chord: float) -> SearchArrays:
     """The same arrays with another cone, for one cell's centre: no curve deviates there."""
-    return arrays._replace(cone_chord=cone_chord, inner_cone_chord=cone_chord)
+    return arrays._replace(
+        cone_chord=cone_chord, inner_cone_chord=cone_chord, settled_chord=cone_chord
+    )
 
 
 def other_rolls(exploration: Exploration, cell: int) -> str:

@@ -74,6 +74,9 @@ class SearchArrays(NamedTuple):
     inner_cone_chord: float
     """The part of the cone chord that self-motions over a cell's centre may use: less what
     ordinary curves deviate, and less what `near` costs."""
+    settled_chord: float
+    """That within which configurations settle: less what turns at inner creases take of it, which
+    they could not begin from nearer to its boundary."""
     roll_lost: float
     """rad, the part of the roll's half range that they may not use, for the same reasons."""
     curvature: float
@@ -108,6 +111,8 @@ def arrays_of(robot: Robot, cells: Cells, task: Task) -> SearchArrays:
     if frames.rate > 0.0:
         near = min(near, NEWTON_CONE * half / frames.rate)
     lost = _ordinary(curves.deviations[:, 1], cone_chord)
+    leans = cells.at_height(cells.surface.side_sign * task.standoff).curves.leans
+    turned = curves.deviations[(leans > 0.0) & (curves.deviations[:, 1] < cone_chord), 1]
     lost_roll = _ordinary(frames.deviations[:, 1], half) + NEAR_COST * frames.rate * near
     return SearchArrays(
         chain=robot.chain,
@@ -127,6 +132,7 @@ def arrays_of(robot: Robot, cells: Cells, task: Task) -> SearchArrays:
         tolerance=float(tolerance),
         roll=np.array([0.0 if task.roll is None else task.roll.middle, half]),
         inner_cone_chord=float(cone_chord - lost - NEAR_COST * curves.centre_curvature * near),
+        settled_chord=float(cone_chord - turned.max(initial=0.0)),
         roll_lost=float(lost_roll),
         curvature=curves.centre_curvature,
         roll_rate=frames.rate,

@@ -89,7 +89,7 @@ def margin_objective(arrays, work, q, size):  # type: ignore[no-untyped-def]
             x = (q[j] - arrays.lower[j]) / half - 1.0
             x2 = x * x
             work.secondary_step[j] = -size * x * x2 * x2
-    _push_back(work, OF_CONE, size, work.error[1, 1] / arrays.cone_chord)
+    _push_back(work, OF_CONE, size, work.error[1, 1] / arrays.settled_chord)
     if arrays.roll[1] < np.inf:
         _push_back(work, OF_ROLL, size, work.error[1, 2] / arrays.roll[1])
     if arrays.collisions.shape[0] > 0:

@@ -33,6 +33,7 @@ from feasibility.roadmap.motions.working_memory import (
 SMALLEST_STEP = 2.0**-7  # [1] of the curve between two centres: a shorter step ends the motion
 OFF_TARGET_STEP = 2.0**-4  # [1] of the curve: the first step with the tool point off its target
 MOST_STEPS = 400  # of one motion
+FOLLOWING = 4.0  # [1] times the turn of a direction: the tool is to follow before it has to
 NEWTON_AHEAD = np.int64(8)  # Newton steps onto the target ahead
 
 
@@ -66,12 +67,19 @@ def track(
 
 @kernel
 def span_of(arrays, work, curve, begin, end):
-    """Distance between the targets of a curve at two parameters, over `arrays.scale`."""
+    """Distance between the targets of a curve at two parameters, over `arrays.scale`.
+
+    And where directions turn on the spot, how far they do, FOLLOWING times.
+    """
     aim(arrays, work, curve, begin)
     x, y, z = work.target[0, 0], work.target[0, 1], work.target[0, 2]
+    u, v, w = work.target[1, 0], work.target[1, 1], work.target[1, 2]
     aim(arrays, work, curve, end)
     dx, dy, dz = work.target[0, 0] - x, work.target[0, 1] - y, work.target[0, 2] - z
-    return np.sqrt(dx * dx + dy * dy + dz * dz) / arrays.scale
+    du, dv, dw = work.target[1, 0] - u, work.target[1, 1] - v, work.target[1, 2] - w
+    on_the_spot = arrays.settled_chord < arrays.cone_chord
+    turn = np.sqrt(du * du + dv * dv + dw * dw) if on_the_spot else 0.0
+    return np.sqrt(dx * dx + dy * dy + dz * dz) / arrays.scale + FOLLOWING * turn
 
 
 @kernel
