@@ -180,11 +180,12 @@ def collision_replay(
 
 def _judged(pairs: list[Pair], pairings: list[Pairing]) -> CollisionReplay:
     """All couples, the nearest first: how near they come sets what is aimed at."""
-    nearest = math.inf
+    nearest, met = math.inf, pairings[0]
     for one in sorted(pairings, key=lambda one: one.bound):
         if not one.bound < nearest:
             break
-        nearest = min(nearest, float(one.measured(np.array([np.argmin(one.low)], float))[0]))
+        distance = float(one.measured(np.array([np.argmin(one.low)], float))[0])
+        nearest, met = min((nearest, met), (distance, one), key=lambda known: known[0])
     for one in pairings:
         one.certify(nearest)
     faults = dict[tuple[str, str], CollisionFault]()
@@ -194,33 +195,33 @@ def _judged(pairs: list[Pair], pairings: list[Pairing]) -> CollisionReplay:
             known = faults.get(fault.pair)
             if known is None or not fault.distance >= known.distance:
                 faults[fault.pair] = fault
-    order = sorted(range(len(pairings)), key=lambda k: _decided(pairings[k].bound))
+    order = sorted(pairings, key=lambda one: _decided(one.bound))
     calls = sum(one.calls for one in pairings)
-    least, pair = pairings[order[0]], pairs[order[0]]
-    measured = None if faults else _measured([pairings[k] for k in order[:MEASURED]])
+    # What is certified of many is no more than was aimed at: they need not be the nearest.
+    measured, near = (None, order[0]) if faults else _measured([met, *order[:MEASURED]])
     return CollisionReplay(
-        min_clearance=least.bound,
-        nearest_pair=(pair.first, pair.second),
-        measured_clearance=measured,
+        min_clearance=order[0].bound,
+        nearest_pair=near.names,
+        measured_clearance=None if measured is None else max(measured, order[0].bound),
         faults=tuple(sorted(faults.values(), key=lambda fault: _decided(fault.distance))),
         calls=calls,
         pairings=tuple(pairings),
     )
 
 
-def _measured(pairings: list[Pairing]) -> float:
-    """m, the least distance that is met, of exact bodies; no less than what is certified.
+def _measured(pairings: list[Pairing]) -> tuple[float, Pairing]:
+    """m, the least distance that is met, of exact bodies, and of which.
 
     Bodies may stand back from what is known of them as far as they may stand out. Of a motion that
     deviates from straight lines only rows are looked at.
     """
     finest = 1.0 if pairings[0].motion.deviations.any() else FINEST
-    found = math.inf
+    found, near = math.inf, pairings[0]
     for one in pairings:
         if one.bound < found:
-            off = one.a.deviation + one.b.deviation
-            found = min(found, one.least_measured(finest)[1] + 2.0 * off)
-    return max(found, pairings[0].bound)
+            distance = one.least_measured(finest)[1] + 2.0 * (one.a.deviation + one.b.deviation)
+            found, near = min((found, near), (distance, one), key=lambda known: known[0])
+    return found, near
 
 
 def _least_norms(start: Array, end: Array) -> Array:
