@@ -21,7 +21,8 @@ from coverable.arrays import Array, Ints, Mask
 _MOST_STEPS = 60
 _MOST_HALVINGS = 40
 _MOST_RIVALS = 8  # valleys tried for one point, besides the nearest sample's
-_BLOCK = 50_000  # pairs of a point and a sample held at a time, about: what a cache holds
+_BLOCK = 1_000_000  # pairs of a point and a sample held at a time, at most
+_FEWEST = 16  # points at a time, though these may be more
 _STILL = 1e-14  # of the box's width: a step this short ends a descent
 _EPSILON = float(np.finfo(float).eps)
 
@@ -81,9 +82,8 @@ class ClosestPointSearch:
         found = self._descend(points, self._samples[start])
         gap = np.linalg.norm(self._point(found) - points, axis=1)
         radius = gap + self._reach
-        many = self._tree.query_ball_point(points, radius, return_length=True)
-        blocks = np.flatnonzero(np.diff(np.cumsum(many) // _BLOCK)) + 1
-        for part in np.split(np.arange(len(points)), blocks):
+        few = max(_BLOCK // len(self._samples), _FEWEST)
+        for part in np.split(np.arange(len(points)), np.arange(few, len(points), few)):
             owner, rival = self._rivals(points[part], radius[part], start[part])
             if not len(owner):
                 continue
