@@ -324,7 +324,7 @@ class Task:
             raise ArgumentError(
                 Fault(
                     "roll_reference",
-                    f"is missing: a {cells.surface.kind} has no u direction",
+                    "is missing: there is no u direction on a mesh, on poses or along passes",
                     expected="give a direction along it, in its own frame, such as (1, 0, 0)",
                 ),
                 "task",

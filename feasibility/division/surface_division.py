@@ -24,6 +24,7 @@ from feasibility.roadmap.causes.disconnection import disconnected
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions.search_arrays import SearchArrays, within
 from feasibility.roadmap.proofs.ruling import Ruling
+from feasibility.roadmap.refinement import COARSE, refine
 from feasibility.roadmap.rounds import explore
 from feasibility.roadmap.search import exploration_of
 from feasibility.roadmap.warmup import warm_up
@@ -244,6 +245,7 @@ def _searched(robot: Robot, cells: Cells, task: Task, seed: int, clock: Clock) -
     ended, apart = True, ProvedBound(min(1, len(cells)))
     try:
         explore(exploration)
+        refine(exploration, task, COARSE)  # as `check` does, or it would know larger patches
         collect_components(exploration)
         if not _no_motion(exploration.arrays):
             apart = prove_apart(exploration, task)
