@@ -31,11 +31,9 @@ def solutions(arrays: SearchArrays, work: Work, cell: int, guesses: Array, most:
     return np.reshape(found, (-1, guesses.shape[1]))
 
 
-def with_cone(arrays: SearchArrays, cone_chord: float) -> SearchArrays:
+def with_cone(arrays: SearchArrays, chord: float) -> SearchArrays:
     """The same arrays with another cone, for one cell's centre: no curve deviates there."""
-    return arrays._replace(
-        cone_chord=cone_chord, inner_cone_chord=cone_chord, settled_chord=cone_chord
-    )
+    return arrays._replace(cone_chord=chord, inner_cone_chord=chord, settled_chord=chord)
 
 
 def other_rolls(exploration: Exploration, cell: int) -> str:

@@ -67,10 +67,7 @@ def track(
 
 @kernel
 def span_of(arrays, work, curve, begin, end):
-    """Distance between the targets of a curve at two parameters, over `arrays.scale`.
-
-    And where directions turn on the spot, how far they do, FOLLOWING times.
-    """
+    """Distance of two targets of a curve over `arrays.scale`; and FOLLOWING turns on the spot."""
     aim(arrays, work, curve, begin)
     x, y, z = work.target[0, 0], work.target[0, 1], work.target[0, 2]
     u, v, w = work.target[1, 0], work.target[1, 1], work.target[1, 2]

@@ -113,8 +113,7 @@ def branch_and_bound(arrays, work, places, boxes, most, directions, space, found
     Args:
         arrays, work: the `SearchArrays` and the `Work`.
         places: the `PlaceParts` of the target.
-        boxes: what is not ruled out yet; start from `box_of` or `root_box`. None may be left out of
-            a proof: the one that ends it stays, too.
+        boxes: what is not ruled out, also what ends it; start from `box_of` or `root_box`.
         most: boxes to examine before returning OPEN.
         directions: (k, 3) unit directions for the cuts.
         space: the `BoxWork`.
