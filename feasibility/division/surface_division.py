@@ -185,6 +185,7 @@ def _with_room(exploration: Exploration, task: Task, clock: Clock, plan: Plan) -
         held = problem.held_back(cone, error, times)
         found = exploration_of(held.robot, cells, held.searched, exploration.seed, clock)
         explore(found)
+        refine(found, held.searched, COARSE)
         collect_components(found)
         if task.requires_rates:
             keep_fast_motions(found, task)
