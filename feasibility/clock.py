@@ -35,7 +35,7 @@ class _Compiling:
 
     def listen(self) -> None:
         """Hear of compilations from now on, once numba is there: an alarm may ring as it loads."""
-        if self.known or not hasattr(sys.modules.get("numba"), "njit"):
+        if self.known or not hasattr(sys.modules.get("numba"), "vectorize"):
             return
         from numba.core import event
 

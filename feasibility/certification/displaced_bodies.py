@@ -191,5 +191,6 @@ class Nearer:
 
 def _furthest(body: Body, point: Array) -> float:
     """m, of any of a body's points from another one."""
-    away = np.linalg.norm(body.corners - point, axis=1).max()
-    return float(away + body.radius + body.circle + body.deviation)
+    away = body.corners - point
+    most = np.sqrt(np.einsum("ki,ki->k", away, away).max())
+    return float(most + body.radius + body.circle + body.deviation)

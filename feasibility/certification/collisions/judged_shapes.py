@@ -98,8 +98,9 @@ class Body:
 
     def highest(self, n: Array) -> Array:
         """(k,) m, h(n) for unit vectors n (k, 3), which are not along a half space."""
-        parts = -(-n.size * len(self.corners) // MOST_NUMBERS)
-        found = [(part @ self.corners.T).max(axis=1) for part in np.array_split(n, max(parts, 1))]
+        few = max(MOST_NUMBERS // len(self.corners), 1)
+        parts = (n[k : k + few] for k in range(0, max(len(n), 1), few))
+        found = [(part @ self.corners.T).max(axis=1) for part in parts]
         along = n @ self.axis
         across = np.sqrt(np.maximum((n * n).sum(axis=1) - along * along, 0.0))
         return np.concatenate(found) + self.circle * across + self.radius
