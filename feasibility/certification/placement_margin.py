@@ -147,7 +147,7 @@ class Balls(Rows):
     @property
     def first(self) -> Ints:
         """(m - 1,) which is the first one behind each row."""
-        return np.flatnonzero(np.diff(self.row, prepend=-1))
+        return np.flatnonzero(self.row != np.append(-1, self.row[:-1]))
 
     def moved(self, position: float, angle: float) -> Array:
         """(m - 1, n) rad or m, e_j from each row to the next, for such a triangle."""
