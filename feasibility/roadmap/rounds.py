@@ -36,7 +36,7 @@ DEEP_BOXES = 2_000_000  # boxes for the few cells that are examined until one is
 DEEP_CELLS = 3
 ARM_CELLS = 4  # for which a collision of any part of the arm is tried to be proved
 MOST_RULED = 500  # cells examined in a row without reaching any; on a fine grid the rest are alike
-NEWTON_STARTS = 25
+NEWTON_STARTS, LAST_STARTS = 25, 1000
 
 
 def explore(exploration: Exploration, between: Callable[[int], None] | None = None) -> None:
@@ -120,6 +120,8 @@ def _unreached(exploration: Exploration) -> None:
     for cell in sorted(left, key=lambda cell: -distance[cell])[:DEEP_CELLS]:
         if rule(exploration, cell, open_boxes[cell], DEEP_BOXES) is Ruling.PROVED:
             return
+        if not exploration.reached[cell]:  # a box was too thin to say: it can be by a hair
+            exploration.add_seeds(cell, exploration.guesses(LAST_STARTS))
 
 
 def _at_the_target(exploration: Exploration) -> None:
