@@ -176,10 +176,7 @@ class JSpace:
             stack = memory.stack_node[: counters[jcells.DEPTH] + 1]
             path = memory.nodes[np.append(stack, counters[jcells.NODES] - 1)]
         return Continuity(
-            outcome=outcome,
-            jcells=path,
-            q=self.q(path),
-            checked=int(counters[jcells.NODES]) - 1,
+            outcome=outcome, jcells=path, q=self.q(path), checked=int(counters[jcells.NODES]) - 1
         )
 
 

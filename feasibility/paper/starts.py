@@ -188,12 +188,7 @@ def starts(
 
 
 def candidates(
-    robot: Robot,
-    cells: Cells,
-    task: Task,
-    search: Search,
-    usable: Mask,
-    clock: Clock | None = None,
+    robot: Robot, cells: Cells, task: Task, search: Search, usable: Mask, clock: Clock | None = None
 ) -> Iterator[Array]:
     """Start configurations (n,) over the start cell, as many as the search asks for.
 

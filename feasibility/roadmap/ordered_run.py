@@ -172,10 +172,7 @@ def layers_of(roadmap: Roadmap, begin: int | None = None) -> Layers:
         there, here = here, int(before[here])
         route.append(steps[here, there][1])
     return Layers(
-        ahead=frozenset(ahead),
-        furthest=cell[end],
-        start=here,
-        route=tuple(reversed(route)),
+        ahead=frozenset(ahead), furthest=cell[end], start=here, route=tuple(reversed(route))
     )
 
 

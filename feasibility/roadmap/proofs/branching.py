@@ -17,13 +17,7 @@ from feasibility.roadmap.motions.search_arrays import SearchArrays
 from feasibility.roadmap.motions.working_memory import Work, put
 from feasibility.roadmap.proofs.box_bounds import rolls_over
 from feasibility.roadmap.proofs.box_contraction import THINNEST, shrink
-from feasibility.roadmap.proofs.boxes import (
-    BoxStack,
-    PlaceParts,
-    box_of,
-    box_work,
-    place_at_rest,
-)
+from feasibility.roadmap.proofs.boxes import BoxStack, PlaceParts, box_of, box_work, place_at_rest
 from feasibility.roadmap.proofs.ruling import Ruling
 
 DIRECTIONS = np.array(
