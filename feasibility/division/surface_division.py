@@ -184,9 +184,7 @@ def _with_room(exploration: Exploration, task: Task, clock: Clock, plan: Plan) -
     for cone, times in HELD_BACK:
         held = problem.held_back(cone, error, times)
         found = exploration_of(held.robot, cells, held.searched, exploration.seed, clock)
-        explore(found)
-        refine(found, held.searched, COARSE)
-        collect_components(found)
+        _explore(found, held.searched)
         if task.requires_rates:
             keep_fast_motions(found, task)
         other = plan_of(found, task, clock.left, exploration)
@@ -229,6 +227,13 @@ def _statistics(exploration: Exploration) -> dict[str, int]:
     }
 
 
+def _explore(exploration: Exploration, task: Task) -> None:
+    """Search for components of motions; in finer cells, too, or `check` would know larger ones."""
+    explore(exploration)
+    refine(exploration, task, COARSE)
+    collect_components(exploration)
+
+
 class _Searched(NamedTuple):
     """What a search found."""
 
@@ -245,9 +250,7 @@ def _searched(robot: Robot, cells: Cells, task: Task, seed: int, clock: Clock) -
     exploration = exploration_of(robot, cells, task, seed, clock)
     ended, apart = True, ProvedBound(min(1, len(cells)))
     try:
-        explore(exploration)
-        refine(exploration, task, COARSE)  # as `check` does, or it would know larger patches
-        collect_components(exploration)
+        _explore(exploration, task)
         if not _no_motion(exploration.arrays):
             apart = prove_apart(exploration, task)
     except OutOfTime:

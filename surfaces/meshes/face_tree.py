@@ -85,11 +85,8 @@ def _cut_at_medians(places: Array, depth: int) -> Ints:
     for level in range(depth):
         starts = _starts(len(places), level)
         low, high = (find.reduceat(places, starts) for find in (np.fmin, np.fmax))
-        row, axis, size = (
-            each[: len(starts)],
-            (high - low).argmax(axis=1),
-            np.diff(starts, append=len(places)),
-        )
+        row, axis = each[: len(starts)], (high - low).argmax(axis=1)
+        size = np.diff(starts, append=len(places))
         width = np.maximum((high - low)[row, axis], 1e-300)
         along = places[each, np.repeat(axis, size)] - np.repeat(low[row, axis], size)
         rank = np.argsort(np.repeat(row, size) + 0.999 * (along / np.repeat(width, size)))

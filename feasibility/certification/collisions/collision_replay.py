@@ -185,7 +185,8 @@ def _judged(pairs: list[Pair], pairings: list[Pairing]) -> CollisionReplay:
         if not one.bound < nearest:
             break
         distance = float(one.measured(np.array([np.argmin(one.low)], float))[0])
-        nearest, met = min((nearest, met), (distance, one), key=lambda known: known[0])
+        if distance < nearest:
+            nearest, met = distance, one
     for one in pairings:
         one.certify(nearest)
     faults = dict[tuple[str, str], CollisionFault]()
@@ -198,7 +199,8 @@ def _judged(pairs: list[Pair], pairings: list[Pairing]) -> CollisionReplay:
     order = sorted(pairings, key=lambda one: _decided(one.bound))
     calls = sum(one.calls for one in pairings)
     # What is certified of many is no more than was aimed at: they need not be the nearest.
-    measured, near = (None, order[0]) if faults else _measured([met, *order[:MEASURED]])
+    nearby = list(dict.fromkeys([met, *order[:MEASURED]]))
+    measured, near = (None, order[0]) if faults else _measured(nearby)
     return CollisionReplay(
         min_clearance=order[0].bound,
         nearest_pair=near.names,
@@ -220,7 +222,8 @@ def _measured(pairings: list[Pairing]) -> tuple[float, Pairing]:
     for one in pairings:
         if one.bound < found:
             distance = one.least_measured(finest)[1] + 2.0 * (one.a.deviation + one.b.deviation)
-            found, near = min((found, near), (distance, one), key=lambda known: known[0])
+            if distance < found:
+                found, near = distance, one
     return found, near
 
 
