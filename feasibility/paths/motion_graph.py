@@ -14,7 +14,6 @@ import networkx as nx
 import numpy as np
 
 from coverable.arrays import Array, Ints
-from feasibility.roadmap.motions.aiming import look_at
 from feasibility.roadmap.motions.search_arrays import SearchArrays, arrays_of
 from feasibility.roadmap.motions.self_motion import connect
 from feasibility.roadmap.motions.tracking import track
@@ -215,8 +214,7 @@ def _self_motion(graph: MotionGraph, cell: int, start: Array, goal: Array) -> Ar
     """(k, n) waypoints over one cell's centre from start to goal; None where none was found."""
     if np.array_equal(start, goal):
         return start[None].copy()
-    look_at(graph.arrays, graph.work, cell)
-    motion, reached = connect(graph.arrays, graph.work, start, goal)
+    motion, reached = connect(graph.arrays, graph.work, start, goal, cell)
     return np.vstack([start, motion]) if reached else None
 
 

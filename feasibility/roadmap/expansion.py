@@ -11,12 +11,11 @@ import numpy as np
 
 from coverable.arrays import Array, Ints
 from feasibility.roadmap.graph import Blocked, Roadmap
-from feasibility.roadmap.motions.aiming import look_at
 from feasibility.roadmap.motions.off_target import project_near_cell
 from feasibility.roadmap.motions.projection import PROJECTION_STEPS
 from feasibility.roadmap.motions.search_arrays import SearchArrays
 from feasibility.roadmap.motions.self_motion import SETTLE_STEPS, connect, effects, settle
-from feasibility.roadmap.motions.tracking import track
+from feasibility.roadmap.motions.tracking import track, track_to
 from feasibility.roadmap.motions.working_memory import Work
 
 MOST_FAILURES = 12  # failed connections after which a pair of components is left alone
@@ -43,8 +42,7 @@ class Grower:
 
     def connect(self, cell: int, q: Array, goal: Array) -> tuple[Array, bool]:
         """The self-motion of `motions.connect` over a cell's centre."""
-        look_at(self.arrays, self.work, cell)
-        return connect(self.arrays, self.work, q, goal)
+        return connect(self.arrays, self.work, q, goal, cell)
 
     def add_node(self, cell: int, q: Array, root: int) -> int:
         """Add a node to a root component, and queue it; returns its number."""
@@ -134,7 +132,7 @@ class Grower:
                 if joined is None:
                     roadmap.add_edge(x, self.add_node(target, motion[-1], own), motion)
                 else:
-                    own = roadmap.add_edge(x, joined[0], np.vstack([motion, joined[1]]))
+                    own = roadmap.add_edge(x, joined[0], np.concatenate([motion, joined[1]]))
                 if enough(own):
                     return True
             roadmap.queue.popleft()
@@ -172,13 +170,12 @@ class Grower:
         there, back = (*nodes, (0.0, 1.0)), (*nodes[::-1], (1.0, 0.0))
         motion = None
         for (a, b, ends), heading in ((there, True), (back, True), (there, False), (back, False)):
-            goal = roadmap.q[b]
-            motion = self.track(curve, ends, roadmap.q[a], goal if heading else None)
-            if motion is None:
-                continue
-            more, reached = self.connect(roadmap.cell[b], motion[-1], goal)
-            if reached:
-                roadmap.add_edge(a, b, np.vstack([motion, more]))
+            motion, reached = track_to(
+                self.arrays, self.work, curve, *ends, roadmap.q[a], roadmap.q[b], heading,
+                roadmap.cell[b],
+            )  # fmt: skip
+            if motion is not None and reached:
+                roadmap.add_edge(a, b, motion)
                 return True
         if motion is None:
             return False

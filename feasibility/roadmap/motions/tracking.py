@@ -14,12 +14,17 @@ import numpy as np
 
 from coverable.arrays import Array
 from coverable.kernels import entry, kernel
-from feasibility.roadmap.motions.aiming import aim, bounds_between
+from feasibility.roadmap.motions.aiming import aim, bounds_between, look_at
 from feasibility.roadmap.motions.off_target import STEPS_FROM_NEAR, project_off_target
 from feasibility.roadmap.motions.projection import linearise, project
 from feasibility.roadmap.motions.search_arrays import FOLD, LONG, SINGULAR, STOPPED, SearchArrays
 from feasibility.roadmap.motions.segment_bound import segment_holds
-from feasibility.roadmap.motions.self_motion import CONE_SLACK, margin_objective
+from feasibility.roadmap.motions.self_motion import (
+    CONE_SLACK,
+    CONNECT_STEPS,
+    connect_over,
+    margin_objective,
+)
 from feasibility.roadmap.motions.working_memory import (
     HERE,
     NEXT,
@@ -35,6 +40,7 @@ OFF_TARGET_STEP = 2.0**-4  # [1] of the curve: the first step with the tool poin
 MOST_STEPS = 400  # of one motion
 FOLLOWING = 4.0  # [1] times the turn of a direction: the tool is to follow before it has to
 NEWTON_AHEAD = np.int64(8)  # Newton steps onto the target ahead
+NOWHERE = -1  # in place of a cell to `connect` over
 
 
 def track(
@@ -59,10 +65,29 @@ def track(
         (k, n) waypoints, the start left out; None when the motion stopped short
         (`work.stop_reason` holds the reason).
     """
-    here, waypoints = q.copy(), np.empty((MOST_STEPS, len(q)))
-    aimed = here if goal is None else goal
-    rows = _track(arrays, work, curve, begin, end, here, aimed, goal is not None, waypoints)
-    return None if rows == STOPPED else waypoints[:rows].copy()
+    aimed = q if goal is None else goal
+    return track_to(arrays, work, curve, begin, end, q, aimed, goal is not None)[0]
+
+
+def track_to(
+    arrays: SearchArrays,
+    work: Work,
+    curve: int,
+    begin: float,
+    end: float,
+    q: Array,
+    goal: Array,
+    heading: bool,
+    cell: int = NOWHERE,
+) -> tuple[Array | None, bool]:
+    """`track`, heading for the goal or not, and over the cell at the end `connect` it to the goal.
+
+    Returns:
+        The waypoints, of both where the goal was reached; and whether it was.
+    """
+    here, waypoints = q.copy(), np.empty((MOST_STEPS + CONNECT_STEPS, len(q)))
+    rows, more = _track_to(arrays, work, curve, begin, end, here, goal, heading, cell, waypoints)
+    return None if rows == STOPPED else waypoints[: rows + more].copy(), more > 0
 
 
 @kernel
@@ -112,6 +137,17 @@ def _starts_inside(arrays, work):
 
 
 @entry
+def _track_to(arrays, work, curve, begin, end, q, goal, heading, cell, waypoints):
+    """Write the waypoints of `track_to` and move q along; returns the numbers of both motions."""
+    rows = _track(arrays, work, curve, begin, end, q, goal, heading, waypoints)
+    if rows == STOPPED or cell == NOWHERE:
+        return rows, 0
+    look_at(arrays, work, cell)
+    more, reached = connect_over(arrays, work, q, goal, waypoints[rows:])
+    return rows, more if reached else 0
+
+
+@kernel
 def _track(arrays, work, curve, begin, end, q, goal, has_goal, waypoints):
     """Write the waypoints of `track` and move q along; returns their number, or STOPPED."""
     n = q.shape[0]
