@@ -50,7 +50,7 @@ def where_it_stops(
     first, cause, motions = pose, "", list[Array]()
     while pose < len(exploration.cells) - 1:
         curve = exploration.curve(pose, pose + 1)
-        motion = track(exploration.arrays, exploration.work, curve, 0.0, 1.0, q)
+        motion, _ = track(exploration.arrays, exploration.work, curve, (0.0, 1.0), q)
         if motion is None:
             code, joint = (int(value) for value in exploration.work.stop_reason)
             cause = _words(exploration, code, joint, pairs)

@@ -14,6 +14,7 @@ import networkx as nx
 import numpy as np
 
 from coverable.arrays import Array, Ints
+from feasibility.roadmap.motions.aiming import look_at
 from feasibility.roadmap.motions.search_arrays import SearchArrays, arrays_of
 from feasibility.roadmap.motions.self_motion import connect
 from feasibility.roadmap.motions.tracking import track
@@ -206,7 +207,7 @@ def _follow(graph: MotionGraph, x: int, cell: int, goal: Array | None) -> Array 
     # The curve between two cells runs from the one of lower index to the other.
     ends = (0.0, 1.0) if here < cell else (1.0, 0.0)
     curve = graph.pairs[min(here, cell), max(here, cell)]
-    motion = track(graph.arrays, graph.work, curve, *ends, q, goal)
+    motion, _ = track(graph.arrays, graph.work, curve, ends, q, goal)
     return None if motion is None else np.vstack([q, motion])
 
 
@@ -214,7 +215,8 @@ def _self_motion(graph: MotionGraph, cell: int, start: Array, goal: Array) -> Ar
     """(k, n) waypoints over one cell's centre from start to goal; None where none was found."""
     if np.array_equal(start, goal):
         return start[None].copy()
-    motion, reached = connect(graph.arrays, graph.work, start, goal, cell)
+    look_at(graph.arrays, graph.work, cell)
+    motion, reached = connect(graph.arrays, graph.work, start, goal)
     return np.vstack([start, motion]) if reached else None
 
 

@@ -11,11 +11,12 @@ import numpy as np
 
 from coverable.arrays import Array, Ints
 from feasibility.roadmap.graph import Blocked, Roadmap
+from feasibility.roadmap.motions.aiming import look_at
 from feasibility.roadmap.motions.off_target import project_near_cell
 from feasibility.roadmap.motions.projection import PROJECTION_STEPS
 from feasibility.roadmap.motions.search_arrays import SearchArrays
 from feasibility.roadmap.motions.self_motion import SETTLE_STEPS, connect, effects, settle
-from feasibility.roadmap.motions.tracking import track, track_to
+from feasibility.roadmap.motions.tracking import track
 from feasibility.roadmap.motions.working_memory import Work
 
 MOST_FAILURES = 12  # failed connections after which a pair of components is left alone
@@ -34,15 +35,14 @@ class Grower:
     tick: Callable[[str], None]
     """Called with what is being done, again and again; what it raises ends that."""
 
-    def track(
-        self, curve: int, ends: tuple[float, float], q: Array, goal: Array | None = None
-    ) -> Array | None:
+    def track(self, curve: int, ends: tuple[float, float], q: Array) -> Array | None:
         """The motion of `motions.track` from one parameter of a curve to another."""
-        return track(self.arrays, self.work, curve, *ends, q, goal)
+        return track(self.arrays, self.work, curve, ends, q)[0]
 
     def connect(self, cell: int, q: Array, goal: Array) -> tuple[Array, bool]:
         """The self-motion of `motions.connect` over a cell's centre."""
-        return connect(self.arrays, self.work, q, goal, cell)
+        look_at(self.arrays, self.work, cell)
+        return connect(self.arrays, self.work, q, goal)
 
     def add_node(self, cell: int, q: Array, root: int) -> int:
         """Add a node to a root component, and queue it; returns its number."""
@@ -170,10 +170,8 @@ class Grower:
         there, back = (*nodes, (0.0, 1.0)), (*nodes[::-1], (1.0, 0.0))
         motion = None
         for (a, b, ends), heading in ((there, True), (back, True), (there, False), (back, False)):
-            motion, reached = track_to(
-                self.arrays, self.work, curve, *ends, roadmap.q[a], roadmap.q[b], heading,
-                roadmap.cell[b],
-            )  # fmt: skip
+            q, goal, cell = roadmap.q[a], roadmap.q[b], roadmap.cell[b]
+            motion, reached = track(self.arrays, self.work, curve, ends, q, goal, heading, cell)
             if motion is not None and reached:
                 roadmap.add_edge(a, b, motion)
                 return True

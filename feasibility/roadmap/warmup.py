@@ -1,5 +1,7 @@
 """The kernels of the complete search, loaded ahead of the work."""
 
+from functools import cache
+
 from feasibility.roadmap.exploration import Exploration
 from feasibility.task import Task
 
@@ -15,13 +17,9 @@ def warm_up(rarely_used: bool = False) -> None:
         rarely_used: those too that a search needs where it does not reach every cell. They are
             compiled when first used; processes that begin together would all do that.
     """
-    global _warm, _rare
-    if not _warm:
-        _explore_two_cells()
-        _warm = True
-    if rarely_used and not _rare:
+    _explore_two_cells()
+    if rarely_used:
         _look_for_reasons()
-        _rare = True
 
 
 def _two_cells(width: tuple[float, float]) -> Exploration:
@@ -34,6 +32,7 @@ def _two_cells(width: tuple[float, float]) -> Exploration:
     return exploration_of(load_robot("puma560"), cells, TASK, 0)
 
 
+@cache
 def _explore_two_cells() -> None:
     """Cover two cells in one motion, and replay it."""
     from feasibility.certification.motion_replay import replay
@@ -47,6 +46,7 @@ def _explore_two_cells() -> None:
     replay(exploration.robot, exploration.cells, TASK, walk, exploration.covered)
 
 
+@cache
 def _look_for_reasons() -> None:
     """Rule cells out, cut, and say why they are missed."""
     from feasibility.roadmap.causes.diagnosis import diagnose
@@ -61,6 +61,3 @@ def _look_for_reasons() -> None:
     Proving(exploration, TASK).attempt(1)
     diagnose(exploration, 0)
     diagnose(_two_cells((5.0, 5.02)), 0)
-
-
-_warm = _rare = False

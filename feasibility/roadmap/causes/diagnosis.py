@@ -120,7 +120,8 @@ def _past_limits(exploration: Exploration, relaxed: SearchArrays, cell: int, fou
     for q in found:
         here = _wrapped(robot, q)
         goal = np.clip(here, robot.lower, robot.upper)
-        motion, _ = connect(relaxed, exploration.work, here, goal, cell)
+        look_at(relaxed, exploration.work, cell)
+        motion, _ = connect(relaxed, exploration.work, here, goal)
         here = _wrapped(robot, motion[-1]) if len(motion) else here
         past = float(np.abs(here - np.clip(here, robot.lower, robot.upper)).sum())
         if past < least:

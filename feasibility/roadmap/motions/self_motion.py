@@ -36,7 +36,6 @@ CONE_SLACK = 1e-3  # [1] share of cone and roll kept free by a full step; less b
 NEWTON_AT_REST = np.int64(6)  # Newton steps of one step of a self-motion
 CONNECT_STEPS = 60  # of one self-motion towards a goal
 SETTLE_STEPS = np.int64(40)  # of `settle`
-SET_ALREADY = -1  # in place of a cell: the target
 
 
 @entry
@@ -114,12 +113,8 @@ def _step_towards(arrays, work, q, goal, share, slack, off_target):  # type: ign
     return project_off_target(arrays, work, work.trial, STEPS_FROM_NEAR)
 
 
-def connect(
-    arrays: SearchArrays, work: Work, q: Array, goal: Array, cell: int = SET_ALREADY
-) -> tuple[Array, bool]:
-    """Self-motion over a cell's centre, from a configuration q (n,) towards another one.
-
-    By default it is over `work.target`, at rest.
+def connect(arrays: SearchArrays, work: Work, q: Array, goal: Array) -> tuple[Array, bool]:
+    """Self-motion over `work.target`, at rest, from a configuration q (n,) towards another one.
 
     Each step heads for the goal and is projected back onto the manifold. The motion ends early when
     it falls behind: a step that brings the goal nearer by only a small part of its length means
@@ -130,21 +125,13 @@ def connect(
         (k, n) waypoints, the start left out; and whether the last one is `goal`.
     """
     waypoints = np.empty((CONNECT_STEPS, len(q)))
-    rows, reached = _connect(arrays, work, cell, q.copy(), goal, waypoints)
+    rows, reached = move_towards(arrays, work, q.copy(), goal, waypoints)
     return waypoints[:rows].copy(), bool(reached)
 
 
 @entry
-def _connect(arrays, work, cell, q, goal, waypoints):  # type: ignore[no-untyped-def]
+def move_towards(arrays, work, q, goal, waypoints):  # type: ignore[no-untyped-def]
     """Write the waypoints of `connect` and move q along; returns their number, and `reached`."""
-    if cell != SET_ALREADY:
-        look_at(arrays, work, cell)
-    return connect_over(arrays, work, q, goal, waypoints)
-
-
-@kernel
-def connect_over(arrays, work, q, goal, waypoints):  # type: ignore[no-untyped-def]
-    """`_connect` over `work.target`."""
     n = q.shape[0]
     place(arrays, work, HERE, q)
     size, written = 0.3, 0

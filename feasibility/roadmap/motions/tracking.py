@@ -14,17 +14,12 @@ import numpy as np
 
 from coverable.arrays import Array
 from coverable.kernels import entry, kernel
+from feasibility.roadmap.motions import self_motion
 from feasibility.roadmap.motions.aiming import aim, bounds_between, look_at
 from feasibility.roadmap.motions.off_target import STEPS_FROM_NEAR, project_off_target
 from feasibility.roadmap.motions.projection import linearise, project
 from feasibility.roadmap.motions.search_arrays import FOLD, LONG, SINGULAR, STOPPED, SearchArrays
 from feasibility.roadmap.motions.segment_bound import segment_holds
-from feasibility.roadmap.motions.self_motion import (
-    CONE_SLACK,
-    CONNECT_STEPS,
-    connect_over,
-    margin_objective,
-)
 from feasibility.roadmap.motions.working_memory import (
     HERE,
     NEXT,
@@ -40,53 +35,38 @@ OFF_TARGET_STEP = 2.0**-4  # [1] of the curve: the first step with the tool poin
 MOST_STEPS = 400  # of one motion
 FOLLOWING = 4.0  # [1] times the turn of a direction: the tool is to follow before it has to
 NEWTON_AHEAD = np.int64(8)  # Newton steps onto the target ahead
-NOWHERE = -1  # in place of a cell to `connect` over
+NOWHERE = -1  # in place of a cell
 
 
 def track(
     arrays: SearchArrays,
     work: Work,
     curve: int,
-    begin: float,
-    end: float,
+    ends: tuple[float, float],
     q: Array,
     goal: Array | None = None,
-) -> Array | None:
-    """Follow a curve from `begin` to `end`, from a configuration q (n,).
+    heading: bool = True,
+    cell: int = NOWHERE,
+) -> tuple[Array | None, bool]:
+    """Follow a curve from a configuration q (n,), and go on to a goal.
 
     Args:
         arrays, work: what the kernels read, and the working memory of this thread.
         curve: which curve.
-        begin, end: parameters in [0, 1]: where q is, and where to go, in either direction.
+        ends: parameters in [0, 1]: where q is, and where to go, in either direction.
         q: where the motion starts.
         goal: (n,) configuration to head for, where there is one.
+        heading: False where it is a goal at the end of the curve alone.
+        cell: there, over whose centre a self-motion, see `connect`, is to reach it.
 
     Returns:
-        (k, n) waypoints, the start left out; None when the motion stopped short
-        (`work.stop_reason` holds the reason).
+        (k, n) waypoints, the start left out; None when the motion stopped short on the curve
+        (`work.stop_reason` holds the reason). And whether the self-motion, which is among them
+        then, reached the goal.
     """
-    aimed = q if goal is None else goal
-    return track_to(arrays, work, curve, begin, end, q, aimed, goal is not None)[0]
-
-
-def track_to(
-    arrays: SearchArrays,
-    work: Work,
-    curve: int,
-    begin: float,
-    end: float,
-    q: Array,
-    goal: Array,
-    heading: bool,
-    cell: int = NOWHERE,
-) -> tuple[Array | None, bool]:
-    """`track`, heading for the goal or not, and over the cell at the end `connect` it to the goal.
-
-    Returns:
-        The waypoints, of both where the goal was reached; and whether it was.
-    """
-    here, waypoints = q.copy(), np.empty((MOST_STEPS + CONNECT_STEPS, len(q)))
-    rows, more = _track_to(arrays, work, curve, begin, end, here, goal, heading, cell, waypoints)
+    here, waypoints = q.copy(), np.empty((MOST_STEPS + self_motion.CONNECT_STEPS, len(q)))
+    heading, goal = (False, q) if goal is None else (heading, goal)
+    rows, more = _track(arrays, work, curve, *ends, here, goal, heading, cell, waypoints)
     return None if rows == STOPPED else waypoints[: rows + more].copy(), more > 0
 
 
@@ -111,7 +91,8 @@ def _step_from(arrays, work, q, dt, off_target):
     Returns what `segment_holds` does, inf where the projection failed.
     """
     put(work.trial, q)
-    good = project(arrays, work, work.trial, CONE_SLACK * dt, work.error[0, 1], NEWTON_AHEAD)
+    slack = self_motion.CONE_SLACK * dt
+    good = project(arrays, work, work.trial, slack, work.error[0, 1], NEWTON_AHEAD)
     if not good and off_target:
         put(work.trial, q)
         copy_slot(arrays, work)
@@ -137,19 +118,19 @@ def _starts_inside(arrays, work):
 
 
 @entry
-def _track_to(arrays, work, curve, begin, end, q, goal, heading, cell, waypoints):
-    """Write the waypoints of `track_to` and move q along; returns the numbers of both motions."""
-    rows = _track(arrays, work, curve, begin, end, q, goal, heading, waypoints)
+def _track(arrays, work, curve, begin, end, q, goal, heading, cell, waypoints):
+    """Write the waypoints of `track` and move q along; returns the numbers on curve and cell."""
+    rows = _along_curve(arrays, work, curve, begin, end, q, goal, heading, waypoints)
     if rows == STOPPED or cell == NOWHERE:
         return rows, 0
     look_at(arrays, work, cell)
-    more, reached = connect_over(arrays, work, q, goal, waypoints[rows:])
+    more, reached = self_motion.move_towards(arrays, work, q, goal, waypoints[rows:])
     return rows, more if reached else 0
 
 
 @kernel
-def _track(arrays, work, curve, begin, end, q, goal, has_goal, waypoints):
-    """Write the waypoints of `track` and move q along; returns their number, or STOPPED."""
+def _along_curve(arrays, work, curve, begin, end, q, goal, heading, waypoints):
+    """Those on the curve; returns their number, or STOPPED."""
     n = q.shape[0]
     size = span_of(arrays, work, curve, begin, end)
     aim(arrays, work, curve, begin)
@@ -171,12 +152,12 @@ def _track(arrays, work, curve, begin, end, q, goal, has_goal, waypoints):
             return STOPPED
         aim(arrays, work, curve, there)
         copy_slot(arrays, work)
-        if has_goal:
+        if heading:
             for j in range(n):
                 work.secondary_step[j] = dt / (1.0 - t) * (goal[j] - q[j])
         else:
             linearise(arrays, work, NEXT)
-            margin_objective(arrays, work, q, 2.0 * size * dt)
+            self_motion.margin_objective(arrays, work, q, 2.0 * size * dt)
         position, cone = _step_from(arrays, work, q, dt, off_target)
         if position <= 1.0 and cone <= 1.0:
             for j in range(n):
