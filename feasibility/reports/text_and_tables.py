@@ -120,7 +120,7 @@ def certificate_text(
         counted(certificate.waypoints, noun),
         f"tool point within {at_most(1e3 * certificate.max_position_error, 3)} mm of its "
         f"surface{allowed}",
-        f"tool axis within {at_most(angle, 4)} deg (allowed {task.cone_deg:g})",
+        f"tool axis within {_within(angle, task.cone_deg)} deg (allowed {task.cone_deg:g})",
         roll_text(certificate, task),
         limits if 0.0 <= margin < math.inf else "",
         rates_text(certificate, task),
@@ -148,7 +148,13 @@ def roll_text(certificate: Certificate, task: Task) -> str:
         return ""
     middle, half = math.degrees(task.roll.middle), math.degrees(task.roll.half)
     most = math.degrees(certificate.max_roll)
-    return f"roll within {at_most(most, 4)} deg of {middle:.4g} deg (allowed {half:g})"
+    return f"roll within {_within(most, half)} deg of {middle:.4g} deg (allowed {half:g})"
+
+
+def _within(bound: float, allowed: float) -> str:
+    """A bound to four digits that still holds, and does not look like more than is allowed."""
+    found = at_most(bound, 4)
+    return f"{allowed:g}" if bound <= allowed < float(found) else found
 
 
 def clearance_text(certificate: Certificate | CollisionReplay) -> str:
