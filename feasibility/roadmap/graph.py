@@ -160,7 +160,7 @@ class Roadmap:
             [node for node in reversed(self.over[cell]) if self.root_of(node) == root]
             for cell in cells
         )
-        if len(first) < 2 and len(second) < 2:
+        if len(first) * len(second) < 2:  # mostly there is one each
             return (first[0], second[0]) if first and second else None
         off = np.array([self.q[x] for x in first])[:, None] - [self.q[y] for y in second]
         x, y = divmod(int((off**2).sum(axis=2).argmin()), len(second))
