@@ -17,7 +17,7 @@ from surfaces.at_home import AtHome
 from surfaces.cell_curves import CellCurves
 from surfaces.cells import Cells, CellTriangles, Finer, Unrolled
 from surfaces.curve_fitting import CurveFit
-from surfaces.patches.patch import ClosedFormPatch, Patch
+from surfaces.patches.parametric import ParametricSurface
 from surfaces.surface import max_principal_curvature
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ class GridCells(Cells):
     A cell's centre lies at its mid parameters. A grid without cells (0 x nv) is allowed.
     """
 
-    surface: Patch
+    surface: ParametricSurface
     shape: tuple[int, int]
     u: Array
     """(N,) first parameter of each centre, rad or m."""
@@ -44,7 +44,7 @@ class GridCells(Cells):
     """(N,) second parameter of each centre, rad or m."""
 
     @staticmethod
-    def cut(surface: Patch, nu: int, nv: int) -> GridCells:
+    def cut(surface: ParametricSurface, nu: int, nv: int) -> GridCells:
         """Cut `surface` into nu x nv cells of equal parameter steps; see `Patch.cells`."""
         nu, nv = grid_counts(nu, nv)
         u_edges = np.linspace(*surface.u_range, nu + 1)
@@ -140,10 +140,7 @@ class GridCells(Cells):
     @cached_property
     def patch_kernel(self) -> PatchKernel | None:
         """What compiled loops need of these cells; None for kinds that they know no formulas of."""
-        surface = self.surface
-        if not isinstance(surface, ClosedFormPatch):
-            return None
-        return surface.patch_kernel(*self.shape)
+        return self.surface.patch_kernel(*self.shape)
 
     def index(self, i: int, j: int) -> int:
         """Flat index of the cell in row i (u) and column j (v).

@@ -17,7 +17,7 @@ from surfaces.piecewise.edges import SMOOTH
 from surfaces.piecewise.seams import Border, contacts, sides_of
 
 if TYPE_CHECKING:
-    from surfaces.piecewise.piecewise_surface import Piecewise
+    from surfaces.piecewise.joined_patches import JoinedPatches
 
 Counts = Sequence[tuple[int, int]]
 
@@ -53,7 +53,7 @@ class SeamPairs:
         return SeamPairs(self.pairs[which], self.crossings[which], self.normals[which])
 
 
-def seam_pairs_of(surface: Piecewise, counts: Counts) -> SeamPairs:
+def seam_pairs_of(surface: JoinedPatches, counts: Counts) -> SeamPairs:
     """Find the pairs of cells of different pieces that touch.
 
     Two cells touch across a seam where their border sides share more than a thirtieth or so of the
@@ -78,7 +78,7 @@ def seam_pairs_of(surface: Piecewise, counts: Counts) -> SeamPairs:
 
 
 def _along_sides(
-    surface: Piecewise, counts: Counts, first: Ints, sides: Sequence[Border]
+    surface: JoinedPatches, counts: Counts, first: Ints, sides: Sequence[Border]
 ) -> tuple[Ints, Array]:
     """Pairs that share a stretch of border, and the middle of it, in the surface's own frame."""
     joined = {seam.pieces for seam in surface.seams}
@@ -109,7 +109,7 @@ def _along_sides(
 
 
 def _at_corners(
-    surface: Piecewise, counts: Counts, first: Ints, sides: Sequence[Border], touching: Ints
+    surface: JoinedPatches, counts: Counts, first: Ints, sides: Sequence[Border], touching: Ints
 ) -> tuple[Ints, Array]:
     """Pairs that share a corner and a neighbour but no border, and the corners."""
     from scipy.sparse import coo_array
@@ -154,7 +154,7 @@ def _cells_at(side: Border, counts: Counts, along: Ints) -> Ints:
     return along * nv + (nv - 1 if side.upper else 0)
 
 
-def _normals(surface: Piecewise, first: Ints, pairs: Ints, places: Array) -> Array:
+def _normals(surface: JoinedPatches, first: Ints, pairs: Ints, places: Array) -> Array:
     """(m, 2, 3) outward unit normals of the pieces of two cells at a place of their seam."""
     pieces = np.searchsorted(first, pairs, side="right") - 1
     normals = np.empty((*pairs.shape, 3))
@@ -174,7 +174,7 @@ def _keys(pairs: Ints) -> Ints:
 
 
 def curves_across(
-    surface: Piecewise,
+    surface: JoinedPatches,
     seam_pairs: SeamPairs,
     start: Array,
     end: Array,
@@ -212,7 +212,9 @@ def curves_across(
     return points, normals
 
 
-def fit_round_edges(fit: CurveFit, surface: Piecewise, touching: SeamPairs, pieces: Ints) -> None:
+def fit_round_edges(
+    fit: CurveFit, surface: JoinedPatches, touching: SeamPairs, pieces: Ints
+) -> None:
     """Replace rough curves over outer edges by such that turn on the spot there.
 
     Args:
@@ -235,7 +237,7 @@ def fit_round_edges(fit: CurveFit, surface: Piecewise, touching: SeamPairs, piec
 
 
 def fit_over_inner(
-    fit: CurveFit, surface: Piecewise, touching: SeamPairs, pieces: Ints, height: float
+    fit: CurveFit, surface: JoinedPatches, touching: SeamPairs, pieces: Ints, height: float
 ) -> None:
     """Replace rough curves over inner creases by such that turn where both offset surfaces meet.
 
@@ -268,7 +270,7 @@ def fit_over_inner(
 
 def _legs(
     fit: CurveFit,
-    surface: Piecewise,
+    surface: JoinedPatches,
     curves: Ints,
     of: tuple[int, int],
     ends: Array,
@@ -299,7 +301,7 @@ def _legs(
 
 
 def _up_to(
-    cells: Cells, surface: Piecewise, which: Ints, piece: int, corners: Array, share: Array
+    cells: Cells, surface: JoinedPatches, which: Ints, piece: int, corners: Array, share: Array
 ) -> Array:
     """(k, m, 6) points and normals at shares (k,) of the way from centres to corners (m, 3)."""
     start = cells.centres[which]
@@ -312,7 +314,7 @@ def _up_to(
 
 
 def _over_the_border(
-    surface: Piecewise,
+    surface: JoinedPatches,
     seam_pairs: SeamPairs,
     start: Array,
     end: Array,

@@ -25,7 +25,7 @@ from surfaces.piecewise.across_seams import (
     seam_pairs_of,
 )
 from surfaces.piecewise.edges import SMOOTH
-from surfaces.piecewise.piecewise_surface import Piecewise
+from surfaces.piecewise.joined_patches import JoinedPatches
 from surfaces.surface import SurfaceError
 
 LEFT = 0.2  # rad, so far clockwise from the left a list of neighbours begins, as in a grid
@@ -35,12 +35,12 @@ LEFT = 0.2  # rad, so far clockwise from the left a list of neighbours begins, a
 class PieceCells(Cells):
     """N cells of several pieces; cell (piece, i, j) is cell (i, j) of that piece's grid."""
 
-    surface: Piecewise
+    surface: JoinedPatches
     counts: tuple[tuple[int, int], ...]
     """Cells along u and v of each piece."""
 
     @staticmethod
-    def cut(surface: Piecewise, counts: Any) -> PieceCells:
+    def cut(surface: JoinedPatches, counts: Any) -> PieceCells:
         """See `Piecewise.cells`."""
         checked = _counts(counts, len(surface.pieces))
         grids = [piece.cells(*of) for piece, of in zip(surface.placed, checked, strict=True)]

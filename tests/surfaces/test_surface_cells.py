@@ -151,7 +151,7 @@ def test_sizes_must_be_whole_numbers(bad):
                 ask(k)
 
 
-@pytest.mark.parametrize("name", [n for n, s in SMOOTH.items() if hasattr(s, "patch_kernel")])
+@pytest.mark.parametrize("name", [n for n, s in SMOOTH.items() if hasattr(s, "code")])
 def test_the_compiled_patch_is_the_patch_to_the_last_bit(name):
     surface, rng = SMOOTH[name], np.random.default_rng(7)
     kernel = surface.cells(4, 6).patch_kernel

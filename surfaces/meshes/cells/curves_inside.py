@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import dijkstra
 from coverable.arrays import Array, Ints
 from surfaces.cells import Cells
 from surfaces.curve_fitting import PIECES, CurveFit, fit_between_centres
-from surfaces.meshes.mesh_surface import MeshSurface
+from surfaces.meshes.triangle_surface import TriangleSurface
 
 RINGS = (9.0, 4.0, 2.0)  # [1] times as long: faces that touch the border, and those next to them
 SAMPLES = 8  # for each cubic
@@ -25,7 +25,7 @@ PLACES = 33  # on a straight line, where it is looked at whether it leaves the s
 ACROSS = 0.5  # [1] of a distance: interpolated normals of facets lean by less
 
 
-def fit_inside(fit: CurveFit, surface: MeshSurface, labels: Ints, middles: Ints) -> None:
+def fit_inside(fit: CurveFit, surface: TriangleSurface, labels: Ints, middles: Ints) -> None:
     """Replace curves along the border of the mesh by such inside, where these deviate less.
 
     Args:
@@ -81,7 +81,7 @@ def _along(cells: Cells, pair: Ints, line: Array, count: int) -> tuple[Array, Ar
 class _Paths:
     """Shortest paths over the middles of faces, inside two cells at a time."""
 
-    def __init__(self, surface: MeshSurface, labels: Ints) -> None:
+    def __init__(self, surface: TriangleSurface, labels: Ints) -> None:
         """Faces as a graph: joined where they share an edge."""
         mesh = surface.mesh
         self.surface, self.labels = surface, labels

@@ -14,7 +14,7 @@ from surfaces.adjacency import Neighbours
 from surfaces.cell_curves import CellCurves
 from surfaces.cells import Cells, CellTriangles, Unrolled
 from surfaces.curve_fitting import CurveFit
-from surfaces.meshes.mesh_surface import MeshSurface
+from surfaces.meshes.triangle_surface import TriangleSurface
 from surfaces.surface import SurfaceError, max_principal_curvature, points_of
 
 if TYPE_CHECKING:
@@ -28,12 +28,12 @@ JUMP = 3.0  # times the step along the straight line: there closest points jump
 class MeshCells(Cells):
     """N cells of a mesh; a cell is the faces with its label."""
 
-    surface: MeshSurface
+    surface: TriangleSurface
     labels: Ints
     """(F,) cell of each face of `surface.mesh`."""
 
     @staticmethod
-    def cut(surface: MeshSurface, count: int | None, size: float | None) -> MeshCells:
+    def cut(surface: TriangleSurface, count: int | None, size: float | None) -> MeshCells:
         """See `MeshSurface.cells`."""
         from surfaces.meshes.cells.clustering import cells_for
 
@@ -42,7 +42,7 @@ class MeshCells(Cells):
         return MeshCells.of(fine, cut.labels)
 
     @staticmethod
-    def of(surface: MeshSurface, labels: ArrayLike) -> MeshCells:
+    def of(surface: TriangleSurface, labels: ArrayLike) -> MeshCells:
         """Cells from given groups of faces.
 
         Args:
@@ -273,7 +273,7 @@ def _length(line: Array) -> float:
     return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
 
 
-def _figures(surface: MeshSurface, labels: Ints) -> Figures:
+def _figures(surface: TriangleSurface, labels: Ints) -> Figures:
     """The figures of labelled faces."""
     from surfaces.meshes.cells.properties import figures
 

@@ -23,8 +23,8 @@ from surfaces.cell_curves import PLACES, slopes_of
 from surfaces.cells import Cells
 from surfaces.curve_fitting import BLOCK, PIECES, CurveFit, fit_between_centres
 from surfaces.curves_over_corners import ENOUGH, SAMPLES, over_corners
-from surfaces.meshes.mesh_surface import MeshSurface
 from surfaces.meshes.normals import sharp_edges
+from surfaces.meshes.triangle_surface import TriangleSurface
 
 Shares = Callable[[Ints, Array], Array]
 """From pairs (m, 2) and points (m, k, 3) m to (m, k), see `MeshSurface.crease_share`."""
@@ -47,7 +47,7 @@ class Creases(NamedTuple):
     """(K, 2) the cells of the two faces, the lower first."""
 
 
-def creases_of(surface: MeshSurface, labels: Ints) -> Creases:
+def creases_of(surface: TriangleSurface, labels: Ints) -> Creases:
     """The creases of a mesh whose faces belong to cells `labels` (F,)."""
     mesh, rotation = surface.mesh, surface.rotation
     sharp = sharp_edges(mesh)
