@@ -10,7 +10,7 @@ from coverable.arrays import Array
 from feasibility.clock import Clock, OutOfTime
 from feasibility.placement.reach_bound import Reach
 from feasibility.placement.region import Pose, Region
-from feasibility.placement.trials import Evaluator, Trial
+from feasibility.placement.trials import Effort, Evaluator, Trial
 from feasibility.search_settings import Progress
 
 SMALLEST = 5  # poses that evolution needs
@@ -95,20 +95,20 @@ class Evolution:
         self.bound += len(outside)
         costs = np.where(far > 1.0, 1.0 + far, 2.0)
         poses = [Pose.of_values(values[k]) for k in inside]
-        self.look(poses, fully=False)
+        self.look(poses, "quickly")
         for k, pose in zip(inside, poses, strict=True):
             if (trial := self.trials.get(pose)) is not None:
                 costs[k] = -trial.margin if trial.feasible else 1.01 - trial.share
         return costs
 
-    def look(self, poses: Sequence[Pose], fully: bool) -> None:
+    def look(self, poses: Sequence[Pose], effort: Effort) -> None:
         """Try some poses, as long as there is time."""
-        asked = [p for p in dict.fromkeys(poses) if fully or p not in self.trials]
+        asked = [p for p in dict.fromkeys(poses) if effort == "fully" or p not in self.trials]
         self._report()
         with suppress(OutOfTime):
             if not (self.stopped or self.clock.out_of_time):
                 with self.clock.enforced():
-                    for trial in self.evaluator(asked, fully):
+                    for trial in self.evaluator(asked, effort):
                         self.trials[trial.pose] = trial
                         self._report()
                         if self.clock.out_of_time:
@@ -126,7 +126,7 @@ class Evolution:
             return
         best = [trial.pose for trial in distinct(ranked, self.region, FULLY)]
         last = self.nearest[1]
-        self.look(best or ([] if last is None else [last]), fully=True)
+        self.look(best or ([] if last is None else [last]), "fully")
 
     def _report(self) -> None:
         """Say how far it is, and what the best so far is."""

@@ -53,7 +53,7 @@ def placement_map(
     shape: Sequence[int] | None = None,
     progress: Progress | None = None,
 ) -> PlacementMap:
-    """A quick look at every placement of a raster.
+    """A wide look at every placement of a raster.
 
     Args:
         evaluator: tries placements.

@@ -244,7 +244,7 @@ def _searched(
         )
         feasible = {"answer": Answer.FEASIBLE, "evidence": Evidence.WITNESS}
         return answered(**feasible, message=message, cause=None)
-    closely = [trial for trial in trials if trial.fully and not trial.failed]
+    closely = [trial for trial in trials if trial.effort == "fully" and not trial.failed]
     doubtful = [trial for trial in closely if trial.answer is Answer.UNDECIDED]
     undecided = bool(search.stopped or failed or doubtful or not closely)
     told = [trial for trial in closely if not (rated and trial in doubtful)]

@@ -19,7 +19,7 @@ from feasibility.division.set_covering import set_cover
 from feasibility.placement.placements import COUNT, Placements
 from feasibility.placement.reach_bound import Reach
 from feasibility.placement.region import Pose, moved_cells
-from feasibility.placement.trials import Evaluator, Trial, effort, search_all
+from feasibility.placement.trials import Evaluator, Trial, search_all, search_with
 from feasibility.search_settings import Progress, Search
 
 TIME_LIMIT = 60.0  # [s] for the optimum; tables of thousands of rows take far less
@@ -116,7 +116,7 @@ def station_plan(
             placements.robot,
             moved_cells(placements.cells, trial.pose),
             placements.task,
-            effort(search, len(placements.cells), trial.fully),
+            search_with(trial.effort, search, len(placements.cells)),
             station.covers,
         ).refusal
         for trial, station in zip(chosen, stations.stations, strict=True)

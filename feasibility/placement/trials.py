@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -21,19 +21,23 @@ from feasibility.verdict import Answer, Evidence
 from robots.robot import Robot
 from surfaces.cells import Cells
 
+Effort = Literal["quickly", "widely", "fully"]
+"""Few evaluations, and no more than the answer needs; some, for as many cells as they reach, as
+shares of the area need them; or all that the search may have, and causes of missed cells."""
 FEW, EACH = 2_000, 40  # evaluations of a quick look, in all and for each cell
+WIDE = 3  # times as many for a wide one: all but a few shares of notebook 05's map are those of all
 AHEAD = 4  # placements for each worker in one batch
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Trial:
-    """What `check` says of one placement, with all its effort or with little."""
+    """What `check` says of one placement, with all its effort or with less."""
 
     pose: Pose
     result: Mapping[str, Any]
     """See `studies.outcome_of`; the message alone of one that could not be tried."""
-    fully: bool = False
-    """With all effort, and with the causes of missed cells? A feasible one is as good without."""
+    effort: Effort = "quickly"
+    """A feasible one is as good with little."""
 
     @property
     def failed(self) -> bool:
@@ -80,28 +84,32 @@ class Trial:
     @property
     def rank(self) -> tuple[float, ...]:
         """Larger is better."""
-        return float(self.feasible), round(self.share, 9), self.margin, float(self.fully)
+        fully = float(self.effort == "fully")
+        return float(self.feasible), round(self.share, 9), self.margin, fully
 
 
-Evaluator = Callable[[Sequence[Pose], bool], Iterator[Trial]]
-"""Tries poses, fully or not; the trials come in their order, as they are finished."""
+Evaluator = Callable[[Sequence[Pose], Effort], Iterator[Trial]]
+"""Tries poses; the trials come in their order, as they are finished."""
 
 
-def effort(search: Search, cells: int, fully: bool) -> Search:
+def search_with(effort: Effort, search: Search, cells: int) -> Search:
     """The settings of a trial: those given, or with few evaluations."""
-    few = FEW + EACH * cells
+    if effort == "fully":
+        return search
+    quick = effort == "quickly"
+    few = (1 if quick else WIDE) * (FEW + EACH * cells)
     most = few if search.evaluations is None else min(few, search.evaluations)
-    return search if fully else replace(search, evaluations=most, early=True)
+    return replace(search, evaluations=most, early=quick)
 
 
 def evaluator_here(robot: Robot, cells: Cells, task: Task, search: Search) -> Evaluator:
     """Tries placements of a surface in this process."""
 
-    def tried(poses: Sequence[Pose], fully: bool) -> Iterator[Trial]:
-        chosen = effort(search, len(cells), fully)
+    def tried(poses: Sequence[Pose], effort: Effort) -> Iterator[Trial]:
+        chosen = search_with(effort, search, len(cells))
         for pose in poses:
             verdict = check(robot, moved_cells(cells, pose), task, chosen)
-            yield Trial(pose, outcome_of(verdict, causes=fully), fully)
+            yield Trial(pose, outcome_of(verdict, causes=effort == "fully"), effort)
 
     return tried
 
@@ -125,31 +133,31 @@ def evaluator_of_study(
     """
     batch = AHEAD * workers.width
 
-    def tried(poses: Sequence[Pose], fully: bool) -> Iterator[Trial]:
-        tables = replace(case, search=effort(case.search, cells, fully)).to_tables()
+    def tried(poses: Sequence[Pose], effort: Effort) -> Iterator[Trial]:
+        tables = replace(case, search=search_with(effort, case.search, cells)).to_tables()
         for start in range(0, len(poses), batch):
             some = poses[start : start + batch]
-            tasks = [_task(tables, pose, fully) for pose in some]
+            tasks = [_task(tables, pose, effort == "fully") for pose in some]
             rows = run_tasks(tasks, workers, store, progress)
             for pose, row in zip(some, rows, strict=True):
-                yield Trial(pose, row.result, fully)
+                yield Trial(pose, row.result, effort)
 
     return tried
 
 
-def _task(tables: Mapping[str, Any], pose: Pose, fully: bool) -> StudyTask:
+def _task(tables: Mapping[str, Any], pose: Pose, causes: bool) -> StudyTask:
     """A case with the surface at a pose."""
     where = {"position": list(pose.position), "rpy_deg": list(pose.rpy_deg)}
     surface = {**tables["surface"], **where}
-    return StudyTask({**tables, "surface": surface, "wanted": {"causes": fully}}, where)
+    return StudyTask({**tables, "surface": surface, "wanted": {"causes": causes}}, where)
 
 
 def search_all(
     evaluator: Evaluator, poses: Sequence[Pose], progress: Progress | None, text: str
 ) -> list[Trial]:
-    """A quick look at each of some poses."""
+    """A wide look at each of some poses."""
     trials = list[Trial]()
-    for trial in evaluator(poses, False):
+    for trial in evaluator(poses, "widely"):
         trials.append(trial)
         if progress is not None:
             progress(len(trials), len(poses), text)

@@ -81,7 +81,7 @@ def _found_json(trial: Trial) -> dict[str, Any]:
 
 def _tried(trial: Trial) -> str:
     """How a placement was tried, in a word."""
-    return "failed" if trial.failed else "fully" if trial.fully else "quickly"
+    return "failed" if trial.failed else trial.effort
 
 
 def _stations_json(plan: StationPlan) -> dict[str, Any]:

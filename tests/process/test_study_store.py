@@ -219,8 +219,8 @@ def test_what_works_keep_is_what_is_read_again_and_judged(tmp_path) -> None:
         with open_workers(0) as workers:
             compare(case, ["ur3", "ur5"], workers, store=store)
             evaluator = evaluator_of_study(case, 4, workers, store)
-            for fully in (False, True):
-                assert not any(trial.failed for trial in evaluator(poses, fully))
+            for effort in ("quickly", "fully"):
+                assert not any(trial.failed for trial in evaluator(poses, effort))
             run_tasks([StudyTask(case.to_tables(), {})], workers, store)
 
     for _ in range(2):

@@ -395,7 +395,7 @@ def of_explain(one: Any) -> Json:
 def trial(one: Any) -> Json | None:
     return None if one is None else {
         "position": list(one.pose.position), "rpy_deg": list(one.pose.rpy_deg),
-        "tried": "fully" if one.fully else "quickly",
+        "tried": one.effort,
         "share": one.share, "margin_m": one.margin,
         "cells": one.covers.shape[1], "verdict": one.answer, "evidence": one.evidence,
         "message": one.message, "causes": dict(one.result["causes"]),

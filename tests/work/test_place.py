@@ -18,7 +18,7 @@ from coverable import Answer, Evidence, Pose, Region, Search, check, evaluator_h
 from feasibility.division.one_motion import motion_over
 from feasibility.placement.reach_bound import Reach
 from feasibility.placement.region import AXES, PlacementError, moved_cells
-from feasibility.placement.trials import Trial, effort, evaluator_of_study
+from feasibility.placement.trials import Trial, evaluator_of_study, search_with
 from surfaces.surface import rotation_from_rpy
 
 SHIFT, TURN_DEG = 0.3, 40.0  # [m], [deg] that a surface is moved by, at most
@@ -95,12 +95,12 @@ def test_a_surface_moved_away_is_put_back(name, seed):
         assert (trial.feasible, trial.share) == (True, 1.0)
     margins = [trial.margin for trial in found.found]
     assert margins == sorted(margins, reverse=True)
-    again = check(*case_at(name, found.best.pose)[:3], effort(moved.search, 20, found.best.fully))
+    best = found.found[0]
+    again = check(*case_at(name, best.pose)[:3], search_with(best.effort, moved.search, 20))
     assert found.best.margin == again.certificate.placement_margin.position > 0.0
-    assert found.best is found.found[0]
 
 
-def nobody(poses, fully):
+def nobody(poses, effort):
     raise AssertionError("no search should be run")
 
 
@@ -127,8 +127,8 @@ def stopping(setup, after, error):
     """An evaluator that raises an error in place of the trial after so many."""
     here, tried = evaluator_here(*setup), count()
 
-    def evaluator(poses, fully):
-        for trial in here(poses, fully):
+    def evaluator(poses, effort):
+        for trial in here(poses, effort):
             if next(tried) == after:
                 raise error
             yield trial
@@ -142,7 +142,7 @@ def test_what_covers_more_leads_to_what_covers_all():
     own = Pose.of_surface(setup.cells.surface)
     x = own.position[0] + 0.0321
 
-    def evaluator(poses, fully):
+    def evaluator(poses, effort):
         for pose in poses:
             yield Trial(pose, {"message": "", "share": 1.0 - abs(pose.position[0] - x)})
 
@@ -258,8 +258,8 @@ def test_what_a_place_is_said_to_cover_one_motion_covers(name, seed):
     """Each component is replayed over the moved cells; what no search found is not."""
     setup = setup_of(name)
     pose, areas = moved_away(name, seed), setup.cells.areas
-    (trial,) = evaluator_here(*setup)([pose], False)
-    quick = effort(setup.search, len(setup.cells), False)
+    (trial,) = evaluator_here(*setup)([pose], "quickly")
+    quick = search_with("quickly", setup.search, len(setup.cells))
     moved = setup.robot, moved_cells(setup.cells, pose), setup.task
     assert len(trial.covers)
     assert trial.share == pytest.approx(areas[trial.covers[0]].sum() / areas.sum())
@@ -288,7 +288,7 @@ def test_stations_share_out_what_no_placement_covers_alone(tmp_path):
 
 
 def told(trials):
-    return [(trial.pose, trial.fully, dict(trial.result)) for trial in trials]
+    return [(trial.pose, trial.effort, dict(trial.result)) for trial in trials]
 
 
 def test_who_tries_placements_changes_nothing_and_what_fails_is_undecided():
@@ -317,7 +317,7 @@ def test_a_map_tells_what_single_placements_tell():
         values = chart.held.values
         for axis, ticks, k in zip(chart.axes, chart.ticks, index, strict=True):
             values[list(AXES).index(axis)] = ticks[k]
-        (trial,) = evaluator([Pose.of_values(values)], False)
+        (trial,) = evaluator([Pose.of_values(values)], "fully")
         assert (chart.share[index], chart.margin[index]) == (trial.share, trial.margin)
     assert chart.share.max() == 1.0 > chart.share.min()
     with pytest.raises(PlacementError, match="z: does not vary"):
