@@ -58,11 +58,17 @@ def part_matrices(degree: int, low: Array, high: Array) -> Array:
 
 
 def along(matrix: Array, net: Array, axis: int) -> Array:
-    """The net with a matrix (p, m) applied to its coefficients along axis 0 or 1."""
+    """The net with a matrix (p, m) applied to its coefficients along axis 0 or 1.
+
+    Line by line: one product of all would be shared out among threads, and wait for busy ones.
+    """
     m, n = net.shape[:2]
-    flat = net.reshape(m, -1) if axis == 0 else net.reshape(m, n, -1)
-    shape = (len(matrix), n) if axis == 0 else (m, len(matrix))
-    return np.asarray(matrix @ flat).reshape(shape + net.shape[2:])
+    found = np.empty(((len(matrix), n) if axis == 0 else (m, len(matrix))) + net.shape[2:])
+    lines, made = (each.reshape(*each.shape[:2], -1) for each in (net, found))
+    if axis == 0:
+        lines, made = lines.swapaxes(0, 1), made.swapaxes(0, 1)
+    np.matmul(matrix, lines, out=made)
+    return found
 
 
 def product(one: Array, other: Array) -> Array:

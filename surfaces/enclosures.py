@@ -22,7 +22,7 @@ from coverable.arrays import Array
 from surfaces import bernstein
 
 KEPT = 4  # coefficients along each parameter that results are brought down to
-MOST = 13  # coefficients along each parameter, at most, of a product
+MOST = 27  # coefficients along each parameter, at most, of a product: normals of degree 9
 ROUNDING = 4e-16  # [1] of the terms that are added up
 
 UFUNCS: dict[Any, Callable[..., Enclosure]] = {}

@@ -21,6 +21,7 @@ from surfaces import bernstein
 from surfaces.enclosures import Enclosure
 
 ORDERS = ((0, 0), (1, 0), (0, 1))
+SMALLEST = 1e-300
 
 
 class SpanNets:
@@ -110,5 +111,12 @@ def _seen_from_inside(made: list[Enclosure]) -> tuple[Any, ...]:
 
 
 def unit(vectors: Any) -> Any:
-    """At length 1."""
+    """At length 1.
+
+    First at 1 along the mean of their directions, along which one of them at least leads: what
+    lengths differ by cancels in quotients, as it would not where a root is one of the factors.
+    """
+    lengths = np.linalg.norm(vectors.net, axis=-1, keepdims=True)
+    middle = (vectors.net / np.maximum(lengths, SMALLEST)).mean(axis=(0, 1))
+    vectors = vectors / (vectors * middle).sum(axis=-1, keepdims=True)
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)

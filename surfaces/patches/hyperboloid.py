@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from coverable.arrays import Array
 from surfaces.arguments import ORIGIN, Checks
+from surfaces.enclosures import Enclosure
 from surfaces.patches.patch import ClosedFormPatch
 from surfaces.surface import Side
 
@@ -51,6 +52,17 @@ class Hyperboloid(ClosedFormPatch):
         rise = (self.waist / self.flare) ** 2 * v / self._radius(v)
         length = np.hypot(1.0, rise)
         return np.stack([np.cos(u) / length, np.sin(u) / length, -rise / length], axis=-1)
+
+    def local_enclosures(self, u: Enclosure, v: Enclosure) -> tuple[Enclosure, Enclosure]:
+        """Of normals as (r cos u, r sin u, -r r') over its length: r' alone is known less well."""
+        slope = self.waist / self.flare
+
+        def normal(u: Array, v: Array) -> Array:
+            length = np.hypot(self.waist, v * (slope * math.hypot(1.0, slope)))
+            point = self.local_point(u, v)
+            return point * np.array([1.0, 1.0, -(slope**2)]) / length[..., None]
+
+        return self._enclosed(self.local_point, u, v), self._enclosed(normal, u, v)
 
     def area(self, u0: ArrayLike, u1: ArrayLike, v0: ArrayLike, v1: ArrayLike) -> Array:
         """(u1 - u0) times the integral of g, z (g + waist asinh(x) / x) / 2, x = b z / waist."""
