@@ -22,8 +22,9 @@ from surfaces.fitted.nurbs_checks import (
     checked_weights,
     regularity_faults,
 )
-from surfaces.patches.patch import EDGE, LocalClosestPoints, SmoothPatch
+from surfaces.patches.parametric import EDGE
 from surfaces.patches.quadrature import rectangle_areas
+from surfaces.patches.smooth_patch import LocalClosestPoints, SmoothPatch
 from surfaces.surface import Side, SurfaceError
 
 

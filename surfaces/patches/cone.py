@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from coverable.arrays import Array
 from coverable.errors import Fault
 from surfaces.arguments import LARGEST_RATIO, ORIGIN, Checks
-from surfaces.patches.patch import LocalClosestPoints, SmoothPatch, azimuth
+from surfaces.patches.smooth_patch import LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.surface import Side
 
 

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from coverable.arrays import Array
 from surfaces.arguments import ORIGIN, Checks
-from surfaces.patches.patch import LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.patches.quadrature import rectangle_areas
+from surfaces.patches.smooth_patch import LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.patches.sphere import unit_sphere
 from surfaces.surface import Side
 

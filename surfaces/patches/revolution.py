@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike
 from coverable.arrays import Array
 from coverable.errors import Fault
 from surfaces.arguments import ORIGIN, Checks, metres
-from surfaces.patches.patch import EDGE, LocalClosestPoints, SmoothPatch, azimuth
+from surfaces.patches.parametric import EDGE
 from surfaces.patches.profile import Profile
 from surfaces.patches.quadrature import rectangle_areas
+from surfaces.patches.smooth_patch import LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.surface import Side
 
 MOST_POINTS = 1000

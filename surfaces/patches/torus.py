@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from coverable.arrays import Array
 from surfaces.arguments import ORIGIN, Checks
-from surfaces.patches.patch import LocalClosestPoints, SmoothPatch, azimuth
+from surfaces.patches.smooth_patch import LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.surface import Side
 
 

@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from coverable.arrays import Array
-from surfaces.patches.patch import LocalClosestPoints, Patch, SmoothPatch
+from surfaces.patches.patch import Patch
+from surfaces.patches.smooth_patch import LocalClosestPoints, SmoothPatch
 from surfaces.piecewise.seams import INWARD, PARTS, Border, Seam, contacts, sides_of
 from surfaces.surface import Side, SurfaceError
 
