@@ -32,7 +32,6 @@ from feasibility.timing.sampled_trajectory import Trajectory
 from feasibility.timing.speed_limits import MotionLimits
 from feasibility.verdict import Verdict
 from feasibility.version import version
-from robots.robot import Robot
 from surfaces.passes.parallel import Passes
 
 FEW = 5  # cells that are named
@@ -154,7 +153,7 @@ def as_text(
     rates: RateReplay | None = None,
     ends: Ends | None = None,
 ) -> str:
-    """The path for people: its length compared with the least possible, margins, and times.
+    """The path for people: its length, margins, and times.
 
     The arguments are those of `as_json`.
     """
@@ -178,11 +177,11 @@ def as_text(
         ("treated", "" if treated is None else treated_words(treated)),
     ]
     if trajectory is not None:
-        speed = at_most(float(trajectory.tool_speed.max()), 4)
-        samples = f"{len(trajectory):,} samples"
+        told = _timing(path, trajectory, limits)
+        time = f"{told['duration_s']:.4g} s in {told['samples']:,} samples"
         rows += [
-            ("time", f"{trajectory.duration:.4g} s in {samples}, tool at up to {speed} m/s"),
-            ("limits", _limits_text(path.robot, trajectory, limits)),
+            ("time", f"{time}, tool at up to {at_most(told['max_tool_speed'], 4)} m/s"),
+            ("limits", _limits_text(told)),
         ]
     rows += [("speed", rates_words(path, rates, trajectory)), ("ends", ends_words(ends))]
     head = f"path: one continuous motion over {over}."
@@ -224,16 +223,19 @@ def _margins_text(figures: PathFigures) -> str:
     return ", ".join(parts)
 
 
-def _limits_text(robot: Robot, trajectory: Trajectory, limits: MotionLimits | None) -> str:
-    """The share of its limits that a trajectory uses, between samples too."""
-    if limits is None:
+def _limits_text(told: dict[str, Any]) -> str:
+    """The share of its limits that a trajectory uses, between samples too; see `_timing`."""
+    if "limits" not in told:
         return ""
-    most = used(robot, trajectory, limits)
-    velocity, acceleration = (100 * float(s.max()) for s in (most.velocity, most.acceleration))
+    velocity, acceleration = (
+        max(told[f"max_{key}"][joint] / most for joint, most in told["limits"][key].items())
+        for key in ("velocity", "acceleration")
+    )
+    limit = told["limits"]["tool_speed"]
     return (
-        f"at most {at_most(velocity, 3)} % of the joints' velocities, "
-        f"{at_most(acceleration, 3)} % of their accelerations, "
-        f"{at_most(100 * most.tool_speed, 3)} % of the tool's {limits.tool_speed:g} m/s, "
+        f"at most {at_most(100 * velocity, 3)} % of the joints' velocities, "
+        f"{at_most(100 * acceleration, 3)} % of their accelerations, "
+        f"{at_most(100 * told['max_tool_speed'] / limit, 3)} % of the tool's {limit:g} m/s, "
         "between samples too, as quintics or cubics"
     )
 
