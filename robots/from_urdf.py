@@ -57,18 +57,20 @@ def robot_from_urdf(
     chosen = select_joints(checked, tool_frame, lock or {}, limits, mounting.surface_link)
     faults = list(chosen.faults)
     sets = limit_sets or {}
-    if not chosen.is_chain:
+    if chosen.is_chain:
+        axes = (approach_axis, np.full(3, np.nan) if reference_axis is None else reference_axis)
+        robot = _of_selection(checked, chosen, name, axes, sets, mounting)
+        try:
+            robot = robot if limits is None else robot.with_limits(limits)
+        except RobotError as error:
+            faults += error.faults
+        if not faults:
+            return robot
+    else:
         faults += _limit_faults(checked, limits, sets)
-        raise RobotError(faults, f"robot {name!r}")
-    axes = (approach_axis, np.full(3, np.nan) if reference_axis is None else reference_axis)
-    robot = _of_selection(checked, chosen, name, axes, sets, mounting)
-    try:
-        robot = robot if limits is None else robot.with_limits(limits)
-    except RobotError as error:
-        faults += error.faults
-    if faults:
-        raise RobotError(faults, f"robot {name!r}")
-    return robot
+    refused = RobotError(faults, f"robot {name!r}")
+    refused.joint_kinds = {joint.name: joint.kind for joint in checked.joints if joint.moves}
+    raise refused
 
 
 def _of_selection(

@@ -203,32 +203,6 @@ def _fetched(info: RobotInfo) -> RobotInfo:
     return replace(info, urdf=found.path, package_dirs=found.folders, xacro_args=args)
 
 
-def joint_kinds(
-    name_or_path: str | os.PathLike[str],
-    package_dirs: Sequence[str | os.PathLike[str]] = (),
-    xacro_args: Mapping[str, Any] = {},
-) -> dict[str, str]:
-    """The kind of every moving joint of a URDF, by name, whatever else the arm is loaded with.
-
-    Args:
-        name_or_path, package_dirs, xacro_args: see `load_robot`.
-
-    Raises:
-        RobotError: the name is unknown, or the URDF has faults.
-
-    Example:
-        >>> joint_kinds("puma560")["joint6"]
-        'revolute'
-    """
-    from robots.urdf.checked_urdf import check_urdf
-
-    info = find_robot(name_or_path)
-    folders = (*package_dirs, *info.package_dirs)
-    args = {**info.xacro_args, **xacro_args}
-    checked = check_urdf(info.urdf, package_dirs=folders, xacro_args=args)
-    return {joint.name: joint.kind for joint in checked.joints if joint.moves}
-
-
 def _limit_sets(path: Path) -> dict[str, dict[str, tuple[float, float]]]:
     """Named limits of a file: set name -> joint name -> (lower, upper), rad."""
     table = tomllib.loads(path.read_text(encoding="utf-8"))

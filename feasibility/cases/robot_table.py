@@ -120,30 +120,13 @@ class RobotPart:
                 xacro_args=self.xacro_args or None,
             )
         except RobotError as error:
-            units = self._wrong_units(self._kinds_alone())
+            units = self._wrong_units(error.joint_kinds)
             raise RobotError((*error.faults, *units), error.source) from error
         kinds = dict(zip(robot.joint_names, robot.joint_kinds, strict=True))
         if faults := self._wrong_units(kinds, robot.joint_names):
             raise RobotError(faults, f"robot {robot.name!r}")
         start = self.start if self.start_deg is None else tuple(map(math.radians, self.start_deg))
         return robot if start is None else _starting_at(robot, start, self.start_deg is not None)
-
-    def _kinds_alone(self) -> dict[str, str]:
-        """The kinds of all moving joints, by name; none where the URDF itself is at fault.
-
-        Nor where no limit is given for a name: what cannot be fetched is not asked for twice.
-        """
-        if not self.limits_m and not isinstance(self.limits_deg, Mapping):
-            return {}
-        from robots.errors import RobotError
-        from robots.library import joint_kinds
-
-        axes = {axis["name"]: axis["type"] for axis in self.axis}
-        try:
-            source = self.urdf or self.name or ""
-            return axes | joint_kinds(source, self.package_dirs, self.xacro_args)
-        except RobotError:
-            return {}
 
     def _wrong_units(self, kinds: Mapping[str, str], in_order: Iterable[str] = ()) -> list[Fault]:
         """Degrees for joints that slide, metres for joints that turn.
