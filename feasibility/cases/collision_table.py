@@ -98,9 +98,8 @@ def read_collision(table: Any, faults: list[Fault]) -> CollisionPart | None:
     """
     before = len(faults)
     section = Section("collision", table, faults)
-    values: dict[str, Any] = section.take(
-        *("surface", "clearance", "tool_clearance", "tool_links", "allow", "shapes", "thickness")
-    )
+    plain = {entry.name for entry in fields(CollisionPart)} - {"srdf", "clearances", *MAKERS}
+    values: dict[str, Any] = section.take(*sorted(plain))
     if section.has("self"):
         values["self_"] = section.table["self"]
     values |= section.path("srdf")

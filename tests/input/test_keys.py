@@ -14,7 +14,7 @@ import pytest
 from coverable import Case, CaseError, Collision, Search
 from coverable.errors import MISSING, Fault
 from feasibility.cases.collision_table import CollisionPart
-from feasibility.cases.keys import Key, all_keys, keys_of, kinds
+from feasibility.cases.keys import Key, all_keys, keys_of, own_keys
 from feasibility.cases.toml import as_read
 from feasibility.cases.toml_text import toml_document
 
@@ -43,17 +43,14 @@ OTHERS: dict[str, tuple[str, tuple[str | int, ...], Tables]] = {
 OF_SHAPES = {"size": {"kind": "box", "size": [1, 1, 1]}, "file": {"kind": "mesh", "file": "a.stl"}}
 OF_SHAPES["scale"] = OF_SHAPES["file"]
 """What an object is that has a key which a capsule has not."""
-KINDS = {
-    "cylinder": {"radius": 1.0, "u_deg": [10, 90], "v": [0, 1], "cells": [3, 4]},
-    "hyperboloid": {"radius": 1.0, "flare": 1.0, "u_deg": [10, 90], "v": [0, 1], "cells": [3, 4]},
-    "plane": {"u": [0, 1], "v": [0, 1], "cells": [3, 4]},
-}
 
 
 def tables_of(kind: str) -> Tables:
-    tables = tomllib.loads(bad_input.goods("case")["sphere" if kind in KINDS else kind])
-    if kind in KINDS:
-        tables["surface"] = {"kind": kind, **KINDS[kind]}
+    good = bad_input.goods("case")
+    tables = tomllib.loads(good.get(kind, good["sphere"]))
+    if kind not in good:  # what its keys show makes one
+        written = "\n".join(key.written for key in own_keys(kind).values())
+        tables["surface"] = {"kind": kind, "cells": [3, 4], **tomllib.loads(written)}
     return {**tables, "search": {}, "collision": {}}
 
 
@@ -222,7 +219,6 @@ def test_the_reference_has_every_default() -> None:
         value = tomllib.loads(f"x = {keys_of('collision')[name].default}")["x"]
         assert value == getattr(CollisionPart(), name) == getattr(Collision(), name)
     assert set(keys_of("search")) == {*Search.__dataclass_fields__}
-    assert set(kinds()) == {*KINDS, *bad_input.goods("case")} - {"scene", "mounted", "slider"}
 
 
 def test_the_page_of_the_reference_is_in_step() -> None:

@@ -169,7 +169,7 @@ def test_the_class_of_the_page_has_keys_by_rows_of_a_table(tmp_path):
     (tmp_path / "case.toml").write_text(case)
     command = [sys.executable, "-c", "\n".join([*blocks("python"), OF_A_CASE])]
     said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False).stderr
-    assert "surface.rise: must be a finite number > 0 (metres), got -0.1" in said
+    assert "surface.rise: must be a finite number > 0 (m per radian), got -0.1" in said
 
 
 def test_a_kind_that_cannot_be_followed_is_measured(names):
