@@ -127,7 +127,7 @@ WHOLE = "[[-90, 90], [-90, 90], [-90, 90], [-90, 90], [-90, 90], [-90, 90]]"
 VARY = 'base.case = "paper/4a"\n[vary]\n'
 ARMS = 'base.case = "paper/4a"\nbase.robot.name = "puma560"\nvary.robots = ["puma560", "ur5"]\n'
 FAULTY = [
-    "a = 1",
+    "a = 1\ndescription = 5",
     "base = [",
     "base = 3\nvary = 4",
     'base.case = "paper/4z"\nbase.taks = {}\nvary.count = 3',
@@ -137,12 +137,12 @@ FAULTY = [
     VARY + 'robots = ["ur5", "urfive", { name = "ur5", limitss = 3 }, { urdf = "none.urdf" }]\n'
     '"task.cone_deg" = [20, -1, nan, "a", true]\n"task.standof" = [1]\n'
     '"surface.radius" = { from = 1, to = 1, steps = 1 }\n"surface.cells" = [[1, 2], [3]]',
-    VARY + 'robots = ["ur5", 7]',
+    VARY + 'robots = ["ur5", 7]\n"task.cone_deg" = []\n"surface.position" = { x = nan }',
     VARY + '"surface.position".y = { range = [0.4, 0.2] }\n"surface.position".z = { range = [0.4, '
     '0.4] }\n"surface.position".x = { range = [0.4, inf] }\n"surface.positon" = [1]\ncount = 4',
     VARY + 'robots = ["puma560", "ur5"]\n"robot.limits" = ["set-1", "set-9"]',
     VARY + '"task.cone_deg" = 30\n"surface.position" = 2024-01-01',
-    VARY + '"task.cone_deg" = [30]\ntask.cone_deg = [40]',
+    VARY + '"task.cone_deg" = [30]\ntask.cone_deg = [40]\n"task.standoff" = { range = [0, 1] }',
     VARY + '"surface.position" = { x = { from = 0, to = 1, steps = 2000 }, '
     "y = { from = 0, to = 1, steps = 999 } }",
     VARY + '"task.cone_deg" = { from = 10, to = 45, steps = 20000 }',
