@@ -23,6 +23,7 @@ _MOST_HALVINGS = 40
 _MOST_RIVALS = 8  # valleys tried for one point, besides the nearest sample's
 _BLOCK = 1_000_000  # pairs of a point and a sample held at a time, at most
 _FEWEST = 16  # points at a time, though these may be more
+_HALF = 0.6  # of a step from sample to sample: what is between is longer than the chord
 _STILL = 1e-14  # of the box's width: a step this short ends a descent
 _EPSILON = float(np.finfo(float).eps)
 
@@ -65,7 +66,7 @@ class ClosestPointSearch:
         self._closed = np.array(closed, dtype=bool)
         mesh = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
         placed = point(mesh.reshape(-1, len(lines))).reshape(*mesh.shape[:-1], -1)
-        self._reach = sum(
+        self._reach = _HALF * sum(
             float(np.linalg.norm(np.diff(placed, axis=axis), axis=-1).max())
             for axis in range(len(lines))
         )
@@ -110,7 +111,8 @@ class ClosestPointSearch:
             return np.asarray(np.einsum("nm,nm->n", offset, offset))
 
         away = square(sample)
-        for shift in itertools.product((-1, 0, 1), repeat=len(self._shape)):
+        shifts = itertools.product((-1, 0, 1), repeat=len(self._shape))
+        for shift in sorted(shifts, key=np.count_nonzero):  # the nearest ones leave the fewest
             if any(shift):
                 lowest = away <= square(self._beside(sample, shift))
                 owner, sample, away = owner[lowest], sample[lowest], away[lowest]

@@ -21,6 +21,7 @@ SAMPLES = np.linspace(0.0, 1.0, 9)  # of a line, where no model is known
 MEASURED = 2.0  # times what is measured counts there
 DIFFERENCE = 1e-5  # [1] of a range of parameters
 STEPS, LONGEST = 8, 0.1  # of Newton's, [1] of a range
+MANY, TOGETHER, CLOSE = 256, 4, 1e-5  # boxes, neighbours that have one model, its radii [m], [1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,12 +94,24 @@ class PatchPlaces(OffsetSurface):
         """(k, 2) how far offset points (m) and normals are from straight between their ends."""
         low, high = np.minimum(start, stop), np.maximum(start, stop)
         try:
-            radius = _known(self.patch.local_models(low, high)[0].radius)
+            radius = _known(self._radii(low, high))
         except SurfaceError:  # of a kind of one's own, whose formulas cannot be followed
             both = [_measured(partial(self._at_once, k), start, stop) for k in (0, 1)]
             return np.stack(both, axis=1)
         leaning = abs(self.height) * radius[:, 1] if self.height else 0.0  # which may be inf
         return 2.0 * np.stack([radius[:, 0] + leaning, radius[:, 1]], axis=1)
+
+    def _radii(self, low: Array, high: Array) -> Array:
+        """(k, 2) of models over boxes; of many, with one for neighbours where that is close."""
+        if len(low) < MANY:
+            return self.patch.local_models(low, high)[0].radius
+        first = np.arange(0, len(low), TOGETHER)
+        wide = np.minimum.reduceat(low, first), np.maximum.reduceat(high, first)
+        radius = self.patch.local_models(*wide)[0].radius
+        radius = np.repeat(radius, TOGETHER, axis=0)[: len(low)]
+        rough = ~(radius <= CLOSE).all(axis=1)
+        radius[rough] = self.patch.local_models(low[rough], high[rough])[0].radius
+        return radius
 
     def _at_once(self, which: int, x: Array) -> Array:
         return self.placed(x)[which]
