@@ -20,13 +20,10 @@ only of pairs that do not allow all of it planes are tried, and coal is asked ag
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import reduce
-from typing import NamedTuple
 
 import numpy as np
 
 from coverable.arrays import Array
-from feasibility.certification.collisions.judged_shapes import Body
 from feasibility.certification.collisions.pairing import Pairing
 from feasibility.collisions.words import SURFACE
 from feasibility.task import Task
@@ -38,25 +35,19 @@ FEW, MOST_CALLS = 20, 0.8  # ... no less, of which a couple gets this share of w
 HUGE = 1e6  # [m] the radius of a half space
 LEAST = 1e-12  # [m] so that nothing is divided by 0
 
-
-class ClearShare(NamedTuple):
-    """How much of a margin bodies allow."""
-
-    along: Array
-    """(m - 1,) share that they allow along each segment."""
-    pair: tuple[str, str] | None
-    """What allows no more than the least of these; None where all is allowed."""
+Shares = tuple[Array, tuple[str, str] | None]
+"""(m - 1,) shares along each segment, and the two bodies that allow least; None where all is."""
 
 
 def displaced_share(
     robot: Robot,
     task: Task,
     pivot: Array,
-    pairings: tuple[Pairing, ...],
+    pairings: Sequence[Pairing],
     most: tuple[float, float],
     moved: Callable[[float, float], Array],
-) -> ClearShare:
-    """A share of a margin with which bodies stay clear along a motion, and why not with more.
+) -> Shares:
+    """The share of a margin with which bodies stay clear along a motion.
 
     Args:
         robot, task: the case.
@@ -66,56 +57,52 @@ def displaced_share(
         moved: (m - 1, n) rad or m, e_j of each segment with the part so far off.
     """
     scene = () if task.collision is None else task.collision.scene
-    beside = {SURFACE, *(one.name for one in scene)}
-    nearer = Nearer(robot, pairings, beside, pivot)
+    nearer = Nearer(robot, pairings, {SURFACE, *(one.name for one in scene)}, pivot)
     along, some, pair = np.zeros(len(pairings[0].low)), 1.0, None
-    calls = SHARE_OF_CALLS * sum(one.calls for one in pairings)
-    for allowed in (0.0, calls):
+    most_calls = SHARE_OF_CALLS * sum(one.calls for one in pairings)
+    for calls in (0.0, most_calls):
         part = some * most[0], some * most[1]
-        clear = clear_share(pairings, nearer.by(moved(*part), *part), allowed)
-        along, pair = np.maximum(along, some * clear.along), clear.pair or pair
+        shares, least = clear_share(pairings, nearer.by(moved(*part), *part), calls)
+        along, pair = np.maximum(along, some * shares), least or pair
         some = min(max(LESS, WIDER * float(along.min())), 1.0)
-        if clear.pair is None or (some == 1.0 and calls < FEW):
+        if least is None or (some == 1.0 and most_calls < FEW):
             break
-    return ClearShare(along, pair)
+    return along, pair
 
 
-def clear_share(pairings: Sequence[Pairing], nearer: Array, calls: float) -> ClearShare:
+def clear_share(pairings: Sequence[Pairing], nearer: Array, calls: float) -> Shares:
     """The share of `nearer` (c, m - 1) m that couples may come nearer by, as far as known.
 
     Of those that allow least planes find out more, or so many calls of coal.
     """
-    more = np.maximum(nearer, LEAST)
-    shares, pair = _shares(pairings, more), None
-    known, least = shares.min(axis=1), 1.0
-    for k in np.argsort(known).tolist():
-        if known[k] >= least:
+    more, needed = np.maximum(nearer, LEAST), np.array([one.needed for one in pairings])
+
+    def shares_of(k: slice) -> Array:  # 0 where that is NaN
+        over = np.array([one.low for one in pairings[k]]) - needed[k, None]
+        return np.minimum(np.fmax(over / more[k], 0.0), 1.0)
+
+    shares, least, pair = shares_of(slice(None)), 1.0, None
+    for k in np.argsort(shares.min(axis=1)).tolist():
+        if shares[k].min() >= least:
             break
-        one, row = pairings[k], int(shares[k].argmin())
-        if calls == 0.0:
-            one.part_at(row, one.needed + least * more[k])
-        elif calls >= FEW:
+        one, wanted = pairings[k], needed[k] + least * more[k]
+        if calls < FEW:
+            one.part_at(int(shares[k].argmin()), wanted)
+        else:
             calls += one.calls
-            one.look_closer(row, least * more[k], MOST_CALLS * (calls - one.calls))
+            one.look_closer(wanted, MOST_CALLS * (calls - one.calls))
             calls -= one.calls
-        shares[k] = _shares([one], more[k])
+        shares[k] = shares_of(slice(k, k + 1))
         if shares[k].min() < least:
             least, pair = float(shares[k].min()), one.names
-    return ClearShare(shares.min(axis=0), pair)
-
-
-def _shares(pairings: Sequence[Pairing], more: Array) -> Array:
-    """(c, m - 1) the share of `more` that couples allow along each segment; 0 where that is NaN."""
-    needed = np.array([one.needed for one in pairings])[:, None]
-    over = np.array([one.low for one in pairings]) - needed
-    return np.asarray(np.minimum(np.fmax(over / more, 0.0), 1.0))
+    return shares.min(axis=0), pair
 
 
 class Nearer:
     """How much nearer couples of bodies may come along a motion."""
 
     def __init__(
-        self, robot: Robot, pairings: tuple[Pairing, ...], beside: set[str], pivot: Array
+        self, robot: Robot, pairings: Sequence[Pairing], beside: set[str], pivot: Array
     ) -> None:
         """See where they are along it.
 
@@ -125,48 +112,44 @@ class Nearer:
             beside: names of what is displaced with the part, if it is at rest.
             pivot: (3,) m, about which the part turns.
         """
-        motion, self.slides = pairings[0].motion, robot.prismatic
+        motion, self.slides = pairings[0].motion, robot.prismatic[:, None, None]
         bodies = list(dict.fromkeys(body for one in pairings for body in (one.a, one.b)))
         index = {body: k for k, body in enumerate(bodies)}
-        self.first = np.array([index[one.a] for one in pairings])
-        self.second = np.array([index[one.b] for one in pairings])
+        self.couples = np.array([(index[one.a], index[one.b]) for one in pairings]).T
         tool = robot.model.frames[robot.tool_frame_id].placement.translation
         centres = np.array([*(body.centre for body in bodies), tool])
         self.joints = np.array([*(body.joint for body in bodies), robot.n])
         balls = np.array([*(min(body.ball, HUGE) + body.deviation for body in bodies), 0.0])
         """(B,) m, about the centres of all bodies, and of the tool point."""
-        middles, slides = motion.middles(self.joints, centres), self.slides[:, None, None]
-        levers = motion.levers(middles) + balls
-        most = np.where(slides, 1.0, np.maximum(levers[:, :-1], levers[:, 1:]))
-        way = self._sums(most * motion.steps.T[:, :, None])
-        between = np.where(np.arange(robot.n)[:, None, None] < self.joints, way[1:], way[:-1])
-        self.levers = np.where(slides, 1.0, 0.5 * (levers[:, :-1] + levers[:, 1:] + between))
-        """(n, m - 1, B) m, the largest along each segment, of points of each body."""
+        middles = motion.middles(self.joints, centres)
+        levers = (motion.levers(middles) + balls).transpose(0, 2, 1)
+        most = np.where(self.slides, 1.0, np.maximum(levers[..., :-1], levers[..., 1:]))
+        way = self._seen(most * motion.steps.T[:, None])
+        ahead = (np.arange(robot.n)[:, None] < self.joints)[..., None]
+        behind = np.where(ahead, way[1:], way[:-1])
+        mean = 0.5 * (levers[..., :-1] + levers[..., 1:] + behind)
+        self.levers = np.where(self.slides, 1.0, mean)
+        """(n, B, m - 1) m, the largest along each segment, of points of each body."""
         rests = [one.a.joint == 0 and not beside.isdisjoint(one.names) for one in pairings]
-        self.goes, self.over = np.array(rests), np.array([SURFACE in one.names for one in pairings])
-        self.over &= self.goes
-        self.far = self._apart(middles, pivot, way[0], balls)
-        """(m - 1, c) m, of the second ones from the pivot, at most."""
-        self.size = (np.linalg.norm(centres - pivot, axis=1) + balls)[self.first]
-        """(c,) m, of what is at rest from there."""
-        self.reach = self._apart(middles, middles[:, [-1]], way[self.joints, :, -1].T, balls)
-        """(m - 1, c) m, of the second ones from the tool point, at most."""
-        ends = {body: _furthest(body, tool) for body in bodies if body.joint == robot.n}
-        np.minimum(self.reach, [ends.get(one.b, np.inf) for one in pairings], out=self.reach)
+        over = [SURFACE in one.names for one in pairings]
+        self.goes, self.over = np.array([rests, np.logical_and(rests, over)])[..., None]
 
-    def _sums(self, each: Array) -> Array:
-        """(n + 1, m - 1, B) sums over the joints from every one up to each body's, or back.
+        def apart(points: Array, ways: Array) -> Array:  # (c, m - 1) m, the second ones, at most
+            away = np.linalg.norm(middles - points, axis=2)
+            return (0.5 * (away[:-1] + away[1:] + ways.T) + balls).T[self.couples[1]]
 
-        Of values (n, m - 1, B) of all joints.
+        self.far, self.reach = apart(pivot, way[0]), apart(middles[:, -1:], way[self.joints, -1])
+        """From the pivot, and from the tool point."""
+        self.size = (np.linalg.norm(centres - pivot, axis=1) + balls)[self.couples[0], None]
+        """(c, 1) m, of what is at rest from there."""
+
+    def _seen(self, each: Array) -> Array:
+        """(n + 1, B, m - 1) sums over the joints between each body's and every one.
+
+        Of values (n, B, m - 1) of all joints.
         """
-        sums = np.zeros((len(each) + 1, *each.shape[1:]))
-        each.cumsum(axis=0, out=sums[1:])
-        return np.abs(sums - sums[self.joints, :, np.arange(len(self.joints))].T)
-
-    def _apart(self, middles: Array, points: Array, way: Array, balls: Array) -> Array:
-        """(m - 1, c) m, how far the second ones are at most from points that go such ways."""
-        away = np.linalg.norm(middles - points, axis=2)
-        return np.asarray(0.5 * (away[:-1] + away[1:] + way) + balls)[:, self.second]
+        sums = np.concatenate([np.zeros_like(each[:1]), np.cumsum(each, axis=0)])
+        return np.abs(sums - sums[self.joints, np.arange(len(self.joints))])
 
     def by(self, moved: Array, shift: float, turn: float) -> Array:
         """(c, m - 1) m, how much nearer they come at most.
@@ -175,22 +158,13 @@ class Nearer:
             moved: (m - 1, n) rad or m, e_j of each segment.
             shift, turn: m and rad, how far the part is displaced.
         """
-        off = self._sums(self.levers * moved.T[:, :, None])  # as seen from every joint
-        found = reduce(np.minimum, (one[:, self.first] + one[:, self.second] for one in off))
+        moved = moved.T[:, None]
+        off, (a, b) = self._seen(self.levers * moved), self.couples  # as seen from every joint
+        found = (off[:, a] + off[:, b]).min(axis=0)
         # The part, and what is beside it.
-        away = np.minimum(self.size, self.far + off[0][:, self.second])
-        found += self.goes * np.maximum(shift, turn * away)
+        found += self.goes * np.maximum(shift, turn * np.minimum(self.size, self.far + off[0, b]))
         # The part, as seen from the tool point.
-        turned = np.zeros((len(moved), len(self.slides) + 1))
-        np.where(self.slides, 0.0, moved).cumsum(axis=1, out=turned[:, 1:])
-        b = self.joints[self.second]
-        away = off[b, :, -1].T + (turn + turned[:, b]) * self.reach
-        np.minimum(found, away, out=found, where=self.over)
-        return np.asarray(found.T)
-
-
-def _furthest(body: Body, point: Array) -> float:
-    """m, of any of a body's points from another one."""
-    away = body.corners - point
-    most = np.sqrt(np.einsum("ki,ki->k", away, away).max())
-    return float(most + body.radius + body.circle + body.deviation)
+        turned, on = np.zeros((len(moved) + 1, moved.shape[2])), self.joints[b]
+        np.where(self.slides, 0.0, moved)[:, 0].cumsum(axis=0, out=turned[1:])
+        followed = off[on, -1] + (turn + turned[on]) * self.reach
+        return np.asarray(np.where(self.over, np.minimum(found, followed), found))

@@ -38,29 +38,19 @@ def second_derivative_bound(largest: Array, steps: Array, prismatic: Mask) -> Ar
     return np.asarray((largest * steps * (turns + 2.0 * before)).sum(axis=-1))
 
 
-def column_changes(largest: Array, steps: Array, prismatic: Mask) -> Array:
+def column_changes(largest: Array, steps: Array, prismatic: Mask, twice: bool = False) -> Array:
     """(..., n) how far each column of the Jacobian moves at most, from L_j and the steps.
 
-    Column j turns with the joints up to j, and is changed by what those behind j move.
-    """
-    own = np.cumsum(np.where(prismatic, 0.0, steps), axis=-1)
-    moved = largest * steps
-    behind = np.cumsum(moved[..., ::-1], axis=-1)[..., ::-1] - moved
-    # A joint that slides keeps its direction unless joints before it turn.
-    return np.asarray(largest * own + np.where(prismatic, 0.0, behind))
-
-
-def column_bends(largest: Array, steps: Array, prismatic: Mask) -> Array:
-    """(..., n) what |J_j''| of each column is at most along a segment, from L_j and the steps.
-
-    Of three joints the third derivative is z_a x (z_b x (z_c x (p - o_c))), c the last of them: as
-    long as the lever of c at most, and 0 if a or b slides.
+    Column j turns with the joints up to j, and is changed by what those behind j move. Or how fast
+    that changes along a segment, |J_j''|: of three joints the third derivative is z_a x (z_b x
+    (z_c x (p - o_c))), c the last of them, as long as its lever at most, and 0 if a or b slides.
     """
     turns = np.where(prismatic, 0.0, steps)
     own = np.cumsum(turns, axis=-1)
-    moved = largest * steps * (2.0 * own - turns)
+    moved = largest * steps * (2.0 * own - turns if twice else 1.0)
     behind = np.cumsum(moved[..., ::-1], axis=-1)[..., ::-1] - moved
-    return np.asarray(largest * own**2 + np.where(prismatic, 0.0, behind))
+    # A joint that slides keeps its direction unless joints before it turn.
+    return np.asarray(largest * own ** (1 + twice) + np.where(prismatic, 0.0, behind))
 
 
 def levers_along(

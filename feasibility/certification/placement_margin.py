@@ -17,7 +17,7 @@ changes by at most M y, the tool point is M y^2 / 2 off its linear model. The ax
 changes h_j. A is the Jacobian of the axis, P about a right inverse of J at both ends and straight
 between, with |JP - I| <= eps and |AP| <= T there. d_j bounds the norms of its rows, which change by
 g_j in all; columns of J change at the rate c_j at most (`column_changes`), and that by b_j
-(`column_bends`); those of A likewise. Whatever is no more than so much at both ends is in between
+(the same, twice); those of A likewise. Whatever is no more than so much at both ends is in between
 no more than that and an eighth of its second derivative. P'' = 0, and products of matrices are sums
 over columns and rows:
 
@@ -45,19 +45,16 @@ angle / Theta <= 1. `displaced_bodies` says which share of it bodies allow.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from coverable.arrays import Array, Ints
 from feasibility.certification.bisection import Rows
-from feasibility.certification.jacobians import Jacobians, jacobians, smallest_singular
-from feasibility.certification.lever_bounds import (
-    column_bends,
-    column_changes,
-    second_derivative_bound,
-)
+from feasibility.certification.jacobians import jacobians, lengths, smallest_singular
+from feasibility.certification.lever_bounds import column_changes, second_derivative_bound
 from feasibility.task import PlacementError, Task
 from feasibility.verdict import Bound, Certificate, PlacementMargin
 from robots.kinematics import Kinematics
@@ -67,50 +64,20 @@ from surfaces.cells import Cells
 if TYPE_CHECKING:
     from feasibility.certification.collisions.pairing import Pairing
 
-CLOSE = 0.95  # [1] of the least room at a row: stretches with less are cut
-ROUNDS = 3  # of cutting, after which they are taken as they are
-PIECES = 4  # that a stretch is cut into
+STEP = 0.03  # [rad], [m] no joint moves further along a stretch: the shorter, the less is lost
+FINE = 0.001  # [rad], [m] where singular values count, whose bounds lose most
 MOST = 10.0  # [m] no larger ball is tried
 LEAST = 1e-12  # [m], [rad] so that nothing is divided by 0
 FREE = 1e9  # [rad] room for what is free
 BELOW = 1.0 - 1e-9  # [1] of what is found is claimed: rounding
-DAMPED = 1e-10  # [1] of all squared singular values: so a right inverse exists everywhere
-BOUNDS = (Bound.LIMIT, Bound.SINGULAR, Bound.CONE, Bound.ROLL)
-
-
-class Given(NamedTuple):
-    """What all stretches of a motion share."""
-
-    robot: Robot
-    task: Task
-    pivot: Array
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Ends(Rows):
-    """k configurations at which stretches begin or end; or (2, k) of them, where some end too."""
-
-    q: Array
-    points: Array
-    levers: Array
-    """(k, 2, n) r_j, and those of the axis, sines."""
-    right: Array
-    """(k, n, 3) P."""
-    rows: Array
-    """(k, n) norms of its rows."""
-    norms: Array
-    """(k, 2) eps and T."""
-    sigma: Array
-    """(k,) the smallest singular value; inf where it does not matter."""
+DAMPED = 1e-10  # [m2] added to squared singular values: so a right inverse exists everywhere
+BOUNDS = (Bound.SINGULAR, Bound.CONE, Bound.ROLL)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Balls(Rows):
     """What holds along k stretches for |v| <= y."""
 
-    row: Ints
-    share: Array
-    """(k, 2) from where to where on the way from that row to the next, 0..1."""
     slope: Array
     """(k,) 1 - kappa."""
     second: Array
@@ -120,18 +87,19 @@ class Balls(Rows):
     moves: Array
     """(k, n) d_j."""
     caps: Array
-    """(k, 2) m, what y may be for limits, and for singularities and the lemma itself."""
+    """(k, n + 1) m, what y may be for each joint's limits; for singularities and the lemma."""
     room: Array
     """(k, 2) rad, of the cone, c; of the roll, times cos(swing / 2)."""
     far: Array
     """(k,) m, r."""
 
     def allowed(self, turn: Array | float) -> Array:
-        """(..., k, 4) m, y by `BOUNDS`, with the part turned by (..., k) rad a metre of f(y)."""
+        """(..., k, n + 3) m, y by `caps` and `room`, the part turned (..., k) rad a metre of f."""
         part = np.asarray(turn)[..., None]
         first = self.turns[..., 0] + part * self.slope[:, None]
         angles = solved(first, self.turns[..., 1] - part * self.second[:, None], self.room)
-        return np.concatenate([np.broadcast_to(self.caps, angles.shape), angles], axis=-1)
+        caps = np.broadcast_to(self.caps, (*angles.shape[:-1], self.caps.shape[1]))
+        return np.concatenate([caps, angles], axis=-1)
 
     def reached(self, turn: Array | float) -> Array:
         """(..., k) m, f of the least of these."""
@@ -144,15 +112,10 @@ class Balls(Rows):
         shift, turn = self.reached(np.stack([0.0 * self.far, 1.0 / self.far]))
         return np.stack([shift, np.minimum(turn / self.far, np.pi)], axis=1)
 
-    @property
-    def first(self) -> Ints:
-        """(m - 1,) which is the first one behind each row."""
-        return np.flatnonzero(self.row != np.append(-1, self.row[:-1]))
-
     def moved(self, position: float, angle: float) -> Array:
-        """(m - 1, n) rad or m, e_j from each row to the next, for such a triangle."""
+        """(k, n) rad or m, e_j for such a triangle."""
         y = solved(self.slope, -self.second, np.maximum(position, angle * self.far))
-        return np.maximum.reduceat(self.moves * y[:, None], self.first)
+        return np.asarray(self.moves * y[:, None])
 
 
 def solved(a: Array, b: Array | float, c: Array) -> Array:
@@ -164,98 +127,58 @@ def solved(a: Array, b: Array | float, c: Array) -> Array:
     return np.minimum(np.where(reached, MOST, 2.0 * c / np.where(reached, 1.0, below)), MOST)
 
 
-def ends_of(case: Given, q: Array, at: Jacobians | None = None) -> Ends:
-    """What has to be known of configurations q (k, n), whose Jacobians may be known."""
-    at = jacobians(Kinematics(case.robot), q) if at is None else at
-    back = at.point.transpose(0, 2, 1)
-    square = at.point @ back
-    least = DAMPED * square.trace(axis1=1, axis2=2) + LEAST**2
-    right = back @ np.linalg.inv(square + least[:, None, None] * np.eye(3))
-    off, turned = at.point @ right - np.eye(3), at.axis @ right
-    most = np.linalg.eigvalsh(turned @ turned.transpose(0, 2, 1))[:, 2]
-    norms = np.sqrt(np.stack([(off**2).sum(axis=(1, 2)), most], axis=1)) / BELOW
-    sigma = np.full(len(q), np.inf)
-    if case.task.min_manipulability is not None:
-        sigma = smallest_singular(at, case.robot.length_unit)
-    levers = np.stack([at.levers, at.sines], axis=1)
-    return Ends(q, at.points, levers, right, np.sqrt((right**2).sum(axis=2)), norms, sigma)
+def larger(ends: Array) -> Array:
+    """The larger one of the values at both ends of stretches."""
+    return np.maximum(ends[:-1], ends[1:])
 
 
-def left_to_limits(robot: Robot, ends: Array) -> Array:
-    """(..., n) rad or m, from both limits to straight lines between ends (2, ..., n)."""
-    low, high = ends.min(axis=0), ends.max(axis=0)
-    return np.maximum(np.minimum(low - robot.lower, robot.upper - high), 0.0)
+def cut(q: Array, task: Task) -> tuple[Array, Ints]:
+    """Rows of a motion (m, n) and others between; and behind which row each but the last one is."""
+    step = STEP if task.min_manipulability is None else FINE
+    parts = np.ceil(np.abs(np.diff(q, axis=0)).max(axis=1) / step).clip(1.0).astype(np.intp)
+    row = np.repeat(np.arange(len(parts)), parts)
+    share = (np.arange(len(row)) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[row]
+    return np.vstack([q[row] + share[:, None] * np.diff(q, axis=0)[row], q[-1:]]), row
 
 
-def balls_of(case: Given, row: Ints, share: Array, ends: Ends, room: Array) -> Balls:
-    """What holds along stretches.
-
-    Args:
-        case: what is given.
-        row, share: of the balls.
-        ends: (2, k) where they begin and end.
-        room: (m - 1, 2) rad, what is left of cone and roll along the motion.
-    """
-    robot, slides, least = case.robot, case.robot.prismatic, case.task.min_manipulability
-    steps, moves = np.abs(ends.q[1] - ends.q[0]), ends.rows.max(axis=0)
-    off, turned = ends.norms.max(axis=0).T
-    way = ends.levers.max(axis=0) * steps[:, None]
+def balls_along(robot: Robot, task: Task, pivot: Array, q: Array, room: Array) -> Balls:
+    """What holds along a motion q (k + 1, n), with (k, 2) rad left of cone and roll."""
+    slides, at = robot.prismatic, jacobians(Kinematics(robot), q)
+    square = at.point @ at.point.transpose(0, 2, 1)
+    inverse = at.point.transpose(0, 2, 1) @ np.linalg.inv(square + DAMPED * np.eye(3))  # P
+    off = np.linalg.norm(at.point @ inverse - np.eye(3), axis=(1, 2)) / BELOW
+    right, axis = inverse.transpose(0, 2, 1), at.axis @ inverse
+    axis = np.sqrt(np.linalg.eigvalsh(axis @ axis.transpose(0, 2, 1))[:, 2]) / BELOW
+    steps, moves = np.abs(np.diff(q, axis=0)), larger(lengths(right))
+    ends = np.stack([at.levers, at.sines], axis=1)
+    way = larger(ends) * steps[:, None]
     behind = np.cumsum(way[..., ::-1], axis=2)[..., ::-1] - way
-    levers = np.where(slides, ends.levers[0], 0.5 * (ends.levers.sum(axis=0) + behind))
+    levers = np.where(slides, ends[:-1], 0.5 * (ends[:-1] + ends[1:] + behind))
     levers[:, 1] = np.minimum(levers[:, 1], 1.0)
-    rates = column_changes(levers, steps[:, None], slides)
-    bends = column_bends(levers, steps[:, None], slides)
-    change = np.sqrt(((ends.right[1] - ends.right[0]) ** 2).sum(axis=2))
+    rates, bends = (
+        column_changes(levers, steps[:, None], slides, twice) for twice in (False, True)
+    )
+    change = lengths(right[1:] - right[:-1])
     between = 0.125 * (bends * moves[:, None] + 2.0 * rates * change[:, None]).sum(axis=2)
     second, bend = second_derivative_bound(levers, moves[:, None], slides).T
-    slope = np.maximum(1.0 - off - between[:, 0], 0.0)
+    slope = np.maximum(1.0 - larger(off) - between[:, 0], 0.0)
     lemma = np.minimum(BELOW * slope / np.maximum(second, LEAST), MOST)
-    limits = solved(moves, 0.0, left_to_limits(robot, ends.q)).min(axis=1)
-    if least is not None:
+    if task.min_manipulability is not None:
         both = np.stack([rates, column_changes(levers, moves[:, None], slides)])
         fall, falls = np.sqrt((both**2 / [[robot.length_unit**2], [1.0]]).sum(axis=(2, 3)))
-        spare = np.maximum(0.5 * (ends.sigma.sum(axis=0) - fall) - least, 0.0)
-        lemma = np.minimum(lemma, solved(falls, 0.0, spare))
-    far = np.linalg.norm(ends.points - case.pivot, axis=2).max(axis=0)
-    far += 0.125 * second_derivative_bound(levers[:, 0], steps, slides) + LEAST
-    room = np.minimum(room[row], FREE) * [1.0, np.cos(0.5 * min(case.task.cone, 0.5 * np.pi))]
-    wide = np.maximum(np.where(room[:, 0] < np.pi, 0.5 * room[:, 0], LEAST), LEAST)
-    room[room[:, 0] >= np.pi, 0] = FREE
-    chord = wide / np.sin(wide)
-    turns = np.stack([
-        chord * (turned + between[:, 1]), chord * bend,
-        np.where(slides, 0.0, moves).sum(axis=1), 0.0 * bend,
-    ], axis=1).reshape(-1, 2, 2)  # fmt: skip
-    caps = np.stack([limits, lemma], axis=1)
-    return Balls(row, share, slope, second, turns, moves, caps, room, far)
-
-
-def balls_along(case: Given, q: Array, room: Array, at: Jacobians | None = None) -> Balls:
-    """Of a whole motion q (m, n), in stretches with little less room than there is at rows."""
-    row, ends, found = np.arange(len(q) - 1), ends_of(case, q, at), list[Balls]()
-    share = np.tile([0.0, 1.0], (len(row), 1))
-    pairs = np.array([[row, row, row + 1], [row + 1, row, row + 1]]).reshape(2, -1)
-    made = balls_of(case, np.tile(row, 3), np.tile(share, (3, 1)), ends.of(pairs), room)
-    reach, made = made.triangle, made.of(slice(len(row)))
-    most, reach = reach[len(row) :].min(axis=0), reach[: len(row)]
-    for _ in range(ROUNDS):
-        bad = (reach < CLOSE * most).any(axis=1)
-        if not bad.any():
-            break
-        found.append(made.of(~bad))
-        (low, high), row = share[bad].T, row[bad, None]
-        part = np.linspace(low, high, PIECES + 1, axis=1)
-        between = q[row] + part[..., None] * (q[row + 1] - q[row])
-        k = np.arange(part.size).reshape(part.shape)
-        pairs = np.stack([k[:, :-1], k[:, 1:]]).reshape(2, -1)
-        row, share = np.repeat(row, PIECES), part.ravel()[pairs].T
-        ends = ends_of(case, between.reshape(-1, q.shape[1]))
-        made = balls_of(case, row, share, ends.of(pairs), room)
-        reach = made.triangle
-    if not found:
-        return made
-    made = Balls.join(*found, made)
-    return made.of(np.argsort(made.row, kind="stable"))
+        sigma = smallest_singular(at, robot.length_unit)
+        spare = 0.5 * (sigma[:-1] + sigma[1:] - fall) - task.min_manipulability
+        lemma = np.minimum(lemma, solved(falls, 0.0, np.maximum(spare, 0.0)))
+    left = -larger(-np.minimum(q - robot.lower, robot.upper - q))  # at both ends, so between, too
+    caps = np.column_stack([solved(moves, 0.0, np.maximum(left, 0.0)), lemma])
+    far = larger(np.linalg.norm(at.points - pivot, axis=1)) + LEAST
+    far += 0.125 * second_derivative_bound(levers[:, 0], steps, slides)
+    half = np.clip(0.5 * room[:, 0], LEAST, 0.5 * np.pi)
+    tilts = np.stack([larger(axis) + between[:, 1], bend]) * half / np.sin(half)
+    rolls = np.stack([np.where(slides, 0.0, moves).sum(axis=1), 0.0 * bend])
+    turns = np.stack([tilts, rolls]).transpose(2, 0, 1)
+    room = np.minimum(room, FREE) * [1.0, np.cos(0.5 * min(task.cone, 0.5 * np.pi))]
+    return Balls(slope, second, turns, moves, caps, room, far)
 
 
 def placement_margin(
@@ -264,8 +187,7 @@ def placement_margin(
     task: Task,
     q: Array,
     room: Array,
-    at: Jacobians | None = None,
-    pairings: tuple[Pairing, ...] | None = None,
+    pairings: Sequence[Pairing] | None = None,
 ) -> PlacementMargin | None:
     """The margin of an accepted motion; see the module. None where bodies were not judged.
 
@@ -273,43 +195,36 @@ def placement_margin(
         robot, cells, task: the case.
         q: (m, n) the motion, m >= 1, rad or m.
         room: (m, 2) rad, what is left of cone and roll from each row to the next; inf where free.
-        at: m Jacobians at its rows, where they are known.
         pairings: all couples of bodies along the motion, as they were judged.
     """
-    case = Given(robot, task, cells.centres.mean(axis=0))
-    middle, poses = tuple(case.pivot.tolist()), at or jacobians(Kinematics(robot), q)
+    pivot, worst, what = cells.centres.mean(axis=0), 0, ""
+    position, angle, bound_by, along = 0.0, 0.0, Bound.START, None
+    if robot.start is None:  # else the motion has to begin there, wherever the part stands
+        if pairings is None and task.collision is not None and task.collision.checked:
+            return None
+        rows, row = cut(np.vstack([q, q[-1:]]), task)  # the last row stands for itself
+        balls, row = balls_along(robot, task, pivot, rows, room[row]), np.minimum(row, len(q) - 2)
+        first, reach = np.flatnonzero(np.diff(row, prepend=-2)), balls.triangle
+        along, least = np.minimum.reduceat(reach[:, 0], first), int(reach[:, 0].argmin())
+        worst, bound = max(int(row[least]), 0), int(balls.allowed(0.0)[least].argmin())
+        bound_by = Bound.LIMIT if bound < robot.n else BOUNDS[bound - robot.n]
+        what = robot.joint_names[bound] if bound < robot.n else ""
+        position, angle = (BELOW * reach.min(axis=0)).tolist()
+        if pairings and position > 0.0:
+            from feasibility.certification.displaced_bodies import displaced_share
 
-    def cell_at(row: int) -> tuple[int, ...]:  # the one whose target is nearest to the tool
-        off = np.linalg.norm(task.targets(cells).points - poses.points[row], axis=1)
-        return cells.unravel(int(off.argmin()))
+            def moved(*part: float) -> Array:
+                return np.asarray(np.maximum.reduceat(balls.moved(*part), first))
 
-    if robot.start is not None:  # the motion has to begin there, wherever the part stands
-        return PlacementMargin(0.0, 0.0, middle, Bound.START, cell_at(0))
-    if pairings is None and task.collision is not None and task.collision.checked:
-        return None
-    if len(q) == 1:
-        q, room = np.repeat(q, 2, axis=0), np.repeat(room, 2, axis=0)
-        poses = poses.of(np.array([0, 0]))
-    room = np.vstack([room[:-2], room[-2:].min(axis=0)])  # the last row ends the last segment
-    balls = balls_along(case, q, room, poses)
-    reach = balls.triangle
-    along = np.minimum.reduceat(reach[:, 0], balls.first)
-    worst = int(np.argmin(reach[:, 0]))
-    row, what = int(balls.row[worst]), ""
-    bound_by = BOUNDS[int(balls.allowed(0.0)[worst].argmin())]
-    if bound_by is Bound.LIMIT:
-        left = left_to_limits(robot, q[row : row + 2])
-        what = robot.joint_names[int(np.argmin(solved(balls.moves[worst], 0.0, left)))]
-    position, angle = (BELOW * reach.min(axis=0)).tolist()
-    if pairings and position > 0.0:
-        from feasibility.certification.displaced_bodies import displaced_share
-
-        clear = displaced_share(robot, task, case.pivot, pairings, (position, angle), balls.moved)
-        along, share = np.minimum(along, clear.along * position), float(clear.along.min())
-        position, angle = share * position, share * angle
-        if clear.pair is not None:
-            row, bound_by, what = int(along.argmin()), Bound.CLEARANCE, " and ".join(clear.pair)
-    return PlacementMargin(position, angle, middle, bound_by, cell_at(row), what, along)
+            shares, pair = displaced_share(robot, task, pivot, pairings, (position, angle), moved)
+            along, share = np.minimum(along, shares * position), float(shares.min())
+            position, angle = share * position, share * angle
+            if pair:
+                worst, bound_by, what = int(along.argmin()), Bound.CLEARANCE, " and ".join(pair)
+    point = Kinematics(robot).tools(q[[worst]])[0]
+    off = np.linalg.norm(task.targets(cells).points - point, axis=1)
+    cell, middle = cells.unravel(int(off.argmin())), tuple(pivot.tolist())
+    return PlacementMargin(position, angle, middle, bound_by, cell, what, along)
 
 
 def margin_fault(task: Task, certificate: Certificate) -> str:

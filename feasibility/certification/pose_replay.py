@@ -155,4 +155,4 @@ def _with_what_follows(
         most = np.maximum(most, one.most)
         faults += [part.placed(fault) for fault in one.faults]
         np.minimum.at(room, part.row, one.room)
-    return Along(most, faults, found.samples, room, found.poses)
+    return Along(most, faults, found.samples, room)

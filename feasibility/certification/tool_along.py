@@ -16,7 +16,7 @@ from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.bisection import bisected
 from feasibility.certification.cells_reached import in_order
 from feasibility.certification.faults import MotionFault
-from feasibility.certification.jacobians import Jacobians, jacobians
+from feasibility.certification.jacobians import jacobians
 from feasibility.certification.stretches import Bounds, Judge, SampledStretches, Samples
 from feasibility.task import Task
 from robots.kinematics import Kinematics
@@ -38,8 +38,6 @@ class Along(NamedTuple):
     room: Array
     """(m, 2) rad, how much of cone and roll is left at least from each row to the next; inf where
     they are free, or the tool does not work."""
-    poses: Jacobians | None = None
-    """At all rows, where they are known."""
 
 
 def tool_along(
@@ -87,7 +85,7 @@ def tool_along(
     samples = in_order(samples)
     np.maximum(most, _most(judge, samples), out=most)
     less_room(room, judge.task, samples.row, samples.chord, samples.roll)
-    return Along(most, faults, samples, room, poses)
+    return Along(most, faults, samples, room)
 
 
 def _said(judge: Judge, wrong: Samples, noun: str) -> list[MotionFault]:

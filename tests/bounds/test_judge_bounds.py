@@ -59,7 +59,7 @@ def test_a_stretched_arm_bends_as_much_as_is_said(count):
     bound = lever_bounds.second_derivative_bound(levers, steps, robot.prismatic)
     each = np.cumsum(steps, axis=1) ** 2
     holds(bound, each.sum(axis=1), 1.0 - 1e-9)
-    bends = lever_bounds.column_bends(levers, steps, robot.prismatic)
+    bends = lever_bounds.column_changes(levers, steps, robot.prismatic, True)
     holds(bends, np.cumsum(each[:, ::-1], axis=1)[:, ::-1], 1.0 - 1e-9)
 
 
@@ -70,7 +70,7 @@ def test_a_slide_on_a_turning_arm_bends_by_twice_the_turn():
     levers = jacobians(Kinematics(robot), none).levers
     found = lever_bounds.second_derivative_bound(levers, steps, robot.prismatic)
     holds(found, 2 * 0.5 * 0.7, 1.0 - 1e-9)
-    bends = lever_bounds.column_bends(levers, steps, robot.prismatic)
+    bends = lever_bounds.column_changes(levers, steps, robot.prismatic, True)
     holds(bends, [[2 * 0.5 * 0.7, 2 * 0.5 * 0.7, 0.7**2]], 1.0 - 1e-9)
 
 

@@ -48,31 +48,32 @@ def placed(frames, joint, points):
 
 
 def margin_and_balls(robot, cells, task, walk):
-    """The margin of a motion, the bounds along it that it is made of, and couples of bodies."""
+    """The margin of a motion, with the bounds that it is made of, and couples of bodies."""
     found = replay(robot, cells, task, walk, np.ones(len(cells), dtype=bool))
     assert found.accepted, found.refusal
-    kept = found.certificate.margin
-    pairings = getattr(kept, "args", ((),))[0]
-    *_, q, room, _ = getattr(kept, "func", kept).__wrapped__.args
-    case = lemma.Given(robot, task, cells.centres.mean(axis=0))
-    balls = lemma.balls_along(case, q, room)
-    return found.certificate.placement_margin, balls, pairings
+    kept, margin = found.certificate.margin, found.certificate.placement_margin
+    pivot = cells.centres.mean(axis=0)
+    np.testing.assert_allclose(margin.pivot, pivot, atol=1e-12)
+    *_, q, room = getattr(kept, "func", kept).__wrapped__.args
+    rows, row = lemma.cut(np.vstack([q, q[-1:]]), task)
+    balls = lemma.balls_along(robot, task, pivot, rows, room[row])
+    return margin, SimpleNamespace(
+        balls=balls, rows=rows, row=row, pairings=getattr(kept, "args", ((),))[0]
+    )
 
 
-def displaced(arm, cells, walk, margin, balls, rng, count):
+def displaced(arm, cells, walk, margin, bounds, rng, count):
     """Displacements, and where the claim says that the arm is."""
-    pivot, share = np.array(margin.pivot), rng.random(count)
-    np.testing.assert_allclose(pivot, cells.centres.mean(axis=0), atol=1e-12)
+    pivot, share, balls = np.array(margin.pivot), rng.random(count), bounds.balls
     share = np.where(rng.random(count) < 0.6, np.round(share), share)
-    last = len(balls.row) - 1
+    last = len(bounds.row) - 1
     weak = np.argsort(balls.triangle[:, 0])[np.minimum(rng.exponential(4, count), last).astype(int)]
     at, part = np.where(rng.random(count) < 0.5, weak, rng.integers(0, last + 1, count)), None
     if cells.surface.kind == "poses":  # directions between poses are not known here
-        begin = np.flatnonzero((balls.share[:, 0] == 0.0) & (walk.cell[balls.row] >= 0))
+        begin = np.flatnonzero(np.diff(bounds.row, prepend=-1) & (walk.cell[bounds.row] >= 0))
         at, part = begin[rng.integers(0, len(begin), count)], np.zeros(count)
     part = (rng.random(count) if part is None else part)[:, None]
-    start, way = walk.q[balls.row[at]], np.diff(walk.q, axis=0)[balls.row[at]]
-    low, high = (start + end[:, None] * way for end in balls.share[at].T)
+    low, high = bounds.rows[at], bounds.rows[at + 1]
     one, other = (np.linalg.pinv(derivative(arm, q)) for q in (low, high))
     inverse = (1.0 - part[..., None]) * one + part[..., None] * other
     q = nominal = (1.0 - part) * low + part * high
@@ -93,7 +94,7 @@ def displaced(arm, cells, walk, margin, balls, rng, count):
     placement = np.tile(np.eye(4), (count, 1, 1))
     placement[:, :3, :3], placement[:, :3, 3] = turn, pivot + shift - turn @ pivot
     return SimpleNamespace(
-        ball=balls.of(at), cell=walk.cell[balls.row[at]], q=q, nominal=nominal, v=v, tool=found,
+        ball=balls.of(at), cell=walk.cell[bounds.row[at]], q=q, nominal=nominal, v=v, tool=found,
         before=(points, axes, x), seen=seen, rho=np.linalg.norm(target - points, axis=1),
         theta=share * margin.angle, placement=placement,
     )  # fmt: skip
@@ -124,11 +125,11 @@ def use(name, truth, bound):
 
 def attack(arm, robot, cells, task, walk, rng, count):
     """Displace, solve and judge; the margin."""
-    margin, balls, pairings = margin_and_balls(robot, cells, task, walk)
+    margin, along = margin_and_balls(robot, cells, task, walk)
     if margin.position == 0.0 and margin.angle == 0.0:
         return margin
     np.testing.assert_allclose(margin.along.min(), margin.position, rtol=1e-6)
-    here = displaced(arm, cells, walk, margin, balls, rng, count)
+    here = displaced(arm, cells, walk, margin, along, rng, count)
     ball = here.ball
     root = np.sqrt(np.maximum(ball.slope**2 - 2 * ball.second * here.rho, 0))
     y = 2 * here.rho / (ball.slope + root)
@@ -161,11 +162,17 @@ def attack(arm, robot, cells, task, walk, rng, count):
     scene = plain.scene_of(robot, cells, task)
     if scene is not None and scene.pairs:
         stays_clear(scene, here, rng)
-    if pairings:
+    if along.pairings:
         beside = {"surface", *(one.name for one in task.collision.scene)}
-        bodies = Nearer(robot, pairings, beside, np.array(margin.pivot))
-        most = bodies.by(balls.moved(margin.position, margin.angle), margin.position, margin.angle)
-        for one, each in zip(pairings, most, strict=True):
+        bodies, part = (
+            Nearer(robot, along.pairings, beside, np.array(margin.pivot)),
+            margin.position,
+        )
+        moved = along.balls.moved(part, margin.angle)
+        row = np.minimum(along.row, max(len(walk.q) - 2, 0))
+        most = [moved[row == k].max(axis=0) for k in range(row[-1] + 1)]
+        most = bodies.by(np.array(most), part, margin.angle)
+        for one, each in zip(along.pairings, most, strict=True):
             assert (one.low - one.needed >= each - 1e-9).all()
     return margin
 

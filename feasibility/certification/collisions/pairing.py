@@ -77,8 +77,7 @@ class Pairing:
         self.inside = False
         """Is one wholly within the other there?"""
         self._aim, self._hulls_part, self.met = self.needed, True, 0.0
-        self._weights = np.ones(len(low))
-        """(m - 1,) times `_aim`, m, is aimed at along each segment."""
+        self._failures = FAILURES if self.a.half_space else 0
 
     @property
     def bound(self) -> float:
@@ -146,40 +145,22 @@ class Pairing:
             return
         ends = self._runs(open_)
         while len(ends) and self.refused is None:
+            if self.calls + len(ends) > most[0] + most[1] * len(self._rows):
+                return self._refuse(float(ends[0].mean()), math.nan)
             ends = self._cut(ends)
             if self.calls > EASY[0] + EASY[1] * len(self._rows):
                 self._aim = min(self._aim, max(self.needed, LITTLE * nearest))
-            if self.calls > most[0] + most[1] * len(self._rows) and len(ends):
-                self._refuse(float(ends[0].mean()), math.nan)
-        self.low[open_] = np.maximum(self.low[open_], self._aim)
+        if self.refused is None:
+            self.low[open_] = np.maximum(self.low[open_], self._aim)
 
-    def part_at(self, row: int, wanted: Array) -> None:
-        """Raise `low` to what is wanted (m - 1,) m, as far as a plane does that parts at a row."""
-        rotations, points = self.motion.poses(self.a.joint, self.b.joint)
-        (apart,), n = self._gaps(rotations[[row]], points[[row]])
-        if apart > 0.0:
-            self._raised(wanted, n)
+    def look_closer(self, wanted: Array, calls: float) -> None:
+        """Raise `low` of an accepted motion to what is wanted (m - 1,) m, or to less.
 
-    def look_closer(self, row: int, more: Array, calls: float) -> None:
-        """Raise `low` of an accepted motion to `more` (m - 1,) m over what is needed.
-
-        By so many calls at most. Where less is met, and after half of them, to less of that.
+        By so many calls at most, with which all is certified or nothing.
         """
-        needed, most = self.needed, self.calls + calls
-        times = np.array([row, self.met])
-        over = (self.measured(times) - needed) / more[times.astype(np.intp).clip(0, len(more) - 1)]
-        self._aim, self._weights = min(1.0, ENOUGH * float(over.min())), more
-        self.low, self._off, self.needed = self.low - needed, self._off + needed, -math.inf
-        open_ = np.flatnonzero(~(self.low >= self._aim * more))
-        ends = self._runs(open_)
-        while len(ends) and self._aim > 0.0 and self.calls + len(ends) <= most:
-            ends = self._cut(ends)
-            if self.calls > most - 0.5 * calls:
-                self._aim *= LITTLE
-        if len(ends) == 0:
-            self.low[open_] = np.maximum(self.low[open_], self._aim * more[open_])
-        self.low, self._off, self.needed = self.low + needed, self._off - needed, needed
-        self._weights = np.ones(len(more))
+        most = float(wanted[self.low < wanted].max(initial=self.needed))
+        self.certify(most / ENOUGH, (self.calls + int(calls), 0))
+        self.refused, self.distance = None, math.inf
 
     def _runs(self, segments: Ints) -> Array:
         """(k, 2) rows from where to where segments in order follow each other; each for planes."""
@@ -199,16 +180,21 @@ class Pairing:
         ahead = rotations @ self.b.centre + points - self.a.centre
         turns = len(self.a.corners) * len(self.low) < COSTLY
         tried = self._raised(wanted, ahead[:-1] + ahead[1:] if turns else ahead[:1])
-        failures = FAILURES if self.a.half_space else 0
-        while failures < FAILURES and not tried.all():
+        while self._failures < FAILURES and not tried.all():
             worst = int(np.argmin(np.where(tried, np.inf, self.low)))
-            (apart,), n = self._gaps(rotations[[worst]], points[[worst]])
-            if apart > 0.0:
-                tried |= self._raised(wanted, n)
-                if turns:
-                    tried |= self._raised(wanted, rotations[:-1] @ (rotations[worst].T @ n[0]))
-            failures = 0 if tried[worst] else failures + 1
+            tried |= self.part_at(worst, wanted, turns)
+            self._failures = 0 if tried[worst] else self._failures + 1
             tried[worst] = True
+
+    def part_at(self, row: int, wanted: float | Array, turns: bool = False) -> Mask:
+        """(m - 1,) which segments have what is wanted (m), with a plane that parts at a row."""
+        rotations, points = self.motion.poses(self.a.joint, self.b.joint)
+        (apart,), n = self._gaps(rotations[[row]], points[[row]])
+        if apart > 0.0:
+            self._raised(wanted, n)
+            if turns:
+                self._raised(wanted, rotations[:-1] @ (rotations[row].T @ n[0]))
+        return np.asarray(self.low >= wanted)
 
     def _raised(self, wanted: float | Array, n: Array) -> Mask:
         """(m - 1,) which segments have what is wanted (m), with planes across n (m - 1 or 1, 3)."""
@@ -222,7 +208,6 @@ class Pairing:
         """What is left to certify of stretches from row to row (k, 2), in parts; may refuse."""
         way = np.interp(ends, self._rows, self.way)
         half, off = 0.5 * (way[:, 1] - way[:, 0]), self._most(self._off, ends)
-        weights = self._most(self._weights, ends)
         within = np.floor(ends[:, 0]) + 1.0 >= ends[:, 1]
 
         def at(share: Array, some: Any) -> Array:
@@ -236,24 +221,21 @@ class Pairing:
         poses = self.motion.poses(self.a.joint, self.b.joint, middle)
         parts = np.full(len(ends), 2)
         if not self.convex:
-            parts = self._parts_by_coal(self.b.placed(*poses), middle, half, off, weights)
+            parts = self._parts_by_coal(self.b.placed(*poses), middle, half, off)
         some = (parts > 0) & within & self._hulls_part
         if some.any() and self.refused is None:
             apart, n = self._gaps(*(one[some] for one in poses))
             apart -= off[some] + ROUNDING
             if not (self.convex and self._near(apart, middle[some])):
-                aims = self._aim * weights[some]
-                self._hulls_part = self.convex or bool((apart >= aims).any())
-                clear = self.parted(ends[some], n) >= aims
-                clear |= apart - half[some] >= aims
+                self._hulls_part = self.convex or bool((apart >= self._aim).any())
+                clear = self.parted(ends[some], n) >= self._aim
+                clear |= apart - half[some] >= self._aim
                 parts[some] = np.where(clear, 0, parts[some])
         cut = np.repeat(np.arange(len(ends)), parts)
         number = np.arange(len(cut)) - np.repeat(np.cumsum(parts) - parts, parts)
         return np.column_stack([at((number + k) / parts[cut], cut) for k in (0, 1)])
 
-    def _parts_by_coal(
-        self, places: list[Any], middle: Array, half: Array, off: Array, weights: Array
-    ) -> Ints:
+    def _parts_by_coal(self, places: list[Any], middle: Array, half: Array, off: Array) -> Ints:
         """(k,) in how many parts to look at stretches again, by places in their middles.
 
         None of those that coal calls far enough apart; of others at least as many as will be
@@ -264,12 +246,12 @@ class Pairing:
         meets = self.a.meets(self.b)
         for k, place in enumerate(places):
             self.calls += 1
-            found = meets(place, float(self._aim * weights[k] + half[k] + bodies[k]))
+            found = meets(place, float(self._aim + half[k] + bodies[k]))
             if found is not None:
                 spare = found - float(bodies[k])
                 if self._near(np.array([spare - 2.0 * COAL]), middle[[k]]):
                     break
-                room = max(spare - self._aim * weights[k], half[k] / MOST_PARTS)
+                room = max(spare - self._aim, half[k] / MOST_PARTS)
                 parts[k] = max(2, math.ceil(half[k] / room)) if room > 0.0 else 2
         return parts
 
@@ -278,12 +260,11 @@ class Pairing:
 
         They are less all that is taken off.
         """
-        weights = self._weights[np.minimum(times.astype(np.intp), len(self._weights) - 1)]
-        worst = int(np.argmin(spare / weights))
+        worst = int(np.argmin(spare))
         if not spare[worst] >= self.needed:
             self._refuse(*self.least_measured(DEEPEST, float(times[worst])))
             return True
-        limit = max(self.needed, ENOUGH * float(spare[worst] / weights[worst]))
+        limit = max(self.needed, ENOUGH * float(spare[worst]))
         if limit < self._aim:
             self._aim, self.met = limit, float(times[worst])
         return False

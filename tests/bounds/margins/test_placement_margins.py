@@ -65,13 +65,10 @@ def bent(levers, steps, slides, moves, change):
     return found
 
 
-def ball_along(robot, q, least=None, cone=9.0):
+def ball_along(robot, q, least=None, cone=1e-6):
     """The bounds of a stretch between two configurations (2, n)."""
     task = Task(0.0, 30.0, min_manipulability=least)
-    case = lemma.Given(robot, task, np.ones(3))
-    ends, one = lemma.ends_of(case, q), np.array([0])
-    share, room = np.array([[0.0, 1.0]]), np.full((1, 2), cone)
-    return lemma.balls_of(case, one, share, ends.of(np.array([[0], [1]])), room)
+    return lemma.balls_along(robot, task, np.ones(3), q, np.full((1, 2), cone))
 
 
 def test_the_furthest_place_of_a_stretch_counts():
@@ -84,28 +81,28 @@ def test_the_furthest_place_of_a_stretch_counts():
     there = middle + np.linspace(-1.0, 1.0, 21)[:, None] * way
     away = np.linalg.norm(arm.tool(there)[0] - np.ones(3), axis=1)
     holds(ball_along(robot, there[[0, -1]]).far, away, 0.5)
-    narrow, wide = (ball_along(robot, np.stack(2 * [middle]), cone=c).turns for c in (1.6, 9.0))
+    narrow, wide = (ball_along(robot, np.stack(2 * [middle]), cone=c).turns for c in (1e-6, 1.6))
     times = np.array([0.8 / np.sin(0.8), 1.0])  # chords of angles up to 1.6; the roll has none
-    np.testing.assert_allclose(narrow, wide * times[:, None])
+    np.testing.assert_allclose(wide, narrow * times[:, None])
 
 
 def test_what_a_ball_allows_is_solved_for():
     """Limits, cone and roll with the part turned; what is reached, and how far joints move."""
     rng, k = np.random.default_rng(2), 50
-    turns, caps = rng.uniform(0.1, 3.0, (k, 2, 2)), rng.uniform(0.01, 0.3, (k, 2))
+    turns, caps = rng.uniform(0.1, 3.0, (k, 2, 2)), rng.uniform(0.01, 0.3, (k, 7))
     room, slope, second = rng.uniform(0.05, 1.0, (k, 2)), *rng.uniform(0.5, 0.9, (2, k))
     moves, far = rng.uniform(0.0, 2.0, (k, 6)), rng.uniform(0.1, 1.0, k)
-    ball = lemma.Balls(np.arange(k), room, slope, second, turns, moves, caps, room, far)
+    ball = lemma.Balls(slope, second, turns, moves, caps, room, far)
 
     def f(y):
         return slope * y - 0.5 * second * y**2
 
     for turn in (np.zeros(k), 1.0 / far):  # rad for each metre that is reached
-        limit, other, *angles = ball.allowed(turn).T
-        np.testing.assert_array_equal([limit, other], caps.T)
+        angles = ball.allowed(turn).T[7:]
+        np.testing.assert_array_equal(ball.allowed(turn)[:, :7], caps)
         for y, (first, bend), left in zip(angles, turns.transpose(1, 2, 0), room.T, strict=True):
             np.testing.assert_allclose(first * y + 0.5 * bend * y**2 + turn * f(y), left)
-        y = np.minimum.reduce([limit, other, *angles])
+        y = np.minimum.reduce([*caps.T, *angles])
         np.testing.assert_allclose(ball.reached(turn), f(y))
     np.testing.assert_allclose(ball.triangle, np.stack([ball.reached(0.0), f(y) / far], axis=1))
     small = 0.5 * min(ball.triangle[:, 0].min(), 0.01)
@@ -115,8 +112,6 @@ def test_what_a_ball_allows_is_solved_for():
     np.testing.assert_allclose([f(each) for each in y.T], np.tile(small * far, (6, 1)))
     one, other, both = (ball.moved(*each) for each in ((small, 0), (0, small), (small, small)))
     assert (both >= np.maximum(one, other)).all()
-    parts = replace(ball, row=np.arange(k) // 2).moved(small, small)
-    np.testing.assert_array_equal(parts, np.maximum(both[::2], both[1::2]))
 
 
 @sampled("seed", seeds(1, all=40))
@@ -164,9 +159,9 @@ def test_bounds_along_stretches(name, seed):
             linear = (along @ moved[..., None])[..., 0]
             note(name, 0.5 * bound * size**2, norm(there - here - linear))
         note("far", ball.far, norm(arm.tool(rows)[0] - np.ones(3)))
-        if ball.caps[0, 1] > 0.0:
+        if ball.caps[0, -1] > 0.0:
             after = singular(
-                robot, arm, rows + (mean @ (ball.caps[0, 1] / size * v[..., None]))[..., 0]
+                robot, arm, rows + (mean @ (ball.caps[0, -1] / size * v[..., None]))[..., 0]
             )
             note("sigma", 0.1 * least, least - after)
     for what, (bound, truth) in found.items():
@@ -242,14 +237,14 @@ def test_there_is_none_without_a_way_to_follow():
 def test_what_is_asked_for_is_found_or_said_to_be_missing(name):
     robot, cells, task = question(name)[2:5]
     task = replace(task, cone_deg=5.0)
-    asked_for = PlacementError(0.006, 0.2)
+    asked_for = PlacementError(0.007, 0.2)
     nominal = check(robot, cells, task).certificate.placement_margin
     verdict = check(robot, cells, replace(task, placement_error=asked_for))
     assert verdict.feasible
     margin = verdict.certificate.placement_margin
     assert nominal.share(asked_for) > 1.0 >= margin.share(asked_for)
     assert margin.share(asked_for) == pytest.approx(
-        0.006 / margin.position + np.radians(0.2) / margin.angle
+        0.007 / margin.position + np.radians(0.2) / margin.angle
     )
     assert verify(verdict).holds
     too_much = replace(task, placement_error=(0.4, 0.0))
@@ -400,13 +395,13 @@ def test_a_share_of_what_bodies_may_move_leaves_them_clear(seed):
     scene = plain.scene_of(robot, cells, task)
     more = {one.names: rng.uniform(0.0, 0.05) * rng.random(len(walk.q) - 1) for one in pairings}
     nearer = np.stack([more[one.names] for one in pairings])
-    found = displaced_bodies.clear_share(pairings, nearer, rng.choice([0, 10, 100, 1000]))
-    assert ((found.along >= 0.0) & (found.along <= 1.0)).all()
+    along, _ = displaced_bodies.clear_share(pairings, nearer, rng.choice([0, 10, 100, 1000]))
+    assert ((along >= 0.0) & (along <= 1.0)).all()
     needed = np.array([pair[2] for pair in scene.pairs])
     for _ in range(60 if samples.EVERYTHING else 20):
         row, time = rng.integers(len(walk.q) - 1), rng.random()
         at = walk.q[row] + time * (walk.q[row + 1] - walk.q[row])
-        over = found.along[row] * np.array([more[pair[:2]][row] for pair in scene.pairs])
+        over = along[row] * np.array([more[pair[:2]][row] for pair in scene.pairs])
         assert (scene.distances(at) >= needed + over - 1e-6).all()
 
 
