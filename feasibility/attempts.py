@@ -15,7 +15,6 @@ from feasibility.clock import Clock, OutOfTime
 from feasibility.problem import Problem
 from feasibility.search_result import SearchResult
 from feasibility.search_settings import Search
-from feasibility.task import PlacementError
 from feasibility.verdict import Bound, PlacementMargin, Replay
 
 if TYPE_CHECKING:
@@ -35,9 +34,6 @@ START_IN_PIECES = (
     "cut into convex pieces.)"
 )
 NOT_IN_PIECES = " (With the links cut into convex pieces no more was found: {} of {} cells.)"
-
-HELD_BACK = ((0.2, 0.0), (0.2, 1.5), (0.4, 1.5), (0.6, 3.0))
-"""Shares of the cone, and multiples of the error of the placement, that are held back in turn."""
 
 Method = Callable[[Problem, Search, Clock], SearchResult]
 
@@ -61,9 +57,11 @@ class Attempt(NamedTuple):
         """That of the placement, where it is known."""
         return None if self.replayed is None else self.replayed.certificate.placement_margin
 
-    def left(self, error: PlacementError) -> float:
-        """The share of its margin that an error of the placement uses; inf where there is none."""
-        return np.inf if self.margin is None else self.margin.share(error)
+    @property
+    def used(self) -> float:
+        """The share of its margin that the task's error of the placement uses; inf without one."""
+        error, margin = self.problem.task.placement_error, self.margin
+        return np.inf if error is None or margin is None else margin.share(*error)
 
     @property
     def lacks_room(self) -> bool:
@@ -117,11 +115,10 @@ def _with_these_shapes(
 
 def _with_room(first: Attempt, search: Search, clock: Clock, method: Method) -> list[Attempt]:
     """Attempts at a motion that leaves room for the task's error of the placement, best first."""
-    problem, tried = first.problem, [first]
-    error = PlacementError(*(problem.task.placement_error or (0.0, 0.0)))
-    for cone, times in () if problem.robot.start is not None else HELD_BACK:
-        found = _attempt(problem.held_back(cone, error, times), search, clock, method, problem)
-        if found.accepted or found.left(error) < tried[0].left(error):
+    tried = [first]
+    for held in first.problem.with_room:
+        found = _attempt(held, search, clock, method, first.problem)
+        if found.accepted or found.used < tried[0].used:
             tried.insert(0, found)
         if found.accepted or clock.out_of_time:
             break

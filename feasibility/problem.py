@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from feasibility.collisions.asked_bodies import gather
-from feasibility.task import PlacementError, Task, check_footprint, check_smooth
+from feasibility.task import Task, check_footprint, check_smooth
 from robots.robot import Robot
 from surfaces.cells import Cells
 from surfaces.surface import Surface
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
 
 HELD = 0.3  # [m] lever by which a shift of the tool turns a joint, about
 NARROWER = 0.9  # [1] of tolerance, cone and roll, when the replay refuses what just kept to them
+HELD_BACK = ((0.2, 0.0), (0.2, 1.5), (0.4, 1.5), (0.6, 3.0))
+"""Shares of cone and roll that are held back in turn, and for how many times the error of the
+placement limits and clearances are."""
 
 Given = tuple[object, str, type, str]
 """The value of an argument, its name, its type, and an example in words."""
@@ -86,39 +90,28 @@ class Problem:
     def narrowed(self) -> Problem:
         """The same problem, searched with less of tolerance, cone and range of the roll."""
         tolerance = NARROWER * self.task.effective_tolerance
-        cone_deg, roll_deg = NARROWER * self.task.cone_deg, self.task.roll_deg
-        if self.task.roll is not None and roll_deg is not None:
-            less = 0.5 * (1.0 - NARROWER) * (roll_deg[1] - roll_deg[0])
-            roll_deg = roll_deg[0] + less, roll_deg[1] - less
-        searched = replace(self.task, tolerance=tolerance, cone_deg=cone_deg, roll_deg=roll_deg)
-        return replace(self, searched=searched)
+        return replace(self, searched=replace(_narrower(self.task, NARROWER), tolerance=tolerance))
 
-    def held_back(self, cone: float, error: PlacementError, times: float) -> Problem:
-        """The same problem, searched with room for an error of the placement.
+    @property
+    def with_room(self) -> Iterator[Problem]:
+        """The same problem, searched with more and more room for its error of the placement.
 
-        Nothing is proved by it: the answer counts where the motion keeps what is asked for.
-
-        Args:
-            cone: which share of cone and range of the roll the search leaves.
-            error: of the placement.
-            times: how much of it, about, limits and clearances are held back for.
+        Nothing is proved by it: the answer counts where the motion keeps what is asked for. None
+        where there is no such error; nor with a start, which the motion has, wherever it goes.
         """
-        cells, robot, task = self.cells, self.robot, self.searched
+        cells, robot, error = self.cells, self.robot, self.task.placement_error
+        if error is None or robot.start is not None:
+            return
         size = np.linalg.norm(cells.centres - cells.centres.mean(axis=0), axis=1).max(initial=0.0)
-        shift = times * (error.position + np.radians(error.angle_deg) * float(size))
-        turn = shift * np.where(robot.prismatic, 1.0, 1.0 / HELD)
-        lower, upper = robot.lower + turn, robot.upper - turn
-        limits = np.where(lower < upper, [lower, upper], [robot.lower, robot.upper]).T
-        collision, roll_deg = task.collision, task.roll_deg
-        if collision is not None:
-            collision = collision.raised(shift)
-        if task.roll is not None and roll_deg is not None:
-            less = 0.5 * cone * (roll_deg[1] - roll_deg[0])
-            roll_deg = roll_deg[0] + less, roll_deg[1] - less
-        searched = replace(
-            task, cone_deg=(1.0 - cone) * task.cone_deg, roll_deg=roll_deg, collision=collision
-        )
-        return replace(self, robot=robot.with_limits(limits), searched=searched, tried={})
+        for held, times in HELD_BACK:
+            shift = times * (error[0] + np.radians(error[1]) * float(size))
+            turn = shift * np.where(robot.prismatic, 1.0, 1.0 / HELD)
+            lower, upper = robot.lower + turn, robot.upper - turn
+            limits = np.where(lower < upper, [lower, upper], [robot.lower, robot.upper]).T
+            task = _narrower(self.searched, 1.0 - held)
+            if task.collision is not None:
+                task = replace(task, collision=task.collision.raised(shift))
+            yield replace(self, robot=robot.with_limits(limits), searched=task, tried={})
 
     @property
     def in_pieces(self) -> Problem | None:
@@ -187,3 +180,12 @@ def _refuse_other_types(*given: Given) -> None:
     ]
     if faults:
         raise TypeError("; ".join(faults))
+
+
+def _narrower(task: Task, share: float) -> Task:
+    """A task with that share of cone and range of the roll."""
+    roll_deg = task.roll_deg
+    if task.roll is not None and roll_deg is not None:
+        less = 0.5 * (1.0 - share) * (roll_deg[1] - roll_deg[0])
+        roll_deg = roll_deg[0] + less, roll_deg[1] - less
+    return replace(task, cone_deg=share * task.cone_deg, roll_deg=roll_deg)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from coverable.arrays import Array, Ints, Mask
 from coverable.errors import at_least
 from feasibility.collisions.asked_bodies import said_of
-from feasibility.task import PlacementError, Task
+from feasibility.task import Task
 from robots.robot import Robot
 from surfaces.cells import Cells
 
@@ -102,6 +102,23 @@ class Bound(StrEnum):
     """The motion has to begin there, wherever the surface stands."""
 
 
+ROOM = {
+    Bound.LIMIT: ("{}'s limit", "a wider limit of {}"),
+    Bound.CONE: ("the cone", "a wider cone"),
+    Bound.ROLL: ("the range of the roll", "a wider range of the roll"),
+    Bound.SINGULAR: (
+        "the arm is near a singularity",
+        "another place of the part, further from singularities (coverable place)",
+    ),
+    Bound.CLEARANCE: (
+        "the clearance of {}",
+        "less clearance of {}, or a place further from what is in the way",
+    ),
+    Bound.START: ("the start", "a motion that may begin elsewhere (without robot.start)"),
+}
+"""What leaves least room, and what would widen it."""
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class PlacementMargin:
     """Where the surface may stand, as displaced against the arm, so that a motion still exists.
@@ -124,24 +141,18 @@ class PlacementMargin:
     along: Array | None = None
     """(m - 1,) m, how far the surface may be shifted for each segment; None with a start."""
 
-    def share(self, error: PlacementError) -> float:
-        """The share of the margin that an error of the placement uses: up to 1 it is certified."""
-        parts = (error.position, self.position), (math.radians(error.angle_deg), self.angle)
+    def share(self, position: float, angle_deg: float) -> float:
+        """The share of it that an error of so many m and degrees uses: up to 1 it is certified."""
+        parts = (position, self.position), (math.radians(angle_deg), self.angle)
         return sum(0.0 if not a else a / b if b else math.inf for a, b in parts)
 
     def __str__(self) -> str:
         """What is certified, and what leaves least room."""
         if self.bound_by is Bound.START:
             return "no margin: the motion begins at the start, wherever the part stands"
-        least = {
-            Bound.LIMIT: f"{self.what}'s limit",
-            Bound.CONE: "the cone",
-            Bound.ROLL: "the range of the roll",
-            Bound.SINGULAR: "the arm is near a singularity",
-            Bound.CLEARANCE: f"the clearance of {self.what}",
-        }[self.bound_by]
         shift, turn = at_least(1e3 * self.position, 3), at_least(math.degrees(self.angle), 3)
         held = f"within {shift} mm, or turned by up to {turn} deg about its middle"
+        least = ROOM[self.bound_by][0].format(self.what)
         return f"{held}; least room: {least} at cell {list(self.cell)}"
 
 

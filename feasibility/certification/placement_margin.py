@@ -55,7 +55,7 @@ from coverable.arrays import Array, Ints
 from feasibility.certification.bisection import Rows
 from feasibility.certification.jacobians import jacobians, lengths, smallest_singular
 from feasibility.certification.lever_bounds import column_changes, second_derivative_bound
-from feasibility.task import PlacementError, Task
+from feasibility.task import Task
 from feasibility.verdict import Bound, Certificate, PlacementMargin
 from robots.kinematics import Kinematics
 from robots.robot import Robot
@@ -229,10 +229,8 @@ def placement_margin(
 
 def margin_fault(task: Task, certificate: Certificate) -> str:
     """Why the margin is less than what the task asks for; empty where it is not, or not known."""
-    if task.placement_error is None or certificate.placement_margin is None:
+    error, margin = task.placement_error, certificate.placement_margin
+    if error is None or margin is None or margin.share(*error) <= 1.0:
         return ""
-    error, margin = PlacementError(*task.placement_error), certificate.placement_margin
-    if margin.share(error) <= 1.0:
-        return ""
-    asked = f"{1e3 * error.position:g} mm and {error.angle_deg:g} deg off its place"
+    asked = f"{1e3 * error[0]:g} mm and {error[1]:g} deg off its place"
     return f"the part may stand {asked}; certified is {margin}"

@@ -8,7 +8,6 @@ import numpy as np
 
 from coverable.arrays import Ints
 from coverable.errors import ArgumentError, counted
-from feasibility.attempts import HELD_BACK
 from feasibility.clock import Clock, OutOfTime
 from feasibility.collisions.problem_bodies import Pair
 from feasibility.demands.every_demand import OF_EACH, further, unjudged
@@ -30,7 +29,7 @@ from feasibility.roadmap.search import exploration_of
 from feasibility.roadmap.warmup import warm_up
 from feasibility.search_settings import Progress, Search
 from feasibility.targets.blocked import blocked_curves
-from feasibility.task import PlacementError, Task
+from feasibility.task import Task
 from feasibility.verdict import Cause
 from robots.robot import Robot
 from surfaces.cells import Cells
@@ -177,12 +176,10 @@ def _with_room(exploration: Exploration, task: Task, clock: Clock, plan: Plan) -
         OutOfTime: the deadline passed.
     """
     robot, cells = exploration.robot, exploration.cells
-    if plan.accepted or task.placement_error is None or robot.start is not None:
+    if plan.accepted or task.placement_error is None:
         return plan
-    error, problem = PlacementError(*task.placement_error), Problem.of(robot, cells, task)
     covered = plan.patch_of(len(cells)) >= 0
-    for cone, times in HELD_BACK:
-        held = problem.held_back(cone, error, times)
+    for held in Problem.of(robot, cells, task).with_room:
         found = exploration_of(held.robot, cells, held.searched, exploration.seed, clock)
         _explore(found, held.searched)
         if task.requires_rates:

@@ -14,7 +14,7 @@ from feasibility.reports.changes import LIMITS, shown, worded
 from feasibility.reports.text_and_tables import placement_text
 from feasibility.sensitivity.quantities import Kind, Quantity
 from feasibility.sensitivity.thresholds import Change, Explanation, Finding, Threshold
-from feasibility.verdict import Bound, Certificate, Evidence, Verdict
+from feasibility.verdict import ROOM, Certificate, Evidence, Verdict
 from robots.kinematics import Kinematics
 
 SEEDED = "[1]"  # behind thresholds that a search without known motions did not find
@@ -267,21 +267,11 @@ def _against(quantity: Quantity, other: Finding) -> str:
 
 # -- the placement margin ---------------------------------------------------------------------
 
-WIDER = {
-    Bound.LIMIT: "a wider limit of {what}",
-    Bound.CONE: "a wider cone",
-    Bound.ROLL: "a wider range of the roll",
-    Bound.SINGULAR: "another place of the part, further from singularities (coverable place)",
-    Bound.CLEARANCE: "less clearance of {what}, or a place further from what is in the way",
-    Bound.START: "a motion that may begin elsewhere (without robot.start)",
-}
-"""What would widen a placement margin."""
-
 
 def widening(certificate: Certificate | None) -> str:
     """The placement margin, and what would widen it; empty where it is not known."""
     margin = None if certificate is None else certificate.placement_margin
     if margin is None:
         return ""
-    wider = WIDER[margin.bound_by].format(what=margin.what)
+    wider = ROOM[margin.bound_by][1].format(margin.what)
     return f"{placement_text(certificate)}; {wider} would widen it"

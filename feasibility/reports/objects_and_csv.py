@@ -12,7 +12,7 @@ from coverable.arrays import Array
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from feasibility.reports.text_and_tables import limit_margin_deg
 from feasibility.results.plain import plain
-from feasibility.verdict import Cause, Certificate, PlacementMargin, Walk
+from feasibility.verdict import Cause, Certificate, Walk
 from robots.robot import Robot
 from surfaces.cells import Cells
 from surfaces.surface import Surface
@@ -56,7 +56,7 @@ def left_out_json(one: LeftOut) -> dict[str, Any]:
 
 def certificate_json(certificate: Certificate) -> dict[str, Any]:
     """What the replay of a motion measured; null where it measured nothing."""
-    found = {
+    found: dict[str, Any] = {
         "waypoints": int(certificate.waypoints),
         "max_position_error_m": plain(float(certificate.max_position_error)),
         "max_angle_deg": plain(math.degrees(certificate.max_angle)),
@@ -68,20 +68,15 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
         found["stops_in_place"], found["corners"] = certificate.stops_in_place, certificate.corners
     if certificate.min_singular_value is not None:
         found["min_singular_value"] = plain(float(certificate.min_singular_value))
-    return found | {"placement_margin": placement_json(certificate.placement_margin)}
-
-
-def placement_json(margin: PlacementMargin | None) -> dict[str, Any] | None:
-    """Where the surface may stand; null where that is not known."""
-    if margin is None:
-        return None
-    return {
-        "position_m": float(margin.position),
+    margin = certificate.placement_margin
+    found["placement_margin"] = margin and {
+        "position_m": margin.position,
         "angle_deg": math.degrees(margin.angle),
         "pivot": list(margin.pivot),
         "bound_by": margin.bound_by,
         "cell": list(margin.cell),
     }
+    return found
 
 
 def measured_json(

@@ -208,7 +208,8 @@ def test_a_closer_look_certifies_no_more_than_there_is(calls):
         if one.refused is not None:
             continue
         before, more = one.low.min(), truth * rng.uniform(0.3, 1.5, len(truth))
-        one.look_closer(more, calls)
-        assert (one.low <= truth + 1e-6).all()
+        for one.needed in (0.0, 2.0 * truth.max()):  # the latter is refused
+            one.look_closer(more + one.needed, calls)
+            assert (one.low <= truth + 1e-6).all()
         raised += one.low.min() > before
     assert raised or calls == 4

@@ -52,14 +52,12 @@ def margin_and_balls(robot, cells, task, walk):
     found = replay(robot, cells, task, walk, np.ones(len(cells), dtype=bool))
     assert found.accepted, found.refusal
     kept, margin = found.certificate.margin, found.certificate.placement_margin
-    pivot = cells.centres.mean(axis=0)
+    pivot, (*_, q, room) = cells.centres.mean(axis=0), getattr(kept, "func", kept).__wrapped__.args
     np.testing.assert_allclose(margin.pivot, pivot, atol=1e-12)
-    *_, q, room = getattr(kept, "func", kept).__wrapped__.args
     rows, row = lemma.cut(np.vstack([q, q[-1:]]), task)
     balls = lemma.balls_along(robot, task, pivot, rows, room[row])
-    return margin, SimpleNamespace(
-        balls=balls, rows=rows, row=row, pairings=getattr(kept, "args", ((),))[0]
-    )
+    pairings = getattr(kept, "args", ((),))[0]
+    return margin, SimpleNamespace(balls=balls, rows=rows, row=row, pairings=pairings)
 
 
 def displaced(arm, cells, walk, margin, bounds, rng, count):
@@ -168,10 +166,9 @@ def attack(arm, robot, cells, task, walk, rng, count):
             Nearer(robot, along.pairings, beside, np.array(margin.pivot)),
             margin.position,
         )
-        moved = along.balls.moved(part, margin.angle)
-        row = np.minimum(along.row, max(len(walk.q) - 2, 0))
-        most = [moved[row == k].max(axis=0) for k in range(row[-1] + 1)]
-        most = bodies.by(np.array(most), part, margin.angle)
+        row, moved = along.row.clip(max=len(walk.q) - 2), along.balls.moved(part, margin.angle)
+        moved = np.array([moved[row == k].max(axis=0) for k in range(row[-1] + 1)])
+        most = bodies.by(moved, part, margin.angle)
         for one, each in zip(along.pairings, most, strict=True):
             assert (one.low - one.needed >= each - 1e-9).all()
     return margin

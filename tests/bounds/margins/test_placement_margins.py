@@ -28,7 +28,6 @@ from feasibility.certification import placement_margin as lemma
 from feasibility.certification.collisions.collision_replay import collision_replay, couples_of
 from feasibility.certification.collisions.motion import ArmMotion
 from feasibility.collisions.asked_bodies import gather
-from feasibility.task import PlacementError
 from feasibility.verdict import Bound, Walk
 from robots.kinematics import Kinematics
 from robots.shapes.bodies import Solid
@@ -237,13 +236,13 @@ def test_there_is_none_without_a_way_to_follow():
 def test_what_is_asked_for_is_found_or_said_to_be_missing(name):
     robot, cells, task = question(name)[2:5]
     task = replace(task, cone_deg=5.0)
-    asked_for = PlacementError(0.007, 0.2)
+    asked_for = 0.007, 0.2
     nominal = check(robot, cells, task).certificate.placement_margin
     verdict = check(robot, cells, replace(task, placement_error=asked_for))
     assert verdict.feasible
     margin = verdict.certificate.placement_margin
-    assert nominal.share(asked_for) > 1.0 >= margin.share(asked_for)
-    assert margin.share(asked_for) == pytest.approx(
+    assert nominal.share(*asked_for) > 1.0 >= margin.share(*asked_for)
+    assert margin.share(*asked_for) == pytest.approx(
         0.007 / margin.position + np.radians(0.2) / margin.angle
     )
     assert verify(verdict).holds
@@ -265,6 +264,9 @@ def test_the_last_row_counts_for_the_last_segment():
     q[3, 2] = 0.996  # [m], of 1
     margin = lemma.placement_margin(slides(), PLATE, Task(0.0, 30.0), q, room)
     assert margin.position == pytest.approx(0.004, rel=1e-6)
+    q[1, 2] = -0.998  # as does any other one
+    margin = lemma.placement_margin(slides(), PLATE, Task(0.0, 30.0), q, room)
+    assert margin.position == pytest.approx(0.002, rel=1e-6)
     task = Task(0.0, 30.0, collision=Collision())  # and bodies were not judged
     assert lemma.placement_margin(slides(), PLATE, task, q, room) is None
 
@@ -370,7 +372,7 @@ def case_of(seed):
     raise AssertionError("no feasible case was found")
 
 
-@sampled("seed", seeds(6, all=300))
+@sampled("seed", [25, *seeds(5, all=300)])
 def test_a_part_that_stands_as_far_off_as_is_claimed_is_reached(seed):
     """And `check` never calls it infeasible there, with the motion to begin from."""
     made, rng = case_of(seed), np.random.default_rng([seed, 1])
