@@ -261,12 +261,10 @@ def test_the_last_row_counts_for_the_last_segment():
     room[3, 0] = 0.01
     margin = lemma.placement_margin(slides(), PLATE, Task(0.0, 30.0), q, room)
     assert margin.angle == pytest.approx(0.01, rel=1e-6)
-    q[3, 2] = 0.996  # [m], of 1
-    margin = lemma.placement_margin(slides(), PLATE, Task(0.0, 30.0), q, room)
-    assert margin.position == pytest.approx(0.004, rel=1e-6)
-    q[1, 2] = -0.998  # as does any other one
-    margin = lemma.placement_margin(slides(), PLATE, Task(0.0, 30.0), q, room)
-    assert margin.position == pytest.approx(0.002, rel=1e-6)
+    for row, height in ((3, 0.996), (1, -0.998)):  # [m], of 1; any other one does, too
+        q[row, 2] = height
+        margin = lemma.placement_margin(slides(), PLATE, Task(0.0, 30.0), q, room)
+        assert margin.position == pytest.approx(1.0 - abs(height), rel=1e-6)
     task = Task(0.0, 30.0, collision=Collision())  # and bodies were not judged
     assert lemma.placement_margin(slides(), PLATE, task, q, room) is None
 
