@@ -229,7 +229,8 @@ def placement_margin(
 
 def margin_fault(task: Task, certificate: Certificate) -> str:
     """Why the margin is less than what the task asks for; empty where it is not, or not known."""
-    error, margin = task.placement_error, certificate.placement_margin
+    error = task.placement_error
+    margin = None if error is None else certificate.placement_margin  # found when it is asked for
     if error is None or margin is None or margin.share(*error) <= 1.0:
         return ""
     asked = f"{1e3 * error[0]:g} mm and {error[1]:g} deg off its place"
