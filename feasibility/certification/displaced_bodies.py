@@ -20,6 +20,7 @@ only of pairs that do not allow all of it planes are tried, and coal is asked ag
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import reduce
 
 import numpy as np
 
@@ -160,7 +161,7 @@ class Nearer:
         """
         moved = moved.T[:, None]
         off, (a, b) = self._seen(self.levers * moved), self.couples  # as seen from every joint
-        found = (off[:, a] + off[:, b]).min(axis=0)
+        found = reduce(np.minimum, (one[a] + one[b] for one in off))  # faster than all at once
         # The part, and what is beside it.
         found += self.goes * np.maximum(shift, turn * np.minimum(self.size, self.far + off[0, b]))
         # The part, as seen from the tool point.
