@@ -53,9 +53,9 @@ def blocked_curves(cells: Cells, task: Task) -> str:
         return (
             f"The surface is creased, or rougher than the task allows, "
             f"{some.format(int(rough.sum()))}, so no motion can be certified there (round an edge "
-            f"of a mesh it can, but not into a concave one, or past a corner){parted}; use smaller "
-            "cells, a finer or smoother mesh, cut it along its creases, or allow a wider cone or a "
-            "larger tolerance."
+            f"of a mesh it can, but not past a corner, nor into a concave one){parted}; use "
+            "smaller cells, a finer or smoother mesh, patches joined as a piecewise surface, which "
+            "can be followed into a concave edge, or allow a wider cone or a larger tolerance."
         )
     leans = cells.at_height(cells.surface.side_sign * task.standoff).curves.leans
     if leans.any():
