@@ -14,6 +14,7 @@ from feasibility.cli.command_parts import (
     add_html,
     json_text,
     open_case,
+    tell,
 )
 from feasibility.cli.console import print_err, print_out
 from feasibility.cli.first_interrupt import raised
@@ -174,10 +175,7 @@ def explain(args: argparse.Namespace, began: float) -> int:
 
         explanation = run(*opened.setup, progress=opened.progress, clock=opened.clock)
     name, verdict = opened.case.name, explanation.verdict
-    if args.json:
-        print_out(json_text(report.as_json(explanation, name, opened.case)))
-    else:
-        print_out(report.as_text(explanation, name, opened.case))
+    tell(args, report, explanation, name, opened.case)
     if args.witness is not None:
         _write_witnesses(args.witness, explanation)
     if args.html is not None:

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from feasibility.cli.console import Bar, print_err
+from feasibility.cli.console import Bar, print_err, print_out
 from feasibility.read_files import shown_path
 from feasibility.search_settings import Progress
 
@@ -209,3 +209,8 @@ def command_clock(
 def json_text(value: dict[str, Any]) -> str:
     """One JSON object without NaN."""
     return json.dumps(value, allow_nan=False, indent=2)
+
+
+def tell(args: argparse.Namespace, report: Any, *known: Any) -> None:
+    """Print what a module of reports makes of an answer: text, or with --json an object."""
+    print_out(json_text(report.as_json(*known)) if args.json else report.as_text(*known))

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from feasibility.cli.command_parts import add_command, json_text
+from feasibility.cli.command_parts import add_command, json_text, tell
 from feasibility.cli.console import print_out
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def keys(args: argparse.Namespace, began: float) -> int:
     from feasibility.reports import keys as report
 
     found = report.keys_under(".".join(args.table) if args.table else None)
-    print_out(json_text(report.as_json(found)) if args.json else report.as_text(found))
+    tell(args, report, found)
     return 0
 
 

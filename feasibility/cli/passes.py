@@ -4,22 +4,17 @@ from __future__ import annotations
 
 import argparse
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coverable.errors import CoverableError, Fault
-from feasibility.cli.command_parts import STATUS, json_text, numbers, positive
-from feasibility.cli.console import print_err, print_out
+from feasibility.cli.command_parts import STATUS, numbers, positive, tell
 from feasibility.cli.output_files import write_text
-from feasibility.cli.programs import period_of, write_programs
-from feasibility.read_files import shown_path
+from feasibility.cli.programs import period_of, write_runs
 
 if TYPE_CHECKING:
     from feasibility.cli.command_parts import OpenCase
     from feasibility.division.pass_planning import PlannedPasses
-    from feasibility.division.pass_runs import PassRuns
     from feasibility.task import Task
-    from feasibility.timing.sampled_trajectory import Trajectory
     from surfaces.passes.parallel import Passes
     from surfaces.surface import Surface
     from surfaces.toolpaths.pose_cells import PoseCells
@@ -173,27 +168,11 @@ def in_runs(args: argparse.Namespace, opened: OpenCase, along: PlannedPasses) ->
         for run in found.runs
     ]  # fmt: skip
     treated = along.treated(*(run.walk for run in found.runs)) if found.runs else None
-    if args.json:
-        print_out(json_text(report.as_json(along, found, timed, treated)))
-    else:
-        print_out(report.as_text(along, found, timed, treated))
-    _write(args, found, timed)
-    write_programs(args, opened, along, *timed, numbered=True)
+    tell(args, report, along, found, timed, treated)
+    write_runs(args, opened, along, *timed, numbered=True)
     if args.html is not None:
         from feasibility.viewer.pass_view import view_passes
 
         drawn = view_passes(along, found.runs, treated, case=opened.case.name)
         write_text(args.html, drawn.html(), "view")
     return STATUS[str(verdict.answer)]
-
-
-def _write(args: argparse.Namespace, found: PassRuns, timed: list[Trajectory]) -> None:
-    """A trajectory a run, numbered from 1 in the order in which they are run."""
-    from feasibility.results.trajectory_files import save_trajectory
-
-    for out in args.out:
-        for number, run in enumerate(timed, start=1):
-            file = Path(out)
-            numbered = file.with_name(f"{file.stem}_{number}{file.suffix}")
-            save_trajectory(numbered, run, found.robot)
-            print_err(f"trajectory {number} of {len(found.runs)}: {shown_path(str(numbered))}")

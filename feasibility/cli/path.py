@@ -14,11 +14,12 @@ from feasibility.cli.command_parts import (
     json_text,
     open_case,
     positive,
+    tell,
 )
 from feasibility.cli.console import print_err, print_out
 from feasibility.cli.output_files import write_text
 from feasibility.cli.passes import add_passes, check_passes, in_runs, passes_asked
-from feasibility.cli.programs import add_programs, check_programs, period_of, write_programs
+from feasibility.cli.programs import add_programs, check_programs, period_of, write_runs
 from feasibility.read_files import shown_path
 
 if TYPE_CHECKING:
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from feasibility.timing.speed_limits import MotionLimits
     from feasibility.verdict import Verdict
     from feasibility.viewer.viewer import View
-    from robots.robot import Robot
 
 ORDERS = ("rows", "columns", "spiral", "shortest", "given")
 STATUSES = "exit status: as of `coverable check`"
@@ -149,13 +149,9 @@ def path(args: argparse.Namespace, began: float) -> int:
             verdict = replace(verdict, answer=Answer.UNDECIDED, message=f"{verdict.message} {late}")
             return _no_path(args, opened.case.name, verdict, loaded)
     known = None if along is None else along.passes, treated, rates, ends
-    if args.json:
-        print_out(json_text(report.as_json(found, run, limits, *known)))
-    else:
-        print_out(report.as_text(found, run, limits, *known))
+    tell(args, report, found, run, limits, *known)
     short = report.short_words(treated, opened.setup.task.coverage)
-    _write(args, run, found.robot)
-    write_programs(args, opened, along, run)
+    write_runs(args, opened, along, run)
     if args.html is not None:
         write_text(args.html, _view(opened, along, found, treated, run, limits).html(), "view")
     if short:
@@ -215,16 +211,3 @@ def _approach(args: argparse.Namespace, task: Task) -> float | None:
     if args.approach is not None or task.home_deg is None:
         return None if args.approach is None else float(args.approach)
     return APPROACH
-
-
-def _write(args: argparse.Namespace, run: Trajectory, robot: Robot) -> None:
-    """Write the wanted trajectories, and report them on stderr.
-
-    Raises:
-        FileError: a file cannot be written.
-    """
-    for out in args.out:
-        from feasibility.results.trajectory_files import save_trajectory
-
-        save_trajectory(out, run, robot)
-        print_err(f"trajectory: {shown_path(out)}")

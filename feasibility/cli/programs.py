@@ -1,4 +1,4 @@
-"""Programs of robot controllers for `coverable path`: arguments, refusals, files."""
+"""Programs of robot controllers for `coverable path`: arguments, refusals; and what it writes."""
 
 from __future__ import annotations
 
@@ -128,33 +128,39 @@ def _settings(args: argparse.Namespace) -> ProgramSettings:
     )  # fmt: skip
 
 
-def write_programs(
+def write_runs(
     args: argparse.Namespace, opened: OpenCase, along: PlannedPasses | None, *runs: Trajectory,
     numbered: bool = False,
 ) -> None:  # fmt: skip
-    """Write the wanted programs, and report them on stderr.
+    """Write the wanted trajectories and programs, and report them on stderr.
 
     Args:
         args, opened, along: what was asked for.
-        runs: a program each.
-        numbered: put their numbers into the names, as of trajectories.
+        runs: a file each.
+        numbered: put their numbers, in the order in which they are run, into the names.
 
     Raises:
         FileError: a file cannot be written.
     """
     from feasibility.programs.working import working_places
     from feasibility.programs.writing import save_program
+    from feasibility.results.trajectory_files import save_trajectory
 
     work = None if along is None else working_places(along.places, along.passes.stretches)
     robot, cells = opened.setup.robot, opened.setup.cells
-    for file in args.program:
+    wanted = [("out", "trajectory", out) for out in args.out]
+    wanted += [("program", "program", file) for file in args.program]
+    for flag, what, name in wanted:
         if not runs:
-            print_err(f"--program: nothing written to {shown_path(file)}: there is no motion")
+            print_err(f"--{flag}: nothing written to {shown_path(name)}: there is no motion")
         for number, run in enumerate(runs, start=1):
-            path, what = Path(file), "program"
+            path, which = Path(name), what
             if numbered:
                 path = path.with_name(f"{path.stem}_{number}{path.suffix}")
-                what = f"program {number} of {len(runs)}"
-            name, settings = opened.case.name, _settings(args)
-            save_program(path, robot, run, name, settings, cells.surface, work)
-            print_err(f"{what}: {shown_path(path)}")
+                which = f"{what} {number} of {len(runs)}"
+            if flag == "out":
+                save_trajectory(path, run, robot)
+            else:
+                settings = _settings(args)
+                save_program(path, robot, run, opened.case.name, settings, cells.surface, work)
+            print_err(f"{which}: {shown_path(path)}")

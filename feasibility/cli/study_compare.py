@@ -12,9 +12,9 @@ from feasibility.cli.command_parts import (
     add_csv,
     add_html,
     add_workers,
-    json_text,
+    tell,
 )
-from feasibility.cli.console import Bar, print_err, print_out, with_rate
+from feasibility.cli.console import Bar, print_err, with_rate
 from feasibility.cli.output_files import check_outputs, write_text
 from feasibility.interrupts import at_leave
 from feasibility.read_files import shown_path
@@ -79,10 +79,7 @@ def study(args: argparse.Namespace, began: float) -> int:
 
         with Bar() as bar, open_workers(args.workers, args.dask) as workers, at_leave(say):
             rows = run_tasks(loaded.tasks, workers, store, with_rate(bar, "deciding cases"))
-    if args.json:
-        print_out(json_text(report.as_json(loaded, rows)))
-    else:
-        print_out(report.as_text(loaded, rows))
+    tell(args, report, loaded, rows)
     if args.csv is not None:
         write_text(args.csv, report.as_csv(loaded, rows), "table")
     if args.html is not None:
@@ -105,7 +102,7 @@ def compare(args: argparse.Namespace, began: float) -> int:
     with Bar() as bar, open_workers(args.workers, args.dask) as workers:
         progress = with_rate(bar, "comparing robots")
         found = run(case, robots, workers, critical=args.critical, progress=progress)
-    print_out(json_text(report.as_json(found)) if args.json else report.as_text(found))
+    tell(args, report, found)
     if args.csv is not None:
         write_text(args.csv, report.as_csv(found), "table")
     if args.html is not None:
