@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from robots.robot import Robot
 
 POSES = ("tcp", "base")
+AS_GIVEN = ("tool_frame", "approach_axis", "reference_axis", "package_dirs", *POSES)
+"""Keys that `load_robot` takes as they are."""
 UNITS = {
     "limits_deg": ("degrees", "slides", "limits_m"),
     "limits_m": ("metres", "turns", "limits_deg"),
@@ -108,16 +110,11 @@ class RobotPart:
             robot = load_robot(
                 source,
                 limits=self._limits(),
-                tool_frame=self.tool_frame,
-                approach_axis=self.approach_axis,
                 lock=self.lock or None,
-                package_dirs=self.package_dirs,
-                tcp=self.tcp,
-                base=self.base,
-                reference_axis=self.reference_axis,
                 axes=axes,
                 surface_link=surface_link,
                 xacro_args=self.xacro_args or None,
+                **{key: getattr(self, key) for key in AS_GIVEN},
             )
         except RobotError as error:
             units = self._wrong_units(error.joint_kinds)

@@ -212,5 +212,9 @@ def json_text(value: dict[str, Any]) -> str:
 
 
 def tell(args: argparse.Namespace, report: Any, *known: Any) -> None:
-    """Print what a module of reports makes of an answer: text, or with --json an object."""
+    """Print what a module of reports makes of an answer: text, or with --json an object; --csv."""
     print_out(json_text(report.as_json(*known)) if args.json else report.as_text(*known))
+    if getattr(args, "csv", None) is not None:
+        from feasibility.cli.output_files import write_text
+
+        write_text(args.csv, report.as_csv(*known), "table")

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from feasibility.demands.area import TreatedArea
     from feasibility.division.pass_planning import PlannedPasses
     from feasibility.paths.coverage import CoveragePath
-    from feasibility.task import Task
     from feasibility.timing.sampled_trajectory import Trajectory
     from feasibility.timing.speed_limits import MotionLimits
     from feasibility.verdict import Verdict
@@ -135,7 +134,8 @@ def path(args: argparse.Namespace, began: float) -> int:
                 opened.progress(0, None, "planning the path")
                 found = coverage_path(verdict, args.order)
                 treated = _treated(opened, along, found)
-                approach, rates = _approach(args, found.task), path_rates(found)
+                approach = args.approach or (None if found.task.home_deg is None else APPROACH)
+                rates = path_rates(found)
                 ends = None if approach is None else ends_of(found, approach)
                 entry, leave = (None, None) if ends is None else (ends.entry, ends.exit)
                 opened.progress(0, None, "timing the path")
@@ -204,10 +204,3 @@ def _no_path(args: argparse.Namespace, name: str, verdict: Verdict, loaded: floa
     if args.json:
         print_out(json_text(report.no_path_json(verdict, reason, loaded)))
     return STATUS[str(verdict.answer)]
-
-
-def _approach(args: argparse.Namespace, task: Task) -> float | None:
-    """m, length of the moves along the approach direction; None where there are none."""
-    if args.approach is not None or task.home_deg is None:
-        return None if args.approach is None else float(args.approach)
-    return APPROACH

@@ -80,8 +80,6 @@ def study(args: argparse.Namespace, began: float) -> int:
         with Bar() as bar, open_workers(args.workers, args.dask) as workers, at_leave(say):
             rows = run_tasks(loaded.tasks, workers, store, with_rate(bar, "deciding cases"))
     tell(args, report, loaded, rows)
-    if args.csv is not None:
-        write_text(args.csv, report.as_csv(loaded, rows), "table")
     if args.html is not None:
         page = report.as_html(loaded, rows, _poses(loaded, rows))
         write_text(args.html, page, "page")
@@ -103,8 +101,6 @@ def compare(args: argparse.Namespace, began: float) -> int:
         progress = with_rate(bar, "comparing robots")
         found = run(case, robots, workers, critical=args.critical, progress=progress)
     tell(args, report, found)
-    if args.csv is not None:
-        write_text(args.csv, report.as_csv(found), "table")
     if args.html is not None:
         write_text(args.html, report.as_html(found), "page")
     return 0

@@ -112,7 +112,6 @@ def _patch_json(patch: SubPatch, cells: Cells) -> dict[str, Any]:
         "certificate": {
             **certificate_json(patch.certificate),
             "min_limit_margin": plain(float(patch.certificate.min_limit_margin)),
-            **clearance_json(patch.certificate),
         },
     }
 

@@ -55,7 +55,7 @@ def left_out_json(one: LeftOut) -> dict[str, Any]:
 
 
 def certificate_json(certificate: Certificate) -> dict[str, Any]:
-    """What the replay of a motion measured; null where it measured nothing."""
+    """What the replay of a motion measured, with clearance; null where it measured nothing."""
     found: dict[str, Any] = {
         "waypoints": int(certificate.waypoints),
         "max_position_error_m": plain(float(certificate.max_position_error)),
@@ -76,21 +76,20 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
         "bound_by": margin.bound_by,
         "cell": list(margin.cell),
     }
-    return found
+    return found | clearance_json(certificate)
 
 
 def measured_json(
     robot: Robot, certificate: Certificate | None, q: Array | None
 ) -> dict[str, Any] | None:
-    """What the replay of a motion q (m, n) measured, with limits and clearance; null without one.
+    """What the replay of a motion q (m, n) measured, with limits; null without one.
 
     The margins of prismatic joints are not among these.
     """
     if certificate is None:
         return None
     margin = plain(limit_margin_deg(robot, certificate, q))
-    found = {**certificate_json(certificate), "min_limit_margin_deg": margin}
-    return found | clearance_json(certificate)
+    return {**certificate_json(certificate), "min_limit_margin_deg": margin}
 
 
 def clearance_json(certificate: Certificate | CollisionReplay) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from feasibility.demands.area import TreatedArea
 from feasibility.demands.treated_words import treated_json, treated_words
 from feasibility.division.pass_planning import PlannedPasses
 from feasibility.division.pass_runs import Interruption, PassRuns
-from feasibility.reports.objects_and_csv import certificate_json, clearance_json, smooth_json
+from feasibility.reports.objects_and_csv import certificate_json, smooth_json
 from feasibility.reports.text_and_tables import aligned, smooth_text, summary
 from feasibility.timing.sampled_trajectory import Trajectory
 from feasibility.version import version
@@ -48,7 +48,7 @@ def as_json(
                 "poses": [int(run.visits[0]), int(run.visits[-1])],
                 "length_m": run.figures.length,
                 "duration_s": trajectory.duration,
-                "certificate": certificate_json(run.certificate) | clearance_json(run.certificate),
+                "certificate": certificate_json(run.certificate),
             }
             for run, trajectory in zip(found.runs, timed, strict=True)
         ],

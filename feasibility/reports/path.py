@@ -16,7 +16,7 @@ from feasibility.demands.treated_words import share_words, treated_json, treated
 from feasibility.division.ends import Ends
 from feasibility.paths.coverage import CoveragePath
 from feasibility.paths.metrics import PathFigures
-from feasibility.reports.objects_and_csv import certificate_json, clearance_json, smooth_json
+from feasibility.reports.objects_and_csv import certificate_json, smooth_json
 from feasibility.reports.pass_runs import passes_json, passes_text
 from feasibility.reports.text_and_tables import (
     clearance_text,
@@ -83,7 +83,7 @@ def as_json(
             "cone_deg": plain(math.degrees(figures.cone_margin)),
             "singular_value": plain(figures.singular_value),
         },
-        "certificate": certificate_json(path.certificate) | clearance_json(path.certificate),
+        "certificate": certificate_json(path.certificate),
         "treated": treated_json(treated),
         "passes": None if passes is None else passes_json(passes, treated),
         "trajectory": None if trajectory is None else _timing(path, trajectory, limits),

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
-from surfaces.piecewise.closest_on_pieces import nearest_places
+from surfaces.piecewise.joined_patches import nearest_places
 from surfaces.piecewise.piecewise_surface import Piecewise
 from surfaces.places.patch_places import PatchPlaces
 from surfaces.places.places import OffsetSurface, PlacePaths, Places, by_closest_points, share_of

@@ -73,7 +73,7 @@ def ended(one: Any) -> Json:
 
 
 def bounds(one: Any) -> Json:
-    """A certificate, but for limits and clearance."""
+    """A certificate, but for limits."""
     return {
         "waypoints": one.waypoints, "max_position_error_m": one.max_position_error,
         "max_angle_deg": degrees(one.max_angle),
@@ -86,6 +86,7 @@ def bounds(one: Any) -> Json:
             "pivot": list(one.placement_margin.pivot),
             "bound_by": str(one.placement_margin.bound_by), "cell": list(one.placement_margin.cell),
         },
+        **clearances(one),
     }  # fmt: skip
 
 
@@ -104,10 +105,7 @@ def certificate(one: Any) -> Json | None:
     if np.ndim(q) == 2:
         off = np.minimum(q - one.robot.lower, one.robot.upper - q)
         margin = off[:, ~one.robot.prismatic].min(initial=np.inf)
-    return {
-        **bounds(one.certificate), "min_limit_margin_deg": degrees(margin),
-        **clearances(one.certificate),
-    }  # fmt: skip
+    return {**bounds(one.certificate), "min_limit_margin_deg": degrees(margin)}
 
 
 def causes(given: Any, cells: Any) -> list[Json]:
@@ -205,7 +203,7 @@ def of_path(one: Any) -> Json:
             "limit_deg": degrees(figures.turn_margin), "limit_m": figures.slide_margin,
             "cone_deg": degrees(figures.cone_margin), "singular_value": figures.singular_value,
         },
-        "certificate": {**bounds(path.certificate), **clearances(path.certificate)},
+        "certificate": bounds(path.certificate),
         "treated": treated(one.treated), "passes": one.passes and layout(one.passes),
         "trajectory": timed(one),
         **there(
@@ -270,7 +268,7 @@ def of_runs(one: Any) -> Json:
                 "stretches": [1 + k for k in found.stretches_of(run)],
                 "poses": run.walk.cell[run.walk.cell >= 0][[0, -1]].tolist(),
                 "length_m": run.figures.length, "duration_s": moved.time[-1] - moved.time[0],
-                "certificate": {**bounds(run.certificate), **clearances(run.certificate)},
+                "certificate": bounds(run.certificate),
             } for run, moved in zip(found.runs, one.timed, strict=True)
         ],
         "cuts": [
@@ -310,7 +308,6 @@ def of_divide(one: Any) -> Json:
                 "certificate": {
                     **bounds(patch.certificate),
                     "min_limit_margin": patch.certificate.min_limit_margin,
-                    **clearances(patch.certificate),
                 },
             } for patch in plan.patches
         ],
