@@ -21,7 +21,7 @@ SAMPLES = np.linspace(0.0, 1.0, 9)  # of a line, where no model is known
 MEASURED = 2.0  # times what is measured counts there
 DIFFERENCE = 1e-5  # [1] of a range of parameters
 STEPS, LONGEST = 8, 0.1  # of Newton's, [1] of a range
-MANY, TOGETHER, CLOSE = 256, 4, 1e-5  # boxes, neighbours that have one model, its radii [m], [1]
+MANY, TOGETHER, CLOSE = 1024, 4, 1e-5  # boxes, neighbours that have one model, its radii [m], [1]
 
 
 @dataclass(frozen=True, eq=False)
