@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from coverable.errors import CoverableError, Fault, alternatives
 from feasibility.cli.command_parts import numbers
 from feasibility.cli.console import print_err
+from feasibility.programs.controllers import NAMED, language_of
 from feasibility.read_files import shown_path
 
 if TYPE_CHECKING:
@@ -30,8 +31,7 @@ def add_programs(parser: argparse.ArgumentParser) -> None:
     """Programs of robot controllers."""
     parser.add_argument(
         "--program", metavar="FILE", action="append", default=[],
-        help="write the trajectory as a program: .script (URScript), .mod (ABB RAPID), .src (KUKA "
-        "KRL), .ls (FANUC TP) or .jbi (Yaskawa INFORM); can be repeated",
+        help=f"write the trajectory as a program: {NAMED}; can be repeated",
     )  # fmt: skip
     parser.add_argument(
         "--on", metavar="TEXT", default="",
@@ -84,7 +84,6 @@ def check_programs(args: argparse.Namespace, case: Case) -> None:
             arguments do not go together.
     """
     from feasibility.programs.controller_axes import ProgramError, check_program
-    from feasibility.programs.controllers import language_of
     from robots.errors import RobotError
 
     languages = {language_of(file) for file in args.program}
@@ -110,7 +109,6 @@ def check_programs(args: argparse.Namespace, case: Case) -> None:
 
 def period_of(args: argparse.Namespace) -> float:
     """S between samples: as asked for, else what the programs take, if there is no other file."""
-    from feasibility.programs.controllers import language_of
 
     if args.period is not None:
         return float(args.period)

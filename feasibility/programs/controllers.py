@@ -48,6 +48,7 @@ KRL = Language("KRL", "src", "KUKA", _numbered("E{}"), _numbered("A{}"))
 TP = Language("TP", "ls", "FANUC", (), _numbered("J{}"), time_digits=3, frame="X Y Z W P R")
 INFORM = Language("INFORM", "jbi", "Yaskawa", (), tuple("SLURBT"), "pulses", 0)
 LANGUAGES = (URSCRIPT, RAPID, KRL, TP, INFORM)
+NAMED = alternatives([f".{each.ending} ({each.maker} {each.name})" for each in LANGUAGES])
 
 
 def language_of(path: str | os.PathLike[str]) -> Language:
@@ -64,5 +65,4 @@ def language_of(path: str | os.PathLike[str]) -> Language:
     for language in LANGUAGES:
         if language.ending == ending:
             return language
-    named = alternatives([f".{each.ending} ({each.maker} {each.name})" for each in LANGUAGES])
-    raise FileError(f"expected the name of a program, which ends in {named}", shown_path(path))
+    raise FileError(f"expected the name of a program, which ends in {NAMED}", shown_path(path))

@@ -13,7 +13,7 @@ from timed_motions import TURN, UR5, motion
 
 from coverable import Axis, ProgramSettings, load_robot, parallel_passes, plane, save_program
 from feasibility.programs.controller_axes import ProgramError, check_program
-from feasibility.programs.controllers import language_of
+from feasibility.programs.controllers import LANGUAGES, language_of
 from feasibility.programs.working import working_places, working_times
 from robots.kinematics import Kinematics
 from surfaces.passes.toolpath import PassPlaces
@@ -230,7 +230,7 @@ PARSED = {
 """Frames as the makers' manuals have them: mm, and a turn."""
 
 
-@pytest.mark.parametrize("ending", PARSED)
+@pytest.mark.parametrize("ending", [f".{language.ending}" for language in LANGUAGES])
 def test_the_head_has_the_frames_of_tool_and_part(tmp_path, ending):
     tcp = [0.01, -0.02, 0.12], [10, -20, 130]
     base = [0.5, 0.1, 0.8], [0, 0, 90]
