@@ -28,6 +28,7 @@ LARGEST_FILE = 512 << 20  # bytes, as it lies on the disk
 LARGEST_CONTENT = 2 << 30  # bytes of all members, inflated
 LARGEST_TEXT = 64 << 20  # bytes of the JSON member, inflated
 MOST_MEMBERS = 64
+MOST = 1e300  # of numbers: in degrees they are finite, too
 DAMAGED = (
     zipfile.BadZipFile, zlib.error, ValueError, RuntimeError, EOFError, OSError, MemoryError,
     tokenize.TokenError, SyntaxError, TypeError,
@@ -168,8 +169,8 @@ class Archive:
         if not fits:
             wanted = " x ".join("any" if length is None else str(length) for length in shape)
             raise self.error(f"{name!r} has the shape {array.shape}, not {wanted}")
-        if dtype is np.float64 and not np.isfinite(array).all():
-            raise self.error(f"{name!r} holds NaN or infinite values")
+        if dtype is np.float64 and not (np.abs(array) <= MOST).all():
+            raise self.error(f"{name!r} holds NaN, or values that are too large")
         array.flags.writeable = False
         return array
 
@@ -203,8 +204,11 @@ class Fields:
         return bool(self.get(key, bool, "true or false"))
 
     def number(self, key: str) -> float:
-        """A number."""
-        return float(self.get(key, (int, float), "a number"))
+        """A finite number."""
+        value = self.get(key, (int, float), "a number")
+        if abs(value) > MOST:
+            raise self.archive.error(f"meta.json: {self.path}{key} is no number up to {MOST:g}")
+        return float(value)
 
     def cell(self, key: str, count: int) -> int:
         """The index of one of `count` cells."""

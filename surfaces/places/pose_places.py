@@ -71,8 +71,8 @@ class PosePlaces(OffsetSurface):
         return np.hypot(np.linalg.norm(self._ahead, axis=1), TURN * self._turn)
 
     @cached_property
-    def _tree(self) -> tuple[cKDTree, Ints]:
-        """Places all along the curves, and the curve of each."""
+    def _tree(self) -> tuple[cKDTree, Ints, float]:
+        """Places all along the curves, the curve of each, and how far they are apart on it (m)."""
         from scipy.spatial import cKDTree
 
         i, ahead = self.poses.pairs[:, 0], self._ahead
@@ -82,7 +82,7 @@ class PosePlaces(OffsetSurface):
         curve = np.repeat(np.arange(len(parts)), parts)
         number = np.arange(len(curve)) - np.repeat(np.cumsum(parts) - parts, parts)
         share = number / np.maximum(parts[curve] - 1, 1)
-        return cKDTree(self._points[i[curve]] + share[:, None] * ahead[curve]), curve
+        return cKDTree(self._points[i[curve]] + share[:, None] * ahead[curve]), curve, wide
 
     @cached_property
     def _around(self) -> tuple[Ints, Ints]:
@@ -134,17 +134,23 @@ class PosePlaces(OffsetSurface):
             share, _ = self._closest(only[known], points[known], axes)
             chart[known], t[known] = only[known], share
             return _placed(chart, t)
-        tree, curves = self._tree
+
+        def put(row: Ints, curve: Ints) -> None:
+            share, cost = self._closest(curve, points[known[row]], axes[row])
+            order = np.lexsort((cost, row))
+            best = order[np.searchsorted(row[order], np.unique(row))]
+            chart[known[row[best]]], t[known[row[best]]] = curve[best], share[best]
+
+        tree, curves, wide = self._tree
         count = min(NEAREST, len(curves))
         near = curves[tree.query(points[known], k=count)[1].reshape(len(known), count)]
-        row, curve = self._curves_of(self.poses.pairs[near].reshape(len(known), -1))
-        if not len(row):
-            return _placed(chart, t)
-        share, cost = self._closest(curve, points[known[row]], axes[row])
-        order = np.lexsort((cost, row))
-        best = order[np.searchsorted(row[order], np.unique(row))]
-        found = known[row[best]]
-        chart[found], t[found] = curve[best], share[best]
+        put(*self._curves_of(self.poses.pairs[near].reshape(len(known), -1)))
+        # Where these are all too far off, any curve that is not: it has a place as near as this.
+        off = np.linalg.norm(points[known] - self._at(chart[known], t[known])[0], axis=1)
+        (far,) = np.nonzero(off > within)
+        some = tree.query_ball_point(points[known[far]], np.hypot(min(within, 1e9), 0.5 * wide))
+        row = np.repeat(far, [len(one) for one in some])
+        put(row, curves[np.concatenate([[], *some]).astype(np.int64)])
         return _placed(chart, t)
 
     def _curves_of(self, around: Ints) -> tuple[Ints, Ints]:
