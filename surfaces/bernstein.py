@@ -169,3 +169,11 @@ def halves(size: int) -> Array:
     """(2 size, size) from coefficients to those of both halves."""
     parts = part_matrices(size - 1, np.array([0.0, 0.5]), np.array([0.5, 1.0]))
     return np.asarray(parts.reshape(2 * size, size))
+
+
+def halved(net: Array) -> Array:
+    """The coefficients of all quarters of a net, which are nearer to its values."""
+    for axis in (0, 1):
+        if net.shape[axis] > 1:
+            net = along(halves(net.shape[axis]), net, axis)
+    return net

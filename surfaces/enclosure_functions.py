@@ -35,6 +35,7 @@ from surfaces.enclosures import (
 
 WIDE = 1.2  # rad, half an interval over which sines are taken for cubics
 WIDER = 6  # coefficients that they have over wider ones
+UNEVEN = 4.0  # [1] the largest coefficient of a divisor beside the least, where quarters say more
 SMALLEST = 1e-150
 
 
@@ -76,7 +77,10 @@ def _divided(a: Any, b: Any) -> Enclosure:
     quotient = _interpolated(ratio, a, b)
     left = _add(Enclosure(a.net), _negative(_plain_product(quotient, b.net)))
     known = a.radius + _size(quotient) * b.radius + left.radius
-    return Enclosure(quotient, _largest_ratio(left.net, known, b.net, -b.radius))
+    r, s = bernstein.alike(left.net, b.net)
+    if (s.max(axis=(0, 1)) > UNEVEN * s.min(axis=(0, 1))).any():
+        r, s = bernstein.halved(r), bernstein.halved(s)
+    return Enclosure(quotient, _largest_ratio(r, known, s, -b.radius))
 
 
 def _size(net: Array) -> Array:

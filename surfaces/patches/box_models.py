@@ -63,9 +63,7 @@ class VectorModel(NamedTuple):
             a, b = 2 * i - 1, 2 * j - 1
             ends[i, j] = centre + a * slopes[:, 0] + b * slopes[:, 1] + a * b * twist
         left, affine = bernstein.alike(vectors.net, ends)
-        left = left - affine
-        for axis in (0, 1):
-            left = bernstein.along(bernstein.halves(left.shape[axis]), left, axis)
+        left = bernstein.halved(left - affine)
         shift = 0.5 * (left.min(axis=(0, 1)) + left.max(axis=(0, 1)))
         radius = _lengths(left - shift).max(axis=(0, 1)) + _lengths(vectors.radius)
         full[0, 0] = full[1, 0] = full[0, 1] = 0.0
