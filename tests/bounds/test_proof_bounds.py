@@ -228,8 +228,7 @@ def test_bodies_are_asked_to_overlap_wherever_the_target_of_a_box_may_be():
     q, x = np.zeros(6), np.array([0.3, -0.2])
     half = np.append(np.full(6, 1e-3), [0.5, 0.25])
     centre = np.append(q, x)
-    box = Boxes((centre - half)[None], (centre + half)[None], *np.array([[part], [0]]))
-    search.examine(box)
+    search.examine(Boxes((centre - half)[None], (centre + half)[None], *np.array([[part], [0]])))
     ((target, off),) = asked
     slopes = parts.slopes[part][:, :3]
     assert target[0] == pytest.approx(parts.centre[part, :3] + x @ slopes)

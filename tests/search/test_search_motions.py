@@ -7,10 +7,11 @@ from plain import tools
 from random_arms import QUESTIONS, planar_arm, robot_of
 from search_kernels import assert_walked
 
-from coverable import Search, Task, check, plane, replay
+from coverable import Search, Task, check, load_case, plane, replay
 from feasibility.roadmap.connecting import explore_self_motions
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions.search_arrays import arrays_of
+from feasibility.roadmap.motions.tracking import track
 from feasibility.roadmap.rounds import explore
 from feasibility.roadmap.walk import covering_walk
 from feasibility.verdict import Walk
@@ -50,8 +51,7 @@ def test_a_slide_whose_stroke_lies_far_out(stroke, tool, feasible):
 
 def refusal(robot, cells, task, q, first, last):
     """Why the replay refuses a motion from one cell's centre to another's; empty if it does not."""
-    marks = np.full(len(q), -1)
-    marks[0], marks[-1] = first, last
+    marks = np.array([first, *[-1] * (len(q) - 2), last])
     return replay(robot, cells, task, Walk(q, marks), np.zeros(len(cells), dtype=bool)).refusal
 
 
@@ -74,3 +74,13 @@ def test_every_motion_that_a_search_stores_holds_and_the_walk_takes_them_alone(n
     order = assert_walked(roadmap, covering_walk(roadmap, exploration.best))
     assert set(order) == set(range(len(cells)))
     assert len(order) <= 1.4 * len(cells)
+
+
+def test_a_motion_that_does_not_get_to_its_goal_ends_on_the_curve():
+    robot, cells, task, _ = load_case("paper/4d").build()
+    one = Exploration(robot, cells, arrays_of(robot, cells, task), 0)
+    one.add_seeds(0, one.guesses(40))
+    over, root = one.roadmap.over, one.roadmap.root_of
+    x, y = next((x, y) for x in over[0] for y in over[1] if root(x) != root(y))
+    asked = one.arrays, one.work, one.curve(0, 1), (0.0, 1.0), one.roadmap.q[x]
+    assert np.array_equal(track(*asked, one.roadmap.q[y], False, 1)[0], track(*asked)[0])

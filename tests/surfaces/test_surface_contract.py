@@ -216,8 +216,7 @@ def test_areas_are_those_of_fine_triangles_and_add_up(smooth):
     cells = smooth.cells(7, 5)
     assert (cells.areas > 0).all()
     assert cells.areas.sum() == pytest.approx(total, rel=1e-10)
-    back = float(smooth.area(*smooth.u_range[::-1], *smooth.v_range))
-    assert back == pytest.approx(-total)
+    assert float(smooth.area(*smooth.u_range[::-1], *smooth.v_range)) == pytest.approx(-total)
     fine = extrapolated_area(smooth, 40)
     assert total == pytest.approx(fine, rel=2e-5 if smooth.kind in NETS else 1e-7)
 

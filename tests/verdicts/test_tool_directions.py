@@ -51,8 +51,7 @@ def test_a_wide_cone_is_no_free_axis(cone_deg, holds):
     verdict = verdict_of("plate")
     away = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.34), side="inside").cells(3, 4)
     asked = question("plate")
-    judged = verify(asked.robot, away, Task(0.02, cone_deg), verdict.witness.q)
-    assert judged.holds == holds
+    assert verify(asked.robot, away, Task(0.02, cone_deg), verdict.witness.q).holds == holds
 
 
 def test_paths_and_patches_keep_to_the_roll():

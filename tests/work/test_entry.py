@@ -31,8 +31,7 @@ def test_the_tool_comes_and_goes_straight_along_the_approach(path):
     assert np.array_equal([ends.entry[0], ends.exit[-1]], np.radians([HOME, HOME]))
     assert np.array_equal(ends.entry[-1], path.walk.q[0])
     assert np.array_equal(ends.exit[0], path.walk.q[-1])
-    free = replace(path, task=replace(TASK, home_deg=None))
-    alone = ends_of(free, 0.08)
+    alone = ends_of(replace(path, task=replace(TASK, home_deg=None)), 0.08)
     assert (ends.from_home, alone.from_home) == (True, False)
     for rows in (alone.entry[::-1], alone.exit):
         points, axes = Kinematics(UR5).tools(dense(rows))
