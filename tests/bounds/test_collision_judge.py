@@ -86,8 +86,7 @@ def test_distances_from_a_half_space_and_a_sheet(name):
     bodies = bodies_of([solid], pairs=[pair("link1", "surface")], soups=[soup])
     assert judged(SLIDE, bodies, [0.0], [0.3]).min_clearance == pytest.approx(0.096, abs=CLOSE)
     assert not judged(SLIDE, bodies, [0.0], [1.0]).accepted  # through it to its other side
-    beyond = judged(SLIDE, bodies, [0.8], [1.0])
-    assert beyond.min_clearance == pytest.approx(0.196, abs=CLOSE)
+    assert judged(SLIDE, bodies, [0.8], [1.0]).min_clearance == pytest.approx(0.196, abs=CLOSE)
 
 
 @pytest.mark.parametrize("gap", [0.003, 0.0139, 0.0141, 0.2])

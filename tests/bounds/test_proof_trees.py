@@ -10,11 +10,11 @@ import pytest
 from arm_urdfs import joint
 from gantry import gantry
 from proof_cases import elbow, elbow_case, free_elbow_case, rail_case, split, stored_case, strip
-from random_arms import robot_of
+from random_arms import planar_arm, robot_of
 from samples import EVERYTHING, sampled, seeds
 
-from coverable import Task, bspline, load_robot, mesh, piecewise, plane, poses
-from feasibility.certification.cut_proofs.proof_verification import verify_on, verify_proof
+from coverable import Axis, Task, bspline, load_robot, mesh, piecewise, plane, poses
+from feasibility.certification.cut_proofs.proof_verification import too_far, verify_on, verify_proof
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from robots.kinematics import Kinematics
 from surfaces.meshes.triangle_mesh import TriangleMesh
@@ -101,11 +101,9 @@ def test_windings_are_not_one():
     case = elbow_case()
     wide = case._replace(robot=case.robot.with_limits({"j2": (-2 * np.pi, 2 * np.pi)}))
     assert "leaf 1 (cell [0, 4]) is wrong" in verified(wide).refusal
-    opened = CutTree(free_elbow_case().tree.root, opened=((1, np.pi),))
-    assert verified(wide, tree=opened).accepted
+    assert verified(wide, tree=CutTree(free_elbow_case().tree.root, opened=((1, np.pi),))).accepted
     assert "leaf 1" in verified(wide, split(np.pi, split(0.0, 4, 0), 4)).refusal
-    full = split(np.pi, split(-np.pi, 0, split(0.0, 4, 0)), 4)
-    assert verified(wide, full).accepted
+    assert verified(wide, split(np.pi, split(-np.pi, 0, split(0.0, 4, 0)), 4)).accepted
 
 
 def test_an_opening_has_to_be_empty():
@@ -263,6 +261,20 @@ def test_surfaces_whose_bounds_miss_them_prove_nothing():
     assert verify_on(*case, own).accepted
     for parts in (smaller, shifted):
         assert "the surface's bounds do not hold the surface" in verify_on(*case, parts).refusal
+
+
+def test_too_far_is_what_lies_further_than_the_links_are_long():
+    arm, rail = planar_arm(3), Axis("rail", "prismatic", (1, 0, 0), limits=(-2, 4))
+    (end,), _ = Kinematics(arm).tools(np.zeros((1, 3)))
+    for share in (0.999, 1.001):
+        assert too_far(arm, np.add(end, (0.01 * share, 0, 0)), 0.01) == (share > 1.0)
+    for robot in (load_robot("xarm7"), load_robot("ur5", axes=[rail])):
+        q = np.random.default_rng(0).uniform(-2, 2, (200, robot.n))
+        tips, _ = Kinematics(robot).tools(q.clip(robot.lower, robot.upper))
+        assert not any(too_far(robot, tip, 0.0) for tip in tips)
+        far = plane((3.9, 6.9), (-0.5, 0.5), "outside").cells(4, 1)
+        found = verify_proof(robot, far, Task(0.0, 180.0), CutTree(Leaf(3)))
+        assert (found.accepted, found.boxes) == (True, 0)
 
 
 def test_where_a_surface_has_no_bounds_nothing_is_proved():

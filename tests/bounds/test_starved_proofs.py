@@ -98,8 +98,7 @@ def test_the_corners_of_a_box_of_tilts_count(wide, confirmed):
         allow=tuple((name, ball.name) for name in UR5.link_names for ball in scene),
     )  # fmt: skip
     bodies = gather(UR5, FLAT, asked, 0.02)
-    found = never_clear(UR5, bodies, cone, 1e-6, point, up, most=20_000)
-    assert found.confirmed == confirmed
+    assert never_clear(UR5, bodies, cone, 1e-6, point, up, most=20_000).confirmed == confirmed
 
 
 def test_a_tool_in_a_sheet():

@@ -108,8 +108,7 @@ def test_fanuc_has_samples_times_and_j3_from_the_horizontal(tmp_path, fanuc):
     steep = np.abs(axes[:, 2]) < 89.0
     assert steep.any()
     assert np.abs(rise - axes[:, 2])[steep].max() <= 1e-3
-    said = "".join(lines)
-    assert "J3 = j3 - j2, in deg" in said
+    assert "J3 = j3 - j2, in deg" in "".join(lines)
     plain = ProgramSettings(j3_from_horizontal=False)
     save_program(tmp_path / "b.ls", fanuc, run, settings=plain)
     _, _, _, axes = read_tp((tmp_path / "b.ls").read_bytes().decode("ascii"))

@@ -174,8 +174,7 @@ def test_compiling_moves_the_deadline_and_nothing_else_does():
     assert clock.deadline == pytest.approx(before + took, abs=1e-9)
     # What was compiled before a clock starts is not given to it.
     assert Clock(10.0).begin(5.0).deadline == pytest.approx(15.0, abs=1e-9)
-    half = clock.part(0.5)
-    assert half.limit == pytest.approx(0.5 * clock.left, rel=1e-3)
+    assert clock.part(0.5).limit == pytest.approx(0.5 * clock.left, rel=1e-3)
     assert not clock.out_of_time
     assert Clock(10.0).begin(time.monotonic() - 10.1).out_of_time
     assert Clock().start().left == math.inf

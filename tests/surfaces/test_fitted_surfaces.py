@@ -128,8 +128,7 @@ def test_the_class_of_the_page_is_the_surface_of_its_formula(names):
 def test_the_class_of_the_page_needs_no_more_than_its_formulas(names):
     """Parts for proofs, sheets, paths for the replay with u directions, motions, and their page."""
     screw, cells = names["screw"], names["flank"]
-    rng = np.random.default_rng(0)
-    assert not lost(screw, rng)
+    assert not lost(screw, np.random.default_rng(0))
     assert 0.0 < sheet_of(screw).deviation < 1e-3
     offset = offset_surface(screw, 0.02)
     x = np.array([[0.0, 0.2], [0.1, 0.21]])

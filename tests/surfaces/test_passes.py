@@ -113,8 +113,7 @@ def test_a_hole_parts_passes_and_leaves_them_straight():
         assert len(row) == (2 if chord > 0.0 else 1)
         assert sum(each.length for each in row) == pytest.approx(0.6 - chord, abs=2e-3)
         for each in row:
-            off = np.linalg.norm(each.points[:, :2] - [0.3, 0.2], axis=1)
-            assert off.min() >= 0.08 - 2e-4
+            assert np.linalg.norm(each.points[:, :2] - [0.3, 0.2], axis=1).min() >= 0.08 - 2e-4
 
 
 def test_every_other_pass_is_turned_round_unless_it_is_one_way():

@@ -158,8 +158,7 @@ def test_of_many_pairs_the_one_in_the_way_is_named_with_its_distance():
     pairs = [pair[:2] for pair in scene.pairs]
     middle = 0.5 * (verdict.robot.lower + verdict.robot.upper)
     for cause in verdict.causes:
-        there = scene.distances(middle, [pairs.index(cause.pair)])[0]
-        assert abs(cause.clearance - there) < 0.02
+        assert abs(cause.clearance - scene.distances(middle, [pairs.index(cause.pair)])[0]) < 0.02
         assert cause.clearance < 0.05
 
 

@@ -116,8 +116,7 @@ def test_what_it_rests_on_holds(name):
     walk, robot, certificate = verdict.witness, verdict.robot, verdict.certificate
     per_segment = SAMPLES.get(name, 20)
     surface = form_of(name)
-    faults = plain.faults_of(verdict, surface=surface, per_segment=per_segment)
-    assert faults == []
+    assert plain.faults_of(verdict, surface=surface, per_segment=per_segment) == []
     assert set(walk.cell[walk.cell >= 0].tolist()) == set(range(len(verdict.cells)))
     assert certificate.waypoints == len(walk.q)
     margin = np.minimum(walk.q - robot.lower, robot.upper - walk.q).min()
@@ -222,8 +221,7 @@ def test_a_motion_a_little_worse_is_refused(name):
     for what, robot, task, walk in worse(name):
         tried.add(what)
         assert not verify(robot, verdict.cells, task, walk.q).holds, what
-        judged = replay(robot, verdict.cells, task, walk, every(verdict))
-        assert not judged.accepted, what
+        assert not replay(robot, verdict.cells, task, walk, every(verdict)).accepted, what
         if what not in ("clearance",):
             told = SimpleNamespace(
                 robot=robot, task=task, cells=verdict.cells, witness=verdict.witness

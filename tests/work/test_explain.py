@@ -230,8 +230,7 @@ def test_toolpaths_stay_in_their_order_and_are_not_divided():
     walk = coverable.poses(far, np.tile((0.0, 0.0, 1.0), (4, 1)), side="outside")
     found = explain(UR5, walk, Task(0.01, 10.0))
     assert found.verdict.answer is Answer.INFEASIBLE
-    helping = [t.quantity.axis for t in found.thresholds if t.feasible is not None]
-    assert helping == [(-1, 0, 0)]
+    assert [t.quantity.axis for t in found.thresholds if t.feasible is not None] == [(-1, 0, 0)]
 
 
 def test_edges():

@@ -108,8 +108,7 @@ def test_a_region_far_away_is_refused_by_the_bound_alone():
     for name in TEXTS:
         setup = setup_of(name)
         far = Pose.of_surface(setup.cells.surface).values + np.array([3.0, 0, 0, 0, 0, 0])
-        region = region_about(Pose.of_values(far))
-        found = place(*setup[:3], region, setup.search, evaluator=nobody)
+        found = place(*setup[:3], region_about(Pose.of_values(far)), setup.search, evaluator=nobody)
         assert (found.answer, found.evidence) == (Answer.INFEASIBLE, Evidence.PROOF)
         assert (found.cause, found.found) == (coverable.CauseKind.OUT_OF_REACH, ())
 

@@ -56,8 +56,7 @@ def test_quintics_and_cubics_of_controllers_are_one_spline_and_what_is_used_is_w
     assert (said[:-1] <= truth[:-1] * 1.01).all()
     assert said[-1] <= 1.2 * truth[-1]
     weaker = replace(limits, acceleration=limits.acceleration / 1e4)
-    slow = 100.0 * here.acceleration.max() ** 0.5
-    assert used(UR5, run, weaker).too_fast == pytest.approx(slow)
+    assert used(UR5, run, weaker).too_fast == pytest.approx(100.0 * here.acceleration.max() ** 0.5)
     slower = replace(run, time=2.0 * run.time, dq=run.dq / 2.0, ddq=run.ddq / 4.0)
     assert used(UR5, slower, limits).acceleration == pytest.approx(here.acceleration / 4.0)
     assert (used(UR5, slower, limits).velocity <= here.velocity / 2.0 * (1.0 + 1e-9)).all()

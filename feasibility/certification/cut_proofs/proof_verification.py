@@ -8,8 +8,9 @@ tool on the surface, within tolerance and cone, and its roll in the range,
     no q in M and in the region of a cut has q_j = t, and
     no q in the region of a leaf has the tool at its cell's target, and held likewise.
 
-A tree of one leaf proves its claim too where the tool collides in every pose within tolerance and
-cone of the cell's target, whatever the arm does (`collisions/every_pose.py`). And where bodies are
+A tree of one leaf proves its claim too where the cell's target is out of reach, and where the tool
+collides in every pose within tolerance and cone of it, whatever the arm does
+(`collisions/every_pose.py`). And where bodies are
 to stay clear of each other, M and leaves hold only what is clear.
 
 Both say that a region is empty, which `empty_region` proves by bounds (`linear_models`,
@@ -22,11 +23,13 @@ A tree comes from a file, so anything may be in it: what is no tree is refused w
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from coverable.arrays import Array
 from feasibility.certification.collisions.every_pose import PoseCheck, never_clear
 from feasibility.certification.collisions.everywhere import Overlapping
 from feasibility.certification.cut_proofs.cut_region import TURN, JointRegion
@@ -46,13 +49,16 @@ from feasibility.collisions.asked_bodies import gather
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from feasibility.cut_words import joint_value
 from feasibility.task import Task
+from robots.kinematics import Kinematics
 from robots.robot import Robot
 from surfaces.cells import Cells
 from surfaces.parts import SurfaceParts
 from surfaces.surface import SurfaceError
 
 MOST_BOXES = 2_000_000
-WITHOUT_BODIES = 20_000  # boxes after which it is looked into whether bodies overlap
+WITHOUT_BODIES = 250_000  # boxes after which it is looked into whether bodies overlap
+MOST_SLIDES = 6  # joints that slide, of which all ends are looked at
+CLOSE = 1e-9  # m, rounding of distances
 FINE = 0.25  # of tolerance and cone, that the finest parts of the surface may be off by
 NARROWEST = 1e-6  # a chord that parts of the surface are made for, at least
 
@@ -96,6 +102,10 @@ def verify_proof(
     fault = out_of_line(robot) or malformed(robot, len(cells), tree)
     if fault:
         return ProofCheck(fault, 0)
+    if isinstance(tree.root, Leaf):
+        target = task.targets(cells).points[tree.root.cell]
+        if too_far(robot, target, task.effective_tolerance):
+            return ProofCheck("", 0)
     alone = _by_the_tool(robot, cells, task, tree, tick or (lambda: None))
     if alone is not None and alone.confirmed:
         return ProofCheck("", alone.boxes)
@@ -117,6 +127,40 @@ def _by_the_tool(
     targets, cell = task.targets(cells), tree.root.cell
     target = targets.points[cell], targets.approaches[cell]
     return never_clear(robot, bodies, task.cone, task.effective_tolerance, *target, tick)
+
+
+def too_far(robot: Robot, target: Array, tolerance: float) -> bool:
+    """Is a target (3,) m further from the arm's first axis than the arm is long?
+
+    Points on the axes of two joints that turn, one behind the other, keep their distance, whatever
+    the joints do; where joints slide between them, it is convex in these, so largest at ends of
+    strokes. The tool is no further from the first point than all of these together. Any points will
+    do; those are looked for that leave the target furthest out.
+    """
+    moves = robot.lower < robot.upper
+    turns, slides = (np.flatnonzero(moves & kind) for kind in (~robot.prismatic, robot.prismatic))
+    strokes = np.column_stack([robot.lower, robot.upper])[slides]
+    if len(slides) > MOST_SLIDES or not np.isfinite(strokes).all():
+        return False
+    q = np.tile(np.where(moves, 0.0, robot.lower), (2 ** len(slides), 1))
+    q[:, slides] = list(itertools.product(*strokes))
+    kinematics = Kinematics(robot)
+    points, axes = kinematics.joints(q).points[:, 1 + turns], kinematics.twists(q)[:, 3:, turns]
+    tool = kinematics.tools(q)[0][:, None]
+
+    def beyond(along: Array) -> float:
+        string = np.concatenate([points + along[:, None] * axes.swapaxes(1, 2), tool], axis=1)
+        first = string[:, 0].mean(axis=0)
+        links = np.linalg.norm(np.diff(string, axis=1), axis=2).max(axis=0).sum()
+        from_first = np.linalg.norm(string[:, 0] - first, axis=1).max()
+        return float(np.linalg.norm(target - first) - links - from_first)
+
+    from scipy.optimize import minimize
+
+    best = np.zeros(len(turns))
+    if len(turns):
+        best = minimize(lambda along: -beyond(along), best, method="Powell").x
+    return beyond(best) > tolerance + CLOSE
 
 
 def verify_on(
