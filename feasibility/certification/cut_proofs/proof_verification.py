@@ -93,7 +93,7 @@ def verify_proof(
         cells: the cells.
         task: the task; its tolerance, cone and roll are used exactly.
         tree: the proof.
-        tick: called every few thousand boxes; what it raises ends the verification.
+        tick: called at the beginning and every few thousand boxes; what it raises ends the verification.
         most: how many boxes may be looked at altogether.
 
     Returns:
@@ -102,11 +102,13 @@ def verify_proof(
     fault = out_of_line(robot) or malformed(robot, len(cells), tree)
     if fault:
         return ProofCheck(fault, 0)
+    tick = tick or (lambda: None)
+    tick()
     if isinstance(tree.root, Leaf):
         target = task.targets(cells).points[tree.root.cell]
         if too_far(robot, target, task.effective_tolerance):
             return ProofCheck("", 0)
-    alone = _by_the_tool(robot, cells, task, tree, tick or (lambda: None))
+    alone = _by_the_tool(robot, cells, task, tree, tick)
     if alone is not None and alone.confirmed:
         return ProofCheck("", alone.boxes)
     cone = max(min(task.cone_chord, 1.0), NARROWEST)
