@@ -93,7 +93,7 @@ def verify_proof(
         cells: the cells.
         task: the task; its tolerance, cone and roll are used exactly.
         tree: the proof.
-        tick: called at the beginning and every few thousand boxes; what it raises ends the verification.
+        tick: called first, and every few thousand boxes; what it raises ends the verification.
         most: how many boxes may be looked at altogether.
 
     Returns:
