@@ -10,8 +10,8 @@ tool on the surface, within tolerance and cone, and its roll in the range,
 
 A tree of one leaf proves its claim too where the cell's target is out of reach, and where the tool
 collides in every pose within tolerance and cone of it, whatever the arm does
-(`collisions/every_pose.py`). And where bodies are
-to stay clear of each other, M and leaves hold only what is clear.
+(`collisions/every_pose.py`). And where bodies are to stay clear of each other, M and leaves hold
+only what is clear.
 
 Both say that a region is empty, which `empty_region` proves by bounds (`linear_models`,
 `box_exclusion`). A joint that the tree opens at t is to have no q in M at any
@@ -137,7 +137,8 @@ def too_far(robot: Robot, target: Array, tolerance: float) -> bool:
     Points on the axes of two joints that turn, one behind the other, keep their distance, whatever
     the joints do; where joints slide between them, it is convex in these, so largest at ends of
     strokes. The tool is no further from the first point than all of these together. Any points will
-    do; those are looked for that leave the target furthest out.
+    do; those are looked for that leave the target furthest out. (The search asks `robots/reach.py`;
+    this is written again so that a fault there is no fault here.)
     """
     moves = robot.lower < robot.upper
     turns, slides = (np.flatnonzero(moves & kind) for kind in (~robot.prismatic, robot.prismatic))
