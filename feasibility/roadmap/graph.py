@@ -172,14 +172,13 @@ class Roadmap:
         At a singularity two sheets are near although their joints are far apart. Of several nodes
         over a cell the latest counts.
         """
-        roots = self.roots_of_nodes()
-        ones, others = (
-            {self.cell[node]: node for node in np.flatnonzero(roots == root).tolist()}
-            for root in (one, other)
-        )
-        both = pairs.tolist()
-        both += [(j, i) for i, j in both]
-        found = [(ones[i], others[j]) for i, j in both if i in ones and j in others]
+        roots, cells = self.roots_of_nodes(), np.array(self.cell, dtype=np.int64)
+        latest = np.full((2, len(self.over)), -1)
+        for over, root in zip(latest, (one, other), strict=True):
+            over[cells[roots == root]] = np.flatnonzero(roots == root)
+        both = np.column_stack([pairs.T, pairs.T[::-1]])
+        nodes = np.column_stack([latest[0, both[0]], latest[1, both[1]]])
+        found = [(x, y) for x, y in nodes[(nodes >= 0).all(axis=1)].tolist()]
         if not found:
             return []
         off = np.array([self.q[x] - self.q[y] for x, y in found])
