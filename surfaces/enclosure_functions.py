@@ -170,6 +170,18 @@ def _chosen(which: Mask, one: Enclosure, other: Enclosure) -> Enclosure:
     return Enclosure(np.where(which, a, b), np.where(which, one.radius, other.radius))
 
 
+def of_length_one(vectors: Enclosure) -> Enclosure:
+    """Unit vectors (k, 3), closer where one coordinate leads: it is what the others leave of 1."""
+    low, high = vectors.ends
+    square = np.maximum(low**2, high**2)
+    most = square.sum(axis=-1, keepdims=True) - square
+    least = np.sqrt(np.maximum(1.0 - most, 0.0)) - ROUNDING
+    one = 1.0 + ROUNDING
+    low = np.where(low > -least, np.maximum(low, least), np.maximum(low, -one))
+    high = np.where(high < least, np.minimum(high, -least), np.minimum(high, one))
+    return _closer(vectors, Enclosure.between(low, high))
+
+
 def _wave(shift: float) -> Callable[[Enclosure], Enclosure]:
     """sin(x + shift)."""
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from coverable.arrays import Array, Ints
+from surfaces.enclosure_functions import of_length_one
 from surfaces.enclosures import Enclosure, enclosed
 from surfaces.parts import MOST_PARTS, PartModels, SurfaceParts
 from surfaces.patches.box_models import Formula, Pieces, over_boxes
@@ -93,7 +94,8 @@ class ParametricSurface(Surface):
         Raises:
             SurfaceError: they take u and v to something that is not known over boxes.
         """
-        return self._enclosed(self.local_point, u, v), self._enclosed(self.local_normal, u, v)
+        normals = self._enclosed(self.local_normal, u, v)
+        return self._enclosed(self.local_point, u, v), of_length_one(normals)
 
     def local_tangents(self, u: Enclosure, v: Enclosure) -> Enclosure:
         """Unit directions in which u grows, likewise.
