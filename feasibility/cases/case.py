@@ -212,7 +212,7 @@ class Case:
         except TomlError as error:
             raise CaseError(str(error), name) from error
         make_absolute(tables, base_dir)
-        made = _from_tables(tables, name, tuple(overrides))
+        made = case_of_tables(tables, name, tuple(overrides))
         return replace(made, source=(text, os.path.abspath(base_dir or "")))
 
     def with_overrides(self, overrides: Iterable[str]) -> Case:
@@ -225,7 +225,7 @@ class Case:
             title: {key: as_read(value) for key, value in table.items()}
             for title, table in self.to_tables().items()
         }
-        made = _from_tables(tables, self.name, tuple(overrides), self.description)
+        made = case_of_tables(tables, self.name, tuple(overrides), self.description)
         return replace(made, source=self.source)
 
 
@@ -273,7 +273,7 @@ def builtin_cases() -> Mapping[str, Case]:
 def _builtin_case(name: str) -> Case:
     """One of them; the others are not looked at."""
     tables, description = _builtin_tables()[name]
-    return _from_tables(tables, name, (), description)
+    return case_of_tables(tables, name, (), description)
 
 
 @cache
@@ -291,10 +291,14 @@ def _builtin_tables() -> Mapping[str, tuple[Tables, str]]:
     return found
 
 
-def _from_tables(
-    tables: Tables, name: str, overrides: Sequence[str], description: str = ""
+def case_of_tables(
+    tables: Tables, name: str = "case", overrides: Sequence[str] = (), description: str = ""
 ) -> Case:
-    """Apply overrides, which the description then names, and check everything."""
+    """Apply overrides, which the description then names, and check everything.
+
+    Raises:
+        CaseError: with everything that is wrong.
+    """
     faults: list[Fault] = []
     if overrides:
         from feasibility.cases.toml_edits import override

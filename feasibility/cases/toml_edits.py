@@ -239,15 +239,15 @@ def override(tables: dict[str, Any], setting: str, faults: list[Fault]) -> None:
 def make_absolute(tables: dict[str, Any], base_dir: str | os.PathLike[str] | None) -> None:
     """Make the paths of a case file independent of the working directory, where they are paths."""
     if base_dir is not None:
-        _change_paths(tables, lambda path: os.path.join(base_dir, os.path.expanduser(path)))
+        change_paths(tables, lambda path: os.path.join(base_dir, os.path.expanduser(path)))
 
 
 def make_relative(tables: dict[str, Any], base_dir: str | os.PathLike[str]) -> None:
     """Make the paths of a case relative to the folder of its file."""
-    _change_paths(tables, lambda path: os.path.relpath(path, base_dir))
+    change_paths(tables, lambda path: os.path.relpath(path, base_dir))
 
 
-def _change_paths(tables: Any, change: Callable[[str], str]) -> None:
+def change_paths(tables: Any, change: Callable[[str], str]) -> None:
     """Change the paths of a case file, where they are paths."""
 
     def changed(value: Any) -> Any:
@@ -259,4 +259,4 @@ def _change_paths(tables: Any, change: Callable[[str], str]) -> None:
         elif key == FOLDERS and isinstance(value, list):
             tables[key] = [*map(changed, value)]
         elif isinstance(value, (dict, list)) and key not in NAMED_BY_USERS:
-            _change_paths(value, change)
+            change_paths(value, change)

@@ -3,23 +3,22 @@
 And the files that a case depends on: those that it names, and those that these name in turn.
 """
 
-import os
+import json
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from coverable.files import stamps
-from feasibility.cases.case import TABLES, Case
+from feasibility.cases.case import TABLES, Case, case_of_tables
 from feasibility.cases.robot_table import RobotPart, read_robot
-from feasibility.cases.surface_reading import read_surface
-from feasibility.cases.toml import as_read, parse_toml
-from feasibility.cases.toml_text import toml_document
+from feasibility.cases.surface_reading import SurfacePart, read_surface
+from feasibility.cases.toml import as_read
+from feasibility.cases.toml_edits import change_paths
 from feasibility.clock import Clock
-from feasibility.studies.pool import Tables
 from robots.library import flange_axis
 from robots.robot import Robot
 from surfaces.cells import Cells
@@ -29,38 +28,25 @@ if TYPE_CHECKING:
     from surfaces.meshes.cells.mesh_cells import MeshCells
 
 
-class CaseFiles(NamedTuple):
-    """Paths of files, which need not exist."""
+def files_of(tables: Mapping[str, Any]) -> tuple[str, ...]:
+    """Paths of the files that a case, given by its tables, depends on; they need not exist.
 
-    named: tuple[str, ...]
-    """By the case itself."""
-    further: tuple[str, ...]
-    """What a xacro file includes, and with collisions the meshes of the arm's URDF."""
-
-
-def files_of(tables: Mapping[str, Any]) -> CaseFiles:
-    """The files of a case, given by its tables; nothing of what cannot be read.
-
-    An arm of the library has none: its files come with the program.
+    Those that it names, what a xacro file includes, and with collisions the meshes of the arm's
+    URDF. An arm of the library has none: its files come with the program.
     """
-    parts = [tables.get(title) for title in ("robot", "surface", "collision")]
-    for part, key in zip((*parts[1:], parts[2]), ("pieces", "scene", "tool"), strict=True):
-        if isinstance(part, Mapping) and isinstance(part.get(key), Sequence):
-            parts += part[key]
-    named = []
-    for part in parts:
-        written = part if isinstance(part, Mapping) else {}
-        name = written.get("urdf", written.get("file", written.get("srdf")))
-        if isinstance(name, str):
-            named.append(name)
-    robot, _, collision = parts[:3]
-    further: tuple[str, ...] = ()
-    if isinstance(robot, Mapping) and isinstance(robot.get("urdf"), str):
-        arm = read_robot(as_read(robot), [])
-        further += () if arm is None else files_of_arm(arm, meshes=collision is not None)
-    if isinstance(collision, Mapping) and isinstance(collision.get("srdf"), str):
-        further += _further(collision["srdf"])
-    return CaseFiles(tuple(named), further)
+    plain, found = as_read(tables), list[str]()
+
+    def seen(path: str) -> str:
+        found.append(path)
+        return path
+
+    change_paths(plain, seen)
+    robot, collision = plain.get("robot"), plain.get("collision")
+    if isinstance(robot, dict) and (arm := read_robot(robot, [])) is not None:
+        found += files_of_arm(arm, meshes=collision is not None)
+    if isinstance(collision, dict) and isinstance(collision.get("srdf"), str):
+        found += _further(collision["srdf"])
+    return tuple(found)
 
 
 def files_of_arm(arm: RobotPart, *, meshes: bool) -> tuple[str, ...]:
@@ -87,14 +73,13 @@ MESHES_KEPT = 4
 TOOL = ("tcp", "approach_axis", "reference_axis")
 
 
-def case_of(tables: Tables) -> Case:
+def case_of(tables: Mapping[str, Any]) -> Case:
     """The case of some tables, checked; tables that belong to no case are left out.
 
     Raises:
         CaseError: with everything that is wrong.
     """
-    chosen = {title: tables[title] for title in TABLES if title in tables}
-    return Case.from_toml(toml_document(chosen))
+    return case_of_tables({title: as_read(tables[title]) for title in TABLES if title in tables})
 
 
 def clock_of(case: Case) -> Clock:
@@ -110,16 +95,13 @@ def arm_of(case: Case) -> Robot:
     """
     arm = case.robot
     files = () if arm.urdf is None else (arm.urdf, *files_of_arm(arm, meshes=True))
-    return _load(toml_document({"robot": arm.table()}), case.surface.frame, stamps(files))
+    return _load(json.dumps(arm.table()), case.surface.frame, stamps(files))
 
 
 @lru_cache(maxsize=ROBOTS_KEPT)
 def _load(table: str, surface_link: str | None, changed: tuple[object, ...]) -> Robot:
-    """The arm of a [robot] table, written as a document; a link of it may carry the surface."""
-    part = read_robot(parse_toml(table)["robot"], [])
-    if part is None:
-        raise ValueError("the table of a robot that was read before cannot be read again")
-    return part.build(surface_link)
+    """The arm of a [robot] table, as JSON; a link of it may carry the surface."""
+    return cast("RobotPart", read_robot(json.loads(table), [])).build(surface_link)
 
 
 def mounted_as(robot: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
@@ -168,9 +150,8 @@ def cut_of(case: Case) -> Cells:
 
     if case.surface.kind not in ("mesh", "step"):
         return case.surface.cut(case.task.disc)
-    disc, smoothing = case.task.disc, case.task.smoothing
-    file = os.stat(case.surface.table()["file"])
-    home = _cut(surface_at_home(case), disc, smoothing, file.st_mtime_ns, file.st_size)
+    stamp = stamps([case.surface.table()["file"]])
+    home = _cut(surface_at_home(case), case.task.disc, case.task.smoothing, stamp)
     placed = replace(
         home.surface,
         rotation=rotation_from_rpy(*np.radians(case.surface.rpy_deg)),
@@ -180,9 +161,14 @@ def cut_of(case: Case) -> Cells:
 
 
 def surface_at_home(case: Case) -> str:
-    """The [surface] table of a case as a document, with the surface at the world's origin."""
+    """The [surface] table of a case as JSON, with the surface at the world's origin."""
     table = {key: value for key, value in case.surface.table().items() if value is not None}
-    return toml_document({"surface": table | HOME})
+    return json.dumps(table | HOME)
+
+
+def part_at_home(table: str) -> SurfacePart:
+    """That table, which was read before, as a part of a case."""
+    return cast("SurfacePart", read_surface(json.loads(table), []))
 
 
 @lru_cache(maxsize=MESHES_KEPT)
@@ -190,11 +176,7 @@ def _cut(
     table: str,
     footprint: tuple[float, float] | None,
     smoothing: tuple[float, float] | None,
-    changed: int,
-    size: int,
+    changed: tuple[object, ...],
 ) -> "MeshCells":
-    """The cells of the mesh of a [surface] table, written as a document."""
-    part = read_surface(parse_toml(table)["surface"], [])
-    if part is None:
-        raise ValueError("the table of a surface that was read before cannot be read again")
-    return cast("MeshCells", part.cut(footprint, smoothing))
+    """The cells of the mesh of a [surface] table, see `surface_at_home`."""
+    return cast("MeshCells", part_at_home(table).cut(footprint, smoothing))

@@ -3,31 +3,36 @@
 import copy
 import itertools
 import json
+import os
 import re
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from coverable.errors import Fault, shown
+from coverable.errors import Fault, listed, shown
+from feasibility.cases.case import Case
 from feasibility.cases.robot_table import in_robot_table
-from feasibility.cases.surface_reading import faults_of_building, read_surface
-from feasibility.cases.table_reader import CaseError
-from feasibility.cases.toml import as_read, parse_toml
+from feasibility.cases.surface_reading import faults_of_building
+from feasibility.cases.table_reader import ORIGIN, CaseError, Section
+from feasibility.cases.toml import as_read
+from feasibility.cases.toml_edits import make_absolute
 from feasibility.studies.built_cases import (
     arm_of,
     case_of,
     mounted_as,
     mounting_fault,
+    part_at_home,
     surface_at_home,
 )
 from feasibility.studies.pool import Tables
 from feasibility.studies.run import StudyTask
-from feasibility.studies.varied_keys import POSES, Key, Variation
+from feasibility.studies.varied_keys import Key, Range, Variation, VariedKey
+from surfaces.arguments import check_pose
 
-ORIGIN = (0.0, 0.0, 0.0)
-POSED = [[key] for key in POSES]
+MOST_ALIKE = 4  # values of one key that are named, of those that are wrong for the same cause
 
 
 def put(tables: Tables, path: Sequence[str | int], value: Any) -> None:
@@ -44,66 +49,106 @@ def put(tables: Tables, path: Sequence[str | int], value: Any) -> None:
     table[path[-1]] = value
 
 
-def tasks_of(base: Tables, varied: Variation, faults: list[Fault]) -> tuple[StudyTask, ...]:
+class _Combination(NamedTuple):
+    """Values of everything but the surface's pose, and the case that they make."""
+
+    values: Mapping[str, str]
+    """By label, for messages."""
+    tables: Tables
+    faults: Sequence[Fault]
+
+
+def tasks_of(
+    base: Tables,
+    varied: Variation,
+    base_dir: str | os.PathLike[str] | None,
+    faults: list[Fault],
+) -> tuple[StudyTask, ...]:
     """Every combination of what varies; those that make no case are kept as faults, one a cause.
 
-    Cases that differ in the pose of the surface alone are checked once.
+    Cases that differ in the pose of the surface alone are checked once, and each pose by itself.
     """
-    entries = (*varied.axes, *varied.ranges)
-    checked: dict[str, Tables | None] = {}
-    refused: dict[tuple[str, str], tuple[Fault, list[dict[str, str]]]] = {}
+    entries: tuple[VariedKey | Range, ...] = (*varied.axes, *varied.ranges)
+    wrong = [fault for entry in entries for fault in _wrong_poses(entry)]
+    checked: dict[str, _Combination] = {}
     tasks = []
-    for combination in itertools.product(*(axis.values for axis in varied.axes), draw(varied)):
-        *values, sample = combination
+    for *values, sample in itertools.product(*(axis.values for axis in varied.axes), draw(varied)):
         row = list(zip(entries, (*values, *sample), strict=True))
         parameters = {entry.label: _parameter(entry.label, value) for entry, value in row}
         others = [(entry, value) for entry, value in row if not entry.is_pose]
         name = json.dumps([value for _, value in others], sort_keys=True)
         if name not in checked:
-            made, found = case_with(base, others)
-            checked[name] = None if found else made
-            texts = {k: shown(v) for k, v in parameters.items() if k.split(".")[1:2] not in POSED}
-            for fault in found:
-                cause = fault.key, cause_of(fault.message)
-                refused.setdefault(cause, (fault, []))[1].append(texts)
+            texts = {entry.label: shown(parameters[entry.label]) for entry, _ in others}
+            checked[name] = _Combination(texts, *case_with(base, others, base_dir))
         case = checked[name]
-        if case is None:
+        if case.faults or wrong:
             continue
-        tables = {**case, "surface": copy.deepcopy(case["surface"])}
+        tables = {**case.tables, "surface": copy.deepcopy(case.tables["surface"])}
         for entry, value in row:
             if entry.is_pose:
                 numbers = list(map(float, value)) if isinstance(value, list) else float(value)
                 put(tables, entry.path, numbers)
         tasks.append(StudyTask(tables, parameters))
-    faults += [_as_one(*alike) for alike in refused.values()]
+    faults += [*wrong, *_refusals(entries, list(checked.values()))]
     return tuple(tasks)
 
 
-def case_with(base: Tables, values: Sequence[tuple[Key, Any]]) -> tuple[Tables, list[Fault]]:
-    """The base with some values and all defaults filled in, or what is wrong with it."""
-    tables, faults = copy.deepcopy(base), []
-    given = base.get("robot", {})
+def _wrong_poses(entry: VariedKey | Range) -> list[Fault]:
+    """What is wrong with each value of a key that moves the surface, if it is one."""
+    faults = list[Fault]()
+    values = entry.values if isinstance(entry, VariedKey) else (entry.low, entry.high)
+    for k, value in enumerate(values if entry.is_pose else ()):
+        surface: Tables = {}
+        put({"surface": surface}, entry.path, value)
+        Section(f"{entry.place}[{k}]: surface", surface, faults).make(check_pose, surface)
+    return faults
+
+
+def case_with(
+    base: Tables,
+    values: Sequence[tuple[Key, Any]],
+    base_dir: str | os.PathLike[str] | None = None,
+) -> tuple[Tables, list[Fault]]:
+    """The base with some values and all defaults filled in, or what is wrong with it.
+
+    Paths are relative to `base_dir`, by default to the working directory.
+    """
+    tables, given = copy.deepcopy(base), base.get("robot", {})
     for entry, value in values:
         if entry.path == ("robot",):
             fault = mounting_fault(value, given)
             if fault is not None:
-                faults.append(Fault("robot", f"{value.get('name', value.get('urdf'))} {fault}"))
+                name = value.get("name", value.get("urdf"))
+                return {}, [Fault("robot", f"{name} {fault}")]
             value = mounted_as(value, given)
         put(tables, entry.path, copy.deepcopy(value))
-    faults = faults or faults_of(tables)
-    return ({} if faults else as_read(case_of(tables).to_tables())), faults
+    make_absolute(tables, base_dir)
+    try:
+        case = case_of(tables)
+    except CaseError as error:
+        return {}, list(error.faults)
+    faults = [*_faults_of_arm(case), *_faults_of_file(case)]
+    return ({} if faults else as_read(case.to_tables())), faults
 
 
-def _as_one(first: Fault, texts: list[dict[str, str]]) -> Fault:
-    """Combinations refused for one cause as one fault, with the values that they have in common."""
-    alike = [
-        f"{label} = {value}"
-        for label, value in texts[0].items()
-        if all(other[label] == value for other in texts)
-    ]
-    more = f" ({len(texts)} combinations with that)" if len(texts) > 1 else ""
-    place = f"vary: with {', '.join(alike)}: " if alike else "vary: "
-    return Fault(f"{place}{first.key}", f"{first.message}{more}", first.place)
+def _refusals(entries: Sequence[Key], checked: Sequence[_Combination]) -> Iterator[Fault]:
+    """What is wrong with combinations, each cause once, with the values that only those have."""
+    causes = defaultdict[tuple[str, str], list[tuple[Fault, Mapping[str, str]]]](list)
+    for one in checked:
+        for fault in one.faults:
+            causes[fault.key, cause_of(fault.message)].append((fault, one.values))
+    for (key, _), found in causes.items():
+        fault, some = found[0]
+        refused = [values for _, values in found]
+        bad = {label: list(dict.fromkeys(values[label] for values in refused)) for label in some}
+        alike = [
+            f"{label} = {listed(texts, MOST_ALIKE)}"
+            for label, texts in bad.items()
+            if any(one.values[label] not in texts for one in checked)
+        ]
+        places = [f"vary: with {', '.join(alike)}: "] if alike else []
+        places += [f"{entry.place}: " for entry in entries if entry.covers(key)]
+        yield fault._replace(key=[*places, "base."][0] + key)
 
 
 def cause_of(message: str) -> str:
@@ -142,26 +187,23 @@ def draw(varied: Variation) -> list[tuple[float, ...]]:
     return [tuple(row) for row in (low + (high - low) * unit).tolist()]
 
 
-def faults_of(tables: Tables) -> list[Fault]:
-    """What is wrong with a case, its arm and its files too."""
+def _faults_of_arm(case: Case) -> list[Fault]:
+    """What loading the arm says."""
     from robots.errors import RobotError
 
     try:
-        case = case_of(tables)
-    except CaseError as error:
-        return list(error.faults)
-    found: list[Fault] = []
-    try:
         arm_of(case)
     except RobotError as error:
-        found += in_robot_table(error)
-    if "file" in case.surface.values:
-        found += _faults_of_file(surface_at_home(case))
-    return found
+        return in_robot_table(error)
+    return []
+
+
+def _faults_of_file(case: Case) -> list[Fault]:
+    """What reading the file of a surface says, if it has one."""
+    return _faults_at_home(surface_at_home(case)) if "file" in case.surface.values else []
 
 
 @lru_cache(maxsize=256)
-def _faults_of_file(surface: str) -> list[Fault]:
-    """What reading the file of a surface says; `surface` is its table as a document."""
-    part = read_surface(parse_toml(surface)["surface"], [])
-    return [] if part is None else faults_of_building(part)
+def _faults_at_home(surface: str) -> list[Fault]:
+    """The same; `surface` is its table, as JSON."""
+    return faults_of_building(part_at_home(surface))

@@ -17,28 +17,23 @@ seed = 0
 ```
 """
 
-import copy
+import json
 import os
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import reduce
-from operator import getitem
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
-from coverable.errors import Fault, listed, shown
+from coverable.errors import Fault, shown
 from feasibility.cases.case import TABLES, load_case, read_document
 from feasibility.cases.table_reader import CaseError, Section
-from feasibility.cases.toml import TomlError, as_read, parse_toml, toml_key
-from feasibility.cases.toml_edits import make_absolute
+from feasibility.cases.toml import TomlError, as_read, parse_toml
 from feasibility.read_files import shown_path
-from feasibility.studies.combinations import cause_of, faults_of, put, tasks_of
+from feasibility.studies.combinations import tasks_of
 from feasibility.studies.pool import Tables
 from feasibility.studies.run import StudyTask
-from feasibility.studies.varied_keys import Range, Variation, VariedKey, read_variation
+from feasibility.studies.varied_keys import read_variation
 
 MOST_TASKS = 1_000_000
-MOST_ALIKE = 3  # values of one key, wrong for the same cause, that are reported one by one
-MOST_INDICES = 8  # of the others
 MOST_CASES = 10_000  # combinations of everything but the surface's pose: each is checked by itself
 
 
@@ -91,10 +86,8 @@ def read_study(
         document = parse_toml(text)
     except TomlError as error:
         raise CaseError(str(error), name) from error
+    document = json.loads(json.dumps(document, default=str))  # no key is a date: each is refused
     faults: list[Fault] = []
-    _no_dates("", document, faults)
-    if faults:  # nothing else of such a document can be written down again
-        raise CaseError(faults, name)
     description = document.get("description", "")
     if not isinstance(description, str):
         faults.append(Fault("description", f"must be a sentence, got {shown(description)}"))
@@ -108,33 +101,18 @@ def read_study(
     varied = read_variation(document["vary"], faults) if "vary" in document else None
     if base is None or varied is None:
         raise CaseError(faults, name)
-    varied = _absolute(varied, base_dir)
+    tasks: tuple[StudyTask, ...] = ()
     if varied.size > MOST_TASKS:
         faults.append(Fault("vary", f"makes {varied.size} tasks, more than {MOST_TASKS}"))
     elif varied.cases > MOST_CASES:
         what = f"makes {varied.cases} cases besides those that differ in the pose"
         faults.append(Fault("vary", f"{what}, more than {MOST_CASES}"))
     else:
-        _check(base, varied, faults)
-    if faults:
-        raise CaseError(faults, name)
-    tasks = tasks_of(base, varied, faults)
+        tasks = tasks_of(base, varied, base_dir, faults)
     if faults:
         raise CaseError(faults, name)
     labels = (*(axis.label for axis in varied.axes), *(span.label for span in varied.ranges))
     return Study(name, description, tasks, labels)
-
-
-def _no_dates(place: str, value: Any, faults: list[Fault]) -> None:
-    """Keep a fault for every date or time: no key of a study is one."""
-    if isinstance(value, Mapping):
-        for key, inner in value.items():
-            _no_dates(f"{place}.{toml_key(key)}" if place else toml_key(key), inner, faults)
-    elif isinstance(value, list):
-        for k, inner in enumerate(value):
-            _no_dates(f"{place}[{k}]", inner, faults)
-    elif not isinstance(value, (str, int, float, bool)):
-        faults.append(Fault(place, f"must be no date or time, got {shown(str(value))}"))
 
 
 def _read_base(
@@ -153,92 +131,15 @@ def _read_base(
             case = load_case(path if is_file else name)
             tables = as_read(case.to_tables())
         except CaseError as error:
-            faults += [fault._replace(key=_join("base.case", fault.key)) for fault in error.faults]
-    own = {}
-    for title in TABLES:
-        if section.has(title) and isinstance(section.table[title], Mapping):
-            own[title] = dict(section.table[title])
-        elif title in section.table:
-            section.fault(title, f"must be a table, got {shown(section.table[title])}")
-    section.refuse_others()
-    make_absolute(own, base_dir)
-    for title, keys in own.items():
+            faults += [
+                fault._replace(key=f"base.case: {fault.key}".rstrip(": ")) for fault in error.faults
+            ]
+    for title, keys in section.take(*TABLES).items():
+        if not isinstance(keys, Mapping):
+            section.fault(title, f"must be a table, got {shown(keys)}")
+            continue
         # Another arm or another kind of surface has other keys: it replaces the whole table.
         fresh = keys.keys() & {"name", "urdf", "kind"}
-        tables[title] = keys if fresh else {**tables.get(title, {}), **keys}
+        tables[title] = {**({} if fresh else tables.get(title, {})), **keys}
+    section.refuse_others()
     return tables
-
-
-def _join(place: str, key: str) -> str:
-    """Where, and the key there."""
-    return f"{place}: {key}" if key else place
-
-
-def _absolute(varied: Variation, base_dir: str | os.PathLike[str] | None) -> Variation:
-    """Make paths among the values independent of the working directory."""
-
-    def values(axis: VariedKey) -> tuple[Any, ...]:
-        made = []
-        for value in axis.values:
-            tables: Any = {}
-            put(tables, axis.path, copy.deepcopy(value))
-            make_absolute(tables, base_dir)
-            made.append(reduce(getitem, axis.path, tables))
-        return tuple(made)
-
-    files = ("urdf", "package_dirs", "file", "pieces", "srdf", "scene", "tool")
-    axes = tuple(
-        replace(axis, values=values(axis))
-        if axis.path == ("robot",) or axis.path[-1] in files
-        else axis
-        for axis in varied.axes
-    )
-    return replace(varied, axes=axes)
-
-
-def _check(base: Tables, varied: Variation, faults: list[Fault]) -> None:
-    """Keep the faults of every value, each tried with the first value of everything else."""
-    entries: list[tuple[VariedKey | Range, tuple[Any, ...]]] = [
-        *((axis, axis.values) for axis in varied.axes),
-        *((span, (span.low, span.high)) for span in varied.ranges),
-    ]
-
-    def tried(changed: int, value: Any) -> list[Fault]:
-        tables = copy.deepcopy(base)
-        for k, (entry, values) in enumerate(entries):
-            put(tables, entry.path, copy.deepcopy(value if k == changed else values[0]))
-        return faults_of(tables)
-
-    known = tried(-1, None)
-    for fault in known:
-        places = [f"{e.place}[0]" for e, _ in entries if _covers(e.path, fault.key)]
-        place = _join(places[0], fault.key) if places else f"base.{fault.key}"
-        faults.append(fault._replace(key=place))
-    for n, (entry, values) in enumerate(entries):
-        alike: dict[tuple[str, str], list[int]] = {}
-        for k, value in enumerate(values[1:], start=1):
-            for fault in tried(n, value):
-                if fault in known:
-                    continue
-                same = alike.setdefault((fault.key, cause_of(fault.message)), [])
-                same.append(k)
-                if len(same) <= MOST_ALIKE:
-                    faults.append(fault._replace(key=_join(f"{entry.place}[{k}]", fault.key)))
-        faults += [
-            Fault(entry.place, _more(key, same[MOST_ALIKE:]))
-            for (key, _), same in alike.items()
-            if len(same) > MOST_ALIKE
-        ]
-
-
-def _more(key: str, indices: Sequence[int]) -> str:
-    """Values that are wrong for the same cause as others that were reported."""
-    which = listed([f"[{k}]" for k in indices], MOST_INDICES)
-    what = "value is" if len(indices) == 1 else "values are"
-    return f"{len(indices)} more {what} no better for {key}: {which}"
-
-
-def _covers(path: Sequence[str | int], key: str) -> bool:
-    """Is what a fault is about at the path, or inside it?"""
-    name = ".".join(step for step in path if isinstance(step, str))
-    return key == name or key.startswith((f"{name}.", f"{name}["))

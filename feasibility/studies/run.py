@@ -49,11 +49,12 @@ class StudyTask:
         if self.fault is None and self.work is evaluate:
             object.__setattr__(self, "fault", outcome_fault)
         package = self.work.__module__.partition(".")[0]
+        files = files_of(self.tables)
         identity = {
             "work": f"{package}.{self.work.__qualname__}",
             "version": version(),
             "tables": self.tables,
-            "files": _digests(self.tables),
+            "files": list(map(_digest, files, stamps(files))),
         }
         text = json.dumps(identity, sort_keys=True, allow_nan=False, separators=(",", ":"))
         object.__setattr__(self, "key", hashlib.sha256(text.encode()).hexdigest())
@@ -167,13 +168,6 @@ def _record(task: StudyTask, reply: Reply) -> Record:
         return Record(task.key, task.parameters, "done", reply.result, reply.seconds)
     result = {"verdict": "undecided", "evidence": "budget", "message": reply.failure}
     return Record(task.key, task.parameters, "failed", result, reply.seconds)
-
-
-def _digests(tables: Mapping[str, Any]) -> list[str]:
-    """What the files of a case hold, in short; those that it names and that are gone left out."""
-    files = files_of(tables)
-    named, further = (list(zip(paths, stamps(paths), strict=True)) for paths in files)
-    return [_digest(*file) for file in (*(file for file in named if file[1]), *further)]
 
 
 @lru_cache(maxsize=4096)

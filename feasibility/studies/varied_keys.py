@@ -11,6 +11,7 @@ from feasibility.cases.robot_table import is_urdf
 from feasibility.cases.table_reader import Section, is_text
 
 POSES = {"position": ("x", "y", "z"), "rpy_deg": ("roll", "pitch", "yaw")}
+OWN = ("robots", "sampler", "count", "seed")
 SAMPLERS = ("sobol",)
 MOST_VALUES = 100_000  # of one key, and samples
 FORMS = "an array of values, { from = a, to = b, steps = n }, or { range = [a, b] } for samples"
@@ -31,6 +32,11 @@ class Key:
     def is_pose(self) -> bool:
         """Does it move the surface alone?"""
         return self.path[0] == "surface" and self.path[1] in POSES
+
+    def covers(self, key: str) -> bool:
+        """Is what a fault is about this key, or inside it?"""
+        name = ".".join(step for step in self.path if isinstance(step, str))
+        return key == name or key.startswith((f"{name}.", f"{name}["))
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +86,7 @@ def read_variation(table: Any, faults: list[Fault]) -> Variation:
     sampler = section.word("sampler", SAMPLERS)
     count = _whole(section, "count", 1, MOST_VALUES)
     seed = _whole(section, "seed", 0)
-    for name, key, value in _flattened(section):
+    for (name, key), value in _flattened(section).items():
         place = f"vary.{name}.{printable(key)}"
         if name == "surface" and key in POSES and isinstance(value, Mapping):
             _read_pose(place, key, value, keys, faults)
@@ -104,44 +110,34 @@ def _whole(section: Section, key: str, low: int, high: int = LARGEST_WHOLE) -> i
     return section.whole(key, written[key], low, high) if written else None
 
 
-def _flattened(section: Section) -> list[tuple[str, str, Any]]:
-    """Table, key and value of everything else: "task.cone_deg" = ..., or [vary.task]."""
-    found: list[tuple[str, str, Any]] = []
-    own = ("robots", "sampler", "count", "seed")
+def _flattened(section: Section) -> dict[tuple[str, str], Any]:
+    """Values of everything else by table and key: "task.cone_deg" = ..., or [vary.task].
+
+    The parts of a pose, which may be written apart, are put together.
+    """
+    found: dict[tuple[str, str], Any] = {}
     for key, value in section.table.items():
-        title, dot, rest = key.partition(".")
-        if key in own:
+        title, *parts = key.split(".", 2)
+        if key in OWN:
             continue
-        if dot and title in TABLES and rest:
-            name, _, inner = rest.partition(".")
-            found.append((title, name, {inner: value} if inner else value))
-        elif key in TABLES and isinstance(value, Mapping):
-            found += [(key, name, inner) for name, inner in value.items()]
-        elif key in TABLES:
+        if title not in TABLES:
+            guess = close(key, OWN)
+            hint = f"did you mean {guess}?" if guess else f"known are {', '.join(OWN)}"
+            what = f"is not known here; {hint} and keys such as task.cone_deg"
+            section.fault(printable(key), what)
+            continue
+        for part in reversed(parts):
+            value = {part: value}
+        if not isinstance(value, Mapping):
             section.fault(key, f"must be a table [vary.{key}], got {shown(value)}")
-        else:
-            guess = close(key, own)
-            hint = f"did you mean {guess}?" if guess else "known are robots, sampler, count, seed"
-            section.fault(
-                printable(key), f"is not known here; {hint} and keys such as task.cone_deg"
-            )
-    return _merged(section, found)
-
-
-def _merged(section: Section, found: list[tuple[str, str, Any]]) -> list[tuple[str, str, Any]]:
-    """Keys that are written more than once: parts of a pose are put together."""
-    result: dict[tuple[str, str], Any] = {}
-    for title, name, value in found:
-        before = result.get((title, name))
-        if before is None:
-            result[title, name] = value
-        elif isinstance(before, Mapping) and isinstance(value, Mapping):
-            for key in sorted(before.keys() & value.keys()):
-                section.fault(f"{title}.{printable(name)}.{printable(key)}", "is written twice")
-            result[title, name] = {**before, **value}
-        else:
-            section.fault(f"{title}.{printable(name)}", "is written twice")
-    return [(*key, value) for key, value in result.items()]
+            continue
+        for name, inner in value.items():
+            before = found.get((title, name), {})
+            apart = isinstance(before, Mapping) and isinstance(inner, Mapping)
+            if (title, name) in found and (not apart or before.keys() & inner.keys()):
+                section.fault(f"{title}.{printable(name)}", "is written twice")
+            found[title, name] = {**before, **inner} if apart else inner
+    return found
 
 
 def _read_robots(section: Section, keys: list[VariedKey | Range]) -> None:
@@ -182,15 +178,7 @@ def _read_pose(
             continue
         part = Key(f"surface.{key}.{name}", f"{place}.{name}", ("surface", key, index))
         inner = [float(value[name])] if is_number(value[name]) else value[name]
-        found: list[VariedKey | Range] = []
-        _read_values(part, inner, found, faults)
-        for entry in found:
-            values = entry.values if isinstance(entry, VariedKey) else ()
-            bad = [value for value in values if not is_number(value)]
-            if bad:
-                faults.append(Fault(part.place, f"must hold finite numbers, got {shown(bad[0])}"))
-            else:
-                keys.append(entry)
+        _read_values(part, inner, keys, faults)
 
 
 def _read_values(key: Key, value: Any, keys: list[VariedKey | Range], faults: list[Fault]) -> None:
