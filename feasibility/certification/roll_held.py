@@ -1,4 +1,4 @@
-"""How a task wants the tool held where its roll is limited: approach and reference direction.
+"""How a task wants the tool held where its roll is limited: its reference direction.
 
 Along a straight piece of a path of places b differs from a straight line by at most d_b
 (`PlacePaths`). The reference e is fixed, or the u direction, which differs from a straight line by
@@ -17,7 +17,6 @@ import numpy as np
 from coverable.arrays import Array
 from feasibility.certification.roll_bounds import (
     ROOT,
-    frame_second_derivatives,
     largest_off,
     off_middle,
     products_of_changes,
@@ -27,9 +26,7 @@ from feasibility.certification.roll_bounds import (
 from feasibility.certification.roll_box_models import Directions, reference_parts
 from feasibility.certification.tool_directions import Held
 from feasibility.roll import Roll, projected
-from robots.kinematics import reference_axes
-from robots.robot import Robot
-from surfaces.places.places import PlacePaths, Places
+from surfaces.places.places import OffsetSurface, PlacePaths, Places
 
 FIRST, LAST = 0, 2  # pieces of a path; in the middle one the place changes sides, on the spot
 
@@ -46,21 +43,15 @@ class ReferencesAlong(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class HeldRoll(Held):
-    """Approach and reference directions over the places of one surface."""
+class HeldRoll:
+    """Reference directions over the places of one surface, and the range of the roll."""
 
+    held: Held
+    offset: OffsetSurface
     reference: Array | None
     """(3,) where it is one direction; else the u direction."""
     roll: Roll
     """Its range."""
-
-    def axes_x(self, robot: Robot, q: Array) -> Array:
-        """See `Held.axes_x`."""
-        return reference_axes(robot, q)
-
-    def second_derivatives(self, robot: Robot, q: Array, axes: Array, x: Array) -> Array:
-        """See `Held.second_derivatives`."""
-        return frame_second_derivatives(robot, q, axes, x)
 
     def _references(self, places: Places, approaches: Array) -> tuple[Array, Array]:
         """t (k, 3) and h (k,) at places."""
@@ -69,7 +60,13 @@ class HeldRoll(Held):
         return projected(np.broadcast_to(self.reference, approaches.shape), approaches)
 
     def rolls(self, x: Array, axes: Array, approaches: Array, places: Places) -> Array:
-        """See `Held.rolls`."""
+        """(k,) rad, how far rolls are off the middle of their range.
+
+        Args:
+            x, axes: (k, 3) of the tool.
+            approaches: (k, 3) at the places.
+            places: k of them.
+        """
         references, _ = self._references(places, approaches)
         return off_middle(roll_vectors(x, axes, references, approaches, self.roll))
 
@@ -81,7 +78,14 @@ class HeldRoll(Held):
         path: PlacePaths,
         approaches: Array,
     ) -> Array:
-        """See `Held.rolls_between`."""
+        """(k,) rad, bounds on that along stretches; inf where the roll may leave its range.
+
+        Args:
+            x, axes: (k, 3) of the tool at both ends.
+            second: (k,) D_x + D_y along the stretch.
+            path: of places.
+            approaches: (k, 4, 3) at its four places.
+        """
         references, second_u, beside = self.references_along(path, approaches)
         share = path.share[..., None]
         ends = x, tuple(map(np.cross, axes, x))
@@ -109,7 +113,7 @@ class HeldRoll(Held):
         """
         ends = [self._references(path.place(k), approaches[:, k])[0] for k in range(4)]
         references = np.stack(ends, axis=1)
-        d_b = self.deviations(path)
+        d_b = self.held.deviations(path)
         db, dt = (np.linalg.norm(np.diff(a, axis=1), axis=2) for a in (approaches, references))
         beside = np.zeros_like(d_b)
         for piece in (FIRST, LAST):
@@ -129,4 +133,4 @@ class HeldRoll(Held):
         start, end = path.place(piece), path.place(piece + 1)
         ends = self.offset.tangents(start), self.offset.tangents(end)
         e = Directions.between(*ends, 0.5 * self.offset.tangent_deviations(start, end))
-        return reference_parts(b, e, self.approach is None and self.offset.square)
+        return reference_parts(b, e, self.held.approach is None and self.offset.square)

@@ -35,7 +35,7 @@ from feasibility.certification.jacobians import Jacobians
 from feasibility.certification.lever_bounds import peaks, second_derivatives
 from feasibility.certification.tool_directions import ROLL_CLOSE, Held
 from feasibility.task import Task
-from robots.kinematics import Kinematics
+from robots.kinematics import Kinematics, reference_axes
 from robots.robot import Robot
 from surfaces.cells import Cells
 from surfaces.places.places import OffsetSurface, Places
@@ -116,7 +116,11 @@ class Judge:
         """
         self.robot, self.task, self.offset, self._curves = robot, task, offset, curves
         self._kinematics = Kinematics(robot)
-        self._held = _held(task, cells, offset)
+        self._held, self._roll = Held.of(task, cells), None
+        if task.roll is not None:  # what judges a roll is loaded where there is a range of it
+            from feasibility.certification.roll_held import HeldRoll
+
+            self._roll = HeldRoll(self._held, offset, task.fixed_reference(cells), task.roll)
 
     def sampled(self, row: Ints, share: Array, q: Array) -> Samples:
         """Samples at configurations q (k, n)."""
@@ -124,7 +128,7 @@ class Judge:
 
     def reference_axes(self, q: Array) -> Array:
         """(k, 3) of configurations (k, n); 0 where the roll is free."""
-        return self._held.axes_x(self.robot, q)
+        return np.zeros((len(q), 3)) if self._roll is None else reference_axes(self.robot, q)
 
     def compared(self, row: Ints, share: Array, points: Array, axes: Array, x: Array) -> Samples:
         """Samples of known tool points, axes and reference axes (k, 3).
@@ -163,7 +167,9 @@ class Judge:
         error = np.linalg.norm(points - target, axis=1)
         chord = np.linalg.norm(axes - approaches, axis=1)
         facets = self.offset.facets(points)
-        roll = self._held.rolls(x, axes, approaches, places)
+        roll = np.zeros(len(x))
+        if self._roll is not None:
+            roll = self._roll.rolls(x, axes, approaches, places)
         return Samples(row, share, points, axes, places, error, chord, facets, x, roll)
 
     def targets(self, places: Places) -> tuple[Array, Array]:
@@ -180,14 +186,16 @@ class Judge:
     def between_rows(self, rows: Array, poses: Jacobians, at: Samples) -> SampledStretches:
         """The stretches from row to row, with the samples `at` every row."""
         steps, slides = np.abs(np.diff(rows, axis=0)), self.robot.prismatic
-        second = [
-            second_derivatives(steps, slides, poses.levers, np.inf),
-            second_derivatives(steps, slides, poses.sines, 1.0),
-            self._held.second_derivatives(self.robot, rows, at.axes, at.x),
-        ]
+        second = np.zeros((len(steps), 3))
+        second[:, 0] = second_derivatives(steps, slides, poses.levers, np.inf)
+        second[:, 1] = second_derivatives(steps, slides, poses.sines, 1.0)
+        if self._roll is not None:
+            from feasibility.certification.roll_bounds import frame_second_derivatives
+
+            second[:, 2] = frame_second_derivatives(self.robot, rows, at.axes, at.x)
         row, none = np.arange(len(steps)), np.zeros(len(steps))
         ends = at.of(row), at.of(row + 1)
-        return SampledStretches(row, none, none + 1.0, *ends, np.stack(second, axis=1))
+        return SampledStretches(row, none, none + 1.0, *ends, second)
 
     def bounds(self, s: SampledStretches) -> Bounds:
         """See the module's text."""
@@ -209,7 +217,9 @@ class Judge:
                 peak = peaks(off[:, :-1], off[:, 1:], width * own) + beside
             found.append(peak.max(axis=1, initial=0.0))
         x, axes = (s.start.x, s.end.x), (s.start.axes, s.end.axes)
-        roll = self._held.rolls_between(x, axes, second[:, 2], path, approaches)
+        roll = np.zeros(len(second))
+        if self._roll is not None:
+            roll = self._roll.rolls_between(x, axes, second[:, 2], path, approaches)
         return Bounds(found[0], found[1], _apart(s), path.known, roll)
 
     def beyond(self, one: Samples | Bounds) -> Array:
@@ -220,17 +230,6 @@ class Judge:
     def within(self, one: Samples | Bounds) -> Mask:
         """(k,) inside tolerance, cone and roll, apart from a mesh's triangles; NaN is not."""
         return np.asarray((self.beyond(one) <= 0.0).all(axis=0))
-
-
-def _held(task: Task, cells: Cells, offset: OffsetSurface) -> Held:
-    """How the tool is to be held; what judges a roll is loaded where there is a range of it."""
-    free = Held.of(task, cells, offset)
-    if task.roll is None:
-        return free
-    from feasibility.certification.roll_held import HeldRoll
-
-    reference = task.fixed_reference(cells)
-    return HeldRoll(free.offset, free.sign, free.approach, reference, task.roll)
 
 
 def beyond(task: Task, error: Array, chord: Array, roll: Array) -> Array:

@@ -117,31 +117,29 @@ def _volumes(vertices: Array, faces: Ints) -> Array:
 def _turned(sides: Ints, agree: Mask, volumes: Array) -> Array | None:
     """(m,) 1 for a triangle to be kept, -1 for one to be turned over; None where nothing helps.
 
+    Each is two nodes of a graph, kept and turned over, and neighbours join those that agree: a
+    piece is two components, mirror images. That of more volume is taken; a piece with one side is
+    one component.
+
     Args:
         sides: (e, 2) the two triangles at each edge.
         agree: (e,) whether they do.
         volumes: (m,) of the triangles as they are.
     """
     from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import breadth_first_order, connected_components
+    from scipy.sparse.csgraph import connected_components
 
-    count = len(volumes)
-    kept = {}
-    for (a, b), same in zip(sides.tolist(), agree.tolist(), strict=True):
-        kept[a, b] = kept[b, a] = 1.0 if same else -1.0
-    graph = coo_array((np.ones(len(sides)), sides.T), shape=(count, count)).tocsr()
-    turns = np.ones(count)
-    pieces, piece = connected_components(graph, directed=False)
-    for k in range(pieces):
-        start = int(np.argmax(piece == k))
-        order, before = breadth_first_order(graph, start, directed=False)
-        for face in order[1:].tolist():
-            turns[face] = turns[before[face]] * kept[int(before[face]), face]
-        if volumes[order] @ turns[order] < 0.0:
-            turns[order] *= -1.0
-    if ((turns[sides[:, 0]] == turns[sides[:, 1]]) != agree).any():
+    (a, b), count = sides.T, len(volumes)
+    other = np.where(agree, b, b + count)
+    first, second = np.append(a, a + count), np.append(other, (other + count) % (2 * count))
+    joined = coo_array((np.ones(len(first)), (first, second)), shape=(2 * count, 2 * count))
+    nodes = connected_components(joined, directed=False)[1]
+    kept, turned = nodes[:count], nodes[count:]
+    if (kept == turned).any():
         return None
-    return turns
+    whole = np.bincount(nodes, np.append(volumes, -volumes))
+    better = np.where(whole[kept] == whole[turned], kept < turned, whole[kept] > whole[turned])
+    return np.where(better, 1.0, -1.0)
 
 
 class MeshBodies:
