@@ -10,11 +10,18 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.errors import ArgumentError
-from feasibility.collisions.outer_bodies import polytopes_of, soup_of, tool_solids
-from feasibility.collisions.overlaps_at_rest import overlapping
+from feasibility.collisions.outer_bodies import (
+    Seat,
+    carried_bodies,
+    furthest,
+    overlapping,
+    polytopes_of,
+    seats_of,
+    soup_of,
+    tool_solids,
+)
 from feasibility.collisions.problem_bodies import Bodies, Pair, Soup
 from feasibility.collisions.scene import ToolShape
-from feasibility.collisions.seats import Seat, carried_bodies, furthest, seats_of
 from feasibility.collisions.settings import Collision
 from feasibility.collisions.words import SURFACE, TOOL
 from robots.robot import Robot

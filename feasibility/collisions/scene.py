@@ -13,14 +13,15 @@ import numpy as np
 from coverable.arrays import Array
 from coverable.errors import ArgumentError, Checks
 from feasibility.collisions.named_pairs import checked_distance
-from feasibility.collisions.scene_triangles import PLACEHOLDER, read_triangles
 from feasibility.collisions.shapes import (
     ORIGIN,
+    PLACEHOLDER,
     HalfSpace,
     Shape,
     checked_placement,
     checked_shape,
     placement_of,
+    read_triangles,
 )
 from feasibility.collisions.words import SURFACE, TOOL
 from robots.shapes.bodies import Triangles

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.arrays import Array
-from feasibility.certification.collisions.inside import winding
+from feasibility.certification.collisions.judged_shapes import winding
 from feasibility.collisions.shapes import HalfSpace
 from robots.shapes.bodies import Triangles
 from robots.shapes.hulls import rims

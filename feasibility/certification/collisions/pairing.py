@@ -28,8 +28,7 @@ from typing import Any
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
-from feasibility.certification.collisions.inside import one_inside_other
-from feasibility.certification.collisions.judged_shapes import COAL, Body
+from feasibility.certification.collisions.judged_shapes import COAL, Body, one_inside_other
 from feasibility.certification.collisions.motion import ArmMotion
 from feasibility.collisions.problem_bodies import Pair
 

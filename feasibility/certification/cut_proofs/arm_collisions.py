@@ -13,7 +13,7 @@ import numpy as np
 
 from coverable.arrays import Array
 from feasibility.certification.collisions.everywhere import Overlapping
-from feasibility.certification.cut_proofs.cut_region import JointRegion
+from feasibility.certification.cut_proofs.box_cutting import JointRegion
 from feasibility.certification.cut_proofs.empty_region import Claim, Emptiness
 from feasibility.certification.cut_proofs.linear_models import Allowed, ArmModel, cell_parts
 from feasibility.certification.cut_proofs.refutation import Refuter

@@ -1,14 +1,20 @@
-"""Boxes cut into smaller ones: nothing of them is lost.
+"""Regions of the joint space that cuts leave, and boxes cut into smaller ones: nothing is lost.
 
 A box is cut along what can move the tool furthest from, or along, the surface: a joint is halved,
 or the part of the surface gives way to its children. The finest parts are halved along x.
+
+*Joints of a turn and more.* Turns of 2 pi leave the tool where it is. So where the question is
+whether a region holds any configuration with the tool on the surface, a joint whose interval holds
+a whole turn may take any one turn of it. That makes joints without limits finite.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from coverable.arrays import Array, Ints
+from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.cut_proofs.linear_models import Boxes, Models, Parts
 
 KEPT = 0.7  # share of a box's width, in its shortest joint, over which contraction is no progress
@@ -95,3 +101,33 @@ def _children(boxes: Boxes, reach: Array, parts: Parts) -> list[tuple[Boxes, Arr
         child = Boxes(low, high, parts.children[boxes.part, side], boxes.claim)
         made.append((child.of(kept), shrunk[kept]))
     return made
+
+
+TURN = 2.0 * np.pi
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class JointRegion:
+    """Joints inside a box."""
+
+    low: Array
+    """(n,) rad or m; -inf where there is no limit."""
+    high: Array
+    """(n,)"""
+
+    def within(self, joint: int, least: float, most: float) -> JointRegion:
+        """The part of it in which a joint lies in least .. most."""
+        low, high = self.low.copy(), self.high.copy()
+        low[joint], high[joint] = max(low[joint], least), min(high[joint], most)
+        return JointRegion(low, high)
+
+    @property
+    def empty(self) -> bool:
+        """Does it hold no configuration?"""
+        return bool((self.low > self.high).any())
+
+    def folded(self, prismatic: Mask) -> JointRegion:
+        """One turn of each joint whose interval holds one."""
+        turns = ~prismatic & (self.high - self.low > TURN)
+        low = np.where(turns, np.where(np.isfinite(self.low), self.low, -np.pi), self.low)
+        return JointRegion(low, np.where(turns, low + TURN, self.high))

@@ -21,14 +21,13 @@ import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.collisions.everywhere import Overlapping
-from feasibility.certification.cut_proofs.box_cutting import smaller
+from feasibility.certification.cut_proofs.box_cutting import JointRegion, smaller
 from feasibility.certification.cut_proofs.box_exclusion import (
     contract,
     directions_for,
     nearest,
     separated,
 )
-from feasibility.certification.cut_proofs.cut_region import JointRegion
 from feasibility.certification.cut_proofs.linear_models import (
     Allowed,
     ArmModel,

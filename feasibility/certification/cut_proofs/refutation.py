@@ -12,7 +12,7 @@ import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.cells_reached import at_targets
-from feasibility.certification.cut_proofs.cut_region import JointRegion
+from feasibility.certification.cut_proofs.box_cutting import JointRegion
 from feasibility.certification.cut_proofs.linear_models import derivatives
 from feasibility.certification.stretches import Judge, Samples
 from feasibility.task import Task
