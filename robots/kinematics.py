@@ -47,9 +47,6 @@ class Kinematics:
         self._rotation = placement.rotation
         self._pose = _pose_view(placement)
         self._twists = self._data.J.T  # (n, 6), one behind another in memory
-        first, second = self._data.oMi[0], self._data.oMi[1]
-        self._rotations = _joints_view(first.rotation, second.rotation, robot.n + 1)
-        self._translations = _joints_view(first.translation, second.translation, robot.n + 1)
 
     def configuration(self, q: ArrayLike) -> Array:
         """Pinocchio's configuration vector (nq,) for n real joint values (rad or m)."""
@@ -105,10 +102,13 @@ class Kinematics:
         rows = self._configurations(q)
         count = self.robot.n + 1
         frames = JointFrames(np.empty((len(rows), count, 3, 3)), np.empty((len(rows), count, 3)))
+        first, second = self._data.oMi[0], self._data.oMi[1]
+        rotations = _joints_view(first.rotation, second.rotation, count)
+        translations = _joints_view(first.translation, second.translation, count)
         for k, row in enumerate(rows):
             pin.forwardKinematics(self._model, self._data, row)
-            frames.rotations[k] = self._rotations
-            frames.points[k] = self._translations
+            frames.rotations[k] = rotations
+            frames.points[k] = translations
         return frames
 
     def twists(self, q: ArrayLike) -> Array:

@@ -61,9 +61,10 @@ def displaced_share(
     nearer = Nearer(robot, pairings, {SURFACE, *(one.name for one in scene)}, pivot)
     along, some, pair = np.zeros(len(pairings[0].low)), 1.0, None
     most_calls = SHARE_OF_CALLS * sum(one.calls for one in pairings)
+    tried = set[tuple[int, int]]()
     for calls in (0.0, most_calls):
         part = some * most[0], some * most[1]
-        shares, least = clear_share(pairings, nearer.by(moved(*part), *part), calls)
+        shares, least = clear_share(pairings, nearer.by(moved(*part), *part), calls, tried)
         along, pair = np.maximum(along, some * shares), least or pair
         some = min(max(LESS, WIDER * float(along.min())), 1.0)
         if least is None or (some == 1.0 and most_calls < FEW):
@@ -71,10 +72,13 @@ def displaced_share(
     return along, pair
 
 
-def clear_share(pairings: Sequence[Pairing], nearer: Array, calls: float) -> Shares:
+def clear_share(
+    pairings: Sequence[Pairing], nearer: Array, calls: float, tried: set[tuple[int, int]]
+) -> Shares:
     """The share of `nearer` (c, m - 1) m that couples may come nearer by, as far as known.
 
-    Of those that allow least planes find out more, or so many calls of coal.
+    Of those that allow least planes find out more, or so many calls of coal; planes at couples
+    and rows that were tried before do not again.
     """
     more, needed = np.maximum(nearer, LEAST), np.array([one.needed for one in pairings])
 
@@ -87,9 +91,11 @@ def clear_share(pairings: Sequence[Pairing], nearer: Array, calls: float) -> Sha
         if shares[k].min() >= least:
             break
         one, wanted = pairings[k], needed[k] + least * more[k]
-        if calls < FEW:
-            one.part_at(int(shares[k].argmin()), wanted)
-        else:
+        at = k, int(shares[k].argmin())
+        if calls < FEW and at not in tried:
+            tried.add(at)
+            one.part_at(at[1], wanted)
+        elif calls >= FEW:
             calls += one.calls
             one.look_closer(wanted, MOST_CALLS * (calls - one.calls))
             calls -= one.calls

@@ -58,7 +58,6 @@ from feasibility.certification.lever_bounds import column_changes, second_deriva
 from feasibility.task import Task
 from feasibility.verdict import Bound, Certificate, PlacementMargin
 from robots.kinematics import Kinematics
-from robots.robot import Robot
 from surfaces.cells import Cells
 
 if TYPE_CHECKING:
@@ -141,9 +140,10 @@ def cut(q: Array, task: Task) -> tuple[Array, Ints]:
     return np.vstack([q[row] + share[:, None] * np.diff(q, axis=0)[row], q[-1:]]), row
 
 
-def balls_along(robot: Robot, task: Task, pivot: Array, q: Array, room: Array) -> Balls:
+def balls_along(kinematics: Kinematics, task: Task, pivot: Array, q: Array, room: Array) -> Balls:
     """What holds along a motion q (k + 1, n), with (k, 2) rad left of cone and roll."""
-    slides, at = robot.prismatic, jacobians(Kinematics(robot), q)
+    robot, at = kinematics.robot, jacobians(kinematics, q)
+    slides = robot.prismatic
     square = at.point @ at.point.transpose(0, 2, 1)
     inverse = at.point.transpose(0, 2, 1) @ np.linalg.inv(square + DAMPED * np.eye(3))  # P
     off = np.linalg.norm(at.point @ inverse - np.eye(3), axis=(1, 2)) / BELOW
@@ -182,7 +182,7 @@ def balls_along(robot: Robot, task: Task, pivot: Array, q: Array, room: Array) -
 
 
 def placement_margin(
-    robot: Robot,
+    kinematics: Kinematics,
     cells: Cells,
     task: Task,
     q: Array,
@@ -192,18 +192,20 @@ def placement_margin(
     """The margin of an accepted motion; see the module. None where bodies were not judged.
 
     Args:
-        robot, cells, task: the case.
+        kinematics, cells, task: the case.
         q: (m, n) the motion, m >= 1, rad or m.
         room: (m, 2) rad, what is left of cone and roll from each row to the next; inf where free.
         pairings: all couples of bodies along the motion, as they were judged.
     """
-    pivot, worst, what = cells.centres.mean(axis=0), 0, ""
+    robot, pivot = kinematics.robot, cells.centres.mean(axis=0)
+    worst, what = 0, ""
     position, angle, bound_by, along = 0.0, 0.0, Bound.START, None
     if robot.start is None:  # else the motion has to begin there, wherever the part stands
         if pairings is None and task.collision is not None and task.collision.checked:
             return None
         rows, row = cut(np.vstack([q, q[-1:]]), task)  # the last row stands for itself
-        balls, row = balls_along(robot, task, pivot, rows, room[row]), np.minimum(row, len(q) - 2)
+        balls = balls_along(kinematics, task, pivot, rows, room[row])
+        row = np.minimum(row, len(q) - 2)
         first, reach = np.flatnonzero(np.diff(row, prepend=-2)), balls.triangle
         along, least = np.minimum.reduceat(reach[:, 0], first), int(reach[:, 0].argmin())
         worst, bound = max(int(row[least]), 0), int(balls.allowed(0.0)[least].argmin())
@@ -221,7 +223,7 @@ def placement_margin(
             position, angle = share * position, share * angle
             if pair:
                 worst, bound_by, what = int(along.argmin()), Bound.CLEARANCE, " and ".join(pair)
-    point = Kinematics(robot).tools(q[[worst]])[0]
+    point = kinematics.tool(q[worst])[0]
     off = np.linalg.norm(task.targets(cells).points - point, axis=1)
     cell, middle = cells.unravel(int(off.argmin())), tuple(pivot.tolist())
     return PlacementMargin(position, angle, middle, bound_by, cell, what, along)

@@ -21,7 +21,6 @@ from feasibility.certification.stretches import Judge, Samples
 from feasibility.certification.tool_along import Along, tool_along
 from feasibility.task import Task
 from feasibility.verdict import Walk
-from robots.kinematics import Kinematics
 from surfaces.cells import Cells
 from surfaces.places.offset_surfaces import offset_surface
 from surfaces.places.places import OffsetSurface
@@ -111,7 +110,7 @@ def tool_at_work(
             reached.row[new] = some.row[new] + part[0]
             reached.chord[new], reached.roll[new] = some.chord[new], some.roll[new]
     lifted = np.flatnonzero(~(working[:-1] & working[1:])).astype(float)
-    kinematics, tolerance = Kinematics(judge.robot), judge.task.effective_tolerance
+    kinematics, tolerance = judge.kinematics, judge.task.effective_tolerance
     faults += lifted_faults(surface.wall, rows, (lifted, lifted + 1.0), kinematics, tolerance)
     none = judge.sampled(np.zeros(0, dtype=np.int64), np.zeros(0), rows[:0])
     return Along(most, faults, Samples.join(none, *samples), room), reached
@@ -147,7 +146,7 @@ def _with_what_follows(
     over = Judge(judge.robot, task, offset_surface(surface.under, judge.offset.height), cells)
     followed, most, room = surface.followed, found.most, found.room
     at = off_surface(followed, found.samples)
-    kinematics, tolerance = Kinematics(judge.robot), judge.task.effective_tolerance
+    kinematics, tolerance = judge.kinematics, judge.task.effective_tolerance
     faults = lifted_faults(surface.under.wall, rows, at, kinematics, tolerance)
     faults += too_vague(judge.task, surface.under)
     for part in followed_parts(judge, followed, rows, found.samples):

@@ -115,7 +115,7 @@ class Judge:
         which curve the motion is on behind each row.
         """
         self.robot, self.task, self.offset, self._curves = robot, task, offset, curves
-        self._kinematics = Kinematics(robot)
+        self.kinematics = Kinematics(robot)
         self._held, self._roll = Held.of(task, cells), None
         if task.roll is not None:  # what judges a roll is loaded where there is a range of it
             from feasibility.certification.roll_held import HeldRoll
@@ -124,7 +124,7 @@ class Judge:
 
     def sampled(self, row: Ints, share: Array, q: Array) -> Samples:
         """Samples at configurations q (k, n)."""
-        return self.compared(row, share, *self._kinematics.tools(q), self.reference_axes(q))
+        return self.compared(row, share, *self.kinematics.tools(q), self.reference_axes(q))
 
     def reference_axes(self, q: Array) -> Array:
         """(k, 3) of configurations (k, n); 0 where the roll is free."""

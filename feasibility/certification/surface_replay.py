@@ -113,7 +113,7 @@ def replay_over_surface(
         len(rows), error, angle_of(chord), margin, max_roll=None if task.roll is None else roll
     )
     if len(cells) and not faults:
-        margin_of = partial(placement_margin, robot, cells, task, rows, found.room)
+        margin_of = partial(placement_margin, judge.kinematics, cells, task, rows, found.room)
         certificate = replace(certificate, margin=cache(margin_of))  # found when it is asked for
     if bodies is not None:
         certificate, hit = _among(bodies, robot, rows, certificate)

@@ -19,7 +19,6 @@ from feasibility.certification.faults import MotionFault
 from feasibility.certification.jacobians import jacobians
 from feasibility.certification.stretches import Bounds, Judge, SampledStretches, Samples
 from feasibility.task import Task
-from robots.kinematics import Kinematics
 from surfaces.cells import Cells
 
 LEVELS = 26  # halvings of a segment between two rows
@@ -44,7 +43,7 @@ def tool_along(
     judge: Judge, rows: Array, cells: Cells | None = None, marks: Ints | None = None
 ) -> Along:
     """Judge tool point, axis and roll at all rows and between them."""
-    poses, x = jacobians(Kinematics(judge.robot), rows), judge.reference_axes(rows)
+    poses, x = jacobians(judge.kinematics, rows), judge.reference_axes(rows)
     count = np.arange(len(rows))
     at_rows = judge.compared(count, np.zeros(len(rows)), poses.points, poses.axes, x)
     if marks is not None and cells is not None:

@@ -55,7 +55,7 @@ def margin_and_balls(robot, cells, task, walk):
     pivot, (*_, q, room) = cells.centres.mean(axis=0), getattr(kept, "func", kept).__wrapped__.args
     np.testing.assert_allclose(margin.pivot, pivot, atol=1e-12)
     rows, row = lemma.cut(np.vstack([q, q[-1:]]), task)
-    balls = lemma.balls_along(robot, task, pivot, rows, room[row])
+    balls = lemma.balls_along(lemma.Kinematics(robot), task, pivot, rows, room[row])
     pairings = getattr(kept, "args", ((),))[0]
     return margin, SimpleNamespace(balls=balls, rows=rows, row=row, pairings=pairings)
 

@@ -299,10 +299,11 @@ class Pairing:
         length = np.linalg.norm(n, axis=1, keepdims=True)
         n = np.where(length > 0.0, n / np.where(length > 0.0, length, 1.0), [0.0, 0.0, 1.0])
         n = self.a.axis[None] if self.a.half_space else n
-        lows = [self._low(n, *self._placed(times)) for times in ends.T]
+        both = n if len(n) == 1 else np.concatenate([n, n])  # at both ends at once
+        lows = self._low(both, *self._placed(ends.T.ravel())).reshape(2, -1)
         row = ends[:, 0].astype(np.intp)
         bent = self._delta[row] * (ends[:, 1] - ends[:, 0]) ** 2
-        least = np.minimum(*lows) - self.a.highest(n) - bent - self._off[row]
+        least = lows.min(axis=0) - self.a.highest(n) - bent - self._off[row]
         return np.asarray(least - self.a.deviation - self.b.deviation - ROUNDING)
 
     def _placed(self, times: Array) -> tuple[Array, Array]:

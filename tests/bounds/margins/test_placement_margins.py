@@ -67,7 +67,7 @@ def bent(levers, steps, slides, moves, change):
 def ball_along(robot, q, least=None, cone=1e-6):
     """The bounds of a stretch between two configurations (2, n)."""
     task = Task(0.0, 30.0, min_manipulability=least)
-    return lemma.balls_along(robot, task, np.ones(3), q, np.full((1, 2), cone))
+    return lemma.balls_along(Kinematics(robot), task, np.ones(3), q, np.full((1, 2), cone))
 
 
 def test_the_furthest_place_of_a_stretch_counts():
@@ -259,14 +259,14 @@ def test_the_last_row_counts_for_the_last_segment():
     """And a cell's own approach direction where its target is passed."""
     q, room = PLATE.centres[[0, 1, 3, 2]], np.full((4, 2), 0.5)
     room[3, 0] = 0.01
-    margin = lemma.placement_margin(slides(), PLATE, Task(0.0, 30.0), q, room)
+    margin = lemma.placement_margin(Kinematics(slides()), PLATE, Task(0.0, 30.0), q, room)
     assert margin.angle == pytest.approx(0.01, rel=1e-6)
     for row, height in ((3, 0.996), (1, -0.998)):  # [m], of 1; any other one does, too
         q[row, 2] = height
-        margin = lemma.placement_margin(slides(), PLATE, Task(0.0, 30.0), q, room)
+        margin = lemma.placement_margin(Kinematics(slides()), PLATE, Task(0.0, 30.0), q, room)
         assert margin.position == pytest.approx(1.0 - abs(height), rel=1e-6)
     task = Task(0.0, 30.0, collision=Collision())  # and bodies were not judged
-    assert lemma.placement_margin(slides(), PLATE, task, q, room) is None
+    assert lemma.placement_margin(Kinematics(slides()), PLATE, task, q, room) is None
 
 
 @pytest.mark.sampled
@@ -395,7 +395,7 @@ def test_a_share_of_what_bodies_may_move_leaves_them_clear(seed):
     scene = plain.scene_of(robot, cells, task)
     more = {one.names: rng.uniform(0.0, 0.05) * rng.random(len(walk.q) - 1) for one in pairings}
     nearer = np.stack([more[one.names] for one in pairings])
-    along, _ = displaced_bodies.clear_share(pairings, nearer, rng.choice([0, 10, 100, 1000]))
+    along, _ = displaced_bodies.clear_share(pairings, nearer, rng.choice([0, 10, 100, 1000]), set())
     assert ((along >= 0.0) & (along <= 1.0)).all()
     needed = np.array([pair[2] for pair in scene.pairs])
     for _ in range(60 if samples.EVERYTHING else 20):
