@@ -37,18 +37,6 @@ def notify(notice: str = NOTICE) -> None:
 
 
 @contextmanager
-def slow_notice() -> Iterator[None]:
-    """Say something on stderr if the block takes longer than `PATIENCE` seconds."""
-    timer = threading.Timer(PATIENCE, notify, [WAITING])
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
-
-
-@contextmanager
 def compiling_notice(
     patience: float | None = None, say: Callable[[], None] | None = None, notice: str = NOTICE
 ) -> Iterator[None]:

@@ -10,7 +10,7 @@ from functools import partial
 from distributed import Client, Future, KilledWorker, wait
 from distributed.comm import get_address_host
 
-from feasibility.notices import slow_notice
+from feasibility.notices import WAITING, notify
 from feasibility.roadmap.warmup import warm_up
 from feasibility.studies.pool import (
     LOOK,
@@ -110,7 +110,8 @@ class DaskWorkers:
     def _load(self) -> None:
         """Have one worker of each machine load the kernels, so that the others need not compile."""
         machines = {get_address_host(name): name for name in self._client.nthreads()}
-        with slow_notice(), self._client.as_current():
+        notify(WAITING)
+        with self._client.as_current():
             # Another one will do, should the one that is named die meanwhile.
             submit = partial(self._client.submit, pure=False, allow_other_workers=True)
             wait([submit(warm_up, True, workers=[name]) for name in machines.values()])

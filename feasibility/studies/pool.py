@@ -4,6 +4,7 @@ Each of these has a pipe of its own, so that what dies with one of them is one t
 again. They are started afresh (spawn): a forked one would share locks of Pinocchio and numba.
 """
 
+import itertools
 import json
 import multiprocessing
 import os
@@ -22,13 +23,13 @@ from typing import Any, Protocol
 
 from coverable.errors import CoverableError, counted
 from feasibility.clock import OutOfTime
-from feasibility.notices import compiling_notice, notify
+from feasibility.notices import compiling_notice
 from feasibility.roadmap.warmup import warm_up
 
 LOOK = 0.1  # [s] between two calls of `receive`
 PATIENCE = 3  # workers that may die with a task before it is given up
 STARTS = 3  # workers that may die before they are ready, one after the other
-COMPILING, READY = b"!", b"."  # from a worker, ahead of its first reply
+READY = b"."  # from a worker, ahead of its first reply
 
 Tables = dict[str, Any]
 Work = Callable[[Tables], Mapping[str, Any]]
@@ -140,12 +141,9 @@ class Processes:
         """None is started yet; see `open_workers`."""
         self.width, self._warm = count, warm
         self._context = multiprocessing.get_context("spawn")
-        self._all = dict[Connection, BaseProcess]()
-        self._new = list[Connection]()
-        """Started, and not yet told to load the kernels."""
-        self._loading, self._idle = set[Connection](), list[Connection]()
-        self._busy = dict[Connection, int]()
-        self._loaded = not warm
+        self._all, self._busy = dict[Connection, BaseProcess](), dict[Connection, int]()
+        self._ready = set[Connection]()
+        """Those that have loaded what they need."""
         self._lost = 0  # before they were ready, since anything was done
         self._waiting, self._deaths = deque[int](), Counter[int]()
 
@@ -153,45 +151,37 @@ class Processes:
         """See `Workers`."""
         self._waiting, self._deaths = deque(range(len(tables))), Counter()
         try:
+            self._start()
+            if self._warm and tables:  # compiled here, if need be: the others find that
+                with compiling_notice():
+                    warm_up(True)
             while self._waiting or self._busy:
-                self._occupy(work, tables)
-                replies = list[Reply]()
-                for pipe in wait(list(self._all), LOOK):
-                    replies += self._heard(pipe)  # type: ignore[arg-type]
-                receive(replies)
+                self._start()
+                for pipe in list(self._all.keys() - self._busy.keys())[: len(self._waiting)]:
+                    self._busy[pipe] = self._waiting.popleft()
+                    self._send(pipe, (work, tables[self._busy[pipe]]))
+                heard = (self._heard(pipe) for pipe in wait(list(self._all), LOOK))  # type: ignore[arg-type]
+                receive(list(itertools.chain.from_iterable(heard)))
         finally:
             for pipe in list(self._busy):  # whatever ended the work: nobody asks for it any more
                 self._end(pipe)
 
-    def _occupy(self, work: Work, tables: Sequence[Tables]) -> None:
-        """Have as many processes as are needed, and have them do something."""
-        while len(self._all) < min(self.width, len(self._waiting) + len(self._busy)):
-            self._new.append(self._start())
-        # The first one to load may have to compile; the others find what it has compiled.
-        while self._new and (self._loaded or not self._loading):
-            self._loading.add(pipe := self._new.pop())
-            self._send(pipe, self._warm)
-        while self._waiting and self._idle:
-            pipe, index = self._idle.pop(), self._waiting.popleft()
-            self._busy[pipe] = index
-            self._send(pipe, (work, tables[index]))
+    def _start(self) -> None:
+        """Have as many processes as are needed.
 
-    def _start(self) -> Connection:
-        """The pipe to a new process.
-
-        It must never see a Ctrl-C, which a terminal sends to all: it takes over what is blocked.
+        They must never see a Ctrl-C, which a terminal sends to all: they take over what is blocked.
         """
-        ours, theirs = self._context.Pipe()
-        process = self._context.Process(target=_serve, args=[theirs], daemon=True)
-        resource_tracker.ensure_running()  # which would unblock it, in the first process's start
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        try:
-            process.start()
-            self._all[ours] = process
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        theirs.close()  # so that its end shows
-        return ours
+        while len(self._all) < min(self.width, len(self._waiting) + len(self._busy)):
+            ours, theirs = self._context.Pipe()
+            process = self._context.Process(target=_serve, args=[theirs, self._warm], daemon=True)
+            resource_tracker.ensure_running()  # which would unblock it, in the first one's start
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+            try:
+                process.start()
+                self._all[ours] = process
+            finally:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
+            theirs.close()  # so that its end shows
 
     def _send(self, pipe: Connection, what: Any) -> None:
         """Tell a process what to do; that it died meanwhile will show.
@@ -216,23 +206,17 @@ class Processes:
             said = pipe.recv()
         except (EOFError, OSError):
             return self._died(pipe)
-        if said == COMPILING:
-            notify()
-        elif said == READY:
-            self._loading.discard(pipe)
-            self._idle.append(pipe)
-            self._loaded, self._lost = True, 0
-        elif isinstance(said, str):
+        self._lost = 0
+        if said == READY:
+            self._ready.add(pipe)
+            return []
+        if isinstance(said, str):
             raise untold(said)
-        else:
-            self._idle.append(pipe)
-            self._lost = 0
-            return [Reply.of(self._busy.pop(pipe), said)]
-        return []
+        return [Reply.of(self._busy.pop(pipe), said)]
 
     def _died(self, pipe: Connection) -> list[Reply]:
         """A process is gone: its task is done again, unless it has cost too many already."""
-        starting, index = pipe in self._loading or pipe in self._new, self._busy.get(pipe)
+        starting, index = pipe not in self._ready, self._busy.get(pipe)
         self._end(pipe)
         self._lost += starting
         if self._lost >= STARTS:
@@ -242,7 +226,7 @@ class Processes:
             )
         if index is None:
             return []
-        self._deaths[index] += 1
+        self._deaths[index] += not starting
         if self._deaths[index] < PATIENCE:
             self._waiting.append(index)
             return []
@@ -256,10 +240,7 @@ class Processes:
         process.join()
         pipe.close()
         self._busy.pop(pipe, None)
-        self._loading.discard(pipe)
-        for some in (self._new, self._idle):
-            if pipe in some:
-                some.remove(pipe)
+        self._ready.discard(pipe)
 
     def close(self) -> None:
         """End all processes."""
@@ -269,8 +250,8 @@ class Processes:
             self._end(pipe)
 
 
-def _serve(pipe: Connection) -> None:
-    """In a new process: load the kernels when told to, then do one task after the other."""
+def _serve(pipe: Connection, warm: bool) -> None:
+    """In a new process: do one task after the other, with the kernels loaded before the first."""
     parent = multiprocessing.parent_process()
 
     def watch() -> None:
@@ -279,15 +260,16 @@ def _serve(pipe: Connection) -> None:
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
+    done: Any = None
     with suppress(EOFError, OSError):
-        if pipe.recv():
-            with compiling_notice(say=lambda: pipe.send(COMPILING)):
-                warm_up(True)
-        pipe.send(READY)
         while True:
             try:
                 work, tables = pipe.recv()
-                done: Any = run_one(work, tables)
+                if done is None:
+                    if warm:
+                        warm_up(True)
+                    pipe.send(READY)
+                done = run_one(work, tables)
             except (EOFError, OSError):
                 raise
             except Exception as error:  # noqa: BLE001 - work that is unknown here
