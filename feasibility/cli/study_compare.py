@@ -21,7 +21,7 @@ from feasibility.read_files import shown_path
 
 if TYPE_CHECKING:
     from feasibility.studies.file import Study
-    from feasibility.studies.run import Row
+    from feasibility.studies.store import Row
     from feasibility.viewer.viewer import View
 
 

@@ -16,7 +16,8 @@ from feasibility.reports.pages import COLOURS, PLAIN, bar, framed, page, table
 from feasibility.reports.study_plot import are_numbers, charts, short, worded
 from feasibility.reports.text_and_tables import aligned, bodiless, percent
 from feasibility.studies.file import Study
-from feasibility.studies.run import Row, StudyTask
+from feasibility.studies.run import StudyTask
+from feasibility.studies.store import Row
 from feasibility.studies.study_outcome import merit
 from feasibility.version import version
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from feasibility.studies.run import Row
+    from feasibility.studies.store import Row
 
 MAPS = 6  # at most
 PANELS = 4  # values of a key that is no number, each with a map of its own

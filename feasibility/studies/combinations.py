@@ -79,7 +79,7 @@ def tasks_of(
         name = json.dumps([value for _, value in others], sort_keys=True)
         if name not in checked:
             texts = {entry.label: shown(parameters[entry.label]) for entry, _ in others}
-            checked[name] = _Combination(texts, *case_with(base, others, base_dir))
+            checked[name] = _Combination(texts, *_case_with(base, others, base_dir))
         case = checked[name]
         if case.faults or wrong:
             continue
@@ -104,10 +104,8 @@ def _wrong_poses(entry: VariedKey | Range) -> list[Fault]:
     return faults
 
 
-def case_with(
-    base: Tables,
-    values: Sequence[tuple[Key, Any]],
-    base_dir: str | os.PathLike[str] | None = None,
+def _case_with(
+    base: Tables, values: Sequence[tuple[Key, Any]], base_dir: str | os.PathLike[str] | None
 ) -> tuple[Tables, list[Fault]]:
     """The base with some values and all defaults filled in, or what is wrong with it.
 
@@ -146,7 +144,7 @@ def _refusals(entries: Sequence[Key], checked: Sequence[_Combination]) -> Iterat
             for label, texts in bad.items()
             if any(one.values[label] not in texts for one in checked)
         ]
-        places = [f"vary: with {', '.join(alike)}: "] if alike else []
+        places = [f"with {', '.join(alike)}: "] if alike else []
         places += [f"{entry.place}: " for entry in entries if entry.covers(key)]
         yield fault._replace(key=[*places, "base."][0] + key)
 

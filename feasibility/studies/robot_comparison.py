@@ -1,7 +1,7 @@
 """One case for several arms: a study over robots."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING
 
 from coverable.errors import Fault
@@ -12,16 +12,14 @@ from feasibility.cases.table_reader import CaseError, absolute
 from feasibility.cases.toml import as_read
 from feasibility.search_settings import Progress
 from feasibility.studies.built_cases import arm_of, case_of
-from feasibility.studies.combinations import case_with
-from feasibility.studies.pool import Tables, Workers
+from feasibility.studies.combinations import tasks_of
+from feasibility.studies.pool import Workers
 from feasibility.studies.run import StudyTask, run_tasks
 from feasibility.studies.study_outcome import finite, merit
-from feasibility.studies.varied_keys import Key
+from feasibility.studies.varied_keys import Variation, VariedKey
 
 if TYPE_CHECKING:
     from feasibility.studies.store import Store
-
-ROBOT = Key("robot", "--robots", ("robot",))
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,10 +110,11 @@ def compare(
         >>> [(arm.robot, arm.verdict) for arm in found.ranked]
         [('puma560', 'feasible'), ('ur5', 'infeasible')]
     """
-    tasks = []
-    for name, tables in zip(robots, _tables_of(case, robots), strict=True):
-        tables["wanted"] = {"patches": divide, "critical": critical}
-        tasks.append(StudyTask(tables, {"robot": name}))
+    wanted = {"wanted": {"patches": divide, "critical": critical}}
+    tasks = [
+        replace(task, tables={**task.tables, **wanted}, parameters={"robot": name})
+        for task, name in zip(_tasks_of(case, robots), robots, strict=True)
+    ]
     rows = run_tasks(tasks, workers, store, progress)
     arms = []
     for task, row in zip(tasks, rows, strict=True):
@@ -130,29 +129,28 @@ def compare(
     return Comparison(case.name, tuple(arms), divide, critical, case.collision)
 
 
-def _tables_of(case: Case, robots: Sequence[str]) -> list[Tables]:
+def _tasks_of(case: Case, robots: Sequence[str]) -> tuple[StudyTask, ...]:
     """The case with each of the arms, checked.
 
     Raises:
         CaseError: see `compare`.
     """
-    base = {title: as_read(table) for title, table in case.to_tables().items()}
+    base = as_read(case.to_tables())
     if case.search.method != "complete":
         kept = ("seed", "time_limit", "evaluations")
         base["search"] = {key: base["search"][key] for key in kept if key in base["search"]}
-    faults, made = [], []
+    tables = [{"urdf": absolute(name)} if is_urdf(name) else {"name": name} for name in robots]
+    own = base["robot"]
+    arms = tuple(own if table.items() <= own.items() else table for table in tables)
+    faults = [
+        Fault(f"--robots[{k}]", f"{name!r} is named twice")
+        for k, name in enumerate(robots)
+        if name in robots[:k]
+    ]
     if not robots:
         faults.append(Fault("--robots", "is empty; expected such as ur5,panda,my_arm.urdf"))
-    for k, name in enumerate(robots):
-        place = f"--robots[{k}]"
-        if name in robots[:k]:
-            faults.append(Fault(place, f"{name!r} is named twice"))
-            continue
-        given = {"urdf": absolute(name)} if is_urdf(name) else {"name": name}
-        own = given.items() <= base["robot"].items()
-        tables, found = case_with(base, [] if own else [(ROBOT, given)])
-        made.append(tables)
-        faults += [fault._replace(key=f"{place}: {fault.key}") for fault in found]
+    varied = VariedKey("robot", "--robots", ("robot",), arms)
+    tasks = tasks_of(base, Variation((varied,), (), 0, 0), None, faults)
     if faults:
         raise CaseError(faults, case.name)
-    return made
+    return tasks

@@ -3,8 +3,8 @@
 import hashlib
 import json
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from typing import Any
 
@@ -12,7 +12,7 @@ from coverable.files import FileFault, open_regular, stamps
 from feasibility.search_settings import Progress
 from feasibility.studies.built_cases import files_of
 from feasibility.studies.pool import Reply, Tables, Work, Workers
-from feasibility.studies.store import Record, Status, Store
+from feasibility.studies.store import Row, Store
 from feasibility.studies.stored import outcome_fault
 from feasibility.studies.study_outcome import evaluate
 from feasibility.version import version
@@ -38,16 +38,11 @@ class StudyTask:
     """What varies in the study, for its table: JSON values."""
     work: Work = evaluate
     """What is done with the tables, in a worker: a function of a module, returning JSON values."""
-    fault: Callable[[Mapping[str, Any]], str] | None = None
-    """What is wrong with a result that a store holds, in words; empty where nothing is. Verdicts
-    are always checked, what other works return only where this is given."""
     key: str = field(init=False)
     """The same for the same work on the same tables, files and version of the program."""
 
     def __post_init__(self) -> None:
         """Work out the key: no module's name is in it, so that modules may move."""
-        if self.fault is None and self.work is evaluate:
-            object.__setattr__(self, "fault", outcome_fault)
         package = self.work.__module__.partition(".")[0]
         files = files_of(self.tables)
         identity = {
@@ -58,18 +53,6 @@ class StudyTask:
         }
         text = json.dumps(identity, sort_keys=True, allow_nan=False, separators=(",", ":"))
         object.__setattr__(self, "key", hashlib.sha256(text.encode()).hexdigest())
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Row:
-    """What came of one task."""
-
-    parameters: Mapping[str, Any]
-    status: Status
-    result: Mapping[str, Any]
-    """What the work returned; where it failed, an undecided verdict whose message says why."""
-    seconds: float
-    """Time that the work took."""
 
 
 def run_tasks(
@@ -108,66 +91,49 @@ def run_tasks(
     """
     found = {} if store is None else _finished(store, tasks)
     missing = list({task.key: task for task in tasks if task.key not in found}.values())
-    keeper = _Keeper(store, found, progress, total=len(found) + len(missing))
+    total, fresh, written = len(found) + len(missing), list[Row](), 0.0
+
+    def flush() -> None:
+        nonlocal written
+        written, rows = time.monotonic(), fresh[:]
+        fresh.clear()
+        if store is not None and rows:
+            store.keep(rows)
+
+    def receive(part: Sequence[StudyTask], replies: Sequence[Reply]) -> None:
+        for reply in replies:
+            fresh.append(_row(part[reply.index], reply))
+            found[fresh[-1].key] = fresh[-1]
+        if fresh and time.monotonic() - written > KEEP_S:
+            flush()
+        if progress is not None:
+            progress(len(found), total, "")
+
     try:
         for work in dict.fromkeys(task.work for task in missing):
             part = [task for task in missing if task.work is work]
-            receive = partial(keeper.receive, part)
-            workers.run(work, [task.tables for task in part], receive)
+            workers.run(work, [task.tables for task in part], partial(receive, part))
     finally:
-        keeper.flush()
-    rows = [(task, found[task.key]) for task in tasks]
-    return tuple(Row(task.parameters, r.status, r.result, r.seconds) for task, r in rows)
+        flush()
+    return tuple(replace(found[task.key], parameters=task.parameters) for task in tasks)
 
 
-def _finished(store: Store, tasks: Sequence[StudyTask]) -> dict[str, Record]:
-    """The records of the tasks that were done before, each checked."""
+def _finished(store: Store, tasks: Sequence[StudyTask]) -> dict[str, Row]:
+    """The rows of the tasks that were done before, each checked."""
     kept = store.find(task.key for task in tasks)
-    found = {key: record for key, record in kept.items() if record.status == "done"}
-    for task in {task.key: task for task in tasks if task.key in found}.values():
-        fault = task.fault(found[task.key].result) if task.fault else ""
-        if fault:
-            raise store.damaged(task.key, fault)
+    found = {key: row for key, row in kept.items() if row.status == "done"}
+    for key in {task.key: None for task in tasks if task.key in found and task.work is evaluate}:
+        if fault := outcome_fault(found[key].result):
+            raise store.damaged(key, fault)
     return found
 
 
-@dataclass(slots=True)
-class _Keeper:
-    """Collects replies in `found`, and writes them to the store some times a second."""
-
-    store: Store | None
-    found: dict[str, Record]
-    progress: Progress | None
-    total: int
-    waiting: list[Record] = field(default_factory=list)
-    written: float = 0.0
-
-    def receive(self, tasks: Sequence[StudyTask], replies: list[Reply]) -> None:
-        """Take in replies to some of `tasks`."""
-        for reply in replies:
-            record = _record(tasks[reply.index], reply)
-            self.waiting.append(record)
-            self.found[record.key] = record
-        now = time.monotonic()
-        if self.waiting and now - self.written > KEEP_S:
-            self.flush()
-        if self.progress is not None:
-            self.progress(len(self.found), self.total, "")
-
-    def flush(self) -> None:
-        """Write what has not been written."""
-        waiting, self.waiting = self.waiting, []
-        self.written = time.monotonic()
-        if self.store is not None and waiting:
-            self.store.keep(waiting)
-
-
-def _record(task: StudyTask, reply: Reply) -> Record:
+def _row(task: StudyTask, reply: Reply) -> Row:
     """A reply as the store keeps it."""
     if reply.result is not None:
-        return Record(task.key, task.parameters, "done", reply.result, reply.seconds)
+        return Row(task.parameters, "done", reply.result, reply.seconds, task.key)
     result = {"verdict": "undecided", "evidence": "budget", "message": reply.failure}
-    return Record(task.key, task.parameters, "failed", result, reply.seconds)
+    return Row(task.parameters, "failed", result, reply.seconds, task.key)
 
 
 @lru_cache(maxsize=4096)

@@ -13,6 +13,7 @@ import stat
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal
 
 from coverable.files import FileFault, open_regular
@@ -56,28 +57,29 @@ class StoreError(FileError):
     """A store that cannot be read or written: which file, why, and what would do."""
 
 
-@dataclass(frozen=True, slots=True)
-class Record:
-    """One task that was worked on."""
+@dataclass(frozen=True, eq=False, slots=True)
+class Row:
+    """What came of one task."""
 
-    key: str
-    """Says what the task is; see `StudyTask`."""
     parameters: Mapping[str, Any]
-    """What varies in the study, for people who read the file."""
+    """What varies in the study."""
     status: Status
     """'failed' where no worker came to an end with it; it is tried again next time."""
     result: Mapping[str, Any]
-    """JSON values."""
+    """What the work returned, JSON values; where it failed, an undecided verdict whose message says
+    why."""
     seconds: float
-    """Time that the task took."""
+    """Time that the work took."""
+    key: str = ""
+    """Says what the task is; see `StudyTask`."""
 
 
 class Store(AbstractContextManager["Store"]):
-    """Records by key in one file. Use it as a context, so that it is closed.
+    """Rows by key in one file. Use it as a context, so that it is closed.
 
     Example:
         >>> with Store(":memory:") as store:
-        ...     store.keep([Record("k1", {"cone": 10}, "done", {"verdict": "feasible"}, 0.1)])
+        ...     store.keep([Row({"cone": 10}, "done", {"verdict": "feasible"}, 0.1, "k1")])
         ...     store.find(["k1", "k2"])["k1"].result
         {'verdict': 'feasible'}
     """
@@ -101,7 +103,7 @@ class Store(AbstractContextManager["Store"]):
             self._base = sqlite3.connect(
                 self.path if in_memory else os.path.abspath(self.path),
                 timeout=patience,
-                isolation_level=None,
+                isolation_level="IMMEDIATE",
             )
         try:
             with self._reported():
@@ -132,7 +134,8 @@ class Store(AbstractContextManager["Store"]):
     def _prepare(self) -> None:
         """Make the table, or see that it is there, undamaged and alone."""
         self._base.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_ROW)
-        made = self._made()
+        rows = self._base.execute("SELECT sql FROM sqlite_master WHERE sql IS NOT NULL")
+        made = [str(sql) for (sql,) in rows]
         if made not in ([], [TABLE]):
             raise self._refused(FOREIGN)
         (state,) = self._base.execute("PRAGMA quick_check(1)").fetchone()
@@ -140,26 +143,7 @@ class Store(AbstractContextManager["Store"]):
             raise self._refused(DAMAGED.format(" ".join(str(state).split())))
         self._base.execute("PRAGMA journal_mode = WAL")
         self._base.execute("PRAGMA synchronous = NORMAL")
-        with self._transaction():
-            if not self._made():
-                self._base.execute(TABLE)
-
-    def _made(self) -> list[str]:
-        """How all that is in the file was made."""
-        rows = self._base.execute("SELECT sql FROM sqlite_master WHERE sql IS NOT NULL")
-        return [str(sql) for (sql,) in rows]
-
-    @contextmanager
-    def _transaction(self) -> Iterator[None]:
-        """All or nothing of what is written inside."""
-        self._base.execute("BEGIN IMMEDIATE")
-        try:
-            yield
-            self._base.execute("COMMIT")
-        except BaseException:
-            if self._base.in_transaction:  # a full disk may have ended it already
-                self._base.execute("ROLLBACK")
-            raise
+        self._base.execute(TABLE.replace("TABLE", "TABLE IF NOT EXISTS", 1))
 
     def _refused(self, fault: str) -> StoreError:
         """An error about this file."""
@@ -176,54 +160,48 @@ class Store(AbstractContextManager["Store"]):
             text = FAULTS.get(code, "cannot be used as a study file: {}")
             raise self._refused(text.format(error)) from error
 
-    def keep(self, records: Iterable[Record]) -> None:
-        """Write records in one transaction; one with a known key replaces the old one.
+    def keep(self, rows: Iterable[Row]) -> None:
+        """Write rows in one transaction; one with a known key replaces the old one.
 
         Raises:
             StoreError: the file cannot be written, such as on a full disk; what was kept before
                 stays.
         """
-        rows = [
-            (
-                record.key,
-                json.dumps(dict(record.parameters), allow_nan=False),
-                record.status,
-                json.dumps(dict(record.result), allow_nan=False),
-                float(record.seconds),
-            )
-            for record in records
+        dumps = partial(json.dumps, allow_nan=False)
+        values = [
+            (row.key, dumps(dict(row.parameters)), row.status, dumps(dict(row.result)), row.seconds)
+            for row in rows
         ]
-        with self._reported(), self._transaction():
-            self._base.executemany("INSERT OR REPLACE INTO tasks VALUES (?, ?, ?, ?, ?)", rows)
+        with self._reported(), self._base:
+            self._base.executemany("INSERT OR REPLACE INTO tasks VALUES (?, ?, ?, ?, ?)", values)
 
-    def find(self, keys: Iterable[str]) -> dict[str, Record]:
-        """The records of some keys, as far as there are any.
+    def find(self, keys: Iterable[str]) -> dict[str, Row]:
+        """The rows of some keys, as far as there are any.
 
         Raises:
             StoreError: the file cannot be read, or holds rows that no study has written.
         """
         with self._reported():
-            rows = (row for key in set(keys) for row in self._base.execute(FIND, [key]))
-            return {row[0]: self._record(row) for row in rows}
+            found = (values for key in set(keys) for values in self._base.execute(FIND, [key]))
+            return {values[0]: self._row(*values) for values in found}
 
-    def _record(self, row: tuple[Any, ...]) -> Record:
+    def _row(self, key: str, parameters: Any, status: Any, result: Any, seconds: Any) -> Row:
         """A row read back."""
-        key, parameters, status, result, seconds = row
         try:
             if status not in ("done", "failed"):
                 raise ValueError("its status is neither done nor failed")
             if not isinstance(seconds, float) or not 0.0 <= seconds < math.inf:
                 raise ValueError("its time is no finite number of seconds")
-            return Record(key, json_object(parameters), status, json_object(result), seconds)
+            return Row(json_object(parameters), status, json_object(result), seconds, key)
         except ValueError as error:
             raise self.damaged(key, str(error)) from error
 
     def damaged(self, key: str, fault: str) -> StoreError:
-        """The error about a record that no study has written."""
+        """The error about a row that no study has written."""
         return self._refused(DAMAGED_RECORD.format(str(key)[:20], fault))
 
     def __len__(self) -> int:
-        """Number of records.
+        """Number of rows.
 
         Raises:
             StoreError: the file cannot be read.

@@ -40,7 +40,8 @@ from robots.robot import Robot
 if TYPE_CHECKING:
     from feasibility.placement.placements import Placements
     from feasibility.placement.stations import StationPlan
-    from feasibility.studies.run import Row, StudyTask
+    from feasibility.studies.run import StudyTask
+    from feasibility.studies.store import Row
 
 
 LOOKED = 24  # configurations of a motion that have to be in the picture

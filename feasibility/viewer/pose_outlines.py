@@ -37,7 +37,7 @@ from surfaces.passes.welded_triangles import border_edges
 
 if TYPE_CHECKING:
     from feasibility.placement.stations import StationPlan
-    from feasibility.studies.run import Row
+    from feasibility.studies.store import Row
 
 
 MOST = 96  # segments of one outline

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 import coverable
 from coverable import Answer, Evidence, Pose, load_robot, plane, view_placements
 from feasibility.placement.trials import Trial
-from feasibility.studies.run import Row
+from feasibility.studies.store import Row
 from feasibility.studies.stored import bits_of
 from feasibility.viewer import pose_outlines as pose_layers
 from feasibility.viewer.pose_outlines import Class, class_of_row, class_of_share, outline

@@ -13,7 +13,7 @@ from coverable import Comparison, check, load_case, read_study, view, view_divis
 from feasibility.collisions.words import UNCHECKED
 from feasibility.reports import comparison, explanation, study
 from feasibility.studies.robot_comparison import Arm
-from feasibility.studies.run import Row
+from feasibility.studies.store import Row
 from feasibility.version import version
 from feasibility.viewer.robot_visuals import joint_paths
 
