@@ -1,6 +1,7 @@
 """What may be wanted of a case besides its verdict: the motions it takes, the smallest cone."""
 
 import math
+from bisect import bisect_left
 from dataclasses import replace
 from typing import Any
 
@@ -8,7 +9,6 @@ from feasibility.cases.case import Case
 from feasibility.checking import check
 from feasibility.clock import Clock, OutOfTime
 from feasibility.division.surface_division import divide
-from feasibility.sensitivity.probes import last_true
 from feasibility.sensitivity.quantities import LEAST_CONE_DEG
 from feasibility.verdict import Verdict
 
@@ -57,22 +57,17 @@ def critical_cone(verdict: Verdict, case: Case, clock: Clock) -> float | None:
     A wider cone allows all that a narrower one does, so halving finds it. What a search cannot
     decide counts as not found.
     """
-    own = verdict.task
-    given = case.task.cone_deg
+    task, given = verdict.task, verdict.task.cone_deg / CONE_STEP_DEG
 
     def holds(step: int) -> bool:
-        task = replace(own, cone_deg=step * CONE_STEP_DEG)
-        return check(verdict.robot, verdict.cells, task, case.search, clock=clock).feasible
+        tried = replace(task, cone_deg=step * CONE_STEP_DEG)
+        return check(verdict.robot, verdict.cells, tried, case.search, clock=clock).feasible
 
-    # Steps below the first one tested count as failed; the case's own cone may lie between two.
-    below = round(LEAST_CONE_DEG / CONE_STEP_DEG) - 1
-    if verdict.feasible:
-        good = math.ceil(given / CONE_STEP_DEG)
-        if good <= below + 1:
-            return given
-        return min(last_true(holds, good, below)[0] * CONE_STEP_DEG, given)
-    widest = round((180.0 if own.roll is None else 90.0) / CONE_STEP_DEG)
-    failed = max(below, math.floor(given / CONE_STEP_DEG))
-    if failed >= widest or not holds(widest):
-        return None
-    return last_true(holds, widest, failed)[0] * CONE_STEP_DEG
+    first, last = round(LEAST_CONE_DEG / CONE_STEP_DEG), math.ceil(given)
+    if not verdict.feasible:
+        first = max(first, math.floor(given) + 1)
+        last = round((180.0 if task.roll is None else 90.0) / CONE_STEP_DEG)
+        if last < first or not holds(last):
+            return None
+    found = first + bisect_left(range(first, last), True, key=holds)
+    return min(found * CONE_STEP_DEG, task.cone_deg if verdict.feasible else math.inf)

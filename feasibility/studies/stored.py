@@ -79,8 +79,6 @@ class Outcome(TypedDict):
     """All neighbouring cells."""
     causes: dict[CauseKind, Count]
     """Missed cells by cause, the most frequent first."""
-    examined: Count
-    """How many of them were examined, the others counting as the nearest of these."""
     components: list[str]
     """What single motions cover, as hexadecimal bits (see `cells_of`), the best first."""
     margins: Margins | None

@@ -3,68 +3,16 @@
 import math
 from collections import Counter
 from collections.abc import Mapping
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
 
 import numpy as np
 
 from coverable.arrays import Mask
-from feasibility.collisions.asked_bodies import gather
 from feasibility.division.set_covering import undominated
 from feasibility.studies.built_cases import arm_of, case_of, clock_of, cut_of
 from feasibility.studies.pool import Tables
 from feasibility.studies.stored import Further, Margins, Outcome, bits_of
-from feasibility.verdict import CauseKind, Verdict
-
-EXAMINED = 6  # missed cells whose causes are determined; the others take that of the nearest one
-
-
-class CauseCounts(NamedTuple):
-    """Why the cells of one verdict are missed."""
-
-    cells: dict[CauseKind, int]
-    """Number of missed cells by cause, the most frequent first."""
-    examined: int
-    """How many cells were examined for it."""
-
-
-def cause_counts(verdict: Verdict) -> CauseCounts:
-    """Count the missed cells of a verdict by cause.
-
-    Cells that another component covers are disconnected. Of the cells that no component covers,
-    `EXAMINED` are examined, and the others count as the nearest of these.
-    """
-    missed = np.flatnonzero(~verdict.covered)
-    if len(missed) == 0:
-        return CauseCounts({}, 0)
-    if verdict.method == "greedy":
-        kinds = [cause.kind for cause in verdict.causes]
-        return CauseCounts(_counted(kinds), len(kinds))
-    from feasibility.roadmap.causes.diagnosis import cause_of
-    from feasibility.roadmap.rulings import tool_collides
-    from feasibility.roadmap.search import exploration_of
-
-    robot, cells, task = verdict.robot, verdict.cells, verdict.task
-    reached = np.isin(np.arange(len(cells)), np.concatenate([[], *verdict.components]))
-    kinds = [CauseKind.DISCONNECTED] * int(reached[missed].sum())
-    lost = missed[~reached[missed]]
-    if len(lost) == 0:
-        return CauseCounts(_counted(kinds), 0)
-    # A new exploration: its Newton's method, its random starts, and proofs by the tool are used.
-    exploration = exploration_of(robot, cells, task, verdict.seed)
-    bodies = gather(robot, cells.surface, task.collision, task.standoff)
-    pairs = () if bodies is None else bodies.pairs
-    few = lost[np.unique(np.linspace(0, len(lost) - 1, EXAMINED).round().astype(np.int64))]
-    for cell in few.tolist():
-        tool_collides(exploration, cell)
-    examined = [cause_of(exploration, cell, pairs) for cell in few.tolist()]
-    away = np.linalg.norm(cells.centres[lost][:, None] - cells.centres[few], axis=2)  # (L, E)
-    kinds += [examined[int(k)].kind for k in away.argmin(axis=1)]
-    return CauseCounts(_counted(kinds), len(examined))
-
-
-def _counted(kinds: list[CauseKind]) -> dict[CauseKind, int]:
-    """Causes with their number of cells, the most frequent first."""
-    return dict(sorted(Counter(kinds).items(), key=lambda entry: (-entry[1], entry[0])))
+from feasibility.verdict import Verdict
 
 
 def evaluate(tables: Tables) -> Outcome | Further:
@@ -107,7 +55,7 @@ def outcome_of(verdict: Verdict, causes: bool = True) -> Outcome:
     """
     areas = np.asarray(verdict.cells.areas)
     total = float(areas.sum())
-    counts = cause_counts(verdict) if causes else CauseCounts({}, 0)
+    kinds = Counter(cause.kind for cause in verdict.causes) if causes else Counter()
     measured = verdict.certificate
     return {
         "verdict": verdict.answer,
@@ -120,8 +68,7 @@ def outcome_of(verdict: Verdict, causes: bool = True) -> Outcome:
         "share": float(areas[verdict.covered].sum()) / total if total > 0.0 else 1.0,
         "edges": int(verdict.n_edges),
         "pairs": len(verdict.cells.pairs),
-        "causes": counts.cells,
-        "examined": counts.examined,
+        "causes": dict(sorted(kinds.items(), key=lambda entry: (-entry[1], entry[0]))),
         "components": [bits_of(cover) for cover in component_covers(verdict)],
         "margins": margins_of(verdict),
         "certificate": None
