@@ -86,22 +86,19 @@ def _tried(trial: Trial) -> str:
 
 def _stations_json(plan: StationPlan) -> dict[str, Any]:
     """The stations and their cells; cells as flat indices."""
-    stations = plan.stations
     return {
-        "optimal": stations.optimal,
-        "at_least": stations.bound,
-        "left_out": stations.left_out.tolist(),
+        "optimal": plan.optimal,
+        "at_least": plan.bound,
+        "left_out": plan.cells(-1).tolist(),
         "not_judged": list(plan.not_judged),
         "stations": [
             {
                 "position": list(trial.pose.position),
                 "rpy_deg": list(trial.pose.rpy_deg),
-                "cells": station.cells.tolist(),
-                "certified": not refusal,
+                "cells": plan.cells(k).tolist(),
+                "certified": not plan.refusals[k],
             }
-            for station, trial, refusal in zip(
-                stations.stations, plan.trials, plan.refusals, strict=True
-            )
+            for k, trial in enumerate(plan.trials)
         ],
     }
 
@@ -196,17 +193,18 @@ def _table(trials: Sequence[Trial]) -> list[str]:
 
 def _stations_text(plan: StationPlan) -> list[str]:
     """The stations, one a line."""
-    stations, number = plan.stations, len(plan.stations)
+    number = len(plan.trials)
     if number == 0:
         return ["no stations: no motion found covers any cell"]
-    proof = f"at least {stations.bound} are needed"
-    if stations.optimal:
+    proof = f"at least {plan.bound} are needed"
+    if plan.optimal:
         proof = "proved to be the fewest among the motions found"
     poses = len({trial.pose for trial in plan.trials})
     where = f", at {counted(poses, 'placement')}" if poses < number else ""
     lines = [f"{counted(number, 'station')}{where} ({proof}):"]
-    for station, trial, refusal in zip(stations.stations, plan.trials, plan.refusals, strict=True):
-        cells = f"{len(station.cells):5d} cell{'' if len(station.cells) == 1 else 's'}"
+    for k, (trial, refusal) in enumerate(zip(plan.trials, plan.refusals, strict=True)):
+        size = len(plan.cells(k))
+        cells = f"{size:5d} cell{'' if size == 1 else 's'}"
         position = ", ".join(f"{v:.3f}" for v in trial.pose.position)
         angles = ", ".join(f"{v:.2f}" for v in trial.pose.rpy_deg)
         refused = f" (not certified: {refusal})" if refusal else ""
@@ -214,7 +212,7 @@ def _stations_text(plan: StationPlan) -> list[str]:
     lines += [f"  not judged of them together: {', '.join(plan.not_judged)}"] * bool(
         plan.not_judged
     )
-    missed = len(stations.left_out)
+    missed = len(plan.cells(-1))
     nowhere = f"  {missed:5d} cells are covered at no placement that was tried"
     return [*lines, nowhere] if missed else lines
 

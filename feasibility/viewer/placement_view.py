@@ -82,7 +82,7 @@ def view_placements(
     if plan is not None:
         layers = station_layers(placements.cells, plan)
         stations = list(zip(layers, [trial.pose for trial in plan.trials], strict=True))
-        left_out = len(plan.stations.left_out)
+        left_out = len(plan.cells(-1))
         text += f"; {len(layers)} station{' covers ' if len(layers) == 1 else 's cover '}"
         text += f"{len(placements.cells) - left_out} of {counted(len(placements.cells), 'cell')}"
     return _view(setup, tried, title, text, stations, progress, play=play, at=at)

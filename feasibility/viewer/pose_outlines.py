@@ -137,12 +137,12 @@ def best_layers(cells: Cells, best: Tried, motion: Playback | None) -> list[Laye
 def station_layers(cells: Cells, plan: StationPlan) -> list[Layer]:
     """The surface at each station, with the cells given to it."""
     parts, lines = [], outline(cells)
-    for k, (station, trial) in enumerate(zip(plan.stations.stations, plan.trials, strict=True)):
-        colour = PATCHES[k % len(PATCHES)]
+    for k, trial in enumerate(plan.trials):
+        mine, colour = plan.cells(k), PATCHES[k % len(PATCHES)]
         root = f"/stations/station {k + 1}"
         there = moved_cells(cells, trial.pose)
-        label = f"station {k + 1} ({counted(len(station.cells), 'cell')})"
-        part = filled(there, station.cells, colour, f"{root}/cells", label)
+        label = f"station {k + 1} ({counted(len(mine), 'cell')})"
+        part = filled(there, mine, colour, f"{root}/cells", label)
         ends = placed(lines, trial.pose).reshape(-1, 3)
         border = threejs.segments(f"{root}/outline", ends, colour)
         entry = replace(part.entry, path=root)

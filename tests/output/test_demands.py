@@ -124,7 +124,7 @@ def says_yes(ask, known, settings):
     if placed.answer == "feasible":
         said.add("place")
     plan = station_plan(placed, coverable.evaluator_here(*setup[:3], coverable.Search()), count=1)
-    whole = len(plan.stations) > 0 and not len(plan.stations.left_out)
+    whole = len(plan.trials) > 0 and not len(plan.cells(-1))
     return said | {"stations"} if whole and plan.certified and not plan.not_judged else said
 
 

@@ -410,13 +410,12 @@ def of_place(one: Any) -> Json:
         "collisions": checked(found.task.collision), "cause": found.cause,
         "causes": dict(found.causes),
         "stations": plan and {
-            "optimal": plan.stations.optimal, "at_least": plan.stations.bound,
-            "left_out": plan.stations.left_out.tolist(), "not_judged": list(plan.not_judged),
+            "optimal": plan.optimal, "at_least": plan.bound,
+            "left_out": plan.cells(-1).tolist(), "not_judged": list(plan.not_judged),
             "stations": [
                 {"position": list(tried.pose.position), "rpy_deg": list(tried.pose.rpy_deg),
-                 "cells": station.cells.tolist(), "certified": not refusal}
-                for station, tried, refusal in
-                zip(plan.stations.stations, plan.trials, plan.refusals, strict=True)
+                 "cells": plan.cells(k).tolist(), "certified": not plan.refusals[k]}
+                for k, tried in enumerate(plan.trials)
             ],
         },
         "map": OBJECT_OR_NULL, "statistics": dict(found.statistics), "timing": dict,

@@ -1,15 +1,13 @@
-"""The fewest patches and stations: hundreds of small tables against brute force, and real sizes."""
+"""The fewest patches: hundreds of small tables against brute force, and real sizes."""
 
 from functools import reduce
 from itertools import combinations
 from operator import or_
 
 import numpy as np
-import pytest
 from samples import sampled, seeds
 
 from feasibility.division.plans import fewest_patches
-from feasibility.placement.stations import fewest_stations
 
 
 def random_table(seed):
@@ -70,33 +68,7 @@ def test_patches_grow_from_the_cells_without_a_choice():
     assert found.patch.tolist() == [0] * 6 + [1] * 6
 
 
-@pytest.mark.parametrize("seed", range(25))
-def test_stations_against_brute_force(seed):
-    """Each cell is given to one station, which covers it; motions of several placements."""
-    rng = np.random.default_rng([6, seed])
-    covers = rng.random((rng.integers(1, 9), rng.integers(1, 13))) < rng.uniform(0.1, 0.9)
-    parts = np.split(np.arange(len(covers)), np.sort(rng.integers(0, len(covers) + 1, 3)))
-    found = fewest_stations([covers[part] for part in parts], covers.shape[1])
-    assert found.optimal
-    assert len(found) == fewest_by_brute_force(covers)
-    wanted = covers.any(axis=0)
-    given = [cell for station in found.stations for cell in station.cells.tolist()]
-    assert sorted(given) == np.flatnonzero(wanted).tolist()
-    assert found.left_out.tolist() == np.flatnonzero(~wanted).tolist()
-    for station in found.stations:
-        assert len(station.cells)
-        assert station.covers[station.cells].all()
-        assert (covers[parts[station.placement][station.component]] == station.covers).all()
-    sizes = [len(station.cells) for station in found.stations]
-    assert sizes == sorted(sizes, reverse=True)
-
-
 def test_nothing_covers_nothing():
-    none, whole = np.zeros((0, 0), dtype=bool), np.ones((1, 3), dtype=bool)
-    found = fewest_stations([none, whole[:0], whole], 3)
-    assert [(s.placement, s.cells.tolist()) for s in found.stations] == [(2, [0, 1, 2])]
-    assert len(fewest_stations([], 0)) == 0
-    assert fewest_stations([none], 2).left_out.tolist() == [0, 1]
     for shape in ((0, 0), (0, 4), (3, 0), (3, 4)):
         found = fewest_patches(np.zeros(shape, dtype=bool), np.zeros((0, 2), dtype=np.int64))
         assert (len(found), found.bound, found.patch.tolist()) == (0, 0, [-1] * shape[1])
