@@ -156,7 +156,8 @@ def _further(
 ) -> tuple[StationPlan | None, PlacementMap | None]:
     """Stations and map, where they are wanted; reports what there was no time for."""
     from feasibility.clock import OutOfTime
-    from feasibility.placement.map import map_around_best
+    from feasibility.placement.map import placement_map
+    from feasibility.placement.region import Pose
     from feasibility.placement.stations import station_plan
 
     plan = chart = None
@@ -169,7 +170,11 @@ def _further(
                 plan = station_plan(placements, evaluator, search, count, progress, clock)
             wanted = "map" if args.map is not None else ""
             if wanted:
-                chart = map_around_best(placements, evaluator, progress)
+                region, best = placements.region, placements.best
+                held = (
+                    Pose.of_values(0.5 * (region.low + region.high)) if best is None else best.pose
+                )
+                chart = placement_map(evaluator, region, held, progress=progress)
     except OutOfTime:
         missing = [wanted] * bool(wanted) + ["map"] * (wanted != "map" and args.map is not None)
         if missing:

@@ -1,6 +1,6 @@
 """A search for placements in progress: differential evolution over the poses of a region."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 
@@ -40,8 +40,6 @@ class Evolution:
     """Of those that the bound discarded the one that is least out of reach, and by how much."""
     stopped: str = ""
     """Why it did not go on to its end, if so."""
-    fault: Exception | None = None
-    """What an evaluator raised."""
 
     @property
     def ranked(self) -> list[Trial]:
@@ -65,27 +63,24 @@ class Evolution:
         low, high = self.region.low, self.region.high
         free, self.expected = high > low, (rounds + 1) * count
 
-        def costs(function: Callable[[Array], float], rows: Iterable[Array]) -> list[float]:
+        def costs(rows: Array) -> Array:
             values = np.tile(low, (count, 1))
-            values[:, free] = list(rows)
-            try:
-                return self.costs(self.region.rounded(values)).tolist()
-            except (TypeError, ValueError) as error:  # which SciPy would take for its own
-                self.fault = error
-                return [np.inf] * count
+            values[:, free] = rows.T
+            return self.costs(self.region.rounded(values))
 
-        differential_evolution(
-            lambda row: np.inf, list(zip(low[free], high[free], strict=True)), workers=costs,
-            init=self.region.samples(count, seed)[:count, free], maxiter=rounds,
-            mutation=STRIDES, seed=np.random.default_rng(seed), tol=0.0, polish=False,
-            updating="deferred", callback=lambda *_: bool(self.stopped or self.fault),
-        )  # fmt: skip
-        if self.fault is not None:
-            raise self.fault
+        try:
+            differential_evolution(
+                costs, list(zip(low[free], high[free], strict=True)), vectorized=True,
+                init=self.region.samples(count, seed)[:, free], maxiter=rounds,
+                mutation=STRIDES, seed=np.random.default_rng(seed), tol=0.0, polish=False,
+                updating="deferred", callback=lambda *_: bool(self.stopped),
+            )  # fmt: skip
+        except RuntimeError as error:  # for SciPy errors of an evaluator are those of a map
+            raise error.__cause__ or error from None
 
     def costs(self, values: Array) -> Array:
         """(k,) of poses (k, 6): what is less is better."""
-        if self.stopped or self.fault:
+        if self.stopped:
             return np.full(len(values), np.inf)
         self.drawn += len(values)
         far = self.reach.distances(values).max(axis=1) / (self.reach.reach + self.reach.tolerance)

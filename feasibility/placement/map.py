@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable.arrays import Array, Mask
-from feasibility.placement.placements import Placements
+from coverable.arrays import Array, Protected
 from feasibility.placement.region import AXES, PlacementError, Pose, Region
 from feasibility.placement.trials import Evaluator, search_all
 from feasibility.search_settings import Progress
@@ -16,7 +15,7 @@ PANELS = 3  # places along the third
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class PlacementMap:
+class PlacementMap(Protected):
     """A raster of placements; what is not among its axes is held at one pose."""
 
     axes: tuple[str, ...]
@@ -25,16 +24,10 @@ class PlacementMap:
     ticks: tuple[Array, ...]
     """Places along each axis, m or degrees."""
     share: Array
-    """(a, b) or (a, b, c) largest share of the area that one motion was found to cover."""
+    """(a, b) or (a, b, c) largest share of the area that one motion was found to cover; NaN where
+    it could not be tried."""
     margin: Array
     """Likewise the margin in m, see `Trial.margin`; 0 where none is feasible."""
-    known: Mask
-    """Likewise, where it could be tried; elsewhere share and margin are NaN."""
-
-    def __post_init__(self) -> None:
-        """Write-protect the arrays."""
-        for array in (*self.ticks, self.share, self.margin, self.known):
-            array.flags.writeable = False
 
 
 def axes_of(region: Region) -> tuple[str, ...]:
@@ -91,18 +84,6 @@ def placement_map(
         values[:, k] = places.ravel()
     poses = [Pose.of_values(row) for row in values]
     trials = search_all(evaluator, poses, progress, "searching the map")
-    known = np.array([not trial.failed for trial in trials])
-    share = np.where(known, [trial.share for trial in trials], np.nan)
-    margin = np.where(known, [trial.margin for trial in trials], np.nan)
-    raster = (array.reshape(counts) for array in (share, margin, known))
-    return PlacementMap(names, held, ticks, *raster)
-
-
-def map_around_best(
-    placements: Placements, evaluator: Evaluator, progress: Progress | None = None
-) -> PlacementMap:
-    """The map of a region through the best placement found there, or through its middle."""
-    region = placements.region
-    middle = Pose.of_values(0.5 * (region.low + region.high))
-    held = middle if placements.best is None else placements.best.pose
-    return placement_map(evaluator, region, held, progress=progress)
+    found = [(np.nan,) * 2 if one.failed else (one.share, one.margin) for one in trials]
+    share, margin = np.array(found).T
+    return PlacementMap(names, held, ticks, share.reshape(counts), margin.reshape(counts))

@@ -166,20 +166,12 @@ def place(
     tried = Evolution(evaluator, reach, region, clock, progress)
     tried.run(count, rounds, search.seed, interruptible)
     found = distinct((trial for trial in tried.ranked if trial.feasible), region, keep)
-    return _timed(
-        _with_blocked(_searched(answered, tried, found, task.requires_rates), clock), began
-    )
-
-
-def _with_blocked(placements: Placements, clock: Clock) -> Placements:
-    """The same; where it is undecided, with what no placement helps, and what may."""
-    cells, task = placements.cells, placements.task
-    closed = blocked_curves(cells, task) if placements.answer is Answer.UNDECIDED else ""
-    if not closed:
-        return placements
-    offer = smoothing_offer(cells, task, clock)
-    message = f"{placements.message} Wherever it stands: {closed} {offer}".rstrip()
-    return replace(placements, message=message)
+    answer = _searched(answered, tried, found, task.requires_rates)
+    closed = blocked_curves(cells, task) if answer.answer is Answer.UNDECIDED else ""
+    if closed:
+        said = f"Wherever it stands: {closed} {smoothing_offer(cells, task, clock)}".rstrip()
+        answer = replace(answer, message=f"{answer.message} {said}")
+    return _timed(answer, began)
 
 
 def _timed(placements: Placements, began: float) -> Placements:

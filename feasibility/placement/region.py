@@ -154,28 +154,19 @@ class Region:
         return bool(((values >= self.low - slack) & (values <= self.high + slack)).all())
 
     def samples(self, count: int, seed: int) -> Array:
-        """(k, 6) poses, the middle first, then spread evenly by a Sobol sequence; k >= count."""
-        return self.rounded(np.vstack([0.5 * (self.low + self.high), self._spread(count, seed)]))
-
-    def rounded(self, values: Array) -> Array:
-        """Poses that people can write down, inside the region still."""
-        return np.clip(np.round(values, DIGITS), self.low, self.high)
-
-    def _spread(self, count: int, seed: int) -> Array:
-        """(k, 6) the first points of a scrambled Sobol sequence; k is a power of two >= count.
-
-        None for a count of 0, and then without loading scipy.stats, which takes its time.
-        """
-        if count == 0:
-            return np.empty((0, len(AXES)))
+        """(count, 6) poses, the middle first, then spread evenly by a Sobol sequence."""
         from scipy.stats import qmc
 
         free = self.high > self.low
         sampler = qmc.Sobol(int(free.sum()), scramble=True, seed=np.random.default_rng(seed))
         unit = sampler.random_base2(max(count - 1, 0).bit_length())
-        values = np.tile(self.low, (len(unit), 1))
-        values[:, free] += unit * (self.high - self.low)[free]
-        return values
+        values = np.tile(0.5 * (self.low + self.high), (len(unit) + 1, 1))
+        values[1:, free] = self.low[free] + unit * (self.high - self.low)[free]
+        return self.rounded(values[:count])
+
+    def rounded(self, values: Array) -> Array:
+        """Poses that people can write down, inside the region still."""
+        return np.clip(np.round(values, DIGITS), self.low, self.high)
 
 
 def moved_cells(cells: Cells, pose: Pose) -> Cells:

@@ -78,7 +78,7 @@ def station_plan(
         The plan. Optimal is meant among the motions found; more placements may need fewer.
     """
     search, cells = Search() if search is None else search, placements.cells
-    values = placements.region.samples(count, search.seed)[:count]
+    values = placements.region.samples(count, search.seed)
     reach = Reach.of(placements.robot, cells, placements.task)
     poses = [Pose.of_values(row) for row in values[reach.share(values) > 0.0]]
     trials = [trial for trial in placements.trials if len(trial.covers)]

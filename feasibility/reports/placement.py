@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from coverable.arrays import Array, Mask
+import numpy as np
+
+from coverable.arrays import Array
 from coverable.errors import at_least, counted
 from feasibility.collisions.asked_bodies import said_of
 from feasibility.collisions.words import checked
@@ -109,15 +111,15 @@ def _map_json(chart: PlacementMap) -> dict[str, Any]:
         "axes": list(chart.axes),
         "ticks": [ticks.tolist() for ticks in chart.ticks],
         "held": dict(zip(AXES, chart.held.values.tolist(), strict=True)),
-        "share": _nulled(chart.share, ~chart.known),
-        "margin_m": _nulled(chart.margin, ~chart.known),
+        "share": _nulled(chart.share),
+        "margin_m": _nulled(chart.margin),
     }
 
 
-def _nulled(values: Array, unknown: Mask) -> Any:
-    """Nested lists with None where a value is unknown."""
+def _nulled(values: Array) -> Any:
+    """Nested lists with None in place of NaN."""
     plain = values.astype(object)
-    plain[unknown] = None
+    plain[np.isnan(values)] = None
     return plain.tolist()
 
 
