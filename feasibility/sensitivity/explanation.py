@@ -160,7 +160,7 @@ def _ask_alone(prober: Prober, done: list[Threshold]) -> None:
     quantity, side = done[least].quantity, done[least].feasible
     if side is not None:
         changed = quantity.applied(prober.given, quantity.steps_to(side.value))
-        unaided = prober.asked(changed, effort=ALONE).feasible
+        unaided = prober.asked(changed, effort=ALONE).accepted
         done[least] = replace(done[least], feasible=replace(side, unaided=unaided))
 
 

@@ -76,21 +76,21 @@ class Look(NamedTuple):
         """Is it said by `check` that the case is feasible?"""
         return self.certificate is not None
 
-    @classmethod
-    def of_search(cls, found: SearchResult) -> "Look":
-        """What a search says by itself."""
-        undecided = Evidence.BUDGET if found.unfinished or found.motion else Evidence.EXHAUSTED
-        evidence = Evidence.PROOF if found.proof is not None else undecided
-        covered = int(found.covered.sum())
-        return cls(evidence, found.motion, found.proof, covered, int(found.counts["fk"]))
 
-    @classmethod
-    def of_verdict(cls, verdict: Verdict) -> "Look":
-        """What `check` says."""
-        return cls(
-            verdict.evidence, verdict.witness, verdict.proof, verdict.n_covered,
-            int(verdict.statistics["fk"]), verdict.certificate,
-        )  # fmt: skip
+def _look_of_search(found: SearchResult) -> Look:
+    """What a search says by itself."""
+    undecided = Evidence.BUDGET if found.unfinished or found.motion else Evidence.EXHAUSTED
+    evidence = Evidence.PROOF if found.proof is not None else undecided
+    covered = int(found.covered.sum())
+    return Look(evidence, found.motion, found.proof, covered, int(found.counts["fk"]))
+
+
+def _look_of_verdict(found: Verdict) -> Look:
+    """What `check` says."""
+    return Look(
+        found.evidence, found.witness, found.proof, found.n_covered, int(found.statistics["fk"]),
+        found.certificate,
+    )  # fmt: skip
 
 
 @dataclass
@@ -118,65 +118,55 @@ class Prober:
 
     def __post_init__(self) -> None:
         """Begin with what is known of the case as given."""
-        self.looks[()] = Look.of_verdict(self.verdict)
+        self.looks[()] = _look_of_verdict(self.verdict)
         self._suspect(self.looks[()])
 
-    def at(self, steps: Steps, seeds: Walk | None = None) -> Look:
-        """What a search finds of a changed case, from a known motion if there is one.
+    def at(self, steps: Steps, seeds: Walk | None = None, *, judged: bool = False) -> Look:
+        """What is found of a changed case, from a known motion if there is one.
+
+        Args:
+            steps: the changes; those of no steps are none.
+            seeds: the motion.
+            judged: whether `check` is asked, unless a proof is known, or that it accepts a motion;
+                else a search will do.
 
         Raises:
             OutOfTime: the deadline passed before it was decided.
         """
         steps = tuple((quantity, k) for quantity, k in steps if k)
-        if steps not in self.looks:
-            self.looks[steps] = self._searched(steps, seeds)
-        return self.looks[steps]
+        known = self.looks.get(steps)
+        final = known and (not judged or not steps or known.accepted or known.proof is not None)
+        if known is None or not final:
+            variant = self.given
+            for quantity, k in steps:
+                variant = quantity.applied(variant, k)
+            made = self.asked if judged else self._searched
+            self.looks[steps] = known = made(variant, seeds)
+        return known
 
-    def judged(self, steps: Steps, seeds: Walk | None = None) -> Look:
-        """What `check` says of a changed case, unless the answer is proved, or accepted already.
-
-        Raises:
-            OutOfTime: the deadline passed before it was decided.
-        """
-        steps = tuple((quantity, k) for quantity, k in steps if k)
-        before = self.looks.get(steps)
-        if before is None or not (not steps or before.accepted or before.proof is not None):
-            self.looks[steps] = Look.of_verdict(self.asked(self._variant(steps), seeds))
-        return self.looks[steps]
-
-    def _variant(self, steps: Steps) -> Variant:
-        """The changed case."""
-        variant = self.given
-        for quantity, k in steps:
-            variant = quantity.applied(variant, k)
-        return variant
-
-    def _searched(self, steps: Steps, seeds: Walk | None) -> Look:
+    def _searched(self, variant: Variant, seeds: Walk | None) -> Look:
         """What a search says, without the judges; where shapes are in the way, what `check` says.
 
         Raises:
             OutOfTime: the deadline passed before it was decided.
         """
-        clock, search, variant = *self._limits(SEEDED if seeds else 1.0), self._variant(steps)
+        clock, search = self._limits(SEEDED if seeds else 1.0)
         problem = Problem.of(*variant)
         clock.allow(search.evaluations)
         found = complete_search(problem, search, clock, seeds, self.suspects, judging=False)
-        look = Look.of_search(found)
-        self._count(look)
+        look = self._counted(_look_of_search(found))
         if look.walk is None and look.proof is None and found.hindered and seeds is None:
-            return Look.of_verdict(self.asked(variant))
+            return self.asked(variant)
         return look
 
-    def asked(self, variant: Variant, seeds: Walk | None = None, effort: float = 1.0) -> Verdict:
+    def asked(self, variant: Variant, seeds: Walk | None = None, effort: float = 1.0) -> Look:
         """What `check` says, with so many times the usual effort.
 
         Raises:
             OutOfTime: the deadline passed before it was decided.
         """
         clock, search = self._limits(SEEDED if seeds else effort)
-        found = check(*variant, search, seeds=seeds, clock=clock)
-        self._count(Look.of_verdict(found))
-        return found
+        return self._counted(_look_of_verdict(check(*variant, search, seeds=seeds, clock=clock)))
 
     def _limits(self, effort: float) -> tuple[Clock, Search]:
         """Time and evaluations of the next search.
@@ -191,8 +181,8 @@ class Prober:
         clock = self.clock.part(1.0, lambda *_: self.tick())
         return clock, replace(self.search, evaluations=evaluations)
 
-    def _count(self, look: Look) -> None:
-        """Count a search, and learn from it.
+    def _counted(self, look: Look) -> Look:
+        """The same, counted and learnt from.
 
         Raises:
             OutOfTime: the deadline passed before it found a motion.
@@ -201,6 +191,7 @@ class Prober:
         self._suspect(look)
         if self.clock.out_of_time and look.walk is None:
             raise OutOfTime
+        return look
 
     def _suspect(self, look: Look) -> None:
         """Look first at a cell that was proved uncoverable, from now on."""
@@ -223,7 +214,7 @@ class Prober:
         if feasible:
             return Threshold(quantity, self.finding(quantity, before), None)
         proofs = sum(self.at(((quantity, k),)).proof is not None for k in stops)
-        self.judged(((quantity, before),))
+        self.at(((quantity, before),), judged=True)
         tried = f"{counted(len(stops), 'value')} tried, {proofs} of them proved infeasible"
         each, tried = proofs == len(stops), "" if quantity.monotone else tried
         end = self.finding(quantity, before)
@@ -234,26 +225,24 @@ class Prober:
         value = quantity.value(k) if k else quantity.given
         return finding_of(value, self.at(((quantity, k),)), self.given.cells)
 
-    def _along(self, quantity: Quantity) -> dict[int, Look]:
-        """What was found along a quantity, by the number of steps."""
-        single = {
-            steps[0][1]: look
-            for steps, look in self.looks.items()
-            if len(steps) == 1 and steps[0][0] is quantity
-        }
-        return {0: self.looks[()], **single}
-
     def _holds(self, quantity: Quantity, k: int) -> bool:
         """Is there a motion, as far as a search from the nearest one leads?"""
-        known = {j: one.walk for j, one in self._along(quantity).items() if one.walk is not None}
-        nearest = min(known, key=lambda j: abs(j - k), default=None)
-        seeds = None if nearest is None else known[nearest]
-        return self.at(((quantity, k),), seeds).walk is not None
+        known = {
+            sum(j for _, j in steps): look.walk
+            for steps, look in self.looks.items()
+            if all(one is quantity for one, _ in steps) and look.walk is not None
+        }
+        nearest = min(known, key=lambda j: abs(j - k), default=0)
+        return self.at(((quantity, k),), known.get(nearest)).walk is not None
 
     def _accepted(self, quantity: Quantity, k: int) -> bool:
         """Does `check` accept the motion that was found there?"""
         steps = ((quantity, k),)
-        return self.judged(steps, self.at(steps).walk).accepted
+        return self.at(steps, self.at(steps).walk, judged=True).accepted
+
+    def _alone(self, quantity: Quantity, k: int) -> bool:
+        """Does `check` find a motion there with none known?"""
+        return self.at(((quantity, k),), judged=True).accepted
 
     def _between(self, quantity: Quantity, good: int, bad: int) -> Threshold:
         """The threshold between two values; further on where `check` alone goes further.
@@ -273,7 +262,7 @@ class Prober:
                 continue
             further = self._as_far(quantity, good, bad)  # now that its cone was measured
             good = further if self._accepted(quantity, further) else good
-            if not self.judged(((quantity, bad),)).accepted:
+            if not self._alone(quantity, bad):
                 sides = self.finding(quantity, good), self.finding(quantity, bad)
                 return Threshold(quantity, *sides)
             return self._by_check(quantity, bad, stop)
@@ -306,13 +295,10 @@ class Prober:
             stop: further on, where none was found by a search.
         """
         last = quantity.last if self.verdict.feasible else 0
-
-        def accepted(k: int) -> bool:
-            return self.judged(((quantity, k),)).accepted
-
         for k in dict.fromkeys((stop, last)):
-            if not accepted(k):
-                good, bad = last_true(accepted, good, k, self._resolution(k - good))
+            if not self._alone(quantity, k):
+                alone, least = partial(self._alone, quantity), self._resolution(k - good)
+                good, bad = last_true(alone, good, k, least)
                 sides = self.finding(quantity, good), self.finding(quantity, bad)
                 return Threshold(quantity, *sides)
             good = k

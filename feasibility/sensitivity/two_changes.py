@@ -58,7 +58,7 @@ def _needed(prober: Prober, steps: Steps, removable: Steps) -> Steps:
         if len(needed) < 2:
             break
         # A motion that uses all of them may lead to none with fewer, and a search alone to one.
-        if prober.at(rest, prober.at(needed).walk).walk or prober.judged(rest).walk:
+        if prober.at(rest, prober.at(needed).walk).walk or prober.at(rest, judged=True).walk:
             needed = rest
     return needed
 
@@ -72,7 +72,7 @@ def _narrowed(prober: Prober, steps: Steps) -> ChangePair | None:
     for index in (0, 1):
         narrow = _smaller(prober, narrow, *narrow[index])
     for found in (narrow, steps):
-        walk = prober.judged(found, prober.at(found).walk).walk
+        walk = prober.at(found, prober.at(found).walk, judged=True).walk
         if walk is not None:
             changes = tuple(Change(quantity, quantity.value(k)) for quantity, k in found)
             return ChangePair(changes, walk)
