@@ -4,15 +4,13 @@ A motion that is too slow somewhere joins nothing: components fall apart into wh
 As `check` does at a speed, more motions are made first, from every configuration that is known.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from feasibility.clock import OutOfTime
-from feasibility.demands.rated_graph import Edge, RatedGraph, grow
+from feasibility.demands.rated_graph import RatedGraph, grow
+from feasibility.demands.routes import roadmap_of
 from feasibility.paths.motion_graph import MotionGraph
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.graph import Roadmap
 from feasibility.task import Task
 from feasibility.verdict import Cause, CauseKind
 from surfaces.adjacency import components
@@ -31,11 +29,16 @@ def keep_fast_motions(exploration: Exploration, task: Task) -> dict[int, Cause]:
     Returns:
         Cells that lose their last component, and why.
     """
-    reached = exploration.reached
+    reached, cells = exploration.reached, len(exploration.cells)
     rated = _rated(exploration, task)
-    exploration.roadmap = _roadmap_of(rated.graph, rated.enough, len(exploration.cells))
-    lost = np.flatnonzero(reached & ~exploration.reached).tolist()
     cell = rated.graph.cell
+    ends, over = np.array(rated.enough, dtype=np.int64).reshape(-1, 2), np.array(cell)
+    if cells > 1:  # without parts over one cell alone
+        part = components(ends, len(cell))[ends[:, 0]]
+        ends = ends[np.isin(part, part[over[ends[:, 0]] != over[ends[:, 1]]])]
+    edges = [(x, y) for x, y in ends.tolist()]
+    exploration.roadmap = roadmap_of(rated.graph, np.unique(ends).tolist(), edges, cells)
+    lost = np.flatnonzero(reached & ~exploration.reached).tolist()
     best = rated.fastest_to_cells((x, y) for x, y in rated.rated if cell[x] != cell[y])
     kind, none = CauseKind.DISCONNECTED, "no motion leads to it"
     return {c: Cause(c, kind, False, rated.fault(best[c]) if c in best else none) for c in lost}
@@ -55,27 +58,3 @@ def _rated(exploration: Exploration, task: Task) -> RatedGraph:
     except OutOfTime:
         rated.rate()
     return rated
-
-
-def _roadmap_of(graph: MotionGraph, edges: Sequence[Edge], cells: int) -> Roadmap:
-    """A roadmap of some motions, with each connected part of their nodes as a component."""
-    ends = np.array(edges, dtype=np.int64).reshape(-1, 2)
-    over = np.array(graph.cell, dtype=np.int64)
-    if cells > 1:  # without parts over one cell alone
-        part = components(ends, len(over))
-        several = np.zeros(int(part.max(initial=-1)) + 1, dtype=bool)
-        several[part[ends[over[ends[:, 0]] != over[ends[:, 1]], 0]]] = True
-        ends = ends[several[part[ends[:, 0]]]]
-    nodes, of = np.unique(ends, return_inverse=True)
-    component = components(of.reshape(-1, 2).astype(np.int64), len(nodes)).tolist()
-    roadmap, number = Roadmap(cells), dict[int, int]()
-    for _ in range(max(component, default=-1) + 1):
-        roadmap.add_component()
-    for node, root in zip(nodes.tolist(), component, strict=True):
-        q = graph.q[node]
-        number[node] = roadmap.add_node(graph.cell[node], q, np.zeros_like(q), root)
-    for x, y in ends.tolist():
-        roadmap.add_edge(number[x], number[y], graph.motion(x, y)[1:])
-    roadmap.largest = int(np.argmax([*roadmap.size, 0]))
-    roadmap.queue.clear()
-    return roadmap

@@ -1,5 +1,6 @@
 """The largest speed of the tool, and how near singularities a motion comes: figures to explain."""
 
+from bisect import bisect_left
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -7,7 +8,7 @@ import numpy as np
 from feasibility.certification.rate_replay import RateReplay, replay_rates
 from feasibility.clock import Clock, OutOfTime
 from feasibility.demands.rated_graph import RatedGraph, grow, rated_graph
-from feasibility.demands.routes import covered
+from feasibility.demands.routes import best_motion
 from feasibility.verdict import Verdict
 
 
@@ -45,25 +46,14 @@ def rate_figures(
             grow(rated, Clock() if clock is None else clock)
     except OutOfTime:
         rated.rate()
-    return RateFigures(replayed, max(replayed.speed, largest_speed(rated, begin_of(rated))))
+    return RateFigures(replayed, max(replayed.speed, largest_speed(rated)))
 
 
-def begin_of(rated: RatedGraph) -> int | None:
-    """The node that the motion has to begin at; None where the arm has no start."""
-    start = rated.robot.start
-    if start is None:
-        return None
-    return int(np.argmin([np.abs(q - start).max() for q in rated.graph.q]))
-
-
-def largest_speed(rated: RatedGraph, begin: int | None, sigma: float = -np.inf) -> float:
+def largest_speed(rated: RatedGraph) -> float:
     """m/s, the largest speed that a motion over all cells allows; 0 where there is no motion."""
-    speeds = np.unique([r.speed for r in rated.rated.values() if r.sigma >= sigma])
-    low, high = -1, len(speeds)  # speeds[low] is possible, speeds[high] is not
-    while high - low > 1:
-        middle = (low + high) // 2
-        if covered(rated, rated.holding(float(speeds[middle]), sigma), begin).all():
-            low = middle
-        else:
-            high = middle
-    return float(speeds[low]) if low >= 0 else 0.0
+    sigma = rated.task.min_manipulability or -np.inf
+    speeds = np.unique([r.speed for r in rated.rated.values() if r.sigma >= sigma]).tolist()
+    possible = bisect_left(
+        speeds, True, key=lambda v: not best_motion(rated, rated.holding(v)).covered.all()
+    )
+    return float(speeds[possible - 1]) if possible else 0.0

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from feasibility.clock import Clock
-from feasibility.demands.motion_rates import motion_rates, too_slow_words
+from feasibility.demands.motion_rates import MotionRates, motion_rates
 from feasibility.paths.motion_graph import MotionGraph, join_self_motions, motion_graph_of, step_to
 from feasibility.task import Task
 from feasibility.verdict import Verdict
@@ -23,20 +23,6 @@ Edge = tuple[int, int]
 MOST_STEPS = 20_000  # attempts from a configuration to a cell beside it
 
 
-@dataclass(frozen=True, slots=True)
-class Rated:
-    """What one motion between two configurations allows."""
-
-    speed: float
-    """m/s, lower bound."""
-    sigma: float
-    """Lower bound of the smallest singular value."""
-    joint: int
-    """The joint that allows no more speed."""
-    share: float
-    """m/s allowed over that joint's limit: v / share is what the joint needs for v."""
-
-
 @dataclass
 class RatedGraph:
     """Nodes, motions, and what they allow."""
@@ -45,7 +31,7 @@ class RatedGraph:
     cells: Cells
     task: Task
     graph: MotionGraph
-    rated: dict[Edge, Rated] = field(default_factory=dict)
+    rated: dict[Edge, MotionRates] = field(default_factory=dict)
 
     def rate(self) -> None:
         """Rate the motions that are not yet rated, all at once."""
@@ -55,20 +41,25 @@ class RatedGraph:
             return
         motions = [np.asarray(self.graph.motion(*edge)) for edge in new]
         found = motion_rates(self.robot, self.cells, self.task, motions)
-        for k, edge in enumerate(new):
-            self.rated[edge] = Rated(
-                float(found.speed[k]), float(found.sigma[k]), int(found.joint[k]),
-                float(found.share[k]),
-            )  # fmt: skip
+        self.rated |= zip(new, found, strict=True)
 
-    def holding(self, speed: float, sigma: float) -> list[Edge]:
-        """The motions that allow both."""
+    @property
+    def begin(self) -> int | None:
+        """The node that a motion has to begin at; None where the arm has no start."""
+        start = self.robot.start
+        if start is None:
+            return None
+        return int(np.argmin([np.abs(q - start).max() for q in self.graph.q]))
+
+    def holding(self, speed: float) -> list[Edge]:
+        """The motions that allow a speed (m/s), and the singular values that the task requires."""
+        sigma = self.task.min_manipulability or -np.inf
         return [e for e, r in self.rated.items() if r.speed >= speed and r.sigma >= sigma]
 
     @property
     def enough(self) -> list[Edge]:
         """The motions that hold what the task requires."""
-        return self.holding(self.task.speed or -np.inf, self.task.min_manipulability or -np.inf)
+        return self.holding(self.task.speed or -np.inf)
 
     def fastest_to_cells(self, edges: Iterable[Edge]) -> dict[int, Edge]:
         """The fastest of some motions to each cell that they lead to."""
@@ -80,14 +71,8 @@ class RatedGraph:
         return best
 
     def fault(self, edge: Edge, where: str = "") -> str:
-        """Why a motion does not hold what the task requires; `where` as in `too_slow_words`."""
-        one, speed = self.rated[edge], self.task.speed
-        if speed is not None and one.speed < speed:
-            return too_slow_words(self.robot, one.joint, one.share, speed, where)
-        return (
-            f"singular values fall to {one.sigma:.3g} on the motion to it; "
-            f"{self.task.min_manipulability:g} is required"
-        )
+        """Why a motion does not hold what the task requires; `where` as in `MotionRates.fault`."""
+        return self.rated[edge].fault(self.robot, self.task, where)
 
 
 def rated_graph(verdict: Verdict) -> RatedGraph:

@@ -14,11 +14,11 @@ from coverable.arrays import Mask
 from coverable.errors import at_least, counted
 from feasibility.certification.rate_replay import RateReplay, replay_rates
 from feasibility.clock import Clock, OutOfTime
-from feasibility.demands.largest import begin_of, largest_speed
+from feasibility.demands.largest import largest_speed
 from feasibility.demands.motion_rates import replay_at_rates
 from feasibility.demands.rated_graph import RatedGraph, grow, rated_graph
 from feasibility.demands.requirements import required_words
-from feasibility.demands.routes import covered, route
+from feasibility.demands.routes import best_motion
 from feasibility.verdict import (
     Answer,
     Cause,
@@ -43,24 +43,23 @@ def at_rates(verdict: Verdict, clock: Clock) -> Verdict:
     replayed = replay_rates(verdict.robot, verdict.cells, task, walk)
     if replayed.accepted:
         return _accepted(verdict, walk, verdict.certificate, "")
-    rated = rated_graph(verdict)
-    begin, late = begin_of(rated), ""
-    found = route(rated, rated.enough, begin)
+    rated, late = rated_graph(verdict), ""
+    found = best_motion(rated, rated.enough)
     try:
-        if found is None:
+        if not found.covered.all():
             with clock.enforced():
                 grow(rated, clock)
-            found = route(rated, rated.enough, begin)
+            found = best_motion(rated, rated.enough)
     except OutOfTime:
         late = " The time limit ran out before all that might be faster was tried."
-    if found is not None:
-        other = rated.graph.walk(found)
+    if found.covered.all():
+        other = found.walk()
         every = np.ones(len(verdict.cells), dtype=bool)
         certificate, refusal = replay_at_rates(verdict.robot, verdict.cells, task, other, every)
         if not refusal:
             note = " It is not the first motion that was found."
             return _accepted(verdict, other, certificate, note)
-    return _not_found(verdict, rated, replayed, begin, late)
+    return _not_found(verdict, rated, replayed, found.covered, late)
 
 
 def _accepted(verdict: Verdict, walk: Walk, certificate: Certificate | None, note: str) -> Verdict:
@@ -103,12 +102,11 @@ def _accepted(verdict: Verdict, walk: Walk, certificate: Certificate | None, not
 
 
 def _not_found(
-    verdict: Verdict, rated: RatedGraph, replayed: RateReplay, begin: int | None, late: str
+    verdict: Verdict, rated: RatedGraph, replayed: RateReplay, reached: Mask, late: str
 ) -> Verdict:
     """Undecided: what is wrong with the motion that is known, and how much is possible."""
     task, total = verdict.task, len(verdict.cells)
-    reached = covered(rated, rated.enough, begin)
-    best = largest_speed(rated, begin, task.min_manipulability or -np.inf)
+    best = largest_speed(rated)
     message = (
         f"One continuous motion covers every cell, but none was found that does so "
         f"{required_words(task)}: on the one that is known {'; '.join(replayed.refusals)}. "

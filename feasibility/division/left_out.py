@@ -60,10 +60,9 @@ def where_it_stops(
         pose += 1
     if task.requires_rates:
         rates = motion_rates(exploration.robot, exploration.cells, task, motions)
-        slow = np.flatnonzero(~rates.enough(task))
-        if len(slow):
-            which = int(slow[0])
-            return RunStop(first + which, rates.words(exploration.robot, task, which))
+        for which, rate in enumerate(rates):
+            if slow := rate.fault(exploration.robot, task):
+                return RunStop(first + which, slow)
     return RunStop(pose, cause)
 
 
