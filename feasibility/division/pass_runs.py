@@ -11,7 +11,7 @@ from feasibility.collisions.problem_bodies import Pair
 from feasibility.demands.fast_motions import keep_fast_motions
 from feasibility.demands.motion_rates import replay_at_rates
 from feasibility.division.between_patches import clear_moves
-from feasibility.division.fewest_runs import Run, Stations, fewest_runs
+from feasibility.division.fewest_runs import Run, fewest_runs
 from feasibility.division.left_out import (
     Gap,
     RunStop,
@@ -115,9 +115,12 @@ def pass_runs(
     except OutOfTime:
         pass  # what was found until then counts
     slow = keep_fast_motions(exploration, task) if task.requires_rates else {}
-    stations = _stations(exploration, places)
-    runs, refusals = _replayed(exploration, task, fewest_runs(stations))
-    worked = np.zeros(len(stations.pieces), dtype=bool)
+    same = places.stretch[1:] == places.stretch[:-1]
+    inside = same & (places.stretch[1:] >= 0)
+    pieces = inside * np.linalg.norm(np.diff(places.points, axis=0), axis=1)
+    found = fewest_runs(exploration.roadmap, pieces, inside)
+    runs, refusals = _replayed(exploration, task, found)
+    worked = np.zeros(len(pieces), dtype=bool)
     for path in runs:
         own = np.flatnonzero(path.needed)
         worked[own[0] : own[-1]] = True
@@ -129,24 +132,9 @@ def pass_runs(
         places=places,
         runs=tuple(runs),
         cuts=_cuts(exploration, task, places, runs, pairs),
-        gaps=gaps_of(exploration, task, places, stations.pieces, worked, pairs, slow),
+        gaps=gaps_of(exploration, task, places, pieces, worked, pairs, slow),
         refusals=tuple(refusals),
     )
-
-
-def _stations(exploration: Exploration, places: PassPlaces) -> Stations:
-    """What a search found, as stations along the toolpath."""
-    roadmap = exploration.roadmap
-    over = np.array(roadmap.cell, dtype=np.int64)
-    edges = list(enumerate(roadmap.edges, start=1))
-    there = [(x, y, number, len(motion)) for number, (x, y, motion) in edges]
-    back = [(y, x, -number, rows) for x, y, number, rows in there]
-    steps = np.array(there + back, dtype=np.int64).reshape(-1, 4)
-    ahead = over[steps[:, 1]] - over[steps[:, 0]]
-    same = places.stretch[1:] == places.stretch[:-1]
-    inside = same & (places.stretch[1:] >= 0)
-    lengths = np.linalg.norm(np.diff(places.points, axis=0), axis=1)
-    return Stations(over, steps[(ahead == 0) | (ahead == 1)], lengths * inside, inside)
 
 
 def _replayed(
@@ -156,7 +144,7 @@ def _replayed(
     robot, cells = exploration.robot, exploration.cells
     runs, refusals = list[CoveragePath](), list[str]()
     for run in found:
-        walk = route_walk(exploration.roadmap, run.nodes[0], run.route)
+        walk = route_walk(exploration.roadmap, *run)
         walk = unwound(robot, task, walk)
         needed = np.zeros(len(cells), dtype=bool)
         needed[walk.cell[walk.cell >= 0]] = True

@@ -157,7 +157,7 @@ def layers_of(roadmap: Roadmap, begin: int | None = None) -> Layers:
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import dijkstra
 
-    cell, steps = roadmap.cell, _steps(roadmap)
+    cell, steps = roadmap.cell, steps_ahead(roadmap)
     starts = roadmap.over[0] if begin is None else [begin]
     if not starts:
         return Layers(frozenset(), -1, -1, ())
@@ -176,7 +176,7 @@ def layers_of(roadmap: Roadmap, begin: int | None = None) -> Layers:
     )
 
 
-def _steps(roadmap: Roadmap) -> dict[tuple[int, int], tuple[float, int]]:
+def steps_ahead(roadmap: Roadmap) -> dict[tuple[int, int], tuple[float, int]]:
     """From one node to another, by the cheapest edge: what it costs, and the signed edge + 1."""
     found: dict[tuple[int, int], tuple[float, int]] = {}
     cell = roadmap.cell

@@ -12,58 +12,72 @@ import coverable
 from coverable import Task, load_robot, parallel_passes, pass_runs, plan_passes, plane, verify
 from feasibility.certification.rate_replay import replay_rates
 from feasibility.clock import Clock
-from feasibility.division.fewest_runs import Stations, fewest_runs
+from feasibility.division.fewest_runs import fewest_runs
+from feasibility.roadmap.graph import Roadmap
 from surfaces.passes.toolpath import PassPlaces
 
 
-def drawn(rng, stations, classes, share):
-    """A node over some stations for each class, joined with the next one where both are there."""
-    there = rng.random((stations, classes)) < share
-    number = np.full((stations, classes), -1)
-    number[there] = np.arange(there.sum())
+def roadmap_of(poses, over, steps):
+    """Nodes over poses, and motions (x, y, waypoints) between them."""
+    roadmap = Roadmap(poses)
+    for pose in over:
+        roadmap.add_node(pose, np.zeros(1), np.zeros(1), roadmap.add_component())
+    for x, y, rows in steps:
+        roadmap.add_edge(x, y, np.zeros((rows, 1)))
+    return roadmap
+
+
+def drawn(rng, poses, classes, share):
+    """A node over some poses for each class, joined with the next one where both are there."""
+    nodes = np.argwhere(rng.random((poses, classes)) < share).tolist()
     steps = [
-        (number[i, a], number[i + 1, b])
-        for i, a, b in itertools.product(range(stations - 1), range(classes), range(classes))
-        if there[i, a] and there[i + 1, b] and rng.random() < (0.8 if a == b else 0.15)
+        (x, y, 1)
+        for (x, (i, a)), (y, (j, b)) in itertools.permutations(enumerate(nodes), 2)
+        if j == i + 1 and rng.random() < (0.8 if a == b else 0.15)
     ]
-    steps = [(x, y, k + 1, 1) for k, (x, y) in enumerate(steps)]
-    inside = rng.random(stations - 1) < 0.8
-    pieces = np.where(inside, rng.integers(1, 4, stations - 1), 0).astype(float)
-    over = np.repeat(np.arange(stations), there.sum(axis=1))
-    return Stations(over, np.array(steps, dtype=np.int64).reshape(-1, 4), pieces, inside)
+    inside = rng.random(poses - 1) < 0.8
+    pieces = np.where(inside, rng.integers(1, 4, poses - 1), 0).astype(float)
+    return roadmap_of(poses, [pose for pose, _ in nodes], steps), pieces, inside
 
 
-def measured(stations, found):
+def between(roadmap, run):
+    """The poses at which a run begins and ends; each of its motions goes on from the last."""
+    here = run.start
+    for number in run.route:
+        x, y = roadmap.edges[abs(number) - 1][:2][:: 1 if number > 0 else -1]
+        assert x == here
+        here = y
+    return roadmap.cell[run.start], roadmap.cell[here]
+
+
+def measured(roadmap, pieces, found):
     """Undone length and runs, with everything about the runs checked."""
-    edges = {int(number): (int(x), int(y)) for x, y, number, _ in stations.steps}
-    done, last = np.zeros(len(stations.pieces), dtype=bool), -1
+    done, last = np.zeros(len(pieces), dtype=bool), -1
     for run in found:
-        assert [edges[number] for number in run.route] == list(itertools.pairwise(run.nodes))
-        first, end = (int(stations.over[run.nodes[k]]) for k in (0, -1))
+        first, end = between(roadmap, run)
         assert last <= first < end
         assert not done[first:end].any()
         done[first:end], last = True, end
-    return float(stations.pieces[~done].sum()), len(found)
+    return float(pieces[~done].sum()), len(found)
 
 
-def by_force(stations):
+def by_force(roadmap, pieces):
     """The best of all choices of pieces that are worked on, each run as far as sets of nodes go."""
-    count, after = len(stations.pieces), {}
-    for x, y, _, _ in stations.steps.tolist():
+    after = {}
+    for x, y, _ in roadmap.edges:
         after.setdefault(x, set()).add(y)
-    over = [set(np.flatnonzero(stations.over == i).tolist()) for i in range(count + 1)]
     best = (np.inf, 0)
-    for worked in itertools.product((False, True), repeat=count):
+    for worked in itertools.product((False, True), repeat=len(pieces)):
         runs, possible, here = 0, True, set()
-        for i, on in enumerate(worked):
+        for over, on in zip(roadmap.over, worked, strict=False):
             if not on:
                 here = set()
                 continue
             ahead = {y for x in here for y in after.get(x, ())}
             if not ahead:
-                ahead, runs = {y for x in over[i] for y in after.get(x, ())}, runs + 1
+                ahead, runs = {y for x in over for y in after.get(x, ())}, runs + 1
             possible, here = possible and bool(ahead), ahead
-        undone = float(stations.pieces[~np.array(worked)].sum())
+        undone = float(pieces[~np.array(worked)].sum())
         if possible:
             best = min(best, (undone, runs))
     return best
@@ -73,9 +87,9 @@ def by_force(stations):
 def test_no_choice_leaves_less_or_has_fewer_runs(seed):
     rng, several = np.random.default_rng(seed), 0
     for share in np.tile([0.4, 0.7, 0.95], 15):
-        stations = drawn(rng, int(rng.integers(2, 9)), int(rng.integers(1, 4)), share)
-        found = measured(stations, fewest_runs(stations))
-        assert found == by_force(stations)
+        given = drawn(rng, int(rng.integers(2, 9)), int(rng.integers(1, 4)), share)
+        found = measured(*given[:2], fewest_runs(*given))
+        assert found == by_force(*given[:2])
         several += found[1] > 1
     assert several > 2
 
@@ -83,13 +97,12 @@ def test_no_choice_leaves_less_or_has_fewer_runs(seed):
 @pytest.mark.parametrize("turn", range(2, 7))
 def test_cuts_are_made_between_passes_where_they_can_be(turn):
     """Two classes overlap over six stations; the turn between two passes is one of the pieces."""
-    over = np.concatenate([np.arange(0, 8), np.arange(2, 10)])
-    steps = [(k, k + 1, k + 1, 1) for k in range(7)]
-    steps += [(8 + k, 9 + k, 20 + k, 9) for k in range(7)]  # longer, so that later cuts are shorter
-    inside = np.arange(9) != turn
-    found = fewest_runs(Stations(over, np.array(steps), np.where(inside, 0.01, 0.0), inside))
-    assert [int(over[run.nodes[-1]]) for run in found] == [turn, 9]
-    assert int(over[found[1].nodes[0]]) in (turn, turn + 1)
+    steps = [(k, k + 1, 1) for k in range(7)]
+    steps += [(8 + k, 9 + k, 9) for k in range(7)]  # longer, so that later cuts are shorter
+    roadmap, inside = roadmap_of(10, [*range(8), *range(2, 10)], steps), np.arange(9) != turn
+    first, second = fewest_runs(roadmap, np.where(inside, 0.01, 0.0), inside)
+    assert between(roadmap, first)[1] == turn
+    assert between(roadmap, second) in ((turn, 9), (turn + 1, 9))
 
 
 DEG = math.pi / 180.0
