@@ -10,19 +10,17 @@ stuck is where it had better begin.
 """
 
 import math
-import operator
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import networkx as nx
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask, Protected
-from coverable.errors import listed
 from feasibility.certification.followed import lifted_faults
 from feasibility.certification.motion_replay import replay
-from feasibility.paths.ladder import FEW, JointRoute, joint_route
+from feasibility.paths.ladder import JointRoute, joint_route
 from feasibility.paths.metrics import PathFigures, figures_of
 from feasibility.paths.motion_graph import MotionGraph, motion_graph_of
 from feasibility.paths.order import (
@@ -30,10 +28,9 @@ from feasibility.paths.order import (
     Order,
     PathError,
     check_order,
-    check_run,
     closed_sides,
     grid_order,
-    route,
+    shortest_order,
     usual_order,
 )
 from feasibility.paths.winding import unwound
@@ -102,9 +99,7 @@ class CoveragePath(Protected):
         )
 
 
-def coverage_path(
-    verdict: Verdict, order: Order | None = None, only: Iterable[int] | None = None
-) -> CoveragePath:
+def coverage_path(verdict: Verdict, order: Order | None = None) -> CoveragePath:
     """A path over the surface of a feasible verdict.
 
     Args:
@@ -113,15 +108,13 @@ def coverage_path(
             (u), "spiral" from outside to the middle; "shortest" is the shortest order found, for
             any cells; "given" is that of poses, and the only one of a toolpath. None for rows of a
             grid, the given order of a toolpath, and else the shortest.
-        only: flat indices of the cells to visit; all by default. They may be cells that the best
-            motion of an infeasible verdict covers.
 
     Returns:
         The path, replayed and measured.
 
     Raises:
-        PathError: the verdict is not feasible, a cell cannot be reached, there is no such order,
-            or no path was found that the replay accepts.
+        PathError: the verdict is not feasible, there is no such order, or no path was found that
+            the replay accepts.
 
     Example:
         >>> from coverable import Task, check
@@ -137,12 +130,12 @@ def coverage_path(
     """
     cells = verdict.cells
     order = usual_order(cells) if order is None else order
-    check_order(order, cells.surface.kind, len(cells.shape) == 2)
-    check_run(cells, order)
-    needed = _needed(verdict, only)
+    check_order(order, cells.surface.kind, len(cells.shape) == 2, cells.in_order)
+    witness = _witness(verdict)
+    needed = np.ones(len(cells), dtype=bool)
     robot, task = verdict.robot, verdict.task
     refusal = ""
-    for walk in _tried(verdict, order, needed):
+    for walk in _tried(verdict, order, witness):
         walk = unwound(robot, task, walk)
         replayed = replay(robot, cells, task, walk, needed)
         if replayed.accepted:
@@ -151,7 +144,30 @@ def coverage_path(
     raise PathError(f"the independent replay refuses the path: {refusal}")
 
 
-def _tried(verdict: Verdict, order: Order, needed: Mask) -> Iterator[Walk]:
+def _witness(verdict: Verdict) -> Walk:
+    """The motion that is known.
+
+    Raises:
+        PathError: there is none over the centres of all cells.
+    """
+    witness = verdict.witness
+    if verdict.method != "complete":
+        raise PathError(
+            f"a path needs a verdict of the complete search; this one is of the {verdict.method} "
+            "search, whose motions do not pass the centres of cells; take method = 'complete'"
+        )
+    if not len(verdict.cells):
+        raise PathError("there are no cells to cover")
+    if verdict.answer is not Answer.FEASIBLE or witness is None:
+        raise PathError(
+            f"no path over this surface is known: the verdict is {verdict.answer} with "
+            f"{verdict.n_covered} of {len(verdict.cells)} cells covered by the best single motion; "
+            "divide the surface"
+        )
+    return witness
+
+
+def _tried(verdict: Verdict, order: Order, witness: Walk) -> Iterator[Walk]:
     """Motions over cells in an order: of all that are known, then of those of the witness alone.
 
     The witness has the margins that were asked for; other motions may be shorter and have less.
@@ -160,18 +176,18 @@ def _tried(verdict: Verdict, order: Order, needed: Mask) -> Iterator[Walk]:
         PathError: no motion leads from cell to cell.
     """
     if verdict.cells.in_order:
-        yield _run(verdict, needed)
+        first, last = np.flatnonzero(witness.cell >= 0)[[0, -1]]
+        yield Walk(q=witness.q[first : last + 1], cell=witness.cell[first : last + 1])
         return
 
     def walk(alone: bool) -> Walk:
         graph = motion_graph_of(verdict, witness_alone=alone)
-        found = _least_revisiting(graph, verdict.cells, order, needed)
+        found = _least_revisiting(graph, verdict.cells, order)
         return found.graph.walk(_from_start(found, verdict.robot.start))
 
     yield walk(alone=False)
-    if verdict.feasible:
-        with suppress(PathError):  # then it is said why the first one is refused
-            yield walk(alone=True)
+    with suppress(PathError):  # then it is said why the first one is refused
+        yield walk(alone=True)
 
 
 def _from_start(found: JointRoute, start: Array | None) -> list[int]:
@@ -184,86 +200,25 @@ def _from_start(found: JointRoute, start: Array | None) -> list[int]:
     return [*path[:-1], *found.nodes]
 
 
-def _needed(verdict: Verdict, only: Iterable[int] | None) -> Mask:
-    """(N,) the cells to visit.
-
-    Raises:
-        PathError: some of them cannot be visited by one motion.
-    """
-    total = len(verdict.cells)
-    if verdict.method != "complete":
-        raise PathError(
-            f"a path needs a verdict of the complete search; this one is of the {verdict.method} "
-            "search, whose motions do not pass the centres of cells; take method = 'complete'"
-        )
-    if only is None:
-        if verdict.answer is not Answer.FEASIBLE:
-            raise PathError(
-                f"no path over this surface is known: the verdict is {verdict.answer} with "
-                f"{verdict.n_covered} of {total} cells covered by the best single motion; "
-                "divide the surface, or name the cells to visit"
-            )
-        if total == 0:
-            raise PathError("there are no cells to cover")
-        return np.ones(total, dtype=bool)
-    try:
-        named = np.array(sorted({operator.index(cell) for cell in only}), dtype=np.int64)
-    except (TypeError, OverflowError) as error:
-        raise PathError("cells to visit must be whole numbers, their flat indices") from error
-    beyond = named[(named < 0) | (named >= total)]
-    within = named[(named >= 0) & (named < total)]
-    missed = within[~verdict.covered[within]]
-    faults = []
-    if len(named) == 0:
-        faults.append("no cells are named; name at least one")
-    if len(beyond):
-        faults.append(
-            f"there is no cell {listed(beyond.tolist(), FEW)}; cells are 0 to {total - 1}"
-        )
-    if len(missed):
-        names = listed(missed.tolist(), FEW)
-        faults.append(
-            f"cell {names} cannot be reached by the motion that covers most; leave it out"
-        )
-    if faults:
-        raise PathError(faults)
-    needed = np.zeros(total, dtype=bool)
-    needed[within] = True
-    return needed
-
-
-def _run(verdict: Verdict, needed: Mask) -> Walk:
-    """The part of a toolpath's witness from the first needed pose to the last.
-
-    Raises:
-        PathError: there is no witness.
-    """
-    walk = verdict.witness
-    if walk is None:
-        raise PathError("no run of this toolpath in its order is known, nor of parts of it")
-    over = (walk.cell >= 0) & needed[walk.cell]
-    first, last = np.flatnonzero(over)[[0, -1]]
-    return Walk(q=walk.q[first : last + 1], cell=walk.cell[first : last + 1])
-
-
-def _least_revisiting(graph: MotionGraph, cells: Cells, order: Order, needed: Mask) -> JointRoute:
+def _least_revisiting(graph: MotionGraph, cells: Cells, order: Order) -> JointRoute:
     """The motion over cells in an order that revisits least, of those that are tried.
 
     Raises:
         PathError: no motion leads from cell to cell.
     """
-    attempts = _Attempts(graph, cells, needed)
-    if order == "given":
-        attempts.along(route(cells, order, needed))
-        return attempts.best()
-    if order != "shortest":
+    attempts = _Attempts(graph, cells)
+    if order in GRID_ORDERS:
         attempts.along_grid(order)
-        return attempts.best()
-    attempts.along(route(cells, order, needed, graph.joined_cells()))
-    if attempts.left() and len(cells.shape) == 2:
-        for grid in GRID_ORDERS:
-            attempts.along_grid(grid)
-    return attempts.best()
+    elif order == "given":
+        attempts.along(np.arange(len(cells)))
+    else:
+        attempts.along(shortest_order(cells, graph.joined_cells()))
+        if attempts.left() and len(cells.shape) == 2:
+            for grid in GRID_ORDERS:
+                attempts.along_grid(grid)
+    if attempts.found is None:
+        raise attempts.faults[0]
+    return attempts.found
 
 
 @dataclass
@@ -272,15 +227,8 @@ class _Attempts:
 
     graph: MotionGraph
     cells: Cells
-    needed: Mask
     found: JointRoute | None = None
-    fault: PathError | None = None
-
-    def best(self) -> JointRoute:
-        """The motion that revisits least."""
-        if self.found is None:
-            raise self.fault or PathError("there are no cells to cover")
-        return self.found
+    faults: list[PathError] = field(default_factory=list)
 
     def left(self) -> bool:
         """Is there anything to gain?"""
@@ -295,7 +243,7 @@ class _Attempts:
                     self.graph.copy(), self.cells, visits, wind=wind, most_revisited=most
                 )
             except PathError as error:
-                self.fault = self.fault or error
+                self.faults.append(error)
                 continue
             if self.found is None or found.rank < self.found.rank:
                 self.found = found
@@ -306,15 +254,14 @@ class _Attempts:
         """Try an order of a grid from its corners, and from where the best one got stuck."""
         rows, columns = int(self.cells.shape[0]), int(self.cells.shape[1])
         close = closed_sides(self.cells)
-        left = max(1, min(MOST_TRIED, MOST_CELLS // max(1, int(self.needed.sum()))))
+        left = max(1, min(MOST_TRIED, MOST_CELLS // len(self.cells)))
         begins = [(0, 0)]
         for begin in begins:  # grows
             for flipped in FLIPS:
                 if left <= 0:
                     return
                 left -= 1
-                visits = grid_order(order, rows, columns, begin, flipped)
-                stuck = self.along(visits[self.needed[visits]])
+                stuck = self.along(grid_order(order, rows, columns, begin, flipped))
                 if not self.left():
                     return
                 for cell in stuck:

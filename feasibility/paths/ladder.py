@@ -29,7 +29,6 @@ KEPT = 4  # nodes that are kept over each cell of the route
 APART = 0.1  # [rad] or [m], a node nearer to a cheaper one than this is a copy of it
 FEWEST = 2  # nodes that are kept even where they are copies
 REVISIT = 20.0  # [rad], what a detour as long as the arm costs; revisits are expensive
-FEW = 5  # cells that a message names
 START, GOAL = -1, -2  # nodes before those that a detour begins at, and behind those it ends at
 
 
@@ -91,12 +90,8 @@ def joint_route(
         The motion; without nodes and with infinite figures where it was given up.
 
     Raises:
-        PathError: no configuration over a cell is known, or no motion leads there.
+        PathError: no motion leads on from a cell.
     """
-    missing = [int(c) for c in route if not graph.over.get(int(c))]
-    if missing:
-        plural, names = "s" if len(missing) > 1 else "", cells.named(missing, FEW)
-        raise PathError(f"no motion leads to cell{plural} {names}")
     states = [_State(x, 0.0, (x,), None) for x in graph.over[int(route[0])]]
     seen = {int(route[0])}
     stuck, again = [], 0.0

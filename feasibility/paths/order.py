@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from coverable.arrays import Ints, Mask
+from coverable.arrays import Ints
 from coverable.errors import CoverableError
 from feasibility.paths.two_opt import improved, tour_length
 from surfaces.cells import Cells
@@ -89,13 +89,14 @@ def closed_sides(cells: Cells) -> tuple[bool, bool]:
     )
 
 
-def check_order(order: str, kind: str, grid: bool) -> None:
+def check_order(order: str, kind: str, grid: bool, in_order: bool = False) -> None:
     """Refuse an order that cells do not have, before anything is searched for.
 
     Args:
-        order: one of `ORDERS`.
+        order: one of `Order`.
         kind: of the surface.
         grid: whether its cells lie in rows and columns.
+        in_order: whether they are a toolpath.
 
     Raises:
         PathError: there is no such order, or these cells do not have it.
@@ -103,6 +104,11 @@ def check_order(order: str, kind: str, grid: bool) -> None:
     if order not in get_args(Order):
         names = ", ".join(get_args(Order))
         raise PathError(f"there is no order {order!r}; the orders are {names}")
+    if in_order and order != "given":
+        raise PathError(
+            f"a toolpath is run in its order, 'given', not {order!r}; to visit its poses in "
+            "another, give them a radius as neighbours"
+        )
     if order in GRID_ORDERS and not grid:
         raise PathError(
             f"the order {order!r} follows the rows and columns of a grid, which the cells of a "
@@ -114,19 +120,6 @@ def check_order(order: str, kind: str, grid: bool) -> None:
         )
 
 
-def check_run(cells: Cells, order: Order) -> None:
-    """Refuse another order of a toolpath than its own.
-
-    Raises:
-        PathError: it is one.
-    """
-    if cells.in_order and order != "given":
-        raise PathError(
-            f"a toolpath is run in its order, 'given', not {order!r}; to visit its poses in "
-            "another, give them a radius as neighbours"
-        )
-
-
 def usual_order(cells: Cells) -> Order:
     """The default order."""
     if cells.in_order:
@@ -134,38 +127,29 @@ def usual_order(cells: Cells) -> Order:
     return "rows" if len(cells.shape) == 2 else "shortest"
 
 
-def route(
-    cells: Cells,
-    order: Order,
-    needed: Mask | None = None,
-    pairs: Ints | None = None,
-) -> Ints:
-    """The order in which a path visits cells.
+def shortest_order(cells: Cells, pairs: Ints | None = None) -> Ints:
+    """(N,) the shortest order found: of a grid's and a greedy one the best, improved.
 
     Args:
-        cells: the cells.
-        order: one of `ORDERS`; all but "shortest" need a grid.
-        needed: (N,) cells to visit; all by default.
+        cells: N cells; more than `MOST_IMPROVED` are not improved.
         pairs: (M, 2) pairs of cells between which a step is possible; those that touch by default.
-
-    Returns:
-        (k,) flat indices, each needed cell once.
-
-    Raises:
-        PathError: no such order, or one that these cells do not have.
     """
-    grid = len(cells.shape) == 2
-    check_order(order, cells.surface.kind, grid)
-    wanted = np.ones(len(cells), dtype=bool) if needed is None else needed
-    if order == "given":
-        return np.flatnonzero(wanted)
-    names = GRID_ORDERS if order == "shortest" else (order,)
-    orders = [grid_order(name, int(cells.shape[0]), int(cells.shape[1])) for name in names if grid]
-    candidates = [found[wanted[found]] for found in orders]
-    if order != "shortest":
-        return candidates[0]
     steps = step_lengths(cells, cells.pairs if pairs is None else pairs)
-    return _shortest(steps, [*candidates, _greedy(steps, wanted)])
+    shape = tuple(map(int, cells.shape))
+    grids = [grid_order(name, *shape) for name in GRID_ORDERS if len(shape) == 2]
+    candidates = [*grids, _greedy(steps)]
+    lengths = [route_length(steps, order) for order in candidates]
+    best = candidates[int(np.argmin(lengths))]
+    if not 3 <= len(best) <= MOST_IMPROVED:
+        return best
+    distance = dijkstra(steps)
+    if not np.isfinite(distance).all():
+        return best  # some cells cannot be reached from others; which, the caller will find
+    alike = np.round(np.array(lengths) / min(lengths), 9)  # of equal ones the first
+    promising = np.argsort(alike, kind="stable")[:MOST_CANDIDATES]
+    tours = [improved(distance, candidates[k]) for k in promising]
+    shortened = np.array([tour_length(distance, tour) for tour in tours])
+    return tours[int(np.flatnonzero(shortened <= shortened.min() * (1.0 + TIE))[0])]
 
 
 def step_lengths(cells: Cells, pairs: Ints) -> csr_array:
@@ -187,43 +171,19 @@ def route_length(steps: csr_array, order: Ints) -> float:
     return total
 
 
-def _shortest(steps: csr_array, candidates: list[Ints]) -> Ints:
-    """The shortest of some orders, each improved where there are not too many cells."""
-    lengths = [route_length(steps, order) for order in candidates]
-    best = candidates[int(np.argmin(lengths))]
-    cells = np.sort(best)
-    if len(best) > MOST_IMPROVED or len(best) < 3:
-        return best
-    distance = dijkstra(steps, indices=cells)[:, cells]
-    if not np.isfinite(distance).all():
-        return best  # some cells cannot be reached from others; which, the caller will find
-    alike = np.round(np.array(lengths) / min(lengths), 9)  # of equal ones the first
-    promising = np.argsort(alike, kind="stable")[:MOST_CANDIDATES]
-    tours = [improved(distance, np.searchsorted(cells, candidates[k])) for k in promising]
-    shortened = np.array([tour_length(distance, tour) for tour in tours])
-    first = int(np.flatnonzero(shortened <= shortened.min() * (1.0 + TIE))[0])
-    return cells[tours[first]]
-
-
-def _greedy(steps: csr_array, wanted: Mask) -> Ints:
+def _greedy(steps: csr_array) -> Ints:
     """An order that goes on to the unvisited neighbour with the fewest open ends, or the nearest.
 
     Corners are so not left behind (Warnsdorff's rule); from a dead end the nearest unvisited cell
     over visited ones comes next.
     """
-    left = wanted.copy()
-    ends = [steps.indices[steps.indptr[k] : steps.indptr[k + 1]] for k in range(len(wanted))]
-    if not left.any():
-        return np.empty(0, dtype=np.int64)
-    degree = np.array([left[near].sum() for near in ends])
-    here = int(np.flatnonzero(left)[np.argmin(degree[left])])
-    found = [here]
-    left[here] = False
+    ends = np.split(steps.indices, steps.indptr[1:-1])
+    left, here, found = np.ones(len(ends), dtype=bool), -1, list[int]()
     while left.any():
-        near = ends[here][left[ends[here]]]
+        near = ends[here][left[ends[here]]] if found else np.arange(len(ends))
         if len(near):
             open_ends = np.array([left[ends[k]].sum() for k in near])
-            away = np.asarray(steps[[here], near]).reshape(-1)
+            away = np.asarray(steps[[here], near]).reshape(-1) if found else open_ends
             here = int(near[np.lexsort((away, open_ends))[0]])
         else:
             away = np.where(left, dijkstra(steps, indices=here), np.inf)

@@ -9,9 +9,9 @@ from mesh_patches import sheet
 from path_cases import verdict_of
 from samples import sampled, seeds
 
-from coverable import PathError, coverage_path, cylinder, mesh, plane
+from coverable import PathError, coverage_path, mesh, plane
 from feasibility.paths import order as orders
-from feasibility.paths.order import ORDERS, grid_order, route, route_length, step_lengths
+from feasibility.paths.order import grid_order, route_length, shortest_order, step_lengths
 from feasibility.paths.two_opt import improved, tour_length
 from surfaces.meshes.triangle_mesh import TriangleMesh
 
@@ -68,10 +68,11 @@ def test_an_improved_tour_has_no_better_neighbour(seed):
 def test_the_shortest_order_is_no_longer_than_the_others(name):
     cells = verdict_of(name).cells
     steps = step_lengths(cells, cells.pairs)
-    lengths = {order: route_length(steps, route(cells, order)) for order in ORDERS}
-    assert lengths["shortest"] <= min(lengths.values()) * (1 + 1e-9)
-    for order in ORDERS:
-        assert sorted(route(cells, order).tolist()) == list(range(len(cells)))
+    found = shortest_order(cells)
+    assert sorted(found.tolist()) == list(range(len(cells)))
+    others = [grid_order(order, *map(int, cells.shape)) for order in orders.GRID_ORDERS]
+    least = min(route_length(steps, other) for other in others)
+    assert route_length(steps, found) <= least * (1 + 1e-9)
 
 
 def test_the_length_of_a_route_goes_round_what_does_not_touch():
@@ -81,32 +82,24 @@ def test_the_length_of_a_route_goes_round_what_does_not_touch():
     assert route_length(step_lengths(cells, np.array([[0, 1]])), np.array([0, 1, 2])) == np.inf
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_only_needed_cells_are_visited_and_one_is_an_order_of_its_own(order):
-    cells = cylinder(0.5, (-60, 60), (0.0, 0.9)).cells(4, 5)
-    needed = np.random.default_rng(3).random(20) < 0.5
-    found = route(cells, order, needed)
-    assert sorted(found.tolist()) == np.flatnonzero(needed).tolist()
+def test_one_cell_is_an_order_of_its_own():
     one = plane((0.0, 0.1), (0.0, 0.1)).cells(1, 1)
-    assert route(one, order).tolist() == [0]
+    assert shortest_order(one).tolist() == [0]
     assert route_length(step_lengths(one, one.pairs), np.array([0])) == 0.0
 
 
 def test_the_shortest_order_of_cells_in_two_pieces_names_each_once():
     cells = plane((0, 0.4), (0, 0.2)).cells(4, 2)
     pairs = cells.pairs[(cells.pairs < 4).all(axis=1) | (cells.pairs >= 4).all(axis=1)]
-    assert sorted(route(cells, "shortest", None, pairs).tolist()) == list(range(8))
+    assert sorted(shortest_order(cells, pairs).tolist()) == list(range(8))
 
 
 def test_cells_of_a_mesh_have_the_shortest_order_alone():
     cells = mesh(TriangleMesh(*sheet(12))).cells(12)
-    assert sorted(route(cells, "shortest").tolist()) == list(range(len(cells)))
+    assert sorted(shortest_order(cells).tolist()) == list(range(len(cells)))
+    asked = SimpleNamespace(cells=cells)  # no arm is asked
     for order in orders.GRID_ORDERS:
-        for ask in (
-            lambda order=order: route(cells, order),
-            lambda order=order: coverage_path(SimpleNamespace(cells=cells), order),  # asks no arm
-        ):
-            with pytest.raises(PathError, match=f"{order}.*not.*use order 'shortest'"):
-                ask()
+        with pytest.raises(PathError, match=f"{order}.*not.*use order 'shortest'"):
+            coverage_path(asked, order)
     with pytest.raises(PathError, match=r"'zigzag'.*rows, columns, spiral, shortest"):
-        route(cells, "zigzag")
+        coverage_path(asked, "zigzag")
