@@ -11,28 +11,28 @@ import numpy as np
 
 from coverable.arrays import Array
 from feasibility.certification.collisions.collision_replay import CollisionReplay, collision_replay
+from feasibility.certification.jacobians import jacobians
+from feasibility.certification.lever_bounds import second_derivatives
 from feasibility.collisions.asked_bodies import gather
 from feasibility.collisions.kernels.memory import collision_buffer
 from feasibility.collisions.problem_bodies import Bodies
 from feasibility.division.free_motion import FreeSpace, free_motion
 from feasibility.division.reconfiguration import Reconfiguration
+from feasibility.paths.order import PathError
 from feasibility.task import Task
 from robots.kinematics import Kinematics, configuration_near
 from robots.robot import Robot
 from surfaces.cells import Cells
 
-LIFT = 0.02  # [m]
-STEPS = 4  # of the lift: a straight line of the tool point to 0.01 mm or so
-NEWTON = 8
-CLOSE = 1e-6  # [m], and [1] of the axis
+LIFT, STRAIGHT = 0.02, 1e-4  # [m] how far a tool is lifted, and how straight between rows
+STEP = 0.005  # [m] of the tool point drawn back from row to row, at most
+MOST_HALVINGS = 6  # of that, until the motion is straight enough between rows
+NEWTON = 20
+CLOSE = 1e-7  # [m], and [1] of the axis
 
 
 def clear_moves(
-    robot: Robot,
-    cells: Cells,
-    task: Task,
-    buffer: Array,
-    moves: Iterable[Reconfiguration],
+    robot: Robot, cells: Cells, task: Task, moves: Iterable[Reconfiguration]
 ) -> tuple[Reconfiguration, ...]:
     """The same moves led around obstacles; unchanged where collisions are not checked.
 
@@ -41,58 +41,42 @@ def clear_moves(
 
     Args:
         robot, cells, task: the question, with its collisions.
-        buffer: of `collision_buffer`, for the same task.
         moves: straight lines.
     """
-    bodies = gather(robot, cells.surface, task.collision, task.standoff)
-    if bodies is None:
+    bodies = lifted = gather(robot, cells.surface, task.collision, task.standoff)
+    if bodies is not None and any(one.why == "contact" for one in bodies.left_out):
+        lifted = gather(robot, cells.surface, task.collision, LIFT)
+    if bodies is None or lifted is None:
         return tuple(moves)
-    if not any(one.why == "contact" for one in bodies.left_out):
-        return tuple(_clear(robot, bodies, buffer, move) for move in moves)
-    lifted = gather(robot, cells.surface, task.collision, LIFT)
-    if lifted is None:
-        return tuple(moves)
-    return tuple(_clear_of_contact(robot, bodies, lifted, move) for move in moves)
+    buffer = collision_buffer(lifted, robot)
+    return tuple(_clear(robot, bodies, lifted, buffer, move) for move in moves)
 
 
-def _clear(robot: Robot, bodies: Bodies, buffer: Array, move: Reconfiguration) -> Reconfiguration:
-    """A move that the judge accepts; the straight one, judged, where none was found."""
-    rows = free_motion(FreeSpace(robot, buffer), move.start, move.end, seed=0)
-    if rows is not None:
-        replayed = collision_replay(robot, bodies, rows)
-        if replayed.accepted:
-            return replace(move, via=rows[1:-1], replayed=replayed)
-    return _straight(robot, bodies, move)
-
-
-def _straight(robot: Robot, bodies: Bodies, move: Reconfiguration) -> Reconfiguration:
-    """A move without a way around, judged."""
-    replayed = collision_replay(robot, bodies, np.stack([move.start, move.end]))
-    return replace(move, via=np.zeros((0, robot.n)), replayed=replayed)
-
-
-def _clear_of_contact(
-    robot: Robot, touching: Bodies, lifted: Bodies, move: Reconfiguration
+def _clear(
+    robot: Robot, bodies: Bodies, lifted: Bodies, buffer: Array, move: Reconfiguration
 ) -> Reconfiguration:
-    """The same of a tool that touches at both ends; the straight move where it cannot be lifted.
+    """A move that the judge accepts; the straight one, judged, where none was found.
 
-    `touching` are the bodies without the pairs of tool and surface, `lifted` those with them.
+    Args:
+        robot, move: what moves.
+        bodies: at both ends.
+        lifted: those with the pairs of tool and surface, where `bodies` lacks them; else the same.
+        buffer: of `collision_buffer`, for `lifted`.
     """
-    up, down = lift(robot, move.start), lift(robot, move.end)
-    if up is None or down is None:
-        return _straight(robot, lifted, move)
-    space = FreeSpace(robot, collision_buffer(lifted, robot))
-    between = free_motion(space, up[-1], down[-1], seed=0)
-    if between is None:
-        return _straight(robot, lifted, move)
-    via = np.concatenate([up[:-1], between, down[-2::-1]])
-    found = [
-        collision_replay(robot, touching, np.vstack([move.start, *via, move.end])),
-        collision_replay(robot, lifted, between),
-    ]
-    if not all(one.accepted for one in found):
-        return _straight(robot, lifted, move)
-    return replace(move, via=via, replayed=min(found, key=_nearest))
+    touches = lifted is not bodies
+    up, down = (_lifted(robot, q) if touches else q[None] for q in (move.start, move.end))
+    between = None
+    if up is not None and down is not None:
+        between = free_motion(FreeSpace(robot, buffer), up[-1], down[-1], seed=0)
+    if up is not None and down is not None and between is not None:
+        rows = np.concatenate([up[:-1], between, down[-2::-1]])
+        found = [collision_replay(robot, bodies, rows)]
+        if touches:
+            found.append(collision_replay(robot, lifted, between))
+        if all(one.accepted for one in found):
+            return replace(move, via=rows[1:-1], replayed=min(found, key=_nearest))
+    replayed = collision_replay(robot, lifted, np.stack([move.start, move.end]))
+    return replace(move, via=np.zeros((0, robot.n)), replayed=replayed)
 
 
 def _nearest(replayed: CollisionReplay) -> float:
@@ -100,30 +84,60 @@ def _nearest(replayed: CollisionReplay) -> float:
     return np.inf if replayed.min_clearance is None else replayed.min_clearance
 
 
-def tool_moved(robot: Robot, q: Array, move: Array, count: int, newton: int, close: float) -> Array:
-    """Configurations (k, n) rad or m, q (n,) the first, with the tool point ever further on a line.
-
-    The line is `move` (3,) m, in `count` equal steps; the axis keeps its direction. Fewer rows
-    follow q where the arm cannot go on. Each takes at most `newton` steps of Newton's method, and
-    is off by less than `close`, m and 1 of the axis.
-    """
-    kinematics = Kinematics(robot)
-    point, axis = kinematics.tool(q)
-    rows = [q]
-    for k in range(1, count + 1):
-        there = point + k / count * move
-        reached = configuration_near(kinematics, rows[-1], there, axis, newton, close)
-        if reached is None:
-            break
-        rows.append(reached)
-    return np.array(rows)
-
-
-def lift(robot: Robot, q: Array) -> Array | None:
+def _lifted(robot: Robot, q: Array) -> Array | None:
     """Configurations (k, n) rad or m that draw the tool back from where it touches at q (n,).
 
     The last is `LIFT` away; None where a limit prevents it.
     """
-    back = -LIFT * Kinematics(robot).tool(q)[1]
-    rows = tool_moved(robot, q, back, STEPS, NEWTON, CLOSE)
-    return rows[1:] if len(rows) > STEPS else None
+    try:
+        return drawn_back(robot, q, -Kinematics(robot).tool(q)[1], LIFT, STRAIGHT)
+    except PathError:
+        return None
+
+
+def drawn_back(
+    robot: Robot, q: Array, direction: Array, distance: float, tolerance: float
+) -> Array:
+    """Configurations (k, n) rad or m, from q on, that move the tool point straight back.
+
+    The axis keeps its direction.
+
+    Args:
+        robot: the arm.
+        q: (n,) where it begins.
+        direction: (3,) unit, where to.
+        distance: m, how far.
+        tolerance: m, how far the tool point may be off the line, between rows too.
+
+    Raises:
+        PathError: a limit or a singularity prevents it.
+    """
+    kinematics = Kinematics(robot)
+    point, axis = kinematics.tool(q)
+    count = max(2, int(np.ceil(distance / STEP)))
+    for _ in range(MOST_HALVINGS):
+        rows = [q]
+        for away in np.linspace(0.0, distance, count + 1)[1:].tolist():
+            there = point + away * direction
+            reached = configuration_near(kinematics, rows[-1], there, axis, NEWTON, CLOSE)
+            if reached is None:
+                why = _in_the_way(robot, rows[-1], away - distance / count)
+                raise PathError(f"the tool cannot be drawn back by {1e3 * distance:g} mm: {why}")
+            rows.append(reached)
+        at, steps = jacobians(kinematics, np.array(rows)), np.abs(np.diff(rows, axis=0))
+        bound = second_derivatives(steps, robot.prismatic, at.levers, np.inf)
+        if bound.max() / 8.0 + CLOSE <= tolerance:
+            return np.array(rows)
+        count *= 2
+    why = "the joints would have to turn too far meanwhile"
+    raise PathError(f"the tool cannot be drawn back by {1e3 * distance:g} mm: {why}")
+
+
+def _in_the_way(robot: Robot, q: Array, done: float) -> str:
+    """What stops the tool at a configuration, after `done` m."""
+    margin = np.minimum(q - robot.lower, robot.upper - q)
+    joint = int(np.argmin(margin))
+    after = f"after {1e3 * done:.3g} mm"
+    if margin[joint] < 1e-6:
+        return f"{after} {robot.joint_names[joint]} is at its limit"
+    return f"{after} the arm cannot follow, being stretched out or folded up"

@@ -13,22 +13,15 @@ import numpy as np
 
 from coverable.arrays import Array, Protected
 from feasibility.certification.collisions.collision_replay import collision_replay
-from feasibility.certification.jacobians import jacobians
-from feasibility.certification.lever_bounds import second_derivatives
 from feasibility.collisions.asked_bodies import gather
 from feasibility.collisions.kernels.memory import collision_buffer
 from feasibility.collisions.problem_bodies import Bodies
-from feasibility.division.between_patches import tool_moved
+from feasibility.division.between_patches import drawn_back
 from feasibility.division.free_motion import FreeSpace, free_motion
 from feasibility.paths.coverage import CoveragePath
 from feasibility.paths.order import PathError
-from robots.kinematics import Kinematics
 from robots.robot import Robot
 
-STEP = 0.005  # [m] of the tool point drawn back from row to row, at most
-MOST_HALVINGS = 6  # of that, until the motion is straight enough between rows
-NEWTON = 20
-CLOSE = 1e-7  # [m], and [1] of the axis
 HOME_STEP = 0.2  # [rad], [m] of a joint between rows of a move home: the judge has a budget a row
 TRIES = 5  # moves home that are looked for, until the judge accepts one
 
@@ -78,7 +71,7 @@ def _move(path: CoveragePath, q: Array, cell: int, approach: float, what: str) -
     robot, task = path.robot, path.task
     direction = -task.approaches(path.cells)[cell]
     try:
-        back = _drawn_back(robot, q, direction, approach, task.effective_tolerance)
+        back = drawn_back(robot, q, direction, approach, task.effective_tolerance)
     except PathError as error:
         raise PathError(f"{what}: {error}; give another --approach") from error
     surface = path.cells.surface
@@ -137,43 +130,3 @@ def _refusal(robot: Robot, bodies: Bodies, rows: Array) -> str:
         if not found.accepted:
             return found.refusal
     return ""
-
-
-def _drawn_back(
-    robot: Robot, q: Array, direction: Array, distance: float, tolerance: float
-) -> Array:
-    """Configurations (k, n) rad or m, from q on, that move the tool point straight back.
-
-    Args:
-        robot: the arm.
-        q: (n,) where it begins.
-        direction: (3,) unit, where to.
-        distance: m, how far.
-        tolerance: m, how far the tool point may be off the line, between rows too.
-
-    Raises:
-        PathError: a limit or a singularity prevents it.
-    """
-    count = max(2, int(np.ceil(distance / STEP)))
-    why = "the joints would have to turn too far meanwhile"
-    for _ in range(MOST_HALVINGS):
-        rows = tool_moved(robot, q, distance * direction, count, NEWTON, CLOSE)
-        if len(rows) <= count:
-            why = _in_the_way(robot, rows[-1], distance * (len(rows) - 1) / count)
-            break
-        at, steps = jacobians(Kinematics(robot), rows), np.abs(np.diff(rows, axis=0))
-        bound = second_derivatives(steps, robot.prismatic, at.levers, np.inf)
-        if bound.max() / 8.0 + CLOSE <= tolerance:
-            return rows
-        count *= 2
-    raise PathError(f"the tool cannot be drawn back by {1e3 * distance:g} mm: {why}")
-
-
-def _in_the_way(robot: Robot, q: Array, done: float) -> str:
-    """What stops the tool at a configuration, after `done` m."""
-    margin = np.minimum(q - robot.lower, robot.upper - q)
-    joint = int(np.argmin(margin))
-    after = f"after {1e3 * done:.3g} mm"
-    if margin[joint] < 1e-6:
-        return f"{after} {robot.joint_names[joint]} is at its limit"
-    return f"{after} the arm cannot follow, being stretched out or folded up"

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from feasibility.division.left_out import (
     where_it_stops,
 )
 from feasibility.division.plans import collect_components, connect_pairs
-from feasibility.division.reconfiguration import Reconfiguration
+from feasibility.division.reconfiguration import Reconfiguration, straight_moves
 from feasibility.paths.coverage import CoveragePath
 from feasibility.paths.winding import unwound
 from feasibility.problem import Problem
@@ -166,11 +165,8 @@ def _cuts(
 ) -> tuple[Interruption, ...]:
     """What lies between the runs."""
     robot, cells = exploration.robot, exploration.cells
-    moves = [
-        Reconfiguration(robot.joint_names, robot.prismatic, a.walk.q[-1], b.walk.q[0])
-        for a, b in pairwise(runs)
-    ]
-    clear = clear_moves(robot, cells, task, exploration.arrays.collisions, moves)
+    moves = straight_moves(robot, [run.walk for run in runs])
+    clear = clear_moves(robot, cells, task, moves)
     found = []
     for before, after, move in zip(runs, runs[1:], clear, strict=False):
         pose, following = int(before.visits[-1]), int(after.visits[0])

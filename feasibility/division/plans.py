@@ -24,7 +24,7 @@ from coverable.arrays import Array, Ints, Mask, Protected
 from feasibility.demands.motion_rates import replay_at_rates
 from feasibility.division.between_patches import clear_moves
 from feasibility.division.division import Plan, SubPatch
-from feasibility.division.reconfiguration import itinerary
+from feasibility.division.reconfiguration import itinerary, straight_moves
 from feasibility.division.set_covering import set_cover
 from feasibility.roadmap.expansion import UNTRIED
 from feasibility.roadmap.exploration import Exploration
@@ -171,7 +171,7 @@ def plan_of(
                 refusal=refusal,
             )
         )
-    moves = clear_moves(robot, cells, task, asked.arrays.collisions, chosen.moves)
+    moves = clear_moves(robot, cells, task, straight_moves(robot, chosen.walks))
     return Plan(tuple(patches), moves, partition.bound)
 
 

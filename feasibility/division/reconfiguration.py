@@ -85,16 +85,13 @@ class Reconfiguration(Protected):
         return ", ".join(parts) or "no joint"
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Itinerary:
-    """Walks in the order in which they are done, and the moves between them."""
+class Itinerary(NamedTuple):
+    """Walks in the order in which they are done."""
 
-    order: tuple[int, ...]
+    order: list[int]
     """Which patch comes when."""
-    walks: tuple[Walk, ...]
+    walks: list[Walk]
     """One for each patch, in that order."""
-    moves: tuple[Reconfiguration, ...]
-    """From each walk to the next; one fewer than there are walks."""
 
 
 def itinerary(robot: Robot, choices: Sequence[Sequence[Walk]]) -> Itinerary:
@@ -110,12 +107,15 @@ def itinerary(robot: Robot, choices: Sequence[Sequence[Walk]]) -> Itinerary:
     own = [np.flatnonzero(group == p) for p in range(len(choices))]
     orders = [[own[p] for p in order] for order in _orders(costs.largest, own)]
     path = _least_path(costs, orders, AS_GOOD)
-    walks = _unwound(robot, [options[k][1] for k in path])
-    moves = tuple(
+    return Itinerary(group[path].tolist(), _unwound(robot, [options[k][1] for k in path]))
+
+
+def straight_moves(robot: Robot, walks: Sequence[Walk]) -> list[Reconfiguration]:
+    """From the end of each walk to the start of the next one."""
+    return [
         Reconfiguration(robot.joint_names, robot.prismatic, a.q[-1], b.q[0])
         for a, b in pairwise(walks)
-    )
-    return Itinerary(tuple(int(group[k]) for k in path), tuple(walks), moves)
+    ]
 
 
 def _turns(robot: Robot, walks: Sequence[Walk]) -> tuple[Array, Array]:

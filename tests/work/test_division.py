@@ -22,7 +22,7 @@ from coverable import Search, Task, check, divide, load_case, load_robot, plane,
 from feasibility.certification.cut_proofs.proof_verification import verify_proof
 from feasibility.certification.rate_replay import replay_rates
 from feasibility.cut_tree import Leaf
-from feasibility.division.reconfiguration import itinerary
+from feasibility.division.reconfiguration import itinerary, straight_moves
 from feasibility.verdict import CauseKind, Walk
 
 UR5 = load_robot("ur5")
@@ -235,7 +235,8 @@ def test_the_largest_move_is_the_least_there_is(seed):
         choices.append(own)
     found = itinerary(robot, choices)
     assert sorted(found.order) == list(range(len(choices)))
-    largest = max((float(np.abs(move.moves).max()) for move in found.moves), default=0.0)
+    moves = straight_moves(robot, found.walks)
+    largest = max((float(np.abs(move.moves).max()) for move in moves), default=0.0)
     assert largest <= 1.02 * largest_by_brute_force(robot, choices) + 1e-9
     for p, walk in zip(found.order, found.walks, strict=True):
         assert (walk.q >= robot.lower).all()
@@ -255,5 +256,6 @@ def test_turns_along_a_chain_of_patches():
     robot = planar_arm(1).with_limits(np.radians([[-170, 1300]]))
     angles = np.radians([(0, 100), (110, 200), (-150, -60), (-50, 80)])
     choices = [[Walk(np.array(pair)[:, None], np.zeros(2, dtype=np.int64))] for pair in angles]
-    moves = [abs(math.degrees(float(m.moves[0]))) for m in itinerary(robot, choices).moves]
+    found = straight_moves(robot, itinerary(robot, choices).walks)
+    moves = [abs(math.degrees(float(move.moves[0]))) for move in found]
     assert moves == pytest.approx([10.0] * 3)

@@ -14,7 +14,6 @@ from feasibility.collisions.kernels.memory import collision_buffer
 from feasibility.division.between_patches import clear_moves
 from feasibility.division.free_motion import FreeSpace, free_motion
 from feasibility.division.reconfiguration import Reconfiguration
-from feasibility.roadmap.motions.search_arrays import arrays_of
 from robots.kinematics import Kinematics
 
 UR5 = load_robot("ur5")
@@ -74,8 +73,7 @@ def test_a_move_that_is_not_found_is_refused_and_said():
     division = behind()
     wall = Obstacle.box("wall", (0.02, 4.0, 4.0), position=(0.2, 0.0, 0.0))
     task = replace(division.task, collision=Collision(clearance=0.005, scene=(wall,)))
-    buffer = arrays_of(division.robot, division.cells, task).collisions
-    (move,) = clear_moves(division.robot, division.cells, task, buffer, division.moves)
+    (move,) = clear_moves(division.robot, division.cells, task, division.moves)
     assert len(move.via) == 0
     assert move.refusal.startswith("no path around was found, and straight on")
     assert "wall overlap" in move.refusal
@@ -86,7 +84,7 @@ def test_a_move_that_is_not_found_is_refused_and_said():
     # Nothing is checked where nothing is asked.
     free = replace(division.task, collision=None)
     moves = [Reconfiguration(("a",), np.zeros(1, dtype=bool), np.zeros(1), np.ones(1))]
-    (same,) = clear_moves(division.robot, division.cells, free, np.zeros(0), moves)
+    (same,) = clear_moves(division.robot, division.cells, free, moves)
     assert (same is moves[0], same.refusal) == (True, "")
     np.testing.assert_array_equal(same.waypoints, [[0.0], [1.0]])
 
@@ -113,7 +111,7 @@ def test_a_tool_that_touches_is_lifted_along_its_axis_and_drags_over_nothing():
     assert contact
     assert contact <= {(one.first, one.second) for one in lifted.pairs}
     assert not collision_replay(UR5, lifted, move.waypoints).accepted
-    (clear,) = clear_moves(UR5, FLAT, TOUCHING, np.zeros(0), [move])
+    (clear,) = clear_moves(UR5, FLAT, TOUCHING, [move])
     assert clear.refusal == ""
     rows = clear.waypoints
     np.testing.assert_array_equal(rows[[0, -1]], [start, end])
@@ -137,6 +135,6 @@ def test_a_tool_that_cannot_be_lifted_is_refused():
     low, high = np.minimum(start, end), np.maximum(start, end)
     robot = UR5.with_limits(np.column_stack([low, high]))
     move = Reconfiguration(robot.joint_names, robot.prismatic, start, end)
-    (refused,) = clear_moves(robot, FLAT, TOUCHING, np.zeros(0), [move])
+    (refused,) = clear_moves(robot, FLAT, TOUCHING, [move])
     assert len(refused.via) == 0
     assert "surface" in refused.refusal
