@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.arrays import Array, Ints
+from feasibility.paths.metrics import denser
 from feasibility.verdict import Walk
 from robots.kinematics import Kinematics
 from robots.robot import Robot
@@ -94,8 +95,5 @@ def _dense(robot: Robot, q: Array) -> _Dense:
     count = np.maximum(finest, 1)
     if count.sum() > MOST_ROWS:
         count = np.maximum(count * MOST_ROWS // count.sum(), 1)
-    of = np.repeat(np.arange(len(count)), count)
-    share = (np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)) / count[of]
-    rows = np.concatenate([q[of] + share[:, None] * (q[of + 1] - q[of]), q[-1:]])
     sag = float((reach * (steps / count) ** 2).max(initial=0.0)) / 8.0
-    return _Dense(rows, np.append(of + share, len(q) - 1.0), sag)
+    return _Dense(*denser(q, count), sag)

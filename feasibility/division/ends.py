@@ -19,6 +19,7 @@ from feasibility.collisions.problem_bodies import Bodies
 from feasibility.division.between_patches import drawn_back
 from feasibility.division.free_motion import FreeSpace, free_motion
 from feasibility.paths.coverage import CoveragePath
+from feasibility.paths.metrics import denser
 from feasibility.paths.order import PathError
 from robots.robot import Robot
 
@@ -91,22 +92,13 @@ def _move(path: CoveragePath, q: Array, cell: int, approach: float, what: str) -
         move = free_motion(space, back[-1], home, seed=seed)
         if move is None:
             continue
-        move = _in_short_steps(move)
+        steps = np.ceil(np.abs(np.diff(move, axis=0)).max(axis=1) / HOME_STEP)
+        move, _ = denser(move, np.maximum(steps, 1).astype(int))
         refused = _refusal(robot, lifted, move)
         if not refused:
             return np.vstack([back, move[1:]])
         refusal = f"the move home: {refused}"
     raise PathError(f"{what}: {refusal}")
-
-
-def _in_short_steps(rows: Array) -> Array:
-    """The same motion in rows that are closer to each other."""
-    counts = np.ceil(np.abs(np.diff(rows, axis=0)).max(axis=1) / HOME_STEP).astype(int)
-    pieces = [
-        np.linspace(a, b, max(count, 1), endpoint=False)
-        for a, b, count in zip(rows[:-1], rows[1:], counts.tolist(), strict=True)
-    ]
-    return np.vstack([*pieces, rows[-1:]])
 
 
 def _judged(robot: Robot, bodies: Bodies | None, rows: Array, what: str) -> None:

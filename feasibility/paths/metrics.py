@@ -56,7 +56,7 @@ def figures_of(
     needed: Mask,
 ) -> PathFigures:
     """Measure a path over the cells `needed` (N,) that a replay has accepted with a certificate."""
-    along, owner = _denser(walk.q)
+    along, at = denser(walk.q, np.full(len(walk.q) - 1, BETWEEN))
     points, _ = Kinematics(robot).tools(along)
     closest_point = cells.surface.closest(points)
     places = points - closest_point.height[:, None] * closest_point.normal
@@ -65,7 +65,7 @@ def figures_of(
     turns, slides = margins[:, ~robot.prismatic], margins[:, robot.prismatic]
     return PathFigures(
         length=float(steps.sum()),
-        revisited=float(steps[revisiting(walk)[owner]].sum()),
+        revisited=float(steps[revisiting(walk)[at[:-1].astype(int)]].sum()),
         travel=np.abs(np.diff(walk.q, axis=0)).sum(axis=0),
         turn_margin=float(turns.min(initial=np.inf)),
         slide_margin=float(slides.min(initial=np.inf)),
@@ -85,11 +85,13 @@ def revisiting(walk: Walk) -> Mask:
     return np.append(again, False)[np.searchsorted(marks, np.arange(1, len(walk.q)))]
 
 
-def _denser(q: Array) -> tuple[Array, Ints]:
-    """Places along the segments of a walk, and the segment that each step between them is on."""
-    if len(q) < 2:
-        return q, np.empty(0, dtype=np.int64)
-    share = np.arange(BETWEEN)[None, :, None] / BETWEEN
-    inner = q[:-1, None] + share * np.diff(q, axis=0)[:, None]
-    rows = np.vstack([inner.reshape(-1, q.shape[1]), q[-1:]])
-    return rows, np.repeat(np.arange(len(q) - 1), BETWEEN)
+def denser(q: Array, counts: Ints) -> tuple[Array, Array]:
+    """More rows of a motion q (m, n), so many on each of its straight lines; m at least 1.
+
+    Returns:
+        (k, n) its rows, and (k,) where each is: the row before it, with the share of the line.
+    """
+    of = np.repeat(np.arange(len(counts)), counts)
+    share = (np.arange(len(of)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[of]
+    rows = q[of] + share[:, None] * (q[of + 1] - q[of])
+    return np.vstack([rows, q[-1:]]), np.append(of + share, len(q) - 1.0)
