@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -112,8 +111,6 @@ class Division(Protected):
     not judged; empty where they hold all."""
     timing: Mapping[str, float] = field(default_factory=dict)
     """Seconds: load_s, search_s, divide_s, total_s."""
-    statistics: Mapping[str, Any] = field(default_factory=dict)
-    """Counts of work done."""
 
     @property
     def patches(self) -> tuple[SubPatch, ...]:

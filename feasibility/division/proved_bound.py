@@ -5,7 +5,8 @@ two of k cells can be covered by one motion, each pair by a cut tree of its own,
 covers one of them at most.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -36,8 +37,6 @@ class ProvedBound:
     apart: tuple[Apart, ...] = ()
     """The pairs among `number` cells of which a motion covers one at most; empty where `proof` is
     enough."""
-    boxes: int = 0
-    """Examined for it."""
 
 
 def prove_apart(exploration: Exploration, task: Task) -> ProvedBound:
@@ -53,65 +52,49 @@ def prove_apart(exploration: Exploration, task: Task) -> ProvedBound:
         return ProvedBound(int(reached.any()))
     rng = np.random.default_rng(exploration.seed)
     prover = Prover(exploration.arrays, places_on(exploration.cells.surface, task), rng)
-    proofs = _Proofs(exploration, prover)
-    whole = proofs.tree(None)
+    before, whole = exploration.boxes, _tree(exploration, prover, None)
     if whole is None:
-        return ProvedBound(1, boxes=proofs.boxes)
+        return ProvedBound(1)
     apart: dict[tuple[int, int], CutTree] = {}
     refuted: set[tuple[int, int]] = set()
-    while len(refuted) <= MOST_REFUTED and proofs.boxes < ALL_BOXES:
-        cells = _never_together(exploration, refuted)
-        if len(cells) < 3:
+    while len(refuted) <= MOST_REFUTED and exploration.boxes - before < ALL_BOXES:
+        pairs = list(combinations(_never_together(exploration, refuted), 2))
+        if len(pairs) < 2:
             break
-        pairs = [(a, b) for a in cells for b in cells if a < b]
-        failed = next((p for p in pairs if p not in apart and not proofs.put(apart, p)), None)
-        if failed is None:
-            trees = tuple(Apart(a, b, apart[a, b]) for a, b in pairs)
-            return ProvedBound(len(cells), whole, trees, proofs.boxes)
-        refuted.add(failed)
-    return ProvedBound(2, whole, boxes=proofs.boxes)
-
-
-@dataclass(eq=False)
-class _Proofs:
-    """Cut trees about some of the cells, and what they cost."""
-
-    exploration: Exploration
-    prover: Prover
-    boxes: int = field(default=0)
-
-    def put(self, apart: dict[tuple[int, int], CutTree], pair: tuple[int, int]) -> bool:
-        """Prove that no motion covers both cells; False where that fails."""
-        tree = self.tree(pair)
-        if tree is not None:
+        for pair in pairs:
+            tree = apart.get(pair) or _tree(exploration, prover, pair)
+            if tree is None:
+                refuted.add(pair)
+                break
             apart[pair] = tree
-        return tree is not None
+        else:
+            trees = tuple(Apart(*pair, apart[pair]) for pair in pairs)
+            return ProvedBound(len({cell for pair in pairs for cell in pair}), whole, trees)
+    return ProvedBound(2, whole)
 
-    def tree(self, cells: tuple[int, ...] | None) -> CutTree | None:
-        """A proof that no motion covers all of some cells, or all that are reached; or None."""
-        exploration = self.exploration
-        for _ in range(ATTEMPTS):
-            wanted = exploration.reached.copy()
-            if cells is not None:
-                wanted[:] = False
-                wanted[list(cells)] = True
-            # The other cells do not count: every component is taken to cover them.
-            known = [
-                c._replace(cover=c.cover | ~wanted) for c in components_of(exploration.roadmap)
-            ]
-            if any(component.cover.all() for component in known):
-                return None
-            attempt = self.prover.attempt(known, BOXES, self._tick)
-            self.boxes += attempt.boxes
-            if attempt.tree is not None or not attempt.seeds:
-                return attempt.tree
-            for cell, q in attempt.seeds:
-                exploration.add_seeds(cell, q[None])
-        return None
 
-    def _tick(self) -> None:
-        """Report progress, and stop when the time is up."""
-        self.exploration.tick("proving how many motions it takes")
+def _tree(
+    exploration: Exploration, prover: Prover, cells: tuple[int, ...] | None
+) -> CutTree | None:
+    """A proof that no motion covers all of some cells, or all that are reached; or None."""
+    for _ in range(ATTEMPTS):
+        wanted = exploration.reached.copy()
+        if cells is not None:
+            wanted[:] = False
+            wanted[list(cells)] = True
+        # The other cells do not count: every component is taken to cover them.
+        known = [c._replace(cover=c.cover | ~wanted) for c in components_of(exploration.roadmap)]
+        if any(component.cover.all() for component in known):
+            return None
+        attempt = prover.attempt(
+            known, BOXES, lambda: exploration.tick("proving how many motions it takes")
+        )
+        exploration.boxes += attempt.boxes
+        if attempt.tree is not None or not attempt.seeds:
+            return attempt.tree
+        for cell, q in attempt.seeds:
+            exploration.add_seeds(cell, q[None])
+    return None
 
 
 def _never_together(exploration: Exploration, refuted: set[tuple[int, int]]) -> list[int]:

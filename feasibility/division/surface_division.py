@@ -1,15 +1,13 @@
 """How a surface is divided: `divide` collects components, shares the cells out, and walks them."""
 
 import time
-from dataclasses import replace
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from coverable.arrays import Ints
 from coverable.errors import ArgumentError, counted
 from feasibility.clock import Clock, OutOfTime
-from feasibility.collisions.problem_bodies import Pair
 from feasibility.demands.every_demand import OF_EACH, further, unjudged
 from feasibility.demands.fast_motions import keep_fast_motions
 from feasibility.demands.requirements import check_requirements, required_words
@@ -18,7 +16,7 @@ from feasibility.division.plans import collect_components, plan_of
 from feasibility.division.proved_bound import ProvedBound, prove_apart
 from feasibility.notices import compiling_notice
 from feasibility.problem import Problem
-from feasibility.roadmap.causes.diagnosis import cause_of, causes_of, diagnose
+from feasibility.roadmap.causes.diagnosis import causes_of, diagnose
 from feasibility.roadmap.causes.disconnection import disconnected
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions.search_arrays import SearchArrays, within
@@ -84,87 +82,110 @@ def divide(
         (1, True, True)
     """
     search = Search() if search is None else search
-    _refuse_others(robot, cells, task, search)
+    if search.method != "complete":
+        raise ArgumentError(NOT_GREEDY.format(search.method))
+    if cells.in_order:
+        raise ArgumentError(NOT_IN_ORDER)
+    check_requirements(robot, task, search)
     called = time.monotonic()
     with compiling_notice():
         warm_up()
     clock = (Clock(search.time_limit, progress) if clock is None else clock).start()
     clock.allow(search.evaluations)
     began = time.monotonic()
-    exploration, apart, ended, slow = _searched(robot, cells, task, search.seed, clock)
+    exploration = exploration_of(robot, cells, task, search.seed, clock)
+    work = _Work(exploration, task, Plan((), (), 0), ProvedBound(min(1, len(cells))))
+    _search(work)
     searched = time.monotonic()
-    folded = bool(np.isinf(exploration.arrays.derivative_bounds).any())
-    blocked = blocked_curves(cells, task) if len(cells) and _no_motion(exploration.arrays) else ""
-    shared = _shared(exploration, task, clock, blocked, ended, slow)
-    plan, ended = shared.plan, ended and not shared.late
-    found = _message(shared, task, apart.number, len(cells), ended, folded)
-    return Division(
-        robot=robot,
-        cells=cells,
-        task=task,
-        seed=search.seed,
-        plan=plan,
-        left_out=shared.causes,
-        unsettled=np.setdiff1d(shared.missing, [cause.cell for cause in shared.causes]),
-        ended=ended and not blocked and not folded,
-        message=blocked or found,
-        at_least=min(apart.number, len(plan.patches)),
-        proof=apart.proof if plan.patches else None,
-        apart=apart.apart if plan.patches else (),
-        lacking=shared.lacking,
-        timing=_timing(called, began, searched),
-        statistics=_statistics(exploration),
-    )
+    _share_out(work, clock)
+    now = time.monotonic()
+    timing = {
+        "load_s": began - called,
+        "search_s": searched - began,
+        "divide_s": now - searched,
+        "total_s": now - called,
+    }
+    return _division(work, timing)
 
 
-class _Shared(NamedTuple):
-    """The cells shared out among patches."""
+@dataclass
+class _Work:
+    """A division in progress."""
 
+    exploration: Exploration
+    task: Task
     plan: Plan
-    missing: Ints
-    """Cells in no patch."""
-    causes: tuple[Cause, ...]
-    late: bool
-    """Did a command's time run out meanwhile?"""
+    apart: ProvedBound
+    ended: bool = True
+    """Did the search run to its end?"""
+    slow: dict[int, Cause] = field(default_factory=dict)
+    """Cells that no motion leads to at the required speed or distance from singularities."""
+    causes: tuple[Cause, ...] = ()
+    """Of cells in no patch."""
     lacking: str = ""
     """See `Division.lacking`."""
+    late: bool = False
+    """Did a command's time run out meanwhile?"""
+    blocked: str = ""
+    """Why no motion can be certified anywhere, see `blocked_curves`."""
+
+    @property
+    def missing(self) -> Ints:
+        """Cells in no patch."""
+        return np.flatnonzero(self.plan.patch_of(len(self.exploration.cells)) < 0)
 
 
-def _refuse_others(robot: Robot, cells: Cells, task: Task, search: Search) -> None:
-    """Refuse the greedy search, toolpaths, and speeds that this arm cannot have.
+def _search(work: _Work) -> None:
+    """Search for all components of motions that can be found, and for a bound."""
+    exploration, task = work.exploration, work.task
+    try:
+        _explore(exploration, task)
+        if not _no_motion(exploration.arrays):
+            work.apart = prove_apart(exploration, task)
+    except OutOfTime:
+        work.ended = False
+    if task.requires_rates:
+        work.slow = keep_fast_motions(exploration, task)
+    exploration.clock = Clock()
 
-    Raises:
-        ArgumentError: it is one of them.
-    """
-    if search.method != "complete":
-        raise ArgumentError(NOT_GREEDY.format(search.method))
-    if cells.in_order:
-        raise ArgumentError(NOT_IN_ORDER)
-    check_requirements(robot, task, search)
 
-
-def _shared(
-    exploration: Exploration,
-    task: Task,
-    clock: Clock,
-    blocked: str,
-    ended: bool,
-    slow: dict[int, Cause],
-) -> _Shared:
+def _share_out(work: _Work, clock: Clock) -> None:
     """A plan for what the search found, and why cells are in none, as far as there is time."""
-    total = len(exploration.cells)
-    shared = _Shared(Plan((), (), 0), np.arange(total), (), False)
+    exploration, task = work.exploration, work.task
+    if len(exploration.cells) and _no_motion(exploration.arrays):
+        work.blocked = blocked_curves(exploration.cells, task)
     try:
         with clock.enforced():
-            if not blocked:
-                plan = plan_of(exploration, task, clock.left)
-                missing = np.flatnonzero(plan.patch_of(total) < 0)
-                shared = shared._replace(plan=plan, missing=missing)
-                shared = shared._replace(plan=_with_room(exploration, task, clock, plan))
-            causes = _causes(exploration, task, shared.missing, ended, slow)
-            return shared._replace(causes=causes, lacking=_lacking(exploration, task, shared))
+            if not work.blocked:
+                work.plan = plan_of(exploration, task, clock.left)
+                work.plan = _with_room(exploration, task, clock, work.plan)
+            work.causes = _causes(work)
+            work.lacking = _lacking(work)
     except OutOfTime:
-        return shared._replace(late=True)
+        work.late = True
+
+
+def _division(work: _Work, timing: dict[str, float]) -> Division:
+    """What was found."""
+    exploration, plan, ended = work.exploration, work.plan, work.ended and not work.late
+    folded = bool(np.isinf(exploration.arrays.derivative_bounds).any())
+    apart = work.apart if plan.patches else ProvedBound(0)
+    return Division(
+        robot=exploration.robot,
+        cells=exploration.cells,
+        task=work.task,
+        seed=exploration.seed,
+        plan=plan,
+        left_out=work.causes,
+        unsettled=np.setdiff1d(work.missing, [cause.cell for cause in work.causes]),
+        ended=ended and not work.blocked and not folded,
+        message=work.blocked or _message(work, ended, folded),
+        at_least=min(apart.number, len(plan.patches)),
+        proof=apart.proof,
+        apart=apart.apart,
+        lacking=work.lacking,
+        timing=timing,
+    )
 
 
 def _with_room(exploration: Exploration, task: Task, clock: Clock, plan: Plan) -> Plan:
@@ -190,38 +211,16 @@ def _with_room(exploration: Exploration, task: Task, clock: Clock, plan: Plan) -
     return plan
 
 
-def _lacking(exploration: Exploration, task: Task, shared: _Shared) -> str:
+def _lacking(work: _Work) -> str:
     """What the case demands that the motions do not hold together; see `Division`."""
-    robot, cells = exploration.robot, exploration.cells
-    left = unjudged(robot, task, OF_EACH)
+    robot, cells = work.exploration.robot, work.exploration.cells
+    left = unjudged(robot, work.task, OF_EACH)
     if not left or not len(cells):
         return ""
-    if len(shared.missing) or not shared.plan.accepted:
+    if len(work.missing) or not work.plan.accepted:
         return f"not judged, since not every cell is in a patch: {', '.join(left)}"
-    walks = [patch.walk for patch in shared.plan.patches]
-    return further(robot, cells, task, walks, OF_EACH).refusal
-
-
-def _timing(called: float, began: float, searched: float) -> dict[str, float]:
-    """Seconds by phase."""
-    now = time.monotonic()
-    return {
-        "load_s": began - called,
-        "search_s": searched - began,
-        "divide_s": now - searched,
-        "total_s": now - called,
-    }
-
-
-def _statistics(exploration: Exploration) -> dict[str, int]:
-    """Counts of the work done."""
-    return {
-        "fk": int(exploration.work.counts[0]),
-        "nodes": len(exploration.roadmap.cell),
-        "components": len(exploration.roots()),
-        "boxes": exploration.boxes,
-        "rounds": exploration.rounds,
-    }
+    walks = [patch.walk for patch in work.plan.patches]
+    return further(robot, cells, work.task, walks, OF_EACH).refusal
 
 
 def _explore(exploration: Exploration, task: Task) -> None:
@@ -231,56 +230,17 @@ def _explore(exploration: Exploration, task: Task) -> None:
     collect_components(exploration)
 
 
-class _Searched(NamedTuple):
-    """What a search found."""
-
-    exploration: Exploration
-    apart: ProvedBound
-    ended: bool
-    """Did it run to its end?"""
-    slow: dict[int, Cause]
-    """Cells that no motion leads to at the required speed or distance from singularities."""
-
-
-def _searched(robot: Robot, cells: Cells, task: Task, seed: int, clock: Clock) -> _Searched:
-    """The search with all components that it found, and a bound."""
-    exploration = exploration_of(robot, cells, task, seed, clock)
-    ended, apart = True, ProvedBound(min(1, len(cells)))
-    try:
-        _explore(exploration, task)
-        if not _no_motion(exploration.arrays):
-            apart = prove_apart(exploration, task)
-    except OutOfTime:
-        ended = False
-    slow = keep_fast_motions(exploration, task) if task.requires_rates else {}
-    exploration.clock = Clock()
-    return _Searched(exploration, apart, ended, slow)
-
-
-def _causes(
-    exploration: Exploration,
-    task: Task,
-    missing: Ints,
-    ended: bool,
-    slow: dict[int, Cause],
-) -> tuple[Cause, ...]:
+def _causes(work: _Work) -> tuple[Cause, ...]:
     """Why cells are in no patch; of a search that did not end, only what is proved or too slow."""
-    if not ended:
-        proved = [c for c in missing.tolist() if exploration.rulings.get(c) is Ruling.PROVED]
+    exploration, missing = work.exploration, work.missing.tolist()
+    if not work.ended:
+        proved = [c for c in missing if exploration.rulings.get(c) is Ruling.PROVED]
         found = [diagnose(exploration, cell) for cell in proved[:MOST_EXPLAINED]]
-        return tuple(sorted([*found, *slow.values()], key=lambda cause: cause.cell))
-    pairs = Problem.of(exploration.robot, exploration.cells, task).pairs
-    known = {cause.cell: cause for cause in causes_of(exploration, None, pairs)}
-    return tuple(
-        slow.get(c) or known.get(c) or _cause(exploration, c, pairs) for c in missing.tolist()
-    )
-
-
-def _cause(exploration: Exploration, cell: int, pairs: tuple[Pair, ...]) -> Cause:
-    """Why a cell that the best motion covers is in no patch all the same."""
-    if exploration.reached[cell]:
-        return disconnected(exploration, cell, None, pairs)
-    return cause_of(exploration, cell, pairs)
+        return tuple(sorted([*found, *work.slow.values()], key=lambda cause: cause.cell))
+    pairs = Problem.of(exploration.robot, exploration.cells, work.task).pairs
+    known = {cause.cell: cause for cause in causes_of(exploration, None, pairs)} | work.slow
+    # A cell that the best motion covers is in no patch only where no motion can be certified.
+    return tuple(known.get(c) or disconnected(exploration, c, None, pairs) for c in missing)
 
 
 def _no_motion(arrays: SearchArrays) -> bool:
@@ -291,11 +251,10 @@ def _no_motion(arrays: SearchArrays) -> bool:
     return nowhere or not arrays.cone_chord > 0.0
 
 
-def _message(
-    shared: _Shared, task: Task, at_least: int, cells: int, ended: bool, folded: bool
-) -> str:
+def _message(work: _Work, ended: bool, folded: bool) -> str:
     """One or two sentences: what was found, and on what it rests."""
-    plan, total = shared.plan, (cells - len(shared.missing), cells)
+    plan, task, at_least = work.plan, work.task, work.apart.number
+    cells = len(work.exploration.cells)
     refused = [patch.refusal for patch in plan.patches if not patch.accepted]
     if refused:
         return (
@@ -303,25 +262,19 @@ def _message(
             f"independent replay refuses: {refused[0]}."
         )
     number, how = len(plan.patches), f" {required_words(task)}" * task.requires_rates
-    if total[1] == 0:
+    if cells == 0:
         return "There are no cells to cover."
+    if number == 0 and not ended:
+        return "The time limit ran out before any patch was found." + LATE * work.late
     if number == 0:
-        return (
-            (
-                f"No motion was found that covers any cell{how}."
-                if how
-                else "No motion covers any cell."
-            )
-            if ended
-            else "The time limit ran out before any patch was found." + LATE * shared.late
-        )
+        found = f"No motion was found that covers any cell{how}."
+        return found if how else "No motion covers any cell."
     what = counted(number, "continuous motion")
     proof = f"; at least {at_least}, proved" if min(number, at_least) > 1 else ""
     if plan.bound > max(at_least, 1):
         proof += f"; at least {plan.bound} among the motions found"
-    sentence = (
-        f"{what} cover{'' if number > 1 else 's'} {total[0]} of {total[1]} cells{how}{proof}."
-    )
+    covered = f"{cells - len(work.missing)} of {cells} cells{how}"
+    sentence = f"{what} cover{'' if number > 1 else 's'} {covered}{proof}."
     blocked = [k for k, move in enumerate(plan.moves, start=1) if move.refusal]
     if blocked:
         named = ", ".join(f"{k} to {k + 1}" for k in blocked)
@@ -331,8 +284,8 @@ def _message(
             " Where the standoff reaches the surface's radius of curvature its offset folds and no "
             "motion can be certified: these are the fewest known."
         )
-    if shared.lacking:
-        sentence += f" But {shared.lacking}"
+    if work.lacking:
+        sentence += f" But {work.lacking}"
     if not ended:
         sentence += " The time limit ran out: these are the fewest known."
     return sentence
