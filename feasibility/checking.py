@@ -226,7 +226,7 @@ def _measured(verdict: Verdict, clock: Clock) -> Verdict:
     if task.coverage is None:
         return replace(verdict, treated=deferred(lambda: _treated(verdict, clock)))
     treated = _treated(verdict, clock)
-    from feasibility.demands.decision import with_coverage
+    from feasibility.demands.treated_words import with_coverage
 
     said = Decision(verdict.answer, verdict.evidence, verdict.message)
     decision = with_coverage(said, task, treated)

@@ -140,8 +140,7 @@ def write_runs(
     Raises:
         FileError: a file cannot be written.
     """
-    from feasibility.programs.working import working_places
-    from feasibility.programs.writing import save_program
+    from feasibility.programs.writing import save_program, working_places
     from feasibility.results.trajectory_files import save_trajectory
 
     work = None if along is None else working_places(along.places, along.passes.stretches)

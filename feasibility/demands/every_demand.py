@@ -77,7 +77,7 @@ def _at_rates(robot: Robot, cells: Cells, task: Task, walks: Sequence[Walk]) -> 
 def _treating(robot: Robot, cells: Cells, task: Task, walks: Sequence[Walk]) -> Findings:
     """Do the motions treat enough of the area?"""
     from feasibility.demands.area import treated_by_walk
-    from feasibility.demands.decision import shortfall
+    from feasibility.demands.treated_words import shortfall
 
     treated = treated_by_walk(robot, cells, task, *walks)
     short = shortfall(task, treated)

@@ -1,19 +1,79 @@
-"""What is left of a search at a speed, or at a distance from singularities.
+"""What motions hold together at a speed, or at a distance from singularities: a roadmap of them.
 
 A motion that is too slow somewhere joins nothing: components fall apart into what the others join.
-As `check` does at a speed, more motions are made first, from every configuration that is known.
+The best motion over most cells is one through such a component, the largest speed the one up to
+which a component has all cells.
 """
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from feasibility.clock import OutOfTime
-from feasibility.demands.rated_graph import RatedGraph, grow
-from feasibility.demands.routes import roadmap_of
+from coverable.arrays import Mask
+from feasibility.certification.rate_replay import RateReplay, replay_rates
+from feasibility.clock import Clock, OutOfTime
+from feasibility.demands.rated_graph import Edge, RatedGraph, grow, rated_graph
 from feasibility.paths.motion_graph import MotionGraph
 from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.graph import Roadmap
+from feasibility.roadmap.ordered_run import layers_of
+from feasibility.roadmap.walk import covering_walk, route_walk
 from feasibility.task import Task
-from feasibility.verdict import Cause, CauseKind
+from feasibility.verdict import Cause, CauseKind, Verdict, Walk
 from surfaces.adjacency import components
+
+
+class BestMotion(NamedTuple):
+    """A motion over as many cells as some motions allow."""
+
+    covered: Mask
+    """(N,) the cells that it visits."""
+    walk: Callable[[], Walk]
+    """Makes it."""
+
+
+def best_motion(rated: RatedGraph, edges: Sequence[Edge]) -> BestMotion:
+    """The best motion made of some, from the start of the arm on where it has one.
+
+    Cells that have an order are visited in it.
+    """
+    cells, begin = len(rated.cells), rated.begin
+    roadmap = roadmap_of(rated.graph, range(len(rated.graph.cell)), edges, cells)
+    if rated.cells.in_order:
+        run = layers_of(roadmap, begin)
+        over = np.arange(cells) <= run.furthest
+        return BestMotion(over, lambda: route_walk(roadmap, run.start, run.route))
+    root = roadmap.largest if begin is None else roadmap.root_of(begin)
+    return BestMotion(roadmap.cover[root], lambda: covering_walk(roadmap, root, begin))
+
+
+def roadmap_of(
+    graph: MotionGraph, nodes: Iterable[int], edges: Sequence[Edge], cells: int
+) -> Roadmap:
+    """A roadmap of some nodes, numbered in this order, and motions between them.
+
+    Each connected part is a component, and no node is queued.
+    """
+    number = {node: k for k, node in enumerate(nodes)}
+    ends = np.array([(number[x], number[y]) for x, y in edges], dtype=np.int64).reshape(-1, 2)
+    part = components(ends, len(number)).tolist()
+    roadmap = Roadmap(cells)
+    for _ in range(max(part, default=-1) + 1):
+        roadmap.add_component()
+    for node, root in zip(number, part, strict=True):
+        q = graph.q[node]
+        roadmap.add_node(graph.cell[node], q, np.zeros_like(q), root)
+    for x, y in edges:
+        roadmap.add_edge(number[x], number[y], graph.motion(x, y)[1:])
+    roadmap.largest = int(np.argmax([*roadmap.size, 0]))
+    roadmap.queue.clear()
+    return roadmap
 
 
 def keep_fast_motions(exploration: Exploration, task: Task) -> dict[int, Cause]:
@@ -53,8 +113,51 @@ def _rated(exploration: Exploration, task: Task) -> RatedGraph:
         ends = graph.node(roadmap.cell[x], motion[0]), graph.node(roadmap.cell[y], motion[-1])
         graph.join(*ends, motion)
     rated = RatedGraph(exploration.robot, cells, task, graph)
-    try:
+    with suppress(OutOfTime):
         grow(rated, exploration.clock)
-    except OutOfTime:
-        rated.rate()
     return rated
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class RateFigures:
+    """What the motions of a feasible verdict allow."""
+
+    witness: RateReplay
+    """Of the covering motion itself."""
+    largest: float
+    """m/s, the largest speed that a motion over all cells is known to hold."""
+
+
+def rate_figures(
+    verdict: Verdict, clock: Clock | None = None, more: bool = True
+) -> RateFigures | None:
+    """Look for the largest speed; None where the verdict has no motion.
+
+    Where the joints have no velocity limits, it is inf.
+
+    Args:
+        verdict: a feasible one, of the complete search.
+        clock: when its time is over, what is known by then is returned.
+        more: whether motions beyond those of the verdict are tried, as `check` does at a speed.
+    """
+    if verdict.witness is None or not len(verdict.cells):
+        return None
+    free = replace(verdict.task, speed=None, min_manipulability=None)
+    replayed = replay_rates(verdict.robot, verdict.cells, free, verdict.witness, closely=True)
+    if not np.isfinite(replayed.speed):
+        return RateFigures(replayed, replayed.speed)
+    rated = rated_graph(replace(verdict, task=free))
+    with suppress(OutOfTime):
+        if more:
+            grow(rated, Clock() if clock is None else clock)
+    return RateFigures(replayed, max(replayed.speed, largest_speed(rated)))
+
+
+def largest_speed(rated: RatedGraph) -> float:
+    """m/s, the largest speed that a motion over all cells allows; 0 where there is no motion."""
+    sigma = rated.task.min_manipulability or -np.inf
+    speeds = np.unique([r.speed for r in rated.rated.values() if r.sigma >= sigma]).tolist()
+    possible = bisect_left(
+        speeds, True, key=lambda v: not best_motion(rated, rated.holding(v)).covered.all()
+    )
+    return float(speeds[possible - 1]) if possible else 0.0

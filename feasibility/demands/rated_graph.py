@@ -86,20 +86,19 @@ def grow(rated: RatedGraph, clock: Clock) -> None:
     """Make more motions from every known configuration to the cells beside it, and over its own.
 
     Raises:
-        OutOfTime: the deadline passed.
+        OutOfTime: the deadline passed; what was made until then is rated.
     """
-    graph, cells = rated.graph, rated.cells
-    beside: dict[int, list[int]] = {}
-    for i, j in cells.pairs.tolist():
-        beside.setdefault(i, []).append(j)
-        beside.setdefault(j, []).append(i)
-    left = MOST_STEPS
-    for x in range(len(graph.cell)):
-        clock.tick(0, None, "looking for faster motions")
-        join_self_motions(graph, x)
-        for cell in beside.get(graph.cell[x], []):
-            step_to(graph, x, cell)
-        left -= len(beside.get(graph.cell[x], []))
-        if left <= 0:
-            break
-    rated.rate()
+    graph, left = rated.graph, MOST_STEPS
+    neighbours = rated.cells.neighbours
+    try:
+        for x, over in enumerate(list(graph.cell)):
+            clock.tick(0, None, "looking for faster motions")
+            join_self_motions(graph, x)
+            beside = np.unique(neighbours.of(over)).tolist()
+            for cell in beside:
+                step_to(graph, x, cell)
+            left -= len(beside)
+            if left <= 0:
+                break
+    finally:
+        rated.rate()

@@ -14,11 +14,10 @@ from coverable.arrays import Mask
 from coverable.errors import at_least, counted
 from feasibility.certification.rate_replay import RateReplay, replay_rates
 from feasibility.clock import Clock, OutOfTime
-from feasibility.demands.largest import largest_speed
+from feasibility.demands.fast_motions import best_motion, largest_speed
 from feasibility.demands.motion_rates import replay_at_rates
 from feasibility.demands.rated_graph import RatedGraph, grow, rated_graph
 from feasibility.demands.requirements import required_words
-from feasibility.demands.routes import best_motion
 from feasibility.verdict import (
     Answer,
     Cause,

@@ -9,10 +9,10 @@ import numpy as np
 from coverable.errors import ArgumentError
 from feasibility.checking import check
 from feasibility.clock import Clock, OutOfTime
-from feasibility.demands.decision import shortfall
 from feasibility.demands.every_demand import refuse_start
-from feasibility.demands.largest import rate_figures
+from feasibility.demands.fast_motions import rate_figures
 from feasibility.demands.requirements import check_requirements
+from feasibility.demands.treated_words import shortfall
 from feasibility.division.one_motion import motion_over
 from feasibility.division.surface_division import divide
 from feasibility.search_settings import Progress, Search

@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass
 
 from coverable.arrays import Ints, Protected
-from feasibility.demands.largest import RateFigures
+from feasibility.demands.fast_motions import RateFigures
 from feasibility.sensitivity.quantities import Kind, Quantity
 from feasibility.verdict import Answer, Evidence, Verdict, Walk
 

@@ -9,7 +9,7 @@ from gantry import configurations, gantry
 from coverable import Answer, CaseError, Task, check, load_case, load_robot, plane, poses
 from coverable.errors import CoverableError
 from feasibility.demands.area import treated_by_walk
-from feasibility.demands.decision import with_coverage
+from feasibility.demands.treated_words import with_coverage
 from feasibility.verdict import Decision, Evidence, Walk
 
 UR5 = load_robot("ur5")

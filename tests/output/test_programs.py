@@ -14,7 +14,7 @@ from timed_motions import TURN, UR5, motion
 from coverable import Axis, ProgramSettings, load_robot, parallel_passes, plane, save_program
 from feasibility.programs.controller_axes import ProgramError, check_program
 from feasibility.programs.controllers import LANGUAGES, language_of
-from feasibility.programs.working import working_places, working_times
+from feasibility.programs.writing import working_places, working_times
 from robots.kinematics import Kinematics
 from surfaces.passes.toolpath import PassPlaces
 

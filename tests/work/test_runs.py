@@ -12,7 +12,7 @@ import coverable
 from coverable import Task, load_robot, parallel_passes, pass_runs, plan_passes, plane, verify
 from feasibility.certification.rate_replay import replay_rates
 from feasibility.clock import Clock
-from feasibility.division.fewest_runs import fewest_runs
+from feasibility.division.pass_runs import fewest_runs
 from feasibility.roadmap.graph import Roadmap
 from surfaces.passes.toolpath import PassPlaces
 
