@@ -112,6 +112,7 @@ def path(args: argparse.Namespace, began: float) -> int:
         from feasibility.checking import check
         from feasibility.clock import OutOfTime
         from feasibility.demands.motion_rates import path_rates
+        from feasibility.demands.treated_words import shortfall
         from feasibility.division.ends import ends_of
         from feasibility.paths.coverage import coverage_path
         from feasibility.reports import path as report
@@ -150,12 +151,12 @@ def path(args: argparse.Namespace, began: float) -> int:
             return _no_path(args, opened.case.name, verdict, loaded)
     known = None if along is None else along.passes, treated, rates, ends
     tell(args, report, found, run, limits, *known)
-    short = report.short_words(treated, opened.setup.task.coverage)
+    short = shortfall(opened.setup.task, treated)
     write_runs(args, opened, along, run)
     if args.html is not None:
         write_text(args.html, _view(opened, along, found, treated, run, limits).html(), "view")
     if short:
-        print_err(short)
+        print_err(f"undecided: {short}")
     return STATUS["undecided" if short else "feasible"]
 
 

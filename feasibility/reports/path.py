@@ -12,7 +12,7 @@ from feasibility.certification.rate_replay import RateReplay
 from feasibility.collisions.asked_bodies import said_of
 from feasibility.collisions.words import checked
 from feasibility.demands.area import TreatedArea
-from feasibility.demands.treated_words import share_words, treated_json, treated_words
+from feasibility.demands.treated_words import treated_json, treated_words
 from feasibility.division.ends import Ends
 from feasibility.paths.coverage import CoveragePath
 from feasibility.paths.metrics import PathFigures
@@ -99,17 +99,6 @@ def as_json(
 def no_path_json(verdict: Verdict, reason: str, before_s: float = 0.0) -> dict[str, Any]:
     """What `coverable path --json` prints where there is no path: the verdict's object, and why."""
     return verdict_json(verdict, before_s) | {"message": reason, "trajectory": None}
-
-
-def short_words(treated: TreatedArea | None, coverage: float | None) -> str:
-    """That a path treats less of the area than is required; empty where it treats enough."""
-    if coverage is None or (treated is not None and treated.lower >= coverage):
-        return ""
-    share = "a share that was not measured" if treated is None else share_words(treated)
-    return (
-        f"undecided: the path treats {share} of the area, and "
-        f"{100.0 * coverage:g} % is required; passes or cells that are closer treat more."
-    )
 
 
 def _timing(

@@ -11,7 +11,7 @@ import numpy as np
 
 from coverable.arrays import Array
 from feasibility.timing.sampled_trajectory import Trajectory, bends
-from feasibility.timing.speed_limits import MotionLimits, tool_slopes, tool_speeds
+from feasibility.timing.speed_limits import MotionLimits, tool_speeds
 from robots.robot import Robot
 
 PLACES = 4  # at which the tool is looked at on each piece, its first end among them
@@ -66,18 +66,10 @@ def used_each(robot: Robot, run: Trajectory, limits: MotionLimits) -> Array:
 def past_limits(robot: Robot, run: Trajectory) -> Array:
     """(n,) rad or m, how far each joint goes past its limits; negative where it keeps away."""
     low, high = run.q.min(axis=0), run.q.max(axis=0)
-    if len(run) > 1:
-        first, last = bends(run)
-        h = np.diff(run.time)[:, None]
-        # By the share t of a piece dq = a + b t + c t^2; its roots, so that nothing cancels.
-        a, b, c = h * run.dq[:-1], h**2 * first, 0.5 * h**2 * (last - first)
-        root = np.sqrt(np.maximum(b**2 - 4.0 * a * c, 0.0))
-        q = -0.5 * (b + np.where(b >= 0.0, root, -root))
-        for over, under in ((q, c), (a, q)):
-            with np.errstate(divide="ignore", invalid="ignore"):
-                t = np.clip(np.nan_to_num(over / under, posinf=0.0, neginf=0.0), 0.0, 1.0)
-            turning = run.q[:-1] + t * (a + t * (b / 2.0 + t * c / 3.0))
-            low, high = np.minimum(low, turning.min(axis=0)), np.maximum(high, turning.max(axis=0))
+    turns = run.spline.derivative().roots(extrapolate=False) if len(run) > 1 else ()
+    for joint, times in enumerate(turns):  # NaN follows the beginning of a rest
+        q = run.at(times[np.isfinite(times)])[:, joint]
+        low[joint], high[joint] = q.min(initial=low[joint]), q.max(initial=high[joint])
     return np.asarray(np.maximum(robot.lower - low, high - robot.upper))
 
 
@@ -98,4 +90,4 @@ def held_inside(robot: Robot, run: Trajectory) -> Trajectory:
     moved = np.where(both, 0.0, np.where(np.isfinite(robot.lower), past, -past))
     q = np.where(past > 0.0, middle + share * (run.q - middle) + moved, run.q)
     dq, ddq = share * run.dq, share * run.ddq
-    return replace(run, q=q, dq=dq, ddq=ddq, tool_speed=tool_slopes(robot, q, dq))
+    return replace(run, q=q, dq=dq, ddq=ddq, tool_speed=tool_speeds(robot, q, dq))

@@ -20,7 +20,7 @@ from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from coverable.arrays import Array, Ints, Mask
 from coverable.errors import ArgumentError
-from feasibility.timing.speed_limits import tool_slopes
+from feasibility.timing.speed_limits import tool_speeds
 from feasibility.verdict import Walk
 from robots.robot import Robot
 
@@ -120,7 +120,7 @@ class Trajectory:
         motion = CubicSpline(time, q, bc_type="clamped")
         dq, ddq = motion(time, 1) + 0.0, motion(time, 2) + 0.0
         dq[[0, -1]] = 0.0
-        return Trajectory(robot.joint_names, time, q, dq, ddq, tool_slopes(robot, q, dq), cell)
+        return Trajectory(robot.joint_names, time, q, dq, ddq, tool_speeds(robot, q, dq), cell)
 
     def __len__(self) -> int:
         """Number of samples."""
@@ -152,7 +152,12 @@ class Trajectory:
         if len(self) == 1:
             return np.tile(0.0 if order else self.q, (len(time), self.q.shape[1] if order else 1))
         inside = np.clip(time, self.time[0], self.time[-1])
-        return np.asarray(CubicHermiteSpline(self.time, self.q, self.dq)(inside, order))
+        return np.asarray(self.spline(inside, order))
+
+    @property
+    def spline(self) -> CubicHermiteSpline:
+        """The motion between samples, of which there are two at least."""
+        return CubicHermiteSpline(self.time, self.q, self.dq)
 
     def between(self, places: int) -> Walk:
         """The motion at so many places of each piece, as straight lines that a replay can check."""

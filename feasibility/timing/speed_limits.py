@@ -10,7 +10,6 @@ from coverable.arrays import Array, Protected
 from coverable.errors import real
 from feasibility.paths.order import PathError
 from robots.chain import moved_by_joints
-from robots.kinematics import Kinematics
 from robots.robot import Robot
 
 ACCELERATION_TIME = 0.5  # [s], in which a joint gets to its largest velocity, by default
@@ -94,16 +93,11 @@ def _per_joint(robot: Robot, name: str, unit: str, value: ArrayLike, faults: lis
 
 
 def tool_speeds(robot: Robot, q: Array, slope: Array) -> Array:
-    """`tool_slopes` by the search's own kinematics, which takes far less time."""
+    """(m,) m, how fast the tool point moves when the joints q (m, n) move at `slope` (m, n).
+
+    By the search's own kinematics, as Pinocchio takes far longer.
+    """
     velocity = np.zeros((3, len(q)))
     for by_joint, rate in zip(moved_by_joints(robot.chain, q), slope.T, strict=True):
         velocity += by_joint * rate
     return np.asarray(np.sqrt((velocity**2).sum(axis=0)))
-
-
-def tool_slopes(robot: Robot, q: Array, slope: Array) -> Array:
-    """(m,) m, how fast the tool point moves when the joints q (m, n) move at `slope` (m, n).
-
-    By Pinocchio, for what users see.
-    """
-    return np.linalg.norm(Kinematics(robot).tool_velocities(q, slope), axis=1)
