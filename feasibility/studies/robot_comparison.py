@@ -43,12 +43,10 @@ class Arm:
     cause: str | None = None
     """The most frequent cause of missed cells; None without any."""
     patches: int | None = None
-    """Continuous motions that together cover all that can be covered; None where not requested."""
+    """Continuous motions that together cover all that can be covered; None where that is not known,
+    as of surfaces with more than 400 cells."""
     patches_share: float | None = None
     """Of the area, 0..1, that these cover together."""
-    critical_cone_deg: float | None = None
-    """The smallest cone with a covering motion, to half a degree; narrower ones than
-    `LEAST_CONE_DEG` are not tested. None where there is none, or it was not requested."""
     margins: dict[str, float | None] | None = None
     """What the covering motion leaves: limit_deg, limit_m, cone_deg, reach_m, placement_m."""
     unchecked_links: Sequence[str] = ()
@@ -63,10 +61,6 @@ class Comparison:
 
     case: str
     arms: tuple[Arm, ...]
-    divided: bool
-    """Were patches counted?"""
-    critical: bool
-    """Were critical cones searched for?"""
     collision: CollisionPart | None = None
     """What was checked of collisions; None where nothing was."""
 
@@ -81,8 +75,6 @@ def compare(
     robots: Sequence[str],
     workers: Workers,
     *,
-    divide: bool = True,
-    critical: bool = False,
     store: "Store | None" = None,
     progress: Progress | None = None,
 ) -> Comparison:
@@ -93,9 +85,6 @@ def compare(
             robots.
         robots: names of the library, and paths of URDF or xacro files.
         workers: where they run, see `open_workers`.
-        divide: count the patches that an arm needs where one motion will not do, on surfaces of
-            up to 400 cells.
-        critical: look for the smallest cone that each arm can do with; some ten verdicts each.
         store: where finished arms are kept.
         progress: called as progress(done, total, text); what it raises ends the work.
 
@@ -106,13 +95,14 @@ def compare(
         >>> from coverable import load_case
         >>> from coverable import open_workers
         >>> with open_workers(0) as workers:
-        ...     found = compare(load_case("paper/4a"), ["puma560", "ur5"], workers, divide=False)
+        ...     found = compare(load_case("paper/4a"), ["puma560", "ur5"], workers)
         >>> [(arm.robot, arm.verdict) for arm in found.ranked]
         [('puma560', 'feasible'), ('ur5', 'infeasible')]
     """
-    wanted = {"wanted": {"patches": divide, "critical": critical}}
     tasks = [
-        replace(task, tables={**task.tables, **wanted}, parameters={"robot": name})
+        replace(
+            task, tables={**task.tables, "wanted": {"patches": True}}, parameters={"robot": name}
+        )
         for task, name in zip(_tasks_of(case, robots), robots, strict=True)
     ]
     rows = run_tasks(tasks, workers, store, progress)
@@ -126,7 +116,7 @@ def compare(
                 cause=next(iter(result.get("causes", {})), None), seconds=row.seconds,
             )
         )  # fmt: skip
-    return Comparison(case.name, tuple(arms), divide, critical, case.collision)
+    return Comparison(case.name, tuple(arms), case.collision)
 
 
 def _tasks_of(case: Case, robots: Sequence[str]) -> tuple[StudyTask, ...]:

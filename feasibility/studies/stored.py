@@ -90,12 +90,11 @@ class Outcome(TypedDict):
     """Evaluations of the arm."""
 
 
-class Further(Outcome):
-    """With what else was wanted, see `further_figures`; None where it was not, or not found."""
+class Divided(Outcome):
+    """With how many motions it takes; None where that is not known."""
 
     patches: Count | None
     patches_share: Share | None
-    critical_cone_deg: Angle | None
 
 
 def outcome_fault(result: Mapping[str, Any]) -> str:
@@ -105,7 +104,7 @@ def outcome_fault(result: Mapping[str, Any]) -> str:
         >>> outcome_fault({"more": 1})
         'more is not known'
     """
-    fault = _fault("", result, Further if "patches" in result else Outcome)
+    fault = _fault("", result, Divided if "patches" in result else Outcome)
     if fault:
         return fault
     if result["covered"] > result["cells"]:

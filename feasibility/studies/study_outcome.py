@@ -3,19 +3,23 @@
 import math
 from collections import Counter
 from collections.abc import Mapping
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
 from coverable.arrays import Mask
+from feasibility.clock import Clock, OutOfTime
 from feasibility.division.set_covering import undominated
+from feasibility.search_settings import Search
 from feasibility.studies.built_cases import arm_of, case_of, clock_of, cut_of
 from feasibility.studies.pool import Tables
-from feasibility.studies.stored import Further, Margins, Outcome, bits_of
+from feasibility.studies.stored import Divided, Margins, Outcome, bits_of
 from feasibility.verdict import Verdict
 
+MOST_DIVIDED = 400  # cells of a surface that is divided: a division takes several verdicts
 
-def evaluate(tables: Tables) -> Outcome | Further:
+
+def evaluate(tables: Tables) -> Outcome | Divided:
     """Decide one case.
 
     The outcome depends on the tables alone, as long as the search has no time limit; a limit
@@ -23,11 +27,10 @@ def evaluate(tables: Tables) -> Outcome | Further:
 
     Args:
         tables: a case, as `Case.to_tables` gives it; and `wanted`, where it is there: whether to
-            look for `causes` of missed cells, and also for `patches` and the `critical` cone, see
-            `further_figures`.
+            look for `causes` of missed cells, and to count `patches`.
 
     Returns:
-        See `outcome_of`.
+        See `outcome_of`; and how many continuous motions together cover all that can be covered.
 
     Raises:
         CaseError: the case cannot be used.
@@ -38,12 +41,26 @@ def evaluate(tables: Tables) -> Outcome | Further:
     clock, wanted = clock_of(case), tables.get("wanted", {})
     verdict = check(arm_of(case), cut_of(case), case.built_task(), case.search, clock=clock)
     found = outcome_of(verdict, wanted.get("causes", True))
-    if "patches" not in wanted:
+    if not wanted.get("patches"):
         return found
-    from feasibility.studies.further_figures import further_figures
+    motions, share = (1, 1.0) if verdict.feasible else _patches(verdict, case.search, clock)
+    return {**found, "patches": motions, "patches_share": share}
 
-    more = further_figures(verdict, case, clock, wanted["patches"], wanted["critical"])
-    return cast("Further", {**found, **more})
+
+def _patches(
+    verdict: Verdict, search: Search, clock: Clock
+) -> tuple[int, float] | tuple[None, None]:
+    """The least number of motions, and the share of the area that they cover; None if not known."""
+    from feasibility.division.surface_division import divide
+
+    if len(verdict.cells) > MOST_DIVIDED or clock.out_of_time:
+        return None, None
+    try:
+        found = divide(verdict.robot, verdict.cells, verdict.task, search, clock=clock)
+    except OutOfTime:
+        return None, None
+    accepted = [patch for patch in found.patches if patch.accepted]
+    return len(accepted), sum(patch.area for patch in accepted) / float(verdict.cells.areas.sum())
 
 
 def outcome_of(verdict: Verdict, causes: bool = True) -> Outcome:

@@ -449,7 +449,7 @@ def of_study(one: Any) -> Json:
 
 
 ARM = ("robot", "joints", "reach_m", "verdict", "evidence", "message", "share", "covered", "cells",
-       "cause", "patches", "patches_share", "critical_cone_deg", "margins",
+       "cause", "patches", "patches_share", "margins",
        "unchecked_links")  # fmt: skip
 
 
