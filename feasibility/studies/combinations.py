@@ -29,7 +29,7 @@ from feasibility.studies.built_cases import (
 )
 from feasibility.studies.pool import Tables
 from feasibility.studies.run import StudyTask
-from feasibility.studies.varied_keys import Key, Range, Variation, VariedKey
+from feasibility.studies.varied_keys import Variation, VariedKey
 from surfaces.arguments import check_pose
 
 MOST_ALIKE = 4  # values of one key that are named, of those that are wrong for the same cause
@@ -68,7 +68,7 @@ def tasks_of(
 
     Cases that differ in the pose of the surface alone are checked once, and each pose by itself.
     """
-    entries: tuple[VariedKey | Range, ...] = (*varied.axes, *varied.ranges)
+    entries = varied.keys
     wrong = [fault for entry in entries for fault in _wrong_poses(entry)]
     checked: dict[str, _Combination] = {}
     tasks = []
@@ -93,11 +93,10 @@ def tasks_of(
     return tuple(tasks)
 
 
-def _wrong_poses(entry: VariedKey | Range) -> list[Fault]:
+def _wrong_poses(entry: VariedKey) -> list[Fault]:
     """What is wrong with each value of a key that moves the surface, if it is one."""
     faults = list[Fault]()
-    values = entry.values if isinstance(entry, VariedKey) else (entry.low, entry.high)
-    for k, value in enumerate(values if entry.is_pose else ()):
+    for k, value in enumerate(entry.values if entry.is_pose else ()):
         surface: Tables = {}
         put({"surface": surface}, entry.path, value)
         Section(f"{entry.place}[{k}]: surface", surface, faults).make(check_pose, surface)
@@ -105,7 +104,7 @@ def _wrong_poses(entry: VariedKey | Range) -> list[Fault]:
 
 
 def _case_with(
-    base: Tables, values: Sequence[tuple[Key, Any]], base_dir: str | os.PathLike[str] | None
+    base: Tables, values: Sequence[tuple[VariedKey, Any]], base_dir: str | os.PathLike[str] | None
 ) -> tuple[Tables, list[Fault]]:
     """The base with some values and all defaults filled in, or what is wrong with it.
 
@@ -129,7 +128,7 @@ def _case_with(
     return ({} if faults else as_read(case.to_tables())), faults
 
 
-def _refusals(entries: Sequence[Key], checked: Sequence[_Combination]) -> Iterator[Fault]:
+def _refusals(entries: Sequence[VariedKey], checked: Sequence[_Combination]) -> Iterator[Fault]:
     """What is wrong with combinations, each cause once, with the values that only those have."""
     causes = defaultdict[tuple[str, str], list[tuple[Fault, Mapping[str, str]]]](list)
     for one in checked:
@@ -181,7 +180,7 @@ def draw(varied: Variation) -> list[tuple[float, ...]]:
     sequence = qmc.Sobol(len(varied.ranges), scramble=True, seed=varied.seed)
     # The sequence is balanced at powers of two only; what is left over is not taken.
     unit = sequence.random_base2((varied.count - 1).bit_length())[: varied.count]
-    low, high = np.array([(span.low, span.high) for span in varied.ranges]).T
+    low, high = np.array([span.values for span in varied.ranges]).T
     return [tuple(row) for row in (low + (high - low) * unit).tolist()]
 
 

@@ -111,8 +111,7 @@ def read_study(
         tasks = tasks_of(base, varied, base_dir, faults)
     if faults:
         raise CaseError(faults, name)
-    labels = (*(axis.label for axis in varied.axes), *(span.label for span in varied.ranges))
-    return Study(name, description, tasks, labels)
+    return Study(name, description, tasks, tuple(key.label for key in varied.keys))
 
 
 def _read_base(

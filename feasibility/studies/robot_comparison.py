@@ -140,7 +140,7 @@ def _tasks_of(case: Case, robots: Sequence[str]) -> tuple[StudyTask, ...]:
     if not robots:
         faults.append(Fault("--robots", "is empty; expected such as ur5,panda,my_arm.urdf"))
     varied = VariedKey("robot", "--robots", ("robot",), arms)
-    tasks = tasks_of(base, Variation((varied,), (), 0, 0), None, faults)
+    tasks = tasks_of(base, Variation((varied,)), None, faults)
     if faults:
         raise CaseError(faults, case.name)
     return tasks

@@ -18,8 +18,8 @@ FORMS = "an array of values, { from = a, to = b, steps = n }, or { range = [a, b
 
 
 @dataclass(frozen=True, slots=True)
-class Key:
-    """One key of a case."""
+class VariedKey:
+    """A key of a case, and the values that it takes."""
 
     label: str
     """In the study's table, such as 'task.cone_deg', 'surface.position.x' or 'robot'."""
@@ -27,6 +27,9 @@ class Key:
     """In the study file, for messages."""
     path: tuple[str | int, ...]
     """Of what is replaced in the tables of a case; the last one may index an array."""
+    values: tuple[Any, ...]
+    sampled: bool = False
+    """Are its values the ends of a range, in which numbers are sampled?"""
 
     @property
     def is_pose(self) -> bool:
@@ -40,60 +43,55 @@ class Key:
 
 
 @dataclass(frozen=True, slots=True)
-class VariedKey(Key):
-    """A key and the values that it takes."""
-
-    values: tuple[Any, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Range(Key):
-    """A key whose value, a number, is sampled."""
-
-    low: float
-    high: float
-
-
-@dataclass(frozen=True, slots=True)
 class Variation:
-    """All that varies: every combination of the axes' values, with every sample of the ranges."""
+    """All that varies: every combination of the values of keys, with every sample of ranges."""
 
-    axes: tuple[VariedKey, ...]
-    ranges: tuple[Range, ...]
-    count: int
+    keys: tuple[VariedKey, ...]
+    """Those that are sampled stand last."""
+    count: int = 0
     """Samples of all ranges together; 0 without ranges."""
-    seed: int
+    seed: int = 0
+
+    @property
+    def axes(self) -> tuple[VariedKey, ...]:
+        """The keys that are not sampled."""
+        return tuple(key for key in self.keys if not key.sampled)
+
+    @property
+    def ranges(self) -> tuple[VariedKey, ...]:
+        """The keys that are sampled."""
+        return self.keys[len(self.axes) :]
 
     @property
     def size(self) -> int:
         """Number of tasks."""
-        return math.prod((len(axis.values) for axis in self.axes), start=self.count or 1)
+        return math.prod((len(key.values) for key in self.axes), start=self.count or 1)
 
     @property
     def cases(self) -> int:
         """Number of tasks that differ in more than the pose of the surface."""
-        sampled = not all(span.is_pose for span in self.ranges)
-        sizes = (len(axis.values) for axis in self.axes if not axis.is_pose)
-        return math.prod(sizes, start=self.count if sampled else 1)
+        fixed = all(key.is_pose for key in self.ranges)
+        sizes = (len(key.values) for key in self.axes if not key.is_pose)
+        return math.prod(sizes, start=1 if fixed else self.count)
 
 
 def read_variation(table: Any, faults: list[Fault]) -> Variation:
     """Read the [vary] table; what is wrong is added to `faults` and left out."""
     section = Section("vary", table, faults)
-    keys: list[VariedKey | Range] = []
+    keys: list[VariedKey] = []
     if section.has("robots"):
-        _read_robots(section, keys)
+        keys += _read_robots(section)
     sampler = section.word("sampler", SAMPLERS)
     count = _whole(section, "count", 1, MOST_VALUES)
     seed = _whole(section, "seed", 0)
     for (name, key), value in _flattened(section).items():
         place = f"vary.{name}.{printable(key)}"
         if name == "surface" and key in POSES and isinstance(value, Mapping):
-            _read_pose(place, key, value, keys, faults)
+            keys += _read_pose(place, key, value, faults)
         else:
-            _read_values(Key(f"{name}.{key}", place, (name, key)), value, keys, faults)
-    axes = tuple(key for key in keys if isinstance(key, VariedKey))
-    ranges = tuple(key for key in keys if isinstance(key, Range))
+            keys += _read_values(f"{name}.{key}", place, (name, key), value, faults)
+    keys.sort(key=lambda key: key.sampled)
+    ranges = any(key.sampled for key in keys)
     if ranges and count is None and "count" not in section.table:
         section.fault("count", "is missing; expected how many samples of the ranges to take")
     for key, given in (("sampler", sampler), ("count", count), ("seed", seed)):
@@ -101,7 +99,7 @@ def read_variation(table: Any, faults: list[Fault]) -> Variation:
             section.fault(key, "is of no use without a { range = [low, high] }; leave it out")
     if section.is_table and not section.table:
         section.fault("", "is empty; expected at least one key that varies")
-    return Variation(axes, ranges, (count or 1) if ranges else 0, seed or 0)
+    return Variation(tuple(keys), (count or 1) if ranges else 0, seed or 0)
 
 
 def _whole(section: Section, key: str, low: int, high: int = LARGEST_WHOLE) -> int | None:
@@ -140,13 +138,13 @@ def _flattened(section: Section) -> dict[tuple[str, str], Any]:
     return found
 
 
-def _read_robots(section: Section, keys: list[VariedKey | Range]) -> None:
+def _read_robots(section: Section) -> list[VariedKey]:
     """The arms: names, paths of URDF or xacro files, or tables as under [robot]."""
     expected = 'an array of robots, such as ["ur5", { name = "puma560", limits = "set-1" }]'
     value = section.table["robots"]
     if not isinstance(value, list) or not value or len(value) > MOST_VALUES:
         section.wrong("robots", value, f"must be {expected}")
-        return
+        return []
     tables: list[Any] = []
     for k, robot in enumerate(value):
         if is_text(robot):
@@ -155,55 +153,47 @@ def _read_robots(section: Section, keys: list[VariedKey | Range]) -> None:
             tables.append(dict(robot))
         else:
             section.fault(f"robots[{k}]", f"must be a name or a table, got {shown(robot)}")
-    if len(tables) == len(value):
-        keys.append(VariedKey("robot", "vary.robots", ("robot",), tuple(tables)))
+    return [VariedKey("robot", "vary.robots", ("robot",), tuple(tables))]
 
 
 def _read_pose(
-    place: str,
-    key: str,
-    value: Mapping[str, Any],
-    keys: list[VariedKey | Range],
-    faults: list[Fault],
-) -> None:
+    place: str, key: str, value: Mapping[str, Any], faults: list[Fault]
+) -> list[VariedKey]:
     """A position or an orientation, part by part."""
-    names = POSES[key]
+    names, found = POSES[key], list[VariedKey]()
     faults += [
         Fault(f"{place}.{printable(name)}", f"is not known here; use {alternatives(names)}")
         for name in value
         if name not in names
     ]
     for index, name in enumerate(names):
-        if name not in value:
-            continue
-        part = Key(f"surface.{key}.{name}", f"{place}.{name}", ("surface", key, index))
-        inner = [float(value[name])] if is_number(value[name]) else value[name]
-        _read_values(part, inner, keys, faults)
+        if name in value:
+            inner = [float(value[name])] if is_number(value[name]) else value[name]
+            own = f"surface.{key}.{name}", f"{place}.{name}", ("surface", key, index)
+            found += _read_values(*own, inner, faults)
+    return found
 
 
-def _read_values(key: Key, value: Any, keys: list[VariedKey | Range], faults: list[Fault]) -> None:
-    """The values of one key, in one of the forms that there are."""
-    own = (key.label, key.place, key.path)
-    if isinstance(value, list):
-        if not value:
-            faults.append(Fault(key.place, f"is empty; expected {FORMS}"))
-        elif len(value) > MOST_VALUES:
-            faults.append(Fault(key.place, f"has {len(value)} values, more than {MOST_VALUES}"))
-        else:
-            keys.append(VariedKey(*own, tuple(value)))
-        return
-    section = Section(key.place, value if isinstance(value, Mapping) else {}, faults)
-    before = len(faults)
-    if section.table.keys() == {"range"}:
+def _read_values(
+    label: str, place: str, path: tuple[str | int, ...], value: Any, faults: list[Fault]
+) -> list[VariedKey]:
+    """A key with its values, in one of the forms that there are; nothing after a fault."""
+    own, before = (label, place, path), len(faults)
+    section = Section(place, value if isinstance(value, Mapping) else {}, faults)
+    made = None
+    if isinstance(value, list) and 0 < len(value) <= MOST_VALUES:
+        made = VariedKey(*own, tuple(value))
+    elif isinstance(value, list):
+        number = f"has {len(value)} values, more than {MOST_VALUES}"
+        section.fault("", number if value else f"is empty; expected {FORMS}")
+    elif section.table.keys() == {"range"}:
         pair = section.interval("range", value["range"], "the key's own unit")
-        if len(faults) == before:
-            keys.append(Range(*own, *pair))
+        made = VariedKey(*own, pair, sampled=True)
     elif section.table.keys() == {"from", "to", "steps"}:
-        values = _steps(section)
-        if len(faults) == before:
-            keys.append(VariedKey(*own, values))
+        made = VariedKey(*own, _steps(section))
     else:
-        faults.append(Fault(key.place, f"must be {FORMS}; got {shown(value)}"))
+        section.fault("", f"must be {FORMS}; got {shown(value)}")
+    return [] if made is None or len(faults) > before else [made]
 
 
 def _steps(section: Section) -> tuple[float, ...]:
