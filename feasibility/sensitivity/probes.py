@@ -315,9 +315,7 @@ class Prober:
             used = float(found.walk.q[:, quantity.joint].max())
         else:
             return good
-        steps = (used - quantity.given) * (1.0 if quantity.end > quantity.given else -1.0)
-        steps = (math.degrees(steps) if quantity.unit == "rad" else steps) / quantity.step
-        k = math.floor(steps) if bad > good else math.ceil(steps)
+        k = (math.floor if bad > good else math.ceil)(quantity.steps(used))
         if not min(good, bad) < k < max(good, bad):
             return good
         look = self.looks.setdefault(((quantity, k),), found._replace(certificate=None))

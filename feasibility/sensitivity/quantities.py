@@ -68,11 +68,10 @@ class Quantity:
     """The value of the case as given; 0 for a shift."""
     end: float
     """The furthest value that is tried."""
-    step: float
-    """> 0, distance of neighbouring values; degrees for angles, m for lengths."""
-    monotone: bool
-    """Is there one threshold at most? True where every value allows all that the ones before it
-    allow, or the other way round."""
+    key: str = ""
+    """The key of the case file that holds it: 'task.cone_deg', 'robot.limits_deg.joint1'."""
+    which: str = ""
+    """Which of the key's numbers it is, such as 'upper' or '-y'; empty where there is one."""
     joint: int = -1
     """The joint whose limit it is; -1 for other kinds."""
     axis: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -80,10 +79,19 @@ class Quantity:
     in the surface's."""
     obstacle: str = ""
     """What is left out: the name of an object, or nothing for all collisions."""
-    key: str = ""
-    """The key of the case file that holds it: 'task.cone_deg', 'robot.limits_deg.joint1'."""
-    which: str = ""
-    """Which of the key's numbers it is, such as 'upper' or '-y'; empty where there is one."""
+
+    @property
+    def monotone(self) -> bool:
+        """Is there one threshold at most?
+
+        True where every value allows all that the ones before it allow, or the other way round.
+        """
+        return self.kind not in BOTH_WAYS
+
+    @property
+    def step(self) -> float:
+        """Distance of neighbouring values; degrees for angles, m for lengths."""
+        return {"rad": ANGLE_STEP_DEG, "m": LENGTH_STEP}.get(self.unit, 1.0)
 
     @property
     def label(self) -> str:
@@ -95,9 +103,16 @@ class Quantity:
     @property
     def last(self) -> int:
         """Number of steps from the value given to the end; the last one may be shorter."""
-        length = abs(self.end - self.given)
-        length = math.degrees(length) if self.unit == "rad" else length
-        return math.ceil(round(length / self.step, 6))
+        return self.steps_to(self.end)
+
+    def steps_to(self, value: float) -> int:
+        """The number of steps k after which the value is this one, or beyond it."""
+        return math.ceil(round(self.steps(value), 6))
+
+    def steps(self, value: float) -> float:
+        """How many steps a value (rad or m) is away from the one given, towards the end."""
+        length = value - self.given if self.end >= self.given else self.given - value
+        return (math.degrees(length) if self.unit == "rad" else length) / self.step
 
     def value(self, k: int) -> float:
         """The value (rad or m) after k steps, 0 <= k <= last."""
@@ -107,12 +122,6 @@ class Quantity:
         if self.unit == "m":
             return round(self.given + sign * k * self.step, 9)
         return math.radians(round(math.degrees(self.given) + sign * k * self.step, 9))
-
-    def steps_to(self, value: float) -> int:
-        """The number of steps k after which the value is this one."""
-        length = abs(value - self.given)
-        length = math.degrees(length) if self.unit == "rad" else length
-        return self.last if value == self.end else round(length / self.step)
 
     def applied(self, variant: Variant, k: int) -> Variant:
         """The case with this quantity k steps from the value given."""
@@ -204,7 +213,7 @@ def quantities(variant: Variant, widen: bool) -> tuple[Quantity, ...]:
     task = variant.task
     widest = 180.0 if task.roll is None else 90.0
     end = math.radians(widest if widen else min(task.cone_deg, LEAST_CONE_DEG))
-    found = [_number(Kind.CONE, "cone", "rad", task.cone, end, "task.cone_deg")]
+    found = [Quantity(Kind.CONE, "cone", "rad", task.cone, end, "task.cone_deg")]
     found += _of_directions(task, widen)
     limits = [
         _limit(variant.robot, joint, kind, widen)
@@ -214,27 +223,18 @@ def quantities(variant: Variant, widen: bool) -> tuple[Quantity, ...]:
     of_collisions = _of_collisions(task, widen)
     found += of_collisions or limits
     for which, end in (("smaller", 0.0), ("larger", task.standoff + FURTHEST)):
-        ends = task.standoff, end
-        found.append(
-            _number(Kind.STANDOFF, f"{which} standoff", "m", *ends, "task.standoff", which)
-        )
+        ends, name = (task.standoff, end), f"{which} standoff"
+        found.append(Quantity(Kind.STANDOFF, name, "m", *ends, "task.standoff", which))
     for index, letter in enumerate("xyz"):
         for sign in (1.0, -1.0):
             x, y, z = (sign if index == k else 0.0 for k in range(3))
-            which, key = f"{'+' if sign > 0 else '-'}{letter}", "surface.position"
-            shift = _number(Kind.SHIFT, f"shift along {which}", "m", 0.0, FURTHEST, key, which)
-            found.append(replace(shift, axis=(x, y, z)))
+            which = f"{'+' if sign > 0 else '-'}{letter}"
+            words = "surface.position", which
+            ends, name = (0.0, FURTHEST), f"shift along {which}"
+            found.append(Quantity(Kind.SHIFT, name, "m", *ends, *words, axis=(x, y, z)))
     if of_collisions:  # limits come last where the time may run out: places matter more there
         found += limits
     return tuple(q for q in found if math.isfinite(q.given) and q.last > 0)
-
-
-def _number(
-    kind: Kind, name: str, unit: str, given: float, end: float, key: str, which: str = ""
-) -> Quantity:
-    """An angle or a length; see `Quantity`."""
-    step, monotone = ANGLE_STEP_DEG if unit == "rad" else LENGTH_STEP, kind not in BOTH_WAYS
-    return Quantity(kind, name, unit, given, end, step, monotone, key=key, which=which)
 
 
 def _of_directions(task: Task, widen: bool) -> list[Quantity]:
@@ -243,8 +243,8 @@ def _of_directions(task: Task, widen: bool) -> list[Quantity]:
     if task.roll is not None:
         least = min(task.roll.half, math.radians(LEAST_ROLL_DEG))
         end = math.pi if widen else least
-        half, key = task.roll.half, "task.roll_deg"
-        found.append(_number(Kind.ROLL, "roll", "rad", half, end, key, "half its range"))
+        ends, words = (task.roll.half, end), ("task.roll_deg", "half its range")
+        found.append(Quantity(Kind.ROLL, "roll", "rad", *ends, *words))
     if task.approach is None or isinstance(task.approach, str):
         return found
     b = unit_along(task.approach)
@@ -255,9 +255,9 @@ def _of_directions(task: Task, widen: bool) -> list[Quantity]:
             x, y, z = (square / np.linalg.norm(square)).tolist()
             letter = "xyz"[int(np.argmax(axis))]
             which = f"tilted to {'+' if sign > 0 else '-'}{letter}"
-            end, key = math.radians(MOST_TILT_DEG), "task.approach"
-            tilt = _number(Kind.TILT, f"approach {which}", "rad", 0.0, end, key, which)
-            found.append(replace(tilt, axis=(x, y, z)))
+            ends, words = (0.0, math.radians(MOST_TILT_DEG)), ("task.approach", which)
+            name = f"approach {which}"
+            found.append(Quantity(Kind.TILT, name, "rad", *ends, *words, axis=(x, y, z)))
     return found
 
 
@@ -272,16 +272,14 @@ def _of_collisions(task: Task, widen: bool) -> list[Quantity]:
         return []
     given = settings.clearance
     end = 0.0 if widen else max(given, MOST_CLEARANCE)
-    found = [_number(Kind.CLEARANCE, "clearance", "m", given, end, "collision.clearance")]
+    found = [Quantity(Kind.CLEARANCE, "clearance", "m", given, end, "collision.clearance")]
     if settings.surface and task.standoff > 0.0:
         given = settings.tool_clearance
         end = 0.0 if widen else max(given, task.standoff)
         key = "collision.tool_clearance"
-        found.append(_number(Kind.TOOL_CLEARANCE, "tool clearance", "m", given, end, key))
+        found.append(Quantity(Kind.TOOL_CLEARANCE, "tool clearance", "m", given, end, key))
     if widen:
-        every = Quantity(
-            Kind.WITHOUT, "without collisions", "", 0.0, 1.0, 1.0, True, key="collision"
-        )
+        every = Quantity(Kind.WITHOUT, "without collisions", "", 0.0, 1.0, "collision")
         found.append(every)
         found += [
             replace(every, name=f"without {one.name}", obstacle=one.name, key="collision.scene")
@@ -320,6 +318,4 @@ def _limit(robot: Robot, joint: int, kind: Kind, widen: bool) -> Quantity:
     end = outwards if widen else inwards[kind is Kind.UPPER]
     unit, key = ("m", "limits_m") if slides else ("rad", "limits_deg")
     key = f"robot.{key}.{toml_key(name)}"
-    return replace(
-        _number(kind, f"{name} {which} limit", unit, given, end, key, which), joint=joint
-    )
+    return Quantity(kind, f"{name} {which} limit", unit, given, end, key, which, joint)

@@ -55,7 +55,7 @@ MORE_IS_LESS = (Kind.LOWER, Kind.CLEARANCE, Kind.TOOL_CLEARANCE)
 @pytest.mark.parametrize("value", [0.1234567, 0.7654321])
 def test_feasible_values_allow_more_and_others_less_by_a_digit_at_most(kind, value):
     turns = kind not in (Kind.CLEARANCE, Kind.TOOL_CLEARANCE)
-    asked = Quantity(kind, "it", "rad" if turns else "m", 0.0, 1.0, 0.5, True)
+    asked = Quantity(kind, "it", "rad" if turns else "m", 0.0, 1.0)
     exact, digit = (math.degrees(value), 0.01) if turns else (value, 1e-5)
     for feasible in (True, False):
         more = float(changes.number(asked, value, feasible)) - exact
@@ -65,8 +65,8 @@ def test_feasible_values_allow_more_and_others_less_by_a_digit_at_most(kind, val
 
 @pytest.mark.parametrize(("given", "others"), [(3, False), (3, True), (100, False)])
 def test_no_cone_that_lets_the_tool_point_away_is_proposed(plate, given, others):
-    cone = Quantity(Kind.CONE, "cone", "rad", math.radians(given), math.pi, 0.1, True, key="cone")
-    shift = Quantity(Kind.SHIFT, "shift", "m", 0.0, 0.5, 0.001, False, key="place")
+    cone = Quantity(Kind.CONE, "cone", "rad", math.radians(given), math.pi, "cone")
+    shift = Quantity(Kind.SHIFT, "shift", "m", 0.0, 0.5, "place")
     made = [
         Threshold(quantity, Finding(value, Answer.FEASIBLE, Evidence.WITNESS, "a motion"), None)
         for quantity, value in ((cone, math.radians(120)), (shift, 0.499))
@@ -154,7 +154,7 @@ def test_a_motion_across_a_cut_opens_it(commands, side):
     root = verdict.proof.root
     q = np.zeros((2, 6))
     q[:, root.joint] = root.value + np.array([[-0.2, -0.1], [-0.1, 0.1], [0.1, 0.2]][side + 1])
-    cone = Quantity(Kind.CONE, "cone", "rad", math.radians(3), math.pi, 0.1, True)
+    cone = Quantity(Kind.CONE, "cone", "rad", math.radians(3), math.pi)
     walk = Walk(q, np.array([0, 1]))
     found = Finding(math.radians(9), Answer.FEASIBLE, Evidence.WITNESS, "a motion", witness=walk)
     made = coverable.Explanation(verdict, (Threshold(cone, found, None),), (), None, 0, 0.0)
