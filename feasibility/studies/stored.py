@@ -1,4 +1,4 @@
-"""The outcome of a case as a study keeps it: typed, and checked by its types when it is read back.
+"""The outcome of a case as a study keeps it: typed, and checked when it is read back.
 
 What a file holds is not trusted: no value of another type or outside its range is taken over.
 """
@@ -7,34 +7,18 @@ import json
 import math
 import re
 from collections.abc import Mapping
-from enum import StrEnum
-from functools import cache, partial
-from types import NoneType
-from typing import Annotated, Any, Literal, NamedTuple, TypedDict, get_args, get_origin
-from typing import get_type_hints as hints_of
+from typing import Any, Literal, TypedDict
 
 import numpy as np
 
 from coverable.arrays import Mask
-from coverable.errors import alternatives, is_number, is_whole, printable, shown
+from coverable.errors import LARGEST_WHOLE, MISSING, Checks, Fault, printable, worded
+from feasibility.search_settings import METHODS
 from feasibility.verdict import Answer, CauseKind, Evidence
 
 LONGEST_TEXT = 20_000  # characters
+MOST_SHARE = 1.0 + 1e-9  # sums of areas are rounded
 _CONTROL = re.compile(r"[\x00-\x09\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
-
-
-class Within(NamedTuple):
-    """The least and the largest value of a number."""
-
-    low: float
-    high: float = math.inf
-
-
-Count = Annotated[int, Within(0, 1_000_000_000)]
-"""Of cells, edges, waypoints."""
-Whole = Annotated[int, Within(0)]
-Share = Annotated[float, Within(0.0, 1.0 + 1e-9)]  # sums of areas are rounded
-Angle = Annotated[float, Within(0.0, 180.0)]
 
 
 class Margins(TypedDict):
@@ -55,9 +39,9 @@ class Margins(TypedDict):
 class Measured(TypedDict):
     """What the replay measured."""
 
-    waypoints: Count
-    max_position_error_m: Annotated[float, Within(0.0)] | None
-    max_angle_deg: Angle | None
+    waypoints: int
+    max_position_error_m: float | None
+    max_angle_deg: float | None
 
 
 class Outcome(TypedDict):
@@ -67,17 +51,17 @@ class Outcome(TypedDict):
     evidence: Evidence
     message: str
     method: Literal["complete", "greedy"]
-    seed: Whole
-    cells: Count
-    covered: Count
+    seed: int
+    cells: int
+    covered: int
     """Cells of the best motion."""
-    share: Share
+    share: float
     """Of the area that these have."""
-    edges: Count
+    edges: int
     """Neighbouring cells that a motion joins."""
-    pairs: Count
+    pairs: int
     """All neighbouring cells."""
-    causes: dict[CauseKind, Count]
+    causes: dict[CauseKind, int]
     """Missed cells by cause, the most frequent first."""
     components: list[str]
     """What single motions cover, as hexadecimal bits (see `cells_of`), the best first."""
@@ -86,15 +70,24 @@ class Outcome(TypedDict):
     certificate: Measured | None
     unchecked_links: list[str]
     """What has no body, as in `Verdict`."""
-    fk: Whole
+    fk: int
     """Evaluations of the arm."""
 
 
 class Divided(Outcome):
     """With how many motions it takes; None where that is not known."""
 
-    patches: Count | None
-    patches_share: Share | None
+    patches: int | None
+    patches_share: float | None
+
+
+WORDS = {"verdict": [*Answer], "evidence": [*Evidence], "method": [*METHODS]}
+COUNTS = ("cells", "covered", "edges", "pairs")
+MOST = 1_000_000_000  # of any of these
+SHARE = "must be a number in 0 .. 1"
+MARGINS = dict.fromkeys(Margins.__annotations__, (-math.inf, math.inf))
+MEASURED = {"waypoints": (0.0, MOST), "max_position_error_m": (0.0, math.inf),
+            "max_angle_deg": (0.0, 180.0)}  # fmt: skip
 
 
 def outcome_fault(result: Mapping[str, Any]) -> str:
@@ -104,9 +97,31 @@ def outcome_fault(result: Mapping[str, Any]) -> str:
         >>> outcome_fault({"more": 1})
         'more is not known'
     """
-    fault = _fault("", result, Divided if "patches" in result else Outcome)
-    if fault:
-        return fault
+    checks, kind = Checks(), Divided if "patches" in result else Outcome
+    for key in result:
+        if key not in kind.__annotations__:
+            checks.keep(Fault(printable(str(key)), "is not known"))
+    values = {key: result.get(key, MISSING) for key in kind.__annotations__}
+    for key, words in WORDS.items():
+        checks.choice(key, values[key], words)
+    for key in (*COUNTS, "seed", "fk"):
+        checks.whole(key, values[key], 0, MOST if key in COUNTS else LARGEST_WHOLE)
+    checks.number("share", values["share"], SHARE, 0.0, MOST_SHARE)
+    if values.get("patches") is not None:
+        checks.whole("patches", values["patches"], 0, MOST)
+    if values.get("patches_share") is not None:
+        checks.number("patches_share", values["patches_share"], SHARE, 0.0, MOST_SHARE)
+    _check_numbers(checks, "margins", values["margins"], MARGINS)
+    _check_numbers(checks, "certificate", values["certificate"], MEASURED)
+    _check_texts(checks, "message", [values["message"]])
+    _check_texts(checks, "components", values["components"])
+    _check_texts(checks, "unchecked_links", values["unchecked_links"])
+    causes = values["causes"] if isinstance(values["causes"], dict) else {"": values["causes"]}
+    for kind_of, number in causes.items():
+        checks.choice("causes", kind_of, [*CauseKind])
+        checks.whole("causes", number, 0, MOST)
+    if checks.faults:
+        return worded(checks.faults[0])
     if result["covered"] > result["cells"]:
         return "covered is more than cells"
     try:
@@ -117,56 +132,26 @@ def outcome_fault(result: Mapping[str, Any]) -> str:
     return ""
 
 
-_types = cache(lambda kind: hints_of(kind, include_extras=True))
+def _check_numbers(
+    checks: Checks, name: str, value: Any, ranges: Mapping[str, tuple[float, float]]
+) -> None:
+    """None, or a table of numbers that may be None, each between two ends."""
+    if value is None:
+        return
+    if not isinstance(value, Mapping) or value.keys() != ranges.keys():
+        checks.wrong(name, value, f"must be an object of {', '.join(ranges)}")
+        return
+    for key, (low, high) in ranges.items():
+        if value[key] is not None:
+            expected = f"must be a number in {low:g} .. {high:g}"
+            checks.number(f"{name}.{key}", value[key], expected, low, high)
 
 
-def _fault(name: str, value: Any, kind: Any) -> str:
-    """What is wrong with a value that should be of a type; empty where nothing is."""
-    outer, parts, expected, good = get_origin(kind), get_args(kind), "", False
-    if outer is Annotated:
-        low, high = parts[1]
-        expected = (
-            f"a {'whole' if parts[0] is int else 'finite'} number in {low:g} .. {round(high, 6):,}"
-        )
-        good = (
-            is_whole(value, 0) if parts[0] is int else is_number(value)
-        ) and low <= value <= high
-    elif NoneType in parts:
-        return "" if value is None else _fault(name, value, parts[0])
-    elif hasattr(kind, "__total__"):
-        return _fault_in_table(name, value, _types(kind))
-    elif outer in (list, dict):
-        if isinstance(value, outer):
-            both = [*value, *(value.values() if outer is dict else ())]
-            kinds = np.repeat(np.array(parts, dtype=object), len(value))
-            return next(filter(None, map(partial(_fault, name), both, kinds)), "")
-        expected = "a list of texts" if outer is list else "an object"
-    elif outer is Literal or issubclass(kind, StrEnum):
-        words = [str(word) for word in parts or kind]
-        expected, good = alternatives(words), isinstance(value, str) and value in words
-    elif kind is str:
-        expected = "a text that can be printed"
-        good = isinstance(value, str) and len(value) <= LONGEST_TEXT and not _CONTROL.search(value)
-    else:
-        expected, good = "a finite number", is_number(value)
-    return "" if good else _must(name, expected, value)
-
-
-def _fault_in_table(name: str, value: Any, types: Mapping[str, Any]) -> str:
-    """What is wrong with an object of such values."""
-    if not isinstance(value, Mapping):
-        return _must(name, f"an object of {alternatives(list(types))}", value)
-    unknown = [printable(str(key)) for key in value if key not in types]
-    missing = [key for key in types if key not in value]
-    if unknown or missing:
-        said = f"{unknown[0]} is not known" if unknown else f"{missing[0]} is missing"
-        return f"{name}: {said}" if name else said
-    inner = (_fault(f"{name}.{key}" if name else key, value[key], types[key]) for key in types)
-    return next(filter(None, inner), "")
-
-
-def _must(name: str, expected: str, value: Any) -> str:
-    return f"{name} must be {expected}, got {shown(value)}"
+def _check_texts(checks: Checks, name: str, value: Any) -> None:
+    """A list of texts that can be printed."""
+    for text in value if isinstance(value, list) else [None]:
+        if not isinstance(text, str) or len(text) > LONGEST_TEXT or _CONTROL.search(text):
+            checks.wrong(name, value, "must be a text that can be printed, or a list of such")
 
 
 def bits_of(cover: Mask) -> str:
