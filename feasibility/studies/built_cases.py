@@ -4,7 +4,6 @@ And the files that a case depends on: those that it names, and those that these 
 """
 
 import json
-import time
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
@@ -18,7 +17,6 @@ from feasibility.cases.robot_table import RobotPart, read_robot
 from feasibility.cases.surface_reading import SurfacePart, read_surface
 from feasibility.cases.toml import as_read
 from feasibility.cases.toml_edits import change_paths
-from feasibility.clock import Clock
 from robots.library import flange_axis
 from robots.robot import Robot
 from surfaces.cells import Cells
@@ -80,11 +78,6 @@ def case_of(tables: Mapping[str, Any]) -> Case:
         CaseError: with everything that is wrong.
     """
     return case_of_tables({title: as_read(tables[title]) for title in TABLES if title in tables})
-
-
-def clock_of(case: Case) -> Clock:
-    """The time limit of a case, from now on; kernels are loaded before, like everywhere."""
-    return Clock(case.search.time_limit).begin(time.monotonic())
 
 
 def arm_of(case: Case) -> Robot:

@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
@@ -18,7 +17,6 @@ from feasibility.studies.study_outcome import evaluate
 from feasibility.version import version
 
 LARGEST = 1 << 30  # bytes; no reader takes a file beyond it
-KEEP_S = 0.5  # [s] for which finished tasks may wait to be written together
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -63,8 +61,8 @@ def run_tasks(
 ) -> tuple[Row, ...]:
     """Do all tasks that the store does not hold yet.
 
-    Whatever ends the run, what was finished half a second before is in the store; run again to
-    continue. Tasks with the same key are done once, those that failed are tried again.
+    Whatever ends the run, what was finished is in the store; run again to continue. Tasks with the
+    same key are done once, those that failed are tried again.
 
     Args:
         tasks: in the order of the table.
@@ -91,30 +89,19 @@ def run_tasks(
     """
     found = {} if store is None else _finished(store, tasks)
     missing = list({task.key: task for task in tasks if task.key not in found}.values())
-    total, fresh, written = len(found) + len(missing), list[Row](), 0.0
-
-    def flush() -> None:
-        nonlocal written
-        written, rows = time.monotonic(), fresh[:]
-        fresh.clear()
-        if store is not None and rows:
-            store.keep(rows)
+    total = len(found) + len(missing)
 
     def receive(part: Sequence[StudyTask], replies: Sequence[Reply]) -> None:
-        for reply in replies:
-            fresh.append(_row(part[reply.index], reply))
-            found[fresh[-1].key] = fresh[-1]
-        if fresh and time.monotonic() - written > KEEP_S:
-            flush()
+        rows = [_row(part[reply.index], reply) for reply in replies]
+        if store is not None and rows:
+            store.keep(rows)
+        found.update((row.key, row) for row in rows)
         if progress is not None:
             progress(len(found), total, "")
 
-    try:
-        for work in dict.fromkeys(task.work for task in missing):
-            part = [task for task in missing if task.work is work]
-            workers.run(work, [task.tables for task in part], partial(receive, part))
-    finally:
-        flush()
+    for work in dict.fromkeys(task.work for task in missing):
+        part = [task for task in missing if task.work is work]
+        workers.run(work, [task.tables for task in part], partial(receive, part))
     return tuple(replace(found[task.key], parameters=task.parameters) for task in tasks)
 
 

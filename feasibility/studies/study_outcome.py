@@ -1,6 +1,7 @@
 """What a study keeps of one verdict: plain numbers and words, computed where the task runs."""
 
 import math
+import time
 from collections import Counter
 from collections.abc import Mapping
 from typing import Any
@@ -11,7 +12,7 @@ from coverable.arrays import Mask
 from feasibility.clock import Clock, OutOfTime
 from feasibility.division.set_covering import undominated
 from feasibility.search_settings import Search
-from feasibility.studies.built_cases import arm_of, case_of, clock_of, cut_of
+from feasibility.studies.built_cases import arm_of, case_of, cut_of
 from feasibility.studies.pool import Tables
 from feasibility.studies.stored import Divided, Margins, Outcome, bits_of
 from feasibility.verdict import Verdict
@@ -38,7 +39,8 @@ def evaluate(tables: Tables) -> Outcome | Divided:
     from feasibility.checking import check
 
     case = case_of(tables)
-    clock, wanted = clock_of(case), tables.get("wanted", {})
+    clock = Clock(case.search.time_limit).begin(time.monotonic())  # kernels are loaded before
+    wanted = tables.get("wanted", {})
     verdict = check(arm_of(case), cut_of(case), case.built_task(), case.search, clock=clock)
     found = outcome_of(verdict, wanted.get("causes", True))
     if not wanted.get("patches"):
