@@ -88,8 +88,8 @@ def test_a_cell_out_of_reach_is_a_leaf_alone():
     found = verified(near, Leaf(2), **free)
     assert "leaf 1 (cell [2, 0]) is wrong: the tool can be at its target" in found.refusal
     assert_points_refute(near._replace(**free), found.refusal)
-    cells = plane((1.39, 1.41), (0.29, 0.31), side="inside").cells(1, 1)  # at the far end of it
-    assert not verified(near, Leaf(0), cells=cells, **free).accepted
+    cells = plane((-2, 6), (0.29, 0.31), side="inside").cells(2, 1)  # one is at 4 m
+    assert not verified(near, Leaf(1), cells=cells, **free).accepted
     slides = [joint(1, "prismatic", axis=(1, 0, 0)), joint(2, "prismatic", axis=(-1, 0, 0))]
     robot = robot_of(slides).with_limits(np.tile([-np.inf, np.inf], (2, 1)))
     found = verify_proof(robot, strip(), proof_cases.FLAT, CutTree(Leaf(0)))
@@ -278,9 +278,16 @@ def test_too_far_is_what_lies_further_than_the_links_are_long():
 
 
 def test_where_a_surface_has_no_bounds_nothing_is_proved():
-    cells = poses([[0.9, 0, 0], [1, 0, 0]], [[0, 0, 1]] * 2, approaches=[[0, 0, -1]] * 2)
-    found = verified(elbow_case(), Leaf(0), cells=cells)
-    assert "the surface has no bounds to prove anything with" in found.refusal
+    """But that a cell's own target is out of reach."""
+    case = elbow_case()
+    points, (along, *_), _ = case.task.targets(case.cells)
+    cells = poses(points[:2], [[0, 0, 1]] * 2, approaches=[[0, 1, 0], along])
+    assert verified(case, Leaf(0), cells=cells).accepted
+    free = {"cells": cells, "robot": free_elbow_case().robot}
+    assert verified(case, tree=CutTree(Leaf(0), opened=((1, 0.0),)), **free).accepted
+    assert "is wrong" in verified(case, Leaf(1), cells=cells).refusal
+    refusal = verified(case, split(0.0, 0, 0), cells=cells).refusal
+    assert "the surface has no bounds to prove anything with" in refusal
 
 
 TABLE = plane((0.35, 0.55), (-0.1, 0.1), side="outside", position=(0, 0, 0.2)).cells(1, 1)

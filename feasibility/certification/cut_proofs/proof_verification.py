@@ -8,10 +8,10 @@ tool on the surface, within tolerance and cone, and its roll in the range,
     no q in M and in the region of a cut has q_j = t, and
     no q in the region of a leaf has the tool at its cell's target, and held likewise.
 
-A tree of one leaf proves its claim too where the cell's target is out of reach, and where the tool
-collides in every pose within tolerance and cone of it, whatever the arm does
-(`collisions/every_pose.py`). And where bodies are to stay clear of each other, M and leaves hold
-only what is clear.
+A tree of one leaf needs nothing of the surface but the cell's target, so no bounds of it. It proves
+its claim too where that is out of reach, and where the tool collides in every pose within tolerance
+and cone of it, whatever the arm does (`collisions/every_pose.py`). And where bodies are to stay
+clear of each other, M and leaves hold only what is clear.
 
 Both say that a region is empty, which `empty_region` proves by bounds (`linear_models`,
 `box_exclusion`). A joint that the tree opens at t is to have no q in M at any
@@ -111,6 +111,8 @@ def verify_proof(
     alone = _by_the_tool(robot, cells, task, tree, tick)
     if alone is not None and alone.confirmed:
         return ProofCheck("", alone.boxes)
+    if isinstance(tree.root, Leaf):
+        return verify_on(robot, cells, task, tree, None, tick, most)
     cone = max(min(task.cone_chord, 1.0), NARROWEST)
     try:
         parts = cells.surface.parts(FINE * task.effective_tolerance, FINE * cone)
@@ -171,32 +173,41 @@ def verify_on(
     cells: Cells,
     task: Task,
     tree: CutTree,
-    parts: SurfaceParts,
+    parts: SurfaceParts | None,
     tick: Callable[[], object] | None = None,
     most: int = MOST_BOXES,
 ) -> ProofCheck:
-    """The same, with the surface's parts given; the tree is well formed."""
-    fault = disagreement(cells, parts)
+    """The same, with the surface's parts given; the tree is well formed.
+
+    Where it is one leaf they may be None: then nothing is asked of the surface, nor is it where
+    joints are opened, as a turn of each is all that there is.
+    """
+    held, first, fault = cell_parts(task.targets(cells)), 0, ""
+    if parts is not None:
+        fault, first = disagreement(cells, parts), len(parts)
+        held = held.join(target_parts(parts, cells, task), held)
     if fault:
         return ProofCheck(fault, 0)
-    surface = target_parts(parts, cells, task)
-    limits, fault = _finite_slides(robot, surface, task.effective_tolerance)
+
+    def root_of(cell: int | None) -> int:
+        return 0 if cell is None else first + cell
+
+    whole = root_of(tree.root.cell) if parts is None and isinstance(tree.root, Leaf) else 0
+    limits, fault = _finite_slides(
+        robot, held.of(slice(whole, whole + 1)), task.effective_tolerance
+    )
     if fault:
         return ProofCheck(fault, 0)
     arm = ArmModel(robot, limits.low, limits.high)
-    allowed, targets = Allowed.by(task, arm), task.targets(cells)
+    allowed = Allowed.by(task, arm)
 
-    def root_of(cell: int | None) -> int:
-        return 0 if cell is None else len(parts) + cell
-
-    claims, refuter = (
-        list(_claims(robot, cells, tree, limits)),
-        Refuter(robot, cells, task, allowed.length),
-    )
+    claims = list(_claims(robot, cells, tree, limits))
+    if parts is None:
+        claims = [one for one in claims if one.cell is not None]
+    refuter = Refuter(robot, cells, task, allowed.length)
     bodies = gather(robot, cells.surface, task.collision, task.standoff)
 
     def tested(boxes: int, overlapping: Overlapping | None = None) -> Outcome:
-        held = surface.join(surface, cell_parts(targets))
         emptiness = Emptiness(arm, held, root_of, allowed, tick or (lambda: None), overlapping)
         return emptiness.test(claims, refuter, boxes)
 
