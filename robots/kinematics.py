@@ -158,25 +158,6 @@ class Kinematics:
         # w x a = [a]x^T w for each column w; `np.cross` takes longer than all the rest.
         return jacobian[:3].copy(), pin.skew(axis).T @ jacobian[3:]
 
-    def tool_velocities(self, q: ArrayLike, dq: ArrayLike) -> Array:
-        """Velocities (m, 3) of the tool point at configurations q (m, n) with dq (m, n).
-
-        In m/s in the root frame, see `Robot`, when dq is in rad/s or m/s.
-
-        Raises:
-            ArgumentError: q or dq does not have the shape (m, n), or they differ in m.
-        """
-        rows, rates = self._configurations(q), np.ascontiguousarray(dq, dtype=float)
-        if rates.shape != (len(rows), self.robot.n):
-            raise ArgumentError(f"dq must have the shape of q, {np.shape(q)}, got {rates.shape}")
-        velocities = np.empty((len(rows), 3))
-        for k, row in enumerate(rows):
-            pin.forwardKinematics(self._model, self._data, row, rates[k])
-            velocities[k] = pin.getFrameVelocity(
-                self._model, self._data, self._frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-            ).linear
-        return velocities
-
 
 def _joints_view(first: Array, second: Array, count: int) -> Array:
     """One live view (count, ...) of the same member of all of Pinocchio's joint placements.
