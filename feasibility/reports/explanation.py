@@ -13,7 +13,6 @@ from feasibility.collisions.asked_bodies import said_of
 from feasibility.collisions.words import checked
 from feasibility.reports.changes import settings, worded
 from feasibility.reports.explanation_words import (
-    SEEDED,
     best_changes,
     headline,
     helpful,
@@ -136,11 +135,6 @@ def _remarks(explanation: Explanation) -> list[str]:
     if explanation.pair is not None:
         texts.append(_pair(explanation.pair))
     texts += helpless(explanation)
-    if any(t.feasible is not None and t.feasible.unaided is False for t in helps):
-        texts.append(
-            f"{SEEDED} from a motion nearby, replayed; the search of `check` alone, with seed "
-            f"{verdict.seed}, did not find one there."
-        )
     if explanation.dropped is not None:
         texts.append(_dropped(verdict, explanation.dropped))
     if explanation.left_out:
@@ -302,7 +296,6 @@ def _finding(quantity: Quantity, finding: Finding | None) -> dict[str, Any] | No
         "verdict": str(finding.answer),
         "evidence": str(finding.evidence),
         "detail": finding.detail,
-        "unaided": finding.unaided,
     }
 
 

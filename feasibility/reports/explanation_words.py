@@ -17,7 +17,6 @@ from feasibility.sensitivity.thresholds import Change, Explanation, Finding, Thr
 from feasibility.verdict import ROOM, Certificate, Evidence, Verdict
 from robots.kinematics import Kinematics
 
-SEEDED = "[1]"  # behind thresholds that a search without known motions did not find
 SPARE = 1.0 / 3.0  # [1] of a joint's range: a limit that may tighten by more does not matter
 FURTHEST = "the furthest value tried"
 
@@ -115,8 +114,7 @@ def row_of(threshold: Threshold) -> ThresholdRow:
     beyond = FURTHEST if other is None and found.value == quantity.end else ""
     if other is not None:
         beyond = _against(quantity, other)
-    mark = f" {SEEDED}" if found.unaided is False else ""
-    return ThresholdRow(quantity.label, now, value + mark, beyond)
+    return ThresholdRow(quantity.label, now, value, beyond)
 
 
 def idle_limits(explanation: Explanation) -> str:
@@ -170,8 +168,7 @@ def in_the_way(explanation: Explanation) -> list[str]:
             continue
         name = f"{quantity.name[0].upper()}{quantity.name[1:]}"
         if found is not None:
-            mark = f" {SEEDED}" if found.unaided is False else ""
-            lines.append(f"{name}: feasible, {found.detail}{mark}.")
+            lines.append(f"{name}: feasible, {found.detail}.")
         elif threshold.other is not None:
             lines.append(f"{name}: {_against(quantity, threshold.other)}.")
     return lines

@@ -27,7 +27,6 @@ from surfaces.cells import Cells
 
 EFFORT, MOST = 2, 15_000  # of one verdict: times that of the case as given, but not above ...
 FEW, EACH = 8_000, 20  # ... or so many evaluations, and for each cell, where that is more
-ALONE = 4  # times that, for `check` with the one change that is recommended
 NEAREST = 4  # changed cases whose motions are tried on the case as given
 VERDICT_SHARE = 0.5  # of the time limit, at most, for the verdict of the case as given
 
@@ -126,10 +125,9 @@ def _explained(
             dropped = drop(prober)
         for quantity in varied:
             done.append(_threshold(prober, quantity, done))
-        if not verdict.feasible:
-            _ask_alone(prober, done)
-            if not any(t.feasible for t in done if t.quantity.kind is not Kind.WITHOUT):
-                pair = changes_together(prober, varied)
+        helpful = [t for t in done if t.feasible and t.quantity.kind is not Kind.WITHOUT]
+        if not verdict.feasible and not helpful:
+            pair = changes_together(prober, varied)
     left_out = tuple(quantity.name for quantity in varied[len(done) :])
     seconds = time.monotonic() - began
     return Explanation(verdict, tuple(done), left_out, dropped, prober.spent, seconds, pair)
@@ -143,25 +141,6 @@ def _threshold(prober: Prober, quantity: Quantity, done: list[Threshold]) -> Thr
             if all_ and bare.feasible is None:
                 return replace(bare, quantity=quantity, tried=NOT_EVEN)
     return prober.threshold(quantity)
-
-
-def _ask_alone(prober: Prober, done: list[Threshold]) -> None:
-    """Say of the change that asks for the least whether `check` alone finds its motion; in place.
-
-    Raises:
-        OutOfTime: the deadline passed.
-    """
-    helping = [k for k, found in enumerate(done) if found.feasible is not None]
-    if not helping:
-        return
-    least = min(
-        helping, key=lambda k: (not done[k].quantity.unit, done[k].turns_away, done[k].effort)
-    )
-    quantity, side = done[least].quantity, done[least].feasible
-    if side is not None:
-        changed = quantity.applied(prober.given, quantity.steps_to(side.value))
-        unaided = prober.asked(changed, effort=ALONE).accepted
-        done[least] = replace(done[least], feasible=replace(side, unaided=unaided))
 
 
 def _over_given(found: Explanation, search: Search, clock: Clock) -> Walk | None:

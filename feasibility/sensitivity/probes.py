@@ -140,7 +140,7 @@ class Prober:
             variant = self.given
             for quantity, k in steps:
                 variant = quantity.applied(variant, k)
-            made = self.asked if judged else self._searched
+            made = self._asked if judged else self._searched
             self.looks[steps] = known = made(variant, seeds)
         return known
 
@@ -150,26 +150,26 @@ class Prober:
         Raises:
             OutOfTime: the deadline passed before it was decided.
         """
-        clock, search = self._limits(SEEDED if seeds else 1.0)
+        clock, search = self._limits(seeds)
         problem = Problem.of(*variant)
         clock.allow(search.evaluations)
         found = complete_search(problem, search, clock, seeds, self.suspects, judging=False)
         look = self._counted(_look_of_search(found))
         if look.walk is None and look.proof is None and found.hindered and seeds is None:
-            return self.asked(variant)
+            return self._asked(variant)
         return look
 
-    def asked(self, variant: Variant, seeds: Walk | None = None, effort: float = 1.0) -> Look:
-        """What `check` says, with so many times the usual effort.
+    def _asked(self, variant: Variant, seeds: Walk | None = None) -> Look:
+        """What `check` says.
 
         Raises:
             OutOfTime: the deadline passed before it was decided.
         """
-        clock, search = self._limits(SEEDED if seeds else effort)
+        clock, search = self._limits(seeds)
         return self._counted(_look_of_verdict(check(*variant, search, seeds=seeds, clock=clock)))
 
-    def _limits(self, effort: float) -> tuple[Clock, Search]:
-        """Time and evaluations of the next search.
+    def _limits(self, seeds: Walk | None) -> tuple[Clock, Search]:
+        """Time and evaluations of the next search, from a known motion or without one.
 
         Raises:
             OutOfTime: the deadline has passed.
@@ -177,7 +177,7 @@ class Prober:
         self.tick()
         if self.clock.out_of_time:
             raise OutOfTime
-        evaluations = int(effort * (self.search.evaluations or 1))
+        evaluations = int((SEEDED if seeds else 1.0) * (self.search.evaluations or 1))
         clock = self.clock.part(1.0, lambda *_: self.tick())
         return clock, replace(self.search, evaluations=evaluations)
 

@@ -103,11 +103,7 @@ class Quantity:
     @property
     def last(self) -> int:
         """Number of steps from the value given to the end; the last one may be shorter."""
-        return self.steps_to(self.end)
-
-    def steps_to(self, value: float) -> int:
-        """The number of steps k after which the value is this one, or beyond it."""
-        return math.ceil(round(self.steps(value), 6))
+        return math.ceil(round(self.steps(self.end), 6))
 
     def steps(self, value: float) -> float:
         """How many steps a value (rad or m) is away from the one given, towards the end."""

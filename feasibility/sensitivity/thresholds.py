@@ -30,11 +30,7 @@ class Finding:
     cell: int | None = None
     """The cell that a proof is about; None without a proof."""
     witness: Walk | None = None
-    """The covering motion; None unless feasible."""
-    unaided: bool | None = None
-    """Does the search of `check`, with the seed given and no motion known, find a covering motion
-    too? None where that was not tried, which it is of the change that asks for the least. With
-    `witness` as its `seeds`, `check` finds it."""
+    """The covering motion, with which as its `seeds` `check` says so; None unless feasible."""
 
     @property
     def feasible(self) -> bool:

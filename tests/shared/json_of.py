@@ -351,7 +351,7 @@ def with_unit(quantity: Any, key: str, value: float | None) -> Json:
 def finding(quantity: Any, one: Any) -> Json | None:
     return None if one is None else {
         **with_unit(quantity, "value", one.value), "verdict": one.answer,
-        "evidence": one.evidence, "detail": one.detail, "unaided": one.unaided,
+        "evidence": one.evidence, "detail": one.detail,
     }  # fmt: skip
 
 
