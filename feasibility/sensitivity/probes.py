@@ -209,7 +209,9 @@ class Prober:
             if holds and (not feasible or k == stops[-1]):
                 holds = self._accepted(quantity, k)
             if holds != feasible:
-                return self._between(quantity, *((before, k) if feasible else (k, before)))
+                good, bad = self._between(quantity, *((before, k) if feasible else (k, before)))
+                other = None if bad is None else self.finding(quantity, bad)
+                return Threshold(quantity, self.finding(quantity, good), other)
             before = k
         if feasible:
             return Threshold(quantity, self.finding(quantity, before), None)
@@ -244,28 +246,35 @@ class Prober:
         """Does `check` find a motion there with none known?"""
         return self.at(((quantity, k),), judged=True).accepted
 
-    def _between(self, quantity: Quantity, good: int, bad: int) -> Threshold:
-        """The threshold between two values; further on where `check` alone goes further.
+    def _between(self, quantity: Quantity, good: int, bad: int) -> tuple[int, int | None]:
+        """Both sides of the threshold between two values; further on where `check` goes further.
 
         Args:
             quantity: what is varied.
             good: where it is feasible, as `check` says.
             bad: where no motion was found.
+
+        Returns:
+            Where it is feasible, and where it is not; None where it is all the way.
         """
-        stop = bad
+        stop, sure = bad, good
         while True:
-            sure, good = good, self._as_far(quantity, good, bad)
+            good = self._as_far(quantity, good, bad)
             good, bad = self._narrowed(quantity, good, bad)
             good = self._as_far(quantity, good, bad)
-            if not self._accepted(quantity, good):
-                good, bad = sure, good
-                continue
-            further = self._as_far(quantity, good, bad)  # now that its cone was measured
-            good = further if self._accepted(quantity, further) else good
-            if not self._alone(quantity, bad):
-                sides = self.finding(quantity, good), self.finding(quantity, bad)
-                return Threshold(quantity, *sides)
-            return self._by_check(quantity, bad, stop)
+            if self._accepted(quantity, good):
+                break
+            good, bad = sure, good
+        further = self._as_far(quantity, good, bad)  # now that its cone was measured
+        good = further if self._accepted(quantity, further) else good
+        if not self._alone(quantity, bad):
+            return good, bad
+        # `check` alone finds more than searches from the motions known, so it leads from here on.
+        for k in dict.fromkeys((stop, quantity.last if self.verdict.feasible else 0)):
+            if not self._alone(quantity, k):
+                return last_true(partial(self._alone, quantity), bad, k, self._least(k - bad))
+            bad = k
+        return bad, None
 
     def _narrowed(self, quantity: Quantity, good: int, bad: int) -> tuple[int, int]:
         """The two ends nearer to each other, as far as searches from the nearest motions lead.
@@ -273,7 +282,7 @@ class Prober:
         Of a margin `good` is where a motion was found to end, mostly near the threshold: from there
         on steps begin small, and double.
         """
-        least = self._resolution(bad - good)
+        least = self._least(bad - good)
         step = least if bad > good else -least
         while self.verdict.feasible and abs(bad - good) > abs(step):
             if not self._holds(quantity, good + step):
@@ -282,27 +291,9 @@ class Prober:
             good, step = good + step, 2 * step
         return last_true(partial(self._holds, quantity), good, bad, least)
 
-    def _resolution(self, stretch: int) -> int:
+    def _least(self, stretch: int) -> int:
         """Steps, how near to a threshold on a stretch both sides are to be."""
         return math.ceil(abs(stretch) / (MARGINS if self.verdict.feasible else REMEDIES))
-
-    def _by_check(self, quantity: Quantity, good: int, stop: int) -> Threshold:
-        """The threshold where `check` alone finds more than searches from the motions known.
-
-        Args:
-            quantity: what is varied.
-            good: where `check` alone finds a motion.
-            stop: further on, where none was found by a search.
-        """
-        last = quantity.last if self.verdict.feasible else 0
-        for k in dict.fromkeys((stop, last)):
-            if not self._alone(quantity, k):
-                alone, least = partial(self._alone, quantity), self._resolution(k - good)
-                good, bad = last_true(alone, good, k, least)
-                sides = self.finding(quantity, good), self.finding(quantity, bad)
-                return Threshold(quantity, *sides)
-            good = k
-        return Threshold(quantity, self.finding(quantity, good), None)
 
     def _as_far(self, quantity: Quantity, good: int, bad: int) -> int:
         """The value nearest to `bad` for which the motion found at `good` does as it is."""
