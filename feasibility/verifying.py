@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +20,7 @@ from coverable.arrays import Array, Ints, Mask
 from coverable.errors import ArgumentError, CoverableError
 from feasibility.certification.cut_proofs.proof_verification import verify_proof
 from feasibility.certification.faults import MotionFault
-from feasibility.certification.surface_replay import replay_over_surface
+from feasibility.certification.motion_replay import replay_over_surface
 from feasibility.clock import Clock, OutOfTime
 from feasibility.collisions.asked_bodies import said_of
 from feasibility.collisions.settings import Collision
@@ -101,23 +101,6 @@ class Verification:
         said = f"{self.claim} {'holds' if self.holds else 'does not hold'}: {what}."
         checked = f"{said_of(self.robot, self.collision).capitalize()}."
         return " ".join(filter(None, [said, self.refusal, checked]))
-
-
-@overload
-def verify(
-    claim: Robot,
-    cells: Cells,
-    task: Task,
-    q: ArrayLike,
-    *,
-    working: ArrayLike | None = None,
-    marks: ArrayLike | None = None,
-    clock: Clock | None = None,
-) -> Verification: ...
-
-
-@overload
-def verify(claim: Verdict | Result, *, clock: Clock | None = None) -> Verification: ...
 
 
 def verify(

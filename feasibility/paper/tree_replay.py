@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from coverable.arrays import Array, Mask
-from feasibility.certification.surface_replay import replay_over_surface
+from feasibility.certification.motion_replay import replay_over_surface
 from feasibility.cone import angle_of
 from feasibility.paper.jcell_steps import Steps
 from feasibility.paper.tree_and_graph import corners, there_and_back

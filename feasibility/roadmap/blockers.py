@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from feasibility.certification.collisions.every_pose import PoseCheck, never_clear
-from feasibility.certification.cut_proofs.arm_collisions import ArmCheck, ArmCollisions
+from feasibility.certification.collisions.every_pose import Collides, never_clear
+from feasibility.certification.cut_proofs.arm_collisions import ArmCollisions
 from feasibility.collisions.asked_bodies import gather
 from feasibility.collisions.problem_bodies import Bodies
 from feasibility.roadmap.motions.off_target import project_near_cell
@@ -34,16 +34,16 @@ class Blockers:
     task: Task
     bodies: Bodies
     collisions: ArmCollisions
-    tried: dict[Tried, tuple[int, ArmCheck]]
+    tried: dict[Tried, tuple[int, Collides]]
     """What boxes of joint values said, and how many were allowed. The shapes are those of the
     judge, so it holds for the same arm with its links cut into pieces, too."""
     left: int = ALL_ARM_BOXES
     """Boxes of joint values that may still be looked at."""
     poses_left: int = ALL_POSE_BOXES
     """Boxes of tilt and roll that may still be looked at."""
-    tool: dict[int, PoseCheck] = field(default_factory=dict)
+    tool: dict[int, Collides] = field(default_factory=dict)
     """By cell: whether the tool collides over it in every pose."""
-    arm: dict[int, ArmCheck] = field(default_factory=dict)
+    arm: dict[int, Collides] = field(default_factory=dict)
     """By cell: whether something collides wherever the tool is over it."""
 
     def tool_collides(self, arrays: SearchArrays, cell: int, tick: Callable[[], object]) -> bool:
@@ -74,16 +74,16 @@ class Blockers:
 
     def _examined(
         self, arrays: SearchArrays, work: Work, cell: int, tick: Callable[[], object]
-    ) -> ArmCheck:
+    ) -> Collides:
         if not self.collisions.possible or self.left <= 0:
-            return ArmCheck(False, 0)
+            return Collides(False, 0)
         box = root_box(arrays)
         low, high = box.low[0], box.high[0]
         # Random numbers of its own: whether it is tried does not change the search.
         guesses = np.random.default_rng(cell).uniform(low, high, (GUESSES, len(low)))
         found = [q for q in guesses if project_near_cell(arrays, work, cell, q, PROJECTION_STEPS)]
         if not found or self.collisions.any_clear(np.array(found), cell):
-            return ArmCheck(False, 0)
+            return Collides(False, 0)
         which = cell, tuple((pair.first, pair.second) for pair in self.bodies.pairs)
         most = min(ARM_BOXES, self.left)
         if which not in self.tried or self.tried[which][0] < most:
@@ -92,7 +92,7 @@ class Blockers:
 
 
 def blockers_of(
-    robot: Robot, cells: Cells, task: Task, tried: dict[Tried, tuple[int, ArmCheck]] | None = None
+    robot: Robot, cells: Cells, task: Task, tried: dict[Tried, tuple[int, Collides]] | None = None
 ) -> Blockers | None:
     """What may keep an arm from cells of a surface; None where collisions are not checked.
 

@@ -11,7 +11,7 @@ from random_arms import robot_of
 
 from coverable import Task, cylinder, mesh, parametric, plane, poses, verify
 from feasibility.certification.followed import lifted_faults
-from feasibility.certification.surface_replay import replay_over_surface
+from feasibility.certification.motion_replay import replay_over_surface
 from robots.kinematics import Kinematics
 from surfaces.meshes.triangle_mesh import TriangleMesh
 

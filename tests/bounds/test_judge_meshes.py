@@ -16,7 +16,7 @@ from referee import evenly as dense
 from samples import sampled, spread
 
 from coverable import Task, check, load_robot, mesh, verify
-from feasibility.certification.surface_replay import replay_over_surface
+from feasibility.certification.motion_replay import replay_over_surface
 from robots.kinematics import Kinematics
 from surfaces.meshes.triangle_mesh import TriangleMesh
 

@@ -11,7 +11,7 @@ from referee import Facets
 from referee import evenly as dense
 
 from coverable import Obstacle, Task, load_robot, piecewise, plane, poses, replay, sphere
-from feasibility.certification.surface_replay import replay_over_surface
+from feasibility.certification.motion_replay import replay_over_surface
 from feasibility.verdict import Walk
 from robots.kinematics import Kinematics
 from robots.shapes.bodies import Solid

@@ -13,10 +13,10 @@ from samples import sampled, seeds
 
 from coverable import Task, cylinder, replay, sphere
 from feasibility.certification import roll_bounds
+from feasibility.certification.motion_replay import replay_over_surface
 from feasibility.certification.roll_bounds import frame_second_derivatives, largest_off, vectors_of
 from feasibility.certification.roll_box_models import Directions, reference_parts
 from feasibility.certification.roll_held import HeldRoll
-from feasibility.certification.surface_replay import replay_over_surface
 from feasibility.certification.tool_directions import Held
 from feasibility.roll import Roll
 from feasibility.targets.references import u_directions

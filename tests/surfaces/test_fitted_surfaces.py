@@ -16,7 +16,7 @@ from specimens import EQUAL, ball, ring, sampled
 import coverable
 from coverable import check, grid, load_robot, parallel_passes, parametric, piecewise, view
 from feasibility.cases.keys import KEYS
-from feasibility.certification.surface_replay import replay_over_surface
+from feasibility.certification.motion_replay import replay_over_surface
 from surfaces.places.offset_surfaces import offset_surface
 from surfaces.places.places import Places
 from surfaces.sheet import sheet_of

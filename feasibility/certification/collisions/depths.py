@@ -39,10 +39,10 @@ class Balls(NamedTuple):
     """(k,) m"""
 
     @staticmethod
-    def among(points: Array, deep: Array) -> Balls:
+    def among(points: Array, deep: Array, most: int = MOST_BALLS) -> Balls:
         """The deepest of some points, then those that reach furthest from what is taken."""
         out, chosen = np.full(len(points), np.inf), [int(deep.argmax())]
-        while len(chosen) < min(MOST_BALLS, len(points)):
+        while len(chosen) < min(most, len(points)):
             last = chosen[-1]
             away = np.linalg.norm(points - points[last], axis=1) + deep - deep[last]
             out = np.minimum(out, away)
@@ -118,7 +118,8 @@ def points_inside(shape: object) -> tuple[Array, Array]:
 def _points_of_mesh(mesh: Triangles) -> tuple[Array, Array]:
     """Corners that are far from each other, on wide triangles too, and places inside a solid."""
     grid = _grid(mesh.vertices.min(axis=0), mesh.vertices.max(axis=0))
-    found, corners = depths(mesh, grid), _apart(_all_over(mesh))
+    found, corners = depths(mesh, grid), _all_over(mesh)
+    corners = Balls.among(corners, np.zeros(len(corners)), MOST_CORNERS).centres
     if found is None:
         found = _depths_by_triangles(mesh, grid)
     inside = found > 0.0
@@ -170,15 +171,6 @@ def _grid(low: Array, high: Array) -> Array:
     counts[int(np.argmax(high - low))] = ALONG
     sides = [np.linspace(a, b, int(k)) for a, b, k in zip(low, high, counts, strict=True)]
     return np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 3)
-
-
-def _apart(corners: Array) -> Array:
-    """Some of the corners, far from each other."""
-    chosen, away = [0], np.full(len(corners), np.inf)
-    while len(chosen) < min(MOST_CORNERS, len(corners)):
-        away = np.minimum(away, ((corners - corners[chosen[-1]]) ** 2).sum(axis=1))
-        chosen.append(int(away.argmax()))
-    return corners[chosen]
 
 
 @lru_cache(maxsize=64)

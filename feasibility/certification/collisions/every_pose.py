@@ -31,15 +31,14 @@ MOST_POINTS = 20_000  # of bodies at once, each compared with all planes of anot
 POSES = 12  # directions of tilt, and rolls, among which the best is told
 
 
-class PoseCheck(NamedTuple):
-    """What became of the claim."""
+class Collides(NamedTuple):
+    """What became of the claim that something collides wherever the tool covers a cell."""
 
     confirmed: bool
     boxes: int
-    """How many boxes of tilt and roll were looked at."""
+    """How many boxes, of tilt and roll or of joint values, were looked at."""
     pairs: tuple[tuple[str, str], ...] = ()
-    """Where it is confirmed: in every pose one of them collides; the first is that of `distance`.
-    """
+    """Where it is confirmed: one of them collides; the first is that of `distance`."""
     distance: float = np.nan
     """m, of that pair in the best of some poses all over the cone; negative where they overlap."""
 
@@ -69,7 +68,7 @@ def never_clear(
     approach: Array,
     tick: Callable[[], object] = lambda: None,
     most: int = MOST_BOXES,
-) -> PoseCheck:
+) -> Collides:
     """Is it confirmed that the tool collides in every pose over a target?
 
     Args:
@@ -84,7 +83,7 @@ def never_clear(
     """
     pairs = tool_pairs(robot, bodies, point)
     if not pairs:
-        return PoseCheck(False, 0)
+        return Collides(False, 0)
     tool, looked, used = _Tool(robot, point, approach, tolerance), 0, set[int]()
     cone = min(cone, np.pi)
     # Sheets have thousands of points, and tool and objects few.
@@ -94,11 +93,11 @@ def never_clear(
         boxes, waiting = waiting[-BATCH:], waiting[:-BATCH]
         looked += len(boxes)
         if looked > most:
-            return PoseCheck(False, looked)
+            return Collides(False, looked)
         tick()
         found = tool.measured(boxes, pairs, order)
         if ((found.over <= 0.0) & (np.hypot(boxes[:, 0], boxes[:, 1]) <= cone)).any():
-            return PoseCheck(False, looked)  # nor would a smaller box be ruled out
+            return Collides(False, looked)  # nor would a smaller box be ruled out
         open_ = found.ratio >= 1.0
         used |= set(found.best[~open_].tolist())
         order.sort(key=lambda i: i not in used)
@@ -106,7 +105,7 @@ def never_clear(
     over, nearest = _at_best(tool, cone, pairs)
     blamed = [pairs[nearest].pair, *(pairs[i].pair for i in sorted(used))]
     named = dict.fromkeys((pair.first, pair.second) for pair in blamed)
-    return PoseCheck(True, looked, tuple(named), blamed[0].clearance - over - tolerance)
+    return Collides(True, looked, tuple(named), blamed[0].clearance - over - tolerance)
 
 
 def _at_best(tool: _Tool, cone: float, pairs: list[ToolPair]) -> tuple[float, int]:

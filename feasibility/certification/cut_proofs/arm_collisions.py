@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
 from coverable.arrays import Array
+from feasibility.certification.collisions.every_pose import Collides
 from feasibility.certification.collisions.everywhere import Overlapping
 from feasibility.certification.cut_proofs.box_cutting import JointRegion
 from feasibility.certification.cut_proofs.empty_region import Claim, Emptiness
@@ -22,16 +22,6 @@ from feasibility.collisions.problem_bodies import Bodies
 from feasibility.task import Task
 from robots.robot import Robot
 from surfaces.cells import Cells
-
-
-class ArmCheck(NamedTuple):
-    """What became of the claim."""
-
-    confirmed: bool
-    boxes: int
-    """How many boxes of joint values were looked at."""
-    pairs: tuple[tuple[str, str], ...] = ()
-    """Where it is confirmed: wherever the tool is at the target, one of them collides."""
 
 
 class ArmCollisions:
@@ -63,7 +53,7 @@ class ArmCollisions:
         off = np.full(len(q), self._task.effective_tolerance)
         return bool((self._overlapping.deepest(q, q, target, off).pair < 0).any())
 
-    def check(self, cell: int, tick: Callable[[], object], most: int) -> ArmCheck:
+    def check(self, cell: int, tick: Callable[[], object], most: int) -> Collides:
         """Is it confirmed that something collides wherever the tool is over a cell?
 
         Args:
@@ -77,6 +67,6 @@ class ArmCollisions:
         refuter = Refuter(self._robot, self._cells, self._task, allowed.length)
         found = engine.test([Claim("", self._region, cell)], refuter, most)
         if found.failed is not None:
-            return ArmCheck(False, found.boxes)
+            return Collides(False, found.boxes)
         pairs = [self._bodies.pairs[k] for k in sorted(engine.blamed)]
-        return ArmCheck(True, found.boxes, tuple((pair.first, pair.second) for pair in pairs))
+        return Collides(True, found.boxes, tuple((pair.first, pair.second) for pair in pairs))

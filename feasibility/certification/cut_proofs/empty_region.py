@@ -109,9 +109,8 @@ class Emptiness:
                 starts = (left.centre[some] + place[some])[:, :n]
                 at = [(regions[k], claims[k].cell) for k in left.claim[some]]
                 found = refuter.find(starts, at)
-                if found is not None and self._clear(found.q):
-                    failed = int(left.claim[some[found.start]])
-                    return Outcome(done, failed, found.q)
+                if found is not None and self._clear(found[1]):
+                    return Outcome(done, int(left.claim[some[found[0]]]), found[1])
             waiting.append(smaller(left, models, self.parts, self.allowed.length))
         return Outcome(done)
 

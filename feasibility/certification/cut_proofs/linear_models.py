@@ -24,7 +24,7 @@ import numpy as np
 
 from coverable.arrays import Array, Ints
 from feasibility.certification.bisection import Rows
-from feasibility.certification.jacobians import Jacobians, cross, jacobians, lengths
+from feasibility.certification.jacobians import cross, jacobians, lengths
 from feasibility.certification.lever_bounds import longest_levers, second_derivative_bound
 from feasibility.certification.roll_box_models import (
     Directions,
@@ -180,7 +180,9 @@ class ArmModel:
         n, length = self.n, allowed.length
         centre, half = boxes.centre, 0.5 * (boxes.high - boxes.low)
         at_centre = jacobians(self.kinematics, centre[:, :n])
-        by_joint, tool = _weighted(at_centre, length)
+        by_joint = np.concatenate([at_centre.point, length * at_centre.axis], axis=1)
+        by_joint = np.ascontiguousarray(by_joint.transpose(0, 2, 1))
+        tool = np.concatenate([at_centre.points, length * at_centre.axes], axis=1)
         weights = np.array([1.0, 1.0, 1.0, length, length, length])
         slopes = parts.slopes[boxes.part] * weights
         target = parts.centre[boxes.part] * weights
@@ -249,18 +251,3 @@ def _over_parts(parts: Parts, part: Ints, x: Array) -> tuple[Array, Array]:
     centre = np.stack([parts.centre[part, 3:], parts.references.centre[part]], axis=1)
     slopes = np.stack([parts.slopes[part][..., 3:], parts.references.slopes[part]], axis=2)
     return centre + (x[:, :, None, None] * slopes).sum(axis=1), slopes
-
-
-def derivatives(kinematics: Kinematics, q: Array, length: float) -> tuple[Array, Array]:
-    """Derivatives (m, n, 6) of tool point and axis by joints (m, n), and the two themselves (m, 6).
-
-    Those of the axis are multiplied by `length` (m).
-    """
-    return _weighted(jacobians(kinematics, q), length)
-
-
-def _weighted(at: Jacobians, length: float) -> tuple[Array, Array]:
-    """`derivatives`, from known Jacobians."""
-    by_joint = np.concatenate([at.point, length * at.axis], axis=1)
-    tool = np.concatenate([at.points, length * at.axes], axis=1)
-    return np.ascontiguousarray(by_joint.transpose(0, 2, 1)), tool

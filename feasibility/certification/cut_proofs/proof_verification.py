@@ -30,7 +30,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from coverable.arrays import Array
-from feasibility.certification.collisions.every_pose import PoseCheck, never_clear
+from feasibility.certification.collisions.every_pose import Collides, never_clear
 from feasibility.certification.collisions.everywhere import Overlapping
 from feasibility.certification.cut_proofs.box_cutting import TURN, JointRegion
 from feasibility.certification.cut_proofs.empty_region import Claim, Emptiness, Outcome
@@ -123,7 +123,7 @@ def verify_proof(
 
 def _by_the_tool(
     robot: Robot, cells: Cells, task: Task, tree: CutTree, tick: Callable[[], object]
-) -> PoseCheck | None:
+) -> Collides | None:
     """Does the tool collide in every pose over the one cell that a tree is about?"""
     bodies = gather(robot, cells.surface, task.collision, task.standoff)
     if bodies is None or not isinstance(tree.root, Leaf):

@@ -6,14 +6,12 @@ right, whatever the bounds say. What is not found proves nothing.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.cells_reached import at_targets
 from feasibility.certification.cut_proofs.box_cutting import JointRegion
-from feasibility.certification.cut_proofs.linear_models import derivatives
+from feasibility.certification.jacobians import jacobians
 from feasibility.certification.stretches import Judge, Samples
 from feasibility.task import Task
 from robots.kinematics import Kinematics
@@ -27,15 +25,6 @@ DAMPING = 1e-4  # of the sum of squares
 INNER_TOLERANCE, INNER_CONE = 0.5, 0.95  # what the steps aim at, as shares
 
 
-class Refutation(NamedTuple):
-    """A configuration that a tree says there is none of."""
-
-    q: Array
-    """(n,) rad or m."""
-    start: int
-    """Index of the start that led there."""
-
-
 class Refuter:
     """Looks for configurations with the tool on the surface, or at one cell's target."""
 
@@ -46,8 +35,10 @@ class Refuter:
         self._kinematics, self._targets = Kinematics(robot), task.targets(cells)
         self._task, self._length = task, length
 
-    def find(self, starts: Array, at: list[tuple[JointRegion, int | None]]) -> Refutation | None:
-        """A configuration that keeps to the constraints, near one of the starts (m, n).
+    def find(
+        self, starts: Array, at: list[tuple[JointRegion, int | None]]
+    ) -> tuple[int, Array] | None:
+        """Which start (m, n) leads to a configuration that keeps to the constraints; and that.
 
         Args:
             starts: rad or m.
@@ -63,7 +54,7 @@ class Refuter:
             kept = self._kept(here, cell)
             if kept.any():
                 first = int(np.argmax(kept))
-                return Refutation(q[first], first)
+                return first, q[first]
             step = self._step(q, here, cell, low < high)
             step = np.nan_to_num(np.clip(step, -LONGEST, LONGEST))  # where there is no place
             q = np.clip(q + step, low, high)
@@ -87,17 +78,16 @@ class Refuter:
         target, approach = self._judge.targets(here.places)
         target = np.where(over, self._targets.points[cell], target)
         approach = np.where(over, self._targets.approaches[cell], approach)
-        by_joint, _ = derivatives(self._kinematics, q, self._length)
-        missed, rows = [], []
+        at, missed, rows = jacobians(self._kinematics, q), [], []
         for off, columns, aim in (
-            (here.points - target, by_joint[..., :3], INNER_TOLERANCE * task.effective_tolerance),
-            (self._length * (here.axes - approach), by_joint[..., 3:],
+            (here.points - target, at.point, INNER_TOLERANCE * task.effective_tolerance),
+            (self._length * (here.axes - approach), self._length * at.axis,
              self._length * INNER_CONE * min(task.cone_chord, 4.0)),
         ):  # fmt: skip
             size = np.linalg.norm(off, axis=1)
             along = off / np.maximum(size, 1e-300)[:, None]
             missed.append(np.maximum(size - aim, 0.0))
-            rows.append(np.einsum("mjk,mk->mj", columns, along) * free)
+            rows.append(np.einsum("mkj,mk->mj", columns, along) * free)
         matrix, left = np.stack(rows, axis=1), np.stack(missed, axis=1)
         squares = matrix @ matrix.transpose(0, 2, 1)
         damped = squares + (DAMPING * np.trace(squares, axis1=1, axis2=2) + 1e-12)[

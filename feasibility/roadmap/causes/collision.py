@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from coverable.arrays import Array
-from feasibility.certification.cut_proofs.arm_collisions import ArmCheck
+from feasibility.certification.collisions.every_pose import Collides
 from feasibility.collisions.kernels.memory import configuration_bounds
 from feasibility.collisions.problem_bodies import Pair
 from feasibility.roadmap.exploration import Exploration
@@ -71,13 +71,13 @@ def proved_collision(exploration: Exploration, cell: int) -> Cause | None:
     return Cause(cell, CauseKind.COLLISION, True, detail, found.pairs[0], found.distance)
 
 
-def _of_the_arm(exploration: Exploration, cell: int) -> ArmCheck | None:
+def _of_the_arm(exploration: Exploration, cell: int) -> Collides | None:
     """The proof that something of the arm collides wherever the tool is over a cell; or None."""
     found = None if exploration.blockers is None else exploration.blockers.arm.get(cell)
     return found if found is not None and found.confirmed else None
 
 
-def _proved(cell: int, proof: ArmCheck, found: Cause | None = None) -> Cause:
+def _proved(cell: int, proof: Collides, found: Cause | None = None) -> Cause:
     """The cause of a cell from which collisions are proved to keep the arm.
 
     `found` is what was seen of some configurations over it.

@@ -12,7 +12,7 @@ from foreign_clearances import ForeignScene
 
 import coverable
 from coverable import Axis, Cells, Collision, Obstacle, Robot, Task, ToolShape, load_robot, plane
-from feasibility.certification.collisions.every_pose import PoseCheck, never_clear
+from feasibility.certification.collisions.every_pose import Collides, never_clear
 from feasibility.collisions.asked_bodies import gather
 from feasibility.collisions.problem_bodies import Bodies
 from robots.kinematics import Kinematics
@@ -97,7 +97,7 @@ class Over:
     def bodies(self) -> Bodies:
         return gather(self.robot, self.surface, self.task.collision, self.task.standoff)
 
-    def proved(self, most: int = 4000) -> PoseCheck:
+    def proved(self, most: int = 4000) -> Collides:
         """Does the tool collide in every pose? With as many boxes as the search has for a cell."""
         numbers = self.task.cone, self.task.effective_tolerance
         return never_clear(self.robot, self.bodies, *numbers, self.point, self.approach, most=most)
