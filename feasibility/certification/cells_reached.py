@@ -143,7 +143,7 @@ def at_targets(
     chord = np.linalg.norm(axes - approaches, axis=1)
     roll = np.zeros(len(cell))
     if task.roll is not None and aims.references is not None:
-        from feasibility.certification.roll_bounds import off_middle, roll_vectors
+        from feasibility.certification.roll_held import off_middle, roll_vectors
 
         roll = off_middle(roll_vectors(x, axes, aims.references[cell], approaches, task.roll))
     inside = (beyond(task, off, chord, roll) <= 0.0).all(axis=0)

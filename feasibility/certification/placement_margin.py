@@ -53,8 +53,13 @@ import numpy as np
 
 from coverable.arrays import Array, Ints
 from feasibility.certification.bisection import Rows
-from feasibility.certification.jacobians import jacobians, lengths, smallest_singular
-from feasibility.certification.lever_bounds import column_changes, second_derivative_bound
+from feasibility.certification.lever_bounds import (
+    column_changes,
+    jacobians,
+    lengths,
+    second_derivative_bound,
+    smallest_singular,
+)
 from feasibility.task import Task
 from feasibility.verdict import Bound, Certificate, PlacementMargin
 from robots.kinematics import Kinematics

@@ -24,8 +24,12 @@ from scipy.spatial import cKDTree
 
 from coverable.arrays import Array, Ints, Mask
 from coverable.errors import ArgumentError, Fault
-from feasibility.certification.jacobians import Jacobians, jacobians, smallest_singular
-from feasibility.certification.lever_bounds import second_derivatives
+from feasibility.certification.lever_bounds import (
+    Jacobians,
+    jacobians,
+    second_derivatives,
+    smallest_singular,
+)
 from feasibility.certification.segment_rates import (
     SegmentRates,
     fastest_anywhere,

@@ -1,6 +1,6 @@
 """Linear models of the roll over boxes of joints and surface parameters, with proved remainders.
 
-A range of half width h <= 90 deg about its middle m says F >= 0 of both (see `roll_bounds`)
+A range of half width h <= 90 deg about its middle m says F >= 0 of both (see `roll_held`)
 
     F = x . p + y . (b x p)    p = t turned about b by m +- h, and on by -+90 deg
 

@@ -28,12 +28,14 @@ import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.bisection import Rows, Stretches, bisected
-from feasibility.certification.jacobians import Jacobians, jacobians, smallest_singular
 from feasibility.certification.lever_bounds import (
+    Jacobians,
     column_changes,
+    jacobians,
     levers_along,
     longest_levers,
     second_derivative_bound,
+    smallest_singular,
 )
 from robots.kinematics import Kinematics
 from robots.robot import Robot

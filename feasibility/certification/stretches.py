@@ -31,8 +31,7 @@ import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.bisection import Rows, Stretches
-from feasibility.certification.jacobians import Jacobians
-from feasibility.certification.lever_bounds import peaks, second_derivatives
+from feasibility.certification.lever_bounds import Jacobians, peaks, second_derivatives
 from feasibility.certification.tool_directions import ROLL_CLOSE, Held
 from feasibility.task import Task
 from robots.kinematics import Kinematics, reference_axes
@@ -190,7 +189,7 @@ class Judge:
         second[:, 0] = second_derivatives(steps, slides, poses.levers, np.inf)
         second[:, 1] = second_derivatives(steps, slides, poses.sines, 1.0)
         if self._roll is not None:
-            from feasibility.certification.roll_bounds import frame_second_derivatives
+            from feasibility.certification.roll_held import frame_second_derivatives
 
             second[:, 2] = frame_second_derivatives(self.robot, rows, at.axes, at.x)
         row, none = np.arange(len(steps)), np.zeros(len(steps))

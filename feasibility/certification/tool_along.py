@@ -16,7 +16,7 @@ from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.bisection import bisected
 from feasibility.certification.cells_reached import in_order
 from feasibility.certification.faults import MotionFault
-from feasibility.certification.jacobians import jacobians
+from feasibility.certification.lever_bounds import jacobians
 from feasibility.certification.stretches import Bounds, Judge, SampledStretches, Samples
 from feasibility.task import Task
 from surfaces.cells import Cells

@@ -10,8 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.errors import ArgumentError
-from feasibility.collisions.outer_bodies import (
+from feasibility.collisions.problem_bodies import (
+    Bodies,
+    Pair,
     Seat,
+    Soup,
     carried_bodies,
     furthest,
     overlapping,
@@ -20,7 +23,6 @@ from feasibility.collisions.outer_bodies import (
     soup_of,
     tool_solids,
 )
-from feasibility.collisions.problem_bodies import Bodies, Pair, Soup
 from feasibility.collisions.scene import ToolShape
 from feasibility.collisions.settings import Collision
 from feasibility.collisions.words import SURFACE, TOOL

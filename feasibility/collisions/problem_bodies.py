@@ -1,14 +1,33 @@
-"""Everything that can collide in one problem, and the pairs that are checked."""
+"""Everything that can collide in one problem, and the pairs that are checked.
+
+The search knows convex bodies around objects and tool. Each holds the exact shape, so what stays
+clear of it stays clear of the shape. Boxes, balls and capsules are exact, a cylinder gets a prism
+around it, and a mesh that is not convex stays triangles.
+
+Objects are placed in the world or on a link. Where a link carries the surface, it is the surface
+that is at rest for the search and the judge, and the world may move.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import itertools
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from coverable.arrays import Array
-from feasibility.collisions.scene import Obstacle
-from robots.shapes.bodies import Polytope, Solid
+from feasibility.collisions.scene import Obstacle, ToolShape
+from feasibility.collisions.shapes import HalfSpace
+from feasibility.collisions.words import TOOL
+from robots.robot import Robot
+from robots.shapes.bodies import Fineness, Polytope, Solid, Triangles
+from robots.shapes.coal_shapes import coal_distance
+from robots.shapes.hulls import is_convex
 from robots.shapes.link_pairs import LeftOut
+from robots.shapes.links import outer_bodies
+from robots.urdf.link_shapes import Box
 
 if TYPE_CHECKING:
     from surfaces.sheet import Sheet
@@ -73,3 +92,147 @@ class Bodies:
     """What a user should know, one sentence each."""
     carried: tuple[Seat, ...] = ()
     """The objects of the scene that move, for pictures."""
+
+
+MOST_VERTICES = 64  # of a convex mesh: its hull would be thinned, so one with more stays triangles
+_CUBE = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+
+
+def polytopes_of(obstacle: Obstacle, reach: float) -> tuple[Polytope, ...] | None:
+    """Convex bodies that together hold an object; None where it is a mesh that is not convex.
+
+    A half space becomes a box from its plane downwards. Every point x of the arm is within `reach`
+    of the root's origin. The box begins beneath the origin, at its projection onto the plane, and
+    is `reach` wide to each side and reach + |height of the origin| deep, so the place of the half
+    space that is nearest to x, which is x itself or its projection onto the plane, lies in the box:
+    their distances to x are one.
+
+    Args:
+        obstacle: of the scene.
+        reach: m, no point of the arm is ever further from the origin of the root frame.
+    """
+    geometry, placement = obstacle.geometry, obstacle.placement
+    if isinstance(geometry, HalfSpace):
+        middle, size = below(placement, reach)
+        vertices = _moved(placement, middle + _CUBE * (0.5 * size))
+        return (Polytope(obstacle.name, 0, vertices, 0.0),)
+    if isinstance(geometry, Triangles) and not _is_convex(geometry):
+        return None
+    return tuple(outer_bodies(Solid(obstacle.name, 0, placement, geometry)))
+
+
+def soup_of(obstacle: Obstacle) -> Soup | None:
+    """The triangles of an object that is a mesh and not convex; None for any other."""
+    geometry = obstacle.geometry
+    if not isinstance(geometry, Triangles) or _is_convex(geometry):
+        return None
+    corners = _moved(obstacle.placement, geometry.vertices)[geometry.faces]
+    return Soup(obstacle.name, corners, 0.0, geometry.closed)
+
+
+def tool_solids(tool: Sequence[ToolShape], robot: Robot) -> tuple[Solid, ...]:
+    """The shapes of the tool as they are, on the last joint; their owner is 'tool'."""
+    frame = robot.model.frames[robot.tool_link_id]
+    mount = frame.placement.homogeneous
+    return tuple(
+        Solid(TOOL, int(frame.parentJoint), mount @ shape.placement, shape.geometry)
+        for shape in tool
+    )
+
+
+def _is_convex(shape: Triangles) -> bool:
+    """Is it a convex solid whose hull needs no thinning?"""
+    return len(shape.vertices) <= MOST_VERTICES and is_convex(shape)
+
+
+def below(placement: Array, reach: float) -> tuple[Array, Array]:
+    """The box that stands for a half space, see `polytopes_of`: its middle and its sides, (3,) m.
+
+    Both are in the half space's own frame.
+    """
+    own = np.linalg.inv(placement)[:3, 3]  # the origin of the root frame, seen from the plane
+    deep = reach + abs(own[2])
+    middle = np.array([own[0], own[1], -deep / 2.0])
+    return middle, np.array([2.0 * reach, 2.0 * reach, deep])
+
+
+def _moved(placement: Array, points: Array) -> Array:
+    """Points after the rigid motion of a (4, 4) matrix."""
+    return points @ placement[:3, :3].T + placement[:3, 3]
+
+
+def seats_of(robot: Robot, scene: Iterable[Obstacle]) -> tuple[Seat, ...]:
+    """Where each object is; links that it names have to exist."""
+    import pinocchio as pin
+
+    model, found = robot.model, []
+    for one in scene:
+        number = robot.world_frame_id
+        if one.frame is not None:
+            number = model.getFrameId(one.frame, pin.FrameType.BODY)
+        frame = model.frames[number]
+        if number:  # frame 0 is the root frame
+            placement = frame.placement.homogeneous @ one.placement
+            one = replace(one, placement=placement, frame=None)
+        found.append(Seat(one, int(frame.parentJoint)))
+    return tuple(found)
+
+
+def carried_solid(seat: Seat, reach: float) -> Solid:
+    """A carried object as a body of the arm; of a half space the box that any body can reach.
+
+    Args:
+        seat: with a joint.
+        reach: m, no body gets further from the origin of the joint's frame.
+    """
+    one = seat.obstacle
+    if not isinstance(one.geometry, HalfSpace):
+        return Solid(one.name, seat.joint, one.placement, one.geometry)
+    middle, size = below(one.placement, reach)
+    placement = one.placement.copy()
+    placement[:3, 3] += one.placement[:3, :3] @ middle
+    placement.flags.writeable = False
+    x, y, z = size.tolist()
+    return Solid(one.name, seat.joint, placement, Box((x, y, z)))
+
+
+def carried_bodies(
+    seats: Sequence[Seat], reach: float, fineness: Fineness
+) -> tuple[list[Solid], list[Polytope]]:
+    """Carried objects, exact and as convex bodies."""
+    solids = [carried_solid(seat, reach) for seat in seats if seat.joint]
+    convex = list[Polytope]()
+    for solid in solids:  # one hull would close the hollows of a fixture
+        hollow = isinstance(solid.geometry, Triangles)
+        convex += outer_bodies(solid, "pieces" if hollow else fineness)
+    return solids, convex
+
+
+def furthest(points: np.ndarray) -> float:
+    """m, of points (..., 3) from the origin; 0 where there are none."""
+    return float(np.linalg.norm(points, axis=-1).max(initial=0.0))
+
+
+NOTED = 5e-3  # [m] of overlap: the base of a ur5, as drawn, ends 4 mm below its frame
+
+
+def overlapping(bodies: Sequence[Polytope], pairs: Iterable[tuple[str, str]]) -> list[str]:
+    """A sentence for each pair of owners at rest whose convex bodies overlap.
+
+    Args:
+        bodies: convex ones, each in the root frame.
+        pairs: of owners.
+    """
+    of_owner: dict[str, list[Polytope]] = {}
+    for body in bodies:
+        of_owner.setdefault(body.owner, []).append(body)
+    notes = []
+    for first, second in pairs:
+        both = of_owner.get(first, ()), of_owner.get(second, ())
+        nearest = min((coal_distance(a, b) for a in both[0] for b in both[1]), default=0.0)
+        if nearest < -NOTED:
+            notes.append(
+                f"{first} and {second} are rigid to each other, so the pair is not checked, but "
+                f"they overlap by {-1e3 * nearest:.1f} mm"
+            )
+    return notes

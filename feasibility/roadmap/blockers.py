@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from feasibility.certification.collisions.every_pose import Collides, never_clear
-from feasibility.certification.cut_proofs.arm_collisions import ArmCollisions
+from feasibility.certification.cut_proofs.empty_region import ArmCollisions
 from feasibility.collisions.asked_bodies import gather
 from feasibility.collisions.problem_bodies import Bodies
 from feasibility.roadmap.motions.off_target import project_near_cell

@@ -9,7 +9,7 @@ from coverable import Axis, Collision, Obstacle, ToolShape, load_robot, plane
 from coverable.errors import ArgumentError
 from feasibility.certification.collisions.collision_replay import collision_replay
 from feasibility.collisions.asked_bodies import gather
-from feasibility.collisions.outer_bodies import polytopes_of, soup_of, tool_solids
+from feasibility.collisions.problem_bodies import polytopes_of, soup_of, tool_solids
 from feasibility.collisions.shapes import HalfSpace
 from feasibility.collisions.words import TOOL
 from robots.shapes.bodies import Triangles

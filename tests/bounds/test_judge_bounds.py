@@ -14,8 +14,7 @@ from coverable import Task, cylinder, mesh, plane
 from feasibility.certification import lever_bounds
 from feasibility.certification.cells_reached import at_targets, cells_reached
 from feasibility.certification.faults import less_deviations
-from feasibility.certification.jacobians import jacobians
-from feasibility.certification.lever_bounds import levers_along, longest_levers, peaks
+from feasibility.certification.lever_bounds import jacobians, levers_along, longest_levers, peaks
 from feasibility.certification.motion_replay import limits
 from feasibility.certification.pose_replay import order_of_marks, order_of_places
 from feasibility.certification.refusals import exact_faults

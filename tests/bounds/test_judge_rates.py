@@ -11,8 +11,7 @@ from samples import sampled, seeds
 
 from coverable import Task, load_robot, plane
 from coverable.errors import ArgumentError
-from feasibility.certification.jacobians import jacobians
-from feasibility.certification.lever_bounds import levers_along, second_derivatives
+from feasibility.certification.lever_bounds import jacobians, levers_along, second_derivatives
 from feasibility.certification.rate_replay import check_rates, in_place, replay_rates
 from feasibility.certification.segment_rates import (
     fastest_anywhere,

@@ -12,11 +12,15 @@ from referee import roll_about, unit
 from samples import sampled, seeds
 
 from coverable import Task, cylinder, replay, sphere
-from feasibility.certification import roll_bounds
+from feasibility.certification import roll_held
 from feasibility.certification.motion_replay import replay_over_surface
-from feasibility.certification.roll_bounds import frame_second_derivatives, largest_off, vectors_of
 from feasibility.certification.roll_box_models import Directions, reference_parts
-from feasibility.certification.roll_held import HeldRoll
+from feasibility.certification.roll_held import (
+    HeldRoll,
+    frame_second_derivatives,
+    largest_off,
+    vectors_of,
+)
 from feasibility.certification.tool_directions import Held
 from feasibility.roll import Roll
 from feasibility.targets.references import u_directions
@@ -42,7 +46,7 @@ def test_a_range_holds_the_roll_all_along_and_hardly_less_would(half, middle):
     for size in (0.03, 0.3, 1.0):
         x, y, t, u = lines(rng, 300, size)
         z0, z1 = (vectors_of(x[k], y[k], t[k], u[k], roll) for k in (0, 1))
-        second = roll_bounds.products_of_changes(*(one[1] - one[0] for one in (x, y, t, u)))
+        second = roll_held.products_of_changes(*(one[1] - one[0] for one in (x, y, t, u)))
         unknown = size * rng.random((len(z0), 2)) * rng.integers(0, 2, (1, 2))
         found = largest_off(z0, z1, second, unknown, half)
         at = ((1.0 - S[..., None]) * one[0] + S[..., None] * one[1] for one in (x, y, t, u))
@@ -51,7 +55,7 @@ def test_a_range_holds_the_roll_all_along_and_hardly_less_would(half, middle):
         for angle in np.linspace(-np.pi, np.pi, 7):
             way = np.array([np.cos(angle), np.sin(angle)])
             less = (1.0 - S) * unknown[:, 0] + S * unknown[:, 1]
-            truth = roll_bounds.off_middle(z + less[..., None] * way).max(axis=0)
+            truth = roll_held.off_middle(z + less[..., None] * way).max(axis=0)
             some = np.isfinite(found)
             assert (truth[some] <= found[some] + 1e-6).all()
             used.append((truth / found)[some & (truth > 0.05)].max(initial=0.0))

@@ -9,8 +9,7 @@ from samples import sampled, seeds
 
 from coverable import Obstacle, ToolShape, load_robot
 from feasibility.certification.collisions.collision_replay import collision_replay
-from feasibility.collisions.outer_bodies import polytopes_of, soup_of, tool_solids
-from feasibility.collisions.problem_bodies import Bodies, Pair
+from feasibility.collisions.problem_bodies import Bodies, Pair, polytopes_of, soup_of, tool_solids
 from robots.shapes.bodies import Solid, Triangles
 from robots.shapes.links import outer_bodies
 from robots.urdf.link_shapes import Sphere

@@ -19,11 +19,11 @@ from random_arms import robot_of
 from coverable import Obstacle, Task, parametric, plane
 from feasibility.certification.collisions.collision_replay import Couples, collision_replay
 from feasibility.certification.collisions.motion import ArmMotion
-from feasibility.certification.jacobians import jacobians
+from feasibility.certification.lever_bounds import jacobians
 from feasibility.certification.motion_replay import replay_over_surface
 from feasibility.certification.rate_replay import in_place
-from feasibility.certification.roll_bounds import largest_off
 from feasibility.certification.roll_box_models import TargetModel, ToolModel, roll_models
+from feasibility.certification.roll_held import largest_off
 from feasibility.certification.segment_rates import segment_rates
 from feasibility.certification.stretches import Judge
 from feasibility.collisions.problem_bodies import Soup

@@ -24,8 +24,13 @@ import numpy as np
 
 from coverable.arrays import Array, Ints
 from feasibility.certification.bisection import Rows
-from feasibility.certification.jacobians import cross, jacobians, lengths
-from feasibility.certification.lever_bounds import longest_levers, second_derivative_bound
+from feasibility.certification.lever_bounds import (
+    cross,
+    jacobians,
+    lengths,
+    longest_levers,
+    second_derivative_bound,
+)
 from feasibility.certification.roll_box_models import (
     Directions,
     TargetModel,

@@ -43,10 +43,9 @@ from feasibility.certification.cut_proofs.linear_models import (
 )
 from feasibility.certification.cut_proofs.parts_agreement import disagreement
 from feasibility.certification.cut_proofs.refutation import Refuter
-from feasibility.certification.cut_proofs.tree_shape import malformed
 from feasibility.certification.lever_bounds import out_of_line, stretched_length
 from feasibility.collisions.asked_bodies import gather
-from feasibility.cut_tree import Cut, CutTree, Leaf
+from feasibility.cut_tree import Cut, CutTree, Leaf, malformed
 from feasibility.cut_words import joint_value
 from feasibility.task import Task
 from robots.kinematics import Kinematics

@@ -11,7 +11,7 @@ import numpy as np
 from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.cells_reached import at_targets
 from feasibility.certification.cut_proofs.box_cutting import JointRegion
-from feasibility.certification.jacobians import jacobians
+from feasibility.certification.lever_bounds import jacobians
 from feasibility.certification.stretches import Judge, Samples
 from feasibility.task import Task
 from robots.kinematics import Kinematics
