@@ -1,34 +1,38 @@
-"""Does the tool collide in every pose that covers a cell? Boxes of tilt and roll.
+"""Does the tool collide in every pose that covers a cell? It is an arm of its own then.
 
-Over a cell the tool has three free numbers: two of the tilt w, a rotation vector across the
-approach direction with |w| inside the cone, and the roll about that direction. The tool point is
-within the tolerance of its target. Within a box of (w, roll) no point of the tool, nor one at rest
-as it is seen from the tool, moves from where it is at the middle by more than
+Over a cell the tool has three free numbers, the joints of an arm that stands at the target: two
+tilt it about axes across the approach direction, the second of which goes with the first, and the
+third rolls it about its own axis. All meet in its tool point, which is within the tolerance of the
+target. Tilted by a and b its axis is off the approach by the angle whose cosine is cos a cos b.
 
-    m = (its distance from the tool point) |dw| + (from the tool axis) |d roll| + tolerance.
-
-So bodies are too near all over the box if there a point that is r deep in one of them is s deep in
-another (`depths`), and r + s and the clearance together are more than m. What the arm does to bring
+So `everywhere` says whether bodies are too near all over a box of these. What the arm does to bring
 the tool there, and whether it can, does not matter.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from coverable.arrays import Array, Mask
-from feasibility.certification.collisions.tool_pairs import ToolPair, tool_pairs
+from coverable.arrays import Array
+from feasibility.certification.collisions.everywhere import Overlapping, Points
 from feasibility.collisions.problem_bodies import Bodies
 from robots.robot import Robot
+from robots.shapes.bodies import Triangles
 
 MOST_BOXES = 100_000
 BATCH = 512  # boxes at a time
 MOST_POINTS = 20_000  # of bodies at once, each compared with all planes of another: 0.1 GB
 POSES = 12  # directions of tilt, and rolls, among which the best is told
+FEW = 1_000  # points of bodies that are first looked at for that
+FINEST = 40  # parts of the tool's reach that triangles of a sheet are cut to
+CUTS = 40  # of a triangle, at most
+WIDE = np.array([np.pi, 0.5 * np.pi, np.pi])  # [rad] half the range of all directions and rolls
+Z = np.array([0.0, 0.0, 1.0])
 
 
 class Collides(NamedTuple):
@@ -41,22 +45,6 @@ class Collides(NamedTuple):
     """Where it is confirmed: one of them collides; the first is that of `distance`."""
     distance: float = np.nan
     """m, of that pair in the best of some poses all over the cone; negative where they overlap."""
-
-
-class _Measured(NamedTuple):
-    """Of k boxes, the point that is nearest to showing that all of a box collides."""
-
-    over: Array
-    """(k,) m, by how much bodies are too near at the middle, for certain and at most."""
-    ratio: Array
-    """(k,) how far the best point moves in the box by how far it may; below 1 the box is ruled out,
-    inf where nothing is too near."""
-    by_tilt: Mask
-    """(k,) does tilting move that point more than rolling?"""
-    best: Array
-    """(k,) the pair that the point belongs to."""
-    nearest: Array
-    """(k,) the pair that `over` belongs to."""
 
 
 def never_clear(
@@ -81,142 +69,147 @@ def never_clear(
         tick: called now and then; what it raises ends the work.
         most: how many boxes may be looked at.
     """
-    pairs = tool_pairs(robot, bodies, point)
-    if not pairs:
+    tool, cone, looked, used = (
+        _alone(robot, bodies, point, approach),
+        min(cone, np.pi),
+        0,
+        set[int](),
+    )
+    if not tool.most_points:
         return Collides(False, 0)
-    tool, looked, used = _Tool(robot, point, approach, tolerance), 0, set[int]()
-    cone = min(cone, np.pi)
-    # Sheets have thousands of points, and tool and objects few.
-    order = sorted(range(len(pairs)), key=lambda i: not pairs[i].moving)
-    waiting = np.array([[0.0, 0.0, cone, 0.0, np.pi]])  # tilts u, v +- half; roll +- wide
-    while len(waiting):
-        boxes, waiting = waiting[-BATCH:], waiting[:-BATCH]
-        looked += len(boxes)
+    batch = min(BATCH, max(1, MOST_POINTS // tool.most_points))
+    high = np.where([cone < 0.5 * np.pi, cone < 0.5 * np.pi, False], cone, WIDE)[None]
+    low = -high
+    while len(low):
+        (low, a), (high, b) = ((ends[:-batch], ends[-batch:]) for ends in (low, high))
+        looked += len(a)
         if looked > most:
             return Collides(False, looked)
         tick()
-        found = tool.measured(boxes, pairs, order)
-        if ((found.over <= 0.0) & (np.hypot(boxes[:, 0], boxes[:, 1]) <= cone)).any():
+        found, middle = tool.deepest(a, b, point, tolerance), 0.5 * (a + b)
+        nothing = np.isinf(found.ratio)
+        if (nothing & (_least_tilt(middle, middle) <= cone)).any():
             return Collides(False, looked)  # nor would a smaller box be ruled out
         open_ = found.ratio >= 1.0
-        used |= set(found.best[~open_].tolist())
-        order.sort(key=lambda i: i not in used)
-        waiting = np.concatenate([waiting, _parts(boxes[open_], found.by_tilt[open_], cone)])
-    over, nearest = _at_best(tool, cone, pairs)
-    blamed = [pairs[nearest].pair, *(pairs[i].pair for i in sorted(used))]
+        used |= set(found.pair[~open_].tolist())
+        effect = np.where(nothing[:, None], (b - a) * [1.0, 1.0, 0.0], found.effect)
+        along = np.eye(3, dtype=bool)[effect.argmax(axis=1)]
+        first, last = (a, np.where(along, middle, b)), (np.where(along, middle, a), b)
+        a, b = (
+            np.concatenate([one[open_], two[open_]]) for one, two in zip(first, last, strict=True)
+        )
+        kept = _least_tilt(a, b) <= cone
+        low, high = np.concatenate([low, a[kept]]), np.concatenate([high, b[kept]])
+    over, nearest = _at_best(tool, _all_over(cone), point, tolerance, batch)
+    blamed = [bodies.pairs[k] for k in (nearest, *sorted(used))]
     named = dict.fromkeys((pair.first, pair.second) for pair in blamed)
     return Collides(True, looked, tuple(named), blamed[0].clearance - over - tolerance)
 
 
-def _at_best(tool: _Tool, cone: float, pairs: list[ToolPair]) -> tuple[float, int]:
-    """By how much (m) bodies are too near in the best of some poses all over the cone, and which.
+def _least_tilt(low: Array, high: Array) -> Array:
+    """(k,) rad, no pose in boxes (k, 3) is tilted less."""
+    (a, b), (_, wide) = np.maximum(np.maximum(low, -high), 0.0).T[:2], np.maximum(-low, high).T[:2]
+    b = np.where(a < 0.5 * np.pi, b, wide)
+    off = np.hypot(np.sin(b), np.sin(a) * np.cos(b))
+    return np.asarray(np.arctan2(off, np.cos(a) * np.cos(b)) * (1.0 - 1e-9))
 
-    With one pair alone it is no more: only poses that could be the best are measured with all.
+
+def _at_best(
+    tool: Overlapping, poses: Array, point: Array, tolerance: float, batch: int
+) -> tuple[float, int]:
+    """By how much (m) bodies are too near in the best of some poses, and which pair.
+
+    By bodies with few points it is no more: only poses that could be the best are looked at with
+    all of them.
     """
-    poses, least, nearest, known = _all_over(cone), np.inf, 0, set[int]()
-    at_least = np.full(len(poses), -np.inf)
-    while at_least.min() < least:
-        k = int(at_least.argmin())
-        found = tool.measured(poses[k : k + 1], pairs, range(len(pairs)), whole=True)
-        over, i = float(found.over[0]), int(found.nearest[0])
+    parts = np.array_split(poses, -(-len(poses) // batch))
+    some = [tool.too_near(part, point, tolerance, FEW)[0] for part in parts]
+    at_least, least, nearest = np.concatenate(some), np.inf, 0
+    for k in np.argsort(at_least, kind="stable"):
+        if at_least[k] >= least:
+            break
+        (over,), (pair,) = tool.too_near(poses[k : k + 1], point, tolerance)
         if over < least:
-            least, nearest = over, i
-        if i not in known:
-            known.add(i)
-            at_least = np.maximum(at_least, tool.measured(poses, pairs, [i], whole=True).over)
-        at_least[k] = np.inf
+            least, nearest = float(over), int(pair)
     return least, nearest
 
 
-class _Tool:
-    """The tool over one target."""
-
-    def __init__(self, robot: Robot, point: Array, approach: Array, tolerance: float) -> None:
-        """See `never_clear`."""
-        frame = robot.model.frames[robot.tool_frame_id].placement
-        self._tip, self._axis = frame.translation, frame.rotation @ robot.approach_axis
-        self._point, self._approach, self._tolerance = point, approach, tolerance
-        up = np.array([0.0, 0.0, 1.0])
-        self._onto = pin.Quaternion.FromTwoVectors(self._axis, approach).toRotationMatrix()
-        self._plane = pin.Quaternion.FromTwoVectors(up, approach).toRotationMatrix()[:, :2]
-
-    def measured(
-        self, boxes: Array, pairs: list[ToolPair], order: Sequence[int], whole: bool = False
-    ) -> _Measured:
-        """What is known of boxes (k, 5), a few at a time where pairs have many points.
-
-        Pairs are taken in this order; boxes that one rules out are not asked about the others,
-        unless `whole`.
-        """
-        some = max(1, MOST_POINTS // max(len(pair.points) for pair in pairs))
-        parts = [
-            self._measured(boxes[first : first + some], pairs, order, whole)
-            for first in range(0, len(boxes), some)
-        ]
-        return _Measured(*map(np.concatenate, zip(*parts, strict=True)))
-
-    def _measured(
-        self, boxes: Array, pairs: list[ToolPair], order: Sequence[int], whole: bool
-    ) -> _Measured:
-        """`measured` of all at once."""
-        rotations = np.array([self._rotation(*box[[0, 1, 3]]) for box in boxes])
-        places, count = self._point - rotations @ self._tip, len(boxes)
-        over, ratio = np.full(count, -np.inf), np.full(count, np.inf)
-        by_tilt, best, nearest = (np.zeros(count, kind) for kind in (bool, int, int))
-        for i in order:
-            rows = np.flatnonzero((ratio >= 1.0) | whole)
-            if not len(rows):
-                break
-            inside, own = pairs[i].overlaps(rotations[rows], places[rows])
-            away = own - self._tip
-            size = np.einsum("...i,...i->...", away, away)
-            beside = np.sqrt(np.maximum(size - (away @ self._axis) ** 2, 0.0))
-            tilting = np.sqrt(2.0 * size) * boxes[rows, 2:3]
-            rolling = beside * boxes[rows, 4:]
-            spare = inside - self._tolerance
-            times = np.divide(tilting + rolling, spare, out=np.full(spare.shape, np.inf),
-                              where=spare > 0.0)  # fmt: skip
-            at = np.arange(len(rows)), times.argmin(axis=1)
-            # Where nothing is too near, any point tells how to cut.
-            better = (times[at] < ratio[rows]) | (i == order[0])
-            more = spare.max(axis=1) > over[rows]
-            over[rows[more]], nearest[rows[more]] = spare.max(axis=1)[more], i
-            ratio[rows[better]], best[rows[better]] = times[at][better], i
-            by_tilt[rows[better]] = np.broadcast_to(tilting > rolling, spare.shape)[at][better]
-        return _Measured(over, ratio, by_tilt, best, nearest)
-
-    def _rotation(self, u: float, v: float, roll: float) -> Array:
-        """(3, 3) of the last joint, tilted and rolled about the approach direction."""
-        tilt = pin.exp3(self._plane @ np.array([u, v]))
-        return np.asarray(tilt @ pin.exp3(roll * self._approach) @ self._onto)
-
-
 def _all_over(cone: float) -> Array:
-    """(k, 5) poses all over the cone, as boxes of no size."""
-    turns = 2.0 * np.pi * np.arange(POSES) / POSES
-    ring = cone * np.column_stack([np.cos(turns), np.sin(turns)])
-    both = np.concatenate([np.zeros((1, 2)), 0.5 * ring, ring])
-    poses = np.zeros((len(both) * POSES, 5))
-    poses[:, :2], poses[:, 3] = np.repeat(both, POSES, axis=0), np.tile(turns, len(both))
-    return poses
+    """(k, 3) poses all over the cone: not tilted, and in all directions by half of it and by it."""
+    turns, poses = 2.0 * np.pi * np.arange(POSES) / POSES, []
+    ring = cone * np.column_stack([np.cos(turns), np.sin(turns), 0.0 * turns])
+    for tilt in np.concatenate([np.zeros((1, 3)), 0.5 * ring, ring]):
+        (x, y, z), (_, _, u), (_, _, v) = pin.exp3(tilt)
+        rolled = np.arctan2(-y, x)
+        poses += [(np.arctan2(-u, v), np.arcsin(z), rolled + turn) for turn in turns]
+    return np.array(poses)
 
 
-def _parts(boxes: Array, by_tilt: Mask, cone: float) -> Array:
-    """Boxes cut into four along the tilt where `by_tilt`, else into halves along the roll.
+def _alone(robot: Robot, bodies: Bodies, point: Array, approach: Array) -> Overlapping:
+    """The tool over one target, beside what is at rest."""
+    frame = robot.model.frames[robot.tool_frame_id]
+    axis, model = frame.placement.rotation @ robot.approach_axis, pin.Model()
+    upright = pin.Quaternion.FromTwoVectors(Z, approach).toRotationMatrix()
+    joints = pin.JointModelRX(), pin.JointModelRY(), pin.JointModelRZ()
+    for k, joint in enumerate(joints):
+        place = pin.SE3.Identity() if k else pin.SE3(upright, point)
+        model.addJoint(k, joint, place, f"turn {k}")
+    model.addFrame(pin.Frame("tool", 3, 0, pin.SE3.Identity(), pin.FrameType.BODY), False)
+    kinds, names = ("revolute",) * 3, tuple(model.names)[1:]
+    tool = Robot("tool", model, "tool", Z, names, kinds, -WIDE, WIDE)
+    onto = upright.T @ pin.Quaternion.FromTwoVectors(axis, approach).toRotationMatrix()
+    mount = pin.SE3(onto, -onto @ frame.placement.translation).homogeneous
+    solids = tuple(
+        replace(one, joint=3, placement=mount @ one.placement) if one.joint else one
+        for one in bodies.solids
+        if one.joint in (0, frame.parentJoint)
+    )
+    own = [Points.of(one.owner, 3, one.geometry, one.placement) for one in solids if one.joint]
+    ends = [np.linalg.norm(one.places, axis=1) + one.deep for one in own]
+    reach = max((float(one.max()) for one in ends), default=0.0)
+    held = replace(bodies, solids=solids)
+    return Overlapping(tool, held, _beside(held, point, reach))
 
-    Parts wholly outside the cone are left out.
+
+def _beside(bodies: Bodies, target: Array, reach: float) -> list[Points]:
+    """Points at rest, no further from a target (3,) m than the tool reaches.
+
+    Of meshes all over their triangles, too, and of the surface. What is left out proves nothing.
     """
-    found = []
-    for signs in ((-0.5, -0.5), (-0.5, 0.5), (0.5, -0.5), (0.5, 0.5)):
-        part = boxes[by_tilt]
-        part[:, :2] += np.array(signs) * part[:, 2:3]
-        part[:, 2] *= 0.5
-        found.append(part)
-    for sign in (-0.5, 0.5):
-        part = boxes[~by_tilt]
-        part[:, 3] += sign * part[:, 4]
-        part[:, 4] *= 0.5
-        found.append(part)
-    cut = np.concatenate(found)
-    nearest = np.maximum(np.abs(cut[:, :2]) - cut[:, 2:3], 0.0)
-    return np.asarray(cut[np.hypot(nearest[:, 0], nearest[:, 1]) <= cone])
+    rest = (one for one in bodies.solids if not one.joint)
+    found = [Points.of(one.owner, 0, one.geometry, one.placement) for one in rest]
+    sheets = {one.owner: (one.triangles, one.deviation) for one in bodies.soups}
+    for one in bodies.scene:
+        found.append(Points.of(one.name, 0, one.geometry, one.placement))
+        if isinstance(one.geometry, Triangles):
+            corners = one.geometry.vertices @ one.placement[:3, :3].T + one.placement[:3, 3]
+            sheets[one.name] = corners[one.geometry.faces], 0.0
+    for owner, (triangles, deviation) in sheets.items():
+        places = _all_over_triangles(triangles, target, reach)
+        found.append(Points(owner, 0, places, np.full(len(places), -deviation)))
+    clearance = max((pair.clearance for pair in bodies.pairs), default=0.0)
+
+    def near(one: Points) -> Points:
+        away = np.linalg.norm(one.places - target, axis=1)
+        some = away <= reach + np.maximum(one.deep + clearance, 0.0)
+        return one._replace(places=one.places[some], deep=one.deep[some])
+
+    return [near(one) for one in found]
+
+
+def _all_over_triangles(triangles: Array, target: Array, reach: float) -> Array:
+    """(k, 3) m, all over those of some triangles (k, 3, 3) m that the tool may meet at a target."""
+    for _ in range(CUTS):
+        middles = triangles.mean(axis=1)
+        wide = np.linalg.norm(triangles - middles[:, None], axis=2).max(axis=1, initial=0.0)
+        near = np.linalg.norm(middles - target, axis=1) <= reach + wide
+        triangles, large = triangles[near], wide[near] > reach / FINEST
+        if not large.any():
+            break
+        some = triangles[large]  # halved at their longest sides: narrow ones do not stay narrow
+        sides = np.linalg.norm(some - np.roll(some, -1, axis=1), axis=2)
+        order = (sides.argmax(axis=1)[:, None] + np.arange(3)) % 3
+        a, b, c = np.take_along_axis(some, order[:, :, None], axis=1).transpose(1, 0, 2)
+        parts = [np.stack(half, axis=1) for half in ((a, 0.5 * (a + b), c), (0.5 * (a + b), b, c))]
+        triangles = np.concatenate([triangles[~large], *parts])
+    return np.asarray(triangles.mean(axis=1))

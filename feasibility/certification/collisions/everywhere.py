@@ -12,10 +12,14 @@ joints are moved one by one, the first first, so that those behind k are still a
 those before it have carried its axis along with the point. Or else, where the tool point p is
 within e of a place T, the point is as far from T + x - p as that difference changes, and e: joints
 beyond i move p, those up to i turn the difference.
+
+Where the tool is looked at alone (`every_pose`), it is all that moves, and all is seen from T:
+points at rest that are deep in it, too.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -33,14 +37,22 @@ from robots.shapes.bodies import Triangles
 GUARD = 1e-7  # [m] that an overlap has to be larger by
 
 
-class _Points(NamedTuple):
-    """Points of a body that moves."""
+class Points(NamedTuple):
+    """Points of a body."""
 
+    owner: str
     joint: int
+    """0 at rest."""
     places: Array
     """(k, 3) m, in the frame of the joint."""
     deep: Array
     """(k,) m"""
+
+    @staticmethod
+    def of(owner: str, joint: int, shape: object, placement: Array) -> Points:
+        """Of a shape at a placement (4, 4) in the frame of a joint."""
+        places, deep = points_inside(shape)
+        return Points(owner, joint, places @ placement[:3, :3].T + placement[:3, 3], deep)
 
 
 class _Inside(NamedTuple):
@@ -56,7 +68,7 @@ class _Inside(NamedTuple):
 class _Couples(NamedTuple):
     """Points, and the bodies that they may be inside."""
 
-    points: _Points
+    points: Points
     bodies: list[tuple[_Inside, int]]
     """Each with the index of the pair, whose clearance it has to have."""
 
@@ -98,30 +110,44 @@ class _Middles(Rows):
 class Overlapping:
     """Finds boxes in which bodies of one problem overlap everywhere."""
 
-    def __init__(self, robot: Robot, bodies: Bodies) -> None:
-        """Place points in the bodies of all pairs that are checked."""
-        self._robot, self._bodies, self._kinematics = robot, bodies, Kinematics(robot)
-        self._couples = _couples(bodies)
+    def __init__(
+        self, robot: Robot, bodies: Bodies, beside: Sequence[Points] | None = None
+    ) -> None:
+        """Place points in the bodies of all pairs that are checked.
 
-    def deepest(self, low: Array, high: Array, target: Array, off: Array) -> Deepest:
+        Args:
+            robot: the arm, or the tool alone.
+            bodies: of the problem.
+            beside: points at rest, beside the tool alone.
+        """
+        self._robot, self._bodies, self._kinematics = robot, bodies, Kinematics(robot)
+        self._alone, self._couples = beside is not None, _couples(bodies, beside)
+        self.most_points = max((len(one.points.places) for one in self._couples), default=0)
+        """In any body; 0 where nothing can be proved."""
+
+    def _middles(self, low: Array, high: Array, target: Array, off: Array | float) -> _Middles:
+        """See `deepest`."""
+        q = 0.5 * (low + high)
+        frames, twists = self._kinematics.joints(q), self._kinematics.twists(q).transpose(0, 2, 1)
+        return _Middles(
+            0.5 * (high - low), frames.rotations, frames.points, twists[..., :3], twists[..., 3:],
+            self._kinematics.tools(q)[0], np.broadcast_to(target, (len(q), 3)),
+            np.broadcast_to(off, len(q)),
+        )  # fmt: skip
+
+    def deepest(self, low: Array, high: Array, target: Array, off: Array | float) -> Deepest:
         """What of m boxes is nearest to being too near all over, with the tool at its target.
 
         Args:
             low, high: (m, n) rad or m.
-            target: (m, 3) m, where the tool point is to be in each.
+            target: (m, 3) m, where the tool point is to be in each; or (3,) for all.
             off: (m,) m, how far it may be from there.
         """
         m, n = low.shape
         found = Deepest(np.full(m, np.inf), np.zeros((m, n)), np.full(m, -1))
         if not m:
             return found
-        q = 0.5 * (low + high)
-        frames, twists = self._kinematics.joints(q), self._kinematics.twists(q).transpose(0, 2, 1)
-        tool, _ = self._kinematics.tools(q)
-        boxes = _Middles(
-            0.5 * (high - low), frames.rotations, frames.points, twists[..., :3], twists[..., 3:],
-            tool, target, off,
-        )  # fmt: skip
+        boxes = self._middles(low, high, target, off)
         hits = np.zeros(len(self._couples), dtype=int)
         for k, couples in enumerate(self._couples):
             left = np.flatnonzero(found.ratio >= 1.0)
@@ -140,33 +166,60 @@ class Overlapping:
         """Does the judge of collisions find all pairs apart at a configuration (n,)?"""
         return collision_replay(self._robot, self._bodies, np.array([q, q])).accepted
 
+    def too_near(
+        self, q: Array, target: Array, off: float, most: float = np.inf
+    ) -> tuple[Array, Array]:
+        """(m,) m, by how much bodies are too near for certain at configurations q (m, n); and who.
+
+        By points of bodies that have `most` of them at most.
+        """
+        over, pair = np.full(len(q), -np.inf), np.full(len(q), -1)
+        boxes = self._middles(q, q, target, off)
+        for couples in (one for one in self._couples if len(one.points.places) <= most):
+            for k, found, _, _ in self._measured(couples, boxes):
+                nearest = found.max(axis=1)
+                pair = np.where(nearest > over, k, pair)
+                over = np.maximum(over, nearest)
+        return over, pair
+
     def _overlap(self, couples: _Couples, boxes: _Middles) -> Deepest:
         """What points of one body say of m boxes."""
-        points, n = couples.points, self._robot.n
+        rows, shape = np.arange(len(boxes.half)), boxes.half.shape
+        found = Deepest(np.full(len(rows), np.inf), np.zeros(shape), np.full(len(rows), -1))
+        for pair, over, first, moves in self._measured(couples, boxes):
+            ratio = np.full(over.shape, np.inf)
+            np.divide(sum(moves[first:]), over, out=ratio, where=over > 0.0)
+            best = ratio.argmin(axis=1)
+            (nearer,) = np.nonzero(ratio[rows, best] < found.ratio)
+            best = best[nearer]
+            found.ratio[nearer], found.pair[nearer] = ratio[nearer, best], pair
+            found.effect[nearer] = 0.0
+            for j in range(first, len(moves)):
+                found.effect[nearer, j] = moves[j][nearer, best]
+        return found
+
+    def _measured(
+        self, couples: _Couples, boxes: _Middles
+    ) -> Iterator[tuple[int, Array, int, list[Array]]]:
+        """What is known of k points of one body, for each other body and way to look at it.
+
+        The pair; by how much points are too near, (m, k) m; the first joint that moves them, and by
+        how much each does, (m, k) m.
+        """
+        points = couples.points
         turned = points.places @ boxes.rotations[:, points.joint].transpose(0, 2, 1)
         x = turned + boxes.origins[:, points.joint, None]
         steps = self._steps(boxes, x, points.joint)
-        from_tool = self._steps_from_tool(boxes, x, points.joint)
+        from_tool = self._steps_from_tool(boxes, x, points.joint or self._robot.n)
         shifted = x + (boxes.target - boxes.tool)[:, None]
-        rows = np.arange(len(x))
-        found = Deepest(np.full(len(x), np.inf), np.zeros((len(x), n)), np.full(len(x), -1))
         for body, pair in couples.bodies:
             kept = points.deep + self._bodies.pairs[pair].clearance - GUARD
-            seen = [(x, steps, body.joint, np.zeros((len(x), 1)))]
-            if body.joint == 0:
+            seen = [] if self._alone else [(x, steps, body.joint, np.zeros((len(x), 1)))]
+            if self._alone or body.joint == 0:
                 seen.append((shifted, from_tool, 0, boxes.off[:, None]))
             for places, moves, first, off in seen:
                 over = kept + _depths(body, boxes, places, kept.max(initial=0.0)) - off
-                ratio = np.full(over.shape, np.inf)
-                np.divide(sum(moves[first:]), over, out=ratio, where=over > 0.0)
-                best = ratio.argmin(axis=1)
-                (nearer,) = np.nonzero(ratio[rows, best] < found.ratio)
-                best = best[nearer]
-                found.ratio[nearer], found.pair[nearer] = ratio[nearer, best], pair
-                found.effect[nearer] = 0.0
-                for j in range(first, len(moves)):
-                    found.effect[nearer, j] = moves[j][nearer, best]
-        return found
+                yield pair, over, first, moves
 
     def _steps(self, boxes: _Middles, x: Array, joint: int) -> list[Array]:
         """By how much (m, k) each joint up to one moves points of that one, seen from before it."""
@@ -215,30 +268,32 @@ def _depths(body: _Inside, boxes: _Middles, x: Array, near: float) -> Array:
     return found
 
 
-def _couples(bodies: Bodies) -> list[_Couples]:
-    """The points of every body that moves, with all bodies with an inside that it may not meet."""
+def _couples(bodies: Bodies, beside: Sequence[Points] | None) -> list[_Couples]:
+    """The points of every body that moves, with all bodies with an inside that it may not meet.
+
+    And points beside it, with those that move.
+    """
     held: list[tuple[str, int, object, Array]]
     held = [(one.owner, one.joint, one.geometry, one.placement) for one in bodies.solids]
+    points = [Points.of(*one) for one in held if one[1] > 0] + [*(beside or ())]
     held += [(one.name, 0, one.geometry, one.placement) for one in bodies.scene]
     inside = dict[str, list[_Inside]]()
     for owner, joint, shape, placement in held:
         shapes = [shape] if depths(shape, np.zeros(3)) is not None else []
-        if isinstance(shape, Triangles) and joint > 0:
+        if isinstance(shape, Triangles) and (joint > 0 if beside is None else not shapes):
             shapes.append(Balls.among(*points_inside(shape)))
         inside.setdefault(owner, []).extend(
             _Inside(joint, one, np.asarray(placement)) for one in shapes
         )
     found = []
-    for solid in bodies.solids:
+    for some in points:
         inside_of = [
             (body, k)
             for k, pair in enumerate(bodies.pairs)
             for one, other in ((pair.first, pair.second), (pair.second, pair.first))
-            for body in (inside.get(other, ()) if one == solid.owner else ())
-            if solid.joint > body.joint
+            for body in (inside.get(other, ()) if one == some.owner else ())
+            if some.joint > body.joint or some.joint == 0 < body.joint
         ]
-        if inside_of:
-            places, deep = points_inside(solid.geometry)
-            places = places @ solid.placement[:3, :3].T + solid.placement[:3, 3]
-            found.append(_Couples(_Points(solid.joint, places, deep), inside_of))
+        if inside_of and len(some.places):
+            found.append(_Couples(some, inside_of))
     return found
