@@ -11,8 +11,7 @@ import numpy as np
 
 from coverable.arrays import Array
 from feasibility.certification.collisions.collision_replay import CollisionReplay, collision_replay
-from feasibility.certification.jacobians import jacobians
-from feasibility.certification.lever_bounds import second_derivatives
+from feasibility.certification.lever_bounds import jacobians, second_derivatives
 from feasibility.collisions.asked_bodies import gather
 from feasibility.collisions.kernels.memory import collision_buffer
 from feasibility.collisions.problem_bodies import Bodies
