@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -102,39 +102,29 @@ def _arm(
     tool: tuple[ToolShape, ...],
     allow: tuple[tuple[str, str], ...],
     srdf: str | None,
-    scene: tuple[str, ...],
     with_itself: bool,
 ) -> _Arm:
     """What surface, places and clearances leave as it is: it takes most of the time of `gather`.
 
     Args:
         robot, fineness, tool, allow, srdf: see `Collision`.
-        scene: names of its objects.
         with_itself: is the arm to stay clear of itself?
     """
     hulls, solids = link_shapes(robot, fineness), tool_solids(tool, robot)
     bodies = [body for solid in solids for body in outer_bodies(solid)]
 
-    def sorted_pairs(shapes: LinkShapes) -> LinkPairs:
-        others = [*scene, SURFACE, TOOL]
-        return link_pairs(robot, shapes, allow, srdf, bodies, others, solids)
-
+    pairs_of = partial(link_pairs, robot, allow=allow, srdf=srdf, tool=solids)
     shapes = hulls
     if with_itself and fineness == "hulls":
-        shapes = with_crude_links_cut(robot, hulls, sorted_pairs(hulls).checked)
-
-    @cache
-    def pairs() -> LinkPairs:
-        return sorted_pairs(shapes)
-
-    return _Arm(shapes, tuple(bodies), tuple(tool_reach(robot, shapes, bodies)), pairs)
+        shapes = with_crude_links_cut(robot, hulls, pairs_of(hulls).checked)
+    reaches = tool_reach(robot, shapes, bodies)
+    return _Arm(shapes, tuple(bodies), reaches, cache(partial(pairs_of, shapes)))
 
 
 def _arm_of(robot: Robot, collision: Collision) -> _Arm:
     """Bodies of links and tool."""
-    names = tuple(one.name for one in collision.scene)
-    of_arm = collision.tool, collision.allow, collision.srdf, names, collision.self_
-    return _arm(robot, collision.shapes, *of_arm)
+    asked = collision.tool, collision.allow, collision.srdf, collision.self_
+    return _arm(robot, collision.shapes, *asked)
 
 
 def bare_stretch(robot: Robot, collision: Collision) -> dict[str, str]:

@@ -12,10 +12,9 @@ import numpy as np
 
 from coverable.errors import Fault, listed
 from robots.errors import RobotError
-from robots.joint_selection import suggestion
 from robots.robot import Robot
 from robots.shapes.bodies import Polytope, Solid
-from robots.shapes.links import LinkShapes
+from robots.shapes.links import LinkShapes, outer_bodies
 from robots.shapes.sampling import Pair, PairSampling, random_configurations
 from robots.urdf.elements import UrdfError
 from robots.urdf.srdf import DisabledPairs, read_srdf
@@ -53,9 +52,7 @@ def link_pairs(
     shapes: LinkShapes,
     allow: Iterable[Pair] = (),
     srdf: str | os.PathLike[str] | None = None,
-    tool: Sequence[Polytope] = (),
-    others: Iterable[str] = (),
-    tool_solids: Sequence[Solid] = (),
+    tool: Sequence[Solid] = (),
 ) -> LinkPairs:
     """Sort the pairs of links, and of links and tool, into those that are checked and others.
 
@@ -69,35 +66,28 @@ def link_pairs(
     Args:
         robot: the arm.
         shapes: of its links.
-        allow: pairs of names that the user leaves out; those with one of `others` are passed over.
+        allow: pairs of names that the user leaves out; others than these are passed over.
         srdf: path of an SRDF.
-        tool: bodies on the last joint that are no link's.
-        others: names that are known besides links and the owner of `tool`.
-        tool_solids: the exact shapes that `tool` holds.
+        tool: exact shapes on the last joint that are no link's.
 
     Raises:
-        RobotError: `allow` names what does not exist, or the SRDF is of another robot.
+        RobotError: the SRDF is of another robot.
     """
-    bodies = (*shapes.polytopes, *tool)
-    joint = {body.owner: body.joint for body in bodies}
-    known = {*shapes.parents, *shapes.parents.values(), *joint}
-    outside = set(others)
-    faults, allowed, notes = [], set[frozenset[str]](), list[str]()
-    for pair in allow:
-        allowed.add(frozenset(pair))
-        for name in pair:
-            if name not in known | outside:
-                hint = suggestion(name, [*joint, *sorted(outside)])
-                faults.append(
-                    Fault("allow", f"names {name!r}, which is no link or object here; {hint}")
-                )
-    disabled = set[frozenset[str]]()
+    bodies = (*shapes.polytopes, *(body for one in tool for body in outer_bodies(one)))
+    joint, notes = {body.owner: body.joint for body in bodies}, list[str]()
+    allowed, disabled = {frozenset(pair) for pair in allow}, set[frozenset[str]]()
     if srdf is not None:
-        disabled, said, fault = _of_srdf(srdf, known, robot.name)
-        notes += said
-        faults += fault
-    if faults:
-        raise RobotError(faults, f"robot {robot.name!r}")
+        pairs = read_srdf(srdf)
+        faults = _strangers(srdf, pairs, {*shapes.parents, *shapes.parents.values(), *joint})
+        if faults:
+            raise RobotError(faults, f"robot {robot.name!r}")
+        disabled = {frozenset(pair) for pair in pairs.taken}
+        for why, count in pairs.ignored:
+            reason_given = f"the reason {why!r}" if why else "no reason"
+            plural = "s are" if count > 1 else " is"
+            notes.append(
+                f"{count} pair{plural} not taken from the SRDF, which gives {reason_given}"
+            )
 
     def reason(first: str, second: str) -> Why | None:
         pair = frozenset((first, second))
@@ -111,7 +101,7 @@ def link_pairs(
 
     order = sorted(joint, key=lambda owner: joint[owner])
     reasons = {pair: reason(*pair) for pair in combinations(order, 2)}
-    return _measured(robot, bodies, (*shapes.solids, *tool_solids), reasons, notes)
+    return _measured(robot, bodies, (*shapes.solids, *tool), reasons, notes)
 
 
 def _measured(
@@ -177,22 +167,6 @@ def _upwards(owner: str, shapes: LinkShapes) -> list[str]:
     while links[-1] in shapes.parents:
         links.append(shapes.parents[links[-1]])
     return links
-
-
-def _of_srdf(
-    path: str | os.PathLike[str], known: set[str], name: str
-) -> tuple[set[frozenset[str]], list[str], list[Fault]]:
-    """The pairs that an SRDF leaves out, what is to be said, and what is wrong."""
-    pairs = read_srdf(path)
-    faults = _strangers(path, pairs, known)
-    if faults:
-        return set(), [], faults
-    notes = []
-    for reason, count in pairs.ignored:
-        why = f"the reason {reason!r}" if reason else "no reason"
-        plural = "s are" if count > 1 else " is"
-        notes.append(f"{count} pair{plural} not taken from the SRDF, which gives {why}")
-    return {frozenset(pair) for pair in pairs.taken}, notes, []
 
 
 def _strangers(
