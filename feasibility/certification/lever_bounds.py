@@ -83,21 +83,17 @@ def levers_along(
     return largest
 
 
-def second_derivatives(
-    steps: Array, prismatic: Mask, levers: Array, cap: float, own: Array | None = None
-) -> Array:
-    """(m,) D of |p''| (or of |a''|) along segments, straight ones in joint space by default.
+def second_derivatives(steps: Array, prismatic: Mask, levers: Array, cap: float) -> Array:
+    """(m,) D of |p''| (or of |a''|) along segments that are straight in joint space.
 
     Args:
-        steps: (m, n) absolute joint changes; along curves bounds on |dq/ds|, s from 0 to 1.
+        steps: (m, n) absolute joint changes.
         prismatic: (n,) which joints slide.
         levers: (m + 1, n) r_j (or s_j) at the ends of the segments.
         cap: upper bound of every lever (1 for sines, inf for lengths).
-        own: (m, n) bounds on the joints' own |d^2q/ds^2|; each adds that times its lever.
     """
     largest = levers_along(steps, prismatic, levers[:-1], levers[1:], cap)
-    total = second_derivative_bound(largest, steps, prismatic)
-    return total if own is None else total + (largest * own).sum(axis=1)
+    return second_derivative_bound(largest, steps, prismatic)
 
 
 def peaks(a: Array, b: Array, most: Array) -> Array:

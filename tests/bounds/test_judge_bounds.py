@@ -73,13 +73,6 @@ def test_a_slide_on_a_turning_arm_bends_by_twice_the_turn():
     holds(bends, [[2 * 0.5 * 0.7, 2 * 0.5 * 0.7, 0.7**2]], 1.0 - 1e-9)
 
 
-def test_joints_that_do_not_run_evenly_bend_the_way_by_that_as_well():
-    """On a circle |p''|^2 = r^2 (q'^4 + q''^2)."""
-    rate, own, levers = np.array([[0.7]]), np.array([[2.0]]), np.full((2, 1), 0.4)
-    found = lever_bounds.second_derivatives(rate, np.array([False]), levers, np.inf, own)
-    holds(found, 0.4 * np.hypot(0.7**2, 2.0), 0.8)
-
-
 @pytest.mark.parametrize("turn", [0.01, 0.3, 1.5, 3.1])
 def test_levers_grow_as_joints_behind_turn(turn):
     """Two links: the lever is |1 + exp(i q)|, least where the arm is folded."""

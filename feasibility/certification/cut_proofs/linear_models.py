@@ -51,19 +51,9 @@ GUARD = 1e-9  # [m], [1] added to every radius; rounding of double arithmetic is
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Parts(Rows):
-    """Parts of the surface that the tool point is to be on, with target points and approaches."""
+class Parts(SurfaceParts, Rows):
+    """Parts of the surface that the tool point is to be on: T (m) for points, and b for normals."""
 
-    centre: Array
-    """(K, 6) T (m) and b at x = 0."""
-    slopes: Array
-    """(K, 2, 6) what x_1 and x_2 change T and b by."""
-    radius: Array
-    """(K, 2) r_T (m) and r_b."""
-    children: Ints
-    """(K, 2) the parts that each is cut into; -1, -1 for the finest."""
-    axis: Ints
-    """(K,) the parameter that the cut halves; -1 where the children are any two parts."""
     references: Directions
     """Reference directions over the same parts; those of no use where the roll is free."""
 
