@@ -19,8 +19,10 @@ from feasibility.certification.collisions.motion import ArmMotion
 from feasibility.certification.collisions.pairing import ROUNDING, Pairing
 from feasibility.certification.faults import Judged, MotionFault
 from feasibility.collisions.problem_bodies import Bodies, Pair
+from feasibility.collisions.scene import Obstacle
 from feasibility.verdict import Certificate
 from robots.robot import Robot
+from robots.shapes.bodies import Solid
 
 TOUCHING = 5e-7  # [m] overlap that is called touching
 MEASURED = 8  # couples, with the lowest certified distances, of which coal measures the least
@@ -77,14 +79,14 @@ class Couples:
         Raises:
             ArgumentError: a pair names what has no body, or a body is malformed.
         """
-        named = {name for pair in bodies.pairs for name in (pair.first, pair.second)}
-        of: dict[str, list[Body]] = {name: [] for name in named}
-        for solid in (one for one in bodies.solids if one.owner in named):
-            of[solid.owner].append(Body(solid.joint, solid.geometry, solid.placement))
+        of = {name: list[Body]() for pair in bodies.pairs for name in (pair.first, pair.second)}
+        held: list[tuple[str, int, Solid | Obstacle]]
+        held = [(one.owner, one.joint, one) for one in bodies.solids]
+        held += [(one.name, 0, one) for one in bodies.scene]
+        for name, joint, one in (row for row in held if row[0] in of):
+            of[name].append(Body(joint, one.geometry, one.placement))
         scene = {thing.name for thing in bodies.scene}
-        for thing in (one for one in bodies.scene if one.name in named):
-            of[thing.name].append(Body(0, thing.geometry, thing.placement))
-        for soup in (one for one in bodies.soups if one.owner in named - scene):
+        for soup in (one for one in bodies.soups if one.owner in of.keys() - scene):
             of[soup.owner].append(body_of_soup(soup))
         empty = sorted(name for name, parts in of.items() if not parts)
         if empty:

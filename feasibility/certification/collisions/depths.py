@@ -16,7 +16,7 @@ from coverable.arrays import Array
 from feasibility.certification.collisions.judged_shapes import winding
 from feasibility.collisions.shapes import HalfSpace
 from robots.shapes.bodies import Triangles
-from robots.shapes.hulls import rims
+from robots.shapes.hulls import is_convex, rims
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
 ALONG, ACROSS = 9, 5  # points along the longest side of a body, and along the others
@@ -181,21 +181,17 @@ def planes_around(mesh: Triangles) -> Array | None:
     concave over a face, so no point of it is then deeper than three times that of its middle; and
     a closed surface that stays at the hull and encloses its volume is the hull.
     """
-    from scipy.spatial import ConvexHull, QhullError
+    from scipy.spatial import ConvexHull
 
-    if not mesh.closed or len(mesh.faces) > MOST_FACES:
+    if len(mesh.faces) > MOST_FACES or not is_convex(mesh, FULL):
         return None
-    corners = mesh.vertices[mesh.faces]
-    try:
-        hull = ConvexHull(corners.reshape(-1, 3))
-    except QhullError:
-        return None
-    wide = float(np.ptp(hull.points, axis=0).max())
-    points = np.concatenate([corners.reshape(-1, 3), corners.mean(axis=1)])
+    hull, middles = ConvexHull(mesh.vertices), mesh.vertices[mesh.faces].mean(axis=1)
+    points, wide = (
+        np.concatenate([mesh.vertices, middles]),
+        float(np.ptp(hull.points, axis=0).max()),
+    )
     depths = -(points @ hull.equations[:, :3].T + hull.equations[:, 3]).max(axis=1)
-    a, b, c = (corners[:, k] - corners[0, 0] for k in range(3))
-    volume = abs(float(np.einsum("ki,ki->", np.cross(a, b), c))) / 6.0
-    if depths.max() > FLUSH * wide or abs(volume - hull.volume) > FULL * hull.volume:
+    if depths.max() > FLUSH * wide:
         return None
     planes = np.array(hull.equations)
     planes[:, 3] += 3.0 * FLUSH * wide

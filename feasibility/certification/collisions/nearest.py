@@ -84,36 +84,12 @@ def _searched(pairings: list[Pairing], count: int) -> tuple[Array, NDArray[np.in
                 break
             one = pairings[k]  # of meshes the hulls, first
             exactly = one.convex or k in known
-            distance = _line(one, row, exactly)[0]
+            distance = one.lines(np.array([float(row)]), hulls=not exactly)[0][0]
             low[k] = np.maximum(low[k], distance - np.abs(one.way - one.way[row])[:count])
             known.add(k)
             if exactly and distance < distances[row]:
                 distances[row], found[row] = distance, k
     return distances, found
-
-
-def _line(one: Pairing, row: int, exactly: bool = True) -> tuple[float, Array]:
-    """The distance (m) at a row, or that of hulls, and the ends (2, 3) m of the line, seen from a.
-
-    What bodies stand out by is taken off.
-    """
-    a, b = one.a, one.b
-    rotation, point = (poses[row] for poses in one.motion.poses(a.joint, b.joint))
-    if a.half_space:
-        n = rotation.T @ a.axis
-        across = n - (n @ b.axis) * b.axis
-        own = b.corners[np.argmin(b.corners @ n)] - b.radius * n
-        own = own - b.circle * across / max(float(np.linalg.norm(across)), 1e-300)
-        end = rotation @ own + point
-        distance = float((end - a.centre) @ a.axis)
-        ends = np.stack([end - distance * a.axis, end])
-    else:
-        (place,) = b.placed(rotation[None], point[None])
-        distance, *near = a.distance(b, place, hulls=not exactly)
-        ends = np.stack(near)
-        if not (distance > 0.0 and np.isfinite(ends).all()):  # what overlaps has no nearest points
-            ends[:] = rotation @ b.centre + point
-    return distance - a.deviation - b.deviation, ends
 
 
 def _lines(names: Names, pairings: list[Pairing], found: NDArray[np.intp], here: Mask) -> NearPair:
@@ -126,6 +102,7 @@ def _lines(names: Names, pairings: list[Pairing], found: NDArray[np.intp], here:
     lines = []
     for row in rows.tolist():
         one = pairings[of[row]]
-        turn = one.motion.frames.rotations[row, one.a.joint]
-        lines.append(_line(one, row)[1] @ turn.T + one.motion.frames.points[row, one.a.joint])
+        (ends,), frames = one.lines(np.array([float(row)]))[1], one.motion.frames
+        at = row, one.a.joint
+        lines.append(ends @ frames.rotations[at].T + frames.points[at])
     return NearPair(names, rows, np.array(lines))

@@ -83,21 +83,33 @@ class Pairing:
         """m, certified along the whole motion, or measured where they are refused."""
         return float(self.low.min()) if self.refused is None else self.distance
 
-    def measured(self, times: Array) -> Array:
-        """(k,) m, the distances at instants (k,), in rows, on the straight lines between them."""
-        rotations, points = self.motion.poses(self.a.joint, self.b.joint, times)
-        if self.a.half_space:
-            heights = self._low(self.a.axis[None], rotations, points) - self.a.axis @ self.a.centre
-            return heights - self.b.deviation
-        off = self.a.deviation + self.b.deviation
-        found = []
-        for place in self.b.placed(rotations, points):
+    def lines(self, times: Array, hulls: bool = False) -> tuple[Array, Array]:
+        """Distances at instants (k,), in rows, on the straight lines between them.
+
+        (k,) m, and the ends (k, 2, 3) m of the shortest lines, seen from a; of overlaps any points.
+        With `hulls` of these, which may be nearer.
+        """
+        (rotations, points), a, b = self._placed(times), self.a, self.b
+        found, ends = np.empty(len(times)), np.empty((len(times), 2, 3))
+        if a.half_space:
+            n = np.einsum("kij,i->kj", rotations, a.axis)
+            across = n - (n @ b.axis)[:, None] * b.axis
+            across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
+            lowest = b.corners[(n @ b.corners.T).argmin(axis=1)] - b.radius * n - b.circle * across
+            ends[:, 1] = np.einsum("kij,kj->ki", rotations, lowest) + points
+            found = (ends[:, 1] - a.centre) @ a.axis
+            ends[:, 0] = ends[:, 1] - found[:, None] * a.axis
+            return found - b.deviation, ends
+        for k, place in enumerate(b.placed(rotations, points)):
             self.calls += 1
-            distance = self.a.distance(self.b, place)[0]
-            if distance <= 0.0 and not self.convex:  # of triangles that overlap coal knows no depth
-                distance = min(0.0, self.a.distance(self.b, place, hulls=True)[0])
-            found.append(distance - off)
-        return np.array(found)
+            found[k], *ends[k] = a.distance(b, place, hulls)
+            if found[k] <= 0.0 and not self.convex:  # of triangles that overlap coal knows no depth
+                found[k] = min(0.0, a.distance(b, place, hulls=True)[0])
+        return found - a.deviation - b.deviation, np.nan_to_num(ends)
+
+    def measured(self, times: Array) -> Array:
+        """(k,) m, the distances at instants (k,), see `lines`."""
+        return self.lines(times)[0]
 
     def least_measured(self, finest: float, also: float | None = None) -> tuple[float, float]:
         """An instant, in rows, and the distance (m) there: the least that is met on the motion.
