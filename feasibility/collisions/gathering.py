@@ -16,7 +16,6 @@ from feasibility.collisions.problem_bodies import (
     Seat,
     Soup,
     carried_bodies,
-    furthest,
     overlapping,
     polytopes_of,
     seats_of,
@@ -177,10 +176,9 @@ def _reach(
     wide = max(
         float(np.linalg.norm(body.vertices, axis=1).max()) + body.radius for body in polytopes
     )
-    carried = [seat for seat in seats if seat.joint]
-    if carried:
-        placed = [float(np.linalg.norm(seat.obstacle.placement[:3, 3])) for seat in carried]
-        wide = max(wide, *placed, *(furthest(soup.triangles) for soup in soups))
+    carried = [seat.obstacle.placement[None, :3, 3] for seat in seats if seat.joint]
+    for points in (*carried, *(soup.triangles for soup in soups if carried)):
+        wide = max(wide, float(np.linalg.norm(points, axis=-1).max(initial=0.0)))
     return min(steps + float(slides) + wide, FURTHEST)
 
 

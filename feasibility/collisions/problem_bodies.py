@@ -10,7 +10,6 @@ that is at rest for the search and the judge, and the world may move.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
@@ -95,30 +94,18 @@ class Bodies:
 
 
 MOST_VERTICES = 64  # of a convex mesh: its hull would be thinned, so one with more stays triangles
-_CUBE = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
 
 def polytopes_of(obstacle: Obstacle, reach: float) -> tuple[Polytope, ...] | None:
     """Convex bodies that together hold an object; None where it is a mesh that is not convex.
 
-    A half space becomes a box from its plane downwards. Every point x of the arm is within `reach`
-    of the root's origin. The box begins beneath the origin, at its projection onto the plane, and
-    is `reach` wide to each side and reach + |height of the origin| deep, so the place of the half
-    space that is nearest to x, which is x itself or its projection onto the plane, lies in the box:
-    their distances to x are one.
-
     Args:
-        obstacle: of the scene.
-        reach: m, no point of the arm is ever further from the origin of the root frame.
+        obstacle: of the scene, at rest.
+        reach: see `solid_of`.
     """
-    geometry, placement = obstacle.geometry, obstacle.placement
-    if isinstance(geometry, HalfSpace):
-        middle, size = below(placement, reach)
-        vertices = _moved(placement, middle + _CUBE * (0.5 * size))
-        return (Polytope(obstacle.name, 0, vertices, 0.0),)
-    if isinstance(geometry, Triangles) and not _is_convex(geometry):
+    if isinstance(obstacle.geometry, Triangles) and not _is_convex(obstacle.geometry):
         return None
-    return tuple(outer_bodies(Solid(obstacle.name, 0, placement, geometry)))
+    return tuple(outer_bodies(solid_of(obstacle, 0, reach)))
 
 
 def soup_of(obstacle: Obstacle) -> Soup | None:
@@ -126,7 +113,8 @@ def soup_of(obstacle: Obstacle) -> Soup | None:
     geometry = obstacle.geometry
     if not isinstance(geometry, Triangles) or _is_convex(geometry):
         return None
-    corners = _moved(obstacle.placement, geometry.vertices)[geometry.faces]
+    rotation, position = obstacle.placement[:3, :3], obstacle.placement[:3, 3]
+    corners = (geometry.vertices @ rotation.T + position)[geometry.faces]
     return Soup(obstacle.name, corners, 0.0, geometry.closed)
 
 
@@ -143,22 +131,6 @@ def tool_solids(tool: Sequence[ToolShape], robot: Robot) -> tuple[Solid, ...]:
 def _is_convex(shape: Triangles) -> bool:
     """Is it a convex solid whose hull needs no thinning?"""
     return len(shape.vertices) <= MOST_VERTICES and is_convex(shape)
-
-
-def below(placement: Array, reach: float) -> tuple[Array, Array]:
-    """The box that stands for a half space, see `polytopes_of`: its middle and its sides, (3,) m.
-
-    Both are in the half space's own frame.
-    """
-    own = np.linalg.inv(placement)[:3, 3]  # the origin of the root frame, seen from the plane
-    deep = reach + abs(own[2])
-    middle = np.array([own[0], own[1], -deep / 2.0])
-    return middle, np.array([2.0 * reach, 2.0 * reach, deep])
-
-
-def _moved(placement: Array, points: Array) -> Array:
-    """Points after the rigid motion of a (4, 4) matrix."""
-    return points @ placement[:3, :3].T + placement[:3, 3]
 
 
 def seats_of(robot: Robot, scene: Iterable[Obstacle]) -> tuple[Seat, ...]:
@@ -178,39 +150,38 @@ def seats_of(robot: Robot, scene: Iterable[Obstacle]) -> tuple[Seat, ...]:
     return tuple(found)
 
 
-def carried_solid(seat: Seat, reach: float) -> Solid:
-    """A carried object as a body of the arm; of a half space the box that any body can reach.
+def solid_of(obstacle: Obstacle, joint: int, reach: float) -> Solid:
+    """An object on a joint as a body of the arm; a half space becomes a box beneath its plane.
+
+    Every point x that matters is within `reach` of the origin. The box begins beneath the origin,
+    at its projection onto the plane, and is `reach` wide to each side and reach + |height of the
+    origin| deep, so the place of the half space that is nearest to x, which is x itself or its
+    projection onto the plane, lies in the box: their distances to x are one.
 
     Args:
-        seat: with a joint.
-        reach: m, no body gets further from the origin of the joint's frame.
+        obstacle: with its placement in the frame of that joint.
+        joint: Pinocchio's, 0 at rest.
+        reach: m, no point of a body gets further from the origin of the joint's frame.
     """
-    one = seat.obstacle
-    if not isinstance(one.geometry, HalfSpace):
-        return Solid(one.name, seat.joint, one.placement, one.geometry)
-    middle, size = below(one.placement, reach)
-    placement = one.placement.copy()
-    placement[:3, 3] += one.placement[:3, :3] @ middle
+    if not isinstance(obstacle.geometry, HalfSpace):
+        return Solid(obstacle.name, joint, obstacle.placement, obstacle.geometry)
+    x, y, height = np.linalg.inv(obstacle.placement)[:3, 3]  # the origin, seen from the plane
+    deep, placement = reach + abs(height), obstacle.placement.copy()
+    placement[:3, 3] += placement[:3, :3] @ [x, y, -deep / 2.0]
     placement.flags.writeable = False
-    x, y, z = size.tolist()
-    return Solid(one.name, seat.joint, placement, Box((x, y, z)))
+    return Solid(obstacle.name, joint, placement, Box((2.0 * reach, 2.0 * reach, float(deep))))
 
 
 def carried_bodies(
     seats: Sequence[Seat], reach: float, fineness: Fineness
 ) -> tuple[list[Solid], list[Polytope]]:
     """Carried objects, exact and as convex bodies."""
-    solids = [carried_solid(seat, reach) for seat in seats if seat.joint]
+    solids = [solid_of(seat.obstacle, seat.joint, reach) for seat in seats if seat.joint]
     convex = list[Polytope]()
     for solid in solids:  # one hull would close the hollows of a fixture
         hollow = isinstance(solid.geometry, Triangles)
         convex += outer_bodies(solid, "pieces" if hollow else fineness)
     return solids, convex
-
-
-def furthest(points: np.ndarray) -> float:
-    """m, of points (..., 3) from the origin; 0 where there are none."""
-    return float(np.linalg.norm(points, axis=-1).max(initial=0.0))
 
 
 NOTED = 5e-3  # [m] of overlap: the base of a ur5, as drawn, ends 4 mm below its frame

@@ -8,16 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from scipy.optimize import nnls
 
 from robots.robot import Robot
 from robots.shapes.bodies import Polytope, Solid, Triangles
+from robots.shapes.coal_shapes import coal_distance
 from robots.shapes.hulls import hull_of
 from robots.shapes.links import LinkShapes
 from robots.urdf.link_shapes import Cylinder
 
 NEAR = 1e-3  # [m]
-HEAVY = 1e3  # [1] of a sum of weights beside lengths
 BARE = 0.02  # [m] from the tool point to the nearest body, from which on that is to be said
 
 
@@ -67,15 +66,10 @@ def bare_length(robot: Robot, bodies: Iterable[Polytope]) -> float:
     At most the way from the flange, as nothing has to be between the two where they are one.
     """
     _, joint, (start, end) = tool_line(robot)
-    length = least = float(np.linalg.norm(end - start))
+    least, point = float(np.linalg.norm(end - start)), Polytope("tool point", joint, end[None], 0.0)
     for body in bodies:
         if body.joint == joint and least > BARE:
-            # The nearest point of the hull: weights of its corners, at least 0, that sum up to 1.
-            apart = body.vertices - end
-            rows = np.vstack([apart.T, np.full(len(apart), HEAVY * max(length, 1.0))])
-            weights, _ = nnls(rows, np.append(np.zeros(3), rows[3, 0]))
-            nearest = np.linalg.norm(weights @ apart / weights.sum())
-            least = min(least, float(nearest) - body.radius)
+            least = min(least, coal_distance(point, body))
     return least if least > BARE else 0.0
 
 
