@@ -13,6 +13,8 @@ import numpy as np
 from feasibility.task import Task
 from surfaces.surface import Surface
 
+ROLL_CLOSE = 1e-9  # [1], [rad]: u directions are known by differences to about this
+
 
 @dataclass(frozen=True, slots=True)
 class MotionFault:

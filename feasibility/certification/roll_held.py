@@ -32,9 +32,9 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.arrays import Array, Mask
+from feasibility.certification.faults import ROLL_CLOSE
 from feasibility.certification.lever_bounds import cross, lengths, peaks, second_derivatives
 from feasibility.certification.roll_box_models import Directions, reference_parts
-from feasibility.certification.tool_directions import ROLL_CLOSE, Held
 from feasibility.roll import Roll, projected
 from robots.kinematics import Kinematics
 from robots.robot import Robot
@@ -130,8 +130,9 @@ class ReferencesAlong(NamedTuple):
 class HeldRoll:
     """Reference directions over the places of one surface, and the range of the roll."""
 
-    held: Held
     offset: OffsetSurface
+    fixed: bool
+    """Is the approach one direction everywhere?"""
     reference: Array | None
     """(3,) where it is one direction; else the u direction."""
     roll: Roll
@@ -160,23 +161,22 @@ class HeldRoll:
         axes: tuple[Array, Array],
         second: Array,
         path: PlacePaths,
-        approaches: Array,
     ) -> Array:
         """(k,) rad, bounds on that along stretches; inf where the roll may leave its range.
 
         Args:
             x, axes: (k, 3) of the tool at both ends.
             second: (k,) D_x + D_y along the stretch.
-            path: of places.
-            approaches: (k, 4, 3) at its four places.
+            path: of places, with approach directions for normals.
         """
-        references, second_u, beside = self.references_along(path, approaches)
+        references, second_u, beside = self.references_along(path)
         share = path.share[..., None]
         ends = x, tuple(map(np.cross, axes, x))
         xs, ys = ((1.0 - share) * one[:, None] + share * other[:, None] for one, other in ends)
-        z = vectors_of(xs, ys, references, np.cross(approaches, references), self.roll)
+        us = np.cross(path.normals, references)
+        z = vectors_of(xs, ys, references, us, self.roll)
         unknown = 0.5 * path.share * (1.0 - path.share) * second[:, None]
-        dt, du = np.diff(references, axis=1), np.diff(np.cross(approaches, references), axis=1)
+        dt, du = np.diff(references, axis=1), np.diff(us, axis=1)
         width = np.diff(path.share, axis=1)
         with np.errstate(invalid="ignore"):  # inf * 0 is NaN, and refused
             most = width**2 * second[:, None] + ROOT * second_u
@@ -188,33 +188,26 @@ class HeldRoll:
             found.append(largest_off(z[:, k], z[:, k + 1], most[:, k], less, self.roll.half))
         return np.asarray(np.max(found, axis=0))
 
-    def references_along(self, path: PlacePaths, approaches: Array) -> ReferencesAlong:
-        """t at the places of paths, and how much t and u bend along their pieces.
-
-        Args:
-            path: of places.
-            approaches: (k, 4, 3) at its four places.
-        """
+    def references_along(self, path: PlacePaths) -> ReferencesAlong:
+        """t at the places of paths, and how much t and u bend along their pieces."""
+        approaches, d_b = path.normals, path.deviations[..., 1]
         ends = [self._references(path.place(k), approaches[:, k])[0] for k in range(4)]
         references = np.stack(ends, axis=1)
-        d_b = self.held.deviations(path)
         db, dt = (np.linalg.norm(np.diff(a, axis=1), axis=2) for a in (approaches, references))
         beside = np.zeros_like(d_b)
         for piece in (FIRST, LAST):
-            two = approaches[:, piece : piece + 2]
-            d_t = 2.0 * self._along_piece(path, piece, two, d_b[:, piece]).radius
+            d_t = 2.0 * self._along_piece(path, piece).radius
             beside[:, piece] = 2.0 * d_t + d_b[:, piece]
         with np.errstate(invalid="ignore"):  # inf * 0 is NaN, and refused
             return ReferencesAlong(references, 2.0 * db * dt, beside)
 
-    def _along_piece(
-        self, path: PlacePaths, piece: int, approaches: Array, beside: Array
-    ) -> Directions:
-        """t along one piece of paths, from b at its two ends (k, 2, 3) and d_b (k,)."""
-        b = Directions.between(approaches[:, 0], approaches[:, 1], beside)
+    def _along_piece(self, path: PlacePaths, piece: int) -> Directions:
+        """t along one piece of paths."""
+        ends = path.normals[:, piece], path.normals[:, piece + 1]
+        b = Directions.between(*ends, path.deviations[:, piece, 1])
         if self.reference is not None:
-            return reference_parts(b, Directions.fixed(self.reference, len(beside)))
+            return reference_parts(b, Directions.fixed(self.reference, len(path.share)))
         start, end = path.place(piece), path.place(piece + 1)
         ends = self.offset.tangents(start), self.offset.tangents(end)
         e = Directions.between(*ends, 0.5 * self.offset.tangent_deviations(start, end))
-        return reference_parts(b, e, self.held.approach is None and self.offset.square)
+        return reference_parts(b, e, not self.fixed and self.offset.square)

@@ -31,8 +31,8 @@ import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.bisection import Rows, Stretches
+from feasibility.certification.faults import ROLL_CLOSE
 from feasibility.certification.lever_bounds import Jacobians, peaks, second_derivatives
-from feasibility.certification.tool_directions import ROLL_CLOSE, Held
 from feasibility.task import Task
 from robots.kinematics import Kinematics, reference_axes
 from robots.robot import Robot
@@ -115,11 +115,13 @@ class Judge:
         """
         self.robot, self.task, self.offset, self._curves = robot, task, offset, curves
         self.kinematics = Kinematics(robot)
-        self._held, self._roll = Held.of(task, cells), None
+        self._sign, self._approach = -cells.surface.side_sign, task.fixed_approach(cells)
+        self._roll = None
         if task.roll is not None:  # what judges a roll is loaded where there is a range of it
             from feasibility.certification.roll_held import HeldRoll
 
-            self._roll = HeldRoll(self._held, offset, task.fixed_reference(cells), task.roll)
+            fixed = self._approach is not None
+            self._roll = HeldRoll(offset, fixed, task.fixed_reference(cells), task.roll)
 
     def sampled(self, row: Ints, share: Array, q: Array) -> Samples:
         """Samples at configurations q (k, n)."""
@@ -174,7 +176,13 @@ class Judge:
     def targets(self, places: Places) -> tuple[Array, Array]:
         """(k, 3) m, targets over places, and (k, 3) the approach directions there."""
         target, normal = self.offset.at(places)
-        return target, self._held.approaches(normal)
+        return target, self._approaches(normal)
+
+    def _approaches(self, normals: Array) -> Array:
+        """Approach directions (..., 3) where the surface has these outward normals."""
+        if self._approach is None:
+            return self._sign * normals
+        return np.where(np.isnan(normals), np.nan, self._approach)
 
     def middles(self, rows: Array, stretches: SampledStretches) -> Samples:
         """Samples in the middle of stretches of the motion `rows` (m, n)."""
@@ -199,13 +207,16 @@ class Judge:
     def bounds(self, s: SampledStretches) -> Bounds:
         """See the module's text."""
         path = self.offset.paths(s.start.places, s.end.places)
+        known = path.known
+        path = path._replace(normals=self._approaches(path.normals))
+        if self._approach is not None:
+            path.deviations[..., 1] = 0.0
         share, width = path.share[..., None], np.diff(path.share, axis=1) ** 2
         second = s.second
         found = []
-        approaches, off_axes = self._held.approaches(path.normals), self._held.deviations(path)
         for start, end, aims, own, beside in (
             (s.start.points, s.end.points, path.points, second[:, :1], path.deviations[..., 0]),
-            (s.start.axes, s.end.axes, approaches, second[:, 1:2], off_axes),
+            (s.start.axes, s.end.axes, path.normals, second[:, 1:2], path.deviations[..., 1]),
         ):  # fmt: skip
             line = (1.0 - share) * start[:, None] + share * end[:, None]
             sag = 0.5 * path.share * (1.0 - path.share) * own
@@ -218,8 +229,8 @@ class Judge:
         x, axes = (s.start.x, s.end.x), (s.start.axes, s.end.axes)
         roll = np.zeros(len(second))
         if self._roll is not None:
-            roll = self._roll.rolls_between(x, axes, second[:, 2], path, approaches)
-        return Bounds(found[0], found[1], _apart(s), path.known, roll)
+            roll = self._roll.rolls_between(x, axes, second[:, 2], path)
+        return Bounds(found[0], found[1], _apart(s), known, roll)
 
     def beyond(self, one: Samples | Bounds) -> Array:
         """(4, k) see `beyond`; and m, how far too near to the triangles of a mesh."""

@@ -21,7 +21,6 @@ from feasibility.certification.roll_held import (
     largest_off,
     vectors_of,
 )
-from feasibility.certification.tool_directions import Held
 from feasibility.roll import Roll
 from feasibility.targets.references import u_directions
 from feasibility.verdict import Walk
@@ -98,24 +97,25 @@ def test_references_bend_no_more_than_is_said(kind):
     surface = surface or sphere(1.0, (20, 160), (-180, 180))
     offset, along = offset_surface(surface, 0.0), None if kind == "by u" else (1.0, 0.0, 0.0)
     task = Task(0.0, 90, roll_deg=(-80.0, 80.0), roll_reference=along)
-    free = Held.of(task, surface.cells(2, 2))
     reference = task.fixed_reference(surface.cells(2, 2))
-    held = HeldRoll(free, offset, reference, task.roll)
+    held = HeldRoll(offset, False, reference, task.roll)
     middle = [np.pi / 2, 0.0] if kind != "tube" else [0.4, 0.0]
     way = 10.0 ** rng.uniform(-3, -1.3, (count, 1)) * rng.normal(size=(count, 2))
     beside = np.linalg.norm(way, axis=1, keepdims=True) * rng.uniform(0.7, 3.0, (count, 1))
     first = middle + beside * rng.choice([-1.0, 1.0], (count, 2)) - 0.5 * way
     chart = np.zeros(count, dtype=np.int64)
     path = offset.paths(Places(chart, first), Places(chart, first + way))
-    found = held.references_along(path, free.approaches(path.normals))
+    path = path._replace(normals=-path.normals)
+    found = held.references_along(path)
     some = np.isfinite(found.beside[:, 2])
     assert some.sum() > 80
-    ends = [(free.approaches(path.normals[:, k]), found.t[:, k]) for k in (0, 3)]
+    ends = [(path.normals[:, k], found.t[:, k]) for k in (0, 3)]
     used = []
     for s in (0.1, 0.5, 0.8):
         places = Places(chart, first + s * way)
-        b = free.approaches(offset.at(places)[1])
-        t = held.references_along(offset.paths(places, places), np.stack([b] * 4, axis=1)).t[:, 0]
+        here = offset.paths(places, places)
+        b, here = -here.normals[:, 0], here._replace(normals=-here.normals)
+        t = held.references_along(here).t[:, 0]
         off = 0.0
         for here, (one, other) in (
             (t, [t for _, t in ends]), (np.cross(b, t), [np.cross(b, t) for b, t in ends]),
@@ -142,7 +142,7 @@ def test_the_bounds_of_references_are_those_of_the_lemma(kind):
             square=kind == "square",
         )
         roll = Roll(0.1, half)
-        held = HeldRoll(Held(1.0, None), offset, X if kind == "fixed" else None, roll)
+        held = HeldRoll(offset, False, X if kind == "fixed" else None, roll)
         at = np.array([0.0, 0.4, 0.4, 1.0])
         number = np.stack([np.arange(4.0), np.zeros(4)], axis=1)[None]
         off, chart = np.stack([0.0 * aside, aside], axis=1)[None], np.zeros((1, 4), dtype=np.int64)
@@ -151,7 +151,7 @@ def test_the_bounds_of_references_are_those_of_the_lemma(kind):
         u = np.cross(b, t)
         x, axes = unit(X + 0.1 * rng.normal(size=(2, 3))), unit(-Z + 0.1 * rng.normal(size=(2, 3)))
         y, second, worst = np.cross(axes, x), rng.uniform(0.01, 0.05), []
-        known = held.references_along(path, path.normals)
+        known = held.references_along(path)
         for k in (0, 2):
             d_b = aside[k]
             directions = Directions.between(b[k : k + 1], b[k + 1 : k + 2], np.array([d_b]))
@@ -173,7 +173,7 @@ def test_the_bounds_of_references_are_those_of_the_lemma(kind):
             unknown += np.sqrt(2.0) * (2.0 * d_t + d_b)
             worst.append(largest_off(z0, z1, np.array([most]), unknown, half)[0])
         ends = [tuple(np.split(one, 2)) for one in (x, axes)]
-        found = held.rolls_between(*ends, np.array([second]), path, path.normals)
+        found = held.rolls_between(*ends, np.array([second]), path)
         assert found[0] == pytest.approx(max(worst), abs=1e-7)
 
 
