@@ -27,7 +27,7 @@ from feasibility.certification.cells_reached import at_targets, cells_reached, m
 from feasibility.certification.faults import Judged, MotionFault, less_deviations, too_vague
 from feasibility.certification.placement_margin import margin_fault, placement_margin
 from feasibility.certification.stretches import Judge
-from feasibility.certification.tool_along import less_room, tool_along
+from feasibility.certification.tool_along import less_room, past_limit, tool_along
 from feasibility.collisions.asked_bodies import gather
 from feasibility.cone import angle_of
 from feasibility.task import Task
@@ -132,8 +132,6 @@ def limits(robot: Robot, rows: Array) -> tuple[float, list[MotionFault]]:
     least = float(np.minimum(rows - robot.lower, robot.upper - rows).min(initial=np.inf))
     if least >= 0.0:
         return least, []
-    from feasibility.certification.refusals import past_limit
-
     return least, [past_limit(robot, rows)]
 
 

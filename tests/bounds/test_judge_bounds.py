@@ -17,8 +17,8 @@ from feasibility.certification.faults import less_deviations
 from feasibility.certification.lever_bounds import jacobians, levers_along, longest_levers, peaks
 from feasibility.certification.motion_replay import limits
 from feasibility.certification.pose_replay import order_of_marks, order_of_places
-from feasibility.certification.refusals import exact_faults
 from feasibility.certification.stretches import Judge
+from feasibility.certification.tool_along import exact_faults
 from feasibility.task import Targets
 from feasibility.verdict import Walk
 from robots.kinematics import Kinematics

@@ -15,7 +15,7 @@ UNUSED = (
     "feasibility.roadmap.ordered_run", "feasibility.roadmap.proofs.branching",
     "feasibility.targets.frames",
     "feasibility.roadmap.rounds", "feasibility.roadmap.proving",
-    "feasibility.certification.roll_", "feasibility.certification.refusals",
+    "feasibility.certification.roll_",
     "feasibility.certification.pose_replay",
     "feasibility.roll", "feasibility.roadmap.seeds", "feasibility.roadmap.connecting",
     "feasibility.reports.objects_and_csv", "feasibility.reports.shortfalls",
