@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -96,8 +95,9 @@ class PatchPlaces(OffsetSurface):
         try:
             radius = _known(self._radii(low, high))
         except SurfaceError:  # of a kind of one's own, whose formulas cannot be followed
-            both = [_measured(partial(self._at_once, k), start, stop) for k in (0, 1)]
-            return np.stack(both, axis=1)
+            points = _measured(lambda x: self.placed(x)[0], start, stop)
+            normals = _measured(lambda x: self.placed(x)[1], start, stop)
+            return np.stack([points, normals], axis=1)
         leaning = abs(self.height) * radius[:, 1] if self.height else 0.0  # which may be inf
         return 2.0 * np.stack([radius[:, 0] + leaning, radius[:, 1]], axis=1)
 
@@ -112,9 +112,6 @@ class PatchPlaces(OffsetSurface):
         rough = ~(radius <= CLOSE).all(axis=1)
         radius[rough] = self.patch.local_models(low[rough], high[rough])[0].radius
         return radius
-
-    def _at_once(self, which: int, x: Array) -> Array:
-        return self.placed(x)[which]
 
     def tangents(self, places: Places) -> Array:
         """See `OffsetSurface.tangents`."""

@@ -53,8 +53,6 @@ class CollisionReplay(Judged):
     `min_clearance` and this. None where there is no pair, and of a refused motion."""
     faults: tuple[CollisionFault, ...]
     """One for each pair that comes too near, the nearest first; none when it is accepted."""
-    calls: int
-    """How often it was asked how far apart two bodies are, for what is certified."""
     pairings: tuple[Pairing, ...] = field(default=(), compare=False, repr=False)
     """All couples of bodies, as they were judged."""
 
@@ -170,10 +168,10 @@ def collision_replay(
     if not finite.all():
         row = int(np.argmin(finite))
         fault = CollisionFault(row, 0.0, "a joint value is not finite", ("", ""), np.nan)
-        return CollisionReplay(None, None, None, (fault,), 0)
+        return CollisionReplay(None, None, None, (fault,))
     couples = couples_of(bodies)
     if not len(rows) or not bodies.pairs:
-        return CollisionReplay(None, None, None, (), 0)
+        return CollisionReplay(None, None, None, ())
     if len(rows) == 1:  # an arm at rest: a motion that goes nowhere
         rows, deviations = np.repeat(rows, 2, axis=0), None
     motion = ArmMotion(robot, rows, deviations)
@@ -199,7 +197,6 @@ def _judged(pairs: list[Pair], pairings: list[Pairing]) -> CollisionReplay:
             if known is None or not fault.distance >= known.distance:
                 faults[fault.pair] = fault
     order = sorted(pairings, key=lambda one: _decided(one.bound))
-    calls = sum(one.calls for one in pairings)
     # What is certified of many is no more than was aimed at: they need not be the nearest.
     nearby = list(dict.fromkeys([met, *order[:MEASURED]]))
     measured, near = (None, order[0]) if faults else _measured(nearby)
@@ -208,7 +205,6 @@ def _judged(pairs: list[Pair], pairings: list[Pairing]) -> CollisionReplay:
         nearest_pair=near.names,
         measured_clearance=None if measured is None else max(measured, order[0].bound),
         faults=tuple(sorted(faults.values(), key=lambda fault: _decided(fault.distance))),
-        calls=calls,
         pairings=tuple(pairings),
     )
 

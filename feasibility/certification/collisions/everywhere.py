@@ -209,7 +209,7 @@ class Overlapping:
         points = couples.points
         turned = points.places @ boxes.rotations[:, points.joint].transpose(0, 2, 1)
         x = turned + boxes.origins[:, points.joint, None]
-        steps = self._steps(boxes, x, points.joint)
+        steps = [self._step(boxes, k, x) for k in range(points.joint)]
         from_tool = self._steps_from_tool(boxes, x, points.joint or self._robot.n)
         shifted = x + (boxes.target - boxes.tool)[:, None]
         for body, pair in couples.bodies:
@@ -220,10 +220,6 @@ class Overlapping:
             for places, moves, first, off in seen:
                 over = kept + _depths(body, boxes, places, kept.max(initial=0.0)) - off
                 yield pair, over, first, moves
-
-    def _steps(self, boxes: _Middles, x: Array, joint: int) -> list[Array]:
-        """By how much (m, k) each joint up to one moves points of that one, seen from before it."""
-        return [self._step(boxes, k, x) for k in range(joint)]
 
     def _steps_from_tool(self, boxes: _Middles, x: Array, joint: int) -> list[Array]:
         """By how much (m, k) each joint changes the difference of points and the tool point."""

@@ -70,12 +70,6 @@ class Body:
         self.ball = np.inf if self.half_space else np.hypot(reach, self.circle) + self.radius
         """m, radius of a ball about `centre` around it."""
 
-    @property
-    def solid_mesh(self) -> Triangles | None:
-        """Its triangles, where they bound a solid: for coal they have no inside."""
-        is_solid = isinstance(self.shape, Triangles) and self.shape.closed
-        return self.shape if is_solid else None  # type: ignore[return-value]
-
     @cached_property
     def _geometry(self) -> Any:
         """Coal's; of a convex mesh its hull, which has an inside."""
@@ -205,8 +199,8 @@ def one_inside_other(a: Body, b: Body, rotation: Array, point: Array) -> bool:
 
 def _any_inside(body: Body, points: Array) -> bool:
     """Is one of the points (k, 3) inside a mesh, whose shells are oriented as it is closed?"""
-    mesh = body.solid_mesh
-    if mesh is None:
+    mesh = body.shape
+    if not (isinstance(mesh, Triangles) and mesh.closed):
         return False
     corners, own = mesh.vertices[mesh.faces], body.placement
     seen = (points - own[:3, 3]) @ own[:3, :3]
