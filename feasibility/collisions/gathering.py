@@ -15,10 +15,10 @@ from feasibility.collisions.problem_bodies import (
     Pair,
     Seat,
     Soup,
-    carried_bodies,
     overlapping,
     polytopes_of,
     seats_of,
+    solid_of,
     soup_of,
     tool_solids,
 )
@@ -26,7 +26,7 @@ from feasibility.collisions.scene import ToolShape
 from feasibility.collisions.settings import Collision
 from feasibility.collisions.words import SURFACE, TOOL
 from robots.robot import Robot
-from robots.shapes.bodies import Fineness, Polytope
+from robots.shapes.bodies import Fineness, Polytope, Triangles
 from robots.shapes.link_pairs import LeftOut, LinkPairs, link_pairs
 from robots.shapes.links import LinkShapes, link_shapes, outer_bodies
 from robots.shapes.sampling import with_crude_links_cut
@@ -58,28 +58,32 @@ def gathered(robot: Robot, surface: Surface, collision: Collision, standoff: flo
         polytopes += outer or ()
         soups += [soup] if soup is not None else []
     links = {solid.owner: solid.joint for solid in solids}
-    exact, convex = carried_bodies(seats, reach, collision.shapes)
-    found = _Pairs(collision, links, seats, _tool_owners(collision, links, robot))
-    if collision.self_:
-        found.add_links(arm.pairs())
-    found.add_objects(touching=not standoff > 0.0)
+    carried = [solid_of(seat.obstacle, seat.joint, reach) for seat in seats if seat.joint]
+    for one in carried:  # one hull would close the hollows of a fixture
+        hollow = isinstance(one.geometry, Triangles)
+        polytopes += outer_bodies(one, "pieces" if hollow else collision.shapes)
+    owners = _tool_owners(collision, links, robot)
+    among = arm.pairs() if collision.self_ else LinkPairs((), (), ())
+    asked, left_out, at_rest = _sorted_out(
+        collision, links, seats, owners, among, touching=not standoff > 0.0
+    )
     return Bodies(
-        solids=(*solids, *exact),
-        polytopes=(*polytopes, *convex),
+        solids=(*solids, *carried),
+        polytopes=tuple(polytopes),
         soups=tuple(soups),
         scene=tuple(seat.obstacle for seat in seats if not seat.joint),
         carried=tuple(seat for seat in seats if seat.joint),
-        pairs=tuple(found.asked),
-        left_out=tuple(found.left_out),
+        pairs=tuple(asked),
+        left_out=tuple(left_out),
         unchecked=(*shapes.unchecked, *bare_stretch(robot, collision)),
         checked=collision.checked,
         notes=(
             *shapes.notes,
-            *found.notes,
+            *among.notes,
             *(note for one in collision.scene for note in one.notes),
-            *overlapping([body for body in polytopes if body.joint == 0], found.at_rest),
+            *overlapping([body for body in polytopes if body.joint == 0], at_rest),
             *collision.notes_on(standoff),
-            *_beyond([r for r in arm.reaches if r.owner in found.tool], found.asked, standoff),
+            *_beyond([r for r in arm.reaches if r.owner in owners], asked, standoff),
         ),
     )
 
@@ -200,66 +204,55 @@ def _tool_owners(collision: Collision, joints: Mapping[str, int], robot: Robot) 
     return {owner for owner, joint in joints.items() if joint == robot.n}
 
 
-class _Pairs:
-    """Who must stay clear of whom, and who is left out for which reason."""
+def _sorted_out(
+    collision: Collision,
+    joints: Mapping[str, int],
+    seats: Sequence[Seat],
+    tool: set[str],
+    links: LinkPairs,
+    touching: bool,
+) -> tuple[list[Pair], list[LeftOut], list[tuple[str, str]]]:
+    """Who must stay clear of whom; who is left out, and why; who is rigid, and not allowed to meet.
 
-    def __init__(
-        self,
-        collision: Collision,
-        joints: Mapping[str, int],
-        seats: Sequence[Seat],
-        tool: set[str],
-    ) -> None:
-        """With the joints of links and tool, the objects of the scene, and the tool's owners."""
-        self.collision, self.joints, self.seats, self.tool = collision, joints, seats, tool
-        self.own = {frozenset(pair[:2]): pair[2] for pair in collision.clearances}
-        self.allowed = {frozenset(pair) for pair in collision.allow}
-        self.asked = list[Pair]()
-        self.left_out = list[LeftOut]()
-        self.notes: tuple[str, ...] = ()
-        self.at_rest = list[tuple[str, str]]()
-        """Links and objects that are rigid to each other, and not allowed to meet."""
+    Args:
+        collision: what has to stay clear of what.
+        joints: of links and tool.
+        seats: the objects of the scene.
+        tool: the tool's owners.
+        links: against each other, and against the tool.
+        touching: may the tool touch the surface?
+    """
 
-    def add_links(self, links: LinkPairs) -> None:
-        """Links against each other, and against the tool."""
-        self.notes = links.notes
-        self.left_out += links.left_out
-        for first, second in links.checked:
-            self._ask(first, second, self.collision.clearance)
+    def wanted(*of: Seat) -> float:
+        own = (seat.obstacle.clearance for seat in of)
+        return max(collision.clearance if one is None else one for one in own)
 
-    def add_objects(self, touching: bool) -> None:
-        """The arm against scene and surface; the tool may be `touching` the surface."""
-        general = self.collision.clearance
-        for owner, joint in self.joints.items():
-            for seat in self.seats:
-                still = "rigid" if seat.joint == joint else ""
-                self._ask(owner, seat.obstacle.name, self._wanted(seat), still)
-            still = "" if joint else "rigid"
-            if self.collision.surface and owner in self.tool:
-                near = self.collision.tool_clearance
-                self._ask(owner, SURFACE, near, still or ("contact" if touching else ""))
-            elif self.collision.surface:
-                self._ask(owner, SURFACE, general, still)
-        for number, seat in enumerate(self.seats):
-            if self.collision.surface and seat.joint:
-                self._ask(seat.obstacle.name, SURFACE, self._wanted(seat))
-            for other in self.seats[number + 1 :]:
-                if other.joint != seat.joint:
-                    wanted = max(self._wanted(seat), self._wanted(other))
-                    self._ask(seat.obstacle.name, other.obstacle.name, wanted)
-
-    def _wanted(self, seat: Seat) -> float:
-        """m, the clearance of an object of the scene."""
-        own = seat.obstacle.clearance
-        return self.collision.clearance if own is None else own
-
-    def _ask(self, first: str, second: str, clearance: float, why: str = "") -> None:
-        """Ask for a pair, unless there is a reason why not."""
+    rows = [(first, second, collision.clearance, "") for first, second in links.checked]
+    for owner, joint in joints.items():
+        for seat in seats:
+            still = "rigid" if seat.joint == joint else ""
+            rows.append((owner, seat.obstacle.name, wanted(seat), still))
+        if collision.surface:
+            mine = owner in tool
+            why = "rigid" if not joint else "contact" if mine and touching else ""
+            near = collision.tool_clearance if mine else collision.clearance
+            rows.append((owner, SURFACE, near, why))
+    for number, seat in enumerate(seats):
+        name = seat.obstacle.name
+        if collision.surface and seat.joint:
+            rows.append((name, SURFACE, wanted(seat), ""))
+        others = (other for other in seats[number + 1 :] if other.joint != seat.joint)
+        rows += [(name, other.obstacle.name, wanted(seat, other), "") for other in others]
+    clearances = {frozenset(pair[:2]): pair[2] for pair in collision.clearances}
+    allowed = {frozenset(pair) for pair in collision.allow}
+    asked, left_out, at_rest = list[Pair](), [*links.left_out], list[tuple[str, str]]()
+    for first, second, clearance, why in rows:
         names = frozenset((first, second))
-        if why == "rigid" and second != SURFACE and names not in self.allowed:
-            self.at_rest.append((first, second))
-        why = why or ("allowed" if names in self.allowed else "")
+        if why == "rigid" and second != SURFACE and names not in allowed:
+            at_rest.append((first, second))
+        why = why or ("allowed" if names in allowed else "")
         if why:
-            self.left_out.append(LeftOut(first, second, why))
+            left_out.append(LeftOut(first, second, why))
         else:
-            self.asked.append(Pair(first, second, self.own.get(names, clearance)))
+            asked.append(Pair(first, second, clearances.get(names, clearance)))
+    return asked, left_out, at_rest

@@ -21,7 +21,7 @@ from feasibility.collisions.scene import Obstacle, ToolShape
 from feasibility.collisions.shapes import HalfSpace
 from feasibility.collisions.words import TOOL
 from robots.robot import Robot
-from robots.shapes.bodies import Fineness, Polytope, Solid, Triangles
+from robots.shapes.bodies import Polytope, Solid, Triangles
 from robots.shapes.coal_shapes import coal_distance
 from robots.shapes.hulls import is_convex
 from robots.shapes.link_pairs import LeftOut
@@ -170,18 +170,6 @@ def solid_of(obstacle: Obstacle, joint: int, reach: float) -> Solid:
     placement[:3, 3] += placement[:3, :3] @ [x, y, -deep / 2.0]
     placement.flags.writeable = False
     return Solid(obstacle.name, joint, placement, Box((2.0 * reach, 2.0 * reach, float(deep))))
-
-
-def carried_bodies(
-    seats: Sequence[Seat], reach: float, fineness: Fineness
-) -> tuple[list[Solid], list[Polytope]]:
-    """Carried objects, exact and as convex bodies."""
-    solids = [solid_of(seat.obstacle, seat.joint, reach) for seat in seats if seat.joint]
-    convex = list[Polytope]()
-    for solid in solids:  # one hull would close the hollows of a fixture
-        hollow = isinstance(solid.geometry, Triangles)
-        convex += outer_bodies(solid, "pieces" if hollow else fineness)
-    return solids, convex
 
 
 NOTED = 5e-3  # [m] of overlap: the base of a ur5, as drawn, ends 4 mm below its frame
