@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -26,44 +25,37 @@ WORDS = {
 }
 
 
-class RunStop(NamedTuple):
-    """Where a motion along poses ends."""
-
-    pose: int
-    """The last pose that it reaches."""
-    cause: str
-    """Why it does not reach the next one; empty where it reaches the last."""
-
-
 def where_it_stops(
     exploration: Exploration,
     task: Task,
+    places: PassPlaces,
     pose: int,
     q: Array,
     pairs: tuple[Pair, ...],
-) -> RunStop:
-    """Follow the poses from a configuration q (n,) over one of them, as far as it goes.
+) -> str:
+    """Where a motion ends that follows the poses from a configuration q (n,) over one, and why.
 
-    Speed and singular values count where the task limits them; `pairs` are the bodies that had to
-    stay clear of each other.
+    Empty where it reaches the last of them. Speed and singular values count where the task limits
+    them; `pairs` are the bodies that had to stay clear of each other.
     """
     first, cause, motions = pose, "", list[Array]()
-    while pose < len(exploration.cells) - 1:
+    while not cause and pose < len(exploration.cells) - 1:
         curve = exploration.curve(pose, pose + 1)
         motion, _ = track(exploration.arrays, exploration.work, curve, (0.0, 1.0), q)
         if motion is None:
             code, joint = (int(value) for value in exploration.work.stop_reason)
             cause = _words(exploration, code, joint, pairs)
-            break
-        motions.append(np.vstack([q, motion]))
-        q = motion[-1]
-        pose += 1
+        else:
+            motions.append(np.vstack([q, motion]))
+            q = motion[-1]
+            pose += 1
     if task.requires_rates:
         rates = motion_rates(exploration.robot, exploration.cells, task, motions)
-        for which, rate in enumerate(rates):
-            if slow := rate.fault(exploration.robot, task):
-                return RunStop(first + which, slow)
-    return RunStop(pose, cause)
+        slow = [rate.fault(exploration.robot, task) for rate in rates]
+        if any(slow):
+            cause = next(filter(None, slow))
+            pose = first + slow.index(cause)
+    return f"{place_words(places, pose)}: {cause}" if cause else ""
 
 
 def _words(exploration: Exploration, code: int, joint: int, pairs: tuple[Pair, ...]) -> str:
@@ -141,10 +133,8 @@ def _why(
             cause = slow.get(pose) or cause_of(exploration, pose, pairs)
             return f"{place_words(places, pose)}: {cause.detail}", cause.proved
     node = exploration.roadmap.over[poses[0]][-1]
-    stop = where_it_stops(exploration, task, poses[0], exploration.roadmap.q[node], pairs)
-    if not stop.cause:
-        return "", False
-    return f"{place_words(places, stop.pose)}: {stop.cause}", False
+    q = exploration.roadmap.q[node]
+    return where_it_stops(exploration, task, places, poses[0], q, pairs), False
 
 
 def along_stretch(places: PassPlaces, pose: int) -> float:

@@ -23,14 +23,7 @@ from feasibility.collisions.problem_bodies import Pair
 from feasibility.demands.fast_motions import keep_fast_motions
 from feasibility.demands.motion_rates import replay_at_rates
 from feasibility.division.between_patches import clear_moves
-from feasibility.division.left_out import (
-    Gap,
-    RunStop,
-    along_stretch,
-    gaps_of,
-    place_words,
-    where_it_stops,
-)
+from feasibility.division.left_out import Gap, along_stretch, gaps_of, where_it_stops
 from feasibility.division.plans import collect_components, connect_pairs
 from feasibility.division.reconfiguration import Reconfiguration, straight_moves
 from feasibility.paths.coverage import CoveragePath
@@ -236,22 +229,15 @@ def _cuts(
     found = []
     for before, after, move in zip(runs, runs[1:], clear, strict=False):
         pose, following = int(before.visits[-1]), int(after.visits[0])
-        stop = where_it_stops(exploration, task, pose, move.start, pairs)
+        stop = where_it_stops(exploration, task, places, pose, move.start, pairs)
         found.append(
             Interruption(
                 pose=pose,
                 next_pose=following,
                 stretch=int(places.stretch[pose]),
                 along=along_stretch(places, pose),
-                cause=_cause_words(places, stop),
+                cause=stop or "another configuration gets further",
                 move=move,
             )
         )
     return tuple(found)
-
-
-def _cause_words(places: PassPlaces, stop: RunStop) -> str:
-    """What stops an arm that goes on, and where."""
-    if not stop.cause:
-        return "another configuration gets further"
-    return f"{stop.cause}, {place_words(places, stop.pose)}"

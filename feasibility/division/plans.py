@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable.arrays import Array, Ints, Mask, Protected
+from coverable.arrays import Ints, Mask, Protected
 from feasibility.demands.motion_rates import replay_at_rates
 from feasibility.division.between_patches import clear_moves
 from feasibility.division.division import Plan, SubPatch
@@ -29,7 +29,7 @@ from feasibility.division.set_covering import set_cover
 from feasibility.roadmap.expansion import UNTRIED
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.rounds import improve
-from feasibility.roadmap.walk import Links, links_of, patch_walk
+from feasibility.roadmap.walk import links_of, patch_walk
 from feasibility.task import Task
 from feasibility.verdict import Walk
 from surfaces.adjacency import components
@@ -124,20 +124,6 @@ COVER_SECONDS = 2.0  # for the cover of one round, which need not be the best
 ELSEWHERE = 2  # state of a pair of cells that is not to be joined
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class _Option:
-    """A component that covers one patch, and where walks over the patch may begin."""
-
-    patch: int
-    wanted: Mask
-    """(N,) cells of the patch."""
-    links: Links
-    nodes: list[int]
-    """Nodes of the component over these cells."""
-    q: Array
-    """Their configurations."""
-
-
 def plan_of(
     exploration: Exploration, task: Task, left: float = np.inf, asked: Exploration | None = None
 ) -> Plan:
@@ -182,50 +168,36 @@ def _choices(
     covers: Mask,
     at_speed: bool,
 ) -> list[list[Walk]]:
-    """For each patch walks of the components that cover it, from several starts."""
-    fitting = []
-    for mine in wanted:
-        rows = np.flatnonzero(covers[:, mine].all(axis=1))
-        most = MOST_COMPONENTS if len(wanted) > 1 else 1
-        fitting.append([roots[row] for row in rows[:most].tolist()])
-        for component in () if at_speed else fitting[-1]:  # of those at a speed all is known
-            connect_pairs(exploration, component, mine)
-    roadmap = exploration.roadmap
-    links = {root: links_of(roadmap, root) for root in {r for own in fitting for r in own}}
-    options = []
-    for p, (mine, own) in enumerate(zip(wanted, fitting, strict=True)):
-        for component in own:
-            nodes = [node for node in links[component] if mine[roadmap.cell[node]]]
-            q = np.array([roadmap.q[node] for node in nodes])
-            options.append(_Option(p, mine, links[component], nodes, q))
-    choices: list[list[Walk]] = [[] for _ in wanted]
-    for option, starts in zip(options, _starts(options), strict=True):
-        choices[option.patch] += [
-            patch_walk(roadmap, option.links, option.wanted, start) for start in starts
-        ]
-    return choices
+    """For each patch walks of the components that cover it, from several starts.
 
-
-def _starts(options: Sequence[_Option]) -> list[list[int]]:
-    """Nodes that are worth starting the walks of each option from.
-
-    One is a node with the fewest edges, because corners are best begun with. The others come
+    One start is a node with the fewest edges, because corners are best begun with. The others come
     nearest to a node of another patch, so that the arm need not move far from one to the next.
     """
     from scipy.spatial import cKDTree
 
-    trees = [cKDTree(option.q) for option in options]
-    result = []
-    for option in options:
-        starts = [min(option.nodes, key=lambda node: len(option.links[node]))]
+    roadmap, most = exploration.roadmap, MOST_COMPONENTS if len(wanted) > 1 else 1
+    options = [
+        (p, roots[row])
+        for p, mine in enumerate(wanted)
+        for row in np.flatnonzero(covers[:, mine].all(axis=1))[:most].tolist()
+    ]
+    for p, component in () if at_speed else options:  # of those at a speed all is known
+        connect_pairs(exploration, component, wanted[p])
+    links = {root: links_of(roadmap, root) for _, root in options}
+    nodes = [[node for node in links[r] if wanted[p][roadmap.cell[node]]] for p, r in options]
+    q = [np.array([roadmap.q[node] for node in own]) for own in nodes]
+    trees = [cKDTree(rows) for rows in q]
+    choices: list[list[Walk]] = [[] for _ in wanted]
+    for (p, root), own, rows in zip(options, nodes, q, strict=True):
         near = []
-        for other, tree in zip(options, trees, strict=True):
-            if other.patch != option.patch:
-                distance, _ = tree.query(option.q, p=np.inf)
-                near.append((float(distance.min()), option.nodes[int(np.argmin(distance))]))
-        starts += [x for _, x in sorted(near)[:MOST_NEAR]]
-        result.append(list(dict.fromkeys(starts)))
-    return result
+        for (other, _), tree in zip(options, trees, strict=True):
+            if other != p:
+                away, _ = tree.query(rows, p=np.inf)
+                near.append((float(away.min()), own[int(np.argmin(away))]))
+        corner = own[int(np.argmin([len(links[root][node]) for node in own]))]
+        starts = dict.fromkeys([corner, *(node for _, node in sorted(near)[:MOST_NEAR])])
+        choices[p] += [patch_walk(roadmap, links[root], wanted[p], start) for start in starts]
+    return choices
 
 
 def cover_table(exploration: Exploration) -> tuple[list[int], Mask]:
