@@ -15,7 +15,6 @@ from feasibility.collisions.kernels.clearance import clearance_gradient, segment
 from robots.robot import Robot
 
 MOST_LINES = 40_000  # that are tried for one motion
-FIRST_LINE = 0.5  # [rad], length of the pieces that a line is tried in at first
 SHORTEST = 1e-3  # [rad], no line is halved below this
 LONGEST = 1.0  # [rad] towards a random place at once
 PUSHES, PUSH = 12, 0.1  # from what an end is near, and the length [rad] of one
@@ -44,21 +43,16 @@ class FreeSpace:
 
     def reached(self, start: Array, end: Array) -> Array:
         """(n,) how far the straight line is certified; `end` itself where all of it is."""
-        length = self.length(start, end)
-        here, done, step = start, 0.0, min(1.0, FIRST_LINE / max(length, SHORTEST))
-        while done < 1.0:
-            ahead = min(1.0, done + step)
-            there = end if ahead == 1.0 else start + ahead * (end - start)
-            self.left -= 1
-            if self.left < 0:
-                return here
-            if segment_clear(self.buffer, here, there) > 0.0:
-                here, done, step = there, ahead, 2.0 * step
-            elif step * length < SHORTEST:
-                return here
-            else:
-                step *= 0.5
-        return end
+        self.left -= 1
+        if self.left < 0:
+            return start
+        if segment_clear(self.buffer, start, end) > 0.0:
+            return end
+        if self.length(start, end) < SHORTEST:
+            return start
+        middle = 0.5 * (start + end)
+        here = self.reached(start, middle)
+        return here if here is not middle else self.reached(middle, end)
 
     def clear(self, start: Array, end: Array) -> bool:
         """Is all of a straight line certified?"""
