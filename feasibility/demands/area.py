@@ -144,7 +144,9 @@ def _measured(
         lines=contacts.lines,
         notes=_notes(surface, small, footprint),
     )
-    return _with_twice(found)
+    some = np.arange(0, len(found.shares), max(1, -(-len(found.shares) // MOST_COUNTED)))
+    again = found.mesh.areas[some] * (found.times(some) > 1)
+    return replace(found, twice=float(again.sum() / found.mesh.areas[some].sum()))
 
 
 def _untreated_regions(found: Treated) -> tuple[UntreatedRegion, ...]:
@@ -168,15 +170,6 @@ def _untreated_regions(found: Treated) -> tuple[UntreatedRegion, ...]:
         regions.append(UntreatedRegion(middles[own][nearest], float(areas[own].sum())))
     listed = (each for each in regions if each.area >= LEAST * found.area)
     return tuple(sorted(listed, key=lambda each: -each.area))
-
-
-def _with_twice(found: TreatedArea) -> TreatedArea:
-    """With the share that the tool comes by more than once, counted on some of the faces."""
-    every = max(1, -(-len(found.shares) // MOST_COUNTED))
-    some = np.arange(0, len(found.shares), every)
-    weight = found.mesh.areas[some]
-    again = found.times(some) > 1
-    return replace(found, twice=float((weight * again).sum() / weight.sum()))
 
 
 def _mesh_of(surface: Surface, edge: float) -> WorkingMesh:
