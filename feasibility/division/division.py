@@ -52,11 +52,6 @@ class Plan:
     """The components that the search found cannot be shared out in fewer patches."""
 
     @property
-    def optimal(self) -> bool:
-        """Is the number of patches proved to be the least, given the components found?"""
-        return len(self.patches) <= self.bound
-
-    @property
     def accepted(self) -> bool:
         """Are all walks accepted by the replay?"""
         return all(patch.accepted for patch in self.patches)
@@ -80,15 +75,13 @@ class Apart:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Division(Protected):
+class Division(Plan, Protected):
     """A surface divided into the fewest patches; see `feasibility.division.divide`."""
 
     robot: Robot
     cells: Cells
     task: Task
     seed: int
-    plan: Plan
-    """The fewest continuous motions; a patch may be in several pieces on the surface."""
     left_out: tuple[Cause, ...]
     """Cells that are in no patch, in order of index, and why."""
     unsettled: Ints
@@ -113,19 +106,9 @@ class Division(Protected):
     """Seconds: load_s, search_s, divide_s, total_s."""
 
     @property
-    def patches(self) -> tuple[SubPatch, ...]:
-        """The patches of the plan, in the order of work."""
-        return self.plan.patches
-
-    @property
-    def moves(self) -> tuple[Reconfiguration, ...]:
-        """The moves between these patches."""
-        return self.plan.moves
-
-    @property
     def optimal(self) -> bool:
         """Fewest of all that the search can find: it ended, and the optimum is proved."""
-        return (self.ended and self.plan.optimal) or self.proved_fewest
+        return (self.ended and len(self.patches) <= self.bound) or self.proved_fewest
 
     @property
     def proved_fewest(self) -> bool:
@@ -135,7 +118,7 @@ class Division(Protected):
     @property
     def decided(self) -> bool:
         """Did the search end, and is every walk accepted by the replay?"""
-        return self.ended and self.plan.accepted
+        return self.ended and self.accepted
 
     @property
     def n_covered(self) -> int:

@@ -16,11 +16,11 @@ only one of these components has; so most patches are in one piece.
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from coverable.arrays import Ints, Mask, Protected
+from coverable.arrays import Ints, Mask
 from feasibility.demands.motion_rates import replay_at_rates
 from feasibility.division.between_patches import clear_moves
 from feasibility.division.division import Plan, SubPatch
@@ -37,8 +37,7 @@ from surfaces.adjacency import components
 TIME_LIMIT = 10.0  # [s]
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Partition(Protected):
+class Partition(NamedTuple):
     """Each cell in exactly one patch, each patch inside one component."""
 
     rows: Ints
@@ -47,10 +46,6 @@ class Partition(Protected):
     """(N,) the patch of each cell; -1 for cells that nothing covers."""
     bound: int
     """No partition has fewer patches."""
-
-    def __len__(self) -> int:
-        """Number of patches."""
-        return len(self.rows)
 
 
 def fewest_patches(covers: Mask, pairs: Ints, time_limit: float = TIME_LIMIT) -> Partition:
@@ -64,7 +59,7 @@ def fewest_patches(covers: Mask, pairs: Ints, time_limit: float = TIME_LIMIT) ->
     Example:
         >>> covers = np.array([[1, 1, 0], [0, 1, 1]], dtype=bool)
         >>> found = fewest_patches(covers, np.array([[0, 1], [1, 2]]))
-        >>> len(found), found.bound, found.patch.tolist()
+        >>> len(found.rows), found.bound, found.patch.tolist()
         (2, 2, [0, 0, 1])
     """
     chosen = set_cover(covers[:, covers.any(axis=0)], time_limit)
@@ -139,9 +134,9 @@ def plan_of(
     robot, cells = asked.robot, asked.cells
     roots, covers = cover_table(exploration)
     partition = fewest_patches(covers, cells.pairs, min(TIME_LIMIT, max(left, LEAST_SECONDS)))
-    if len(partition) == 0:
+    wanted = [partition.patch == p for p in range(len(partition.rows))]
+    if not wanted:
         return Plan((), (), partition.bound)
-    wanted = [partition.patch == p for p in range(len(partition))]
     chosen = itinerary(robot, _choices(exploration, wanted, roots, covers, task.requires_rates))
     patches = []
     for p, walk in zip(chosen.order, chosen.walks, strict=True):

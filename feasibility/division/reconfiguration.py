@@ -103,10 +103,11 @@ def itinerary(robot: Robot, choices: Sequence[Sequence[Walk]]) -> Itinerary:
         for direction in (1, -1)
     ]
     group = np.array([p for p, _ in options], dtype=np.int64)
-    costs = _costs(robot, [walk for _, walk in options])
+    moves = _moves(robot, [walk for _, walk in options])
+    largest, total = moves.max(axis=2, initial=0.0), moves.sum(axis=2)
     own = [np.flatnonzero(group == p) for p in range(len(choices))]
-    orders = [[own[p] for p in order] for order in _orders(costs.largest, own)]
-    path = _least_path(costs, orders, AS_GOOD)
+    orders = [[own[p] for p in order] for order in _orders(largest, own)]
+    path = _least_path(largest, total, orders, AS_GOOD)
     return Itinerary(group[path].tolist(), _unwound(robot, [options[k][1] for k in path]))
 
 
@@ -124,24 +125,17 @@ def _turns(robot: Robot, walks: Sequence[Walk]) -> tuple[Array, Array]:
     return np.array(fewest), np.array(most)
 
 
-class _Costs(NamedTuple):
-    """(S, S) figures of the move from the end of each walk to the start of each other."""
+def _moves(robot: Robot, walks: Sequence[Walk]) -> Array:
+    """(S, S, n) rad, from the end of each walk to the start of each other: how far joints move.
 
-    largest: Array
-    """The largest move of a joint, rad."""
-    total: Array
-    """The sum over all joints, rad."""
-
-
-def _costs(robot: Robot, walks: Sequence[Walk]) -> _Costs:
-    """Moves between walks, each walk moved on by the full turns that suit the two best."""
+    Each walk is moved on by the full turns that suit the two best.
+    """
     starts = np.array([walk.q[0] for walk in walks])
     ends = np.array([walk.q[-1] for walk in walks])
     low, high = _turns(robot, walks)
     gap = starts[None] - ends[:, None]
     turns = np.clip(np.round(-gap / TURN), low[None] - high[:, None], high[None] - low[:, None])
-    moves = np.abs(gap + TURN * turns) * in_radians(robot)
-    return _Costs(np.max(moves, axis=2, initial=0.0), moves.sum(axis=2))
+    return np.asarray(np.abs(gap + TURN * turns) * in_radians(robot))
 
 
 def _orders(largest: Array, own: Sequence[Ints]) -> list[tuple[int, ...]]:
@@ -152,13 +146,18 @@ def _orders(largest: Array, own: Sequence[Ints]) -> list[tuple[int, ...]]:
     return [tuple(improved(apart, np.arange(len(own))).tolist())]
 
 
-def _least_path(costs: _Costs, orders: Sequence[Sequence[Ints]], as_good: float) -> list[int]:
+def _least_path(
+    largest: Array, total: Array, orders: Sequence[Sequence[Ints]], as_good: float
+) -> list[int]:
     """One option of each layer: the least sum, of those whose largest move is about the least.
 
-    The `orders` hold layers of options; `as_good` times the least is about the least.
+    Args:
+        largest, total: (S, S) from each option to each other: the largest move, and what is summed.
+        orders: each of layers of options.
+        as_good: times the least is about the least.
     """
-    most = min(_through(costs.largest, layers, np.maximum)[0] for layers in orders)
-    allowed = np.where(costs.largest <= as_good * most + SLACK, costs.total, np.inf)
+    most = min(_through(largest, layers, np.maximum)[0] for layers in orders)
+    allowed = np.where(largest <= as_good * most + SLACK, total, np.inf)
     return min(_through(allowed, layers, np.add) for layers in orders)[1]
 
 
@@ -202,7 +201,7 @@ def _unwound(robot: Robot, walks: Sequence[Walk]) -> list[Walk]:
         )
         fewest = move + SLACK * np.abs(turn)[:, None]  # of equal moves those with the fewest turns
         layers = [np.flatnonzero(walk == i) for i in range(count)]
-        turns[:, j] = turn[_least_path(_Costs(move, fewest), [layers], 1.0)]
+        turns[:, j] = turn[_least_path(move, fewest, [layers], 1.0)]
     # Rounding must not move a joint past its limit.
     return [
         Walk(np.clip(w.q + TURN * t, robot.lower, robot.upper) if t.any() else w.q, w.cell)

@@ -66,17 +66,17 @@ def as_json(division: Division, before_s: float = 0.0) -> dict[str, Any]:
         division: the division.
         before_s: seconds of imports and files before it began; they count as loading.
     """
-    cells, plan = division.cells, division.plan
+    cells = division.cells
     return {
         "answer": answer_of(division),
         "cells": len(cells),
         "covered": division.n_covered,
         "ended": division.ended,
-        "optimal": division.ended and plan.optimal,
-        "at_least": plan.bound,
-        "patches": [_patch_json(patch, cells) for patch in plan.patches],
-        "moves": [_move_json(move, k) for k, move in enumerate(plan.moves)],
-        "patch_of_cell": plan.patch_of(len(cells)).tolist(),
+        "optimal": division.ended and len(division.patches) <= division.bound,
+        "at_least": division.bound,
+        "patches": [_patch_json(patch, cells) for patch in division.patches],
+        "moves": [_move_json(move, k) for k, move in enumerate(division.moves)],
+        "patch_of_cell": division.patch_of(len(cells)).tolist(),
         "proved_at_least": division.at_least,
         "proof": proof_json(division.proof, division.robot, cells),
         "apart": [_apart_json(apart, division) for apart in division.apart],

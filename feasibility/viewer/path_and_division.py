@@ -110,30 +110,30 @@ def view_division(division: Division, case: str | None = None) -> View:
         division: the division.
         case: name of the case, for the title.
     """
-    robot, cells, plan = division.robot, division.cells, division.plan
+    robot, cells = division.robot, division.cells
     names = [
         f"patch {k + 1} ({counted(len(patch.cells), 'cell')})"
-        for k, patch in enumerate(plan.patches)
+        for k, patch in enumerate(division.patches)
     ]
-    parts = [*cells_layers(cells), *patch_layers(cells, plan.patch_of(len(cells)), names)]
+    parts = [*cells_layers(cells), *patch_layers(cells, division.patch_of(len(cells)), names)]
     parts += _left_out(division)
-    walks = [patch.walk.q for patch in plan.patches if len(patch.walk.q)]
+    walks = [patch.walk.q for patch in division.patches if len(patch.walk.q)]
     motion = None
     if walks:
         legs = [walks[0]]
-        for move, walk in zip(plan.moves, walks[1:], strict=True):
+        for move, walk in zip(division.moves, walks[1:], strict=True):
             legs += [_along(move, DENSE)[1:-1], walk]
         motion = paced(robot, np.concatenate(legs), False, "all patches")
         size = cell_size(cells)
-        for k, move in enumerate(plan.moves):
+        for k, move in enumerate(division.moves):
             parts.append(_move(robot, move, f"{k + 1} to {k + 2}", size))
-    patches = counted(len(plan.patches), "patch", "patches")
+    patches = counted(len(division.patches), "patch", "patches")
     title = f"{division.n_covered} of {counted(len(cells), 'cell')}: {patches}"
     if division.n_covered < len(cells):
         title += f", {len(cells) - division.n_covered} left out"
     text = f"{robot.name}; " + "; ".join(
         f"move {k + 1} to {k + 2}: {move.described(FEW)}{' (not clear)' if move.refusal else ''}"
-        for k, move in enumerate(plan.moves)
+        for k, move in enumerate(division.moves)
     )
     return compose(
         robot, cells, titled(title, case), text.rstrip("; "),

@@ -134,7 +134,7 @@ def test_the_motion_as_a_table_is_the_motion(commands):
 
 def test_a_number_of_motions_is_the_least_only_where_the_search_has_ended(plate):
     found = coverable.divide(*plate[0].build()[:3])
-    assert (found.plan.optimal, division.as_json(found)["optimal"]) == (True, True)
+    assert (found.optimal, division.as_json(found)["optimal"]) == (True, True)
     assert division.as_json(replace(found, ended=False))["optimal"] is False
 
 

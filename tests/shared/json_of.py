@@ -291,7 +291,7 @@ def of_runs(one: Any) -> Json:
 
 def of_divide(one: Any) -> Json:
     """The fewest patches; CONTRACT has no words for the answer in Python."""
-    plan, cells = one.plan, one.cells
+    plan, cells = one, one.cells
     by_cell = [
         next((k for k, patch in enumerate(plan.patches) if cell in patch.cells), -1)
         for cell in range(len(cells))
@@ -299,7 +299,8 @@ def of_divide(one: Any) -> Json:
     return {
         "answer": str, "cells": len(cells),
         "covered": len({k for patch in plan.patches for k in patch.cells.tolist()}),
-        "ended": one.ended, "optimal": one.ended and plan.optimal, "at_least": plan.bound,
+        "ended": one.ended, "optimal": one.ended and len(plan.patches) <= plan.bound,
+        "at_least": plan.bound,
         "patches": [
             {
                 "cells": [index(cells, k) for k in patch.cells],

@@ -38,7 +38,7 @@ def disconnected_problem(number):
 
 def assert_division(division):
     """Disjoint patches, walks that a replay accepts, moves between them, causes of the rest."""
-    robot, cells, task, plan = division.robot, division.cells, division.task, division.plan
+    robot, cells, task, plan = division.robot, division.cells, division.task, division
     taken, touching = np.zeros(len(cells), dtype=int), nx.Graph(cells.pairs.tolist())
     touching.add_nodes_from(range(len(cells)))
     for patch in plan.patches:
@@ -130,7 +130,7 @@ def test_divisions_agree_with_verdicts(arm, number):
     reached = np.zeros(len(verdict.cells), dtype=bool)
     for component in verdict.components:
         reached[component] = True
-    assert (division.plan.patch_of(len(reached)) >= 0)[reached].all()
+    assert (division.patch_of(len(reached)) >= 0)[reached].all()
     for patch in division.patches[:2] if arm != "paper" else ():
         assert_motion(division, patch.walk.q)
 
@@ -152,7 +152,7 @@ def test_how_many_it_takes_at_least_is_proved(number, motions):
     cells = sorted({cell for pair in pairs for cell in pair})
     assert len(cells) == (motions if motions > 2 else 0)
     assert pairs == set(itertools.combinations(cells, 2))
-    patch = division.plan.patch_of(len(division.cells))
+    patch = division.patch_of(len(division.cells))
     assert len(set(patch[cells].tolist())) == len(cells)  # no motion found has two of them
     hasty = divide(*setup, Search(time_limit=1e-6))
     assert (hasty.ended, hasty.proof, len(hasty.apart)) == (False, None, 0)

@@ -37,13 +37,13 @@ def assert_partition(found, covers):
     """Each cell that can be covered is in one patch, each patch in one row of its own."""
     inside = found.patch >= 0
     assert (inside == covers.any(axis=0)).all()
-    sizes = np.bincount(found.patch[inside], minlength=len(found))
-    assert len(sizes) == len(found)
+    sizes = np.bincount(found.patch[inside], minlength=len(found.rows))
+    assert len(sizes) == len(found.rows)
     assert sizes.all()
     assert (np.diff(sizes) <= 0).all()
     assert covers[found.rows[found.patch[inside]], np.flatnonzero(inside)].all()
-    assert len(set(found.rows.tolist())) == len(found)
-    assert found.bound <= len(found)
+    assert len(set(found.rows.tolist())) == len(found.rows)
+    assert found.bound <= len(found.rows)
 
 
 @sampled("block", seeds(3, all=20))
@@ -54,10 +54,11 @@ def test_random_tables_against_brute_force(block):
         n = covers.shape[1]
         found = fewest_patches(covers, pairs)
         assert_partition(found, covers)
-        assert len(found) == found.bound == fewest_by_brute_force(covers)
+        assert len(found.rows) == found.bound == fewest_by_brute_force(covers)
         place, mixed = rng.permutation(n), np.empty_like(covers)
         mixed[:, place] = covers
-        assert len(fewest_patches(mixed[rng.permutation(len(covers))], place[pairs])) == len(found)
+        other = fewest_patches(mixed[rng.permutation(len(covers))], place[pairs])
+        assert len(other.rows) == len(found.rows)
 
 
 def test_patches_grow_from_the_cells_without_a_choice():
@@ -71,7 +72,7 @@ def test_patches_grow_from_the_cells_without_a_choice():
 def test_nothing_covers_nothing():
     for shape in ((0, 0), (0, 4), (3, 0), (3, 4)):
         found = fewest_patches(np.zeros(shape, dtype=bool), np.zeros((0, 2), dtype=np.int64))
-        assert (len(found), found.bound, found.patch.tolist()) == (0, 0, [-1] * shape[1])
+        assert (len(found.rows), found.bound, found.patch.tolist()) == (0, 0, [-1] * shape[1])
 
 
 def test_without_time_there_is_a_gap_and_it_is_honest():
@@ -83,6 +84,6 @@ def test_without_time_there_is_a_gap_and_it_is_honest():
         hasty, best = fewest_patches(covers, pairs, 0.0), fewest_patches(covers, pairs)
         assert_partition(hasty, covers)
         assert_partition(best, covers)
-        assert hasty.bound <= best.bound <= len(best) <= len(hasty)
-        gaps.append(len(hasty) - hasty.bound)
+        assert hasty.bound <= best.bound <= len(best.rows) <= len(hasty.rows)
+        gaps.append(len(hasty.rows) - hasty.bound)
     assert any(gaps)
