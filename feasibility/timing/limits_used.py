@@ -5,7 +5,7 @@ parabolas and places are cubics, largest at the ends or where they turn. The too
 `PLACES` of each piece, and twice what a parabola through them may be higher is allowed for.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from feasibility.timing.speed_limits import MotionLimits, tool_speeds
 from robots.robot import Robot
 
 PLACES = 4  # at which the tool is looked at on each piece, its first end among them
-ROUNDING = 1e-12  # [rad] or [m] that is left free inside a joint's limits
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -71,23 +70,3 @@ def past_limits(robot: Robot, run: Trajectory) -> Array:
         q = run.at(times[np.isfinite(times)])[:, joint]
         low[joint], high[joint] = q.min(initial=low[joint]), q.max(initial=high[joint])
     return np.asarray(np.maximum(robot.lower - low, high - robot.upper))
-
-
-def held_inside(robot: Robot, run: Trajectory) -> Trajectory:
-    """The same motion, drawn in by what joints pass their limits by between samples.
-
-    Each of them is scaled about the middle of its limits (or moved, where it has one limit only),
-    its velocities and accelerations too: a spline is linear in its samples.
-    """
-    past = past_limits(robot, run) + ROUNDING
-    if not (past > 0.0).any():
-        return run
-    past = np.maximum(past, 0.0)
-    both = np.isfinite(robot.lower) & np.isfinite(robot.upper)
-    lower, upper = np.where(both, robot.lower, -1.0), np.where(both, robot.upper, 1.0)
-    middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
-    share = np.where(both & (past > 0.0), np.maximum(half - ROUNDING, 0.0) / (half + past), 1.0)
-    moved = np.where(both, 0.0, np.where(np.isfinite(robot.lower), past, -past))
-    q = np.where(past > 0.0, middle + share * (run.q - middle) + moved, run.q)
-    dq, ddq = share * run.dq, share * run.ddq
-    return replace(run, q=q, dq=dq, ddq=ddq, tool_speed=tool_speeds(robot, q, dq))

@@ -24,7 +24,7 @@ from feasibility.collisions.words import checked
 from feasibility.paths.coverage import CoveragePath
 from feasibility.paths.order import PathError
 from feasibility.task import Task
-from feasibility.timing.limits_used import PLACES, held_inside, past_limits, used, used_each
+from feasibility.timing.limits_used import PLACES, past_limits, used, used_each
 from feasibility.timing.sampled_trajectory import Trajectory
 from feasibility.timing.smooth_curve import Curve, blended, control_points
 from feasibility.timing.speed_limits import MotionLimits, motion_limits
@@ -37,7 +37,7 @@ DEFAULT_SPEED = 0.1  # [m/s] of the tool point
 DEFAULT_PERIOD = 0.02  # [s] between samples
 SHORTEST, LONGEST = 0.0001, 10.0  # [s], periods that can be requested
 FINER = 4  # times that the period may be halved
-MENDED = 1e-6  # [rad] or [m] past a joint's limit between samples: the motion is drawn in by that
+FREE = 1e-6  # [rad] or [m] from joint limits to samples: between them a joint may come nearer
 ROUNDS = 6  # timings of a curve, each with less where something was exceeded
 SLIGHTLY = 1.01  # [1] times a limit that is mended by slowing all of it down
 SLOWINGS = 16  # times that the last of them is slowed down
@@ -105,8 +105,6 @@ def trajectory(
         out = _move(leave, SHARE * share, int(walk.cell[-1]), 0)
         parts = [part for part in (into, curves.get(asked), out) if part is not None]
         run = within_limits(robot, parts, limits, period * share)
-        if past_limits(robot, run).max(initial=0.0) <= MENDED:
-            run = held_inside(robot, run)
         run = replace(run, working=_working(path, run))
         refusal = _refusal(path, run)
         if not refusal:
@@ -204,7 +202,10 @@ def _over(run: Trajectory, each: Array, timed: Sequence[TimedCurve]) -> list[Arr
 
 
 def _joined(robot: Robot, parts: Sequence[tuple[Array, Array, Ints]]) -> Trajectory:
-    """Samples one after the other; each part begins where the one before it ends."""
+    """Samples one after the other; each part begins where the one before it ends.
+
+    Joints that come to a limit are drawn in a little, for what a spline is past its samples.
+    """
     times, rows, cells, begin = list[Array](), list[Array](), list[Ints](), 0.0
     for time, q, cell in parts:
         first = int(begin > 0.0)
@@ -212,7 +213,11 @@ def _joined(robot: Robot, parts: Sequence[tuple[Array, Array, Ints]]) -> Traject
         rows.append(q[first:])
         cells.append(cell[first:])
         begin = float(times[-1][-1])
-    return Trajectory.through(robot, np.concatenate(times), np.vstack(rows), np.concatenate(cells))
+    q, free = np.vstack(rows), np.minimum(FREE, 0.5 * (robot.upper - robot.lower))
+    low, high = q.min(axis=0), q.max(axis=0)
+    first, last = np.clip([low, high], robot.lower + free, robot.upper - free)
+    q = first + (q - low) * (last - first) / np.maximum(high - low, np.finfo(float).tiny)
+    return Trajectory.through(robot, np.concatenate(times), q, np.concatenate(cells))
 
 
 def _refusal(path: CoveragePath, run: Trajectory) -> str:

@@ -9,7 +9,7 @@ import pytest
 from timed_motions import UR5, at, interpolated
 
 from coverable import Trajectory, load_robot, motion_limits
-from feasibility.timing.limits_used import held_inside, past_limits, used
+from feasibility.timing.limits_used import past_limits, used
 from feasibility.timing.sampled_trajectory import deviations
 from robots.kinematics import Kinematics
 
@@ -129,7 +129,7 @@ def test_what_turns_back_along_its_chord_is_beyond_it(times):
 
 
 @pytest.mark.parametrize("ends", ["both", "lower", "upper"])
-def test_a_motion_drawn_in_keeps_its_shape_and_its_limits(ends):
+def test_how_far_joints_pass_their_limits_between_samples(ends):
     """Random samples with steep ends, whose cubics pass the limits of all joints."""
     rng, k, robot = np.random.default_rng(3), 9, load_robot("panda")
     q = rng.uniform(robot.lower, robot.upper, (k, robot.n))
@@ -138,15 +138,9 @@ def test_a_motion_drawn_in_keeps_its_shape_and_its_limits(ends):
         limits[:, int(ends == "lower")] = np.inf if ends == "lower" else -np.inf
     bounded = robot.with_limits(limits)
     run = Trajectory.through(robot, np.arange(k) * 0.02, q, np.full(k, -1))
-    held = held_inside(bounded, run)
-    for made, inside in ((run, False), (held, True)):
-        dense = np.vstack([interpolated(made, degree, 400)[0] for degree in (3, 5)])
-        past = np.maximum(bounded.lower - dense.min(axis=0), dense.max(axis=0) - bounded.upper)
-        bound = past_limits(bounded, made)
-        assert (past <= bound + 1e-12).all()
-        assert (bound.max() <= 0.0) == inside
-        assert (past[past > 1e-3] >= 0.99 * bound[past > 1e-3]).all()
-    assert np.abs(held.q - run.q).max() <= 2.0 * past_limits(bounded, run).max() + 1e-11
-    scale = held.dq[1:-1] / run.dq[1:-1]
-    assert scale == pytest.approx(np.broadcast_to(scale[0], scale.shape))
-    assert held_inside(UR5, run_of("even")) is run_of("even")
+    dense = np.vstack([interpolated(run, degree, 400)[0] for degree in (3, 5)])
+    past = np.maximum(bounded.lower - dense.min(axis=0), dense.max(axis=0) - bounded.upper)
+    bound = past_limits(bounded, run)
+    assert (past <= bound + 1e-12).all()
+    assert bound.max() > 0.0
+    assert (past[past > 1e-3] >= 0.99 * bound[past > 1e-3]).all()
