@@ -18,7 +18,7 @@ import numpy as np
 from coverable.arrays import Mask
 from feasibility.certification.rate_replay import RateReplay, replay_rates
 from feasibility.clock import Clock, OutOfTime
-from feasibility.demands.rated_graph import Edge, RatedGraph, grow, rated_graph
+from feasibility.demands.motion_rates import Edge, RatedGraph, grow, rated_graph
 from feasibility.paths.motion_graph import MotionGraph
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import Roadmap

@@ -1,6 +1,13 @@
-"""What some motions allow: speed of the tool, and distance from singularities."""
+"""What motions allow: speed of the tool, and distance from singularities.
 
-from collections.abc import Sequence
+More motions than a verdict knows are made from cell to cell, from every known configuration,
+whatever the required speed: so what is found at one speed is found at every lower one, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -9,11 +16,13 @@ from coverable.arrays import Array, Mask
 from feasibility.certification.motion_replay import replay
 from feasibility.certification.rate_replay import RateReplay, in_place, replay_rates
 from feasibility.certification.segment_rates import segment_rates
+from feasibility.clock import Clock
 from feasibility.demands.every_demand import TOGETHER, further
 from feasibility.paths.coverage import CoveragePath
+from feasibility.paths.motion_graph import MotionGraph, join_self_motions, motion_graph_of, step_to
 from feasibility.paths.order import PathError
 from feasibility.task import Task
-from feasibility.verdict import Certificate, Walk
+from feasibility.verdict import Certificate, Verdict, Walk
 from robots.robot import Robot
 from surfaces.cells import Cells
 
@@ -117,3 +126,90 @@ def path_rates(path: CoveragePath, walk: Walk | None = None) -> RateReplay | Non
             f"singularity: {replayed.refusals[-1]}; try another --order"
         )
     return replayed
+
+
+Edge = tuple[int, int]
+"""Two nodes, the lower index first."""
+
+MOST_STEPS = 20_000  # attempts from a configuration to a cell beside it
+
+
+@dataclass
+class RatedGraph:
+    """Nodes, motions, and what they allow."""
+
+    robot: Robot
+    cells: Cells
+    task: Task
+    graph: MotionGraph
+    rated: dict[Edge, MotionRates] = field(default_factory=dict)
+
+    def rate(self) -> None:
+        """Rate the motions that are not yet rated, all at once."""
+        new = [(min(x, y), max(x, y)) for x, y in self.graph.edges.edges]
+        new = [edge for edge in new if edge not in self.rated]
+        if not new:
+            return
+        motions = [np.asarray(self.graph.motion(*edge)) for edge in new]
+        found = motion_rates(self.robot, self.cells, self.task, motions)
+        self.rated |= zip(new, found, strict=True)
+
+    @property
+    def begin(self) -> int | None:
+        """The node that a motion has to begin at; None where the arm has no start."""
+        start = self.robot.start
+        if start is None:
+            return None
+        return int(np.argmin([np.abs(q - start).max() for q in self.graph.q]))
+
+    def holding(self, speed: float) -> list[Edge]:
+        """The motions that allow a speed (m/s), and the singular values that the task requires."""
+        sigma = self.task.min_manipulability or -np.inf
+        return [e for e, r in self.rated.items() if r.speed >= speed and r.sigma >= sigma]
+
+    @property
+    def enough(self) -> list[Edge]:
+        """The motions that hold what the task requires."""
+        return self.holding(self.task.speed or -np.inf)
+
+    def fastest_to_cells(self, edges: Iterable[Edge]) -> dict[int, Edge]:
+        """The fastest of some motions to each cell that they lead to."""
+        best = dict[int, Edge]()
+        for edge in edges:
+            for cell in {self.graph.cell[node] for node in edge}:
+                if cell not in best or self.rated[edge].speed > self.rated[best[cell]].speed:
+                    best[cell] = edge
+        return best
+
+    def fault(self, edge: Edge, where: str = "") -> str:
+        """Why a motion does not hold what the task requires; `where` as in `MotionRates.fault`."""
+        return self.rated[edge].fault(self.robot, self.task, where)
+
+
+def rated_graph(verdict: Verdict) -> RatedGraph:
+    """The motions of a verdict of the complete search, rated."""
+    graph = RatedGraph(verdict.robot, verdict.cells, verdict.task, motion_graph_of(verdict))
+    graph.rate()
+    return graph
+
+
+def grow(rated: RatedGraph, clock: Clock) -> None:
+    """Make more motions from every known configuration to the cells beside it, and over its own.
+
+    Raises:
+        OutOfTime: the deadline passed; what was made until then is rated.
+    """
+    graph, left = rated.graph, MOST_STEPS
+    neighbours = rated.cells.neighbours
+    try:
+        for x, over in enumerate(list(graph.cell)):
+            clock.tick(0, None, "looking for faster motions")
+            join_self_motions(graph, x)
+            beside = np.unique(neighbours.of(over)).tolist()
+            for cell in beside:
+                step_to(graph, x, cell)
+            left -= len(beside)
+            if left <= 0:
+                break
+    finally:
+        rated.rate()

@@ -15,8 +15,7 @@ from coverable.errors import at_least, counted
 from feasibility.certification.rate_replay import RateReplay, replay_rates
 from feasibility.clock import Clock, OutOfTime
 from feasibility.demands.fast_motions import best_motion, largest_speed
-from feasibility.demands.motion_rates import replay_at_rates
-from feasibility.demands.rated_graph import RatedGraph, grow, rated_graph
+from feasibility.demands.motion_rates import RatedGraph, grow, rated_graph, replay_at_rates
 from feasibility.demands.requirements import required_words
 from feasibility.verdict import (
     Answer,

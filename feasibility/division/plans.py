@@ -14,13 +14,17 @@ the proven optimum. Patches then grow over the surface, all at the same speed, f
 only one of these components has; so most patches are in one piece.
 """
 
+from __future__ import annotations
+
 from collections import deque
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
 
 from coverable.arrays import Ints, Mask
+from feasibility.clock import Clock, OutOfTime
 from feasibility.demands.motion_rates import replay_at_rates
 from feasibility.division.between_patches import clear_moves
 from feasibility.division.division import Plan, SubPatch
@@ -28,11 +32,15 @@ from feasibility.division.reconfiguration import itinerary, straight_moves
 from feasibility.division.set_covering import set_cover
 from feasibility.roadmap.expansion import UNTRIED
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.rounds import improve
-from feasibility.roadmap.walk import links_of, patch_walk
+from feasibility.roadmap.rounds import explore, improve
+from feasibility.roadmap.search import exploration_of
+from feasibility.roadmap.walk import covering_walk, links_of, patch_walk
+from feasibility.search_settings import Search
 from feasibility.task import Task
 from feasibility.verdict import Walk
+from robots.robot import Robot
 from surfaces.adjacency import components
+from surfaces.cells import Cells
 
 TIME_LIMIT = 10.0  # [s]
 
@@ -232,3 +240,37 @@ def connect_pairs(exploration: Exploration, component: int, wanted: Mask) -> Non
     pairs = exploration.cells.pairs
     state = np.where(wanted[pairs].all(axis=1), UNTRIED, ELSEWHERE)
     exploration.close_pairs(state, component)
+
+
+class OneMotion(NamedTuple):
+    """A motion over some cells, or why there is none."""
+
+    walk: Walk | None
+    """None where it is refused."""
+    refusal: str
+    """Empty where the independent replay accepts it."""
+
+
+def motion_over(
+    robot: Robot, cells: Cells, task: Task, search: Search, cover: Mask, clock: Clock | None = None
+) -> OneMotion:
+    """One continuous motion over what a component covers.
+
+    Args:
+        robot, cells, task, search: those of the verdict that the component is of.
+        cover: (N,) its cells.
+        clock: whose time limit counts.
+    """
+    clock = (Clock() if clock is None else clock).allow(search.evaluations)
+    exploration = exploration_of(robot, cells, task, search.seed, clock)
+    exploration.early = search.early
+    with suppress(OutOfTime):
+        explore(exploration)
+    exploration.clock = Clock()
+    for root in exploration.roots():
+        found = exploration.covers(root)
+        if (found >= cover).all():
+            walk = covering_walk(exploration.roadmap, root)
+            refusal = replay_at_rates(robot, cells, task, walk, found)[1]
+            return OneMotion(None if refusal else walk, refusal)
+    return OneMotion(None, "the search did not find this motion again")

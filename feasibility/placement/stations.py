@@ -12,8 +12,7 @@ import numpy as np
 from coverable.arrays import Ints, Protected
 from feasibility.clock import Clock
 from feasibility.demands.every_demand import OF_EACH, unjudged
-from feasibility.division.one_motion import motion_over
-from feasibility.division.plans import fewest_patches
+from feasibility.division.plans import fewest_patches, motion_over
 from feasibility.placement.placements import COUNT, Placements
 from feasibility.placement.reach_bound import Reach
 from feasibility.placement.region import Pose, moved_cells

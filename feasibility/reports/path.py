@@ -27,9 +27,8 @@ from feasibility.reports.text_and_tables import (
 )
 from feasibility.reports.verdict_json import as_json as verdict_json
 from feasibility.results.plain import plain
-from feasibility.timing.limits_used import used
 from feasibility.timing.sampled_trajectory import Trajectory
-from feasibility.timing.speed_limits import MotionLimits
+from feasibility.timing.speed_limits import MotionLimits, used
 from feasibility.verdict import Verdict
 from feasibility.version import version
 from surfaces.passes.parallel import Passes
@@ -234,11 +233,8 @@ def share_at_speed(trajectory: Trajectory, speed: float) -> float:
 
     The rest is where the joints' accelerations do not allow it, at stops above all.
     """
-    over = np.flatnonzero(trajectory.cell >= 0)
-    if len(over) < 2:
-        return 0.0
-    inside = slice(int(over[0]), int(over[-1]) + 1)
-    speeds, time = trajectory.tool_speed[inside], trajectory.time[inside]
+    over = trajectory.over
+    speeds, time = trajectory.tool_speed[over], trajectory.time[over]
     lengths = 0.5 * (speeds[1:] + speeds[:-1]) * np.diff(time)
     fast = np.minimum(speeds[1:], speeds[:-1]) >= HARDLY_LESS * speed
     return float(lengths[fast].sum() / max(float(lengths.sum()), 1e-300))

@@ -13,7 +13,7 @@ from feasibility.demands.every_demand import refuse_start
 from feasibility.demands.fast_motions import rate_figures
 from feasibility.demands.requirements import check_requirements
 from feasibility.demands.treated_words import shortfall
-from feasibility.division.one_motion import motion_over
+from feasibility.division.plans import motion_over
 from feasibility.division.surface_division import divide
 from feasibility.search_settings import Progress, Search
 from feasibility.sensitivity.probes import Prober

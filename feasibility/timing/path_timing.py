@@ -24,10 +24,16 @@ from feasibility.collisions.words import checked
 from feasibility.paths.coverage import CoveragePath
 from feasibility.paths.order import PathError
 from feasibility.task import Task
-from feasibility.timing.limits_used import PLACES, past_limits, used, used_each
 from feasibility.timing.sampled_trajectory import Trajectory
 from feasibility.timing.smooth_curve import Curve, blended, control_points
-from feasibility.timing.speed_limits import MotionLimits, motion_limits
+from feasibility.timing.speed_limits import (
+    PLACES,
+    MotionLimits,
+    motion_limits,
+    past_limits,
+    used,
+    used_each,
+)
 from feasibility.timing.timed_curve import CurveBounds, TimedCurve
 from feasibility.verdict import Walk
 from robots.robot import Robot
@@ -70,8 +76,8 @@ def trajectory(
         entry, leave: (k, n) rad or m, moves before and behind it, see `feasibility.division.ends`.
 
     Returns:
-        The samples. They keep to the limits, and the independent replay accepts them, as straight
-        lines and as the quintics and cubics that controllers make of them.
+        The samples. They keep to the limits, and the replay accepts them, as straight lines and as
+        the quintics and cubics that controllers make of them.
 
     Raises:
         PathError: a number is not as it should be, or no such motion was found.
@@ -91,9 +97,10 @@ def trajectory(
     limits = motion_limits(robot, speed, velocity, acceleration)
     if not SHORTEST <= real(period) <= LONGEST:
         raise PathError(f"the period must be {SHORTEST} to {LONGEST} seconds, got {period!r}")
-    still = len(np.unique(walk.q, axis=0)) == 1
+    said, still = tuple(checked(task.collision)), len(np.unique(walk.q, axis=0)) == 1
     if still and entry is None and leave is None:
-        return _resting(path)
+        run = Trajectory.through(robot, np.zeros(1), walk.q[:1], walk.cell[:1])
+        return replace(run, collisions=said)
     # Turns found without collisions mostly stay clear, and the motion is judged anyway.
     tries = [] if task.collision is None else [(replace(task, collision=None), 0)]
     refusal, curves = "", dict[Task, Curve]()
@@ -105,21 +112,11 @@ def trajectory(
         out = _move(leave, SHARE * share, int(walk.cell[-1]), 0)
         parts = [part for part in (into, curves.get(asked), out) if part is not None]
         run = within_limits(robot, parts, limits, period * share)
-        run = replace(run, working=_working(path, run))
+        run = replace(run, working=_working(path, run), collisions=said)
         refusal = _refusal(path, run)
         if not refusal:
-            return replace(run, collisions=tuple(checked(task.collision)))
+            return run
     raise PathError(f"the independent replay refuses the timed motion: {refusal}")
-
-
-def _resting(path: CoveragePath) -> Trajectory:
-    """The trajectory of a path that is one configuration."""
-    robot, walk, rest = path.robot, path.walk, np.zeros((1, path.robot.n))
-    return Trajectory(
-        joint_names=robot.joint_names, time=np.zeros(1), q=walk.q[:1], dq=rest, ddq=rest,
-        tool_speed=np.zeros(1), cell=walk.cell[:1],
-        collisions=tuple(checked(path.task.collision)),
-    )  # fmt: skip
 
 
 def _move(rows: Array | None, share: float, cell: int, end: int) -> Curve | None:

@@ -20,8 +20,8 @@ from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from coverable.arrays import Array, Ints, Mask
 from coverable.errors import ArgumentError
-from feasibility.timing.speed_limits import tool_speeds
 from feasibility.verdict import Walk
+from robots.chain import moved_by_joints
 from robots.robot import Robot
 
 ROUNDING = 1e-12  # [rad] or [m]
@@ -116,10 +116,12 @@ class Trajectory:
 
     @staticmethod
     def through(robot: Robot, time: Array, q: Array, cell: Ints) -> "Trajectory":
-        """The motion through joints q (k, n) at times (k,) s, k at least 2."""
-        motion = CubicSpline(time, q, bc_type="clamped")
-        dq, ddq = motion(time, 1) + 0.0, motion(time, 2) + 0.0
-        dq[[0, -1]] = 0.0
+        """The motion through joints q (k, n) at times (k,) s; at rest where there is one."""
+        dq, ddq = np.zeros_like(q), np.zeros_like(q)
+        if len(time) > 1:
+            motion = CubicSpline(time, q, bc_type="clamped")
+            dq, ddq = motion(time, 1) + 0.0, motion(time, 2) + 0.0
+            dq[[0, -1]] = 0.0
         return Trajectory(robot.joint_names, time, q, dq, ddq, tool_speeds(robot, q, dq), cell)
 
     def __len__(self) -> int:
@@ -189,3 +191,14 @@ def bends(run: Trajectory) -> tuple[Array, Array]:
     h = np.diff(run.time)[:, None]
     start, end, ahead = run.dq[:-1], run.dq[1:], np.diff(run.q, axis=0) / h
     return (6.0 * ahead - 4.0 * start - 2.0 * end) / h, (2.0 * start + 4.0 * end - 6.0 * ahead) / h
+
+
+def tool_speeds(robot: Robot, q: Array, slope: Array) -> Array:
+    """(m,) m, how fast the tool point moves when the joints q (m, n) move at `slope` (m, n).
+
+    By the search's own kinematics, as Pinocchio takes far longer.
+    """
+    velocity = np.zeros((3, len(q)))
+    for by_joint, rate in zip(moved_by_joints(robot.chain, q), slope.T, strict=True):
+        velocity += by_joint * rate
+    return np.asarray(np.sqrt((velocity**2).sum(axis=0)))

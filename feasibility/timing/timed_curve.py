@@ -13,8 +13,9 @@ import numpy as np
 from coverable.arrays import Array, Ints
 from feasibility.paths.order import PathError
 from feasibility.timing.fastest_speeds import Rows, fastest_speeds
+from feasibility.timing.sampled_trajectory import tool_speeds
 from feasibility.timing.smooth_curve import Curve, inside
-from feasibility.timing.speed_limits import MotionLimits, tool_speeds
+from feasibility.timing.speed_limits import MotionLimits
 from robots.robot import Robot
 
 COARSEST, FINEST = 4, 32  # places of the grid on each piece of a curve

@@ -23,7 +23,7 @@ from feasibility.demands.area import treated_by_walk
 from feasibility.demands.motion_rates import path_rates
 from feasibility.division.ends import ends_of
 from feasibility.placement.trials import evaluator_of_study
-from feasibility.timing.limits_used import used
+from feasibility.timing.speed_limits import used
 from feasibility.verdict import Walk
 
 CHOICES = re.compile(r"\(choose from .*?\)")  # each version of Python has other quotes

@@ -15,7 +15,7 @@ from samples import sampled, spread
 
 import coverable
 from coverable import Answer, Evidence, Pose, Region, Search, check, evaluator_here, place, plane
-from feasibility.division.one_motion import motion_over
+from feasibility.division.plans import motion_over
 from feasibility.placement.reach_bound import Reach
 from feasibility.placement.region import AXES, PlacementError, moved_cells
 from feasibility.placement.trials import Trial, evaluator_of_study, search_with

@@ -17,9 +17,9 @@ import coverable
 from coverable import Collision, PathError, Task, check, coverage_path, motion_limits, trajectory
 from feasibility.certification.collisions.collision_replay import collision_replay
 from feasibility.collisions.asked_bodies import gather
-from feasibility.timing.limits_used import past_limits
 from feasibility.timing.path_timing import within_limits
 from feasibility.timing.smooth_curve import control_points
+from feasibility.timing.speed_limits import past_limits
 from feasibility.verdict import Walk
 from robots.kinematics import Kinematics
 

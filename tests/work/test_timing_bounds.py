@@ -9,8 +9,8 @@ import pytest
 from timed_motions import UR5, at, interpolated
 
 from coverable import Trajectory, load_robot, motion_limits
-from feasibility.timing.limits_used import past_limits, used
 from feasibility.timing.sampled_trajectory import deviations
+from feasibility.timing.speed_limits import past_limits, used
 from robots.kinematics import Kinematics
 
 MANY = 40  # places between two samples
