@@ -20,10 +20,6 @@ COLLISIONS = COMPILING.format("the kernels that keep clear of collisions")
 MORE = COMPILING.format("what else `coverable {}` needs")
 REASONS = COMPILING.format("the kernels that say why cells are missed")
 GREEDY = COMPILING.format("the kernels of the greedy search")
-WAITING = (
-    "waiting for the workers to load the search kernels (compiled on their first run, up to a "
-    "minute) ..."
-)
 PATIENCE = 3.0  # [s]: loading them from the cache takes less, unless the machine is busy
 
 _open: list[Any] = []  # what watches for compilations now, the innermost last

@@ -192,18 +192,18 @@ def _unknown(explanation: Explanation) -> str:
 def _dropped(verdict: Verdict, dropped: Dropped) -> str:
     """Which cells would have to be given up, unless the search for them was cut short."""
     cells, number = len(verdict.cells), len(dropped.cells)
-    if verdict.answer is Answer.UNDECIDED and dropped.waypoints is None:
+    if verdict.answer is Answer.UNDECIDED and dropped.witness is None:
         found = f"{verdict.n_covered} of {cells} cells"
         return f"The best motion so far covers {found}; what would have to be dropped is unknown."
     if number == cells:
         return f"No cell is covered; all {cells} would have to be dropped."
     missed = "cell" if number == 1 else f"{number:,} cells"
     which = f"the {missed} that the best motion misses ({100.0 * dropped.share:.3g} % of the area)"
-    if dropped.waypoints is None:
+    if dropped.witness is None:
         return f"Dropping {which} may leave one motion, but none could be certified."
     return (
         f"Dropping {which} leaves one motion over the other {cells - number:,}: "
-        f"{dropped.waypoints:,} waypoints, replayed."
+        f"{len(dropped.witness.q):,} waypoints, replayed."
     )
 
 
@@ -231,7 +231,7 @@ def as_json(explanation: Explanation, case_name: str, case: Case | None = None) 
             "cells": [list(verdict.cells.unravel(int(k))) for k in dropped.cells],
             "area_m2": dropped.area,
             "share": dropped.share,
-            "waypoints": dropped.waypoints,
+            "waypoints": dropped.witness and len(dropped.witness.q),
         },
         "collisions": checked(verdict.task.collision),
         "evaluations": explanation.evaluations,

@@ -84,7 +84,7 @@ def headline(explanation: Explanation) -> str:
     why = "No change was found to help" if explanation.thresholds else "Nothing was looked at"
     if helpful(explanation):
         why += ", but for a cone in which the tool may point away from the surface"
-    if dropped is not None and dropped.waypoints is not None:
+    if dropped is not None and dropped.witness is not None:
         rest = len(verdict.cells) - len(dropped.cells)
         without = f"without {counted(len(dropped.cells), 'cell')} one motion covers the other"
         return f"{verdict.answer}. {why}; {without} {rest:,}."

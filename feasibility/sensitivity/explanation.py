@@ -14,7 +14,6 @@ from feasibility.demands.fast_motions import rate_figures
 from feasibility.demands.requirements import check_requirements
 from feasibility.demands.treated_words import shortfall
 from feasibility.division.plans import motion_over
-from feasibility.division.surface_division import divide
 from feasibility.search_settings import Progress, Search
 from feasibility.sensitivity.probes import Prober
 from feasibility.sensitivity.quantities import Kind, Quantity, Variant, quantities
@@ -165,30 +164,16 @@ def _over_given(found: Explanation, search: Search, clock: Clock) -> Walk | None
 
 
 def drop(prober: Prober) -> Dropped:
-    """What the best motion misses, and that motion; or all but the largest patch of a division.
+    """What the best motion misses, and that motion.
 
     Raises:
         OutOfTime: the deadline passed.
     """
     verdict, cells = prober.verdict, prober.given.cells
     left, walk = ~verdict.covered, None
-    if verdict.covered.any() and not cells.in_order:  # a toolpath is not divided
-        search = Search(seed=verdict.seed)
+    if verdict.covered.any() and not cells.in_order:  # a toolpath is not run in part
+        search, clock = Search(seed=verdict.seed), prober.clock.part(1.0)
         prober.tick()
-        walk, _ = motion_over(*prober.given, search, verdict.covered, prober.clock.part(1.0))
-        division = None
-        if walk is None:
-            division = divide(*prober.given, search, clock=prober.clock.part(1.0))
-        patches = [] if division is None else [one for one in division.patches if one.accepted]
-        if patches:
-            largest = max(patches, key=lambda patch: patch.area)
-            walk, left = largest.walk, np.ones(len(cells), dtype=bool)
-            left[largest.cells] = False
+        walk, _ = motion_over(*prober.given, search, verdict.covered, clock)
     area = float(cells.areas[left].sum())
-    return Dropped(
-        cells=np.flatnonzero(left),
-        area=area,
-        share=area / float(cells.areas.sum()),
-        waypoints=None if walk is None else len(walk.q),
-        witness=walk,
-    )
+    return Dropped(np.flatnonzero(left), area, area / float(cells.areas.sum()), walk)

@@ -120,10 +120,8 @@ class Dropped(Protected):
     """m^2."""
     share: float
     """Of the whole area, 0..1."""
-    waypoints: int | None
-    """Of the motion that covers all others, which the replay accepted; None where there is none."""
-    witness: Walk | None = None
-    """That motion."""
+    witness: Walk | None
+    """The motion that covers all others, which the replay accepted; None where there is none."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -5,13 +5,9 @@ from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import CancelledError
 from contextlib import suppress
-from functools import partial
 
 from distributed import Client, Future, KilledWorker, wait
-from distributed.comm import get_address_host
 
-from feasibility.notices import WAITING, notify
-from feasibility.roadmap.warmup import warm_up
 from feasibility.studies.pool import (
     LOOK,
     Receive,
@@ -30,13 +26,12 @@ FIRST_WORKER = 60.0  # [s] for the first worker to be there
 class DaskWorkers:
     """The workers of a Dask cluster; Dask itself does again what dies with one of them."""
 
-    def __init__(self, address: str, warm: bool, connect: float) -> None:
+    def __init__(self, address: str, connect: float) -> None:
         """Connect, and wait for the first worker; see `open_workers`.
 
         Raises:
             WorkersError: nothing useful answers there.
         """
-        self._warm = warm
         # A client that could not connect lives on in its own traceback. Where the garbage collector
         # closes it while another starts a thread, both wait for one lock for ever; so it goes now.
         gc.collect()
@@ -64,8 +59,6 @@ class DaskWorkers:
         """See `Workers`."""
         waiting, flying = deque(range(len(tables))), dict[Future, int]()
         try:
-            if self._warm:
-                self._load()
             while waiting or flying:
                 receive(self._step(work, tables, waiting, flying))
         finally:
@@ -106,16 +99,6 @@ class DaskWorkers:
             raise
         except Exception as error:  # what the tasks themselves raise comes as a reply
             raise untold(error) from error
-
-    def _load(self) -> None:
-        """Have one worker of each machine load the kernels, so that the others need not compile."""
-        machines = {get_address_host(name): name for name in self._client.nthreads()}
-        notify(WAITING)
-        with self._client.as_current():
-            # Another one will do, should the one that is named die meanwhile.
-            submit = partial(self._client.submit, pure=False, allow_other_workers=True)
-            wait([submit(warm_up, True, workers=[name]) for name in machines.values()])
-        self._warm = False
 
     def close(self) -> None:
         """Leave the cluster; it goes on without us."""

@@ -75,7 +75,6 @@ def outcome_of(verdict: Verdict, causes: bool = True) -> Outcome:
     areas = np.asarray(verdict.cells.areas)
     total = float(areas.sum())
     kinds = Counter(cause.kind for cause in verdict.causes) if causes else Counter()
-    measured = verdict.certificate
     return {
         "verdict": verdict.answer,
         "evidence": verdict.evidence,
@@ -90,13 +89,6 @@ def outcome_of(verdict: Verdict, causes: bool = True) -> Outcome:
         "causes": dict(sorted(kinds.items(), key=lambda entry: (-entry[1], entry[0]))),
         "components": [bits_of(cover) for cover in component_covers(verdict)],
         "margins": margins_of(verdict),
-        "certificate": None
-        if measured is None
-        else {
-            "waypoints": int(measured.waypoints),
-            "max_position_error_m": finite(measured.max_position_error),
-            "max_angle_deg": finite(math.degrees(measured.max_angle)),
-        },
         "unchecked_links": list(verdict.unchecked_links),
         "fk": int(verdict.statistics.get("fk", 0)),
     }

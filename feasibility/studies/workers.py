@@ -25,8 +25,8 @@ def open_workers(
         count: processes on this machine; None for one on each processor, 0 for none: then tasks
             run in this process.
         address: of a Dask scheduler, such as "tcp://127.0.0.1:8786", instead of processes.
-        warm: load the kernels of the search before the first task. Where they have to be compiled,
-            one process does it while the others wait, and a line on stderr says so.
+        warm: load the kernels of the search in every process before its first task. Where they have
+            to be compiled, this process does it before, and a line on stderr says so.
         connect: s for a Dask scheduler to answer.
 
     Raises:
@@ -49,7 +49,7 @@ def open_workers(
             raise WorkersError(
                 "--dask needs the library distributed: pip install 'coverable[dask]'"
             ) from error
-        workers = DaskWorkers(address, warm, connect)
+        workers = DaskWorkers(address, connect)
     elif count == 0:
         workers = Here(warm)
     else:

@@ -383,7 +383,8 @@ def of_explain(one: Any) -> Json:
         "not_looked_at": list(one.left_out),
         "dropped": dropped and {
             "cells": [index(cells, k) for k in dropped.cells], "area_m2": share,
-            "share": share / cells.areas.sum(), "waypoints": dropped.waypoints,
+            "share": share / cells.areas.sum(),
+            "waypoints": dropped.witness and len(dropped.witness.q),
         },
         "collisions": checked(verdict.task.collision), "evaluations": int, "seconds": float,
         "robot": verdict.robot.name, "seed": verdict.seed, "version": str,

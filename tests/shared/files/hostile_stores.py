@@ -40,7 +40,7 @@ def allowed(key: str, odd: Any) -> bool:
     """May a result hold this of the odd values?"""
     if key == "message":
         return odd in ("", SCRIPT, "maybe")
-    if key in ("margins", "certificate"):
+    if key == "margins":
         return odd is None
     if key in ("components", "causes"):
         return bool(odd == ([] if key == "components" else {}))
