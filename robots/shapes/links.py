@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import pinocchio as pin
@@ -70,22 +70,23 @@ def link_shapes(robot: Robot, fineness: Fineness = "hulls") -> LinkShapes:
     checked = check_urdf(
         robot.urdf, robot.package_dirs, robot.axes, xacro_args=dict(robot.xacro_args)
     )
-    gathered = _Gathered(robot, checked)
-    for link in checked.links:
-        gathered.add(link)
-    solids = tuple(gathered.solids)
-    unchecked, notes = gathered.unchecked(), gathered.notes()
+    found = _gathered(robot, checked)
+    solids, notes = tuple(found.solids), _notes(found)
     if not solids:
         why = "; ".join(notes) or "its links have neither collision shapes nor visuals"
         raise RobotError(
             f"no link has a shape that can be used for collisions: {why}", f"robot {robot.name!r}"
         )
+    lost = [*(link for links in found.lost.values() for link in links), *found.without]
+    # What bears nothing but the root moves only as seen from another link.
+    carrying = {0, *(solid.joint for solid in solids)}
+    gaps = [link for joint, link in found.carriers.items() if joint not in carrying]
+    unchecked = dict.fromkeys([*lost, *(link for link in gaps if link != checked.root)])
     polytopes = tuple(body for solid in solids for body in outer_bodies(solid, fineness))
     parents = {joint.child: joint.parent for joint in checked.joints}
-    embodied = gathered.embodied()
-    return LinkShapes(
-        solids, polytopes, unchecked, notes, embodied, checked.root, robot.tool_frame, parents
-    )
+    embodied = frozenset([*(solid.owner for solid in solids), *lost])
+    tree = checked.root, robot.tool_frame, parents
+    return LinkShapes(solids, polytopes, tuple(unchecked), notes, embodied, *tree)
 
 
 def outer_bodies(solid: Solid, fineness: Fineness = "hulls") -> list[Polytope]:
@@ -99,106 +100,86 @@ def outer_bodies(solid: Solid, fineness: Fineness = "hulls") -> list[Polytope]:
     return bodies
 
 
+@dataclass(eq=False, slots=True)
 class _Gathered:
     """Solids link by link, and what is to be said about them."""
 
-    def __init__(self, robot: Robot, checked: CheckedUrdf) -> None:
-        self.robot = robot
-        self.root = checked.root
-        shapes = checked.collisions.shapes or checked.visuals
-        self.meshes = MeshBodies(mesh_paths(shapes))
-        self.solids: list[Solid] = []
-        self.collisions, self.visuals = map(_by_link, (checked.collisions.shapes, checked.visuals))
-        self.collision_faults = {fault.link: fault.why for fault in checked.collisions.faults}
-        self.visual_faults = {fault.link: fault.why for fault in checked.visual_faults}
-        self.without = [link for link in checked.collisions.without if link in self.visuals]
-        self.bare = set(checked.collisions.without)
-        self.stand_ins: list[str] = []
-        self.replaced: dict[str, list[str]] = {}  # what is wrong -> links
-        self.lost: dict[str, list[str]] = {}  # what is wrong -> links
-        self.carriers: dict[int, str] = {}  # the first link of each joint
-        self.bodies = {f.name for f in robot.model.frames if f.type == pin.FrameType.BODY}
+    without: list[str]
+    """Links that the URDF leaves without collision shapes on purpose, and draws."""
+    solids: list[Solid] = field(default_factory=list)
+    stand_ins: list[str] = field(default_factory=list)
+    """Links whose visuals stand in for collision shapes that they do not have; ..."""
+    replaced: dict[str, list[str]] = field(default_factory=dict)
+    """... that cannot be used, by what is wrong."""
+    lost: dict[str, list[str]] = field(default_factory=dict)
+    """Links with a shape that nothing stands in for, by what is wrong."""
+    carriers: dict[int, str] = field(default_factory=dict)
+    """The first link of each joint."""
 
-    def add(self, link: str) -> None:
-        """Take the shapes of one link."""
-        if link not in self.bodies:  # the file has changed since it was loaded
-            return
-        frame = self.robot.model.frames[self.robot.model.getFrameId(link, pin.FrameType.BODY)]
-        joint, place = int(frame.parentJoint), frame.placement.homogeneous
-        self.carriers.setdefault(joint, link)
-        if link in self.bare:
-            return
-        found, fault = self._read(self.collisions.get(link, []))
-        fault = fault or self.collision_faults.get(link, "")
+
+def _gathered(robot: Robot, checked: CheckedUrdf) -> _Gathered:
+    """Take the shapes of all links."""
+    own, model = checked.collisions, robot.model
+    bodies = {frame.name for frame in model.frames if frame.type == pin.FrameType.BODY}
+    meshes = MeshBodies(mesh_paths(own.shapes or checked.visuals))
+    faults = [{one.link: one.why for one in some} for some in (own.faults, checked.visual_faults)]
+    drawn = {shape.link for shape in checked.visuals}
+    made = _Gathered([link for link in own.without if link in drawn])
+    for link in checked.links:
+        if link not in bodies:  # the file has changed since it was loaded
+            continue
+        frame = model.frames[model.getFrameId(link, pin.FrameType.BODY)]
+        made.carriers.setdefault(int(frame.parentJoint), link)
+        if link in own.without:
+            continue
+        found, fault = _read(meshes, link, own.shapes, faults[0])
         if fault or not found:
-            shown, visual_fault = self._read(self.visuals.get(link, []))
-            visual_fault = visual_fault or self.visual_faults.get(link, "")
-            if visual_fault or (fault and not shown):
-                self.lost.setdefault(visual_fault or fault, []).append(link)
+            shown, unseen = _read(meshes, link, checked.visuals, faults[1])
+            if unseen or (fault and not shown):
+                made.lost.setdefault(unseen or fault, []).append(link)
             elif fault:
-                self.replaced.setdefault(fault, []).append(link)
+                made.replaced.setdefault(fault, []).append(link)
             elif shown:
-                self.stand_ins.append(link)
+                made.stand_ins.append(link)
             found += shown  # those that can be read are kept: more is safe
         for origin, geometry in found:
-            placement = place @ origin
+            placement = frame.placement.homogeneous @ origin
             placement.flags.writeable = False
-            self.solids.append(Solid(link, joint, placement, geometry))
+            made.solids.append(Solid(link, int(frame.parentJoint), placement, geometry))
+    return made
 
-    def _read(self, shapes: Iterable[LinkShape]) -> tuple[list[tuple[np.ndarray, Geometry]], str]:
-        """The shapes that can be used, and what is wrong with the first of the others."""
-        found: list[tuple[np.ndarray, Geometry]] = []
-        fault = ""
-        for shape in shapes:
-            given = shape.geometry
-            try:
-                geometry = self.meshes.read(given) if isinstance(given, MeshFile) else given
-            except RobotError as error:
-                fault = fault or str(error)
-                continue
+
+def _read(
+    meshes: MeshBodies, link: str, shapes: Iterable[LinkShape], faults: Mapping[str, str]
+) -> tuple[list[tuple[np.ndarray, Geometry]], str]:
+    """The shapes of a link that can be used, and what is wrong with the first of the others."""
+    found, fault = list[tuple[np.ndarray, Geometry]](), ""
+    for shape in (one for one in shapes if one.link == link):
+        given = shape.geometry
+        try:
+            geometry = meshes.read(given) if isinstance(given, MeshFile) else given
             found.append((shape.origin, geometry))
-        return found, fault
-
-    def embodied(self) -> frozenset[str]:
-        """See `LinkShapes.embodied`."""
-        return frozenset(solid.owner for solid in self.solids) | {*self._lost(), *self.without}
-
-    def _lost(self) -> list[str]:
-        return [link for links in self.lost.values() for link in links]
-
-    def unchecked(self) -> tuple[str, ...]:
-        """See `LinkShapes.unchecked`."""
-        carrying = {solid.joint for solid in self.solids}
-        bare = {*carrying, 0}
-        gaps = [link for joint, link in self.carriers.items() if joint not in bare]
-        gaps = [link for link in gaps if link != self.root]  # moves only as seen from another link
-        return tuple(dict.fromkeys([*self._lost(), *self.without, *gaps]))
-
-    def notes(self) -> tuple[str, ...]:
-        """See `LinkShapes.notes`."""
-        notes = []
-        for why, links in self.lost.items():
-            so = "they are" if len(links) > 1 else "it is"
-            notes.append(f"a shape of {_named(links)} cannot be used, so {so} not checked: {why}")
-        notes += [
-            f"a collision shape of {_named(links)} cannot be used, so visuals stand in: {why}"
-            for why, links in self.replaced.items()
-        ]
-        if self.stand_ins:
-            notes.append(f"no collision shapes, so visuals stand in: {_named(self.stand_ins)}")
-        if self.without:
-            notes.append(
-                f"left without collision shapes by the URDF, so not checked: {_named(self.without)}"
-            )
-        return tuple(notes)
+        except RobotError as error:
+            fault = fault or str(error)
+    return found, fault or faults.get(link, "")
 
 
-def _by_link(shapes: Iterable[LinkShape]) -> dict[str, list[LinkShape]]:
-    """The shapes of each link."""
-    found: dict[str, list[LinkShape]] = {}
-    for shape in shapes:
-        found.setdefault(shape.link, []).append(shape)
-    return found
+def _notes(found: _Gathered) -> tuple[str, ...]:
+    """See `LinkShapes.notes`."""
+    notes = []
+    for why, links in found.lost.items():
+        so = "they are" if len(links) > 1 else "it is"
+        notes.append(f"a shape of {_named(links)} cannot be used, so {so} not checked: {why}")
+    notes += [
+        f"a collision shape of {_named(links)} cannot be used, so visuals stand in: {why}"
+        for why, links in found.replaced.items()
+    ]
+    if found.stand_ins:
+        notes.append(f"no collision shapes, so visuals stand in: {_named(found.stand_ins)}")
+    if found.without:
+        left = _named(found.without)
+        notes.append(f"left without collision shapes by the URDF, so not checked: {left}")
+    return tuple(notes)
 
 
 def _named(links: list[str]) -> str:
