@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from coverable.arrays import Array, Ints, Mask
 from coverable.errors import ArgumentError, CoverableError
 from feasibility.certification.cut_proofs.proof_verification import verify_proof
-from feasibility.certification.faults import MotionFault
+from feasibility.certification.faults import Judged, MotionFault
 from feasibility.certification.motion_replay import replay_over_surface
 from feasibility.clock import Clock, OutOfTime
 from feasibility.collisions.asked_bodies import said_of
@@ -50,7 +50,7 @@ class NothingToVerifyError(CoverableError):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Verification:
+class Verification(Judged):
     """What became of a claim."""
 
     claim: Claim
@@ -83,17 +83,12 @@ class Verification:
     @property
     def holds(self) -> bool:
         """True where the claim is confirmed."""
-        return not self.faults
+        return self.accepted
 
     @property
     def collision(self) -> Collision | None:
         """What bodies were judged to stay clear of; None where that was not looked at."""
         return None if "collisions" in self.not_judged else self.task.collision
-
-    @property
-    def refusal(self) -> str:
-        """Why it does not hold, where and by how much; empty where it does."""
-        return "; ".join(map(str, self.faults))
 
     def __repr__(self) -> str:
         """One line."""

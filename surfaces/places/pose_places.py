@@ -99,19 +99,12 @@ class PosePlaces(OffsetSurface):
         _, first, group = np.unique(both, axis=0, return_index=True, return_inverse=True)
         return np.asarray(first[group.reshape(-1)])
 
-    def _ends(self, chart: Ints) -> tuple[Ints, Ints]:
-        i, j = self.poses.pairs[chart].T
-        return i, j
-
     def at(self, places: Places) -> tuple[Array, Array]:
         """See `OffsetSurface.at`."""
-        return self._at(places.chart, places.x[..., 0])
-
-    def _at(self, chart: Ints, t: Array) -> tuple[Array, Array]:
-        known = np.flatnonzero(chart >= 0)
+        chart, known = places.chart, np.flatnonzero(places.chart >= 0)
         points, directions = np.full((2, len(chart), 3), np.nan)
-        i, j = self._ends(chart[known])
-        share = t[known]
+        i, j = self.poses.pairs[chart[known]].T
+        share = places.x[known, 0]
         points[known] = self._points[i] + share[:, None] * self._ahead[chart[known]]
         directions[known], _ = arc_at(self._directions[i], self._directions[j], share)
         return points, directions
@@ -146,7 +139,7 @@ class PosePlaces(OffsetSurface):
         near = curves[tree.query(points[known], k=count)[1].reshape(len(known), count)]
         put(*self._curves_of(self.poses.pairs[near].reshape(len(known), -1)))
         # Where these are all too far off, any curve that is not: it has a place as near as this.
-        off = np.linalg.norm(points[known] - self._at(chart[known], t[known])[0], axis=1)
+        off = np.linalg.norm(points[known] - self.at(_placed(chart[known], t[known]))[0], axis=1)
         (far,) = np.nonzero(off > within)
         some = tree.query_ball_point(points[known[far]], np.hypot(min(within, 1e9), 0.5 * wide))
         row = np.repeat(far, [len(one) for one in some])
@@ -165,7 +158,7 @@ class PosePlaces(OffsetSurface):
 
     def _closest(self, chart: Ints, points: Array, axes: Array) -> tuple[Array, Array]:
         """(k,) t on each curve, and its cost: the squared distance, with a little of the turn."""
-        i, j = self._ends(chart)
+        i, j = self.poses.pairs[chart].T
         begin, ahead, angle = self._points[i], self._ahead[chart], self._turn[chart]
         square = (ahead**2).sum(axis=1)
         known = np.linalg.norm(axes, axis=1) > 0.0
@@ -180,7 +173,7 @@ class PosePlaces(OffsetSurface):
         t = np.divide(square * along + weight * turned, square + weight,
                       out=np.zeros(len(chart)), where=square + weight > 0.0)  # fmt: skip
         t = np.clip(t, 0.0, 1.0)
-        target, direction = self._at(chart, t)
+        target, direction = self.at(_placed(chart, t))
         leans = np.where(known, ((axes - direction) ** 2).sum(axis=1), 0.0)
         return t, ((points - target) ** 2).sum(axis=1) + TURN**2 * leans
 
@@ -236,7 +229,7 @@ class PosePlaces(OffsetSurface):
             return found
         along = self.poses.turned(self.poses.along)
         known = np.flatnonzero(places.chart >= 0)
-        i, j = self._ends(places.chart[known])
+        i, j = self.poses.pairs[places.chart[known]].T
         found[known], _ = arc_at(along[i], along[j], places.x[known, 0])
         return found
 
@@ -250,7 +243,7 @@ class PosePlaces(OffsetSurface):
         if self.poses.along is None:
             return super().tangent_deviations(start, end)
         along = self.poses.turned(self.poses.along)
-        i, j = self._ends(start.chart)
+        i, j = self.poses.pairs[start.chart].T
         angle = arc_angles(along[i], along[j])
         turn = np.abs(end.x[:, 0] - start.x[:, 0]) * angle * ROUNDING
         same = (start.chart >= 0) & (start.chart == end.chart)
