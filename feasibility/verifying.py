@@ -209,11 +209,7 @@ def _in_time(
 
 
 def _of_motion(
-    claim: Claim,
-    problem: Problem,
-    q: Any,
-    marks: Ints | None = None,
-    working: Mask | None = None,
+    claim: Claim, problem: Problem, q: Any, marks: Ints | None = None, working: Mask | None = None
 ) -> Verification:
     """The replay of a motion over the surface, and the other demands' judges."""
     robot, cells, task = problem.robot, problem.cells, problem.task

@@ -57,12 +57,7 @@ def in_order(samples: Samples) -> Samples:
 
 
 def cells_reached(
-    robot: Robot,
-    cells: Cells,
-    task: Task,
-    rows: Array,
-    samples: Samples,
-    marks: Ints | None = None,
+    robot: Robot, cells: Cells, task: Task, rows: Array, samples: Samples, marks: Ints | None = None
 ) -> Reached:
     """Which cells a motion reaches.
 

@@ -30,11 +30,7 @@ from feasibility.certification.lever_bounds import (
     second_derivatives,
     smallest_singular,
 )
-from feasibility.certification.segment_rates import (
-    SegmentRates,
-    fastest_anywhere,
-    segment_rates,
-)
+from feasibility.certification.segment_rates import SegmentRates, fastest_anywhere, segment_rates
 from feasibility.task import Task
 from feasibility.verdict import Walk
 from robots.kinematics import Kinematics

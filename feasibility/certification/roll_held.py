@@ -156,11 +156,7 @@ class HeldRoll:
         return off_middle(roll_vectors(x, axes, references, approaches, self.roll))
 
     def rolls_between(
-        self,
-        x: tuple[Array, Array],
-        axes: tuple[Array, Array],
-        second: Array,
-        path: PlacePaths,
+        self, x: tuple[Array, Array], axes: tuple[Array, Array], second: Array, path: PlacePaths
     ) -> Array:
         """(k,) rad, bounds on that along stretches; inf where the roll may leave its range.
 

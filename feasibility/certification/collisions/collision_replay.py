@@ -137,10 +137,7 @@ def couples_of(bodies: Bodies) -> Couples:
 
 
 def collision_replay(
-    robot: Robot,
-    bodies: Bodies,
-    q: Array,
-    deviations: Array | None = None,
+    robot: Robot, bodies: Bodies, q: Array, deviations: Array | None = None
 ) -> CollisionReplay:
     """Judge a motion that is straight in joint space between its rows.
 

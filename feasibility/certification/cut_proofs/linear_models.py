@@ -196,10 +196,7 @@ class ArmModel:
             low=boxes.low - centre,
             high=boxes.high - centre,
             reach=np.concatenate(
-                [
-                    (levers + length * sines) * h,
-                    np.linalg.norm(slopes, axis=2) * half[:, n:],
-                ],
+                [(levers + length * sines) * h, np.linalg.norm(slopes, axis=2) * half[:, n:]],
                 axis=1,
             ),
         )
