@@ -103,19 +103,13 @@ def treated_by_passes(
 
 def _joined(found: list[ContactPath]) -> ContactPath:
     """Several paths as one, their stretches numbered on."""
-    lines, first = [each.lines for each in found], 0
-    stretch = []
-    for each in lines:
-        stretch.append(each.stretch + first)
-        first += int(each.stretch.max(initial=-1)) + 1
-    return ContactPath(
-        ToolLines(
-            np.concatenate([np.zeros((0, 3)), *(each.points for each in lines)]),
-            np.concatenate([np.zeros((0, 3)), *(each.normals for each in lines)]),
-            np.concatenate([np.zeros(0, dtype=np.int64), *stretch]),
-        ),
-        max((each.off for each in found), default=0.0),
-    )
+    none = np.zeros((0, 3))
+    parts, first = [ToolLines(none, none, np.zeros(0, dtype=np.int64))], 0
+    for each in found:
+        parts.append(each.lines._replace(stretch=each.lines.stretch + first))
+        first += int(each.lines.stretch.max(initial=-1)) + 1
+    lines = ToolLines(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+    return ContactPath(lines, max((each.off for each in found), default=0.0))
 
 
 def _measured(

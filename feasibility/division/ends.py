@@ -55,16 +55,14 @@ def ends_of(path: CoveragePath, approach: float) -> Ends:
     marks = np.flatnonzero(cell >= 0)
     if not len(marks):
         raise PathError("the path passes no cell, so there is no approach direction")
-    into, out = (
-        _move(path, q[row], int(cell[mark]), approach, what)
-        for row, mark, what in ((0, marks[0], "entry"), (-1, marks[-1], "exit"))
-    )
-    for rows, what in ((into, "entry"), (out, "exit")):
-        through = path.through_surface(rows)
+    moves = list[Array]()
+    for row, mark, what in ((0, marks[0], "entry"), (-1, marks[-1], "exit")):
+        moves.append(_move(path, q[row], int(cell[mark]), approach, what))
+        through = path.through_surface(moves[-1])
         if through:
             raise PathError(f"{what}: {through}; give another --approach, or task.home_deg")
     home = path.task.home_deg is not None
-    return Ends(approach=approach, entry=into[::-1], exit=out, from_home=home)
+    return Ends(approach=approach, entry=moves[0][::-1], exit=moves[1], from_home=home)
 
 
 def _move(path: CoveragePath, q: Array, cell: int, approach: float, what: str) -> Array:

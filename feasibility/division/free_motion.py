@@ -58,11 +58,6 @@ class FreeSpace:
         """Is all of a straight line certified?"""
         return self.reached(start, end) is end
 
-    def box(self, start: Array, end: Array) -> tuple[Array, Array]:
-        """Limits of joint values worth a try; a joint without limits stays within a turn."""
-        low, high = np.minimum(start, end), np.maximum(start, end)
-        return np.maximum(self.lower, low - TURN), np.minimum(self.upper, high + TURN)
-
 
 class _Tree:
     """Configurations, each reached by a straight line from the one before it."""
@@ -135,7 +130,9 @@ def free_motion(space: FreeSpace, start: Array, end: Array, seed: int) -> Array 
     if space.clear(start, end):
         return np.stack([start, end])
     rng = np.random.default_rng(seed)
-    low, high = space.box(start, end)
+    # A joint without limits stays within a turn.
+    low = np.maximum(space.lower, np.minimum(start, end) - TURN)
+    high = np.minimum(space.upper, np.maximum(start, end) + TURN)
     trees = [_Tree(space, start), _Tree(space, end)]
     forwards = True
     while space.left > 0:

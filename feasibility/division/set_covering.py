@@ -75,20 +75,15 @@ def _solved(table: Mask, time_limit: float) -> tuple[list[int], int]:
         constraints=LinearConstraint(table.T.astype(float), lb=1.0),
         options={"time_limit": max(time_limit, 0.01)},
     )
-    bound = lower_bound(found.mip_dual_bound)
+    bound = 1  # where the solver gives none
+    if found.mip_dual_bound is not None and math.isfinite(found.mip_dual_bound):
+        bound = max(1, math.ceil(found.mip_dual_bound - ROUNDING))
     if found.x is None:
         return greedy, bound
     rows = np.flatnonzero(found.x > 0.5).tolist()
     # The solver's rows are checked: rounding must not lose an element.
     valid = bool(table[rows].any(axis=0).all()) and len(rows) < len(greedy)
     return (rows if valid else greedy), bound
-
-
-def lower_bound(value: float | None) -> int:
-    """The least integer that a solver's dual bound allows; 1 where it gave none."""
-    if value is None or not math.isfinite(value):
-        return 1
-    return max(1, math.ceil(value - ROUNDING))
 
 
 def _greedy(table: Mask) -> list[int]:

@@ -25,7 +25,7 @@ from feasibility.paths.coverage import CoveragePath
 from feasibility.paths.order import PathError
 from feasibility.task import Task
 from feasibility.timing.sampled_trajectory import Trajectory
-from feasibility.timing.smooth_curve import Curve, blended, control_points
+from feasibility.timing.smooth_curve import Curve, blended, control_points, without_slivers
 from feasibility.timing.speed_limits import (
     PLACES,
     MotionLimits,
@@ -129,10 +129,10 @@ def _move(rows: Array | None, share: float, cell: int, end: int) -> Curve | None
     """
     if rows is None:
         return None
-    kept = rows[np.append(True, np.abs(np.diff(rows, axis=0)).max(axis=1) > 0.0)]
-    cells = np.full(len(kept), -1, dtype=np.int64)
+    cells = np.full(len(rows), -1, dtype=np.int64)
     cells[end] = cell
-    return control_points(Walk(kept, cells), np.full(len(kept), share))
+    walk = without_slivers(Walk(rows, cells), 0.0)
+    return control_points(walk, np.full(len(walk.q), share))
 
 
 def _working(path: CoveragePath, run: Trajectory) -> Mask | None:

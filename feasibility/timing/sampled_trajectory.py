@@ -76,14 +76,12 @@ class Trajectory:
     def __post_init__(self) -> None:
         """Copy, check and write-protect the arrays."""
         object.__setattr__(self, "joint_names", tuple(self.joint_names))
-        for name in ("time", "q", "dq", "ddq", "tool_speed", "cell"):
-            array = np.array(getattr(self, name), dtype=np.int64 if name == "cell" else float)
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
-        if self.working is not None:
-            working = np.array(self.working, dtype=bool)
-            working.flags.writeable = False
-            object.__setattr__(self, "working", working)
+        kinds = {"cell": np.int64, "working": bool}
+        for name in ("time", "q", "dq", "ddq", "tool_speed", "cell", "working"):
+            if getattr(self, name) is not None:
+                array = np.array(getattr(self, name), dtype=kinds.get(name, float))
+                array.flags.writeable = False
+                object.__setattr__(self, name, array)
         faults = self._faults()
         if faults:
             raise ArgumentError(faults, "trajectory")
@@ -96,16 +94,13 @@ class Trajectory:
             faults.append("there must be at least one joint, and no name twice")
         if self.time.ndim != 1 or k == 0:
             faults.append("there must be at least one sample")
-        for name, shape in (
-            ("q", (k, n)), ("dq", (k, n)), ("ddq", (k, n)), ("tool_speed", (k,)), ("cell", (k,))
-        ):  # fmt: skip
+        for name in ("q", "dq", "ddq", "tool_speed", "cell", "working"):
+            shape = (k, n) if name in ("q", "dq", "ddq") else (k,)
             array = getattr(self, name)
-            if array.shape != shape:
+            if array is not None and array.shape != shape:
                 faults.append(f"{name} must have shape {shape}, got {array.shape}")
-            elif not np.isfinite(array).all():
+            elif array is not None and not np.isfinite(array).all():
                 faults.append(f"{name} must hold finite numbers")
-        if self.working is not None and self.working.shape != (k,):
-            faults.append(f"working must have shape {(k,)}, got {self.working.shape}")
         if not np.isfinite(self.time).all() or not (self.time >= 0.0).all():
             faults.append("times must be finite and not negative (seconds)")
         elif not (np.diff(self.time) > 0.0).all():
@@ -188,9 +183,8 @@ class Trajectory:
 
 def bends(run: Trajectory) -> tuple[Array, Array]:
     """(k - 1, n) accelerations at the beginning and at the end of each piece, straight between."""
-    h = np.diff(run.time)[:, None]
-    start, end, ahead = run.dq[:-1], run.dq[1:], np.diff(run.q, axis=0) / h
-    return (6.0 * ahead - 4.0 * start - 2.0 * end) / h, (2.0 * start + 4.0 * end - 6.0 * ahead) / h
+    cubic, square = run.spline.c[:2]  # by the time since the beginning of a piece
+    return 2.0 * square, 2.0 * square + 6.0 * cubic * np.diff(run.time)[:, None]
 
 
 def tool_speeds(robot: Robot, q: Array, slope: Array) -> Array:
