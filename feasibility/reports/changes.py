@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from feasibility.cases.toml import toml_key
+from feasibility.cases.toml_edits import inline
 from feasibility.sensitivity.quantities import Kind, Quantity, range_of, tilted
 from feasibility.sensitivity.thresholds import Change
 from feasibility.verdict import Verdict
@@ -94,14 +94,8 @@ def _scene_without(name: str, case: Case | None) -> list[str]:
     """The scene of a case without one object; nothing where the case is not known."""
     if case is None or case.collision is None or not name:
         return []
-    rows = [_inline(one) for one in case.collision.scene if one["name"] != name]
+    rows = [inline(one) for one in case.collision.scene if one["name"] != name]
     return [f"collision.scene=[{', '.join(rows)}]"]
-
-
-def _inline(table: Mapping[str, Any]) -> str:
-    """A table of plain values as TOML in one line; JSON writes these values alike."""
-    pairs = (f"{toml_key(k)} = {json.dumps(value)}" for k, value in table.items())
-    return f"{{ {', '.join(pairs)} }}"
 
 
 def _by_name(case: Case) -> bool:

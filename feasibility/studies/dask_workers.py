@@ -67,7 +67,7 @@ class DaskWorkers:
 
     def _step(
         self, work: Work, tables: Sequence[Tables], waiting: deque[int], flying: dict[Future, int]
-    ) -> list[Reply]:
+    ) -> dict[int, Reply]:
         """Keep enough tasks in flight, and wait a moment for replies.
 
         Raises:
@@ -82,19 +82,19 @@ class DaskWorkers:
             with suppress(TimeoutError), self._client.as_current():
                 wait(list(flying), timeout=LOOK, return_when="FIRST_COMPLETED")
             done = [future for future in flying if future.done()]
-            return [self._reply(flying.pop(future), future) for future in done]
+            return {flying.pop(future): self._reply(future) for future in done}
         except (OSError, RuntimeError, CancelledError) as error:
             raise WorkersError(
                 "the connection to the workers was lost; what was finished is kept, run again to "
                 "continue"
             ) from error
 
-    def _reply(self, index: int, future: Future) -> Reply:
+    def _reply(self, future: Future) -> Reply:
         """The reply to a task that has come to an end."""
         try:
-            return Reply.of(index, future.result())
+            return Reply(*future.result())
         except KilledWorker:
-            return Reply(index, None, "its worker died, several times", 0.0)
+            return Reply(None, "its worker died, several times", 0.0)
         except (OSError, CancelledError):
             raise
         except Exception as error:  # what the tasks themselves raise comes as a reply

@@ -4,7 +4,6 @@ Each of these has a pipe of its own, so that what dies with one of them is one t
 again. They are started afresh (spawn): a forked one would share locks of Pinocchio and numba.
 """
 
-import itertools
 import json
 import multiprocessing
 import os
@@ -15,11 +14,10 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from coverable.errors import CoverableError, counted
 from feasibility.clock import OutOfTime
@@ -33,33 +31,23 @@ READY = b"."  # from a worker, ahead of its first reply
 
 Tables = dict[str, Any]
 Work = Callable[[Tables], Mapping[str, Any]]
-Done = tuple[str | None, str, float]
-"""Of one task: its result as JSON or None, why it failed, the seconds that it took."""
 
 
 class WorkersError(CoverableError):
     """Workers that cannot be had, or were lost for good; what would do."""
 
 
-@dataclass(frozen=True, slots=True)
-class Reply:
+class Reply(NamedTuple):
     """What came of one task."""
 
-    index: int
     result: dict[str, Any] | None
-    """None where it failed."""
+    """JSON values; None where it failed."""
     failure: str
     """Why it failed; empty otherwise."""
     seconds: float
 
-    @classmethod
-    def of(cls, index: int, done: Done) -> "Reply":
-        """The reply to a task that was done."""
-        text, failure, seconds = done
-        return cls(index, None if text is None else json.loads(text), failure, seconds)
 
-
-Receive = Callable[[list[Reply]], None]
+Receive = Callable[[dict[int, Reply]], None]
 
 
 class Workers(Protocol):
@@ -75,8 +63,8 @@ class Workers(Protocol):
         Args:
             work: called with one of `tables`, in a worker; a function of a module.
             tables: of each task.
-            receive: called here with replies as they come, in any order, and with none several
-                times a second; what it raises ends the work.
+            receive: called here with replies by the index of their tasks, as they come, and with
+                none several times a second; what it raises ends the work.
 
         Raises:
             WorkersError: the workers were lost for good, or cannot be told of such work.
@@ -86,17 +74,17 @@ class Workers(Protocol):
         """End the workers, whatever they are doing."""
 
 
-def run_one(work: Work, tables: Tables) -> Done:
+def run_one(work: Work, tables: Tables) -> Reply:
     """Do one task."""
     began = time.perf_counter()
     result, failure = None, ""
     try:
-        result = json.dumps(work(tables), allow_nan=False)
+        result = json.loads(json.dumps(work(tables), allow_nan=False))
     except OutOfTime:  # of the whole run, which ends with it
         raise
     except Exception as error:  # noqa: BLE001 - one bad task must not end a study
         failure = one_line(error)
-    return result, failure, time.perf_counter() - began
+    return Reply(result, failure, time.perf_counter() - began)
 
 
 def one_line(error: BaseException) -> str:
@@ -128,7 +116,7 @@ class Here:
             with compiling_notice():
                 warm_up()
         for index, table in enumerate(tables):
-            receive([Reply.of(index, run_one(work, table))])
+            receive({index: run_one(work, table)})
 
     def close(self) -> None:
         """Nothing is open."""
@@ -159,9 +147,16 @@ class Processes:
                 self._start()
                 for pipe in list(self._all.keys() - self._busy.keys())[: len(self._waiting)]:
                     self._busy[pipe] = self._waiting.popleft()
-                    self._send(pipe, (work, tables[self._busy[pipe]]))
-                heard = (self._heard(pipe) for pipe in wait(list(self._all), LOOK))  # type: ignore[arg-type]
-                receive(list(itertools.chain.from_iterable(heard)))
+                    try:
+                        pipe.send((work, tables[self._busy[pipe]]))
+                    except OSError:
+                        pass  # it died, which will show
+                    except (AttributeError, TypeError, pickle.PicklingError) as error:
+                        raise untold(error) from error
+                replies = dict[int, Reply]()
+                for heard in wait(list(self._all), LOOK):
+                    replies |= self._heard(heard)  # type: ignore[arg-type]
+                receive(replies)
         finally:
             for pipe in list(self._busy):  # whatever ended the work: nobody asks for it any more
                 self._end(pipe)
@@ -183,20 +178,7 @@ class Processes:
                 signal.pthread_sigmask(signal.SIG_SETMASK, before)
             theirs.close()  # so that its end shows
 
-    def _send(self, pipe: Connection, what: Any) -> None:
-        """Tell a process what to do; that it died meanwhile will show.
-
-        Raises:
-            WorkersError: it cannot be told of such work.
-        """
-        try:
-            pipe.send(what)
-        except OSError:
-            pass
-        except (AttributeError, TypeError, pickle.PicklingError) as error:
-            raise untold(error) from error
-
-    def _heard(self, pipe: Connection) -> list[Reply]:
+    def _heard(self, pipe: Connection) -> dict[int, Reply]:
         """The reply, if there is one, of a process that has sent something or died.
 
         Raises:
@@ -209,12 +191,12 @@ class Processes:
         self._lost = 0
         if said == READY:
             self._ready.add(pipe)
-            return []
+            return {}
         if isinstance(said, str):
             raise untold(said)
-        return [Reply.of(self._busy.pop(pipe), said)]
+        return {self._busy.pop(pipe): said}
 
-    def _died(self, pipe: Connection) -> list[Reply]:
+    def _died(self, pipe: Connection) -> dict[int, Reply]:
         """A process is gone: its task is done again, unless it has cost too many already."""
         starting, index = pipe not in self._ready, self._busy.get(pipe)
         self._end(pipe)
@@ -225,13 +207,12 @@ class Processes:
                 "kept: see that there is enough memory, or use fewer workers"
             )
         if index is None:
-            return []
+            return {}
         self._deaths[index] += not starting
         if self._deaths[index] < PATIENCE:
             self._waiting.append(index)
-            return []
-        failure = f"its worker died, {counted(PATIENCE, 'time')}"
-        return [Reply(index, None, failure, 0.0)]
+            return {}
+        return {index: Reply(None, f"its worker died, {counted(PATIENCE, 'time')}", 0.0)}
 
     def _end(self, pipe: Connection) -> None:
         """End a process, if it has not ended, and forget it."""

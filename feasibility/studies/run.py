@@ -91,8 +91,8 @@ def run_tasks(
     missing = list({task.key: task for task in tasks if task.key not in found}.values())
     total = len(found) + len(missing)
 
-    def receive(part: Sequence[StudyTask], replies: Sequence[Reply]) -> None:
-        rows = [_row(part[reply.index], reply) for reply in replies]
+    def receive(part: Sequence[StudyTask], replies: Mapping[int, Reply]) -> None:
+        rows = [_row(part[index], reply) for index, reply in replies.items()]
         if store is not None and rows:
             store.keep(rows)
         found.update((row.key, row) for row in rows)
