@@ -21,6 +21,7 @@ from coverable.errors import ArgumentError, CoverableError
 from feasibility.certification.cut_proofs.proof_verification import verify_proof
 from feasibility.certification.faults import Judged, MotionFault
 from feasibility.certification.motion_replay import replay_over_surface
+from feasibility.certification.pose_replay import marks_in_order
 from feasibility.clock import Clock, OutOfTime
 from feasibility.collisions.asked_bodies import said_of
 from feasibility.collisions.settings import Collision
@@ -219,14 +220,17 @@ def _of_motion(
         replay_over_surface, robot, cells, task, q, bodies=problem.bodies, working=working
     )
     found = judge(marks=marks)
-    if marks is not None and not found.accepted:
-        found = next((other for other in (judge(),) if other.accepted), found)
+    malformed = math.isnan(found.certificate.min_limit_margin)
+    if not (found.accepted or malformed or working is not None):
+        # Where a toolpath crosses itself, or turns sharply, places to try first decide.
+        guess = marks_in_order(robot, cells, task, q) if marks is None else None
+        other = found if guess is marks else judge(marks=guess)
+        found = other if other.accepted else found
     made = partial(
         Verification, claim, robot, cells, task,
         certificate=found.certificate, q=q, reached=found.reached,
     )  # fmt: skip
     if not found.accepted:
-        malformed = math.isnan(found.certificate.min_limit_margin)
         judged = () if malformed else BY_REPLAY
         return made(found.faults, not_judged=unjudged(robot, task, judged))
     if not len(cells):

@@ -21,6 +21,8 @@ from feasibility.certification.stretches import Judge, Samples
 from feasibility.certification.tool_along import Along, tool_along
 from feasibility.task import Task
 from feasibility.verdict import Walk
+from robots.kinematics import Kinematics
+from robots.robot import Robot
 from surfaces.cells import Cells
 from surfaces.places.offset_surfaces import offset_surface
 from surfaces.places.places import OffsetSurface
@@ -42,6 +44,29 @@ def order_of_marks(cells: Cells, walk: Walk) -> str:
     before, after = marks[wrong[0] : wrong[0] + 2].tolist()
     how = "back" if after < before else "on"
     return f"the motion goes {how} from pose {before} to pose {after}, out of their order"
+
+
+def marks_in_order(robot: Robot, cells: Cells, task: Task, q: Array) -> Ints | None:
+    """(m,) marks for rows that have none: the first that is at each pose, one behind the other.
+
+    None where cells have no order, or rows pass some pose between them.
+    """
+    if not cells.in_order or not len(q):
+        return None
+    tools, targets = Kinematics(robot).tools(q), task.targets(cells)
+    marks, row = np.full(len(q), -1), 0
+    most = task.effective_tolerance, task.cone_chord
+    for k, wanted in enumerate(zip(targets.points, targets.approaches, strict=True)):
+        near = [
+            np.linalg.norm(found[row:] - one, axis=1) <= far
+            for found, one, far in zip(tools, wanted, most, strict=True)
+        ]
+        at = np.flatnonzero(np.logical_and(*near))
+        if not len(at):
+            return None
+        row += int(at[0])
+        marks[row], row = k, row + 1
+    return marks
 
 
 def curves_of_marks(cells: Cells, marks: Ints) -> Ints | None:

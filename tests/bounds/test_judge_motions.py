@@ -10,7 +10,7 @@ from gantry import SURFACES, configurations, gantry, marks_of, places_along, ras
 from referee import Facets
 from referee import evenly as dense
 
-from coverable import Obstacle, Task, load_robot, piecewise, plane, poses, replay, sphere
+from coverable import Obstacle, Task, load_robot, piecewise, plane, poses, replay, sphere, verify
 from feasibility.certification.motion_replay import replay_over_surface
 from feasibility.verdict import Walk
 from robots.kinematics import Kinematics
@@ -354,6 +354,16 @@ def test_a_toolpath_is_run_from_its_first_pose_to_its_last():
     assert "back along the toolpath" in back.refusal
     for rows in (q[::-1], q[len(q) // 2 :]):
         assert not replay_over_surface(gantry(), line, task, rows).accepted
+
+
+def test_a_toolpath_that_crosses_itself_is_followed_by_a_motion_without_marks():
+    flat = np.array([(0.4, 0.0), (0.6, 0.0), (0.6, 0.1), (0.5, 0.1), (0.5, 0.0), (0.5, -0.1)])
+    up = np.tile([0.0, 0.0, 1.0], (6, 1))
+    line, task = poses(np.column_stack([flat, np.full(6, 0.2)]), up), Task(0.02, 20, 5e-4)
+    q = dense(configurations(np.column_stack([flat, np.full(6, 0.22)]), -up), 9)
+    assert not replay_over_surface(gantry(), line, task, q).accepted
+    for rows, holds in ((q, True), (q[::-1], False), (np.delete(q, [26, 27, 28], axis=0), False)):
+        assert verify(gantry(), line, task, rows).holds == holds
 
 
 def test_bodies_that_are_too_near_are_a_fault_of_a_motion_over_a_surface():
