@@ -46,18 +46,8 @@ class Evolution:
         """The best first."""
         return sorted(self.trials.values(), key=lambda trial: trial.rank, reverse=True)
 
-    def run(self, count: int, rounds: int, seed: int, interruptible: bool) -> None:
-        """Search; a Ctrl-C ends it with what is known by then, or is raised."""
-        try:
-            self.evolve(max(count, SMALLEST), rounds, seed)
-            self.look_closer()
-        except KeyboardInterrupt:
-            if not interruptible:
-                raise
-            self.stopped = INTERRUPTED
-
-    def evolve(self, count: int, rounds: int, seed: int) -> None:
-        """Differential evolution over what varies of the region."""
+    def run(self, count: int, rounds: int, seed: int) -> None:
+        """Differential evolution over what varies of the region; then a closer look at the best."""
         from scipy.optimize import differential_evolution
 
         low, high = self.region.low, self.region.high
@@ -77,6 +67,7 @@ class Evolution:
             )  # fmt: skip
         except RuntimeError as error:  # for SciPy errors of an evaluator are those of a map
             raise error.__cause__ or error from None
+        self.look_closer()
 
     def costs(self, values: Array) -> Array:
         """(k,) of poses (k, 6): what is less is better."""

@@ -22,7 +22,7 @@ from feasibility.clock import Clock
 from feasibility.collisions.asked_bodies import said_of
 from feasibility.demands.every_demand import refuse_start
 from feasibility.notices import compiling_notice
-from feasibility.placement.evolution import INTERRUPTED, Evolution, distinct
+from feasibility.placement.evolution import INTERRUPTED, SMALLEST, Evolution, distinct
 from feasibility.placement.reach_bound import Beyond, Reach
 from feasibility.placement.region import PlacementError, Region
 from feasibility.placement.trials import Evaluator, Trial, evaluator_here
@@ -34,13 +34,6 @@ from feasibility.verdict import Answer, CauseKind, Evidence
 from robots.robot import Robot
 from surfaces.cells import Cells
 
-MISSED = {
-    CauseKind.OUT_OF_REACH: "out of reach",
-    CauseKind.JOINT_LIMITS: "missed for joint limits",
-    CauseKind.ORIENTATION: "missed for orientation",
-    CauseKind.COLLISION: "missed for collision",
-    CauseKind.DISCONNECTED: "reachable by another motion only",
-}
 COUNT = 64  # poses spread over the region, and tried again in each round
 ROUNDS = 6
 KEEP = 5
@@ -164,7 +157,12 @@ def place(
             warm_up()
         evaluator = evaluator_here(robot, cells, task, search)
     tried = Evolution(evaluator, reach, region, clock, progress)
-    tried.run(count, rounds, search.seed, interruptible)
+    try:
+        tried.run(max(count, SMALLEST), rounds, search.seed)
+    except KeyboardInterrupt:
+        if not interruptible:
+            raise
+        tried.stopped = INTERRUPTED
     found = distinct((trial for trial in tried.ranked if trial.feasible), region, keep)
     answer = _searched(answered, tried, found, task.requires_rates)
     closed = blocked_curves(cells, task) if answer.answer is Answer.UNDECIDED else ""
@@ -245,7 +243,7 @@ def _searched(
     best = trials[0].share if trials else 0.0
     message = (
         f"None found in the region: {tried}; the best covers {100.0 * best:.1f} % of the area"
-        + (f", and most of the rest is {MISSED[cause]}" if cause else "")
+        + (f", and most of the rest is missed ({cause.replace('_', ' ')})" if cause else "")
         + (f"; {search.stopped}." if search.stopped else ". This is no proof.")
         + "".join(f" Of the best, `check` says: {trial.message}" for trial in doubtful[:1])
     )

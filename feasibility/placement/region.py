@@ -86,19 +86,17 @@ class Region:
         if len(self.ranges) != len(AXES):
             raise PlacementError(f"a region has {len(AXES)} ranges, got {len(self.ranges)}")
         for name, (low, high) in zip(AXES, self.ranges, strict=True):
-            degrees = name.endswith("_deg")
+            degrees, shown, fault = name.endswith("_deg"), f"{low:g} .. {high:g}", ""
             unit = "degrees" if degrees else "metres"
-            shown = f"{low:g} .. {high:g}"
             if not (math.isfinite(low) and math.isfinite(high)):
-                faults.append(f"{name}: {shown} is no range; expected two finite numbers ({unit})")
+                fault = f"is no range; expected two finite numbers ({unit})"
             elif low > high:
-                faults.append(
-                    f"{name}: {shown} is empty; the lowest comes first: {high:g} .. {low:g}"
-                )
+                fault = f"is empty; the lowest comes first: {high:g} .. {low:g}"
             elif max(abs(low), abs(high)) > FURTHEST:
-                faults.append(f"{name}: {shown} is too far; at most {FURTHEST:g} ({unit})")
+                fault = f"is too far; at most {FURTHEST:g} ({unit})"
             elif degrees and high - low > 360.0:
-                faults.append(f"{name}: {shown} is more than a full turn; at most 360 degrees wide")
+                fault = "is more than a full turn; at most 360 degrees wide"
+            faults += [f"{name}: {shown} {fault}"] if fault else []
         if not faults and not self.varies:
             faults.append(f"nothing varies; give a range of {', '.join(AXES)} whose ends differ")
         if faults:
