@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,26 +26,32 @@ WORDS = {
 }
 
 
-def where_it_stops(
-    exploration: Exploration,
-    task: Task,
-    places: PassPlaces,
-    pose: int,
-    q: Array,
-    pairs: tuple[Pair, ...],
-) -> str:
+class PassSearch(NamedTuple):
+    """A finished search along passes."""
+
+    exploration: Exploration
+    task: Task
+    places: PassPlaces
+    """The poses of the passes."""
+    pairs: tuple[Pair, ...]
+    """Of bodies that had to stay clear of each other."""
+    slow: Mapping[int, Cause]
+    """Poses to which no motion leads at the required speed and singular values."""
+
+
+def where_it_stops(search: PassSearch, pose: int, q: Array) -> str:
     """Where a motion ends that follows the poses from a configuration q (n,) over one, and why.
 
     Empty where it reaches the last of them. Speed and singular values count where the task limits
-    them; `pairs` are the bodies that had to stay clear of each other.
+    them.
     """
+    exploration, task = search.exploration, search.task
     first, cause, motions = pose, "", list[Array]()
     while not cause and pose < len(exploration.cells) - 1:
         curve = exploration.curve(pose, pose + 1)
         motion, _ = track(exploration.arrays, exploration.work, curve, (0.0, 1.0), q)
         if motion is None:
-            code, joint = (int(value) for value in exploration.work.stop_reason)
-            cause = _words(exploration, code, joint, pairs)
+            cause = _words(search)
         else:
             motions.append(np.vstack([q, motion]))
             q = motion[-1]
@@ -55,19 +62,21 @@ def where_it_stops(
         if any(slow):
             cause = next(filter(None, slow))
             pose = first + slow.index(cause)
-    return f"{place_words(places, pose)}: {cause}" if cause else ""
+    return f"{place_words(search.places, pose)}: {cause}" if cause else ""
 
 
-def _words(exploration: Exploration, code: int, joint: int, pairs: tuple[Pair, ...]) -> str:
-    """A reason that tracking stopped."""
-    names = exploration.robot.joint_names
+def _words(search: PassSearch) -> str:
+    """Why tracking has just stopped."""
+    code, joint = (int(value) for value in search.exploration.work.stop_reason)
+    names = search.exploration.robot.joint_names
     if code == stop.LIMIT:
         which = names[joint] if 0 <= joint < len(names) else "a joint"
         return f"{which} comes to its limit"
     if code == stop.COLLISION:
-        if not 0 <= joint < len(pairs):
-            return "bodies come too near to each other"
-        return f"{pairs[joint].first} and {pairs[joint].second} come too near to each other"
+        known = 0 <= joint < len(search.pairs)
+        pair = search.pairs[joint] if known else None
+        bodies = "bodies" if pair is None else f"{pair.first} and {pair.second}"
+        return f"{bodies} come too near to each other"
     return WORDS.get(code, "no motion is found")
 
 
@@ -85,23 +94,13 @@ class Gap:
     """Is that proved?"""
 
 
-def gaps_of(
-    exploration: Exploration,
-    task: Task,
-    places: PassPlaces,
-    pieces: Array,
-    worked: Mask,
-    pairs: tuple[Pair, ...],
-    slow: Mapping[int, Cause],
-) -> tuple[Gap, ...]:
+def gaps_of(search: PassSearch, pieces: Array, worked: Mask) -> tuple[Gap, ...]:
     """What is left out, in order.
 
     Args:
-        exploration, task, places: a finished search, its task, the poses of the passes.
+        search: a finished search.
         pieces: (N - 1,) m, of passes between poses.
         worked: (N - 1,) on which of them a run works.
-        pairs: of bodies that had to stay clear of each other.
-        slow: poses to which no motion leads at the required speed and singular values.
     """
     left = (pieces > 0.0) & ~worked
     # What lies between two passes belongs to the gap if it is not worked on either.
@@ -111,30 +110,21 @@ def gaps_of(
     for first, last in ends.reshape(-1, 2).tolist():
         length = float(pieces[first:last][left[first:last]].sum())
         if length > 0.0:
-            own = places.stretch[first : last + 1][np.append(left[first:last], False)]
+            own = search.places.stretch[first:last][left[first:last]]
             stretches = tuple(dict.fromkeys(own.tolist()))
-            poses = range(first, last + 1)
-            cause, proved = _why(exploration, task, places, poses, pairs, slow)
-            found.append(Gap(stretches, length, cause, proved))
+            found.append(Gap(stretches, length, *_why(search, range(first, last + 1))))
     return tuple(found)
 
 
-def _why(
-    exploration: Exploration,
-    task: Task,
-    places: PassPlaces,
-    poses: range,
-    pairs: tuple[Pair, ...],
-    slow: Mapping[int, Cause],
-) -> tuple[str, bool]:
+def _why(search: PassSearch, poses: range) -> tuple[str, bool]:
     """Why the first of some poses is not reached, and whether that is proved."""
+    exploration = search.exploration
     for pose in poses:
         if not exploration.reached[pose]:
-            cause = slow.get(pose) or cause_of(exploration, pose, pairs)
-            return f"{place_words(places, pose)}: {cause.detail}", cause.proved
+            cause = search.slow.get(pose) or cause_of(exploration, pose, search.pairs)
+            return f"{place_words(search.places, pose)}: {cause.detail}", cause.proved
     node = exploration.roadmap.over[poses[0]][-1]
-    q = exploration.roadmap.q[node]
-    return where_it_stops(exploration, task, places, poses[0], q, pairs), False
+    return where_it_stops(search, poses[0], exploration.roadmap.q[node]), False
 
 
 def along_stretch(places: PassPlaces, pose: int) -> float:

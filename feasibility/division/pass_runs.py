@@ -19,17 +19,15 @@ import numpy as np
 
 from coverable.arrays import Array, Mask
 from feasibility.clock import Clock, OutOfTime
-from feasibility.collisions.problem_bodies import Pair
 from feasibility.demands.fast_motions import keep_fast_motions
 from feasibility.demands.motion_rates import replay_at_rates
 from feasibility.division.between_patches import clear_moves
-from feasibility.division.left_out import Gap, along_stretch, gaps_of, where_it_stops
+from feasibility.division.left_out import Gap, PassSearch, along_stretch, gaps_of, where_it_stops
 from feasibility.division.plans import collect_components, connect_pairs
 from feasibility.division.reconfiguration import Reconfiguration, straight_moves
 from feasibility.paths.coverage import CoveragePath
 from feasibility.paths.winding import unwound
 from feasibility.problem import Problem
-from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import Roadmap
 from feasibility.roadmap.ordered_run import steps_ahead
 from feasibility.roadmap.rounds import explore
@@ -177,66 +175,48 @@ def pass_runs(
     inside = same & (places.stretch[1:] >= 0)
     pieces = inside * np.linalg.norm(np.diff(places.points, axis=0), axis=1)
     found = fewest_runs(exploration.roadmap, pieces, inside)
-    runs, refusals = _replayed(exploration, task, found)
-    worked = np.zeros(len(pieces), dtype=bool)
-    for path in runs:
-        own = np.flatnonzero(path.needed)
-        worked[own[0] : own[-1]] = True
-    exploration.clock = Clock()
-    pairs = Problem.of(robot, cells, task).pairs
-    return PassRuns(
-        robot=robot,
-        task=task,
-        places=places,
-        runs=tuple(runs),
-        cuts=_cuts(exploration, task, places, runs, pairs),
-        gaps=gaps_of(exploration, task, places, pieces, worked, pairs, slow),
-        refusals=tuple(refusals),
-    )
-
-
-def _replayed(
-    exploration: Exploration, task: Task, found: Sequence[Run]
-) -> tuple[list[CoveragePath], list[str]]:
-    """The runs that the independent replay accepts, and why it refuses the others."""
-    robot, cells = exploration.robot, exploration.cells
     runs, refusals = list[CoveragePath](), list[str]()
+    worked = np.zeros(len(pieces), dtype=bool)
     for run in found:
-        walk = route_walk(exploration.roadmap, *run)
-        walk = unwound(robot, task, walk)
+        walk = unwound(robot, task, route_walk(exploration.roadmap, *run))
         needed = np.zeros(len(cells), dtype=bool)
         needed[walk.cell[walk.cell >= 0]] = True
         certificate, refusal = replay_at_rates(robot, cells, task, walk, needed)
         if refusal:
             refusals.append(refusal)
-        else:
-            path = CoveragePath.of(robot, cells, task, "given", walk, needed, certificate)
-            runs.append(path)
-    return runs, refusals
+            continue
+        runs.append(CoveragePath.of(robot, cells, task, "given", walk, needed, certificate))
+        worked[walk.cell[0] : walk.cell[-1]] = True
+    exploration.clock = Clock()
+    search = PassSearch(exploration, task, places, Problem.of(robot, cells, task).pairs, slow)
+    return PassRuns(
+        robot=robot,
+        task=task,
+        places=places,
+        runs=tuple(runs),
+        cuts=_cuts(search, runs),
+        gaps=gaps_of(search, pieces, worked),
+        refusals=tuple(refusals),
+    )
 
 
-def _cuts(
-    exploration: Exploration,
-    task: Task,
-    places: PassPlaces,
-    runs: Sequence[CoveragePath],
-    pairs: tuple[Pair, ...],
-) -> tuple[Interruption, ...]:
+def _cuts(search: PassSearch, runs: Sequence[CoveragePath]) -> tuple[Interruption, ...]:
     """What lies between the runs."""
-    robot, cells = exploration.robot, exploration.cells
+    robot, cells = search.exploration.robot, search.exploration.cells
     moves = straight_moves(robot, [run.walk for run in runs])
-    clear = clear_moves(robot, cells, task, moves)
     found = []
-    for before, after, move in zip(runs, runs[1:], clear, strict=False):
-        pose, following = int(before.visits[-1]), int(after.visits[0])
-        stop = where_it_stops(exploration, task, places, pose, move.start, pairs)
+    for before, after, move in zip(
+        runs, runs[1:], clear_moves(robot, cells, search.task, moves), strict=False
+    ):
+        pose = int(before.visits[-1])
         found.append(
             Interruption(
                 pose=pose,
-                next_pose=following,
-                stretch=int(places.stretch[pose]),
-                along=along_stretch(places, pose),
-                cause=stop or "another configuration gets further",
+                next_pose=int(after.visits[0]),
+                stretch=int(search.places.stretch[pose]),
+                along=along_stretch(search.places, pose),
+                cause=where_it_stops(search, pose, move.start)
+                or "another configuration gets further",
                 move=move,
             )
         )
