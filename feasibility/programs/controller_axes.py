@@ -185,12 +185,9 @@ def _axes(
     if len(arm) != JOINTS:
         checks.keep(Fault("", f"it needs {JOINTS} joints that turn; {len(arm)} of them move here"))
     if len(outside) > len(language.external):
-        most = f"has no more than {len(language.external)}" if language.external else "has no"
         named = ", ".join(robot.joint_names[j] for j in outside)
-        what = f"{language.name} {most} external axes; there are {named}"
-        if language in (TP, INFORM):
-            what = f"external axes are not written in {language.name} yet; there are {named}"
-        checks.keep(Fault("", what))
+        most = f"{len(language.external) or 'no'} external axes"
+        checks.keep(Fault("", f"{language.name} is written with {most} here; there are {named}"))
     return tuple(arm), tuple(outside)
 
 

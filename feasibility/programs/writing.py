@@ -10,6 +10,7 @@ import re
 from collections.abc import Sequence
 from functools import partial
 from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import IO
 
@@ -67,15 +68,12 @@ def working_times(run: Trajectory, work: Ints | None = None) -> list[tuple[float
     marks = np.flatnonzero(run.cell >= 0)
     own = np.zeros(len(marks), dtype=np.int64) if work is None else work[run.cell[marks]]
     found = []
-    for number, group in groupby(zip(own.tolist(), run.time[marks].tolist(), strict=True), _first):
+    pairs = zip(own.tolist(), run.time[marks].tolist(), strict=True)
+    for number, group in groupby(pairs, itemgetter(0)):
         times = [time for _, time in group]
         if number != OFF:
             found.append((times[0], times[-1]))
     return found
-
-
-def _first(pair: tuple[int, float]) -> int:
-    return pair[0]
 
 
 ROUNDING = 1e-6  # [s]

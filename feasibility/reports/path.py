@@ -103,31 +103,25 @@ def no_path_json(verdict: Verdict, reason: str, before_s: float = 0.0) -> dict[s
 def _timing(
     path: CoveragePath, trajectory: Trajectory, limits: MotionLimits | None
 ) -> dict[str, Any]:
-    """Duration and maxima, with the limits where they are known.
-
-    With limits the maxima hold for every interpolation of the samples that a controller may use.
-    """
+    """Duration; with limits the maxima, of every interpolation that a controller may use."""
     names = path.robot.joint_names
-    fastest, quickest = np.abs(trajectory.dq).max(axis=0), np.abs(trajectory.ddq).max(axis=0)
-    speed = float(trajectory.tool_speed.max())
-    if limits is not None:
-        most = used(path.robot, trajectory, limits)
-        fastest = most.velocity * limits.velocity
-        quickest = most.acceleration * limits.acceleration
-        speed = most.tool_speed * limits.tool_speed
     found: dict[str, Any] = {
         "duration_s": trajectory.duration,
         "samples": len(trajectory),
         "tool_way_m": trajectory.tool_way,
-        "max_tool_speed": speed,
-        "max_velocity": dict(zip(names, fastest.tolist(), strict=True)),
-        "max_acceleration": dict(zip(names, quickest.tolist(), strict=True)),
     }
     if limits is not None:
-        found["limits"] = {
-            "tool_speed": limits.tool_speed,
-            "velocity": dict(zip(names, limits.velocity.tolist(), strict=True)),
-            "acceleration": dict(zip(names, limits.acceleration.tolist(), strict=True)),
+        most = used(path.robot, trajectory, limits)
+        fastest, quickest = most.velocity * limits.velocity, most.acceleration * limits.acceleration
+        found |= {
+            "max_tool_speed": most.tool_speed * limits.tool_speed,
+            "max_velocity": dict(zip(names, fastest.tolist(), strict=True)),
+            "max_acceleration": dict(zip(names, quickest.tolist(), strict=True)),
+            "limits": {
+                "tool_speed": limits.tool_speed,
+                "velocity": dict(zip(names, limits.velocity.tolist(), strict=True)),
+                "acceleration": dict(zip(names, limits.acceleration.tolist(), strict=True)),
+            },
         }
     return found
 
@@ -167,10 +161,9 @@ def as_text(
     if trajectory is not None:
         told = _timing(path, trajectory, limits)
         time = f"{told['duration_s']:.4g} s in {told['samples']:,} samples"
-        rows += [
-            ("time", f"{time}, tool at up to {at_most(told['max_tool_speed'], 4)} m/s"),
-            ("limits", _limits_text(told)),
-        ]
+        if limits is not None:
+            time += f", tool at up to {at_most(told['max_tool_speed'], 4)} m/s"
+        rows += [("time", time), ("limits", _limits_text(told))]
     rows += [("speed", rates_words(path, rates, trajectory)), ("ends", ends_words(ends))]
     head = f"path: one continuous motion over {over}."
     if passes is not None:

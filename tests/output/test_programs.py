@@ -111,10 +111,10 @@ def test_rounding_leaves_no_joint_outside_its_limits():
 
 @pytest.mark.parametrize(("file", "robot", "said"), [
     ("a.script", load_robot("ur5", lock={"wrist_3_joint": 0.0}), "5 of them move here"),
-    ("a.script", IRB, "URScript has no external axes; there are rail"),
+    ("a.script", IRB, "URScript is written with no external axes here; there are rail"),
     ("a.mod", load_robot("panda"), "7 of them move here"),
     ("a.mod", replace(UR5, surface_link="upper_arm_link"), "order of its axes"),
-    ("a.ls", IRB, "external axes are not written in TP yet; there are"),
+    ("a.ls", IRB, "TP is written with no external axes here; there are"),
     ("a.jbi", UR5, "pulses_per_deg is missing"),
     ("a.ls", load_robot("panda", lock={"panda_joint1": 0.0}),
      "panda_joint3 and panda_joint4 have no parallel axes; where it is counted from the upper arm, "
