@@ -10,7 +10,7 @@ import numpy as np
 
 from feasibility.cases.toml import toml_key
 from feasibility.cases.toml_edits import inline
-from feasibility.sensitivity.quantities import Kind, Quantity, range_of
+from feasibility.sensitivity.quantities import Kind, Quantity, range_of, tilted
 from feasibility.sensitivity.thresholds import Change
 from feasibility.verdict import Verdict
 from robots.robot import Robot
@@ -74,6 +74,9 @@ def settings(changes: Sequence[Change], verdict: Verdict, case: Case | None = No
         elif quantity.kind is Kind.ROLL:
             least, most = range_of(verdict.task, math.radians(float(value)))
             found.append(f"task.roll_deg=[{least:.10g}, {most:.10g}]")
+        elif quantity.kind is Kind.TILT:
+            b = tilted(verdict.task, quantity.axis, change.value)
+            found.append(f"task.approach=[{', '.join(f'{x:.10g}' for x in b)}]")
         elif quantity.kind is Kind.WITHOUT:
             found += _scene_without(quantity.obstacle, case)
         else:

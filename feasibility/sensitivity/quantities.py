@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from coverable.arrays import unit_along
 from feasibility.cases.toml import toml_key
 from feasibility.collisions.settings import Collision
 from feasibility.task import Task
@@ -15,6 +16,7 @@ from surfaces.cells import Cells
 
 ANGLE_STEP_DEG = 0.1  # resolution of cone and revolute joints
 LENGTH_STEP = 1e-3  # [m], resolution of standoff, shifts and prismatic joints
+MOST_TILT_DEG = 60.0  # cap on tilting an approach direction
 LEAST_CONE_DEG = 3.0  # cap on tightening the cone: narrower ones take many times the waypoints
 LEAST_ROLL_DEG = 1.0  # cap on tightening half the range of the roll, likewise
 FURTHEST = 0.5  # [m], cap on shifts, on the standoff's growth and on the widening of a slide
@@ -29,6 +31,8 @@ class Kind(StrEnum):
     CONE = "cone"
     ROLL = "roll"
     """Half the range of the roll, about its middle."""
+    TILT = "tilt"
+    """The angle of an approach direction that is given, from that."""
     LOWER = "lower_limit"
     UPPER = "upper_limit"
     STANDOFF = "standoff"
@@ -39,7 +43,7 @@ class Kind(StrEnum):
     """One object of the scene, or collisions altogether, as if not there."""
 
 
-BOTH_WAYS = (Kind.STANDOFF, Kind.SHIFT)  # neither way allows more
+BOTH_WAYS = (Kind.TILT, Kind.STANDOFF, Kind.SHIFT)  # neither way allows more
 OF_COLLISIONS = (Kind.CLEARANCE, Kind.TOOL_CLEARANCE, Kind.WITHOUT)
 
 
@@ -71,7 +75,8 @@ class Quantity:
     joint: int = -1
     """The joint whose limit it is; -1 for other kinds."""
     axis: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Unit vector of a shift, in the root frame."""
+    """Unit vector of a shift, in the root frame; or towards which the approach tilts, square to it,
+    in the surface's."""
     obstacle: str = ""
     """What is left out: the name of an object, or nothing for all collisions."""
 
@@ -124,6 +129,8 @@ class Quantity:
             return Variant(robot, cells, replace(task, cone_deg=round(math.degrees(value), 9)))
         if self.kind is Kind.ROLL:
             return Variant(robot, cells, replace(task, roll_deg=range_of(task, value)))
+        if self.kind is Kind.TILT:
+            return Variant(robot, cells, replace(task, approach=tilted(task, self.axis, value)))
         if self.kind is Kind.STANDOFF:
             return Variant(robot, cells, replace(task, standoff=value))
         if self.kind is Kind.SHIFT:
@@ -152,6 +159,16 @@ def range_of(task: Task, half: float) -> tuple[float, float]:
     middle, half = 0.5 * (low + high), round(math.degrees(half), 9)
     middle -= 360.0 * round(middle / 360.0)
     return round(middle - half, 9), round(middle + half, 9)
+
+
+def tilted(
+    task: Task, towards: tuple[float, float, float], angle: float
+) -> tuple[float, float, float]:
+    """A task's approach direction, a given one, tilted by an angle (rad) towards a unit vector."""
+    if task.approach is None or isinstance(task.approach, str):
+        raise ValueError("the approach direction is the surface's")
+    x, y, z = math.cos(angle) * unit_along(task.approach) + math.sin(angle) * np.array(towards)
+    return float(x), float(y), float(z)
 
 
 def without(settings: Collision, name: str) -> Collision:
@@ -183,19 +200,17 @@ def quantities(variant: Variant, widen: bool) -> tuple[Quantity, ...]:
             and shifts go both ways in any case.
 
     Returns:
-        The cone; the range of the roll where it is limited; each finite limit of each joint;
-        standoff; shifts along six directions. Where collisions are checked: the cone; clearances,
-        and what is left out of the scene; standoff; shifts; limits. What cannot be varied (a cone
-        of 180 degrees that is to be widened) is left out.
+        The cone; the range of the roll where it is limited; the tilt of an approach direction that
+        is given; each finite limit of each joint; standoff; shifts along six directions. Where
+        collisions are checked: the cone; clearances, and what is left out of the scene; standoff;
+        shifts; limits. What cannot be varied (a cone of 180 degrees that is to be widened) is left
+        out.
     """
     task = variant.task
     widest = 180.0 if task.roll is None else 90.0
     end = math.radians(widest if widen else min(task.cone_deg, LEAST_CONE_DEG))
     found = [Quantity(Kind.CONE, "cone", "rad", task.cone, end, "task.cone_deg")]
-    if task.roll is not None:
-        end = math.pi if widen else min(task.roll.half, math.radians(LEAST_ROLL_DEG))
-        ends, words = (task.roll.half, end), ("task.roll_deg", "half its range")
-        found.append(Quantity(Kind.ROLL, "roll", "rad", *ends, *words))
+    found += _of_directions(task, widen)
     limits = [
         _limit(variant.robot, joint, kind, widen)
         for joint in range(variant.robot.n)
@@ -216,6 +231,30 @@ def quantities(variant: Variant, widen: bool) -> tuple[Quantity, ...]:
     if of_collisions:  # limits come last where the time may run out: places matter more there
         found += limits
     return tuple(q for q in found if math.isfinite(q.given) and q.last > 0)
+
+
+def _of_directions(task: Task, widen: bool) -> list[Quantity]:
+    """Half the range of the roll, and the tilt of a given approach to four sides."""
+    found = []
+    if task.roll is not None:
+        least = min(task.roll.half, math.radians(LEAST_ROLL_DEG))
+        end = math.pi if widen else least
+        ends, words = (task.roll.half, end), ("task.roll_deg", "half its range")
+        found.append(Quantity(Kind.ROLL, "roll", "rad", *ends, *words))
+    if task.approach is None or isinstance(task.approach, str):
+        return found
+    b = unit_along(task.approach)
+    across = np.eye(3)[np.argsort(np.abs(b))[:2]]
+    for axis in across:
+        for sign in (1.0, -1.0):
+            square = sign * (axis - (axis @ b) * b)
+            x, y, z = (square / np.linalg.norm(square)).tolist()
+            letter = "xyz"[int(np.argmax(axis))]
+            which = f"tilted to {'+' if sign > 0 else '-'}{letter}"
+            ends, words = (0.0, math.radians(MOST_TILT_DEG)), ("task.approach", which)
+            name = f"approach {which}"
+            found.append(Quantity(Kind.TILT, name, "rad", *ends, *words, axis=(x, y, z)))
+    return found
 
 
 def _of_collisions(task: Task, widen: bool) -> list[Quantity]:
