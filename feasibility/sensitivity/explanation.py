@@ -16,11 +16,11 @@ from feasibility.demands.treated_words import shortfall
 from feasibility.division.plans import motion_over
 from feasibility.search_settings import Progress, Search
 from feasibility.sensitivity.probes import Prober
-from feasibility.sensitivity.quantities import Kind, Quantity, Variant, quantities
+from feasibility.sensitivity.quantities import Kind, Variant, quantities
 from feasibility.sensitivity.thresholds import Dropped, Explanation, Threshold
 from feasibility.sensitivity.two_changes import changes_together
 from feasibility.task import Task
-from feasibility.verdict import Evidence, Verdict, Walk
+from feasibility.verdict import Evidence, Verdict
 from robots.robot import Robot
 from surfaces.cells import Cells
 
@@ -29,7 +29,7 @@ FEW, EACH = 8_000, 20  # ... or so many evaluations, and for each cell, where th
 NEAREST = 4  # changed cases whose motions are tried on the case as given
 VERDICT_SHARE = 0.5  # of the time limit, at most, for the verdict of the case as given
 
-NOT_EVEN = "not even without any collisions"
+NOT_EVEN = "not even without any collisions"  # of one object where all together are not in the way
 AS_GIVEN = "checking the case as given"
 
 
@@ -88,13 +88,8 @@ def explain(
     if len(cells) == 0 or (verdict.treated is not None and shortfall(task, verdict.treated)):
         return Explanation(verdict, (), (), None, 0, 0.0)
     found = _explained(verdict, search, clock, progress)
-    if not verdict.feasible and (walk := _over_given(found, search, clock)) is not None:
-        seeded = check(robot, cells, task, search, seeds=walk, clock=clock.part(1.0))
-        again = _explained(seeded, search, clock, progress)
-        evaluations, seconds = (
-            found.evaluations + again.evaluations, found.seconds + again.seconds
-        )  # fmt: skip
-        found = replace(again, alone=verdict, evaluations=evaluations, seconds=seconds)
+    if not verdict.feasible and (seeded := _over_given(found, search, clock)) is not None:
+        found = replace(_explained(seeded, search, clock, progress), alone=verdict)
     rates = None
     with suppress(OutOfTime), clock.enforced():
         rates = rate_figures(found.verdict, clock, more=task.speed is not None)
@@ -123,7 +118,11 @@ def _explained(
         if not verdict.covered.all():
             dropped = drop(prober)
         for quantity in varied:
-            done.append(_threshold(prober, quantity, done))
+            bare = next((t for t in done if t.quantity.kind is Kind.WITHOUT), None)
+            if quantity.obstacle and bare is not None and bare.feasible is None:
+                done.append(replace(bare, quantity=quantity, tried=NOT_EVEN))
+            else:
+                done.append(prober.threshold(quantity))
         helpful = [t for t in done if t.feasible and t.quantity.kind is not Kind.WITHOUT]
         if not verdict.feasible and not helpful:
             pair = changes_together(prober, varied)
@@ -132,18 +131,8 @@ def _explained(
     return Explanation(verdict, tuple(done), left_out, dropped, prober.spent, seconds, pair)
 
 
-def _threshold(prober: Prober, quantity: Quantity, done: list[Threshold]) -> Threshold:
-    """One threshold; no object alone is in the way where all of them together are not."""
-    if quantity.obstacle:
-        for bare in done:
-            all_ = bare.quantity.kind is Kind.WITHOUT and not bare.quantity.obstacle
-            if all_ and bare.feasible is None:
-                return replace(bare, quantity=quantity, tried=NOT_EVEN)
-    return prober.threshold(quantity)
-
-
-def _over_given(found: Explanation, search: Search, clock: Clock) -> Walk | None:
-    """A motion over the case as given, from those found near it; None where there is none.
+def _over_given(found: Explanation, search: Search, clock: Clock) -> Verdict | None:
+    """The case as given with a motion from those found near it; None where none leads to one.
 
     A search that was exhausted may have missed it.
     """
@@ -159,7 +148,7 @@ def _over_given(found: Explanation, search: Search, clock: Clock) -> Walk | None
             seeds=threshold.feasible.witness, clock=clock.part(1.0),
         )  # fmt: skip
         if again.feasible:
-            return again.witness
+            return again
     return None
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING
 
 from coverable.errors import Fault
 from feasibility.cases.case import Case
@@ -17,9 +16,6 @@ from feasibility.studies.pool import Workers
 from feasibility.studies.run import StudyTask, run_tasks
 from feasibility.studies.study_outcome import finite, merit
 from feasibility.studies.varied_keys import Variation, VariedKey
-
-if TYPE_CHECKING:
-    from feasibility.studies.store import Store
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,8 +70,6 @@ def compare(
     case: Case,
     robots: Sequence[str],
     workers: Workers,
-    *,
-    store: "Store | None" = None,
     progress: Progress | None = None,
 ) -> Comparison:
     """The same case for several arms, each mounted where the case's arm is: on its base and axes.
@@ -85,7 +79,6 @@ def compare(
             robots.
         robots: names of the library, and paths of URDF or xacro files.
         workers: where they run, see `open_workers`.
-        store: where finished arms are kept.
         progress: called as progress(done, total, text); what it raises ends the work.
 
     Raises:
@@ -105,7 +98,7 @@ def compare(
         )
         for task, name in zip(_tasks_of(case, robots), robots, strict=True)
     ]
-    rows = run_tasks(tasks, workers, store, progress)
+    rows = run_tasks(tasks, workers, progress=progress)
     arms = []
     for task, row in zip(tasks, rows, strict=True):
         robot, result = arm_of(case_of(task.tables)), row.result

@@ -66,7 +66,7 @@ class Outcome(TypedDict):
 
 
 class Divided(Outcome):
-    """With how many motions it takes; None where that is not known."""
+    """With how many motions it takes, which no store holds; None where that is not known."""
 
     patches: int | None
     patches_share: float | None
@@ -75,7 +75,6 @@ class Divided(Outcome):
 WORDS = {"verdict": [*Answer], "evidence": [*Evidence], "method": [*METHODS]}
 COUNTS = ("cells", "covered", "edges", "pairs")
 MOST = 1_000_000_000  # of any of these
-SHARE = "must be a number in 0 .. 1"
 
 
 def outcome_fault(result: Mapping[str, Any]) -> str:
@@ -85,27 +84,23 @@ def outcome_fault(result: Mapping[str, Any]) -> str:
         >>> outcome_fault({"more": 1})
         'more is not known'
     """
-    checks, kind = Checks(), Divided if "patches" in result else Outcome
+    checks, keys = Checks(), Outcome.__annotations__
     for key in result:
-        if key not in kind.__annotations__:
+        if key not in keys:
             checks.keep(Fault(printable(str(key)), "is not known"))
-    values = {key: result.get(key, MISSING) for key in kind.__annotations__}
+    values = {key: result.get(key, MISSING) for key in keys}
     for key, words in WORDS.items():
         checks.choice(key, values[key], words)
     for key in (*COUNTS, "seed", "fk"):
         checks.whole(key, values[key], 0, MOST if key in COUNTS else LARGEST_WHOLE)
-    checks.number("share", values["share"], SHARE, 0.0, MOST_SHARE)
-    if values.get("patches") is not None:
-        checks.whole("patches", values["patches"], 0, MOST)
-    if values.get("patches_share") is not None:
-        checks.number("patches_share", values["patches_share"], SHARE, 0.0, MOST_SHARE)
+    checks.number("share", values["share"], "must be a number in 0 .. 1", 0.0, MOST_SHARE)
     _check_margins(checks, values["margins"])
     _check_texts(checks, "message", [values["message"]])
     _check_texts(checks, "components", values["components"])
     _check_texts(checks, "unchecked_links", values["unchecked_links"])
     causes = values["causes"] if isinstance(values["causes"], dict) else {"": values["causes"]}
-    for kind_of, number in causes.items():
-        checks.choice("causes", kind_of, [*CauseKind])
+    for kind, number in causes.items():
+        checks.choice("causes", kind, [*CauseKind])
         checks.whole("causes", number, 0, MOST)
     if checks.faults:
         return worded(checks.faults[0])
