@@ -151,7 +151,8 @@ def place(
     reach = Reach.of(robot, cells, task)
     answered = partial(Placements, robot, cells, task, region)
     if (beyond := reach.beyond(region)) is not None:
-        return _timed(_ruled_out(answered, beyond), began)
+        took = {"total_s": time.monotonic() - began}
+        return _ruled_out(partial(answered, timing=took), beyond)
     if evaluator is None:
         with compiling_notice():
             warm_up()
@@ -169,13 +170,8 @@ def place(
     if closed:
         said = f"Wherever it stands: {closed} {smoothing_offer(cells, task, clock)}".rstrip()
         answer = replace(answer, message=f"{answer.message} {said}")
-    return _timed(answer, began)
-
-
-def _timed(placements: Placements, began: float) -> Placements:
-    """The same, with the seconds since then."""
-    placements.timing["total_s"] = time.monotonic() - began
-    return placements
+    answer.timing["total_s"] = time.monotonic() - began
+    return answer
 
 
 def _check_settings(

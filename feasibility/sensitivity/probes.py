@@ -22,7 +22,6 @@ from feasibility.search_settings import Search
 from feasibility.sensitivity.quantities import Kind, Quantity, Variant
 from feasibility.sensitivity.thresholds import Finding, Threshold
 from feasibility.verdict import Answer, Certificate, Evidence, Verdict, Walk
-from surfaces.cells import Cells
 
 NEARBY = (1 / 8, 1 / 4, 1 / 2, 1)  # [1] of the way to its end: values of what is not monotone
 ALL_ALONG = (1 / 32, 1 / 16, 1 / 8, 3 / 16, 1 / 4, 3 / 8, 1 / 2, 5 / 8, 3 / 4, 7 / 8, 1)
@@ -224,8 +223,24 @@ class Prober:
 
     def finding(self, quantity: Quantity, k: int) -> Finding:
         """What was found at a value."""
+        look, cells, cell = self.at(((quantity, k),)), self.given.cells, None
+        best = f"the best motion covers {look.covered} of {counted(len(cells), 'cell')}"
+        answer = Answer.INFEASIBLE
+        if look.certificate is not None and look.walk is not None:
+            answer, detail = Answer.FEASIBLE, f"one motion of {len(look.walk.q)} waypoints"
+        elif look.evidence is Evidence.BUDGET:
+            answer = Answer.UNDECIDED
+            detail = f"`check` finds no motion with {look.evaluations} evaluations; {best}"
+        elif look.proof is None:
+            detail = f"the search ended without a covering motion; {best}"
+        elif len(leaves := list(look.proof.leaves())) > 1:
+            detail = "no single motion covers every cell, which is proved"
+        else:
+            cell = leaves[0].cell
+            detail = f"cell {list(cells.unravel(cell))} is proved uncoverable"
         value = quantity.value(k) if k else quantity.given
-        return finding_of(value, self.at(((quantity, k),)), self.given.cells)
+        witness = look.walk if answer is Answer.FEASIBLE else None
+        return Finding(value, answer, look.evidence, detail, cell, witness)
 
     def _holds(self, quantity: Quantity, k: int) -> bool:
         """Is there a motion, as far as a search from the nearest one leads?"""
@@ -324,24 +339,3 @@ def _stops(quantity: Quantity, feasible: bool) -> list[int]:
         return [last]
     shares = NEARBY if feasible else ALL_ALONG
     return sorted({max(1, round(last * share)) for share in shares})
-
-
-def finding_of(value: float, look: Look, cells: Cells) -> Finding:
-    """What was found at a value."""
-    if look.accepted and look.walk is not None:
-        detail = f"one motion of {len(look.walk.q)} waypoints"
-        return Finding(value, Answer.FEASIBLE, Evidence.WITNESS, detail, None, look.walk)
-    best = f"the best motion covers {look.covered} of {counted(len(cells), 'cell')}"
-    if look.evidence is Evidence.BUDGET:
-        detail = f"`check` finds no motion with {look.evaluations} evaluations; {best}"
-        return Finding(value, Answer.UNDECIDED, look.evidence, detail)
-    if look.proof is None:
-        detail = f"the search ended without a covering motion; {best}"
-        return Finding(value, Answer.INFEASIBLE, look.evidence, detail)
-    leaves = list(look.proof.leaves())
-    if len(leaves) > 1:
-        detail = "no single motion covers every cell, which is proved"
-        return Finding(value, Answer.INFEASIBLE, look.evidence, detail)
-    cell = leaves[0].cell
-    detail = f"cell {list(cells.unravel(cell))} is proved uncoverable"
-    return Finding(value, Answer.INFEASIBLE, look.evidence, detail, cell)
