@@ -31,6 +31,8 @@ from surfaces.surface import Surface
 if TYPE_CHECKING:
     from surfaces.toolpaths.pose_surface import PoseSurface
 
+AT_ONCE = 256  # rows, among which a pose is looked for
+
 
 def order_of_marks(cells: Cells, walk: Walk) -> str:
     """Why the marks of a walk are not in the order of a toolpath; empty where they are."""
@@ -54,17 +56,18 @@ def marks_in_order(robot: Robot, cells: Cells, task: Task, q: Array) -> Ints | N
     if not cells.in_order or not len(q):
         return None
     tools, targets = Kinematics(robot).tools(q), task.targets(cells)
-    marks, row = np.full(len(q), -1), 0
-    most = task.effective_tolerance, task.cone_chord
+    marks, row, most = np.full(len(q), -1), 0, (task.effective_tolerance, task.cone_chord)
     for k, wanted in enumerate(zip(targets.points, targets.approaches, strict=True)):
-        near = [
-            np.linalg.norm(found[row:] - one, axis=1) <= far
-            for found, one, far in zip(tools, wanted, most, strict=True)
-        ]
-        at = np.flatnonzero(np.logical_and(*near))
-        if not len(at):
+        at = np.zeros(0, dtype=np.intp)
+        while row < len(q) and not len(at):
+            near = [
+                np.linalg.norm(found[row : row + AT_ONCE] - one, axis=1) <= far
+                for found, one, far in zip(tools, wanted, most, strict=True)
+            ]
+            at = np.flatnonzero(np.logical_and(*near))
+            row += int(at[0]) if len(at) else AT_ONCE
+        if row >= len(q):
             return None
-        row += int(at[0])
         marks[row], row = k, row + 1
     return marks
 
