@@ -21,12 +21,10 @@ from coverable.errors import Checks, Fault, at_least, counted
 from feasibility.clock import Clock
 from feasibility.collisions.asked_bodies import said_of
 from feasibility.demands.every_demand import refuse_start
-from feasibility.notices import compiling_notice
 from feasibility.placement.evolution import INTERRUPTED, SMALLEST, Evolution, distinct
 from feasibility.placement.reach_bound import Beyond, Reach
 from feasibility.placement.region import PlacementError, Region
 from feasibility.placement.trials import Evaluator, Trial, evaluator_here
-from feasibility.roadmap.warmup import warm_up
 from feasibility.search_settings import Progress, Search
 from feasibility.targets.blocked import blocked_curves, smoothing_offer
 from feasibility.task import Task
@@ -151,12 +149,8 @@ def place(
     reach = Reach.of(robot, cells, task)
     answered = partial(Placements, robot, cells, task, region)
     if (beyond := reach.beyond(region)) is not None:
-        took = {"total_s": time.monotonic() - began}
-        return _ruled_out(partial(answered, timing=took), beyond)
-    if evaluator is None:
-        with compiling_notice():
-            warm_up()
-        evaluator = evaluator_here(robot, cells, task, search)
+        return _ruled_out(answered, beyond, time.monotonic() - began)
+    evaluator = evaluator or evaluator_here(robot, cells, task, search)
     tried = Evolution(evaluator, reach, region, clock, progress)
     try:
         tried.run(max(count, SMALLEST), rounds, search.seed)
@@ -165,7 +159,12 @@ def place(
             raise
         tried.stopped = INTERRUPTED
     found = distinct((trial for trial in tried.ranked if trial.feasible), region, keep)
-    answer = _searched(answered, tried, found, task.requires_rates)
+    return _finished(_searched(answered, tried, found, task.requires_rates), clock, began)
+
+
+def _finished(answer: Placements, clock: Clock, began: float) -> Placements:
+    """The same with its time; where it is undecided, with what no placement helps, and what may."""
+    cells, task = answer.cells, answer.task
     closed = blocked_curves(cells, task) if answer.answer is Answer.UNDECIDED else ""
     if closed:
         said = f"Wherever it stands: {closed} {smoothing_offer(cells, task, clock)}".rstrip()
@@ -190,8 +189,8 @@ def _check_settings(
     checks.done()
 
 
-def _ruled_out(answered: Callable[..., Placements], beyond: Beyond) -> Placements:
-    """The answer where the reach bound leaves no placement."""
+def _ruled_out(answered: Callable[..., Placements], beyond: Beyond, seconds: float) -> Placements:
+    """The answer where the reach bound leaves no placement, which took some seconds."""
     message = (
         f"No placement in the region: wherever the surface stands in it, some target is at least "
         f"{beyond.distance:.3f} m from the first joint, and the arm reaches at most "
@@ -202,6 +201,7 @@ def _ruled_out(answered: Callable[..., Placements], beyond: Beyond) -> Placement
     return answered(
         answer=Answer.INFEASIBLE, evidence=Evidence.PROOF, message=message, found=(), trials=(),
         cause=CauseKind.OUT_OF_REACH, statistics={**none, "boxes": beyond.boxes},
+        timing={"total_s": seconds},
     )  # fmt: skip
 
 
