@@ -48,8 +48,9 @@ class Demand:
     """What answers call it."""
     keys: tuple[str, ...]
     """Of the case file, which say it; "collision.*" stands for all of a table."""
-    asked: Callable[[Robot, Task], bool] = lambda robot, task: True
-    """Does this case demand it?"""
+    attribute: str = ""
+    """Of the task, or of the arm ("start"), that is None where a case does not demand it; empty
+    where every case does."""
     judge: Judge | None = None
     """Of motions one after the other that the replay accepted; None where it is the replay that
     judges it."""
@@ -88,29 +89,17 @@ DEMANDS = (
     Demand("standoff", ("task.standoff",)),
     Demand("tolerance", ("task.tolerance",)),
     Demand("cone", ("task.cone_deg", "task.approach")),
-    Demand(
-        "roll", ("task.roll_deg", "task.roll_reference"), lambda robot, task: task.roll is not None
-    ),
+    Demand("roll", ("task.roll_deg", "task.roll_reference"), "roll"),
     Demand("limits", ("robot.limits", "robot.limits_deg", "robot.limits_m")),
-    Demand("collisions", ("collision.*",), lambda robot, task: task.collision is not None),
+    Demand("collisions", ("collision.*",), "collision"),
+    Demand("start", ("robot.start", "robot.start_deg"), "start", _at_start, together=True),
+    Demand("speed", ("task.speed",), "speed", _at_rates),
     Demand(
-        "start", ("robot.start", "robot.start_deg"), lambda robot, task: robot.start is not None,
-        _at_start, together=True,
+        "distance from singularities", ("task.min_manipulability",), "min_manipulability", _at_rates
     ),
-    Demand("speed", ("task.speed",), lambda robot, task: task.speed is not None, _at_rates),
-    Demand(
-        "distance from singularities", ("task.min_manipulability",),
-        lambda robot, task: task.min_manipulability is not None, _at_rates,
-    ),
-    Demand(
-        "placement error", ("task.placement_error",),
-        lambda robot, task: task.placement_error is not None,
-    ),
-    Demand(
-        "coverage", ("task.coverage",), lambda robot, task: task.coverage is not None,
-        _treating, together=True,
-    ),
-)  # fmt: skip
+    Demand("placement error", ("task.placement_error",), "placement_error"),
+    Demand("coverage", ("task.coverage",), "coverage", _treating, together=True),
+)
 NAMES = tuple(demand.name for demand in DEMANDS)
 BY_REPLAY = tuple(demand.name for demand in DEMANDS if demand.judge is None)
 TOGETHER = tuple(demand.name for demand in DEMANDS if demand.together)
@@ -122,7 +111,12 @@ OF_TREE = ("standoff", "tolerance", "cone", "roll", "limits", "start")
 
 def asked_of(robot: Robot, task: Task) -> tuple[Demand, ...]:
     """What a case demands."""
-    return tuple(demand for demand in DEMANDS if demand.asked(robot, task))
+    return tuple(
+        demand
+        for demand in DEMANDS
+        if not demand.attribute
+        or getattr(robot if demand.attribute == "start" else task, demand.attribute) is not None
+    )
 
 
 def unjudged(robot: Robot, task: Task, judged: Collection[str]) -> tuple[str, ...]:
