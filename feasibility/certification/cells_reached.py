@@ -51,11 +51,6 @@ class Reached:
         self.roll[cell[best]] = roll[best]
 
 
-def in_order(samples: Samples) -> Samples:
-    """The same samples as the motion passes them."""
-    return samples.of(np.lexsort((samples.share, samples.row)))
-
-
 def cells_reached(
     robot: Robot, cells: Cells, task: Task, rows: Array, samples: Samples, marks: Ints | None = None
 ) -> Reached:
@@ -66,7 +61,7 @@ def cells_reached(
         cells: the cells.
         task: its tolerance and cone.
         rows: (m, n) the motion.
-        samples: of it, in the order of `in_order`, all rows among them.
+        samples: of it, as it passes them, all rows among them.
         marks: (m,) the cell that each row is said to be at, -1 for none: looked at first.
     """
     reached = Reached.none(len(cells))

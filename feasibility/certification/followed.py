@@ -27,7 +27,6 @@ from feasibility.certification.stretches import Judge, SampledStretches, Samples
 from robots.kinematics import Kinematics
 from surfaces.cells import Cells
 from surfaces.places.patch_places import PatchPlaces
-from surfaces.places.places import Places
 from surfaces.surface import Surface
 
 HALVINGS = 30  # to where a motion leaves what it follows
@@ -211,7 +210,9 @@ def on_the_way(
     """
     nothing, patch = np.zeros(len(rows), dtype=bool), judge.offset
     runs = list(itertools.pairwise(np.flatnonzero(marks >= 0).tolist()))
-    wanted = {k for k, run in enumerate(runs) if _within(doubtful, *run)}
+    wanted = {
+        k for k, run in enumerate(runs) if ((doubtful >= run[0]) & (doubtful <= run[1])).any()
+    }
     found = dict[int, Samples]()
     long = any(runs[k][1] - runs[k][0] > LONGEST for k in wanted)
     if long or not isinstance(patch, PatchPlaces):
@@ -253,11 +254,6 @@ def _right(
     return bool(judge.within(at).all() and decided(stretches).all())
 
 
-def _within(numbers: Ints, low: int, high: int) -> bool:
-    """Is one of some numbers from low to high?"""
-    return bool(((numbers >= low) & (numbers <= high)).any())
-
-
 def _in_order(
     judge: Judge, patch: PatchPlaces, rows: Array, centres: Array, numbers: Ints
 ) -> Samples:
@@ -277,12 +273,8 @@ def _in_order(
     chord = max(judge.task.cone_chord, 1e-9)
     lean = np.linalg.norm(at.axes[:, None] - approaches, axis=2) / chord
     k, m = _by_turns(np.minimum(np.maximum(off, lean), 10.0) ** STEEP)
-    return _over(judge, way.of(m), at.of(k))
-
-
-def _over(judge: Judge, places: Places, at: Samples) -> Samples:
-    """Samples over other places."""
-    return judge.over(places, at.row, at.share, at.points, at.axes, at.x)
+    at = at.of(k)
+    return judge.over(way.of(m), at.row, at.share, at.points, at.axes, at.x)
 
 
 def _by_turns(costs: Array) -> tuple[Ints, Ints]:

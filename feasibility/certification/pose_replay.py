@@ -153,23 +153,14 @@ def along_poses(
     task: Task,
     right: bool,
 ) -> tuple[Along, list[MotionFault]]:
-    """What is found along poses, and its faults; over what they follow too, where all is right."""
-    faults = order_of_places(judge.offset, found.samples, task.effective_tolerance)
-    if faults or not right:
-        return found, faults
-    found = _with_what_follows(found, judge, rows, cells, surface)
-    return found, found.faults
+    """What is found along poses, and its faults.
 
-
-def _with_what_follows(
-    found: Along, judge: Judge, rows: Array, cells: Cells, surface: PoseSurface
-) -> Along:
-    """What is found along poses, and of what follows the surface under them over that, too.
-
-    What is lifted, or beyond the border, must not go through the surface.
+    Where all is `right`, also over the surface under them of what follows that. What is lifted, or
+    beyond the border, must not go through the surface.
     """
-    if surface.under is None or surface.working is None:
-        return found
+    faults = order_of_places(judge.offset, found.samples, task.effective_tolerance)
+    if faults or not right or surface.under is None or surface.working is None:
+        return found, faults
     task = less_deviations(judge.task, surface.under)
     over = Judge(judge.robot, task, offset_surface(surface.under, judge.offset.height), cells)
     followed, most, room = surface.followed, found.most, found.room
@@ -182,4 +173,4 @@ def _with_what_follows(
         most = np.maximum(most, one.most)
         faults += [part.placed(fault) for fault in one.faults]
         np.minimum.at(room, part.row, one.room)
-    return Along(most, faults, found.samples, room)
+    return Along(most, faults, found.samples, room), faults

@@ -15,7 +15,6 @@ import numpy as np
 from coverable.arrays import Array, Ints, Mask
 from coverable.errors import counted
 from feasibility.certification.bisection import bisected
-from feasibility.certification.cells_reached import in_order
 from feasibility.certification.faults import MotionFault
 from feasibility.certification.lever_bounds import jacobians
 from feasibility.certification.stretches import Bounds, Judge, SampledStretches, Samples
@@ -82,7 +81,7 @@ def tool_along(
         faults += exact_faults(judge, samples.of(wrong & rough), "place")
     elif len(left.row):
         faults.append(open_fault(judge, left, judge.bounds(left)))
-    samples = in_order(samples)
+    samples = samples.of(np.lexsort((samples.share, samples.row)))  # as the motion passes them
     np.maximum(most, _most(judge, samples), out=most)
     less_room(room, judge.task, samples.row, samples.chord, samples.roll)
     return Along(most, faults, samples, room)

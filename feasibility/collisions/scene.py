@@ -14,16 +14,16 @@ from coverable.arrays import Array
 from coverable.errors import ArgumentError, Checks
 from feasibility.collisions.named_pairs import checked_distance
 from feasibility.collisions.shapes import (
+    FARTHEST,
     ORIGIN,
     PLACEHOLDER,
     HalfSpace,
     Shape,
-    checked_placement,
     checked_shape,
-    placement_of,
     read_triangles,
 )
 from feasibility.collisions.words import SURFACE, TOOL
+from robots.poses import matrix_of, rigid_matrix
 from robots.shapes.bodies import Triangles
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
@@ -83,7 +83,7 @@ class Obstacle:
         _keep(
             self,
             geometry=checked_shape(checks, self.geometry),
-            placement=checked_placement(checks, self.placement),
+            placement=rigid_matrix(checks, "placement", self.placement, FARTHEST),
             clearance=None
             if clearance is None
             else checked_distance(checks, "clearance", clearance),
@@ -179,7 +179,7 @@ class ToolShape:
         _keep(
             self,
             geometry=checked_shape(checks, self.geometry),
-            placement=checked_placement(checks, self.placement),
+            placement=rigid_matrix(checks, "placement", self.placement, FARTHEST),
         )
         checks.done()
 
@@ -253,7 +253,7 @@ def _placed(
             geometry = read_triangles(*file)
         except ArgumentError as error:
             checks.faults += error.faults
-    placement = placement_of(checks, position, rpy_deg)
+    placement = matrix_of(checks, position, rpy_deg, FARTHEST)
     try:
         if name is None:
             made = make(geometry, placement)

@@ -15,7 +15,6 @@ import numpy as np
 from coverable.arrays import Array, Ints
 from coverable.errors import Checks, CoverableError, Fault, shown
 from coverable.files import shown_name
-from robots.poses import matrix_of, rigid_matrix
 from robots.shapes.bodies import Triangles
 from robots.shapes.solids import solid_faces
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
@@ -165,13 +164,3 @@ def _side(checks: Checks, key: str, value: object) -> float:
     remedy = "; a floor, wall or ceiling is a halfspace" if length > LARGEST_SIDE else ""
     checks.keep(Fault(key, f"got {shown(value)}{remedy}", expected=expected))
     return 1.0
-
-
-def checked_placement(checks: Checks, placement: Any) -> Array:
-    """A (4, 4) rigid motion; the identity after a fault."""
-    return rigid_matrix(checks, "placement", placement, FARTHEST)
-
-
-def placement_of(checks: Checks, position: Any, rpy_deg: Any) -> Array:
-    """The (4, 4) placement at a position (m), turned by roll, pitch and yaw about fixed axes."""
-    return matrix_of(checks, position, rpy_deg, FARTHEST)

@@ -120,7 +120,9 @@ class Emptiness:
                 starts = (left.centre[some] + place[some])[:, :n]
                 at = [(regions[k], claims[k].cell) for k in left.claim[some]]
                 found = refuter.find(starts, at)
-                if found is not None and self._clear(found[1]):
+                if found is not None and (
+                    self.overlapping is None or self.overlapping.clear(found[1])
+                ):
                     return Outcome(done, int(left.claim[some[found[0]]]), found[1])
             waiting.append(smaller(left, models, self.parts, self.allowed.length))
         return Outcome(done)
@@ -176,10 +178,6 @@ class Emptiness:
             ((found.ratio < NEARLY) & deep)[:, None], found.effect, reach[:, :n]
         )
         return ~ruled_out, reach
-
-    def _clear(self, q: Array) -> bool:
-        """Is a configuration one in which no pair is too near?"""
-        return self.overlapping is None or self.overlapping.clear(q)
 
 
 def _next(waiting: list[Boxes]) -> Boxes:

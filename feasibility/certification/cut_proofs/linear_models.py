@@ -202,8 +202,12 @@ class ArmModel:
         )
         if allowed.roll is None:
             return made
+        part, held = boxes.part, parts.references
+        held_centre = np.stack([parts.centre[part, 3:], held.centre[part]], axis=1)
+        turned = np.stack([parts.slopes[part][..., 3:], held.slopes[part]], axis=2)
         at = TargetModel(
-            *_over_parts(parts, boxes.part, centre[:, n:]),
+            held_centre + (centre[:, n:, None, None] * turned).sum(axis=1),
+            turned,
             half[:, n:],
             np.column_stack([parts.radius[:, 1], parts.references.radius])[boxes.part],
         )
@@ -236,10 +240,3 @@ class ArmModel:
             radius=np.concatenate([made.radius, length * found.radius], axis=1),
             reach=reach,
         )
-
-
-def _over_parts(parts: Parts, part: Ints, x: Array) -> tuple[Array, Array]:
-    """b and t (m, 2, 3) at places x (m, 2) of parts (m,), and their slopes (m, 2, 2, 3)."""
-    centre = np.stack([parts.centre[part, 3:], parts.references.centre[part]], axis=1)
-    slopes = np.stack([parts.slopes[part][..., 3:], parts.references.slopes[part]], axis=2)
-    return centre + (x[:, :, None, None] * slopes).sum(axis=1), slopes
