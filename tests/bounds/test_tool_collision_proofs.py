@@ -195,10 +195,16 @@ def test_open_hollow_dented_and_doubled_meshes_are_told_from_solids():
     corners = np.vstack([box.vertices, inside.vertices])
     wrong.append(Triangles(corners, np.vstack([box.faces, both]), True))
     wrong.append(Triangles(box.vertices, np.vstack([box.faces, box.faces[:, ::-1]]), True))
-    hair = box.subdivide().subdivide()  # with a hole as thin as a hair down to its middle
-    corners = hair.vertices.copy()
-    corners[np.linalg.norm(corners - [0.0, 0.0, 0.05], axis=1).argmin(), 2] = 0.0
-    wrong += [checked_triangles(corners, hair.faces), bracket()]
+    top, n = int(box.face_normals[:, 2].argmax()), len(box.vertices)
+    at = box.vertices[box.faces[top]]  # of a hole as thin as a hair, half through
+    middle = at.mean(axis=0)
+    corners = np.vstack([box.vertices, middle + 1e-3 * (at - middle), middle - [0.0, 0.0, 0.05]])
+    sides = [(x, y, n + k, n + (k + 1) % 3) for k, (x, y) in enumerate(
+        zip(box.faces[top], np.roll(box.faces[top], -1), strict=True))]  # fmt: skip
+    hole = [f for x, y, p, q in sides for f in ([x, y, p], [y, q, p], [p, q, n + 3])]
+    hair = checked_triangles(corners, np.vstack([np.delete(box.faces, top, 0), hole]))
+    assert hair.closed
+    wrong += [hair, bracket()]
     for mesh in wrong:
         assert planes_around(mesh) is None
         assert depths(mesh, np.zeros(3)) is None
