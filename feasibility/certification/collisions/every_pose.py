@@ -28,7 +28,6 @@ MOST_BOXES = 100_000
 BATCH = 512  # boxes at a time
 MOST_POINTS = 20_000  # of bodies at once, each compared with all planes of another: 0.1 GB
 POSES = 12  # directions of tilt, and rolls, among which the best is told
-FEW = 1_000  # points of bodies that are first looked at for that
 FINEST = 40  # parts of the tool's reach that triangles of a sheet are cut to
 CUTS = 40  # of a triangle, at most
 WIDE = np.array([np.pi, 0.5 * np.pi, np.pi])  # [rad] half the range of all directions and rolls
@@ -119,18 +118,21 @@ def _at_best(
 ) -> tuple[float, int]:
     """By how much (m) bodies are too near in the best of some poses, and which pair.
 
-    By bodies with few points it is no more: only poses that could be the best are looked at with
+    By the points of one body it is no more: only poses that could be the best are looked at with
     all of them.
     """
-    parts = np.array_split(poses, -(-len(poses) // batch))
-    some = [tool.too_near(part, point, tolerance, FEW)[0] for part in parts]
-    at_least, least, nearest = np.concatenate(some), np.inf, 0
-    for k in np.argsort(at_least, kind="stable"):
-        if at_least[k] >= least:
-            break
-        (over,), (pair,) = tool.too_near(poses[k : k + 1], point, tolerance)
+    parts, known = np.array_split(poses, -(-len(poses) // batch)), set[int]()
+    at_least, least, nearest = np.full(len(poses), -np.inf), np.inf, 0
+    while at_least.min() < least:
+        k = int(at_least.argmin())
+        (over,), (pair,), (body,) = tool.too_near(poses[k : k + 1], point, tolerance)
         if over < least:
             least, nearest = float(over), int(pair)
+        if body not in known:
+            known.add(body)
+            some = [tool.too_near(part, point, tolerance, int(body))[0] for part in parts]
+            at_least = np.maximum(at_least, np.concatenate(some))
+        at_least[k] = np.inf
     return least, nearest
 
 

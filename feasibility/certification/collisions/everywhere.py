@@ -167,20 +167,23 @@ class Overlapping:
         return collision_replay(self._robot, self._bodies, np.array([q, q])).accepted
 
     def too_near(
-        self, q: Array, target: Array, off: float, most: float = np.inf
-    ) -> tuple[Array, Array]:
-        """(m,) m, by how much bodies are too near for certain at configurations q (m, n); and who.
+        self, q: Array, target: Array, off: float, only: int | None = None
+    ) -> tuple[Array, Ints, Ints]:
+        """(m,) m, by how much bodies are too near for certain at configurations q (m, n).
 
-        By points of bodies that have `most` of them at most.
+        And which pair, and by points of which body; or by those of one body alone.
         """
-        over, pair = np.full(len(q), -np.inf), np.full(len(q), -1)
+        over, pair, which = np.full(len(q), -np.inf), *np.full((2, len(q)), -1)
         boxes = self._middles(q, q, target, off)
-        for couples in (one for one in self._couples if len(one.points.places) <= most):
-            for k, found, _, _ in self._measured(couples, boxes):
+        for number in range(len(self._couples)) if only is None else (only,):
+            for k, found, _, _ in self._measured(self._couples[number], boxes, False):
                 nearest = found.max(axis=1)
-                pair = np.where(nearest > over, k, pair)
+                pair, which = (
+                    np.where(nearest > over, one, other)
+                    for one, other in ((k, pair), (number, which))
+                )
                 over = np.maximum(over, nearest)
-        return over, pair
+        return over, pair, which
 
     def _overlap(self, couples: _Couples, boxes: _Middles) -> Deepest:
         """What points of one body say of m boxes."""
@@ -199,19 +202,23 @@ class Overlapping:
         return found
 
     def _measured(
-        self, couples: _Couples, boxes: _Middles
+        self, couples: _Couples, boxes: _Middles, moved: bool = True
     ) -> Iterator[tuple[int, Array, int, list[Array]]]:
         """What is known of k points of one body, for each other body and way to look at it.
 
         The pair; by how much points are too near, (m, k) m; the first joint that moves them, and by
-        how much each does, (m, k) m.
+        how much each does, (m, k) m, unless only places count.
         """
-        points = couples.points
-        turned = points.places @ boxes.rotations[:, points.joint].transpose(0, 2, 1)
-        x = turned + boxes.origins[:, points.joint, None]
-        steps = [self._step(boxes, k, x) for k in range(points.joint)]
-        from_tool = self._steps_from_tool(boxes, x, points.joint or self._robot.n)
-        shifted = x + (boxes.target - boxes.tool)[:, None]
+        points, steps, from_tool = couples.points, list[Array](), list[Array]()
+        x = np.broadcast_to(points.places, (len(boxes.half), *points.places.shape))
+        if points.joint:
+            x = x @ boxes.rotations[:, points.joint].transpose(0, 2, 1)
+            x = x + boxes.origins[:, points.joint, None]
+        if moved and not self._alone:
+            steps = [self._step(boxes, k, x) for k in range(points.joint)]
+        if moved:
+            from_tool = self._steps_from_tool(boxes, x, points.joint or self._robot.n)
+        shifted = x if self._alone else x + (boxes.target - boxes.tool)[:, None]
         for body, pair in couples.bodies:
             kept = points.deep + self._bodies.pairs[pair].clearance - GUARD
             seen = [] if self._alone else [(x, steps, body.joint, np.zeros((len(x), 1)))]
@@ -253,14 +260,14 @@ def _depths(body: _Inside, boxes: _Middles, x: Array, near: float) -> Array:
     turned, shift = boxes.rotations[:, body.joint], body.placement[:3, 3]
     middle = boxes.origins[:, body.joint] + turned @ shift
     own = (x - middle[:, None]) @ (turned @ body.placement[:3, :3])
-    found, rows = np.full(x.shape[:2], -np.inf), np.ones(len(x), dtype=bool)
-    if isinstance(body.shape, Balls):  # these take long
-        centre = body.shape.centres[0]
-        wide = (np.linalg.norm(body.shape.centres - centre, axis=1) + body.shape.radii).max()
-        rows = np.linalg.norm(own - centre, axis=2).min(axis=1) <= wide + near
-    deep = depths(body.shape, own[rows])
-    if deep is not None:
-        found[rows] = deep
+    found = np.full(x.shape[:2], -np.inf)
+    if not isinstance(body.shape, Balls):
+        deep = depths(body.shape, own)
+        return found if deep is None else deep
+    centre = body.shape.centres[0]  # balls take long
+    wide = (np.linalg.norm(body.shape.centres - centre, axis=1) + body.shape.radii).max()
+    rows = np.linalg.norm(own - centre, axis=2).min(axis=1) <= wide + near
+    found[rows] = depths(body.shape, own[rows])
     return found
 
 
