@@ -46,6 +46,9 @@ def add(subcommands: argparse._SubParsersAction) -> None:
         "--robots", metavar="NAMES", required=True,
         help="names of arms, and paths of URDFs: ur5,panda,my_arm.urdf",
     )  # fmt: skip
+    parser.add_argument(
+        "--critical", action="store_true", help="also find the smallest cone of each arm (slow)"
+    )
 
 
 def study(args: argparse.Namespace, began: float) -> int:
@@ -96,7 +99,7 @@ def compare(args: argparse.Namespace, began: float) -> int:
     robots = [name.strip() for name in args.robots.split(",") if name.strip()]
     with Bar() as bar, open_workers(args.workers, args.dask) as workers:
         progress = with_rate(bar, "comparing robots")
-        found = run(case, robots, workers, progress=progress)
+        found = run(case, robots, workers, args.critical, progress)
     tell(args, report, found)
     if args.html is not None:
         write_text(args.html, report.as_html(found), "page")

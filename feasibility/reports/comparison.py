@@ -11,6 +11,7 @@ from feasibility.collisions.words import checked, checked_words
 from feasibility.reports.objects_and_csv import MARGINS, csv_text
 from feasibility.reports.pages import COLOURS, bar, page, table
 from feasibility.reports.text_and_tables import aligned, bodiless, percent
+from feasibility.sensitivity.quantities import LEAST_CONE_DEG
 from feasibility.studies.robot_comparison import Arm, Comparison
 from feasibility.version import version
 
@@ -42,18 +43,28 @@ def as_csv(comparison: Comparison) -> str:
     return csv_text(rows)
 
 
-COLUMNS: tuple[Column, ...] = (
-    ("robot", lambda arm: arm.robot),
-    ("verdict", lambda arm: arm.verdict),
-    ("covered", lambda arm: percent(arm.share)),
-    ("motions needed", lambda arm: _patches(arm)),
-    ("from limits", lambda arm: _unit((arm.margins or {}).get("limit_deg"), "deg")),
-    ("inside cone", lambda arm: _unit((arm.margins or {}).get("cone_deg"), "deg")),
-    ("reach", lambda arm: "any" if arm.reach_m is None else f"{arm.reach_m:.2f} m"),
-    ("joints", lambda arm: str(arm.joints)),
-    ("mostly missed for", lambda arm: (arm.cause or "-").replace("_", " ")),
-)
-"""Headings, and the text below each for an arm."""
+def columns(comparison: Comparison) -> list[Column]:
+    """Headings, and the text below each for an arm."""
+    cone: list[Column] = [("smallest cone", _smallest_cone)] if comparison.critical else []
+    return [
+        ("robot", lambda arm: arm.robot),
+        ("verdict", lambda arm: arm.verdict),
+        ("covered", lambda arm: percent(arm.share)),
+        ("motions needed", _patches),
+        *cone,
+        ("from limits", lambda arm: _unit((arm.margins or {}).get("limit_deg"), "deg")),
+        ("inside cone", lambda arm: _unit((arm.margins or {}).get("cone_deg"), "deg")),
+        ("reach", lambda arm: "any" if arm.reach_m is None else f"{arm.reach_m:.2f} m"),
+        ("joints", lambda arm: str(arm.joints)),
+        ("mostly missed for", lambda arm: (arm.cause or "-").replace("_", " ")),
+    ]
+
+
+def _smallest_cone(arm: Arm) -> str:
+    """'12.5 deg', or '<= 0.5 deg': cones narrower than `LEAST_CONE_DEG` are not tried."""
+    cone = arm.critical_cone_deg
+    least = cone is not None and cone <= LEAST_CONE_DEG
+    return f"{'<= ' if least else ''}{_unit(cone, 'deg')}"
 
 
 def _patches(arm: Arm) -> str:
@@ -73,8 +84,9 @@ def _unit(value: float | None, unit: str) -> str:
 
 def as_text(comparison: Comparison) -> str:
     """The table for people, the best arm first."""
-    rows = [[head for head, _ in COLUMNS]]
-    rows += [[text(arm) for _, text in COLUMNS] for arm in comparison.ranked]
+    heads = columns(comparison)
+    rows = [[head for head, _ in heads]]
+    rows += [[text(arm) for _, text in heads] for arm in comparison.ranked]
     rules = ["-" * max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [line.rstrip() for line in aligned([rows[0], rules, *rows[1:]])]
     return "\n".join([headline(comparison), f"  {_said(comparison)}", "", *lines])
@@ -101,11 +113,11 @@ def headline(comparison: Comparison) -> str:
 
 def as_html(comparison: Comparison) -> str:
     """One self-contained page: headline, and the table with bars of the covered share."""
-    lines = []
+    heads, lines = columns(comparison), []
     for arm in comparison.ranked:
-        cells = [html.escape(text(arm)) for _, text in COLUMNS]
+        cells = [html.escape(text(arm)) for _, text in heads]
         cells[COVERED] += bar((arm.share, COLOURS[arm.verdict], arm.message))
         lines.append(cells)
     body = f"<p>{html.escape(headline(comparison))}.</p>\n"
-    body += table((html.escape(name) for name, _ in COLUMNS), lines)
+    body += table((html.escape(name) for name, _ in heads), lines)
     return page(f"Robots compared: {comparison.case}", body, NOTE, _said(comparison))

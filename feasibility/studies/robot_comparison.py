@@ -43,6 +43,9 @@ class Arm:
     as of surfaces with more than 400 cells."""
     patches_share: float | None = None
     """Of the area, 0..1, that these cover together."""
+    critical_cone_deg: float | None = None
+    """The smallest cone with a covering motion, to half a degree; narrower ones than
+    `LEAST_CONE_DEG` are not tested. None where there is none, or it was not requested."""
     margins: dict[str, float | None] | None = None
     """What the covering motion leaves: limit_deg, limit_m, cone_deg, reach_m, placement_m."""
     unchecked_links: Sequence[str] = ()
@@ -57,6 +60,8 @@ class Comparison:
 
     case: str
     arms: tuple[Arm, ...]
+    critical: bool
+    """Were critical cones searched for?"""
     collision: CollisionPart | None = None
     """What was checked of collisions; None where nothing was."""
 
@@ -70,6 +75,7 @@ def compare(
     case: Case,
     robots: Sequence[str],
     workers: Workers,
+    critical: bool = False,
     progress: Progress | None = None,
 ) -> Comparison:
     """The same case for several arms, each mounted where the case's arm is: on its base and axes.
@@ -79,6 +85,7 @@ def compare(
             robots.
         robots: names of the library, and paths of URDF or xacro files.
         workers: where they run, see `open_workers`.
+        critical: look for the smallest cone that each arm can do with; some ten verdicts each.
         progress: called as progress(done, total, text); what it raises ends the work.
 
     Raises:
@@ -92,10 +99,9 @@ def compare(
         >>> [(arm.robot, arm.verdict) for arm in found.ranked]
         [('puma560', 'feasible'), ('ur5', 'infeasible')]
     """
+    wanted = {"wanted": {"patches": True, "critical": critical}}
     tasks = [
-        replace(
-            task, tables={**task.tables, "wanted": {"patches": True}}, parameters={"robot": name}
-        )
+        replace(task, tables={**task.tables, **wanted}, parameters={"robot": name})
         for task, name in zip(_tasks_of(case, robots), robots, strict=True)
     ]
     rows = run_tasks(tasks, workers, progress=progress)
@@ -109,7 +115,7 @@ def compare(
                 cause=next(iter(result.get("causes", {})), None), seconds=row.seconds,
             )
         )  # fmt: skip
-    return Comparison(case.name, tuple(arms), case.collision)
+    return Comparison(case.name, tuple(arms), critical, case.collision)
 
 
 def _tasks_of(case: Case, robots: Sequence[str]) -> tuple[StudyTask, ...]:

@@ -66,10 +66,11 @@ class Outcome(TypedDict):
 
 
 class Divided(Outcome):
-    """With how many motions it takes, which no store holds; None where that is not known."""
+    """With what `compare` wants, which no store holds; None where that is not known."""
 
     patches: int | None
     patches_share: float | None
+    critical_cone_deg: float | None
 
 
 WORDS = {"verdict": [*Answer], "evidence": [*Evidence], "method": [*METHODS]}

@@ -2,8 +2,10 @@
 
 import math
 import time
+from bisect import bisect_left
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,11 +14,13 @@ from coverable.arrays import Mask
 from feasibility.clock import Clock, OutOfTime
 from feasibility.division.set_covering import undominated
 from feasibility.search_settings import Search
+from feasibility.sensitivity.quantities import LEAST_CONE_DEG
 from feasibility.studies.built_cases import arm_of, case_of, cut_of
 from feasibility.studies.pool import Tables
 from feasibility.studies.stored import Divided, Margins, Outcome, bits_of
 from feasibility.verdict import Verdict
 
+CONE_STEP_DEG = 0.5  # resolution of the critical cone
 MOST_DIVIDED = 400  # cells of a surface that is divided: a division takes several verdicts
 
 
@@ -28,10 +32,11 @@ def evaluate(tables: Tables) -> Outcome | Divided:
 
     Args:
         tables: a case, as `Case.to_tables` gives it; and `wanted`, where it is there: whether to
-            look for `causes` of missed cells, and to count `patches`.
+            look for `causes` of missed cells, to count `patches`, and for the `critical` cone.
 
     Returns:
-        See `outcome_of`; and how many continuous motions together cover all that can be covered.
+        See `outcome_of`; and how many continuous motions together cover all that can be covered,
+        and the smallest cone with which one covers all.
 
     Raises:
         CaseError: the case cannot be used.
@@ -46,7 +51,9 @@ def evaluate(tables: Tables) -> Outcome | Divided:
     if not wanted.get("patches"):
         return found
     motions, share = (1, 1.0) if verdict.feasible else _patches(verdict, case.search, clock)
-    return {**found, "patches": motions, "patches_share": share}
+    sought = wanted["critical"] and not clock.out_of_time
+    cone = critical_cone(verdict, case.search, clock) if sought else None
+    return {**found, "patches": motions, "patches_share": share, "critical_cone_deg": cone}
 
 
 def _patches(
@@ -63,6 +70,30 @@ def _patches(
         return None, None
     accepted = [patch for patch in found.patches if patch.accepted]
     return len(accepted), sum(patch.area for patch in accepted) / float(verdict.cells.areas.sum())
+
+
+def critical_cone(verdict: Verdict, search: Search, clock: Clock) -> float | None:
+    """The smallest cone, deg, with which a covering motion is found; None where none is.
+
+    A wider cone allows all that a narrower one does, so halving finds it. What a search cannot
+    decide counts as not found.
+    """
+    from feasibility.checking import check
+
+    task, given = verdict.task, verdict.task.cone_deg / CONE_STEP_DEG
+
+    def holds(step: int) -> bool:
+        tried = replace(task, cone_deg=step * CONE_STEP_DEG)
+        return check(verdict.robot, verdict.cells, tried, search, clock=clock).feasible
+
+    first, last = round(LEAST_CONE_DEG / CONE_STEP_DEG), math.ceil(given)
+    if not verdict.feasible:
+        first = max(first, math.floor(given) + 1)
+        last = round((180.0 if task.roll is None else 90.0) / CONE_STEP_DEG)
+        if last < first or not holds(last):
+            return None
+    found = first + bisect_left(range(first, last), True, key=holds)
+    return min(found * CONE_STEP_DEG, task.cone_deg if verdict.feasible else math.inf)
 
 
 def outcome_of(verdict: Verdict, causes: bool = True) -> Outcome:

@@ -232,7 +232,7 @@ def of_study(args):
 def of_compare(args):
     with open_workers(0) as workers:
         case, arms = load_case(args.case, args.settings), args.robots.split(",")
-        return json_of.of_compare(coverable.compare(case, arms, workers))
+        return json_of.of_compare(coverable.compare(case, arms, workers, args.critical))
 
 
 def of_verify(args):

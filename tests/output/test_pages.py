@@ -66,7 +66,7 @@ def pages():
         "placements": view_placements(placed, case=EVIL).html(),
         "explanation": explanation.as_html(explained, EVIL, view(verdict, EVIL)),
         "study": study.as_html(replace(asked, name=EVIL, description=EVIL), rows),
-        "comparison": comparison.as_html(Comparison(EVIL, (arm,))),
+        "comparison": comparison.as_html(Comparison(EVIL, (arm,), critical=True)),
     }  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 
 import pytest
 from jobs import PLATE, run_coverable
@@ -70,3 +71,23 @@ def test_other_arms_stand_in_the_same_cell_with_the_same_tool(more, tmp_path) ->
             (tmp_path / "nozzle.toml").write_text(STRIP + more)
             with pytest.raises(CaseError, match=r"kinova has a tool frame.*tcp does not fit"):
                 read_study('base.case = "nozzle.toml"\nvary.robots = ["kinova"]', tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "z", "turns", "given"), [("puma560", 0.2, 3, 12.0), ("ur3", 0.4, 19, 12.0)]
+)
+def test_the_critical_cone_is_where_the_verdict_turns(name, z, turns, given) -> None:
+    """At the cone that is named there is a motion; half a degree below none is found."""
+    settings = [f"robot.name={name}", "surface.u=[0.3, 0.5]", "surface.v=[-0.05, 0.05]",
+                "surface.cells=[2, 1]", f"task.cone_deg={given}",
+                f"surface.position=[0, 0, {z}]"]  # fmt: skip
+    case = load_case("strip.toml", settings)
+    robot, cells, task, search, *_ = case.build()
+    with open_workers(0) as workers:
+        (arm,) = compare(case, [name], workers, critical=True).arms
+    cone = arm.critical_cone_deg
+    assert cone == pytest.approx(turns, abs=1.0)
+    assert (arm.verdict == "feasible") == (cone <= given)
+    assert check(robot, cells, replace(task, cone_deg=cone), search).feasible
+    if cone > 3.0:
+        assert not check(robot, cells, replace(task, cone_deg=cone - 0.5), search).feasible

@@ -147,13 +147,13 @@ def test_what_is_not_verified_in_time_does_not_hold(folder, tmp_path):
 
 
 def test_one_limit_for_all_that_is_done_for_a_case_of_a_study():
-    """Cutting, verdict and patches: nothing is begun when the time is up."""
+    """Cutting, verdict, patches and critical cone: nothing is begun when the time is up."""
     case = case_named("long plate").with_overrides(["search.time_limit=1e-6"])
     with open_workers(0) as workers:
         (row,) = run_tasks([StudyTask(as_read(case.to_tables()), {})], workers)
-        (arm,) = compare(case, ["ur5"], workers).arms
+        (arm,) = compare(case, ["ur5"], workers, critical=True).arms
     assert (row.result["verdict"], row.result["evidence"]) == ("undecided", "budget")
-    assert (arm.verdict, arm.patches) == ("undecided", None)
+    assert (arm.verdict, arm.patches, arm.critical_cone_deg) == ("undecided", None, None)
 
 
 def test_compiling_moves_the_deadline_and_nothing_else_does():

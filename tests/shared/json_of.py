@@ -451,7 +451,7 @@ def of_study(one: Any) -> Json:
 
 
 ARM = ("robot", "joints", "reach_m", "verdict", "evidence", "message", "share", "covered", "cells",
-       "cause", "patches", "patches_share", "margins",
+       "cause", "patches", "patches_share", "critical_cone_deg", "margins",
        "unchecked_links")  # fmt: skip
 
 
