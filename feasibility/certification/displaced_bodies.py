@@ -25,6 +25,7 @@ from functools import reduce
 import numpy as np
 
 from coverable.arrays import Array
+from feasibility.certification.collisions.judged_shapes import Body
 from feasibility.certification.collisions.pairing import Pairing
 from feasibility.collisions.words import SURFACE
 from feasibility.task import Task
@@ -61,10 +62,10 @@ def displaced_share(
     nearer = Nearer(robot, pairings, {SURFACE, *(one.name for one in scene)}, pivot)
     along, some, pair = np.zeros(len(pairings[0].low)), 1.0, None
     most_calls = SHARE_OF_CALLS * sum(one.calls for one in pairings)
-    tried = set[tuple[int, int]]()
+    spare, tried = spare_of(pairings), set[tuple[int, int]]()
     for calls in (0.0, most_calls):
         part = some * most[0], some * most[1]
-        shares, least = clear_share(pairings, nearer.by(moved(*part), *part), calls, tried)
+        shares, least = clear_share(pairings, spare, nearer.by(moved(*part), *part), calls, tried)
         along, pair = np.maximum(along, some * shares), least or pair
         some = min(max(LESS, WIDER * float(along.min())), 1.0)
         if least is None or (some == 1.0 and most_calls < FEW):
@@ -72,25 +73,37 @@ def displaced_share(
     return along, pair
 
 
+def spare_of(pairings: Sequence[Pairing]) -> Array:
+    """(c, m - 1) m, what is certified of couples beyond what they need."""
+    needed = np.array([one.needed for one in pairings])
+    return np.array([one.low for one in pairings]) - needed[:, None]
+
+
 def clear_share(
-    pairings: Sequence[Pairing], nearer: Array, calls: float, tried: set[tuple[int, int]]
-) -> Shares:
-    """The share of `nearer` (c, m - 1) m that couples may come nearer by, as far as known.
+    pairings: Sequence[Pairing], spare: Array, nearer: Array, calls: float,
+    tried: set[tuple[int, int]],
+) -> Shares:  # fmt: skip
+    """The share of `nearer` that couples may come nearer by, as far as known.
 
-    Of those that allow least planes find out more, or so many calls of coal; planes at couples
-    and rows that were tried before do not again.
+    Of those that allow least planes find out more, or so many calls of coal.
+
+    Args:
+        pairings: c couples.
+        spare: of them, see `spare_of`; raised here.
+        nearer: (c, m - 1) m.
+        calls: of coal; with fewer than `FEW` planes are tried.
+        tried: couples and rows at which planes were; added to here.
     """
-    more, needed = np.maximum(nearer, LEAST), np.array([one.needed for one in pairings])
+    more = np.maximum(nearer, LEAST)
 
-    def shares_of(k: slice) -> Array:  # 0 where that is NaN
-        over = np.array([one.low for one in pairings[k]]) - needed[k, None]
-        return np.minimum(np.fmax(over / more[k], 0.0), 1.0)
+    def shares_of(k: int | slice) -> Array:  # 0 where that is NaN
+        return np.minimum(np.fmax(spare[k] / more[k], 0.0), 1.0)
 
     shares, least, pair = shares_of(slice(None)), 1.0, None
     for k in np.argsort(shares.min(axis=1)).tolist():
         if shares[k].min() >= least:
             break
-        one, wanted = pairings[k], needed[k] + least * more[k]
+        one, wanted = pairings[k], pairings[k].needed + least * more[k]
         at = k, int(shares[k].argmin())
         if calls < FEW and at not in tried:
             tried.add(at)
@@ -99,7 +112,8 @@ def clear_share(
             calls += one.calls
             one.look_closer(wanted, MOST_CALLS * (calls - one.calls))
             calls -= one.calls
-        shares[k] = shares_of(slice(k, k + 1))
+        spare[k] = spare_of([one])[0]
+        shares[k] = shares_of(k)
         if shares[k].min() < least:
             least, pair = float(shares[k].min()), one.names
     return shares.min(axis=0), pair
@@ -120,9 +134,9 @@ class Nearer:
             pivot: (3,) m, about which the part turns.
         """
         motion, self.slides = pairings[0].motion, robot.prismatic[:, None, None]
-        bodies = list(dict.fromkeys(body for one in pairings for body in (one.a, one.b)))
-        index = {body: k for k, body in enumerate(bodies)}
-        self.couples = np.array([(index[one.a], index[one.b]) for one in pairings]).T
+        bodies = dict[Body, int]()
+        couples = [bodies.setdefault(x, len(bodies)) for one in pairings for x in (one.a, one.b)]
+        self.couples = np.array(couples).reshape(-1, 2).T
         tool = robot.model.frames[robot.tool_frame_id].placement.translation
         centres = np.array([*(body.centre for body in bodies), tool])
         self.joints = np.array([*(body.joint for body in bodies), robot.n])
@@ -138,8 +152,8 @@ class Nearer:
         self.levers = np.where(self.slides, 1.0, mean)
         """(n, B, m - 1) m, the largest along each segment, of points of each body."""
         rests = [one.a.joint == 0 and not beside.isdisjoint(one.names) for one in pairings]
-        over = [SURFACE in one.names for one in pairings]
-        self.goes, self.over = np.array([rests, np.logical_and(rests, over)])[..., None]
+        over = [rest and SURFACE in one.names for rest, one in zip(rests, pairings, strict=True)]
+        self.goes, self.over = np.array([rests, over])[..., None]
 
         def apart(points: Array, ways: Array) -> Array:  # (c, m - 1) m, the second ones, at most
             away = np.linalg.norm(middles - points, axis=2)
@@ -170,6 +184,8 @@ class Nearer:
         found = reduce(np.minimum, (one[a] + one[b] for one in off))  # faster than all at once
         # The part, and what is beside it.
         found += self.goes * np.maximum(shift, turn * np.minimum(self.size, self.far + off[0, b]))
+        if not self.over.any():
+            return np.asarray(found)
         # The part, as seen from the tool point.
         turned, on = np.zeros((len(moved) + 1, moved.shape[2])), self.joints[b]
         np.where(self.slides, 0.0, moved)[:, 0].cumsum(axis=0, out=turned[1:])

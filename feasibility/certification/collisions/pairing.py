@@ -200,7 +200,7 @@ class Pairing:
     def part_at(self, row: int, wanted: float | Array, turns: bool = False) -> Mask:
         """(m - 1,) which segments have what is wanted (m), with a plane that parts at a row."""
         rotations, points = self.motion.poses(self.a.joint, self.b.joint)
-        (apart,), n = self._gaps(rotations[[row]], points[[row]])
+        (apart,), n = self._normals(rotations[[row]], points[[row]])
         if apart > 0.0:
             self._raised(wanted, n)
             if turns:
@@ -286,6 +286,13 @@ class Pairing:
         From a to b, less what bodies stand out by. Where they overlap, as deep as that, and any
         normal.
         """
+        found, n = self._normals(rotations, points)
+        apart = self._low(n, rotations, points) - self.a.highest(n)
+        apart = np.where(found > 0.0, apart, found)
+        return apart - self.a.deviation - self.b.deviation, n
+
+    def _normals(self, rotations: Array, points: Array) -> tuple[Array, Array]:
+        """(k,) m, how far the hulls are apart by coal, and the normals (k, 3) of such planes."""
         n = np.tile(self.a.axis, (len(points), 1))
         found = np.ones(len(points))
         self.calls += len(points)
@@ -297,9 +304,7 @@ class Pairing:
                     n[k] = (there - here) / length
                 else:
                     found[k] = min(found[k], 0.0)
-        apart = self._low(n, rotations, points) - self.a.highest(n)
-        apart = np.where(found > 0.0, apart, found)
-        return apart - self.a.deviation - self.b.deviation, n
+        return found, n
 
     def parted(self, ends: Array, n: Array) -> Array:
         """(k,) m, how far planes across n (k, 3) part them along stretches (k, 2).

@@ -395,7 +395,9 @@ def test_a_share_of_what_bodies_may_move_leaves_them_clear(seed):
     scene = plain.scene_of(robot, cells, task)
     more = {one.names: rng.uniform(0.0, 0.05) * rng.random(len(walk.q) - 1) for one in pairings}
     nearer = np.stack([more[one.names] for one in pairings])
-    along, _ = displaced_bodies.clear_share(pairings, nearer, rng.choice([0, 10, 100, 1000]), set())
+    spare = displaced_bodies.spare_of(pairings)
+    calls = rng.choice([0, 10, 100, 1000])
+    along, _ = displaced_bodies.clear_share(pairings, spare, nearer, calls, set())
     assert ((along >= 0.0) & (along <= 1.0)).all()
     needed = np.array([pair[2] for pair in scene.pairs])
     for _ in range(60 if samples.EVERYTHING else 20):
