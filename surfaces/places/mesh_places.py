@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -22,11 +22,10 @@ from surfaces.meshes.mesh_surface import MeshSurface
 from surfaces.meshes.normals import WIDTH
 from surfaces.places.places import (
     ROUNDING,
-    OffsetSurface,
+    JoinedCharts,
     PlacePaths,
     Places,
     second_derivative_of_unit,
-    share_of,
 )
 
 if TYPE_CHECKING:
@@ -38,15 +37,12 @@ SLICES = 8  # of the strip along a crease, in flat triangles
 
 
 @dataclass(frozen=True, eq=False)
-class MeshPlaces(OffsetSurface):
+class MeshPlaces(JoinedCharts):
     """The places of a mesh. Paths lead over one edge or vertex at most."""
 
     surface: MeshSurface
 
-    @property
-    def bends_evenly(self) -> bool:
-        """See `OffsetSurface.bends_evenly`."""
-        return True
+    bends_evenly: ClassVar[bool] = True
 
     def at(self, places: Places) -> tuple[Array, Array]:
         """See `OffsetSurface.at`."""
@@ -90,32 +86,15 @@ class MeshPlaces(OffsetSurface):
         """See `OffsetSurface.facets`."""
         return self.surface.beside(points, *self.surface.nearest(points))[0]
 
-    def paths(self, start: Places, end: Places) -> PlacePaths:
-        """See `OffsetSurface.paths`."""
-        none = np.full((len(start.x), 2), np.inf)
-        made = PlacePaths.straight((self.at(start), self.at(end)), none, start, end)
-        same = (start.chart == end.chart) & (start.chart >= 0)
-        row = np.flatnonzero(same)
-        made.deviations[row, 2] = self._deviations(start.chart[row], start.x[row], end.x[row])
-        row = np.flatnonzero(~same & (start.chart >= 0) & (end.chart >= 0))
-        faces = self.surface.mesh.faces
-        equal = faces[start.chart[row]][:, :, None] == faces[end.chart[row]][:, None, :]
-        touching = equal.any(axis=(1, 2))
-        row, equal = row[touching], equal[touching]
-        if len(row):
-            made.put(row, self._across(start.of(row), end.of(row), equal))
-        return made
+    def corners(self, chart: Ints) -> Ints:
+        """See `JoinedCharts.corners`."""
+        return self.surface.mesh.faces[chart]
 
-    def _across(self, start: Places, end: Places, equal: Mask) -> PlacePaths:
-        """Paths from one face to another that shares an edge or a vertex with it.
+    def across(self, start: Places, end: Places, equal: Mask) -> PlacePaths:
+        """See `JoinedCharts.across`.
 
         The edge is crossed where it comes closest to the straight line. There the place belongs to
         both faces; normals on either side differ only if a crease ends there.
-
-        Args:
-            start: places.
-            end: places on other faces.
-            equal: (k, 3, 3) which corners of both faces are one vertex.
         """
         one = np.asarray(equal.any(axis=2))
         count = one.sum(axis=1)
@@ -135,14 +114,8 @@ class MeshPlaces(OffsetSurface):
         t = t[:, None]
         before = Places(start.chart, ((1.0 - t) * eye[corner] + t * eye[last])[:, 1:])
         after = Places(end.chart, ((1.0 - t) * eye[mates[0]] + t * eye[mates[1]])[:, 1:])
-        four = (start, before, after, end)
-        placed = [self.at(places) for places in four]
-        to, fro = (np.linalg.norm(placed[k + 1][0] - placed[k][0], axis=1) for k in (0, 2))
-        off = (
-            self._deviations(start.chart, start.x, before.x),
-            self._deviations(end.chart, after.x, end.x),
-        )
-        return PlacePaths.over(four, placed, share_of(to, fro), off)
+        first, last = self.straight(start, before), self.straight(after, end)
+        return PlacePaths.joined(first, last, (first.length, last.length))
 
     def _shortest(self, start: Places, end: Places, corner: Ints, last: Ints, t: Array) -> Array:
         """(k,) 0..1, where on the edge from `corner` to `last` the path from T to T is shortest.
@@ -171,8 +144,8 @@ class MeshPlaces(OffsetSurface):
         those of the offset surface are not."""
         return self.surface.points_at(places.chart, _weights(places.x))
 
-    def _deviations(self, face: Ints, start: Array, stop: Array) -> Array:
-        """(k, 2) see `PlacePaths.deviations`, for straight lines in the weights of a face.
+    def bends(self, chart: Ints, start: Array, stop: Array) -> Array:
+        """See `JoinedCharts.bends`.
 
         An eighth of bounds of second derivatives. On one side of the strip's border v is smooth:
         v'' = 2 t' g' for the sum g of w_c (crease_c - own_c). A line over that border has a kink
@@ -182,9 +155,9 @@ class MeshPlaces(OffsetSurface):
         """
         surface = self.surface
         a, b = _weights(start), _weights(stop)
-        own = surface.corner_normals[face]
-        turn = surface.crease_normals[face] - own
-        level = [(w * surface.on_crease[face]).sum(axis=1) for w in (a, b)]
+        own = surface.corner_normals[chart]
+        turn = surface.crease_normals[chart] - own
+        level = [(w * surface.on_crease[chart]).sum(axis=1) for w in (a, b)]
         o = [np.einsum("kc,kci->ki", w, own) for w in (a, b)]
         g = [np.einsum("kc,kci->ki", w, turn) for w in (a, b)]
         rate = (level[1] - level[0]) / WIDTH
@@ -197,7 +170,7 @@ class MeshPlaces(OffsetSurface):
         size_dg = np.where(beside, 0.0, np.linalg.norm(dg, axis=1))
         slope = np.linalg.norm(do, axis=1) + np.abs(rate) * most + size_dg
         middle = 0.5 * (a + b)
-        shared = surface.crease_share(face, middle)[:, None]
+        shared = surface.crease_share(chart, middle)[:, None]
         v = np.einsum("kc,kci->ki", middle, own + shared[..., None] * turn)
         least = np.linalg.norm(v, axis=1) - 0.5 * slope
         smooth = second_derivative_of_unit(least, slope, 2.0 * np.abs(rate) * size_dg)

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable.arrays import Array, Ints
+from coverable.arrays import Array
 from surfaces.patches.patch import Patch
-from surfaces.places.places import ROUNDING, OffsetSurface, PlacePaths, Places, by_closest_points
+from surfaces.places.places import ROUNDING, OffsetSurface, PlacePaths, Places
 from surfaces.surface import SurfaceError
 
 SAMPLES = np.linspace(0.0, 1.0, 9)  # of a line, where no model is known
@@ -40,14 +40,8 @@ class PatchPlaces(OffsetSurface):
         normals = self.sign * self.patch.normal(x[..., 0], x[..., 1])
         return self.patch.point(x[..., 0], x[..., 1]) + self.height * normals, normals
 
-    def nearest(
-        self, points: Array, ahead: Array, within: float, only: Ints | None = None
-    ) -> Places:
-        """See `OffsetSurface.nearest`."""
-        return by_closest_points(self, self.closest, points, ahead, within)
-
     def closest(self, points: Array) -> Places:
-        """The patch's places closest to points (k, 3) m, or nearly so."""
+        """See `OffsetSurface.closest`."""
         found = self.patch.closest(points)
         u, v = np.clip(found.u, *self.patch.u_range), np.clip(found.v, *self.patch.v_range)
         return Places(np.zeros(len(u), dtype=np.int64), np.stack([u, v], axis=-1))
@@ -66,7 +60,7 @@ class PatchPlaces(OffsetSurface):
         return Places(start.chart, x)
 
     def between(self, start: Places, end: Places, share: Array) -> Places:
-        """See `OffsetSurface.between`."""
+        """Places at shares (k,) of the straight ways from places to places."""
         x = start.x + share[:, None] * self._step(start, end)
         ranges = (self.patch.u_range, self.patch.v_range)
         for axis, (period, (low, _)) in enumerate(zip(self.patch.periods, ranges, strict=True)):
@@ -87,7 +81,7 @@ class PatchPlaces(OffsetSurface):
         stop = start.x + self._step(start, end)
         ends = self.placed(start.x), self.placed(end.x)
         off = self._deviations(start.x, stop)
-        return PlacePaths.straight(ends, off, start, Places(end.chart, stop))
+        return PlacePaths.straight(start, Places(end.chart, stop), ends, off)
 
     def _deviations(self, start: Array, stop: Array) -> Array:
         """(k, 2) how far offset points (m) and normals are from straight between their ends."""

@@ -11,7 +11,7 @@ from coverable.arrays import Array, Ints, Mask
 from surfaces.piecewise.joined_patches import nearest_places
 from surfaces.piecewise.piecewise_surface import Piecewise
 from surfaces.places.patch_places import PatchPlaces
-from surfaces.places.places import OffsetSurface, PlacePaths, Places, by_closest_points, share_of
+from surfaces.places.places import OffsetSurface, PlacePaths, Places
 from surfaces.surface import points_of
 
 SHARED = 0.3  # of what is near: two pieces so near are equally so
@@ -51,7 +51,7 @@ class PiecePlaces(OffsetSurface):
         self, points: Array, ahead: Array, within: float, only: Ints | None = None
     ) -> Places:
         """See `OffsetSurface.nearest`."""
-        places = by_closest_points(self, self._closest, points, ahead, within)
+        places = super().nearest(points, ahead, within)
         up = np.sign(self.height) * (points - ahead)
         best = (self.at(places)[1] * up).sum(axis=1)
         # Where a tool goes from one piece to another, over the one that it is held for.
@@ -65,16 +65,16 @@ class PiecePlaces(OffsetSurface):
             best[some] = upright[some]
         return places
 
-    def _closest(self, points: Array) -> Places:
+    def closest(self, points: Array) -> Places:
+        """See `OffsetSurface.closest`."""
         patches, signs = zip(*self.surface.charts, strict=True)
         found = nearest_places(patches, signs, points_of(points), self.surface.gap)
         return Places(found.piece, np.stack([found.u, found.v], axis=-1))
 
     def paths(self, start: Places, end: Places) -> PlacePaths:
         """See `OffsetSurface.paths`."""
-        made = PlacePaths.straight(
-            (self.at(start), self.at(end)), np.full((len(start.x), 2), np.inf), start, end
-        )
+        unknown = np.full((len(start.x), 2), np.inf)
+        made = PlacePaths.straight(start, end, (self.at(start), self.at(end)), unknown)
         pairs = np.stack([start.chart, end.chart], axis=1)
         for a, b in np.unique(pairs[(pairs >= 0).all(axis=1)], axis=0):
             some = np.flatnonzero((pairs == (a, b)).all(axis=1))
@@ -96,17 +96,9 @@ class PiecePlaces(OffsetSurface):
             joined |= met
         first = a.paths(start, Places(start.chart, before))
         last = b.paths(Places(end.chart, after), end)
-        to, fro = (
-            np.linalg.norm(path.points[:, 3] - path.points[:, 0], axis=1) for path in (first, last)
-        )
-        ends = ((first, 0), (first, 3), (last, 0), (last, 3))
-        off = [np.where(joined[:, None], path.deviations[:, 2], np.inf) for path in (first, last)]
-        return PlacePaths.over(
-            [path.place(k) for path, k in ends],
-            [(path.points[:, k], path.normals[:, k]) for path, k in ends],
-            share_of(to, fro),
-            (off[0], off[1]),
-        )
+        path = PlacePaths.joined(first, last, (first.length, last.length))
+        path.deviations[~joined, ::2] = np.inf
+        return path
 
     def _crossing(
         self, a: PatchPlaces, b: PatchPlaces, start: Array, end: Array

@@ -10,9 +10,9 @@ its ends; so whoever knows both there knows them along it.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -69,48 +69,42 @@ class PlacePaths(NamedTuple):
 
     @staticmethod
     def straight(
-        ends: tuple[tuple[Array, Array], tuple[Array, Array]],
-        deviations: Array,
-        start: Places,
-        end: Places,
+        start: Places, end: Places, placed: Sequence[tuple[Array, Array]], deviations: Array
     ) -> PlacePaths:
-        """Paths of one piece each.
+        """Paths of one piece each, the last.
 
         Args:
-            ends: points and normals (k, 3) of the first, and of the last places.
+            start, end: k places each.
+            placed: points and normals (k, 3) over the first, and over the last.
             deviations: (k, 2) of that piece.
-            start, end: the places.
         """
-        four, placed = (start, start, start, end), (ends[0], ends[0], ends[0], ends[1])
-        at_once = np.zeros(len(deviations))
-        return PlacePaths.over(four, placed, at_once, (np.zeros_like(deviations), deviations))
+        ends = zip((*placed[0], *start), (*placed[1], *end), strict=True)
+        points, normals, chart, x = (np.stack([a, a, a, b], axis=1) for a, b in ends)
+        share, off = np.tile([0.0, 0.0, 0.0, 1.0], (len(x), 1)), np.zeros((len(x), 3, 2))
+        off[:, 2] = deviations
+        return PlacePaths(share, points, normals, off, chart, x)
 
     @staticmethod
-    def over(
-        four: Sequence[Places],
-        placed: Sequence[tuple[Array, Array]],
-        share: Array,
-        deviations: tuple[Array, Array],
-    ) -> PlacePaths:
+    def joined(first: PlacePaths, last: PlacePaths, lengths: Sequence[Array]) -> PlacePaths:
         """Paths of two pieces, over a place that belongs to both: on an edge, a seam, a pole.
 
         Args:
-            four: k places each: the first, that place twice, and the last.
-            placed: points and normals (k, 3) over them.
-            share: (k,) when a motion is to be at the place that belongs to both.
-            deviations: (k, 2) of the first, and of the last piece.
+            first, last: of one piece each; where those end is where these begin.
+            lengths: (k,) of both, which share the motion.
         """
-        zero = np.zeros_like(share)
-        points, normals = (np.stack(part, axis=1) for part in zip(*placed, strict=True))
-        chart, x = (np.stack(part, axis=1) for part in zip(*four, strict=True))
-        return PlacePaths(
-            np.stack([zero, share, share, zero + 1.0], axis=1),
-            points,
-            normals,
-            np.stack([deviations[0], np.zeros_like(deviations[0]), deviations[1]], axis=1),
-            chart,
-            x,
+        (to, fro), zero = lengths, np.zeros(len(first.x))
+        half = np.divide(to, to + fro, out=zero.copy(), where=to + fro > 0.0)
+        ends: Iterator[Any] = zip(first, last, strict=True)
+        _, points, normals, off, chart, x = (
+            np.stack([a[:, 0], a[:, -1], b[:, 0], b[:, -1]], axis=1) for a, b in ends
         )
+        share = np.stack([zero, half, half, zero + 1.0], axis=1)
+        return PlacePaths(share, points, normals, off[:, [1, 0, 3]], chart, x)
+
+    @property
+    def length(self) -> Array:
+        """(k,) m, of the straight line between the ends."""
+        return np.linalg.norm(self.points[:, 3] - self.points[:, 0], axis=1)
 
     @property
     def known(self) -> Mask:
@@ -134,11 +128,25 @@ class OffsetSurface(ABC):
     def at(self, places: Places) -> tuple[Array, Array]:
         """Points T (k, 3) m of the offset surface, and the surface's normals (k, 3)."""
 
-    @abstractmethod
+    bends_evenly: ClassVar[bool] = False
+    """Are `PlacePaths.deviations` from bounds of second derivatives?"""
+    square: ClassVar[bool] = True
+    """Whether u directions are square to normals everywhere."""
+    least_look: ClassVar[float] = 0.0
+    """m, how far ahead of a tool point the second guess of `nearest` has to lie."""
+
+    def closest(self, points: Array) -> Places:
+        """The places of the surface itself that are closest to points (k, 3) m, or nearly so."""
+        raise NotImplementedError
+
     def nearest(
         self, points: Array, ahead: Array, within: float, only: Ints | None = None
     ) -> Places:
         """Places whose offset points are near to given points; the nearest, if all goes well.
+
+        Under closest points, first of the given points themselves. Parallel surfaces share their
+        normals, so the closest point of the surface is under that of the offset surface, unless
+        another part of the surface is nearer.
 
         Args:
             points: (k, 3) m.
@@ -146,6 +154,19 @@ class OffsetSurface(ABC):
             within: m, the distance from which on a second guess is worth its while.
             only: (k,) between poses, the curve that each is on, where that is known.
         """
+        places = self.closest(points)
+        away = np.linalg.norm(points - self.at(places)[0], axis=1)
+        rest = np.flatnonzero(~(away <= within))
+        guess = ahead[rest].copy()
+        for _ in range(GUESSES if len(rest) else 0):
+            found = self.closest(guess)
+            offset, normal = self.at(found)
+            there = np.linalg.norm(points[rest] - offset, axis=1)
+            nearer = there < away[rest]
+            places.put(rest[nearer], found.of(nearer))
+            away[rest[nearer]] = there[nearer]
+            guess = points[rest] - self.height * normal
+        return places
 
     def approached(self, points: Array, start: Places) -> Places:
         """Places whose offset points are nearer to points (k, 3) m than those of a start, if known.
@@ -153,11 +174,6 @@ class OffsetSurface(ABC):
         Not the nearest of all, but those that the start leads to.
         """
         return start
-
-    @property
-    def bends_evenly(self) -> bool:
-        """Are `PlacePaths.deviations` from bounds of second derivatives?"""
-        return False
 
     def facets(self, points: Array) -> Array:
         """(k,) m, how far points (k, 3) are from the triangles of a mesh themselves.
@@ -170,22 +186,12 @@ class OffsetSurface(ABC):
         """Unit u directions (k, 3) of the surface at places; NaN where it has none."""
         return np.full((len(places.chart), 3), np.nan)
 
-    @property
-    def square(self) -> bool:
-        """Whether u directions are square to normals everywhere."""
-        return True
-
     def tangent_deviations(self, start: Places, end: Places) -> Array:
         """(k,) how far the u direction may be from a straight line along straight pieces of paths.
 
         That is the line between its ends; inf where nothing is known.
         """
         return np.full(len(start.chart), np.inf)
-
-    @property
-    def least_look(self) -> float:
-        """m, how far ahead of a tool point the second guess of `nearest` has to lie."""
-        return 0.0
 
     def along(self, places: Places) -> Array | None:
         """(k,) m, how far along a toolpath places are; None where there is no order."""
@@ -196,43 +202,46 @@ class OffsetSurface(ABC):
         """Continuous paths from places to places, meant for such that are near to each other."""
 
 
-def by_closest_points(
-    surface: OffsetSurface,
-    closest: Callable[[Array], Places],
-    points: Array,
-    ahead: Array,
-    within: float,
-) -> Places:
-    """See `OffsetSurface.nearest`: under closest points, first of the given points themselves.
+class JoinedCharts(OffsetSurface):
+    """Charts that meet at corners: the faces of a mesh at vertices, curves at poses."""
 
-    Parallel surfaces share their normals, so the closest point of the surface is under that of the
-    offset surface, unless another part of the surface is nearer.
+    @abstractmethod
+    def corners(self, chart: Ints) -> Ints:
+        """(k, c) the corners of charts; one number is one corner."""
 
-    Args:
-        surface: the offset surface.
-        closest: the places of the surface itself that are closest to points (k, 3) m, or nearly so.
-        points: (k, 3) m.
-        ahead: (k, 3) m, likewise.
-        within: m, likewise.
-    """
-    places = closest(points)
-    away = np.linalg.norm(points - surface.at(places)[0], axis=1)
-    rest = np.flatnonzero(~(away <= within))
-    guess = ahead[rest].copy()
-    for _ in range(GUESSES if len(rest) else 0):
-        found = closest(guess)
-        offset, normal = surface.at(found)
-        there = np.linalg.norm(points[rest] - offset, axis=1)
-        nearer = there < away[rest]
-        places.put(rest[nearer], found.of(nearer))
-        away[rest[nearer]] = there[nearer]
-        guess = points[rest] - surface.height * normal
-    return places
+    @abstractmethod
+    def bends(self, chart: Ints, start: Array, stop: Array) -> Array:
+        """(k, 2) see `PlacePaths.deviations`, of straight lines in the parameters of charts."""
 
+    @abstractmethod
+    def across(self, start: Places, end: Places, equal: Mask) -> PlacePaths:
+        """Paths from one chart to another that has a corner in common with it.
 
-def share_of(to: Array, fro: Array) -> Array:
-    """(k,) the share of `to` in two lengths; 0 where both are 0."""
-    return np.divide(to, to + fro, out=np.zeros_like(to), where=to + fro > 0.0)
+        Args:
+            start: places.
+            end: places on other charts.
+            equal: (k, c, c) which corners of both charts are one.
+        """
+
+    def straight(self, start: Places, end: Places) -> PlacePaths:
+        """Paths straight in the parameters of a chart; nothing is known of those to another."""
+        off = np.full((len(start.chart), 2), np.inf)
+        some = np.flatnonzero((start.chart == end.chart) & (start.chart >= 0))
+        off[some] = self.bends(start.chart[some], start.x[some], end.x[some])
+        return PlacePaths.straight(start, end, (self.at(start), self.at(end)), off)
+
+    def paths(self, start: Places, end: Places) -> PlacePaths:
+        """See `OffsetSurface.paths`: over one corner, or the edge between two, at most."""
+        made = self.straight(start, end)
+        known = (start.chart >= 0) & (end.chart >= 0)
+        row = np.flatnonzero(known & (start.chart != end.chart))
+        one, other = self.corners(start.chart[row]), self.corners(end.chart[row])
+        equal = one[:, :, None] == other[:, None, :]
+        touching = equal.any(axis=(1, 2))
+        row, equal = row[touching], equal[touching]
+        if len(row):
+            made.put(row, self.across(start.of(row), end.of(row), equal))
+        return made
 
 
 def second_derivative_of_unit(length: Array, first: Array, second: Array) -> Array:

@@ -85,9 +85,9 @@ def test_places_follow_the_curves_past_crowds_and_tell_turns_on_the_spot_apart()
     points, directions = spot.at(there)
     found = spot.nearest(points, points - spot.least_look * directions, 1e-3)
     np.testing.assert_allclose(found.x[2:, 0], share[2:], atol=1e-9)
-    ends = [[x, y, 0] for x in (0, 0.4) for y in range(8)] + [[0.2, 0.05, 0]] * 4
+    ends = [[x, y, 0] for x in (0, 0.4) for y in range(8)] + [[0.1, 0.05, 0]] * 4
     crowd = poses(ends, [[0, 0, 1]] * 16 + [[0, 0, -1]] * 4, neighbours=0.5).surface
-    point = np.array([[0.2, 0.0, 0.0]])
+    point = np.array([[0.1, 0.0, 0.0]])
     found = offset_surface(crowd, 0.0).nearest(point, point - [0, 0, 1], 1e-3)
     assert crowd.pairs[found.chart].tolist() == [[0, 8]]
 
