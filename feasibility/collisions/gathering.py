@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cache, lru_cache, partial
+from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -13,20 +13,18 @@ from coverable.errors import ArgumentError
 from feasibility.collisions.problem_bodies import (
     Bodies,
     Pair,
-    Seat,
     Soup,
+    at_rest,
+    bounded,
     overlapping,
-    polytopes_of,
-    seats_of,
-    solid_of,
-    soup_of,
+    scene_solids,
     tool_solids,
 )
 from feasibility.collisions.scene import ToolShape
 from feasibility.collisions.settings import Collision
 from feasibility.collisions.words import SURFACE, TOOL
 from robots.robot import Robot
-from robots.shapes.bodies import Fineness, Polytope, Triangles
+from robots.shapes.bodies import Fineness, Polytope, Solid, Triangles
 from robots.shapes.link_pairs import LeftOut, LinkPairs, link_pairs
 from robots.shapes.links import LinkShapes, link_shapes, outer_bodies
 from robots.shapes.sampling import with_crude_links_cut
@@ -35,6 +33,7 @@ from surfaces.sheet import sheet_of
 from surfaces.surface import Surface
 
 KEPT = 16  # problems whose bodies are remembered: `explain` and `place` come back to them
+NO_PAIRS = LinkPairs((), (), ())
 FURTHEST = 1e4  # [m] that an arm on a rail without end is taken to get
 
 
@@ -51,37 +50,37 @@ def gathered(robot: Robot, surface: Surface, collision: Collision, standoff: flo
     if collision.surface and surface.wall is not None:
         sheet = sheet_of(surface.wall, thickness=collision.thickness)
         soups.append(Soup(SURFACE, sheet.triangles, sheet.deviation, False, sheet))
-    seats = seats_of(robot, collision.scene)
-    reach = _reach(robot, polytopes, seats, soups)
-    for obstacle in (seat.obstacle for seat in seats if not seat.joint):
-        outer, soup = polytopes_of(obstacle, reach), soup_of(obstacle)
-        polytopes += outer or ()
-        soups += [soup] if soup is not None else []
-    links = {solid.owner: solid.joint for solid in solids}
-    carried = [solid_of(seat.obstacle, seat.joint, reach) for seat in seats if seat.joint]
+    scene = scene_solids(collision.scene, robot)
+    reach = _reach(robot, polytopes, scene, soups)
+    carried = [bounded(one, reach) for one in scene if one.joint]
+    for one in scene:
+        found = [] if one.joint else at_rest(one, reach)
+        if isinstance(found, Soup):
+            soups.append(found)
+        else:
+            polytopes += found
     for one in carried:  # one hull would close the hollows of a fixture
         hollow = isinstance(one.geometry, Triangles)
         polytopes += outer_bodies(one, "pieces" if hollow else collision.shapes)
-    owners = _tool_owners(collision, links, robot)
-    among = arm.pairs() if collision.self_ else LinkPairs((), (), ())
-    asked, left_out, at_rest = _sorted_out(
-        collision, links, seats, owners, among, touching=not standoff > 0.0
+    joints = {solid.owner: solid.joint for solid in solids}
+    owners = _tool_owners(collision, joints, robot)
+    asked, left_out = _sorted_out(
+        collision, joints, scene, owners, arm.pairs, touching=not standoff > 0.0
     )
     return Bodies(
         solids=(*solids, *carried),
         polytopes=tuple(polytopes),
         soups=tuple(soups),
-        scene=tuple(seat.obstacle for seat in seats if not seat.joint),
-        carried=tuple(seat for seat in seats if seat.joint),
+        scene=scene,
         pairs=tuple(asked),
         left_out=tuple(left_out),
         unchecked=(*shapes.unchecked, *bare_stretch(robot, collision)),
         checked=collision.checked,
         notes=(
             *shapes.notes,
-            *among.notes,
+            *arm.pairs.notes,
             *(note for one in collision.scene for note in one.notes),
-            *overlapping([body for body in polytopes if body.joint == 0], at_rest),
+            *overlapping(collision, polytopes, left_out),
             *collision.notes_on(standoff),
             *_beyond([r for r in arm.reaches if r.owner in owners], asked, standoff),
         ),
@@ -94,8 +93,8 @@ class _Arm(NamedTuple):
     shapes: LinkShapes
     tool: tuple[Polytope, ...]
     reaches: tuple[Reach, ...]
-    pairs: Callable[[], LinkPairs]
-    """Sorts them when it is first called."""
+    pairs: LinkPairs
+    """None of them where the arm need not stay clear of itself."""
 
 
 @lru_cache(maxsize=KEPT)
@@ -113,15 +112,14 @@ def _arm(
         robot, fineness, tool, allow, srdf: see `Collision`.
         with_itself: is the arm to stay clear of itself?
     """
-    hulls, solids = link_shapes(robot, fineness), tool_solids(tool, robot)
+    shapes, solids, pairs = link_shapes(robot, fineness), tool_solids(tool, robot), NO_PAIRS
     bodies = [body for solid in solids for body in outer_bodies(solid)]
-
-    pairs_of = partial(link_pairs, robot, allow=allow, srdf=srdf, tool=solids)
-    shapes = hulls
-    if with_itself and fineness == "hulls":
-        shapes = with_crude_links_cut(robot, hulls, pairs_of(hulls).checked)
-    reaches = tool_reach(robot, shapes, bodies)
-    return _Arm(shapes, tuple(bodies), reaches, cache(partial(pairs_of, shapes)))
+    if with_itself:
+        pairs = link_pairs(robot, shapes, allow, srdf, solids)
+        cut = with_crude_links_cut(robot, shapes, pairs.checked) if fineness == "hulls" else shapes
+        if cut is not shapes:
+            shapes, pairs = cut, link_pairs(robot, cut, allow, srdf, solids)
+    return _Arm(shapes, tuple(bodies), tool_reach(robot, shapes, bodies), pairs)
 
 
 def _arm_of(robot: Robot, collision: Collision) -> _Arm:
@@ -168,7 +166,7 @@ def _beyond(reaches: Iterable[Reach], pairs: Iterable[Pair], standoff: float) ->
 
 
 def _reach(
-    robot: Robot, polytopes: Sequence[Polytope], seats: Iterable[Seat], soups: Iterable[Soup]
+    robot: Robot, polytopes: Sequence[Polytope], scene: Iterable[Solid], soups: Iterable[Soup]
 ) -> float:
     """m, no point of the arm is further from the origin of the root frame.
 
@@ -180,7 +178,7 @@ def _reach(
     wide = max(
         float(np.linalg.norm(body.vertices, axis=1).max()) + body.radius for body in polytopes
     )
-    carried = [seat.obstacle.placement[None, :3, 3] for seat in seats if seat.joint]
+    carried = [one.placement[:3, 3] for one in scene if one.joint]
     for points in (*carried, *(soup.triangles for soup in soups if carried)):
         wide = max(wide, float(np.linalg.norm(points, axis=-1).max(initial=0.0)))
     return min(steps + float(slides) + wide, FURTHEST)
@@ -207,52 +205,50 @@ def _tool_owners(collision: Collision, joints: Mapping[str, int], robot: Robot) 
 def _sorted_out(
     collision: Collision,
     joints: Mapping[str, int],
-    seats: Sequence[Seat],
+    scene: Sequence[Solid],
     tool: set[str],
     links: LinkPairs,
     touching: bool,
-) -> tuple[list[Pair], list[LeftOut], list[tuple[str, str]]]:
-    """Who must stay clear of whom; who is left out, and why; who is rigid, and not allowed to meet.
+) -> tuple[list[Pair], list[LeftOut]]:
+    """Who must stay clear of whom; who is left out, and why.
 
     Args:
         collision: what has to stay clear of what.
         joints: of links and tool.
-        seats: the objects of the scene.
+        scene: its objects.
         tool: the tool's owners.
         links: against each other, and against the tool.
         touching: may the tool touch the surface?
     """
+    own = {one.name: one.clearance for one in collision.scene}
 
-    def wanted(*of: Seat) -> float:
-        own = (seat.obstacle.clearance for seat in of)
-        return max(collision.clearance if one is None else one for one in own)
+    def wanted(*names: str) -> float:
+        given = (own[name] for name in names)
+        return max(collision.clearance if one is None else one for one in given)
 
     rows = [(first, second, collision.clearance, "") for first, second in links.checked]
     for owner, joint in joints.items():
-        for seat in seats:
-            still = "rigid" if seat.joint == joint else ""
-            rows.append((owner, seat.obstacle.name, wanted(seat), still))
+        for one in scene:
+            still = "rigid" if one.joint == joint else ""
+            rows.append((owner, one.owner, wanted(one.owner), still))
         if collision.surface:
             mine = owner in tool
             why = "rigid" if not joint else "contact" if mine and touching else ""
             near = collision.tool_clearance if mine else collision.clearance
             rows.append((owner, SURFACE, near, why))
-    for number, seat in enumerate(seats):
-        name = seat.obstacle.name
-        if collision.surface and seat.joint:
-            rows.append((name, SURFACE, wanted(seat), ""))
-        others = (other for other in seats[number + 1 :] if other.joint != seat.joint)
-        rows += [(name, other.obstacle.name, wanted(seat, other), "") for other in others]
+    for number, one in enumerate(scene):
+        if collision.surface and one.joint:
+            rows.append((one.owner, SURFACE, wanted(one.owner), ""))
+        others = [other.owner for other in scene[number + 1 :] if other.joint != one.joint]
+        rows += [(one.owner, other, wanted(one.owner, other), "") for other in others]
     clearances = {frozenset(pair[:2]): pair[2] for pair in collision.clearances}
     allowed = {frozenset(pair) for pair in collision.allow}
-    asked, left_out, at_rest = list[Pair](), [*links.left_out], list[tuple[str, str]]()
+    asked, left_out = list[Pair](), [*links.left_out]
     for first, second, clearance, why in rows:
         names = frozenset((first, second))
-        if why == "rigid" and second != SURFACE and names not in allowed:
-            at_rest.append((first, second))
         why = why or ("allowed" if names in allowed else "")
         if why:
             left_out.append(LeftOut(first, second, why))
         else:
             asked.append(Pair(first, second, clearances.get(names, clearance)))
-    return asked, left_out, at_rest
+    return asked, left_out

@@ -12,16 +12,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from coverable.arrays import Array
 from feasibility.collisions.scene import Obstacle, ToolShape
-from feasibility.collisions.shapes import HalfSpace
 from feasibility.collisions.words import TOOL
 from robots.robot import Robot
-from robots.shapes.bodies import Polytope, Solid, Triangles
+from robots.shapes.bodies import HalfSpace, Polytope, Solid, Triangles
 from robots.shapes.coal_shapes import coal_distance
 from robots.shapes.hulls import is_convex
 from robots.shapes.link_pairs import LeftOut
@@ -29,6 +29,7 @@ from robots.shapes.links import outer_bodies
 from robots.urdf.link_shapes import Box
 
 if TYPE_CHECKING:
+    from feasibility.collisions.settings import Collision
     from surfaces.sheet import Sheet
 
 
@@ -48,15 +49,6 @@ class Soup:
     """Where they are a surface's: the same triangles in its own frame, wherever it stands."""
 
 
-class Seat(NamedTuple):
-    """An object of the scene, and what carries it."""
-
-    obstacle: Obstacle
-    """With its placement in the frame of that joint (Pinocchio's)."""
-    joint: int
-    """0 where it is at rest in the root frame."""
-
-
 @dataclass(frozen=True, slots=True)
 class Pair:
     """Two owners of bodies that must stay apart."""
@@ -74,13 +66,13 @@ class Bodies:
     """All bodies of one problem; pure data, for the search and for the judge alike."""
 
     solids: tuple[Solid, ...]
-    """Exact shapes of links, tool and carried objects, for the judge and for pictures."""
+    """Exact shapes of links and tool, and of objects that they carry, without half spaces."""
     polytopes: tuple[Polytope, ...]
     """Convex bodies around them, and those of convex objects at rest (joint 0)."""
     soups: tuple[Soup, ...]
     """The surface, and objects at rest that are not convex."""
-    scene: tuple[Obstacle, ...]
-    """The objects at rest, with their place in the root frame, for the judge and for pictures."""
+    scene: tuple[Solid, ...]
+    """The objects as they are given, those that move, too."""
     pairs: tuple[Pair, ...]
     left_out: tuple[LeftOut, ...] = ()
     unchecked: tuple[str, ...] = ()
@@ -89,69 +81,58 @@ class Bodies:
     """Which of self, surface, scene are checked."""
     notes: tuple[str, ...] = ()
     """What a user should know, one sentence each."""
-    carried: tuple[Seat, ...] = ()
-    """The objects of the scene that move, for pictures."""
+
+    @property
+    def exact(self) -> tuple[Solid, ...]:
+        """All that the judge sees, but for the surface."""
+        return (*self.solids, *(one for one in self.scene if not one.joint))
 
 
 MOST_VERTICES = 64  # of a convex mesh: its hull would be thinned, so one with more stays triangles
 
 
-def polytopes_of(obstacle: Obstacle, reach: float) -> tuple[Polytope, ...] | None:
-    """Convex bodies that together hold an object; None where it is a mesh that is not convex.
+def at_rest(solid: Solid, reach: float) -> list[Polytope] | Soup:
+    """Convex bodies that together hold an object at rest, or its triangles: a mesh not convex.
 
     Args:
-        obstacle: of the scene, at rest.
-        reach: see `solid_of`.
+        solid: an object of the scene.
+        reach: see `bounded`.
     """
-    if isinstance(obstacle.geometry, Triangles) and not _is_convex(obstacle.geometry):
-        return None
-    return tuple(outer_bodies(solid_of(obstacle, 0, reach)))
-
-
-def soup_of(obstacle: Obstacle) -> Soup | None:
-    """The triangles of an object that is a mesh and not convex; None for any other."""
-    geometry = obstacle.geometry
-    if not isinstance(geometry, Triangles) or _is_convex(geometry):
-        return None
-    rotation, position = obstacle.placement[:3, :3], obstacle.placement[:3, 3]
-    corners = (geometry.vertices @ rotation.T + position)[geometry.faces]
-    return Soup(obstacle.name, corners, 0.0, geometry.closed)
+    mesh, place = solid.geometry, solid.placement
+    # The hull of a convex mesh with more vertices would be thinned.
+    few = not isinstance(mesh, Triangles) or len(mesh.vertices) <= MOST_VERTICES
+    if not isinstance(mesh, Triangles) or (few and is_convex(mesh)):
+        return outer_bodies(bounded(solid, reach))
+    corners = (mesh.vertices @ place[:3, :3].T + place[:3, 3])[mesh.faces]
+    return Soup(solid.owner, corners, 0.0, mesh.closed)
 
 
 def tool_solids(tool: Sequence[ToolShape], robot: Robot) -> tuple[Solid, ...]:
     """The shapes of the tool as they are, on the last joint; their owner is 'tool'."""
-    frame = robot.model.frames[robot.tool_link_id]
-    mount = frame.placement.homogeneous
-    return tuple(
-        Solid(TOOL, int(frame.parentJoint), mount @ shape.placement, shape.geometry)
-        for shape in tool
-    )
+    return tuple(_on(robot, robot.tool_link_id, TOOL, shape) for shape in tool)
 
 
-def _is_convex(shape: Triangles) -> bool:
-    """Is it a convex solid whose hull needs no thinning?"""
-    return len(shape.vertices) <= MOST_VERTICES and is_convex(shape)
-
-
-def seats_of(robot: Robot, scene: Iterable[Obstacle]) -> tuple[Seat, ...]:
-    """Where each object is; links that it names have to exist."""
+def scene_solids(scene: Iterable[Obstacle], robot: Robot) -> tuple[Solid, ...]:
+    """Each object on what carries it; links that they name have to exist."""
     import pinocchio as pin
 
-    model, found = robot.model, []
-    for one in scene:
-        number = robot.world_frame_id
-        if one.frame is not None:
-            number = model.getFrameId(one.frame, pin.FrameType.BODY)
-        frame = model.frames[number]
-        if number:  # frame 0 is the root frame
-            placement = frame.placement.homogeneous @ one.placement
-            one = replace(one, placement=placement, frame=None)
-        found.append(Seat(one, int(frame.parentJoint)))
-    return tuple(found)
+    def frame_of(one: Obstacle) -> int:
+        if one.frame is None:
+            return robot.world_frame_id
+        return int(robot.model.getFrameId(one.frame, pin.FrameType.BODY))
+
+    return tuple(_on(robot, frame_of(one), one.name, one) for one in scene)
 
 
-def solid_of(obstacle: Obstacle, joint: int, reach: float) -> Solid:
-    """An object on a joint as a body of the arm; a half space becomes a box beneath its plane.
+def _on(robot: Robot, number: int, owner: str, shape: Obstacle | ToolShape) -> Solid:
+    """A shape that a frame of the model carries."""
+    frame = robot.model.frames[number]
+    placement = frame.placement.homogeneous @ shape.placement
+    return Solid(owner, int(frame.parentJoint), placement, shape.geometry)
+
+
+def bounded(solid: Solid, reach: float) -> Solid:
+    """The same, but for a half space, which becomes a box beneath its plane.
 
     Every point x that matters is within `reach` of the origin. The box begins beneath the origin,
     at its projection onto the plane, and is `reach` wide to each side and reach + |height of the
@@ -159,39 +140,42 @@ def solid_of(obstacle: Obstacle, joint: int, reach: float) -> Solid:
     projection onto the plane, lies in the box: their distances to x are one.
 
     Args:
-        obstacle: with its placement in the frame of that joint.
-        joint: Pinocchio's, 0 at rest.
+        solid: an object of the scene.
         reach: m, no point of a body gets further from the origin of the joint's frame.
     """
-    if not isinstance(obstacle.geometry, HalfSpace):
-        return Solid(obstacle.name, joint, obstacle.placement, obstacle.geometry)
-    x, y, height = np.linalg.inv(obstacle.placement)[:3, 3]  # the origin, seen from the plane
-    deep, placement = reach + abs(height), obstacle.placement.copy()
+    if not isinstance(solid.geometry, HalfSpace):
+        return solid
+    x, y, height = np.linalg.inv(solid.placement)[:3, 3]  # the origin, seen from the plane
+    deep, placement = reach + abs(height), solid.placement.copy()
     placement[:3, 3] += placement[:3, :3] @ [x, y, -deep / 2.0]
-    placement.flags.writeable = False
-    return Solid(obstacle.name, joint, placement, Box((2.0 * reach, 2.0 * reach, float(deep))))
+    box = Box((2.0 * reach, 2.0 * reach, float(deep)))
+    return replace(solid, placement=placement, geometry=box)
 
 
 NOTED = 5e-3  # [m] of overlap: the base of a ur5, as drawn, ends 4 mm below its frame
 
 
-def overlapping(bodies: Sequence[Polytope], pairs: Iterable[tuple[str, str]]) -> list[str]:
-    """A sentence for each pair of owners at rest whose convex bodies overlap.
+def overlapping(
+    collision: Collision, bodies: Sequence[Polytope], left_out: Iterable[LeftOut]
+) -> list[str]:
+    """A sentence for each object at rest that a link at rest overlaps, and is not allowed to.
 
     Args:
-        bodies: convex ones, each in the root frame.
-        pairs: of owners.
+        collision: with the objects, and what is allowed.
+        bodies: convex ones.
+        left_out: all pairs that are not checked.
     """
-    of_owner: dict[str, list[Polytope]] = {}
-    for body in bodies:
-        of_owner.setdefault(body.owner, []).append(body)
-    notes = []
-    for first, second in pairs:
-        both = of_owner.get(first, ()), of_owner.get(second, ())
-        nearest = min((coal_distance(a, b) for a in both[0] for b in both[1]), default=0.0)
+    notes, allowed = [], {frozenset(pair) for pair in collision.allow}
+    objects = {one.name for one in collision.scene}
+    for pair in (one for one in left_out if one.why == "rigid" and one.second in objects):
+        if frozenset((pair.first, pair.second)) in allowed:
+            continue
+        still = [one for one in bodies if not one.joint]
+        a, b = ([one for one in still if one.owner == who] for who in (pair.first, pair.second))
+        nearest = min((coal_distance(*couple) for couple in product(a, b)), default=0.0)
         if nearest < -NOTED:
             notes.append(
-                f"{first} and {second} are rigid to each other, so the pair is not checked, but "
-                f"they overlap by {-1e3 * nearest:.1f} mm"
+                f"{pair.first} and {pair.second} are rigid to each other, so the pair is not "
+                f"checked, but they overlap by {-1e3 * nearest:.1f} mm"
             )
     return notes

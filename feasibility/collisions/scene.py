@@ -17,14 +17,12 @@ from feasibility.collisions.shapes import (
     FARTHEST,
     ORIGIN,
     PLACEHOLDER,
-    HalfSpace,
-    Shape,
     checked_shape,
     read_triangles,
 )
 from feasibility.collisions.words import SURFACE, TOOL
 from robots.poses import matrix_of, rigid_matrix
-from robots.shapes.bodies import Triangles
+from robots.shapes.bodies import Geometry, HalfSpace, Triangles
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
 Point = Sequence[float]
@@ -60,7 +58,7 @@ class Obstacle:
     """
 
     name: str
-    geometry: Shape | HalfSpace
+    geometry: Geometry
     placement: Array
     """(4, 4) the object's frame in the world or in the link's frame, m."""
     clearance: float | None = None
@@ -167,7 +165,7 @@ class ToolShape:
         >>> nozzle = ToolShape.cylinder(radius=0.01, length=0.1, position=(0.0, 0.0, -0.05))
     """
 
-    geometry: Shape
+    geometry: Geometry
     placement: Array
     """(4, 4) the shape's frame in the tool frame, m."""
 

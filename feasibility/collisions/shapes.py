@@ -7,7 +7,6 @@ from files and arrays that are not trusted: they are checked and welded.
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ import numpy as np
 from coverable.arrays import Array, Ints
 from coverable.errors import Checks, CoverableError, Fault, shown
 from coverable.files import shown_name
-from robots.shapes.bodies import Triangles
+from robots.shapes.bodies import Geometry, HalfSpace, Triangles
 from robots.shapes.solids import solid_faces
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
@@ -125,16 +124,7 @@ FARTHEST = 1e4  # [m], from the origin of the world
 ORIGIN = (0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class HalfSpace:
-    """All points with z <= 0 in the object's frame: a floor, or turned, a wall or a ceiling."""
-
-
-Shape = Box | Cylinder | Capsule | Sphere | Triangles
-"""Primitives are about their frame's origin, round ones along z, as in URDF."""
-
-
-def checked_shape(checks: Checks, geometry: Any) -> Shape | HalfSpace:
+def checked_shape(checks: Checks, geometry: Any) -> Geometry:
     """The shape with its numbers as plain floats; faults are kept under the numbers' names."""
     if isinstance(geometry, HalfSpace):
         return geometry

@@ -10,9 +10,7 @@ import numpy as np
 
 from coverable.arrays import Array
 from feasibility.certification.collisions.nearest import NearPair, nearest_along
-from feasibility.collisions.problem_bodies import Bodies, Seat
-from feasibility.collisions.scene import Obstacle
-from feasibility.collisions.shapes import HalfSpace
+from feasibility.collisions.problem_bodies import Bodies
 from feasibility.collisions.words import TOOL
 from feasibility.viewer import threejs
 from feasibility.viewer.cell_meshes import marks
@@ -32,7 +30,7 @@ from feasibility.viewer.robot_visuals import joint_paths
 from feasibility.viewer.threejs import Colour, Command
 from feasibility.viewer.verdict_scene import Layer, hidden
 from robots.robot import Robot
-from robots.shapes.bodies import Polytope, Triangles
+from robots.shapes.bodies import HalfSpace, Polytope, Solid, Triangles
 
 HULLS = "/hulls"  # a tree of joints beside that of the arm
 SCENE: Colour = (0.66, 0.54, 0.40)
@@ -47,18 +45,18 @@ WIDE = 1.1  # [1] of the reach: half the width of the square that stands for a h
 
 def scene_layers(bodies: Bodies, robot: Robot) -> list[Layer]:
     """The objects of the scene, half transparent; each has a switch where they are not many."""
-    seats = [*(Seat(one, 0) for one in bodies.scene), *bodies.carried]
-    meshes = thinned([_mesh_of(seat.obstacle, robot) for seat in seats], TRIANGLES)
+    scene = sorted(bodies.scene, key=lambda one: one.joint > 0)
+    meshes = thinned([_mesh_of(one, robot) for one in scene], TRIANGLES)
     groups = joint_paths(robot)
     parts = []
-    for number, (seat, mesh) in enumerate(zip(seats, meshes, strict=True)):
+    for number, (one, mesh) in enumerate(zip(scene, meshes, strict=True)):
         if not len(mesh.faces):
             continue
-        name = threejs.safe_name(seat.obstacle.name)
-        path = f"{groups[seat.joint] if seat.joint else ''}/scene/{number} {name}"
+        name = threejs.safe_name(one.owner)
+        path = f"{groups[one.joint] if one.joint else ''}/scene/{number} {name}"
         lines = threejs.segments(f"{path}/edges", _edges(mesh), EDGES)
         drawn = (mesh_command(f"{path}/body", mesh), lines)
-        parts.append(Layer(drawn, Entry(seat.obstacle.name, SCENE, path)))
+        parts.append(Layer(drawn, Entry(one.owner, SCENE, path)))
     if len(parts) <= MOST_ENTRIES:
         return parts
     every = tuple(command for part in parts for command in part.commands)
@@ -80,7 +78,7 @@ def tool_layers(bodies: Bodies, robot: Robot) -> list[Layer]:
 
 def hull_layers(bodies: Bodies, robot: Robot) -> list[Layer]:
     """The convex bodies that the search takes for the links and the tool, off at first."""
-    scene = {one.name for one in bodies.scene} | {one.obstacle.name for one in bodies.carried}
+    scene = {one.owner for one in bodies.scene}
     paths = joint_paths(robot, HULLS)
     commands = []
     for number, body in enumerate(bodies.polytopes):
@@ -94,15 +92,16 @@ def hull_layers(bodies: Bodies, robot: Robot) -> list[Layer]:
     return [hidden(Layer(tuple(commands), Entry(label, CONVEX, HULLS)))]
 
 
-def points_of(scene: Sequence[Obstacle], robot: Robot) -> Array:
-    """(k, 3) m of objects of the scene within reach of the arm's root."""
-    solid = [one for one in scene if not isinstance(one.geometry, HalfSpace)]
+def points_of(scene: Sequence[Solid], robot: Robot) -> Array:
+    """(k, 3) m of objects of the scene at rest within reach of the arm's root."""
+    still = (one for one in scene if not one.joint)
+    solid = [one for one in still if not isinstance(one.geometry, HalfSpace)]
     points = [_mesh_of(one, robot).vertices for one in solid]
     every = np.concatenate([np.empty((0, 3)), *points])
     return every[np.linalg.norm(every, axis=1) <= robot.length_unit]
 
 
-def _mesh_of(one: Obstacle, robot: Robot) -> Mesh:
+def _mesh_of(one: Solid, robot: Robot) -> Mesh:
     """An object in the root frame; of a half space, a square of its plane beneath the root."""
     if not isinstance(one.geometry, HalfSpace):
         return moved(_shape(one.geometry, SCENE, SEEN_THROUGH), one.placement)

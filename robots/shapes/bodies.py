@@ -24,18 +24,23 @@ class Triangles:
     """True where they bound a solid, see `solid_faces`; they look outwards then. Else a sheet."""
 
 
+@dataclass(frozen=True, slots=True)
+class HalfSpace:
+    """All points with z <= 0 in the object's frame: a floor, or turned, a wall or a ceiling."""
+
+
 Fineness = Literal["hulls", "pieces", "meshes"]
 """How closely convex bodies follow a link; see `link_shapes`."""
-Geometry = Box | Cylinder | Capsule | Sphere | Triangles
+Geometry = Box | Cylinder | Capsule | Sphere | Triangles | HalfSpace
 """Primitives are about their frame's origin, round ones along z, as in URDF."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Solid:
-    """One exact shape of a link: what the judge sees, and what pictures show."""
+    """One exact shape: what the judge sees, and what pictures show."""
 
     owner: str
-    """The link's name."""
+    """The link's name, or that of the object in the scene, or 'tool'."""
     joint: int
     """Which joint of the robot's model carries it, 1 .. n; 0 where none does."""
     placement: Array

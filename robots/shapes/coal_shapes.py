@@ -15,7 +15,7 @@ import coal
 import numpy as np
 
 from coverable.arrays import Array, Ints
-from robots.shapes.bodies import Geometry, Polytope, Triangles
+from robots.shapes.bodies import Geometry, HalfSpace, Polytope, Triangles
 from robots.shapes.hulls import thickened
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
@@ -42,6 +42,8 @@ def coal_shape(shape: Geometry) -> Any:
             return coal.Cylinder(radius, length)
         case Triangles():
             return _tree(shape)
+        case HalfSpace():
+            return coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
 
 
 def coal_hull(points: Array) -> tuple[Any, Array]:

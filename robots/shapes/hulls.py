@@ -20,7 +20,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from coverable.arrays import Array, Ints
-from robots.shapes.bodies import Geometry, Triangles
+from robots.errors import RobotError
+from robots.shapes.bodies import Geometry, HalfSpace, Triangles
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
 MOST_VERTICES = 64
@@ -60,6 +61,8 @@ def hull_of(shape: Geometry) -> Hull:
             return Hull(_prism(radius, length), 0.0)
         case Triangles():
             return _hull_of_mesh(shape)
+        case HalfSpace():
+            raise RobotError("a half space has no end")
 
 
 def _prism(radius: float, length: float) -> Array:

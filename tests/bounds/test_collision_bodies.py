@@ -9,10 +9,9 @@ from coverable import Axis, Collision, Obstacle, ToolShape, load_robot, plane
 from coverable.errors import ArgumentError
 from feasibility.certification.collisions.collision_replay import collision_replay
 from feasibility.collisions.asked_bodies import gather
-from feasibility.collisions.problem_bodies import polytopes_of, soup_of, tool_solids
-from feasibility.collisions.shapes import HalfSpace
+from feasibility.collisions.problem_bodies import Soup, at_rest, scene_solids, tool_solids
 from feasibility.collisions.words import TOOL
-from robots.shapes.bodies import Triangles
+from robots.shapes.bodies import HalfSpace, Triangles
 from robots.shapes.links import outer_bodies
 from surfaces.surface import rotation_from_rpy
 
@@ -149,7 +148,7 @@ def test_the_tool_of_an_arm_that_holds_the_part_is_what_stands_on_the_tool_frame
 @pytest.mark.parametrize("height", [-5.0, 0.0, 0.3])
 def test_a_half_space_is_as_far_as_its_box_from_all_that_the_arm_reaches(height):
     floor = Obstacle.halfspace("floor", (4.0, -7.0, height), (30.0, -10.0, 20.0))
-    (box,), rng = polytopes_of(floor, 1.3), np.random.default_rng(2)
+    (box,), rng = seen(floor, 1.3), np.random.default_rng(2)
     points = rng.normal(size=(60, 3))
     points *= 1.3 * rng.uniform(0.2, 1.0, (60, 1)) / np.linalg.norm(points, axis=1)[:, None]
     for point in points:
@@ -158,15 +157,18 @@ def test_a_half_space_is_as_far_as_its_box_from_all_that_the_arm_reaches(height)
         assert off == pytest.approx(above, abs=1e-6)
 
 
+def seen(obstacle, reach=1.0):
+    return at_rest(*scene_solids([obstacle], UR5), reach)
+
+
 def part_of(mesh, closed=False):
-    """A trimesh as an object, its own word about being closed ignored."""
-    return Obstacle("part", Triangles(mesh.vertices, mesh.faces, closed), np.eye(4))
+    """A trimesh as the search sees it, its own word about being closed ignored."""
+    return seen(Obstacle("part", Triangles(mesh.vertices, mesh.faces, closed), np.eye(4)))
 
 
 def test_convex_meshes_are_one_body_and_others_are_triangles():
     for convex in (trimesh.creation.box((1, 2, 3)), trimesh.creation.icosphere(1, 0.3)):
-        (body,) = polytopes_of(part_of(convex), 1.0)
-        assert soup_of(part_of(convex)) is None
+        (body,) = part_of(convex)
         assert len(body.vertices) == len(convex.vertices)
     bent = trimesh.creation.box((1, 2, 3)).subdivide()
     bent.vertices[8] *= 0.9
@@ -179,12 +181,12 @@ def test_convex_meshes_are_one_body_and_others_are_triangles():
         trimesh.creation.torus(0.5, 0.1, 8, 6),
         trimesh.creation.icosphere(3, 0.3),  # convex, but of many vertices
     ):
-        soup = soup_of(part_of(other))
-        assert polytopes_of(part_of(other), 1.0) is None
+        soup = part_of(other)
+        assert isinstance(soup, Soup)
         assert (soup.closed, soup.deviation) == (True, 0.0)
         found = np.sort(soup.triangles.reshape(-1))
         assert found == pytest.approx(np.sort(other.triangles.reshape(-1)))
-    assert not soup_of(part_of(trimesh.Trimesh(bent.vertices, bent.faces[1:]))).closed
+    assert not part_of(trimesh.Trimesh(bent.vertices, bent.faces[1:])).closed
 
 
 def test_tool_shapes_move_with_the_last_joint():
@@ -255,8 +257,8 @@ def test_a_moving_world_is_as_near_as_one_at_rest(angle):
     turned = plane(*ends, position=(0.6, 0.1, 0.22), rpy_deg=(0, 0, np.degrees(angle)))
     one = bodies_of(free, 0.1, part, scene=(shelf, floor, PEG))
     other = bodies_of(UR5, 0.1, turned, scene=(shelf, floor, peg))
-    assert [seat.obstacle.name for seat in one.carried] == ["shelf", "floor"]
-    assert [thing.name for thing in one.scene] == ["peg"]
+    assert [(thing.owner, thing.joint) for thing in one.scene] == [
+        ("shelf", 1), ("floor", 1), ("peg", 0)]  # fmt: skip
     hits = 0
     for q in np.random.default_rng(3).uniform(-1.6, 1.6, (12, 6)):
         here = collision_replay(free, one, np.array([[angle, *q]]))

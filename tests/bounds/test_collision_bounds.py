@@ -91,10 +91,10 @@ def test_bodies_reach_no_further_than_is_said(shape):
     """By planes across any direction, and by balls: coal's distance from a tiny ball far away."""
     rng = np.random.default_rng(1)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    body = Body(0, shape, at(0.1, 0.2, 0.3, turn * np.sign(np.linalg.det(turn))))
+    body = Body(Solid("", 0, at(0.1, 0.2, 0.3, turn * np.sign(np.linalg.det(turn))), shape))
     n = rng.normal(size=(40, 3))
     n /= np.linalg.norm(n, axis=1, keepdims=True)
-    dot, far = Body(0, Sphere(1e-6), np.eye(4)), 1e4  # so far that its distance is a height
+    dot, far = Body(Solid("", 0, np.eye(4), Sphere(1e-6))), 1e4  # its distance is a height
     places = dot.placed(np.tile(np.eye(3), (40, 1, 1)), far * n)
     reach = np.array([far - 1e-6 - body.distance(dot, place)[0] for place in places])
     holds(body.highest(n) + 1e-5, reach, 0.999)

@@ -15,8 +15,8 @@ from feasibility.certification.collisions.collision_replay import collision_repl
 from feasibility.certification.collisions.nearest import nearest_along
 from feasibility.collisions.asked_bodies import gather
 from feasibility.collisions.problem_bodies import Pair, Soup
-from feasibility.collisions.shapes import HalfSpace
 from robots.kinematics import Kinematics
+from robots.shapes.bodies import HalfSpace
 from robots.shapes.links import link_shapes
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 

@@ -14,10 +14,9 @@ from coverable import Answer, CauseKind, Evidence, Obstacle, check
 from feasibility.certification.collisions.everywhere import Overlapping
 from feasibility.certification.cut_proofs.proof_verification import verify_proof
 from feasibility.collisions.asked_bodies import gather
-from feasibility.collisions.shapes import HalfSpace
 from feasibility.cut_tree import CutTree, Leaf
 from robots.kinematics import Kinematics
-from robots.shapes.bodies import Solid
+from robots.shapes.bodies import HalfSpace, Solid
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
 FEW = ("puma560", "puma560 on a rail", "ur5")

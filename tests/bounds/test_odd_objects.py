@@ -9,7 +9,7 @@ from samples import sampled, seeds
 
 from coverable import Obstacle, ToolShape, load_robot
 from feasibility.certification.collisions.collision_replay import collision_replay
-from feasibility.collisions.problem_bodies import Bodies, Pair, polytopes_of, soup_of, tool_solids
+from feasibility.collisions.problem_bodies import Bodies, Pair, at_rest, scene_solids, tool_solids
 from robots.shapes.bodies import Solid, Triangles
 from robots.shapes.links import outer_bodies
 from robots.urdf.link_shapes import Sphere
@@ -24,9 +24,9 @@ SHAPES = [
 
 def use(obstacle, tool=()):
     """Everything that libraries make of it, and the judge with a ball beside it: all is finite."""
-    bodies, soup = polytopes_of(obstacle, 2.0), soup_of(obstacle)
-    assert (bodies is None) == (soup is not None)
-    for found in (*(body.vertices for body in bodies or ()), *([soup.triangles] if soup else ())):
+    (thing,) = scene_solids([obstacle], UR5)
+    seen = at_rest(thing, 2.0)
+    for found in [b.vertices for b in seen] if isinstance(seen, list) else [seen.triangles]:
         assert len(found)
         assert np.isfinite(found).all()
     for body in (body for solid in tool_solids(tool, UR5) for body in outer_bodies(solid)):
@@ -34,7 +34,7 @@ def use(obstacle, tool=()):
         assert np.isfinite(body.vertices).all()
     solids = (*tool_solids(tool, UR5), Solid("ball", UR5.n, np.eye(4), Sphere(0.05)))
     pairs = tuple(Pair(owner, "thing", 0.01) for owner in {solid.owner for solid in solids})
-    asked = Bodies(solids, (), (), (obstacle,), pairs)
+    asked = Bodies(solids, (), (), (thing,), pairs)
     found = collision_replay(UR5, asked, np.array([np.zeros(6), np.full(6, 0.2)]))
     assert math.isfinite(found.min_clearance)
 

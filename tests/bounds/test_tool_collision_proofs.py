@@ -174,7 +174,7 @@ def test_one_gap_at_any_roll_is_enough(gap, radius, edge):
     tool = Solid("tool", 2, at(0.3, 0.0, 0.3), Sphere(radius))
     turn = pin.exp3(np.array([0.0, 0.0, gap or 0.0]))
     wall = at(*(turn @ [edge - 0.5 if gap is not None else 0.0, 0.0, 0.0]), turn)
-    scene = (Obstacle("wall", Box((1.0, 1.0, 0.5 * radius)), wall),)
+    scene = (Solid("wall", 0, wall, Box((1.0, 1.0, 0.5 * radius))),)
     bodies = Bodies((tool,), (), (), scene, (Pair("tool", "wall", 0.0),))
     asked = planar_arm(2), bodies, 0.0, 1e-4 * radius, np.zeros(3), np.array([0.0, 0.0, 1.0])
     assert never_clear(*asked).confirmed == (gap is None)

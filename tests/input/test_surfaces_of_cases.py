@@ -15,7 +15,7 @@ from bad_input import changed, goods, lay_out
 
 import coverable
 from coverable import Case, cut_box, cut_plane, faces_within_cone, load_case, mesh, take_faces
-from feasibility.collisions.shapes import HalfSpace
+from robots.shapes.bodies import HalfSpace
 from robots.urdf.link_shapes import Box, Capsule
 from surfaces.meshes.sources import read_mesh
 

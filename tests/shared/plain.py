@@ -12,8 +12,7 @@ from referee import Arm, Asked, Facets, Floats, Form, Pieces, Scene, Shape
 
 from coverable import Cells, Robot, Surface, Task, Verdict
 from feasibility.collisions.asked_bodies import gather
-from feasibility.collisions.shapes import HalfSpace
-from robots.shapes.bodies import Triangles
+from robots.shapes.bodies import HalfSpace, Triangles
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
 NAMED = ("plane", "sphere", "cylinder", "cone", "torus", "hyperboloid", "ellipsoid")

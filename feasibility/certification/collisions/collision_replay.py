@@ -19,10 +19,8 @@ from feasibility.certification.collisions.motion import ArmMotion
 from feasibility.certification.collisions.pairing import ROUNDING, Pairing
 from feasibility.certification.faults import Judged, MotionFault
 from feasibility.collisions.problem_bodies import Bodies, Pair
-from feasibility.collisions.scene import Obstacle
 from feasibility.verdict import Certificate
 from robots.robot import Robot
-from robots.shapes.bodies import Solid
 
 TOUCHING = 5e-7  # [m] overlap that is called touching
 MEASURED = 8  # couples, with the lowest certified distances, of which coal measures the least
@@ -75,15 +73,12 @@ class Couples:
         """Make a body of whatever a pair names.
 
         Raises:
-            ArgumentError: a pair names what has no body, or a body is malformed.
+            ArgumentError: a pair names what has no body.
         """
         of = {name: list[Body]() for pair in bodies.pairs for name in (pair.first, pair.second)}
-        held: list[tuple[str, int, Solid | Obstacle]]
-        held = [(one.owner, one.joint, one) for one in bodies.solids]
-        held += [(one.name, 0, one) for one in bodies.scene]
-        for name, joint, one in (row for row in held if row[0] in of):
-            of[name].append(Body(joint, one.geometry, one.placement))
-        scene = {thing.name for thing in bodies.scene}
+        for one in (one for one in bodies.exact if one.owner in of):
+            of[one.owner].append(Body(one))
+        scene = {thing.owner for thing in bodies.scene}
         for soup in (one for one in bodies.soups if one.owner in of.keys() - scene):
             of[soup.owner].append(body_of_soup(soup))
         empty = sorted(name for name, parts in of.items() if not parts)
@@ -149,16 +144,9 @@ def collision_replay(
             that are curved between rows; none by default.
 
     Raises:
-        ArgumentError: the bodies are malformed, or q or deviations have other shapes.
+        ArgumentError: a pair names what has no body.
     """
     rows = np.ascontiguousarray(q, dtype=float)
-    if rows.ndim != 2 or rows.shape[1] != robot.n:
-        raise ArgumentError(f"q must have shape (m, {robot.n}), got {rows.shape}")
-    segments = max(len(rows) - 1, 0)
-    if deviations is not None and np.shape(deviations) != (segments, robot.n):
-        raise ArgumentError(
-            f"deviations must have a row for each segment, got {np.shape(deviations)}"
-        )
     finite = np.isfinite(rows).all(axis=1)
     if deviations is not None:
         finite[:-1] &= np.isfinite(deviations).all(axis=1)

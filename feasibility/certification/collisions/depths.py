@@ -14,8 +14,7 @@ import numpy as np
 
 from coverable.arrays import Array
 from feasibility.certification.collisions.judged_shapes import winding
-from feasibility.collisions.shapes import HalfSpace
-from robots.shapes.bodies import Triangles
+from robots.shapes.bodies import HalfSpace, Triangles
 from robots.shapes.hulls import is_convex, rims
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 

@@ -166,7 +166,7 @@ def _alone(robot: Robot, bodies: Bodies, point: Array, approach: Array) -> Overl
         for one in bodies.solids
         if one.joint in (0, frame.parentJoint)
     )
-    own = [Points.of(one.owner, 3, one.geometry, one.placement) for one in solids if one.joint]
+    own = [Points.of(one) for one in solids if one.joint]
     ends = [np.linalg.norm(one.places, axis=1) + one.deep for one in own]
     reach = max((float(one.max()) for one in ends), default=0.0)
     held = replace(bodies, solids=solids)
@@ -178,14 +178,12 @@ def _beside(bodies: Bodies, target: Array, reach: float) -> list[Points]:
 
     Of meshes all over their triangles, too, and of the surface. What is left out proves nothing.
     """
-    rest = (one for one in bodies.solids if not one.joint)
-    found = [Points.of(one.owner, 0, one.geometry, one.placement) for one in rest]
+    found = [Points.of(one) for one in bodies.exact if not one.joint]
     sheets = {one.owner: (one.triangles, one.deviation) for one in bodies.soups}
     for one in bodies.scene:
-        found.append(Points.of(one.name, 0, one.geometry, one.placement))
-        if isinstance(one.geometry, Triangles):
+        if isinstance(one.geometry, Triangles) and not one.joint:
             corners = one.geometry.vertices @ one.placement[:3, :3].T + one.placement[:3, 3]
-            sheets[one.name] = corners[one.geometry.faces], 0.0
+            sheets[one.owner] = corners[one.geometry.faces], 0.0
     for owner, (triangles, deviation) in sheets.items():
         places = _all_over_triangles(triangles, target, reach)
         found.append(Points(owner, 0, places, np.full(len(places), -deviation)))

@@ -32,7 +32,7 @@ from feasibility.certification.collisions.depths import Balls, depths, points_in
 from feasibility.collisions.problem_bodies import Bodies
 from robots.kinematics import Kinematics
 from robots.robot import Robot
-from robots.shapes.bodies import Triangles
+from robots.shapes.bodies import Solid, Triangles
 
 GUARD = 1e-7  # [m] that an overlap has to be larger by
 
@@ -49,28 +49,18 @@ class Points(NamedTuple):
     """(k,) m"""
 
     @staticmethod
-    def of(owner: str, joint: int, shape: object, placement: Array) -> Points:
-        """Of a shape at a placement (4, 4) in the frame of a joint."""
-        places, deep = points_inside(shape)
-        return Points(owner, joint, places @ placement[:3, :3].T + placement[:3, 3], deep)
-
-
-class _Inside(NamedTuple):
-    """A body that has a known inside."""
-
-    joint: int
-    """0 at rest."""
-    shape: object
-    placement: Array
-    """(4, 4) in the frame of the joint."""
+    def of(solid: Solid) -> Points:
+        """Of an exact shape."""
+        (places, deep), place = points_inside(solid.geometry), solid.placement
+        return Points(solid.owner, solid.joint, places @ place[:3, :3].T + place[:3, 3], deep)
 
 
 class _Couples(NamedTuple):
     """Points, and the bodies that they may be inside."""
 
     points: Points
-    bodies: list[tuple[_Inside, int]]
-    """Each with the index of the pair, whose clearance it has to have."""
+    bodies: list[tuple[Solid, object, int]]
+    """Each with the shape, or balls, whose inside is known, and the index of the pair."""
 
 
 class Deepest(NamedTuple):
@@ -219,13 +209,13 @@ class Overlapping:
         if moved:
             from_tool = self._steps_from_tool(boxes, x, points.joint or self._robot.n)
         shifted = x if self._alone else x + (boxes.target - boxes.tool)[:, None]
-        for body, pair in couples.bodies:
+        for body, shape, pair in couples.bodies:
             kept = points.deep + self._bodies.pairs[pair].clearance - GUARD
             seen = [] if self._alone else [(x, steps, body.joint, np.zeros((len(x), 1)))]
             if self._alone or body.joint == 0:
                 seen.append((shifted, from_tool, 0, boxes.off[:, None]))
             for places, moves, first, off in seen:
-                over = kept + _depths(body, boxes, places, kept.max(initial=0.0)) - off
+                over = kept + _depths(body, shape, boxes, places, kept.max(initial=0.0)) - off
                 yield pair, over, first, moves
 
     def _steps_from_tool(self, boxes: _Middles, x: Array, joint: int) -> list[Array]:
@@ -255,19 +245,19 @@ def _length_of_cross(a: Array, b: Array, more: Array | None = None) -> Array:
     return np.asarray(np.sqrt(x * x + y * y + z * z))
 
 
-def _depths(body: _Inside, boxes: _Middles, x: Array, near: float) -> Array:
+def _depths(body: Solid, shape: object, boxes: _Middles, x: Array, near: float) -> Array:
     """(m, k) m, how deep points (m, k, 3) are in a body at least; further out than `near`, -inf."""
     turned, shift = boxes.rotations[:, body.joint], body.placement[:3, 3]
     middle = boxes.origins[:, body.joint] + turned @ shift
     own = (x - middle[:, None]) @ (turned @ body.placement[:3, :3])
     found = np.full(x.shape[:2], -np.inf)
-    if not isinstance(body.shape, Balls):
-        deep = depths(body.shape, own)
+    if not isinstance(shape, Balls):
+        deep = depths(shape, own)
         return found if deep is None else deep
-    centre = body.shape.centres[0]  # balls take long
-    wide = (np.linalg.norm(body.shape.centres - centre, axis=1) + body.shape.radii).max()
+    centre = shape.centres[0]  # balls take long
+    wide = (np.linalg.norm(shape.centres - centre, axis=1) + shape.radii).max()
     rows = np.linalg.norm(own - centre, axis=2).min(axis=1) <= wide + near
-    found[rows] = depths(body.shape, own[rows])
+    found[rows] = depths(shape, own[rows])
     return found
 
 
@@ -276,26 +266,22 @@ def _couples(bodies: Bodies, beside: Sequence[Points] | None) -> list[_Couples]:
 
     And points beside it, with those that move.
     """
-    held: list[tuple[str, int, object, Array]]
-    held = [(one.owner, one.joint, one.geometry, one.placement) for one in bodies.solids]
-    points = [Points.of(*one) for one in held if one[1] > 0] + [*(beside or ())]
-    held += [(one.name, 0, one.geometry, one.placement) for one in bodies.scene]
-    inside = dict[str, list[_Inside]]()
-    for owner, joint, shape, placement in held:
-        shapes = [shape] if depths(shape, np.zeros(3)) is not None else []
-        if isinstance(shape, Triangles) and (joint > 0 if beside is None else not shapes):
+    points = [Points.of(one) for one in bodies.exact if one.joint] + [*(beside or ())]
+    inside = dict[str, list[tuple[Solid, object]]]()
+    for one in bodies.exact:
+        shape = one.geometry
+        shapes: list[object] = [shape] if depths(shape, np.zeros(3)) is not None else []
+        if isinstance(shape, Triangles) and (one.joint > 0 if beside is None else not shapes):
             shapes.append(Balls.among(*points_inside(shape)))
-        inside.setdefault(owner, []).extend(
-            _Inside(joint, one, np.asarray(placement)) for one in shapes
-        )
+        inside.setdefault(one.owner, []).extend((one, shape) for shape in shapes)
     found = []
     for some in points:
         inside_of = [
-            (body, k)
+            (*body, k)
             for k, pair in enumerate(bodies.pairs)
             for one, other in ((pair.first, pair.second), (pair.second, pair.first))
             for body in (inside.get(other, ()) if one == some.owner else ())
-            if some.joint > body.joint or some.joint == 0 < body.joint
+            if some.joint > body[0].joint or some.joint == 0 < body[0].joint
         ]
         if inside_of and len(some.places):
             found.append(_Couples(some, inside_of))

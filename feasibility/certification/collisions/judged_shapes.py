@@ -16,10 +16,8 @@ import coal
 import numpy as np
 
 from coverable.arrays import Array
-from coverable.errors import ArgumentError
 from feasibility.collisions.problem_bodies import Soup
-from feasibility.collisions.shapes import HalfSpace
-from robots.shapes.bodies import Triangles
+from robots.shapes.bodies import Geometry, HalfSpace, Solid, Triangles
 from robots.shapes.coal_shapes import coal_hull, coal_shape, with_contacts
 from robots.shapes.hulls import is_convex
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
@@ -31,7 +29,6 @@ MERGED = 1e-12  # [1] of its size, how far what qhull leaves out may stand out o
 MOST_NUMBERS = 1 << 22  # of corners times directions, looked at at a time
 KEPT = 256  # meshes whose hulls are kept
 
-Shape = Box | Sphere | Capsule | Cylinder | Triangles | HalfSpace
 _asked = coal.DistanceRequest()
 _asked.enable_signed_distance, _asked.gjk_tolerance = True, GJK
 
@@ -39,25 +36,18 @@ _asked.enable_signed_distance, _asked.gjk_tolerance = True, GJK
 class Body:
     """One body, in the frame of the joint that carries it."""
 
-    def __init__(self, joint: int, shape: Shape, placement: Array, deviation: float = 0.0) -> None:
+    def __init__(self, solid: Solid, deviation: float = 0.0) -> None:
         """See the attributes.
 
         Args:
-            joint: Pinocchio's number, 0 where it is at rest.
-            shape: a primitive, `Triangles` or a `HalfSpace`.
-            placement: (4, 4) its frame in the joint's, m.
-            deviation: m, how far the body may stand out from the shape.
-
-        Raises:
-            ArgumentError: it is none of these, empty, or not finite.
+            solid: what it is.
+            deviation: m, how far the body may stand out from it.
         """
-        self.joint, self.shape, self.placement, self.deviation = joint, shape, placement, deviation
-        corners, self.radius = _corners(shape)
+        self.joint, self.shape, self.deviation = solid.joint, solid.geometry, deviation
+        shape, placement = self.shape, solid.placement
+        self.placement, (corners, self.radius) = placement, _corners(shape)
         self.circle = shape.radius if isinstance(shape, Cylinder) else 0.0
         """m, about the axis of a cylinder."""
-        sizes = np.ravel(placement), np.ravel(corners), [self.radius, self.circle]
-        if not np.isfinite(np.concatenate(sizes)).all():
-            raise ArgumentError(f"a shape for the replay is not finite: {shape!r:.80}")
         self.corners: Array = corners @ placement[:3, :3].T + placement[:3, 3]
         """(k, 3) m; the body lies within `radius` (m) of their hull, and of circles about them."""
         self.axis: Array = placement[:3, 2]
@@ -73,14 +63,14 @@ class Body:
     @cached_property
     def _geometry(self) -> Any:
         """Coal's; of a convex mesh its hull, which has an inside."""
-        return self._hull if self.convex else coal_shape(self.shape)  # type: ignore[arg-type]
+        return self._hull if self.convex else coal_shape(self.shape)
 
     @cached_property
     def _hull(self) -> Any:
         """Coal's, of something convex that holds the body."""
         if isinstance(self.shape, Triangles):
             return _hull_of(self.shape)[0] or coal_shape(self.shape)
-        return coal_shape(self.shape)  # type: ignore[arg-type]
+        return coal_shape(self.shape)
 
     @cached_property
     def place(self) -> Any:
@@ -132,17 +122,13 @@ class Body:
 
 
 def body_of_soup(soup: Soup) -> Body:
-    """Triangles at rest.
-
-    Raises:
-        ArgumentError: there are none, or they are not finite.
-    """
+    """Triangles at rest."""
     vertices, faces = np.unique(soup.triangles.reshape(-1, 3), axis=0, return_inverse=True)
     mesh = Triangles(vertices, faces.reshape(-1, 3), soup.closed)
-    return Body(0, mesh, np.eye(4), soup.deviation)
+    return Body(Solid(soup.owner, 0, np.eye(4), mesh), soup.deviation)
 
 
-def _corners(shape: Shape) -> tuple[Array, float]:
+def _corners(shape: Geometry) -> tuple[Array, float]:
     """(k, 3) m in the shape's own frame, and a radius (m) about their hull."""
     match shape:
         case Box(size):
@@ -156,11 +142,8 @@ def _corners(shape: Shape) -> tuple[Array, float]:
             return np.array([[0.0, 0.0, -0.5 * length], [0.0, 0.0, 0.5 * length]]), 0.0
         case HalfSpace():
             return np.zeros((1, 3)), 0.0
-        case Triangles(vertices, faces) if len(faces):
-            if faces.min() < 0 or faces.max() >= len(vertices) or not np.isfinite(vertices).all():
-                raise ArgumentError("a mesh for the replay is not finite, or lacks vertices")
+        case Triangles():
             return _hull_of(shape)[1:]
-    raise ArgumentError(f"the replay knows no shape like {shape!r:.80}")
 
 
 @lru_cache(maxsize=KEPT)

@@ -6,8 +6,7 @@ from random_arms import robot_of
 
 from coverable import Obstacle
 from feasibility.collisions.problem_bodies import Bodies, Pair
-from feasibility.collisions.shapes import HalfSpace
-from robots.shapes.bodies import Solid, Triangles
+from robots.shapes.bodies import HalfSpace, Solid, Triangles
 from robots.urdf.link_shapes import Capsule
 
 
@@ -57,7 +56,8 @@ def fork():
 
 def bodies_of(solids, scene=(), pairs=(), soups=()):
     """Bodies as the judge wants them; it never looks at the polytopes."""
-    return Bodies(tuple(solids), (), tuple(soups), tuple(scene), tuple(pairs))
+    scene = tuple(Solid(one.name, 0, one.placement, one.geometry) for one in scene)
+    return Bodies(tuple(solids), (), tuple(soups), scene, tuple(pairs))
 
 
 def wall_at(x):

@@ -51,10 +51,8 @@ class ForeignScene(Scene):
         self.robot, self.asked = robot, bodies
         self.arm, self.bodies = Joints(robot), {}
         self.pairs = [(pair.first, pair.second, pair.clearance) for pair in bodies.pairs]
-        for solid in bodies.solids:
+        for solid in bodies.exact:
             self._add(solid.owner, solid.joint or None, solid.placement, solid.geometry)
-        for thing in bodies.scene:
-            self._add(thing.name, None, thing.placement, thing.geometry)
         for soup in bodies.soups:
             if soup.owner not in self.bodies:
                 faces = np.arange(3 * len(soup.triangles)).reshape(-1, 3)

@@ -127,7 +127,7 @@ class ToolPoses(ForeignScene):
         joint = {owner: shapes[0][0].link or 0 for owner, shapes in self.bodies.items()}
         self.pairs = [one for one in self.pairs if {joint[one[0]], joint[one[1]]} == {0, robot.n}]
         self.meshes = {
-            one.name: one
+            one.owner: one
             for one in bodies.scene
             if isinstance(one.geometry, Triangles) and one.geometry.closed
         }
