@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.certification.faults import Replay
 from feasibility.clock import Clock, OutOfTime
 from feasibility.problem import Problem
 from feasibility.search_result import SearchResult
 from feasibility.search_settings import Search
-from feasibility.verdict import Bound, PlacementMargin, Replay
+from feasibility.verdict import Bound, PlacementMargin
 
 if TYPE_CHECKING:
     import networkx as nx

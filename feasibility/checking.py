@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike
 
 from coverable.errors import ArgumentError
 from feasibility.attempts import Method, attempts_at
+from feasibility.certification.faults import Replay
 from feasibility.clock import Clock, OutOfTime
 from feasibility.demands.every_demand import OF_TREE, RATES, further, unjudged
 from feasibility.problem import Problem
 from feasibility.search_settings import Progress, Search
 from feasibility.task import Task
-from feasibility.verdict import Answer, Cause, Decision, Evidence, Replay, Verdict, Walk, deferred
+from feasibility.verdict import Answer, Cause, Decision, Evidence, Verdict, Walk, deferred
 from robots.robot import Robot
 from surfaces.cells import Cells
 

@@ -15,8 +15,9 @@ from surfaces.cells import Cells
 from surfaces.surface import Surface
 
 if TYPE_CHECKING:
+    from feasibility.certification.faults import Replay
     from feasibility.collisions.problem_bodies import Bodies, Pair
-    from feasibility.verdict import Replay, Walk
+    from feasibility.verdict import Walk
 
 HELD = 0.3  # [m] lever by which a shift of the tool turns a joint, about
 NARROWER = 0.9  # [1] of tolerance, cone and roll, when the replay refuses what just kept to them

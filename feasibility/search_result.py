@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from coverable.arrays import Array, Ints, Mask
-from feasibility.verdict import Cause, Replay, Walk
+from feasibility.certification.faults import Replay
+from feasibility.verdict import Cause, Walk
 
 if TYPE_CHECKING:
     import networkx as nx

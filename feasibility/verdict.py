@@ -202,32 +202,6 @@ class Certificate:
         return {**vars(self), "margin": self.placement_margin}
 
 
-@dataclass(frozen=True, slots=True)
-class Replay:
-    """The outcome of a replay."""
-
-    certificate: Certificate
-    refusal: str
-    """Why the motion is refused; empty when it is accepted."""
-    collides: bool = False
-    """Is it refused for bodies that come too near alone?"""
-
-    @property
-    def accepted(self) -> bool:
-        """True when every constraint holds along the motion and every cell is visited."""
-        return not self.refusal
-
-    @property
-    def narrowly_refused(self) -> bool:
-        """Is the motion refused for numbers that less tolerance and cone in the search may better?
-
-        Neither moves bodies apart.
-        """
-        if self.accepted or self.collides:
-            return False
-        return math.isfinite(self.certificate.max_position_error)
-
-
 DEFERRED = ("graph", "causes", "tree", "treated")
 
 

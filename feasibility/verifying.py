@@ -204,7 +204,7 @@ def _in_time(
             return judged()
     except OutOfTime:
         robot, cells, task = problem.robot, problem.cells, problem.task
-        late = MotionFault(-1, 0.0, NOT_IN_TIME.format(clock.limit))
+        late = MotionFault(NOT_IN_TIME.format(clock.limit))
         left = unjudged(robot, task, ())
         return Verification(claim, robot, cells, task, (late,), not_judged=left, late=True)
 
@@ -281,18 +281,18 @@ def _of_tree(verdict: Verdict, search: Search) -> Verification:
     robot, cells, task = verdict.robot, verdict.cells, verdict.task
     found = replay_stored(verdict, search)
     left = unjudged(robot, task, OF_TREE)
-    faults = [found.refusal] if found.refusal else []
+    faults = (MotionFault(found.refusal),) if found.faults else ()
     if left:
-        faults.append(f"{', '.join(left)}: not judged, since the greedy search knows nothing of it")
-    told = tuple(MotionFault(-1, 0.0, text) for text in faults)
-    return Verification("tree", robot, cells, task, told, found.certificate, not_judged=left)
+        text = f"{', '.join(left)}: not judged, since the greedy search knows nothing of it"
+        faults += (MotionFault(text),)
+    return Verification("tree", robot, cells, task, faults, found.certificate, not_judged=left)
 
 
 def _of_proof(verdict: Verdict, proof: CutTree, clock: Clock) -> Verification:
     """The proof that no motion covers every cell."""
     robot, cells, task = verdict.robot, verdict.cells, verdict.task
     checked = verify_proof(robot, cells, task, proof, lambda: clock.tick(0, None, "verifying"))
-    faults = () if checked.accepted else (MotionFault(-1, 0.0, checked.refusal),)
+    faults = () if checked.accepted else (MotionFault(checked.refusal),)
     left = unjudged(robot, task, BY_REPLAY)
     return Verification(
         "proof", robot, cells, task, faults, proof=proof, boxes=checked.boxes, not_judged=left

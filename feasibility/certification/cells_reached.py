@@ -43,8 +43,11 @@ class Reached:
         """(N,) which of them are."""
         return self.row >= 0
 
-    def add(self, cell: Ints, row: Ints, chord: Array, roll: Array) -> None:
-        """Keep what holds a cell's tool best, of configurations (k,) as from `at_targets`."""
+    def add(
+        self, task: Task, aims: Targets, cell: Ints, row: Ints, points: Array, axes: Array, x: Array
+    ) -> None:
+        """Keep what holds a cell's tool best, of configurations (k,) as `at_targets` takes them."""
+        chord, roll = at_targets(task, aims, cell, points, axes, x)
         order = np.argsort(-chord, kind="stable")  # of several over one cell the last is kept
         best = order[chord[order] < self.chord[cell[order]]]
         self.row[cell[best]], self.chord[cell[best]] = row[best], chord[best]
@@ -70,17 +73,15 @@ def cells_reached(
     aims, tolerance = task.targets(cells), task.effective_tolerance
     if marks is not None:
         at = samples.of((samples.share == 0.0) & (marks[samples.row] >= 0))
-        cell = marks[at.row]
-        reached.add(cell, at.row, *at_targets(task, aims, cell, at.points, at.axes, at.x))
+        reached.add(task, aims, marks[at.row], at.row, at.points, at.axes, at.x)
         if reached.cells.all():
             return reached
     from scipy.spatial import cKDTree  # takes a while to load
 
     tree = cKDTree(samples.points)
-    near = tree.query_ball_point(aims.points, tolerance)
-    cell, sample = _flat(near)
+    cell, sample = _flat(tree.query_ball_point(aims.points, tolerance))
     at = samples.of(sample)
-    reached.add(cell, at.row, *at_targets(task, aims, cell, at.points, at.axes, at.x))
+    reached.add(task, aims, cell, at.row, at.points, at.axes, at.x)
     left = np.flatnonzero(~reached.cells)
     starts, ends = samples.points[:-1], samples.points[1:]
     if not len(left) or not len(starts):
@@ -91,7 +92,7 @@ def cells_reached(
     some, piece = _flat(tree.query_ball_point(aims.points[left], 2.0 * tolerance + half.max()))
     some = left[some]
     low, high = _passing(aims.points[some], starts[piece], ends[piece], 2.0 * tolerance)
-    passes = low <= high
+    passes = low < high
     some, piece, low, high = some[passes], piece[passes], low[passes], high[passes]
     t = low[:, None] + TRIES * (high - low)[:, None]
     row = samples.row[piece]
@@ -102,9 +103,8 @@ def cells_reached(
     flat = q.reshape(-1, rows.shape[1])
     points, axes = Kinematics(robot).tools(flat)
     x = axes if task.roll is None else reference_axes(robot, flat)
-    cell = np.repeat(some, len(TRIES))
-    held = at_targets(task, aims, cell, points, axes, x)
-    reached.add(cell, np.repeat(row, len(TRIES)), *held)
+    cell, row = np.repeat([some, row], len(TRIES), axis=1)
+    reached.add(task, aims, cell, row, points, axes, x)
     return reached
 
 
@@ -141,17 +141,13 @@ def at_targets(
 
 
 def _passing(aims: Array, starts: Array, ends: Array, within: float) -> tuple[Array, Array]:
-    """(k,) from where to where on lines, 0..1, they are near (within, m); low > high: never."""
+    """(k,) from where to where on lines, 0..1, they are near (within, m); low = high: never."""
     along, off = ends - starts, starts - aims
-    a, b = (along**2).sum(axis=1), (along * off).sum(axis=1)
-    safe = np.maximum(a, 1e-300)
-    nearest = np.clip(-b / safe, 0.0, 1.0)
-    least = ((off + nearest[:, None] * along) ** 2).sum(axis=1)
-    rest = within**2 - ((off - (b / safe)[:, None] * along) ** 2).sum(axis=1)
-    reach = np.sqrt(np.maximum(rest, 0.0) / safe)
-    low, high = np.clip(-b / safe - reach, 0.0, 1.0), np.clip(-b / safe + reach, 0.0, 1.0)
-    never = least > within**2
-    return np.where(never, 1.0, low), np.where(never, 0.0, high)
+    square = np.maximum((along**2).sum(axis=1), 1e-300)
+    nearest = -(along * off).sum(axis=1) / square
+    rest = within**2 - ((off + nearest[:, None] * along) ** 2).sum(axis=1)
+    reach = np.sqrt(np.maximum(rest, 0.0) / square)
+    return np.clip(nearest - reach, 0.0, 1.0), np.clip(nearest + reach, 0.0, 1.0)
 
 
 def missed_text(cells: Cells, task: Task, missed: Ints, samples: Samples) -> str:

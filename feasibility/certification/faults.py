@@ -5,12 +5,17 @@ Where a surface is known only so well, it leaves less tolerance, and less cone.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from coverable.arrays import Array, Mask
+from coverable.errors import counted
 from feasibility.task import Task
+from feasibility.verdict import Certificate
+from surfaces.cells import Cells
 from surfaces.surface import Surface
 
 ROLL_CLOSE = 1e-9  # [1], [rad]: u directions are known by differences to about this
@@ -20,11 +25,11 @@ ROLL_CLOSE = 1e-9  # [1], [rad]: u directions are known by differences to about 
 class MotionFault:
     """One reason why a motion is refused, and where it is met."""
 
-    row: int
-    """Index of the row, or of the row before; -1 where the whole motion is meant."""
-    share: float
-    """How far the motion has come from there to the next row, 0..1."""
     text: str
+    row: int = -1
+    """Index of the row, or of the row before; -1 where the whole motion is meant."""
+    share: float = 0.0
+    """How far the motion has come from there to the next row, 0..1."""
 
     def __str__(self) -> str:
         """Place and fault; rows are counted from 1."""
@@ -54,6 +59,41 @@ class Judged:
         return "; ".join(map(str, self.faults))
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Replay(Judged):
+    """What the replay of a motion over a surface found."""
+
+    certificate: Certificate
+    """Bounds over all of an accepted motion; of a refused one what was measured."""
+    faults: tuple[MotionFault, ...] = ()
+    """Why the motion is refused, the worst of each kind; none when it is accepted."""
+    reached: Mask | None = None
+    """(N,) cells that are reached."""
+    collides: bool = False
+    """Is it refused for bodies that come too near alone?"""
+
+    @property
+    def narrowly_refused(self) -> bool:
+        """Is the motion refused for numbers that less tolerance and cone in the search may better?
+
+        Neither moves bodies apart.
+        """
+        measured = math.isfinite(self.certificate.max_position_error)
+        return measured and not (self.accepted or self.collides)
+
+
+def unmeasured(cells: Cells, rows: Array, *faults: MotionFault) -> Replay:
+    """Of rows that are no motion over some cells."""
+    unknown = Certificate(len(rows) if rows.ndim else 0, math.nan, math.nan, math.nan)
+    return Replay(unknown, faults, np.zeros(len(cells), dtype=bool))
+
+
+def and_others(number: int, noun: str) -> str:
+    """' (the worst; wrong at 3 other rows, too)', or nothing."""
+    others = counted(number, f"other {noun}")
+    return f" (the worst; wrong at {others}, too)" if number > 0 else ""
+
+
 def less_deviations(task: Task, surface: Surface) -> Task:
     """The task less what the surface may deviate from the one meant."""
     off, leans = surface.deviations
@@ -76,9 +116,8 @@ def too_vague(task: Task, surface: Surface) -> list[MotionFault]:
     if off + task.standoff * leans >= task.effective_tolerance:
         known = f"targets on the surface are known to {1e3 * (off + task.standoff * leans):.4g} mm"
         allowed = f"{1e3 * task.effective_tolerance:g} mm are allowed"
-        faults.append(MotionFault(-1, 0.0, f"{known} only, {allowed}"))
+        faults.append(MotionFault(f"{known} only, {allowed}"))
     if _turn_deg(leans) > task.cone_deg:
         known = f"its normals are known to {_turn_deg(leans):.4g} deg only"
-        text = f"{known}, {task.cone_deg:g} deg are allowed"
-        faults.append(MotionFault(-1, 0.0, text))
+        faults.append(MotionFault(f"{known}, {task.cone_deg:g} deg are allowed"))
     return faults

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -57,7 +57,7 @@ class FollowedPart:
         there = self.row[min(k + 1, last)] + self.share[min(k + 1, last)]
         at = float(here + fault.share * (there - here))
         row = int(np.floor(at))
-        return MotionFault(row, at - row, fault.text)
+        return replace(fault, row=row, share=at - row)
 
 
 def followed_parts(
@@ -155,7 +155,7 @@ def lifted_faults(
     if not len(left):
         return []
     text = "not certified: the tool may go through the surface where it is lifted"
-    return [MotionFault(int(left[0]), float(left[0] % 1.0), text)]
+    return [MotionFault(text, int(left[0]), float(left[0] % 1.0))]
 
 
 def _through(part: FollowedPart, heights: Array) -> MotionFault:
@@ -164,7 +164,7 @@ def _through(part: FollowedPart, heights: Array) -> MotionFault:
     text = (
         f"the tool goes through the surface where it is lifted, by {-1e3 * heights[worst]:.4g} mm"
     )
-    return MotionFault(int(part.row[worst]), float(part.share[worst]), text)
+    return MotionFault(text, int(part.row[worst]), float(part.share[worst]))
 
 
 def _heights(surface: Surface, points: Array) -> Array:

@@ -153,6 +153,8 @@ class Jacobians(Rows):
     """(m, 3, n) derivatives of the tool point."""
     axis: Array
     """(m, 3, n) derivatives of the approach axis."""
+    angular: Array
+    """(m, 3, n) what the joints turn about; 0 for those that slide."""
 
     @property
     def levers(self) -> Array:
@@ -170,7 +172,8 @@ def jacobians(kinematics: Kinematics, q: Array) -> Jacobians:
     points, axes, twists = kinematics.tools_and_twists(q)
     moving = np.ascontiguousarray(twists.transpose(1, 0, 2)).transpose(1, 0, 2)  # by coordinate
     linear, angular = moving[:, :3], moving[:, 3:]
-    return Jacobians(points, axes, linear + cross(angular, points), cross(angular, axes))
+    point = linear + cross(angular, points)
+    return Jacobians(points, axes, point, cross(angular, axes), angular)
 
 
 def cross(a: Array, b: Array) -> Array:

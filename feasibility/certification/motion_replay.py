@@ -15,8 +15,7 @@ bodies stay clear in `collisions`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, partial
 from typing import TYPE_CHECKING, TypeGuard
 
@@ -24,14 +23,21 @@ import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.cells_reached import at_targets, cells_reached, missed_text
-from feasibility.certification.faults import Judged, MotionFault, less_deviations, too_vague
+from feasibility.certification.faults import (
+    MotionFault,
+    Replay,
+    and_others,
+    less_deviations,
+    too_vague,
+    unmeasured,
+)
 from feasibility.certification.placement_margin import margin_fault, placement_margin
 from feasibility.certification.stretches import Judge
-from feasibility.certification.tool_along import less_room, past_limit, tool_along
+from feasibility.certification.tool_along import less_room, tool_along
 from feasibility.collisions.asked_bodies import gather
 from feasibility.cone import angle_of
 from feasibility.task import Task
-from feasibility.verdict import Certificate, Replay, Walk
+from feasibility.verdict import Certificate, Walk
 from robots.kinematics import Kinematics, reference_axes
 from robots.robot import Robot
 from surfaces.cells import Cells
@@ -43,18 +49,6 @@ if TYPE_CHECKING:
     from surfaces.toolpaths.pose_surface import PoseSurface
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class MotionReplay(Judged):
-    """What the replay of a motion over a surface found."""
-
-    certificate: Certificate
-    """Bounds over all of an accepted motion; of a refused one what was measured."""
-    faults: tuple[MotionFault, ...]
-    """Why the motion is refused, the worst of each kind; none when it is accepted."""
-    reached: Mask
-    """(N,) cells that are reached."""
-
-
 def replay_over_surface(
     robot: Robot,
     cells: Cells,
@@ -64,7 +58,7 @@ def replay_over_surface(
     bodies: Bodies | None = None,
     marks: Ints | None = None,
     working: Mask | None = None,
-) -> MotionReplay:
+) -> Replay:
     """Judge a motion by the module's rules.
 
     Args:
@@ -79,16 +73,30 @@ def replay_over_surface(
             surface, or over that under poses, whose curves then do not count; elsewhere it may be
             anywhere but through that. Everywhere by default.
     """
-    rows, surface = np.asarray(q, dtype=float), _surface_of(cells, task, working)
+    found = _of_the_tool(robot, cells, task, np.asarray(q, dtype=float), needed, marks, working)
+    malformed = np.isnan(found.certificate.min_limit_margin)
+    return found if malformed else _with_bodies(found, robot, task, q, bodies)
+
+
+def _of_the_tool(
+    robot: Robot,
+    cells: Cells,
+    task: Task,
+    rows: Array,
+    needed: Mask | None,
+    marks: Ints | None,
+    working: Mask | None = None,
+) -> Replay:
+    """Limits, tool point, axis, roll, and the cells that are reached."""
+    surface = _surface_of(cells, task, working)
     refused = _malformed(robot, rows) or too_vague(task, surface)
     if refused:
-        unknown = Certificate(len(rows) if rows.ndim else 0, np.nan, np.nan, np.nan)
-        return MotionReplay(unknown, tuple(refused), np.zeros(len(cells), dtype=bool))
-    curves = None
-    if marks is not None and working is None and _is_of_poses(surface):
-        from feasibility.certification.pose_replay import curves_of_marks
-
-        curves = curves_of_marks(cells, marks)
+        return unmeasured(cells, rows, *refused)
+    poses, curves = _is_of_poses(surface), None
+    if poses or working is not None:
+        from feasibility.certification import pose_replay
+    if poses and marks is not None and working is None:
+        curves = pose_replay.curves_of_marks(cells, marks)
     offset = offset_surface(surface, surface.side_sign * task.standoff)
     judge = Judge(robot, less_deviations(task, surface), offset, cells, curves)
     margin, faults = limits(robot, rows)
@@ -96,20 +104,16 @@ def replay_over_surface(
         found = tool_along(judge, rows, cells, marks)
         reached = cells_reached(robot, cells, task, rows, found.samples, marks)
     else:
-        from feasibility.certification.pose_replay import tool_at_work
-
-        found, reached = tool_at_work(judge, rows, cells, surface, working)
+        found, reached = pose_replay.tool_at_work(judge, rows, cells, surface, working)
         if needed is None and _is_of_poses(cells.surface):
             needed = cells.surface.working
     faults += found.faults
     at = reached.cells
     missed = np.flatnonzero(~at if needed is None else needed & ~at)
     if len(missed):
-        faults.append(MotionFault(-1, 0.0, missed_text(cells, task, missed, found.samples)))
+        faults.append(MotionFault(missed_text(cells, task, missed, found.samples)))
     if _is_of_poses(surface):
-        from feasibility.certification.pose_replay import along_poses
-
-        found, more = along_poses(found, judge, rows, cells, surface, task, not faults)
+        found, more = pose_replay.along_poses(found, judge, rows, cells, surface, task, not faults)
         faults += more
     less_room(found.room, task, reached.row[at], reached.chord[at], reached.roll[at])
     error, chord, roll = found.most.tolist()
@@ -119,20 +123,43 @@ def replay_over_surface(
     if len(cells) and not faults:
         margin_of = partial(placement_margin, judge.kinematics, cells, task, rows, found.room)
         certificate = replace(certificate, margin=cache(margin_of))  # found when it is asked for
+    return Replay(certificate, tuple(faults), at)
+
+
+def _with_bodies(
+    found: Replay,
+    robot: Robot,
+    task: Task,
+    q: Array,
+    bodies: Bodies | None,
+    deviations: Array | None = None,
+) -> Replay:
+    """A replay with what is between bodies, where some are given; and the margin, judged last."""
+    certificate, faults = found.certificate, found.faults
     if bodies is not None:
-        certificate, hit = _among(bodies, robot, rows, certificate)
-        faults += hit
+        from feasibility.certification.collisions.collision_replay import collision_replay
+
+        clear = collision_replay(robot, bodies, q, deviations)
+        certificate, faults = clear.added_to(certificate), faults + clear.faults
+    if deviations is not None:  # the margin is of motions that are straight
+        certificate = replace(certificate, margin=None)
+    collides = len(faults) > len(found.faults)
     short = "" if faults else margin_fault(task, certificate)
-    faults += [MotionFault(-1, 0.0, short)] if short else []
-    return MotionReplay(certificate, tuple(faults), at)
+    faults += (MotionFault(short),) if short else ()
+    return Replay(certificate, faults, found.reached, collides)
 
 
 def limits(robot: Robot, rows: Array) -> tuple[float, list[MotionFault]]:
     """The smallest distance from a limit, and the worst row that passes one; limits are convex."""
-    least = float(np.minimum(rows - robot.lower, robot.upper - rows).min(initial=np.inf))
+    margins = np.minimum(rows - robot.lower, robot.upper - rows)
+    least = float(margins.min(initial=np.inf))
     if least >= 0.0:
         return least, []
-    return least, [past_limit(robot, rows)]
+    row, joint = np.unravel_index(np.argmin(margins), margins.shape)
+    by = f"{-1e3 * least:.4g} mm" if robot.prismatic[joint] else f"{-np.degrees(least):.4g} deg"
+    text = f"{robot.joint_names[joint]} passes its limit by {by}"
+    others = int((margins < 0.0).any(axis=1).sum()) - 1
+    return least, [MotionFault(text + and_others(others, "row"), int(row))]
 
 
 def _surface_of(cells: Cells, task: Task, working: Mask | None) -> Surface:
@@ -151,25 +178,15 @@ def _is_of_poses(surface: Surface) -> TypeGuard[PoseSurface]:
     return surface.kind == "poses"
 
 
-def _among(
-    bodies: Bodies, robot: Robot, rows: Array, found: Certificate, deviations: Array | None = None
-) -> tuple[Certificate, Sequence[MotionFault]]:
-    """The certificate with what was measured between bodies, and where these are too near."""
-    from feasibility.certification.collisions.collision_replay import collision_replay
-
-    clear = collision_replay(robot, bodies, rows, deviations)
-    return clear.added_to(found), clear.faults
-
-
 def _malformed(robot: Robot, rows: Array) -> list[MotionFault]:
     """Why rows are no motion of this arm; nothing when they are one."""
     if rows.ndim != 2 or rows.shape[1] != robot.n:
         text = f"rows of shape {rows.shape} are no motion of {robot.n} joints"
-        return [MotionFault(-1, 0.0, text)]
+        return [MotionFault(text)]
     finite = np.isfinite(rows)
     if not finite.all():
         row, joint = np.argwhere(~finite)[0]
-        return [MotionFault(int(row), 0.0, f"{robot.joint_names[joint]} is not a finite number")]
+        return [MotionFault(f"{robot.joint_names[joint]} is not a finite number", int(row))]
     return []
 
 
@@ -197,33 +214,30 @@ def replay(
         What was measured, and the reason if the walk is refused. NaN anywhere refuses.
     """
     disorder = _mismarked(cells, walk)
-    if cells.in_order and not disorder:
-        from feasibility.certification.pose_replay import order_of_marks
-
-        disorder = order_of_marks(cells, walk)
     if disorder:
-        return Replay(Certificate(len(walk.q), np.nan, np.nan, np.nan), disorder)
-    here = replace(task, placement_error=None)  # its margin is judged last
-    found = replay_over_surface(robot, cells, here, walk.q, needed, marks=walk.cell)
-    refusal = found.refusal or _misplaced(robot, cells, task, walk)
+        return unmeasured(cells, walk.q, MotionFault(disorder))
+    found = _of_the_tool(robot, cells, task, walk.q, needed, walk.cell)
+    misplaced = "" if found.faults else _misplaced(robot, cells, task, walk)
+    if misplaced:
+        certificate = replace(found.certificate, margin=None)
+        return Replay(certificate, (MotionFault(misplaced),), found.reached)
+    if found.faults:
+        return found
     bodies = gather(robot, cells.surface, task.collision, task.standoff)
-    certificate, hit = found.certificate, ""
-    if bodies is not None and not refusal:
-        certificate, faults = _among(bodies, robot, walk.q, certificate, deviations)
-        refusal = hit = "; ".join(map(str, faults))
-    if refusal or deviations is not None:  # the margin is of motions that are straight
-        certificate = replace(certificate, margin=None)
-    refusal = refusal or margin_fault(task, certificate)
-    return Replay(certificate, refusal, bool(hit))
+    return _with_bodies(found, robot, task, walk.q, bodies, deviations)
 
 
 def _mismarked(cells: Cells, walk: Walk) -> str:
-    """Why the marks of a walk are none over these cells; empty where they are."""
+    """Why the marks of a walk are none over these cells, or in their order; empty if they are."""
     if walk.cell.shape != walk.q.shape[:1]:
         return f"waypoints of shape {walk.q.shape} have cells of shape {walk.cell.shape}"
     if ((walk.cell < -1) | (walk.cell >= len(cells))).any():
         return f"a waypoint is marked with a cell that is not one of the {len(cells)}"
-    return ""
+    if not cells.in_order:
+        return ""
+    from feasibility.certification.pose_replay import order_of_marks
+
+    return order_of_marks(cells, walk)
 
 
 def _misplaced(robot: Robot, cells: Cells, task: Task, walk: Walk) -> str:

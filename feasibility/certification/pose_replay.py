@@ -36,8 +36,6 @@ AT_ONCE = 256  # rows, among which a pose is looked for
 
 def order_of_marks(cells: Cells, walk: Walk) -> str:
     """Why the marks of a walk are not in the order of a toolpath; empty where they are."""
-    if not cells.in_order:
-        return ""
     marks = walk.cell[walk.cell >= 0]
     steps = np.diff(marks)
     wrong = np.flatnonzero((steps < 0) | (steps > 1))
@@ -83,14 +81,11 @@ def curves_of_marks(cells: Cells, marks: Ints) -> Ints | None:
     start, end = marks[at[:-1]], marks[at[1:]]
     count = len(cells)
     keys = cells.pairs[:, 0] * count + cells.pairs[:, 1]
-    row = np.searchsorted(keys, np.minimum(start, end) * count + np.maximum(start, end))
-    row = np.minimum(row, len(keys) - 1)
+    wanted = np.minimum(start, end) * count + np.maximum(start, end)
+    row = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
     any_curve = np.full(count, -1)  # to stay over a pose, at the end of any of its curves
     any_curve[cells.pairs.ravel()] = np.repeat(np.arange(len(keys)), 2)
-    known = (
-        cells.pairs[row] == np.column_stack([np.minimum(start, end), np.maximum(start, end)])
-    ).all(axis=1)
-    curve = np.where(start == end, any_curve[start], np.where(known, row, -1))
+    curve = np.where(start == end, any_curve[start], np.where(keys[row] == wanted, row, -1))
     if (curve < 0).any():
         return None
     return np.append(np.repeat(curve, np.diff(at)), curve[-1])
@@ -113,7 +108,7 @@ def order_of_places(offset: OffsetSurface, samples: Samples, tolerance: float) -
     if not back[worst] > tolerance:
         return []
     text = f"the tool goes back along the toolpath, by {1e3 * back[worst]:.4g} mm"
-    return [MotionFault(int(samples.row[worst]), float(samples.share[worst]), text)]
+    return [MotionFault(text, int(samples.row[worst]), float(samples.share[worst]))]
 
 
 def tool_at_work(
@@ -134,7 +129,7 @@ def tool_at_work(
             samples.append(replace(found.samples, row=found.samples.row + part[0]))
             room[part] = found.room
             some = cells_reached(judge.robot, cells, judge.task, rows[part], found.samples)
-            new = some.cells & (some.chord < reached.chord)
+            new = some.chord < reached.chord
             reached.row[new] = some.row[new] + part[0]
             reached.chord[new], reached.roll[new] = some.chord[new], some.roll[new]
     lifted = np.flatnonzero(~(working[:-1] & working[1:])).astype(float)

@@ -22,7 +22,7 @@ from typing import Literal
 import numpy as np
 from scipy.spatial import cKDTree
 
-from coverable.arrays import Array, Ints, Mask
+from coverable.arrays import Array, Mask
 from coverable.errors import ArgumentError, Fault
 from feasibility.certification.lever_bounds import (
     Jacobians,
@@ -106,7 +106,12 @@ def replay_rates(
     if speed is not None and moving.any():
         slow = np.flatnonzero(moving & ~(found.speed >= speed))
         if len(slow):
-            refusals.append(too_slow(robot, cells, targets, points, found, slow, speed))
+            worst = int(slow[np.argmin(found.sampled_speed[slow])])
+            place = _named(cells, targets, points[worst + int(found.share[worst] > 0.5)])
+            with np.errstate(divide="ignore"):
+                times = speed / found.sampled_speed[worst]
+            said = too_slow(robot, int(found.joint[worst]), times, f" at cell {place}")
+            refusals.append(said + _others(len(slow) - 1))
     # Segments know their ends; a motion of one row has none.
     alone = smallest_singular(at, robot.length_unit) if len(walk.q) == 1 else np.empty(0)
     least, exact = np.append(found.sigma, alone), np.append(found.sampled_sigma, alone)
@@ -156,26 +161,12 @@ def in_place(robot: Robot, cells: Cells, task: Task, q: Array) -> Mask:
     return np.asarray((ends <= IN_PLACE * tolerance) & (ends + second / 8.0 <= tolerance))
 
 
-def too_slow(
-    robot: Robot,
-    cells: Cells,
-    targets: Array,
-    points: Array,
-    found: SegmentRates,
-    slow: Ints,
-    speed: float,
-) -> str:
-    """Which joint allows the speed least, how fast it would have to be there, and where that is."""
-    worst = int(slow[np.argmin(found.sampled_speed[slow])])
-    joint = int(found.joint[worst])
-    allowed, most = float(robot.max_velocity[joint]), float(found.sampled_speed[worst])
+def too_slow(robot: Robot, joint: int, times: float, where: str) -> str:
+    """How fast a joint would have to be, so many times as fast as it may, `where`."""
+    allowed = float(robot.max_velocity[joint])
     unit = "m/s" if robot.prismatic[joint] else "rad/s"
-    needed = f"{allowed * speed / most:.3g} {unit}" if most > 0.0 else "endless speed"
-    place = _named(cells, targets, points[worst + int(found.share[worst] > 0.5)])
-    return (
-        f"{robot.joint_names[joint]} would need {needed} at cell {place}; it allows {allowed:.3g}"
-        + _others(len(slow) - 1)
-    )
+    needed = f"{allowed * times:.3g} {unit}" if np.isfinite(times) else "endless speed"
+    return f"{robot.joint_names[joint]} would need {needed}{where}; it allows {allowed:.3g}"
 
 
 def _others(count: int) -> str:

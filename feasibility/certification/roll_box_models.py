@@ -66,6 +66,10 @@ class Directions(Rows):
         """Of which nothing is known."""
         return replace(Directions.fixed(np.zeros(3), count), radius=np.full(count, np.inf))
 
+    def at(self, x: Array) -> Directions:
+        """The same, about other parameters (K, 2) of the parts."""
+        return replace(self, centre=self.centre + (x[..., None] * self.slopes).sum(axis=1))
+
 
 @np.errstate(invalid="ignore", divide="ignore", over="ignore")  # what is not known is inf or NaN
 def reference_parts(b: Directions, e: Directions, square: bool = False) -> Directions:
@@ -124,19 +128,6 @@ class ToolModel(NamedTuple):
     """(m, 2) M_x and M_y."""
 
 
-class TargetModel(NamedTuple):
-    """b and t over m boxes of surface parameters."""
-
-    values: Array
-    """(m, 2, 3) at the centres."""
-    slopes: Array
-    """(m, 2, 2, 3) for each parameter what b and t change by."""
-    half: Array
-    """(m, 2) half the widths of the boxes in the parameters."""
-    radius: Array
-    """(m, 2) r_b and r_t."""
-
-
 class RollModels(NamedTuple):
     """Coordinates F - 1 of both ends, as `linear_models.Models` has them."""
 
@@ -149,14 +140,23 @@ class RollModels(NamedTuple):
 
 
 @np.errstate(invalid="ignore")  # inf * 0, where nothing is known, is NaN on the way
-def roll_models(tool: ToolModel, target: TargetModel, roll: Roll) -> RollModels:
-    """F - 1 for both ends of a range of at most 180 degrees."""
-    b, t = target.values[:, 0], target.values[:, 1]
-    db, dt = target.slopes[:, :, 0], target.slopes[:, :, 1]
-    r_b, r_t = target.radius.T
+def roll_models(
+    tool: ToolModel, approach: Directions, reference: Directions, half: Array, roll: Roll
+) -> RollModels:
+    """F - 1 for both ends of a range of at most 180 degrees, over m boxes.
+
+    Args:
+        tool: x and y over them.
+        approach, reference: b and t over their parameters, at the centres.
+        half: (m, 2) half the widths of the boxes in the parameters.
+        roll: the range.
+    """
+    (b, db, r_b), (t, dt, r_t) = (
+        (one.centre, one.slopes, one.radius) for one in (approach, reference)
+    )
     u, du = np.cross(b, t), np.cross(db, t[:, None]) + np.cross(b[:, None], dt)
     size_b, size_t = np.linalg.norm(b, axis=1), np.linalg.norm(t, axis=1)
-    spans = [(np.linalg.norm(d, axis=2) * target.half).sum(axis=1) for d in (db, dt)]
+    spans = [(np.linalg.norm(d, axis=2) * half).sum(axis=1) for d in (db, dt)]
     r_u = size_b * r_t + size_t * r_b + r_b * r_t + spans[0] * spans[1]
     r_u += spans[0] * r_t + spans[1] * r_b
     residual, radius = np.empty((len(b), 2)), np.empty((len(b), 2))
@@ -175,7 +175,7 @@ def roll_models(tool: ToolModel, target: TargetModel, roll: Roll) -> RollModels:
         n = by_x.shape[1]
         columns[:, :n, end] = (by_x * p[:, None]).sum(axis=2) + (by_y * q[:, None]).sum(axis=2)
         columns[:, n:, end] = (dp * x[:, None]).sum(axis=2) + (dq * y[:, None]).sum(axis=2)
-        moved = [(np.linalg.norm(d, axis=2) * target.half).sum(axis=1) for d in (dp, dq)]
+        moved = [(np.linalg.norm(d, axis=2) * half).sum(axis=1) for d in (dp, dq)]
         sizes = [np.linalg.norm(v, axis=1) for v in (p, q)]
         radius[:, end] = (
             1.0

@@ -33,25 +33,28 @@ import numpy as np
 
 from coverable.arrays import Array, Mask
 from feasibility.certification.faults import ROLL_CLOSE
-from feasibility.certification.lever_bounds import cross, lengths, peaks, second_derivatives
+from feasibility.certification.lever_bounds import (
+    Jacobians,
+    cross,
+    lengths,
+    peaks,
+    second_derivatives,
+)
 from feasibility.certification.roll_box_models import Directions, reference_parts
 from feasibility.roll import Roll, projected
-from robots.kinematics import Kinematics
-from robots.robot import Robot
 from surfaces.places.places import OffsetSurface, PlacePaths, Places
 
 ROUNDS = 24  # halvings of the angle that is looked for
 ROOT = float(np.sqrt(2.0))
 
 
-def frame_second_derivatives(robot: Robot, q: Array, axes: Array, x: Array) -> Array:
-    """(m - 1,) D_x + D_y between rows q (m, n), whose approach and reference axes (m, 3) are known.
+def frame_second_derivatives(steps: Array, slides: Mask, poses: Jacobians, x: Array) -> Array:
+    """(m - 1,) D_x + D_y between m poses with these reference axes (m, 3), as `second_derivatives`.
 
     With the sines of the angles between revolute axes and x, or y, in place of levers.
     """
-    angular, steps = Kinematics(robot).twists(q)[:, 3:], np.abs(np.diff(q, axis=0))
-    sines = [lengths(cross(angular, axis)) for axis in (x, np.cross(axes, x))]
-    found = [second_derivatives(steps, robot.prismatic, one, 1.0) for one in sines]
+    sines = [lengths(cross(poses.angular, axis)) for axis in (x, np.cross(poses.axes, x))]
+    found = [second_derivatives(steps, slides, one, 1.0) for one in sines]
     return found[0] + found[1]
 
 

@@ -199,7 +199,7 @@ class Judge:
         if self._roll is not None:
             from feasibility.certification.roll_held import frame_second_derivatives
 
-            second[:, 2] = frame_second_derivatives(self.robot, rows, at.axes, at.x)
+            second[:, 2] = frame_second_derivatives(steps, slides, poses, at.x)
         row, none = np.arange(len(steps)), np.zeros(len(steps))
         ends = at.of(row), at.of(row + 1)
         return SampledStretches(row, none, none + 1.0, *ends, second)

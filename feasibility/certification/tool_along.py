@@ -13,14 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
-from coverable.errors import counted
 from feasibility.certification.bisection import bisected
-from feasibility.certification.faults import MotionFault
+from feasibility.certification.faults import MotionFault, and_others
 from feasibility.certification.lever_bounds import jacobians
 from feasibility.certification.stretches import Bounds, Judge, SampledStretches, Samples
 from feasibility.cone import angle_of
 from feasibility.task import Task
-from robots.robot import Robot
 from surfaces.cells import Cells
 
 LEVELS = 26  # halvings of a segment between two rows
@@ -138,17 +136,6 @@ def less_room(room: Array, task: Task, row: Ints, chord: Array, roll: Array) -> 
 OFF, TILTED, ROLLED, NEAR = range(4)  # rows of `Judge.beyond`
 
 
-def past_limit(robot: Robot, rows: Array) -> MotionFault:
-    """The worst row that passes a limit; there is one."""
-    margins = np.minimum(rows - robot.lower, robot.upper - rows)
-    row, joint = np.unravel_index(np.argmin(margins), margins.shape)
-    least, slides = float(margins[row, joint]), robot.prismatic[joint]
-    by = f"{-1e3 * least:.4g} mm" if slides else f"{-np.degrees(least):.4g} deg"
-    text = f"{robot.joint_names[joint]} passes its limit by {by}"
-    others = int((margins < 0.0).any(axis=1).sum()) - 1
-    return MotionFault(int(row), 0.0, text + _others(others, "row"))
-
-
 def exact_faults(judge: Judge, wrong: Samples, noun: str) -> list[MotionFault]:
     """The worst of configurations that are wrong, of each kind."""
     faults, beyond = [], judge.beyond(wrong)
@@ -158,8 +145,8 @@ def exact_faults(judge: Judge, wrong: Samples, noun: str) -> list[MotionFault]:
             continue
         worst = int(rows[np.argmax(np.nan_to_num(more[rows], nan=np.inf))])
         text = _said(judge, wrong, what, worst)
-        text += "" if what == NEAR else _others(len(rows) - 1, noun)
-        faults.append(MotionFault(int(wrong.row[worst]), float(wrong.share[worst]), text))
+        text += "" if what == NEAR else and_others(len(rows) - 1, noun)
+        faults.append(MotionFault(text, int(wrong.row[worst]), float(wrong.share[worst])))
     return faults
 
 
@@ -187,12 +174,6 @@ def _said(judge: Judge, wrong: Samples, what: int, k: int) -> str:
     )
 
 
-def _others(number: int, noun: str) -> str:
-    """' (the worst; wrong at 3 other rows, too)', or nothing."""
-    others = counted(number, f"other {noun}")
-    return f" (the worst; wrong at {others}, too)" if number > 0 else ""
-
-
 def open_fault(judge: Judge, left: SampledStretches, bounds: Bounds) -> MotionFault:
     """What to say of a stretch that neither bounds nor exact configurations decide."""
     # One with a jump first, then the shortest: what is wrong there is nearest to a place.
@@ -204,7 +185,7 @@ def open_fault(judge: Judge, left: SampledStretches, bounds: Bounds) -> MotionFa
         ]
         jump = 1e3 * float(np.linalg.norm(target[1] - target[0]))
         text = f"the place on the surface that the tool is over jumps, by {jump:.3g} mm"
-        return MotionFault(row, share, text)
+        return MotionFault(text, row, share)
     allowed = f"{1e3 * judge.task.effective_tolerance:g} mm"
     text = (
         "the tool point is at the edge of the tolerance, or its place on the surface jumps (within "
@@ -215,4 +196,4 @@ def open_fault(judge: Judge, left: SampledStretches, bounds: Bounds) -> MotionFa
         "the roll is at the edge of its range, or the reference turns there",
         "the tool point may come too near to the mesh's triangles",
     )[int(np.argmin(judge.beyond(bounds)[:, one] <= 0.0))]
-    return MotionFault(row, share, f"not certified: {text}")
+    return MotionFault(f"not certified: {text}", row, share)

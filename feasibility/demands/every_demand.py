@@ -63,7 +63,7 @@ def _at_start(robot: Robot, cells: Cells, task: Task, walks: Sequence[Walk]) -> 
     off = np.inf if robot.start is None else float(np.abs(walks[0].q[0] - robot.start).max())
     if off <= AT_START:
         return Findings()
-    return Findings((MotionFault(0, 0.0, f"it begins {off:.3g} rad or m off the start"),))
+    return Findings((MotionFault(f"it begins {off:.3g} rad or m off the start", 0),))
 
 
 def _at_rates(robot: Robot, cells: Cells, task: Task, walks: Sequence[Walk]) -> Findings:
@@ -72,7 +72,7 @@ def _at_rates(robot: Robot, cells: Cells, task: Task, walks: Sequence[Walk]) -> 
 
     check_rates(robot, task)
     found = [replay_rates(robot, cells, task, walk).refusals for walk in walks]
-    return Findings(tuple(MotionFault(-1, 0.0, text) for texts in found for text in texts))
+    return Findings(tuple(MotionFault(text) for texts in found for text in texts))
 
 
 def _treating(robot: Robot, cells: Cells, task: Task, walks: Sequence[Walk]) -> Findings:
@@ -82,7 +82,7 @@ def _treating(robot: Robot, cells: Cells, task: Task, walks: Sequence[Walk]) -> 
 
     treated = treated_by_walk(robot, cells, task, *walks)
     short = shortfall(task, treated)
-    return Findings((MotionFault(-1, 0.0, short),) if short else (), treated)
+    return Findings((MotionFault(short),) if short else (), treated)
 
 
 DEMANDS = (

@@ -14,7 +14,7 @@ import numpy as np
 
 from coverable.arrays import Array, Mask
 from feasibility.certification.motion_replay import replay
-from feasibility.certification.rate_replay import RateReplay, in_place, replay_rates
+from feasibility.certification.rate_replay import RateReplay, in_place, replay_rates, too_slow
 from feasibility.certification.segment_rates import segment_rates
 from feasibility.clock import Clock
 from feasibility.demands.every_demand import TOGETHER, further
@@ -39,8 +39,8 @@ class MotionRates(NamedTuple):
     """Upper bound of it."""
     joint: int
     """The joint that allows no more speed."""
-    share: float
-    """m/s allowed over that joint's limit: v / share is what the joint needs for v."""
+    most: float
+    """m/s, upper bound of that speed."""
 
     def fault(self, robot: Robot, task: Task, where: str = "") -> str:
         """Why it does not hold what a task requires; empty where it does.
@@ -48,12 +48,8 @@ class MotionRates(NamedTuple):
         That is the joint that is too slow, `where` (" at ...", or nothing), or the singular values.
         """
         if task.speed is not None and self.speed < task.speed:
-            unit = "m/s" if robot.prismatic[self.joint] else "rad/s"
-            needed = (
-                f"{task.speed / self.share:.3g} {unit}" if self.share > 0.0 else "endless speed"
-            )
-            allows = f"it allows {robot.max_velocity[self.joint]:.3g}"
-            return f"{robot.joint_names[self.joint]} would need {needed}{where}; {allows}"
+            times = task.speed / self.most if self.most > 0.0 else np.inf
+            return too_slow(robot, self.joint, times, where)
         least = task.min_manipulability
         if least is None or self.sigma >= least:
             return ""
@@ -79,7 +75,7 @@ def motion_rates(
         robot, q[:-1][inside], q[1:][inside],
         sigma=task.min_manipulability, group=owner, resting=resting,
     )  # fmt: skip
-    speed, sigma, sampled, share = (np.full(count, np.inf) for _ in range(4))
+    speed, sigma, sampled, most = (np.full(count, np.inf) for _ in range(4))
     joint = np.zeros(count, dtype=np.int64)
     np.minimum.at(sigma, owner, found.sigma)
     np.minimum.at(sampled, owner, found.sampled_sigma)
@@ -87,8 +83,8 @@ def motion_rates(
     moving, first = np.unique(owner[order], return_index=True)
     rows = order[first]
     speed[moving], joint[moving] = found.speed[rows], found.joint[rows]
-    share[moving] = found.sampled_speed[rows] / robot.max_velocity[joint[moving]]
-    each = (column.tolist() for column in (speed, sigma, sampled, joint, share))
+    most[moving] = found.sampled_speed[rows]
+    each = (column.tolist() for column in (speed, sigma, sampled, joint, most))
     return [MotionRates(*row) for row in zip(*each, strict=True)]
 
 

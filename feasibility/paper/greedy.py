@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from coverable.errors import ArgumentError, counted
+from feasibility.certification.faults import Replay
 from feasibility.clock import Clock
 from feasibility.notices import GREEDY, compiling_notice
 from feasibility.paper.continuity import CallOutcome, JSpace
@@ -21,7 +22,7 @@ from feasibility.paper.tree_replay import Path, replay_tree
 from feasibility.problem import Problem
 from feasibility.search_result import SearchResult
 from feasibility.search_settings import Search
-from feasibility.verdict import Cause, CauseKind, Replay
+from feasibility.verdict import Cause, CauseKind
 from surfaces.cells import Cells
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from coverable.arrays import Array, Mask
+from feasibility.certification.faults import MotionFault, Replay
 from feasibility.certification.motion_replay import replay_over_surface
 from feasibility.cone import angle_of
 from feasibility.paper.jcell_steps import Steps
@@ -18,7 +19,7 @@ from feasibility.roll import projected, roll_of
 from feasibility.search_settings import Search
 from feasibility.targets.references import u_directions
 from feasibility.task import Task
-from feasibility.verdict import Certificate, Replay, Verdict
+from feasibility.verdict import Certificate, Verdict
 from robots.kinematics import Kinematics, reference_axes
 from robots.robot import Robot
 from surfaces.cells import Cells
@@ -130,7 +131,7 @@ def replay_tree(
     if roll is not None and task.roll is not None:
         between = task.roll.half - float(steps.roll[1])
         certificate = replace(certificate, max_roll=roll + between)
-    return Replay(certificate, "; ".join(faults + more))
+    return Replay(certificate, tuple(map(MotionFault, faults + more)))
 
 
 def _by_margins(
@@ -216,11 +217,11 @@ def replay_stored(verdict: Verdict, search: Search) -> Replay:
     robot, cells, task = verdict.robot, verdict.cells, verdict.task
     paths = _paths_of(verdict)
     if isinstance(paths, str):
-        return Replay(Certificate(0, np.nan, np.nan, np.nan), paths)
+        return Replay(Certificate(0, np.nan, np.nan, np.nan), (MotionFault(paths),))
     found = replay_tree(robot, cells, task, Steps.of(robot, cells, task, search), paths)
     missed = len(cells) - len(paths)
     if missed and found.accepted:
-        return Replay(found.certificate, f"{missed} cells are not in the tree")
+        return replace(found, faults=(MotionFault(f"{missed} cells are not in the tree"),))
     return found
 
 

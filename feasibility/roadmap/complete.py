@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from feasibility.certification.faults import Replay
 from feasibility.clock import Clock, OutOfTime
 from feasibility.collisions.kernels.clearance import blamed
 from feasibility.notices import REASONS, compiling_notice
@@ -18,7 +19,7 @@ from feasibility.roadmap.walk import covering_walk
 from feasibility.roadmap.warmup import warm_up
 from feasibility.search_result import SearchResult
 from feasibility.search_settings import Search
-from feasibility.verdict import Cause, Replay, Walk
+from feasibility.verdict import Cause, Walk
 
 if TYPE_CHECKING:
     import networkx as nx

@@ -5,12 +5,13 @@ from numpy.typing import NDArray
 
 from coverable.arrays import Array
 from coverable.errors import ArgumentError, Checks, Fault
+from feasibility.certification.faults import Replay
 from feasibility.collisions.kernels.clearance import blamed, segment_clear
 from feasibility.collisions.problem_bodies import Bodies
 from feasibility.problem import Problem
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions.search_arrays import SearchArrays
-from feasibility.verdict import Replay, Walk
+from feasibility.verdict import Walk
 from robots.kinematics import Kinematics
 
 

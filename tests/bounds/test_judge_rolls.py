@@ -13,6 +13,7 @@ from samples import sampled, seeds
 
 from coverable import Task, cylinder, replay, sphere
 from feasibility.certification import roll_held
+from feasibility.certification.lever_bounds import jacobians
 from feasibility.certification.motion_replay import replay_over_surface
 from feasibility.certification.roll_box_models import Directions, reference_parts
 from feasibility.certification.roll_held import (
@@ -79,8 +80,9 @@ def test_frames_of_the_tool_bend_no_more_than_is_said(seed):
     alone = robot_of([joint(1), joint(2, "fixed", (0.5, 0, 0))])  # both of its axes turn about z
     robot = random_arm(rng) if seed else alone
     ends = rng.uniform(-1.0, 1.0, (2, robot.n))
-    axes, x = Kinematics(robot).tools(ends)[1], reference_axes(robot, ends)
-    bound = frame_second_derivatives(robot, ends, axes, x)[0]
+    steps, poses = np.abs(np.diff(ends, axis=0)), jacobians(Kinematics(robot), ends)
+    x = reference_axes(robot, ends)
+    bound = frame_second_derivatives(steps, robot.prismatic, poses, x)[0]
     q = ends[0] + S * (ends[1] - ends[0])
     x, axes = reference_axes(robot, q), Kinematics(robot).tools(q)[1]
     bent = [np.diff(one, n=2, axis=0) * 100.0**2 for one in (x, np.cross(axes, x))]

@@ -74,7 +74,7 @@ def known(rng, boxes=50):
     parts = target_parts(patch.parts(0.3 * tolerance, 0.3 * chord, 600), patch.cells(1, 1), task)
     arm = ArmModel(robot, robot.lower - FAR, robot.upper + FAR)
     allowed = linear_models.Allowed(tolerance, chord, 0.5, task.roll)
-    emptiness = Emptiness(arm, parts, lambda cell: 0, allowed, lambda: None)
+    emptiness = Emptiness(arm, parts, allowed, lambda: None)
     part, x = at_parameters(patch, u, v)
     made, within = boxes_around(rng, robot, q, parts, int(part[0]), x[0], boxes)
     return Known(emptiness, made, within)
@@ -163,7 +163,7 @@ def test_no_region_around_a_known_place_is_said_to_be_empty(seed):
             size[:, rng.random(arm.n) < 0.2] = 0.0
             turns = np.where(arm.prismatic, 0, 2.0 * np.pi * rng.integers(-1, 2, arm.n))
             region = JointRegion(q - size[0] + turns, q + size[1] + turns)
-            claims = [Claim("a region", region, None)]
+            claims = [Claim("a region", region, None, 0)]
             assert case.emptiness.test(claims, NoRefutation(), 600).failed is not None
 
 
@@ -223,7 +223,7 @@ def test_bodies_are_asked_to_overlap_wherever_the_target_of_a_box_may_be():
     parts = target_parts(dome.parts(0.01, 0.05), dome.cells(1, 1), Task(0.02, 20))
     arm, part = ArmModel(UR5, UR5.lower, UR5.upper), int(np.argmax(parts.radius[:, 0]))
     allowed = linear_models.Allowed(10.0, 4.0, 0.5)  # so that nothing is excluded
-    search = Emptiness(arm, parts, lambda cell: part, allowed, lambda: None, Asked())
+    search = Emptiness(arm, parts, allowed, lambda: None, Asked())
     q, x = np.zeros(6), np.array([0.3, -0.2])
     half = np.append(np.full(6, 1e-3), [0.5, 0.25])
     centre = np.append(q, x)

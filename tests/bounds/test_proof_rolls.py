@@ -38,11 +38,7 @@ def test_models_of_the_roll_hold_over_their_boxes():
         model = Directions(b[None], slopes, radius)
         held = reference_parts(model, Directions.fixed(r, 1))
         q = rng.uniform(-2, 2, UR5.n)
-        target = roll_box_models.TargetModel(
-            np.stack([b, held.centre[0]])[None], np.stack([slopes, held.slopes], axis=2),
-            np.ones((1, 2)), np.array([[radius[0], held.radius[0]]]),
-        )  # fmt: skip
-        found = roll_models(tool_model(q, half), target, roll)
+        found = roll_models(tool_model(q, half), model, held, np.ones((1, 2)), roll)
         inner, x = rng.uniform(-1, 1, (200, UR5.n)) * half, rng.uniform(-1, 1, (200, 2))
         near = b + np.einsum("ki,id->kd", x, slopes[0])
         near /= np.linalg.norm(near, axis=1, keepdims=True)
@@ -108,10 +104,8 @@ def test_radii_are_those_of_the_lemma():
         y, columns = unit(np.cross(x, rng.normal(size=3))), 0.3 * rng.normal(size=(1, 6, 2, 3))
         second, moves = rng.uniform(0.0, 0.1, (2, 1, 2))
         tool = roll_box_models.ToolModel(np.stack([x, y])[None], columns, second, moves)
-        values, both = np.stack([b, t])[None], np.stack([slopes, k], axis=1)[None]
-        target = roll_box_models.TargetModel(values, both, half[None], np.array([[r_b, r_t]]))
         roll = Roll(rng.uniform(-3, 3), rng.uniform(0.1, 1.5))
-        found = roll_models(tool, target, roll)
+        found = roll_models(tool, model, held, half[None], roll)
         spans = [lengths(half[:, None] * one) for one in (slopes, k)]
         size_b, size_t = (float(np.linalg.norm(one)) for one in (b, t))
         r_u = (

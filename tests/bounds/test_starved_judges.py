@@ -22,7 +22,7 @@ from feasibility.certification.collisions.motion import ArmMotion
 from feasibility.certification.lever_bounds import jacobians
 from feasibility.certification.motion_replay import replay_over_surface
 from feasibility.certification.rate_replay import in_place
-from feasibility.certification.roll_box_models import TargetModel, ToolModel, roll_models
+from feasibility.certification.roll_box_models import Directions, ToolModel, roll_models
 from feasibility.certification.roll_held import largest_off
 from feasibility.certification.segment_rates import segment_rates
 from feasibility.certification.stretches import Judge
@@ -110,17 +110,18 @@ def test_a_roll_between_two_instants_and_over_boxes():
     x, y, b = np.eye(3)
     bits = np.full((1, 2), 0.01)
     tool = ToolModel(np.stack([x, y])[None], np.full((1, 6, 2, 3), 0.1), bits, bits)
-    aim = TargetModel(np.stack([b, x])[None], np.full((1, 2, 2, 3), 1e-3), 100 * bits, bits)
+    b, t = (Directions(one[None], np.full((1, 2, 3), 1e-3), bits[0, :1]) for one in (b, x))
 
-    def radius(tool=tool, aim=aim):
-        return roll_models(tool, aim, Roll(0.3, 0.5)).radius
+    def radius(tool=tool, b=b, t=t, half=100 * bits):
+        return roll_models(tool, b, t, half, Roll(0.3, 0.5)).radius
 
     assert (radius() < 1.1).all()
     for k in (0, 1):
         for starved in ({"second": grown(bits, k)}, {"moves": grown(bits, k)}):
             assert (radius(tool._replace(**starved)) >= 2.0).all()  # |F - 1| is never more than 1
-        for name in ("half", "radius"):
-            assert (radius(aim=aim._replace(**{name: grown(bits, k)})) >= 2.0).all()
+        assert (radius(half=grown(bits, k)) >= 2.0).all()
+        less_known = {"bt"[k]: replace((b, t)[k], radius=np.array([LARGE]))}
+        assert (radius(**less_known) >= 2.0).all()
 
 
 @pytest.mark.parametrize(("turn", "asked"), [(2.5, {"speed": 0.05}), (0.0, {"sigma": 0.2})])

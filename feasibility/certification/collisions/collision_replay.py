@@ -28,7 +28,7 @@ FINEST = 1.0 / 16.0  # [1] share of a segment, within which no nearer place is l
 KEPT = 8  # bodies of so many problems are kept ready, for motions replayed one after another
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CollisionFault(MotionFault):
     """Two owners of bodies that come too near, and where."""
 
@@ -152,7 +152,8 @@ def collision_replay(
         finite[:-1] &= np.isfinite(deviations).all(axis=1)
     if not finite.all():
         row = int(np.argmin(finite))
-        fault = CollisionFault(row, 0.0, "a joint value is not finite", ("", ""), np.nan)
+        what, nobody = "a joint value is not finite", ("", "")
+        fault = CollisionFault(what, row, pair=nobody, distance=np.nan)
         return CollisionReplay(None, None, None, (fault,))
     couples = couples_of(bodies)
     if not len(rows) or not bodies.pairs:
@@ -246,4 +247,5 @@ def _fault(pair: Pair, found: Pairing, time: float) -> CollisionFault:
         text = f"{names} overlap by {-1e3 * distance:.3g} mm"
     else:
         text = f"{names} are {1e3 * distance:.4g} mm apart, {wanted}"
-    return CollisionFault(row, time - row, text, (pair.first, pair.second), distance)
+    both = pair.first, pair.second
+    return CollisionFault(text, row, time - row, pair=both, distance=distance)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable.arrays import Array, Ints, Mask
+from coverable.arrays import Array, Mask
 from feasibility.certification.cut_proofs.linear_models import Boxes, Models, Parts
 
 KEPT = 0.7  # share of a box's width, in its shortest joint, over which contraction is no progress
@@ -61,46 +61,33 @@ def cut(boxes: Boxes, reach: Array, parts: Parts, length: float) -> tuple[Boxes,
     finest = parts.children[boxes.part, 0] < 0
     surface_first = over_surface > reach[:, :n].max(axis=1)
     surface_first &= ~finest | (reach[:, n:] > 0.0).any(axis=1)
-    to_children = surface_first & ~finest
     along = np.where(
         surface_first, n + np.argmax(reach[:, n:], axis=1), np.argmax(reach[:, :n], axis=1)
     )
-    halved = _halves(boxes.of(~to_children), reach[~to_children], along[~to_children])
-    made = halved + _children(boxes.of(to_children), reach[to_children], parts)
-    return Boxes.join(*(some for some, _ in made)), np.concatenate([r for _, r in made])
-
-
-def _halves(boxes: Boxes, reach: Array, along: Ints) -> list[tuple[Boxes, Array]]:
-    """Boxes (m) cut at the middle of one variable each (m,)."""
-    rows = np.arange(len(boxes))
-    low, high, reach = boxes.low.copy(), boxes.high.copy(), reach.copy()
-    middle = 0.5 * (low[rows, along] + high[rows, along])
-    high[rows, along] = middle
-    low[rows, along] = middle
-    reach[rows, along] *= 0.5
-    first = Boxes(boxes.low, high, boxes.part, boxes.claim)
-    return [(first, reach), (Boxes(low, boxes.high, boxes.part, boxes.claim), reach)]
-
-
-def _children(boxes: Boxes, reach: Array, parts: Parts) -> list[tuple[Boxes, Array]]:
-    """The same joints over the two children of each box's part."""
-    axis = parts.axis[boxes.part]
-    n = reach.shape[1] - 2
-    shrunk = reach.copy()
-    shrunk[:, n:] *= np.where(axis[:, None] < 0, 0.7, np.where(axis[:, None] == [0, 1], 0.5, 1.0))
-    made = []
-    for side, shift in ((0, 1.0), (1, -1.0)):
-        low, high = boxes.low.copy(), boxes.high.copy()
-        for a in (0, 1):
-            halved = axis == a
-            for ends in (low, high):
-                ends[halved, n + a] = 2.0 * ends[halved, n + a] + shift
-        low[axis < 0, n:], high[axis < 0, n:] = -1.0, 1.0
-        low[:, n:], high[:, n:] = np.maximum(low[:, n:], -1.0), np.minimum(high[:, n:], 1.0)
-        kept = np.asarray(~(low > high).any(axis=1))
-        child = Boxes(low, high, parts.children[boxes.part, side], boxes.claim)
-        made.append((child.of(kept), shrunk[kept]))
-    return made
+    to_children = surface_first & ~finest  # the others are halved
+    (halved,), (split,) = np.nonzero(~to_children), np.nonzero(to_children)
+    rows = np.concatenate([halved, halved, split, split])
+    side = np.repeat([0, 1, 0, 1], [len(halved)] * 2 + [len(split)] * 2)
+    made, reach, child = boxes.of(rows), reach[rows], to_children[rows]
+    low, high, k = made.low, made.high, np.arange(2 * len(halved))
+    at = k, along[rows[k]]
+    middle = 0.5 * (low[at] + high[at])
+    low[at] = np.where(side[k] == 1, middle, low[at])
+    high[at] = np.where(side[k] == 0, middle, high[at])
+    reach[at] *= 0.5
+    axis = np.where(child, parts.axis[made.part], 2)
+    for a in (0, 1):
+        own = axis == a
+        shift = np.array([1.0, -1.0])[side[own]]
+        for ends in (low, high):
+            ends[own, n + a] = 2.0 * ends[own, n + a] + shift
+        reach[own, n + a] *= 0.5
+    low[axis < 0, n:], high[axis < 0, n:] = -1.0, 1.0
+    reach[axis < 0, n:] *= 0.7
+    low[:, n:], high[:, n:] = np.maximum(low[:, n:], -1.0), np.minimum(high[:, n:], 1.0)
+    made.part[child] = parts.children[made.part, side][child]
+    kept = np.asarray(~(child & (low > high).any(axis=1)))
+    return made.of(kept), reach[kept]
 
 
 TURN = 2.0 * np.pi

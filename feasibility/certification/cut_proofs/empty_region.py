@@ -64,6 +64,8 @@ class Claim(NamedTuple):
     region: JointRegion
     cell: int | None
     """The cell whose target it is; None where the tool may be anywhere on the surface."""
+    part: int
+    """That target, or all of the surface, as a part."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -85,8 +87,6 @@ class Emptiness:
     arm: ArmModel
     parts: Parts
     """Of the surface, and targets of cells as parts of their own."""
-    roots: Callable[[int | None], int]
-    """The part of a cell's target, or of the whole surface for None."""
     allowed: Allowed
     """How far the tool may be off."""
     tick: Callable[[], object]
@@ -100,7 +100,11 @@ class Emptiness:
         """Confirm all claims, refute one, or give up after `most` boxes."""
         regions = [claim.region.folded(self.arm.prismatic) for claim in claims]
         waiting = [
-            self._first(region, claims[k], k)
+            Boxes(
+                np.append(region.low, [-1.0, -1.0])[None],
+                np.append(region.high, [1.0, 1.0])[None],
+                *np.array([[claims[k].part], [k]]),
+            )
             for k, region in enumerate(regions)
             if not region.empty
         ]
@@ -126,16 +130,6 @@ class Emptiness:
                     return Outcome(done, int(left.claim[some[found[0]]]), found[1])
             waiting.append(smaller(left, models, self.parts, self.allowed.length))
         return Outcome(done)
-
-    def _first(self, region: JointRegion, claim: Claim, index: int) -> Boxes:
-        """The whole region over the whole surface, or at the cell's target."""
-        root = self.roots(claim.cell)
-        return Boxes(
-            np.append(region.low, [-1.0, -1.0])[None],
-            np.append(region.high, [1.0, 1.0])[None],
-            np.array([root]),
-            np.array([index]),
-        )
 
     def examine(self, boxes: Boxes) -> tuple[Boxes, Models, Array]:
         """The boxes that are not proved empty, their models, and where these come nearest."""
@@ -244,9 +238,9 @@ class ArmCollisions:
         """
         arm = ArmModel(self._robot, self._region.low, self._region.high)
         allowed, parts = Allowed.by(self._task, arm), cell_parts(self._targets)
-        engine = Emptiness(arm, parts, lambda _: cell, allowed, tick, self._overlapping)
+        engine = Emptiness(arm, parts, allowed, tick, self._overlapping)
         refuter = Refuter(self._robot, self._cells, self._task, allowed.length)
-        found = engine.test([Claim("", self._region, cell)], refuter, most)
+        found = engine.test([Claim("", self._region, cell, cell)], refuter, most)
         if found.failed is not None:
             return Collides(False, found.boxes)
         pairs = [self._bodies.pairs[k] for k in sorted(engine.blamed)]

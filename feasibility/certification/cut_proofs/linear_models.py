@@ -25,6 +25,7 @@ import numpy as np
 from coverable.arrays import Array, Ints
 from feasibility.certification.bisection import Rows
 from feasibility.certification.lever_bounds import (
+    Jacobians,
     cross,
     jacobians,
     lengths,
@@ -33,7 +34,6 @@ from feasibility.certification.lever_bounds import (
 )
 from feasibility.certification.roll_box_models import (
     Directions,
-    TargetModel,
     ToolModel,
     reference_parts,
     roll_models,
@@ -172,15 +172,15 @@ class ArmModel:
 
     def models(self, boxes: Boxes, parts: Parts, allowed: Allowed) -> Models:
         """The linear model of every box."""
-        n, length = self.n, allowed.length
+        n, length, part = self.n, allowed.length, boxes.part
         centre, half = boxes.centre, 0.5 * (boxes.high - boxes.low)
         at_centre = jacobians(self.kinematics, centre[:, :n])
         by_joint = np.concatenate([at_centre.point, length * at_centre.axis], axis=1)
         by_joint = np.ascontiguousarray(by_joint.transpose(0, 2, 1))
         tool = np.concatenate([at_centre.points, length * at_centre.axes], axis=1)
         weights = np.array([1.0, 1.0, 1.0, length, length, length])
-        slopes = parts.slopes[boxes.part] * weights
-        target = parts.centre[boxes.part] * weights
+        slopes = parts.slopes[part] * weights
+        target = parts.centre[part] * weights
         target = target + (centre[:, n:, None] * slopes).sum(axis=1)
         h = half[:, :n]
         levers, sines = at_centre.levers, at_centre.sines
@@ -188,55 +188,36 @@ class ArmModel:
         radius = np.empty((len(boxes), 2))
         radius[:, 0] = allowed.position + parts.radius[boxes.part, 0] + 0.5 * of_point
         radius[:, 1] = allowed.axis + parts.radius[boxes.part, 1] + 0.5 * of_axis
-        radius = (radius + GUARD) * [1.0, length]
+        reach = [(levers + length * sines) * h, np.linalg.norm(slopes, axis=2) * half[:, n:]]
         made = Models(
             residual=tool - target,
             columns=np.concatenate([by_joint, -slopes], axis=1),
-            radius=radius,
+            radius=(radius + GUARD) * [1.0, length],
             low=boxes.low - centre,
             high=boxes.high - centre,
-            reach=np.concatenate(
-                [(levers + length * sines) * h, np.linalg.norm(slopes, axis=2) * half[:, n:]],
-                axis=1,
-            ),
+            reach=np.concatenate(reach, axis=1),
         )
         if allowed.roll is None:
             return made
-        part, held = boxes.part, parts.references
-        held_centre = np.stack([parts.centre[part, 3:], held.centre[part]], axis=1)
-        turned = np.stack([parts.slopes[part][..., 3:], held.slopes[part]], axis=2)
-        at = TargetModel(
-            held_centre + (centre[:, n:, None, None] * turned).sum(axis=1),
-            turned,
-            half[:, n:],
-            np.column_stack([parts.radius[:, 1], parts.references.radius])[boxes.part],
-        )
-        return self._with_roll(made, centre[:, :n], h, at, allowed)
-
-    def _with_roll(
-        self, made: Models, q: Array, half: Array, at: TargetModel, allowed: Allowed
-    ) -> Models:
-        """The models with one more coordinate for each end of the roll's limited range."""
-        if allowed.roll is None:
-            return made
-        n, length = self.n, allowed.length
-        axes = self.kinematics.tools(q)[1]
-        x = reference_axes(self.robot, q)
-        both = np.stack([x, np.cross(axes, x)], axis=1)
-        angular = self.kinematics.twists(q)[:, 3:]
-        turned = [cross(angular, both[:, k]) for k in (0, 1)]
-        sines = [lengths(one) for one in turned]
-        columns = np.stack(turned, axis=1).transpose(0, 3, 1, 2)
-        moves = [np.minimum((one * half).sum(axis=1), 2.0) for one in sines]
-        seconds = [second_derivative_bound(one, half, self.prismatic) for one in sines]
-        tool = ToolModel(both, columns, np.column_stack(seconds), np.column_stack(moves))
-        found = roll_models(tool, at, allowed.roll)
-        reach = made.reach.copy()
-        reach[:, :n] += length * (sines[0] + sines[1]) * half
+        b = Directions(parts.centre[part, 3:], parts.slopes[part][..., 3:], parts.radius[part, 1])
+        b, t = (one.at(centre[:, n:]) for one in (b, parts.references.of(part)))
+        frame = self._frames(centre[:, :n], h, at_centre)
+        found = roll_models(frame, b, t, half[:, n:], allowed.roll)
+        made.reach[:, :n] += length * np.linalg.norm(frame.columns, axis=3).sum(axis=2) * h
         return replace(
             made,
             residual=np.concatenate([made.residual, length * found.residual], axis=1),
             columns=np.concatenate([made.columns, length * found.columns], axis=2),
             radius=np.concatenate([made.radius, length * found.radius], axis=1),
-            reach=reach,
         )
+
+    def _frames(self, q: Array, half: Array, at: Jacobians) -> ToolModel:
+        """x and y of the tool over boxes of joints of half widths (m, n) about q (m, n)."""
+        x = reference_axes(self.robot, q)
+        both = np.stack([x, np.cross(at.axes, x)], axis=1)
+        turned = [cross(at.angular, both[:, k]) for k in (0, 1)]
+        sines = [lengths(one) for one in turned]
+        moves = [np.minimum((one * half).sum(axis=1), 2.0) for one in sines]
+        seconds = [second_derivative_bound(one, half, self.prismatic) for one in sines]
+        columns = np.stack(turned, axis=1).transpose(0, 3, 1, 2)
+        return ToolModel(both, columns, np.column_stack(seconds), np.column_stack(moves))

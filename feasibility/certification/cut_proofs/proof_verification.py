@@ -30,7 +30,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from coverable.arrays import Array
-from feasibility.certification.collisions.every_pose import Collides, never_clear
+from feasibility.certification.collisions.every_pose import never_clear
 from feasibility.certification.collisions.everywhere import Overlapping
 from feasibility.certification.cut_proofs.box_cutting import TURN, JointRegion
 from feasibility.certification.cut_proofs.empty_region import Claim, Emptiness, Outcome
@@ -46,7 +46,7 @@ from feasibility.certification.cut_proofs.refutation import Refuter
 from feasibility.certification.lever_bounds import out_of_line, stretched_length
 from feasibility.collisions.asked_bodies import gather
 from feasibility.cut_tree import Cut, CutTree, Leaf, malformed
-from feasibility.cut_words import joint_value
+from feasibility.cut_words import joint_value, place_of
 from feasibility.task import Task
 from robots.kinematics import Kinematics
 from robots.robot import Robot
@@ -82,7 +82,7 @@ def verify_proof(
     cells: Cells,
     task: Task,
     tree: CutTree,
-    tick: Callable[[], object] | None = None,
+    tick: Callable[[], object] = lambda: None,
     most: int = MOST_BOXES,
 ) -> ProofCheck:
     """Is it proved that no motion of the robot covers every cell?
@@ -101,16 +101,17 @@ def verify_proof(
     fault = out_of_line(robot) or malformed(robot, len(cells), tree)
     if fault:
         return ProofCheck(fault, 0)
-    tick = tick or (lambda: None)
     tick()
     if isinstance(tree.root, Leaf):
-        target = task.targets(cells).points[tree.root.cell]
-        if too_far(robot, target, task.effective_tolerance):
+        point, approach = (each[tree.root.cell] for each in task.targets(cells)[:2])
+        if too_far(robot, point, task.effective_tolerance):
             return ProofCheck("", 0)
-    alone = _by_the_tool(robot, cells, task, tree, tick)
-    if alone is not None and alone.confirmed:
-        return ProofCheck("", alone.boxes)
-    if isinstance(tree.root, Leaf):
+        bodies = gather(robot, cells.surface, task.collision, task.standoff)
+        if bodies is not None:
+            most_off = task.cone, task.effective_tolerance
+            alone = never_clear(robot, bodies, *most_off, point, approach, tick)
+            if alone.confirmed:
+                return ProofCheck("", alone.boxes)
         return verify_on(robot, cells, task, tree, None, tick, most)
     cone = max(min(task.cone_chord, 1.0), NARROWEST)
     try:
@@ -118,18 +119,6 @@ def verify_proof(
     except SurfaceError as error:
         return ProofCheck(f"the surface has no bounds to prove anything with: {error}", 0)
     return verify_on(robot, cells, task, tree, parts, tick, most)
-
-
-def _by_the_tool(
-    robot: Robot, cells: Cells, task: Task, tree: CutTree, tick: Callable[[], object]
-) -> Collides | None:
-    """Does the tool collide in every pose over the one cell that a tree is about?"""
-    bodies = gather(robot, cells.surface, task.collision, task.standoff)
-    if bodies is None or not isinstance(tree.root, Leaf):
-        return None
-    targets, cell = task.targets(cells), tree.root.cell
-    target = targets.points[cell], targets.approaches[cell]
-    return never_clear(robot, bodies, task.cone, task.effective_tolerance, *target, tick)
 
 
 def too_far(robot: Robot, target: Array, tolerance: float) -> bool:
@@ -173,7 +162,7 @@ def verify_on(
     task: Task,
     tree: CutTree,
     parts: SurfaceParts | None,
-    tick: Callable[[], object] | None = None,
+    tick: Callable[[], object] = lambda: None,
     most: int = MOST_BOXES,
 ) -> ProofCheck:
     """The same, with the surface's parts given; the tree is well formed.
@@ -187,11 +176,7 @@ def verify_on(
         held = held.join(target_parts(parts, cells, task), held)
     if fault:
         return ProofCheck(fault, 0)
-
-    def root_of(cell: int | None) -> int:
-        return 0 if cell is None else first + cell
-
-    whole = root_of(tree.root.cell) if parts is None and isinstance(tree.root, Leaf) else 0
+    whole = tree.root.cell if parts is None and isinstance(tree.root, Leaf) else 0
     limits, fault = _finite_slides(
         robot, held.of(slice(whole, whole + 1)), task.effective_tolerance
     )
@@ -200,15 +185,14 @@ def verify_on(
     arm = ArmModel(robot, limits.low, limits.high)
     allowed = Allowed.by(task, arm)
 
-    claims = list(_claims(robot, cells, tree, limits))
+    claims = list(_claims(robot, cells, tree, limits, first))
     if parts is None:
         claims = [one for one in claims if one.cell is not None]
     refuter = Refuter(robot, cells, task, allowed.length)
     bodies = gather(robot, cells.surface, task.collision, task.standoff)
 
     def tested(boxes: int, overlapping: Overlapping | None = None) -> Outcome:
-        emptiness = Emptiness(arm, held, root_of, allowed, tick or (lambda: None), overlapping)
-        return emptiness.test(claims, refuter, boxes)
+        return Emptiness(arm, held, allowed, tick, overlapping).test(claims, refuter, boxes)
 
     found = tested(most if bodies is None else min(most, WITHOUT_BODIES))
     if found.failed is not None and bodies is not None:
@@ -234,13 +218,19 @@ def _finite_slides(robot: Robot, surface: Parts, tolerance: float) -> tuple[Join
     return JointRegion(low, high), ""
 
 
-def _claims(robot: Robot, cells: Cells, tree: CutTree, limits: JointRegion) -> Iterator[Claim]:
-    """Everything that a tree claims to be empty: joints opened, cuts and leaves."""
+def _claims(
+    robot: Robot, cells: Cells, tree: CutTree, limits: JointRegion, first: int
+) -> Iterator[Claim]:
+    """Everything that a tree claims to be empty: joints opened, cuts and leaves.
+
+    The part `first` is the first cell's target, the part 0 the surface.
+    """
     low, high = limits.low.copy(), limits.high.copy()
     for joint, value in tree.opened:
         at = limits.low.copy(), limits.high.copy()
         at[0][joint] = at[1][joint] = value
-        yield Claim(f"the opening {_at(joint, value, robot)}", JointRegion(*at), None)
+        place = f"{robot.joint_names[joint]} = {joint_value(robot, joint, value)}"
+        yield Claim(f"the opening {place}", JointRegion(*at), None, 0)
         low[joint], high[joint] = value, value + TURN
     waiting: list[tuple[Cut | Leaf, JointRegion]] = [(tree.root, JointRegion(low, high))]
     leaves = 0
@@ -249,18 +239,13 @@ def _claims(robot: Robot, cells: Cells, tree: CutTree, limits: JointRegion) -> I
         if isinstance(node, Leaf):
             leaves += 1
             name = list(cells.unravel(node.cell))
-            yield Claim(f"leaf {leaves} (cell {name})", region, node.cell)
+            yield Claim(f"leaf {leaves} (cell {name})", region, node.cell, first + node.cell)
             continue
         joint, value = node.joint, node.value
-        what = f"the cut {_at(joint, value, robot)}"
-        yield Claim(what, region.within(joint, value, value), None)
+        what = f"the cut {place_of(node, robot)}"
+        yield Claim(what, region.within(joint, value, value), None, 0)
         waiting.append((node.above, region.within(joint, value, np.inf)))
         waiting.append((node.below, region.within(joint, -np.inf, value)))
-
-
-def _at(joint: int, value: float, robot: Robot) -> str:
-    """Where a joint is, in words."""
-    return f"{robot.joint_names[joint]} = {joint_value(robot, joint, value)}"
 
 
 def _refusal(claim: Claim, found: Outcome) -> str:

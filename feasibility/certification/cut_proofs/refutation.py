@@ -51,7 +51,10 @@ class Refuter:
         q = np.clip(starts, low, high)
         for _ in range(STEPS):
             here = self._judge.sampled(np.zeros(len(q), dtype=np.int64), np.zeros(len(q)), q)
-            kept = self._kept(here, cell)
+            kept, over = self._judge.within(here), cell >= 0
+            held = here.points[over], here.axes[over], here.x[over]
+            chord, _ = at_targets(self._task, self._targets, cell[over], *held)
+            kept[over] = np.isfinite(chord)
             if kept.any():
                 first = int(np.argmax(kept))
                 return first, q[first]
@@ -59,14 +62,6 @@ class Refuter:
             step = np.nan_to_num(np.clip(step, -LONGEST, LONGEST))  # where there is no place
             q = np.clip(q + step, low, high)
         return None
-
-    def _kept(self, here: Samples, cell: Ints) -> Mask:
-        """(m,) samples that have the tool on the surface, or at a cell's target, and held right."""
-        kept, over = self._judge.within(here), cell >= 0
-        held = here.points[over], here.axes[over], here.x[over]
-        chord, _ = at_targets(self._task, self._targets, cell[over], *held)
-        kept[over] = np.isfinite(chord)
-        return kept
 
     def _step(self, q: Array, here: Samples, cell: Ints, free: Mask) -> Array:
         """The short steps (m, n) of free joints that bring tool point and axis to their aims.
