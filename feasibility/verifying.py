@@ -281,11 +281,11 @@ def _of_tree(verdict: Verdict, search: Search) -> Verification:
     robot, cells, task = verdict.robot, verdict.cells, verdict.task
     found = replay_stored(verdict, search)
     left = unjudged(robot, task, OF_TREE)
-    faults = (MotionFault(found.refusal),) if found.faults else ()
+    faults = [found.refusal] if found.faults else []
     if left:
-        text = f"{', '.join(left)}: not judged, since the greedy search knows nothing of it"
-        faults += (MotionFault(text),)
-    return Verification("tree", robot, cells, task, faults, found.certificate, not_judged=left)
+        faults.append(f"{', '.join(left)}: not judged, since the greedy search knows nothing of it")
+    told = tuple(map(MotionFault, faults))
+    return Verification("tree", robot, cells, task, told, found.certificate, not_judged=left)
 
 
 def _of_proof(verdict: Verdict, proof: CutTree, clock: Clock) -> Verification:
