@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from coverable.arrays import Array, Ints, Mask
 from coverable.errors import ArgumentError, CoverableError
+from feasibility.certification.bisection import runs
 from feasibility.certification.cut_proofs.proof_verification import verify_proof
 from feasibility.certification.faults import Judged, MotionFault
 from feasibility.certification.motion_replay import replay_over_surface
@@ -235,13 +236,9 @@ def _of_motion(
         return made(found.faults, not_judged=unjudged(robot, task, judged))
     if not len(cells):
         return made(())
-    if working is None:
-        more = further(robot, cells, task, [_unmarked(q)])
-        return made(more.faults, treated=more.treated)
     # How fast the tool is, and what it treats, counts where it works.
     whole = further(robot, cells, task, [_unmarked(q)], judged=set(NAMES) - {"start"})
-    turns = np.flatnonzero(np.diff(working)) + 1
-    parts = [part for part in np.split(np.arange(len(q)), turns) if working[part[0]]]
+    parts = [slice(None)] if working is None else runs(working)
     at_work = further(robot, cells, task, [_unmarked(q[part]) for part in parts], judged=("start",))
     return made((*whole.faults, *at_work.faults), treated=at_work.treated)
 

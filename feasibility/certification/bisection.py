@@ -20,6 +20,17 @@ from coverable.arrays import Array, Ints, Mask
 Chosen = Mask | NDArray[np.intp] | slice
 
 
+def runs(some: Mask) -> list[Ints]:
+    """The indices (k,) at which `some` (m,) holds, those in a row together.
+
+    Example:
+        >>> [run.tolist() for run in runs(np.array([True, True, False, True]))]
+        [[0, 1], [3]]
+    """
+    turns = np.flatnonzero(np.diff(some)) + 1
+    return [run for run in np.split(np.arange(len(some)), turns) if some[run].any()]
+
+
 class Rows:
     """Base of dataclasses whose fields are arrays, or values of rows themselves.
 

@@ -22,6 +22,7 @@ from functools import partial
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
+from feasibility.certification.bisection import runs
 from feasibility.certification.faults import MotionFault
 from feasibility.certification.stretches import Judge, SampledStretches, Samples
 from robots.kinematics import Kinematics
@@ -76,12 +77,10 @@ def followed_parts(
     turns = np.flatnonzero(on[1:] != on[:-1])
     cuts = _turns(judge, followed, rows, at[turns], at[turns + 1], on[turns])
     parts = []
-    for run in np.split(np.arange(len(at)), turns + 1):
-        if len(run) and on[run[0]]:
-            own = at[run]
-            before, after = np.searchsorted(turns, run[0]) - 1, np.searchsorted(turns, run[-1])
-            ends = [cuts[k : k + 1] if 0 <= k < len(cuts) else own[:0] for k in (before, after)]
-            parts.append(_part(rows, np.unique(np.concatenate([ends[0], own, ends[1]]))))
+    for run in runs(on):
+        before, after = np.searchsorted(turns, run[0]) - 1, np.searchsorted(turns, run[-1])
+        ends = [cuts[k] for k in (before, after) if 0 <= k < len(cuts)]
+        parts.append(_part(rows, np.unique(np.append(at[run], ends))))
     return parts
 
 

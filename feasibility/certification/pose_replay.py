@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
+from feasibility.certification.bisection import runs
 from feasibility.certification.cells_reached import Reached, cells_reached
 from feasibility.certification.faults import MotionFault, less_deviations, too_vague
 from feasibility.certification.followed import followed_parts, lifted_faults, off_surface
@@ -120,18 +121,16 @@ def tool_at_work(
     """
     most, faults, samples = np.zeros(3), list[MotionFault](), list[Samples]()
     reached, room = Reached.none(len(cells)), np.full((len(rows), 2), np.inf)
-    turns = np.flatnonzero(np.diff(working)) + 1
-    for part in np.split(np.arange(len(rows)), turns):
-        if len(part) and working[part[0]]:
-            found = tool_along(judge, rows[part])
-            most = np.maximum(most, found.most)
-            faults += [replace(each, row=each.row + part[0]) for each in found.faults]
-            samples.append(replace(found.samples, row=found.samples.row + part[0]))
-            room[part] = found.room
-            some = cells_reached(judge.robot, cells, judge.task, rows[part], found.samples)
-            new = some.chord < reached.chord
-            reached.row[new] = some.row[new] + part[0]
-            reached.chord[new], reached.roll[new] = some.chord[new], some.roll[new]
+    for part in runs(working):
+        found = tool_along(judge, rows[part])
+        most = np.maximum(most, found.most)
+        faults += [replace(each, row=each.row + part[0]) for each in found.faults]
+        samples.append(replace(found.samples, row=found.samples.row + part[0]))
+        room[part] = found.room
+        some = cells_reached(judge.robot, cells, judge.task, rows[part], found.samples)
+        new = some.chord < reached.chord
+        reached.row[new] = some.row[new] + part[0]
+        reached.chord[new], reached.roll[new] = some.chord[new], some.roll[new]
     lifted = np.flatnonzero(~(working[:-1] & working[1:])).astype(float)
     kinematics, tolerance = judge.kinematics, judge.task.effective_tolerance
     faults += lifted_faults(surface.wall, rows, (lifted, lifted + 1.0), kinematics, tolerance)

@@ -28,7 +28,6 @@ from feasibility.certification.lever_bounds import (
     Jacobians,
     jacobians,
     second_derivatives,
-    smallest_singular,
 )
 from feasibility.certification.segment_rates import SegmentRates, fastest_anywhere, segment_rates
 from feasibility.task import Task
@@ -90,41 +89,36 @@ def replay_rates(
             decide what is asked.
     """
     speed, sigma = task.speed, task.min_manipulability
-    starts, ends = walk.q[:-1], walk.q[1:]
+    rows = walk.q if len(walk.q) > 1 else np.repeat(walk.q, 2, axis=0)
+    starts, ends = rows[:-1], rows[1:]
     targets = task.targets(cells).points
-    resting = in_place(robot, cells, task, walk.q)
+    resting = in_place(robot, cells, task, rows)
     asked = (None, np.inf) if closely else (speed, sigma)
     found = segment_rates(robot, starts, ends, *asked, resting=resting)
-    moving = ~resting
-    at = jacobians(Kinematics(robot), walk.q)
-    points = at.points
+    at = jacobians(Kinematics(robot), rows)
     waits = resting & (_times(robot, starts, ends) > 0.0)
     if speed is not None and len(starts):
         waits &= _exact_speeds(robot, at, starts, ends) < speed
-    stops = _stops(points, targets, resting, waits)
+    stops = _stops(at.points, targets, resting, waits)
     refusals = []
-    if speed is not None and moving.any():
-        slow = np.flatnonzero(moving & ~(found.speed >= speed))
-        if len(slow):
-            worst = int(slow[np.argmin(found.sampled_speed[slow])])
-            place = _named(cells, targets, points[worst + int(found.share[worst] > 0.5)])
-            with np.errstate(divide="ignore"):
-                times = speed / found.sampled_speed[worst]
-            said = too_slow(robot, int(found.joint[worst]), times, f" at cell {place}")
-            refusals.append(said + _others(len(slow) - 1))
-    # Segments know their ends; a motion of one row has none.
-    alone = smallest_singular(at, robot.length_unit) if len(walk.q) == 1 else np.empty(0)
-    least, exact = np.append(found.sigma, alone), np.append(found.sampled_sigma, alone)
-    near = np.flatnonzero(~(least >= (-np.inf if sigma is None else sigma)))
+    slow = np.flatnonzero(~resting & ~(found.speed >= (speed or -np.inf)))
+    if speed is not None and len(slow):
+        worst = int(slow[np.argmin(found.sampled_speed[slow])])
+        place = _named(cells, targets, at.points[worst + int(found.share[worst] > 0.5)])
+        with np.errstate(divide="ignore"):
+            times = speed / found.sampled_speed[worst]
+        said = too_slow(robot, int(found.joint[worst]), times, f" at cell {place}")
+        refusals.append(said + _others(len(slow) - 1))
+    near = np.flatnonzero(~(found.sigma >= (sigma or -np.inf)))
     if len(near):
-        worst = int(near[np.argmin(exact[near])])
-        place = _named(cells, targets, points[worst])
+        worst = int(near[np.argmin(found.sampled_sigma[near])])
+        place = _named(cells, targets, at.points[worst])
         refusals.append(
-            f"the smallest singular value is {exact[worst]:.3g} at cell {place}; "
+            f"the smallest singular value is {found.sampled_sigma[worst]:.3g} at cell {place}; "
             f"{sigma:g} is required" + _others(len(near) - 1)
         )
     return RateReplay(
-        float(found.speed[moving].min(initial=np.inf)), float(least.min(initial=np.inf)),
+        float(found.speed[~resting].min(initial=np.inf)), float(found.sigma.min(initial=np.inf)),
         found, stops, float(_times(robot, starts, ends)[waits].sum()), tuple(refusals),
     )  # fmt: skip
 

@@ -34,7 +34,7 @@ def group_lengths(vectors: Array) -> Array:
     return np.concatenate([lengths, np.abs(vectors[..., 6:])], axis=-1)
 
 
-def nearest(models: Models) -> tuple[Array, Array]:
+def nearest(models: Models, sweeps: int = SWEEPS) -> tuple[Array, Array]:
     """Places d (m, n + 2) in the boxes where the constraints are missed by little, and by what.
 
     Returns:
@@ -47,7 +47,7 @@ def nearest(models: Models) -> tuple[Array, Array]:
     place = np.clip(0.0, low, high)
     values = models.residual.T + np.einsum("jm,jkm->km", place, columns)
     per_square = -1.0 / np.maximum((columns**2).sum(axis=1), TINY)
-    for _ in range(SWEEPS):
+    for _ in range(sweeps):
         for j in range(len(columns)):
             step = np.einsum("km,km->m", columns[j], excess(values, radius)) * per_square[j]
             moved = np.minimum(np.maximum(place[j] + step, low[j]), high[j])

@@ -10,14 +10,16 @@ from __future__ import annotations
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
+from feasibility.certification.cut_proofs.box_exclusion import nearest, separated
+from feasibility.certification.cut_proofs.linear_models import Models
 from surfaces.cells import Cells
 from surfaces.parts import SurfaceParts
 from surfaces.places.offset_surfaces import offset_surface
 
 SAMPLES = 300
+SWEEPS = 30  # of the descent to the x that makes a part nearest
 AT_ONCE = 60  # curves between poses that are looked at
 ROUNDING = 1e-9  # [m], [1] that a radius is taken larger by
-WITHIN = 2.0  # of (|df| / r_f)^2 + (|dn| / r_n)^2; a common x makes each at most 1
 
 
 def disagreement(cells: Cells, parts: SurfaceParts) -> str:
@@ -74,24 +76,10 @@ def on_a_finest_part(places: Array, parts: SurfaceParts) -> Mask:
 
 
 def _may_lie_on(places: Array, parts: SurfaceParts, part: Ints) -> Mask:
-    """(m,) whether places (m, 6) can lie on parts (m,): least squares over x in [-1, 1]^2."""
-    radius = parts.radius[part] + ROUNDING
-    scale = 1.0 / np.repeat(radius, 3, axis=1)
-    offset = (places - parts.centre[part]) * scale
-    slopes = parts.slopes[part] * scale[:, None]
-    (a, b), c = (slopes**2).sum(axis=2).T, (slopes[:, 0] * slopes[:, 1]).sum(axis=1)
-    along = (slopes * offset[:, None]).sum(axis=2)
-    a, b = np.maximum(a, 1e-300), np.maximum(b, 1e-300)
-    det = np.maximum(a * b - c * c, 1e-300)
-    best = np.full(len(part), np.inf)
-    # The least of a convex quadratic over a square is inside, or on one of its four sides.
-    inner = np.stack([b * along[:, 0] - c * along[:, 1], a * along[:, 1] - c * along[:, 0]]) / det
-    tried = [inner.T]
-    for end in (-1.0, 1.0):
-        tried.append(np.column_stack([np.full_like(a, end), (along[:, 1] - end * c) / b]))
-        tried.append(np.column_stack([(along[:, 0] - end * c) / a, np.full_like(a, end)]))
-    for x in tried:
-        clipped = np.clip(np.nan_to_num(x), -1.0, 1.0)
-        left = offset - (clipped[:, :, None] * slopes).sum(axis=1)
-        best = np.fmin(best, (left**2).sum(axis=1))
-    return np.asarray(best <= WITHIN)
+    """(m,) whether places (m, 6) can lie on parts (m,), as boxes of x in [-1, 1]^2 tell."""
+    radius, one = parts.radius[part] + ROUNDING, np.ones((len(part), 2))
+    scale = 1.0 / np.repeat(radius, 3, axis=1)  # so that all radii are 1
+    away, slopes = scale * (places - parts.centre[part]), scale[:, None] * parts.slopes[part]
+    models = Models(away, -slopes, one, -one, one, one)
+    known = ~np.isnan(radius).any(axis=1)
+    return known & ~separated(models, nearest(models, SWEEPS)[1])
