@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from coverable.arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints
 from feasibility.certification.cells_reached import at_targets
 from feasibility.certification.cut_proofs.box_cutting import JointRegion
+from feasibility.certification.cut_proofs.box_exclusion import nearest
+from feasibility.certification.cut_proofs.linear_models import ANY_AXIS, Models
 from feasibility.certification.lever_bounds import jacobians
 from feasibility.certification.stretches import Judge, Samples
 from feasibility.task import Task
@@ -21,8 +23,8 @@ from surfaces.places.offset_surfaces import offset_surface
 
 STEPS = 15  # of Newton's method
 LONGEST = 0.7  # [rad], [m] of a joint in one step
-DAMPING = 1e-4  # of the sum of squares
-INNER_TOLERANCE, INNER_CONE = 0.5, 0.95  # what the steps aim at, as shares
+SWEEPS = 20  # of the descent to where a step goes
+AIMS = np.array([0.5, 0.95])  # shares of tolerance and cone that the steps aim at
 
 
 class Refuter:
@@ -58,34 +60,25 @@ class Refuter:
             if kept.any():
                 first = int(np.argmax(kept))
                 return first, q[first]
-            step = self._step(q, here, cell, low < high)
-            step = np.nan_to_num(np.clip(step, -LONGEST, LONGEST))  # where there is no place
-            q = np.clip(q + step, low, high)
+            q = np.clip(q + self._step(q, here, cell, low, high), low, high)
         return None
 
-    def _step(self, q: Array, here: Samples, cell: Ints, free: Mask) -> Array:
-        """The short steps (m, n) of free joints that bring tool point and axis to their aims.
+    def _step(self, q: Array, here: Samples, cell: Ints, low: Array, high: Array) -> Array:
+        """The steps (m, n) inside low .. high that bring tool point and axis nearest to their aims.
 
-        Two numbers are to become small: how far the tool point is from its target, which on a
-        surface is the nearest one, and the axis from its approach direction.
+        On a surface the aim is the place that the tool is over; no step where there is none.
         """
         task, over = self._task, (cell >= 0)[:, None]
         target, approach = self._judge.targets(here.places)
         target = np.where(over, self._targets.points[cell], target)
         approach = np.where(over, self._targets.approaches[cell], approach)
-        at, missed, rows = jacobians(self._kinematics, q), [], []
-        for off, columns, aim in (
-            (here.points - target, at.point, INNER_TOLERANCE * task.effective_tolerance),
-            (self._length * (here.axes - approach), self._length * at.axis,
-             self._length * INNER_CONE * min(task.cone_chord, 4.0)),
-        ):  # fmt: skip
-            size = np.linalg.norm(off, axis=1)
-            along = off / np.maximum(size, 1e-300)[:, None]
-            missed.append(np.maximum(size - aim, 0.0))
-            rows.append(np.einsum("mkj,mk->mj", columns, along) * free)
-        matrix, left = np.stack(rows, axis=1), np.stack(missed, axis=1)
-        squares = matrix @ matrix.transpose(0, 2, 1)
-        damped = squares + (DAMPING * np.trace(squares, axis1=1, axis2=2) + 1e-12)[
-            :, None, None
-        ] * np.eye(2)
-        return -np.einsum("mij,mi->mj", matrix, np.linalg.solve(damped, left[..., None])[..., 0])
+        at, aims = jacobians(self._kinematics, q), [task.effective_tolerance, task.cone_chord]
+        models = Models(
+            np.hstack([here.points - target, self._length * (here.axes - approach)]),
+            np.concatenate([at.point, self._length * at.axis], axis=1).transpose(0, 2, 1),
+            np.tile(np.minimum(aims, ANY_AXIS) * AIMS * [1.0, self._length], (len(q), 1)),
+            np.maximum(low - q, -LONGEST),
+            np.minimum(high - q, LONGEST),
+            np.zeros_like(q),
+        )
+        return np.nan_to_num(nearest(models, SWEEPS)[0])
