@@ -179,19 +179,12 @@ def _fault_of_nodes(robot: Robot, n_cells: int, tree: CutTree) -> str:
             if not is_whole(node.cell, 0, n_cells - 1):
                 return f"a leaf names cell {shown(node.cell)}; there are {n_cells}, counted from 0"
         elif isinstance(node, Cut):
-            fault = _fault_of_cut(robot, node)
-            if fault:
-                return fault
+            if not is_whole(node.joint, 0, robot.n - 1):
+                what = f"which is none of the {robot.n} joints"
+                return f"a cut goes through joint {shown(node.joint)}, {what}"
+            if not is_number(node.value):
+                return f"a cut has the value {shown(node.value)}, which is no number"
             waiting += [(node.above, depth + 1), (node.below, depth + 1)]
         else:
             return f"a node is neither a cut nor a leaf but {type(node).__name__}"
-    return ""
-
-
-def _fault_of_cut(robot: Robot, cut: Cut) -> str:
-    """Why a cut does not fit the robot; empty when it does."""
-    if not is_whole(cut.joint, 0, robot.n - 1):
-        return f"a cut goes through joint {shown(cut.joint)}, which is none of the {robot.n} joints"
-    if not is_number(cut.value):
-        return f"a cut has the value {shown(cut.value)}, which is no number"
     return ""

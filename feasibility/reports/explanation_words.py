@@ -151,7 +151,7 @@ def rates_sentence(explanation: Explanation) -> str:
 def _nearest_singular(explanation: Explanation) -> str:
     """The cell at which the covering motion is nearest to a singularity."""
     verdict, rates = explanation.verdict, explanation.rates
-    if verdict.witness is None or rates is None or not len(rates.witness.segment.sampled_sigma):
+    if verdict.witness is None or rates is None:
         return str(list(verdict.cells.unravel(0)))
     row = int(np.argmin(rates.witness.segment.sampled_sigma))
     point, _ = Kinematics(verdict.robot).tool(verdict.witness.q[row])
