@@ -12,10 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coverable.arrays import Array, Ints, Mask
-from feasibility.certification.stretches import Samples, beyond
+from feasibility.certification.stretches import Judge, Samples, beyond
 from feasibility.task import Targets, Task
-from robots.kinematics import Kinematics, reference_axes
-from robots.robot import Robot
 from surfaces.cells import Cells
 
 TRIES = np.linspace(0.0, 1.0, 9)  # of the part of a stretch that passes within the tolerance
@@ -54,19 +52,13 @@ class Reached:
         self.roll[cell[best]] = roll[best]
 
 
-def cells_reached(
-    robot: Robot, cells: Cells, task: Task, rows: Array, samples: Samples, marks: Ints | None = None
-) -> Reached:
-    """Which cells a motion reaches.
+def cells_reached(judge: Judge, task: Task, samples: Samples) -> Reached:
+    """Which cells a motion reaches, of which `judge` knows the surface.
 
-    Args:
-        robot: the arm.
-        cells: the cells.
-        task: its tolerance and cone.
-        rows: (m, n) the motion.
-        samples: of it, as it passes them, all rows among them.
-        marks: (m,) the cell that each row is said to be at, -1 for none: looked at first.
+    The task's tolerance and cone are used exactly. The samples are of the motion, as it passes
+    them, all rows among them; those that are marked are looked at first.
     """
+    cells, marks = judge.cells, judge.marks
     reached = Reached.none(len(cells))
     if not len(cells) or not len(samples.row):
         return reached
@@ -98,13 +90,10 @@ def cells_reached(
     row = samples.row[piece]
     stop = np.where(samples.row[piece + 1] > row, 1.0, samples.share[piece + 1])
     share = samples.share[piece][:, None] + t * (stop - samples.share[piece])[:, None]
-    following = np.minimum(row + 1, len(rows) - 1)
-    q = rows[row][:, None] + share[..., None] * (rows[following] - rows[row])[:, None]
-    flat = q.reshape(-1, rows.shape[1])
-    points, axes = Kinematics(robot).tools(flat)
-    x = axes if task.roll is None else reference_axes(robot, flat)
     cell, row = np.repeat([some, row], len(TRIES), axis=1)
-    reached.add(task, aims, cell, row, points, axes, x)
+    q = judge.configurations(row, share.ravel())
+    held = *judge.kinematics.tools(q), judge.reference_axes(q)
+    reached.add(task, aims, cell, row, *held)
     return reached
 
 

@@ -26,8 +26,8 @@ from feasibility.certification.bisection import runs
 from feasibility.certification.faults import MotionFault
 from feasibility.certification.stretches import Judge, SampledStretches, Samples
 from robots.kinematics import Kinematics
-from surfaces.cells import Cells
 from surfaces.places.patch_places import PatchPlaces
+from surfaces.places.places import Places
 from surfaces.surface import Surface
 
 HALVINGS = 30  # to where a motion leaves what it follows
@@ -61,26 +61,20 @@ class FollowedPart:
         return replace(fault, row=row, share=at - row)
 
 
-def followed_parts(
-    judge: Judge, followed: Mask, rows: Array, samples: Samples
-) -> list[FollowedPart]:
-    """The parts of a motion over curves that follow a surface.
+def followed_parts(judge: Judge, followed: Mask, samples: Samples) -> list[FollowedPart]:
+    """The parts of a motion over curves (M,) between poses that follow a surface.
 
-    Args:
-        judge: of the motion over the poses.
-        followed: (M,) which of their curves do.
-        rows: (m, n) the motion, rad or m.
-        samples: of it, as it passes them, over their places on the curves.
+    The samples are of the motion, as it passes them, over their places on the curves.
     """
     on = _on(samples.places.chart, followed)
     at = samples.row + samples.share
     turns = np.flatnonzero(on[1:] != on[:-1])
-    cuts = _turns(judge, followed, rows, at[turns], at[turns + 1], on[turns])
+    cuts = _turns(judge, followed, at[turns], at[turns + 1], on[turns])
     parts = []
     for run in runs(on):
         before, after = np.searchsorted(turns, run[0]) - 1, np.searchsorted(turns, run[-1])
         ends = [cuts[k] for k in (before, after) if 0 <= k < len(cuts)]
-        parts.append(_part(rows, np.unique(np.append(at[run], ends))))
+        parts.append(_part(judge.rows, np.unique(np.append(at[run], ends))))
     return parts
 
 
@@ -97,15 +91,13 @@ def _part(rows: Array, at: Array) -> FollowedPart:
     return FollowedPart(rows[row] + share[:, None] * ahead, row, share)
 
 
-def _turns(
-    judge: Judge, followed: Mask, rows: Array, low: Array, high: Array, begins: Mask
-) -> Array:
+def _turns(judge: Judge, followed: Mask, low: Array, high: Array, begins: Mask) -> Array:
     """(k,) where between `low` and `high` a motion changes what it follows; `begins`: at low."""
     low, high = low.copy(), high.copy()
     for _ in range(HALVINGS if len(low) else 0):
         middle = 0.5 * (low + high)
-        part = _part(rows, middle)
-        found = judge.sampled(part.row, part.share, part.q)
+        part = _part(judge.rows, middle)
+        found = judge.sampled(part.row, part.share)
         same = _on(found.places.chart, followed) == begins
         low, high = np.where(same, middle, low), np.where(same, high, middle)
     return 0.5 * (low + high)
@@ -179,8 +171,6 @@ def _heights(surface: Surface, points: Array) -> Array:
 
 def on_the_way(
     judge: Judge,
-    rows: Array,
-    cells: Cells,
     marks: Ints,
     at_rows: Samples,
     of_segment: Array,
@@ -194,10 +184,7 @@ def on_the_way(
     next part is judged so, too.
 
     Args:
-        judge: of the motion.
-        rows: (m, n) the motion, rad or m.
-        cells: the cells.
-        marks: (m,) at which cell's target a row is said to be, -1 at none.
+        judge: of the motion, with its marks (m,).
         at_rows: samples at all rows, as the rest has them.
         of_segment: (m - 1, 3) see `SampledStretches`.
         doubtful: (k,) rows at which, or behind which, something is wrong or open.
@@ -207,7 +194,7 @@ def on_the_way(
         (m,) behind which rows the motion is right so, and at the last, if it is behind the one
         before; and the samples there. Nothing, unless all that is doubtful is right.
     """
-    nothing, patch = np.zeros(len(rows), dtype=bool), judge.offset
+    rows, nothing, patch = judge.rows, np.zeros(len(marks), dtype=bool), judge.offset
     runs = list(itertools.pairwise(np.flatnonzero(marks >= 0).tolist()))
     wanted = {
         k for k, run in enumerate(runs) if ((doubtful >= run[0]) & (doubtful <= run[1])).any()
@@ -216,11 +203,11 @@ def on_the_way(
     long = any(runs[k][1] - runs[k][0] > LONGEST for k in wanted)
     if long or not isinstance(patch, PatchPlaces):
         return nothing, []
-    right = partial(_right, judge, rows, of_segment, decided)
+    right = partial(_right, judge, of_segment, decided)
     while wanted - found.keys():
         k = min(wanted - found.keys())
-        ends = cells.centres[marks[list(runs[k])]]
-        found[k] = at = _in_order(judge, patch, rows, ends, np.arange(*runs[k]))
+        ends = patch.closest(judge.cells.centres[marks[list(runs[k])]])
+        found[k] = at = _in_order(judge, patch, ends, np.arange(*runs[k]))
         if not right(at):
             return nothing, []
         for other, row, end in ((k - 1, runs[k][0], 0), (k + 1, runs[k][1], len(at.row) - 1)):
@@ -240,33 +227,29 @@ def on_the_way(
 
 def _right(
     judge: Judge,
-    rows: Array,
     of_segment: Array,
     decided: Callable[[SampledStretches], Mask],
     at: Samples,
 ) -> bool:
     """Is a motion right from sample to sample, over the straight ways between their places?"""
     start, end = at.of(slice(-1)), at.of(slice(1, None))
-    row = np.minimum(start.row, len(rows) - 2)
+    row = np.minimum(start.row, len(judge.rows) - 2)
     low, high = (each.share + (each.row - row) for each in (start, end))
     stretches = SampledStretches(row, low, high, start, end, of_segment[row])
     return bool(judge.within(at).all() and decided(stretches).all())
 
 
-def _in_order(
-    judge: Judge, patch: PatchPlaces, rows: Array, centres: Array, numbers: Ints
-) -> Samples:
-    """The motion behind rows (k,) over places on the straight way between two centres (2, 3) m.
+def _in_order(judge: Judge, patch: PatchPlaces, ends: Places, numbers: Ints) -> Samples:
+    """The motion behind rows (k,) over places on the straight way between two of them.
 
     Both go on by turns, as keeps them near to each other.
     """
-    ends, share = patch.closest(centres), np.linspace(0.0, 1.0, STEPS + 1)
+    share = np.linspace(0.0, 1.0, STEPS + 1)
     first, last = (ends.of(np.full(len(share), k)) for k in (0, 1))
     way = patch.between(first, last, share)
     row = np.append(np.repeat(numbers, PARTS), numbers[-1])
     parts = np.append(np.tile(np.arange(PARTS) / PARTS, len(numbers)), 1.0)
-    q = rows[row] + parts[:, None] * (rows[row + 1] - rows[row])
-    at = judge.sampled(row, parts, q)
+    at = judge.sampled(row, parts)
     target, approaches = judge.targets(way)
     off = np.linalg.norm(at.points[:, None] - target, axis=2) / judge.task.effective_tolerance
     chord = max(judge.task.cone_chord, 1e-9)

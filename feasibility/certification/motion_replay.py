@@ -98,13 +98,13 @@ def _of_the_tool(
     if poses and marks is not None and working is None:
         curves = pose_replay.curves_of_marks(cells, marks)
     offset = offset_surface(surface, surface.side_sign * task.standoff)
-    judge = Judge(robot, less_deviations(task, surface), offset, cells, curves)
+    judge = Judge(robot, less_deviations(task, surface), offset, cells, rows, marks, curves)
     margin, faults = limits(robot, rows)
     if working is None:
-        found = tool_along(judge, rows, cells, marks)
-        reached = cells_reached(robot, cells, task, rows, found.samples, marks)
+        found = tool_along(judge)
+        reached = cells_reached(judge, task, found.samples)
     else:
-        found, reached = pose_replay.tool_at_work(judge, rows, cells, surface, working)
+        found, reached = pose_replay.tool_at_work(judge, surface, working)
         if needed is None and _is_of_poses(cells.surface):
             needed = cells.surface.working
     faults += found.faults
@@ -113,7 +113,7 @@ def _of_the_tool(
     if len(missed):
         faults.append(MotionFault(missed_text(cells, task, missed, found.samples)))
     if _is_of_poses(surface):
-        found, more = pose_replay.along_poses(found, judge, rows, cells, surface, task, not faults)
+        found, more = pose_replay.along_poses(found, judge, surface, task, not faults)
         faults += more
     less_room(found.room, task, reached.row[at], reached.chord[at], reached.roll[at])
     error, chord, roll = found.most.tolist()

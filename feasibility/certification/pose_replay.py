@@ -112,37 +112,35 @@ def order_of_places(offset: OffsetSurface, samples: Samples, tolerance: float) -
     return [MotionFault(text, int(samples.row[worst]), float(samples.share[worst]))]
 
 
-def tool_at_work(
-    judge: Judge, rows: Array, cells: Cells, surface: Surface, working: Mask
-) -> tuple[Along, Reached]:
+def tool_at_work(judge: Judge, surface: Surface, working: Mask) -> tuple[Along, Reached]:
     """What is found where the tool works, and the cells that are reached there.
 
     Where it does not, it must not go through the surface.
     """
+    rows, cells = judge.rows, judge.cells
     most, faults, samples = np.zeros(3), list[MotionFault](), list[Samples]()
     reached, room = Reached.none(len(cells)), np.full((len(rows), 2), np.inf)
     for part in runs(working):
-        found = tool_along(judge, rows[part])
+        at_work = judge.along(rows[part])
+        found = tool_along(at_work)
         most = np.maximum(most, found.most)
         faults += [replace(each, row=each.row + part[0]) for each in found.faults]
         samples.append(replace(found.samples, row=found.samples.row + part[0]))
         room[part] = found.room
-        some = cells_reached(judge.robot, cells, judge.task, rows[part], found.samples)
+        some = cells_reached(at_work, judge.task, found.samples)
         new = some.chord < reached.chord
         reached.row[new] = some.row[new] + part[0]
         reached.chord[new], reached.roll[new] = some.chord[new], some.roll[new]
     lifted = np.flatnonzero(~(working[:-1] & working[1:])).astype(float)
     kinematics, tolerance = judge.kinematics, judge.task.effective_tolerance
     faults += lifted_faults(surface.wall, rows, (lifted, lifted + 1.0), kinematics, tolerance)
-    none = judge.sampled(np.zeros(0, dtype=np.int64), np.zeros(0), rows[:0])
+    none = judge.sampled(np.zeros(0, dtype=np.int64), np.zeros(0))
     return Along(most, faults, Samples.join(none, *samples), room), reached
 
 
 def along_poses(
     found: Along,
     judge: Judge,
-    rows: Array,
-    cells: Cells,
     surface: PoseSurface,
     task: Task,
     right: bool,
@@ -156,14 +154,15 @@ def along_poses(
     if faults or not right or surface.under is None or surface.working is None:
         return found, faults
     task = less_deviations(judge.task, surface.under)
-    over = Judge(judge.robot, task, offset_surface(surface.under, judge.offset.height), cells)
+    offset = offset_surface(surface.under, judge.offset.height)
+    over = Judge(judge.robot, task, offset, judge.cells, judge.rows)
     followed, most, room = surface.followed, found.most, found.room
     at = off_surface(followed, found.samples)
     kinematics, tolerance = judge.kinematics, judge.task.effective_tolerance
-    faults = lifted_faults(surface.under.wall, rows, at, kinematics, tolerance)
+    faults = lifted_faults(surface.under.wall, judge.rows, at, kinematics, tolerance)
     faults += too_vague(judge.task, surface.under)
-    for part in followed_parts(judge, followed, rows, found.samples):
-        one = tool_along(over, part.q)
+    for part in followed_parts(judge, followed, found.samples):
+        one = tool_along(over.along(part.q))
         most = np.maximum(most, one.most)
         faults += [part.placed(fault) for fault in one.faults]
         np.minimum.at(room, part.row, one.room)

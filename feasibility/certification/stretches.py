@@ -25,6 +25,7 @@ between its ends; and p is off its chord by D_p / 8 at most.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -106,14 +107,18 @@ class Judge:
         task: Task,
         offset: OffsetSurface,
         cells: Cells,
+        rows: Array,
+        marks: Ints | None = None,
         curves: Ints | None = None,
     ) -> None:
-        """Judge `robot` by `task`, over what `offset` is the parallel of.
+        """Judge a motion `rows` (m, n) of `robot` by `task`, over what `offset` is the parallel of.
 
-        That is the surface of `cells`, or the one under them. Between poses `curves` (m,) may say
-        which curve the motion is on behind each row.
+        That is the surface of `cells`, or the one under them. `marks` (m,) say at which cell's
+        target a row is said to be, -1 for none, and `curves` (m,) between poses which curve the
+        motion is on behind each row.
         """
-        self.robot, self.task, self.offset, self._curves = robot, task, offset, curves
+        self.robot, self.task, self.offset, self.cells = robot, task, offset, cells
+        self.rows, self.marks, self._curves = rows, marks, curves
         self.kinematics = Kinematics(robot)
         self._sign, self._approach = -cells.surface.side_sign, task.fixed_approach(cells)
         self._roll = None
@@ -123,8 +128,20 @@ class Judge:
             fixed = self._approach is not None
             self._roll = HeldRoll(offset, fixed, task.fixed_reference(cells), task.roll)
 
-    def sampled(self, row: Ints, share: Array, q: Array) -> Samples:
-        """Samples at configurations q (k, n)."""
+    def along(self, rows: Array) -> Judge:
+        """The same of another motion without marks."""
+        other = copy(self)
+        other.rows, other.marks = rows, None
+        return other
+
+    def configurations(self, row: Ints, share: Array) -> Array:
+        """(k, n) rad or m, where the motion is so far on from rows (k,) to the next ones."""
+        start = self.rows[row]
+        return start + share[:, None] * (self.rows[np.minimum(row + 1, len(self.rows) - 1)] - start)
+
+    def sampled(self, row: Ints, share: Array) -> Samples:
+        """Samples of the motion so far on from rows (k,) to the next ones."""
+        q = self.configurations(row, share)
         return self.compared(row, share, *self.kinematics.tools(q), self.reference_axes(q))
 
     def reference_axes(self, q: Array) -> Array:
@@ -184,15 +201,9 @@ class Judge:
             return self._sign * normals
         return np.where(np.isnan(normals), np.nan, self._approach)
 
-    def middles(self, rows: Array, stretches: SampledStretches) -> Samples:
-        """Samples in the middle of stretches of the motion `rows` (m, n)."""
-        row, share = stretches.row, stretches.middle
-        q = rows[row] + share[:, None] * (rows[row + 1] - rows[row])
-        return self.sampled(row, share, q)
-
-    def between_rows(self, rows: Array, poses: Jacobians, at: Samples) -> SampledStretches:
-        """The stretches from row to row, with the samples `at` every row."""
-        steps, slides = np.abs(np.diff(rows, axis=0)), self.robot.prismatic
+    def between_rows(self, poses: Jacobians, at: Samples) -> SampledStretches:
+        """The stretches from row to row, with poses and samples `at` every row."""
+        steps, slides = np.abs(np.diff(self.rows, axis=0)), self.robot.prismatic
         second = np.zeros((len(steps), 3))
         second[:, 0] = second_derivatives(steps, slides, poses.levers, np.inf)
         second[:, 1] = second_derivatives(steps, slides, poses.sines, 1.0)

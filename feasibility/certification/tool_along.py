@@ -19,7 +19,6 @@ from feasibility.certification.lever_bounds import jacobians
 from feasibility.certification.stretches import Bounds, Judge, SampledStretches, Samples
 from feasibility.cone import angle_of
 from feasibility.task import Task
-from surfaces.cells import Cells
 
 LEVELS = 26  # halvings of a segment between two rows
 MOST_SAMPLES = 1_000_000  # configurations looked at between rows
@@ -39,16 +38,15 @@ class Along(NamedTuple):
     they are free, or the tool does not work."""
 
 
-def tool_along(
-    judge: Judge, rows: Array, cells: Cells | None = None, marks: Ints | None = None
-) -> Along:
+def tool_along(judge: Judge) -> Along:
     """Judge tool point, axis and roll at all rows and between them."""
+    rows, marks = judge.rows, judge.marks
     poses, x = jacobians(judge.kinematics, rows), judge.reference_axes(rows)
     count = np.arange(len(rows))
     at_rows = judge.compared(count, np.zeros(len(rows)), poses.points, poses.axes, x)
-    if marks is not None and cells is not None:
-        at_rows = _at_marks(judge, cells, marks, at_rows)
-    good, every = judge.within(at_rows), judge.between_rows(rows, poses, at_rows)
+    if marks is not None:
+        at_rows = _at_marks(judge, marks, at_rows)
+    good, every = judge.within(at_rows), judge.between_rows(poses, at_rows)
     most, room = np.zeros(3), np.full((len(rows), 2), np.inf)
 
     def decided(left: SampledStretches) -> Mask:
@@ -59,17 +57,15 @@ def tool_along(
         less_room(room, judge.task, left.row[good], right.chord, right.roll)
         return good
 
-    left, between = _between(judge, rows, every.of(good[:-1] & good[1:]), decided)
+    left, between = _between(judge, every.of(good[:-1] & good[1:]), decided)
     samples = Samples.join(at_rows, *between)
-    if marks is not None and cells is not None and len(rows) > 1:
+    if marks is not None and len(rows) > 1:
         wrong = ~judge.within(samples)
         if (wrong.any() or len(left.row)) and wrong.sum() <= ENOUGH:  # or some were not looked at
             from feasibility.certification.followed import on_the_way
 
             doubtful = np.append(samples.row[wrong], left.row)
-            right, more = on_the_way(
-                judge, rows, cells, marks, at_rows, every.of_segment, doubtful, decided
-            )
+            right, more = on_the_way(judge, marks, at_rows, every.of_segment, doubtful, decided)
             before = right[np.maximum(samples.row - 1, 0)] | (samples.share > 0.0)
             samples = Samples.join(samples.of(~(wrong & right[samples.row] & before)), *more)
             left = left.of(~right[left.row])
@@ -85,26 +81,23 @@ def tool_along(
     return Along(most, faults, samples, room)
 
 
-def _at_marks(judge: Judge, cells: Cells, marks: Ints, at: Samples) -> Samples:
+def _at_marks(judge: Judge, marks: Ints, at: Samples) -> Samples:
     """The samples at all rows, over their marked cells where the places found will not do."""
     bad = np.flatnonzero(~judge.within(at) & (marks >= 0))
     if not len(bad):
         return at
-    aims = judge.task.targets(cells).points[marks[bad]]
+    aims = judge.task.targets(judge.cells).points[marks[bad]]
     return judge.corrected(at, bad, judge.offset.nearest(aims, aims, 0.0))
 
 
 def _between(
-    judge: Judge,
-    rows: Array,
-    stretches: SampledStretches,
-    decided: Callable[[SampledStretches], Mask],
+    judge: Judge, stretches: SampledStretches, decided: Callable[[SampledStretches], Mask]
 ) -> tuple[SampledStretches, list[Samples]]:
     """Halve stretches whose ends are good, as needed: those still open, and what was looked at."""
     samples, wrong = list[Samples](), [0]
 
     def halves(left: SampledStretches) -> SampledStretches:
-        middle = judge.middles(rows, left)
+        middle = judge.sampled(left.row, left.middle)
         good = judge.within(middle)
         samples.append(middle)
         wrong[0] += int((~good).sum())

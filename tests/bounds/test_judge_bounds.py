@@ -138,23 +138,22 @@ def flat(kind):
     return mesh(TriangleMesh(corners, [[0, 2, 1], [1, 2, 3]]))
 
 
-def judged(robot, surface, task):
+def judged(robot, surface, task, *rows):
     cells = surface.cells(2, 2) if surface.kind != "mesh" else surface.cells(4)
-    return Judge(robot, task, offset_surface(surface, 0.0), cells)
+    return Judge(robot, task, offset_surface(surface, 0.0), cells, np.array(rows)[:, None])
 
 
 def along(robot, surface, task, first, last, rounds=4):
     """Stretches of a motion of one joint, halved: of each its bounds, and 401 samples there."""
-    judge, rows = judged(robot, surface, task), np.array([[first], [last]])
-    at = judge.sampled(np.arange(2), np.zeros(2), rows)
-    stretch, found = judge.between_rows(rows, jacobians(Kinematics(robot), rows), at), []
+    judge = judged(robot, surface, task, first, last)
+    at = judge.sampled(np.arange(2), np.zeros(2))
+    stretch, found = judge.between_rows(jacobians(Kinematics(robot), judge.rows), at), []
     for _ in range(rounds):
         bounds = judge.bounds(stretch)
         for k in range(len(stretch.length)):
             share = stretch.start.share[k] + S * stretch.length[k]
-            q = first + share[:, None] * (last - first)
-            found.append((bounds.of([k]), judge.sampled(np.zeros(len(S), int), share, q)))
-        stretch = stretch.halves(judge.middles(rows, stretch))
+            found.append((bounds.of([k]), judge.sampled(np.zeros(len(S), int), share)))
+        stretch = stretch.halves(judge.sampled(stretch.row, stretch.middle))
     return found
 
 
@@ -203,8 +202,8 @@ def test_tolerance_and_cone_are_exact(share):
     """Turned by 0.3 rad the tool is 0.5 (1 - cos 0.3) m before the plane."""
     off, turn = 0.5 - 0.5 * np.cos(0.3), np.degrees(0.3)
     for tolerance, cone in ((share * off, 60.0), (1.0, share * turn)):
-        judge = judged(turning(), flat("patch"), Task(0.0, cone, tolerance))
-        at = judge.sampled(np.zeros(1, int), np.zeros(1), np.array([[0.3]]))
+        judge = judged(turning(), flat("patch"), Task(0.0, cone, tolerance), 0.3)
+        at = judge.sampled(np.zeros(1, int), np.zeros(1))
         assert judge.within(at).all() == (share > 1.0)
 
 
@@ -219,8 +218,8 @@ def test_the_chord_of_a_cone_is_that_of_its_angle(cone, chord):
 def test_a_row_is_at_fault_where_it_is_not_within_one_of_its_margins(name, value):
     """Facets have to be the standoff less the tolerance away: 20 mm less 10 mm."""
     task = Task(0.02, 30.0, 0.01, roll_deg=(-20.0, 20.0), roll_reference=(0.0, 0.0, 1.0))
-    judge, none = judged(turning(), flat("patch"), task), np.zeros(1)
-    at = judge.sampled(np.zeros(1, int), none, np.zeros((1, 1)))
+    judge, none = judged(turning(), flat("patch"), task, 0.0), np.zeros(1)
+    at = judge.sampled(np.zeros(1, int), none)
     right = replace(at, error=none, chord=none, roll=none, facets=np.full(1, np.inf))
     chord = 2.0 * np.sin(np.radians(15.0))
     margins = {"error": 0.01, "chord": chord, "roll": np.radians(20.0), "facets": 0.01}
@@ -234,10 +233,9 @@ def test_a_row_is_at_fault_where_it_is_not_within_one_of_its_margins(name, value
 
 def test_what_is_not_known_at_an_end_is_not_known_between():
     """No NaN in, no acceptance out: of error, tilt or distance from triangles, at either end."""
-    judge = judged(turning(), flat("triangles"), Task(0.0, 180, 0.4))
-    rows = np.array([[0.0], [0.1]])
-    at = judge.sampled(np.arange(2), np.zeros(2), rows)
-    whole = judge.between_rows(rows, jacobians(Kinematics(judge.robot), rows), at)
+    judge = judged(turning(), flat("triangles"), Task(0.0, 180, 0.4), 0.0, 0.1)
+    at = judge.sampled(np.arange(2), np.zeros(2))
+    whole = judge.between_rows(jacobians(Kinematics(judge.robot), judge.rows), at)
     assert judge.within(judge.bounds(whole)).all()
     for end in ("start", "end"):
         for name in ("points", "axes", "facets"):
@@ -279,9 +277,9 @@ def test_a_cell_is_looked_for_all_along_the_way_past_it(reached, turn):
     cells, task = plane((-0.1, 0.1), (-0.1, 0.1), "outside").cells(1, 1), Task(0.0, 10.0, 1e-3)
     tilt = np.radians(10.5 + turn * np.array([-1.0, 1.0]))  # by `turn` deg within 2 mm
     rows = np.column_stack([[-2e-3, 2e-3], tilt])
-    judge = Judge(robot, task, offset_surface(cells.surface, 0.0), cells)
-    samples = judge.sampled(np.arange(2), np.zeros(2), rows)
-    assert cells_reached(robot, cells, task, rows, samples).cells.all() == reached
+    judge = Judge(robot, task, offset_surface(cells.surface, 0.0), cells, rows)
+    samples = judge.sampled(np.arange(2), np.zeros(2))
+    assert cells_reached(judge, task, samples).cells.all() == reached
 
 
 @pytest.mark.parametrize(("j", "end"), [(0, "lower"), (2, "upper")])

@@ -55,10 +55,10 @@ def test_stretches_of_a_motion(name, held, bent):
     task, rows = replace(task, tolerance=2e-3, **held), q[40:60]
     rows = np.vstack([a + share * (b - a) for a, b in itertools.pairwise(rows)])
     offset = offset_surface(surface, surface.side_sign * task.standoff)
-    judge = Judge(robot, task, offset, cells)
+    judge = Judge(robot, task, offset, cells, rows)
     poses, x = jacobians(Kinematics(robot), rows), judge.reference_axes(rows)
     known = judge.compared(np.arange(len(rows)), 0.0 * rows[:, 0], poses.points, poses.axes, x)
-    parts = judge.between_rows(rows, poses, known)
+    parts = judge.between_rows(poses, known)
     assert judge.within(judge.bounds(parts)).all()
     for column in bent:
         bounds = judge.bounds(replace(parts, of_segment=grown(parts.of_segment, column)))
@@ -75,13 +75,13 @@ def test_stretches_of_a_motion(name, held, bent):
     if held and "roll_reference" not in held:
         starved.append(Starved(offset, "tangent_deviations", grown))
     for one in starved:
-        blind = Judge(robot, task, one, cells)
+        blind = Judge(robot, task, one, cells, rows)
         assert not blind.within(blind.bounds(parts)).any()
     if not offset.bends_evenly:  # as near to a model, and no nearer, at the ends
         near = Starved(offset, "paths", lambda path: path._replace(deviations=0 * path[3] + 1e-4))
         aside = replace(parts, end=replace(parts.end, points=parts.end.points + 0.01))
         off = np.linalg.norm(aside.end.points - judge.targets(aside.end.places)[0], axis=1)
-        assert (Judge(robot, task, near, cells).bounds(aside).error > off + 0.99e-4).all()
+        assert (Judge(robot, task, near, cells, rows).bounds(aside).error > off + 0.99e-4).all()
 
 
 @pytest.mark.parametrize(

@@ -33,7 +33,8 @@ class Refuter:
     def __init__(self, robot: Robot, cells: Cells, task: Task, length: float) -> None:
         """Work for one arm, over one surface; differences of axes weigh `length` (m)."""
         height = cells.surface.side_sign * task.standoff
-        self._judge = Judge(robot, task, offset_surface(cells.surface, height), cells)
+        none = np.zeros((0, robot.n))
+        self._judge = Judge(robot, task, offset_surface(cells.surface, height), cells, none)
         self._kinematics, self._targets = Kinematics(robot), task.targets(cells)
         self._task, self._length = task, length
 
@@ -52,7 +53,7 @@ class Refuter:
         cell = np.array([-1 if one is None else one for _, one in at])
         q = np.clip(starts, low, high)
         for _ in range(STEPS):
-            here = self._judge.sampled(np.zeros(len(q), dtype=np.int64), np.zeros(len(q)), q)
+            here = self._judge.along(q).sampled(np.arange(len(q)), np.zeros(len(q)))
             kept, over = self._judge.within(here), cell >= 0
             held = here.points[over], here.axes[over], here.x[over]
             chord, _ = at_targets(self._task, self._targets, cell[over], *held)
