@@ -100,6 +100,10 @@ class Verification(Judged):
         return " ".join(filter(None, [said, self.refusal, checked]))
 
 
+Made = Callable[..., Verification]
+"""Of the faults, and what else is known."""
+
+
 def verify(
     claim: Robot | Verdict | Result,
     cells: Cells | None = None,
@@ -158,7 +162,7 @@ def verify(
         rows = _rows(q)
         at_work = None if working is None else _one_a_row("working", working, rows, "b")
         said = None if marks is None else _one_a_row("marks", marks, rows, "i")
-        judged = partial(_of_motion, "motion", problem, rows, said, at_work)
+        judged = partial(_of_motion, problem, rows, said, at_work)
         return _in_time("motion", problem, judged, clock)
     if any(given is not None for given in (cells, task, q, working, marks)):
         raise TypeError("a verdict knows its robot, cells and task: give it alone")
@@ -196,22 +200,22 @@ def _one_a_row(name: str, values: ArrayLike, rows: Array, kind: Literal["b", "i"
 
 
 def _in_time(
-    claim: Claim, problem: Problem, judged: Callable[[], Verification], clock: Clock | None
+    claim: Claim, problem: Problem, judged: Callable[[Made], Verification], clock: Clock | None
 ) -> Verification:
     """What became of a claim within the limit; a claim that could not be judged does not hold."""
     clock = Clock() if clock is None else clock
+    made = partial(Verification, claim, problem.robot, problem.cells, problem.task)
     try:
         with clock.start().enforced():
-            return judged()
+            return judged(made)
     except OutOfTime:
-        robot, cells, task = problem.robot, problem.cells, problem.task
         late = MotionFault(NOT_IN_TIME.format(clock.limit))
-        left = unjudged(robot, task, ())
-        return Verification(claim, robot, cells, task, (late,), not_judged=left, late=True)
+        left = unjudged(problem.robot, problem.task, ())
+        return made((late,), not_judged=left, late=True)
 
 
 def _of_motion(
-    claim: Claim, problem: Problem, q: Any, marks: Ints | None = None, working: Mask | None = None
+    problem: Problem, q: Any, marks: Ints | None, working: Mask | None, made: Made
 ) -> Verification:
     """The replay of a motion over the surface, and the other demands' judges."""
     robot, cells, task = problem.robot, problem.cells, problem.task
@@ -227,10 +231,7 @@ def _of_motion(
         guess = marks_in_order(robot, cells, task, q) if marks is None else None
         other = found if guess is marks else judge(marks=guess)
         found = other if other.accepted else found
-    made = partial(
-        Verification, claim, robot, cells, task,
-        certificate=found.certificate, q=q, reached=found.reached,
-    )  # fmt: skip
+    made = partial(made, certificate=found.certificate, q=q, reached=found.reached)
     if not found.accepted:
         judged = () if malformed else BY_REPLAY
         return made(found.faults, not_judged=unjudged(robot, task, judged))
@@ -250,50 +251,43 @@ def _unmarked(q: Array) -> Walk:
 
 def _of_verdict(verdict: Verdict, search: Search | None, clock: Clock) -> Verification:
     """A verdict's witness, tree or proof."""
-    problem = Problem.of(verdict.robot, verdict.cells, verdict.task)
+    robot, cells, task, walk = verdict.robot, verdict.cells, verdict.task, verdict.witness
+    if not len(cells):
+        walk = _unmarked(np.empty((0, robot.n)))
     claim: Claim = "witness"
-    if verdict.answer is Answer.FEASIBLE and len(verdict.cells) == 0:
-        judged = partial(_of_motion, claim, problem, np.empty((0, verdict.robot.n)))
-    elif verdict.answer is Answer.FEASIBLE and verdict.witness is not None:
-        walk = verdict.witness
-        judged = partial(_of_motion, claim, problem, walk.q, walk.cell)
-    elif (
-        verdict.answer is Answer.FEASIBLE
-        and verdict.tree is not None
-        and search is not None
-        and search.method == "greedy"
-    ):
-        claim, judged = "tree", partial(_of_tree, verdict, search)
+    problem = Problem.of(robot, cells, task)
+    greedy = search if search is not None and search.method == "greedy" else None
+    judged: Callable[[Made], Verification]
+    if verdict.feasible and walk is not None:
+        judged = partial(_of_motion, problem, walk.q, walk.cell, None)
+    elif verdict.feasible and verdict.tree is not None and greedy is not None:
+        claim, judged = "tree", partial(_of_tree, verdict, greedy)
     elif verdict.answer is Answer.INFEASIBLE and verdict.proof is not None:
-        claim, judged = "proof", partial(_of_proof, verdict, verdict.proof, clock)
+        claim, judged = "proof", partial(_of_proof, problem, verdict.proof, clock)
     else:
         raise NothingToVerifyError(_nothing(verdict))
     return _in_time(claim, problem, judged, clock)
 
 
-def _of_tree(verdict: Verdict, search: Search) -> Verification:
+def _of_tree(verdict: Verdict, search: Search, made: Made) -> Verification:
     """The tree of the paper's search, by the paper's definitions, which know not every demand."""
     from feasibility.paper.tree_replay import replay_stored
 
-    robot, cells, task = verdict.robot, verdict.cells, verdict.task
     found = replay_stored(verdict, search)
-    left = unjudged(robot, task, OF_TREE)
+    left = unjudged(verdict.robot, verdict.task, OF_TREE)
     faults = [found.refusal] if found.faults else []
     if left:
         faults.append(f"{', '.join(left)}: not judged, since the greedy search knows nothing of it")
-    told = tuple(map(MotionFault, faults))
-    return Verification("tree", robot, cells, task, told, found.certificate, not_judged=left)
+    return made(tuple(map(MotionFault, faults)), found.certificate, not_judged=left)
 
 
-def _of_proof(verdict: Verdict, proof: CutTree, clock: Clock) -> Verification:
+def _of_proof(problem: Problem, proof: CutTree, clock: Clock, made: Made) -> Verification:
     """The proof that no motion covers every cell."""
-    robot, cells, task = verdict.robot, verdict.cells, verdict.task
+    robot, cells, task = problem.robot, problem.cells, problem.task
     checked = verify_proof(robot, cells, task, proof, lambda: clock.tick(0, None, "verifying"))
     faults = () if checked.accepted else (MotionFault(checked.refusal),)
     left = unjudged(robot, task, BY_REPLAY)
-    return Verification(
-        "proof", robot, cells, task, faults, proof=proof, boxes=checked.boxes, not_judged=left
-    )
+    return made(faults, proof=proof, boxes=checked.boxes, not_judged=left)
 
 
 def _nothing(verdict: Verdict) -> str:

@@ -109,13 +109,8 @@ def at_targets(
 ) -> tuple[Array, Array]:
     """|a - b| and the roll (k,) of tools over cells: inf where one is not as it has to be there.
 
-    That is within the tolerance of the cell's target, and the cone and the range of the roll.
-
-    Args:
-        task: its tolerance, cone and roll are used exactly.
-        aims: the targets of all cells.
-        cell: (k,) which cell.
-        points, axes, x: (k, 3) tool points (m), approach axes and reference axes.
+    That is within the tolerance of the target of its cell (k,) out of all, and the cone and the
+    range of the roll, exactly. Of tools points (m), approach axes and reference axes (k, 3) count.
     """
     off = np.linalg.norm(points - aims.points[cell], axis=1)
     approaches = aims.approaches[cell]

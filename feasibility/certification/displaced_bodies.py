@@ -83,16 +83,10 @@ def clear_share(
     pairings: Sequence[Pairing], spare: Array, nearer: Array, calls: float,
     tried: set[tuple[int, int]],
 ) -> Shares:  # fmt: skip
-    """The share of `nearer` that couples may come nearer by, as far as known.
+    """The share of `nearer` (c, m - 1) m that c couples may come nearer by, as far as known.
 
-    Of those that allow least planes find out more, or so many calls of coal.
-
-    Args:
-        pairings: c couples.
-        spare: of them, see `spare_of`; raised here.
-        nearer: (c, m - 1) m.
-        calls: of coal; with fewer than `FEW` planes are tried.
-        tried: couples and rows at which planes were; added to here.
+    Of those that allow least planes find out more, where not `tried` before, or so many calls of
+    coal, at least `FEW`. That raises what they `spare`, see `spare_of`.
     """
     more = np.maximum(nearer, LEAST)
 
@@ -125,13 +119,9 @@ class Nearer:
     def __init__(
         self, robot: Robot, pairings: Sequence[Pairing], beside: set[str], pivot: Array
     ) -> None:
-        """See where they are along it.
+        """See where all couples of bodies are along it.
 
-        Args:
-            robot: the arm.
-            pairings: all couples along the motion.
-            beside: names of what is displaced with the part, if it is at rest.
-            pivot: (3,) m, about which the part turns.
+        Of `beside`, by names, what is at rest is displaced with the part, about `pivot` (3,) m.
         """
         motion, self.slides = pairings[0].motion, robot.prismatic[:, None, None]
         bodies = dict[Body, int]()
@@ -173,11 +163,9 @@ class Nearer:
         return np.abs(sums - sums[self.joints, np.arange(len(self.joints))])
 
     def by(self, moved: Array, shift: float, turn: float) -> Array:
-        """(c, m - 1) m, how much nearer they come at most.
+        """(c, m - 1) m, how much nearer they come at most, the part displaced by so many m and rad.
 
-        Args:
-            moved: (m - 1, n) rad or m, e_j of each segment.
-            shift, turn: m and rad, how far the part is displaced.
+        `moved` (m - 1, n) rad or m is e_j of each segment.
         """
         moved = moved.T[:, None]
         off, (a, b) = self._seen(self.levers * moved), self.couples  # as seen from every joint

@@ -122,9 +122,8 @@ def lifted_faults(
 
     Args:
         surface: the surface, if there is one.
-        rows: (m, n) the motion, rad or m.
+        rows: (m, n) the motion of the arm of `kinematics`, rad or m.
         lifted: (k,) from where to where it is, in rows with their shares.
-        kinematics: of the arm.
         tolerance: m, how deep the tool may be.
     """
     left, right = lifted

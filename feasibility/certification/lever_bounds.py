@@ -84,13 +84,9 @@ def levers_along(
 
 
 def second_derivatives(steps: Array, prismatic: Mask, levers: Array, cap: float) -> Array:
-    """(m,) D of |p''| (or of |a''|) along segments that are straight in joint space.
+    """(m,) D of |p''| (or |a''|) along segments of absolute joint changes (m, n), one by one.
 
-    Args:
-        steps: (m, n) absolute joint changes.
-        prismatic: (n,) which joints slide.
-        levers: (m + 1, n) r_j (or s_j) at the ends of the segments.
-        cap: upper bound of every lever (1 for sines, inf for lengths).
+    The levers (m + 1, n) are r_j (or s_j) at their ends; the cap as in `levers_along`.
     """
     largest = levers_along(steps, prismatic, levers[:-1], levers[1:], cap)
     return second_derivative_bound(largest, steps, prismatic)

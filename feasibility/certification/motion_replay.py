@@ -62,9 +62,7 @@ def replay_over_surface(
     """Judge a motion by the module's rules.
 
     Args:
-        robot: the arm.
-        cells: the surface and its cells.
-        task: its tolerance and cone are used exactly.
+        robot, cells, task: the case; tolerance, cone and roll are used exactly.
         q: (m, n) rows, rad or m, unwrapped.
         needed: (N,) cells that have to be reached; all by default.
         bodies: what has to stay clear of what; None where collisions are not checked.
@@ -201,10 +199,8 @@ def replay(
     """Check a walk: limits, tool point, cone and roll at and between waypoints, and its cells.
 
     Args:
-        robot: the arm.
-        cells: the cells.
-        task: the task; its tolerance, cone and roll are used exactly. Whether bodies stay clear is
-            asked only of walks that are right in everything else.
+        robot, cells, task: the case; tolerance, cone and roll are used exactly. Whether bodies stay
+            clear is asked only of walks that are right in everything else.
         walk: the motion.
         needed: (N,) cells that must be visited.
         deviations: (m - 1, n) how far each joint may be from the straight lines between waypoints,

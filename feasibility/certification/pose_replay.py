@@ -93,12 +93,9 @@ def curves_of_marks(cells: Cells, marks: Ints) -> Ints | None:
 
 
 def order_of_places(offset: OffsetSurface, samples: Samples, tolerance: float) -> list[MotionFault]:
-    """Where a motion goes back along a toolpath by more than the tolerance.
+    """Where a motion goes back along a toolpath's curves by more than the tolerance (m).
 
-    Args:
-        offset: the curves of the toolpath.
-        samples: of the motion, as it passes them.
-        tolerance: m.
+    The samples are of the motion, as it passes them.
     """
     along = offset.along(samples.places)
     if along is None or not len(along):

@@ -86,14 +86,9 @@ def off_middle(z: Array) -> Array:
 def largest_off(z0: Array, z1: Array, second: Array, unknown: Array, half: float) -> Array:
     """(k,) rad, bounds on |off| along k stretches, where that is shown to be at most `half`.
 
-    Args:
-        z0, z1: (k, 2) at both ends.
-        second: (k,) D.
-        unknown: (k, 2) how much less F may be at both ends than z shows.
-        half: rad, half the range of the roll.
-
-    Returns:
-        Bounds; inf where the roll may leave the range, NaN where something is.
+    Of z0 and z1 (k, 2) at both ends, the second derivative D (k,), how much less F may be at both
+    ends than z shows (k, 2), and half the range of the roll, rad. They are inf where the roll may
+    leave the range, NaN where something is.
     """
 
     def holds(angle: Array, sign: float) -> Mask:
@@ -148,13 +143,7 @@ class HeldRoll:
         return projected(np.broadcast_to(self.reference, approaches.shape), approaches)
 
     def rolls(self, x: Array, axes: Array, approaches: Array, places: Places) -> Array:
-        """(k,) rad, how far rolls are off the middle of their range.
-
-        Args:
-            x, axes: (k, 3) of the tool.
-            approaches: (k, 3) at the places.
-            places: k of them.
-        """
+        """(k,) rad, how far rolls of tools over places are off the middle of their range."""
         references, _ = self._references(places, approaches)
         return off_middle(roll_vectors(x, axes, references, approaches, self.roll))
 
@@ -163,10 +152,8 @@ class HeldRoll:
     ) -> Array:
         """(k,) rad, bounds on that along stretches; inf where the roll may leave its range.
 
-        Args:
-            x, axes: (k, 3) of the tool at both ends.
-            second: (k,) D_x + D_y along the stretch.
-            path: of places, with approach directions for normals.
+        x and axes (k, 3) are of the tool at both ends, `second` (k,) is D_x + D_y along the
+        stretch; the path of places has approach directions for normals.
         """
         references, second_u, beside = self.references_along(path)
         share = path.share[..., None]

@@ -254,13 +254,9 @@ class Judge:
 
 
 def beyond(task: Task, error: Array, chord: Array, roll: Array) -> Array:
-    """(3, k) by how much tools are outside of what is allowed; NaN is not inside.
+    """(3, k) by how much tools are outside of what is exactly allowed; NaN is not inside.
 
-    Args:
-        task: its tolerance, cone and roll are used exactly.
-        error: (k,) m, how far tool points are off.
-        chord: (k,) |a - b|.
-        roll: (k,) rad, how far the roll is off the middle of its range; 0 where it is free.
+    `error`, `chord` and `roll` (k,) are as in `Samples`.
     """
     half = 0.0 if task.roll is None else task.roll.half
     return np.stack([

@@ -23,13 +23,9 @@ TIMES = 3
 
 
 def smaller(boxes: Boxes, models: Models, parts: Parts, length: float) -> Boxes:
-    """What is left of open boxes: as it is where contraction did much, otherwise cut.
+    """What contraction left of open boxes: as it is where it did much, otherwise cut.
 
-    Args:
-        boxes: the boxes.
-        models: their models, contracted.
-        parts: the parts of the surface.
-        length: m, which differences of axes are multiplied by.
+    Their models are contracted; differences of axes are multiplied by `length` (m).
     """
     centre = boxes.centre
     low = np.maximum(centre + models.low, boxes.low)
@@ -45,16 +41,10 @@ def smaller(boxes: Boxes, models: Models, parts: Parts, length: float) -> Boxes:
 
 
 def cut(boxes: Boxes, reach: Array, parts: Parts, length: float) -> tuple[Boxes, Array]:
-    """Every box in two, or in the one of these that it lies in.
+    """Every box in two, or in the one of these that it lies in; and the reach of these.
 
-    Args:
-        boxes: m boxes.
-        reach: (m, n + 2) m, by how much each variable can move the tool or the target, about.
-        parts: the parts of the surface.
-        length: m, which differences of normals are multiplied by.
-
-    Returns:
-        The smaller boxes and their reach.
+    The reach (m, n + 2) m is how much each variable can move the tool or the target, about.
+    Differences of normals are multiplied by `length` (m).
     """
     n = reach.shape[1] - 2
     over_surface = reach[:, n:].sum(axis=1) + parts.radius[boxes.part] @ [1.0, length]

@@ -229,12 +229,9 @@ class ArmCollisions:
         return bool((self._overlapping.deepest(q, q, target, off).pair < 0).any())
 
     def check(self, cell: int, tick: Callable[[], object], most: int) -> Collides:
-        """Is it confirmed that something collides wherever the tool is over a cell?
+        """Is it confirmed, by so many boxes, that something collides wherever it covers a cell?
 
-        Args:
-            cell: the cell.
-            tick: called between batches of boxes; may raise.
-            most: how many boxes may be looked at.
+        `tick` is called between batches of them; it may raise.
         """
         arm = ArmModel(self._robot, self._region.low, self._region.high)
         allowed, parts = Allowed.by(self._task, arm), cell_parts(self._targets)

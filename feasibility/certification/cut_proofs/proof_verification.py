@@ -88,15 +88,10 @@ def verify_proof(
     """Is it proved that no motion of the robot covers every cell?
 
     Args:
-        robot: the arm; its limits are used exactly.
-        cells: the cells.
-        task: the task; its tolerance, cone and roll are used exactly.
+        robot, cells, task: the case; limits, tolerance, cone and roll are used exactly.
         tree: the proof.
         tick: called first, and every few thousand boxes; what it raises ends the verification.
         most: how many boxes may be looked at altogether.
-
-    Returns:
-        Whether the proof is accepted, and if not, which cut or leaf is refused and why.
     """
     fault = out_of_line(robot) or malformed(robot, len(cells), tree)
     if fault:

@@ -43,10 +43,8 @@ class Refuter:
     ) -> tuple[int, Array] | None:
         """Which start (m, n) leads to a configuration that keeps to the constraints; and that.
 
-        Args:
-            starts: rad or m.
-            at: for each start the region that the configuration has to lie in, and the cell whose
-                target the tool has to be at, None where it may be anywhere on the surface.
+        For each the region that it has to lie in is given, and the cell whose target the tool has
+        to be at, None where it may be anywhere on the surface.
         """
         low = np.array([region.low for region, _ in at])
         high = np.array([region.high for region, _ in at])
