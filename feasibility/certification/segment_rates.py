@@ -27,7 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
-from feasibility.certification.bisection import Rows, Stretches, bisected
+from feasibility.certification.bisection import Stretches, bisected
 from feasibility.certification.lever_bounds import (
     Jacobians,
     column_changes,
@@ -63,15 +63,6 @@ class SegmentRates:
     """(m,) upper bound: that of an exact configuration."""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class _Ends(Rows):
-    """k configurations."""
-
-    at: Jacobians
-    sigma: Array
-    """(k,) the smallest singular value; NaN where it does not matter."""
-
-
 @np.errstate(invalid="ignore")  # NaN where the velocity of a joint is not known
 def segment_rates(
     robot: Robot,
@@ -102,51 +93,34 @@ def segment_rates(
     rate = rate if resting is None else np.where(resting, np.inf, rate)
     groups = np.zeros(m, dtype=np.int64) if group is None else group
 
-    def speeds(p: Stretches[_Ends]) -> tuple[Array, ...]:
+    def speeds(p: Stretches[Jacobians]) -> tuple[Array, ...]:
         r, found = rate[p.row], _way_bounds(robot, (ends - starts)[p.row], p)
         return tuple(np.where(np.isinf(r), np.inf, value * r) for value in found)
 
-    def sigmas(p: Stretches[_Ends]) -> tuple[Array, ...]:
+    def sigmas(p: Stretches[Jacobians]) -> tuple[Array, ...]:
         return _sigma_bounds(robot, steps[p.row], p)
 
     v, s = _Least(groups, speed), _Least(groups, sigma)
     figures = [(v, speeds), (s, sigmas)][: 1 if sigma is None else 2]
 
-    def decided(p: Stretches[_Ends]) -> Mask:
+    def decided(p: Stretches[Jacobians]) -> Mask:
         bounds = [(one, bound(p)) for one, bound in figures]
         good = np.asarray(np.all([one.seen(p, *known) for one, known in bounds], axis=0))
         for one, (low, _, _) in bounds:
             one.keep(p.row[good], low[good])
         return good
 
-    def halves(p: Stretches[_Ends]) -> Stretches[_Ends]:
+    def halves(p: Stretches[Jacobians]) -> Stretches[Jacobians]:
         q = starts[p.row] + p.middle[:, None] * (ends - starts)[p.row]
-        return p.halves(_ends(robot, q, sigma is not None))
+        return p.halves(jacobians(kinematics, q))
 
-    left = _whole(robot, starts, ends, sigma is not None)
-    left = bisected(left, decided, halves, LEVELS, MOST)
+    kinematics, row = Kinematics(robot), np.arange(m)
+    at = jacobians(kinematics, np.vstack([starts, ends]))
+    whole = Stretches(row, np.zeros(m), np.ones(m), at.of(row), at.of(m + row))
+    left = bisected(whole, decided, halves, LEVELS, MOST)
     for one, bound in figures:
         one.keep(left.row, bound(left)[0])
     return SegmentRates(v.low, v.exact, joint, v.share, s.low, s.exact)
-
-
-def _whole(robot: Robot, starts: Array, ends: Array, with_sigma: bool) -> Stretches[_Ends]:
-    """Segments (m, n) as they are; where one begins where another ends, the arm is asked once."""
-    m = len(starts)
-    alone = np.ones(m, dtype=bool)
-    alone[:-1] = (ends[:-1] != starts[1:]).any(axis=1)
-    known = _ends(robot, np.vstack([starts, ends[alone]]), with_sigma)
-    before, after = np.arange(m), np.arange(1, m + 1)
-    after[alone] = m + np.arange(alone.sum())
-    return Stretches(before, np.zeros(m), np.ones(m), known.of(before), known.of(after))
-
-
-def _ends(robot: Robot, q: Array, with_sigma: bool) -> _Ends:
-    """What has to be known of configurations (k, n)."""
-    at = jacobians(Kinematics(robot), q)
-    return _Ends(
-        at, smallest_singular(at, robot.length_unit) if with_sigma else np.full(len(q), np.nan)
-    )
 
 
 class _Least:
@@ -157,7 +131,7 @@ class _Least:
         self.groups, self.asked = groups, asked
         self.low, self.exact, self.share = np.full(m, np.inf), np.full(m, np.inf), np.zeros(m)
 
-    def seen(self, p: Stretches[_Ends], low: Array, first: Array, last: Array) -> Mask:
+    def seen(self, p: Stretches[Jacobians], low: Array, first: Array, last: Array) -> Mask:
         """Take note of exact values at the ends of stretches (k,); which of them are decided."""
         for values, where in ((first, p.low), (last, p.high)):
             better = values < self.exact[p.row]
@@ -174,9 +148,9 @@ class _Least:
         np.minimum.at(self.low, row, np.maximum(low, 0.0))
 
 
-def _way_bounds(robot: Robot, ways: Array, p: Stretches[_Ends]) -> tuple[Array, Array, Array]:
+def _way_bounds(robot: Robot, ways: Array, p: Stretches[Jacobians]) -> tuple[Array, Array, Array]:
     """Lower bound of |p'| by the segment's own parameter, and its values at both ends, (k,)."""
-    at, steps = (p.start.at, p.end.at), np.abs(ways) * p.length[:, None]
+    at, steps = (p.start, p.end), np.abs(ways) * p.length[:, None]
     levers = levers_along(steps, robot.prismatic, at[0].levers, at[1].levers, np.inf)
     second = second_derivative_bound(levers, steps, robot.prismatic)
     first, last = (np.linalg.norm(np.einsum("kij,kj->ki", end.point, ways), axis=1) for end in at)
@@ -185,17 +159,19 @@ def _way_bounds(robot: Robot, ways: Array, p: Stretches[_Ends]) -> tuple[Array, 
     return low / p.length, first, last
 
 
-def _sigma_bounds(robot: Robot, steps: Array, p: Stretches[_Ends]) -> tuple[Array, Array, Array]:
+def _sigma_bounds(
+    robot: Robot, steps: Array, p: Stretches[Jacobians]
+) -> tuple[Array, Array, Array]:
     """Lower bound of the singular value, and its values at both ends, (k,)."""
     square, steps = np.zeros(len(steps)), steps * p.length[:, None]
     for first, last, cap, unit in (
-        (p.start.at.levers, p.end.at.levers, np.inf, robot.length_unit),
-        (p.start.at.sines, p.end.at.sines, 1.0, 1.0),
+        (p.start.levers, p.end.levers, np.inf, robot.length_unit),
+        (p.start.sines, p.end.sines, 1.0, 1.0),
     ):
         most = levers_along(steps, robot.prismatic, first, last, cap)
         change = column_changes(most, steps, robot.prismatic)
         square += ((change / unit) ** 2).sum(axis=1)
-    first, last = p.start.sigma, p.end.sigma
+    first, last = (smallest_singular(end, robot.length_unit) for end in (p.start, p.end))
     return 0.5 * (first + last - np.sqrt(square)), first, last
 
 
