@@ -99,21 +99,20 @@ class Emptiness:
     def test(self, claims: list[Claim], refuter: Refuter, most: int) -> Outcome:
         """Confirm all claims, refute one, or give up after `most` boxes."""
         regions = [claim.region.folded(self.arm.prismatic) for claim in claims]
-        waiting = [
-            Boxes(
-                np.append(region.low, [-1.0, -1.0])[None],
-                np.append(region.high, [1.0, 1.0])[None],
-                *np.array([[claims[k].part], [k]]),
-            )
-            for k, region in enumerate(regions)
-            if not region.empty
-        ]
+        first = [k for k, region in enumerate(regions) if not region.empty]
         done, next_try, n = 0, FIRST_TRY, self.arm.n
-        while waiting:
+        waiting = Boxes(
+            np.array([[*regions[k].low, -1.0, -1.0] for k in first]).reshape(-1, n + 2),
+            np.array([[*regions[k].high, 1.0, 1.0] for k in first]).reshape(-1, n + 2),
+            np.array([claims[k].part for k in first], dtype=np.int64),
+            np.array(first, dtype=np.int64),
+        )
+        while len(waiting):
             if done >= most:
-                return Outcome(done, min(int(boxes.claim.min()) for boxes in waiting))
+                return Outcome(done, int(waiting.claim.min()))
             self.tick()
-            boxes = _next(waiting)
+            # The newest first, so that few wait.
+            boxes, waiting = waiting.of(slice(-BATCH, None)), waiting.of(slice(-BATCH))
             done += len(boxes)
             left, models, place = self.examine(boxes)
             if not len(left):
@@ -128,7 +127,8 @@ class Emptiness:
                     self.overlapping is None or self.overlapping.clear(found[1])
                 ):
                     return Outcome(done, int(left.claim[some[found[0]]]), found[1])
-            waiting.append(smaller(left, models, self.parts, self.allowed.length))
+            new = smaller(left, models, self.parts, self.allowed.length)
+            waiting = Boxes.join(waiting, new)
         return Outcome(done)
 
     def examine(self, boxes: Boxes) -> tuple[Boxes, Models, Array]:
@@ -172,20 +172,6 @@ class Emptiness:
             ((found.ratio < NEARLY) & deep)[:, None], found.effect, reach[:, :n]
         )
         return ~ruled_out, reach
-
-
-def _next(waiting: list[Boxes]) -> Boxes:
-    """Take about a batch of boxes, the newest first, so that few wait."""
-    taken, size = [], 0
-    while waiting and size < BATCH:
-        boxes = waiting.pop()
-        more = len(boxes) + size - BATCH
-        if more > 0:
-            waiting.append(boxes.of(slice(more)))
-            boxes = boxes.of(slice(more, None))
-        taken.append(boxes)
-        size += len(boxes)
-    return Boxes.join(*taken)
 
 
 def _spread(boxes: Boxes) -> Ints:
