@@ -155,34 +155,20 @@ class Jacobians(Rows):
     @property
     def levers(self) -> Array:
         """(m, n) m, r_j; 1 for a joint that slides."""
-        return lengths(self.point)
+        return np.asarray(np.linalg.norm(self.point, axis=1))
 
     @property
     def sines(self) -> Array:
         """(m, n) s_j; 0 for a joint that slides."""
-        return lengths(self.axis)
+        return np.asarray(np.linalg.norm(self.axis, axis=1))
 
 
 def jacobians(kinematics: Kinematics, q: Array) -> Jacobians:
     """Of configurations q (m, n), rad or m."""
     points, axes, twists = kinematics.tools_and_twists(q)
-    moving = np.ascontiguousarray(twists.transpose(1, 0, 2)).transpose(1, 0, 2)  # by coordinate
-    linear, angular = moving[:, :3], moving[:, 3:]
-    point = linear + cross(angular, points)
-    return Jacobians(points, axes, point, cross(angular, axes), angular)
-
-
-def cross(a: Array, b: Array) -> Array:
-    """(m, 3, n) products of n vectors (m, 3, n) with one (m, 3); `np.cross` is slower."""
-    x, y, z = b.T[:, :, None]
-    u, v, w = a[:, 0], a[:, 1], a[:, 2]
-    return np.stack([v * z - w * y, w * x - u * z, u * y - v * x]).transpose(1, 0, 2)
-
-
-def lengths(a: Array) -> Array:
-    """(m, n) lengths of vectors (m, 3, n); numpy's own sums are slow over three numbers."""
-    x, y, z = a[:, 0], a[:, 1], a[:, 2]
-    return np.sqrt(x * x + y * y + z * z)
+    linear, angular = twists[:, :3], twists[:, 3:]
+    around, turned = (np.cross(angular, one[..., None], axis=1) for one in (points, axes))
+    return Jacobians(points, axes, linear + around, turned, angular)
 
 
 def smallest_singular(at: Jacobians, scale: float) -> Array:

@@ -56,7 +56,6 @@ from feasibility.certification.bisection import Rows
 from feasibility.certification.lever_bounds import (
     column_changes,
     jacobians,
-    lengths,
     second_derivative_bound,
     smallest_singular,
 )
@@ -154,7 +153,7 @@ def balls_along(kinematics: Kinematics, task: Task, pivot: Array, q: Array, room
     off = np.linalg.norm(at.point @ inverse - np.eye(3), axis=(1, 2)) / BELOW
     right, axis = inverse.transpose(0, 2, 1), at.axis @ inverse
     axis = np.sqrt(np.linalg.eigvalsh(axis @ axis.transpose(0, 2, 1))[:, 2]) / BELOW
-    steps, moves = np.abs(np.diff(q, axis=0)), larger(lengths(right))
+    steps, moves = np.abs(np.diff(q, axis=0)), larger(np.linalg.norm(right, axis=1))
     ends = np.stack([at.levers, at.sines], axis=1)
     way = larger(ends) * steps[:, None]
     behind = np.cumsum(way[..., ::-1], axis=2)[..., ::-1] - way
@@ -163,7 +162,7 @@ def balls_along(kinematics: Kinematics, task: Task, pivot: Array, q: Array, room
     rates, bends = (
         column_changes(levers, steps[:, None], slides, twice) for twice in (False, True)
     )
-    change = lengths(right[1:] - right[:-1])
+    change = np.linalg.norm(np.diff(right, axis=0), axis=1)
     between = 0.125 * (bends * moves[:, None] + 2.0 * rates * change[:, None]).sum(axis=2)
     second, bend = second_derivative_bound(levers, moves[:, None], slides).T
     slope = np.maximum(1.0 - larger(off) - between[:, 0], 0.0)

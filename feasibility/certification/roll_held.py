@@ -33,13 +33,7 @@ import numpy as np
 
 from coverable.arrays import Array, Mask
 from feasibility.certification.faults import ROLL_CLOSE
-from feasibility.certification.lever_bounds import (
-    Jacobians,
-    cross,
-    lengths,
-    peaks,
-    second_derivatives,
-)
+from feasibility.certification.lever_bounds import Jacobians, peaks, second_derivatives
 from feasibility.certification.roll_box_models import Directions, reference_parts
 from feasibility.roll import Roll, projected
 from surfaces.places.places import OffsetSurface, PlacePaths, Places
@@ -53,9 +47,10 @@ def frame_second_derivatives(steps: Array, slides: Mask, poses: Jacobians, x: Ar
 
     With the sines of the angles between revolute axes and x, or y, in place of levers.
     """
-    sines = [lengths(cross(poses.angular, axis)) for axis in (x, np.cross(poses.axes, x))]
-    found = [second_derivatives(steps, slides, one, 1.0) for one in sines]
-    return found[0] + found[1]
+    both = x, np.cross(poses.axes, x)
+    turned = [np.cross(poses.angular, axis[..., None], axis=1) for axis in both]
+    sines = [np.linalg.norm(one, axis=1) for one in turned]
+    return np.sum([second_derivatives(steps, slides, one, 1.0) for one in sines], axis=0)
 
 
 def roll_vectors(x: Array, axes: Array, references: Array, approaches: Array, roll: Roll) -> Array:

@@ -26,9 +26,7 @@ from coverable.arrays import Array, Ints
 from feasibility.certification.bisection import Rows
 from feasibility.certification.lever_bounds import (
     Jacobians,
-    cross,
     jacobians,
-    lengths,
     longest_levers,
     second_derivative_bound,
 )
@@ -215,8 +213,8 @@ class ArmModel:
         """x and y of the tool over boxes of joints of half widths (m, n) about q (m, n)."""
         x = reference_axes(self.robot, q)
         both = np.stack([x, np.cross(at.axes, x)], axis=1)
-        turned = [cross(at.angular, both[:, k]) for k in (0, 1)]
-        sines = [lengths(one) for one in turned]
+        turned = [np.cross(at.angular, both[:, k, :, None], axis=1) for k in (0, 1)]
+        sines = [np.linalg.norm(one, axis=1) for one in turned]
         moves = [np.minimum((one * half).sum(axis=1), 2.0) for one in sines]
         seconds = [second_derivative_bound(one, half, self.prismatic) for one in sines]
         columns = np.stack(turned, axis=1).transpose(0, 3, 1, 2)
