@@ -33,7 +33,7 @@ import numpy as np
 from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.bisection import Rows, Stretches
 from feasibility.certification.faults import ROLL_CLOSE
-from feasibility.certification.lever_bounds import Jacobians, peaks, second_derivatives
+from feasibility.certification.lever_bounds import jacobians, peaks, second_derivatives
 from feasibility.task import Task
 from robots.kinematics import Kinematics, reference_axes
 from robots.robot import Robot
@@ -139,27 +139,27 @@ class Judge:
         start = self.rows[row]
         return start + share[:, None] * (self.rows[np.minimum(row + 1, len(self.rows) - 1)] - start)
 
-    def sampled(self, row: Ints, share: Array) -> Samples:
-        """Samples of the motion so far on from rows (k,) to the next ones."""
-        q = self.configurations(row, share)
-        return self.compared(row, share, *self.kinematics.tools(q), self.reference_axes(q))
+    def at_rows(self) -> Samples:
+        """Samples at all rows."""
+        return self.sampled(np.arange(len(self.rows)), np.zeros(len(self.rows)))
 
     def reference_axes(self, q: Array) -> Array:
         """(k, 3) of configurations (k, n); 0 where the roll is free."""
         return np.zeros((len(q), 3)) if self._roll is None else reference_axes(self.robot, q)
 
-    def compared(self, row: Ints, share: Array, points: Array, axes: Array, x: Array) -> Samples:
-        """Samples of known tool points, axes and reference axes (k, 3).
+    def sampled(self, row: Ints, share: Array) -> Samples:
+        """Samples of the motion so far on from rows (k,) to the next ones.
 
         The second guess is where the tool looks. Over a hollow that is about as round as the
         standoff a tool point is near to the targets of several places. Where its axis does not fit
         to the nearest, the one that the tool looks at may be right.
         """
-        tolerance = self.task.effective_tolerance
+        q, tolerance = self.configurations(row, share), self.task.effective_tolerance
+        points, axes = self.kinematics.tools(q)
         ahead = points + max(self.task.standoff, self.offset.least_look) * axes
         only = None if self._curves is None else self._curves[row]
         places = self.offset.nearest(points, ahead, tolerance, only)
-        found = self.over(places, row, share, points, axes, x)
+        found = self.over(places, row, share, points, axes, self.reference_axes(q))
         bad = np.flatnonzero(~self.within(found) & (found.error <= tolerance))
         if not len(bad):
             return found
@@ -180,7 +180,7 @@ class Judge:
     def over(
         self, places: Places, row: Ints, share: Array, points: Array, axes: Array, x: Array
     ) -> Samples:
-        """`compared`, over given places."""
+        """`sampled`, of known tool points, axes and reference axes (k, 3), over given places."""
         target, approaches = self.targets(places)
         error = np.linalg.norm(points - target, axis=1)
         chord = np.linalg.norm(axes - approaches, axis=1)
@@ -201,8 +201,9 @@ class Judge:
             return self._sign * normals
         return np.where(np.isnan(normals), np.nan, self._approach)
 
-    def between_rows(self, poses: Jacobians, at: Samples) -> SampledStretches:
-        """The stretches from row to row, with poses and samples `at` every row."""
+    def between_rows(self, at: Samples) -> SampledStretches:
+        """The stretches from row to row, with samples `at` every row."""
+        poses = jacobians(self.kinematics, self.rows)
         steps, slides = np.abs(np.diff(self.rows, axis=0)), self.robot.prismatic
         second = np.zeros((len(steps), 3))
         second[:, 0] = second_derivatives(steps, slides, poses.levers, np.inf)

@@ -7,7 +7,6 @@ refused, and so is what is still open after many halvings.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +14,6 @@ import numpy as np
 from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.bisection import bisected
 from feasibility.certification.faults import MotionFault, and_others
-from feasibility.certification.lever_bounds import jacobians
 from feasibility.certification.stretches import Bounds, Judge, SampledStretches, Samples
 from feasibility.cone import angle_of
 from feasibility.task import Task
@@ -40,45 +38,56 @@ class Along(NamedTuple):
 
 def tool_along(judge: Judge) -> Along:
     """Judge tool point, axis and roll at all rows and between them."""
-    rows, marks = judge.rows, judge.marks
-    poses, x = jacobians(judge.kinematics, rows), judge.reference_axes(rows)
-    count = np.arange(len(rows))
-    at_rows = judge.compared(count, np.zeros(len(rows)), poses.points, poses.axes, x)
+    marks, samples, n_wrong = judge.marks, [judge.at_rows()], 0
     if marks is not None:
-        at_rows = _at_marks(judge, marks, at_rows)
-    good, every = judge.within(at_rows), judge.between_rows(poses, at_rows)
-    most, room = np.zeros(3), np.full((len(rows), 2), np.inf)
+        samples[0] = _at_marks(judge, marks, samples[0])
+    good, every = judge.within(samples[0]), judge.between_rows(samples[0])
+    most, room = np.zeros(3), np.full((len(good), 2), np.inf)
+
+    def note(one: Samples | Bounds, row: Ints) -> None:
+        # Nearer to a mesh's triangles than the standoff a tool point is off, too; further from them
+        # by no more than from its target.
+        off = np.maximum(one.error, judge.task.standoff - one.facets)
+        each = [np.max(values, initial=0.0) for values in (off, one.chord, one.roll)]
+        np.maximum(most, each, out=most)
+        less_room(room, judge.task, row, one.chord, one.roll)
 
     def decided(left: SampledStretches) -> Mask:
         bounds = judge.bounds(left)
         good = judge.within(bounds)
-        right = bounds.of(good)
-        np.maximum(most, _most(judge, right), out=most)
-        less_room(room, judge.task, left.row[good], right.chord, right.roll)
+        note(bounds.of(good), left.row[good])
         return good
 
-    left, between = _between(judge, every.of(good[:-1] & good[1:]), decided)
-    samples = Samples.join(at_rows, *between)
-    if marks is not None and len(rows) > 1:
-        wrong = ~judge.within(samples)
+    def halves(left: SampledStretches) -> SampledStretches:
+        nonlocal n_wrong
+        middle = judge.sampled(left.row, left.middle)
+        good = judge.within(middle)
+        samples.append(middle)
+        n_wrong += int((~good).sum())
+        good &= n_wrong <= ENOUGH
+        return left.of(good).halves(middle.of(good))
+
+    whole = every.of(good[:-1] & good[1:])  # others are wrong already
+    left, seen = bisected(whole, decided, halves, LEVELS, MOST_SAMPLES), Samples.join(*samples)
+    if marks is not None and len(good) > 1:
+        wrong = ~judge.within(seen)
         if (wrong.any() or len(left.row)) and wrong.sum() <= ENOUGH:  # or some were not looked at
             from feasibility.certification.followed import on_the_way
 
-            doubtful = np.append(samples.row[wrong], left.row)
-            right, more = on_the_way(judge, marks, at_rows, every.of_segment, doubtful, decided)
-            before = right[np.maximum(samples.row - 1, 0)] | (samples.share > 0.0)
-            samples = Samples.join(samples.of(~(wrong & right[samples.row] & before)), *more)
+            doubtful = np.append(seen.row[wrong], left.row)
+            right, more = on_the_way(judge, marks, samples[0], every.of_segment, doubtful, decided)
+            before = right[np.maximum(seen.row - 1, 0)] | (seen.share > 0.0)
+            seen = Samples.join(seen.of(~(wrong & right[seen.row] & before)), *more)
             left = left.of(~right[left.row])
-    wrong, rough = ~judge.within(samples), samples.share > 0.0
-    faults = exact_faults(judge, samples.of(wrong & ~rough), "row")
+    wrong, rough = ~judge.within(seen), seen.share > 0.0
+    faults = exact_faults(judge, seen.of(wrong & ~rough), "row")
     if (wrong & rough).any():
-        faults += exact_faults(judge, samples.of(wrong & rough), "place")
+        faults += exact_faults(judge, seen.of(wrong & rough), "place")
     elif len(left.row):
         faults.append(open_fault(judge, left, judge.bounds(left)))
-    samples = samples.of(np.lexsort((samples.share, samples.row)))  # as the motion passes them
-    np.maximum(most, _most(judge, samples), out=most)
-    less_room(room, judge.task, samples.row, samples.chord, samples.roll)
-    return Along(most, faults, samples, room)
+    seen = seen.of(np.lexsort((seen.share, seen.row)))  # as the motion passes them
+    note(seen, seen.row)
+    return Along(most, faults, seen, room)
 
 
 def _at_marks(judge: Judge, marks: Ints, at: Samples) -> Samples:
@@ -88,33 +97,6 @@ def _at_marks(judge: Judge, marks: Ints, at: Samples) -> Samples:
         return at
     aims = judge.task.targets(judge.cells).points[marks[bad]]
     return judge.corrected(at, bad, judge.offset.nearest(aims, aims, 0.0))
-
-
-def _between(
-    judge: Judge, stretches: SampledStretches, decided: Callable[[SampledStretches], Mask]
-) -> tuple[SampledStretches, list[Samples]]:
-    """Halve stretches whose ends are good, as needed: those still open, and what was looked at."""
-    samples, wrong = list[Samples](), [0]
-
-    def halves(left: SampledStretches) -> SampledStretches:
-        middle = judge.sampled(left.row, left.middle)
-        good = judge.within(middle)
-        samples.append(middle)
-        wrong[0] += int((~good).sum())
-        good &= wrong[0] <= ENOUGH
-        return left.of(good).halves(middle.of(good))
-
-    return bisected(stretches, decided, halves, LEVELS, MOST_SAMPLES), samples
-
-
-def _most(judge: Judge, one: Samples | Bounds) -> Array:
-    """(3,) the most of how far tool points are off (m), of |a - b| and of the roll (rad).
-
-    Nearer to a mesh's triangles than the standoff they are off, too; further from them they are off
-    by no more than from their targets.
-    """
-    off = np.maximum(one.error, judge.task.standoff - one.facets)
-    return np.array([np.max(each, initial=0.0) for each in (off, one.chord, one.roll)])
 
 
 def less_room(room: Array, task: Task, row: Ints, chord: Array, roll: Array) -> None:

@@ -146,8 +146,7 @@ def judged(robot, surface, task, *rows):
 def along(robot, surface, task, first, last, rounds=4):
     """Stretches of a motion of one joint, halved: of each its bounds, and 401 samples there."""
     judge = judged(robot, surface, task, first, last)
-    at = judge.sampled(np.arange(2), np.zeros(2))
-    stretch, found = judge.between_rows(jacobians(Kinematics(robot), judge.rows), at), []
+    stretch, found = judge.between_rows(judge.at_rows()), []
     for _ in range(rounds):
         bounds = judge.bounds(stretch)
         for k in range(len(stretch.length)):
@@ -203,8 +202,7 @@ def test_tolerance_and_cone_are_exact(share):
     off, turn = 0.5 - 0.5 * np.cos(0.3), np.degrees(0.3)
     for tolerance, cone in ((share * off, 60.0), (1.0, share * turn)):
         judge = judged(turning(), flat("patch"), Task(0.0, cone, tolerance), 0.3)
-        at = judge.sampled(np.zeros(1, int), np.zeros(1))
-        assert judge.within(at).all() == (share > 1.0)
+        assert judge.within(judge.at_rows()).all() == (share > 1.0)
 
 
 @pytest.mark.parametrize(("cone", "chord"), [(60, 1.0), (90, 2**0.5), (120, 3**0.5), (180, np.inf)])
@@ -219,8 +217,7 @@ def test_a_row_is_at_fault_where_it_is_not_within_one_of_its_margins(name, value
     """Facets have to be the standoff less the tolerance away: 20 mm less 10 mm."""
     task = Task(0.02, 30.0, 0.01, roll_deg=(-20.0, 20.0), roll_reference=(0.0, 0.0, 1.0))
     judge, none = judged(turning(), flat("patch"), task, 0.0), np.zeros(1)
-    at = judge.sampled(np.zeros(1, int), none)
-    right = replace(at, error=none, chord=none, roll=none, facets=np.full(1, np.inf))
+    right = replace(judge.at_rows(), error=none, chord=none, roll=none, facets=np.full(1, np.inf))
     chord = 2.0 * np.sin(np.radians(15.0))
     margins = {"error": 0.01, "chord": chord, "roll": np.radians(20.0), "facets": 0.01}
     given = replace(right, **{name: np.full(1, value * margins[name])})
@@ -234,8 +231,7 @@ def test_a_row_is_at_fault_where_it_is_not_within_one_of_its_margins(name, value
 def test_what_is_not_known_at_an_end_is_not_known_between():
     """No NaN in, no acceptance out: of error, tilt or distance from triangles, at either end."""
     judge = judged(turning(), flat("triangles"), Task(0.0, 180, 0.4), 0.0, 0.1)
-    at = judge.sampled(np.arange(2), np.zeros(2))
-    whole = judge.between_rows(jacobians(Kinematics(judge.robot), judge.rows), at)
+    whole = judge.between_rows(judge.at_rows())
     assert judge.within(judge.bounds(whole)).all()
     for end in ("start", "end"):
         for name in ("points", "axes", "facets"):
@@ -278,8 +274,7 @@ def test_a_cell_is_looked_for_all_along_the_way_past_it(reached, turn):
     tilt = np.radians(10.5 + turn * np.array([-1.0, 1.0]))  # by `turn` deg within 2 mm
     rows = np.column_stack([[-2e-3, 2e-3], tilt])
     judge = Judge(robot, task, offset_surface(cells.surface, 0.0), cells, rows)
-    samples = judge.sampled(np.arange(2), np.zeros(2))
-    assert cells_reached(judge, task, samples).cells.all() == reached
+    assert cells_reached(judge, task, judge.at_rows()).cells.all() == reached
 
 
 @pytest.mark.parametrize(("j", "end"), [(0, "lower"), (2, "upper")])

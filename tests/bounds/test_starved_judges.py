@@ -19,7 +19,6 @@ from random_arms import robot_of
 from coverable import Obstacle, Task, parametric, plane
 from feasibility.certification.collisions.collision_replay import Couples, collision_replay
 from feasibility.certification.collisions.motion import ArmMotion
-from feasibility.certification.lever_bounds import jacobians
 from feasibility.certification.motion_replay import replay_over_surface
 from feasibility.certification.rate_replay import in_place
 from feasibility.certification.roll_box_models import Directions, ToolModel, roll_models
@@ -56,9 +55,7 @@ def test_stretches_of_a_motion(name, held, bent):
     rows = np.vstack([a + share * (b - a) for a, b in itertools.pairwise(rows)])
     offset = offset_surface(surface, surface.side_sign * task.standoff)
     judge = Judge(robot, task, offset, cells, rows)
-    poses, x = jacobians(Kinematics(robot), rows), judge.reference_axes(rows)
-    known = judge.compared(np.arange(len(rows)), 0.0 * rows[:, 0], poses.points, poses.axes, x)
-    parts = judge.between_rows(poses, known)
+    parts = judge.between_rows(judge.at_rows())
     assert judge.within(judge.bounds(parts)).all()
     for column in bent:
         bounds = judge.bounds(replace(parts, of_segment=grown(parts.of_segment, column)))

@@ -51,7 +51,7 @@ class Refuter:
         cell = np.array([-1 if one is None else one for _, one in at])
         q = np.clip(starts, low, high)
         for _ in range(STEPS):
-            here = self._judge.along(q).sampled(np.arange(len(q)), np.zeros(len(q)))
+            here = self._judge.along(q).at_rows()
             kept, over = self._judge.within(here), cell >= 0
             held = here.points[over], here.axes[over], here.x[over]
             chord, _ = at_targets(self._task, self._targets, cell[over], *held)
