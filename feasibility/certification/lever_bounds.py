@@ -61,23 +61,20 @@ def column_changes(largest: Array, steps: Array, prismatic: Mask, twice: bool = 
     return np.asarray(largest * own ** (1 + twice) + np.where(prismatic, 0.0, behind))
 
 
-def levers_along(
-    steps: Array, prismatic: Mask, first: Array, last: Array, cap: Array | float
-) -> Array:
+def levers_along(steps: Array, prismatic: Mask, first: Array, last: Array, cap: float) -> Array:
     """(m, n) L_j along m segments.
 
     Args:
         steps: (m, n) bounds on |q'|, rad or m.
         prismatic: (n,) which joints slide.
         first, last: (m, n) r_j or s_j at both ends; of a prismatic joint 1 for points, 0 for axes.
-        cap: what no lever exceeds anywhere, of each joint (n,) or of all.
+        cap: what no lever exceeds anywhere: inf for points, 1 for axes.
     """
     largest, behind = np.maximum(first, last), np.zeros(len(first))
-    caps = np.broadcast_to(cap, largest.shape[1])
     for j in range(largest.shape[1] - 1, -1, -1):
         turned = 0.5 * steps[:, j]
         if not prismatic[j]:
-            largest[:, j] = np.minimum(largest[:, j] + behind, caps[j])
+            largest[:, j] = np.minimum(largest[:, j] + behind, cap)
             turned = np.minimum(turned, 2.0)
         behind = behind + largest[:, j] * turned
     return largest

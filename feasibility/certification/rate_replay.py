@@ -25,7 +25,6 @@ from scipy.spatial import cKDTree
 from coverable.arrays import Array, Mask
 from coverable.errors import ArgumentError, Fault
 from feasibility.certification.lever_bounds import (
-    Jacobians,
     jacobians,
     second_derivatives,
 )
@@ -96,9 +95,14 @@ def replay_rates(
     asked = (None, np.inf) if closely else (speed, sigma)
     found = segment_rates(robot, starts, ends, *asked, resting=resting)
     at = jacobians(Kinematics(robot), rows)
-    waits = resting & (_times(robot, starts, ends) > 0.0)
-    if speed is not None and len(starts):
-        waits &= _exact_speeds(robot, at, starts, ends) < speed
+    # How long segments take with one joint at its limit; 0 where limits are not known.
+    steps = ends - starts
+    lasts = (np.abs(steps) / robot.max_velocity).max(axis=1, initial=0.0)
+    lasts = np.where(np.isfinite(lasts), lasts, 0.0)
+    waits = resting & (lasts > 0.0)
+    if speed is not None:  # where it is possible at both ends, it is no stop
+        ways = [np.einsum("kij,kj->ki", one, steps) for one in (at.point[:-1], at.point[1:])]
+        waits &= np.linalg.norm(ways, axis=2).min(axis=0) < speed * lasts
     stops = _stops(at.points, targets, resting, waits)
     refusals = []
     slow = np.flatnonzero(~resting & ~(found.speed >= (speed or -np.inf)))
@@ -119,24 +123,8 @@ def replay_rates(
         )
     return RateReplay(
         float(found.speed[~resting].min(initial=np.inf)), float(found.sigma.min(initial=np.inf)),
-        found, stops, float(_times(robot, starts, ends)[waits].sum()), tuple(refusals),
+        found, stops, float(lasts[waits].sum()), tuple(refusals),
     )  # fmt: skip
-
-
-def _times(robot: Robot, starts: Array, ends: Array) -> Array:
-    """(m,) s, how long segments take with one joint at its limit; 0 where limits are not known."""
-    times = (np.abs(ends - starts) / robot.max_velocity).max(axis=1, initial=0.0)
-    return np.where(np.isfinite(times), times, 0.0)
-
-
-def _exact_speeds(robot: Robot, at: Jacobians, starts: Array, ends: Array) -> Array:
-    """(m,) m/s, the less that the tool may have at the two ends of segments."""
-    time = np.maximum(_times(robot, starts, ends), 1e-300)
-    ways = [
-        np.linalg.norm(np.einsum("kij,kj->ki", point, ends - starts), axis=1)
-        for point in (at.point[:-1], at.point[1:])
-    ]
-    return np.asarray(np.minimum(*ways) / time)
 
 
 def in_place(robot: Robot, cells: Cells, task: Task, q: Array) -> Mask:
@@ -202,16 +190,11 @@ def check_rates(robot: Robot, task: Task) -> None:
     """
     if task.speed is None:
         return
-    unknown = [
-        name
-        for name, most in zip(robot.joint_names, robot.max_velocity.tolist(), strict=True)
-        if not np.isfinite(most)
-    ]
+    unknown = [robot.joint_names[j] for j in np.flatnonzero(~np.isfinite(robot.max_velocity))]
     if unknown:
         what = f"cannot be judged: the URDF of {robot.name!r} limits no velocity of "
-        named = ", ".join(unknown)
         add = 'add velocity="..." to <limit>, or max_velocity_deg (_m) to [[robot.axis]]'
-        raise ArgumentError(Fault("speed", what + named, expected=add), "task")
+        raise ArgumentError(Fault("speed", what + ", ".join(unknown), expected=add), "task")
     most = fastest_anywhere(robot)
     if task.speed > most:
         what = f"got {task.speed:g}, but with all joints at their velocities the tool of "
