@@ -18,7 +18,7 @@ from feasibility.certification.collisions.everywhere import Deepest
 from feasibility.certification.cut_proofs import linear_models, parts_agreement
 from feasibility.certification.cut_proofs.box_cutting import JointRegion, cut, smaller
 from feasibility.certification.cut_proofs.empty_region import Claim, Emptiness
-from feasibility.certification.cut_proofs.linear_models import ArmModel, Boxes, target_parts
+from feasibility.certification.cut_proofs.linear_models import Boxes, models_of, target_parts
 from feasibility.certification.cut_proofs.parts_agreement import disagreement, places
 from feasibility.roll import projected, roll_of
 from robots.kinematics import Kinematics, reference_axes
@@ -72,9 +72,8 @@ def known(rng, boxes=50):
     if angle < np.pi / 2 and rng.random() < 0.5:
         task = rolled_task(rng, robot, q, patch, (u, v), standoff)
     parts = target_parts(patch.parts(0.3 * tolerance, 0.3 * chord, 600), patch.cells(1, 1), task)
-    arm = ArmModel(robot, robot.lower - FAR, robot.upper + FAR)
     allowed = linear_models.Allowed(tolerance, chord, 0.5, task.roll)
-    emptiness = Emptiness(arm, parts, allowed, lambda: None)
+    emptiness = Emptiness(Kinematics(robot), parts, allowed, lambda: None)
     part, x = at_parameters(patch, u, v)
     made, within = boxes_around(rng, robot, q, parts, int(part[0]), x[0], boxes)
     return Known(emptiness, made, within)
@@ -157,7 +156,7 @@ def test_no_region_around_a_known_place_is_said_to_be_empty(seed):
     rng = np.random.default_rng(seed)
     for _ in range(10):
         case = known(rng, 1)
-        q, arm = case.places[0][:-2], case.emptiness.arm
+        q, arm = case.places[0][:-2], case.emptiness.kinematics.robot
         for _ in range(3):
             size = np.exp(rng.uniform(np.log(1e-6), np.log(8.0), (2, arm.n)))
             size[:, rng.random(arm.n) < 0.2] = 0.0
@@ -177,12 +176,12 @@ def test_models_hold_over_their_boxes_and_hardly_less_would(size):
     task = Task(0.02, 20)
     parts = target_parts(dome.parts(0.01, 0.05), dome.cells(1, 1), task)
     part = int(np.argmin(parts.radius[:, 0]))
-    arm, allowed = ArmModel(UR5, UR5.lower, UR5.upper), linear_models.Allowed(0.0, 0.0, 0.5)
+    allowed = linear_models.Allowed(0.0, 0.0, 0.5)
     for halves in (*(size * np.eye(6)[:5]), np.full(6, 0.2 * size)):
         q, x = rng.uniform(-1.5, 1.5, 6), rng.uniform(-0.5, 0.5, 2)
         centre, half = np.append(q, x), np.append(halves, [0.4, 0.4])
         box = Boxes((centre - half)[None], (centre + half)[None], *np.array([[part], [0]]))
-        made = arm.models(box, parts, allowed)
+        made = models_of(Kinematics(UR5), box, parts, allowed)
         d = rng.uniform(-1, 1, (300, 8))
         d = np.where(rng.random(d.shape) < 0.5, np.sign(d), d) * half
         points, axes = Kinematics(UR5).tools(q + d[:, :6])
@@ -221,9 +220,9 @@ def test_bodies_are_asked_to_overlap_wherever_the_target_of_a_box_may_be():
             return Deepest(np.full(len(low), np.inf), np.zeros(low.shape), np.full(len(low), -1))
 
     parts = target_parts(dome.parts(0.01, 0.05), dome.cells(1, 1), Task(0.02, 20))
-    arm, part = ArmModel(UR5, UR5.lower, UR5.upper), int(np.argmax(parts.radius[:, 0]))
+    part = int(np.argmax(parts.radius[:, 0]))
     allowed = linear_models.Allowed(10.0, 4.0, 0.5)  # so that nothing is excluded
-    search = Emptiness(arm, parts, allowed, lambda: None, Asked())
+    search = Emptiness(Kinematics(UR5), parts, allowed, lambda: None, Asked())
     q, x = np.zeros(6), np.array([0.3, -0.2])
     half = np.append(np.full(6, 1e-3), [0.5, 0.25])
     centre = np.append(q, x)

@@ -7,7 +7,7 @@ from referee import unit
 from coverable import Task, load_robot, sphere
 from feasibility.certification import roll_box_models
 from feasibility.certification.cut_proofs import linear_models
-from feasibility.certification.cut_proofs.linear_models import Allowed, ArmModel, target_parts
+from feasibility.certification.cut_proofs.linear_models import Allowed, models_of, target_parts
 from feasibility.certification.roll_box_models import Directions, reference_parts, roll_models
 from feasibility.roll import Roll, projected
 from robots.kinematics import Kinematics, reference_axes
@@ -60,13 +60,15 @@ def test_all_joints_together_turn_the_reference_axis():
     dome = sphere(0.3, (0, 25), (0, 360), side="outside")
     task = Task(0.02, 20, roll_deg=(-30, 30), roll_reference=(1, 0, 0))
     parts = target_parts(dome.parts(0.01, 0.05), dome.cells(1, 1), task)
-    arm, q = ArmModel(UR5, UR5.lower, UR5.upper), np.append(np.full(6, 0.5), [0.0, 0.0])
+    q = np.append(np.full(6, 0.5), [0.0, 0.0])
     part = int(np.argmin(parts.radius[:, 1]))
 
     def radii(joints):
         half = np.append(1e-4 * joints, [1.0, 1.0])
         box = linear_models.Boxes((q - half)[None], (q + half)[None], *np.array([[part], [0]]))
-        return arm.models(box, parts, Allowed(1e-3, 0.3, 1.0, task.roll)).radius[0, 2:]
+        return models_of(Kinematics(UR5), box, parts, Allowed(1e-3, 0.3, 1.0, task.roll)).radius[
+            0, 2:
+        ]
 
     none = radii(np.zeros(6))
     alone = sum(radii(one) - none for one in np.eye(6))

@@ -14,7 +14,7 @@ from feasibility.certification.collisions.every_pose import never_clear
 from feasibility.certification.collisions.everywhere import Overlapping
 from feasibility.certification.cut_proofs import linear_models
 from feasibility.certification.cut_proofs.box_exclusion import contract, separated
-from feasibility.certification.cut_proofs.linear_models import ArmModel, Boxes, target_parts
+from feasibility.certification.cut_proofs.linear_models import Boxes, models_of, target_parts
 from feasibility.certification.cut_proofs.proof_verification import verify_on
 from feasibility.collisions.asked_bodies import gather
 from robots.kinematics import Kinematics
@@ -46,12 +46,13 @@ def test_boxes_of_joints(roll):
     """Every term of the radii, and every radius of what separates and contracts boxes."""
     task, cells = Task(0.02, 20, **roll), DOME.cells(1, 1)
     parts = target_parts(DOME.parts(0.01, 0.05), cells, task)
-    arm, q = ArmModel(UR5, UR5.lower, UR5.upper), np.append(np.full(6, 0.3), [0.0, 0.0])
+    q = np.append(np.full(6, 0.3), [0.0, 0.0])
     fed = linear_models.Allowed(task.effective_tolerance, task.cone_chord, 0.2, task.roll)
 
     def model(parts=parts, allowed=fed, half=0.01):
         none = np.zeros(1, dtype=np.int64)
-        return arm.models(Boxes(q[None] - half, q[None] + half, none, none), parts, allowed)
+        boxes = Boxes(q[None] - half, q[None] + half, none, none)
+        return models_of(Kinematics(UR5), boxes, parts, allowed)
 
     def proved(made):
         low, high = contract(made, np.ones((1, 1, made.residual.shape[1])))

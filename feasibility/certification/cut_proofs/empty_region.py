@@ -35,16 +35,17 @@ from feasibility.certification.cut_proofs.box_exclusion import (
 )
 from feasibility.certification.cut_proofs.linear_models import (
     Allowed,
-    ArmModel,
     Boxes,
     Models,
     Parts,
     cell_parts,
+    models_of,
 )
 from feasibility.certification.cut_proofs.refutation import Refuter
 from feasibility.certification.lever_bounds import out_of_line
 from feasibility.collisions.problem_bodies import Bodies
 from feasibility.task import Task
+from robots.kinematics import Kinematics
 from robots.robot import Robot
 from surfaces.cells import Cells
 
@@ -84,7 +85,8 @@ class Outcome:
 class Emptiness:
     """Proves regions empty of configurations with the tool on the surface, or at cells' targets."""
 
-    arm: ArmModel
+    kinematics: Kinematics
+    """Of the arm."""
     parts: Parts
     """Of the surface, and targets of cells as parts of their own."""
     allowed: Allowed
@@ -98,9 +100,9 @@ class Emptiness:
 
     def test(self, claims: list[Claim], refuter: Refuter, most: int) -> Outcome:
         """Confirm all claims, refute one, or give up after `most` boxes."""
-        regions = [claim.region.folded(self.arm.prismatic) for claim in claims]
+        regions = [claim.region.folded(self.kinematics.robot.prismatic) for claim in claims]
         first = [k for k, region in enumerate(regions) if not region.empty]
-        done, next_try, n = 0, FIRST_TRY, self.arm.n
+        done, next_try, n = 0, FIRST_TRY, self.kinematics.robot.n
         waiting = Boxes(
             np.array([[*regions[k].low, -1.0, -1.0] for k in first]).reshape(-1, n + 2),
             np.array([[*regions[k].high, 1.0, 1.0] for k in first]).reshape(-1, n + 2),
@@ -133,7 +135,7 @@ class Emptiness:
 
     def examine(self, boxes: Boxes) -> tuple[Boxes, Models, Array]:
         """The boxes that are not proved empty, their models, and where these come nearest."""
-        models = self.arm.models(boxes, self.parts, self.allowed)
+        models = models_of(self.kinematics, boxes, self.parts, self.allowed)
         normals = self.parts.centre[boxes.part, 3:]
         low, high = contract(models, directions_for(models, normals))
         kept = np.asarray(~(low > high).any(axis=1))
@@ -155,7 +157,7 @@ class Emptiness:
 
         And along what they are cut, (m, n + 2) m.
         """
-        n, parts, part = self.arm.n, self.parts, boxes.part
+        n, parts, part = self.kinematics.robot.n, self.parts, boxes.part
         low, high = boxes.centre + models.low, boxes.centre + models.high
         at, half = 0.5 * (low + high)[:, n:], 0.5 * (high - low)[:, n:]
         slopes = parts.slopes[part][..., :3]
@@ -219,9 +221,9 @@ class ArmCollisions:
 
         `tick` is called between batches of them; it may raise.
         """
-        arm = ArmModel(self._robot, self._region.low, self._region.high)
-        allowed, parts = Allowed.by(self._task, arm), cell_parts(self._targets)
-        engine = Emptiness(arm, parts, allowed, tick, self._overlapping)
+        allowed = Allowed.by(self._task, self._robot, self._region.low, self._region.high)
+        parts = cell_parts(self._targets)
+        engine = Emptiness(Kinematics(self._robot), parts, allowed, tick, self._overlapping)
         refuter = Refuter(self._robot, self._cells, self._task, allowed.length)
         found = engine.test([Claim("", self._region, cell, cell)], refuter, most)
         if found.failed is not None:

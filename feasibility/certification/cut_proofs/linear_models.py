@@ -107,9 +107,9 @@ class Allowed(NamedTuple):
     """The range of the roll, at most 180 deg; None where the roll is not looked at."""
 
     @staticmethod
-    def by(task: Task, arm: ArmModel) -> Allowed:
-        """What a task allows an arm."""
-        length = max(TYPICAL * arm.longest, 1e-3)
+    def by(task: Task, robot: Robot, low: Array, high: Array) -> Allowed:
+        """What a task allows an arm with joints inside low .. high (n,), both finite."""
+        length = max(TYPICAL * float(longest_levers(robot, low, high).max()), 1e-3)
         # A wider range leaves out too little for boxes to show it; so does what is proved without.
         roll = task.roll if task.roll is not None and task.roll.half <= 0.5 * np.pi else None
         return Allowed(task.effective_tolerance, min(task.cone_chord, ANY_AXIS), length, roll)
@@ -157,65 +157,56 @@ class Models(Rows):
     """(m, n + 2) m, by how much each variable can change the residual, about, for cutting boxes."""
 
 
-class ArmModel:
-    """Pinocchio's view of one arm, and a lever (m) that none exceeds."""
+def models_of(kinematics: Kinematics, boxes: Boxes, parts: Parts, allowed: Allowed) -> Models:
+    """The linear model of every box."""
+    robot, length, part = kinematics.robot, allowed.length, boxes.part
+    n = robot.n
+    centre, half = boxes.centre, 0.5 * (boxes.high - boxes.low)
+    at_centre = jacobians(kinematics, centre[:, :n])
+    by_joint = np.concatenate([at_centre.point, length * at_centre.axis], axis=1)
+    by_joint = np.ascontiguousarray(by_joint.transpose(0, 2, 1))
+    tool = np.concatenate([at_centre.points, length * at_centre.axes], axis=1)
+    weights = np.array([1.0, 1.0, 1.0, length, length, length])
+    slopes = parts.slopes[part] * weights
+    target = parts.centre[part] * weights
+    target = target + (centre[:, n:, None] * slopes).sum(axis=1)
+    h = half[:, :n]
+    levers, sines = at_centre.levers, at_centre.sines
+    of_point, of_axis = (second_derivative_bound(r, h, robot.prismatic) for r in (levers, sines))
+    radius = np.empty((len(boxes), 2))
+    radius[:, 0] = allowed.position + parts.radius[boxes.part, 0] + 0.5 * of_point
+    radius[:, 1] = allowed.axis + parts.radius[boxes.part, 1] + 0.5 * of_axis
+    reach = [(levers + length * sines) * h, np.linalg.norm(slopes, axis=2) * half[:, n:]]
+    made = Models(
+        residual=tool - target,
+        columns=np.concatenate([by_joint, -slopes], axis=1),
+        radius=(radius + GUARD) * [1.0, length],
+        low=boxes.low - centre,
+        high=boxes.high - centre,
+        reach=np.concatenate(reach, axis=1),
+    )
+    if allowed.roll is None:
+        return made
+    b = Directions(parts.centre[part, 3:], parts.slopes[part][..., 3:], parts.radius[part, 1])
+    b, t = (one.at(centre[:, n:]) for one in (b, parts.references.of(part)))
+    frame = _frames(robot, centre[:, :n], h, at_centre)
+    found = roll_models(frame, b, t, half[:, n:], allowed.roll)
+    made.reach[:, :n] += length * np.linalg.norm(frame.columns, axis=3).sum(axis=2) * h
+    return replace(
+        made,
+        residual=np.concatenate([made.residual, length * found.residual], axis=1),
+        columns=np.concatenate([made.columns, length * found.columns], axis=2),
+        radius=np.concatenate([made.radius, length * found.radius], axis=1),
+    )
 
-    def __init__(self, robot: Robot, low: Array, high: Array) -> None:
-        """Work with joints inside low .. high (n,), both finite."""
-        self.robot = robot
-        self.kinematics = Kinematics(robot)
-        self.prismatic = robot.prismatic
-        self.n = robot.n
-        self.longest = float(longest_levers(robot, low, high).max())
 
-    def models(self, boxes: Boxes, parts: Parts, allowed: Allowed) -> Models:
-        """The linear model of every box."""
-        n, length, part = self.n, allowed.length, boxes.part
-        centre, half = boxes.centre, 0.5 * (boxes.high - boxes.low)
-        at_centre = jacobians(self.kinematics, centre[:, :n])
-        by_joint = np.concatenate([at_centre.point, length * at_centre.axis], axis=1)
-        by_joint = np.ascontiguousarray(by_joint.transpose(0, 2, 1))
-        tool = np.concatenate([at_centre.points, length * at_centre.axes], axis=1)
-        weights = np.array([1.0, 1.0, 1.0, length, length, length])
-        slopes = parts.slopes[part] * weights
-        target = parts.centre[part] * weights
-        target = target + (centre[:, n:, None] * slopes).sum(axis=1)
-        h = half[:, :n]
-        levers, sines = at_centre.levers, at_centre.sines
-        of_point, of_axis = (second_derivative_bound(r, h, self.prismatic) for r in (levers, sines))
-        radius = np.empty((len(boxes), 2))
-        radius[:, 0] = allowed.position + parts.radius[boxes.part, 0] + 0.5 * of_point
-        radius[:, 1] = allowed.axis + parts.radius[boxes.part, 1] + 0.5 * of_axis
-        reach = [(levers + length * sines) * h, np.linalg.norm(slopes, axis=2) * half[:, n:]]
-        made = Models(
-            residual=tool - target,
-            columns=np.concatenate([by_joint, -slopes], axis=1),
-            radius=(radius + GUARD) * [1.0, length],
-            low=boxes.low - centre,
-            high=boxes.high - centre,
-            reach=np.concatenate(reach, axis=1),
-        )
-        if allowed.roll is None:
-            return made
-        b = Directions(parts.centre[part, 3:], parts.slopes[part][..., 3:], parts.radius[part, 1])
-        b, t = (one.at(centre[:, n:]) for one in (b, parts.references.of(part)))
-        frame = self._frames(centre[:, :n], h, at_centre)
-        found = roll_models(frame, b, t, half[:, n:], allowed.roll)
-        made.reach[:, :n] += length * np.linalg.norm(frame.columns, axis=3).sum(axis=2) * h
-        return replace(
-            made,
-            residual=np.concatenate([made.residual, length * found.residual], axis=1),
-            columns=np.concatenate([made.columns, length * found.columns], axis=2),
-            radius=np.concatenate([made.radius, length * found.radius], axis=1),
-        )
-
-    def _frames(self, q: Array, half: Array, at: Jacobians) -> ToolModel:
-        """x and y of the tool over boxes of joints of half widths (m, n) about q (m, n)."""
-        x = reference_axes(self.robot, q)
-        both = np.stack([x, np.cross(at.axes, x)], axis=1)
-        turned = [np.cross(at.angular, both[:, k, :, None], axis=1) for k in (0, 1)]
-        sines = [np.linalg.norm(one, axis=1) for one in turned]
-        moves = [np.minimum((one * half).sum(axis=1), 2.0) for one in sines]
-        seconds = [second_derivative_bound(one, half, self.prismatic) for one in sines]
-        columns = np.stack(turned, axis=1).transpose(0, 3, 1, 2)
-        return ToolModel(both, columns, np.column_stack(seconds), np.column_stack(moves))
+def _frames(robot: Robot, q: Array, half: Array, at: Jacobians) -> ToolModel:
+    """x and y of the tool over boxes of joints of half widths (m, n) about q (m, n)."""
+    x = reference_axes(robot, q)
+    both = np.stack([x, np.cross(at.axes, x)], axis=1)
+    turned = [np.cross(at.angular, both[:, k, :, None], axis=1) for k in (0, 1)]
+    sines = [np.linalg.norm(one, axis=1) for one in turned]
+    moves = [np.minimum((one * half).sum(axis=1), 2.0) for one in sines]
+    seconds = [second_derivative_bound(one, half, robot.prismatic) for one in sines]
+    columns = np.stack(turned, axis=1).transpose(0, 3, 1, 2)
+    return ToolModel(both, columns, np.column_stack(seconds), np.column_stack(moves))

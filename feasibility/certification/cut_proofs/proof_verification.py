@@ -36,7 +36,6 @@ from feasibility.certification.cut_proofs.box_cutting import TURN, JointRegion
 from feasibility.certification.cut_proofs.empty_region import Claim, Emptiness, Outcome
 from feasibility.certification.cut_proofs.linear_models import (
     Allowed,
-    ArmModel,
     Parts,
     cell_parts,
     target_parts,
@@ -177,8 +176,7 @@ def verify_on(
     )
     if fault:
         return ProofCheck(fault, 0)
-    arm = ArmModel(robot, limits.low, limits.high)
-    allowed = Allowed.by(task, arm)
+    allowed = Allowed.by(task, robot, limits.low, limits.high)
 
     claims = list(_claims(robot, cells, tree, limits, first))
     if parts is None:
@@ -187,7 +185,9 @@ def verify_on(
     bodies = gather(robot, cells.surface, task.collision, task.standoff)
 
     def tested(boxes: int, overlapping: Overlapping | None = None) -> Outcome:
-        return Emptiness(arm, held, allowed, tick, overlapping).test(claims, refuter, boxes)
+        return Emptiness(Kinematics(robot), held, allowed, tick, overlapping).test(
+            claims, refuter, boxes
+        )
 
     found = tested(most if bodies is None else min(most, WITHOUT_BODIES))
     if found.failed is not None and bodies is not None:
