@@ -19,17 +19,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coverable.arrays import Array, Ints
+from coverable.arrays import Array
 from robots.errors import RobotError
 from robots.shapes.bodies import Geometry, HalfSpace, Triangles
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
+KEPT = 256  # shapes whose hulls are kept
 MOST_VERTICES = 64
 CLOSE_ENOUGH = 1e-4  # [m]: no vertex is added for less
 HALF_THICKNESS = 1e-5  # [m] a body without thickness is given this much to each side
 ROUNDING = 1e-12  # of a body's width: what hull and distances may be wrong by
 PRISM_EXCESS = 3e-4  # [m] the corners of a prism around a cylinder stand out by at most this ...
-FACETS = 3  # of a hull, that a distance is taken from at first; four is the least a hull has
 CHUNK = 256  # points whose distances from all facets are taken at a time
 MOST_SIDES = 32  # ... where so many sides are enough
 ROUNDED = 1e-9  # [1] of a hull's volume: what a convex body may miss of it by rounding
@@ -44,10 +44,14 @@ class Hull(NamedTuple):
     """m."""
 
 
+@lru_cache(maxsize=KEPT)
 def hull_of(shape: Geometry) -> Hull:
     """A convex body that holds a shape, in the shape's frame; exact for balls, capsules and boxes.
 
     A cylinder becomes a prism around it.
+
+    Raises:
+        RobotError: it is a half space.
     """
     match shape:
         case Sphere(radius):
@@ -58,19 +62,14 @@ def hull_of(shape: Geometry) -> Hull:
             half = 0.5 * np.array(size)
             return Hull(_box_corners(-half, half), 0.0)
         case Cylinder(radius, length):
-            return Hull(_prism(radius, length), 0.0)
+            # A corner is at radius / cos(pi / k).
+            sides = math.ceil(math.pi / math.acos(radius / (radius + PRISM_EXCESS)))
+            sides = min(max(sides, 8), MOST_SIDES)
+            return Hull(rims(radius / math.cos(math.pi / sides), length, sides), 0.0)
         case Triangles():
-            return _hull_of_mesh(shape)
+            return outer_hull(shape.vertices)
         case HalfSpace():
             raise RobotError("a half space has no end")
-
-
-def _prism(radius: float, length: float) -> Array:
-    """(2 k, 3) corners of a regular prism around a cylinder."""
-    # A corner is at radius / cos(pi / k).
-    sides = math.ceil(math.pi / math.acos(radius / (radius + PRISM_EXCESS)))
-    sides = min(max(sides, 8), MOST_SIDES)
-    return rims(radius / math.cos(math.pi / sides), length, sides)
 
 
 def rims(radius: float, length: float, count: int) -> Array:
@@ -79,12 +78,6 @@ def rims(radius: float, length: float, count: int) -> Array:
     ring = radius * np.column_stack([np.cos(angle), np.sin(angle)])
     ends = [np.column_stack([ring, np.full(count, z)]) for z in (-length / 2, length / 2)]
     return np.concatenate(ends)
-
-
-@lru_cache(maxsize=256)
-def _hull_of_mesh(mesh: Triangles) -> Hull:
-    """The hull of all vertices; the same mesh is looked at once."""
-    return outer_hull(mesh.vertices)
 
 
 def outer_hull(points: Array) -> Hull:
@@ -177,31 +170,25 @@ def _reach_outside(hull: Any, points: Array) -> float:
     """m, an upper bound on the distance of any of the points from a hull of `scipy.spatial`.
 
     A point is projected onto the planes of facets, and moved into each facet by clipping its
-    barycentric coordinates: the nearest of these places is in the hull. A few facets do where they
-    give less than the height of some other point above the hull.
+    barycentric coordinates: the nearest of these places is in the hull.
     """
-    heights = points @ hull.equations[:, :3].T + hull.equations[:, 3]
-    highest = float(heights.max())
-    if highest <= 0.0:
+    heights = (points @ hull.equations[:, :3].T + hull.equations[:, 3]).max(axis=1)
+    if not (heights > 0.0).any():
         return 0.0
     corners = hull.points[hull.simplices]  # (f, 3, 3)
     inverse = np.linalg.pinv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))  # (f, 2, 3)
 
-    def gaps(some: Array, facets: Ints) -> Array:
-        offsets = some[:, None] - corners[facets, 0]
-        shares = np.einsum("nfij,nfj->nfi", inverse[facets], offsets)
+    def gaps(some: Array) -> Array:
+        shares = np.einsum("fij,nfj->nfi", inverse, some[:, None] - corners[:, 0])
         first = 1.0 - shares.sum(axis=2, keepdims=True)
         weights = np.concatenate([first, shares], axis=2).clip(0.0)
         weights /= weights.sum(axis=2, keepdims=True)
-        places = np.einsum("nfi,nfij->nfj", weights, corners[facets])
+        places = np.einsum("nfi,fij->nfj", weights, corners)
         return np.asarray(np.linalg.norm(places - some[:, None], axis=2).min(axis=1))
 
-    outside = np.flatnonzero(heights.max(axis=1) > 0.0)
-    few = np.argpartition(-heights[outside], FACETS, axis=1)[:, :FACETS]
-    doubtful = outside[gaps(points[outside], few) > highest]
-    every = np.arange(len(corners))[None]
-    chunks = np.split(doubtful, range(CHUNK, len(doubtful), CHUNK))
-    return max([highest, *(float(gaps(points[k], every).max()) for k in chunks if len(k))])
+    outside = points[heights > 0.0]
+    chunks = np.split(outside, range(CHUNK, len(outside), CHUNK))
+    return max(float(heights.max()), *(float(gaps(some).max()) for some in chunks))
 
 
 MOST_PIECES = 8
@@ -220,16 +207,10 @@ class _Cut(NamedTuple):
     """m^3, of the hulls together."""
 
 
-def pieces_of(shape: Geometry) -> list[Hull]:
+@lru_cache(maxsize=KEPT)
+def pieces_of(mesh: Geometry) -> tuple[Hull, ...]:
     """Convex bodies that together hold a shape; one where more would not be much smaller."""
-    if isinstance(shape, Triangles):
-        return list(_pieces_of_mesh(shape))
-    return [hull_of(shape)]
-
-
-@lru_cache(maxsize=256)
-def _pieces_of_mesh(mesh: Triangles) -> tuple[Hull, ...]:
-    if is_convex(mesh, WORTH):
+    if not isinstance(mesh, Triangles) or is_convex(mesh, WORTH):
         return (hull_of(mesh),)
     points = _on_surface(mesh)
     cut = min((_best_cut(points, axis) for axis in range(3)), key=lambda cut: cut.volume)

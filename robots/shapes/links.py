@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,7 +13,7 @@ from robots.errors import RobotError
 from robots.robot import Robot
 from robots.shapes.bodies import Fineness, Geometry, Polytope, Solid
 from robots.shapes.hulls import hull_of, pieces_of
-from robots.shapes.solids import MeshBodies
+from robots.shapes.solids import mesh_reader
 from robots.urdf.checked_urdf import CheckedUrdf, check_urdf
 from robots.urdf.link_shapes import LinkShape, MeshFile, mesh_paths
 
@@ -92,12 +92,11 @@ def link_shapes(robot: Robot, fineness: Fineness = "hulls") -> LinkShapes:
 def outer_bodies(solid: Solid, fineness: Fineness = "hulls") -> list[Polytope]:
     """Convex bodies that together hold a solid, in the frame of its joint."""
     place = solid.placement
-    hulls = [hull_of(solid.geometry)] if fineness == "hulls" else pieces_of(solid.geometry)
-    bodies = []
-    for hull in hulls:
-        vertices = hull.vertices @ place[:3, :3].T + place[:3, 3]
-        bodies.append(Polytope(solid.owner, solid.joint, vertices, hull.radius))
-    return bodies
+    hulls = (hull_of(solid.geometry),) if fineness == "hulls" else pieces_of(solid.geometry)
+    return [
+        Polytope(solid.owner, solid.joint, vertices @ place[:3, :3].T + place[:3, 3], radius)
+        for vertices, radius in hulls
+    ]
 
 
 @dataclass(eq=False, slots=True)
@@ -121,7 +120,7 @@ def _gathered(robot: Robot, checked: CheckedUrdf) -> _Gathered:
     """Take the shapes of all links."""
     own, model = checked.collisions, robot.model
     bodies = {frame.name for frame in model.frames if frame.type == pin.FrameType.BODY}
-    meshes = MeshBodies(mesh_paths(own.shapes or checked.visuals))
+    read = mesh_reader(mesh_paths(own.shapes or checked.visuals))
     faults = [{one.link: one.why for one in some} for some in (own.faults, checked.visual_faults)]
     drawn = {shape.link for shape in checked.visuals}
     made = _Gathered([link for link in own.without if link in drawn])
@@ -132,9 +131,9 @@ def _gathered(robot: Robot, checked: CheckedUrdf) -> _Gathered:
         made.carriers.setdefault(int(frame.parentJoint), link)
         if link in own.without:
             continue
-        found, fault = _read(meshes, link, own.shapes, faults[0])
+        found, fault = _read(read, link, own.shapes, faults[0])
         if fault or not found:
-            shown, unseen = _read(meshes, link, checked.visuals, faults[1])
+            shown, unseen = _read(read, link, checked.visuals, faults[1])
             if unseen or (fault and not shown):
                 made.lost.setdefault(unseen or fault, []).append(link)
             elif fault:
@@ -150,14 +149,17 @@ def _gathered(robot: Robot, checked: CheckedUrdf) -> _Gathered:
 
 
 def _read(
-    meshes: MeshBodies, link: str, shapes: Iterable[LinkShape], faults: Mapping[str, str]
+    read: Callable[[MeshFile], Geometry],
+    link: str,
+    shapes: Iterable[LinkShape],
+    faults: Mapping[str, str],
 ) -> tuple[list[tuple[np.ndarray, Geometry]], str]:
     """The shapes of a link that can be used, and what is wrong with the first of the others."""
     found, fault = list[tuple[np.ndarray, Geometry]](), ""
     for shape in (one for one in shapes if one.link == link):
         given = shape.geometry
         try:
-            geometry = meshes.read(given) if isinstance(given, MeshFile) else given
+            geometry = read(given) if isinstance(given, MeshFile) else given
             found.append((shape.origin, geometry))
         except RobotError as error:
             fault = fault or str(error)

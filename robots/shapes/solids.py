@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from hashlib import sha256
 from pathlib import Path
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
 from coverable.files import FileFault, read_regular
-from coverable.meshes.raw_mesh import MeshError, distinct
+from coverable.meshes.raw_mesh import MeshError, distinct, joined
 from coverable.meshes.robot_files import MeshFiles, largest_file
 from robots.errors import RobotError
 from robots.shapes.bodies import Triangles
@@ -57,17 +57,17 @@ def checked_triangles(vertices: Array, faces: Ints, what: str = "the mesh") -> T
         faults.append(f"{what} names a vertex that it does not have; it is damaged")
     if faults:
         raise RobotError(faults)
-    joined, number = distinct(points)
+    each, number = distinct(points)
     kept = number[corners]
     a, b, c = kept.T
     kept = kept[(a != b) & (b != c) & (c != a)]
-    p, q, r = (joined[kept[:, k]] for k in range(3))
+    p, q, r = (each[kept[:, k]] for k in range(3))
     if not np.linalg.norm(np.cross(q - p, r - p), axis=1).any():
         raise RobotError(f"{what} has no triangle with an area")
-    solid = solid_faces(joined, kept)
+    solid = solid_faces(each, kept)
     kept = kept if solid is None else solid
-    joined.flags.writeable = kept.flags.writeable = False
-    return Triangles(joined, kept, closed=solid is not None)
+    each.flags.writeable = kept.flags.writeable = False
+    return Triangles(each, kept, closed=solid is not None)
 
 
 def solid_faces(vertices: Array, faces: Ints) -> Ints | None:
@@ -91,7 +91,8 @@ def solid_faces(vertices: Array, faces: Ints) -> Ints | None:
         return None
     if (number[first[1:]] == number[first[:-1]]).any():
         return None
-    volumes = _volumes(vertices, faces)
+    a, b, c = (vertices[faces[:, k]] - vertices[faces[0, 0]] for k in range(3))
+    volumes = np.asarray(np.einsum("ki,ki->k", a, np.cross(b, c)) / 6.0)
     agree = upwards[first] != upwards[second]
     if not agree.all():
         sides = np.column_stack([first, second]) % len(faces)
@@ -105,13 +106,6 @@ def solid_faces(vertices: Array, faces: Ints) -> Ints | None:
     if not abs(volume) > VOLUME * wide**3:
         return None
     return faces[:, ::-1] if volume < 0.0 else faces
-
-
-def _volumes(vertices: Array, faces: Ints) -> Array:
-    """(m,) m^3, signed, between each triangle and one of the corners."""
-    corners = vertices[faces]
-    a, b, c = (corners[:, k] - corners[0, 0] for k in range(3))
-    return np.asarray(np.einsum("ki,ki->k", a, np.cross(b, c)) / 6.0)
 
 
 def _turned(sides: Ints, agree: Mask, volumes: Array) -> Array | None:
@@ -142,45 +136,33 @@ def _turned(sides: Ints, agree: Mask, volumes: Array) -> Array | None:
     return np.where(better, 1.0, -1.0)
 
 
-class MeshBodies:
-    """The meshes of one robot's links; each content is read and checked once a process."""
+def mesh_reader(paths: Iterable[str]) -> Callable[[MeshFile], Triangles]:
+    """Reads the meshes of one robot's links; each content is read and checked once a process.
 
-    def __init__(self, paths: Iterable[str] = ()) -> None:
-        """Start with nothing read.
+    What it gives are triangles, scaled, m; the same object for the same content. It raises a
+    RobotError where a file cannot be read, or its triangles cannot be used.
 
-        Args:
-            paths: of files that will be asked for; see `MeshFiles`.
-        """
-        self._files = MeshFiles(paths, most_seconds=MOST_SECONDS)
-        self._digests: dict[str, bytes] = {}
+    Args:
+        paths: of files that will be asked for; see `MeshFiles`.
+    """
+    files = MeshFiles(paths, most_seconds=MOST_SECONDS)
 
-    def read(self, mesh: MeshFile) -> Triangles:
-        """The triangles of a mesh file, scaled, m; the same object for the same content.
-
-        Raises:
-            RobotError: the file cannot be read, or its triangles cannot be used.
-        """
+    def read(mesh: MeshFile) -> Triangles:
         file = Path(mesh.path)
         try:
-            if mesh.path not in self._digests:
-                data = read_regular(file, largest_file(file), "a mesh of a robot")
-                self._digests[mesh.path] = sha256(data).digest()
-            key = (self._digests[mesh.path], file.suffix.lower(), mesh.scale)
+            data = read_regular(file, largest_file(file), "a mesh of a robot")
+            key = (sha256(data).digest(), file.suffix.lower(), mesh.scale)
             if key not in _known:
-                read = self._first_read(mesh)
+                whole = joined(files.parts(mesh.path))
+                with np.errstate(over="ignore"):  # infinite coordinates are refused next
+                    made = checked_triangles(whole.vertices * mesh.scale, whole.faces, file.name)
                 if len(_known) >= MOST_KNOWN:
                     _known.clear()
-                _known[key] = read
+                _known[key] = made
             return _known[key]
         except FileFault as fault:
             raise RobotError(fault.faults, file.name) from fault
         except MeshError as fault:
             raise RobotError(fault.faults) from fault
 
-    def _first_read(self, mesh: MeshFile) -> Triangles:
-        parts = self._files.parts(mesh.path)
-        starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
-        with np.errstate(over="ignore"):  # infinite coordinates are refused next
-            vertices = np.concatenate([part.vertices for part in parts]) * mesh.scale
-        faces = [part.faces + start for part, start in zip(parts, starts, strict=False)]
-        return checked_triangles(vertices, np.concatenate(faces), Path(mesh.path).name)
+    return read
