@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, TypedDict, TypeVar, Unpack, cast
 
-import numpy as np
-
 from coverable.arrays import Array
 from coverable.errors import ArgumentError, Checks
 from feasibility.collisions.named_pairs import checked_distance
@@ -77,15 +75,10 @@ class Obstacle:
             )
         if self.frame is not None and not (isinstance(self.frame, str) and self.frame.strip()):
             checks.wrong("frame", self.frame, "must be the name of a link, or None for the world")
-        clearance = self.clearance
-        _keep(
-            self,
-            geometry=checked_shape(checks, self.geometry),
-            placement=rigid_matrix(checks, "placement", self.placement, FARTHEST),
-            clearance=None
-            if clearance is None
-            else checked_distance(checks, "clearance", clearance),
-        )
+        _keep_body(checks, self)
+        if self.clearance is not None:
+            clearance = checked_distance(checks, "clearance", self.clearance)
+            object.__setattr__(self, "clearance", clearance)
         checks.done()
 
     @property
@@ -112,7 +105,7 @@ class Obstacle:
             rpy_deg: (3,) fixed-axis roll, pitch, yaw of its frame.
             own: `clearance` and `frame`, see the class.
         """
-        return _placed(Obstacle, Box(cast("Any", size)), position, rpy_deg, name, **own)
+        return _placed(Obstacle, Box(cast("Any", size)), position, rpy_deg, name=name, **own)
 
     @staticmethod
     def cylinder(
@@ -120,7 +113,7 @@ class Obstacle:
         **own: Unpack[Own],
     ) -> Obstacle:  # fmt: skip
         """A cylinder along z of its own frame, about its position; lengths in m."""
-        return _placed(Obstacle, Cylinder(radius, length), position, rpy_deg, name, **own)
+        return _placed(Obstacle, Cylinder(radius, length), position, rpy_deg, name=name, **own)
 
     @staticmethod
     def sphere(
@@ -128,7 +121,7 @@ class Obstacle:
         **own: Unpack[Own],
     ) -> Obstacle:  # fmt: skip
         """A ball, m."""
-        return _placed(Obstacle, Sphere(radius), position, rpy_deg, name, **own)
+        return _placed(Obstacle, Sphere(radius), position, rpy_deg, name=name, **own)
 
     @staticmethod
     def capsule(
@@ -136,14 +129,14 @@ class Obstacle:
         **own: Unpack[Own],
     ) -> Obstacle:  # fmt: skip
         """A cylinder along z of that length (m), with a half ball on each end."""
-        return _placed(Obstacle, Capsule(radius, length), position, rpy_deg, name, **own)
+        return _placed(Obstacle, Capsule(radius, length), position, rpy_deg, name=name, **own)
 
     @staticmethod
     def halfspace(
         name: str, position: Point = ORIGIN, rpy_deg: Point = ORIGIN, **own: Unpack[Own]
     ) -> Obstacle:
         """All that is below the xy plane of its own frame: a floor at `position` (m)."""
-        return _placed(Obstacle, HalfSpace(), position, rpy_deg, name, **own)
+        return _placed(Obstacle, HalfSpace(), position, rpy_deg, name=name, **own)
 
     @staticmethod
     def mesh(
@@ -151,7 +144,7 @@ class Obstacle:
         rpy_deg: Point = ORIGIN, **own: Unpack[Own],
     ) -> Obstacle:  # fmt: skip
         """The triangles of a file; see `read_triangles` for its formats and its unit."""
-        return _placed(Obstacle, (file, scale), position, rpy_deg, name, **own)
+        return _placed(Obstacle, (file, scale), position, rpy_deg, name=name, **own)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -174,11 +167,7 @@ class ToolShape:
         checks = Checks("a tool shape")
         if isinstance(self.geometry, HalfSpace):
             checks.wrong("geometry", self.geometry, "must be a shape that an arm can carry")
-        _keep(
-            self,
-            geometry=checked_shape(checks, self.geometry),
-            placement=rigid_matrix(checks, "placement", self.placement, FARTHEST),
-        )
+        _keep_body(checks, self)
         checks.done()
 
     @staticmethod
@@ -226,25 +215,19 @@ SHAPES: Mapping[str, tuple[str, ...]] = MappingProxyType(
 """The kinds of objects, and what describes each: the arguments of the function of that name."""
 
 
-def _keep(value: object, **plain: object) -> None:
-    """Set fields of a frozen value; arrays are write-protected."""
-    for name, kept in plain.items():
-        if isinstance(kept, np.ndarray):
-            kept.flags.writeable = False
-        object.__setattr__(value, name, kept)
+def _keep_body(checks: Checks, value: Obstacle | ToolShape) -> None:
+    """Give a value plain numbers and a write-protected place."""
+    object.__setattr__(value, "geometry", checked_shape(checks, value.geometry))
+    placement = rigid_matrix(checks, "placement", value.placement, FARTHEST)
+    placement.flags.writeable = False
+    object.__setattr__(value, "placement", placement)
 
 
 def _placed(
-    make: Callable[..., Made],
-    geometry: object,
-    position: Any,
-    rpy_deg: Any,
-    name: str | None = None,
-    clearance: float | None = None,
-    frame: str | None = None,
+    make: Callable[..., Made], geometry: object, position: Any, rpy_deg: Any, **own: Any
 ) -> Made:
     """An object or a tool shape at a place, of a shape or a file and its scale; all its faults."""
-    checks = Checks("a tool shape" if name is None else f"obstacle {name!r}")
+    checks = Checks(f"obstacle {own['name']!r}" if own else "a tool shape")
     if isinstance(geometry, tuple):
         file, geometry = geometry, PLACEHOLDER
         try:
@@ -253,10 +236,7 @@ def _placed(
             checks.faults += error.faults
     placement = matrix_of(checks, position, rpy_deg, FARTHEST)
     try:
-        if name is None:
-            made = make(geometry, placement)
-        else:
-            made = make(name, geometry, placement, clearance, frame)
+        made = make(geometry=geometry, placement=placement, **own)
     except ArgumentError as error:
         checks.faults += error.faults
     checks.done()

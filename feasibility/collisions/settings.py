@@ -131,17 +131,10 @@ class Collision:
             for k, name in enumerate(objects)
             if name in links
         ]
-        faults += [
-            fault
-            for k, name in enumerate(self.tool_links)
-            for fault in stranger(f"tool_links[{k}]", name, links, "a link of the arm")
-        ]
-        faults += [
-            fault
-            for k, one in enumerate(self.scene)
-            if one.frame is not None
-            for fault in stranger(f"scene[{k}].frame", one.frame, links, "a link of the arm")
-        ]
+        named = [(f"tool_links[{k}]", name) for k, name in enumerate(self.tool_links)]
+        named += [(f"scene[{k}].frame", one.frame) for k, one in enumerate(self.scene) if one.frame]
+        for key, name in named:
+            faults += stranger(key, name, links, "a link of the arm")
         pairs = [(f"allow[{k}]", pair) for k, pair in enumerate(self.allow)]
         pairs += [(f"clearances[{k}].pair", row[:2]) for k, row in enumerate(self.clearances)]
         what = "a link, an object of the scene, 'surface' or 'tool'"

@@ -5,10 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
-from coverable.arrays import Array, Ints
-from robots.errors import RobotError
+from coverable.arrays import Array, Ints, Protected
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
 
@@ -49,7 +46,7 @@ class Solid:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Polytope:
+class Polytope(Protected):
     """A convex body that holds a shape: all points within `radius` of the hull of `vertices`.
 
     A ball is one vertex and its radius, a capsule two.
@@ -63,16 +60,3 @@ class Polytope:
     """(k, 3) m, k >= 1, in the frame of the joint (Pinocchio's), or in the root frame."""
     radius: float
     """m, >= 0."""
-
-    def __post_init__(self) -> None:
-        """Copy and write-protect the vertices.
-
-        Raises:
-            RobotError: they are no points, or not finite.
-        """
-        vertices = np.array(self.vertices, dtype=float)
-        good = vertices.ndim == 2 and vertices.shape[1:] == (3,) and len(vertices) > 0
-        if not (good and np.isfinite(vertices).all() and 0.0 <= self.radius < np.inf):
-            raise RobotError(f"a shape of {self.owner!r} is no finite body")
-        vertices.flags.writeable = False
-        object.__setattr__(self, "vertices", vertices)
