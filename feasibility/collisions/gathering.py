@@ -25,15 +25,17 @@ from feasibility.collisions.settings import Collision
 from feasibility.collisions.words import SURFACE, TOOL
 from robots.robot import Robot
 from robots.shapes.bodies import Fineness, Polytope, Solid, Triangles
+from robots.shapes.coal_shapes import coal_distance
 from robots.shapes.link_pairs import LeftOut, LinkPairs, link_pairs
 from robots.shapes.links import LinkShapes, link_shapes, outer_bodies
 from robots.shapes.sampling import with_crude_links_cut
-from robots.shapes.tool import BARE, Reach, bare_length, tool_line, tool_reach
+from robots.shapes.tool import Reach, tool_line, tool_reach
 from surfaces.sheet import sheet_of
 from surfaces.surface import Surface
 
 KEPT = 16  # problems whose bodies are remembered: `explain` and `place` come back to them
 NO_PAIRS = LinkPairs((), (), ())
+BARE = 0.02  # [m] from the tool point to the nearest body, from which on that is to be said
 FURTHEST = 1e4  # [m] that an arm on a rail without end is taken to get
 
 
@@ -135,8 +137,12 @@ def bare_stretch(robot: Robot, collision: Collision) -> dict[str, str]:
         RobotError: no link has a shape, or the SRDF is not of this arm.
     """
     arm, line = _arm_of(robot, collision), tool_line(robot)
-    bare = bare_length(robot, [*arm.shapes.polytopes, *arm.tool])
-    if not bare:
+    bare = float(np.linalg.norm(line.ends[1] - line.ends[0]))
+    point = Polytope("tool point", line.joint, line.ends[1:], 0.0)
+    for body in (*arm.shapes.polytopes, *arm.tool):
+        if body.joint == line.joint and bare > BARE:
+            bare = min(bare, coal_distance(point, body))
+    if bare <= BARE:
         return {}
     frame = robot.model.frames[robot.tool_link_id].placement.homogeneous
     start, end = (line.ends - frame[:3, 3]) @ frame[:3, :3]

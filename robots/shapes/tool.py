@@ -1,9 +1,9 @@
-"""An arm's tool point and its shapes: how far they reach beyond it, and where none is near it."""
+"""An arm's tool point, and how far its shapes reach beyond it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,13 +11,11 @@ import pinocchio as pin
 
 from robots.robot import Robot
 from robots.shapes.bodies import Polytope, Solid, Triangles
-from robots.shapes.coal_shapes import coal_distance
 from robots.shapes.hulls import hull_of
 from robots.shapes.links import LinkShapes
 from robots.urdf.link_shapes import Cylinder
 
 NEAR = 1e-3  # [m]
-BARE = 0.02  # [m] from the tool point to the nearest body, from which on that is to be said
 
 
 class Reach(NamedTuple):
@@ -58,19 +56,6 @@ def tool_line(robot: Robot) -> ToolLine:
             return ToolLine(frame.name, int(tcp.parentJoint), np.stack([start, end]))
         number = frame.parentFrame
     return ToolLine(robot.tool_frame, int(tcp.parentJoint), np.stack([end, end]))
-
-
-def bare_length(robot: Robot, bodies: Iterable[Polytope]) -> float:
-    """How far (m) the tool point is from the nearest body on its joint; 0 where one is near.
-
-    At most the way from the flange, as nothing has to be between the two where they are one.
-    """
-    _, joint, (start, end) = tool_line(robot)
-    least, point = float(np.linalg.norm(end - start)), Polytope("tool point", joint, end[None], 0.0)
-    for body in bodies:
-        if body.joint == joint and least > BARE:
-            least = min(least, coal_distance(point, body))
-    return least if least > BARE else 0.0
 
 
 def tool_reach(

@@ -143,11 +143,18 @@ class Overlapping:
             left = np.flatnonzero(found.ratio >= 1.0)
             if not len(left):
                 break
-            one = self._overlap(couples, boxes.of(left))
-            nearer = one.ratio < found.ratio[left]
-            for mine, other in zip(found, one, strict=True):
-                mine[left[nearer]] = other[nearer]
-            hits[k] = (one.ratio < 1.0).sum()
+            for pair, over, first, moves in self._measured(couples, boxes.of(left)):
+                ratio = np.full(over.shape, np.inf)
+                np.divide(sum(moves[first:]), over, out=ratio, where=over > 0.0)
+                best = ratio.argmin(axis=1)
+                ratio = ratio[np.arange(len(left)), best]
+                (some,) = np.nonzero(ratio < found.ratio[left])
+                nearer, best = left[some], best[some]
+                found.ratio[nearer], found.pair[nearer] = ratio[some], pair
+                found.effect[nearer] = 0.0
+                for j in range(first, len(moves)):
+                    found.effect[nearer, j] = moves[j][some, best]
+            hits[k] = (found.ratio[left] < 1.0).sum()
         order = np.argsort(-hits, kind="stable")
         self._couples = [self._couples[k] for k in order]
         return found
@@ -174,22 +181,6 @@ class Overlapping:
                 )
                 over = np.maximum(over, nearest)
         return over, pair, which
-
-    def _overlap(self, couples: _Couples, boxes: _Middles) -> Deepest:
-        """What points of one body say of m boxes."""
-        rows, shape = np.arange(len(boxes.half)), boxes.half.shape
-        found = Deepest(np.full(len(rows), np.inf), np.zeros(shape), np.full(len(rows), -1))
-        for pair, over, first, moves in self._measured(couples, boxes):
-            ratio = np.full(over.shape, np.inf)
-            np.divide(sum(moves[first:]), over, out=ratio, where=over > 0.0)
-            best = ratio.argmin(axis=1)
-            (nearer,) = np.nonzero(ratio[rows, best] < found.ratio)
-            best = best[nearer]
-            found.ratio[nearer], found.pair[nearer] = ratio[nearer, best], pair
-            found.effect[nearer] = 0.0
-            for j in range(first, len(moves)):
-                found.effect[nearer, j] = moves[j][nearer, best]
-        return found
 
     def _measured(
         self, couples: _Couples, boxes: _Middles, moved: bool = True
