@@ -15,7 +15,7 @@ import numpy as np
 from coverable.arrays import Array
 from coverable.errors import ArgumentError
 from feasibility.certification.collisions.judged_shapes import Body, body_of_soup
-from feasibility.certification.collisions.motion import ArmMotion
+from feasibility.certification.collisions.motion import ArmMotion, Chords
 from feasibility.certification.collisions.pairing import ROUNDING, Pairing
 from feasibility.certification.faults import Judged, MotionFault
 from feasibility.collisions.problem_bodies import Bodies, Pair
@@ -84,45 +84,27 @@ class Couples:
         empty = sorted(name for name, parts in of.items() if not parts)
         if empty:
             raise ArgumentError(f"pairs name what has no body: {', '.join(empty)}")
-        couples = [
+        self.couples = [
             (pair, *((b, a) if b.joint < a.joint or b.half_space else (a, b)))
             for pair in bodies.pairs
             for a in of[pair.first]
             for b in of[pair.second]
         ]
-        couples.sort(key=lambda one: _outermost(*one))
-        self.pairs = [pair for pair, _, _ in couples]
-        self.couples = [(a, b) for _, a, b in couples]
-        """The one nearer to the root first, or a half space."""
-        self.bodies = list(dict.fromkeys(body for couple in self.couples for body in couple))
-        index = {body: k for k, body in enumerate(self.bodies)}
-        self.which = [index[b] for _, b in self.couples]
-        """Index of the second of each couple in `bodies`."""
+        """Of each pair, the one nearer to the root first, or a half space."""
+        self.couples.sort(key=lambda one: _outermost(*one))
+        self.bodies = list(dict.fromkeys(body for couple in self.couples for body in couple[1:]))
 
     def along(self, motion: ArmMotion) -> list[Pairing]:
-        """Every couple along a motion, with what balls around both say of it.
-
-        The centre of b keeps to its chords but for delta; see `motion`.
-
-        Args:
-            motion: of the arm.
-        """
+        """Every couple along a motion of the arm, with what balls around both say of it."""
         joints = np.array([body.joint for body in self.bodies], dtype=np.intp)
         centres, balls = np.stack([b.centre for b in self.bodies]), [b.ball for b in self.bodies]
         # A half space, whose ball has no end, is at rest.
         chords = motion.chords(joints, centres, np.where(np.isfinite(balls), balls, 0.0))
-        found = list[Pairing]()
-        for pair, (a, b), j in zip(self.pairs, self.couples, self.which, strict=True):
-            delta, moved, off = (one[a.joint, :, j] for one in chords)
-            seen = a.joint, b.joint
-            straight = motion.chord_lengths(*seen, b.centre, b.ball) + 4.0 * delta
-            rotations, points = motion.poses(*seen)
-            ahead = rotations @ b.centre + points - a.centre
-            away = _least_norms(ahead[:-1], ahead[1:]) - a.ball - b.ball - a.deviation
-            low = away - b.deviation - delta - off - ROUNDING
-            bends = delta, np.minimum(moved, straight), off
-            found.append(Pairing((a, b), motion, pair, low, bends))
-        return found
+        index = {body: k for k, body in enumerate(self.bodies)}
+        return [
+            Pairing(pair, a, b, motion, Chords(*(one[a.joint, :, index[b]] for one in chords)))
+            for pair, a, b in self.couples
+        ]
 
 
 @lru_cache(maxsize=KEPT)
@@ -161,10 +143,10 @@ def collision_replay(
     if len(rows) == 1:  # an arm at rest: a motion that goes nowhere
         rows, deviations = np.repeat(rows, 2, axis=0), None
     motion = ArmMotion(robot, rows, deviations)
-    return _judged(couples.pairs, couples.along(motion))
+    return _judged(couples.along(motion))
 
 
-def _judged(pairs: list[Pair], pairings: list[Pairing]) -> CollisionReplay:
+def _judged(pairings: list[Pairing]) -> CollisionReplay:
     """All couples, the nearest first: how near they come sets what is aimed at."""
     nearest, met = math.inf, pairings[0]
     for one in sorted(pairings, key=lambda one: one.bound):
@@ -176,9 +158,9 @@ def _judged(pairs: list[Pair], pairings: list[Pairing]) -> CollisionReplay:
     for one in pairings:
         one.certify(nearest)
     faults = dict[tuple[str, str], CollisionFault]()
-    for pair, one in zip(pairs, pairings, strict=True):
+    for one in pairings:
         if one.refused is not None:
-            fault = _fault(pair, one, one.refused)
+            fault = _fault(one, one.refused)
             known = faults.get(fault.pair)
             if known is None or not fault.distance >= known.distance:
                 faults[fault.pair] = fault
@@ -211,14 +193,6 @@ def _measured(pairings: list[Pairing]) -> tuple[float, Pairing]:
     return found, near
 
 
-def _least_norms(start: Array, end: Array) -> Array:
-    """(k,) the least distances of straight lines between points (k, 3) from the origin."""
-    way = end - start
-    square = np.maximum((way * way).sum(axis=1), 1e-300)
-    share = np.clip(-(start * way).sum(axis=1) / square, 0.0, 1.0)
-    return np.asarray(np.linalg.norm(start + share[:, None] * way, axis=1))
-
-
 def _outermost(pair: Pair, a: Body, b: Body) -> tuple[object, ...]:
     """Brings what is furthest from the base, and often the nearest, to the front.
 
@@ -232,13 +206,13 @@ def _decided(distance: float) -> float:
     return math.inf if math.isnan(distance) else distance
 
 
-def _fault(pair: Pair, found: Pairing, time: float) -> CollisionFault:
+def _fault(found: Pairing, time: float) -> CollisionFault:
     """A pair that is refused, in words."""
     row, distance = int(time), found.distance
-    names = f"{pair.first} and {pair.second}"
-    wanted = f"{1e3 * pair.clearance:g} mm are needed"
-    if not distance < pair.clearance + TOUCHING:
-        text = f"not certified: {names} may come nearer than {1e3 * pair.clearance:g} mm"
+    names, needed = " and ".join(found.names), f"{1e3 * found.needed:g} mm"
+    wanted = f"{needed} are needed"
+    if not distance < found.needed + TOUCHING:
+        text = f"not certified: {names} may come nearer than {needed}"
     elif found.inside:
         text = f"{names} overlap, one is inside the other"
     elif -TOUCHING < distance <= ROUNDING:
@@ -247,5 +221,4 @@ def _fault(pair: Pair, found: Pairing, time: float) -> CollisionFault:
         text = f"{names} overlap by {-1e3 * distance:.3g} mm"
     else:
         text = f"{names} are {1e3 * distance:.4g} mm apart, {wanted}"
-    both = pair.first, pair.second
-    return CollisionFault(text, row, time - row, pair=both, distance=distance)
+    return CollisionFault(text, row, time - row, pair=found.names, distance=distance)

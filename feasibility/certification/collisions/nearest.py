@@ -62,12 +62,10 @@ def nearest_along(robot: Robot, bodies: Bodies, q: Array) -> NearestAlong | None
     if not bodies.pairs:
         return None
     motion = ArmMotion(robot, np.repeat(q, 2, axis=0) if len(q) == 1 else q)
-    couples = couples_of(bodies)
-    named = [(pair.first, pair.second) for pair in couples.pairs]
-    pairings = couples.along(motion)
+    pairings = couples_of(bodies).along(motion)
     distances, found = _searched(pairings, len(q))
-    names = list(dict.fromkeys(named[k] for k in found))
-    which = np.array([names.index(named[k]) for k in found], dtype=np.intp)
+    names = list(dict.fromkeys(pairings[k].names for k in found))
+    which = np.array([names.index(pairings[k].names) for k in found], dtype=np.intp)
     lines = (_lines(name, pairings, found, which == k) for k, name in enumerate(names))
     return NearestAlong(distances, which, tuple(lines))
 

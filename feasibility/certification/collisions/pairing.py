@@ -29,7 +29,7 @@ import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.collisions.judged_shapes import COAL, Body, one_inside_other
-from feasibility.certification.collisions.motion import ArmMotion
+from feasibility.certification.collisions.motion import ArmMotion, Chords
 from feasibility.collisions.problem_bodies import Pair
 
 ROUNDING = 1e-9  # [m] of placements, and what keeps distances from vanishing
@@ -48,23 +48,26 @@ CALLS = (20_000, 1_000)  # most coal calls for two bodies: so many, and so many 
 class Pairing:
     """Two bodies along one motion, and what is known of their distance."""
 
-    def __init__(
-        self, bodies: tuple[Body, Body], motion: ArmMotion, pair: Pair, low: Array,
-        bends: tuple[Array, Array, Array],
-    ) -> None:  # fmt: skip
-        """Begin with what balls say.
+    def __init__(self, pair: Pair, a: Body, b: Body, motion: ArmMotion, bends: Chords) -> None:
+        """Begin with what balls say: the centre of b keeps to its chords but for delta.
 
         Args:
-            bodies: a and b; b is on the same joint or one behind, but for a half space.
-            motion: of the arm.
             pair: whose bodies they are, and their clearance.
-            low: (m - 1,) m, lower bounds of their distance along each segment.
-            bends: `Chords` of b seen from a, (m - 1,) each.
+            a, b: b is on the same joint or one behind, but for a half space.
+            motion: of the arm.
+            bends: of b seen from a, (m - 1,) each.
         """
-        (self.a, self.b), self.motion, self.low = bodies, motion, low
+        self.a, self.b, self.motion = a, b, motion
         self.names, self.needed = (pair.first, pair.second), pair.clearance
         self._delta, moved, self._off = bends
-        self._rows, self.way = np.arange(len(low) + 1.0), np.append(0.0, np.cumsum(moved))
+        straight = motion.chord_lengths(a.joint, b.joint, b.centre, b.ball) + 4.0 * self._delta
+        rotations, points = motion.poses(a.joint, b.joint)
+        ahead = rotations @ b.centre + points - a.centre
+        away = _least_norms(ahead[:-1], ahead[1:]) - a.ball - b.ball - a.deviation
+        self.low = away - b.deviation - self._delta - self._off - ROUNDING
+        """(m - 1,) m, lower bounds of their distance along each segment."""
+        moved = np.minimum(moved, straight)
+        self._rows, self.way = np.arange(len(moved) + 1.0), np.append(0.0, np.cumsum(moved))
         """(m,) m, that no point has moved further since the first row."""
         self.convex = self.a.half_space or (self.a.convex and self.b.convex)
         """Do planes decide? They do for a half space, whatever is above it."""
@@ -356,3 +359,11 @@ class Pairing:
 
     def _refuse(self, time: float, distance: float) -> None:
         self.refused, self.distance = time, distance
+
+
+def _least_norms(start: Array, end: Array) -> Array:
+    """(k,) the least distances of straight lines between points (k, 3) from the origin."""
+    way = end - start
+    square = np.maximum((way * way).sum(axis=1), 1e-300)
+    share = np.clip(-(start * way).sum(axis=1) / square, 0.0, 1.0)
+    return np.asarray(np.linalg.norm(start + share[:, None] * way, axis=1))
