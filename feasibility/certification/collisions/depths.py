@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.arrays import Array
-from feasibility.certification.collisions.judged_shapes import winding
-from robots.shapes.bodies import HalfSpace, Triangles
+from feasibility.certification.collisions.judged_shapes import outline, winding
+from robots.shapes.bodies import Geometry, HalfSpace, Triangles
 from robots.shapes.hulls import is_convex, rims
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
@@ -50,12 +50,10 @@ class Balls(NamedTuple):
         return Balls(points[chosen], deep[chosen])
 
 
-def depths(shape: object, points: Array) -> Array | None:
-    """(...) m, how deep points (..., 3) are, or less; None for what has no known inside.
+def depths(shape: Geometry | Balls, points: Array) -> Array:
+    """(...) m, how deep points (..., 3) in its own frame are in a shape, or less.
 
-    Args:
-        shape: a primitive, `Triangles`, `Balls` or a `HalfSpace`. Outside a convex mesh it is -inf.
-        points: m, in its own frame.
+    Of meshes -inf outside convex ones, and for all others.
     """
     x = np.abs(points)
     match shape:
@@ -81,10 +79,9 @@ def depths(shape: object, points: Array) -> Array | None:
         case Triangles():
             planes = planes_around(shape)
             if planes is None:
-                return None
+                return np.full(points.shape[:-1], -np.inf)
             deep = -(points @ planes[:, :3].T + planes[:, 3]).max(axis=-1)
             return np.where(deep >= 0.0, deep, -np.inf)
-    return None
 
 
 def _within_sides(*past: Array) -> Array:
@@ -93,11 +90,12 @@ def _within_sides(*past: Array) -> Array:
     return np.asarray(-outside - np.minimum(reduce(np.maximum, past), 0.0))
 
 
-def points_inside(shape: object) -> tuple[Array, Array]:
+def points_inside(shape: Geometry) -> tuple[Array, Array]:
     """(k, 3) m, points of a body in its own frame, and (k,) m, how deep they are at least."""
     if isinstance(shape, Triangles):
         return _points_of_mesh(shape)
-    half = _half_sizes(shape)
+    corners, radius, circle = outline(shape)
+    half = corners.max(axis=0) + radius + [circle, circle, 0.0]
     grid = _grid(-half, half)
     if isinstance(shape, Cylinder):
         grid = np.concatenate([grid, rims(shape.radius, shape.length, AROUND)])
@@ -107,8 +105,6 @@ def points_inside(shape: object) -> tuple[Array, Array]:
     # A little less than the body, for rounding.
     grid *= 1.0 - 1e-9
     found = depths(shape, grid)
-    if found is None:
-        return np.empty((0, 3)), np.empty(0)
     inside = found >= 0.0
     return grid[inside], found[inside]
 
@@ -117,10 +113,9 @@ def points_inside(shape: object) -> tuple[Array, Array]:
 def _points_of_mesh(mesh: Triangles) -> tuple[Array, Array]:
     """Corners that are far from each other, on wide triangles too, and places inside a solid."""
     grid = _grid(mesh.vertices.min(axis=0), mesh.vertices.max(axis=0))
-    found, corners = depths(mesh, grid), _all_over(mesh)
+    solid, corners = planes_around(mesh) is not None, _all_over(mesh)
     corners = Balls.among(corners, np.zeros(len(corners)), MOST_CORNERS).centres
-    if found is None:
-        found = _depths_by_triangles(mesh, grid)
+    found = depths(mesh, grid) if solid else _depths_by_triangles(mesh, grid)
     inside = found > 0.0
     points = np.concatenate([corners, grid[inside]])
     return points, np.append(np.zeros(len(corners)), found[inside])
@@ -148,20 +143,6 @@ def _all_over(mesh: Triangles) -> Array:
     widest = float(np.ptp(mesh.vertices, axis=0).max())
     vertices, _ = subdivide_to_size(mesh.vertices, mesh.faces, widest / FINEST, max_iter=20)
     return np.asarray(vertices, dtype=np.float64)
-
-
-def _half_sizes(shape: object) -> Array:
-    """(3,) m, half the sides of the box around a primitive."""
-    match shape:
-        case Sphere(radius):
-            return np.full(3, radius)
-        case Capsule(radius, length):
-            return np.array([radius, radius, radius + 0.5 * length])
-        case Cylinder(radius, length):
-            return np.array([radius, radius, 0.5 * length])
-        case Box(size):
-            return 0.5 * np.array(size)
-    return np.zeros(3)
 
 
 def _grid(low: Array, high: Array) -> Array:

@@ -28,11 +28,16 @@ import numpy as np
 from coverable.arrays import Array, Ints
 from feasibility.certification.bisection import Rows
 from feasibility.certification.collisions.collision_replay import collision_replay
-from feasibility.certification.collisions.depths import Balls, depths, points_inside
+from feasibility.certification.collisions.depths import (
+    Balls,
+    depths,
+    planes_around,
+    points_inside,
+)
 from feasibility.collisions.problem_bodies import Bodies
 from robots.kinematics import Kinematics
 from robots.robot import Robot
-from robots.shapes.bodies import Solid, Triangles
+from robots.shapes.bodies import Geometry, Solid, Triangles
 
 GUARD = 1e-7  # [m] that an overlap has to be larger by
 
@@ -59,7 +64,7 @@ class _Couples(NamedTuple):
     """Points, and the bodies that they may be inside."""
 
     points: Points
-    bodies: list[tuple[Solid, object, int]]
+    bodies: list[tuple[Solid, Geometry | Balls, int]]
     """Each with the shape, or balls, whose inside is known, and the index of the pair."""
 
 
@@ -236,16 +241,14 @@ def _length_of_cross(a: Array, b: Array, more: Array | None = None) -> Array:
     return np.asarray(np.sqrt(x * x + y * y + z * z))
 
 
-def _depths(body: Solid, shape: object, boxes: _Middles, x: Array, near: float) -> Array:
+def _depths(body: Solid, shape: Geometry | Balls, boxes: _Middles, x: Array, near: float) -> Array:
     """(m, k) m, how deep points (m, k, 3) are in a body at least; further out than `near`, -inf."""
     turned, shift = boxes.rotations[:, body.joint], body.placement[:3, 3]
     middle = boxes.origins[:, body.joint] + turned @ shift
     own = (x - middle[:, None]) @ (turned @ body.placement[:3, :3])
-    found = np.full(x.shape[:2], -np.inf)
     if not isinstance(shape, Balls):
-        deep = depths(shape, own)
-        return found if deep is None else deep
-    centre = shape.centres[0]  # balls take long
+        return depths(shape, own)
+    found, centre = np.full(x.shape[:2], -np.inf), shape.centres[0]  # balls take long
     wide = (np.linalg.norm(shape.centres - centre, axis=1) + shape.radii).max()
     rows = np.linalg.norm(own - centre, axis=2).min(axis=1) <= wide + near
     found[rows] = depths(shape, own[rows])
@@ -258,13 +261,13 @@ def _couples(bodies: Bodies, beside: Sequence[Points] | None) -> list[_Couples]:
     And points beside it, with those that move.
     """
     points = [Points.of(one) for one in bodies.exact if one.joint] + [*(beside or ())]
-    inside = dict[str, list[tuple[Solid, object]]]()
+    inside = dict[str, list[tuple[Solid, Geometry | Balls]]]()
     for one in bodies.exact:
-        shape = one.geometry
-        shapes: list[object] = [shape] if depths(shape, np.zeros(3)) is not None else []
-        if isinstance(shape, Triangles) and (one.joint > 0 if beside is None else not shapes):
-            shapes.append(Balls.among(*points_inside(shape)))
-        inside.setdefault(one.owner, []).extend((one, shape) for shape in shapes)
+        shape, own = one.geometry, inside.setdefault(one.owner, [])
+        solid = not isinstance(shape, Triangles) or planes_around(shape) is not None
+        own += [(one, shape)] if solid else []
+        if isinstance(shape, Triangles) and (one.joint > 0 if beside is None else not solid):
+            own.append((one, Balls.among(*points_inside(shape))))
     found = []
     for some in points:
         inside_of = [

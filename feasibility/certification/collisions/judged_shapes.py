@@ -45,11 +45,9 @@ class Body:
         """
         self.joint, self.shape, self.deviation = solid.joint, solid.geometry, deviation
         shape, placement = self.shape, solid.placement
-        self.placement, (corners, self.radius) = placement, _corners(shape)
-        self.circle = shape.radius if isinstance(shape, Cylinder) else 0.0
-        """m, about the axis of a cylinder."""
+        self.placement, (corners, self.radius, self.circle) = placement, outline(shape)
         self.corners: Array = corners @ placement[:3, :3].T + placement[:3, 3]
-        """(k, 3) m; the body lies within `radius` (m) of their hull, and of circles about them."""
+        """(k, 3) m; the body is what `outline` says, about these."""
         self.axis: Array = placement[:3, 2]
         """(3,) of a cylinder, or what a half space is below of."""
         self.half_space = isinstance(shape, HalfSpace)
@@ -128,22 +126,25 @@ def body_of_soup(soup: Soup) -> Body:
     return Body(Solid(soup.owner, 0, np.eye(4), mesh), soup.deviation)
 
 
-def _corners(shape: Geometry) -> tuple[Array, float]:
-    """(k, 3) m in the shape's own frame, and a radius (m) about their hull."""
+def outline(shape: Geometry) -> tuple[Array, float, float]:
+    """Corners (k, 3) m in the shape's own frame, a radius (m), and that of circles (m) across z.
+
+    The shape lies within the radius of the hull of such circles about the corners.
+    """
     match shape:
         case Box(size):
             signs = np.array(np.meshgrid(*[(-0.5, 0.5)] * 3)).reshape(3, 8).T
-            return signs * np.array(size), 0.0
+            return signs * np.array(size), 0.0, 0.0
         case Sphere(radius):
-            return np.zeros((1, 3)), radius
+            return np.zeros((1, 3)), radius, 0.0
         case Capsule(radius, length):
-            return np.array([[0.0, 0.0, -0.5 * length], [0.0, 0.0, 0.5 * length]]), radius
-        case Cylinder(_, length):
-            return np.array([[0.0, 0.0, -0.5 * length], [0.0, 0.0, 0.5 * length]]), 0.0
+            return np.outer([-0.5, 0.5], [0.0, 0.0, length]), radius, 0.0
+        case Cylinder(radius, length):
+            return np.outer([-0.5, 0.5], [0.0, 0.0, length]), 0.0, radius
         case HalfSpace():
-            return np.zeros((1, 3)), 0.0
+            return np.zeros((1, 3)), 0.0, 0.0
         case Triangles():
-            return _hull_of(shape)[1:]
+            return (*_hull_of(shape)[1:], 0.0)
 
 
 @lru_cache(maxsize=KEPT)
