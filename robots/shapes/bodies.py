@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
+
+import numpy as np
 
 from coverable.arrays import Array, Ints, Protected
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
@@ -30,6 +32,35 @@ Fineness = Literal["hulls", "pieces", "meshes"]
 """How closely convex bodies follow a link; see `link_shapes`."""
 Geometry = Box | Cylinder | Capsule | Sphere | Triangles | HalfSpace
 """Primitives are about their frame's origin, round ones along z, as in URDF."""
+
+
+class Outline(NamedTuple):
+    """All points within `radius` of the hull of circles across z about some corners."""
+
+    corners: Array
+    """(k, 3) m, in the shape's own frame."""
+    radius: float
+    """m."""
+    circle: float
+    """m, radius of the circles."""
+
+
+def outline(shape: Geometry) -> Outline:
+    """What a shape is; of a half space a point of its plane, of triangles their corners."""
+    match shape:
+        case Box(size):
+            corners = np.array(np.meshgrid(*[(-0.5, 0.5)] * 3)).reshape(3, 8).T * size
+            return Outline(corners, 0.0, 0.0)
+        case Capsule(radius, length):
+            return Outline(np.outer([-0.5, 0.5], [0.0, 0.0, length]), radius, 0.0)
+        case Cylinder(radius, length):
+            return Outline(np.outer([-0.5, 0.5], [0.0, 0.0, length]), 0.0, radius)
+        case Triangles(vertices):
+            return Outline(vertices, 0.0, 0.0)
+        case Sphere(radius):
+            return Outline(np.zeros((1, 3)), radius, 0.0)
+        case HalfSpace():
+            return Outline(np.zeros((1, 3)), 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

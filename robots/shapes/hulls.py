@@ -21,8 +21,8 @@ import numpy as np
 
 from coverable.arrays import Array
 from robots.errors import RobotError
-from robots.shapes.bodies import Geometry, HalfSpace, Triangles
-from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
+from robots.shapes.bodies import Geometry, HalfSpace, Triangles, outline
+from robots.urdf.link_shapes import Cylinder
 
 KEPT = 256  # shapes whose hulls are kept
 MOST_VERTICES = 64
@@ -54,13 +54,6 @@ def hull_of(shape: Geometry) -> Hull:
         RobotError: it is a half space.
     """
     match shape:
-        case Sphere(radius):
-            return Hull(np.zeros((1, 3)), radius)
-        case Capsule(radius, length):
-            return Hull(np.array([[0.0, 0.0, -length / 2], [0.0, 0.0, length / 2]]), radius)
-        case Box(size):
-            half = 0.5 * np.array(size)
-            return Hull(_box_corners(-half, half), 0.0)
         case Cylinder(radius, length):
             # A corner is at radius / cos(pi / k).
             sides = math.ceil(math.pi / math.acos(radius / (radius + PRISM_EXCESS)))
@@ -70,6 +63,8 @@ def hull_of(shape: Geometry) -> Hull:
             return outer_hull(shape.vertices)
         case HalfSpace():
             raise RobotError("a half space has no end")
+        case _:  # which have no circles
+            return Hull(*outline(shape)[:2])
 
 
 def rims(radius: float, length: float, count: int) -> Array:
@@ -100,7 +95,8 @@ def outer_hull(points: Array) -> Hull:
         radius = _reach_outside(ConvexHull(kept), corners)
     except QhullError:  # no file is known that comes here
         low, high = solid.min(axis=0), solid.max(axis=0)
-        kept, radius = _box_corners(low, high), 0.0
+        kept = np.stack(np.meshgrid(*zip(low, high, strict=True)), axis=-1).reshape(-1, 3)
+        radius = 0.0
     return Hull(kept, radius + ROUNDING * float(np.ptp(solid, axis=0).max()))
 
 
@@ -127,11 +123,6 @@ def is_convex(mesh: Triangles, allowed: float = ROUNDED) -> bool:
     a, b, c = (vertices[faces[:, k]] - vertices[0] for k in range(3))
     volume = float(np.einsum("ij,ij->", np.cross(a, b), c)) / 6.0
     return abs(volume) >= (1.0 - allowed) * hull_volume(vertices) > 0.0
-
-
-def _box_corners(low: Array, high: Array) -> Array:
-    """(8, 3)"""
-    return np.stack(np.meshgrid(*zip(low, high, strict=True)), axis=-1).reshape(-1, 3)
 
 
 def thickened(points: Array) -> Array:

@@ -10,10 +10,8 @@ import numpy as np
 import pinocchio as pin
 
 from robots.robot import Robot
-from robots.shapes.bodies import Polytope, Solid, Triangles
-from robots.shapes.hulls import hull_of
+from robots.shapes.bodies import Polytope, Solid, outline
 from robots.shapes.links import LinkShapes
-from robots.urdf.link_shapes import Cylinder
 
 NEAR = 1e-3  # [m]
 
@@ -83,11 +81,5 @@ def tool_reach(
 def _end(solid: Solid, axis: np.ndarray) -> float:
     """m, how far along a unit vector (3,) a shape reaches from the origin of its joint's frame."""
     own, place = solid.placement[:3, :3].T @ axis, float(solid.placement[:3, 3] @ axis)
-    match solid.geometry:
-        case Triangles(vertices):
-            return place + float((vertices @ own).max())
-        case Cylinder(radius, length):
-            return place + 0.5 * length * abs(own[2]) + radius * math.hypot(own[0], own[1])
-        case shape:
-            vertices, around = hull_of(shape)
-            return place + float((vertices @ own).max()) + around
+    corners, radius, circle = outline(solid.geometry)
+    return place + float((corners @ own).max()) + circle * math.hypot(own[0], own[1]) + radius

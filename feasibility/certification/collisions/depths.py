@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.arrays import Array
-from feasibility.certification.collisions.judged_shapes import outline, winding
-from robots.shapes.bodies import Geometry, HalfSpace, Triangles
+from feasibility.certification.collisions.judged_shapes import winding
+from robots.shapes.bodies import Geometry, HalfSpace, Triangles, outline
 from robots.shapes.hulls import is_convex, rims
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 

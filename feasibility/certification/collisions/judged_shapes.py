@@ -17,10 +17,9 @@ import numpy as np
 
 from coverable.arrays import Array
 from feasibility.collisions.problem_bodies import Soup
-from robots.shapes.bodies import Geometry, HalfSpace, Solid, Triangles
+from robots.shapes.bodies import HalfSpace, Outline, Solid, Triangles, outline
 from robots.shapes.coal_shapes import coal_hull, coal_shape, with_contacts
 from robots.shapes.hulls import is_convex
-from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
 COAL = 1e-7  # [m] more than coal's distances are off, which stops at GJK
 GJK = 1e-8  # [m]
@@ -44,11 +43,12 @@ class Body:
             deviation: m, how far the body may stand out from it.
         """
         self.joint, self.shape, self.deviation = solid.joint, solid.geometry, deviation
-        shape, placement = self.shape, solid.placement
-        self.placement, (corners, self.radius, self.circle) = placement, outline(shape)
-        self.corners: Array = corners @ placement[:3, :3].T + placement[:3, 3]
+        self.placement, shape = solid.placement, self.shape
+        held = _hull_of(shape)[1] if isinstance(shape, Triangles) else outline(shape)
+        corners, self.radius, self.circle = held
+        self.corners: Array = corners @ self.placement[:3, :3].T + self.placement[:3, 3]
         """(k, 3) m; the body is what `outline` says, about these."""
-        self.axis: Array = placement[:3, 2]
+        self.axis: Array = self.placement[:3, 2]
         """(3,) of a cylinder, or what a half space is below of."""
         self.half_space = isinstance(shape, HalfSpace)
         self.convex = not isinstance(shape, Triangles) or is_convex(shape)
@@ -126,33 +126,9 @@ def body_of_soup(soup: Soup) -> Body:
     return Body(Solid(soup.owner, 0, np.eye(4), mesh), soup.deviation)
 
 
-def outline(shape: Geometry) -> tuple[Array, float, float]:
-    """Corners (k, 3) m in the shape's own frame, a radius (m), and that of circles (m) across z.
-
-    The shape lies within the radius of the hull of such circles about the corners.
-    """
-    match shape:
-        case Box(size):
-            signs = np.array(np.meshgrid(*[(-0.5, 0.5)] * 3)).reshape(3, 8).T
-            return signs * np.array(size), 0.0, 0.0
-        case Sphere(radius):
-            return np.zeros((1, 3)), radius, 0.0
-        case Capsule(radius, length):
-            return np.outer([-0.5, 0.5], [0.0, 0.0, length]), radius, 0.0
-        case Cylinder(radius, length):
-            return np.outer([-0.5, 0.5], [0.0, 0.0, length]), 0.0, radius
-        case HalfSpace():
-            return np.zeros((1, 3)), 0.0, 0.0
-        case Triangles():
-            return (*_hull_of(shape)[1:], 0.0)
-
-
 @lru_cache(maxsize=KEPT)
-def _hull_of(mesh: Triangles) -> tuple[Any, Array, float]:
-    """Coal's hull of a mesh, or None, its corners (k, 3) m, and a radius (m) about them.
-
-    Of what is flat, a box along the directions in which it spreads.
-    """
+def _hull_of(mesh: Triangles) -> tuple[Any, Outline]:
+    """Coal's hull of a mesh, or None, and what holds it: of what is flat a box along it."""
     from scipy.spatial import QhullError
 
     points = mesh.vertices[np.unique(mesh.faces)]
@@ -161,13 +137,14 @@ def _hull_of(mesh: Triangles) -> tuple[Any, Array, float]:
     _, spread, axes = np.linalg.svd(points - middle, full_matrices=False)
     if spread[-1] > FLAT * spread[0]:
         try:
-            return (*coal_hull(points), rounding)
+            hull, corners = coal_hull(points)
+            return hull, Outline(corners, rounding, 0.0)
         except (QhullError, RuntimeError):  # coal takes at most 255 edges at a corner
             pass
     along = (points - middle) @ axes.T
     ends = np.stack([along.min(axis=0), along.max(axis=0)])
     box = np.stack(np.meshgrid(*ends.T), axis=-1).reshape(-1, len(axes)) @ axes + middle
-    return None, box, rounding
+    return None, Outline(box, rounding, 0.0)
 
 
 def one_inside_other(a: Body, b: Body, rotation: Array, point: Array) -> bool:
