@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -188,27 +189,18 @@ WORTH = 0.04  # of the volume of the whole hull: what one more piece has to save
 SAMPLES = 600  # points on the surface, by which planes are chosen
 
 
-class _Cut(NamedTuple):
-    """Slabs across one axis."""
-
-    axis: int
-    places: Array
-    """Of the planes along the axis, rising, m."""
-    volume: float
-    """m^3, of the hulls together."""
-
-
 @lru_cache(maxsize=KEPT)
 def pieces_of(mesh: Geometry) -> tuple[Hull, ...]:
     """Convex bodies that together hold a shape; one where more would not be much smaller."""
     if not isinstance(mesh, Triangles) or is_convex(mesh, WORTH):
         return (hull_of(mesh),)
     points = _on_surface(mesh)
-    cut = min((_best_cut(points, axis) for axis in range(3)), key=lambda cut: cut.volume)
-    if len(cut.places) == 0:
+    cuts = [_best_cut(points[:, axis], points) for axis in range(3)]
+    axis = min(range(3), key=lambda k: cuts[k][0])
+    planes = cuts[axis][1]
+    if not planes:
         return (hull_of(mesh),)
-    ends = np.concatenate([[-np.inf], cut.places, [np.inf]])
-    slabs = (_clipped(mesh, cut.axis, *ends[k : k + 2]) for k in range(len(ends) - 1))
+    slabs = (_clipped(mesh, axis, *pair) for pair in pairwise([-np.inf, *planes, np.inf]))
     return tuple(outer_hull(slab) for slab in slabs if len(slab))
 
 
@@ -225,17 +217,20 @@ def _on_surface(mesh: Triangles) -> Array:
     return np.concatenate([inside, hull_of(mesh).vertices])
 
 
-def _best_cut(points: Array, axis: int) -> _Cut:
-    """The slabs across one axis of least volume, as many as are worth it.
+def _best_cut(along: Array, points: Array) -> tuple[float, list[float]]:
+    """The slabs of least volume, as many as are worth it: m^3 of their hulls, and planes between.
 
     Planes lie between bins of even width; with v(i, j) the volume of the hull of bins i .. j - 1,
     the least volume of k slabs over the first j bins is min over i of best(k - 1, i) + v(i, j).
+
+    Args:
+        along: (k,) m, of the points across the slabs; planes rise with it.
+        points: (k, 3) m.
     """
-    along = points[:, axis]
     low, high = float(along.min()), float(along.max())
     whole = hull_volume(points)
     if high - low <= 0.0 or whole <= 0.0:
-        return _Cut(axis, np.empty(0), whole)
+        return whole, []
     borders = np.linspace(low, high, BINS + 1)
     volume = np.full((BINS + 1, BINS + 1), np.inf)
     for i in range(BINS):
@@ -254,7 +249,7 @@ def _best_cut(points: Array, axis: int) -> _Cut:
     for k in range(count - 1, 0, -1):
         end = int(chosen[k][end])
         planes.insert(0, float(borders[end]))
-    return _Cut(axis, np.array(planes), float(best[count - 1][BINS]))
+    return float(best[count - 1][BINS]), planes
 
 
 def _clipped(mesh: Triangles, axis: int, low: float, high: float) -> Array:
