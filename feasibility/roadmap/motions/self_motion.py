@@ -125,7 +125,7 @@ def connect(arrays: SearchArrays, work: Work, q: Array, goal: Array) -> tuple[Ar
         (k, n) waypoints, the start left out; and whether the last one is `goal`.
     """
     waypoints = np.empty((CONNECT_STEPS, len(q)))
-    rows, reached = move_towards(arrays, work, q.copy(), goal, waypoints)
+    rows, reached = move_towards(arrays, work, q.copy(), goal.copy(), waypoints)
     return waypoints[:rows].copy(), bool(reached)
 
 

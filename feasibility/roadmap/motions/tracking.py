@@ -66,6 +66,7 @@ def track(
     """
     here, waypoints = q.copy(), np.empty((MOST_STEPS + self_motion.CONNECT_STEPS, len(q)))
     heading, goal = (False, q) if goal is None else (heading, goal)
+    goal = goal.copy()  # for one that is read-only, numba would compile all once more
     rows, more = _track(arrays, work, curve, *ends, here, goal, heading, cell, waypoints)
     return None if rows == STOPPED else waypoints[: rows + more].copy(), more > 0
 
