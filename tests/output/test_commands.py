@@ -1,7 +1,8 @@
-"""Commands, each run once: their words are approved, their bounds hold, and the numbers of `--json`
-are, key by key, what Python answers to the same question."""
+"""Commands, each run once: their words and the outlines of their pages are approved, their bounds
+hold, and the numbers of `--json` are, key by key, what Python answers to the same question."""
 
 import difflib
+import html
 import itertools
 import json
 import math
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 from approved import NUMBER
 from command_table import COMMANDS, NEEDS, NUMBERS, REFUSED, TABLE, WHOLE
+from page_outline import Page, fetched
 
 import coverable
 from coverable import check, load_case, load_motion, open_workers, pass_runs, trajectory, verify
@@ -25,6 +27,7 @@ from feasibility.division.ends import ends_of
 from feasibility.placement.trials import evaluator_of_study
 from feasibility.timing.speed_limits import used
 from feasibility.verdict import Walk
+from feasibility.version import version
 
 CHOICES = re.compile(r"\(choose from .*?\)")  # each version of Python has other quotes
 STATUS = ("zero", "one", "two", "three")
@@ -77,6 +80,31 @@ def test_what_a_command_says(commands, approved, command, name):
     others = [one for one in WHOLE.get(command, ()) if name not in WHOLE[command]]
     texts = [said(name), *(beside(said(name), said(one), one) for one in others)]
     approved(f"{command}/{name}", min(texts, key=lambda text: text.count("\n")))
+
+
+PAGES = [(command, name) for command, name in COMMANDS if "--html" in TABLE[command][name]]
+ALIKE = ("path", "infeasible"), ("check", "no motion to write")  # as within that of `explain`
+PAGES = [one for one in PAGES if one[0] != "show" and one not in ALIKE]
+
+
+@pytest.mark.parametrize(("command", "name"), PAGES)
+def test_the_outline_of_a_page(commands, approved, command, name):
+    text = commands.page(command, name)
+    assert fetched(text) == []
+    assert len(text) < 2_000_000
+    page = Page(text)
+    assert UNCHECKED in html.unescape(text).lower(), "every page says what is not checked"
+    if command == "check":
+        program = page.block("program").decode()
+        assert set(re.findall(r"https?://[\w./]+", program)) <= {"http://www.w3.org/1999/xhtml"}
+    outline = re.sub(r"\d+ evalu", "# evalu", page.outline()).replace(version(), "VERSION")
+    approved(f"pages/{command} {name}", outline)
+
+
+def test_a_result_is_shown_as_it_was_when_it_was_found(commands):
+    assert commands.page("show", "a page") == commands.page("check", "files")
+    missed = "cells out of reach", "no motion to write"
+    assert commands.page("show", missed[0]) == commands.page("check", missed[1])
 
 
 @pytest.mark.parametrize("command", REFUSED)

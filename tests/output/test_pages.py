@@ -1,11 +1,10 @@
-"""Pages that commands write: approved outlines; they fetch nothing, and names make no markup."""
+"""Pages fetch nothing, and names make no markup; what commands write is in test_commands.py."""
 
 import html
 import re
 from dataclasses import replace
 
 import pytest
-from command_table import COMMANDS, TABLE
 from page_outline import Page, fetched
 
 import coverable
@@ -14,33 +13,9 @@ from feasibility.collisions.words import UNCHECKED
 from feasibility.reports import comparison, explanation, study
 from feasibility.studies.robot_comparison import Arm
 from feasibility.studies.store import Row
-from feasibility.version import version
 from feasibility.viewer.robot_visuals import joint_paths
 
-PAGES = [(command, name) for command, name in COMMANDS if "--html" in TABLE[command][name]]
-ALIKE = ("path", "infeasible"), ("check", "no motion to write")  # as within that of `explain`
-PAGES = [one for one in PAGES if one[0] != "show" and one not in ALIKE]
 EVIL = '</script><script>alert(1)</script><img src=x onerror="alert(2)">/__proto__'
-
-
-@pytest.mark.parametrize(("command", "name"), PAGES)
-def test_the_outline_of_a_page(commands, approved, command, name):
-    text = commands.page(command, name)
-    assert fetched(text) == []
-    assert len(text) < 2_000_000
-    page = Page(text)
-    assert UNCHECKED in html.unescape(text).lower(), "every page says what is not checked"
-    if command == "check":
-        program = page.block("program").decode()
-        assert set(re.findall(r"https?://[\w./]+", program)) <= {"http://www.w3.org/1999/xhtml"}
-    outline = re.sub(r"\d+ evalu", "# evalu", page.outline()).replace(version(), "VERSION")
-    approved(f"pages/{command} {name}", outline)
-
-
-def test_a_result_is_shown_as_it_was_when_it_was_found(commands):
-    assert commands.page("show", "a page") == commands.page("check", "files")
-    missed = "cells out of reach", "no motion to write"
-    assert commands.page("show", missed[0]) == commands.page("check", missed[1])
 
 
 @pytest.fixture(scope="module")

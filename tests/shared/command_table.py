@@ -51,7 +51,11 @@ class Commands:
         return [command, *shlex.split(TABLE[command][name])]
 
     def _run(self, command: str, name: str, *more: str) -> Said:
-        words = [*self.words(command, name), *more]
+        words = self.words(command, name)
+        if more and "--html" in words:  # its page is drawn once
+            at = words.index("--html")
+            del words[at : at + 2]
+        words += more
         for file in set(words) & set(NEEDS):
             if NEEDS[file] != (command, name):
                 self.run(*NEEDS[file])
