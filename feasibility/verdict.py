@@ -202,9 +202,6 @@ class Certificate:
         return {**vars(self), "margin": self.placement_margin}
 
 
-DEFERRED = ("graph", "causes", "tree", "treated")
-
-
 def deferred(make: Callable[[], Any]) -> Any:
     """Stand-in for a field of `Verdict` that is made when it is first read."""
     return _Deferred(make)
@@ -275,9 +272,16 @@ class Verdict:
 
     def __getstate__(self) -> dict[str, Any]:
         """What is pickled: everything, deferred fields as what they are when read."""
-        for name in DEFERRED:
-            getattr(self, name)
-        return dict(vars(self))
+        return {name: getattr(self, name) for name in vars(self)}
+
+    if not TYPE_CHECKING:  # or it would let any name pass
+
+        def __getattribute__(self, name: str) -> Any:
+            """A field; what was `deferred` is made when it is first read, and kept."""
+            value = object.__getattribute__(self, name)
+            if isinstance(value, _Deferred):
+                value = vars(self)[name] = value.make()
+            return value
 
     @property
     def feasible(self) -> bool:
@@ -305,23 +309,3 @@ class Verdict:
             f"{self.answer} ({self.evidence}): {self.n_covered} of {len(self.cells)} cells, "
             f"{self.n_edges} of {pairs} edges. {self.message} {said}."
         )
-
-
-def _made_when_read(name: str) -> property:
-    """A property in place of a field that may have been given as `deferred`."""
-    kept = f"_{name}"
-
-    def read(verdict: Verdict) -> Any:
-        value = vars(verdict)[kept]
-        if isinstance(value, _Deferred):
-            value = vars(verdict)[kept] = value.make()
-        return value
-
-    def keep(verdict: Verdict, value: Any) -> None:
-        vars(verdict)[kept] = value
-
-    return property(read, keep)
-
-
-for _field in DEFERRED:
-    setattr(Verdict, _field, _made_when_read(_field))
