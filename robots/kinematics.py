@@ -70,13 +70,17 @@ class Kinematics:
             >>> points.shape, axes.shape
             ((4, 3), (4, 3))
         """
+        return self.held(q)[:2]
+
+    def held(self, q: ArrayLike) -> tuple[Array, Array, Array]:
+        """`tools`, and the reference axes (m, 3) of the TCP, in the root frame."""
         poses = list[bytes]()
         for row in self._configurations(q):
             pin.forwardKinematics(self._model, self._data, row)
             pin.updateFramePlacement(self._model, self._data, self._frame)
             poses.append(self._pose.tobytes())
         points, rotations = _points_and_rotations(poses)
-        return points, rotations @ self._approach
+        return points, rotations @ self._approach, rotations @ self.robot.reference_axis
 
     def rotation(self, q: ArrayLike) -> Array:
         """(3, 3) axes of the TCP's frame, as columns, in the root frame, at q (n,).
@@ -187,13 +191,6 @@ def _points_and_rotations(poses: list[bytes]) -> tuple[Array, Array]:
     values = np.frombuffer(bytearray().join(poses)).reshape(-1, 12)
     rotations = values[:, :9].reshape(-1, 3, 3).transpose(0, 2, 1)
     return values[:, 9:].copy(), np.ascontiguousarray(rotations)
-
-
-def reference_axes(robot: Robot, q: ArrayLike) -> Array:
-    """(m, 3) the reference axis of the tool at configurations q (m, n), in the root frame."""
-    frame = robot.model.frames[robot.tool_frame_id]
-    joints = Kinematics(robot).joints(q).rotations[:, frame.parentJoint]
-    return np.asarray(joints @ (frame.placement.rotation @ robot.reference_axis))
 
 
 def configuration_near(

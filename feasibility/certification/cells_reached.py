@@ -92,8 +92,7 @@ def cells_reached(judge: Judge, task: Task, samples: Samples) -> Reached:
     share = samples.share[piece][:, None] + t * (stop - samples.share[piece])[:, None]
     cell, row = np.repeat([some, row], len(TRIES), axis=1)
     q = judge.configurations(row, share.ravel())
-    held = *judge.kinematics.tools(q), judge.reference_axes(q)
-    reached.add(task, aims, cell, row, *held)
+    reached.add(task, aims, cell, row, *judge.kinematics.held(q))
     return reached
 
 

@@ -38,7 +38,7 @@ from feasibility.collisions.asked_bodies import gather
 from feasibility.cone import angle_of
 from feasibility.task import Task
 from feasibility.verdict import Certificate, Walk
-from robots.kinematics import Kinematics, reference_axes
+from robots.kinematics import Kinematics
 from robots.robot import Robot
 from surfaces.cells import Cells
 from surfaces.places.offset_surfaces import offset_surface
@@ -239,10 +239,8 @@ def _mismarked(cells: Cells, walk: Walk) -> str:
 def _misplaced(robot: Robot, cells: Cells, task: Task, walk: Walk) -> str:
     """Why a marked waypoint is not where it says it is; empty where all are."""
     at = np.flatnonzero(walk.cell >= 0)
-    q, cell = walk.q[at], walk.cell[at]
-    points, axes = Kinematics(robot).tools(q)
-    x = axes if task.roll is None else reference_axes(robot, q)
-    right = at_targets(task, task.targets(cells), cell, points, axes, x)[0] < np.inf
+    held = Kinematics(robot).held(walk.q[at])
+    right = at_targets(task, task.targets(cells), walk.cell[at], *held)[0] < np.inf
     if right.all():
         return ""
     row = int(at[np.argmin(right)])

@@ -35,7 +35,7 @@ from feasibility.certification.bisection import Rows, Stretches
 from feasibility.certification.faults import ROLL_CLOSE
 from feasibility.certification.lever_bounds import jacobians, peaks, second_derivatives
 from feasibility.task import Task
-from robots.kinematics import Kinematics, reference_axes
+from robots.kinematics import Kinematics
 from robots.robot import Robot
 from surfaces.cells import Cells
 from surfaces.places.places import OffsetSurface, Places
@@ -64,7 +64,7 @@ class Samples(Rows):
     facets: Array
     """(k,) m, distance from the triangles of a mesh; inf where the surface is smooth."""
     x: Array
-    """(k, 3) reference axes; 0 where the roll is free."""
+    """(k, 3) reference axes."""
     roll: Array
     """(k,) rad, how far the roll is off the middle of its range; 0 where it is free."""
 
@@ -143,10 +143,6 @@ class Judge:
         """Samples at all rows."""
         return self.sampled(np.arange(len(self.rows)), np.zeros(len(self.rows)))
 
-    def reference_axes(self, q: Array) -> Array:
-        """(k, 3) of configurations (k, n); 0 where the roll is free."""
-        return np.zeros((len(q), 3)) if self._roll is None else reference_axes(self.robot, q)
-
     def sampled(self, row: Ints, share: Array) -> Samples:
         """Samples of the motion so far on from rows (k,) to the next ones.
 
@@ -155,11 +151,11 @@ class Judge:
         to the nearest, the one that the tool looks at may be right.
         """
         q, tolerance = self.configurations(row, share), self.task.effective_tolerance
-        points, axes = self.kinematics.tools(q)
+        points, axes, x = self.kinematics.held(q)
         ahead = points + max(self.task.standoff, self.offset.least_look) * axes
         only = None if self._curves is None else self._curves[row]
         places = self.offset.nearest(points, ahead, tolerance, only)
-        found = self.over(places, row, share, points, axes, self.reference_axes(q))
+        found = self.over(places, row, share, points, axes, x)
         bad = np.flatnonzero(~self.within(found) & (found.error <= tolerance))
         if not len(bad):
             return found

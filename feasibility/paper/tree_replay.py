@@ -20,7 +20,7 @@ from feasibility.search_settings import Search
 from feasibility.targets.references import u_directions
 from feasibility.task import Task
 from feasibility.verdict import Certificate, Verdict
-from robots.kinematics import Kinematics, reference_axes
+from robots.kinematics import Kinematics
 from robots.robot import Robot
 from surfaces.cells import Cells
 from surfaces.patches.grid_cells import GridCells
@@ -45,14 +45,13 @@ def rolls_at(kinematics: Kinematics, cells: Cells, task: Task, q: Array) -> Arra
         task: whose approach and reference count.
         q: (k, n) configurations, rad or m.
     """
-    points, axes = kinematics.tools(q)
+    points, axes, x = kinematics.held(q)
     reference = task.fixed_reference(cells)
     if reference is None:
         reference = u_directions(cells.surface, points)
     if reference is None:
         return np.full(len(q), np.nan)
     b = approaches_at(cells, task, points)
-    x = reference_axes(kinematics.robot, q)
     return roll_of(x, axes, projected(reference, b)[0], b)
 
 

@@ -5,7 +5,7 @@ import numpy as np
 from coverable.errors import ArgumentError, Fault
 from feasibility.roll import roll_of
 from feasibility.task import Targets, Task
-from robots.kinematics import Kinematics, reference_axes
+from robots.kinematics import Kinematics
 from robots.robot import Robot
 from surfaces.cells import Cells
 
@@ -47,7 +47,6 @@ def _off_roll(robot: Robot, task: Task, targets: Targets) -> np.ndarray:
     if task.roll is None or targets.references is None or robot.start is None:
         return np.full(len(targets.points), -np.inf)
     start, shape = robot.start[None], targets.approaches.shape
-    axes = reference_axes(robot, start), Kinematics(robot).tools(start)[1]
-    x, a = (np.broadcast_to(one, shape) for one in axes)
+    a, x = (np.broadcast_to(one, shape) for one in Kinematics(robot).held(start)[1:])
     roll = roll_of(x, a, targets.references, targets.approaches)
     return np.asarray(np.abs(task.roll.off(roll)) - task.roll.half)

@@ -25,7 +25,7 @@ from feasibility.certification.roll_held import (
 from feasibility.roll import Roll
 from feasibility.targets.references import u_directions
 from feasibility.verdict import Walk
-from robots.kinematics import Kinematics, reference_axes
+from robots.kinematics import Kinematics
 from surfaces.places.offset_surfaces import offset_surface
 from surfaces.places.places import PlacePaths, Places
 
@@ -81,10 +81,10 @@ def test_frames_of_the_tool_bend_no_more_than_is_said(seed):
     robot = random_arm(rng) if seed else alone
     ends = rng.uniform(-1.0, 1.0, (2, robot.n))
     steps, poses = np.abs(np.diff(ends, axis=0)), jacobians(Kinematics(robot), ends)
-    x = reference_axes(robot, ends)
+    x = Kinematics(robot).held(ends)[2]
     bound = frame_second_derivatives(steps, robot.prismatic, poses, x)[0]
     q = ends[0] + S * (ends[1] - ends[0])
-    x, axes = reference_axes(robot, q), Kinematics(robot).tools(q)[1]
+    _, axes, x = Kinematics(robot).held(q)
     bent = [np.diff(one, n=2, axis=0) * 100.0**2 for one in (x, np.cross(axes, x))]
     truth = sum(np.linalg.norm(one, axis=1).max() for one in bent)
     assert truth <= bound * (1.0 + 1e-3)

@@ -21,7 +21,7 @@ from feasibility.certification.cut_proofs.empty_region import Claim, Emptiness
 from feasibility.certification.cut_proofs.linear_models import Boxes, models_of, target_parts
 from feasibility.certification.cut_proofs.parts_agreement import disagreement, places
 from feasibility.roll import projected, roll_of
-from robots.kinematics import Kinematics, reference_axes
+from robots.kinematics import Kinematics
 
 OUT = {"side": "outside"}
 PATCHES = (
@@ -85,7 +85,7 @@ def rolled_task(rng, robot, q, patch, place, standoff):
     b = -patch.side_sign * patch.normal(*place)[0]
     reference = rng.normal(size=3)
     along = patch.rotation @ (reference / np.linalg.norm(reference))
-    roll = roll_of(reference_axes(robot, q[None])[0], axis, projected(along, b)[0], b)
+    roll = roll_of(Kinematics(robot).held(q[None])[2][0], axis, projected(along, b)[0], b)
     half = np.exp(rng.uniform(np.log(1e-3), np.log(np.pi / 2)))
     middle = roll + rng.choice([-1.0, 0.0, 1.0]) * 0.999 * half
     low, high = np.degrees([middle - half, middle + half])

@@ -10,7 +10,7 @@ from feasibility.certification.cut_proofs import linear_models
 from feasibility.certification.cut_proofs.linear_models import Allowed, models_of, target_parts
 from feasibility.certification.roll_box_models import Directions, reference_parts, roll_models
 from feasibility.roll import Roll, projected
-from robots.kinematics import Kinematics, reference_axes
+from robots.kinematics import Kinematics
 
 UR5 = load_robot("ur5")
 
@@ -18,7 +18,7 @@ UR5 = load_robot("ur5")
 def tool_model(q, half):
     """x and y about q (n,) over a box of half widths (n,), and what boxes are made of by hand."""
     _, axis = Kinematics(UR5).tool(q)
-    x = reference_axes(UR5, q[None])
+    x = Kinematics(UR5).held(q[None])[2]
     both = np.stack([x, np.cross(axis, x)], axis=1)
     turning = Kinematics(UR5).twists(q[None]).transpose(0, 2, 1)[..., 3:]
     second = half @ (half + 2.0 * (np.cumsum(half) - half))
@@ -43,8 +43,7 @@ def test_models_of_the_roll_hold_over_their_boxes():
         near = b + np.einsum("ki,id->kd", x, slopes[0])
         near /= np.linalg.norm(near, axis=1, keepdims=True)
         t, _ = projected(np.tile(r, (200, 1)), near)
-        _, axes = kinematics.tools(q + inner)
-        own = reference_axes(UR5, q + inner)
+        _, axes, own = kinematics.held(q + inner)
         y, u = np.cross(axes, own), np.cross(near, t)
         cosine, sine = (t * own + u * y).sum(axis=1), (u * own - t * y).sum(axis=1)
         for end, sign in enumerate((1.0, -1.0)):

@@ -38,7 +38,7 @@ from feasibility.certification.roll_box_models import (
 )
 from feasibility.roll import Roll
 from feasibility.task import Targets, Task
-from robots.kinematics import Kinematics, reference_axes
+from robots.kinematics import Kinematics
 from robots.robot import Robot
 from surfaces.cells import Cells
 from surfaces.parts import SurfaceParts
@@ -189,7 +189,7 @@ def models_of(kinematics: Kinematics, boxes: Boxes, parts: Parts, allowed: Allow
         return made
     b = Directions(parts.centre[part, 3:], parts.slopes[part][..., 3:], parts.radius[part, 1])
     b, t = (one.at(centre[:, n:]) for one in (b, parts.references.of(part)))
-    frame = _frames(robot, centre[:, :n], h, at_centre)
+    frame = _frames(kinematics, centre[:, :n], h, at_centre)
     found = roll_models(frame, b, t, half[:, n:], allowed.roll)
     made.reach[:, :n] += length * np.linalg.norm(frame.columns, axis=3).sum(axis=2) * h
     return replace(
@@ -200,13 +200,13 @@ def models_of(kinematics: Kinematics, boxes: Boxes, parts: Parts, allowed: Allow
     )
 
 
-def _frames(robot: Robot, q: Array, half: Array, at: Jacobians) -> ToolModel:
+def _frames(kinematics: Kinematics, q: Array, half: Array, at: Jacobians) -> ToolModel:
     """x and y of the tool over boxes of joints of half widths (m, n) about q (m, n)."""
-    x = reference_axes(robot, q)
+    x, slides = kinematics.held(q)[2], kinematics.robot.prismatic
     both = np.stack([x, np.cross(at.axes, x)], axis=1)
     turned = [np.cross(at.angular, both[:, k, :, None], axis=1) for k in (0, 1)]
     sines = [np.linalg.norm(one, axis=1) for one in turned]
     moves = [np.minimum((one * half).sum(axis=1), 2.0) for one in sines]
-    seconds = [second_derivative_bound(one, half, robot.prismatic) for one in sines]
+    seconds = [second_derivative_bound(one, half, slides) for one in sines]
     columns = np.stack(turned, axis=1).transpose(0, 3, 1, 2)
     return ToolModel(both, columns, np.column_stack(seconds), np.column_stack(moves))

@@ -11,7 +11,7 @@ from feasibility.roadmap.motions.projection import PROJECTION_STEPS, project_ont
 from feasibility.roadmap.motions.search_arrays import SearchArrays, with_free_roll
 from feasibility.roadmap.motions.working_memory import Work
 from feasibility.roll import Roll, roll_of
-from robots.kinematics import Kinematics, reference_axes
+from robots.kinematics import Kinematics
 
 STARTS = 16  # Newton starts for each relaxed problem
 MANY = 32  # configurations whose rolls are looked at
@@ -70,11 +70,9 @@ def other_rolls(exploration: Exploration, cell: int) -> str:
 def _off_middle(exploration: Exploration, cell: int, q: Array) -> Array:
     """(k,) rad, rolls of configurations (k, n) over a cell, from the middle of the range."""
     arrays, robot = exploration.arrays, exploration.robot
-    _, axes = Kinematics(robot).tools(q)
+    _, axes, x = Kinematics(robot).held(q)
     at = np.ones((len(q), 1))
-    rolls = roll_of(
-        reference_axes(robot, q), axes, at * arrays.references[cell], at * arrays.approaches[cell]
-    )
+    rolls = roll_of(x, axes, at * arrays.references[cell], at * arrays.approaches[cell])
     return Roll(float(arrays.roll[0]), 0.0).off(rolls)
 
 
