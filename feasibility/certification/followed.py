@@ -52,13 +52,9 @@ class FollowedPart:
 
     def placed(self, fault: MotionFault) -> MotionFault:
         """A fault of this part as one of the whole motion."""
-        last = len(self.row) - 1
-        k = min(max(fault.row, 0), last)
-        here = self.row[k] + self.share[k]
-        there = self.row[min(k + 1, last)] + self.share[min(k + 1, last)]
-        at = float(here + fault.share * (there - here))
-        row = int(np.floor(at))
-        return replace(fault, row=row, share=at - row)
+        known = np.arange(len(self.row)), self.row + self.share
+        at = float(np.interp(max(fault.row, 0) + fault.share, *known))
+        return replace(fault, row=int(at), share=at - int(at))
 
 
 def followed_parts(judge: Judge, followed: Mask, samples: Samples) -> list[FollowedPart]:
@@ -135,7 +131,10 @@ def lifted_faults(
         ends = np.stack([_heights(surface, each) for each in points])
         least = np.nan_to_num(ends, nan=np.inf).min(axis=0)
         if (least < -tolerance).any():
-            return [_through(parts[0], least)]
+            k = int(np.argmin(least))
+            by = f"by {-1e3 * least[k]:.4g} mm"
+            text = f"the tool goes through the surface where it is lifted, {by}"
+            return [MotionFault(text, int(parts[0].row[k]), float(parts[0].share[k]))]
         way = BENT * np.linalg.norm(points[1] - points[0], axis=1)
         both, none = np.isfinite(ends).all(axis=0), np.isnan(ends).all(axis=0)
         bound = np.where(both, 0.5 * (ends.sum(axis=0) - way), least - way)
@@ -146,15 +145,6 @@ def lifted_faults(
         return []
     text = "not certified: the tool may go through the surface where it is lifted"
     return [MotionFault(text, int(left[0]), float(left[0] % 1.0))]
-
-
-def _through(part: FollowedPart, heights: Array) -> MotionFault:
-    """The fault of a tool that goes deepest where it is."""
-    worst = int(np.argmin(heights))
-    text = (
-        f"the tool goes through the surface where it is lifted, by {-1e3 * heights[worst]:.4g} mm"
-    )
-    return MotionFault(text, int(part.row[worst]), float(part.share[worst]))
 
 
 def _heights(surface: Surface, points: Array) -> Array:

@@ -72,8 +72,7 @@ def replay_over_surface(
             anywhere but through that. Everywhere by default.
     """
     found = _of_the_tool(robot, cells, task, np.asarray(q, dtype=float), needed, marks, working)
-    malformed = np.isnan(found.certificate.min_limit_margin)
-    return found if malformed else _with_bodies(found, robot, task, q, bodies)
+    return _with_bodies(found, robot, task, q, bodies)
 
 
 def _of_the_tool(
@@ -134,7 +133,7 @@ def _with_bodies(
 ) -> Replay:
     """A replay with what is between bodies, where some are given; and the margin, judged last."""
     certificate, faults = found.certificate, found.faults
-    if bodies is not None:
+    if bodies is not None and not np.isnan(certificate.min_limit_margin):  # these are a motion
         from feasibility.certification.collisions.collision_replay import collision_replay
 
         clear = collision_replay(robot, bodies, q, deviations)
