@@ -13,7 +13,7 @@ from asked import case_of, question, verdict_of
 from jobs import EndingClock
 
 import coverable
-from coverable import Answer, Evidence, Search, Verdict, check, load_result, save_result, verify
+from coverable import Answer, Evidence, Search, check, load_result, save_result, verify
 from coverable.errors import ArgumentError
 from feasibility.problem import Problem
 from feasibility.reports.verdict_json import as_json
@@ -159,7 +159,7 @@ def test_the_graph_is_what_people_draw_and_networkx_writes(name, tmp_path):
         verdict = load_result(save_result(verdict, case_of("plate"), tmp_path / "a")).verdict
     if name == "pickled":
         verdict = pickle.loads(pickle.dumps(verdict))
-        assert all(isinstance(vars(Verdict)[n], property) for n in ("graph", "causes", "tree"))
+        assert not any("Deferred" in type(kept).__name__ for kept in vars(verdict).values())
         assert {"graph", "causes", "tree"} <= set(dir(verdict))
     cells, nodes = verdict.cells, verdict.graph.nodes
     assert list(nodes) == list(range(len(cells)))
