@@ -116,22 +116,16 @@ def _measured(
     q = random_configurations(robot)
     q[0] = np.clip(0.0, robot.lower, robot.upper)
     open_pairs = [pair for pair, why in reasons.items() if why is None]
-    early = np.all(sampling.collisions(open_pairs, q[:FIRST_LOOK]), axis=0).tolist()
-    suspects = [pair for pair, hit in zip(open_pairs, early, strict=True) if hit]
+    early = sampling.rates(open_pairs, q[:FIRST_LOOK])
+    suspects = [pair for pair, rate in early.items() if rate == 1.0]
     moving = [pair for pair, why in reasons.items() if why not in (None, "rigid")] + suspects
-    rates = dict(zip(moving, sampling.collisions(moving, q).mean(axis=0).tolist(), strict=True))
-    found = dict(reasons)
+    rates = sampling.rates(moving, q)
     alike = [pair for pair in suspects if rates[pair] == 1.0]
-    exact = {solid.owner for solid in solids}
-    known = [pair for pair in alike if exact.issuperset(pair)]
-    parted = set[Pair]()
-    if known:
-        hits = np.all(PairSampling(robot, solids).collisions(known, q), axis=0).tolist()
-        parted = {pair for pair, hit in zip(known, hits, strict=True) if not hit}
-    for pair in suspects:
-        found[pair] = "always" if rates[pair] == 1.0 and pair not in parted else None
+    as_they_are = PairSampling(robot, solids).rates(alike, q) if alike else {}
+    parted = [pair for pair, rate in as_they_are.items() if rate < 1.0]
+    found = reasons | {pair: "always" for pair in alike if pair not in parted}
     if parted:
-        named = [f"{first} - {second}" for first, second in alike if (first, second) in parted]
+        named = [" - ".join(pair) for pair in parted]
         notes.append(
             f"checked, though their convex bodies collide in each of {len(q):,} random "
             "configurations, where their exact shapes do not: "
@@ -154,11 +148,8 @@ def _measured(
 def _nothing_between(first: str, second: str, shapes: LinkShapes) -> bool:
     """Is every link between two owners a mere frame? What is no link hangs on the tool's link."""
     a, b = (_upwards(owner, shapes) for owner in (first, second))
-    shared = set(a) & set(b)
-    between = [link for link in (*a, *b) if link not in shared]
-    nearest = next((link for link in a if link in shared), None)  # where the two paths meet
-    between += [] if nearest is None else [nearest]
-    return not any(link in shapes.embodied and link not in (first, second) for link in between)
+    met = next(link for link in a if link in b)
+    return shapes.embodied.isdisjoint(({*a} ^ {*b} | {met}) - {first, second})
 
 
 def _upwards(owner: str, shapes: LinkShapes) -> list[str]:

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 
-from coverable.arrays import Array, Mask
+from coverable.arrays import Array
 from robots.kinematics import Kinematics
 from robots.robot import Robot
 from robots.shapes.bodies import Polytope, Solid
@@ -65,8 +65,8 @@ class PairSampling:
             index = int(self._geometry.addGeometryObject(entry))
             self._of_owner.setdefault(body.owner, []).append(index)
 
-    def collisions(self, pairs: Sequence[Pair], configurations: Array) -> Mask:
-        """(k, p) which of p pairs collide in which of k configurations (k, n)."""
+    def rates(self, pairs: Sequence[Pair], configurations: Array) -> dict[Pair, float]:
+        """In what share of configurations (k, n) each pair collides."""
         self._geometry.removeAllCollisionPairs()
         pair_of: list[int] = []
         for number, (first, second) in enumerate(pairs):
@@ -84,7 +84,7 @@ class PairSampling:
             pin.computeCollisions(model, data, self._geometry, scratch, configuration, False)
             hits = [k for k, result in enumerate(scratch.collisionResults) if result.isCollision()]
             found[row, [pair_of[k] for k in hits]] = True
-        return found
+        return dict(zip(pairs, found.mean(axis=0).tolist(), strict=True))
 
 
 def with_crude_links_cut(robot: Robot, shapes: LinkShapes, pairs: Sequence[Pair]) -> LinkShapes:
@@ -98,18 +98,13 @@ def with_crude_links_cut(robot: Robot, shapes: LinkShapes, pairs: Sequence[Pair]
     exact = {solid.owner for solid in shapes.solids}
     known = [pair for pair in pairs if exact.issuperset(pair)]
     q = random_configurations(robot)[:LOOKED_AT]
-    as_hulls = PairSampling(robot, shapes.polytopes).collisions(known, q).mean(axis=0)
-    often = [pair for pair, rate in zip(known, as_hulls, strict=True) if rate > TOO_OFTEN]
+    as_hulls = PairSampling(robot, shapes.polytopes).rates(known, q)
+    often = [pair for pair, rate in as_hulls.items() if rate > TOO_OFTEN]
     if not often:
         return shapes
-    as_they_are = PairSampling(robot, shapes.solids).collisions(often, q).mean(axis=0)
-    rates = dict(zip(known, as_hulls, strict=True))
-    crude = {
-        owner
-        for pair, rate in zip(often, as_they_are, strict=True)
-        if rates[pair] - rate > TOO_OFTEN
-        for owner in pair
-    }
+    as_they_are = PairSampling(robot, shapes.solids).rates(often, q)
+    rates = ((pair, as_hulls[pair] - as_they_are[pair]) for pair in often)
+    crude = {owner for pair, rate in rates if rate > TOO_OFTEN for owner in pair}
     bodies = [
         body
         for solid in shapes.solids
