@@ -46,9 +46,8 @@ def gathered(robot: Robot, surface: Surface, collision: Collision, standoff: flo
     if faults:
         raise ArgumentError([fault.renamed({}, "collision") for fault in faults])
     arm = _arm_of(robot, collision)
-    shapes, tool = arm.shapes, arm.tool
-    solids = [*shapes.solids, *tool_solids(collision.tool, robot)]
-    polytopes, soups = [*shapes.polytopes, *tool], list[Soup]()
+    solids = [*arm.shapes.solids, *tool_solids(collision.tool, robot)]
+    polytopes, soups = [*arm.polytopes], list[Soup]()
     if collision.surface and surface.wall is not None:
         sheet = sheet_of(surface.wall, thickness=collision.thickness)
         soups.append(Soup(SURFACE, sheet.triangles, sheet.deviation, False, sheet))
@@ -76,15 +75,15 @@ def gathered(robot: Robot, surface: Surface, collision: Collision, standoff: flo
         scene=scene,
         pairs=tuple(asked),
         left_out=tuple(left_out),
-        unchecked=(*shapes.unchecked, *bare_stretch(robot, collision)),
+        unchecked=(*arm.shapes.unchecked, *bare_stretch(robot, collision)),
         checked=collision.checked,
         notes=(
-            *shapes.notes,
+            *arm.shapes.notes,
             *arm.pairs.notes,
             *(note for one in collision.scene for note in one.notes),
             *overlapping(collision, polytopes, left_out),
             *collision.notes_on(standoff),
-            *_beyond([r for r in arm.reaches if r.owner in owners], asked, standoff),
+            *_beyond(tool_reach(robot, solids), owners, asked, standoff),
         ),
     )
 
@@ -93,8 +92,8 @@ class _Arm(NamedTuple):
     """Bodies of links and tool, and the pairs of links."""
 
     shapes: LinkShapes
-    tool: tuple[Polytope, ...]
-    reaches: tuple[Reach, ...]
+    polytopes: tuple[Polytope, ...]
+    """Of links and tool."""
     pairs: LinkPairs
     """None of them where the arm need not stay clear of itself."""
 
@@ -108,20 +107,15 @@ def _arm(
     srdf: str | None,
     with_itself: bool,
 ) -> _Arm:
-    """What surface, places and clearances leave as it is: it takes most of the time of `gather`.
-
-    Args:
-        robot, fineness, tool, allow, srdf: see `Collision`.
-        with_itself: is the arm to stay clear of itself?
-    """
+    """What surface, places and clearances leave as it is: it takes most of the time of `gather`."""
     shapes, solids, pairs = link_shapes(robot, fineness), tool_solids(tool, robot), NO_PAIRS
-    bodies = [body for solid in solids for body in outer_bodies(solid)]
     if with_itself:
         pairs = link_pairs(robot, shapes, allow, srdf, solids)
         cut = with_crude_links_cut(robot, shapes, pairs.checked) if fineness == "hulls" else shapes
         if cut is not shapes:
             shapes, pairs = cut, link_pairs(robot, cut, allow, srdf, solids)
-    return _Arm(shapes, tuple(bodies), tool_reach(robot, shapes, bodies), pairs)
+    own = (body for solid in solids for body in outer_bodies(solid))
+    return _Arm(shapes, (*shapes.polytopes, *own), pairs)
 
 
 def _arm_of(robot: Robot, collision: Collision) -> _Arm:
@@ -139,7 +133,7 @@ def bare_stretch(robot: Robot, collision: Collision) -> dict[str, str]:
     arm, line = _arm_of(robot, collision), tool_line(robot)
     bare = float(np.linalg.norm(line.ends[1] - line.ends[0]))
     point = Polytope("tool point", line.joint, line.ends[1:], 0.0)
-    for body in (*arm.shapes.polytopes, *arm.tool):
+    for body in arm.polytopes:
         if body.joint == line.joint and bare > BARE:
             bare = min(bare, coal_distance(point, body))
     if bare <= BARE:
@@ -159,15 +153,16 @@ def bare_stretch(robot: Robot, collision: Collision) -> dict[str, str]:
     }
 
 
-def _beyond(reaches: Iterable[Reach], pairs: Iterable[Pair], standoff: float) -> list[str]:
-    """That bodies reach further beyond the tool point than the standoff leaves them."""
+def _beyond(
+    reaches: Iterable[Reach], tool: set[str], pairs: Iterable[Pair], standoff: float
+) -> list[str]:
+    """That the tool's bodies reach further beyond its point than the standoff leaves them."""
     needed = {pair.first: pair.clearance for pair in pairs if pair.second == SURFACE}
     return [
-        f"shapes of {reach.owner} reach {1e3 * reach.beyond:.1f} mm beyond the tool point, and "
-        f"have to stay {1e3 * needed[reach.owner]:g} mm off the surface; the standoff is "
-        f"{1e3 * standoff:g} mm"
-        for reach in reaches
-        if reach.owner in needed and reach.beyond + needed[reach.owner] > standoff
+        f"shapes of {owner} reach {1e3 * beyond:.1f} mm beyond the tool point, and have to stay "
+        f"{1e3 * needed[owner]:g} mm off the surface; the standoff is {1e3 * standoff:g} mm"
+        for owner, beyond in reaches
+        if owner in tool and beyond + needed.get(owner, -math.inf) > standoff
     ]
 
 
@@ -195,11 +190,6 @@ def _tool_owners(collision: Collision, joints: Mapping[str, int], robot: Robot) 
 
     Where the tool is fixed in the world and the arm holds the part, the whole world moves with the
     last joint: the tool is then what is mounted on the tool frame, or else the link of that name.
-
-    Args:
-        collision: what has to stay clear of what.
-        joints: which joint carries each owner.
-        robot: the arm.
     """
     if collision.tool_links:
         return {*collision.tool_links, TOOL} & joints.keys()
@@ -218,13 +208,8 @@ def _sorted_out(
 ) -> tuple[list[Pair], list[LeftOut]]:
     """Who must stay clear of whom; who is left out, and why.
 
-    Args:
-        collision: what has to stay clear of what.
-        joints: of links and tool.
-        scene: its objects.
-        tool: the tool's owners.
-        links: against each other, and against the tool.
-        touching: may the tool touch the surface?
+    `joints` carry the links and the tool, `links` are their pairs with each other, and `tool` are
+    the tool's owners, which may be `touching` the surface.
     """
     own = {one.name: one.clearance for one in collision.scene}
 

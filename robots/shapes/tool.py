@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from robots.robot import Robot
-from robots.shapes.bodies import Polytope, Solid, outline
-from robots.shapes.links import LinkShapes
+from robots.shapes.bodies import Solid, outline
 
 NEAR = 1e-3  # [m]
 
@@ -56,30 +55,18 @@ def tool_line(robot: Robot) -> ToolLine:
     return ToolLine(robot.tool_frame, int(tcp.parentJoint), np.stack([end, end]))
 
 
-def tool_reach(
-    robot: Robot, shapes: LinkShapes, tool: Sequence[Polytope] = ()
-) -> tuple[Reach, ...]:
+def tool_reach(robot: Robot, solids: Iterable[Solid]) -> tuple[Reach, ...]:
     """How far the bodies on the last joint reach beyond the tool point, the furthest first.
 
     What reaches further than the standoff is inside a flat surface that is treated, whatever the
     arm does. Exact shapes count, not the convex bodies around them.
-
-    Args:
-        robot: the arm.
-        shapes: of its links.
-        tool: bodies on the last joint that are no link's.
     """
     frame = robot.model.frames[robot.tool_frame_id].placement
     axis, beyond = frame.rotation @ robot.approach_axis, dict[str, float]()
-    ends = [(one.owner, _end(one, axis)) for one in shapes.solids if one.joint == robot.n]
-    ends += [(one.owner, float((one.vertices @ axis).max()) + one.radius) for one in tool]
-    for owner, end in ends:
-        beyond[owner] = max(beyond.get(owner, -np.inf), end - float(frame.translation @ axis))
+    tip = float(frame.translation @ axis)
+    for one in (one for one in solids if one.joint == robot.n):
+        own, (corners, radius, circle) = one.placement[:3, :3].T @ axis, outline(one.geometry)
+        end = float(one.placement[:3, 3] @ axis) + float((corners @ own).max()) + radius
+        end += circle * math.hypot(own[0], own[1])
+        beyond[one.owner] = max(beyond.get(one.owner, -np.inf), end - tip)
     return tuple(sorted(map(Reach._make, beyond.items()), key=lambda reach: -reach.beyond))
-
-
-def _end(solid: Solid, axis: np.ndarray) -> float:
-    """m, how far along a unit vector (3,) a shape reaches from the origin of its joint's frame."""
-    own, place = solid.placement[:3, :3].T @ axis, float(solid.placement[:3, 3] @ axis)
-    corners, radius, circle = outline(solid.geometry)
-    return place + float((corners @ own).max()) + circle * math.hypot(own[0], own[1]) + radius

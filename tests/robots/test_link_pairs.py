@@ -7,12 +7,12 @@ import pytest
 import trimesh
 
 from coverable import RobotError, load_robot
-from robots.shapes.bodies import Polytope, Solid
+from robots.shapes.bodies import Solid
 from robots.shapes.link_pairs import link_pairs
 from robots.shapes.links import link_shapes
 from robots.shapes.solids import checked_triangles
 from robots.shapes.tool import tool_reach
-from robots.urdf.link_shapes import Sphere
+from robots.urdf.link_shapes import Capsule, Sphere
 
 SRDF = '<robot name="x">{}</robot>'
 PAIR = '<disable_collisions link1="{}" link2="{}" {}/>'
@@ -143,12 +143,12 @@ REACH = {
 @pytest.mark.parametrize("name", REACH)
 def test_how_far_tools_reach_beyond_their_point(name):
     robot = load_robot(name)
-    reaches = tool_reach(robot, link_shapes(robot))
+    reaches = tool_reach(robot, link_shapes(robot).solids)
     assert [reach.beyond for reach in reaches] == sorted((r.beyond for r in reaches), reverse=True)
     owner, beyond = REACH[name]
     assert reaches[0].owner == owner
     assert 1e3 * reaches[0].beyond == pytest.approx(beyond, abs=0.06)
     if name == "puma560":  # a tool of the user reaches too
-        rod = Polytope("tool", 6, np.array([[0.0, 0, -0.2], [0, 0.01, 0.03]]), 0.002)
-        first = tool_reach(robot, link_shapes(robot), [rod])[0]
+        rod = Solid("tool", 6, np.eye(4), Capsule(0.002, 0.06))
+        first = tool_reach(robot, [*link_shapes(robot).solids, rod])[0]
         assert (first.owner, first.beyond) == ("tool", pytest.approx(0.032))
