@@ -99,12 +99,11 @@ def object_triangles(checks: Checks, vertices: Any, faces: Any) -> Triangles:
 def _arrays(checks: Checks, vertices: Any, faces: Any) -> tuple[Array, Ints]:
     """Both as arrays; anything after a fault."""
     before = len(checks.faults)
-    points, corners = PLACEHOLDER.vertices, PLACEHOLDER.faces
     try:
         points = np.asarray(vertices, dtype=float)
-        if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
-            checks.keep(Fault("vertices", "are not k x 3 finite numbers (metres)"))
     except (TypeError, ValueError):
+        points = np.empty(0)
+    if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
         checks.keep(Fault("vertices", "are not k x 3 finite numbers (metres)"))
     given = np.asarray(faces)
     if given.ndim != 2 or given.shape[1] != 3 or given.dtype.kind not in "iu":
@@ -114,9 +113,7 @@ def _arrays(checks: Checks, vertices: Any, faces: Any) -> tuple[Array, Ints]:
         checks.keep(Fault("faces", f"are {len(given):,}; thin the mesh", expected=expected))
     elif len(checks.faults) == before and not 0 <= given.min() <= given.max() < len(points):
         checks.keep(Fault("faces", f"name a vertex that is not among the {len(points):,}"))
-    else:
-        corners = given.astype(np.int64)
-    return points, corners
+    return points, given
 
 
 SMALLEST_SIDE, LARGEST_SIDE = 1e-6, 1e4  # [m]

@@ -90,35 +90,28 @@ def _within_sides(*past: Array) -> Array:
     return np.asarray(-outside - np.minimum(reduce(np.maximum, past), 0.0))
 
 
+@lru_cache(maxsize=64)
 def points_inside(shape: Geometry) -> tuple[Array, Array]:
-    """(k, 3) m, points of a body in its own frame, and (k,) m, how deep they are at least."""
-    if isinstance(shape, Triangles):
-        return _points_of_mesh(shape)
+    """(k, 3) m, points of a body in its own frame, and (k,) m, how deep they are at least.
+
+    Of a mesh corners that are far from each other, on wide triangles too, and places inside.
+    """
     corners, radius, circle = outline(shape)
-    half = corners.max(axis=0) + radius + [circle, circle, 0.0]
-    grid = _grid(-half, half)
+    beside = radius + np.array([circle, circle, 0.0])
+    points = _grid(corners.min(axis=0) - beside, corners.max(axis=0) + beside)
+    if isinstance(shape, Triangles):
+        solid, some = planes_around(shape) is not None, _all_over(shape)
+        found = depths(shape, points) if solid else _depths_by_triangles(shape, points)
+        some, none = Balls.among(some, np.zeros(len(some)), MOST_CORNERS)
+        return np.concatenate([some, points[found > 0.0]]), np.append(none, found[found > 0.0])
     if isinstance(shape, Cylinder):
-        grid = np.concatenate([grid, rims(shape.radius, shape.length, AROUND)])
+        points = np.concatenate([points, rims(shape.radius, shape.length, AROUND)])
     if isinstance(shape, Capsule):
         axis = np.outer(np.linspace(-0.5, 0.5, ALONG) * shape.length, [0.0, 0.0, 1.0])
-        grid = np.concatenate([grid, axis])
-    # A little less than the body, for rounding.
-    grid *= 1.0 - 1e-9
-    found = depths(shape, grid)
-    inside = found >= 0.0
-    return grid[inside], found[inside]
-
-
-@lru_cache(maxsize=64)
-def _points_of_mesh(mesh: Triangles) -> tuple[Array, Array]:
-    """Corners that are far from each other, on wide triangles too, and places inside a solid."""
-    grid = _grid(mesh.vertices.min(axis=0), mesh.vertices.max(axis=0))
-    solid, corners = planes_around(mesh) is not None, _all_over(mesh)
-    corners = Balls.among(corners, np.zeros(len(corners)), MOST_CORNERS).centres
-    found = depths(mesh, grid) if solid else _depths_by_triangles(mesh, grid)
-    inside = found > 0.0
-    points = np.concatenate([corners, grid[inside]])
-    return points, np.append(np.zeros(len(corners)), found[inside])
+        points = np.concatenate([points, axis])
+    points *= 1.0 - 1e-9  # a little less than the body, for rounding
+    found = depths(shape, points)
+    return points[found >= 0.0], found[found >= 0.0]
 
 
 def _depths_by_triangles(mesh: Triangles, points: Array) -> Array:
