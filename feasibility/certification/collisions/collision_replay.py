@@ -164,7 +164,7 @@ def _judged(pairings: list[Pairing]) -> CollisionReplay:
             known = faults.get(fault.pair)
             if known is None or not fault.distance >= known.distance:
                 faults[fault.pair] = fault
-    order = sorted(pairings, key=lambda one: _decided(one.bound))
+    order = sorted(pairings, key=lambda one: np.nan_to_num(one.bound, nan=np.inf))
     # What is certified of many is no more than was aimed at: they need not be the nearest.
     nearby = list(dict.fromkeys([met, *order[:MEASURED]]))
     measured, near = (None, order[0]) if faults else _measured(nearby)
@@ -172,7 +172,9 @@ def _judged(pairings: list[Pairing]) -> CollisionReplay:
         min_clearance=order[0].bound,
         nearest_pair=near.names,
         measured_clearance=None if measured is None else max(measured, order[0].bound),
-        faults=tuple(sorted(faults.values(), key=lambda fault: _decided(fault.distance))),
+        faults=tuple(
+            sorted(faults.values(), key=lambda fault: np.nan_to_num(fault.distance, nan=np.inf))
+        ),
         pairings=tuple(pairings),
     )
 
@@ -199,11 +201,6 @@ def _outermost(pair: Pair, a: Body, b: Body) -> tuple[object, ...]:
     So the answer does not depend on the order in which bodies and pairs are given.
     """
     return (-b.joint, *sorted((pair.first, pair.second)), *a.centre, *b.centre)
-
-
-def _decided(distance: float) -> float:
-    """m; infinite where it was not decided."""
-    return math.inf if math.isnan(distance) else distance
 
 
 def _fault(found: Pairing, time: float) -> CollisionFault:

@@ -61,9 +61,13 @@ class Pairing:
         self.names, self.needed = (pair.first, pair.second), pair.clearance
         self._delta, moved, self._off = bends
         straight = motion.chord_lengths(a.joint, b.joint, b.centre, b.ball) + 4.0 * self._delta
-        rotations, points = motion.poses(a.joint, b.joint)
-        ahead = rotations @ b.centre + points - a.centre
-        away = _least_norms(ahead[:-1], ahead[1:]) - a.ball - b.ball - a.deviation
+        self._poses = rotations, points = motion.poses(a.joint, b.joint)
+        """(m, 3, 3) and (m, 3) m, of b seen from a at the rows."""
+        self._ahead = rotations @ b.centre + points - a.centre
+        start, way = self._ahead[:-1], np.diff(self._ahead, axis=0)
+        square = np.maximum((way * way).sum(axis=1), 1e-300)
+        share = np.clip(-(start * way).sum(axis=1) / square, 0.0, 1.0)
+        away = np.linalg.norm(start + share[:, None] * way, axis=1) - a.ball - b.ball - a.deviation
         self.low = away - b.deviation - self._delta - self._off - ROUNDING
         """(m - 1,) m, lower bounds of their distance along each segment."""
         moved = np.minimum(moved, straight)
@@ -190,9 +194,7 @@ class Pairing:
         A plane is tried on all of them. It stays with a, or turns with b: as a link swings about
         the base, so does the plane between them.
         """
-        rotations, points = self.motion.poses(self.a.joint, self.b.joint)
-        ahead = rotations @ self.b.centre + points - self.a.centre
-        turns = len(self.a.corners) * len(self.low) < COSTLY
+        turns, ahead = len(self.a.corners) * len(self.low) < COSTLY, self._ahead
         tried = self._raised(wanted, ahead[:-1] + ahead[1:] if turns else ahead[:1])
         while self._failures < FAILURES and not tried.all():
             worst = int(np.argmin(np.where(tried, np.inf, self.low)))
@@ -202,7 +204,7 @@ class Pairing:
 
     def part_at(self, row: int, wanted: float | Array, turns: bool = False) -> Mask:
         """(m - 1,) which segments have what is wanted (m), with a plane that parts at a row."""
-        rotations, points = self.motion.poses(self.a.joint, self.b.joint)
+        rotations, points = self._poses
         (apart,), n = self._normals(rotations[[row]], points[[row]])
         if apart > 0.0:
             self._raised(wanted, n)
@@ -331,8 +333,7 @@ class Pairing:
         rows = times.astype(np.intp)
         if (rows != times).any():
             return self.motion.poses(self.a.joint, self.b.joint, times)
-        rotations, points = self.motion.poses(self.a.joint, self.b.joint)
-        return rotations[rows], points[rows]
+        return self._poses[0][rows], self._poses[1][rows]
 
     def _low(self, n: Array, rotations: Array, points: Array) -> Array:
         """(k,) m, the least that b reaches along n (k, 3) at poses."""
@@ -349,21 +350,11 @@ class Pairing:
         """Is one body inside the other at the first row? Refuses then."""
         if self.low[0] > 0.0 or self.a.half_space:
             return False
-        rotations, points = self.motion.poses(self.a.joint, self.b.joint)
+        rotations, points = self._poses
         if one_inside_other(self.a, self.b, rotations[0], points[0]):
-            self.inside = True
-            (place,) = self.b.placed(rotations[:1], points[:1])
-            depth = self.a.distance(self.b, place, hulls=True)[0]
-            self._refuse(0.0, min(depth, 0.0))
+            self.inside, (place,) = True, self.b.placed(rotations[:1], points[:1])
+            self._refuse(0.0, min(self.a.distance(self.b, place, hulls=True)[0], 0.0))
         return self.inside
 
     def _refuse(self, time: float, distance: float) -> None:
         self.refused, self.distance = time, distance
-
-
-def _least_norms(start: Array, end: Array) -> Array:
-    """(k,) the least distances of straight lines between points (k, 3) from the origin."""
-    way = end - start
-    square = np.maximum((way * way).sum(axis=1), 1e-300)
-    share = np.clip(-(start * way).sum(axis=1) / square, 0.0, 1.0)
-    return np.asarray(np.linalg.norm(start + share[:, None] * way, axis=1))
