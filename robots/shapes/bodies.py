@@ -64,7 +64,7 @@ def outline(shape: Geometry) -> Outline:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Solid:
+class Solid(Protected):
     """One exact shape: what the judge sees, and what pictures show."""
 
     owner: str

@@ -119,13 +119,12 @@ class _Gathered:
 def _gathered(robot: Robot, checked: CheckedUrdf) -> _Gathered:
     """Take the shapes of all links."""
     own, model = checked.collisions, robot.model
-    bodies = {frame.name for frame in model.frames if frame.type == pin.FrameType.BODY}
     read = mesh_reader(mesh_paths(own.shapes or checked.visuals))
     faults = [{one.link: one.why for one in some} for some in (own.faults, checked.visual_faults)]
     drawn = {shape.link for shape in checked.visuals}
     made = _Gathered([link for link in own.without if link in drawn])
     for link in checked.links:
-        if link not in bodies:  # the file has changed since it was loaded
+        if not model.existFrame(link, pin.FrameType.BODY):  # the file has changed since
             continue
         frame = model.frames[model.getFrameId(link, pin.FrameType.BODY)]
         made.carriers.setdefault(int(frame.parentJoint), link)
@@ -142,9 +141,8 @@ def _gathered(robot: Robot, checked: CheckedUrdf) -> _Gathered:
                 made.stand_ins.append(link)
             found += shown  # those that can be read are kept: more is safe
         for origin, geometry in found:
-            placement = frame.placement.homogeneous @ origin
-            placement.flags.writeable = False
-            made.solids.append(Solid(link, int(frame.parentJoint), placement, geometry))
+            place = frame.placement.homogeneous @ origin
+            made.solids.append(Solid(link, int(frame.parentJoint), place, geometry))
     return made
 
 

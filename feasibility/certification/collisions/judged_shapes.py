@@ -17,7 +17,7 @@ import numpy as np
 
 from coverable.arrays import Array
 from feasibility.collisions.problem_bodies import Soup
-from robots.shapes.bodies import HalfSpace, Outline, Solid, Triangles, outline
+from robots.shapes.bodies import Geometry, HalfSpace, Outline, Solid, Triangles, outline
 from robots.shapes.coal_shapes import coal_hull, coal_shape, with_contacts
 from robots.shapes.hulls import is_convex
 
@@ -44,8 +44,7 @@ class Body:
         """
         self.joint, self.shape, self.deviation = solid.joint, solid.geometry, deviation
         self.placement, shape = solid.placement, self.shape
-        held = _hull_of(shape)[1] if isinstance(shape, Triangles) else outline(shape)
-        corners, self.radius, self.circle = held
+        self._hull, (corners, self.radius, self.circle) = _held(shape)
         self.corners: Array = corners @ self.placement[:3, :3].T + self.placement[:3, 3]
         """(k, 3) m; the body is what `outline` says, about these."""
         self.axis: Array = self.placement[:3, 2]
@@ -62,13 +61,6 @@ class Body:
     def _geometry(self) -> Any:
         """Coal's; of a convex mesh its hull, which has an inside."""
         return self._hull if self.convex else coal_shape(self.shape)
-
-    @cached_property
-    def _hull(self) -> Any:
-        """Coal's, of something convex that holds the body."""
-        if isinstance(self.shape, Triangles):
-            return _hull_of(self.shape)[0] or coal_shape(self.shape)
-        return coal_shape(self.shape)
 
     @cached_property
     def place(self) -> Any:
@@ -127,10 +119,15 @@ def body_of_soup(soup: Soup) -> Body:
 
 
 @lru_cache(maxsize=KEPT)
-def _hull_of(mesh: Triangles) -> tuple[Any, Outline]:
-    """Coal's hull of a mesh, or None, and what holds it: of what is flat a box along it."""
+def _held(mesh: Geometry) -> tuple[Any, Outline]:
+    """Coal's of something convex that holds a shape, its hull, and what that is to planes.
+
+    Of what is flat that is a box along it, and coal's are its triangles.
+    """
     from scipy.spatial import QhullError
 
+    if not isinstance(mesh, Triangles):
+        return coal_shape(mesh), outline(mesh)
     points = mesh.vertices[np.unique(mesh.faces)]
     rounding = MERGED * (1.0 + float(np.abs(points).max()))
     middle = points.mean(axis=0)
@@ -144,7 +141,7 @@ def _hull_of(mesh: Triangles) -> tuple[Any, Outline]:
     along = (points - middle) @ axes.T
     ends = np.stack([along.min(axis=0), along.max(axis=0)])
     box = np.stack(np.meshgrid(*ends.T), axis=-1).reshape(-1, len(axes)) @ axes + middle
-    return None, Outline(box, rounding, 0.0)
+    return coal_shape(mesh), Outline(box, rounding, 0.0)
 
 
 def one_inside_other(a: Body, b: Body, rotation: Array, point: Array) -> bool:
