@@ -68,37 +68,31 @@ def never_clear(
         tick: called now and then; what it raises ends the work.
         most: how many boxes may be looked at.
     """
-    tool, cone, looked, used = (
-        _alone(robot, bodies, point, approach),
-        min(cone, np.pi),
-        0,
-        set[int](),
-    )
+    tool, looked, used = _alone(robot, bodies, point, approach), 0, set[int]()
     if not tool.most_points:
         return Collides(False, 0)
-    batch = min(BATCH, max(1, MOST_POINTS // tool.most_points))
-    high = np.where([cone < 0.5 * np.pi, cone < 0.5 * np.pi, False], cone, WIDE)[None]
-    low = -high
-    while len(low):
-        (low, a), (high, b) = ((ends[:-batch], ends[-batch:]) for ends in (low, high))
-        looked += len(a)
+    batch, cone = min(BATCH, max(1, MOST_POINTS // tool.most_points)), min(cone, np.pi)
+    high = np.where([cone < 0.5 * np.pi, cone < 0.5 * np.pi, False], cone, WIDE)
+    boxes = np.array([[-high, high]])
+    while len(boxes):
+        boxes, some = boxes[:-batch], boxes[-batch:]
+        looked += len(some)
         if looked > most:
             return Collides(False, looked)
         tick()
-        found, middle = tool.deepest(a, b, point, tolerance), 0.5 * (a + b)
+        (low, high), middle = some.swapaxes(0, 1), some.mean(axis=1)
+        found = tool.deepest(low, high, point, tolerance)
         nothing = np.isinf(found.ratio)
         if (nothing & (_least_tilt(middle, middle) <= cone)).any():
             return Collides(False, looked)  # nor would a smaller box be ruled out
-        open_ = found.ratio >= 1.0
-        used |= set(found.pair[~open_].tolist())
-        effect = np.where(nothing[:, None], (b - a) * [1.0, 1.0, 0.0], found.effect)
-        along = np.eye(3, dtype=bool)[effect.argmax(axis=1)]
-        first, last = (a, np.where(along, middle, b)), (np.where(along, middle, a), b)
-        a, b = (
-            np.concatenate([one[open_], two[open_]]) for one, two in zip(first, last, strict=True)
-        )
-        kept = _least_tilt(a, b) <= cone
-        low, high = np.concatenate([low, a[kept]]), np.concatenate([high, b[kept]])
+        left = np.flatnonzero(found.ratio >= 1.0)
+        used |= set(np.delete(found.pair, left).tolist())
+        effect = np.where(nothing[:, None], (high - low) * [1.0, 1.0, 0.0], found.effect)
+        along, row = effect.argmax(axis=1)[left], np.arange(len(left))
+        halves = np.stack([some[left], some[left]])
+        halves[0, row, 1, along] = halves[1, row, 0, along] = middle[left, along]
+        halves = halves.reshape(-1, 2, 3)
+        boxes = np.concatenate([boxes, halves[_least_tilt(*halves.swapaxes(0, 1)) <= cone]])
     over, nearest = _at_best(tool, _all_over(cone), point, tolerance, batch)
     blamed = [bodies.pairs[k] for k in (nearest, *sorted(used))]
     named = dict.fromkeys((pair.first, pair.second) for pair in blamed)
