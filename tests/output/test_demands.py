@@ -26,7 +26,7 @@ position = [0, 0, 0.3], side = "outside" }
 GREEDY = ("search.method=greedy", "search.step_deg=0.5", "search.moves=all", "task.tolerance=0.02")
 BOX = 'name = "flood", kind = "box", size = [0.3, 0.3, 0.1], position = [0.5, 0, 0.37]'
 FLOOD = f"collision.scene=[{{ {BOX} }}]"
-UNTIL = "search.time_limit=2"
+UNTIL = "search.evaluations=2000"
 IMPOSSIBLE = {
     "standoff": ["task.standoff=2.5"],
     "tolerance": ["surface.position=[0, 0, 1.5]"],
@@ -97,7 +97,7 @@ def says_yes(ask, known, settings):
     """What says that the motion is there: commands, and the search for a placement."""
     case, motion, found, tree = known
     flags = [part for setting in settings for part in ("--set", setting)]
-    fewer = [*FEWER, *(["--set", "search.time_limit=3"] if settings else [])]
+    fewer = [*FEWER, *(["--set", "search.evaluations=2000"] if settings else [])]
 
     def asked_of(path):
         """The same result file, as if it had been found for the case with these settings."""
