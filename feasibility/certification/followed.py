@@ -66,12 +66,8 @@ def followed_parts(judge: Judge, followed: Mask, samples: Samples) -> list[Follo
     at = samples.row + samples.share
     turns = np.flatnonzero(on[1:] != on[:-1])
     cuts = _turns(judge, followed, at[turns], at[turns + 1], on[turns])
-    parts = []
-    for run in runs(on):
-        before, after = np.searchsorted(turns, run[0]) - 1, np.searchsorted(turns, run[-1])
-        ends = [cuts[k] for k in (before, after) if 0 <= k < len(cuts)]
-        parts.append(_part(judge.rows, np.unique(np.append(at[run], ends))))
-    return parts
+    at, on = np.insert(at, turns + 1, cuts), np.insert(on, turns + 1, values=True)
+    return [_part(judge.rows, np.unique(at[run])) for run in runs(on)]
 
 
 def _on(chart: Ints, followed: Mask) -> Mask:
