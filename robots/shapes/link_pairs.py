@@ -78,7 +78,7 @@ def link_pairs(
     allowed, disabled = {frozenset(pair) for pair in allow}, set[frozenset[str]]()
     if srdf is not None:
         pairs = read_srdf(srdf)
-        faults = _strangers(srdf, pairs, {*shapes.parents, *shapes.parents.values(), *joint})
+        faults = _strangers(srdf, pairs, {*robot.link_names, *joint})
         if faults:
             raise RobotError(faults, f"robot {robot.name!r}")
         disabled = {frozenset(pair) for pair in pairs.taken}
@@ -93,7 +93,7 @@ def link_pairs(
         pair = frozenset((first, second))
         if joint[first] == joint[second]:
             return "rigid"
-        if _nothing_between(first, second, shapes):
+        if _nothing_between(first, second, shapes, robot):
             return "adjacent"
         if pair in allowed:
             return "allowed"
@@ -145,19 +145,19 @@ def _measured(
     return LinkPairs(checked, tuple(left_out), tuple(notes))
 
 
-def _nothing_between(first: str, second: str, shapes: LinkShapes) -> bool:
+def _nothing_between(first: str, second: str, shapes: LinkShapes, robot: Robot) -> bool:
     """Is every link between two owners a mere frame? What is no link hangs on the tool's link."""
-    a, b = (_upwards(owner, shapes) for owner in (first, second))
+    tree = {*shapes.parents, *shapes.parents.values()}
+
+    def upwards(owner: str) -> list[str]:  # and those that carry it, up to the root
+        links = [owner if owner in tree else robot.tool_frame]
+        while links[-1] in shapes.parents:
+            links.append(shapes.parents[links[-1]])
+        return links
+
+    a, b = upwards(first), upwards(second)
     met = next(link for link in a if link in b)
     return shapes.embodied.isdisjoint(({*a} ^ {*b} | {met}) - {first, second})
-
-
-def _upwards(owner: str, shapes: LinkShapes) -> list[str]:
-    """A link and those that carry it, up to the root."""
-    links = [owner if owner in shapes.parents or owner == shapes.root else shapes.tool]
-    while links[-1] in shapes.parents:
-        links.append(shapes.parents[links[-1]])
-    return links
 
 
 def _strangers(

@@ -39,10 +39,6 @@ class LinkShapes:
     """Which shapes stand in for which, and what is not checked, one sentence each."""
     embodied: frozenset[str]
     """Links that are more than a frame, whether they are checked or not."""
-    root: str
-    """The link that no joint moves."""
-    tool: str
-    """The link whose origin is the tool point."""
     parents: Mapping[str, str]
     """The link that each other link hangs on."""
 
@@ -85,8 +81,7 @@ def link_shapes(robot: Robot, fineness: Fineness = "hulls") -> LinkShapes:
     polytopes = tuple(body for solid in solids for body in outer_bodies(solid, fineness))
     parents = {joint.child: joint.parent for joint in checked.joints}
     embodied = frozenset([*(solid.owner for solid in solids), *lost])
-    tree = checked.root, robot.tool_frame, parents
-    return LinkShapes(solids, polytopes, tuple(unchecked), notes, embodied, *tree)
+    return LinkShapes(solids, polytopes, tuple(unchecked), notes, embodied, parents)
 
 
 def outer_bodies(solid: Solid, fineness: Fineness = "hulls") -> list[Polytope]:
