@@ -35,13 +35,13 @@ Geometry = Box | Cylinder | Capsule | Sphere | Triangles | HalfSpace
 
 
 class Outline(NamedTuple):
-    """All points within `radius` of the hull of circles across z about some corners."""
+    """All points within `radius` of the hull of circles across z about some vertices."""
 
-    corners: Array
+    vertices: Array
     """(k, 3) m, in the shape's own frame."""
     radius: float
     """m."""
-    circle: float
+    circle: float = 0.0
     """m, radius of the circles."""
 
 
@@ -50,17 +50,17 @@ def outline(shape: Geometry) -> Outline:
     match shape:
         case Box(size):
             corners = np.array(np.meshgrid(*[(-0.5, 0.5)] * 3)).reshape(3, 8).T * size
-            return Outline(corners, 0.0, 0.0)
+            return Outline(corners, 0.0)
         case Capsule(radius, length):
-            return Outline(np.outer([-0.5, 0.5], [0.0, 0.0, length]), radius, 0.0)
+            return Outline(np.outer([-0.5, 0.5], [0.0, 0.0, length]), radius)
         case Cylinder(radius, length):
             return Outline(np.outer([-0.5, 0.5], [0.0, 0.0, length]), 0.0, radius)
         case Triangles(vertices):
-            return Outline(vertices, 0.0, 0.0)
+            return Outline(vertices, 0.0)
         case Sphere(radius):
-            return Outline(np.zeros((1, 3)), radius, 0.0)
+            return Outline(np.zeros((1, 3)), radius)
         case HalfSpace():
-            return Outline(np.zeros((1, 3)), 0.0, 0.0)
+            return Outline(np.zeros((1, 3)), 0.0)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -16,13 +16,13 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from coverable.arrays import Array
 from robots.errors import RobotError
-from robots.shapes.bodies import Geometry, HalfSpace, Triangles, outline
+from robots.shapes.bodies import Geometry, HalfSpace, Outline, Triangles, outline
 from robots.urdf.link_shapes import Cylinder
 
 KEPT = 256  # shapes whose hulls are kept
@@ -36,18 +36,9 @@ MOST_SIDES = 32  # ... where so many sides are enough
 ROUNDED = 1e-9  # [1] of a hull's volume: what a convex body may miss of it by rounding
 
 
-class Hull(NamedTuple):
-    """All points within `radius` of the convex hull of `vertices`."""
-
-    vertices: Array
-    """(k, 3) m."""
-    radius: float
-    """m."""
-
-
 @lru_cache(maxsize=KEPT)
-def hull_of(shape: Geometry) -> Hull:
-    """A convex body that holds a shape, in the shape's frame; exact for balls, capsules and boxes.
+def hull_of(shape: Geometry) -> Outline:
+    """A convex body that holds a shape, without circles; exact for balls, capsules and boxes.
 
     A cylinder becomes a prism around it.
 
@@ -59,13 +50,13 @@ def hull_of(shape: Geometry) -> Hull:
             # A corner is at radius / cos(pi / k).
             sides = math.ceil(math.pi / math.acos(radius / (radius + PRISM_EXCESS)))
             sides = min(max(sides, 8), MOST_SIDES)
-            return Hull(rims(radius / math.cos(math.pi / sides), length, sides), 0.0)
+            return Outline(rims(radius / math.cos(math.pi / sides), length, sides), 0.0)
         case Triangles():
             return outer_hull(shape.vertices)
         case HalfSpace():
             raise RobotError("a half space has no end")
-        case _:  # which have no circles
-            return Hull(*outline(shape)[:2])
+        case _:
+            return outline(shape)
 
 
 def rims(radius: float, length: float, count: int) -> Array:
@@ -76,7 +67,7 @@ def rims(radius: float, length: float, count: int) -> Array:
     return np.concatenate(ends)
 
 
-def outer_hull(points: Array) -> Hull:
+def outer_hull(points: Array) -> Outline:
     """A convex body of at most `MOST_VERTICES` that holds some points.
 
     Where the hull has more vertices, the one furthest outside is added to those kept until there
@@ -98,7 +89,7 @@ def outer_hull(points: Array) -> Hull:
         low, high = solid.min(axis=0), solid.max(axis=0)
         kept = np.stack(np.meshgrid(*zip(low, high, strict=True)), axis=-1).reshape(-1, 3)
         radius = 0.0
-    return Hull(kept, radius + ROUNDING * float(np.ptp(solid, axis=0).max()))
+    return Outline(kept, radius + ROUNDING * float(np.ptp(solid, axis=0).max()))
 
 
 def hull_volume(points: Array) -> float:
@@ -190,7 +181,7 @@ SAMPLES = 600  # points on the surface, by which planes are chosen
 
 
 @lru_cache(maxsize=KEPT)
-def pieces_of(mesh: Geometry) -> tuple[Hull, ...]:
+def pieces_of(mesh: Geometry) -> tuple[Outline, ...]:
     """Convex bodies that together hold a shape; one where more would not be much smaller."""
     if not isinstance(mesh, Triangles) or is_convex(mesh, WORTH):
         return (hull_of(mesh),)

@@ -90,7 +90,7 @@ def outer_bodies(solid: Solid, fineness: Fineness = "hulls") -> list[Polytope]:
     hulls = (hull_of(solid.geometry),) if fineness == "hulls" else pieces_of(solid.geometry)
     return [
         Polytope(solid.owner, solid.joint, vertices @ place[:3, :3].T + place[:3, 3], radius)
-        for vertices, radius in hulls
+        for vertices, radius, _ in hulls
     ]
 
 

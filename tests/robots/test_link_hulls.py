@@ -71,7 +71,7 @@ def test_what_is_flat_gets_a_hair():
 @pytest.mark.parametrize("shape", [Sphere(0.3), Capsule(0.1, 0.4), Box((0.2, 0.4, 0.6))])
 def test_balls_capsules_and_boxes_are_exact(shape):
     """In every direction the hull reaches as far as the shape does."""
-    vertices, radius = hull_of(shape)
+    vertices, radius, _ = hull_of(shape)
     for d in np.random.default_rng(5).normal(size=(200, 3)):
         d /= np.linalg.norm(d)
         match shape:

@@ -135,13 +135,13 @@ def _held(mesh: Geometry) -> tuple[Any, Outline]:
     if spread[-1] > FLAT * spread[0]:
         try:
             hull, corners = coal_hull(points)
-            return hull, Outline(corners, rounding, 0.0)
+            return hull, Outline(corners, rounding)
         except (QhullError, RuntimeError):  # coal takes at most 255 edges at a corner
             pass
     along = (points - middle) @ axes.T
     ends = np.stack([along.min(axis=0), along.max(axis=0)])
     box = np.stack(np.meshgrid(*ends.T), axis=-1).reshape(-1, len(axes)) @ axes + middle
-    return coal_shape(mesh), Outline(box, rounding, 0.0)
+    return coal_shape(mesh), Outline(box, rounding)
 
 
 def one_inside_other(a: Body, b: Body, rotation: Array, point: Array) -> bool:
