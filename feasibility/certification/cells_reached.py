@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coverable.arrays import Array, Ints, Mask
-from feasibility.certification.stretches import Judge, Samples, beyond
+from feasibility.certification.stretches import Judge, Samples, beyond, configurations
 from feasibility.task import Targets, Task
 from surfaces.cells import Cells
 
@@ -91,7 +91,7 @@ def cells_reached(judge: Judge, task: Task, samples: Samples) -> Reached:
     stop = np.where(samples.row[piece + 1] > row, 1.0, samples.share[piece + 1])
     share = samples.share[piece][:, None] + t * (stop - samples.share[piece])[:, None]
     cell, row = np.repeat([some, row], len(TRIES), axis=1)
-    q = judge.configurations(row, share.ravel())
+    q = configurations(judge.rows, row, share.ravel())
     reached.add(task, aims, cell, row, *judge.kinematics.held(q))
     return reached
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -24,7 +24,7 @@ import numpy as np
 from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.bisection import runs
 from feasibility.certification.faults import MotionFault
-from feasibility.certification.stretches import Judge, SampledStretches, Samples
+from feasibility.certification.stretches import Judge, SampledStretches, Samples, configurations
 from robots.kinematics import Kinematics
 from surfaces.places.patch_places import PatchPlaces
 from surfaces.places.places import Places
@@ -39,26 +39,22 @@ LONGEST = 500  # rows from mark to mark that are looked at so
 BENT = 1.01  # [1] the way between two points that are so close, compared with the straight line
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class FollowedPart:
-    """A part of a motion that follows a surface."""
-
-    q: Array
-    """(k, n) rows, rad or m."""
-    row: Ints
-    """(k,) the row of the whole motion, or the row before."""
-    share: Array
-    """(k,) how far on the way to the next one, 0..1."""
-
-    def placed(self, fault: MotionFault) -> MotionFault:
-        """A fault of this part as one of the whole motion."""
-        known = np.arange(len(self.row)), self.row + self.share
-        at = float(np.interp(max(fault.row, 0) + fault.share, *known))
-        return replace(fault, row=int(at), share=at - int(at))
+def placed(fault: MotionFault, at: Array) -> MotionFault:
+    """A fault of a part of a motion, whose rows are at row numbers with their shares (k,)."""
+    where = float(np.interp(max(fault.row, 0) + fault.share, np.arange(len(at)), at))
+    return replace(fault, row=int(where), share=where % 1.0)
 
 
-def followed_parts(judge: Judge, followed: Mask, samples: Samples) -> list[FollowedPart]:
+def rows_and_shares(at: Array, count: int) -> tuple[Ints, Array]:
+    """Of row numbers with their shares (k,), in a motion of so many rows."""
+    row = np.minimum(at.astype(np.int64), max(count - 2, 0))
+    return row, at - row
+
+
+def followed_parts(judge: Judge, followed: Mask, samples: Samples) -> list[Array]:
     """The parts of a motion over curves (M,) between poses that follow a surface.
+
+    Each by the row numbers, with their shares, at which it is known.
 
     The samples are of the motion, as it passes them, over their places on the curves.
     """
@@ -67,7 +63,7 @@ def followed_parts(judge: Judge, followed: Mask, samples: Samples) -> list[Follo
     turns = np.flatnonzero(on[1:] != on[:-1])
     cuts = _turns(judge, followed, at[turns], at[turns + 1], on[turns])
     at, on = np.insert(at, turns + 1, cuts), np.insert(on, turns + 1, values=True)
-    return [_part(judge.rows, np.unique(at[run])) for run in runs(on)]
+    return [np.unique(at[run]) for run in runs(on)]
 
 
 def _on(chart: Ints, followed: Mask) -> Mask:
@@ -75,21 +71,12 @@ def _on(chart: Ints, followed: Mask) -> Mask:
     return np.asarray((chart >= 0) & followed[np.maximum(chart, 0)])
 
 
-def _part(rows: Array, at: Array) -> FollowedPart:
-    """The configurations of a motion at row numbers with their shares (k,)."""
-    row = np.minimum(np.floor(at).astype(np.int64), max(len(rows) - 2, 0))
-    share = at - row
-    ahead = rows[np.minimum(row + 1, len(rows) - 1)] - rows[row]
-    return FollowedPart(rows[row] + share[:, None] * ahead, row, share)
-
-
 def _turns(judge: Judge, followed: Mask, low: Array, high: Array, begins: Mask) -> Array:
     """(k,) where between `low` and `high` a motion changes what it follows; `begins`: at low."""
     low, high = low.copy(), high.copy()
     for _ in range(HALVINGS if len(low) else 0):
         middle = 0.5 * (low + high)
-        part = _part(judge.rows, middle)
-        found = judge.sampled(part.row, part.share)
+        found = judge.sampled(*rows_and_shares(middle, len(judge.rows)))
         same = _on(found.places.chart, followed) == begins
         low, high = np.where(same, middle, low), np.where(same, high, middle)
     return 0.5 * (low + high)
@@ -122,15 +109,15 @@ def lifted_faults(
     for _ in range(LEVELS):
         if not len(left) or surface is None:
             return []
-        parts = [_part(rows, end) for end in (left, right)]
-        points = [kinematics.tools(part.q)[0] for part in parts]
+        at = [rows_and_shares(end, len(rows)) for end in (left, right)]
+        points = [kinematics.tools(configurations(rows, *end))[0] for end in at]
         ends = np.stack([_heights(surface, each) for each in points])
         least = np.nan_to_num(ends, nan=np.inf).min(axis=0)
         if (least < -tolerance).any():
-            k = int(np.argmin(least))
+            (row, share), k = at[0], int(np.argmin(least))
             by = f"by {-1e3 * least[k]:.4g} mm"
             text = f"the tool goes through the surface where it is lifted, {by}"
-            return [MotionFault(text, int(parts[0].row[k]), float(parts[0].share[k]))]
+            return [MotionFault(text, int(row[k]), float(share[k]))]
         way = BENT * np.linalg.norm(points[1] - points[0], axis=1)
         both, none = np.isfinite(ends).all(axis=0), np.isnan(ends).all(axis=0)
         bound = np.where(both, 0.5 * (ends.sum(axis=0) - way), least - way)

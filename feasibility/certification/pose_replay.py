@@ -17,8 +17,14 @@ from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.bisection import runs
 from feasibility.certification.cells_reached import Reached, cells_reached
 from feasibility.certification.faults import MotionFault, less_deviations, too_vague
-from feasibility.certification.followed import followed_parts, lifted_faults, off_surface
-from feasibility.certification.stretches import Judge, Samples
+from feasibility.certification.followed import (
+    followed_parts,
+    lifted_faults,
+    off_surface,
+    placed,
+    rows_and_shares,
+)
+from feasibility.certification.stretches import Judge, Samples, configurations
 from feasibility.certification.tool_along import Along, tool_along
 from feasibility.task import Task
 from feasibility.verdict import Walk
@@ -159,8 +165,9 @@ def along_poses(
     faults = lifted_faults(surface.under.wall, judge.rows, at, kinematics, tolerance)
     faults += too_vague(judge.task, surface.under)
     for part in followed_parts(judge, followed, found.samples):
-        one = tool_along(over.along(part.q))
+        row, share = rows_and_shares(part, len(judge.rows))
+        one = tool_along(over.along(configurations(judge.rows, row, share)))
         most = np.maximum(most, one.most)
-        faults += [part.placed(fault) for fault in one.faults]
-        np.minimum.at(room, part.row, one.room)
+        faults += [placed(fault, part) for fault in one.faults]
+        np.minimum.at(room, row, one.room)
     return Along(most, faults, found.samples, room), faults

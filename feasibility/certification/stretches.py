@@ -98,6 +98,12 @@ class Bounds(Rows):
     """(k,) rad, bounds of how far the roll is off the middle of its range; 0 where it is free."""
 
 
+def configurations(rows: Array, row: Ints, share: Array) -> Array:
+    """(k, n) where a motion (m, n) is so far on from rows (k,) to the next ones, rad or m."""
+    start = rows[row]
+    return start + share[:, None] * (rows[np.minimum(row + 1, len(rows) - 1)] - start)
+
+
 class Judge:
     """Compares configurations of one motion, and stretches between them, with a surface."""
 
@@ -134,11 +140,6 @@ class Judge:
         other.rows, other.marks = rows, None
         return other
 
-    def configurations(self, row: Ints, share: Array) -> Array:
-        """(k, n) rad or m, where the motion is so far on from rows (k,) to the next ones."""
-        start = self.rows[row]
-        return start + share[:, None] * (self.rows[np.minimum(row + 1, len(self.rows) - 1)] - start)
-
     def at_rows(self) -> Samples:
         """Samples at all rows."""
         return self.sampled(np.arange(len(self.rows)), np.zeros(len(self.rows)))
@@ -150,7 +151,7 @@ class Judge:
         standoff a tool point is near to the targets of several places. Where its axis does not fit
         to the nearest, the one that the tool looks at may be right.
         """
-        q, tolerance = self.configurations(row, share), self.task.effective_tolerance
+        q, tolerance = configurations(self.rows, row, share), self.task.effective_tolerance
         points, axes, x = self.kinematics.held(q)
         ahead = points + max(self.task.standoff, self.offset.least_look) * axes
         only = None if self._curves is None else self._curves[row]
