@@ -11,7 +11,6 @@ from bisect import bisect_left
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -29,28 +28,19 @@ from feasibility.verdict import Cause, CauseKind, Verdict, Walk
 from surfaces.adjacency import components
 
 
-class BestMotion(NamedTuple):
-    """A motion over as many cells as some motions allow."""
+def best_motion(rated: RatedGraph, edges: Sequence[Edge]) -> tuple[Mask, Callable[[], Walk]]:
+    """The cells (N,) that a motion made of some can visit at most, and what makes that motion.
 
-    covered: Mask
-    """(N,) the cells that it visits."""
-    walk: Callable[[], Walk]
-    """Makes it."""
-
-
-def best_motion(rated: RatedGraph, edges: Sequence[Edge]) -> BestMotion:
-    """The best motion made of some, from the start of the arm on where it has one.
-
-    Cells that have an order are visited in it.
+    It begins at the arm's start, where it has one; cells that have an order are visited in it.
     """
     cells, begin = len(rated.cells), rated.begin
     roadmap = roadmap_of(rated.graph, range(len(rated.graph.cell)), edges, cells)
     if rated.cells.in_order:
         run = layers_of(roadmap, begin)
         over = np.arange(cells) <= run.furthest
-        return BestMotion(over, lambda: route_walk(roadmap, run.start, run.route))
+        return over, lambda: route_walk(roadmap, run.start, run.route)
     root = roadmap.largest if begin is None else roadmap.root_of(begin)
-    return BestMotion(roadmap.cover[root], lambda: covering_walk(roadmap, root, begin))
+    return roadmap.cover[root], lambda: covering_walk(roadmap, root, begin)
 
 
 def roadmap_of(
@@ -158,6 +148,6 @@ def largest_speed(rated: RatedGraph) -> float:
     sigma = rated.task.min_manipulability or -np.inf
     speeds = np.unique([r.speed for r in rated.rated.values() if r.sigma >= sigma]).tolist()
     possible = bisect_left(
-        speeds, True, key=lambda v: not best_motion(rated, rated.holding(v)).covered.all()
+        speeds, True, key=lambda v: not best_motion(rated, rated.holding(v))[0].all()
     )
     return float(speeds[possible - 1]) if possible else 0.0

@@ -153,10 +153,7 @@ class RatedGraph:
     @property
     def begin(self) -> int | None:
         """The node that a motion has to begin at; None where the arm has no start."""
-        start = self.robot.start
-        if start is None:
-            return None
-        return int(np.argmin([np.abs(q - start).max() for q in self.graph.q]))
+        return None if self.robot.start is None else self.graph.nearest(self.robot.start)
 
     def holding(self, speed: float) -> list[Edge]:
         """The motions that allow a speed (m/s), and the singular values that the task requires."""

@@ -42,22 +42,22 @@ def at_rates(verdict: Verdict, clock: Clock) -> Verdict:
     if replayed.accepted:
         return _accepted(verdict, walk, verdict.certificate, "")
     rated, late = rated_graph(verdict), ""
-    found = best_motion(rated, rated.enough)
+    covered, made = best_motion(rated, rated.enough)
     try:
-        if not found.covered.all():
+        if not covered.all():
             with clock.enforced():
                 grow(rated, clock)
-            found = best_motion(rated, rated.enough)
+            covered, made = best_motion(rated, rated.enough)
     except OutOfTime:
         late = " The time limit ran out before all that might be faster was tried."
-    if found.covered.all():
-        other = found.walk()
+    if covered.all():
+        other = made()
         every = np.ones(len(verdict.cells), dtype=bool)
         certificate, refusal = replay_at_rates(verdict.robot, verdict.cells, task, other, every)
         if not refusal:
             note = " It is not the first motion that was found."
             return _accepted(verdict, other, certificate, note)
-    return _not_found(verdict, rated, replayed, found.covered, late)
+    return _not_found(verdict, rated, replayed, covered, late)
 
 
 def _accepted(verdict: Verdict, walk: Walk, certificate: Certificate | None, note: str) -> Verdict:

@@ -5,12 +5,13 @@ Between patches they are, but for the lift itself: the tool is drawn back along 
 """
 
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
 from coverable.arrays import Array
-from feasibility.certification.collisions.collision_replay import CollisionReplay, collision_replay
+from feasibility.certification.collisions.collision_replay import collision_replay
 from feasibility.certification.lever_bounds import jacobians, second_derivatives
 from feasibility.collisions.asked_bodies import gather
 from feasibility.collisions.kernels.memory import collision_buffer
@@ -33,14 +34,10 @@ CLOSE = 1e-7  # [m], and [1] of the axis
 def clear_moves(
     robot: Robot, cells: Cells, task: Task, moves: Iterable[Reconfiguration]
 ) -> tuple[Reconfiguration, ...]:
-    """The same moves led around obstacles; unchanged where collisions are not checked.
+    """Straight moves led around obstacles; the same where collisions are not checked.
 
     A tool that touches the surface is lifted first, and set down at the end: in between it has to
     stay clear of the surface too.
-
-    Args:
-        robot, cells, task: the question, with its collisions.
-        moves: straight lines.
     """
     bodies = lifted = gather(robot, cells.surface, task.collision, task.standoff)
     if bodies is not None and any(one.why == "contact" for one in bodies.left_out):
@@ -56,42 +53,26 @@ def _clear(
 ) -> Reconfiguration:
     """A move that the judge accepts; the straight one, judged, where none was found.
 
-    Args:
-        robot, move: what moves.
-        bodies: at both ends.
-        lifted: those with the pairs of tool and surface, where `bodies` lacks them; else the same.
-        buffer: of `collision_buffer`, for `lifted`.
+    Where `bodies`, those at both ends, lack the pairs of tool and surface, `lifted` has them; else
+    it is the same. The `buffer` is of `lifted`.
     """
-    touches = lifted is not bodies
-    up, down = (_lifted(robot, q) if touches else q[None] for q in (move.start, move.end))
-    between = None
-    if up is not None and down is not None:
+    touches, between, kinematics = lifted is not bodies, None, Kinematics(robot)
+    with suppress(PathError):  # a limit may prevent the lift
+        up, down = (
+            drawn_back(robot, q, -kinematics.tool(q)[1], LIFT, STRAIGHT) if touches else q[None]
+            for q in (move.start, move.end)
+        )
         between = free_motion(FreeSpace(robot, buffer), up[-1], down[-1], seed=0)
-    if up is not None and down is not None and between is not None:
+    if between is not None:
         rows = np.concatenate([up[:-1], between, down[-2::-1]])
         found = [collision_replay(robot, bodies, rows)]
         if touches:
             found.append(collision_replay(robot, lifted, between))
         if all(one.accepted for one in found):
-            return replace(move, via=rows[1:-1], replayed=min(found, key=_nearest))
+            clear = [np.inf if x.min_clearance is None else x.min_clearance for x in found]
+            return replace(move, via=rows[1:-1], replayed=found[int(np.argmin(clear))])
     replayed = collision_replay(robot, lifted, np.stack([move.start, move.end]))
     return replace(move, via=np.zeros((0, robot.n)), replayed=replayed)
-
-
-def _nearest(replayed: CollisionReplay) -> float:
-    """m, of what was found; inf where there is no pair."""
-    return np.inf if replayed.min_clearance is None else replayed.min_clearance
-
-
-def _lifted(robot: Robot, q: Array) -> Array | None:
-    """Configurations (k, n) rad or m that draw the tool back from where it touches at q (n,).
-
-    The last is `LIFT` away; None where a limit prevents it.
-    """
-    try:
-        return drawn_back(robot, q, -Kinematics(robot).tool(q)[1], LIFT, STRAIGHT)
-    except PathError:
-        return None
 
 
 def drawn_back(
@@ -99,14 +80,8 @@ def drawn_back(
 ) -> Array:
     """Configurations (k, n) rad or m, from q on, that move the tool point straight back.
 
-    The axis keeps its direction.
-
-    Args:
-        robot: the arm.
-        q: (n,) where it begins.
-        direction: (3,) unit, where to.
-        distance: m, how far.
-        tolerance: m, how far the tool point may be off the line, between rows too.
+    The axis keeps its direction (3,), a unit vector. Between rows, too, the tool point is off the
+    line by the tolerance (m) at most.
 
     Raises:
         PathError: a limit or a singularity prevents it.

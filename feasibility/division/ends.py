@@ -41,11 +41,7 @@ class Ends(Protected):
 
 
 def ends_of(path: CoveragePath, approach: float) -> Ends:
-    """How a path is entered and left.
-
-    Args:
-        path: over the surface; `task.home_deg` is where it comes from and goes to.
-        approach: m, how far the tool is drawn back along the approach direction.
+    """How a path is entered and left: drawn back by `approach` (m), and from and to home.
 
     Raises:
         PathError: the tool cannot be drawn back, or would go through the surface; a body is too

@@ -72,11 +72,7 @@ class _Tree:
         self.before = list(range(-1, len(self.q) - 1))
 
     def towards(self, aim: Array, most: float = np.inf) -> tuple[int, bool]:
-        """Grow from the nearest configuration.
-
-        Args:
-            aim: (n,) the configuration to be reached.
-            most: rad, no further than this.
+        """Grow from the nearest configuration to another, by no more than so many rad.
 
         Returns:
             Where it got, -1 for nowhere; and whether that is `aim`.

@@ -70,12 +70,10 @@ def _words(search: PassSearch) -> str:
     code, joint = (int(value) for value in search.exploration.work.stop_reason)
     names = search.exploration.robot.joint_names
     if code == stop.LIMIT:
-        which = names[joint] if 0 <= joint < len(names) else "a joint"
-        return f"{which} comes to its limit"
+        return f"{names[joint] if 0 <= joint < len(names) else 'a joint'} comes to its limit"
     if code == stop.COLLISION:
-        known = 0 <= joint < len(search.pairs)
-        pair = search.pairs[joint] if known else None
-        bodies = "bodies" if pair is None else f"{pair.first} and {pair.second}"
+        known = search.pairs[joint : joint + 1] if joint >= 0 else ()
+        bodies = next((f"{pair.first} and {pair.second}" for pair in known), "bodies")
         return f"{bodies} come too near to each other"
     return WORDS.get(code, "no motion is found")
 
@@ -102,29 +100,25 @@ def gaps_of(search: PassSearch, pieces: Array, worked: Mask) -> tuple[Gap, ...]:
         pieces: (N - 1,) m, of passes between poses.
         worked: (N - 1,) on which of them a run works.
     """
-    left = (pieces > 0.0) & ~worked
+    exploration, left = search.exploration, (pieces > 0.0) & ~worked
     # What lies between two passes belongs to the gap if it is not worked on either.
-    open_ = ~worked
-    ends = np.flatnonzero(np.diff(np.concatenate([[0], open_.astype(np.int8), [0]])))
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], ~worked, [False]])))
     found = []
     for first, last in ends.reshape(-1, 2).tolist():
         length = float(pieces[first:last][left[first:last]].sum())
         if length > 0.0:
             own = search.places.stretch[first:last][left[first:last]]
             stretches = tuple(dict.fromkeys(own.tolist()))
-            found.append(Gap(stretches, length, *_why(search, range(first, last + 1))))
+            missed = first + np.flatnonzero(~exploration.reached[first : last + 1])
+            if len(missed):
+                pose = int(missed[0])
+                cause = search.slow.get(pose) or cause_of(exploration, pose, search.pairs)
+                why, proved = f"{place_words(search.places, pose)}: {cause.detail}", cause.proved
+            else:
+                node = exploration.roadmap.over[first][-1]
+                why, proved = where_it_stops(search, first, exploration.roadmap.q[node]), False
+            found.append(Gap(stretches, length, why, proved))
     return tuple(found)
-
-
-def _why(search: PassSearch, poses: range) -> tuple[str, bool]:
-    """Why the first of some poses is not reached, and whether that is proved."""
-    exploration = search.exploration
-    for pose in poses:
-        if not exploration.reached[pose]:
-            cause = search.slow.get(pose) or cause_of(exploration, pose, search.pairs)
-            return f"{place_words(search.places, pose)}: {cause.detail}", cause.proved
-    node = exploration.roadmap.over[poses[0]][-1]
-    return where_it_stops(search, poses[0], exploration.roadmap.q[node]), False
 
 
 def along_stretch(places: PassPlaces, pose: int) -> float:

@@ -61,11 +61,9 @@ def plan_passes(
     note says.
 
     Args:
-        robot: the arm.
-        passes: the passes.
+        robot, passes, search: the arm, what it runs along, and settings.
         task: footprint and coverage are those of the whole surface.
         retract: m > 0, how far the tool is lifted between stretches that are apart.
-        search: settings.
         clock: of the command that this is a part of.
 
     Raises:

@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
 
 import networkx as nx
 import numpy as np
@@ -44,12 +43,8 @@ RESOLUTION = 1e-12  # [m] lengths are counted in this, so that equal sums are eq
 CUT, RUN, UNDONE = 1 << 64, 1 << 96, 1 << 128
 
 
-class Run(NamedTuple):
-    """One run: from a node along motions."""
-
-    start: int
-    route: list[int]
-    """The numbers of the edges + 1, negative where one is run backwards."""
+Run = tuple[int, list[int]]
+"""A node, and the route from it: numbers of edges + 1, negative where one is run backwards."""
 
 
 def fewest_runs(roadmap: Roadmap, pieces: Array, inside: Mask) -> list[Run]:
@@ -69,10 +64,10 @@ def fewest_runs(roadmap: Roadmap, pieces: Array, inside: Mask) -> list[Run]:
     runs = list[Run]()
     for here, there in pairwise(reversed(path)):
         if number := steps[here][there]["number"]:
-            runs[-1].route.append(number)
+            runs[-1][1].append(number)
         elif there >= 0:  # the tool is set down here
-            runs.append(Run(there, []))
-    return [run for run in runs if run.route]
+            runs.append((there, []))
+    return [(start, route) for start, route in runs if route]
 
 
 def _steps(roadmap: Roadmap, pieces: Array, inside: Mask) -> nx.DiGraph:
@@ -203,11 +198,9 @@ def pass_runs(
 def _cuts(search: PassSearch, runs: Sequence[CoveragePath]) -> tuple[Interruption, ...]:
     """What lies between the runs."""
     robot, cells = search.exploration.robot, search.exploration.cells
-    moves = straight_moves(robot, [run.walk for run in runs])
-    found = []
-    for before, after, move in zip(
-        runs, runs[1:], clear_moves(robot, cells, search.task, moves), strict=False
-    ):
+    straight = straight_moves(robot, [run.walk for run in runs])
+    moves, found = clear_moves(robot, cells, search.task, straight), list[Interruption]()
+    for (before, after), move in zip(pairwise(runs), moves, strict=True):
         pose = int(before.visits[-1])
         found.append(
             Interruption(

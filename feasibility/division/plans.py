@@ -70,14 +70,14 @@ def fewest_patches(covers: Mask, pairs: Ints, time_limit: float = TIME_LIMIT) ->
         >>> len(found.rows), found.bound, found.patch.tolist()
         (2, 2, [0, 0, 1])
     """
-    chosen = set_cover(covers[:, covers.any(axis=0)], time_limit)
-    rows = np.array(chosen.rows, dtype=np.int64)
+    chosen, bound = set_cover(covers[:, covers.any(axis=0)], time_limit)
+    rows = np.array(chosen, dtype=np.int64)
     label = _grown(covers[rows], pairs)
     names, first, sizes = np.unique(label[label >= 0], return_index=True, return_counts=True)
     order = np.lexsort((first, -sizes))  # the largest first, then the one that begins first
     rank = np.full(len(rows) + 1, -1, dtype=np.int64)  # the last one is that of label -1
     rank[names[order]] = np.arange(len(names))
-    return Partition(rows[names[order]], rank[label], chosen.bound)
+    return Partition(rows[names[order]], rank[label], bound)
 
 
 def _grown(covers: Mask, pairs: Ints) -> Ints:
@@ -110,12 +110,6 @@ def _grown(covers: Mask, pairs: Ints) -> Ints:
         queue.append(first)
 
 
-def pieces_in(cells: Mask, pairs: Ints) -> int:
-    """Number of pieces that cells (N,) make; pairs (M, 2) are of cells that touch."""
-    piece = components(pairs[cells[pairs].all(axis=1)], len(cells))
-    return len(np.unique(piece[cells]))
-
-
 MOST_COMPONENTS = 4  # components that walks of one patch are made of
 MOST_NEAR = 3  # starts of one component's walks that are near other patches
 DRY_ROUNDS = 10  # rounds without gain after which components are taken as they are
@@ -132,11 +126,8 @@ def plan_of(
 ) -> Plan:
     """Walks for the fewest patches, in the best order, each replayed, and moves between them.
 
-    Args:
-        exploration: what was found.
-        task: that they are replayed for.
-        left: seconds for the proof that they are the fewest.
-        asked: of the arm and the bodies that are asked about, where a search held something back.
+    That they are the fewest is proved in so many seconds, if it can be. Where a search held
+    something back, `asked` is of the arm and the bodies that are asked about.
     """
     asked = exploration if asked is None else asked
     robot, cells = asked.robot, asked.cells
@@ -145,22 +136,24 @@ def plan_of(
     wanted = [partition.patch == p for p in range(len(partition.rows))]
     if not wanted:
         return Plan((), (), partition.bound)
-    chosen = itinerary(robot, _choices(exploration, wanted, roots, covers, task.requires_rates))
+    choices = _choices(exploration, wanted, roots, covers, task.requires_rates)
+    order, walks = itinerary(robot, choices)
     patches = []
-    for p, walk in zip(chosen.order, chosen.walks, strict=True):
+    for p, walk in zip(order, walks, strict=True):
         mine = wanted[p]
         certificate, refusal = replay_at_rates(robot, cells, task, walk, mine)
+        piece = components(cells.pairs[mine[cells.pairs].all(axis=1)], len(cells))
         patches.append(
             SubPatch(
                 cells=np.flatnonzero(mine),
                 area=float(cells.areas[mine].sum()),
-                pieces=pieces_in(mine, cells.pairs),
+                pieces=len(np.unique(piece[mine])),
                 walk=walk,
                 certificate=certificate,
                 refusal=refusal,
             )
         )
-    moves = clear_moves(robot, cells, task, straight_moves(robot, chosen.walks))
+    moves = clear_moves(robot, cells, task, straight_moves(robot, walks))
     return Plan(tuple(patches), moves, partition.bound)
 
 
@@ -219,8 +212,8 @@ def collect_components(exploration: Exploration) -> None:
     for _ in range(MOST_ROUNDS):
         roots, covers = cover_table(exploration)
         left = min(COVER_SECONDS, exploration.clock.left)
-        cover = set_cover(covers[:, exploration.reached], left)
-        chosen = [roots[row] for row in cover.rows]
+        rows, _ = set_cover(covers[:, exploration.reached], left)
+        chosen = [roots[row] for row in rows]
         sizes = sum(exploration.roadmap.size[root] for root in chosen)
         state = (int(exploration.reached.sum()), -len(chosen), sizes)
         dry = dry + 1 if state == before else 0
@@ -242,19 +235,10 @@ def connect_pairs(exploration: Exploration, component: int, wanted: Mask) -> Non
     exploration.close_pairs(state, component)
 
 
-class OneMotion(NamedTuple):
-    """A motion over some cells, or why there is none."""
-
-    walk: Walk | None
-    """None where it is refused."""
-    refusal: str
-    """Empty where the independent replay accepts it."""
-
-
 def motion_over(
     robot: Robot, cells: Cells, task: Task, search: Search, cover: Mask, clock: Clock | None = None
-) -> OneMotion:
-    """One continuous motion over what a component covers.
+) -> tuple[Walk | None, str]:
+    """One continuous motion over what a component covers, or why there is none.
 
     Args:
         robot, cells, task, search: those of the verdict that the component is of.
@@ -272,5 +256,5 @@ def motion_over(
         if (found >= cover).all():
             walk = covering_walk(exploration.roadmap, root)
             refusal = replay_at_rates(robot, cells, task, walk, found)[1]
-            return OneMotion(None if refusal else walk, refusal)
-    return OneMotion(None, "the search did not find this motion again")
+            return None if refusal else walk, refusal
+    return None, "the search did not find this motion again"

@@ -10,7 +10,6 @@ from itertools import combinations
 
 import numpy as np
 
-from coverable.arrays import Ints, Mask
 from feasibility.cut_tree import CutTree
 from feasibility.division.division import Apart
 from feasibility.roadmap.exploration import Exploration
@@ -109,7 +108,11 @@ def _never_together(exploration: Exploration, refuted: set[tuple[int, int]]) -> 
     reached = np.flatnonzero(exploration.reached)
     kinds, group = np.unique(covers[:, reached], axis=1, return_inverse=True)
     group = group.reshape(-1)
-    cells = [_innermost(exploration, reached, group == k) for k in range(kinds.shape[1])]
+    # Of cells that the same components cover the one that is furthest from all others.
+    points, cells = exploration.arrays.points[reached], list[int]()
+    for mine in (group == k for k in range(kinds.shape[1])):
+        away = np.linalg.norm(points[mine, None] - points[None, ~mine], axis=2)
+        cells.append(int(reached[mine][away.min(axis=1, initial=np.inf).argmax()]))
     # Cells that few components cover go together with few others.
     order = np.argsort(kinds.sum(axis=0), kind="stable")[:MOST_GROUPS].tolist()
     graph = nx.Graph()
@@ -121,12 +124,3 @@ def _never_together(exploration: Exploration, refuted: set[tuple[int, int]]) -> 
                 graph.add_edge(a, b)
     clique, _ = nx.max_weight_clique(graph, weight=None)
     return sorted(clique)
-
-
-def _innermost(exploration: Exploration, reached: Ints, mine: Mask) -> int:
-    """Of some of the reached cells the one that is furthest from all others."""
-    points = exploration.arrays.points[reached]
-    if mine.all():
-        return int(reached[0])
-    away = np.linalg.norm(points[mine, None] - points[None, ~mine], axis=2).min(axis=1)
-    return int(reached[mine][away.argmax()])

@@ -14,7 +14,6 @@ obstacles.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise, permutations
-from typing import NamedTuple
 
 import numpy as np
 
@@ -85,17 +84,8 @@ class Reconfiguration(Protected):
         return ", ".join(parts) or "no joint"
 
 
-class Itinerary(NamedTuple):
-    """Walks in the order in which they are done."""
-
-    order: list[int]
-    """Which patch comes when."""
-    walks: list[Walk]
-    """One for each patch, in that order."""
-
-
-def itinerary(robot: Robot, choices: Sequence[Sequence[Walk]]) -> Itinerary:
-    """Choose for each patch one of its walks, its direction, and the order of patches."""
+def itinerary(robot: Robot, choices: Sequence[Sequence[Walk]]) -> tuple[list[int], list[Walk]]:
+    """The order of patches, and one walk of each in that order, chosen with its direction."""
     options = [
         (p, Walk(walk.q[::direction], walk.cell[::direction]))
         for p, walks in enumerate(choices)
@@ -106,9 +96,15 @@ def itinerary(robot: Robot, choices: Sequence[Sequence[Walk]]) -> Itinerary:
     moves = _moves(robot, [walk for _, walk in options])
     largest, total = moves.max(axis=2, initial=0.0), moves.sum(axis=2)
     own = [np.flatnonzero(group == p) for p in range(len(choices))]
-    orders = [[own[p] for p in order] for order in _orders(largest, own)]
-    path = _least_path(largest, total, orders, AS_GOOD)
-    return Itinerary(group[path].tolist(), _unwound(robot, [options[k][1] for k in path]))
+    patches = range(len(own))
+    if len(own) <= MOST_EXACT:  # of two opposite orders one will do: walks can be reversed
+        orders = [list(order) for order in permutations(patches) if order[0] >= order[-1]]
+    else:
+        apart = np.array([[largest[np.ix_(a, b)].min() for b in own] for a in own])
+        orders = [improved(apart, np.array(patches)).tolist()]
+    layers = [[own[p] for p in order] for order in orders]
+    path = _least_path(largest, total, layers, AS_GOOD)
+    return group[path].tolist(), _unwound(robot, [options[k][1] for k in path])
 
 
 def straight_moves(robot: Robot, walks: Sequence[Walk]) -> list[Reconfiguration]:
@@ -136,14 +132,6 @@ def _moves(robot: Robot, walks: Sequence[Walk]) -> Array:
     gap = starts[None] - ends[:, None]
     turns = np.clip(np.round(-gap / TURN), low[None] - high[:, None], high[None] - low[:, None])
     return np.asarray(np.abs(gap + TURN * turns) * in_radians(robot))
-
-
-def _orders(largest: Array, own: Sequence[Ints]) -> list[tuple[int, ...]]:
-    """Orders of patches (each has `own` options) to be tried: all, or one that 2-opt improved."""
-    if len(own) <= MOST_EXACT:  # of two opposite orders one will do: walks can be reversed
-        return [order for order in permutations(range(len(own))) if order[0] >= order[-1]]
-    apart = np.array([[largest[np.ix_(a, b)].min() for b in own] for a in own])
-    return [tuple(improved(apart, np.arange(len(own))).tolist())]
 
 
 def _least_path(

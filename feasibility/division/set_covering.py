@@ -10,7 +10,6 @@ milliseconds.
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,16 +17,6 @@ from coverable.arrays import Ints, Mask
 from coverable.errors import ArgumentError
 
 ROUNDING = 1e-6  # by how much HiGHS's numbers may differ from integers
-
-
-@dataclass(frozen=True, slots=True)
-class Chosen:
-    """Sets that cover everything, and how few could."""
-
-    rows: tuple[int, ...]
-    """The chosen sets, in order of index."""
-    bound: int
-    """No fewer sets cover everything; the number of rows where the optimum is proved."""
 
 
 def undominated(covers: Mask) -> Ints:
@@ -42,12 +31,16 @@ def undominated(covers: Mask) -> Ints:
     return np.flatnonzero((sizes > 0) & ~(contained & better).any(axis=1))
 
 
-def set_cover(covers: Mask, time_limit: float) -> Chosen:
+def set_cover(covers: Mask, time_limit: float) -> tuple[list[int], int]:
     """The fewest rows of a table that together have every column.
 
     Args:
         covers: (K, N) True where set k holds element c; every element is in some set.
         time_limit: s; running out leaves a gap between the number of rows and the bound.
+
+    Returns:
+        The rows in order of index, and a number that no fewer sets than it cover everything: that
+        of the rows where the optimum is proved.
 
     Raises:
         ArgumentError: an element is in no set.
@@ -56,11 +49,11 @@ def set_cover(covers: Mask, time_limit: float) -> Chosen:
         missing = np.flatnonzero(~covers.any(axis=0))
         raise ArgumentError(f"element {missing[0]} (of {len(missing)}) is in no set")
     if covers.shape[1] == 0:
-        return Chosen((), 0)
+        return [], 0
     kept = undominated(covers)
     table = np.unique(covers[kept], axis=1)
     rows, bound = _solved(table, time_limit)
-    return Chosen(tuple(sorted(int(kept[k]) for k in rows)), bound)
+    return sorted(kept[rows].tolist()), bound
 
 
 def _solved(table: Mask, time_limit: float) -> tuple[list[int], int]:

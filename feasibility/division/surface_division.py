@@ -60,12 +60,9 @@ def divide(
     singularities, only motions of the search count that hold it.
 
     Args:
-        robot, cells, task: the question, as for `check`.
+        robot, cells, task, progress, clock: as for `check`.
         search: settings of the complete search; where its time limit strikes, the patches are the
             fewest known.
-        progress: called as progress(done, total, text) some times a second.
-        clock: of the command that this is a part of: its limit and its progress callback count, not
-            those given here.
 
     Raises:
         OutOfTime: a command's time ran out before the search began.

@@ -100,17 +100,14 @@ class CoveragePath(Protected):
 
 
 def coverage_path(verdict: Verdict, order: Order | None = None) -> CoveragePath:
-    """A path over the surface of a feasible verdict.
+    """A path over the surface of a feasible verdict of the complete search, replayed and measured.
 
     Args:
-        verdict: of the complete search.
+        verdict: where a covering motion is known.
         order: "rows" runs along the grid's rows (v), back and forth, "columns" along its columns
             (u), "spiral" from outside to the middle; "shortest" is the shortest order found, for
             any cells; "given" is that of poses, and the only one of a toolpath. None for rows of a
             grid, the given order of a toolpath, and else the shortest.
-
-    Returns:
-        The path, replayed and measured.
 
     Raises:
         PathError: the verdict is not feasible, there is no such order, or no path was found that
@@ -183,21 +180,16 @@ def _tried(verdict: Verdict, order: Order, witness: Walk) -> Iterator[Walk]:
     def walk(alone: bool) -> Walk:
         graph = motion_graph_of(verdict, witness_alone=alone)
         found = _least_revisiting(graph, verdict.cells, order)
-        return found.graph.walk(_from_start(found, verdict.robot.start))
+        grown, nodes, start = found.graph, found.nodes, verdict.robot.start
+        if start is not None:
+            begin = grown.nearest(start)
+            path = nx.shortest_path(grown.edges, begin, nodes[0], weight="length")
+            nodes = [*path[:-1], *nodes]
+        return grown.walk(nodes)
 
     yield walk(alone=False)
     with suppress(PathError):  # then it is said why the first one is refused
         yield walk(alone=True)
-
-
-def _from_start(found: JointRoute, start: Array | None) -> list[int]:
-    """The nodes of a route, with the path to it from the arm's start before them."""
-    if start is None:
-        return found.nodes
-    graph = found.graph
-    begin = int(np.argmin([np.abs(q - start).max() for q in graph.q]))
-    path = nx.shortest_path(graph.edges, begin, found.nodes[0], weight="length")
-    return [*path[:-1], *found.nodes]
 
 
 def _least_revisiting(graph: MotionGraph, cells: Cells, order: Order) -> JointRoute:

@@ -103,6 +103,10 @@ class MotionGraph:
             _known=dict(self._known),
         )
 
+    def nearest(self, q: Array) -> int:
+        """The node whose configuration is nearest to q (n,)."""
+        return int(np.argmin([np.abs(own - q).max() for own in self.q]))
+
     def touch(self, a: int, b: int) -> bool:
         """Do two cells touch?"""
         return (min(a, b), max(a, b)) in self.pairs

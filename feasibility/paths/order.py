@@ -18,7 +18,6 @@ from feasibility.paths.two_opt import improved, tour_length
 from surfaces.cells import Cells
 
 Order = Literal["rows", "columns", "spiral", "shortest", "given"]
-ORDERS: tuple[Order, ...] = ("rows", "columns", "spiral", "shortest")  # of cells on a surface
 POSES = "poses"  # the kind of surface that has an order of its own
 GRID_ORDERS: tuple[Order, ...] = ("rows", "columns", "spiral")
 
@@ -41,10 +40,8 @@ def grid_order(
     """Flat indices of rows x columns cells in the order of a path.
 
     Args:
-        order: "rows" runs along each row (v) and back along the next, "columns" along each column
-            (u), "spiral" from the outside to the middle.
-        rows: number of rows (u).
-        columns: number of columns (v).
+        order: see `coverage_path`.
+        rows, columns: how many there are.
         begin: row and column that count as the first ones, where a grid closes on itself.
         flipped: whether rows, and whether columns, are taken from the last to the first.
 
@@ -92,11 +89,8 @@ def closed_sides(cells: Cells) -> tuple[bool, bool]:
 def check_order(order: str, kind: str, grid: bool, in_order: bool = False) -> None:
     """Refuse an order that cells do not have, before anything is searched for.
 
-    Args:
-        order: one of `Order`.
-        kind: of the surface.
-        grid: whether its cells lie in rows and columns.
-        in_order: whether they are a toolpath.
+    Of the cells it counts of which kind their surface is, whether they lie in rows and columns, and
+    whether they are a toolpath.
 
     Raises:
         PathError: there is no such order, or these cells do not have it.

@@ -22,7 +22,7 @@ from feasibility.clock import Clock
 from feasibility.collisions.asked_bodies import said_of
 from feasibility.demands.every_demand import refuse_start
 from feasibility.placement.evolution import INTERRUPTED, SMALLEST, Evolution, distinct
-from feasibility.placement.reach_bound import Beyond, Reach
+from feasibility.placement.reach_bound import Reach
 from feasibility.placement.region import PlacementError, Region
 from feasibility.placement.trials import Evaluator, Trial, evaluator_here
 from feasibility.search_settings import Progress, Search
@@ -149,7 +149,7 @@ def place(
     reach = Reach.of(robot, cells, task)
     answered = partial(Placements, robot, cells, task, region)
     if (beyond := reach.beyond(region)) is not None:
-        return _ruled_out(answered, beyond, time.monotonic() - began)
+        return _ruled_out(answered, *beyond, reach.reach, time.monotonic() - began)
     evaluator = evaluator or evaluator_here(robot, cells, task, search)
     tried = Evolution(evaluator, reach, region, clock, progress)
     try:
@@ -189,18 +189,19 @@ def _check_settings(
     checks.done()
 
 
-def _ruled_out(answered: Callable[..., Placements], beyond: Beyond, seconds: float) -> Placements:
+def _ruled_out(
+    answered: Callable[..., Placements], distance: float, boxes: int, most: float, seconds: float
+) -> Placements:
     """The answer where the reach bound leaves no placement, which took some seconds."""
     message = (
         f"No placement in the region: wherever the surface stands in it, some target is at least "
-        f"{beyond.distance:.3f} m from the first joint, and the arm reaches at most "
-        f"{beyond.reach:.3f} m (proved for the whole region, "
-        f"{counted(beyond.boxes, 'box', 'boxes')})."
+        f"{distance:.3f} m from the first joint, and the arm reaches at most {most:.3f} m (proved "
+        f"for the whole region, {counted(boxes, 'box', 'boxes')})."
     )
     none = dict.fromkeys(("fk", "drawn", "bound", "tried"), 0)
     return answered(
         answer=Answer.INFEASIBLE, evidence=Evidence.PROOF, message=message, found=(), trials=(),
-        cause=CauseKind.OUT_OF_REACH, statistics={**none, "boxes": beyond.boxes},
+        cause=CauseKind.OUT_OF_REACH, statistics={**none, "boxes": boxes},
         timing={"total_s": seconds},
     )  # fmt: skip
 

@@ -12,7 +12,6 @@ Boxes for which this leaves a target in reach are halved, until none is left or 
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -25,17 +24,6 @@ from surfaces.surface import rotation_from_rpy
 
 MOST_BOXES = 4096  # boxes of poses tested before the region counts as open
 MOST_TARGETS = 200  # targets that each box is tested for; a bound on some is one on all
-
-
-class Beyond(NamedTuple):
-    """A region whose every placement has a target out of reach."""
-
-    distance: float
-    """m, in every placement some target is at least so far from the first joint."""
-    reach: float
-    """m, the tool point never is."""
-    boxes: int
-    """Boxes of poses that this was shown for."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -81,8 +69,12 @@ class Reach:
         share = self.within(values) @ self.areas / self.areas.sum()
         return np.minimum(share, 1.0)  # sums in another order may round to a little more
 
-    def beyond(self, region: Region) -> Beyond | None:
-        """Whether every placement in a region has a target out of reach; None where not shown."""
+    def beyond(self, region: Region) -> tuple[float, int] | None:
+        """Whether every placement in a region has a target out of reach; None where not shown.
+
+        That is the distance (m) of some target from the first joint in every placement, at least,
+        and the number of boxes of poses that this was shown for.
+        """
         some = np.unique(np.linspace(0, len(self.targets) - 1, MOST_TARGETS).astype(np.int64))
         furthest = float(np.linalg.norm(self.targets, axis=1).max())
         boxes = [(region.low, region.high)]
@@ -104,7 +96,7 @@ class Reach:
                 one, other = low.copy(), high.copy()
                 one[axis], other[axis] = start, end
                 boxes.append((one, other))
-        return Beyond(nearest, self.reach, tested)
+        return nearest, tested
 
     def _least(self, low: Array, high: Array, targets: Array) -> float:
         """m: in every pose of the box some target is at least so far from the first joint."""

@@ -94,7 +94,7 @@ def station_plan(
             placements.task,
             search_with(trial.effort, search, len(cells)),
             cover,
-        ).refusal
+        )[1]
         for trial, cover in chosen
     )
     left = unjudged(placements.robot, placements.task, OF_EACH)

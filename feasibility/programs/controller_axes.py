@@ -130,8 +130,7 @@ def check_program(
     """The joints of an arm as the axes of a controller.
 
     Raises:
-        ProgramError: the joints are no such axes, or the settings make
-            no program.
+        ProgramError: the joints are no such axes, or the settings make no program.
     """
     settings = ProgramSettings() if settings is None else settings
     where = f"{language.name} for {robot.name!r}"
@@ -143,10 +142,18 @@ def check_program(
         checks.wrong("signs", settings.signs, f"{expected}, 1 or -1")
     offsets = _six(checks, "offsets_deg", settings.offsets_deg, 0.0, f"{expected} (degrees)")
     per_deg = _per_deg(checks, language, robot, arm, settings)
-    check_lines(checks, settings)
+    for name, text in (("on", settings.on), ("off", settings.off)):
+        if any(not " " <= c <= "~" for c in text) or len(text) > LONGEST_TEXT:
+            expected = f"must be one line of plain ASCII, of {LONGEST_TEXT} characters at most"
+            checks.wrong(name, text, expected)
+        elif not text.strip() and (text or settings.on or settings.off):
+            checks.keep(Fault(name, "is missing: on and off go together; give a comment of the "
+                              "language where there is nothing to do"))  # fmt: skip
     by_j2 = 0.0
     if language is TP and settings.j3_from_horizontal and len(arm) == JOINTS:
-        by_j2 = _together(robot, arm[SECOND], arm[THIRD])
+        _, _, twists = Kinematics(robot).tools_and_twists(np.zeros((1, robot.n)))
+        product = float(twists[0, 3:, arm[SECOND]] @ twists[0, 3:, arm[THIRD]])
+        by_j2 = math.copysign(1.0, product) if abs(product) >= 1.0 - PARALLEL else 0.0
         if not by_j2:
             what = f"{robot.joint_names[arm[SECOND]]} and {robot.joint_names[arm[THIRD]]}"
             fault = f"J3 is counted from the horizontal, but {what} have no parallel axes"
@@ -157,17 +164,6 @@ def check_program(
     except ProgramError as error:
         raise ProgramError(error.faults, where) from error
     return AxisMap(language, arm, outside, signs, offsets, per_deg, by_j2)
-
-
-def check_lines(checks: Checks, settings: ProgramSettings) -> None:
-    """Keep what is wrong with the lines that switch the tool."""
-    for name, text in (("on", settings.on), ("off", settings.off)):
-        if any(not " " <= c <= "~" for c in text) or len(text) > LONGEST_TEXT:
-            expected = f"must be one line of plain ASCII, of {LONGEST_TEXT} characters at most"
-            checks.wrong(name, text, expected)
-        elif not text.strip() and (text or settings.on or settings.off):
-            checks.keep(Fault(name, "is missing: on and off go together; give a comment of the "
-                              "language where there is nothing to do"))  # fmt: skip
 
 
 def _axes(
@@ -211,13 +207,6 @@ def _per_deg(
     if not (found > 0.0).all():
         checks.wrong("pulses_per_deg", settings.pulses_per_deg, expected)
     return found
-
-
-def _together(robot: Robot, one: int, other: int) -> float:
-    """1 where two joints turn about parallel axes, -1 to opposite sides, 0 about others."""
-    _, _, twists = Kinematics(robot).tools_and_twists(np.zeros((1, robot.n)))
-    product = float(twists[0, 3:, one] @ twists[0, 3:, other])
-    return math.copysign(1.0, product) if abs(product) >= 1.0 - PARALLEL else 0.0
 
 
 def _six(

@@ -51,10 +51,7 @@ def head(
 ) -> list[str]:
     """The comment, in lines of plain ASCII.
 
-    Args:
-        axes, robot, run, case: what the program is of.
-        surface: whose frame is stated.
-        switched: s, beginning and end of each stretch in which the tool is on.
+    The frame of the surface is stated; on the stretches `switched` (s) the tool is on.
     """
     flange, tool = _tool(robot)
     lines = [

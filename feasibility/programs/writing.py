@@ -95,8 +95,7 @@ def save_program(
     Args:
         path: of the file; one of TP or INFORM that is too long calls others beside it, NAME_p1,
             NAME_p2.
-        robot: the arm.
-        run: its trajectory.
+        robot, run: the arm and its trajectory.
         case: what the question is called, for the comment at the head.
         settings: of the controller, and the lines that switch the tool on and off.
         surface: what is treated, whose frame is stated at the head.
@@ -111,7 +110,10 @@ def save_program(
     settings = ProgramSettings() if settings is None else settings
     axes = check_program(language, robot, settings)
     start = float(run.time[0])
-    time, q = _servoed(run) if language is URSCRIPT else (run.time - start, run.q)
+    time, q = run.time - start, run.q
+    if language is URSCRIPT:  # the last point is at the end, or behind it
+        time = np.arange(np.ceil(round(run.duration / SERVO, 6)) + 1.0) * SERVO
+        q = run.at(start + time)
     times = working_times(run, work) if settings.on else []
     switched = [(begin - start, end - start) for begin, end in times]
     points = _points(axes, robot, time, q, switched, settings)
@@ -127,13 +129,6 @@ def save_program(
 
 def _write(text: str, stream: IO[bytes]) -> None:
     stream.write(text.encode("ascii"))
-
-
-def _servoed(run: Trajectory) -> tuple[Array, Array]:
-    """Times (m,) and positions (m, n) every `SERVO` seconds, the last one at or behind the end."""
-    count = int(np.ceil(round(run.duration / SERVO, 6))) + 1
-    time = np.arange(count, dtype=np.float64) * SERVO
-    return time, run.at(run.time[0] + time)
 
 
 def _points(

@@ -17,13 +17,14 @@ from feasibility.clock import Clock, OutOfTime
 from feasibility.cut_tree import CutTree
 from feasibility.problem import Problem
 from feasibility.roadmap.complete import complete_search
-from feasibility.search_result import SearchResult
 from feasibility.search_settings import Search
 from feasibility.sensitivity.quantities import Kind, Quantity, Variant
 from feasibility.sensitivity.thresholds import Finding, Threshold
 from feasibility.verdict import Answer, Certificate, Evidence, Verdict, Walk
 
-NEARBY = (1 / 8, 1 / 4, 1 / 2, 1)  # [1] of the way to its end: values of what is not monotone
+# [1] of the way to its end, values of what is not monotone: doubling from a feasible one, so that
+# what is found is the stretch around it, or more of them all along.
+NEARBY = (1 / 8, 1 / 4, 1 / 2, 1)
 ALL_ALONG = (1 / 32, 1 / 16, 1 / 8, 3 / 16, 1 / 4, 3 / 8, 1 / 2, 5 / 8, 3 / 4, 7 / 8, 1)
 MARGINS, REMEDIES = 16, 256  # parts of a stretch that a threshold is found to, of both kinds
 SUSPECTS = 3  # cells that a search looks at first
@@ -74,14 +75,6 @@ class Look(NamedTuple):
     def accepted(self) -> bool:
         """Is it said by `check` that the case is feasible?"""
         return self.certificate is not None
-
-
-def _look_of_search(found: SearchResult) -> Look:
-    """What a search says by itself."""
-    undecided = Evidence.BUDGET if found.unfinished or found.motion else Evidence.EXHAUSTED
-    evidence = Evidence.PROOF if found.proof is not None else undecided
-    covered = int(found.covered.sum())
-    return Look(evidence, found.motion, found.proof, covered, int(found.counts["fk"]))
 
 
 def _look_of_verdict(found: Verdict) -> Look:
@@ -139,58 +132,36 @@ class Prober:
             variant = self.given
             for quantity, k in steps:
                 variant = quantity.applied(variant, k)
-            made = self._asked if judged else self._searched
-            self.looks[steps] = known = made(variant, seeds)
+            self.looks[steps] = known = self._looked(variant, seeds, judged)
         return known
 
-    def _searched(self, variant: Variant, seeds: Walk | None) -> Look:
-        """What a search says, without the judges; where shapes are in the way, what `check` says.
+    def _looked(self, variant: Variant, seeds: Walk | None, judged: bool) -> Look:
+        """What `check` says, or a search without the judges; `check` where shapes are in its way.
 
         Raises:
             OutOfTime: the deadline passed before it was decided.
-        """
-        clock, search = self._limits(seeds)
-        problem = Problem.of(*variant)
-        clock.allow(search.evaluations)
-        found = complete_search(problem, search, clock, seeds, self.suspects, judging=False)
-        look = self._counted(_look_of_search(found))
-        if look.walk is None and look.proof is None and found.hindered and seeds is None:
-            return self._asked(variant)
-        return look
-
-    def _asked(self, variant: Variant, seeds: Walk | None = None) -> Look:
-        """What `check` says.
-
-        Raises:
-            OutOfTime: the deadline passed before it was decided.
-        """
-        clock, search = self._limits(seeds)
-        return self._counted(_look_of_verdict(check(*variant, search, seeds=seeds, clock=clock)))
-
-    def _limits(self, seeds: Walk | None) -> tuple[Clock, Search]:
-        """Time and evaluations of the next search, from a known motion or without one.
-
-        Raises:
-            OutOfTime: the deadline has passed.
         """
         self.tick()
         if self.clock.out_of_time:
             raise OutOfTime
         evaluations = int((SEEDED if seeds else 1.0) * (self.search.evaluations or 1))
-        clock = self.clock.part(1.0, lambda *_: self.tick())
-        return clock, replace(self.search, evaluations=evaluations)
-
-    def _counted(self, look: Look) -> Look:
-        """The same, counted and learnt from.
-
-        Raises:
-            OutOfTime: the deadline passed before it found a motion.
-        """
+        search = replace(self.search, evaluations=evaluations)
+        clock, hindered = self.clock.part(1.0, lambda *_: self.tick()), False
+        if judged:
+            look = _look_of_verdict(check(*variant, search, seeds=seeds, clock=clock))
+        else:
+            problem, clock = Problem.of(*variant), clock.allow(evaluations)
+            found = complete_search(problem, search, clock, seeds, self.suspects, judging=False)
+            undecided = Evidence.BUDGET if found.unfinished or found.motion else Evidence.EXHAUSTED
+            evidence = Evidence.PROOF if found.proof is not None else undecided
+            covered, spent = int(found.covered.sum()), int(found.counts["fk"])
+            look = Look(evidence, found.motion, found.proof, covered, spent)
+            hindered = found.hindered and look.walk is None and look.proof is None
         self.spent += look.evaluations
         self._suspect(look)
         if self.clock.out_of_time and look.walk is None:
             raise OutOfTime
-        return look
+        return self._looked(variant, None, True) if hindered and seeds is None else look
 
     def _suspect(self, look: Look) -> None:
         """Look first at a cell that was proved uncoverable, from now on."""
@@ -202,7 +173,8 @@ class Prober:
     def threshold(self, quantity: Quantity) -> Threshold:
         """Where the verdict changes on the way from the value given to the end."""
         feasible, before = self.verdict.feasible, 0
-        stops = _stops(quantity, feasible)
+        shares = (1,) if quantity.monotone else NEARBY if feasible else ALL_ALONG
+        stops = sorted({max(1, round(quantity.last * share)) for share in shares})
         for k in stops:
             holds = self._holds(quantity, k)
             if holds and (not feasible or k == stops[-1]):
@@ -326,16 +298,3 @@ class Prober:
             return good
         look = self.looks.setdefault(((quantity, k),), found._replace(certificate=None))
         return good if look.walk is None else k
-
-
-def _stops(quantity: Quantity, feasible: bool) -> list[int]:
-    """Numbers of steps at which a verdict is made on the way to the end.
-
-    The end alone where there can be one threshold at most. Otherwise values that double from a
-    feasible one, so that what is found is the stretch around it, or more of them all along.
-    """
-    last = quantity.last
-    if quantity.monotone:
-        return [last]
-    shares = NEARBY if feasible else ALL_ALONG
-    return sorted({max(1, round(last * share)) for share in shares})

@@ -150,7 +150,12 @@ class Quantity:
             return replace(settings, clearance=value)
         if self.kind is Kind.TOOL_CLEARANCE:
             return replace(settings, tool_clearance=value)
-        return without(settings, self.obstacle)
+        return replace(
+            settings,
+            scene=tuple(one for one in settings.scene if one.name != self.obstacle),
+            allow=tuple(pair for pair in settings.allow if self.obstacle not in pair),
+            clearances=tuple(c for c in settings.clearances if self.obstacle not in c[:2]),
+        )
 
 
 def range_of(task: Task, half: float) -> tuple[float, float]:
@@ -169,16 +174,6 @@ def tilted(
         raise ValueError("the approach direction is the surface's")
     x, y, z = math.cos(angle) * unit_along(task.approach) + math.sin(angle) * np.array(towards)
     return float(x), float(y), float(z)
-
-
-def without(settings: Collision, name: str) -> Collision:
-    """The same without one object of the scene, and without the pairs that name it."""
-    return replace(
-        settings,
-        scene=tuple(one for one in settings.scene if one.name != name),
-        allow=tuple(pair for pair in settings.allow if name not in pair),
-        clearances=tuple(row for row in settings.clearances if name not in row[:2]),
-    )
 
 
 def shifted(cells: Cells, translation: np.ndarray) -> Cells:

@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from coverable.errors import Fault, listed, shown
-from feasibility.cases.case import Case
 from feasibility.cases.robot_table import in_robot_table
 from feasibility.cases.surface_reading import faults_of_building
 from feasibility.cases.table_reader import ORIGIN, CaseError, Section
@@ -30,6 +29,7 @@ from feasibility.studies.built_cases import (
 from feasibility.studies.pool import Tables
 from feasibility.studies.run import StudyTask
 from feasibility.studies.varied_keys import Variation, VariedKey
+from robots.errors import RobotError
 from surfaces.arguments import check_pose
 
 MOST_ALIKE = 4  # values of one key that are named, of those that are wrong for the same cause
@@ -68,10 +68,12 @@ def tasks_of(
 
     Cases that differ in the pose of the surface alone are checked once, and each pose by itself.
     """
-    entries = varied.keys
-    wrong = [fault for entry in entries for fault in _wrong_poses(entry)]
-    checked: dict[str, _Combination] = {}
-    tasks = []
+    entries, wrong, checked, tasks = varied.keys, list[Fault](), dict[str, _Combination](), []
+    for entry in entries:
+        for k, value in enumerate(entry.values if entry.is_pose else ()):
+            pose: Tables = {}
+            put({"surface": pose}, entry.path, value)
+            Section(f"{entry.place}[{k}]: surface", pose, wrong).make(check_pose, pose)
     for *values, sample in itertools.product(*(axis.values for axis in varied.axes), draw(varied)):
         row = list(zip(entries, (*values, *sample), strict=True))
         parameters = {entry.label: _parameter(entry.label, value) for entry, value in row}
@@ -91,16 +93,6 @@ def tasks_of(
         tasks.append(StudyTask(tables, parameters))
     faults += [*wrong, *_refusals(entries, list(checked.values()))]
     return tuple(tasks)
-
-
-def _wrong_poses(entry: VariedKey) -> list[Fault]:
-    """What is wrong with each value of a key that moves the surface, if it is one."""
-    faults = list[Fault]()
-    for k, value in enumerate(entry.values if entry.is_pose else ()):
-        surface: Tables = {}
-        put({"surface": surface}, entry.path, value)
-        Section(f"{entry.place}[{k}]: surface", surface, faults).make(check_pose, surface)
-    return faults
 
 
 def _case_with(
@@ -124,7 +116,13 @@ def _case_with(
         case = case_of(tables)
     except CaseError as error:
         return {}, list(error.faults)
-    faults = [*_faults_of_arm(case), *_faults_of_file(case)]
+    faults = list[Fault]()
+    try:
+        arm_of(case)
+    except RobotError as error:
+        faults += in_robot_table(error)
+    if "file" in case.surface.values:
+        faults += _faults_of_file(surface_at_home(case))
     return ({} if faults else as_read(case.to_tables())), faults
 
 
@@ -168,10 +166,9 @@ def _parameter(label: str, value: Any) -> Any:
 
 
 def draw(varied: Variation) -> list[tuple[float, ...]]:
-    """Samples of the ranges: points of a scrambled Sobol sequence; one empty one without ranges.
+    """Numbers for all ranges, so many times: points of a scrambled Sobol sequence.
 
-    Returns:
-        `count` samples, one number for each range.
+    Without ranges it is one empty sample.
     """
     if not varied.ranges:
         return [()]
@@ -184,23 +181,7 @@ def draw(varied: Variation) -> list[tuple[float, ...]]:
     return [tuple(row) for row in (low + (high - low) * unit).tolist()]
 
 
-def _faults_of_arm(case: Case) -> list[Fault]:
-    """What loading the arm says."""
-    from robots.errors import RobotError
-
-    try:
-        arm_of(case)
-    except RobotError as error:
-        return in_robot_table(error)
-    return []
-
-
-def _faults_of_file(case: Case) -> list[Fault]:
-    """What reading the file of a surface says, if it has one."""
-    return _faults_at_home(surface_at_home(case)) if "file" in case.surface.values else []
-
-
 @lru_cache(maxsize=256)
-def _faults_at_home(surface: str) -> list[Fault]:
-    """The same; `surface` is its table, as JSON."""
+def _faults_of_file(surface: str) -> list[Fault]:
+    """What reading the file of a surface says; `surface` is its table, as JSON."""
     return faults_of_building(part_at_home(surface))

@@ -13,7 +13,7 @@ from feasibility.search_settings import Progress
 from feasibility.studies.built_cases import arm_of, case_of
 from feasibility.studies.combinations import tasks_of
 from feasibility.studies.pool import Workers
-from feasibility.studies.run import StudyTask, run_tasks
+from feasibility.studies.run import run_tasks
 from feasibility.studies.study_outcome import finite, merit
 from feasibility.studies.varied_keys import Variation, VariedKey
 
@@ -99,13 +99,30 @@ def compare(
         >>> [(arm.robot, arm.verdict) for arm in found.ranked]
         [('puma560', 'feasible'), ('ur5', 'infeasible')]
     """
+    base = as_read(case.to_tables())
+    if case.search.method != "complete":
+        kept = ("seed", "time_limit", "evaluations")
+        base["search"] = {key: base["search"][key] for key in kept if key in base["search"]}
+    tables = [{"urdf": absolute(name)} if is_urdf(name) else {"name": name} for name in robots]
+    own = base["robot"]
+    mounted = tuple(own if table.items() <= own.items() else table for table in tables)
+    faults = [
+        Fault(f"--robots[{k}]", f"{name!r} is named twice")
+        for k, name in enumerate(robots)
+        if name in robots[:k]
+    ]
+    if not robots:
+        faults.append(Fault("--robots", "is empty; expected such as ur5,panda,my_arm.urdf"))
+    varied = VariedKey("robot", "--robots", ("robot",), mounted)
+    found = tasks_of(base, Variation((varied,)), None, faults)
+    if faults:
+        raise CaseError(faults, case.name)
     wanted = {"wanted": {"patches": True, "critical": critical}}
     tasks = [
         replace(task, tables={**task.tables, **wanted}, parameters={"robot": name})
-        for task, name in zip(_tasks_of(case, robots), robots, strict=True)
+        for task, name in zip(found, robots, strict=True)
     ]
-    rows = run_tasks(tasks, workers, progress=progress)
-    arms = []
+    rows, arms = run_tasks(tasks, workers, progress=progress), []
     for task, row in zip(tasks, rows, strict=True):
         robot, result = arm_of(case_of(task.tables)), row.result
         named = {key: result[key] for key in Arm.__dataclass_fields__ if key in result}
@@ -116,30 +133,3 @@ def compare(
             )
         )  # fmt: skip
     return Comparison(case.name, tuple(arms), critical, case.collision)
-
-
-def _tasks_of(case: Case, robots: Sequence[str]) -> tuple[StudyTask, ...]:
-    """The case with each of the arms, checked.
-
-    Raises:
-        CaseError: see `compare`.
-    """
-    base = as_read(case.to_tables())
-    if case.search.method != "complete":
-        kept = ("seed", "time_limit", "evaluations")
-        base["search"] = {key: base["search"][key] for key in kept if key in base["search"]}
-    tables = [{"urdf": absolute(name)} if is_urdf(name) else {"name": name} for name in robots]
-    own = base["robot"]
-    arms = tuple(own if table.items() <= own.items() else table for table in tables)
-    faults = [
-        Fault(f"--robots[{k}]", f"{name!r} is named twice")
-        for k, name in enumerate(robots)
-        if name in robots[:k]
-    ]
-    if not robots:
-        faults.append(Fault("--robots", "is empty; expected such as ur5,panda,my_arm.urdf"))
-    varied = VariedKey("robot", "--robots", ("robot",), arms)
-    tasks = tasks_of(base, Variation((varied,)), None, faults)
-    if faults:
-        raise CaseError(faults, case.name)
-    return tasks

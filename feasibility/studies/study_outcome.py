@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from coverable.arrays import Mask
 from feasibility.clock import Clock, OutOfTime
 from feasibility.division.set_covering import undominated
 from feasibility.search_settings import Search
@@ -106,6 +105,9 @@ def outcome_of(verdict: Verdict, causes: bool = True) -> Outcome:
     areas = np.asarray(verdict.cells.areas)
     total = float(areas.sum())
     kinds = Counter(cause.kind for cause in verdict.causes) if causes else Counter()
+    covers = np.zeros((len(verdict.components), len(verdict.cells)), dtype=bool)
+    for row, cells in zip(covers, verdict.components, strict=True):
+        row[cells] = True
     return {
         "verdict": verdict.answer,
         "evidence": verdict.evidence,
@@ -118,19 +120,11 @@ def outcome_of(verdict: Verdict, causes: bool = True) -> Outcome:
         "edges": int(verdict.n_edges),
         "pairs": len(verdict.cells.pairs),
         "causes": dict(sorted(kinds.items(), key=lambda entry: (-entry[1], entry[0]))),
-        "components": [bits_of(cover) for cover in component_covers(verdict)],
+        "components": [bits_of(cover) for cover in covers[undominated(covers)]],
         "margins": margins_of(verdict),
         "unchecked_links": list(verdict.unchecked_links),
         "fk": int(verdict.statistics.get("fk", 0)),
     }
-
-
-def component_covers(verdict: Verdict) -> Mask:
-    """(K, N) the cells that single motions cover, none inside another, the best first."""
-    covers = np.zeros((len(verdict.components), len(verdict.cells)), dtype=bool)
-    for row, cells in zip(covers, verdict.components, strict=True):
-        row[cells] = True
-    return np.asarray(covers[undominated(covers)])
 
 
 def merit(outcome: Mapping[str, Any]) -> tuple[bool, float, float]:

@@ -31,8 +31,6 @@ LEAST_SHARE = 1e-13  # [1] of c, below which d is nothing
 class Rows(NamedTuple):
     """Limits |c x + d y| <= l of each piece, made ready for any l > 0."""
 
-    c: Array
-    d: Array
     lean: Array
     """(m - 1, r) c / d; 0 where d is nothing."""
     margin: Array
@@ -48,7 +46,7 @@ class Rows(NamedTuple):
             margin = np.where(alone, np.inf, 1.0 / np.abs(d))
             lean = np.where(alone, 0.0, c / d)
             by_itself = np.where(alone, 1.0 / np.abs(c), np.inf) if alone.any() else None
-        return Rows(c, d, lean, margin, by_itself)
+        return Rows(lean, margin, by_itself)
 
 
 def fastest_speeds(most: Array, rows: Rows, limits: Array | float = 1.0) -> Array:

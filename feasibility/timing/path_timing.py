@@ -120,12 +120,9 @@ def trajectory(
 
 
 def _move(rows: Array | None, share: float, cell: int, end: int) -> Curve | None:
-    """A move as a curve: straight lines between rows, turns blended.
+    """A move along rows (k, n) as a curve; its turns use a share of the lines next to them.
 
-    Args:
-        rows: (k, n) rad or m; None for no move.
-        share: of the lines next to a row that its turn uses.
-        cell, end: whose centre the tool passes at which row, 0 or -1.
+    At the row `end`, 0 or -1, it passes the centre of a cell.
     """
     if rows is None:
         return None
@@ -222,11 +219,6 @@ def _refusal(path: CoveragePath, run: Trajectory) -> str:
     past = float(past_limits(path.robot, run).max(initial=0.0))
     if past > 0.0:
         return f"between samples a joint may go {past:.2g} (rad or m) past its limits"
-    return _off_surface(path, run) or _collisions(path, run)
-
-
-def _off_surface(path: CoveragePath, run: Trajectory) -> str:
-    """Why the replay refuses the tool alone over the surface; empty where it accepts."""
     robot, tool_alone = path.robot, replace(path.task, collision=None)
     for places in (1, PLACES):
         walk, over = run.between(places), run.over
@@ -235,7 +227,8 @@ def _off_surface(path: CoveragePath, run: Trajectory) -> str:
         replayed = replay(robot, path.cells, tool_alone, Walk(q, walk.cell[part]), path.needed)
         if not replayed.accepted:
             return replayed.refusal
-    return "" if run.working is None else path.through_surface(run.q, run.working)
+    through = "" if run.working is None else path.through_surface(run.q, run.working)
+    return through or _collisions(path, run)
 
 
 def _collisions(path: CoveragePath, run: Trajectory) -> str:

@@ -44,11 +44,7 @@ def motion_limits(
 ) -> MotionLimits:
     """Check limits, and fill in what is not given.
 
-    Args:
-        robot: the arm.
-        tool_speed: m/s, largest speed of the tool point.
-        velocity: rad/s or m/s, see `trajectory`.
-        acceleration: rad/s^2 or m/s^2, see `trajectory`.
+    Their meaning and units are those of `trajectory`.
 
     Raises:
         PathError: a number is not positive and finite, or the URDF gives a joint no velocity.

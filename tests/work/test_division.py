@@ -233,12 +233,12 @@ def test_the_largest_move_is_the_least_there_is(seed):
             q = rng.uniform(-half, half, (int(rng.integers(1, 4)), 2))
             own.append(Walk(q, np.zeros(len(q), dtype=np.int64)))
         choices.append(own)
-    found = itinerary(robot, choices)
-    assert sorted(found.order) == list(range(len(choices)))
-    moves = straight_moves(robot, found.walks)
+    order, walks = itinerary(robot, choices)
+    assert sorted(order) == list(range(len(choices)))
+    moves = straight_moves(robot, walks)
     largest = max((float(np.abs(move.moves).max()) for move in moves), default=0.0)
     assert largest <= 1.02 * largest_by_brute_force(robot, choices) + 1e-9
-    for p, walk in zip(found.order, found.walks, strict=True):
+    for p, walk in zip(order, walks, strict=True):
         assert (walk.q >= robot.lower).all()
         assert (walk.q <= robot.upper).all()
         # It is one of the choices, forwards or backwards, up to full turns.
@@ -256,6 +256,6 @@ def test_turns_along_a_chain_of_patches():
     robot = planar_arm(1).with_limits(np.radians([[-170, 1300]]))
     angles = np.radians([(0, 100), (110, 200), (-150, -60), (-50, 80)])
     choices = [[Walk(np.array(pair)[:, None], np.zeros(2, dtype=np.int64))] for pair in angles]
-    found = straight_moves(robot, itinerary(robot, choices).walks)
+    found = straight_moves(robot, itinerary(robot, choices)[1])
     moves = [abs(math.degrees(float(move.moves[0]))) for move in found]
     assert moves == pytest.approx([10.0] * 3)

@@ -263,9 +263,9 @@ def test_what_a_place_is_said_to_cover_one_motion_covers(name, seed):
     assert len(trial.covers)
     assert trial.share == pytest.approx(areas[trial.covers[0]].sum() / areas.sum())
     for cover in trial.covers[:3]:
-        assert motion_over(*moved, quick, cover).refusal == ""
+        assert motion_over(*moved, quick, cover)[1] == ""
     more = np.ones(len(setup.cells), dtype=bool)
-    assert trial.feasible or "did not find" in motion_over(*moved, quick, more).refusal
+    assert trial.feasible or "did not find" in motion_over(*moved, quick, more)[1]
 
 
 def test_stations_share_out_what_no_placement_covers_alone(tmp_path):

@@ -42,12 +42,12 @@ def drawn(rng, poses, classes, share):
 
 def between(roadmap, run):
     """The poses at which a run begins and ends; each of its motions goes on from the last."""
-    here = run.start
-    for number in run.route:
+    (start, route), here = run, run[0]
+    for number in route:
         x, y = roadmap.edges[abs(number) - 1][:2][:: 1 if number > 0 else -1]
         assert x == here
         here = y
-    return roadmap.cell[run.start], roadmap.cell[here]
+    return roadmap.cell[start], roadmap.cell[here]
 
 
 def measured(roadmap, pieces, found):
