@@ -14,7 +14,13 @@ from coverable.errors import ArgumentError
 from feasibility.attempts import Method, attempts_at
 from feasibility.certification.faults import Replay
 from feasibility.clock import Clock, OutOfTime
-from feasibility.demands.every_demand import OF_TREE, RATES, further, unjudged
+from feasibility.demands.every_demand import (
+    OF_TREE,
+    RATES,
+    check_requirements,
+    further,
+    unjudged,
+)
 from feasibility.problem import Problem
 from feasibility.search_settings import Progress, Search
 from feasibility.task import Task
@@ -82,7 +88,7 @@ def check(
     if collision is not None and isinstance(task, Task):
         task = replace(task, collision=collision)
     problem = Problem.of(robot, cells, task, settings)
-    _refuse_impossible(robot, task, search)
+    check_requirements(robot, task, search)
     method: Method
     if search.method == "greedy":
         if seeds is not None:
@@ -97,14 +103,6 @@ def check(
     clock = Clock(search.time_limit, progress) if clock is None else clock
     verdict = _decided(problem, search, clock.allow(search.evaluations), method)
     return _all_judged(_measured(_at_rates(verdict, clock), clock))
-
-
-def _refuse_impossible(robot: Robot, task: Task, search: Search) -> None:
-    """Refuse a speed or a home, where one is given, that this arm cannot have."""
-    if task.requires_rates or task.home_deg is not None:
-        from feasibility.demands.requirements import check_requirements
-
-        check_requirements(robot, task, search)
 
 
 def _all_judged(verdict: Verdict) -> Verdict:
@@ -164,7 +162,7 @@ def greedy_check(
 
     search = Search(method="greedy") if search is None else search
     problem = Problem.of(robot, cells, task)
-    _refuse_impossible(robot, task, search)
+    check_requirements(robot, task, search)
     clock = Clock(search.time_limit, progress)
     method = partial(greedy_search, start=robot.start if start is None else start)
     return _all_judged(_measured(_decided(problem, search, clock, method), clock))

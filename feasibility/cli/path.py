@@ -113,7 +113,7 @@ def path(args: argparse.Namespace, began: float) -> int:
         from feasibility.clock import OutOfTime
         from feasibility.demands.motion_rates import path_rates
         from feasibility.demands.treated_words import shortfall
-        from feasibility.division.ends import ends_of
+        from feasibility.division.between_patches import ends_of
         from feasibility.paths.coverage import coverage_path
         from feasibility.reports import path as report
         from feasibility.timing.path_timing import trajectory

@@ -14,9 +14,9 @@ from coverable.arrays import Mask
 from coverable.errors import at_least, counted
 from feasibility.certification.rate_replay import RateReplay, replay_rates
 from feasibility.clock import Clock, OutOfTime
+from feasibility.demands.every_demand import required_words
 from feasibility.demands.fast_motions import best_motion, largest_speed
 from feasibility.demands.motion_rates import RatedGraph, grow, rated_graph, replay_at_rates
-from feasibility.demands.requirements import required_words
 from feasibility.verdict import (
     Answer,
     Cause,

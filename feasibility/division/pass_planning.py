@@ -18,7 +18,7 @@ from robots.robot import Robot
 from surfaces.passes.parallel import Passes
 from surfaces.passes.pass_directions import ranked_directions
 from surfaces.passes.pass_stretches import Pass
-from surfaces.passes.toolpath import PassPlaces, PassRoute, pass_route
+from surfaces.passes.toolpath import PassPlaces, pass_route
 from surfaces.passes.ways import ToolWay
 from surfaces.surface import Surface
 from surfaces.toolpaths.pose_cells import PoseCells
@@ -90,8 +90,16 @@ def plan_passes(
         if shorter is not None:
             route = pass_route(shorter, retract, way)
             verdict = check(robot, route.cells, alone, search, clock=clock)
-    notes = *route.passes.notes, *_off_surface(route, retract)
-    passes = replace(route.passes, notes=notes)
+    notes, lifts, beyond = list(route.passes.notes), route.places.lifts, route.passes.beyond_border
+    if lifts:
+        times, height = counted(lifts, "time"), 1e3 * retract
+        notes.append(f"the tool is lifted {times} between stretches, by {height:.4g} mm")
+    if beyond > 0.0:
+        notes.append(
+            f"passes go on beyond the border by up to {1e3 * beyond:.4g} mm, straight in the plane "
+            "that is tangent there"
+        )
+    passes = replace(route.passes, notes=tuple(notes))
     return PlannedPasses(passes, route.places, route.cells, task, verdict)
 
 
@@ -163,17 +171,3 @@ def _with_reached_overrun(passes: Passes, places: PassPlaces, reached: Mask) -> 
         f"{1e3 * cut / ends:.3g} mm on average"
     )
     return replace(passes, stretches=tuple(found), notes=(*passes.notes, note))
-
-
-def _off_surface(route: PassRoute, retract: float) -> list[str]:
-    """Where the tool is not over the surface: lifted, or beyond the border."""
-    notes = []
-    if route.places.lifts:
-        times = counted(route.places.lifts, "time")
-        notes.append(f"the tool is lifted {times} between stretches, by {1e3 * retract:.4g} mm")
-    if route.passes.beyond_border > 0.0:
-        notes.append(
-            f"passes go on beyond the border by up to {1e3 * route.passes.beyond_border:.4g} mm, "
-            "straight in the plane that is tangent there"
-        )
-    return notes

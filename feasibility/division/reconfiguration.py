@@ -20,7 +20,7 @@ import numpy as np
 from coverable.arrays import Array, Ints, Mask, Protected
 from feasibility.certification.collisions.collision_replay import CollisionReplay
 from feasibility.division.free_motion import in_radians
-from feasibility.paths.two_opt import improved
+from feasibility.paths.order import improved
 from feasibility.paths.winding import turns_inside
 from feasibility.verdict import Walk
 from robots.robot import Robot

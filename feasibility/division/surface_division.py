@@ -8,9 +8,14 @@ import numpy as np
 from coverable.arrays import Ints
 from coverable.errors import ArgumentError, counted
 from feasibility.clock import Clock, OutOfTime
-from feasibility.demands.every_demand import OF_EACH, further, unjudged
+from feasibility.demands.every_demand import (
+    OF_EACH,
+    check_requirements,
+    further,
+    required_words,
+    unjudged,
+)
 from feasibility.demands.fast_motions import keep_fast_motions
-from feasibility.demands.requirements import check_requirements, required_words
 from feasibility.division.division import Division, Plan
 from feasibility.division.plans import collect_components, plan_of
 from feasibility.division.proved_bound import ProvedBound, prove_apart

@@ -20,8 +20,7 @@ from coverable.arrays import Array, Ints
 from feasibility.programs.controller_axes import AxisMap, ProgramSettings, check_program
 from feasibility.programs.controllers import INFORM, KRL, RAPID, TP, URSCRIPT, language_of
 from feasibility.programs.header import head
-from feasibility.programs.listings import inform, tp
-from feasibility.programs.motions import SERVO, Points, krl, rapid, urscript
+from feasibility.programs.program_texts import SERVO, Points, inform, krl, rapid, tp, urscript
 from feasibility.safe_files import write_whole
 from feasibility.timing.sampled_trajectory import Trajectory
 from robots.robot import Robot

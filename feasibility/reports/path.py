@@ -13,7 +13,7 @@ from feasibility.collisions.asked_bodies import said_of
 from feasibility.collisions.words import checked
 from feasibility.demands.area import TreatedArea
 from feasibility.demands.treated_words import treated_json, treated_words
-from feasibility.division.ends import Ends
+from feasibility.division.between_patches import Ends
 from feasibility.paths.coverage import CoveragePath
 from feasibility.paths.metrics import PathFigures
 from feasibility.reports.objects_and_csv import certificate_json, smooth_json

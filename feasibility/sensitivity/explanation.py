@@ -9,9 +9,8 @@ import numpy as np
 from coverable.errors import ArgumentError
 from feasibility.checking import check
 from feasibility.clock import Clock, OutOfTime
-from feasibility.demands.every_demand import refuse_start
+from feasibility.demands.every_demand import check_requirements, refuse_start
 from feasibility.demands.fast_motions import rate_figures
-from feasibility.demands.requirements import check_requirements
 from feasibility.demands.treated_words import shortfall
 from feasibility.division.plans import motion_over
 from feasibility.search_settings import Progress, Search

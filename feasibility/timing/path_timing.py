@@ -73,7 +73,7 @@ def trajectory(
             to its largest velocity in half a second.
         period: s between samples; one more is taken where a cell's centre is passed. It is
             halved where the motion between samples would leave the tolerance.
-        entry, leave: (k, n) rad or m, moves before and behind it, see `feasibility.division.ends`.
+        entry, leave: (k, n) rad or m, moves before and behind it, see `division.between_patches`.
 
     Returns:
         The samples. They keep to the limits, and the replay accepts them, as straight lines and as

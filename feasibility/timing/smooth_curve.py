@@ -192,9 +192,11 @@ def _refused(
     robot: Robot, cells: Cells, task: Task, curve: Curve, first: int, last: int
 ) -> dict[int, str]:
     """Why the replay refuses which stretches between marks `first` and `last`, by halving."""
-    nowhere = np.zeros(len(cells), dtype=bool)
-    walk = sampled(robot, curve, first, last)
-    replayed = replay(robot, cells, task, walk, nowhere, _deviations(curve, walk, first, last))
+    nowhere, walk = np.zeros(len(cells), dtype=bool), sampled(robot, curve, first, last)
+    k = np.arange(int(curve.marks[first]), int(curve.marks[last]) + 1)
+    seconds = curve.spline().derivative(2)(k) / SAMPLES**2  # it runs straight from one to the next
+    both = np.repeat(np.stack([seconds[:-1], seconds[1:]]), SAMPLES, axis=1)
+    replayed = replay(robot, cells, task, walk, nowhere, deviations(walk.q, both))
     if replayed.accepted:
         return {}
     if last == first + 1:
@@ -204,13 +206,6 @@ def _refused(
         **_refused(robot, cells, task, curve, first, middle),
         **_refused(robot, cells, task, curve, middle, last),
     }
-
-
-def _deviations(curve: Curve, walk: Walk, first: int, last: int) -> Array:
-    """(m - 1, n) how far the curve may be from the straight lines of `sampled`."""
-    k = np.arange(int(curve.marks[first]), int(curve.marks[last]) + 1)
-    seconds = curve.spline().derivative(2)(k) / SAMPLES**2  # it runs straight from one to the next
-    return deviations(walk.q, np.repeat(np.stack([seconds[:-1], seconds[1:]]), SAMPLES, axis=1))
 
 
 def without_slivers(walk: Walk, sliver: float) -> Walk:

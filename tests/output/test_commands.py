@@ -23,7 +23,7 @@ from feasibility.cli.main import _parser
 from feasibility.collisions.words import UNCHECKED
 from feasibility.demands.area import treated_by_walk
 from feasibility.demands.motion_rates import path_rates
-from feasibility.division.ends import ends_of
+from feasibility.division.between_patches import ends_of
 from feasibility.placement.trials import evaluator_of_study
 from feasibility.timing.speed_limits import used
 from feasibility.verdict import Walk

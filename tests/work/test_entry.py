@@ -11,7 +11,7 @@ import coverable
 from coverable import Collision, Obstacle, PathError, check, coverage_path, replay, trajectory
 from feasibility.certification.collisions.collision_replay import collision_replay
 from feasibility.collisions.asked_bodies import gather
-from feasibility.division.ends import ends_of
+from feasibility.division.between_patches import ends_of
 from feasibility.verdict import Walk
 from robots.kinematics import Kinematics
 

@@ -11,8 +11,14 @@ from samples import sampled, seeds
 
 from coverable import PathError, coverage_path, mesh, plane
 from feasibility.paths import order as orders
-from feasibility.paths.order import grid_order, route_length, shortest_order, step_lengths
-from feasibility.paths.two_opt import improved, tour_length
+from feasibility.paths.order import (
+    grid_order,
+    improved,
+    route_length,
+    shortest_order,
+    step_lengths,
+    tour_length,
+)
 from surfaces.meshes.triangle_mesh import TriangleMesh
 
 SHAPES = {(0, 3): [(False, False)], (1, 5): [(False, False)], (5, 1): [(False, False)],
