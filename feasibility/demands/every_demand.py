@@ -128,12 +128,9 @@ def unjudged(robot: Robot, task: Task, judged: Collection[str]) -> tuple[str, ..
 def further(
     robot: Robot, cells: Cells, task: Task, walks: Sequence[Walk], judged: Collection[str] = ()
 ) -> Findings:
-    """Judge what the replay does not, of motions that it accepted.
+    """Judge what the replay does not, of motions that it accepted, run one after the other.
 
-    Args:
-        robot, cells, task: the case.
-        walks: one motion, or several that are run one after the other.
-        judged: names of demands that were judged before.
+    Demands whose names are among `judged` were judged before.
 
     Raises:
         ArgumentError: the speed cannot be judged of this arm.

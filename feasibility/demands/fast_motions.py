@@ -72,10 +72,6 @@ def keep_fast_motions(exploration: Exploration, task: Task) -> dict[int, Cause]:
     A cell to which no such motion leads is in no component any more: that the arm can hold still
     over it is not enough. A single cell is kept where there is nothing else.
 
-    Args:
-        exploration: a search, which is changed; its clock's time counts.
-        task: with a speed or a least singular value.
-
     Returns:
         Cells that lose their last component, and why.
     """
@@ -121,14 +117,10 @@ class RateFigures:
 def rate_figures(
     verdict: Verdict, clock: Clock | None = None, more: bool = True
 ) -> RateFigures | None:
-    """Look for the largest speed; None where the verdict has no motion.
+    """Look for the largest speed, as long as there is time; None where the verdict has no motion.
 
-    Where the joints have no velocity limits, it is inf.
-
-    Args:
-        verdict: a feasible one, of the complete search.
-        clock: when its time is over, what is known by then is returned.
-        more: whether motions beyond those of the verdict are tried, as `check` does at a speed.
+    Where the joints have no velocity limits, it is inf. Motions beyond those of the verdict are
+    tried where `more` is wanted, as `check` does at a speed.
     """
     if verdict.witness is None or not len(verdict.cells):
         return None

@@ -113,15 +113,10 @@ def _away(space: FreeSpace, q: Array) -> list[Array]:
 
 
 def free_motion(space: FreeSpace, start: Array, end: Array, seed: int) -> Array | None:
-    """A motion between two configurations of which every straight line is certified clear.
+    """(m, n) a motion between two configurations, inside the limits, all certified clear.
 
-    Args:
-        space: the arm among its bodies.
-        start, end: (n,) rad or m, inside the limits.
-        seed: of the random places.
-
-    Returns:
-        (m, n) its rows, the straight line itself where that is clear; None where none was found.
+    It is the straight line where that is clear; None where none was found. The seed is that of
+    random places.
     """
     if space.clear(start, end):
         return np.stack([start, end])

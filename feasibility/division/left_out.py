@@ -93,13 +93,7 @@ class Gap:
 
 
 def gaps_of(search: PassSearch, pieces: Array, worked: Mask) -> tuple[Gap, ...]:
-    """What is left out, in order.
-
-    Args:
-        search: a finished search.
-        pieces: (N - 1,) m, of passes between poses.
-        worked: (N - 1,) on which of them a run works.
-    """
+    """What is left out, in order: `pieces` (N - 1,) m between poses on which no run has worked."""
     exploration, left = search.exploration, (pieces > 0.0) & ~worked
     # What lies between two passes belongs to the gap if it is not worked on either.
     ends = np.flatnonzero(np.diff(np.concatenate([[False], ~worked, [False]])))

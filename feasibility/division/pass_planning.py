@@ -61,10 +61,9 @@ def plan_passes(
     note says.
 
     Args:
-        robot, passes, search: the arm, what it runs along, and settings.
+        robot, passes, search, clock: the arm, what it runs along, and those of `check`.
         task: footprint and coverage are those of the whole surface.
         retract: m > 0, how far the tool is lifted between stretches that are apart.
-        clock: of the command that this is a part of.
 
     Raises:
         SurfaceError: see `surfaces.passes.pass_route`.
@@ -121,14 +120,9 @@ def plan_best_passes(
 ) -> PlannedPasses:
     """The direction with the fewest passes that one motion runs.
 
-    Directions are ranked by the number of pieces of passes, and the best three are tried with the
-    arm. Where none of them can be run in one motion, it is the first of them.
-
-    Args:
-        robot, task, retract, search, clock: see `plan_passes`.
-        surface: what is to be covered.
-        pitch: m, the largest distance between passes.
-        passes_along: the passes in a direction, an angle in rad.
+    Directions are ranked by the number of pieces of passes with a pitch (m), and the best three are
+    tried with the arm, as by `plan_passes`: `passes_along` makes the passes of one, an angle in
+    rad. Where none of them can be run in one motion, it is the first of them.
 
     Raises:
         SurfaceError: see `surfaces.passes.parallel_passes` and `pass_route`.

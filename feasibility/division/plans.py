@@ -60,9 +60,8 @@ def fewest_patches(covers: Mask, pairs: Ints, time_limit: float = TIME_LIMIT) ->
     """Share cells out among as few components as possible.
 
     Args:
-        covers: (K, N) True where component k covers cell c.
+        covers, time_limit: of components, see `set_cover`.
         pairs: (M, 2) cells that touch.
-        time_limit: s; running out leaves a gap between the number of patches and its bound.
 
     Example:
         >>> covers = np.array([[1, 1, 0], [0, 1, 1]], dtype=bool)
@@ -238,12 +237,9 @@ def connect_pairs(exploration: Exploration, component: int, wanted: Mask) -> Non
 def motion_over(
     robot: Robot, cells: Cells, task: Task, search: Search, cover: Mask, clock: Clock | None = None
 ) -> tuple[Walk | None, str]:
-    """One continuous motion over what a component covers, or why there is none.
+    """One continuous motion over what a component of a verdict covers (N,), or why there is none.
 
-    Args:
-        robot, cells, task, search: those of the verdict that the component is of.
-        cover: (N,) its cells.
-        clock: whose time limit counts.
+    Arm, cells, task and search are those of the verdict.
     """
     clock = (Clock() if clock is None else clock).allow(search.evaluations)
     exploration = exploration_of(robot, cells, task, search.seed, clock)

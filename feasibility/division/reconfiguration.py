@@ -70,8 +70,7 @@ class Reconfiguration(Protected):
     def described(self, most: int | None = None) -> str:
         """The joints that move, the furthest first: 'shoulder_pan_joint by -352.1 deg, ...'.
 
-        Args:
-            most: how many are named, if not all; the others are counted.
+        No more are named than `most`, if that is given; the others are counted.
         """
         shown = np.where(self.prismatic, 1e4 * self.moves, np.degrees(self.moves))
         parts = []
@@ -139,10 +138,8 @@ def _least_path(
 ) -> list[int]:
     """One option of each layer: the least sum, of those whose largest move is about the least.
 
-    Args:
-        largest, total: (S, S) from each option to each other: the largest move, and what is summed.
-        orders: each of layers of options.
-        as_good: times the least is about the least.
+    From each option to each other there are the largest move and what is summed (S, S); the orders
+    are of layers of options, and `as_good` times the least is about the least.
     """
     most = min(_through(largest, layers, np.maximum)[0] for layers in orders)
     allowed = np.where(largest <= as_good * most + SLACK, total, np.inf)

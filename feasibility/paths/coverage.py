@@ -76,11 +76,9 @@ class CoveragePath(Protected):
         return self.walk.cell[self.walk.cell >= 0]
 
     def through_surface(self, q: Array, working: Mask | None = None) -> str:
-        """Where the tool point of another motion goes through the surface, or may; empty: nowhere.
+        """Where the tool point of a motion q (k, n) goes through the surface, or may; or nothing.
 
-        Args:
-            q: (k, n) rad or m, rows that straight lines join.
-            working: (k,) where the tool works; between two such rows nothing is looked at.
+        Between two rows that are `working` (k,) nothing is looked at.
         """
         lifted = np.arange(len(q) - 1.0)
         if working is not None:

@@ -80,14 +80,11 @@ def joint_route(
 
     Args:
         graph: the known motions; those that are made meanwhile are added.
-        cells: the cells.
-        route: flat indices of cells, each once.
+        cells, route: the cells, and flat indices of them, each once.
         wind: whether the path may be run full turns of a joint earlier or later than known motions
             are.
-        most_revisited: m, of more than this the path is given up.
-
-    Returns:
-        The motion; without nodes and with infinite figures where it was given up.
+        most_revisited: m, of more than this the path is given up; without nodes, then, and with
+            infinite figures.
 
     Raises:
         PathError: no motion leads on from a cell.

@@ -130,9 +130,7 @@ def usual_order(cells: Cells) -> Order:
 def shortest_order(cells: Cells, pairs: Ints | None = None) -> Ints:
     """(N,) the shortest order found: of a grid's and a greedy one the best, improved.
 
-    Args:
-        cells: N cells; more than `MOST_IMPROVED` are not improved.
-        pairs: (M, 2) pairs of cells between which a step is possible; those that touch by default.
+    Steps are possible between `pairs` (M, 2), by default the cells that touch.
     """
     steps = step_lengths(cells, cells.pairs if pairs is None else pairs)
     shape = tuple(map(int, cells.shape))
@@ -202,9 +200,7 @@ def tour_length(distance: Array, tour: Ints) -> float:
 def improved(distance: Array, tour: Ints) -> Ints:
     """A path that is no longer, and that no turn of a part and no move of a short part shortens.
 
-    Args:
-        distance: (N, N) symmetric distances.
-        tour: (N,) places in the order of the path, which may begin and end anywhere.
+    Of N places with symmetric distances (N, N); the path may begin and end anywhere.
 
     Example:
         >>> x = np.array([0.0, 1.0, 2.0, 3.0])

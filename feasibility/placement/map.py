@@ -49,12 +49,11 @@ def placement_map(
     """A wide look at every placement of a raster.
 
     Args:
-        evaluator: tries placements.
+        evaluator, progress: as for `place`.
         region: its ranges are the map's.
         held: values of the axes that are not mapped, such as those of the best placement.
         axes: two or three of those that vary; default `axes_of`. One is mapped as a strip.
         shape: places along each.
-        progress: called as progress(done, total, text); what it raises ends it.
 
     Raises:
         PlacementError: there are no such axes, or the shape does not fit them.

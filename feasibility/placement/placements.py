@@ -109,9 +109,7 @@ def place(
     """Where in a region may the surface stand, so that one continuous motion covers it?
 
     Args:
-        robot: the arm.
-        cells: the surface, wherever it stands now, cut into cells.
-        task: standoff, cone and tolerance.
+        robot, cells, task: the question, as for `check`, wherever the surface stands now.
         region: the poses of the surface's frame to search.
         search: of each verdict; its seed also spreads the poses.
         count: poses spread over the region (five at least), and tried again in each round.
@@ -122,9 +120,6 @@ def place(
         progress: called as progress(done, total, text); what it raises ends the search.
         clock: of the command that this is a part of; its limit counts instead of `time_limit`.
         interruptible: whether a Ctrl-C ends the search as the time limit does, and is not raised.
-
-    Returns:
-        The placements. That there are none is a result, not an error.
 
     Raises:
         PlacementError: there is nothing to place, or the settings make no sense.

@@ -39,7 +39,7 @@ class StationPlan(Protected):
 
     @property
     def optimal(self) -> bool:
-        """Is it proved that no fewer will do, given the components found?"""
+        """Is it proved that no fewer will do, given the components found? More may need fewer."""
         return len(self.trials) <= self.bound
 
     @property
@@ -67,14 +67,8 @@ def station_plan(
 
     Args:
         placements: the search for one placement, which found none.
-        evaluator: tries placements.
-        search: its settings; the seed is that of the replays, as of the evaluator.
+        evaluator, search, progress, clock: as for `place`; the seed is that of the replays, too.
         count: poses spread over the region and searched, besides those of `placements`.
-        progress: called as progress(done, total, text); what it raises ends it.
-        clock: of the command that this is a part of.
-
-    Returns:
-        The plan. Optimal is meant among the motions found; more placements may need fewer.
     """
     search, cells = Search() if search is None else search, placements.cells
     values = placements.region.samples(count, search.seed)

@@ -121,15 +121,10 @@ def evaluator_of_study(
     store: Store | None = None,
     progress: Progress | None = None,
 ) -> Evaluator:
-    """Tries placements of a case's surface as tasks of a study: by many workers, and kept.
+    """Tries placements of a case's surface, of so many cells, as tasks of a study.
 
-    Args:
-        case: the robot, the surface, the task and the search.
-        cells: how many the surface has.
-        workers: where they are tried.
-        store: where what was tried is kept and found again.
-        progress: called as progress(done, total, text) several times a second, with the tasks of
-            the present batch; what it raises ends the run.
+    By many workers, and kept in a store, if there is one. The progress is that of the tasks of the
+    present batch, several times a second; what it raises ends the run.
     """
     batch = AHEAD * workers.width
 

@@ -36,10 +36,6 @@ def working_places(places: PassPlaces, stretches: Sequence[Pass]) -> Ints:
 
     Where one pass follows on another along the surface the tool goes on working, as it does for the
     treated area; between two parts of one pass there is a hole.
-
-    Args:
-        places: of passes.
-        stretches: of the same passes.
     """
     levels = np.array([each.level for each in stretches])
     lifted = places.stretch == LIFTED
@@ -136,10 +132,8 @@ def _points(
 ) -> Points:  # fmt: skip
     """Numbers as text, and the steps of rounded times, which add up to the last of them.
 
-    Args:
-        axes, robot, settings: of the program.
-        time, q: (m,) s from 0, and (m, n) rad or m.
-        switched: s from 0, beginning and end of each stretch in which the tool is on.
+    The motion is q (m, n) at times (m,) s from 0; on the stretches `switched`, likewise, the tool
+    is on.
     """
     digits, time_digits = axes.language.digits, axes.language.time_digits
     ticks = np.round(time * 10**time_digits)

@@ -1,6 +1,15 @@
-"""What would make a case feasible, and how large the margins of a feasible one are."""
+"""What would make a case feasible, and how large the margins of a feasible one are.
 
+Where no single change does, two are looked for. Wider limits, a wider cone and smaller clearances
+only ever help. So they are all opened at once; if that is feasible, they are put back one after
+another as long as it stays feasible, and what cannot be put back is needed. A shift of the surface,
+which may do harm too, is tried in a few sizes, alone with the others opened, and with a second one.
+"""
+
+import itertools
+import math
 import time
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -14,10 +23,9 @@ from feasibility.demands.fast_motions import rate_figures
 from feasibility.demands.treated_words import shortfall
 from feasibility.division.plans import motion_over
 from feasibility.search_settings import Progress, Search
-from feasibility.sensitivity.probes import Prober
-from feasibility.sensitivity.quantities import Kind, Variant, quantities
-from feasibility.sensitivity.thresholds import Dropped, Explanation, Threshold
-from feasibility.sensitivity.two_changes import changes_together
+from feasibility.sensitivity.probes import REMEDIES, Prober, Steps, last_true
+from feasibility.sensitivity.quantities import Kind, Quantity, Variant, quantities
+from feasibility.sensitivity.thresholds import Change, ChangePair, Dropped, Explanation, Threshold
 from feasibility.task import Task
 from feasibility.verdict import Evidence, Verdict
 from robots.robot import Robot
@@ -27,6 +35,9 @@ EFFORT, MOST = 2, 15_000  # of one verdict: times that of the case as given, but
 FEW, EACH = 8_000, 20  # ... or so many evaluations, and for each cell, where that is more
 NEAREST = 4  # changed cases whose motions are tried on the case as given
 VERDICT_SHARE = 0.5  # of the time limit, at most, for the verdict of the case as given
+
+SHIFTS = (0.2, 0.5, 1.0)  # [1] of the largest shift: sizes that are tried
+LAST_PUT_BACK = (Kind.ROLL, Kind.CONE, Kind.CLEARANCE, Kind.TOOL_CLEARANCE)
 
 NOT_EVEN = "not even without any collisions"  # of one object where all together are not in the way
 AS_GIVEN = "checking the case as given"
@@ -48,9 +59,7 @@ def explain(
     "feasible" is said only of a motion that holds all that the case demands.
 
     Args:
-        robot: the arm, with its limits.
-        cells: the surface, cut into cells.
-        task: standoff, cone and tolerance.
+        robot, cells, task: the case, as for `check`.
         search: settings of the complete search. The time limit is for everything; the verdict of
             the case as given gets half of it at most.
         progress: called as progress(done, total, text); what it raises ends the work.
@@ -165,3 +174,80 @@ def drop(prober: Prober) -> Dropped:
         walk, _ = motion_over(*prober.given, search, verdict.covered, clock)
     area = float(cells.areas[left].sum())
     return Dropped(np.flatnonzero(left), area, area / float(cells.areas.sum()), walk)
+
+
+def changes_together(prober: Prober, varied: Sequence[Quantity]) -> ChangePair | None:
+    """Two changes, each as small as it was found to do; None where none were found.
+
+    Raises:
+        OutOfTime: the deadline passed.
+    """
+    for steps in _sets(prober, varied):
+        if len(steps) == 2:
+            return _narrowed(prober, steps)
+    return None
+
+
+def _sets(prober: Prober, varied: Sequence[Quantity]) -> Iterator[Steps]:
+    """Sets of changes that were found to be feasible, no member of which can be left out."""
+    shifts = [q for q in varied if q.kind is Kind.SHIFT]
+    # The cone is put back last: of two pairs the one with it needs fewer new joint limits.
+    helpers = [q for q in varied if q.kind in (Kind.LOWER, Kind.UPPER)]
+    helpers += [q for q in varied if q.kind in LAST_PUT_BACK]
+    opened = tuple((quantity, quantity.last) for quantity in helpers)
+    if prober.at(opened).walk:
+        yield _needed(prober, opened, opened)
+    for share in SHIFTS:
+        moved = [(shift, max(1, round(share * shift.last))) for shift in shifts]
+        for step in moved:
+            if prober.at((step, *opened)).walk:
+                yield _needed(prober, (step, *opened), opened)
+        for one, other in itertools.combinations(moved, 2):
+            opposite = one[0].axis == tuple(-x for x in other[0].axis)
+            if not opposite and prober.at((one, other)).walk:
+                yield one, other
+
+
+def _needed(prober: Prober, steps: Steps, removable: Steps) -> Steps:
+    """Those of some changes that are feasible together which cannot be left out."""
+    needed = steps
+    for step in removable:
+        rest = tuple(other for other in needed if other is not step)
+        if len(needed) < 2:
+            break
+        # A motion that uses all of them may lead to none with fewer, and a search alone to one.
+        if prober.at(rest, prober.at(needed).walk).walk or prober.at(rest, judged=True).walk:
+            needed = rest
+    return needed
+
+
+def _narrowed(prober: Prober, steps: Steps) -> ChangePair | None:
+    """Both changes made as small as they were found to do, one after the other.
+
+    None where `check` does not accept the motion, of the small ones nor of those given.
+    """
+    narrow = steps
+    for quantity, k in steps:
+        narrow = _smaller(prober, narrow, quantity, k)
+    for found in (narrow, steps):
+        walk = prober.at(found, prober.at(found).walk, judged=True).walk
+        if walk is not None:
+            changes = tuple(Change(quantity, quantity.value(k)) for quantity, k in found)
+            return ChangePair(changes, walk)
+    return None
+
+
+def _smaller(prober: Prober, steps: Steps, quantity: Quantity, k: int) -> Steps:
+    """The same with one of them as small as was found to do."""
+    seeds = prober.at(steps).walk
+
+    def changed(k: int) -> Steps:
+        return tuple((other, k if other is quantity else j) for other, j in steps)
+
+    def holds(k: int) -> bool:
+        nonlocal seeds
+        found = prober.at(changed(k), seeds)
+        seeds = found.walk or seeds
+        return found.walk is not None
+
+    return changed(last_true(holds, k, 0, math.ceil(k / REMEDIES))[0])

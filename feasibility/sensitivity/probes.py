@@ -114,13 +114,10 @@ class Prober:
         self._suspect(self.looks[()])
 
     def at(self, steps: Steps, seeds: Walk | None = None, *, judged: bool = False) -> Look:
-        """What is found of a changed case, from a known motion if there is one.
+        """What is found of a changed case, from a known motion (`seeds`) if there is one.
 
-        Args:
-            steps: the changes; those of no steps are none.
-            seeds: the motion.
-            judged: whether `check` is asked, unless a proof is known, or that it accepts a motion;
-                else a search will do.
+        Where it is to be `judged`, `check` is asked, unless a proof is known, or that it accepts a
+        motion; else a search will do.
 
         Raises:
             OutOfTime: the deadline passed before it was decided.
@@ -234,15 +231,10 @@ class Prober:
         return self.at(((quantity, k),), judged=True).accepted
 
     def _between(self, quantity: Quantity, good: int, bad: int) -> tuple[int, int | None]:
-        """Both sides of the threshold between two values; further on where `check` goes further.
+        """Where it is feasible, and where it is not; None where it is all the way.
 
-        Args:
-            quantity: what is varied.
-            good: where it is feasible, as `check` says.
-            bad: where no motion was found.
-
-        Returns:
-            Where it is feasible, and where it is not; None where it is all the way.
+        Between `good`, which `check` says is feasible, and `bad`, where no motion was found; or
+        further on, where `check` goes further.
         """
         stop, sure = bad, good
         while True:

@@ -187,19 +187,11 @@ def shifted(cells: Cells, translation: np.ndarray) -> Cells:
 
 
 def quantities(variant: Variant, widen: bool) -> tuple[Quantity, ...]:
-    """What can be varied in a case.
+    """What can be varied in a case, in the order in which it is tried.
 
-    Args:
-        variant: the case.
-        widen: towards more freedom (for a case that is not feasible), or towards less. Standoff
-            and shifts go both ways in any case.
-
-    Returns:
-        The cone; the range of the roll where it is limited; the tilt of an approach direction that
-        is given; each finite limit of each joint; standoff; shifts along six directions. Where
-        collisions are checked: the cone; clearances, and what is left out of the scene; standoff;
-        shifts; limits. What cannot be varied (a cone of 180 degrees that is to be widened) is left
-        out.
+    It is widened, towards more freedom (for a case that is not feasible), or goes towards less;
+    standoff and shifts go both ways in any case. What cannot be varied (a cone of 180 degrees that
+    is to be widened) is left out.
     """
     task = variant.task
     widest = 180.0 if task.roll is None else 90.0

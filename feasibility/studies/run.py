@@ -65,14 +65,11 @@ def run_tasks(
     same key are done once, those that failed are tried again.
 
     Args:
-        tasks: in the order of the table.
-        workers: where to, see `open_workers`.
+        tasks: in the order of the table; each has its row, in the same order.
+        workers: where they run, see `open_workers`.
         store: where finished tasks are kept.
         progress: called as progress(done, total, text) several times a second; what it raises
             ends the run.
-
-    Returns:
-        One row for each task, in the same order.
 
     Raises:
         StoreError: the store cannot be read or written.

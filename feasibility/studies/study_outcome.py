@@ -98,9 +98,7 @@ def critical_cone(verdict: Verdict, search: Search, clock: Clock) -> float | Non
 def outcome_of(verdict: Verdict, causes: bool = True) -> Outcome:
     """A verdict as JSON values; no timing, so that the same case always has the same outcome.
 
-    Args:
-        verdict: of a case.
-        causes: whether to look for the causes of missed cells, which takes some time.
+    Causes of missed cells take some time; where they are not wanted there are none.
     """
     areas = np.asarray(verdict.cells.areas)
     total = float(areas.sum())
@@ -128,10 +126,9 @@ def outcome_of(verdict: Verdict, causes: bool = True) -> Outcome:
 
 
 def merit(outcome: Mapping[str, Any]) -> tuple[bool, float, float]:
-    """A key that sorts the best first: feasible, by covered share, by margin to the limits.
+    """A key that sorts outcomes, the best first: feasible, by covered share, by margin to limits.
 
-    Args:
-        outcome: with `verdict`, `share` (absent where the task failed) and `margins`.
+    The share is absent where the task failed.
     """
     margins = outcome.get("margins") or {}
     limit = margins.get("limit_deg")

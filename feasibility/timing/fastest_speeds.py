@@ -52,10 +52,7 @@ class Rows(NamedTuple):
 def fastest_speeds(most: Array, rows: Rows, limits: Array | float = 1.0) -> Array:
     """(m,) the largest x from rest to rest; see the module.
 
-    Args:
-        most: (m,) upper bounds of x.
-        rows: |c x + d y| <= l of each piece.
-        limits: (m - 1, r) l, or what makes that by repetition.
+    It is at most `most` (m,); of the rows of each piece `limits` are l (m - 1, r), or a number.
 
     Example:
         >>> rows = Rows.of(np.full((4, 1), -0.5), np.full((4, 1), 0.5))

@@ -65,6 +65,9 @@ def trajectory(
 ) -> Trajectory:
     """Run a path as fast as its limits allow.
 
+    The samples keep to the limits, and the replay accepts them, as straight lines and as the
+    quintics and cubics that controllers make of them.
+
     Args:
         path: the path.
         speed: m/s, largest speed of the tool point.
@@ -74,10 +77,6 @@ def trajectory(
         period: s between samples; one more is taken where a cell's centre is passed. It is
             halved where the motion between samples would leave the tolerance.
         entry, leave: (k, n) rad or m, moves before and behind it, see `division.between_patches`.
-
-    Returns:
-        The samples. They keep to the limits, and the replay accepts them, as straight lines and as
-        the quintics and cubics that controllers make of them.
 
     Raises:
         PathError: a number is not as it should be, or no such motion was found.

@@ -98,11 +98,9 @@ class CurveBounds:
         return CurveBounds(curve, grid, np.abs(slope), tool_speeds(robot, q, slope), rows)
 
     def timed(self, limits: MotionLimits, share: Array) -> TimedCurve:
-        """Time along the curve.
+        """Time along the curve, within limits at the places of the grid.
 
-        Args:
-            limits: at the places of the grid.
-            share: (m - 1, 2 n + 1) of the velocities, accelerations and tool speed on each piece.
+        Of their velocities, accelerations and tool speed a share (m - 1, 2 n + 1) on each piece.
 
         Raises:
             PathError: the motion would have to stop in between.

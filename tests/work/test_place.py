@@ -207,11 +207,11 @@ def test_the_bound_on_a_region_holds_for_its_placements():
         corners = np.where(picks == 0, region.low, region.high)
         furthest = reach.distances(np.vstack([region.samples(64, k), corners])).max(axis=1)
         if beyond is not None:
-            assert furthest.min() >= beyond.distance - 1e-9
-            assert beyond.distance > reach.reach + reach.tolerance
+            assert furthest.min() >= beyond[0] - 1e-9
+            assert beyond[0] > reach.reach + reach.tolerance
             proved += 1
-            several += beyond.boxes > 1
-            tight.append(beyond.distance / furthest.min())
+            several += beyond[1] > 1
+            tight.append(beyond[0] / furthest.min())
         else:  # a pose in reach, or nearly so
             assert furthest.min() <= 1.05 * (reach.reach + reach.tolerance)
     assert 20 < proved < 80
