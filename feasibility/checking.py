@@ -127,7 +127,7 @@ def _at_rates(verdict: Verdict, clock: Clock) -> Verdict:
     """The verdict at the speed, and as far from singularities, as the task asks."""
     if not verdict.task.requires_rates:
         return verdict
-    from feasibility.demands.verdict_at_speed import at_rates
+    from feasibility.demands.fast_motions import at_rates
 
     began = time.monotonic()
     found = at_rates(verdict, clock)

@@ -9,6 +9,7 @@ import numpy as np
 
 from coverable.arrays import Array
 from coverable.errors import CoverableError
+from feasibility.studies.combinations import spread
 from surfaces.cells import Cells
 from surfaces.patches.grid_cells import GridCells
 from surfaces.surface import Surface, rotation_from_rpy
@@ -153,14 +154,10 @@ class Region:
 
     def samples(self, count: int, seed: int) -> Array:
         """(count, 6) poses, the middle first, then spread evenly by a Sobol sequence."""
-        from scipy.stats import qmc
-
         free = self.high > self.low
-        sampler = qmc.Sobol(int(free.sum()), scramble=True, seed=np.random.default_rng(seed))
-        unit = sampler.random_base2(max(count - 1, 0).bit_length())
-        values = np.tile(0.5 * (self.low + self.high), (len(unit) + 1, 1))
-        values[1:, free] = self.low[free] + unit * (self.high - self.low)[free]
-        return self.rounded(values[:count])
+        values = np.tile(0.5 * (self.low + self.high), (count, 1))
+        values[1:, free] = spread(self.low[free], self.high[free], count - 1, seed)
+        return self.rounded(values)
 
     def rounded(self, values: Array) -> Array:
         """Poses that people can write down, inside the region still."""

@@ -133,8 +133,7 @@ def check_program(
         ProgramError: the joints are no such axes, or the settings make no program.
     """
     settings = ProgramSettings() if settings is None else settings
-    where = f"{language.name} for {robot.name!r}"
-    checks = Checks("", ProgramError)
+    checks = Checks(f"{language.name} for {robot.name!r}", ProgramError)
     arm, outside = _axes(checks, language, robot)
     expected = f"must be {JOINTS} numbers, one for each axis of the arm"
     signs = _six(checks, "signs", settings.signs, 1.0, f"{expected}, 1 or -1")
@@ -159,10 +158,7 @@ def check_program(
             fault = f"J3 is counted from the horizontal, but {what} have no parallel axes"
             wanted = "where it is counted from the upper arm, say --j3-from-upper-arm"
             checks.keep(Fault("", fault, expected=wanted))
-    try:
-        checks.done()
-    except ProgramError as error:
-        raise ProgramError(error.faults, where) from error
+    checks.done()
     return AxisMap(language, arm, outside, signs, offsets, per_deg, by_j2)
 
 

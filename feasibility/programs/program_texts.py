@@ -7,6 +7,7 @@ controller holds so many in a program, a long motion becomes several, which a ma
 """
 
 import textwrap
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -50,12 +51,8 @@ class Points:
     """How much of its largest velocity the quickest axis takes from each point to the next."""
     duration: float
     """s."""
-    lines: dict[int, list[str]]
-    """Those that switch the tool, by the number of the point at which they do."""
-
-    def at(self, point: int) -> list[str]:
-        """The lines that switch the tool at a point."""
-        return self.lines.get(point, [])
+    at: defaultdict[int, list[str]]
+    """Lines that switch the tool, by the number of the point at which they do."""
 
 
 def urscript(head: Sequence[str], points: Points, name: str) -> dict[str, str]:
@@ -63,9 +60,9 @@ def urscript(head: Sequence[str], points: Points, name: str) -> dict[str, str]:
     del name
     first, *others = [f"[{', '.join(row)}]" for row in points.arm]
     rest = f"0, 0, {SERVO:g}, {LOOKAHEAD:g}, {GAIN}"
-    moves = [*points.at(0)]
+    moves = [*points.at[0]]
     for k, point in enumerate(others, start=1):
-        moves += [f"servoj({point}, {rest})", *points.at(k)]
+        moves += [f"servoj({point}, {rest})", *points.at[k]]
     parts = [moves[k : k + FUNCTION_LINES] for k in range(0, len(moves), FUNCTION_LINES)]
     body, calls = list[str](), list[str]()
     for number, part in enumerate(parts, start=1):
@@ -85,10 +82,10 @@ def rapid(head: Sequence[str], points: Points, name: str) -> dict[str, str]:
         extra = [*external, *[UNUSED] * (6 - len(external))]
         targets.append(f"[[{','.join(arm)}],[{','.join(extra)}]]")
     last = len(points.steps)
-    body = [f"MoveAbsJ {targets[0]},v50,fine,tool0;", *points.at(0)]
+    body = [f"MoveAbsJ {targets[0]},v50,fine,tool0;", *points.at[0]]
     for k, step in enumerate(points.steps, start=1):
         zone = "fine" if k == last else "z0"
-        body += [f"MoveAbsJ {targets[k]},v1000\\T:={step},{zone},tool0;", *points.at(k)]
+        body += [f"MoveAbsJ {targets[k]},v1000\\T:={step},{zone},tool0;", *points.at[k]]
     lines = ["MODULE CoverablePath", *(f"  ! {line}" for line in head), "  PROC coverable_path()"]
     lines += [f"    {line}" for line in body]
     return {"": _text([*lines, "  ENDPROC", "ENDMODULE"])}
@@ -108,11 +105,11 @@ def krl(head: Sequence[str], points: Points, name: str) -> dict[str, str]:
     lines = ["&ACCESS RVP", f"DEF {name}()", *(f"; {line}" for line in head)]
     lines += ["BAS(#INITMOV, 0)", "BAS(#VEL_PTP, 10)", f"PTP {targets[0]}"]
     if not points.steps:
-        return {"": _text([*lines, *points.at(0), "END"])}
+        return {"": _text([*lines, *points.at[0], "END"])}
     lines += ["PTP_SPLINE", "  TIME_BLOCK START"]
-    lines += [f"  TRIGGER WHEN PATH=0 ONSTART DELAY=0 DO {line}" for line in points.at(0)]
+    lines += [f"  TRIGGER WHEN PATH=0 ONSTART DELAY=0 DO {line}" for line in points.at[0]]
     for k, step in enumerate(points.steps, start=1):
-        lines += [f"  TRIGGER WHEN PATH=0 DELAY=0 DO {line}" for line in points.at(k)]
+        lines += [f"  TRIGGER WHEN PATH=0 DELAY=0 DO {line}" for line in points.at[k]]
         share = 100.0 * float(step) / points.duration
         lines += [f"  SPTP {targets[k]}", f"  TIME_BLOCK PART = {share:.8f}"]
     lines += [f"  TIME_BLOCK END = {points.duration:.{KRL.time_digits}f}", "ENDSPLINE"]
@@ -128,7 +125,7 @@ def tp(head: Sequence[str], points: Points, name: str) -> dict[str, str]:
         positions = list[str]()
         for number, point in enumerate(numbers, start=1):
             lines.append(f"J P[{number}] {_tp_speed(points, point)}")
-            lines += [f"  {line.strip().rstrip(';').rstrip()}" for line in points.at(point)]
+            lines += [f"  {line.strip().rstrip(';').rstrip()}" for line in points.at[point]]
             rows = [
                 ",\t".join(f"J{k}= {points.arm[point][k - 1]} deg" for k in row)
                 for row in ((1, 2, 3), (4, 5, 6))
@@ -165,7 +162,7 @@ def inform(head: Sequence[str], points: Points, name: str) -> dict[str, str]:
         lines = [f"'{line}" for line in _remarks(head, ending)]
         for number, point in enumerate(numbers):
             lines.append(f"MOVJ C{number:05d} {_vj(points, point)}")
-            lines += [line.strip() for line in points.at(point)]
+            lines += [line.strip() for line in points.at[point]]
         rows = [f"C{k:05d}={','.join(points.arm[point])}" for k, point in enumerate(numbers)]
         programs[ending] = _job(f"{name}{ending}".upper(), rows, lines)
     if len(programs) > 1:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections import defaultdict
 from collections.abc import Sequence
 from functools import partial
 from itertools import groupby
@@ -146,13 +147,13 @@ def _points(
     steps = np.diff(ticks) / 10**time_digits
     speeds = np.abs(np.diff(q[:, list(axes.arm)], axis=0)) / steps[:, None]
     shares = (speeds / robot.max_velocity[list(axes.arm)]).max(axis=1, initial=0.0)
-    lines = dict[int, list[str]]()
+    at = defaultdict[int, list[str]](list)
     for begin, end in switched:
         first = min(int(np.searchsorted(time, begin - ROUNDING)), len(time) - 1)
         last = max(int(np.searchsorted(time, end + ROUNDING, side="right")) - 1, first)
-        lines.setdefault(first, []).append(settings.on)
-        lines.setdefault(last, []).append(settings.off)
+        at[first].append(settings.on)
+        at[last].append(settings.off)
     return Points(
         arm, external, [f"{step:.{time_digits}f}" for step in steps.tolist()], shares.tolist(),
-        float(ticks[-1]) / 10**time_digits, lines,
+        float(ticks[-1]) / 10**time_digits, at,
     )  # fmt: skip

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from coverable.arrays import Array
 from coverable.errors import Fault, listed, shown
 from feasibility.cases.robot_table import in_robot_table
 from feasibility.cases.surface_reading import faults_of_building
@@ -166,19 +167,20 @@ def _parameter(label: str, value: Any) -> Any:
 
 
 def draw(varied: Variation) -> list[tuple[float, ...]]:
-    """Numbers for all ranges, so many times: points of a scrambled Sobol sequence.
-
-    Without ranges it is one empty sample.
-    """
+    """Numbers for all ranges, so many times; one empty sample without ranges."""
     if not varied.ranges:
         return [()]
+    low, high = np.array([span.values for span in varied.ranges]).T
+    return [tuple(row) for row in spread(low, high, varied.count, varied.seed).tolist()]
+
+
+def spread(low: Array, high: Array, count: int, seed: int) -> Array:
+    """(count, n) places between two corners (n,): points of a scrambled Sobol sequence."""
     from scipy.stats import qmc
 
-    sequence = qmc.Sobol(len(varied.ranges), scramble=True, seed=varied.seed)
+    sequence = qmc.Sobol(len(low), scramble=True, seed=np.random.default_rng(seed))
     # The sequence is balanced at powers of two only; what is left over is not taken.
-    unit = sequence.random_base2((varied.count - 1).bit_length())[: varied.count]
-    low, high = np.array([span.values for span in varied.ranges]).T
-    return [tuple(row) for row in (low + (high - low) * unit).tolist()]
+    return low + (high - low) * sequence.random_base2((count - 1).bit_length())[:count]
 
 
 @lru_cache(maxsize=256)

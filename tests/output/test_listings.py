@@ -12,7 +12,7 @@ from arm_urdfs import arm, joint, load_text
 from timed_motions import TURN, UR5, motion
 
 from coverable import ProgramSettings, save_program
-from feasibility.programs import listings
+from feasibility.programs import program_texts
 from robots.kinematics import Kinematics
 
 PULSES = (1341.4, 1341.4, 1000.0, 811.0, 800.5, 452.2)
@@ -136,8 +136,8 @@ def test_yaskawa_has_pulses_and_shares_of_the_largest_speeds(tmp_path):
 
 @pytest.mark.parametrize("language", ["ls", "jbi"])
 def test_a_long_motion_becomes_programs_that_one_calls(tmp_path, monkeypatch, fanuc, language):
-    monkeypatch.setattr(listings, "MOST_TP", 40)
-    monkeypatch.setattr(listings, "MOST_INFORM", 40)
+    monkeypatch.setattr(program_texts, "MOST_TP", 40)
+    monkeypatch.setattr(program_texts, "MOST_INFORM", 40)
     robot = fanuc if language == "ls" else replace(UR5, name="gp7")
     run = motion(robot)
     run = replace(run, cell=np.where(np.arange(len(run)) % 50 == 0, 0, -1))
