@@ -156,7 +156,8 @@ class Region:
         """(count, 6) poses, the middle first, then spread evenly by a Sobol sequence."""
         free = self.high > self.low
         values = np.tile(0.5 * (self.low + self.high), (count, 1))
-        values[1:, free] = spread(self.low[free], self.high[free], count - 1, seed)
+        rng = np.random.default_rng(seed)
+        values[1:, free] = spread(self.low[free], self.high[free], count - 1, rng)
         return self.rounded(values)
 
     def rounded(self, values: Array) -> Array:

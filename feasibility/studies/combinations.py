@@ -174,11 +174,11 @@ def draw(varied: Variation) -> list[tuple[float, ...]]:
     return [tuple(row) for row in spread(low, high, varied.count, varied.seed).tolist()]
 
 
-def spread(low: Array, high: Array, count: int, seed: int) -> Array:
+def spread(low: Array, high: Array, count: int, seed: int | np.random.Generator) -> Array:
     """(count, n) places between two corners (n,): points of a scrambled Sobol sequence."""
     from scipy.stats import qmc
 
-    sequence = qmc.Sobol(len(low), scramble=True, seed=np.random.default_rng(seed))
+    sequence = qmc.Sobol(len(low), scramble=True, seed=seed)
     # The sequence is balanced at powers of two only; what is left over is not taken.
     return low + (high - low) * sequence.random_base2((count - 1).bit_length())[:count]
 
