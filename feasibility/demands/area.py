@@ -139,7 +139,9 @@ def _measured(
     The disc is a ball about each contact, see `surfaces.passes.treated_share`.
     """
     inner, outer = 0.5 * min(footprint), 0.5 * max(footprint)
-    mesh = _mesh_of(surface.wall or surface, FINE * inner)  # not a smoothed copy
+    measured = surface.wall or surface  # not a smoothed copy
+    extent = float(np.linalg.norm(np.ptp(working_mesh(measured, np.inf).vertices, axis=0)))
+    mesh = working_mesh(measured, min(FINE * inner, extent / ACROSS))
     doubled = mesh.doubled_areas
     normals = doubled / np.maximum(np.linalg.norm(doubled, axis=1), 1e-300)[:, None]
     off = contacts.off
@@ -183,13 +185,6 @@ def _untreated_regions(found: Treated) -> tuple[UntreatedRegion, ...]:
         regions.append(UntreatedRegion(middles[own][nearest], float(areas[own].sum())))
     listed = (each for each in regions if each.area >= LEAST * found.area)
     return tuple(sorted(listed, key=lambda each: -each.area))
-
-
-def _mesh_of(surface: Surface, edge: float) -> WorkingMesh:
-    """Triangles fine enough for the footprint, and for a curved surface."""
-    coarse = working_mesh(surface, np.inf)
-    extent = float(np.linalg.norm(np.ptp(coarse.vertices, axis=0)))
-    return working_mesh(surface, min(edge, extent / ACROSS))
 
 
 def _notes(surface: Surface, found: Treated, footprint: tuple[float, float]) -> tuple[str, ...]:

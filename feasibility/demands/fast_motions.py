@@ -93,33 +93,25 @@ def keep_fast_motions(exploration: Exploration, task: Task) -> dict[int, Cause]:
     Returns:
         Cells that lose their last component, and why.
     """
-    reached, cells = exploration.reached, len(exploration.cells)
-    rated = _rated(exploration, task)
-    cell = rated.graph.cell
-    ends, over = np.array(rated.enough, dtype=np.int64).reshape(-1, 2), np.array(cell)
-    if cells > 1:  # without parts over one cell alone
-        part = components(ends, len(cell))[ends[:, 0]]
-        ends = ends[np.isin(part, part[over[ends[:, 0]] != over[ends[:, 1]]])]
-    edges = [(x, y) for x, y in ends.tolist()]
-    exploration.roadmap = roadmap_of(rated.graph, np.unique(ends).tolist(), edges, cells)
-    lost = np.flatnonzero(reached & ~exploration.reached).tolist()
-    best = rated.fastest_to_cells((x, y) for x, y in rated.rated if cell[x] != cell[y])
-    kind, none = CauseKind.DISCONNECTED, "no motion leads to it"
-    return {c: Cause(c, kind, False, rated.fault(best[c]) if c in best else none) for c in lost}
-
-
-def _rated(exploration: Exploration, task: Task) -> RatedGraph:
-    """The motions of a search, and more of them, rated."""
-    roadmap, cells = exploration.roadmap, exploration.cells
-    graph = MotionGraph.of(exploration.arrays, exploration.work, cells)
+    reached, cells, roadmap = exploration.reached, len(exploration.cells), exploration.roadmap
+    graph = MotionGraph.of(exploration.arrays, exploration.work, exploration.cells)
     for edge, (x, y, _) in enumerate(roadmap.edges):
         motion = roadmap.motion(edge)
         ends = graph.node(roadmap.cell[x], motion[0]), graph.node(roadmap.cell[y], motion[-1])
         graph.join(*ends, motion)
-    rated = RatedGraph(exploration.robot, cells, task, graph)
+    rated, cell = RatedGraph(exploration.robot, exploration.cells, task, graph), graph.cell
     with suppress(OutOfTime):
         grow(rated, exploration.clock)
-    return rated
+    pairs, over = np.array(rated.enough, dtype=np.int64).reshape(-1, 2), np.array(cell)
+    if cells > 1:  # without parts over one cell alone
+        part = components(pairs, len(cell))[pairs[:, 0]]
+        pairs = pairs[np.isin(part, part[over[pairs[:, 0]] != over[pairs[:, 1]]])]
+    edges = [(x, y) for x, y in pairs.tolist()]
+    exploration.roadmap = roadmap_of(graph, np.unique(pairs).tolist(), edges, cells)
+    lost = np.flatnonzero(reached & ~exploration.reached).tolist()
+    best = rated.fastest_to_cells((x, y) for x, y in rated.rated if cell[x] != cell[y])
+    kind, none = CauseKind.DISCONNECTED, "no motion leads to it"
+    return {c: Cause(c, kind, False, rated.fault(best[c]) if c in best else none) for c in lost}
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -31,9 +31,9 @@ def in_radians(robot: Robot) -> Array:
 class FreeSpace:
     """Straight lines that are certified clear, at most so many of them."""
 
-    def __init__(self, robot: Robot, buffer: Array, most: int = MOST_LINES) -> None:
+    def __init__(self, robot: Robot, buffer: Array) -> None:
         """Nothing is certified yet; `buffer` is of `collision_buffer`."""
-        self.buffer, self.left = buffer, most
+        self.buffer, self.left = buffer, MOST_LINES
         self.scale = in_radians(robot)
         self.lower, self.upper = robot.lower, robot.upper
 

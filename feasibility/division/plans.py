@@ -2,8 +2,7 @@
 
 A verdict's search works on its largest components. A division goes on with the components that the
 best cover of all reached cells uses: cells that only some of them reach are seeded, and each two of
-them may join. A round has gained something when the cover has fewer components, or one of them
-covers more. Some rounds in a row without gain end it.
+them may join, until the cover has no fewer components, and none covers more, for some rounds.
 
 Several components may cover the cells of a patch; they differ in how the arm holds itself. A patch
 gets walks of some of them, each from several starts, and the itinerary picks those between which

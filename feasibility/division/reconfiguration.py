@@ -92,7 +92,13 @@ def itinerary(robot: Robot, choices: Sequence[Sequence[Walk]]) -> tuple[list[int
         for direction in (1, -1)
     ]
     group = np.array([p for p, _ in options], dtype=np.int64)
-    moves = _moves(robot, [walk for _, walk in options])
+    # How far joints move from the end of each walk to the start of each other, each moved on by the
+    # full turns that suit the two best.
+    starts, ends = (np.array([walk.q[row] for _, walk in options]) for row in (0, -1))
+    low, high = _turns(robot, [walk for _, walk in options])
+    gap = starts[None] - ends[:, None]
+    turns = np.clip(np.round(-gap / TURN), low[None] - high[:, None], high[None] - low[:, None])
+    moves = np.abs(gap + TURN * turns) * in_radians(robot)
     largest, total = moves.max(axis=2, initial=0.0), moves.sum(axis=2)
     own = [np.flatnonzero(group == p) for p in range(len(choices))]
     patches = range(len(own))
@@ -118,19 +124,6 @@ def _turns(robot: Robot, walks: Sequence[Walk]) -> tuple[Array, Array]:
     """(S, n) fewest and most full turns that each joint of each walk can be moved on by."""
     fewest, most = zip(*(turns_inside(robot, walk.q) for walk in walks), strict=True)
     return np.array(fewest), np.array(most)
-
-
-def _moves(robot: Robot, walks: Sequence[Walk]) -> Array:
-    """(S, S, n) rad, from the end of each walk to the start of each other: how far joints move.
-
-    Each walk is moved on by the full turns that suit the two best.
-    """
-    starts = np.array([walk.q[0] for walk in walks])
-    ends = np.array([walk.q[-1] for walk in walks])
-    low, high = _turns(robot, walks)
-    gap = starts[None] - ends[:, None]
-    turns = np.clip(np.round(-gap / TURN), low[None] - high[:, None], high[None] - low[:, None])
-    return np.asarray(np.abs(gap + TURN * turns) * in_radians(robot))
 
 
 def _least_path(

@@ -1,7 +1,6 @@
 """A coverage path: one continuous motion over all cells in a chosen order, as one would run it.
 
-The witness of a verdict shows that there is a covering motion; this one is made to be run. The
-cells are put in order (`order`), a configuration is chosen over each (`ladder`), the motion is
+The cells are put in order (`order`), a configuration is chosen over each (`ladder`), the motion is
 replayed like any witness, and measured (`metrics`).
 
 Rows may be followed from any corner of a grid, and where the surface closes on itself from any row.

@@ -1,11 +1,10 @@
 """Where may the surface stand? A search over the poses of a region.
 
-1. The reach bound is evaluated over the region; where it shows that every placement has a target
-   out of reach, that is the answer, and no search is run.
+1. Where the reach bound shows that every placement in it has a target out of reach, that is the
+   answer, and no search is run.
 2. Poses are spread evenly over the region (Sobol) and improved by differential evolution (Storn and
    Price, 1997): larger covered share first, then larger margin. A pose with a target out of reach
    costs nothing, and is the worse the further out it is; at the others `check` has a quick look.
-   Where that finds a motion it is replayed, and feasible like any other.
 3. Where none is found, the best placements are checked with all effort.
 
 The poses tried depend on the region, the counts and the seed alone, not on the evaluator.

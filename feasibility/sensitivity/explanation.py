@@ -124,7 +124,14 @@ def _explained(
     dropped = pair = None
     with suppress(OutOfTime):
         if not verdict.covered.all():
-            dropped = drop(prober)
+            left, walk = ~verdict.covered, None
+            if verdict.covered.any() and not given.cells.in_order:  # a toolpath is not run in part
+                tick()
+                again = Search(seed=verdict.seed)
+                walk, _ = motion_over(*given, again, verdict.covered, clock.part(1.0))
+            area = float(given.cells.areas[left].sum())
+            share = area / float(given.cells.areas.sum())
+            dropped = Dropped(np.flatnonzero(left), area, share, walk)
         for quantity in varied:
             bare = next((t for t in done if t.quantity.kind is Kind.WITHOUT), None)
             if quantity.obstacle and bare is not None and bare.feasible is None:
@@ -158,22 +165,6 @@ def _over_given(found: Explanation, search: Search, clock: Clock) -> Verdict | N
         if again.feasible:
             return again
     return None
-
-
-def drop(prober: Prober) -> Dropped:
-    """What the best motion misses, and that motion.
-
-    Raises:
-        OutOfTime: the deadline passed.
-    """
-    verdict, cells = prober.verdict, prober.given.cells
-    left, walk = ~verdict.covered, None
-    if verdict.covered.any() and not cells.in_order:  # a toolpath is not run in part
-        search, clock = Search(seed=verdict.seed), prober.clock.part(1.0)
-        prober.tick()
-        walk, _ = motion_over(*prober.given, search, verdict.covered, clock)
-    area = float(cells.areas[left].sum())
-    return Dropped(np.flatnonzero(left), area, area / float(cells.areas.sum()), walk)
 
 
 def changes_together(prober: Prober, varied: Sequence[Quantity]) -> ChangePair | None:

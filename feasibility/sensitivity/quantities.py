@@ -271,16 +271,6 @@ def _of_collisions(task: Task, widen: bool) -> list[Quantity]:
     return found
 
 
-def _within_turn(robot: Robot, joint: int, given: float, end: float) -> float:
-    """A limit (rad), but no further than a full turn beyond what the joint of the URDF has."""
-    turn, model, at = math.radians(TURN_DEG), robot.model, robot.model.idx_qs[joint + 1]
-    if robot.model.nqs[joint + 1] > 1:  # it turns freely in the URDF
-        return end
-    if end > given:
-        return max(min(end, float(model.upperPositionLimit[at]) + turn), given)
-    return min(max(end, float(model.lowerPositionLimit[at]) - turn), given)
-
-
 def _limit(robot: Robot, joint: int, kind: Kind, widen: bool) -> Quantity:
     """One limit of one joint, outwards up to the cap, or inwards to a step from the other limit.
 
@@ -293,8 +283,12 @@ def _limit(robot: Robot, joint: int, kind: Kind, widen: bool) -> Quantity:
     if not math.isfinite(opposite):  # tightened by no more than it would be widened
         opposite = given + (most if kind is Kind.LOWER else -most)
     outwards = given + (most if kind is Kind.UPPER else -most)
-    if not slides:
-        outwards = _within_turn(robot, joint, given, outwards)
+    model, at, turn = robot.model, robot.model.idx_qs[joint + 1], math.radians(TURN_DEG)
+    if not slides and model.nqs[joint + 1] == 1:  # no further than a turn beyond the URDF's limit
+        if outwards > given:
+            outwards = max(min(outwards, float(model.upperPositionLimit[at]) + turn), given)
+        else:
+            outwards = min(max(outwards, float(model.lowerPositionLimit[at]) - turn), given)
     step = LENGTH_STEP if slides else math.radians(ANGLE_STEP_DEG)
     inwards = max(opposite - step, given), min(opposite + step, given)
     name, which = robot.joint_names[joint], "lower" if kind is Kind.LOWER else "upper"

@@ -1,21 +1,4 @@
-"""A study file: a base case and what varies, read with every fault named.
-
-```toml
-[base]
-case = "paper/4a"                  # a built-in case, or a case file beside this one; and/or
-task = { cone_deg = 30 }           # tables of a case, whose keys replace those of the case
-
-[vary]                             # every combination of these
-robots = ["puma560", { name = "ur5" }]
-"task.cone_deg" = [20, 30, 45]     # any key of a case; or { from = 20, to = 45, steps = 6 },
-                                   # evenly spaced; { from = 45, to = 20, ... } goes down
-"surface.position" = { x = [0.0, 0.1], y = { range = [-0.2, 0.2] }, z = 0.3 }
-"surface.rpy_deg" = { yaw = { range = [-90, 90] } }
-sampler = "sobol"                  # ranges are sampled together
-count = 64
-seed = 0
-```
-"""
+"""A study file: a base case and what varies, read with every fault named (docs/studies.md)."""
 
 import json
 import os

@@ -26,15 +26,12 @@ LONGEST_LINE = 500  # characters
 _LINE = re.compile(r"\s*(?:-\s+)?(\w+)\s*:\s*(\S.*?)\s*(?:\s#.*)?")
 
 
-def reach_case(path: str | os.PathLike[str], robot: str = "ur5") -> str:
+def reach_case(path: str | os.PathLike[str]) -> str:
     """The text of a case file that asks for one motion over all targets of a study of REACH.
 
     Of the YAML are read `pcd_file`, `collision_mesh_filename`, `distance_threshold` and
-    `touch_links`. Files of ROS packages are looked for in packages around the study, and beside it.
-
-    Args:
-        path: the study; the case belongs beside it.
-        robot: what the case calls the arm.
+    `touch_links`. Files of ROS packages are looked for in packages around the study, and beside it,
+    where the case belongs.
 
     Raises:
         FileError: it cannot be read, or names no cloud of targets that is there.
@@ -47,7 +44,7 @@ def reach_case(path: str | os.PathLike[str], robot: str = "ur5") -> str:
         raise FileError("names no pcd_file, so it is no study of REACH", shown_path(path))
     cloud = _file_of(path, found["pcd_file"], ".pcd")
     tables = {
-        "robot": {"name": robot},
+        "robot": {"name": "ur5"},
         "surface": {
             "kind": "poses", "file": os.path.relpath(cloud, Path(path).parent), "units": "m",
             "side": "outside", "neighbours": _radius(read_poses(cloud).points),

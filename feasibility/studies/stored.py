@@ -95,7 +95,13 @@ def outcome_fault(result: Mapping[str, Any]) -> str:
     for key in (*COUNTS, "seed", "fk"):
         checks.whole(key, values[key], 0, MOST if key in COUNTS else LARGEST_WHOLE)
     checks.number("share", values["share"], "must be a number in 0 .. 1", 0.0, MOST_SHARE)
-    _check_margins(checks, values["margins"])
+    margins, names = values["margins"], Margins.__annotations__.keys()
+    if isinstance(margins, Mapping) and margins.keys() == names:
+        for key in names:
+            if margins[key] is not None:
+                checks.number(f"margins.{key}", margins[key], "must be a finite number")
+    elif margins is not None:
+        checks.wrong("margins", margins, f"must be an object of {', '.join(names)}")
     _check_texts(checks, "message", [values["message"]])
     _check_texts(checks, "components", values["components"])
     _check_texts(checks, "unchecked_links", values["unchecked_links"])
@@ -113,19 +119,6 @@ def outcome_fault(result: Mapping[str, Any]) -> str:
     except ValueError as error:
         return f"components: {error}"
     return ""
-
-
-def _check_margins(checks: Checks, value: Any) -> None:
-    """None, or a table of numbers that may be None."""
-    names = Margins.__annotations__.keys()
-    if value is None:
-        return
-    if not isinstance(value, Mapping) or value.keys() != names:
-        checks.wrong("margins", value, f"must be an object of {', '.join(names)}")
-        return
-    for key in names:
-        if value[key] is not None:
-            checks.number(f"margins.{key}", value[key], "must be a finite number")
 
 
 def _check_texts(checks: Checks, name: str, value: Any) -> None:

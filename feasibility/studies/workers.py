@@ -53,16 +53,10 @@ def open_workers(
     elif count == 0:
         workers = Here(warm)
     else:
-        workers = Processes(processors() if count is None else count, warm)
+        here = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+        workers = Processes((here or 1) if count is None else count, warm)
     try:
         with at_leave(workers.close):
             yield workers
     finally:
         workers.close()
-
-
-def processors() -> int:
-    """How many processors this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

@@ -7,9 +7,9 @@ one control point on either side of it. So
 - where four control points in a row are on one line, it is on that line;
 - at a waypoint it is off by (W- - 2 W + W+) / 6: the nearer the neighbours, the sharper the turn.
 
-How near the neighbours may be is found by replays: each turn begins as wide as its lines allow, and
-is made sharper until the independent replay accepts the curve from cell to cell. A turn at a cell's
-centre must leave the tool within tolerance and cone of its target, which is tried beforehand.
+Each turn begins as wide as its lines allow, and is made sharper until the independent replay
+accepts the curve. At a cell's centre it must leave the tool within tolerance and cone of its
+target, which is tried beforehand.
 """
 
 from dataclasses import dataclass
