@@ -96,17 +96,15 @@ def treated_by_walk(robot: Robot, cells: Cells, task: Task, *walks: Walk) -> Tre
     surface = cells.surface.wall
     if task.disc is None or surface is None or not sum(len(walk.q) for walk in walks):
         return None
-    if isinstance(cells.surface, PoseSurface):
-        walks = tuple(part for walk in walks for part in _at_work(cells.surface, walk))
-    found = [contacts_on(surface, robot, walk) for walk in walks]
+    parts = list(walks)
+    if isinstance(cells.surface, PoseSurface):  # those in which the tool works
+        parts = []
+        for walk in walks:
+            works = cells.surface.works(walk.cell)
+            rows = np.split(np.arange(len(works)), np.flatnonzero(np.diff(works)) + 1)
+            parts += [Walk(walk.q[part], walk.cell[part]) for part in rows if works[part[0]]]
+    found = [contacts_on(surface, robot, walk) for walk in parts]
     return _measured(surface, task.disc, _joined(found))
-
-
-def _at_work(surface: PoseSurface, walk: Walk) -> list[Walk]:
-    """The parts of a motion along poses in which the tool works."""
-    works = surface.works(walk.cell)
-    parts = np.split(np.arange(len(works)), np.flatnonzero(np.diff(works)) + 1)
-    return [Walk(walk.q[part], walk.cell[part]) for part in parts if works[part[0]]]
 
 
 def treated_by_passes(
@@ -147,6 +145,16 @@ def _measured(
     off = contacts.off
     small = treated_share(mesh, normals, contacts.lines, inner, off=off)
     large = treated_share(mesh, normals, contacts.lines, outer, off=off) if outer > inner else small
+    notes, (error, _) = list[str](), measured.deviations
+    if 0.25 * math.pi * footprint[0] * footprint[1] >= small.area:
+        notes.append("the footprint is larger than the whole surface")
+    if footprint[0] != footprint[1]:
+        notes.append(
+            "of an ellipse the share is at least that of the disc inside it, and at most that of "
+            "the disc around it"
+        )
+    if error > 0.0:
+        notes.append(f"the surface is known to {1e3 * error:.2g} mm")
     found = TreatedArea(
         footprint=footprint,
         area=small.area,
@@ -157,7 +165,7 @@ def _measured(
         mesh=small.mesh,
         shares=small.shares,
         lines=contacts.lines,
-        notes=_notes(surface, small, footprint),
+        notes=tuple(notes),
     )
     some = np.arange(0, len(found.shares), max(1, -(-len(found.shares) // MOST_COUNTED)))
     again = found.mesh.areas[some] * (found.times(some) > 1)
@@ -185,22 +193,6 @@ def _untreated_regions(found: Treated) -> tuple[UntreatedRegion, ...]:
         regions.append(UntreatedRegion(middles[own][nearest], float(areas[own].sum())))
     listed = (each for each in regions if each.area >= LEAST * found.area)
     return tuple(sorted(listed, key=lambda each: -each.area))
-
-
-def _notes(surface: Surface, found: Treated, footprint: tuple[float, float]) -> tuple[str, ...]:
-    """What to know about a share."""
-    notes = []
-    if 0.25 * math.pi * footprint[0] * footprint[1] >= found.area:
-        notes.append("the footprint is larger than the whole surface")
-    if footprint[0] != footprint[1]:
-        notes.append(
-            "of an ellipse the share is at least that of the disc inside it, and at most that of "
-            "the disc around it"
-        )
-    error, _ = (surface.wall or surface).deviations
-    if error > 0.0:
-        notes.append(f"the surface is known to {1e3 * error:.2g} mm")
-    return tuple(notes)
 
 
 def contacts_on(surface: Surface, robot: Robot, walk: Walk) -> ContactPath:

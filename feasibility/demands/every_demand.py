@@ -160,7 +160,21 @@ def check_requirements(robot: Robot, task: Task, search: Search) -> None:
         ArgumentError: joints without velocity limits, a speed beyond all of them, the greedy
             search, or a home that is no configuration of the arm.
     """
-    _check_home(robot, task)
+    if task.home_deg is not None:
+        what, home, names = "", np.radians(task.home_deg), robot.joint_names
+        if len(home) != robot.n:
+            what = f"has {len(home)} values; expected one for each of {', '.join(names)}"
+        elif robot.prismatic.any():
+            what = f"gives degrees, but {names[int(np.argmax(robot.prismatic))]} slides"
+        elif not ((home >= robot.lower) & (home <= robot.upper)).all():
+            past = int(np.argmax(np.maximum(robot.lower - home, home - robot.upper)))
+            low, high = np.degrees([robot.lower[past], robot.upper[past]])
+            what = (
+                f"puts {names[past]} at {task.home_deg[past]:g} deg, outside its limits "
+                f"{low:.4g} to {high:.4g} deg"
+            )
+        if what:
+            raise ArgumentError(Fault("home_deg", what), "task")
     if not task.requires_rates:
         return
     if search.method != "complete":
@@ -177,28 +191,3 @@ def required_words(task: Task) -> str:
     if task.min_manipulability is not None:
         words.append(f"with singular values of {task.min_manipulability:g} at least")
     return " and ".join(words)
-
-
-def _check_home(robot: Robot, task: Task) -> None:
-    """Refuse a home that is no configuration of the arm.
-
-    Raises:
-        ArgumentError: it has another number of joints, one that slides, or one past its limits.
-    """
-    if task.home_deg is None:
-        return
-    what, names = "", ", ".join(robot.joint_names)
-    home = np.radians(task.home_deg)
-    if len(home) != robot.n:
-        what = f"has {len(home)} values; expected one for each of {names}"
-    elif robot.prismatic.any():
-        what = f"gives degrees, but {robot.joint_names[int(np.argmax(robot.prismatic))]} slides"
-    elif not ((home >= robot.lower) & (home <= robot.upper)).all():
-        past = int(np.argmax(np.maximum(robot.lower - home, home - robot.upper)))
-        limits = np.degrees([robot.lower[past], robot.upper[past]])
-        what = (
-            f"puts {robot.joint_names[past]} at {task.home_deg[past]:g} deg, outside its limits "
-            f"{limits[0]:.4g} to {limits[1]:.4g} deg"
-        )
-    if what:
-        raise ArgumentError(Fault("home_deg", what), "task")

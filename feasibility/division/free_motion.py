@@ -1,9 +1,8 @@
 """A joint motion clear of collisions, away from the surface: RRT-connect, then shortened.
 
-Two trees of certified straight lines grow from both ends: one towards a random place, the other
-towards where the first has got (Kuffner and LaValle, "RRT-Connect", ICRA 2000). Every line is
-certified between its ends too, by the compiled clearance of the search. The effort is a count of
-lines that are tried, so the same question always has the same answer.
+Two trees of straight lines grow from both ends: one towards a random place, the other towards where
+the first has got (Kuffner and LaValle, "RRT-Connect", ICRA 2000). Every line is certified by the
+compiled clearance of the search. The effort is a count of lines, the same on every machine.
 """
 
 from itertools import pairwise
@@ -31,9 +30,9 @@ def in_radians(robot: Robot) -> Array:
 class FreeSpace:
     """Straight lines that are certified clear, at most so many of them."""
 
-    def __init__(self, robot: Robot, buffer: Array) -> None:
+    def __init__(self, robot: Robot, buffer: Array, most: int = MOST_LINES) -> None:
         """Nothing is certified yet; `buffer` is of `collision_buffer`."""
-        self.buffer, self.left = buffer, MOST_LINES
+        self.buffer, self.left = buffer, most
         self.scale = in_radians(robot)
         self.lower, self.upper = robot.lower, robot.upper
 

@@ -25,7 +25,7 @@ from feasibility.division.left_out import Gap, PassSearch, along_stretch, gaps_o
 from feasibility.division.plans import collect_components, connect_pairs
 from feasibility.division.reconfiguration import Reconfiguration, straight_moves
 from feasibility.paths.coverage import CoveragePath
-from feasibility.paths.winding import unwound
+from feasibility.paths.metrics import unwound
 from feasibility.problem import Problem
 from feasibility.roadmap.graph import Roadmap
 from feasibility.roadmap.ordered_run import steps_ahead
@@ -147,9 +147,8 @@ def pass_runs(
     from singularities, only motions count that hold it.
 
     Args:
-        robot, cells, task: the question; cells are the poses of `surfaces.passes.pass_toolpath`.
+        robot, cells, task, seed, clock: as for `check`; cells are the poses of `pass_toolpath`.
         places: the same poses, with their stretches.
-        seed, clock: of the search.
 
     Raises:
         OutOfTime: the time ran out before the search began.

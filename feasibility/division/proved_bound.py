@@ -27,15 +27,12 @@ MOST_GROUPS = 60  # of cells that the same components cover
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ProvedBound:
-    """A number of motions that no division goes below."""
+    """A number of motions that no division goes below, and its proofs, see `Division`."""
 
     number: int
-    """Motions; 0 for no cells, 1 where nothing is proved."""
+    """0 for no cells, 1 where nothing is proved."""
     proof: CutTree | None = None
-    """No single motion covers all cells that some motion covers; None where that is not proved."""
     apart: tuple[Apart, ...] = ()
-    """The pairs among `number` cells of which a motion covers one at most; empty where `proof` is
-    enough."""
 
 
 def prove_apart(exploration: Exploration, task: Task) -> ProvedBound:

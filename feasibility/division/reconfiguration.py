@@ -1,14 +1,12 @@
 """From one patch to the next: in which order, from which end, and how far the joints move.
 
-A patch can be painted by several walks, each from either end, and a walk may be done a full turn
-of a joint further on where the limits allow it. The order and the ends are chosen so that the
-largest move of a joint is the least there is (a bottleneck travelling salesman, by trying all
-orders of a few patches). What comes within 2 per cent of that counts as equally good, and of it the
-least sum over all joints.
+A patch can be painted by several walks, each from either end, and full turns of a joint further on
+where the limits allow it. The largest move of a joint is to be the least there is (a bottleneck
+travelling salesman, by trying all orders of a few patches). What comes within 2 per cent of that
+counts as equally good, and of it the least sum over all joints.
 
-The moves are straight lines in joint space, away from the surface. They stay inside the limits,
-because limits are convex. Where collisions are checked, `between_patches` leads a move around
-obstacles.
+The moves are straight lines in joint space, which stay inside the limits. Where collisions are
+checked, `between_patches` leads a move around obstacles.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,8 +18,8 @@ import numpy as np
 from coverable.arrays import Array, Ints, Mask, Protected
 from feasibility.certification.collisions.collision_replay import CollisionReplay
 from feasibility.division.free_motion import in_radians
+from feasibility.paths.metrics import turns_inside
 from feasibility.paths.order import improved
-from feasibility.paths.winding import turns_inside
 from feasibility.verdict import Walk
 from robots.robot import Robot
 

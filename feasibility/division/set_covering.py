@@ -4,9 +4,8 @@ How few of K components cover N cells is the set cover problem,
 
     minimise sum_k y_k   so that   sum_{k covers c} y_k >= 1 for each cell c,   y_k in {0, 1}.
 
-It is NP-hard, but the tables of a search are easy: few components are not contained in another
-one, and cells covered by the same components need one row only. HiGHS then solves it in
-milliseconds.
+It is NP-hard, but in the tables of a search few components are not contained in another one, and
+cells covered by the same components need one row only. HiGHS then solves it in milliseconds.
 """
 
 import math

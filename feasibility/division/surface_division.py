@@ -37,14 +37,6 @@ from feasibility.verdict import Cause
 from robots.robot import Robot
 from surfaces.cells import Cells
 
-NOT_GREEDY = (
-    "a division needs search.method 'complete', got {!r}: the greedy search keeps one tree of "
-    "motions, not all components"
-)
-NOT_IN_ORDER = (
-    "a toolpath is run in its order and not divided into patches; to divide its poses, give them a "
-    "radius as neighbours"
-)
 LATE = " Patches were not planned and replayed: the time limit ran out first."
 MOST_EXPLAINED = 400  # proved cells that are explained although the search did not end
 
@@ -71,8 +63,8 @@ def divide(
 
     Raises:
         OutOfTime: a command's time ran out before the search began.
-        ArgumentError: the search is the greedy one, which keeps a single tree of motions; or the
-            cells are a toolpath; or the task has a speed that this arm cannot have.
+        ArgumentError: the search is the greedy one; or the cells are a toolpath; or the task has a
+            speed that this arm cannot have.
         RobotError: the arm is no serial chain of one-dof joints.
 
     Example:
@@ -85,9 +77,15 @@ def divide(
     """
     search = Search() if search is None else search
     if search.method != "complete":
-        raise ArgumentError(NOT_GREEDY.format(search.method))
+        raise ArgumentError(
+            f"a division needs search.method 'complete', got {search.method!r}: the greedy search "
+            "keeps one tree of motions, not all components"
+        )
     if cells.in_order:
-        raise ArgumentError(NOT_IN_ORDER)
+        raise ArgumentError(
+            "a toolpath is run in its order and not divided into patches; to divide its poses, "
+            "give them a radius as neighbours"
+        )
     check_requirements(robot, task, search)
     called = time.monotonic()
     with compiling_notice():

@@ -20,7 +20,7 @@ from coverable.arrays import Array, Ints, Mask, Protected
 from feasibility.certification.followed import lifted_faults
 from feasibility.certification.motion_replay import replay
 from feasibility.paths.ladder import JointRoute, joint_route
-from feasibility.paths.metrics import PathFigures, figures_of
+from feasibility.paths.metrics import PathFigures, figures_of, unwound
 from feasibility.paths.motion_graph import MotionGraph, motion_graph_of
 from feasibility.paths.order import (
     GRID_ORDERS,
@@ -32,7 +32,6 @@ from feasibility.paths.order import (
     shortest_order,
     usual_order,
 )
-from feasibility.paths.winding import unwound
 from feasibility.task import Task
 from feasibility.verdict import Answer, Certificate, Verdict, Walk
 from robots.kinematics import Kinematics
@@ -176,7 +175,7 @@ def _tried(verdict: Verdict, order: Order, witness: Walk) -> Iterator[Walk]:
 
     def walk(alone: bool) -> Walk:
         graph = motion_graph_of(verdict, witness_alone=alone)
-        found = _least_revisiting(graph, verdict.cells, order)
+        found = _Attempts(graph, verdict.cells).least_revisiting(order)
         grown, nodes, start = found.graph, found.nodes, verdict.robot.start
         if start is not None:
             begin = grown.nearest(start)
@@ -189,27 +188,6 @@ def _tried(verdict: Verdict, order: Order, witness: Walk) -> Iterator[Walk]:
         yield walk(alone=True)
 
 
-def _least_revisiting(graph: MotionGraph, cells: Cells, order: Order) -> JointRoute:
-    """The motion over cells in an order that revisits least, of those that are tried.
-
-    Raises:
-        PathError: no motion leads from cell to cell.
-    """
-    attempts = _Attempts(graph, cells)
-    if order in GRID_ORDERS:
-        attempts.along_grid(order)
-    elif order == "given":
-        attempts.along(np.arange(len(cells)))
-    else:
-        attempts.along(shortest_order(cells, graph.joined_cells()))
-        if attempts.left() and len(cells.shape) == 2:
-            for grid in GRID_ORDERS:
-                attempts.along_grid(grid)
-    if attempts.found is None:
-        raise attempts.faults[0]
-    return attempts.found
-
-
 @dataclass
 class _Attempts:
     """Motions that have been tried, of which the best is kept."""
@@ -218,6 +196,25 @@ class _Attempts:
     cells: Cells
     found: JointRoute | None = None
     faults: list[PathError] = field(default_factory=list)
+
+    def least_revisiting(self, order: Order) -> JointRoute:
+        """The motion over cells in an order that revisits least, of those that are tried.
+
+        Raises:
+            PathError: no motion leads from cell to cell.
+        """
+        cells = self.cells
+        if order in GRID_ORDERS:
+            self.along_grid(order)
+        elif order == "given":
+            self.along(np.arange(len(cells)))
+        else:
+            self.along(shortest_order(cells, self.graph.joined_cells()))
+            for grid in GRID_ORDERS if len(cells.shape) == 2 and self.left() else ():
+                self.along_grid(grid)
+        if self.found is None:
+            raise self.faults[0]
+        return self.found
 
     def left(self) -> bool:
         """Is there anything to gain?"""

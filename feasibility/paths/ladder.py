@@ -1,9 +1,8 @@
 """Which configuration to take over each cell of a route, so that the joints travel least.
 
-Dynamic programming over (cell, node): after each cell the best few nodes over it are kept, each
-with the cheapest path to it. Where no single motion leads on, all of the path until there may have
-to be run one turn of a joint earlier (`windings`); else the cheapest path through the known motions
-leads on, over cells that are then visited again.
+After each cell the best few nodes over it are kept, each with the cheapest path to it. Where no
+single motion leads on, all of the path until there may have to be run one turn of a joint earlier
+(`windings`); else the cheapest path through the known motions leads on, over cells visited again.
 """
 
 import math

@@ -103,10 +103,7 @@ class Evolution:
         self.stopped = self.stopped or TIME_OUT
 
     def look_closer(self) -> None:
-        """Where nothing is feasible, check the best with all effort, or what is least out of reach.
-
-        A quick look may have missed what all effort finds.
-        """
+        """Where nothing is feasible, check the best, or what is least out of reach, thoroughly."""
         ranked = self.ranked
         if self.stopped or any(trial.feasible for trial in ranked):
             return

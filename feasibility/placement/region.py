@@ -105,11 +105,9 @@ class Region:
 
     @staticmethod
     def around(pose: Pose, ranges: Mapping[str, Any]) -> "Region":
-        """The region with the ranges given by name; all else stays as at `pose`.
+        """The region with ranges (lowest, highest) of some of `AXES`; all else stays as at `pose`.
 
-        Args:
-            pose: what the axes that are not named are held at.
-            ranges: (lowest, highest) for some of `AXES`, absolute: m and degrees in the root frame.
+        They are absolute: m and degrees in the root frame.
 
         Raises:
             PlacementError: with everything that is wrong.

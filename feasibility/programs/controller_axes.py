@@ -1,13 +1,13 @@
 """The joints of an arm as the axes of a controller.
 
-A program names axes by their number, so the joints of the URDF have to be those of the controller:
-six that turn, from base to flange, in this order. Where signs or zeros differ, the user gives them:
+The joints of the URDF have to be those of the controller: six that turn, from base to flange, in
+this order. Where signs or zeros differ, the user gives them:
 
     axis = sign * joint + offset
 
-A FANUC controller counts J3 from the horizontal: J3 stays where it is while J2 moves and the
-forearm keeps its direction. A URDF counts joint 3 from the upper arm, so joint 2 is added to it, or
-taken from it where the two axes point to opposite sides, as in the URDFs of ROS-Industrial:
+A FANUC controller counts J3 from the horizontal, a URDF joint 3 from the upper arm. So joint 2 is
+added to it, or taken from it where the two axes point to opposite sides, as in the URDFs of
+ROS-Industrial:
 
     J3 = sign * (joint 3 +- joint 2) + offset
 

@@ -124,7 +124,11 @@ def tp(head: Sequence[str], points: Points, name: str) -> dict[str, str]:
         lines += ["  UFRAME_NUM=0", "  UTOOL_NUM=1"] if ending in ("", "_p1") else []
         positions = list[str]()
         for number, point in enumerate(numbers, start=1):
-            lines.append(f"J P[{number}] {_tp_speed(points, point)}")
+            speed = "5% FINE"  # how fast a point is gone to, and whether the arm stops there
+            if point:
+                stop = "FINE" if point == len(points.steps) else "CNT100"
+                speed = f"{round(1e3 * float(points.steps[point - 1]))}msec {stop}"
+            lines.append(f"J P[{number}] {speed}")
             lines += [f"  {line.strip().rstrip(';').rstrip()}" for line in points.at[point]]
             rows = [
                 ",\t".join(f"J{k}= {points.arm[point][k - 1]} deg" for k in row)
@@ -147,21 +151,17 @@ def _tp_text(name: str, lines: Sequence[str], positions: Sequence[str]) -> str:
     return _text([f"/PROG  {name}", attributes, *numbered, "/POS", *positions, "/END"], "\r\n")
 
 
-def _tp_speed(points: Points, point: int) -> str:
-    """How fast a point is gone to, and whether the arm stops there."""
-    if point == 0:
-        return "5% FINE"
-    stop = "FINE" if point == len(points.steps) else "CNT100"
-    return f"{round(1e3 * float(points.steps[point - 1]))}msec {stop}"
-
-
 def inform(head: Sequence[str], points: Points, name: str) -> dict[str, str]:
     """Joint moves at shares of the axes' largest speeds, positions in pulses."""
     programs = dict[str, str]()
     for ending, numbers in _parts(points, MOST_INFORM):
         lines = [f"'{line}" for line in _remarks(head, ending)]
         for number, point in enumerate(numbers):
-            lines.append(f"MOVJ C{number:05d} {_vj(points, point)}")
+            speed = "VJ=5.00 PL=0"  # the share (%) of the quickest axis' largest; stops with PL=0
+            if point:
+                share = min(max(100.0 * points.shares[point - 1], SLOWEST), FASTEST)
+                speed = f"VJ={share:.2f}" + " PL=0" * (point == len(points.steps))
+            lines.append(f"MOVJ C{number:05d} {speed}")
             lines += [line.strip() for line in points.at[point]]
         rows = [f"C{k:05d}={','.join(points.arm[point])}" for k, point in enumerate(numbers)]
         programs[ending] = _job(f"{name}{ending}".upper(), rows, lines)
@@ -179,14 +179,6 @@ def _job(name: str, rows: Sequence[str], lines: Sequence[str]) -> str:
     date = f"///DATE {datetime.now():%Y/%m/%d %H:%M}"
     top += ["//INST", date, "///COMM coverable", "///ATTR SC,RW", "///GROUP1 RB1", "NOP"]
     return _text([*top, *lines, "END"], "\r\n")
-
-
-def _vj(points: Points, point: int) -> str:
-    """The share (%) of the quickest axis' largest speed, and whether the arm stops there."""
-    if point == 0:
-        return "VJ=5.00 PL=0"
-    share = min(max(100.0 * points.shares[point - 1], SLOWEST), FASTEST)
-    return f"VJ={share:.2f}" + " PL=0" * (point == len(points.steps))
 
 
 def _parts(points: Points, most: int) -> list[tuple[str, range]]:

@@ -151,17 +151,14 @@ def _over_given(found: Explanation, search: Search, clock: Clock) -> Verdict | N
 
     A search that was exhausted may have missed it.
     """
-    if found.verdict.evidence is Evidence.PROOF:
+    verdict, near = found.verdict, sorted(found.thresholds, key=lambda t: t.effort)
+    if verdict.evidence is Evidence.PROOF:
         return None
-    near = sorted((t for t in found.thresholds if t.feasible is not None), key=lambda t: t.effort)
-    verdict = found.verdict
-    for threshold in near[:NEAREST]:
-        if threshold.feasible is None or clock.out_of_time:
-            continue
-        again = check(
-            verdict.robot, verdict.cells, verdict.task, search,
-            seeds=threshold.feasible.witness, clock=clock.part(1.0),
-        )  # fmt: skip
+    given = Variant(verdict.robot, verdict.cells, verdict.task)
+    for known in [t.feasible.witness for t in near if t.feasible is not None][:NEAREST]:
+        if clock.out_of_time:
+            return None
+        again = check(*given, search, seeds=known, clock=clock.part(1.0))
         if again.feasible:
             return again
     return None

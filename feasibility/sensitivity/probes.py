@@ -37,11 +37,8 @@ Steps = tuple[tuple[Quantity, int], ...]
 def last_true(holds: Callable[[int], bool], good: int, bad: int, least: int = 1) -> tuple[int, int]:
     """The last whole number before `bad`, seen from `good`, for which `holds` is true.
 
-    Args:
-        holds: called for numbers strictly between the two ends.
-        good: where it is known to be true.
-        bad: where it is known to be false; above or below `good`.
-        least: how near the two are to be brought by halving.
+    It is asked strictly between the two ends; `bad` may be above or below `good`, where it is known
+    to be true.
 
     Returns:
         Two numbers, at most `least` apart: where it holds, and where it does not.

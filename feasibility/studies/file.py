@@ -51,7 +51,7 @@ def read_study(
     Args:
         text: TOML.
         base_dir: folder that its paths are relative to; default the working directory.
-        name: what the study is called in messages.
+        name: what messages call it.
 
     Raises:
         CaseError: with everything that is wrong.

@@ -84,9 +84,8 @@ def compare(
         case: surface, task and search; its own arm keeps its limits and tool if it is among the
             robots.
         robots: names of the library, and paths of URDF or xacro files.
-        workers: where they run, see `open_workers`.
+        workers, progress: as for `run_tasks`.
         critical: look for the smallest cone that each arm can do with; some ten verdicts each.
-        progress: called as progress(done, total, text); what it raises ends the work.
 
     Raises:
         CaseError: an arm cannot be loaded, or is named twice; all of them together.

@@ -61,13 +61,11 @@ def run_tasks(
 ) -> tuple[Row, ...]:
     """Do all tasks that the store does not hold yet.
 
-    Whatever ends the run, what was finished is in the store; run again to continue. Tasks with the
-    same key are done once, those that failed are tried again.
+    Each has its row, in the same order. Whatever ends the run, what was finished is in the store;
+    run again to continue. Tasks with the same key are done once, those that failed are tried again.
 
     Args:
-        tasks: in the order of the table; each has its row, in the same order.
-        workers: where they run, see `open_workers`.
-        store: where finished tasks are kept.
+        tasks, workers, store: what is done, where (see `open_workers`), and where it is kept.
         progress: called as progress(done, total, text) several times a second; what it raises
             ends the run.
 

@@ -92,8 +92,7 @@ class Store(AbstractContextManager["Store"]):
             patience: s that another process may hold the file.
 
         Raises:
-            StoreError: the file is something else, damaged, of a later version, or cannot be
-                written.
+            StoreError: the file is something else, damaged, or cannot be written.
         """
         self.path, self._name = os.fspath(path), shown_path(path)
         in_memory = self.path == ":memory:"

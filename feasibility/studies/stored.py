@@ -102,9 +102,11 @@ def outcome_fault(result: Mapping[str, Any]) -> str:
                 checks.number(f"margins.{key}", margins[key], "must be a finite number")
     elif margins is not None:
         checks.wrong("margins", margins, f"must be an object of {', '.join(names)}")
-    _check_texts(checks, "message", [values["message"]])
-    _check_texts(checks, "components", values["components"])
-    _check_texts(checks, "unchecked_links", values["unchecked_links"])
+    for key in ("message", "components", "unchecked_links"):
+        texts = [values[key]] if key == "message" else values[key]
+        for text in texts if isinstance(texts, list) else [None]:
+            if not isinstance(text, str) or len(text) > LONGEST_TEXT or _CONTROL.search(text):
+                checks.wrong(key, texts, "must be a text that can be printed, or a list of such")
     causes = values["causes"] if isinstance(values["causes"], dict) else {"": values["causes"]}
     for kind, number in causes.items():
         checks.choice("causes", kind, [*CauseKind])
@@ -119,13 +121,6 @@ def outcome_fault(result: Mapping[str, Any]) -> str:
     except ValueError as error:
         return f"components: {error}"
     return ""
-
-
-def _check_texts(checks: Checks, name: str, value: Any) -> None:
-    """A list of texts that can be printed."""
-    for text in value if isinstance(value, list) else [None]:
-        if not isinstance(text, str) or len(text) > LONGEST_TEXT or _CONTROL.search(text):
-            checks.wrong(name, value, "must be a text that can be printed, or a list of such")
 
 
 def bits_of(cover: Mask) -> str:
@@ -161,7 +156,7 @@ def json_object(text: Any) -> dict[str, Any]:
         ValueError: the text is anything else.
     """
     try:
-        value = json.loads(text, parse_constant=_refused, parse_float=_finite)
+        value = json.loads(text, parse_constant=_finite, parse_float=_finite)
     except (TypeError, RecursionError) as error:
         raise ValueError("is no JSON, or nested too deeply") from error
     if not isinstance(value, dict):
@@ -169,10 +164,7 @@ def json_object(text: Any) -> dict[str, Any]:
     return value
 
 
-def _refused(word_: str) -> float:
-    raise ValueError(f"holds {word_}")
-
-
 def _finite(text: str) -> float:
-    value = float(text)
-    return value if math.isfinite(value) else _refused(text[:20])
+    if not math.isfinite(value := float(text)):
+        raise ValueError(f"holds {text[:20]}")
+    return value

@@ -24,18 +24,12 @@ MOST_DIVIDED = 400  # cells of a surface that is divided: a division takes sever
 
 
 def evaluate(tables: Tables) -> Outcome | Divided:
-    """Decide one case.
+    """Decide one case, given as by `Case.to_tables`.
 
     The outcome depends on the tables alone, as long as the search has no time limit; a limit
-    counts from here on, for loading and cutting too.
-
-    Args:
-        tables: a case, as `Case.to_tables` gives it; and `wanted`, where it is there: whether to
-            look for `causes` of missed cells, to count `patches`, and for the `critical` cone.
-
-    Returns:
-        See `outcome_of`; and how many continuous motions together cover all that can be covered,
-        and the smallest cone with which one covers all.
+    counts from here on, for loading and cutting too. A table `wanted`, where it is there, says
+    whether to look for `causes` of missed cells, to count `patches` (motions that together cover
+    all that can be covered), and for the `critical` cone, the smallest with which one covers all.
 
     Raises:
         CaseError: the case cannot be used.

@@ -1,11 +1,10 @@
 """Time along a path: as fast as joints and tool may, from rest to rest.
 
 The path's straight lines are blended into a smooth curve (`blended`), fast speeds along it are
-found (`timed_curve`), and it is sampled: the motion is the spline through the samples, which is
-also what controllers make of them (`sampled_trajectory`). It is judged by what it is, not by how it
-was made: where it exceeds a limit, the curve is timed again with less of that there, and what is
-left is mended by running all of it slower. Entry and exit are parts of the same motion. At last it
-is replayed like any witness, as straight lines between samples and as the spline.
+found (`timed_curve`), and it is sampled: the motion is the spline through the samples
+(`sampled_trajectory`). It is judged by what it is, not by how it was made: where it exceeds a
+limit, the curve is timed again with less of that there, and what is left is mended by running all
+of it slower. At last it is replayed like any witness, as straight lines and as the spline.
 """
 
 from collections.abc import Sequence
@@ -155,8 +154,7 @@ def within_limits(
     bounds = [CurveBounds.of(robot, curve) for curve in curves]
     shares = [np.ones((len(bound.grid) - 1, 2 * robot.n + 1)) for bound in bounds]
     for attempt in range(ROUNDS + SLOWINGS):
-        timed = [bound.timed(given, share) for bound, share in zip(bounds, shares, strict=True)]
-        timed = [part.slowed(slower) for part in timed]
+        timed = [b.timed(given, share, slower) for b, share in zip(bounds, shares, strict=True)]
         duration = sum(part.duration for part in timed)
         if duration > MOST_SAMPLES * period:
             raise PathError(

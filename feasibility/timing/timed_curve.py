@@ -21,7 +21,7 @@ analysis, IEEE Transactions on Robotics 34 (2018).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -133,10 +133,6 @@ class TimedCurve:
         """Seconds from start to end."""
         return float(self.time[-1])
 
-    def slowed(self, times: float) -> TimedCurve:
-        """The same motion, so many times slower."""
-        return replace(self, x=self.x / times**2, time=self.time * times)
-
     def samples(self, robot: Robot, period: float) -> tuple[Array, Array, Ints]:
         """Times (k,), joints (k, n) and cells (k,) every `period` seconds and at cells' centres."""
         # Whole nanoseconds, which is what a ROS message can hold.
@@ -189,8 +185,8 @@ class CurveBounds:
         rows = Rows.of(np.hstack([bend[:-1] - begin, -end]), np.hstack([begin, bend[1:] + end]))
         return CurveBounds(curve, grid, np.abs(slope), tool_speeds(robot, q, slope), rows)
 
-    def timed(self, limits: MotionLimits, share: Array) -> TimedCurve:
-        """Time along the curve, within limits at the places of the grid.
+    def timed(self, limits: MotionLimits, share: Array, slower: float = 1.0) -> TimedCurve:
+        """Time along the curve, within limits at the places of the grid; so many times slower.
 
         Of their velocities, accelerations and tool speed a share (m - 1, 2 n + 1) on each piece.
 
@@ -210,4 +206,4 @@ class CurveBounds:
         time = np.concatenate([[0.0], np.cumsum(steps)])
         if not np.isfinite(time).all():
             raise PathError("no timing was found: the motion would have to stop in between")
-        return TimedCurve(self.curve, self.grid, x, time)
+        return TimedCurve(self.curve, self.grid, x / slower**2, time * slower)

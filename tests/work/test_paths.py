@@ -16,10 +16,9 @@ from samples import sampled, seeds, spread
 import coverable
 from coverable import PathError, Task, check, coverage_path, cylinder, load_robot, plane, replay
 from feasibility.paths.ladder import joint_route
-from feasibility.paths.metrics import revisiting
+from feasibility.paths.metrics import revisiting, unwound
 from feasibility.paths.motion_graph import MotionGraph
 from feasibility.paths.order import GRID_ORDERS, closed_sides, grid_order
-from feasibility.paths.winding import unwound
 from feasibility.roadmap.motions.search_arrays import arrays_of
 from feasibility.roadmap.motions.working_memory import work_for
 from feasibility.verdict import Walk
