@@ -15,7 +15,7 @@ from robots.errors import RobotError
 from robots.robot import Robot
 from robots.shapes.bodies import Polytope, Solid
 from robots.shapes.links import LinkShapes, outer_bodies
-from robots.shapes.sampling import Pair, PairSampling, random_configurations
+from robots.shapes.sampling import Pair, collision_rates, random_configurations
 from robots.urdf.elements import UrdfError
 from robots.urdf.srdf import DisabledPairs, read_srdf
 
@@ -112,16 +112,15 @@ def _measured(
     notes: list[str],
 ) -> LinkPairs:
     """Find the pairs that always collide, and how often the others that are left out do."""
-    sampling = PairSampling(robot, bodies)
     q = random_configurations(robot)
     q[0] = np.clip(0.0, robot.lower, robot.upper)
     open_pairs = [pair for pair, why in reasons.items() if why is None]
-    early = sampling.rates(open_pairs, q[:FIRST_LOOK])
+    early = collision_rates(robot, bodies, open_pairs, q[:FIRST_LOOK])
     suspects = [pair for pair, rate in early.items() if rate == 1.0]
     moving = [pair for pair, why in reasons.items() if why not in (None, "rigid")] + suspects
-    rates = sampling.rates(moving, q)
+    rates = collision_rates(robot, bodies, moving, q)
     alike = [pair for pair in suspects if rates[pair] == 1.0]
-    as_they_are = PairSampling(robot, solids).rates(alike, q) if alike else {}
+    as_they_are = collision_rates(robot, solids, alike, q)
     parted = [pair for pair, rate in as_they_are.items() if rate < 1.0]
     found = reasons | {pair: "always" for pair in alike if pair not in parted}
     if parted:

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pinocchio as pin
 
 from coverable.arrays import Array
-from robots.kinematics import Kinematics
 from robots.robot import Robot
 from robots.shapes.bodies import Polytope, Solid
 from robots.shapes.coal_shapes import coal_body, coal_shape, with_contacts
@@ -40,51 +40,40 @@ def random_configurations(robot: Robot) -> Array:
     return np.random.default_rng(SEED).uniform(lower, upper, (SAMPLES, robot.n))
 
 
-class PairSampling:
-    """Which pairs of owners collide, by coal."""
+def collision_rates(
+    robot: Robot,
+    bodies: Sequence[Polytope | Solid],
+    pairs: Sequence[Pair],
+    configurations: Array,
+) -> dict[Pair, float]:
+    """In what share of configurations (k, n) pairs of owners collide, by coal.
 
-    def __init__(self, robot: Robot, bodies: Sequence[Polytope | Solid]) -> None:
-        """Build coal's shapes.
-
-        Args:
-            robot: whose joints carry the bodies.
-            bodies: of links and tool; those of one owner count as one. Of an exact mesh the
-                triangles count, so what is wholly inside of it does not collide.
-        """
-        self._robot = robot
-        self._kinematics = Kinematics(robot)
-        self._geometry = pin.GeometryModel()
-        self._of_owner: dict[str, list[int]] = {}
-        for number, body in enumerate(bodies):
-            if isinstance(body, Solid):
-                shape, placement = coal_shape(body.geometry), np.array(body.placement)
-            else:
-                shape, placement = coal_body(body)
-            title = f"{number} {body.owner}"
-            entry = pin.GeometryObject(title, body.joint, 0, pin.SE3(placement), shape)
-            index = int(self._geometry.addGeometryObject(entry))
-            self._of_owner.setdefault(body.owner, []).append(index)
-
-    def rates(self, pairs: Sequence[Pair], configurations: Array) -> dict[Pair, float]:
-        """In what share of configurations (k, n) each pair collides."""
-        self._geometry.removeAllCollisionPairs()
-        pair_of: list[int] = []
-        for number, (first, second) in enumerate(pairs):
-            for i in self._of_owner[first]:
-                for j in self._of_owner[second]:
-                    self._geometry.addCollisionPair(pin.CollisionPair(i, j))
-                    pair_of.append(number)
-        model, data = self._robot.model, self._robot.model.createData()
-        scratch = self._geometry.createData()
-        for request in scratch.collisionRequests:
-            with_contacts(request)
-        found = np.zeros((len(configurations), len(pairs)), dtype=bool)
-        for row, q in enumerate(configurations):
-            configuration = self._kinematics.configuration(q)
-            pin.computeCollisions(model, data, self._geometry, scratch, configuration, False)
-            hits = [k for k, result in enumerate(scratch.collisionResults) if result.isCollision()]
-            found[row, [pair_of[k] for k in hits]] = True
-        return dict(zip(pairs, found.mean(axis=0).tolist(), strict=True))
+    The bodies of one owner count as one. Of an exact mesh the triangles count, so what is wholly
+    inside of it does not collide.
+    """
+    geometry, of_owner = pin.GeometryModel(), dict[str, list[int]]()
+    for number, body in enumerate(bodies if pairs else ()):
+        if isinstance(body, Solid):
+            shape, place = coal_shape(body.geometry), body.placement
+        else:
+            shape, place = coal_body(body)
+        title, placement = f"{number} {body.owner}", pin.SE3(np.array(place))
+        entry = pin.GeometryObject(title, body.joint, 0, placement, shape)
+        of_owner.setdefault(body.owner, []).append(int(geometry.addGeometryObject(entry)))
+    pair_of: list[int] = []
+    for number, (first, second) in enumerate(pairs):
+        for couple in product(of_owner[first], of_owner[second]):
+            geometry.addCollisionPair(pin.CollisionPair(*couple))
+            pair_of.append(number)
+    data, scratch = robot.model.createData(), geometry.createData()
+    for request in scratch.collisionRequests:
+        with_contacts(request)
+    found = np.zeros((len(configurations), len(pairs)), dtype=bool)
+    for row, q in enumerate(configurations if pairs else ()):
+        pin.computeCollisions(robot.model, data, geometry, scratch, q, False)
+        hits = [k for k, result in enumerate(scratch.collisionResults) if result.isCollision()]
+        found[row, [pair_of[k] for k in hits]] = True
+    return dict(zip(pairs, found.mean(axis=0).tolist(), strict=True))
 
 
 def with_crude_links_cut(robot: Robot, shapes: LinkShapes, pairs: Sequence[Pair]) -> LinkShapes:
@@ -98,11 +87,11 @@ def with_crude_links_cut(robot: Robot, shapes: LinkShapes, pairs: Sequence[Pair]
     exact = {solid.owner for solid in shapes.solids}
     known = [pair for pair in pairs if exact.issuperset(pair)]
     q = random_configurations(robot)[:LOOKED_AT]
-    as_hulls = PairSampling(robot, shapes.polytopes).rates(known, q)
+    as_hulls = collision_rates(robot, shapes.polytopes, known, q)
     often = [pair for pair, rate in as_hulls.items() if rate > TOO_OFTEN]
     if not often:
         return shapes
-    as_they_are = PairSampling(robot, shapes.solids).rates(often, q)
+    as_they_are = collision_rates(robot, shapes.solids, often, q)
     rates = ((pair, as_hulls[pair] - as_they_are[pair]) for pair in often)
     crude = {owner for pair, rate in rates if rate > TOO_OFTEN for owner in pair}
     bodies = [
