@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any, TypedDict, TypeVar, Unpack, cast
 
 from coverable.arrays import Array
@@ -202,16 +201,14 @@ class ToolShape:
         return _placed(ToolShape, (file, scale), position, rpy_deg)
 
 
-SHAPES: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        "box": ("size",),
-        "cylinder": ("radius", "length"),
-        "sphere": ("radius",),
-        "capsule": ("radius", "length"),
-        "halfspace": (),
-        "mesh": ("file", "scale"),
-    }
-)
+SHAPES: Mapping[str, tuple[str, ...]] = {
+    "box": ("size",),
+    "cylinder": ("radius", "length"),
+    "sphere": ("radius",),
+    "capsule": ("radius", "length"),
+    "halfspace": (),
+    "mesh": ("file", "scale"),
+}
 """The kinds of objects, and what describes each: the arguments of the function of that name."""
 
 

@@ -8,7 +8,6 @@ at one row bounds the distance at all others.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,11 +91,10 @@ def _searched(pairings: list[Pairing], count: int) -> tuple[Array, NDArray[np.in
 
 def _lines(names: Names, pairings: list[Pairing], found: NDArray[np.intp], here: Mask) -> NearPair:
     """The lines of one pair, with one more behind each run of its rows."""
-    of = {int(row): int(found[row]) for row in np.flatnonzero(here)}
-    for row, behind in pairwise(range(len(here))):
-        if here[row] and not here[behind]:
-            of[behind] = int(found[row])
-    rows = np.array(sorted(of), dtype=np.intp)
+    behind = np.flatnonzero(here[:-1] & ~here[1:]) + 1
+    of = np.where(here, found, -1)
+    of[behind] = found[behind - 1]
+    rows = np.flatnonzero(of >= 0)
     lines = []
     for row in rows.tolist():
         one = pairings[of[row]]
