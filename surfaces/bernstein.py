@@ -73,8 +73,6 @@ def along(matrix: Array, net: Array, axis: int) -> Array:
 
 def product(one: Array, other: Array) -> Array:
     """The net of a product."""
-    if 1 in (one.shape[0] * one.shape[1], other.shape[0] * other.shape[1]):
-        return np.asarray(one * other)
     a, b = (net * _binomials(net) for net in (one, other))
     if a.shape[0] * a.shape[1] > b.shape[0] * b.shape[1]:
         a, b = b, a

@@ -31,7 +31,6 @@ from surfaces.enclosures import (
     UFUNCS,
     Enclosure,
     enclosed,
-    largest,
 )
 
 WIDE = 1.2  # rad, half an interval over which sines are taken for cubics
@@ -77,15 +76,19 @@ def _divided(a: Any, b: Any) -> Enclosure:
 
     quotient = _interpolated(ratio, a, b)
     left = _add(Enclosure(a.net), _negative(_plain_product(quotient, b.net)))
-    known = a.radius + largest(quotient) * b.radius + left.radius
+    known = a.radius + _size(quotient) * b.radius + left.radius
     r, s = bernstein.alike(left.net, b.net)
     if (s.max(axis=(0, 1)) > UNEVEN * s.min(axis=(0, 1))).any():
         r, s = bernstein.halved(r), bernstein.halved(s)
     return Enclosure(quotient, _largest_ratio(r, known, s, -b.radius))
 
 
+def _size(net: Array) -> Array:
+    return np.asarray(np.abs(net).max(axis=(0, 1)))
+
+
 def _plain_product(one: Array, other: Array) -> Enclosure:
-    size = largest(one) * largest(other)
+    size = _size(one) * _size(other)
     return Enclosure(bernstein.product(one, other), 8 * ROUNDING * size)
 
 

@@ -34,7 +34,7 @@ FUNCTIONS: dict[Any, Callable[..., Any]] = {}
 class Enclosure(NDArrayOperatorsMixin):
     """Functions over k boxes, (k, ...) in shape like the arrays that numbers would give."""
 
-    __slots__ = ("net", "radius", "size")
+    __slots__ = ("net", "radius")
 
     def __init__(self, net: Array, radius: Array | float = 0.0) -> None:
         """Keep both, made so that nothing is known where one of them is not finite.
@@ -42,16 +42,14 @@ class Enclosure(NDArrayOperatorsMixin):
         Args:
             net: (m, n, k, ...) see `bernstein`.
             radius: (k, ...) how far a value may be from it.
-
-        `size` (k, ...) is the largest absolute value of the polynomial, or more.
         """
-        size = largest(net)
+        size = np.abs(net).max(axis=(0, 1))
         radius = np.asarray(radius + ROUNDING * size)
         unknown = ~np.isfinite(radius)
         if unknown.any():
-            net, size = np.where(unknown, 0.0, net), np.where(unknown, 0.0, size)
+            net = np.where(unknown, 0.0, net)
             radius = np.where(unknown, np.inf, radius)
-        self.net, self.radius, self.size = net, radius, size
+        self.net, self.radius = net, radius
 
     @staticmethod
     def variable(low: Array, high: Array, axis: int) -> Enclosure:
@@ -78,6 +76,11 @@ class Enclosure(NDArrayOperatorsMixin):
     def ends(self) -> tuple[Array, Array]:
         """Lowest and highest values (k, ...), or beyond."""
         return self.net.min(axis=(0, 1)) - self.radius, self.net.max(axis=(0, 1)) + self.radius
+
+    @property
+    def size(self) -> Array:
+        """(k, ...) the largest absolute value of the polynomial, or more."""
+        return np.abs(self.net).max(axis=(0, 1))
 
     def __array__(self, *_: Any, **__: Any) -> Any:
         """Refuse to be an array of numbers."""
@@ -120,12 +123,6 @@ class Enclosure(NDArrayOperatorsMixin):
                 radius = radius + np.abs(rest).max(axis=1 - axis).sum(axis=0)
                 net = bernstein.along(bernstein.from_chebyshev(KEPT), kept, axis)
         return self if net is self.net else Enclosure(net, radius)
-
-
-def largest(net: Array) -> Array:
-    """(k, ...) the largest absolute coefficient."""
-    sizes = np.abs(net)
-    return np.asarray(sizes[0, 0] if sizes.shape[:2] == (1, 1) else sizes.max(axis=(0, 1)))
 
 
 def _of_coordinates(axis: int, ndim: int) -> int:
