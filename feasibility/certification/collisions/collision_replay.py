@@ -107,10 +107,7 @@ class Couples:
         ]
 
 
-@lru_cache(maxsize=KEPT)
-def couples_of(bodies: Bodies) -> Couples:
-    """The bodies of a problem, kept for the next motion among them."""
-    return Couples(bodies)
+couples_of = lru_cache(maxsize=KEPT)(Couples)  # for the next motion among them
 
 
 def collision_replay(

@@ -45,6 +45,7 @@ class Body:
         self.joint, self.shape, self.deviation = solid.joint, solid.geometry, deviation
         self.placement, shape = solid.placement, self.shape
         self._hull, (corners, self.radius, self.circle) = _held(shape)
+        self._place = coal.Transform3s(self.placement[:3, :3], self.placement[:3, 3])
         self.corners: Array = corners @ self.placement[:3, :3].T + self.placement[:3, 3]
         """(k, 3) m; the body is what `outline` says, about these."""
         self.axis: Array = self.placement[:3, 2]
@@ -61,11 +62,6 @@ class Body:
     def _geometry(self) -> Any:
         """Coal's; of a convex mesh its hull, which has an inside."""
         return self._hull if self.convex else coal_shape(self.shape)
-
-    @cached_property
-    def place(self) -> Any:
-        """Coal's placement."""
-        return coal.Transform3s(self.placement[:3, :3], self.placement[:3, 3])
 
     def placed(self, rotations: Array, points: Array) -> list[Any]:
         """Coal's placements with the joint at poses (k, 3, 3), (k, 3) m."""
@@ -88,7 +84,7 @@ class Body:
         """
         request, found = with_contacts(coal.CollisionRequest()), coal.CollisionResult()
         request.gjk_tolerance = GJK
-        one, place, two = self._geometry, self.place, other._geometry
+        one, place, two = self._geometry, self._place, other._geometry
 
         def nearer(there: Any, margin: float) -> float | None:
             request.security_margin = margin + COAL
@@ -107,7 +103,7 @@ class Body:
         """
         one, two = (self._hull, other._hull) if hulls else (self._geometry, other._geometry)
         result = coal.DistanceResult()
-        found = coal.distance(one, self.place, two, place, _asked, result)
+        found = coal.distance(one, self._place, two, place, _asked, result)
         return float(found), result.getNearestPoint1(), result.getNearestPoint2()
 
 
