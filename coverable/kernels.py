@@ -2,9 +2,11 @@
 
 `entry` is for functions that Python calls, and `kernel` for those that only these call: called
 from Python, one runs as plain, slow Python. `inlined` ones are written into their callers: a call
-hands on every number of a named tuple of arrays. What makes arrays is `allocating_entry` or
-`allocating`: numba counts references there, and refuses to compile what should count and does not.
-A division by zero gives inf or NaN, which no comparison in the search accepts.
+hands on every number of a named tuple of arrays. So are `spliced` ones, but before these are
+compiled, and never by themselves: what calls much takes as long to compile as its callers. What
+makes arrays is `allocating_entry` or `allocating`: numba counts references there, and refuses to
+compile what should count and does not. A division by zero gives inf or NaN, which no comparison in
+the search accepts.
 
 Kernels are kept while all of `CODE` is as it was, as what a function calls may stand elsewhere.
 Their folder bears its stamp: numba loads the classes that a kernel is given before it compares
@@ -119,6 +121,7 @@ _COUNTED: dict[str, Any] = {"error_model": "numpy", "_nrt": True, "no_cfunc_wrap
 _UNCOUNTED = _COUNTED | {"_nrt": False}
 kernel: Callable[[Any], Any] = register_jitable(**_UNCOUNTED)
 inlined: Callable[[Any], Any] = register_jitable(**_UNCOUNTED, forceinline=True)
+spliced: Callable[[Any], Any] = partial(njit, **_UNCOUNTED, inline="always")
 allocating: Callable[[Any], Any] = register_jitable(**_COUNTED)
 entry: Callable[[Any], Any] = partial(_kept, partial(njit, **_UNCOUNTED))
 allocating_entry: Callable[[Any], Any] = partial(_kept, partial(njit, **_COUNTED))

@@ -8,7 +8,7 @@ made, see `feasibility.roadmap.motions.segment_bound`.
 import numpy as np
 
 from coverable.arrays import Array
-from coverable.kernels import entry, kernel
+from coverable.kernels import entry, kernel, spliced
 from feasibility.collisions.kernels.clearance import clearance_gradient
 from feasibility.roadmap.motions.aiming import look_at
 from feasibility.roadmap.motions.off_target import STEPS_FROM_NEAR, project_off_target
@@ -96,7 +96,7 @@ def margin_objective(arrays, work, q, size):  # type: ignore[no-untyped-def]
         clearance_gradient(arrays.collisions, q, work.secondary_step, size)
 
 
-@kernel
+@spliced
 def _step_towards(arrays, work, q, goal, share, slack, off_target):  # type: ignore[no-untyped-def]
     """Put a share of the way from q to the goal, projected, into `work.trial`; True on success."""
     copy_slot(arrays, work)

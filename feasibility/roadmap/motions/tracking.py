@@ -13,7 +13,7 @@ short enough, the tool point may leave its target, within the tolerance.
 import numpy as np
 
 from coverable.arrays import Array
-from coverable.kernels import entry, kernel
+from coverable.kernels import entry, kernel, spliced
 from feasibility.roadmap.motions import self_motion
 from feasibility.roadmap.motions.aiming import aim, bounds_between, look_at
 from feasibility.roadmap.motions.off_target import STEPS_FROM_NEAR, project_off_target
@@ -85,7 +85,7 @@ def span_of(arrays, work, curve, begin, end):
     return np.sqrt(dx * dx + dy * dy + dz * dz) / arrays.scale + FOLLOWING * turn
 
 
-@kernel
+@spliced
 def _step_from(arrays, work, q, dt, off_target):
     """Project q, with its secondary step, onto the target ahead; `work.trial` is the result.
 
@@ -129,7 +129,7 @@ def _track(arrays, work, curve, begin, end, q, goal, heading, cell, waypoints):
     return rows, more if reached else 0
 
 
-@kernel
+@spliced
 def _along_curve(arrays, work, curve, begin, end, q, goal, heading, waypoints):
     """Those on the curve; returns their number, or STOPPED."""
     n = q.shape[0]
