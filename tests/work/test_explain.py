@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from functools import cache
 
 import numpy as np
@@ -87,7 +88,9 @@ def test_what_is_said_of_a_side_is_what_a_verdict_says(name):
             if side is None:
                 continue
             changed = case_at(case, found.quantity, side.value)
-            verdict = check(*changed)
+            effort = re.search(r"with (\d+) evaluations", side.detail)  # of what is undecided
+            search = coverable.Search(evaluations=int(effort[1])) if effort else None
+            verdict = check(*changed, search)
             sides += 1
             if side is found.feasible:
                 assert side.evidence is Evidence.WITNESS
