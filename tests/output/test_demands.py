@@ -146,8 +146,8 @@ def test_every_joint_every_demand_and_every_motion_is_judged(known):
         verify(begun, cells, task, q, working=np.ones(3))
     for off in 1e-3 * np.eye(robot.n):
         assert not verify(replace(robot, start=q[0] + off), cells, task, q).holds
-    much = replace(task, footprint=0.005, coverage=0.99)
-    assert "99 % is required" in verify(begun, cells, much, q).refusal, "not the start alone"
+    much = replace(task, footprint=0.005, coverage=0.99, speed=0.3)
+    assert "99 % is required" in verify(begun, cells, much, q).refusal, "not the speed alone"
     bent = q.copy()
     bent[:, 4] = np.linspace(0.0, 0.3, len(q))  # through a singularity, and fast
     good, bad = (Walk(rows, np.full(len(q), -1)) for rows in (q, bent))
