@@ -14,13 +14,7 @@ from coverable.errors import ArgumentError
 from feasibility.attempts import Method, attempts_at
 from feasibility.certification.faults import Replay
 from feasibility.clock import Clock, OutOfTime
-from feasibility.demands.every_demand import (
-    OF_TREE,
-    RATES,
-    check_requirements,
-    further,
-    unjudged,
-)
+from feasibility.demands.every_demand import OF_TREE, RATES, check_requirements, further, unjudged
 from feasibility.problem import Problem
 from feasibility.search_settings import Progress, Search
 from feasibility.task import Task
