@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.arrays import Array, Ints, Protected
+from feasibility.certification.bisection import runs
 from feasibility.paths.metrics import denser
 from feasibility.task import Task
 from feasibility.verdict import Walk
@@ -101,8 +102,7 @@ def treated_by_walk(robot: Robot, cells: Cells, task: Task, *walks: Walk) -> Tre
         parts = []
         for walk in walks:
             works = cells.surface.works(walk.cell)
-            rows = np.split(np.arange(len(works)), np.flatnonzero(np.diff(works)) + 1)
-            parts += [Walk(walk.q[part], walk.cell[part]) for part in rows if works[part[0]]]
+            parts += [Walk(walk.q[part], walk.cell[part]) for part in runs(works)]
     found = [contacts_on(surface, robot, walk) for walk in parts]
     return _measured(surface, task.disc, _joined(found))
 

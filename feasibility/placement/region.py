@@ -155,7 +155,8 @@ class Region:
         free = self.high > self.low
         values = np.tile(0.5 * (self.low + self.high), (count, 1))
         rng = np.random.default_rng(seed)
-        values[1:, free] = spread(self.low[free], self.high[free], count - 1, rng)
+        others = spread(self.low[free], self.high[free], max(count - 1, 0), rng)
+        values[1:, free] = others
         return self.rounded(values)
 
     def rounded(self, values: Array) -> Array:

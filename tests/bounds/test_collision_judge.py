@@ -1,5 +1,6 @@
 """The judge of collisions, on bodies of known distances: what it accepts and refuses."""
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -244,6 +245,18 @@ def test_values_that_are_no_numbers_are_refused(value):
 
 def test_what_cannot_be_judged_is_an_error_with_words():
     good = bodies_of(LINKS, [wall_at(2.0)], [pair("link2", "wall")])
+    with pytest.raises(ArgumentError, match=r"shape \(m, 2\)"):
+        collision_replay(ELBOW, good, np.zeros((3, 3)))
+    for count in (1, 3):  # one row would be that of every segment
+        with pytest.raises(ArgumentError, match="deviations"):
+            collision_replay(ELBOW, good, np.zeros((3, 2)), np.zeros((count, 2)))
     assert judged(ELBOW, bodies_of(LINKS), [0.0, 0.0], [0.0, 0.0]).min_clearance is None
     with pytest.raises(ArgumentError, match="shelf"):
         judged(ELBOW, replace(good, pairs=(pair("link2", "shelf"),)), [0.0, 0.0])
+    gone = Triangles(np.zeros((3, 3)), np.array([[0, 1, 7]]), False)
+    nowhere = Triangles(np.full((3, 3), np.nan), np.array([[0, 1, 2]]), False)
+    nothing = Triangles(np.zeros((0, 3)), np.zeros((0, 3)), False)
+    for shape in (nowhere, gone, nothing, Sphere(np.nan)):
+        bad = replace(good, solids=(Solid("link2", 2, np.eye(4), shape),))
+        with suppress(ValueError, IndexError):  # shapes are checked where they are made
+            assert not judged(ELBOW, bad, [0.0, 0.0], [0.0, 0.0]).accepted

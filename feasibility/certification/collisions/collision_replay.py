@@ -123,9 +123,12 @@ def collision_replay(
             that are curved between rows; none by default.
 
     Raises:
-        ArgumentError: a pair names what has no body.
+        ArgumentError: a pair names what has no body, or q or deviations have other shapes.
     """
     rows = np.ascontiguousarray(q, dtype=float)
+    segments = max(len(rows) - 1, 0), robot.n
+    if deviations is not None and np.shape(deviations) != segments:
+        raise ArgumentError(f"deviations must have shape {segments}, got {np.shape(deviations)}")
     finite = np.isfinite(rows).all(axis=1)
     if deviations is not None:
         finite[:-1] &= np.isfinite(deviations).all(axis=1)
