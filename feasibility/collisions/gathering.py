@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -26,10 +26,9 @@ from feasibility.collisions.words import SURFACE, TOOL
 from robots.robot import Robot
 from robots.shapes.bodies import Fineness, Polytope, Solid, Triangles
 from robots.shapes.coal_shapes import coal_distance
-from robots.shapes.link_pairs import LeftOut, LinkPairs, link_pairs
+from robots.shapes.link_pairs import LeftOut, LinkPairs, link_pairs, with_crude_links_cut
 from robots.shapes.links import LinkShapes, link_shapes, outer_bodies
-from robots.shapes.sampling import with_crude_links_cut
-from robots.shapes.tool import Reach, tool_line, tool_reach
+from robots.shapes.tool import tool_line, tool_reach
 from surfaces.sheet import sheet_of
 from surfaces.surface import Surface
 
@@ -45,8 +44,8 @@ def gathered(robot: Robot, surface: Surface, collision: Collision, standoff: flo
     faults = collision.unknown_names(robot.link_names)
     if faults:
         raise ArgumentError([fault.renamed({}, "collision") for fault in faults])
-    arm = _arm_of(robot, collision)
-    solids = [*arm.shapes.solids, *tool_solids(collision.tool, robot)]
+    arm, pairs = _arm_of(robot, collision)
+    solids = [*arm.solids, *tool_solids(collision.tool, robot)]
     polytopes, soups = [*arm.polytopes], list[Soup]()
     if collision.surface and surface.wall is not None:
         sheet = sheet_of(surface.wall, thickness=collision.thickness)
@@ -66,7 +65,7 @@ def gathered(robot: Robot, surface: Surface, collision: Collision, standoff: flo
     joints = {solid.owner: solid.joint for solid in solids}
     owners = _tool_owners(collision, joints, robot)
     asked, left_out = _sorted_out(
-        collision, joints, scene, owners, arm.pairs, touching=not standoff > 0.0
+        collision, joints, scene, owners, pairs, touching=not standoff > 0.0
     )
     return Bodies(
         solids=(*solids, *carried),
@@ -75,27 +74,17 @@ def gathered(robot: Robot, surface: Surface, collision: Collision, standoff: flo
         scene=scene,
         pairs=tuple(asked),
         left_out=tuple(left_out),
-        unchecked=(*arm.shapes.unchecked, *bare_stretch(robot, collision)),
+        unchecked=(*arm.unchecked, *bare_stretch(robot, collision)),
         checked=collision.checked,
         notes=(
-            *arm.shapes.notes,
-            *arm.pairs.notes,
+            *arm.notes,
+            *pairs.notes,
             *(note for one in collision.scene for note in one.notes),
             *overlapping(collision, polytopes, left_out),
             *collision.notes_on(standoff),
-            *_beyond(tool_reach(robot, solids), owners, asked, standoff),
+            *_beyond(robot, solids, owners, asked, standoff),
         ),
     )
-
-
-class _Arm(NamedTuple):
-    """Bodies of links and tool, and the pairs of links."""
-
-    shapes: LinkShapes
-    polytopes: tuple[Polytope, ...]
-    """Of links and tool."""
-    pairs: LinkPairs
-    """None of them where the arm need not stay clear of itself."""
 
 
 @lru_cache(maxsize=KEPT)
@@ -106,8 +95,11 @@ def _arm(
     allow: tuple[tuple[str, str], ...],
     srdf: str | None,
     with_itself: bool,
-) -> _Arm:
-    """What surface, places and clearances leave as it is: it takes most of the time of `gather`."""
+) -> tuple[LinkShapes, LinkPairs]:
+    """Bodies of links, and convex ones of the tool; the pairs of links, unless none are asked for.
+
+    Surface, places and clearances leave them as they are: it takes most of the time of `gather`.
+    """
     shapes, solids, pairs = link_shapes(robot, fineness), tool_solids(tool, robot), NO_PAIRS
     if with_itself:
         pairs = link_pairs(robot, shapes, allow, srdf, solids)
@@ -115,11 +107,11 @@ def _arm(
         if cut is not shapes:
             shapes, pairs = cut, link_pairs(robot, cut, allow, srdf, solids)
     own = (body for solid in solids for body in outer_bodies(solid))
-    return _Arm(shapes, (*shapes.polytopes, *own), pairs)
+    return replace(shapes, polytopes=(*shapes.polytopes, *own)), pairs
 
 
-def _arm_of(robot: Robot, collision: Collision) -> _Arm:
-    """Bodies of links and tool."""
+def _arm_of(robot: Robot, collision: Collision) -> tuple[LinkShapes, LinkPairs]:
+    """See `_arm`."""
     asked = collision.tool, collision.allow, collision.srdf, collision.self_
     return _arm(robot, collision.shapes, *asked)
 
@@ -130,7 +122,7 @@ def bare_stretch(robot: Robot, collision: Collision) -> dict[str, str]:
     Raises:
         RobotError: no link has a shape, or the SRDF is not of this arm.
     """
-    arm, line = _arm_of(robot, collision), tool_line(robot)
+    (arm, _), line = _arm_of(robot, collision), tool_line(robot)
     bare = float(np.linalg.norm(line.ends[1] - line.ends[0]))
     point = Polytope("tool point", line.joint, line.ends[1:], 0.0)
     for body in arm.polytopes:
@@ -154,14 +146,14 @@ def bare_stretch(robot: Robot, collision: Collision) -> dict[str, str]:
 
 
 def _beyond(
-    reaches: Iterable[Reach], tool: set[str], pairs: Iterable[Pair], standoff: float
+    robot: Robot, solids: Iterable[Solid], tool: set[str], pairs: Iterable[Pair], standoff: float
 ) -> list[str]:
     """That the tool's bodies reach further beyond its point than the standoff leaves them."""
     needed = {pair.first: pair.clearance for pair in pairs if pair.second == SURFACE}
     return [
         f"shapes of {owner} reach {1e3 * beyond:.1f} mm beyond the tool point, and have to stay "
         f"{1e3 * needed[owner]:g} mm off the surface; the standoff is {1e3 * standoff:g} mm"
-        for owner, beyond in reaches
+        for owner, beyond in tool_reach(robot, solids).items()
         if owner in tool and beyond + needed.get(owner, -math.inf) > standoff
     ]
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import coal
 import numpy as np
+import pinocchio as pin
 
 from coverable.arrays import Array, Ints
 from robots.shapes.bodies import Geometry, HalfSpace, Polytope, Triangles
@@ -21,6 +22,7 @@ from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
 LEAST = 1e-9  # [m] radius of a ball or capsule for coal
 KEPT = 256  # meshes whose trees are kept
+Z = np.array([0.0, 0.0, 1.0])
 
 
 def with_contacts(request: Any) -> Any:
@@ -43,7 +45,7 @@ def coal_shape(shape: Geometry) -> Any:
         case Triangles():
             return _tree(shape)
         case HalfSpace():
-            return coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
+            return coal.Halfspace(Z, 0.0)
 
 
 def coal_hull(points: Array) -> tuple[Any, Array]:
@@ -72,9 +74,8 @@ def coal_body(body: Polytope) -> tuple[Any, Array]:
     if len(vertices) == 1:
         return coal.Sphere(radius), place
     along = vertices[1] - vertices[0]
-    length = float(np.linalg.norm(along))
-    place[:3, :3] = _turn_to(along / length)
-    return coal.Capsule(radius, length), place
+    place[:3, :3] = pin.Quaternion.FromTwoVectors(Z, along).toRotationMatrix()
+    return coal.Capsule(radius, float(np.linalg.norm(along))), place
 
 
 def coal_distance(a: Polytope, b: Polytope) -> float:
@@ -92,13 +93,6 @@ def coal_distance(a: Polytope, b: Polytope) -> float:
     request = coal.DistanceRequest()
     request.enable_signed_distance = True
     return float(coal.distance(*placed, request, coal.DistanceResult()))
-
-
-def _turn_to(z: Array) -> Array:
-    """(3, 3) a rotation whose third column is a unit vector."""
-    x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(z, x), z])
 
 
 @lru_cache(maxsize=KEPT)

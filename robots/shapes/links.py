@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
@@ -18,6 +18,14 @@ from robots.urdf.checked_urdf import CheckedUrdf, check_urdf
 from robots.urdf.link_shapes import LinkShape, MeshFile, mesh_paths
 
 MOST_NAMED = 8  # links in one note
+KINDS = LOST, REPLACED, STAND_IN, WITHOUT = (
+    "a shape of {} cannot be used, so {} not checked: ",
+    "a collision shape of {} cannot be used, so visuals stand in: ",
+    "no collision shapes, so visuals stand in: {}",
+    "left without collision shapes by the URDF, so not checked: {}",
+)
+Said = dict[tuple[str, str], list[str]]
+"""Links by what is said of them, and why; those `WITHOUT` are drawn."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -66,22 +74,23 @@ def link_shapes(robot: Robot, fineness: Fineness = "hulls") -> LinkShapes:
     checked = check_urdf(
         robot.urdf, robot.package_dirs, robot.axes, xacro_args=dict(robot.xacro_args)
     )
-    found = _gathered(robot, checked)
-    solids, notes = tuple(found.solids), _notes(found)
+    solids, carriers, said = _gathered(robot, checked)
+    notes = _notes(said)
     if not solids:
         why = "; ".join(notes) or "its links have neither collision shapes nor visuals"
         raise RobotError(
             f"no link has a shape that can be used for collisions: {why}", f"robot {robot.name!r}"
         )
-    lost = [*(link for links in found.lost.values() for link in links), *found.without]
+    ended = [links for (what, _), links in said.items() if what in (LOST, WITHOUT)]
+    lost = [link for links in ended for link in links]
     # What bears nothing but the root moves only as seen from another link.
     carrying = {0, *(solid.joint for solid in solids)}
-    gaps = [link for joint, link in found.carriers.items() if joint not in carrying]
+    gaps = [link for joint, link in carriers.items() if joint not in carrying]
     unchecked = dict.fromkeys([*lost, *(link for link in gaps if link != checked.root)])
     polytopes = tuple(body for solid in solids for body in outer_bodies(solid, fineness))
     parents = {joint.child: joint.parent for joint in checked.joints}
     embodied = frozenset([*(solid.owner for solid in solids), *lost])
-    return LinkShapes(solids, polytopes, tuple(unchecked), notes, embodied, parents)
+    return LinkShapes(tuple(solids), polytopes, tuple(unchecked), notes, embodied, parents)
 
 
 def outer_bodies(solid: Solid, fineness: Fineness = "hulls") -> list[Polytope]:
@@ -94,51 +103,33 @@ def outer_bodies(solid: Solid, fineness: Fineness = "hulls") -> list[Polytope]:
     ]
 
 
-@dataclass(eq=False, slots=True)
-class _Gathered:
-    """Solids link by link, and what is to be said about them."""
-
-    without: list[str]
-    """Links that the URDF leaves without collision shapes on purpose, and draws."""
-    solids: list[Solid] = field(default_factory=list)
-    stand_ins: list[str] = field(default_factory=list)
-    """Links whose visuals stand in for collision shapes that they do not have; ..."""
-    replaced: dict[str, list[str]] = field(default_factory=dict)
-    """... that cannot be used, by what is wrong."""
-    lost: dict[str, list[str]] = field(default_factory=dict)
-    """Links with a shape that nothing stands in for, by what is wrong."""
-    carriers: dict[int, str] = field(default_factory=dict)
-    """The first link of each joint."""
-
-
-def _gathered(robot: Robot, checked: CheckedUrdf) -> _Gathered:
-    """Take the shapes of all links."""
+def _gathered(robot: Robot, checked: CheckedUrdf) -> tuple[list[Solid], dict[int, str], Said]:
+    """The shapes of all links, the first link of each joint, and what is to be said of links."""
     own, model = checked.collisions, robot.model
     read = mesh_reader(mesh_paths(own.shapes or checked.visuals))
     faults = [{one.link: one.why for one in some} for some in (own.faults, checked.visual_faults)]
     drawn = {shape.link for shape in checked.visuals}
-    made = _Gathered([link for link in own.without if link in drawn])
+    solids, carriers, said = list[Solid](), dict[int, str](), Said()
     for link in checked.links:
         if not model.existFrame(link, pin.FrameType.BODY):  # the file has changed since
             continue
         frame = model.frames[model.getFrameId(link, pin.FrameType.BODY)]
-        made.carriers.setdefault(int(frame.parentJoint), link)
+        carriers.setdefault(int(frame.parentJoint), link)
         if link in own.without:
             continue
         found, fault = _read(read, link, own.shapes, faults[0])
         if fault or not found:
             shown, unseen = _read(read, link, checked.visuals, faults[1])
             if unseen or (fault and not shown):
-                made.lost.setdefault(unseen or fault, []).append(link)
-            elif fault:
-                made.replaced.setdefault(fault, []).append(link)
+                said.setdefault((LOST, unseen or fault), []).append(link)
             elif shown:
-                made.stand_ins.append(link)
+                said.setdefault((REPLACED if fault else STAND_IN, fault), []).append(link)
             found += shown  # those that can be read are kept: more is safe
         for origin, geometry in found:
             place = frame.placement.homogeneous @ origin
-            made.solids.append(Solid(link, int(frame.parentJoint), place, geometry))
-    return made
+            solids.append(Solid(link, int(frame.parentJoint), place, geometry))
+    without = [link for link in own.without if link in drawn]
+    return solids, carriers, said | ({(WITHOUT, ""): without} if without else {})
 
 
 def _read(
@@ -159,24 +150,11 @@ def _read(
     return found, fault or faults.get(link, "")
 
 
-def _notes(found: _Gathered) -> tuple[str, ...]:
+def _notes(said: Said) -> tuple[str, ...]:
     """See `LinkShapes.notes`."""
     notes = []
-    for why, links in found.lost.items():
-        so = "they are" if len(links) > 1 else "it is"
-        notes.append(f"a shape of {_named(links)} cannot be used, so {so} not checked: {why}")
-    notes += [
-        f"a collision shape of {_named(links)} cannot be used, so visuals stand in: {why}"
-        for why, links in found.replaced.items()
-    ]
-    if found.stand_ins:
-        notes.append(f"no collision shapes, so visuals stand in: {_named(found.stand_ins)}")
-    if found.without:
-        left = _named(found.without)
-        notes.append(f"left without collision shapes by the URDF, so not checked: {left}")
+    for (what, why), links in sorted(said.items(), key=lambda one: KINDS.index(one[0][0])):
+        many = len(links) > 1
+        named = f"link{'s' if many else ''} {listed(links, MOST_NAMED)}"
+        notes.append(what.format(named, "they are" if many else "it is") + why)
     return tuple(notes)
-
-
-def _named(links: list[str]) -> str:
-    """Links by name, in short."""
-    return f"link{'s' if len(links) > 1 else ''} {listed(links, MOST_NAMED)}"

@@ -15,15 +15,6 @@ from robots.shapes.bodies import Solid, outline
 NEAR = 1e-3  # [m]
 
 
-class Reach(NamedTuple):
-    """How far one owner's bodies reach along the approach axis."""
-
-    owner: str
-    """A link, or 'tool'."""
-    beyond: float
-    """m beyond the tool point; negative where all ends behind it."""
-
-
 class ToolLine(NamedTuple):
     """From the flange to the tool point."""
 
@@ -55,8 +46,8 @@ def tool_line(robot: Robot) -> ToolLine:
     return ToolLine(robot.tool_frame, int(tcp.parentJoint), np.stack([end, end]))
 
 
-def tool_reach(robot: Robot, solids: Iterable[Solid]) -> tuple[Reach, ...]:
-    """How far the bodies on the last joint reach beyond the tool point, the furthest first.
+def tool_reach(robot: Robot, solids: Iterable[Solid]) -> dict[str, float]:
+    """By owner, how far (m) bodies on the last joint reach beyond the tool point, furthest first.
 
     What reaches further than the standoff is inside a flat surface that is treated, whatever the
     arm does. Exact shapes count, not the convex bodies around them.
@@ -69,4 +60,4 @@ def tool_reach(robot: Robot, solids: Iterable[Solid]) -> tuple[Reach, ...]:
         end = float(one.placement[:3, 3] @ axis) + float((corners @ own).max()) + radius
         end += circle * math.hypot(own[0], own[1])
         beyond[one.owner] = max(beyond.get(one.owner, -np.inf), end - tip)
-    return tuple(sorted(map(Reach._make, beyond.items()), key=lambda reach: -reach.beyond))
+    return dict(sorted(beyond.items(), key=lambda reach: -reach[1]))
