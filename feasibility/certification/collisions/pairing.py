@@ -96,18 +96,9 @@ class Pairing:
         (k,) m, and the ends (k, 2, 3) m of the shortest lines, seen from a; of overlaps any points.
         With `hulls` of these, which may be nearer.
         """
-        (rotations, points), a, b = self._placed(times), self.a, self.b
+        a, b, hulls = self.a, self.b, hulls or self.a.half_space
         found, ends = np.empty(len(times)), np.empty((len(times), 2, 3))
-        if a.half_space:
-            n = np.einsum("kij,i->kj", rotations, a.axis)
-            across = n - (n @ b.axis)[:, None] * b.axis
-            across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
-            lowest = b.corners[(n @ b.corners.T).argmin(axis=1)] - b.radius * n - b.circle * across
-            ends[:, 1] = np.einsum("kij,kj->ki", rotations, lowest) + points
-            found = (ends[:, 1] - a.centre) @ a.axis
-            ends[:, 0] = ends[:, 1] - found[:, None] * a.axis
-            return found - b.deviation, ends
-        for k, place in enumerate(b.placed(rotations, points)):
+        for k, place in enumerate(b.placed(*self._placed(times))):
             self.calls += 1
             found[k], *ends[k] = a.distance(b, place, hulls)
             if found[k] <= 0.0 and not self.convex:  # of triangles that overlap coal knows no depth
@@ -205,7 +196,7 @@ class Pairing:
     def part_at(self, row: int, wanted: float | Array, turns: bool = False) -> Mask:
         """(m - 1,) which segments have what is wanted (m), with a plane that parts at a row."""
         rotations, points = self._poses
-        (apart,), n = self._normals(rotations[[row]], points[[row]])
+        (apart,), n = self._gaps(rotations[[row]], points[[row]])
         if apart > 0.0:
             self._raised(wanted, n)
             if turns:
@@ -288,28 +279,21 @@ class Pairing:
     def _gaps(self, rotations: Array, points: Array) -> tuple[Array, Array]:
         """(k,) m, how far planes part the hulls with b at poses, and their normals (k, 3).
 
-        From a to b, less what bodies stand out by. Where they overlap, as deep as that, and any
-        normal.
+        From a to b, less what bodies stand out by, across the shortest line that coal finds. Where
+        they overlap, as deep as that, and any normal.
         """
-        found, n = self._normals(rotations, points)
+        n, found = np.tile(self.a.axis, (len(points), 1)), np.ones(len(points))
+        self.calls += len(points)
+        for k, place in enumerate(() if self.a.half_space else self.b.placed(rotations, points)):
+            found[k], here, there = self.a.distance(self.b, place, hulls=True)
+            length = float(np.linalg.norm(there - here))
+            if length > 0.0:
+                n[k] = (there - here) / length
+            else:
+                found[k] = min(found[k], 0.0)
         apart = self._low(n, rotations, points) - self.a.highest(n)
         apart = np.where(found > 0.0, apart, found)
         return apart - self.a.deviation - self.b.deviation, n
-
-    def _normals(self, rotations: Array, points: Array) -> tuple[Array, Array]:
-        """(k,) m, how far the hulls are apart by coal, and the normals (k, 3) of such planes."""
-        n = np.tile(self.a.axis, (len(points), 1))
-        found = np.ones(len(points))
-        self.calls += len(points)
-        if not self.a.half_space:
-            for k, place in enumerate(self.b.placed(rotations, points)):
-                found[k], here, there = self.a.distance(self.b, place, hulls=True)
-                length = float(np.linalg.norm(there - here))
-                if length > 0.0:
-                    n[k] = (there - here) / length
-                else:
-                    found[k] = min(found[k], 0.0)
-        return found, n
 
     def parted(self, ends: Array, n: Array) -> Array:
         """(k,) m, how far planes across n (k, 3) part them along stretches (k, 2).
