@@ -8,9 +8,8 @@ from typing import Any, NamedTuple, cast
 
 from coverable.errors import MISSING, CoverableError, Fault, is_number
 from feasibility.cases.table_reader import CaseError, Section, frozen, is_text
-from feasibility.collisions.named_pairs import checked_distance, checked_pair
-from feasibility.collisions.scene import SHAPES, Obstacle, ToolShape
-from feasibility.collisions.settings import Collision
+from feasibility.collisions.scene import SHAPES, Obstacle, ToolShape, checked_distance
+from feasibility.collisions.settings import Collision, checked_pair
 from feasibility.collisions.shapes import read_triangles
 from feasibility.collisions.words import asked_for
 

@@ -9,7 +9,6 @@ from typing import Any, TypedDict, TypeVar, Unpack, cast
 
 from coverable.arrays import Array
 from coverable.errors import ArgumentError, Checks
-from feasibility.collisions.named_pairs import checked_distance
 from feasibility.collisions.shapes import (
     FARTHEST,
     ORIGIN,
@@ -25,6 +24,7 @@ from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 Point = Sequence[float]
 Path = str | os.PathLike[str]
 Made = TypeVar("Made")
+CLEAREST = 10.0  # [m], the largest clearance, and the thickest sheet
 
 
 class Own(TypedDict, total=False):
@@ -238,3 +238,9 @@ def _placed(
         checks.faults += error.faults
     checks.done()
     return made
+
+
+def checked_distance(checks: Checks, key: str, value: object) -> float:
+    """m, a clearance or a thickness."""
+    expected = f"must be a number in 0 .. {CLEAREST:g} (metres)"
+    return checks.number(key, value, expected, 0.0, CLEAREST)

@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, get_args
 
-from coverable.errors import Checks, Fault
-from feasibility.collisions.named_pairs import (
-    checked_distance,
-    clearances_of,
-    names_of,
-    pairs_of,
-    refuse_repeated,
-    sequence,
-    stranger,
-)
-from feasibility.collisions.scene import Obstacle, ToolShape
+from coverable.errors import Checks, Fault, close, shown
+from feasibility.collisions.scene import Obstacle, ToolShape, checked_distance
 from feasibility.collisions.words import SURFACE, TOOL, asked_for
 from robots.shapes.bodies import Fineness
 
@@ -79,9 +71,9 @@ class Collision:
             if not isinstance(getattr(self, name), bool):
                 checks.wrong(name, getattr(self, name), "must be true or false")
         kept["shapes"] = checks.choice("shapes", self.shapes, get_args(Fineness))
-        kept["tool_links"] = names_of(checks, "tool_links", self.tool_links)
-        kept["allow"] = pairs_of(checks, "allow", self.allow)
-        kept["clearances"] = clearances_of(checks, self.clearances)
+        kept["tool_links"] = _names_of(checks, "tool_links", self.tool_links)
+        kept["allow"] = _pairs_of(checks, "allow", self.allow)
+        kept["clearances"] = _clearances_of(checks, self.clearances)
         kept |= _objects(checks, self.scene, self.tool)
         if self.srdf is not None and not (isinstance(self.srdf, str) and self.srdf.strip()):
             checks.wrong("srdf", self.srdf, "must be the path of an SRDF file, or None")
@@ -134,7 +126,7 @@ class Collision:
         named = [(f"tool_links[{k}]", name) for k, name in enumerate(self.tool_links)]
         named += [(f"scene[{k}].frame", one.frame) for k, one in enumerate(self.scene) if one.frame]
         for key, name in named:
-            faults += stranger(key, name, links, "a link of the arm")
+            faults += _stranger(key, name, links, "a link of the arm")
         pairs = [(f"allow[{k}]", pair) for k, pair in enumerate(self.allow)]
         pairs += [(f"clearances[{k}].pair", row[:2]) for k, row in enumerate(self.clearances)]
         what = "a link, an object of the scene, 'surface' or 'tool'"
@@ -144,7 +136,7 @@ class Collision:
                     text = "names the surface, which is not checked; write surface = true"
                     faults.append(Fault(key, text))
                 else:
-                    faults += stranger(key, name, known, what)
+                    faults += _stranger(key, name, known, what)
         return faults
 
     def notes_on(self, standoff: float) -> tuple[str, ...]:
@@ -167,7 +159,7 @@ def _objects(checks: Checks, scene: Any, tool: Any) -> dict[str, tuple[Any, ...]
     kept: dict[str, tuple[Any, ...]] = {}
     for key, given, kind in (("scene", scene, Obstacle), ("tool", tool, ToolShape)):
         expected = f"must be a list of {kind.__name__}, such as {kind.__name__}.box makes"
-        rows = sequence(checks, key, given, expected)
+        rows = _sequence(checks, key, given, expected)
         if len(rows) > MOST_OBJECTS:
             got = f"has {len(rows):,} objects, more than {MOST_OBJECTS:,}: join them as a mesh"
             checks.keep(Fault(key, got))
@@ -175,5 +167,75 @@ def _objects(checks: Checks, scene: Any, tool: Any) -> dict[str, tuple[Any, ...]
             if not isinstance(row, kind):
                 checks.wrong(f"{key}[{k}]", row, f"must be made by {kind.__name__}")
         kept[key] = tuple(row for row in rows if isinstance(row, kind))
-    refuse_repeated(checks, "scene", [obstacle.name for obstacle in kept["scene"]])
+    _refuse_repeated(checks, "scene", [obstacle.name for obstacle in kept["scene"]])
     return kept
+
+
+def _stranger(key: str, name: str, known: Sequence[str], what: str) -> list[Fault]:
+    """The fault of a name that is not known, if it is not."""
+    if name in known:
+        return []
+    guess = close(name, known)
+    hint = f"did you mean {guess}?" if guess else f"there are {', '.join(known[:20])}"
+    return [Fault(key, f"got {shown(name)}; {hint}", expected=f"must be {what}")]
+
+
+def _sequence(checks: Checks, key: str, value: Any, expected: str) -> Sequence[Any]:
+    """A list or tuple; empty after a fault."""
+    if isinstance(value, (list, tuple)):
+        return value
+    checks.wrong(key, value, expected)
+    return ()
+
+
+def _names_of(checks: Checks, key: str, value: Any) -> tuple[str, ...]:
+    """Names, each once."""
+    expected = 'must be a list of names of links, such as ["nozzle"]'
+    names = _sequence(checks, key, value, expected)
+    if not all(isinstance(name, str) and name for name in names):
+        checks.wrong(key, value, expected)
+        return ()
+    _refuse_repeated(checks, key, names)
+    return tuple(names)
+
+
+def checked_pair(checks: Checks, key: str, value: Any) -> tuple[str, str] | None:
+    """Two different names."""
+    expected = 'must be two different names, such as ["link5", "link7"]'
+    if isinstance(value, (list, tuple)) and len(value) == 2:
+        first, second = value
+        if all(isinstance(name, str) and name for name in value) and first != second:
+            return first, second
+    checks.wrong(key, value, expected)
+    return None
+
+
+def _pairs_of(checks: Checks, key: str, value: Any) -> tuple[tuple[str, str], ...]:
+    """Pairs of names; the same twice does no harm."""
+    expected = 'must be a list of pairs of names, such as [["link5", "link7"]]'
+    rows = _sequence(checks, key, value, expected)
+    found = [checked_pair(checks, f"{key}[{k}]", row) for k, row in enumerate(rows)]
+    return tuple(pair for pair in found if pair is not None)
+
+
+def _clearances_of(checks: Checks, value: Any) -> tuple[tuple[str, str, float], ...]:
+    """Pairs with a distance each, no pair twice."""
+    key, found = "clearances", []
+    expected = "must be a list of (name, name, metres)"
+    for k, row in enumerate(_sequence(checks, key, value, expected)):
+        if not isinstance(row, (list, tuple)) or len(row) != 3:
+            checks.wrong(f"{key}[{k}]", row, "must be (name, name, metres)")
+            continue
+        pair = checked_pair(checks, f"{key}[{k}].pair", row[:2])
+        distance = checked_distance(checks, f"{key}[{k}].value", row[2])
+        if pair is not None:
+            found.append((*pair, distance))
+    _refuse_repeated(checks, key, [" and ".join(sorted(row[:2])) for row in found])
+    return tuple(found)
+
+
+def _refuse_repeated(checks: Checks, key: str, names: Iterable[str]) -> None:
+    """Keep a fault of each name that is there more than once."""
+    for name, count in Counter(names).items():
+        if count > 1:
+            checks.keep(Fault(key, f"has {shown(name)} {count} times; one of them is enough"))

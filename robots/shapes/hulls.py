@@ -174,7 +174,6 @@ def _reach_outside(hull: Any, points: Array) -> float:
     return max(float(heights.max()), *(float(gaps(some).max()) for some in chunks))
 
 
-MOST_PIECES = 8
 BINS = 16  # planes may lie between any two of them
 WORTH = 0.04  # of the volume of the whole hull: what one more piece has to save
 SAMPLES = 600  # points on the surface, by which planes are chosen
@@ -212,35 +211,25 @@ def _best_cut(along: Array, points: Array) -> tuple[float, list[float]]:
     """The slabs of least volume, as many as are worth it: m^3 of their hulls, and planes between.
 
     Planes lie between bins of even width; with v(i, j) the volume of the hull of bins i .. j - 1,
-    the least volume of k slabs over the first j bins is min over i of best(k - 1, i) + v(i, j).
+    and w what a slab has to save, the least volume of slabs over the first j bins, and w for each,
+    is min over i of best(i) + v(i, j) + w.
 
     Args:
         along: (k,) m, of the points across the slabs; planes rise with it.
         points: (k, 3) m.
     """
-    low, high = float(along.min()), float(along.max())
     whole = hull_volume(points)
-    if high - low <= 0.0 or whole <= 0.0:
+    borders = np.linspace(along.min(), along.max(), BINS + 1)
+    if not whole > 0.0 or not borders[-1] > borders[0]:
         return whole, []
-    borders = np.linspace(low, high, BINS + 1)
-    volume = np.full((BINS + 1, BINS + 1), np.inf)
-    for i in range(BINS):
-        for j in range(i + 1, BINS + 1):
-            some = points[(along >= borders[i]) & (along <= borders[j])]
-            volume[i, j] = hull_volume(some)
-    best, chosen = [volume[0]], [np.zeros(BINS + 1, dtype=int)]
-    for _ in range(1, MOST_PIECES):
-        totals = best[-1][:, None] + volume
-        chosen.append(totals.argmin(axis=0))
-        best.append(totals.min(axis=0))
-    count = 1
-    while count < MOST_PIECES and best[count - 1][BINS] - best[count][BINS] > WORTH * whole:
-        count += 1
-    planes, end = list[float](), BINS
-    for k in range(count - 1, 0, -1):
-        end = int(chosen[k][end])
-        planes.insert(0, float(borders[end]))
-    return float(best[count - 1][BINS]), planes
+    best, planes = [0.0], [list[float]()]
+    for j in range(1, BINS + 1):
+        slabs = (points[(along >= low) & (along <= borders[j])] for low in borders[:j])
+        totals = np.add(best, [hull_volume(slab) + WORTH * whole for slab in slabs])
+        i = int(totals.argmin())
+        best.append(float(totals[i]))
+        planes.append([*planes[i], float(borders[i])] if i else [])
+    return best[-1] - WORTH * whole * (len(planes[-1]) + 1), planes[-1]
 
 
 def _clipped(mesh: Triangles, axis: int, low: float, high: float) -> Array:
