@@ -53,8 +53,7 @@ def gathered(robot: Robot, surface: Surface, collision: Collision, standoff: flo
     scene = scene_solids(collision.scene, robot)
     reach = _reach(robot, polytopes, scene, soups)
     carried = [bounded(one, reach) for one in scene if one.joint]
-    for one in scene:
-        found = [] if one.joint else at_rest(one, reach)
+    for found in (at_rest(one, reach) for one in scene if not one.joint):
         if isinstance(found, Soup):
             soups.append(found)
         else:
@@ -204,34 +203,34 @@ def _sorted_out(
     the tool's owners, which may be `touching` the surface.
     """
     own = {one.name: one.clearance for one in collision.scene}
+    clearances = {frozenset(pair[:2]): pair[2] for pair in collision.clearances}
+    allowed = {frozenset(pair) for pair in collision.allow}
+    asked, left_out = list[Pair](), [*links.left_out]
+
+    def sort(first: str, second: str, clearance: float, why: str = "") -> None:
+        names = frozenset((first, second))
+        if why or names in allowed:
+            left_out.append(LeftOut(first, second, why or "allowed"))
+        else:
+            asked.append(Pair(first, second, clearances.get(names, clearance)))
 
     def wanted(*names: str) -> float:
         given = (own[name] for name in names)
         return max(collision.clearance if one is None else one for one in given)
 
-    rows = [(first, second, collision.clearance, "") for first, second in links.checked]
+    for pair in links.checked:
+        sort(*pair, collision.clearance)
     for owner, joint in joints.items():
         for one in scene:
-            still = "rigid" if one.joint == joint else ""
-            rows.append((owner, one.owner, wanted(one.owner), still))
+            sort(owner, one.owner, wanted(one.owner), "rigid" if one.joint == joint else "")
         if collision.surface:
             mine = owner in tool
             why = "rigid" if not joint else "contact" if mine and touching else ""
-            near = collision.tool_clearance if mine else collision.clearance
-            rows.append((owner, SURFACE, near, why))
+            sort(owner, SURFACE, collision.tool_clearance if mine else collision.clearance, why)
     for number, one in enumerate(scene):
         if collision.surface and one.joint:
-            rows.append((one.owner, SURFACE, wanted(one.owner), ""))
-        others = [other.owner for other in scene[number + 1 :] if other.joint != one.joint]
-        rows += [(one.owner, other, wanted(one.owner, other), "") for other in others]
-    clearances = {frozenset(pair[:2]): pair[2] for pair in collision.clearances}
-    allowed = {frozenset(pair) for pair in collision.allow}
-    asked, left_out = list[Pair](), [*links.left_out]
-    for first, second, clearance, why in rows:
-        names = frozenset((first, second))
-        why = why or ("allowed" if names in allowed else "")
-        if why:
-            left_out.append(LeftOut(first, second, why))
-        else:
-            asked.append(Pair(first, second, clearances.get(names, clearance)))
+            sort(one.owner, SURFACE, wanted(one.owner))
+        for other in scene[number + 1 :]:
+            if other.joint != one.joint:
+                sort(one.owner, other.owner, wanted(one.owner, other.owner))
     return asked, left_out

@@ -23,7 +23,7 @@ from feasibility.collisions.words import TOOL
 from robots.robot import Robot
 from robots.shapes.bodies import HalfSpace, Polytope, Solid, Triangles
 from robots.shapes.coal_shapes import coal_distance
-from robots.shapes.hulls import is_convex
+from robots.shapes.hulls import MOST_VERTICES, is_convex
 from robots.shapes.link_pairs import LeftOut
 from robots.shapes.links import outer_bodies
 from robots.urdf.link_shapes import Box
@@ -88,9 +88,6 @@ class Bodies:
         return (*self.solids, *(one for one in self.scene if not one.joint))
 
 
-MOST_VERTICES = 64  # of a convex mesh: its hull would be thinned, so one with more stays triangles
-
-
 def at_rest(solid: Solid, reach: float) -> list[Polytope] | Soup:
     """Convex bodies that together hold an object at rest, or its triangles: a mesh not convex.
 
@@ -100,11 +97,10 @@ def at_rest(solid: Solid, reach: float) -> list[Polytope] | Soup:
     """
     mesh, place = solid.geometry, solid.placement
     # The hull of a convex mesh with more vertices would be thinned.
-    few = not isinstance(mesh, Triangles) or len(mesh.vertices) <= MOST_VERTICES
-    if not isinstance(mesh, Triangles) or (few and is_convex(mesh)):
-        return outer_bodies(bounded(solid, reach))
-    corners = (mesh.vertices @ place[:3, :3].T + place[:3, 3])[mesh.faces]
-    return Soup(solid.owner, corners, 0.0, mesh.closed)
+    if isinstance(mesh, Triangles) and (len(mesh.vertices) > MOST_VERTICES or not is_convex(mesh)):
+        corners = (mesh.vertices @ place[:3, :3].T + place[:3, 3])[mesh.faces]
+        return Soup(solid.owner, corners, 0.0, mesh.closed)
+    return outer_bodies(bounded(solid, reach))
 
 
 def tool_solids(tool: Sequence[ToolShape], robot: Robot) -> tuple[Solid, ...]:

@@ -157,13 +157,10 @@ def _judged(pairings: list[Pairing]) -> CollisionReplay:
             nearest, met = distance, one
     for one in pairings:
         one.certify(nearest)
+    refused = [_fault(one) for one in pairings if one.refused is not None]
     faults = dict[tuple[str, str], CollisionFault]()
-    for one in pairings:
-        if one.refused is not None:
-            fault = _fault(one, one.refused)
-            known = faults.get(fault.pair)
-            if known is None or not fault.distance >= known.distance:
-                faults[fault.pair] = fault
+    for fault in sorted(refused, key=lambda one: np.nan_to_num(one.distance, nan=np.inf)):
+        faults.setdefault(fault.pair, fault)
     order = sorted(pairings, key=lambda one: np.nan_to_num(one.bound, nan=np.inf))
     # What is certified of many is no more than was aimed at: they need not be the nearest.
     nearby = list(dict.fromkeys([met, *order[:MEASURED]]))
@@ -172,9 +169,7 @@ def _judged(pairings: list[Pairing]) -> CollisionReplay:
         min_clearance=order[0].bound,
         nearest_pair=near.names,
         measured_clearance=None if measured is None else max(measured, order[0].bound),
-        faults=tuple(
-            sorted(faults.values(), key=lambda fault: np.nan_to_num(fault.distance, nan=np.inf))
-        ),
+        faults=tuple(faults.values()),
         pairings=tuple(pairings),
     )
 
@@ -203,9 +198,10 @@ def _outermost(pair: Pair, a: Body, b: Body) -> tuple[object, ...]:
     return (-b.joint, *sorted((pair.first, pair.second)), *a.centre, *b.centre)
 
 
-def _fault(found: Pairing, time: float) -> CollisionFault:
+def _fault(found: Pairing) -> CollisionFault:
     """A pair that is refused, in words."""
-    row, distance = int(time), found.distance
+    time, distance = found.refused or 0.0, found.distance
+    row = int(time)
     names, needed = " and ".join(found.names), f"{1e3 * found.needed:g} mm"
     wanted = f"{needed} are needed"
     if not distance < found.needed + TOUCHING:

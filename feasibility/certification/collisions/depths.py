@@ -158,14 +158,12 @@ def planes_around(mesh: Triangles) -> Array | None:
 
     if len(mesh.faces) > MOST_FACES or not is_convex(mesh, FULL):
         return None
-    hull, middles = ConvexHull(mesh.vertices), mesh.vertices[mesh.faces].mean(axis=1)
-    points, wide = (
-        np.concatenate([mesh.vertices, middles]),
-        float(np.ptp(hull.points, axis=0).max()),
+    planes, wide = (
+        np.array(ConvexHull(mesh.vertices).equations),
+        np.ptp(mesh.vertices, axis=0).max(),
     )
-    depths = -(points @ hull.equations[:, :3].T + hull.equations[:, 3]).max(axis=1)
-    if depths.max() > FLUSH * wide:
+    points = np.concatenate([mesh.vertices, mesh.vertices[mesh.faces].mean(axis=1)])
+    if (points @ planes[:, :3].T + planes[:, 3]).max(axis=1).min() < -FLUSH * wide:
         return None
-    planes = np.array(hull.equations)
     planes[:, 3] += 3.0 * FLUSH * wide
     return planes
