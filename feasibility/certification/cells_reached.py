@@ -6,13 +6,14 @@ no sample reaches are looked for between samples, where the tool passes nearest.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.stretches import Judge, Samples, beyond, configurations
+from feasibility.certification.tool_along import less_room
 from feasibility.task import Targets, Task
 from surfaces.cells import Cells
 
@@ -20,80 +21,66 @@ TRIES = np.linspace(0.0, 1.0, 9)  # of the part of a stretch that passes within 
 NAMED = 5  # cells that are listed
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Reached:
-    """The N cells, and for each that is reached one configuration that does."""
-
-    row: Ints
-    """(N,) the row of the motion, or the row before; -1 where none is known."""
-    chord: Array
-    """(N,) |a - b| there, b the approach direction of the cell's centre; inf where none is."""
-    roll: Array
-    """(N,) rad, how far the roll is off the middle of its range there; 0 where it is free."""
-
-    @staticmethod
-    def none(count: int) -> Reached:
-        """Of so many cells none is reached."""
-        return Reached(np.full(count, -1, dtype=np.int64), np.full(count, np.inf), np.zeros(count))
-
-    @property
-    def cells(self) -> Mask:
-        """(N,) which of them are."""
-        return self.row >= 0
-
-    def add(
-        self, task: Task, aims: Targets, cell: Ints, row: Ints, points: Array, axes: Array, x: Array
-    ) -> None:
-        """Keep what holds a cell's tool best, of configurations (k,) as `at_targets` takes them."""
-        chord, roll = at_targets(task, aims, cell, points, axes, x)
-        order = np.argsort(-chord, kind="stable")  # of several over one cell the last is kept
-        best = order[chord[order] < self.chord[cell[order]]]
-        self.row[cell[best]], self.chord[cell[best]] = row[best], chord[best]
-        self.roll[cell[best]] = roll[best]
-
-
-def cells_reached(judge: Judge, task: Task, samples: Samples) -> Reached:
-    """Which cells a motion reaches, of which `judge` knows the surface.
+def cells_reached(judge: Judge, task: Task, samples: Samples, room: Array) -> Mask:
+    """(N,) which cells a motion reaches, of which `judge` knows the surface.
 
     The task's tolerance and cone are used exactly. The samples are of the motion, as it passes
-    them, all rows among them; those that are marked are looked at first.
+    them, all rows at which it works among them; those that are marked are looked at first. `room`
+    (m, 2), see `Along`, is made less where the tool is over a cell.
+    """
+    count = len(judge.cells)
+    row, chord, roll = np.full(count, -1), np.full(count, np.inf), np.zeros(count)
+    for cell, at, *held in _over_cells(judge, task, samples, row):
+        found, rolls = at_targets(task, task.targets(judge.cells), cell, *held)
+        order = np.argsort(-found, kind="stable")  # of several over one cell the last is kept
+        best = order[found[order] < chord[cell[order]]]
+        row[cell[best]], chord[cell[best]], roll[cell[best]] = at[best], found[best], rolls[best]
+        if (row >= 0).all():
+            break
+    reached = np.asarray(row >= 0)
+    less_room(room, task, row[reached], chord[reached], roll[reached])
+    return reached
+
+
+def _over_cells(
+    judge: Judge, task: Task, samples: Samples, known: Ints
+) -> Iterator[tuple[Ints, Ints, Array, Array, Array]]:
+    """Cells (k,), and tools that may be at their targets, as `at_targets` takes them.
+
+    Each with the row that it is at, or behind. Between samples only cells that are not `known` (N,)
+    by then, with a row, are looked for.
     """
     cells, marks = judge.cells, judge.marks
-    reached = Reached.none(len(cells))
     if not len(cells) or not len(samples.row):
-        return reached
+        return
     aims, tolerance = task.targets(cells), task.effective_tolerance
     if marks is not None:
         at = samples.of((samples.share == 0.0) & (marks[samples.row] >= 0))
-        reached.add(task, aims, marks[at.row], at.row, at.points, at.axes, at.x)
-        if reached.cells.all():
-            return reached
+        yield marks[at.row], at.row, at.points, at.axes, at.x
     from scipy.spatial import cKDTree  # takes a while to load
 
     tree = cKDTree(samples.points)
     cell, sample = _flat(tree.query_ball_point(aims.points, tolerance))
     at = samples.of(sample)
-    reached.add(task, aims, cell, at.row, at.points, at.axes, at.x)
-    left = np.flatnonzero(~reached.cells)
+    yield cell, at.row, at.points, at.axes, at.x
+    left = np.flatnonzero(known < 0)
+    if len(samples.row) < 2:
+        return
     starts, ends = samples.points[:-1], samples.points[1:]
-    if not len(left) or not len(starts):
-        return reached
     half = 0.5 * np.linalg.norm(ends - starts, axis=1)
     tree = cKDTree(0.5 * (starts + ends))
     # Of stretches much longer than others there are few; a tool may bend off its chord a little.
     some, piece = _flat(tree.query_ball_point(aims.points[left], 2.0 * tolerance + half.max()))
     some = left[some]
     low, high = _passing(aims.points[some], starts[piece], ends[piece], 2.0 * tolerance)
-    passes = low < high
+    passes = (low < high) & (np.diff(samples.row)[piece] <= 1)  # else it does not work between
     some, piece, low, high = some[passes], piece[passes], low[passes], high[passes]
     t = low[:, None] + TRIES * (high - low)[:, None]
     row = samples.row[piece]
     stop = np.where(samples.row[piece + 1] > row, 1.0, samples.share[piece + 1])
     share = samples.share[piece][:, None] + t * (stop - samples.share[piece])[:, None]
     cell, row = np.repeat([some, row], len(TRIES), axis=1)
-    q = configurations(judge.rows, row, share.ravel())
-    reached.add(task, aims, cell, row, *judge.kinematics.held(q))
-    return reached
+    yield cell, row, *judge.kinematics.held(configurations(judge.rows, row, share.ravel()))
 
 
 def _flat(lists: NDArray[np.object_]) -> tuple[Ints, Ints]:

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -39,15 +38,9 @@ LONGEST = 500  # rows from mark to mark that are looked at so
 BENT = 1.01  # [1] the way between two points that are so close, compared with the straight line
 
 
-def placed(fault: MotionFault, at: Array) -> MotionFault:
-    """A fault of a part of a motion, whose rows are at row numbers with their shares (k,)."""
-    where = float(np.interp(max(fault.row, 0) + fault.share, np.arange(len(at)), at))
-    return replace(fault, row=int(where), share=where % 1.0)
-
-
-def rows_and_shares(at: Array, count: int) -> tuple[Ints, Array]:
-    """Of row numbers with their shares (k,), in a motion of so many rows."""
-    row = np.minimum(at.astype(np.int64), max(count - 2, 0))
+def rows_and_shares(at: Array) -> tuple[Ints, Array]:
+    """Of row numbers with their shares (k,)."""
+    row = at.astype(np.int64)
     return row, at - row
 
 
@@ -76,7 +69,7 @@ def _turns(judge: Judge, followed: Mask, low: Array, high: Array, begins: Mask) 
     low, high = low.copy(), high.copy()
     for _ in range(HALVINGS if len(low) else 0):
         middle = 0.5 * (low + high)
-        found = judge.sampled(*rows_and_shares(middle, len(judge.rows)))
+        found = judge.sampled(*rows_and_shares(middle))
         same = _on(found.places.chart, followed) == begins
         low, high = np.where(same, middle, low), np.where(same, high, middle)
     return 0.5 * (low + high)
@@ -109,7 +102,7 @@ def lifted_faults(
     for _ in range(LEVELS):
         if not len(left) or surface is None:
             return []
-        at = [rows_and_shares(end, len(rows)) for end in (left, right)]
+        at = [rows_and_shares(end) for end in (left, right)]
         points = [kinematics.tools(configurations(rows, *end))[0] for end in at]
         ends = np.stack([_heights(surface, each) for each in points])
         least = np.nan_to_num(ends, nan=np.inf).min(axis=0)
@@ -222,7 +215,7 @@ def _in_order(judge: Judge, patch: PatchPlaces, ends: Places, numbers: Ints) -> 
     row = np.append(np.repeat(numbers, PARTS), numbers[-1])
     parts = np.append(np.tile(np.arange(PARTS) / PARTS, len(numbers)), 1.0)
     at = judge.sampled(row, parts)
-    target, approaches = judge.targets(way)
+    target, approaches, _ = judge.targets(way)
     off = np.linalg.norm(at.points[:, None] - target, axis=2) / judge.task.effective_tolerance
     chord = max(judge.task.cone_chord, 1e-9)
     lean = np.linalg.norm(at.axes[:, None] - approaches, axis=2) / chord

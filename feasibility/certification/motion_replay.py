@@ -33,7 +33,7 @@ from feasibility.certification.faults import (
 )
 from feasibility.certification.placement_margin import margin_fault, placement_margin
 from feasibility.certification.stretches import Judge
-from feasibility.certification.tool_along import less_room, tool_along
+from feasibility.certification.tool_along import tool_along
 from feasibility.collisions.asked_bodies import gather
 from feasibility.cone import angle_of
 from feasibility.task import Task
@@ -41,7 +41,6 @@ from feasibility.verdict import Certificate, Walk
 from robots.kinematics import Kinematics
 from robots.robot import Robot
 from surfaces.cells import Cells
-from surfaces.places.offset_surfaces import offset_surface
 from surfaces.surface import Surface
 
 if TYPE_CHECKING:
@@ -94,25 +93,24 @@ def _of_the_tool(
         from feasibility.certification import pose_replay
     if poses and marks is not None and working is None:
         curves = pose_replay.curves_of_marks(cells, marks)
-    offset = offset_surface(surface, surface.side_sign * task.standoff)
-    judge = Judge(robot, less_deviations(task, surface), offset, cells, rows, marks, curves)
+    less = less_deviations(task, surface)
+    judge = Judge(robot, less, surface, cells, rows, None if working is not None else marks, curves)
     margin, faults = limits(robot, rows)
     if working is None:
         found = tool_along(judge)
-        reached = cells_reached(judge, task, found.samples)
     else:
-        found, reached = pose_replay.tool_at_work(judge, surface, working)
+        found = pose_replay.tool_at_work(judge, surface.wall, working)
         if needed is None and _is_of_poses(cells.surface):
             needed = cells.surface.working
     faults += found.faults
-    at = reached.cells
+    exact = task if working is None else less
+    at = cells_reached(judge, exact, found.samples, found.room)
     missed = np.flatnonzero(~at if needed is None else needed & ~at)
     if len(missed):
         faults.append(MotionFault(missed_text(cells, task, missed, found.samples)))
     if _is_of_poses(surface):
-        found, more = pose_replay.along_poses(found, judge, surface, task, not faults)
-        faults += more
-    less_room(found.room, task, reached.row[at], reached.chord[at], reached.roll[at])
+        found = pose_replay.along_poses(found, judge, surface, not faults)
+        faults += found.faults
     error, chord, roll = found.most.tolist()
     certificate = Certificate(
         len(rows), error, angle_of(chord), margin, max_roll=None if task.roll is None else roll

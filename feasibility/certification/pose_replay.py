@@ -8,6 +8,7 @@ A toolpath is run from its first pose to its last, and never back.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -15,13 +16,11 @@ import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.bisection import runs
-from feasibility.certification.cells_reached import Reached, cells_reached
 from feasibility.certification.faults import MotionFault, less_deviations, too_vague
 from feasibility.certification.followed import (
     followed_parts,
     lifted_faults,
     off_surface,
-    placed,
     rows_and_shares,
 )
 from feasibility.certification.stretches import Judge, Samples, configurations
@@ -31,7 +30,6 @@ from feasibility.verdict import Walk
 from robots.kinematics import Kinematics
 from robots.robot import Robot
 from surfaces.cells import Cells
-from surfaces.places.offset_surfaces import offset_surface
 from surfaces.places.places import OffsetSurface
 from surfaces.surface import Surface
 
@@ -115,59 +113,54 @@ def order_of_places(offset: OffsetSurface, samples: Samples, tolerance: float) -
     return [MotionFault(text, int(samples.row[worst]), float(samples.share[worst]))]
 
 
-def tool_at_work(judge: Judge, surface: Surface, working: Mask) -> tuple[Along, Reached]:
-    """What is found where the tool works, and the cells that are reached there.
+def over_parts(
+    judge: Judge, parts: Sequence[Array], lifted: tuple[Array, Array], wall: Surface | None
+) -> Along:
+    """What is found along parts of a motion, each by row numbers with their shares (k,).
 
-    Where it does not, it must not go through the surface.
+    Where it is `lifted`, from where to where by such numbers (k,), it must not go through the wall.
     """
-    rows, cells = judge.rows, judge.cells
-    most, faults, samples = np.zeros(3), list[MotionFault](), list[Samples]()
-    reached, room = Reached.none(len(cells)), np.full((len(rows), 2), np.inf)
-    for part in runs(working):
-        at_work = judge.along(rows[part])
-        found = tool_along(at_work)
+    rows = judge.rows
+    most, faults, room = np.zeros(3), list[MotionFault](), np.full((len(rows), 2), np.inf)
+    samples = [judge.sampled(np.zeros(0, dtype=np.int64), np.zeros(0))]
+    for part in parts:
+        row, share = rows_and_shares(part)
+        found = tool_along(judge.along(configurations(rows, row, share)))
         most = np.maximum(most, found.most)
-        faults += [replace(each, row=each.row + part[0]) for each in found.faults]
-        samples.append(replace(found.samples, row=found.samples.row + part[0]))
-        room[part] = found.room
-        some = cells_reached(at_work, judge.task, found.samples)
-        new = some.chord < reached.chord
-        reached.row[new] = some.row[new] + part[0]
-        reached.chord[new], reached.roll[new] = some.chord[new], some.roll[new]
+        np.minimum.at(room, row, found.room)
+        number = np.arange(len(part))
+        for fault in found.faults:
+            where = float(np.interp(fault.row + fault.share, number, part))
+            faults.append(replace(fault, row=int(where), share=where % 1.0))
+        at = np.interp(found.samples.row + found.samples.share, number, part)
+        row, share = rows_and_shares(at)
+        samples.append(replace(found.samples, row=row, share=share))
+    tolerance = judge.task.effective_tolerance
+    faults += lifted_faults(wall, rows, lifted, judge.kinematics, tolerance)
+    return Along(most, faults, Samples.join(*samples), room)
+
+
+def tool_at_work(judge: Judge, wall: Surface | None, working: Mask) -> Along:
+    """What is found where the tool works; elsewhere it must not go through the wall."""
     lifted = np.flatnonzero(~(working[:-1] & working[1:])).astype(float)
-    kinematics, tolerance = judge.kinematics, judge.task.effective_tolerance
-    faults += lifted_faults(surface.wall, rows, (lifted, lifted + 1.0), kinematics, tolerance)
-    none = judge.sampled(np.zeros(0, dtype=np.int64), np.zeros(0))
-    return Along(most, faults, Samples.join(none, *samples), room), reached
+    parts = [part.astype(float) for part in runs(working)]
+    return over_parts(judge, parts, (lifted, lifted + 1.0), wall)
 
 
-def along_poses(
-    found: Along,
-    judge: Judge,
-    surface: PoseSurface,
-    task: Task,
-    right: bool,
-) -> tuple[Along, list[MotionFault]]:
-    """What is found along poses, and its faults.
+def along_poses(found: Along, judge: Judge, surface: PoseSurface, right: bool) -> Along:
+    """What is found along poses, and its faults besides those that were found before.
 
     Where all is `right`, also over the surface under them of what follows that. What is lifted, or
     beyond the border, must not go through the surface.
     """
-    faults = order_of_places(judge.offset, found.samples, task.effective_tolerance)
+    faults = order_of_places(judge.offset, found.samples, judge.task.effective_tolerance)
     if faults or not right or surface.under is None or surface.working is None:
-        return found, faults
+        return found._replace(faults=faults)
     task = less_deviations(judge.task, surface.under)
-    offset = offset_surface(surface.under, judge.offset.height)
-    over = Judge(judge.robot, task, offset, judge.cells, judge.rows)
-    followed, most, room = surface.followed, found.most, found.room
-    at = off_surface(followed, found.samples)
-    kinematics, tolerance = judge.kinematics, judge.task.effective_tolerance
-    faults = lifted_faults(surface.under.wall, judge.rows, at, kinematics, tolerance)
+    over = Judge(judge.robot, task, surface.under, judge.cells, judge.rows)
     faults += too_vague(judge.task, surface.under)
-    for part in followed_parts(judge, followed, found.samples):
-        row, share = rows_and_shares(part, len(judge.rows))
-        one = tool_along(over.along(configurations(judge.rows, row, share)))
-        most = np.maximum(most, one.most)
-        faults += [placed(fault, part) for fault in one.faults]
-        np.minimum.at(room, row, one.room)
-    return Along(most, faults, found.samples, room), faults
+    parts = followed_parts(judge, surface.followed, found.samples)
+    lifted = off_surface(surface.followed, found.samples)
+    more = over_parts(over, parts, lifted, surface.under.wall)
+    room = np.minimum(found.room, more.room)
+    return Along(np.maximum(found.most, more.most), faults + more.faults, found.samples, room)

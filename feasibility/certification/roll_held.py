@@ -2,7 +2,7 @@
 
 *Reference.* Along a straight piece of a path of places b differs from a straight line by at most
 d_b (`PlacePaths`). The reference e is fixed, or the u direction, which differs from a straight line
-by a known amount, too (`OffsetSurface.tangent_deviations`). What that says of t, `reference_parts`
+by a known amount, too (`PlacePaths`). What that says of t, `reference_parts`
 knows, as over boxes: t is within a radius r_t of a straight line, and within d_t = 2 r_t of that
 between its ends. The product u = b x t has D_u = 2 |db| |dt|, and d_u = d_b + d_t on top.
 
@@ -26,7 +26,6 @@ of its half turns is left out: there it is enough that F >= 0 for one sign, or t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -36,7 +35,7 @@ from feasibility.certification.faults import ROLL_CLOSE
 from feasibility.certification.lever_bounds import Jacobians, peaks, second_derivatives
 from feasibility.certification.roll_box_models import Directions, reference_parts
 from feasibility.roll import Roll, projected
-from surfaces.places.places import OffsetSurface, PlacePaths, Places
+from surfaces.places.places import PlacePaths
 
 ROUNDS = 24  # halvings of the angle that is looked for
 ROOT = float(np.sqrt(2.0))
@@ -119,28 +118,17 @@ class ReferencesAlong(NamedTuple):
     """(k, 3) d_t + d_u."""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class HeldRoll:
-    """Reference directions over the places of one surface, and the range of the roll."""
+class HeldRoll(NamedTuple):
+    """The range of the roll, and what is known of its references."""
 
-    offset: OffsetSurface
-    fixed: bool
-    """Is the approach one direction everywhere?"""
-    reference: Array | None
-    """(3,) where it is one direction; else the u direction."""
     roll: Roll
-    """Its range."""
+    square: bool
+    """Are they square to the approach everywhere, as u directions are to normals?"""
 
-    def _references(self, places: Places, approaches: Array) -> tuple[Array, Array]:
-        """t (k, 3) and h (k,) at places."""
-        if self.reference is None:
-            return projected(self.offset.tangents(places), approaches)
-        return projected(np.broadcast_to(self.reference, approaches.shape), approaches)
-
-    def rolls(self, x: Array, axes: Array, approaches: Array, places: Places) -> Array:
-        """(k,) rad, how far rolls of tools over places are off the middle of their range."""
-        references, _ = self._references(places, approaches)
-        return off_middle(roll_vectors(x, axes, references, approaches, self.roll))
+    def rolls(self, x: Array, axes: Array, approaches: Array, references: Array) -> Array:
+        """(k,) rad, how far rolls of tools are off the middle of their range."""
+        t, _ = projected(references, approaches)
+        return off_middle(roll_vectors(x, axes, t, approaches, self.roll))
 
     def rolls_between(
         self, x: tuple[Array, Array], axes: tuple[Array, Array], second: Array, path: PlacePaths
@@ -148,7 +136,7 @@ class HeldRoll:
         """(k,) rad, bounds on that along stretches; inf where the roll may leave its range.
 
         x and axes (k, 3) are of the tool at both ends, `second` (k,) is D_x + D_y along the
-        stretch; the path of places has approach directions for normals.
+        stretch; the path of places has approach and reference directions for normals and u.
         """
         references, second_u, beside = self.references_along(path)
         share = path.share[..., None]
@@ -171,24 +159,14 @@ class HeldRoll:
 
     def references_along(self, path: PlacePaths) -> ReferencesAlong:
         """t at the places of paths, and how much t and u bend along their pieces."""
-        approaches, d_b = path.normals, path.deviations[..., 1]
-        ends = [self._references(path.place(k), approaches[:, k])[0] for k in range(4)]
-        references = np.stack(ends, axis=1)
-        db, dt = (np.linalg.norm(np.diff(a, axis=1), axis=2) for a in (approaches, references))
-        beside = np.zeros_like(d_b)
-        for piece in (FIRST, LAST):
-            d_t = 2.0 * self._along_piece(path, piece).radius
-            beside[:, piece] = 2.0 * d_t + d_b[:, piece]
+        b, e, off = path.normals, path.tangents, path.deviations
+        references, _ = projected(e, b)
+        db, dt = (np.linalg.norm(np.diff(a, axis=1), axis=2) for a in (b, references))
+        beside = np.zeros_like(off[..., 1])
+        for k in (FIRST, LAST):
+            of_b = Directions.between(b[:, k], b[:, k + 1], off[:, k, 1])
+            of_e = Directions.between(e[:, k], e[:, k + 1], 0.5 * off[:, k, 2])
+            d_t = 2.0 * reference_parts(of_b, of_e, self.square).radius
+            beside[:, k] = 2.0 * d_t + off[:, k, 1]
         with np.errstate(invalid="ignore"):  # inf * 0 is NaN, and refused
             return ReferencesAlong(references, 2.0 * db * dt, beside)
-
-    def _along_piece(self, path: PlacePaths, piece: int) -> Directions:
-        """t along one piece of paths."""
-        ends = path.normals[:, piece], path.normals[:, piece + 1]
-        b = Directions.between(*ends, path.deviations[:, piece, 1])
-        if self.reference is not None:
-            return reference_parts(b, Directions.fixed(self.reference, len(path.share)))
-        start, end = path.place(piece), path.place(piece + 1)
-        ends = self.offset.tangents(start), self.offset.tangents(end)
-        e = Directions.between(*ends, 0.5 * self.offset.tangent_deviations(start, end))
-        return reference_parts(b, e, not self.fixed and self.offset.square)

@@ -38,7 +38,9 @@ from feasibility.task import Task
 from robots.kinematics import Kinematics
 from robots.robot import Robot
 from surfaces.cells import Cells
-from surfaces.places.places import OffsetSurface, Places
+from surfaces.places.offset_surfaces import offset_surface
+from surfaces.places.places import Places
+from surfaces.surface import Surface
 
 ANY_CHORD = 4.0  # more than any; what is not known is inside a cone of all directions
 CLOSE_TO_ZERO = 1e-12  # [m], [1]: rounding of double arithmetic on unit vectors
@@ -111,28 +113,30 @@ class Judge:
         self,
         robot: Robot,
         task: Task,
-        offset: OffsetSurface,
+        surface: Surface,
         cells: Cells,
         rows: Array,
         marks: Ints | None = None,
         curves: Ints | None = None,
     ) -> None:
-        """Judge a motion `rows` (m, n) of `robot` by `task`, over what `offset` is the parallel of.
+        """Judge a motion `rows` (m, n) of `robot` by `task`, over the parallel of a surface.
 
         That is the surface of `cells`, or the one under them. `marks` (m,) say at which cell's
         target a row is said to be, -1 for none, and `curves` (m,) between poses which curve the
         motion is on behind each row.
         """
-        self.robot, self.task, self.offset, self.cells = robot, task, offset, cells
+        self.robot, self.task, self.cells = robot, task, cells
         self.rows, self.marks, self._curves = rows, marks, curves
         self.kinematics = Kinematics(robot)
         self._sign, self._approach = -cells.surface.side_sign, task.fixed_approach(cells)
-        self._roll = None
+        self._reference = None if task.roll is None else task.fixed_reference(cells)
+        by_u, self._roll = task.roll is not None and self._reference is None, None
+        self.offset = offset_surface(surface, -self._sign * task.standoff, by_u)
         if task.roll is not None:  # what judges a roll is loaded where there is a range of it
             from feasibility.certification.roll_held import HeldRoll
 
-            fixed = self._approach is not None
-            self._roll = HeldRoll(offset, fixed, task.fixed_reference(cells), task.roll)
+            square = by_u and self._approach is None and self.offset.square
+            self._roll = HeldRoll(task.roll, square)
 
     def along(self, rows: Array) -> Judge:
         """The same of another motion without marks."""
@@ -178,25 +182,28 @@ class Judge:
         self, places: Places, row: Ints, share: Array, points: Array, axes: Array, x: Array
     ) -> Samples:
         """`sampled`, of known tool points, axes and reference axes (k, 3), over given places."""
-        target, approaches = self.targets(places)
+        target, approaches, references = self.targets(places)
         error = np.linalg.norm(points - target, axis=1)
         chord = np.linalg.norm(axes - approaches, axis=1)
         facets = self.offset.facets(points)
         roll = np.zeros(len(x))
         if self._roll is not None:
-            roll = self._roll.rolls(x, axes, approaches, places)
+            roll = self._roll.rolls(x, axes, approaches, references)
         return Samples(row, share, points, axes, places, error, chord, facets, x, roll)
 
-    def targets(self, places: Places) -> tuple[Array, Array]:
-        """(k, 3) m, targets over places, and (k, 3) the approach directions there."""
-        target, normal = self.offset.at(places)
-        return target, self._approaches(normal)
+    def targets(self, places: Places) -> tuple[Array, Array, Array]:
+        """(k, 3) m, targets over places, and (k, 3) approach and reference directions there."""
+        target, normals, tangents = self.offset.at(places)
+        return target, *self._directions(normals, tangents)
 
-    def _approaches(self, normals: Array) -> Array:
-        """Approach directions (..., 3) where the surface has these outward normals."""
-        if self._approach is None:
-            return self._sign * normals
-        return np.where(np.isnan(normals), np.nan, self._approach)
+    def _directions(self, normals: Array, tangents: Array) -> tuple[Array, Array]:
+        """Approach and reference directions (..., 3), of outward normals and u directions."""
+        approaches = self._sign * normals
+        if self._approach is not None:
+            approaches = np.where(np.isnan(normals), np.nan, self._approach)
+        if self._reference is not None:
+            tangents = np.broadcast_to(self._reference, normals.shape)
+        return approaches, tangents
 
     def between_rows(self, at: Samples) -> SampledStretches:
         """The stretches from row to row, with samples `at` every row."""
@@ -217,9 +224,11 @@ class Judge:
         """See the module's text."""
         path = self.offset.paths(s.start.places, s.end.places)
         known = path.known
-        path = path._replace(normals=self._approaches(path.normals))
-        if self._approach is not None:
-            path.deviations[..., 1] = 0.0
+        normals, tangents = self._directions(path.normals, path.tangents)
+        path = path._replace(normals=normals, tangents=tangents)
+        for column, fixed in ((1, self._approach), (2, self._reference)):
+            if fixed is not None:
+                path.deviations[..., column] = 0.0
         share, width = path.share[..., None], np.diff(path.share, axis=1) ** 2
         second = s.second
         found = []

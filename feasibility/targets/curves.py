@@ -102,7 +102,7 @@ def _see_surface(cells: Cells, height: float, deviations: Array) -> None:
     ends = cells.centres + height * cells.normals
     for t in (np.arange(FEW) + 0.5) / FEW:
         over, normals = cells.curves.at(some, np.full(len(some), t))
-        target, normal = offset.at(base.nearest(over, over, np.inf))
+        target, normal, _ = offset.at(base.nearest(over, over, np.inf))
         tool = (1.0 - t) * ends[i] + t * ends[j]
         off = np.linalg.norm(tool - target, axis=1)
         leans = np.linalg.norm(normals - normal, axis=1)

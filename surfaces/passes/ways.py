@@ -88,7 +88,7 @@ def _beside(
     base, offset = offset_surface(surface, 0.0), offset_surface(surface, height)
     start, ahead, share = points[:-1], np.diff(points, axis=0), SHARES[:, None, None]
     over = (start + share * ahead).reshape(-1, 3)
-    target, normal = offset.at(base.nearest(over, over, np.inf))
+    target, normal, _ = offset.at(base.nearest(over, over, np.inf))
     ends = points + height * normals
     tool = (ends[:-1] + share * np.diff(ends, axis=0)).reshape(-1, 3)
     first, last = (np.tile(some, (len(SHARES), 1)) for some in (normals[:-1], normals[1:]))
@@ -126,7 +126,7 @@ def beside(surface: Surface, ends: Array, normals: Array, way: ToolWay) -> Besid
     tool = ends + way.height * normals
     tool = tool[0] + share * (tool[1] - tool[0])
     base = offset_surface(surface, 0.0)
-    foot, normal = base.at(base.nearest(tool, tool, np.inf))
+    foot, normal, _ = base.at(base.nearest(tool, tool, np.inf))
     apart = np.linalg.norm(tool - foot, axis=1)
     above = surface.side_sign * ((tool - foot) * normal).sum(axis=1)
     over = np.abs(above) > OVER * apart

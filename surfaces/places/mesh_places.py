@@ -44,14 +44,14 @@ class MeshPlaces(JoinedCharts):
 
     bends_evenly: ClassVar[bool] = True
 
-    def at(self, places: Places) -> tuple[Array, Array]:
+    def at(self, places: Places) -> tuple[Array, Array, Array]:
         """See `OffsetSurface.at`."""
         face, weights = np.maximum(places.chart, 0), _weights(places.x)
         normals = self.surface.normals_at(face, weights)
         points = self.surface.points_at(face, weights) + self.height * normals
         for values in (points, normals):
             values[places.chart < 0] = np.nan
-        return points, normals
+        return points, normals, np.full_like(normals, np.nan)
 
     @cached_property
     def _triangles(self) -> tuple[FaceTree, Places]:
@@ -125,14 +125,13 @@ class MeshPlaces(JoinedCharts):
         """
         eye = np.eye(3)
         low, high = np.zeros_like(t), np.ones_like(t)
-        (a, _), (b, _) = self.at(start), self.at(end)
+        a, b = self.at(start)[0], self.at(end)[0]
         best = t
         for _ in range(ROUNDS):
             tried = np.concatenate([low + GRID[:, None] * (high - low), best[None]])
             x = (1.0 - tried)[..., None] * eye[corner] + tried[..., None] * eye[last]
             chart = np.tile(start.chart, len(tried))
-            over, _ = self.at(Places(chart, x.reshape(-1, 3)[:, 1:]))
-            over = over.reshape(*tried.shape, 3)
+            over = self.at(Places(chart, x.reshape(-1, 3)[:, 1:]))[0].reshape(*tried.shape, 3)
             length = np.linalg.norm(over - a, axis=2) + np.linalg.norm(over - b, axis=2)
             best = tried[np.argmin(length, axis=0), np.arange(len(t))]
             width = 1.5 * GRID[1] * (high - low)
@@ -179,7 +178,7 @@ class MeshPlaces(JoinedCharts):
         normal = np.where(beside | within, smooth, kinked)
         normal = np.where((start == stop).all(axis=1), 0.0, normal / 8.0) * ROUNDING
         point = abs(self.height) * normal if self.height else np.zeros_like(normal)
-        return np.stack([np.where(positive, point, np.inf), normal], axis=1)
+        return np.column_stack([np.where(positive, point, np.inf), normal, np.inf + 0.0 * rate])
 
 
 def _weights(x: Array) -> Array:

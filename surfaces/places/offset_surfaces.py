@@ -11,8 +11,10 @@ from surfaces.surface import Surface, SurfaceError
 
 
 @lru_cache(maxsize=4)  # surfaces are values; one motion after the other is judged over them
-def offset_surface(surface: Surface, height: float) -> OffsetSurface:
+def offset_surface(surface: Surface, height: float, directed: bool = False) -> OffsetSurface:
     """The surface's parallel at a signed height (m) along its outward normal.
+
+    `directed` where its u directions are wanted, too.
 
     Raises:
         SurfaceError: the surface is of a kind that is not known here.
@@ -27,7 +29,7 @@ def offset_surface(surface: Surface, height: float) -> OffsetSurface:
         [0.75]
     """
     if isinstance(surface, Patch):
-        return PatchPlaces(height, surface)
+        return PatchPlaces(height, directed, surface)
     # Loaded where they are needed: most questions are about one patch.
     from surfaces.meshes.mesh_surface import MeshSurface
     from surfaces.piecewise.piecewise_surface import Piecewise
@@ -37,9 +39,9 @@ def offset_surface(surface: Surface, height: float) -> OffsetSurface:
     from surfaces.toolpaths.pose_surface import PoseSurface
 
     if isinstance(surface, Piecewise):
-        return PiecePlaces(height, surface)
+        return PiecePlaces(height, directed, surface)
     if isinstance(surface, MeshSurface):
-        return MeshPlaces(height, surface)
+        return MeshPlaces(height, directed, surface)
     if isinstance(surface, PoseSurface):
-        return PosePlaces(height, surface)
+        return PosePlaces(height, directed, surface)
     raise SurfaceError(f"a surface of kind {surface.kind} has no places to follow")

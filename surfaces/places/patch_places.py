@@ -6,7 +6,7 @@ along any line from one place of the box to another they are within 2 r of strai
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,14 +31,20 @@ class PatchPlaces(OffsetSurface):
     sign: float = 1.0
     """-1.0 where the patch's own normal is turned over."""
 
-    def at(self, places: Places) -> tuple[Array, Array]:
+    def at(self, places: Places) -> tuple[Array, Array, Array]:
         """See `OffsetSurface.at`."""
-        return self.placed(places.x)
+        points, normals = self.placed(places.x)
+        none = np.full_like(normals, np.nan)
+        return points, normals, self._along(places.x)[0] if self.directed else none
 
     def placed(self, x: Array) -> tuple[Array, Array]:
         """Points and normals (..., 3) at u and v (..., 2)."""
         normals = self.sign * self.patch.normal(x[..., 0], x[..., 1])
         return self.patch.point(x[..., 0], x[..., 1]) + self.height * normals, normals
+
+    def _along(self, x: Array) -> tuple[Array]:
+        """Unit u directions (..., 3), likewise."""
+        return (self.patch.tangent(x[..., 0], x[..., 1]),)
 
     def closest(self, points: Array) -> Places:
         """See `OffsetSurface.closest`."""
@@ -79,21 +85,24 @@ class PatchPlaces(OffsetSurface):
     def paths(self, start: Places, end: Places) -> PlacePaths:
         """See `OffsetSurface.paths`."""
         stop = start.x + self._step(start, end)
-        ends = self.placed(start.x), self.placed(end.x)
-        off = self._deviations(start.x, stop)
+        off = np.full((len(stop), 3), np.inf)
+        off[:, :2] = _deviations(self._bent, self.placed, start.x, stop)
+        if self.directed:
+            off[:, 2] = 0.0
+            some = np.flatnonzero((start.x != stop).any(axis=1))
+            off[some, 2:] = _deviations(self._turned, self._along, start.x[some], stop[some])
+        ends = self.at(start), self.at(end)
         return PlacePaths.straight(start, Places(end.chart, stop), ends, off)
 
-    def _deviations(self, start: Array, stop: Array) -> Array:
-        """(k, 2) how far offset points (m) and normals are from straight between their ends."""
-        low, high = np.minimum(start, stop), np.maximum(start, stop)
-        try:
-            radius = _known(self._radii(low, high))
-        except SurfaceError:  # of a kind of one's own, whose formulas cannot be followed
-            points = _measured(lambda x: self.placed(x)[0], start, stop)
-            normals = _measured(lambda x: self.placed(x)[1], start, stop)
-            return np.stack([points, normals], axis=1)
+    def _bent(self, low: Array, high: Array) -> Array:
+        """(k, 2) radii of models of offset points (m) and normals over boxes."""
+        radius = _known(self._radii(low, high))
         leaning = abs(self.height) * radius[:, 1] if self.height else 0.0  # which may be inf
-        return 2.0 * np.stack([radius[:, 0] + leaning, radius[:, 1]], axis=1)
+        return np.stack([radius[:, 0] + leaning, radius[:, 1]], axis=1)
+
+    def _turned(self, low: Array, high: Array) -> Array:
+        """(k, 1) those of u directions."""
+        return _known(self.patch.tangent_models(low, high).radius[:, 1:])
 
     def _radii(self, low: Array, high: Array) -> Array:
         """(k, 2) of models over boxes; of many, with one for neighbours where that is close."""
@@ -107,31 +116,27 @@ class PatchPlaces(OffsetSurface):
         radius[rough] = self.patch.local_models(low[rough], high[rough])[0].radius
         return radius
 
-    def tangents(self, places: Places) -> Array:
-        """See `OffsetSurface.tangents`."""
-        return self.patch.tangent(places.x[:, 0], places.x[:, 1])
-
-    def tangent_deviations(self, start: Places, end: Places) -> Array:
-        """See `OffsetSurface.tangent_deviations`."""
-        found = np.zeros(len(start.chart))
-        some = np.flatnonzero((start.x != end.x).any(axis=1))
-        one, other = start.x[some], end.x[some]
-        try:
-            low, high = np.minimum(one, other), np.maximum(one, other)
-            found[some] = 2.0 * _known(self.patch.tangent_models(low, high).radius[:, 1])
-        except SurfaceError:
-            found[some] = _measured(lambda x: self.patch.tangent(x[..., 0], x[..., 1]), one, other)
-        return found
-
 
 def _known(radius: Array) -> Array:
     """Enclosures have room for their own rounding; inf where nothing is known."""
     return np.where(np.isnan(radius), np.inf, radius * ROUNDING)
 
 
-def _measured(values: Callable[[Array], Array], start: Array, stop: Array) -> Array:
-    """(k,) twice what values are off straight at a few places of lines (k, 2): no proof."""
-    share = SAMPLES[:, None, None]
-    found = values(start + share * (stop - start))
-    off = np.linalg.norm(found - (found[0] + share * (found[-1] - found[0])), axis=-1)
-    return np.asarray(MEASURED * off.max(axis=0))
+def _deviations(
+    radii: Callable[[Array, Array], Array],
+    values: Callable[[Array], Sequence[Array]],
+    start: Array,
+    stop: Array,
+) -> Array:
+    """(k, c) how far c values are from straight between the ends of lines (k, 2) of parameters.
+
+    By radii of models over boxes.
+    """
+    try:
+        return 2.0 * radii(np.minimum(start, stop), np.maximum(start, stop))
+    except SurfaceError:  # of a kind of one's own, whose formulas cannot be followed: no proof
+        share = SAMPLES[:, None, None]
+        found = np.stack(values(start + share * (stop - start)))
+        line = found[:, :1] + share * (found[:, -1:] - found[:, :1])
+        off = np.linalg.norm(found - line, axis=-1)
+        return np.asarray(MEASURED * off.max(axis=1).T)

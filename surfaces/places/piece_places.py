@@ -37,15 +37,19 @@ class PiecePlaces(OffsetSurface):
     @cached_property
     def pieces(self) -> tuple[PatchPlaces, ...]:
         """The places of each piece, and of each edge."""
-        return tuple(PatchPlaces(self.height, *chart) for chart in self.surface.charts)
+        count = len(self.surface.pieces)  # on an edge u directions jump from one's to the other's
+        return tuple(
+            PatchPlaces(self.height, self.directed and k < count, *chart)
+            for k, chart in enumerate(self.surface.charts)
+        )
 
-    def at(self, places: Places) -> tuple[Array, Array]:
+    def at(self, places: Places) -> tuple[Array, Array, Array]:
         """See `OffsetSurface.at`."""
-        points, normals = np.full((2, len(places.chart), 3), np.nan)
+        found = np.full((3, len(places.chart), 3), np.nan)
         for k in np.unique(places.chart[places.chart >= 0]):
             some = np.flatnonzero(places.chart == k)
-            points[some], normals[some] = self.pieces[k].at(places.of(some))
-        return points, normals
+            found[:, some] = self.pieces[k].at(places.of(some))
+        return found[0], found[1], found[2]
 
     def nearest(
         self, points: Array, ahead: Array, within: float, only: Ints | None = None
@@ -73,7 +77,7 @@ class PiecePlaces(OffsetSurface):
 
     def paths(self, start: Places, end: Places) -> PlacePaths:
         """See `OffsetSurface.paths`."""
-        unknown = np.full((len(start.x), 2), np.inf)
+        unknown = np.full((len(start.x), 3), np.inf)
         made = PlacePaths.straight(start, end, (self.at(start), self.at(end)), unknown)
         pairs = np.stack([start.chart, end.chart], axis=1)
         for a, b in np.unique(pairs[(pairs >= 0).all(axis=1)], axis=0):
@@ -148,23 +152,6 @@ class PiecePlaces(OffsetSurface):
         u = patch.along((points - patch.position) @ patch.rotation)
         x = np.stack(patch.on_side(which, u), axis=-1)
         return np.stack([u, np.full_like(u, float(which))], axis=-1), x
-
-    def tangents(self, places: Places) -> Array:
-        """See `OffsetSurface.tangents`."""
-        found = np.full((len(places.chart), 3), np.nan)
-        pieces = len(self.surface.pieces)  # on an edge directions jump from one's to the other's
-        for k in np.unique(places.chart[(places.chart >= 0) & (places.chart < pieces)]):
-            some = np.flatnonzero(places.chart == k)
-            found[some] = self.pieces[k].tangents(places.of(some))
-        return found
-
-    def tangent_deviations(self, start: Places, end: Places) -> Array:
-        """See `OffsetSurface.tangent_deviations`."""
-        found, pieces = np.full(len(start.chart), np.inf), len(self.surface.pieces)
-        for k in np.unique(start.chart[(start.chart >= 0) & (start.chart < pieces)]):
-            some = np.flatnonzero((start.chart == k) & (end.chart == k))
-            found[some] = self.pieces[k].tangent_deviations(start.of(some), end.of(some))
-        return found
 
 
 def _on(piece: PatchPlaces, x: Array) -> Array:

@@ -53,10 +53,13 @@ class PlacePaths(NamedTuple):
     """(k, 4, 3) m, the offset surface's points over them."""
     normals: Array
     """(k, 4, 3) the surface's outward unit normals there."""
+    tangents: Array
+    """(k, 4, 3) its unit u directions there."""
     deviations: Array
-    """(k, 3, 2) how far offset point (m) and normal may be, anywhere along each piece, from the
-    straight line between its ends; inf where nothing is known. On a surface that `bends_evenly`
-    no further than 4 s (1 - s) times this, s the piece's own parameter in 0..1."""
+    """(k, 3, 3) how far offset point (m), normal and u direction may be, anywhere along each piece,
+    from the straight line between its ends; inf where nothing is known. On a surface that
+    `bends_evenly` points and normals are no further than 4 s (1 - s) times this, s the piece's own
+    parameter in 0..1."""
     chart: Ints
     """(k, 4) patch or face of the four places."""
     x: Array
@@ -69,20 +72,20 @@ class PlacePaths(NamedTuple):
 
     @staticmethod
     def straight(
-        start: Places, end: Places, placed: Sequence[tuple[Array, Array]], deviations: Array
+        start: Places, end: Places, placed: Sequence[tuple[Array, ...]], deviations: Array
     ) -> PlacePaths:
         """Paths of one piece each, the last.
 
         Args:
             start, end: k places each.
-            placed: points and normals (k, 3) over the first, and over the last.
-            deviations: (k, 2) of that piece.
+            placed: what is `at` the first, and at the last.
+            deviations: (k, 3) of that piece.
         """
         ends = zip((*placed[0], *start), (*placed[1], *end), strict=True)
-        points, normals, chart, x = (np.stack([a, a, a, b], axis=1) for a, b in ends)
-        share, off = np.tile([0.0, 0.0, 0.0, 1.0], (len(x), 1)), np.zeros((len(x), 3, 2))
+        p, n, t, chart, x = (np.stack([a, a, a, b], axis=1) for a, b in ends)
+        share, off = np.tile([0.0, 0.0, 0.0, 1.0], (len(x), 1)), np.zeros((len(x), 3, 3))
         off[:, 2] = deviations
-        return PlacePaths(share, points, normals, off, chart, x)
+        return PlacePaths(share, p, n, t, off, chart, x)
 
     @staticmethod
     def joined(first: PlacePaths, last: PlacePaths, lengths: Sequence[Array]) -> PlacePaths:
@@ -95,11 +98,11 @@ class PlacePaths(NamedTuple):
         (to, fro), zero = lengths, np.zeros(len(first.x))
         half = np.divide(to, to + fro, out=zero.copy(), where=to + fro > 0.0)
         ends: Iterator[Any] = zip(first, last, strict=True)
-        _, points, normals, off, chart, x = (
+        _, p, n, t, off, chart, x = (
             np.stack([a[:, 0], a[:, -1], b[:, 0], b[:, -1]], axis=1) for a, b in ends
         )
         share = np.stack([zero, half, half, zero + 1.0], axis=1)
-        return PlacePaths(share, points, normals, off[:, [1, 0, 3]], chart, x)
+        return PlacePaths(share, p, n, t, off[:, [1, 0, 3]], chart, x)
 
     @property
     def length(self) -> Array:
@@ -108,8 +111,8 @@ class PlacePaths(NamedTuple):
 
     @property
     def known(self) -> Mask:
-        """(k,) whether something is known of all pieces."""
-        return np.asarray(np.isfinite(self.deviations).all(axis=(1, 2)))
+        """(k,) whether something is known of points and normals of all pieces."""
+        return np.asarray(np.isfinite(self.deviations[..., :2]).all(axis=(1, 2)))
 
     def put(self, rows: Ints | Mask, others: PlacePaths) -> None:
         """Replace some of the paths."""
@@ -123,10 +126,15 @@ class OffsetSurface(ABC):
 
     height: float
     """m, h along the outward normal."""
+    directed: bool
+    """Are u directions wanted? Else nothing is known of them."""
 
     @abstractmethod
-    def at(self, places: Places) -> tuple[Array, Array]:
-        """Points T (k, 3) m of the offset surface, and the surface's normals (k, 3)."""
+    def at(self, places: Places) -> tuple[Array, Array, Array]:
+        """Points T (k, 3) m of the offset surface, and the surface's normals (k, 3).
+
+        And its unit u directions (k, 3), NaN where it has none, or they are not wanted.
+        """
 
     bends_evenly: ClassVar[bool] = False
     """Are `PlacePaths.deviations` from bounds of second derivatives?"""
@@ -160,7 +168,7 @@ class OffsetSurface(ABC):
         guess = ahead[rest].copy()
         for _ in range(GUESSES if len(rest) else 0):
             found = self.closest(guess)
-            offset, normal = self.at(found)
+            offset, normal, _ = self.at(found)
             there = np.linalg.norm(points[rest] - offset, axis=1)
             nearer = there < away[rest]
             places.put(rest[nearer], found.of(nearer))
@@ -182,17 +190,6 @@ class OffsetSurface(ABC):
         """
         return np.full(len(points), np.inf)
 
-    def tangents(self, places: Places) -> Array:
-        """Unit u directions (k, 3) of the surface at places; NaN where it has none."""
-        return np.full((len(places.chart), 3), np.nan)
-
-    def tangent_deviations(self, start: Places, end: Places) -> Array:
-        """(k,) how far the u direction may be from a straight line along straight pieces of paths.
-
-        That is the line between its ends; inf where nothing is known.
-        """
-        return np.full(len(start.chart), np.inf)
-
     def along(self, places: Places) -> Array | None:
         """(k,) m, how far along a toolpath places are; None where there is no order."""
         return None
@@ -211,7 +208,7 @@ class JoinedCharts(OffsetSurface):
 
     @abstractmethod
     def bends(self, chart: Ints, start: Array, stop: Array) -> Array:
-        """(k, 2) see `PlacePaths.deviations`, of straight lines in the parameters of charts."""
+        """(k, 3) see `PlacePaths.deviations`, of straight lines in the parameters of charts."""
 
     @abstractmethod
     def across(self, start: Places, end: Places, equal: Mask) -> PlacePaths:
@@ -225,7 +222,7 @@ class JoinedCharts(OffsetSurface):
 
     def straight(self, start: Places, end: Places) -> PlacePaths:
         """Paths straight in the parameters of a chart; nothing is known of those to another."""
-        off = np.full((len(start.chart), 2), np.inf)
+        off = np.full((len(start.chart), 3), np.inf)
         some = np.flatnonzero((start.chart == end.chart) & (start.chart >= 0))
         off[some] = self.bends(start.chart[some], start.x[some], end.x[some])
         return PlacePaths.straight(start, end, (self.at(start), self.at(end)), off)

@@ -84,15 +84,23 @@ class PosePlaces(JoinedCharts):
         _, first, group = np.unique(both, axis=0, return_index=True, return_inverse=True)
         return np.asarray(first[group.reshape(-1)])
 
-    def at(self, places: Places) -> tuple[Array, Array]:
+    @cached_property
+    def _along(self) -> Array | None:
+        """(N, 3) tangents of the poses, where there are some and they are wanted."""
+        along = self.poses.along
+        return self.poses.turned(along) if self.directed and along is not None else None
+
+    def at(self, places: Places) -> tuple[Array, Array, Array]:
         """See `OffsetSurface.at`."""
         chart, known = places.chart, np.flatnonzero(places.chart >= 0)
-        points, directions = np.full((2, len(chart), 3), np.nan)
+        points, directions, tangents = np.full((3, len(chart), 3), np.nan)
         i, j = self.poses.pairs[chart[known]].T
         share = places.x[known, 0]
         points[known] = self._points[i] + share[:, None] * self._ahead[chart[known]]
         directions[known], _ = arc_at(self._directions[i], self._directions[j], share)
-        return points, directions
+        if self._along is not None:
+            tangents[known], _ = arc_at(self._along[i], self._along[j], share)
+        return points, directions, tangents
 
     def nearest(
         self, points: Array, ahead: Array, within: float, only: Ints | None = None
@@ -138,7 +146,7 @@ class PosePlaces(JoinedCharts):
         t = np.divide(square * along + weight * turned, square + weight,
                       out=np.zeros(len(chart)), where=square + weight > 0.0)  # fmt: skip
         t = np.clip(t, 0.0, 1.0)
-        target, direction = self.at(_placed(chart, t))
+        target, direction, _ = self.at(_placed(chart, t))
         leans = np.where(known, ((axes - direction) ** 2).sum(axis=1), 0.0)
         return t, ((points - target) ** 2).sum(axis=1) + TURN**2 * leans
 
@@ -155,9 +163,14 @@ class PosePlaces(JoinedCharts):
         return self._same[self.poses.pairs[chart]]
 
     def bends(self, chart: Ints, start: Array, stop: Array) -> Array:
-        """See `JoinedCharts.bends`: a direction that turns at an even speed."""
-        turn = (stop[:, 0] - start[:, 0]) * self._turn[chart]
-        return np.stack([np.zeros(len(chart)), ROUNDING * turn**2 / 8.0], axis=1)
+        """See `JoinedCharts.bends`: directions that turn at an even speed."""
+        (i, j), share = self.poses.pairs[chart].T, stop[:, 0] - start[:, 0]
+        found = np.full((len(chart), 3), np.inf)
+        found[:, 0], found[:, 1] = 0.0, ROUNDING * (share * self._turn[chart]) ** 2 / 8.0
+        if self._along is not None:
+            turn = share * arc_angles(self._along[i], self._along[j])
+            found[:, 2] = ROUNDING * turn**2 / 8.0
+        return found
 
     def across(self, start: Places, end: Places, equal: Mask) -> PlacePaths:
         """See `JoinedCharts.across`."""
@@ -167,28 +180,6 @@ class PosePlaces(JoinedCharts):
         first, last = (self.straight(*part) for part in parts)
         lengths = [np.abs(b.x - a.x)[:, 0] * self._lengths[a.chart] for a, b in parts]
         return PlacePaths.joined(first, last, lengths)
-
-    def tangents(self, places: Places) -> Array:
-        """See `OffsetSurface.tangents`: between the tangents of both poses."""
-        found = super().tangents(places)
-        if self.poses.along is None:
-            return found
-        along = self.poses.turned(self.poses.along)
-        known = np.flatnonzero(places.chart >= 0)
-        i, j = self.poses.pairs[places.chart[known]].T
-        found[known], _ = arc_at(along[i], along[j], places.x[known, 0])
-        return found
-
-    def tangent_deviations(self, start: Places, end: Places) -> Array:
-        """See `OffsetSurface.tangent_deviations`: of an arc that is run at an even speed."""
-        if self.poses.along is None:
-            return super().tangent_deviations(start, end)
-        along = self.poses.turned(self.poses.along)
-        i, j = self.poses.pairs[start.chart].T
-        angle = arc_angles(along[i], along[j])
-        turn = np.abs(end.x[:, 0] - start.x[:, 0]) * angle * ROUNDING
-        same = (start.chart >= 0) & (start.chart == end.chart)
-        return np.where(same, turn**2 / 8.0, np.inf)
 
 
 def _placed(chart: Ints, t: Array) -> Places:

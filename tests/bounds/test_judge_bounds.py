@@ -23,7 +23,6 @@ from feasibility.task import Targets
 from feasibility.verdict import Walk
 from robots.kinematics import Kinematics
 from surfaces.meshes.triangle_mesh import TriangleMesh
-from surfaces.places.offset_surfaces import offset_surface
 
 S = np.linspace(0.0, 1.0, 401)
 X, Y, Z = np.eye(3)
@@ -140,7 +139,7 @@ def flat(kind):
 
 def judged(robot, surface, task, *rows):
     cells = surface.cells(2, 2) if surface.kind != "mesh" else surface.cells(4)
-    return Judge(robot, task, offset_surface(surface, 0.0), cells, np.array(rows)[:, None])
+    return Judge(robot, task, surface, cells, np.array(rows)[:, None])
 
 
 def along(robot, surface, task, first, last, rounds=4):
@@ -273,8 +272,8 @@ def test_a_cell_is_looked_for_all_along_the_way_past_it(reached, turn):
     cells, task = plane((-0.1, 0.1), (-0.1, 0.1), "outside").cells(1, 1), Task(0.0, 10.0, 1e-3)
     tilt = np.radians(10.5 + turn * np.array([-1.0, 1.0]))  # by `turn` deg within 2 mm
     rows = np.column_stack([[-2e-3, 2e-3], tilt])
-    judge = Judge(robot, task, offset_surface(cells.surface, 0.0), cells, rows)
-    assert cells_reached(judge, task, judge.at_rows()).cells.all() == reached
+    judge = Judge(robot, task, cells.surface, cells, rows)
+    assert cells_reached(judge, task, judge.at_rows(), np.ones((2, 2))).all() == reached
 
 
 @pytest.mark.parametrize(("j", "end"), [(0, "lower"), (2, "upper")])

@@ -1,7 +1,6 @@
 """The judge of the roll: its bounds hold where they are sampled, and both judges obey them."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ from random_arms import random_arm, robot_of
 from referee import roll_about, unit
 from samples import sampled, seeds
 
-from coverable import Task, cylinder, replay, sphere
+from coverable import cylinder, replay, sphere
 from feasibility.certification import roll_held
 from feasibility.certification.lever_bounds import jacobians
 from feasibility.certification.motion_replay import replay_over_surface
@@ -97,27 +96,28 @@ def test_references_bend_no_more_than_is_said(kind):
     rng, count = np.random.default_rng(5), 400
     surface = cylinder(1.0, (-170, 170), (-1, 1)) if kind == "tube" else None
     surface = surface or sphere(1.0, (20, 160), (-180, 180))
-    offset, along = offset_surface(surface, 0.0), None if kind == "by u" else (1.0, 0.0, 0.0)
-    task = Task(0.0, 90, roll_deg=(-80.0, 80.0), roll_reference=along)
-    reference = task.fixed_reference(surface.cells(2, 2))
-    held = HeldRoll(offset, False, reference, task.roll)
+    offset, held = offset_surface(surface, 0.0, directed=True), HeldRoll(Roll(0.0, 1.4), False)
     middle = [np.pi / 2, 0.0] if kind != "tube" else [0.4, 0.0]
     way = 10.0 ** rng.uniform(-3, -1.3, (count, 1)) * rng.normal(size=(count, 2))
     beside = np.linalg.norm(way, axis=1, keepdims=True) * rng.uniform(0.7, 3.0, (count, 1))
     first = middle + beside * rng.choice([-1.0, 1.0], (count, 2)) - 0.5 * way
     chart = np.zeros(count, dtype=np.int64)
-    path = offset.paths(Places(chart, first), Places(chart, first + way))
-    path = path._replace(normals=-path.normals)
+
+    def paths(*ends):  # approaches against normals, and one reference or u directions
+        path = offset.paths(*(Places(chart, x) for x in ends))
+        if kind != "by u":
+            path.tangents[:], path.deviations[..., 2] = X, 0.0
+        return path._replace(normals=-path.normals)
+
+    path = paths(first, first + way)
     found = held.references_along(path)
     some = np.isfinite(found.beside[:, 2])
     assert some.sum() > 80
     ends = [(path.normals[:, k], found.t[:, k]) for k in (0, 3)]
     used = []
     for s in (0.1, 0.5, 0.8):
-        places = Places(chart, first + s * way)
-        here = offset.paths(places, places)
-        b, here = -here.normals[:, 0], here._replace(normals=-here.normals)
-        t = held.references_along(here).t[:, 0]
+        here = paths(first + s * way, first + s * way)
+        b, t = here.normals[:, 0], held.references_along(here).t[:, 0]
         off = 0.0
         for here, (one, other) in (
             (t, [t for _, t in ends]), (np.cross(b, t), [np.cross(b, t) for b, t in ends]),
@@ -138,17 +138,12 @@ def test_the_bounds_of_references_are_those_of_the_lemma(kind):
         e = np.tile(X, (4, 1)) if kind == "fixed" else unit(X + 0.1 * rng.normal(size=(4, 3)))
         b[2], e[2] = b[1], e[1]
         aside, own = rng.uniform(0.001, 0.02, (2, 3))
-        offset = SimpleNamespace(
-            tangents=lambda places, e=e: e[places.x[:, 0].astype(int)],
-            tangent_deviations=lambda one, other, own=own: own[one.x[:, 0].astype(int)],
-            square=kind == "square",
-        )
+        own *= kind != "fixed"
         roll = Roll(0.1, half)
-        held = HeldRoll(offset, False, X if kind == "fixed" else None, roll)
-        at = np.array([0.0, 0.4, 0.4, 1.0])
-        number = np.stack([np.arange(4.0), np.zeros(4)], axis=1)[None]
-        off, chart = np.stack([0.0 * aside, aside], axis=1)[None], np.zeros((1, 4), dtype=np.int64)
-        path = PlacePaths(at[None], np.zeros((1, 4, 3)), b[None], off, chart, number)
+        held = HeldRoll(roll, kind == "square")
+        at, none = np.array([0.0, 0.4, 0.4, 1.0]), np.zeros((1, 4, 3))
+        off = np.stack([0.0 * aside, aside, own], axis=1)[None]
+        path = PlacePaths(at[None], none, b[None], e[None], off, none[..., 0], none[..., :2])
         t = unit(e - (e * b).sum(axis=1, keepdims=True) * b)
         u = np.cross(b, t)
         x, axes = unit(X + 0.1 * rng.normal(size=(2, 3))), unit(-Z + 0.1 * rng.normal(size=(2, 3)))
@@ -157,8 +152,7 @@ def test_the_bounds_of_references_are_those_of_the_lemma(kind):
         for k in (0, 2):
             d_b = aside[k]
             directions = Directions.between(b[k : k + 1], b[k + 1 : k + 2], np.array([d_b]))
-            r_e = np.zeros(1) if kind == "fixed" else 0.5 * own[k : k + 1]
-            reference = Directions.between(e[k : k + 1], e[k + 1 : k + 2], r_e)
+            reference = Directions.between(e[k : k + 1], e[k + 1 : k + 2], 0.5 * own[k : k + 1])
             d_t = 2.0 * reference_parts(directions, reference, kind == "square").radius[0]
             of_u = 2.0 * np.linalg.norm(b[k + 1] - b[k]) * np.linalg.norm(t[k + 1] - t[k])
             assert d_t == pytest.approx(own[k]) or kind != "square"

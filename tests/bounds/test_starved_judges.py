@@ -32,7 +32,6 @@ from feasibility.verdict import Walk
 from robots.kinematics import Kinematics
 from robots.shapes.bodies import Solid, Triangles
 from robots.urdf.link_shapes import Box, Sphere
-from surfaces.places.offset_surfaces import offset_surface
 
 FAR = 9e3  # m, of an axis: as far as a URDF may put it
 PLANAR, LINKS = planar_arm((0.5, 0.4)), capsule_links((0.5, 0.4), 0.03)
@@ -53,8 +52,8 @@ def test_stretches_of_a_motion(name, held, bent):
     surface, share = cells.surface, np.linspace(0, 1, 20)[:, None]
     task, rows = replace(task, tolerance=2e-3, **held), q[40:60]
     rows = np.vstack([a + share * (b - a) for a, b in itertools.pairwise(rows)])
-    offset = offset_surface(surface, surface.side_sign * task.standoff)
-    judge = Judge(robot, task, offset, cells, rows)
+    judge = Judge(robot, task, surface, cells, rows)
+    offset = judge.offset
     parts = judge.between_rows(judge.at_rows())
     assert judge.within(judge.bounds(parts)).all()
     for column in bent:
@@ -68,17 +67,15 @@ def test_stretches_of_a_motion(name, held, bent):
     def unknown(column):
         return lambda path: path._replace(deviations=grown(path.deviations, column))
 
-    starved = [Starved(offset, "paths", unknown(column)) for column in (0, 1)]
-    if held and "roll_reference" not in held:
-        starved.append(Starved(offset, "tangent_deviations", grown))
-    for one in starved:
-        blind = Judge(robot, task, one, cells, rows)
-        assert not blind.within(blind.bounds(parts)).any()
+    for column in (0, 1, 2) if held and "roll_reference" not in held else (0, 1):
+        judge.offset = Starved(offset, "paths", unknown(column))
+        assert not judge.within(judge.bounds(parts)).any()
     if not offset.bends_evenly:  # as near to a model, and no nearer, at the ends
-        near = Starved(offset, "paths", lambda path: path._replace(deviations=0 * path[3] + 1e-4))
+        near = {"deviations": np.full((len(parts.row), 3, 3), 1e-4)}
+        judge.offset = Starved(offset, "paths", lambda path: path._replace(**near))
         aside = replace(parts, end=replace(parts.end, points=parts.end.points + 0.01))
         off = np.linalg.norm(aside.end.points - judge.targets(aside.end.places)[0], axis=1)
-        assert (Judge(robot, task, near, cells, rows).bounds(aside).error > off + 0.99e-4).all()
+        assert (judge.bounds(aside).error > off + 0.99e-4).all()
 
 
 @pytest.mark.parametrize(

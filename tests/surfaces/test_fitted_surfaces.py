@@ -130,16 +130,13 @@ def test_the_class_of_the_page_needs_no_more_than_its_formulas(names):
     screw, cells = names["screw"], names["flank"]
     assert not lost(screw, np.random.default_rng(0))
     assert 0.0 < sheet_of(screw).deviation < 1e-3
-    offset = offset_surface(screw, 0.02)
+    offset = offset_surface(screw, 0.02, directed=True)
     x = np.array([[0.0, 0.2], [0.1, 0.21]])
     start, end = (Places(np.zeros(1, dtype=int), x[k : k + 1]) for k in (0, 1))
     t = np.linspace(0.0, 1.0, 41)[:, None]
     dense = Places(np.zeros(41, dtype=int), x[0] + t * (x[1] - x[0]))
     stated = offset.paths(start, end).deviations[0, 2]
-    for values, bound in zip(
-        (*offset.at(dense), offset.tangents(dense)),
-        (*stated, offset.tangent_deviations(start, end)[0]), strict=True,
-    ):  # fmt: skip
+    for values, bound in zip(offset.at(dense), stated, strict=True):
         off = np.linalg.norm(values - values[0] - t * (values[-1] - values[0]), axis=1).max()
         assert 0.4 * bound < off < bound
     task, robot = coverable.Task(0.02, 60, roll_deg=(-175, 175)), load_robot("puma560")
@@ -181,8 +178,7 @@ def test_a_kind_that_cannot_be_followed_is_measured(names):
         sheet_of(own)
     places = [Places(np.zeros(1, dtype=int), np.array([[u, 0.2]])) for u in (0.0, 0.1)]
     known, measured = (
-        [*offset_surface(one, 0.02).paths(*places).deviations[0, 2],
-         *offset_surface(one, 0.02).tangent_deviations(*places)]
+        offset_surface(one, 0.02, directed=True).paths(*places).deviations[0, 2]
         for one in (names["screw"], own)
-    )  # fmt: skip
-    np.testing.assert_allclose(measured, 2.0 * np.array(known), rtol=0.1)
+    )
+    np.testing.assert_allclose(measured, 2.0 * known, rtol=0.1)

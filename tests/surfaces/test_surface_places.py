@@ -122,7 +122,7 @@ def sagging(offset, one, other):
     x = one.x[:, None] + DENSE[:, None] * (other.x - one.x)[:, None]
     dense = Places(np.repeat(one.chart, len(DENSE)), x.reshape(-1, 2))
     found = []
-    for values in offset.at(dense):
+    for values in offset.at(dense)[:2]:
         values = values.reshape(-1, len(DENSE), 3)
         line = values[:, :1] + DENSE[:, None] * (values[:, -1:] - values[:, :1])
         found.append(np.linalg.norm(values - line, axis=2)[:, 1:-1])
@@ -138,7 +138,7 @@ def test_paths_bend_no_more_than_is_said(named, height):
     stated, found, some_known = [], [], np.zeros(len(start.chart), dtype=bool)
     for piece in (0, 2):
         one, other = path.place(piece), path.place(piece + 1)
-        off = path.deviations[:, piece]
+        off = path.deviations[:, piece, :2]
         known = np.isfinite(off).all(axis=1) & (one.chart >= 0)
         known &= path.share[:, piece + 1] > path.share[:, piece]
         assert (one.chart == other.chart)[known].all()
@@ -200,7 +200,7 @@ def test_paths_begin_and_end_where_they_should_and_do_not_jump(named, height):
     start, end = pairs(surface, 200, np.random.default_rng(1))
     path = offset.paths(start, end)
     for k, places in ((0, start), (3, end)):
-        points, normals = offset.at(places)
+        points, normals, _ = offset.at(places)
         np.testing.assert_allclose(path.points[:, k], points, atol=1e-12)
         np.testing.assert_allclose(path.normals[:, k], normals, atol=1e-12)
     assert (np.diff(path.share, axis=1) >= 0.0).all()
@@ -227,7 +227,7 @@ def test_nearest_places_are_no_further_than_samples(named):
     height = 0.02 * (surface.side_sign if surface.kind == "piecewise" else 1.0)
     offset = offset_surface(surface, height)
     at, _ = pairs(surface, 150, rng)
-    point, normal = offset.at(at)
+    point, normal, _ = offset.at(at)
     point = point + 1e-3 * rng.normal(size=point.shape)
     found = offset.nearest(point, point - height * normal, 1e-3)
     away = np.linalg.norm(offset.at(found)[0] - point, axis=1)
@@ -243,7 +243,7 @@ def test_a_second_guess_is_taken_where_it_is_nearer_and_only_there():
     )
     offset = offset_surface(plate, 0.02)  # they face each other: beyond the other one
     places = Places(np.array([0, 1]), np.array([[0.3, 0.4], [0.6, 0.2]]))
-    points, normals = offset.at(places)
+    points, normals, _ = offset.at(places)
     found = offset.nearest(points, points - 0.02 * normals, 1e-3)
     np.testing.assert_allclose(offset.at(found)[0], points, atol=1e-9)
     assert found.chart.tolist() == [0, 1]
@@ -277,21 +277,22 @@ def test_paths_beside_a_pole_are_near_it():
     offset = offset_surface(sphere(1.0, (0, 80), (0, 360)), 0.05)
     for beside in (1e-2, 1e-3, 1e-4):
         start, end = (Places(np.zeros(1, int), np.array([[beside, v]])) for v in (0.1, 3.1))
-        assert offset.paths(start, end).deviations[0, 2].max() < 5.0 * beside
+        assert offset.paths(start, end).deviations[0, 2, :2].max() < 5.0 * beside
 
 
 @pytest.mark.parametrize("name", [n for n, s in SURFACES.items() if s.kind != "mesh"])
 def test_the_u_direction_turns_as_is_said(name):
     surface = SURFACES[name]
     start, end = pairs(surface, 400, np.random.default_rng(5))
-    offset = offset_surface(surface, 0.03)
+    offset = offset_surface(surface, 0.03, directed=True)
     path = offset.paths(start, end)
+    stated = np.concatenate([path.deviations[:, piece, 2] for piece in (0, 2)])
     legs = [[path.place(piece + k) for piece in (0, 2)] for k in (0, 1)]
     start, end = (Places.join(*leg) for leg in legs)
-    stated = offset.tangent_deviations(start, end)
     x = start.x[:, None] + DENSE[:, None] * (end.x - start.x)[:, None]
-    ways = offset.tangents(Places(np.repeat(start.chart, len(DENSE)), x.reshape(-1, 2)))
+    ways = offset.at(Places(np.repeat(start.chart, len(DENSE)), x.reshape(-1, 2)))[2]
     ways = ways.reshape(*x.shape[:2], 3)
+    stated[np.isnan(ways).any(axis=(1, 2))] = np.inf  # round an edge there is none
     line = ways[:, :1] + DENSE[:, None] * (ways[:, -1:] - ways[:, :1])
     off = np.linalg.norm(np.where(np.isfinite(stated)[:, None, None], ways - line, 0.0), axis=2)
     known = np.isfinite(stated) & (stated > 1e-4)
@@ -307,4 +308,4 @@ def test_joined_pieces_have_those_of_each_and_a_mesh_has_none():
     mesh = random_surface("mesh", np.random.default_rng(0))
     assert mesh.cells(5).tangents is None
     places = Places(np.zeros(2, dtype=np.int64), np.full((2, 2), 0.2))
-    assert np.isinf(offset_surface(mesh, 0.0).tangent_deviations(places, places)).all()
+    assert np.isinf(offset_surface(mesh, 0.0, True).paths(places, places).deviations[:, 2, 2]).all()

@@ -50,7 +50,7 @@ def places(cells: Cells, samples: int) -> tuple[Array, Array]:
     near = cells.centres[chosen] + size * rng.uniform(-1.0, 1.0, (samples, 3))
     surface = offset_surface(cells.surface, 0.0)
     found = surface.nearest(near, near, np.inf)
-    points, normals = surface.at(found.of(found.chart >= 0))
+    points, normals, _ = surface.at(found.of(found.chart >= 0))
     some = np.linspace(0, len(cells) - 1, min(len(cells), samples)).astype(int)
     return (
         np.concatenate([cells.centres[some], points]),

@@ -19,7 +19,6 @@ from feasibility.task import Task
 from robots.kinematics import Kinematics
 from robots.robot import Robot
 from surfaces.cells import Cells
-from surfaces.places.offset_surfaces import offset_surface
 
 STEPS = 15  # of Newton's method
 LONGEST = 0.7  # [rad], [m] of a joint in one step
@@ -32,9 +31,7 @@ class Refuter:
 
     def __init__(self, robot: Robot, cells: Cells, task: Task, length: float) -> None:
         """Work for one arm, over one surface; differences of axes weigh `length` (m)."""
-        height = cells.surface.side_sign * task.standoff
-        none = np.zeros((0, robot.n))
-        self._judge = Judge(robot, task, offset_surface(cells.surface, height), cells, none)
+        self._judge = Judge(robot, task, cells.surface, cells, np.zeros((0, robot.n)))
         self._kinematics, self._targets = Kinematics(robot), task.targets(cells)
         self._task, self._length = task, length
 
@@ -68,7 +65,7 @@ class Refuter:
         On a surface the aim is the place that the tool is over; no step where there is none.
         """
         task, over = self._task, (cell >= 0)[:, None]
-        target, approach = self._judge.targets(here.places)
+        target, approach, _ = self._judge.targets(here.places)
         target = np.where(over, self._targets.points[cell], target)
         approach = np.where(over, self._targets.approaches[cell], approach)
         at, aims = jacobians(self._kinematics, q), [task.effective_tolerance, task.cone_chord]
