@@ -82,17 +82,20 @@ class CutTree:
             q[..., joint] = value + np.mod(q[..., joint] - value, 2.0 * np.pi)
         return q
 
-    def path_to(self, q: Array) -> tuple[tuple[Cut, bool], ...]:
-        """The cuts from the root to the leaf whose region holds q (n,).
+    def path_to(self, *q: Array) -> tuple[list[tuple[Cut, bool]], Cut | Leaf]:
+        """The cuts from the root down that configurations (n,) are on one side of together.
 
-        Each with whether q is above it. All of a motion is in the same region.
+        Each with whether they are above it; all of a motion is. And the first cut that they are on
+        both sides of, or the leaf whose region holds them all.
         """
-        found, node, q = [], self.root, self.folded(q)
+        found, node, rows = list[tuple[Cut, bool]](), self.root, self.folded(np.stack(q))
         while isinstance(node, Cut):
-            above = bool(q[node.joint] > node.value)
-            found.append((node, above))
-            node = node.above if above else node.below
-        return tuple(found)
+            above = rows[:, node.joint] > node.value
+            if above.any() != above.all():
+                break
+            found.append((node, bool(above.all())))
+            node = node.above if above.all() else node.below
+        return found, node
 
     def opened_by(self, walk: Array) -> Cut | Leaf | tuple[int, float]:
         """What a motion (m, n) of a changed case shows to be true no more.
@@ -107,20 +110,7 @@ class CutTree:
             turns = np.floor((walk[:, joint] - value) / (2.0 * np.pi))
             if turns.min() < turns.max():
                 return joint, value
-        node, q = self.root, self.folded(walk)
-        while isinstance(node, Cut):
-            above = q[:, node.joint] > node.value
-            if above.any() and not above.all():
-                return node
-            node = node.above if above.all() else node.below
-        return node
-
-    def parting(self, q: Array, other: Array) -> Cut | None:
-        """The cut between two configurations (n,) that no motion joins; None in one region."""
-        for (cut, above), (_, beyond) in zip(self.path_to(q), self.path_to(other), strict=False):
-            if above != beyond:
-                return cut
-        return None
+        return self.path_to(*walk)[1]
 
     def nodes(self) -> Iterator[Cut | Leaf]:
         """Every node, a cut before the nodes below and above it."""
@@ -133,7 +123,6 @@ class CutTree:
 
 
 MOST_NODES = 10_000
-MOST_CUTS_DEEP = 1_000
 
 
 def malformed(robot: Robot, n_cells: int, tree: CutTree) -> str:
@@ -166,25 +155,17 @@ def _fault_of_opened(robot: Robot, opened: object) -> str:
 
 def _fault_of_nodes(robot: Robot, n_cells: int, tree: CutTree) -> str:
     """Why the nodes form no tree for this robot and so many cells; empty when they do."""
-    waiting: list[tuple[object, int]] = [(tree.root, 0)]
-    count = 0
-    while waiting:
-        node, depth = waiting.pop()
-        count += 1
-        if count > MOST_NODES:
+    for count, node in enumerate(tree.nodes()):
+        if count == MOST_NODES:
             return f"the tree has more than {MOST_NODES:,} nodes"
-        if depth > MOST_CUTS_DEEP:
-            return f"the tree is more than {MOST_CUTS_DEEP:,} cuts deep"
         if isinstance(node, Leaf):
             if not is_whole(node.cell, 0, n_cells - 1):
                 return f"a leaf names cell {shown(node.cell)}; there are {n_cells}, counted from 0"
-        elif isinstance(node, Cut):
-            if not is_whole(node.joint, 0, robot.n - 1):
-                what = f"which is none of the {robot.n} joints"
-                return f"a cut goes through joint {shown(node.joint)}, {what}"
-            if not is_number(node.value):
-                return f"a cut has the value {shown(node.value)}, which is no number"
-            waiting += [(node.above, depth + 1), (node.below, depth + 1)]
-        else:
+        elif not isinstance(node, Cut):
             return f"a node is neither a cut nor a leaf but {type(node).__name__}"
+        elif not is_whole(node.joint, 0, robot.n - 1):
+            what = f"which is none of the {robot.n} joints"
+            return f"a cut goes through joint {shown(node.joint)}, {what}"
+        elif not is_number(node.value):
+            return f"a cut has the value {shown(node.value)}, which is no number"
     return ""

@@ -102,7 +102,7 @@ def what_opens(tree: CutTree, walk: Array, robot: Robot, cells: Cells) -> str:
         name = robot.joint_names[joint]
         return f"{name} then passes {joint_value(robot, joint, value)}, which it cannot now"
     text = f"cell {_cell(found, cells)} can then be covered"
-    path = tree.path_to(walk[0])
+    path, _ = tree.path_to(walk[0])
     if path:
         cut, above = path[-1]
         text += f" {'above' if above else 'below'} {place_of(cut, robot)}, where it cannot now"

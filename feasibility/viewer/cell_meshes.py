@@ -186,7 +186,7 @@ def sides_of(verdict: Verdict) -> Sides | None:
     cut = proof.root
     reached = np.zeros((2, len(verdict.cells)), dtype=bool)
     for q, cells in zip(verdict.postures, verdict.components, strict=True):
-        (_, above), *_ = proof.path_to(q)
+        (_, above), *_ = proof.path_to(q)[0]
         reached[int(above), cells] = True
     labels = np.full(len(verdict.cells), -1, dtype=np.int64)
     labels[reached[0]] = BELOW

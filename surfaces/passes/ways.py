@@ -75,7 +75,7 @@ def followed(surface: Surface, points: Array, normals: Array, way: ToolWay) -> L
         cut = (off > way.within) | (level < TURNING) & (leans > LEANS)
         if not cut.any():
             break
-        new = base.at(base.nearest(middle[cut], middle[cut], np.inf))
+        new = base.at(base.nearest(middle[cut], middle[cut], np.inf))[:2]
         at = np.flatnonzero(cut) + 1
         line = Line(*(np.insert(old, at, put, axis=0) for old, put in zip(line, new, strict=True)))
     return line

@@ -15,7 +15,7 @@ from feasibility.certification import lever_bounds
 from feasibility.certification.cells_reached import at_targets, cells_reached
 from feasibility.certification.faults import less_deviations
 from feasibility.certification.lever_bounds import jacobians, levers_along, longest_levers, peaks
-from feasibility.certification.motion_replay import limits
+from feasibility.certification.motion_replay import limits, replay_over_surface
 from feasibility.certification.pose_replay import order_of_marks, order_of_places
 from feasibility.certification.stretches import Judge
 from feasibility.certification.tool_along import exact_faults
@@ -274,6 +274,9 @@ def test_a_cell_is_looked_for_all_along_the_way_past_it(reached, turn):
     rows = np.column_stack([[-2e-3, 2e-3], tilt])
     judge = Judge(robot, task, cells.surface, cells, rows)
     assert cells_reached(judge, task, judge.at_rows(), np.ones((2, 2))).all() == reached
+    lifted = np.array([True, False, True])  # on the way, and back where it is
+    found = replay_over_surface(robot, cells, task, rows[[0, 1, 1]], working=lifted)
+    assert not found.reached.any()
 
 
 @pytest.mark.parametrize(("j", "end"), [(0, "lower"), (2, "upper")])

@@ -163,7 +163,7 @@ def test_no_region_around_a_known_place_is_said_to_be_empty(seed):
             turns = np.where(arm.prismatic, 0, 2.0 * np.pi * rng.integers(-1, 2, arm.n))
             region = JointRegion(q - size[0] + turns, q + size[1] + turns)
             claims = [Claim("a region", region, None, 0)]
-            assert case.emptiness.test(claims, NoRefutation(), 600).failed is not None
+            assert case.emptiness.test(claims, NoRefutation(), 600).refusal
 
 
 UR5 = load_robot("ur5")

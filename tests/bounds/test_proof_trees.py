@@ -187,8 +187,8 @@ SHAPES = {
     "joint j2 is opened at nan": CutTree(Leaf(0), opened=((1, np.nan),)),
     "joint j2 is opened twice": CutTree(Leaf(0), opened=((1, 0.0), (1, 1.0))),
     "opened joints are no pairs": CutTree(Leaf(0), opened=(1,)),
-    "more than 1,000 cuts deep": CutTree(DEEP),
     "more than 10,000 nodes": CutTree(WIDE),
+    "has more than 10,000 nodes": CutTree(DEEP),
 }
 
 

@@ -187,9 +187,8 @@ def test_what_a_cut_parts_is_proved_and_named():
     postures, cells = tree.folded(verdict.postures), [c.tolist() for c in verdict.components]
     best = postures[cells.index(np.flatnonzero(verdict.covered).tolist())]
     for cause in apart:
-        cut = tree.parting(
-            best, next(postures[k] for k in range(len(cells)) if cause.cell in cells[k])
-        )
+        other = next(postures[k] for k in range(len(cells)) if cause.cell in cells[k])
+        cut = tree.path_to(best, other)[1]
         assert cause.detail.endswith("above" if best[cut.joint] > cut.value else "below")
 
 

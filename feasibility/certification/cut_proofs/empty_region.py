@@ -69,16 +69,18 @@ class Claim(NamedTuple):
     """That target, or all of the surface, as a part."""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Outcome:
-    """What became of some claims."""
+class ProofCheck(NamedTuple):
+    """What became of a proof."""
 
     boxes: int
-    """How many boxes were looked at."""
-    failed: int | None = None
-    """The index of a claim that is not confirmed; None when all are."""
-    point: Array | None = None
-    """(n,) a configuration that refutes it, if one was found."""
+    """How many boxes of joints and surface, or of the tool's tilt and roll, were looked at."""
+    refusal: str = ""
+    """Why it is refused; empty when it is accepted."""
+
+    @property
+    def accepted(self) -> bool:
+        """True when every claim is confirmed."""
+        return not self.refusal
 
 
 @dataclass(eq=False, slots=True)
@@ -98,7 +100,7 @@ class Emptiness:
     blamed: set[int] = field(default_factory=set)
     """Indices of the pairs that were found to overlap all over some box."""
 
-    def test(self, claims: list[Claim], refuter: Refuter, most: int) -> Outcome:
+    def test(self, claims: list[Claim], refuter: Refuter, most: int) -> ProofCheck:
         """Confirm all claims, refute one, or give up after `most` boxes."""
         regions = [claim.region.folded(self.kinematics.robot.prismatic) for claim in claims]
         first = [k for k, region in enumerate(regions) if not region.empty]
@@ -111,7 +113,8 @@ class Emptiness:
         )
         while len(waiting):
             if done >= most:
-                return Outcome(done, int(waiting.claim.min()))
+                what = f"{claims[int(waiting.claim.min())].what} cannot be confirmed"
+                return ProofCheck(done, f"{what}: after {done:,} boxes it is still open")
             self.tick()
             # The newest first, so that few wait.
             boxes, waiting = waiting.of(slice(-BATCH, None)), waiting.of(slice(-BATCH))
@@ -128,10 +131,14 @@ class Emptiness:
                 if found is not None and (
                     self.overlapping is None or self.overlapping.clear(found[1])
                 ):
-                    return Outcome(done, int(left.claim[some[found[0]]]), found[1])
+                    claim = claims[int(left.claim[some[found[0]]])]
+                    where = "on the surface" if claim.cell is None else "at its target"
+                    values = ", ".join(f"{value:.4f}" for value in found[1])
+                    said = f"{claim.what} is wrong: the tool can be {where} at q = [{values}]"
+                    return ProofCheck(done, said)
             new = smaller(left, models, self.parts, self.allowed.length)
             waiting = Boxes.join(waiting, new)
-        return Outcome(done)
+        return ProofCheck(done)
 
     def examine(self, boxes: Boxes) -> tuple[Boxes, Models, Array]:
         """The boxes that are not proved empty, their models, and where these come nearest."""
@@ -226,7 +233,7 @@ class ArmCollisions:
         engine = Emptiness(Kinematics(self._robot), parts, allowed, tick, self._overlapping)
         refuter = Refuter(self._robot, self._cells, self._task, allowed.length)
         found = engine.test([Claim("", self._region, cell, cell)], refuter, most)
-        if found.failed is not None:
+        if not found.accepted:
             return Collides(False, found.boxes)
         pairs = [self._bodies.pairs[k] for k in sorted(engine.blamed)]
         return Collides(True, found.boxes, tuple((pair.first, pair.second) for pair in pairs))

@@ -25,7 +25,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -33,7 +32,7 @@ from coverable.arrays import Array
 from feasibility.certification.collisions.every_pose import never_clear
 from feasibility.certification.collisions.everywhere import Overlapping
 from feasibility.certification.cut_proofs.box_cutting import TURN, JointRegion
-from feasibility.certification.cut_proofs.empty_region import Claim, Emptiness, Outcome
+from feasibility.certification.cut_proofs.empty_region import Claim, Emptiness, ProofCheck
 from feasibility.certification.cut_proofs.linear_models import (
     Allowed,
     Parts,
@@ -61,21 +60,6 @@ FINE = 0.25  # of tolerance and cone, that the finest parts of the surface may b
 NARROWEST = 1e-6  # a chord that parts of the surface are made for, at least
 
 
-@dataclass(frozen=True, slots=True)
-class ProofCheck:
-    """What became of a proof."""
-
-    refusal: str
-    """Why it is refused; empty when it is accepted."""
-    boxes: int
-    """How many boxes of joints and surface, or of the tool's tilt and roll, were looked at."""
-
-    @property
-    def accepted(self) -> bool:
-        """True when every cut and every leaf of the tree is confirmed."""
-        return not self.refusal
-
-
 def verify_proof(
     robot: Robot,
     cells: Cells,
@@ -94,24 +78,24 @@ def verify_proof(
     """
     fault = out_of_line(robot) or malformed(robot, len(cells), tree)
     if fault:
-        return ProofCheck(fault, 0)
+        return ProofCheck(0, fault)
     tick()
     if isinstance(tree.root, Leaf):
         point, approach = (each[tree.root.cell] for each in task.targets(cells)[:2])
         if too_far(robot, point, task.effective_tolerance):
-            return ProofCheck("", 0)
+            return ProofCheck(0)
         bodies = gather(robot, cells.surface, task.collision, task.standoff)
         if bodies is not None:
             most_off = task.cone, task.effective_tolerance
             alone = never_clear(robot, bodies, *most_off, point, approach, tick)
             if alone.confirmed:
-                return ProofCheck("", alone.boxes)
+                return ProofCheck(alone.boxes)
         return verify_on(robot, cells, task, tree, None, tick, most)
     cone = max(min(task.cone_chord, 1.0), NARROWEST)
     try:
         parts = cells.surface.parts(FINE * task.effective_tolerance, FINE * cone)
     except SurfaceError as error:
-        return ProofCheck(f"the surface has no bounds to prove anything with: {error}", 0)
+        return ProofCheck(0, f"the surface has no bounds to prove anything with: {error}")
     return verify_on(robot, cells, task, tree, parts, tick, most)
 
 
@@ -169,13 +153,13 @@ def verify_on(
         fault, first = disagreement(cells, parts), len(parts)
         held = held.join(target_parts(parts, cells, task), held)
     if fault:
-        return ProofCheck(fault, 0)
+        return ProofCheck(0, fault)
     whole = tree.root.cell if parts is None and isinstance(tree.root, Leaf) else 0
     limits, fault = _finite_slides(
         robot, held.of(slice(whole, whole + 1)), task.effective_tolerance
     )
     if fault:
-        return ProofCheck(fault, 0)
+        return ProofCheck(0, fault)
     allowed = Allowed.by(task, robot, limits.low, limits.high)
 
     claims = list(_claims(robot, cells, tree, limits, first))
@@ -184,17 +168,15 @@ def verify_on(
     refuter = Refuter(robot, cells, task, allowed.length)
     bodies = gather(robot, cells.surface, task.collision, task.standoff)
 
-    def tested(boxes: int, overlapping: Overlapping | None = None) -> Outcome:
+    def tested(boxes: int, overlapping: Overlapping | None = None) -> ProofCheck:
         return Emptiness(Kinematics(robot), held, allowed, tick, overlapping).test(
             claims, refuter, boxes
         )
 
     found = tested(most if bodies is None else min(most, WITHOUT_BODIES))
-    if found.failed is not None and bodies is not None:
+    if not found.accepted and bodies is not None:
         found = tested(most, Overlapping(robot, bodies))
-    if found.failed is None:
-        return ProofCheck("", found.boxes)
-    return ProofCheck(_refusal(claims[found.failed], found), found.boxes)
+    return found
 
 
 def _finite_slides(robot: Robot, surface: Parts, tolerance: float) -> tuple[JointRegion, str]:
@@ -241,12 +223,3 @@ def _claims(
         yield Claim(what, region.within(joint, value, value), None, 0)
         waiting.append((node.above, region.within(joint, value, np.inf)))
         waiting.append((node.below, region.within(joint, -np.inf, value)))
-
-
-def _refusal(claim: Claim, found: Outcome) -> str:
-    """Why a claim is not confirmed, in words."""
-    if found.point is None:
-        return f"{claim.what} cannot be confirmed: after {found.boxes:,} boxes it is still open"
-    place = "on the surface" if claim.cell is None else "at its target"
-    q = ", ".join(f"{value:.4f}" for value in found.point)
-    return f"{claim.what} is wrong: the tool can be {place} at q = [{q}]"

@@ -1,7 +1,7 @@
 """Why the best motion misses a cell that another one covers: where it stopped, or a proved cut."""
 
 from feasibility.collisions.problem_bodies import Pair
-from feasibility.cut_tree import CutTree
+from feasibility.cut_tree import CutTree, Leaf
 from feasibility.cut_words import nowhere
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import Blocked
@@ -61,9 +61,9 @@ def _parted(exploration: Exploration, proof: CutTree, other: int, roots: set[int
     All of a component is on one side of each cut of its region: one configuration is enough.
     """
     best = exploration.posture(exploration.best)
-    cuts = {root: proof.parting(best, exploration.posture(root)) for root in roots}
+    cuts = {root: proof.path_to(best, exploration.posture(root))[1] for root in roots}
     cut = cuts[other]
-    if cut is None or None in cuts.values():
+    if isinstance(cut, Leaf) or any(isinstance(one, Leaf) for one in cuts.values()):
         return ""
     where = "on the surface" if cut is proof.root else "in that part of the joint space"
     above = proof.folded(best)[cut.joint] > cut.value
