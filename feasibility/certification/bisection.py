@@ -48,7 +48,8 @@ class Rows:
 
     def of(self, rows: Chosen) -> Self:
         """Some of the rows of every field."""
-        return type(self)(*(_some(value, rows) for value in self._values()))
+        values = self._values()
+        return type(self)(*(x[rows] if isinstance(x, np.ndarray) else x.of(rows) for x in values))
 
     @classmethod
     def join(cls, *parts: Self) -> Self:
@@ -58,11 +59,6 @@ class Rows:
     def _values(self) -> list[Any]:
         """What is in the fields."""
         return [getattr(self, one.name) for one in fields(self)]  # type: ignore[arg-type]
-
-
-def _some(value: Any, rows: Chosen) -> Any:
-    """Some rows of an array, or of a value of rows."""
-    return value[rows] if isinstance(value, np.ndarray) else value.of(rows)
 
 
 def _joined(*values: Any) -> Any:

@@ -27,8 +27,7 @@ from robots.robot import Robot
 from robots.shapes.bodies import Fineness, Polytope, Solid, Triangles
 from robots.shapes.coal_shapes import coal_distance
 from robots.shapes.link_pairs import LeftOut, LinkPairs, link_pairs, with_crude_links_cut
-from robots.shapes.links import LinkShapes, link_shapes, outer_bodies
-from robots.shapes.tool import tool_line, tool_reach
+from robots.shapes.links import LinkShapes, link_shapes, outer_bodies, tool_line, tool_reach
 from surfaces.sheet import sheet_of
 from surfaces.surface import Surface
 
@@ -80,8 +79,7 @@ def gathered(robot: Robot, surface: Surface, collision: Collision, standoff: flo
             *pairs.notes,
             *(note for one in collision.scene for note in one.notes),
             *overlapping(collision, polytopes, left_out),
-            *collision.notes_on(standoff),
-            *_beyond(robot, solids, owners, asked, standoff),
+            *_beside_standoff(robot, solids, collision, owners, asked, standoff),
         ),
     )
 
@@ -144,12 +142,19 @@ def bare_stretch(robot: Robot, collision: Collision) -> dict[str, str]:
     }
 
 
-def _beyond(
-    robot: Robot, solids: Iterable[Solid], tool: set[str], pairs: Iterable[Pair], standoff: float
-) -> list[str]:
-    """That the tool's bodies reach further beyond its point than the standoff leaves them."""
-    needed = {pair.first: pair.clearance for pair in pairs if pair.second == SURFACE}
-    return [
+def _beside_standoff(
+    robot: Robot, solids: Iterable[Solid], collision: Collision, tool: set[str],
+    pairs: Iterable[Pair], standoff: float,
+) -> list[str]:  # fmt: skip
+    """That clearances of the tool, or what it reaches beyond its point, are more than it leaves."""
+    needed, notes = {pair.first: pair.clearance for pair in pairs if pair.second == SURFACE}, []
+    if collision.surface and collision.tool_clearance > standoff:
+        notes.append(
+            f"tool_clearance ({1e3 * collision.tool_clearance:g} mm) is larger than the standoff "
+            f"({1e3 * standoff:g} mm): no shape of the tool may be nearer than "
+            f"{1e3 * (collision.tool_clearance - standoff):g} mm to the tool point."
+        )
+    return notes + [
         f"shapes of {owner} reach {1e3 * beyond:.1f} mm beyond the tool point, and have to stay "
         f"{1e3 * needed[owner]:g} mm off the surface; the standoff is {1e3 * standoff:g} mm"
         for owner, beyond in tool_reach(robot, solids).items()

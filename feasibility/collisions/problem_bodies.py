@@ -16,6 +16,7 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pinocchio as pin
 
 from coverable.arrays import Array
 from feasibility.collisions.scene import Obstacle, ToolShape
@@ -108,16 +109,11 @@ def tool_solids(tool: Sequence[ToolShape], robot: Robot) -> tuple[Solid, ...]:
     return tuple(_on(robot, robot.tool_link_id, TOOL, shape) for shape in tool)
 
 
-def scene_solids(scene: Iterable[Obstacle], robot: Robot) -> tuple[Solid, ...]:
+def scene_solids(scene: Sequence[Obstacle], robot: Robot) -> tuple[Solid, ...]:
     """Each object on what carries it; links that they name have to exist."""
-    import pinocchio as pin
-
-    def frame_of(one: Obstacle) -> int:
-        if one.frame is None:
-            return robot.world_frame_id
-        return int(robot.model.getFrameId(one.frame, pin.FrameType.BODY))
-
-    return tuple(_on(robot, frame_of(one), one.name, one) for one in scene)
+    link, world = pin.FrameType.BODY, robot.world_frame_id
+    frames = (robot.model.getFrameId(one.frame, link) if one.frame else world for one in scene)
+    return tuple(_on(robot, frame, one.name, one) for frame, one in zip(frames, scene, strict=True))
 
 
 def _on(robot: Robot, number: int, owner: str, shape: Obstacle | ToolShape) -> Solid:

@@ -130,28 +130,13 @@ class Collision:
         pairs = [(f"allow[{k}]", pair) for k, pair in enumerate(self.allow)]
         pairs += [(f"clearances[{k}].pair", row[:2]) for k, row in enumerate(self.clearances)]
         what = "a link, an object of the scene, 'surface' or 'tool'"
-        for key, pair in pairs:
-            for name in pair:
-                if name == SURFACE and not self.surface:
-                    text = "names the surface, which is not checked; write surface = true"
-                    faults.append(Fault(key, text))
-                else:
-                    faults += _stranger(key, name, known, what)
+        for key, name in ((key, name) for key, pair in pairs for name in pair):
+            if name == SURFACE and not self.surface:
+                text = "names the surface, which is not checked; write surface = true"
+                faults.append(Fault(key, text))
+            else:
+                faults += _stranger(key, name, known, what)
         return faults
-
-    def notes_on(self, standoff: float) -> tuple[str, ...]:
-        """What a user should know about these numbers under a task, one sentence each.
-
-        Args:
-            standoff: m, between surface and tool point.
-        """
-        if not self.surface or self.tool_clearance <= standoff:
-            return ()
-        return (
-            f"tool_clearance ({1e3 * self.tool_clearance:g} mm) is larger than the standoff "
-            f"({1e3 * standoff:g} mm): no shape of the tool may be nearer than "
-            f"{1e3 * (self.tool_clearance - standoff):g} mm to the tool point.",
-        )
 
 
 def _objects(checks: Checks, scene: Any, tool: Any) -> dict[str, tuple[Any, ...]]:

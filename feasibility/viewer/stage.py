@@ -22,7 +22,7 @@ from feasibility.viewer.robot_visuals import SKELETON, joint_paths
 from feasibility.viewer.threejs import Command
 from robots.kinematics import Kinematics
 from robots.robot import Robot
-from robots.shapes.tool import tool_line
+from robots.shapes.links import tool_line
 from surfaces.cells import Cells
 
 GROUP = "/with the surface"

@@ -138,7 +138,7 @@ def test_no_bound_is_above_a_distance(step):
             for one in pairings(UR5, q, solid, things):
                 for first, last in ((0.0, 1.0), (1.25, 1.75), (2.5, 3.0)):
                     times = np.linspace(first, last, 9)
-                    truth = one.measured(times).min()
+                    truth = one.lines(times)[0].min()
                     n = rng.normal(size=3) if truth <= 0.0 else one._gaps(*one.motion.poses(
                         one.a.joint, one.b.joint, times[4:5]))[1][0]  # fmt: skip
                     found = one.parted(np.array([[first, last]]), n[None])[0]
@@ -168,7 +168,7 @@ def test_clearance_of_many_triangles_is_never_above_the_distance_and_seldom_far_
         bent = [q + np.array([0.0, 0.0, way]) for way in (-off, 0.0, off)]
         ways = [pairings(robot, one, solid, [], None, 0.0, [soup]) for one in bent]
         times = np.arange(float(len(q)))
-        truth = min(one.measured(times).min() for (one,) in ways)
+        truth = min(one.lines(times)[0].min() for (one,) in ways)
         for needed in (0.5 * max(truth, 0.0), max(truth, 0.0) + 1e-4):
             bodies = bodies_of([solid], [], [pair("tool", "surface", needed)], [soup])
             deviations = np.full((len(rows) - 1, 3), [0.0, 0.0, off])
@@ -203,7 +203,7 @@ def test_a_closer_look_certifies_no_more_than_there_is(calls):
         ((one,), (fine,)) = (
             pairings(robot, each, solid, [], None, 0.0, [soup]) for each in (rows, q)
         )
-        truth = fine.measured(np.arange(len(q), dtype=float)).reshape(-1, 15).min(axis=1)
+        truth = fine.lines(np.arange(len(q), dtype=float))[0].reshape(-1, 15).min(axis=1)
         one.certify(0.0)
         if one.refused is not None:
             continue

@@ -9,9 +9,8 @@ import trimesh
 from coverable import RobotError, load_robot
 from robots.shapes.bodies import Solid
 from robots.shapes.link_pairs import link_pairs
-from robots.shapes.links import link_shapes
+from robots.shapes.links import link_shapes, tool_reach
 from robots.shapes.solids import checked_triangles
-from robots.shapes.tool import tool_reach
 from robots.urdf.link_shapes import Capsule, Sphere
 
 SRDF = '<robot name="x">{}</robot>'

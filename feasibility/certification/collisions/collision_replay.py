@@ -152,7 +152,7 @@ def _judged(pairings: list[Pairing]) -> CollisionReplay:
     for one in sorted(pairings, key=lambda one: one.bound):
         if not one.bound < nearest:
             break
-        distance = float(one.measured(np.array([np.argmin(one.low)], float))[0])
+        distance = float(one.lines(np.array([np.argmin(one.low)], float))[0][0])
         if distance < nearest:
             nearest, met = distance, one
     for one in pairings:

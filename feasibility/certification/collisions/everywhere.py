@@ -60,12 +60,9 @@ class Points(NamedTuple):
         return Points(solid.owner, solid.joint, places @ place[:3, :3].T + place[:3, 3], deep)
 
 
-class _Couples(NamedTuple):
-    """Points, and the bodies that they may be inside."""
-
-    points: Points
-    bodies: list[tuple[Solid, Geometry | Balls, int]]
-    """Each with the shape, or balls, whose inside is known, and the index of the pair."""
+_Couples = tuple[Points, list[tuple[Solid, Geometry | Balls, int]]]
+"""Points, and the bodies that they may be inside: each with the shape, or balls, whose inside is
+known, and the index of the pair."""
 
 
 class Deepest(NamedTuple):
@@ -117,7 +114,7 @@ class Overlapping:
         """
         self._robot, self._bodies, self._kinematics = robot, bodies, Kinematics(robot)
         self._alone, self._couples = beside is not None, _couples(bodies, beside)
-        self.most_points = max((len(one.points.places) for one in self._couples), default=0)
+        self.most_points = max((len(one.places) for one, _ in self._couples), default=0)
         """In any body; 0 where nothing can be proved."""
 
     def _middles(self, low: Array, high: Array, target: Array, off: Array | float) -> _Middles:
@@ -187,7 +184,7 @@ class Overlapping:
         The pair; by how much points are too near, (m, k) m; the first joint that moves them, and by
         how much each does, (m, k) m, unless only places count.
         """
-        points, steps, from_tool = couples.points, list[Array](), list[Array]()
+        (points, beside), steps, from_tool = couples, list[Array](), list[Array]()
         x = np.broadcast_to(points.places, (len(boxes.half), *points.places.shape))
         if points.joint:
             x = x @ boxes.rotations[:, points.joint].transpose(0, 2, 1)
@@ -197,7 +194,7 @@ class Overlapping:
         if moved:
             from_tool = self._steps_from_tool(boxes, x, points.joint or self._robot.n)
         shifted = x if self._alone else x + (boxes.target - boxes.tool)[:, None]
-        for body, shape, pair in couples.bodies:
+        for body, shape, pair in beside:
             kept = points.deep + self._bodies.pairs[pair].clearance - GUARD
             seen = [] if self._alone else [(x, steps, body.joint, np.zeros((len(x), 1)))]
             if self._alone or body.joint == 0:
@@ -270,5 +267,5 @@ def _couples(bodies: Bodies, beside: Sequence[Points] | None) -> list[_Couples]:
             if some.joint > body[0].joint or some.joint == 0 < body[0].joint
         ]
         if inside_of and len(some.places):
-            found.append(_Couples(some, inside_of))
+            found.append((some, inside_of))
     return found

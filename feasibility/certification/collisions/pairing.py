@@ -105,10 +105,6 @@ class Pairing:
                 found[k] = min(0.0, a.distance(b, place, hulls=True)[0])
         return found - a.deviation - b.deviation, np.nan_to_num(ends)
 
-    def measured(self, times: Array) -> Array:
-        """(k,) m, the distances at instants (k,), see `lines`."""
-        return self.lines(times)[0]
-
     def least_measured(self, finest: float, also: float | None = None) -> tuple[float, float]:
         """An instant, in rows, and the distance (m) there: the least that is met on the motion.
 
@@ -126,13 +122,13 @@ class Pairing:
         also = self.met if also is None else also
         times = np.append(rows, also if finest < 1.0 else np.floor(also))
         step = 2.0 ** math.ceil(math.log2(last / len(parts)))
-        found = self.measured(times)
+        found = self.lines(times)[0]
         while True:
             least, time = float(found.min()), float(times[np.argmin(found)])
             if step < finest:
                 return time, least
             times = np.array([time - step, time, time + step]).clip(0.0, last)
-            found = np.append(self.measured(times[::2]), least)[[0, 2, 1]]
+            found = np.append(self.lines(times[::2])[0], least)[[0, 2, 1]]
             step *= 0.5
 
     def certify(self, nearest: float, most: tuple[int, int] = CALLS) -> None:
