@@ -21,11 +21,7 @@ def gather(
 ) -> Bodies | None:
     """All bodies and pairs of one problem; None where collisions are not checked.
 
-    Args:
-        robot: the arm.
-        surface: what it works on.
-        collision: what has to stay clear of what.
-        standoff: m; where it is 0 the tool touches the surface, and that pair is left out.
+    Where the standoff (m) is 0 the tool touches the surface, and that pair is left out.
 
     Raises:
         RobotError: no link has a shape, or the SRDF is not of this arm.

@@ -90,12 +90,7 @@ class Bodies:
 
 
 def at_rest(solid: Solid, reach: float) -> list[Polytope] | Soup:
-    """Convex bodies that together hold an object at rest, or its triangles: a mesh not convex.
-
-    Args:
-        solid: an object of the scene.
-        reach: see `bounded`.
-    """
+    """Convex bodies that together hold an object at rest; of a mesh not convex its triangles."""
     mesh, place = solid.geometry, solid.placement
     # The hull of a convex mesh with more vertices would be thinned.
     if isinstance(mesh, Triangles) and (len(mesh.vertices) > MOST_VERTICES or not is_convex(mesh)):
@@ -126,14 +121,11 @@ def _on(robot: Robot, number: int, owner: str, shape: Obstacle | ToolShape) -> S
 def bounded(solid: Solid, reach: float) -> Solid:
     """The same, but for a half space, which becomes a box beneath its plane.
 
-    Every point x that matters is within `reach` of the origin. The box begins beneath the origin,
-    at its projection onto the plane, and is `reach` wide to each side and reach + |height of the
-    origin| deep, so the place of the half space that is nearest to x, which is x itself or its
-    projection onto the plane, lies in the box: their distances to x are one.
-
-    Args:
-        solid: an object of the scene.
-        reach: m, no point of a body gets further from the origin of the joint's frame.
+    Every point x that matters is within `reach` (m) of the origin of the joint's frame. The box
+    begins beneath the origin, at its projection onto the plane, and is `reach` wide to each side
+    and reach + |height of the origin| deep, so the place of the half space that is nearest to x,
+    which is x itself or its projection onto the plane, lies in the box: their distances to x are
+    one.
     """
     if not isinstance(solid.geometry, HalfSpace):
         return solid
@@ -150,13 +142,7 @@ NOTED = 5e-3  # [m] of overlap: the base of a ur5, as drawn, ends 4 mm below its
 def overlapping(
     collision: Collision, bodies: Sequence[Polytope], left_out: Iterable[LeftOut]
 ) -> list[str]:
-    """A sentence for each object at rest that a link at rest overlaps, and is not allowed to.
-
-    Args:
-        collision: with the objects, and what is allowed.
-        bodies: convex ones.
-        left_out: all pairs that are not checked.
-    """
+    """A sentence for each object at rest that a link at rest overlaps, and is not allowed to."""
     notes, allowed = [], {frozenset(pair) for pair in collision.allow}
     objects = {one.name for one in collision.scene}
     for pair in (one for one in left_out if one.why == "rigid" and one.second in objects):

@@ -111,11 +111,7 @@ class Collision:
         return replace(self, clearance=self.clearance + more, clearances=rows, scene=scene)
 
     def unknown_names(self, links: Sequence[str]) -> list[Fault]:
-        """Faults of names that are neither links of the arm nor objects, to be raised with others.
-
-        Args:
-            links: all links of the arm, those without shapes too.
-        """
+        """Faults of names that are neither links of the arm nor objects, to be raised later."""
         objects = [obstacle.name for obstacle in self.scene]
         known = [*links, *objects, *([SURFACE] if self.surface else []), TOOL]
         faults = [

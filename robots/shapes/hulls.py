@@ -68,15 +68,12 @@ def rims(radius: float, length: float, count: int) -> Array:
 
 
 def outer_hull(points: Array) -> Outline:
-    """A convex body of at most `MOST_VERTICES` that holds some points.
+    """A convex body of at most `MOST_VERTICES` that holds some points (k, 3) m, k >= 1.
 
     Where the hull has more vertices, the one furthest outside is added to those kept until there
     are enough, or none is further outside than `CLOSE_ENOUGH`; the radius is then an upper bound on
     the distance of any point from the hull of those kept. Flat points are first given a thickness
     of `HALF_THICKNESS` to each side, which Qhull needs.
-
-    Args:
-        points: (k, 3) m, finite, at least one.
     """
     from scipy.spatial import ConvexHull, QhullError
 
@@ -212,11 +209,7 @@ def _best_cut(along: Array, points: Array) -> tuple[float, list[float]]:
 
     Planes lie between bins of even width; with v(i, j) the volume of the hull of bins i .. j - 1,
     and w what a slab has to save, the least volume of slabs over the first j bins, and w for each,
-    is min over i of best(i) + v(i, j) + w.
-
-    Args:
-        along: (k,) m, of the points across the slabs; planes rise with it.
-        points: (k, 3) m.
+    is min over i of best(i) + v(i, j) + w. Planes rise along that coordinate (k,) of the points.
     """
     whole = hull_volume(points)
     borders = np.linspace(along.min(), along.max(), BINS + 1)

@@ -79,10 +79,7 @@ def link_pairs(
     prove nothing.
 
     Args:
-        robot: the arm.
-        shapes: of its links.
         allow: pairs of names that the user leaves out; others than these are passed over.
-        srdf: path of an SRDF.
         tool: exact shapes on the last joint that are no link's.
 
     Raises:
@@ -186,12 +183,7 @@ def _strangers(
 
 
 def faults_of_srdf(path: str | os.PathLike[str], links: Collection[str]) -> list[Fault]:
-    """What is wrong with an SRDF, to be reported with other faults before any shape is made.
-
-    Args:
-        path: of the file.
-        links: all links of the arm.
-    """
+    """What is wrong with an SRDF, to be reported with other faults before any shape is made."""
     try:
         return _strangers(path, read_srdf(path), links)
     except UrdfError as error:
@@ -246,13 +238,7 @@ def collision_rates(
 
 
 def with_crude_links_cut(robot: Robot, shapes: LinkShapes, pairs: Sequence[Pair]) -> LinkShapes:
-    """The same shapes, with the links of some pairs cut into convex pieces; others keep their hull.
-
-    Args:
-        robot: the arm.
-        shapes: of its links, with one hull for each shape.
-        pairs: of owners of bodies, that have to stay apart.
-    """
+    """The same shapes, with crude links of pairs that stay apart cut into convex pieces."""
     exact = {solid.owner for solid in shapes.solids}
     known = [pair for pair in pairs if exact.issuperset(pair)]
     q = random_configurations(robot)[:LOOKED_AT]

@@ -29,13 +29,8 @@ _known: dict[tuple[bytes, str, tuple[float, float, float]], Triangles] = {}
 def checked_triangles(vertices: Array, faces: Ints, what: str = "the mesh") -> Triangles:
     """Triangles that a native library may see.
 
-    Vertices that are equal are joined, and triangles that name a vertex twice are dropped. Those
-    of a solid look outwards.
-
-    Args:
-        vertices: (k, 3) m.
-        faces: (m, 3) indices of vertices.
-        what: has the triangles, for the message.
+    Vertices (k, 3) that are equal are joined, and triangles that name a vertex twice are dropped.
+    Those of a solid look outwards.
 
     Raises:
         RobotError: a number is not finite or beyond 10 km, an index names no vertex, or no triangle
@@ -73,13 +68,9 @@ def checked_triangles(vertices: Array, faces: Ints, what: str = "the mesh") -> T
 def solid_faces(vertices: Array, faces: Ints) -> Ints | None:
     """The triangles of a solid, looking outwards; None where they are a sheet.
 
-    They bound a solid where each edge has two of them and they enclose a volume. Where they do not
-    agree about the outer side, as in careless files, each piece is turned to look outwards; where
-    no reversal makes them agree, they are a sheet.
-
-    Args:
-        vertices: (k, 3) m, equal ones joined.
-        faces: (m, 3) indices of vertices, m >= 1.
+    They bound a solid where each edge has two of them and they enclose a volume; vertices that are
+    equal have been joined. Where they do not agree about the outer side, as in careless files, each
+    piece is turned to look outwards; where no reversal makes them agree, they are a sheet.
     """
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     upwards = edges[:, 0] < edges[:, 1]
@@ -111,14 +102,9 @@ def solid_faces(vertices: Array, faces: Ints) -> Ints | None:
 def _turned(sides: Ints, agree: Mask, volumes: Array) -> Array | None:
     """(m,) 1 for a triangle to be kept, -1 for one to be turned over; None where nothing helps.
 
-    Each is two nodes of a graph, kept and turned over, and neighbours join those that agree: a
-    piece is two components, mirror images. That of more volume is taken; a piece with one side is
-    one component.
-
-    Args:
-        sides: (e, 2) the two triangles at each edge.
-        agree: (e,) whether they do.
-        volumes: (m,) of the triangles as they are.
+    Each is two nodes of a graph, kept and turned over, and the two at each edge (e, 2) join those
+    that agree: a piece is two components, mirror images. That of more volume is taken; a piece with
+    one side is one component.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -140,10 +126,8 @@ def mesh_reader(paths: Iterable[str]) -> Callable[[MeshFile], Triangles]:
     """Reads the meshes of one robot's links; each content is read and checked once a process.
 
     What it gives are triangles, scaled, m; the same object for the same content. It raises a
-    RobotError where a file cannot be read, or its triangles cannot be used.
-
-    Args:
-        paths: of files that will be asked for; see `MeshFiles`.
+    RobotError where a file cannot be read, or its triangles cannot be used. The paths are those
+    that will be asked for; see `MeshFiles`.
     """
     files = MeshFiles(paths, most_seconds=MOST_SECONDS)
 

@@ -113,14 +113,10 @@ couples_of = lru_cache(maxsize=KEPT)(Couples)  # for the next motion among them
 def collision_replay(
     robot: Robot, bodies: Bodies, q: Array, deviations: Array | None = None
 ) -> CollisionReplay:
-    """Judge a motion that is straight in joint space between its rows.
+    """Judge a motion that is straight in joint space between its rows q (m, n), unwrapped.
 
-    Args:
-        robot: the arm.
-        bodies: everything that can collide, and the pairs that are checked.
-        q: (m, n) rows, rad or m, unwrapped. Values that are not finite refuse.
-        deviations: (m - 1, n) bounds on how far each joint is from the straight lines, for motions
-            that are curved between rows; none by default.
+    Values that are not finite refuse. Of motions that are curved between rows, `deviations`
+    (m - 1, n) bound how far each joint is from the straight lines.
 
     Raises:
         ArgumentError: a pair names what has no body, or q or deviations have other shapes.

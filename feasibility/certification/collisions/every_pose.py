@@ -58,13 +58,10 @@ def never_clear(
 ) -> Collides:
     """Is it confirmed that the tool collides in every pose over a target?
 
+    Its point is within the tolerance (m) of `point` (3,), and its axis within the cone (rad) of
+    `approach`, a unit vector. Of the arm only what moves with the tool counts.
+
     Args:
-        robot: the arm, of which only what moves with the tool counts.
-        bodies: its bodies, and the pairs that are checked.
-        cone: rad, largest angle between tool axis and approach direction.
-        tolerance: m, of the tool point.
-        point: (3,) m, the target of the tool point.
-        approach: (3,) unit vector, the approach direction there.
         tick: called now and then; what it raises ends the work.
         most: how many boxes may be looked at.
     """

@@ -105,13 +105,7 @@ class Overlapping:
     def __init__(
         self, robot: Robot, bodies: Bodies, beside: Sequence[Points] | None = None
     ) -> None:
-        """Place points in the bodies of all pairs that are checked.
-
-        Args:
-            robot: the arm, or the tool alone.
-            bodies: of the problem.
-            beside: points at rest, beside the tool alone.
-        """
+        """Place points in the bodies of all pairs; the tool alone has some at rest `beside` it."""
         self._robot, self._bodies, self._kinematics = robot, bodies, Kinematics(robot)
         self._alone, self._couples = beside is not None, _couples(bodies, beside)
         self.most_points = max((len(one.places) for one, _ in self._couples), default=0)
@@ -130,10 +124,7 @@ class Overlapping:
     def deepest(self, low: Array, high: Array, target: Array, off: Array | float) -> Deepest:
         """What of m boxes is nearest to being too near all over, with the tool at its target.
 
-        Args:
-            low, high: (m, n) rad or m.
-            target: (m, 3) m, where the tool point is to be in each; or (3,) for all.
-            off: (m,) m, how far it may be from there.
+        The tool point may be so far `off` (m,) from there, (m, 3) m, or (3,) for all.
         """
         m, n = low.shape
         found = Deepest(np.full(m, np.inf), np.zeros((m, n)), np.full(m, -1))

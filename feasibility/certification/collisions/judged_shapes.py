@@ -36,12 +36,7 @@ class Body:
     """One body, in the frame of the joint that carries it."""
 
     def __init__(self, solid: Solid, deviation: float = 0.0) -> None:
-        """See the attributes.
-
-        Args:
-            solid: what it is.
-            deviation: m, how far the body may stand out from it.
-        """
+        """A solid that the body may stand out from by some deviation (m)."""
         self.joint, self.shape, self.deviation = solid.joint, solid.geometry, deviation
         self.placement, shape = solid.placement, self.shape
         self._hull, (corners, self.radius, self.circle) = _held(shape)

@@ -50,12 +50,9 @@ class ArmMotion:
     """A joint motion, straight between its rows, with Pinocchio's placements of every joint."""
 
     def __init__(self, robot: Robot, q: Array, deviations: Array | None = None) -> None:
-        """Place the arm.
+        """Place an arm at rows q (m, n), finite, m >= 2.
 
-        Args:
-            robot: the arm, a serial chain.
-            q: (m, n) rows, finite, m >= 2.
-            deviations: (m - 1, n) how far each joint may be off the straight line; 0 by default.
+        Its joints may be so far off straight lines, (m - 1, n): by default not at all.
 
         Raises:
             ArgumentError: the joints form no serial chain.

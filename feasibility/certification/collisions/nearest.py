@@ -48,12 +48,7 @@ def nearest_along(robot: Robot, bodies: Bodies, q: Array) -> NearestAlong | None
     """The nearest pair of bodies at each row of a motion; None where there is no pair.
 
     Distances are those of the exact bodies, less the deviation of the surface's triangles. Meshes
-    have no inside here: this is for motions that were accepted.
-
-    Args:
-        robot: the arm.
-        bodies: all of the problem.
-        q: (m, n) rows, finite, m >= 1.
+    have no inside here: this is for motions q (m, n), m >= 1, that were accepted.
 
     Raises:
         ArgumentError: a pair names what has no body.

@@ -51,11 +51,8 @@ class Pairing:
     def __init__(self, pair: Pair, a: Body, b: Body, motion: ArmMotion, bends: Chords) -> None:
         """Begin with what balls say: the centre of b keeps to its chords but for delta.
 
-        Args:
-            pair: whose bodies they are, and their clearance.
-            a, b: b is on the same joint or one behind, but for a half space.
-            motion: of the arm.
-            bends: of b seen from a, (m - 1,) each.
+        Body b is on the joint of a or on one behind, unless a is a half space; `bends` are those of
+        b seen from a, (m - 1,) each.
         """
         self.a, self.b, self.motion = a, b, motion
         self.names, self.needed = (pair.first, pair.second), pair.clearance
