@@ -162,7 +162,7 @@ def test_clearance_of_many_triangles_is_never_above_the_distance_and_seldom_far_
     walk = np.cumsum(rng.normal(size=(60, 3)) * [0.08, 0.08, 0.02], axis=0)
     walk += [0.6, 0.3, 0.2]
     solid, soup = Solid("tool", 3, at(0.05), body), Soup("surface", dome(20), 0.0, False)
-    for start in range(0, 60, 6):
+    for start in range(0, 60, 15):
         rows = walk[start : start + 6]
         q = np.concatenate([np.linspace(*ends, 15) for ends in pairwise(rows)])
         bent = [q + np.array([0.0, 0.0, way]) for way in (-off, 0.0, off)]

@@ -27,7 +27,7 @@ MOST_TIME = 20  # [s] of processor time
 PATIENCE = 1800  # [s] after which something is waited for that never comes
 # Each .dae file takes three processes more than a second each.
 DAE = [name for name, (ending, *_) in hostile.TRAPS.items() if ending == "dae"]
-FEW = {*hostile.TRAPS} - {*DAE} | {"wide", "entity beside it", "painted", "no such corner"}
+FEW = {*hostile.TRAPS} - {*DAE} | {"wide", "entity beside it"}
 TRAPS = [*hostile.TRAPS, *hostile.LARGE] if samples.EVERYTHING else sorted(FEW)
 OWN_NAMES = {"net": "net as JSON", "trajectory": "trajectory as CSV"}
 BALL = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'

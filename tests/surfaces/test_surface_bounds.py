@@ -59,7 +59,7 @@ def test_the_tree_is_one_and_is_cut_as_asked(patch, tree):
         rough = (fewer.radius[fewer.children[:, 0] < 0] > [FLAT, STRAIGHT]).any()
         assert len(fewer) <= most
         assert not rough or len(fewer) + 2 > most
-    coarse, fine = (patch.parts(flat, 1e9, 4000) for flat in (2e-3, 5e-4))
+    coarse, fine = (patch.parts(flat, 1e9, 4000) for flat in (4e-3, 1e-3))
     assert len(fine) < 7 * len(coarse) or patch.kind == "plane"  # halved sides: a quarter
 
 

@@ -132,7 +132,7 @@ def sagging(offset, one, other):
 @pytest.mark.parametrize("height", [0.0, -0.05])
 def test_paths_bend_no_more_than_is_said(named, height):
     name, surface = named
-    start, end = pairs(surface, 1200, np.random.default_rng(2))
+    start, end = pairs(surface, 400, np.random.default_rng(2))
     offset = offset_surface(surface, height)
     path = offset.paths(start, end)
     stated, found, some_known = [], [], np.zeros(len(start.chart), dtype=bool)
