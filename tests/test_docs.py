@@ -73,7 +73,8 @@ def test_commands_of_the_pages_run(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     for name, page in (("case", "first_cell"), ("study", "studies")):
-        (tmp_path / f"{name}.toml").write_text(*blocks(WRITTEN[page], "toml"))
+        (text,) = blocks(WRITTEN[page], "toml")
+        (tmp_path / f"{name}.toml").write_text(text.replace("count = 4 ", "count = 1 "))
     pages = [WRITTEN["first_cell"], *WRITTEN.values()]  # later ones use what the first writes
     found = [block for page in pages for block in blocks(page, "")]
     lines = dict.fromkeys(line for block in found for line in block.splitlines())
@@ -101,7 +102,7 @@ def test_commands_of_the_pages_run(
     for page in ("shown.html", "where.html", "study.html"):
         assert (tmp_path / page).stat().st_size > 1e5
     assert (tmp_path / "where.png").read_bytes().startswith(b"\x89PNG")
-    assert len((tmp_path / "table.csv").read_text().splitlines()) == 1 + 2 * 3 * 4
+    assert len((tmp_path / "table.csv").read_text().splitlines()) == 1 + 2 * 3 * 1
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)

@@ -11,9 +11,10 @@ from coverable.kernels import entry
 from feasibility.collisions.kernels.clearance import blamed, segment_clear
 from feasibility.collisions.kernels.memory import collision_buffer, configuration_bounds
 from feasibility.collisions.problem_bodies import Bodies
-from feasibility.roadmap.motions import aiming, projection, segment_bound
+from feasibility.roadmap.motions import aiming, segment_bound
 from feasibility.roadmap.motions.aiming import aim, stand_still
 from feasibility.roadmap.motions.off_target import project_near_cell
+from feasibility.roadmap.motions.projection import project_onto_cell
 from feasibility.roadmap.motions.roll_kernels import level, roll_off_middle
 from feasibility.roadmap.motions.search_arrays import arrays_of
 from feasibility.roadmap.motions.working_memory import place, work_for
@@ -25,7 +26,7 @@ from feasibility.roadmap.proofs.ruling import Ruling
 Floats = NDArray[np.float64]
 
 # Only other kernels call these in the search.
-bounds_between, project = entry(aiming.bounds_between), entry(projection.project)
+bounds_between = entry(aiming.bounds_between)
 segment_holds = entry(segment_bound.segment_holds)
 second_derivatives = entry(segment_bound.second_derivatives)
 roll_derivatives = entry(segment_bound.roll_derivatives)
@@ -115,14 +116,10 @@ class Motions:
         """Let the roll have another range (rad)."""
         self.arrays = self.arrays._replace(roll=np.array([middle, half]))
 
-    def onto(self, q: Floats, t: float = 1.0) -> Floats | None:
-        """Newton from q onto the target of the first curve at t; None where it fails."""
+    def onto(self, q: Floats) -> Floats | None:
+        """Newton from q onto the target at the end of the first curve; None where it fails."""
         found = q.copy()
-        aim(self.arrays, self.work, 0, t)
-        bounds_between(self.arrays, self.work, 0, 0.0, 1.0)
-        place(self.arrays, self.work, 1, found)
-        self.work.secondary_step[:] = 0.0
-        there = project(self.arrays, self.work, found, 1e-6, np.inf, 60)
+        there = project_onto_cell(self.arrays, self.work, np.int64(1), found, np.int64(60))
         return found if there else None
 
     def along_curve(self, q0: Floats, q1: Floats) -> Held:
