@@ -87,10 +87,9 @@ FORKS = """
 import json, os, sys, numba
 numba.njit("f8(f8)")(lambda x: x + 1.0)
 for line in sys.stdin:
-    environment, folder, ask = json.loads(line)
+    changes, folder, ask = json.loads(line)
     if not os.fork():
-        os.environ.clear()
-        os.environ.update(environment)
+        os.environ |= changes
         numba.config.reload_config()
         os.chdir(folder)
         sys.path.insert(0, folder)
@@ -118,9 +117,8 @@ def ended() -> Iterator[None]:
 def asked(folder: Path, value: float = 4.0, ask: str = ASK, **more: str) -> tuple[int, int]:
     """Is the kernel loaded, and can it be kept nowhere? Its value is as expected."""
     home = {"HOME": f"{folder.parent}/home", "XDG_CACHE_HOME": f"{folder.parent}/home/cache"}
-    environment = {**os.environ, **home}
-    environment.pop("NUMBA_CACHE_DIR", None)
-    print(json.dumps([environment | more, f"{folder}", ask]), file=forks().stdin, flush=True)
+    changes = home | {"NUMBA_CACHE_DIR": ""} | more
+    print(json.dumps([changes, f"{folder}", ask]), file=forks().stdin, flush=True)
     said = "".join(iter(forks().stdout.readline, "over\n"))
     result, hits, nowhere, endless, classes = said.split()
     assert (float(result), endless) == (value, "-inf")
