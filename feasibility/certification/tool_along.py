@@ -108,7 +108,7 @@ def less_room(room: Array, task: Task, row: Ints, chord: Array, roll: Array) -> 
         np.minimum.at(room[:, 1], row, np.maximum(task.roll.half - roll, 0.0))
 
 
-OFF, TILTED, ROLLED, NEAR = range(4)  # rows of `Judge.beyond`
+OFF, NEAR = 0, 3  # rows of `Judge.beyond`
 
 
 def exact_faults(judge: Judge, wrong: Samples, noun: str) -> list[MotionFault]:
@@ -119,33 +119,25 @@ def exact_faults(judge: Judge, wrong: Samples, noun: str) -> list[MotionFault]:
         if not len(rows) or (what == NEAR and not (beyond[OFF] <= 0.0).all()):
             continue
         worst = int(rows[np.argmax(np.nan_to_num(more[rows], nan=np.inf))])
-        text = _said(judge, wrong, what, worst)
+        text = _said(judge, wrong, worst)[what]
         text += "" if what == NEAR else and_others(len(rows) - 1, noun)
         faults.append(MotionFault(text, int(wrong.row[worst]), float(wrong.share[worst])))
     return faults
 
 
-def _said(judge: Judge, wrong: Samples, what: int, k: int) -> str:
-    """What is wrong with one configuration."""
-    task = judge.task
-    if what == OFF:
-        return (
-            f"the tool point is {1e3 * wrong.error[k]:.4g} mm off its surface, "
-            f"{1e3 * task.effective_tolerance:g} mm are allowed"
-        )
-    if what == TILTED:
-        return (
-            f"the tool axis tilts {np.degrees(angle_of(float(wrong.chord[k]))):.6g} deg, "
-            f"{task.cone_deg:g} deg are allowed"
-        )
-    if what == ROLLED and task.roll is not None and task.roll_deg is not None:
-        beyond = np.degrees(wrong.roll[k] - task.roll.half)
-        low, high = task.roll_deg
-        return f"the roll is {beyond:.6g} deg outside its range, {low:g} to {high:g} deg"
+def _said(judge: Judge, wrong: Samples, k: int) -> tuple[str, ...]:
+    """What may be wrong with one configuration, in the order of `Judge.beyond`."""
+    task, (low, high) = judge.task, judge.task.roll_deg or (-180.0, 180.0)
+    beyond = np.degrees(wrong.roll[k] - (task.roll.half if task.roll else 0.0))
     return (
+        f"the tool point is {1e3 * wrong.error[k]:.4g} mm off its surface, "
+        f"{1e3 * task.effective_tolerance:g} mm are allowed",
+        f"the tool axis tilts {np.degrees(angle_of(float(wrong.chord[k]))):.6g} deg, "
+        f"{task.cone_deg:g} deg are allowed",
+        f"the roll is {beyond:.6g} deg outside its range, {low:g} to {high:g} deg",
         f"the tool point comes within {1e3 * wrong.facets[k]:.4g} mm of the mesh's triangles, "
         f"nearer than the standoff of {1e3 * task.standoff:g} mm: something protrudes there, or "
-        "its facets are too coarse for this standoff"
+        "its facets are too coarse for this standoff",
     )
 
 

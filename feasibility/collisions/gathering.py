@@ -44,8 +44,7 @@ def gathered(robot: Robot, surface: Surface, collision: Collision, standoff: flo
     if faults:
         raise ArgumentError([fault.renamed({}, "collision") for fault in faults])
     arm, pairs = _arm_of(robot, collision)
-    solids = [*arm.solids, *tool_solids(collision.tool, robot)]
-    polytopes, soups = [*arm.polytopes], list[Soup]()
+    solids, polytopes, soups = arm.solids, [*arm.polytopes], list[Soup]()
     if collision.surface and surface.wall is not None:
         sheet = sheet_of(surface.wall, thickness=collision.thickness)
         soups.append(Soup(SURFACE, sheet.triangles, sheet.deviation, False, sheet))
@@ -93,18 +92,21 @@ def _arm(
     srdf: str | None,
     with_itself: bool,
 ) -> tuple[LinkShapes, LinkPairs]:
-    """Bodies of links, and convex ones of the tool; the pairs of links, unless none are asked for.
+    """Bodies of links and tool, and the pairs of them, unless none are asked for.
 
     Surface, places and clearances leave them as they are: it takes most of the time of `gather`.
     """
-    shapes, solids, pairs = link_shapes(robot, fineness), tool_solids(tool, robot), NO_PAIRS
+    shapes, mounted, pairs = link_shapes(robot, fineness), tool_solids(tool, robot), NO_PAIRS
+    hulls = (body for solid in mounted for body in outer_bodies(solid))
+    solids, polytopes = (*shapes.solids, *mounted), (*shapes.polytopes, *hulls)
+    shapes = replace(shapes, solids=solids, polytopes=polytopes)
     if with_itself:
-        pairs = link_pairs(robot, shapes, allow, srdf, solids)
-        cut = with_crude_links_cut(robot, shapes, pairs.checked) if fineness == "hulls" else shapes
+        pairs = link_pairs(robot, shapes, allow, srdf)
+        of_links = [pair for pair in pairs.checked if TOOL not in pair]
+        cut = with_crude_links_cut(robot, shapes, of_links) if fineness == "hulls" else shapes
         if cut is not shapes:
-            shapes, pairs = cut, link_pairs(robot, cut, allow, srdf, solids)
-    own = (body for solid in solids for body in outer_bodies(solid))
-    return replace(shapes, polytopes=(*shapes.polytopes, *own)), pairs
+            shapes, pairs = cut, link_pairs(robot, cut, allow, srdf)
+    return shapes, pairs
 
 
 def _arm_of(robot: Robot, collision: Collision) -> tuple[LinkShapes, LinkPairs]:

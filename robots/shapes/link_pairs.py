@@ -67,7 +67,6 @@ def link_pairs(
     shapes: LinkShapes,
     allow: Iterable[Pair] = (),
     srdf: str | os.PathLike[str] | None = None,
-    tool: Sequence[Solid] = (),
 ) -> LinkPairs:
     """Sort the pairs of links, and of links and tool, into those that are checked and others.
 
@@ -76,17 +75,12 @@ def link_pairs(
     apart otherwise are its limits), where the user says so ("allowed"), where an SRDF does
     ("srdf"), and where both the convex bodies and the exact shapes collide in each of 1,000 random
     configurations and at zero ("always"). A pair that never collided in these is checked: samples
-    prove nothing.
-
-    Args:
-        allow: pairs of names that the user leaves out; others than these are passed over.
-        tool: exact shapes on the last joint that are no link's.
+    prove nothing. Of the pairs that are allowed, others than these are passed over.
 
     Raises:
         RobotError: the SRDF is of another robot.
     """
-    bodies = (*shapes.polytopes, *(body for one in tool for body in outer_bodies(one)))
-    joint, notes = {body.owner: body.joint for body in bodies}, list[str]()
+    joint, notes = {body.owner: body.joint for body in shapes.polytopes}, list[str]()
     allowed, disabled = {frozenset(pair) for pair in allow}, set[frozenset[str]]()
     if srdf is not None:
         pairs = read_srdf(srdf)
@@ -113,26 +107,22 @@ def link_pairs(
 
     order = sorted(joint, key=lambda owner: joint[owner])
     reasons = {pair: reason(*pair) for pair in combinations(order, 2)}
-    return _measured(robot, bodies, (*shapes.solids, *tool), reasons, notes)
+    return _measured(robot, shapes, reasons, notes)
 
 
 def _measured(
-    robot: Robot,
-    bodies: Sequence[Polytope],
-    solids: Sequence[Solid],
-    reasons: dict[Pair, Why | None],
-    notes: list[str],
+    robot: Robot, shapes: LinkShapes, reasons: dict[Pair, Why | None], notes: list[str]
 ) -> LinkPairs:
     """Find the pairs that always collide, and how often the others that are left out do."""
     q = random_configurations(robot)
-    q[0] = np.clip(0.0, robot.lower, robot.upper)
+    q[0], bodies = np.clip(0.0, robot.lower, robot.upper), shapes.polytopes
     open_pairs = [pair for pair, why in reasons.items() if why is None]
     early = collision_rates(robot, bodies, open_pairs, q[:FIRST_LOOK])
     suspects = [pair for pair, rate in early.items() if rate == 1.0]
     moving = [pair for pair, why in reasons.items() if why not in (None, "rigid")] + suspects
     rates = collision_rates(robot, bodies, moving, q)
     alike = [pair for pair in suspects if rates[pair] == 1.0]
-    as_they_are = collision_rates(robot, solids, alike, q)
+    as_they_are = collision_rates(robot, shapes.solids, alike, q)
     parted = [pair for pair, rate in as_they_are.items() if rate < 1.0]
     found = reasons | {pair: "always" for pair in alike if pair not in parted}
     if parted:
@@ -239,10 +229,8 @@ def collision_rates(
 
 def with_crude_links_cut(robot: Robot, shapes: LinkShapes, pairs: Sequence[Pair]) -> LinkShapes:
     """The same shapes, with crude links of pairs that stay apart cut into convex pieces."""
-    exact = {solid.owner for solid in shapes.solids}
-    known = [pair for pair in pairs if exact.issuperset(pair)]
     q = random_configurations(robot)[:LOOKED_AT]
-    as_hulls = collision_rates(robot, shapes.polytopes, known, q)
+    as_hulls = collision_rates(robot, shapes.polytopes, pairs, q)
     often = [pair for pair, rate in as_hulls.items() if rate > TOO_OFTEN]
     if not often:
         return shapes
