@@ -90,13 +90,10 @@ def never_clear(
         halves[0, row, 1, along] = halves[1, row, 0, along] = middle[left, along]
         halves = halves.reshape(-1, 2, 3)
         boxes = np.concatenate([boxes, halves[_least_tilt(*halves.swapaxes(0, 1)) <= cone]])
-    poses = _all_over(cone)
-    parts = np.array_split(poses, -(-len(poses) // batch))
-    over, pair = np.hstack([tool.too_near(part, point, tolerance) for part in parts])
-    best = int(over.argmin())
-    blamed = [bodies.pairs[k] for k in (int(pair[best]), *sorted(used))]
+    over, nearest = _at_best(tool, _all_over(cone), point, tolerance, batch)
+    blamed = [bodies.pairs[k] for k in (nearest, *sorted(used))]
     named = dict.fromkeys((pair.first, pair.second) for pair in blamed)
-    return Collides(True, looked, tuple(named), blamed[0].clearance - float(over[best]) - tolerance)
+    return Collides(True, looked, tuple(named), blamed[0].clearance - over - tolerance)
 
 
 def _least_tilt(low: Array, high: Array) -> Array:
@@ -105,6 +102,29 @@ def _least_tilt(low: Array, high: Array) -> Array:
     b = np.where(a < 0.5 * np.pi, b, wide)
     off = np.hypot(np.sin(b), np.sin(a) * np.cos(b))
     return np.asarray(np.arctan2(off, np.cos(a) * np.cos(b)) * (1.0 - 1e-9))
+
+
+def _at_best(
+    tool: Overlapping, poses: Array, point: Array, tolerance: float, batch: int
+) -> tuple[float, int]:
+    """By how much (m) bodies are too near in the best of some poses, and which pair.
+
+    By the points of one body it is no more: only poses that could be the best are looked at with
+    all of them.
+    """
+    parts, known = np.array_split(poses, -(-len(poses) // batch)), set[int]()
+    at_least, least, nearest = np.full(len(poses), -np.inf), np.inf, 0
+    while at_least.min() < least:
+        k = int(at_least.argmin())
+        (over,), (pair,), (body,) = tool.too_near(poses[k : k + 1], point, tolerance)
+        if over < least:
+            least, nearest = float(over), int(pair)
+        if body not in known:
+            known.add(body)
+            some = [tool.too_near(part, point, tolerance, int(body))[0] for part in parts]
+            at_least = np.maximum(at_least, np.concatenate(some))
+        at_least[k] = np.inf
+    return least, nearest
 
 
 def _all_over(cone: float) -> Array:

@@ -156,16 +156,24 @@ class Overlapping:
         """Does the judge of collisions find all pairs apart at a configuration (n,)?"""
         return collision_replay(self._robot, self._bodies, np.array([q, q])).accepted
 
-    def too_near(self, q: Array, target: Array, off: float) -> tuple[Array, Ints]:
-        """(m,) m, by how much bodies are too near for certain at q (m, n), and which pair (m,)."""
-        over, pair = np.full(len(q), -np.inf), np.full(len(q), -1)
+    def too_near(
+        self, q: Array, target: Array, off: float, only: int | None = None
+    ) -> tuple[Array, Ints, Ints]:
+        """(m,) m, by how much bodies are too near for certain at configurations q (m, n).
+
+        And which pair, and by points of which body; or by those of one body alone.
+        """
+        over, pair, which = np.full(len(q), -np.inf), *np.full((2, len(q)), -1)
         boxes = self._middles(q, q, target, off)
-        for couples in self._couples:
-            for k, found, _, _ in self._measured(couples, boxes, False):
+        for number in range(len(self._couples)) if only is None else (only,):
+            for k, found, _, _ in self._measured(self._couples[number], boxes, False):
                 nearest = found.max(axis=1)
-                pair = np.where(nearest > over, k, pair)
+                pair, which = (
+                    np.where(nearest > over, one, other)
+                    for one, other in ((k, pair), (number, which))
+                )
                 over = np.maximum(over, nearest)
-        return over, pair
+        return over, pair, which
 
     def _measured(
         self, couples: _Couples, boxes: _Middles, moved: bool = True
