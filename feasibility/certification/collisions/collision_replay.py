@@ -187,10 +187,7 @@ def _measured(pairings: list[Pairing]) -> tuple[float, Pairing]:
 
 
 def _outermost(pair: Pair, a: Body, b: Body) -> tuple[object, ...]:
-    """Brings what is furthest from the base, and often the nearest, to the front.
-
-    So the answer does not depend on the order in which bodies and pairs are given.
-    """
+    """Brings what is furthest from the base to the front, in whatever order all is given."""
     return (-b.joint, *sorted((pair.first, pair.second)), *a.centre, *b.centre)
 
 

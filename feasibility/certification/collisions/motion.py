@@ -19,7 +19,6 @@ point by another sum_j r_j e_j at most, with r_j enlarged by what the joints beh
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -92,15 +91,10 @@ class ArmMotion:
 
     def levers(self, points: Array) -> Array:
         """(n, m, B) m, how far points (m, B, 3) are from each joint's axis, if it turns."""
-        twists = self._twists
+        twists = self._kinematics.twists(self.q).transpose(1, 2, 0)[..., None]
         (u, v, w), (x, y, z) = twists[3:], points.transpose(2, 0, 1)
         moved = v * z - w * y, w * x - u * z, u * y - v * x
         return np.asarray(np.sqrt(sum((a + b) ** 2 for a, b in zip(twists, moved, strict=False))))
-
-    @cached_property
-    def _twists(self) -> Array:
-        """(6, n, m, 1)"""
-        return self._kinematics.twists(self.q).transpose(1, 2, 0)[:, :, :, None]
 
     def middles(self, joints: NDArray[np.intp], centres: Array) -> Array:
         """(m, B, 3) m, where points `centres` (B, 3) of `joints` (B,) are at the rows."""

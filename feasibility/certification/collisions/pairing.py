@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 
 from coverable.arrays import Array, Ints, Mask
+from feasibility.certification.bisection import runs
 from feasibility.certification.collisions.judged_shapes import COAL, Body, one_inside_other
 from feasibility.certification.collisions.motion import ArmMotion, Chords
 from feasibility.collisions.problem_bodies import Pair
@@ -106,11 +107,8 @@ class Pairing:
         """An instant, in rows, and the distance (m) there: the least that is met on the motion.
 
         Looked for at the row with the lowest bound in each of several parts of the motion, and from
-        the best of them in ever shorter steps to both sides, down to `finest` rows.
-
-        Args:
-            finest: [1] share of a segment, within which no other place is looked for.
-            also: an instant to begin with, too; where the least was met by default.
+        the best of them in ever shorter steps to both sides, down to a `finest` share of a segment.
+        It begins at an instant `also`, too: by default where the least was met.
         """
         last = len(self.low)
         parts = np.array_split(self.low, min(PARTS, last))
@@ -131,9 +129,8 @@ class Pairing:
     def certify(self, nearest: float, most: tuple[int, int] = CALLS) -> None:
         """Certify what is needed, and most of what is over it: raise `low`, or refuse.
 
-        Args:
-            nearest: m, the least distance of any two bodies that was met.
-            most: calls after which it is given up, and refused; see `CALLS`.
+        The least distance of any two bodies that was met is `nearest` (m). After so many calls, see
+        `CALLS`, it is given up, and refused.
         """
         self._aim = max(self.needed, ENOUGH * nearest)
         wanted = max(self.needed, NEAR * nearest)
@@ -142,10 +139,11 @@ class Pairing:
         if not np.isfinite(self.way[-1] + self._delta.sum() + self._off.sum()):
             return self._refuse(0.0, math.nan)
         self._part(wanted)
-        open_ = np.flatnonzero(~(self.low >= self._aim))
-        if not len(open_) or self._begins_inside():
+        open_ = ~(self.low >= self._aim)
+        if not open_.any() or self._begins_inside():
             return
-        ends = self._runs(open_)
+        parts = np.flatnonzero(open_)[:, None] if self.convex else runs(open_)  # one for a plane
+        ends = np.array([(part[0], part[-1] + 1.0) for part in parts])
         while len(ends) and self.refused is None:
             if self.calls + len(ends) > most[0] + most[1] * len(self._rows):
                 return self._refuse(float(ends[0].mean()), math.nan)
@@ -163,14 +161,6 @@ class Pairing:
         most = float(wanted[self.low < wanted].max(initial=self.needed))
         self.certify(most / ENOUGH, (self.calls + int(calls), 0))
         self.refused, self.distance = None, math.inf
-
-    def _runs(self, segments: Ints) -> Array:
-        """(k, 2) rows from where to where segments in order follow each other; each for planes."""
-        borders = np.arange(1, len(segments))
-        if not self.convex:
-            borders = borders[np.diff(segments) > 1]
-        runs = [run for run in np.split(segments, borders) if len(run)]
-        return np.array([(run[0], run[-1] + 1.0) for run in runs]).reshape(-1, 2)
 
     def _part(self, wanted: float) -> None:
         """Raise the bounds of segments by planes between the hulls, up to what is wanted (m).
