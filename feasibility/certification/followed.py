@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 
@@ -142,11 +141,9 @@ def on_the_way(
     doubtful: Ints,
     decided: Callable[[SampledStretches], Mask],
 ) -> tuple[Mask, list[Samples]]:
-    """Judge parts of a motion from mark to mark over straight ways between their cells' centres.
+    """Judge parts of a motion from mark to mark over straight ways between their places.
 
-    Any places would do for `Judge.bounds`; these pass in order. Where such parts begin or end, the
-    tool stands while the place goes on to, or comes from, that of the rest; where it cannot, the
-    next part is judged so, too.
+    Any places would do for `Judge.bounds`; these pass in order.
 
     Args:
         judge: of the motion, with its marks (m,).
@@ -159,49 +156,29 @@ def on_the_way(
         (m,) behind which rows the motion is right so, and at the last, if it is behind the one
         before; and the samples there. Nothing, unless all that is doubtful is right.
     """
-    rows, nothing, patch = judge.rows, np.zeros(len(marks), dtype=bool), judge.offset
+    good, nothing, found = *np.zeros((2, len(marks)), dtype=bool), list[Samples]()
     runs = list(itertools.pairwise(np.flatnonzero(marks >= 0).tolist()))
-    wanted = {
-        k for k, run in enumerate(runs) if ((doubtful >= run[0]) & (doubtful <= run[1])).any()
-    }
-    found = dict[int, Samples]()
-    long = any(runs[k][1] - runs[k][0] > LONGEST for k in wanted)
-    if long or not isinstance(patch, PatchPlaces):
-        return nothing, []
-    right = partial(_right, judge, of_segment, decided)
-    while wanted - found.keys():
-        k = min(wanted - found.keys())
-        ends = patch.closest(judge.cells.centres[marks[list(runs[k])]])
-        found[k] = at = _in_order(judge, patch, ends, np.arange(*runs[k]))
-        if not right(at):
+    wanted = [((doubtful >= run[0]) & (doubtful <= run[1])).any() for run in runs]
+    for k in np.flatnonzero(wanted).tolist():
+        first, last = runs[k]
+        if last - first > LONGEST or not isinstance(judge.offset, PatchPlaces):
             return nothing, []
-        for other, row, end in ((k - 1, runs[k][0], 0), (k + 1, runs[k][1], len(at.row) - 1)):
-            if other in wanted or row in (0, len(rows) - 1):
-                continue
-            there = at.of(np.array([end]))
-            if right(Samples.join(there, at_rows.of(np.array([row])))):
-                continue
-            if not 0 <= other < len(runs) or runs[other][1] - runs[other][0] > LONGEST:
-                return nothing, []
-            wanted.add(other)
-    for k in found:
-        nothing[slice(*runs[k])] = True
-    nothing[-1] = nothing[-2]
-    return nothing, list(found.values())
-
-
-def _right(
-    judge: Judge,
-    of_segment: Array,
-    decided: Callable[[SampledStretches], Mask],
-    at: Samples,
-) -> bool:
-    """Is a motion right from sample to sample, over the straight ways between their places?"""
-    start, end = at.of(slice(-1)), at.of(slice(1, None))
-    row = np.minimum(start.row, len(judge.rows) - 2)
-    low, high = (each.share + (each.row - row) for each in (start, end))
-    stretches = SampledStretches(row, low, high, start, end, of_segment[row])
-    return bool(judge.within(at).all() and decided(stretches).all())
+        ends = judge.offset.closest(judge.cells.centres[marks[[first, last]]])
+        at = _in_order(judge, judge.offset, ends, np.arange(first, last))
+        found.append(at)
+        if first > 0 and not (k and wanted[k - 1]):
+            at = Samples.join(at_rows.of(np.array([first])), at)
+        if last < len(marks) - 1 and not (k + 1 < len(runs) and wanted[k + 1]):
+            at = Samples.join(at, at_rows.of(np.array([last])))
+        start, end = at.of(slice(-1)), at.of(slice(1, None))
+        row = np.minimum(start.row, len(marks) - 2)
+        low, high = (each.share + (each.row - row) for each in (start, end))
+        stretches = SampledStretches(row, low, high, start, end, of_segment[row])
+        if not (judge.within(at).all() and decided(stretches).all()):
+            return nothing, []
+        good[first:last] = True
+    good[-1] = good[-2]
+    return good, found
 
 
 def _in_order(judge: Judge, patch: PatchPlaces, ends: Places, numbers: Ints) -> Samples:

@@ -36,8 +36,6 @@ from surfaces.surface import Surface
 if TYPE_CHECKING:
     from surfaces.toolpaths.pose_surface import PoseSurface
 
-AT_ONCE = 256  # rows, among which a pose is looked for
-
 
 def order_of_marks(cells: Cells, walk: Walk) -> str:
     """Why the marks of a walk are not in the order of a toolpath; empty where they are."""
@@ -58,20 +56,17 @@ def marks_in_order(robot: Robot, cells: Cells, task: Task, q: Array) -> Ints | N
     """
     if not cells.in_order or not len(q):
         return None
-    tools, targets = Kinematics(robot).tools(q), task.targets(cells)
-    marks, row, most = np.full(len(q), -1), 0, (task.effective_tolerance, task.cone_chord)
-    for k, wanted in enumerate(zip(targets.points, targets.approaches, strict=True)):
-        at = np.zeros(0, dtype=np.intp)
-        while row < len(q) and not len(at):
-            near = [
-                np.linalg.norm(found[row : row + AT_ONCE] - one, axis=1) <= far
-                for found, one, far in zip(tools, wanted, most, strict=True)
-            ]
-            at = np.flatnonzero(np.logical_and(*near))
-            row += int(at[0]) if len(at) else AT_ONCE
-        if row >= len(q):
+    from scipy.spatial import cKDTree  # takes a while to load
+
+    (points, axes), targets = Kinematics(robot).tools(q), task.targets(cells)
+    near = cKDTree(points).query_ball_point(targets.points, task.effective_tolerance)
+    marks, row = np.full(len(q), -1), 0
+    for k, (rows, approach) in enumerate(zip(near, targets.approaches, strict=True)):
+        some = np.sort([at for at in rows if at >= row]).astype(np.int64)
+        some = some[np.linalg.norm(axes[some] - approach, axis=1) <= task.cone_chord]
+        if not len(some):
             return None
-        marks[row], row = k, row + 1
+        marks[some[0]], row = k, int(some[0]) + 1
     return marks
 
 

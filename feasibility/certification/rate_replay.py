@@ -24,10 +24,7 @@ from scipy.spatial import cKDTree
 
 from coverable.arrays import Array, Mask
 from coverable.errors import ArgumentError, Fault
-from feasibility.certification.lever_bounds import (
-    jacobians,
-    second_derivatives,
-)
+from feasibility.certification.lever_bounds import jacobians, second_derivatives
 from feasibility.certification.segment_rates import SegmentRates, fastest_anywhere, segment_rates
 from feasibility.task import Task
 from feasibility.verdict import Walk

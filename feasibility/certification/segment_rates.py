@@ -10,14 +10,9 @@ by s. Run so that it has the speed v, joint j turns at v |d_j| / |p'(s)|: inside
 
 **Singularities.** sigma is the smallest of the five singular values that count of the Jacobian of
 tool point (over the arm's reach) and approach axis; for arms of fewer joints the smallest of as
-many as there are. It changes by no more than the norm of the Jacobian's change (Weyl), and column j
-of the tool point's part changes by at most
-
-    r_j (sum of |d_i|, i up to j) + sum of r_i |d_i|, i behind j
-
-along the segment, the axis' part likewise with s: second derivatives of chains, as in
-`lever_bounds`. So with L the root of the sum of their squares, sigma is at least
-(sigma(0) + sigma(1) - L) / 2.
+many as there are. It changes by no more than the norm of the Jacobian's change (Weyl), the columns
+of which change along the segment as `column_changes` says. So with L the root of the sum of their
+squares, sigma is at least (sigma(0) + sigma(1) - L) / 2.
 """
 
 from __future__ import annotations

@@ -20,7 +20,6 @@ SAMPLES = np.linspace(0.0, 1.0, 9)  # of a line, where no model is known
 MEASURED = 2.0  # times what is measured counts there
 DIFFERENCE = 1e-5  # [1] of a range of parameters
 STEPS, LONGEST = 8, 0.1  # of Newton's, [1] of a range
-MANY, TOGETHER, CLOSE = 1024, 4, 1e-5  # boxes, neighbours that have one model, its radii [m], [1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,25 +95,13 @@ class PatchPlaces(OffsetSurface):
 
     def _bent(self, low: Array, high: Array) -> Array:
         """(k, 2) radii of models of offset points (m) and normals over boxes."""
-        radius = _known(self._radii(low, high))
+        radius = _known(self.patch.local_models(low, high)[0].radius)
         leaning = abs(self.height) * radius[:, 1] if self.height else 0.0  # which may be inf
         return np.stack([radius[:, 0] + leaning, radius[:, 1]], axis=1)
 
     def _turned(self, low: Array, high: Array) -> Array:
         """(k, 1) those of u directions."""
         return _known(self.patch.tangent_models(low, high).radius[:, 1:])
-
-    def _radii(self, low: Array, high: Array) -> Array:
-        """(k, 2) of models over boxes; of many, with one for neighbours where that is close."""
-        if len(low) < MANY:
-            return self.patch.local_models(low, high)[0].radius
-        first = np.arange(0, len(low), TOGETHER)
-        wide = np.minimum.reduceat(low, first), np.maximum.reduceat(high, first)
-        radius = self.patch.local_models(*wide)[0].radius
-        radius = np.repeat(radius, TOGETHER, axis=0)[: len(low)]
-        rough = ~(radius <= CLOSE).all(axis=1)
-        radius[rough] = self.patch.local_models(low[rough], high[rough])[0].radius
-        return radius
 
 
 def _known(radius: Array) -> Array:

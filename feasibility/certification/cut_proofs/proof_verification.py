@@ -152,14 +152,11 @@ def verify_on(
     if parts is not None:
         fault, first = disagreement(cells, parts), len(parts)
         held = held.join(target_parts(parts, cells, task), held)
-    if fault:
-        return ProofCheck(0, fault)
     whole = tree.root.cell if parts is None and isinstance(tree.root, Leaf) else 0
-    limits, fault = _finite_slides(
-        robot, held.of(slice(whole, whole + 1)), task.effective_tolerance
-    )
-    if fault:
-        return ProofCheck(0, fault)
+    one = held.of(slice(whole, whole + 1))
+    limits, endless = _finite_slides(robot, one, task.effective_tolerance)
+    if fault or endless:
+        return ProofCheck(0, fault or endless)
     allowed = Allowed.by(task, robot, limits.low, limits.high)
 
     claims = list(_claims(robot, cells, tree, limits, first))
