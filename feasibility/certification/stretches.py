@@ -47,8 +47,22 @@ CLOSE_TO_ZERO = 1e-12  # [m], [1]: rounding of double arithmetic on unit vectors
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Samples(Rows):
-    """k exact configurations of a motion, compared with the surface."""
+class Figures(Rows):
+    """What is known of k configurations of a motion, or at least along k stretches."""
+
+    error: Array
+    """(k,) m, |p - T|."""
+    chord: Array
+    """(k,) |a - b|."""
+    facets: Array
+    """(k,) m, distance from the triangles of a mesh; inf where the surface is smooth."""
+    roll: Array
+    """(k,) rad, how far the roll is off the middle of its range; 0 where it is free."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Samples(Figures):
+    """k exact configurations of a motion, compared with the surface over some places."""
 
     row: Ints
     """(k,) the row, or the row before."""
@@ -59,16 +73,8 @@ class Samples(Rows):
     axes: Array
     """(k, 3) approach axes."""
     places: Places
-    error: Array
-    """(k,) m, |p - T| over these places."""
-    chord: Array
-    """(k,) |a - b|."""
-    facets: Array
-    """(k,) m, distance from the triangles of a mesh; inf where the surface is smooth."""
     x: Array
     """(k, 3) reference axes."""
-    roll: Array
-    """(k,) rad, how far the roll is off the middle of its range; 0 where it is free."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -85,19 +91,11 @@ class SampledStretches(Stretches[Samples]):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Bounds(Rows):
-    """What is known along k stretches."""
+class Bounds(Figures):
+    """What is known all along k stretches."""
 
-    error: Array
-    """(k,) m, bounds of |p - T|."""
-    chord: Array
-    """(k,) of |a - b|."""
-    facets: Array
-    """(k,) m, lower bounds of the distance from the triangles of a mesh."""
     joined: Mask
     """(k,) whether a path of places from one end to the other is known."""
-    roll: Array
-    """(k,) rad, bounds of how far the roll is off the middle of its range; 0 where it is free."""
 
 
 def configurations(rows: Array, row: Ints, share: Array) -> Array:
@@ -189,7 +187,7 @@ class Judge:
         roll = np.zeros(len(x))
         if self._roll is not None:
             roll = self._roll.rolls(x, axes, approaches, references)
-        return Samples(row, share, points, axes, places, error, chord, facets, x, roll)
+        return Samples(error, chord, facets, roll, row, share, points, axes, places, x)
 
     def targets(self, places: Places) -> tuple[Array, Array, Array]:
         """(k, 3) m, targets over places, and (k, 3) approach and reference directions there."""
@@ -248,14 +246,14 @@ class Judge:
         roll = np.zeros(len(second))
         if self._roll is not None:
             roll = self._roll.rolls_between(x, axes, second[:, 2], path)
-        return Bounds(found[0], found[1], _apart(s), known, roll)
+        return Bounds(found[0], found[1], _apart(s), roll, known)
 
-    def beyond(self, one: Samples | Bounds) -> Array:
+    def beyond(self, one: Figures) -> Array:
         """(4, k) see `beyond`; and m, how far too near to the triangles of a mesh."""
         least = self.task.standoff - self.task.effective_tolerance - CLOSE_TO_ZERO
         return np.vstack([beyond(self.task, one.error, one.chord, one.roll), least - one.facets])
 
-    def within(self, one: Samples | Bounds) -> Mask:
+    def within(self, one: Figures) -> Mask:
         """(k,) inside tolerance, cone and roll, apart from a mesh's triangles; NaN is not."""
         return np.asarray((self.beyond(one) <= 0.0).all(axis=0))
 
