@@ -16,7 +16,7 @@ from specimens import cells_of
 from coverable import Task, cone, cylinder, hyperboloid, load_robot, plane, sphere, torus
 from feasibility.certification.collisions.everywhere import Deepest
 from feasibility.certification.cut_proofs import linear_models, parts_agreement
-from feasibility.certification.cut_proofs.box_cutting import JointRegion, cut, smaller
+from feasibility.certification.cut_proofs.box_exclusion import JointRegion, cut, smaller
 from feasibility.certification.cut_proofs.empty_region import Claim, Emptiness
 from feasibility.certification.cut_proofs.linear_models import Boxes, models_of, target_parts
 from feasibility.certification.cut_proofs.parts_agreement import disagreement, places

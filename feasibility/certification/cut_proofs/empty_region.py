@@ -2,9 +2,9 @@
 
 A *claim* says so of one region and of the whole surface or one cell's target. The boxes of many
 claims are looked at together, as a step over a thousand boxes takes hardly longer than one over
-ten. Boxes that the linear models do not prove empty are contracted and cut (`box_cutting`). What is
-dropped is proved empty: when no box is left, every claim holds. Of the boxes that are left a few
-give starts for a search for a configuration that refutes its claim.
+ten. Boxes that the linear models do not prove empty are contracted and cut. What is dropped is
+proved empty: when no box is left, every claim holds (`box_exclusion`). Of the boxes that are left a
+few give starts for a search for a configuration that refutes its claim.
 
 Where bodies are to stay clear of each other, a box in which some overlap everywhere is empty too
 (`everywhere`), and only a configuration that is clear refutes a claim. Boxes in which some nearly
@@ -26,12 +26,13 @@ import numpy as np
 from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.collisions.every_pose import Collides
 from feasibility.certification.collisions.everywhere import Overlapping
-from feasibility.certification.cut_proofs.box_cutting import JointRegion, smaller
 from feasibility.certification.cut_proofs.box_exclusion import (
+    JointRegion,
     contract,
     directions_for,
     nearest,
     separated,
+    smaller,
 )
 from feasibility.certification.cut_proofs.linear_models import (
     Allowed,

@@ -31,7 +31,7 @@ import numpy as np
 from coverable.arrays import Array
 from feasibility.certification.collisions.every_pose import never_clear
 from feasibility.certification.collisions.everywhere import Overlapping
-from feasibility.certification.cut_proofs.box_cutting import TURN, JointRegion
+from feasibility.certification.cut_proofs.box_exclusion import TURN, JointRegion
 from feasibility.certification.cut_proofs.empty_region import Claim, Emptiness, ProofCheck
 from feasibility.certification.cut_proofs.linear_models import (
     Allowed,

@@ -10,8 +10,7 @@ import numpy as np
 
 from coverable.arrays import Array, Ints
 from feasibility.certification.cells_reached import at_targets
-from feasibility.certification.cut_proofs.box_cutting import JointRegion
-from feasibility.certification.cut_proofs.box_exclusion import nearest
+from feasibility.certification.cut_proofs.box_exclusion import JointRegion, nearest
 from feasibility.certification.cut_proofs.linear_models import ANY_AXIS, Models
 from feasibility.certification.lever_bounds import jacobians
 from feasibility.certification.stretches import Judge, Samples
