@@ -43,19 +43,22 @@ def rows_and_shares(at: Array) -> tuple[Ints, Array]:
     return row, at - row
 
 
-def followed_parts(judge: Judge, followed: Mask, samples: Samples) -> list[Array]:
+def followed_parts(
+    judge: Judge, followed: Mask, samples: Samples
+) -> tuple[list[Array], tuple[Array, Array]]:
     """The parts of a motion over curves (M,) between poses that follow a surface.
 
-    Each by the row numbers, with their shares, at which it is known.
-
-    The samples are of the motion, as it passes them, over their places on the curves.
+    Each by the row numbers, with their shares, at which it is known; and (k,) from where to where
+    it does not follow the surface. The samples are of the motion, as it passes them, over their
+    places on the curves.
     """
     on = _on(samples.places.chart, followed)
     at = samples.row + samples.share
+    off = np.flatnonzero(~(on[:-1] & on[1:]))
     turns = np.flatnonzero(on[1:] != on[:-1])
     cuts = _turns(judge, followed, at[turns], at[turns + 1], on[turns])
-    at, on = np.insert(at, turns + 1, cuts), np.insert(on, turns + 1, values=True)
-    return [np.unique(at[run]) for run in runs(on)]
+    ends, on = np.insert(at, turns + 1, cuts), np.insert(on, turns + 1, values=True)
+    return [np.unique(ends[run]) for run in runs(on)], (at[off], at[off + 1])
 
 
 def _on(chart: Ints, followed: Mask) -> Mask:
@@ -72,14 +75,6 @@ def _turns(judge: Judge, followed: Mask, low: Array, high: Array, begins: Mask) 
         same = _on(found.places.chart, followed) == begins
         low, high = np.where(same, middle, low), np.where(same, high, middle)
     return 0.5 * (low + high)
-
-
-def off_surface(followed: Mask, samples: Samples) -> tuple[Array, Array]:
-    """(k,) from where to where, in rows with their shares, a motion does not follow the surface."""
-    off = ~_on(samples.places.chart, followed)
-    at = samples.row + samples.share
-    some = np.flatnonzero(off[:-1] | off[1:])
-    return at[some], at[some + 1]
 
 
 def lifted_faults(

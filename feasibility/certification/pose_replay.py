@@ -17,12 +17,7 @@ import numpy as np
 from coverable.arrays import Array, Ints, Mask
 from feasibility.certification.bisection import runs
 from feasibility.certification.faults import MotionFault, less_deviations, too_vague
-from feasibility.certification.followed import (
-    followed_parts,
-    lifted_faults,
-    off_surface,
-    rows_and_shares,
-)
+from feasibility.certification.followed import followed_parts, lifted_faults, rows_and_shares
 from feasibility.certification.stretches import Judge, Samples, configurations
 from feasibility.certification.tool_along import Along, tool_along
 from feasibility.task import Task
@@ -154,8 +149,7 @@ def along_poses(found: Along, judge: Judge, surface: PoseSurface, right: bool) -
     task = less_deviations(judge.task, surface.under)
     over = Judge(judge.robot, task, surface.under, judge.cells, judge.rows)
     faults += too_vague(judge.task, surface.under)
-    parts = followed_parts(judge, surface.followed, found.samples)
-    lifted = off_surface(surface.followed, found.samples)
+    parts, lifted = followed_parts(judge, surface.followed, found.samples)
     more = over_parts(over, parts, lifted, surface.under.wall)
     room = np.minimum(found.room, more.room)
     return Along(np.maximum(found.most, more.most), faults + more.faults, found.samples, room)
