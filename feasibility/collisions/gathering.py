@@ -102,7 +102,8 @@ def _arm(
     shapes = replace(shapes, solids=solids, polytopes=polytopes)
     if with_itself:
         pairs = link_pairs(robot, shapes, allow, srdf)
-        of_links = [pair for pair in pairs.checked if TOOL not in pair]
+        beside = {solid.owner for solid in mounted}
+        of_links = [pair for pair in pairs.checked if beside.isdisjoint(pair)]
         cut = with_crude_links_cut(robot, shapes, of_links) if fineness == "hulls" else shapes
         if cut is not shapes:
             shapes, pairs = cut, link_pairs(robot, cut, allow, srdf)

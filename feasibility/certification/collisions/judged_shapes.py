@@ -8,7 +8,6 @@ Meshes are only their triangles to coal, and have no inside there.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -30,6 +29,8 @@ KEPT = 256  # meshes whose hulls are kept
 
 _asked = coal.DistanceRequest()
 _asked.enable_signed_distance, _asked.gjk_tolerance = True, GJK
+_within = with_contacts(coal.CollisionRequest())
+_within.gjk_tolerance = GJK
 
 
 class Body:
@@ -72,23 +73,15 @@ class Body:
         across = np.sqrt(np.maximum((n * n).sum(axis=1) - along * along, 0.0))
         return np.concatenate(found) + self.circle * across + self.radius
 
-    def meets(self, other: Body) -> Callable[[Any, float], float | None]:
-        """Ask coal: does a body, placed in this one's frame, come nearer than a margin (m)?
+    def meets(self, other: Body, place: Any, margin: float) -> float | None:
+        """Ask coal: does a body at a place in this one's frame come nearer than a margin (m)?
 
         None where it does not, else a distance (m) of some of their triangles that is less.
         """
-        request, found = with_contacts(coal.CollisionRequest()), coal.CollisionResult()
-        request.gjk_tolerance = GJK
-        one, place, two = self._geometry, self._place, other._geometry
-
-        def nearer(there: Any, margin: float) -> float | None:
-            request.security_margin = margin + COAL
-            found.clear()
-            if not coal.collide(one, place, two, there, request, found):
-                return None
-            return float(found.getContact(0).penetration_depth)
-
-        return nearer
+        _within.security_margin, found = margin + COAL, coal.CollisionResult()
+        if not coal.collide(self._geometry, self._place, other._geometry, place, _within, found):
+            return None
+        return float(found.getContact(0).penetration_depth)
 
     def distance(self, other: Body, place: Any, hulls: bool = False) -> tuple[float, Array, Array]:
         """Coal's distance (m) to a body at a place in this one's frame, and nearest points (3,) m.

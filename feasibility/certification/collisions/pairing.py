@@ -233,10 +233,9 @@ class Pairing:
         """
         parts = np.zeros(len(places), dtype=np.int64)
         bodies = off + self.a.deviation + self.b.deviation
-        meets = self.a.meets(self.b)
         for k, place in enumerate(places):
             self.calls += 1
-            found = meets(place, float(self._aim + half[k] + bodies[k]))
+            found = self.a.meets(self.b, place, float(self._aim + half[k] + bodies[k]))
             if found is not None:
                 spare = found - float(bodies[k])
                 if self._near(np.array([spare - 2.0 * COAL]), middle[[k]]):
