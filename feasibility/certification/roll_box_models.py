@@ -159,34 +159,22 @@ def roll_models(
     spans = [(np.linalg.norm(d, axis=2) * half).sum(axis=1) for d in (db, dt)]
     r_u = size_b * r_t + size_t * r_b + r_b * r_t + spans[0] * spans[1]
     r_u += spans[0] * r_t + spans[1] * r_b
-    residual, radius = np.empty((len(b), 2)), np.empty((len(b), 2))
-    columns = np.empty((len(b), tool.columns.shape[1] + 2, 2))
-    x, y = tool.values[:, 0], tool.values[:, 1]
+    n, values = tool.columns.shape[1], tool.values
+    residual, radius = np.empty((2, len(b), 2))
+    columns = np.empty((len(b), n + 2, 2))
     for end, sign in enumerate((1.0, -1.0)):
         # x . p + y . q = sin(h - off), or sin(h + off), times 1 + c.
         angle = roll.middle + sign * roll.half
         c, s = sign * np.cos(angle), sign * np.sin(angle)
-        p, q = s * t - c * u, c * t + s * u
-        dp, dq = s * dt - c * du, c * dt + s * du
-        r_p = abs(s) * r_t + abs(c) * r_u
-        r_q = abs(c) * r_t + abs(s) * r_u
-        residual[:, end] = (x * p).sum(axis=1) + (y * q).sum(axis=1) - 1.0
-        by_x, by_y = tool.columns[:, :, 0], tool.columns[:, :, 1]
-        n = by_x.shape[1]
-        columns[:, :n, end] = (by_x * p[:, None]).sum(axis=2) + (by_y * q[:, None]).sum(axis=2)
-        columns[:, n:, end] = (dp * x[:, None]).sum(axis=2) + (dq * y[:, None]).sum(axis=2)
-        moved = [(np.linalg.norm(d, axis=2) * half).sum(axis=1) for d in (dp, dq)]
-        sizes = [np.linalg.norm(v, axis=1) for v in (p, q)]
-        radius[:, end] = (
-            1.0
-            + 0.5 * tool.second[:, 0] * sizes[0]
-            + 0.5 * tool.second[:, 1] * sizes[1]
-            + tool.moves[:, 0] * moved[0]
-            + tool.moves[:, 1] * moved[1]
-            + r_p
-            + r_q
-            + ROUNDING
-        )
+        both = np.stack([s * t - c * u, c * t + s * u], axis=1)  # p and q
+        slopes = np.stack([s * dt - c * du, c * dt + s * du], axis=2)
+        residual[:, end] = (values * both).sum(axis=(1, 2)) - 1.0
+        columns[:, :n, end] = (tool.columns * both[:, None]).sum(axis=(2, 3))
+        columns[:, n:, end] = (slopes * values[:, None]).sum(axis=(2, 3))
+        moved = (np.linalg.norm(slopes, axis=3) * half[..., None]).sum(axis=1)
+        bends = 0.5 * tool.second * np.linalg.norm(both, axis=2)
+        radius[:, end] = 1.0 + ROUNDING + (bends + tool.moves * moved).sum(axis=1)
+        radius[:, end] += (abs(s) + abs(c)) * (r_t + r_u)
     silent = ~(radius < NEVER)
     residual[silent], radius[silent] = 0.0, NEVER
     columns[np.broadcast_to(silent[:, None], columns.shape)] = 0.0
