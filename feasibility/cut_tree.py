@@ -138,7 +138,7 @@ def _fault_of_opened(robot: Robot, opened: object) -> str:
         isinstance(pair, tuple) and len(pair) == 2 for pair in opened
     ):
         return "opened joints are no pairs of a joint and a value"
-    seen = set()
+    joints = [joint for joint, _ in opened]
     for joint, value in opened:
         if not is_whole(joint, 0, robot.n - 1):
             return f"opened joint {shown(joint)} is none of the {robot.n} joints"
@@ -147,9 +147,8 @@ def _fault_of_opened(robot: Robot, opened: object) -> str:
             return f"joint {name} is opened at {shown(value)}, which is no number"
         if robot.prismatic[joint]:
             return f"joint {name} slides and cannot be opened: there are no turns of it"
-        if joint in seen:
+        if joints.count(joint) > 1:
             return f"joint {name} is opened twice"
-        seen.add(joint)
     return ""
 
 

@@ -157,6 +157,7 @@ def verify(
         >>> verify(robot, cells, task, verdict.witness.q[:4]).holds
         False
     """
+    clock = Clock() if clock is None else clock
     if isinstance(claim, Robot):
         problem = Problem.of(claim, cells, task)  # type: ignore[arg-type]  # refuses None
         rows = _rows(q)
@@ -170,7 +171,7 @@ def verify(
     verdict = claim.verdict if isinstance(claim, Result) else claim
     if not isinstance(verdict, Verdict):
         raise TypeError(f"expected a Robot, a Verdict or a Result, got {verdict!r:.60}")
-    return _of_verdict(verdict, search, Clock() if clock is None else clock)
+    return _of_verdict(verdict, search, clock)
 
 
 def _rows(q: Any) -> Array:
@@ -200,10 +201,9 @@ def _one_a_row(name: str, values: ArrayLike, rows: Array, kind: Literal["b", "i"
 
 
 def _in_time(
-    claim: Claim, problem: Problem, judged: Callable[[Made], Verification], clock: Clock | None
+    claim: Claim, problem: Problem, judged: Callable[[Made], Verification], clock: Clock
 ) -> Verification:
     """What became of a claim within the limit; a claim that could not be judged does not hold."""
-    clock = Clock() if clock is None else clock
     made = partial(Verification, claim, problem.robot, problem.cells, problem.task)
     try:
         with clock.start().enforced():
