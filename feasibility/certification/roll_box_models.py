@@ -58,13 +58,8 @@ class Directions(Rows):
 
     @staticmethod
     def fixed(one: Array, count: int) -> Directions:
-        """The same (3,) everywhere."""
+        """The same (3,) everywhere; of zeros `reference_parts` says that nothing is known."""
         return Directions(np.tile(one, (count, 1)), np.zeros((count, 2, 3)), np.zeros(count))
-
-    @staticmethod
-    def unknown(count: int) -> Directions:
-        """Of which nothing is known."""
-        return replace(Directions.fixed(np.zeros(3), count), radius=np.full(count, np.inf))
 
     def at(self, x: Array) -> Directions:
         """The same, about other parameters (K, 2) of the parts."""

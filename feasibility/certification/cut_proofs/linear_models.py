@@ -73,8 +73,7 @@ def target_parts(parts: SurfaceParts, cells: Cells, task: Task) -> Parts:
     if fixed is not None:
         centre[:, 3:], slopes[..., 3:], radius[:, 1] = fixed, 0.0, 0.0
     reference = None if task.roll is None else task.fixed_reference(cells)
-    along_u = Directions.unknown(len(parts))
-    e = along_u if reference is None else Directions.fixed(reference, len(parts))
+    e = Directions.fixed(np.zeros(3) if reference is None else reference, len(parts))
     held = reference_parts(Directions(centre[:, 3:], slopes[..., 3:], radius[:, 1]), e)
     return Parts(centre, slopes, radius, parts.children, parts.axis, held)
 
