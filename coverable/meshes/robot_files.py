@@ -20,6 +20,8 @@ from coverable.meshes.raw_mesh import MeshError, RawMesh
 
 MOST_BYTES = 256 << 20  # of .dae files that are read together; the last may exceed it
 MOST_SECONDS = 8.0  # of processor time, for a picture
+_LAST: dict[tuple[bytes, ...], list[list[RawMesh] | MeshError]] = {}
+"""The .dae files that were read last, and what is in them: arms are loaded again and again."""
 
 
 class MeshFiles:
@@ -100,12 +102,23 @@ class MeshFiles:
                 size += len(given[one])
             except CoverableError as fault:
                 self._read[one] = _refused(file, fault)
-        for one, found in zip(given, read_collada(list(given.values())), strict=True):
+        for one, found in zip(given, _read_once(tuple(given.values())), strict=True):
             file = Path(one)
             if isinstance(found, MeshError):
                 self._read[one] = _refused(file, found)
             else:
                 self._read[one] = _usable(file, found)
+
+
+def _read_once(files: tuple[bytes, ...]) -> list[list[RawMesh] | MeshError]:
+    """`read_collada`; what is wrong with files may be a matter of time, and is looked at anew."""
+    if files in _LAST:
+        return _LAST[files]
+    found = read_collada(files)
+    if not any(isinstance(one, MeshError) for one in found):
+        _LAST.clear()
+        _LAST[files] = found
+    return found
 
 
 def largest_file(file: Path) -> int:
