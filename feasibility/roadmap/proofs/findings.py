@@ -11,16 +11,14 @@ from typing import NamedTuple
 import numpy as np
 
 from coverable.arrays import Array, Mask
-from coverable.kernels import entry
-from feasibility.roadmap.motions.aiming import stand_still
-from feasibility.roadmap.motions.projection import PROJECTION_SLACK, project
+from feasibility.roadmap.motions.projection import project_onto_cell
 from feasibility.roadmap.motions.search_arrays import SearchArrays, with_free_roll
-from feasibility.roadmap.motions.working_memory import NEXT, Work, place, work_for
-from feasibility.roadmap.proofs.box_bounds import unturned
-from feasibility.roadmap.proofs.boxes import place_at_rest
+from feasibility.roadmap.motions.working_memory import Work, work_for
+from feasibility.roadmap.proofs.boxes import place_at_rest, toward_middle
 from feasibility.roadmap.proofs.branching import PlaceParts
 from feasibility.roadmap.proofs.regions import JointRegion, folded
 from feasibility.roadmap.proofs.statements import Statement
+from feasibility.roll import projected as across
 from robots.chain import tool
 
 SAMPLES = 100  # Newton tries onto the motion set, each attempt
@@ -154,25 +152,6 @@ class CutFindings:
         return next(proved, None)
 
 
-@entry
-def _project_rows(arrays, work, targets, q, enough, hit):  # type: ignore[no-untyped-def]
-    """Project rows of q (k, n), in place, onto the targets (k, 9), until there are enough hits."""
-    hits = 0
-    for i in range(q.shape[0]):
-        for k in range(3):
-            work.target[0, k], work.target[1, k] = targets[i, k], targets[i, 3 + k]
-        if arrays.roll[1] < np.inf:
-            unturned(work.target, targets[i, 6:], arrays.roll[0])
-        stand_still(arrays, work)
-        place(arrays, work, NEXT, q[i])
-        for j in range(q.shape[1]):
-            work.secondary_step[j] = 0.0
-        hit[i] = project(arrays, work, q[i], PROJECTION_SLACK, np.inf, NEWTON_STEPS)
-        hits += hit[i]
-        if hits == enough:
-            return
-
-
 def projected(
     arrays: SearchArrays,
     work: Work,
@@ -193,13 +172,20 @@ def projected(
     Returns:
         (hits, n) configurations.
     """
-    box = region.over_one_turn()
-    inside = arrays._replace(lower=box.low, upper=box.high)
-    q = rng.uniform(box.low, box.high, (len(targets), len(box.low)))
-    hit = np.zeros(len(targets), dtype=np.bool_)
-    _project_rows(inside, work, np.ascontiguousarray(targets), q, enough, hit)
-    q = q[hit]
-    return q[region.inside(q)]
+    box, approaches = region.over_one_turn(), targets[:, 3:6].copy()
+    toward = toward_middle(approaches, targets[:, 6:], -arrays.roll[0])
+    over = arrays._replace(
+        lower=box.low, upper=box.high, points=targets[:, :3].copy(), approaches=approaches,
+        references=across(toward, approaches)[0] if arrays.roll[1] < np.inf else toward,
+    )  # fmt: skip
+    found = []
+    for k, q in enumerate(rng.uniform(box.low, box.high, (len(targets), len(box.low)))):
+        if project_onto_cell(over, work, k, q, NEWTON_STEPS):
+            found.append(q)
+        if len(found) == enough:
+            break
+    hits = np.array(found).reshape(-1, len(box.low))
+    return hits[region.inside(hits)]
 
 
 def random_targets(places: PlaceParts, k: int, rng: np.random.Generator) -> Array:
