@@ -62,7 +62,9 @@ class Roadmap:
         self.blocked: dict[int, Blocked] = {}
         """By cell."""
         self.parent: list[int] = []
-        """A component that each one is part of by now, itself for a root."""
+        """The root that each component is part of by now, itself for a root."""
+        self.parts: list[list[int]] = []
+        """The components that each root stands for."""
         self.cover: list[Mask] = []
         """(N,) cells that each component covers."""
         self.size: list[int] = []
@@ -73,12 +75,8 @@ class Roadmap:
         """A component that covers most cells."""
 
     def root(self, component: int) -> int:
-        """The root that a component is part of; on the way, paths are halved."""
-        parent = self.parent
-        while parent[component] != component:
-            parent[component] = parent[parent[component]]
-            component = parent[component]
-        return component
+        """The root that a component is part of."""
+        return self.parent[component]
 
     def root_of(self, node: int) -> int:
         """The root component of a node."""
@@ -86,7 +84,7 @@ class Roadmap:
 
     def roots_of_nodes(self) -> Ints:
         """(nodes,) the root component of every node."""
-        return np.array([self.root(component) for component in self.component], dtype=np.int64)
+        return np.array([self.parent[component] for component in self.component], dtype=np.int64)
 
     def covers(self, roots: Sequence[int]) -> Mask:
         """(K, N) the cells that each of some root components covers."""
@@ -96,6 +94,7 @@ class Roadmap:
     def add_component(self) -> int:
         """A component without nodes."""
         self.parent.append(len(self.parent))
+        self.parts.append([self.parent[-1]])
         self.cover.append(np.zeros(len(self.over), dtype=bool))
         self.size.append(0)
         self.failures.append({})
@@ -126,7 +125,9 @@ class Roadmap:
             return a
         if self.size[a] < self.size[b]:
             a, b = b, a
-        self.parent[b] = a
+        for component in self.parts[b]:
+            self.parent[component] = a
+        self.parts[a] += self.parts[b]
         self.cover[a] |= self.cover[b]
         self.size[a] = int(self.cover[a].sum())
         for other, count in self.failures[b].items():
@@ -147,8 +148,8 @@ class Roadmap:
 
         Near means that a motion there would move the tool little, see `self_motion.effects`.
         """
-        root, made = self.root, self.component
-        nodes = [node for node in reversed(self.over[cell]) if root(made[node]) not in passed]
+        root, made = self.parent, self.component
+        nodes = [node for node in reversed(self.over[cell]) if root[made[node]] not in passed]
         if len(nodes) < 2:
             return nodes[0] if nodes else None
         off = (np.array([self.q[x] for x in nodes]) - q) * [self.effect[x] for x in nodes]
