@@ -76,7 +76,7 @@ def no_less(narrow, wide):
     assert not reached & {cause.cell for cause in lost if cause.proved}
 
 
-@sampled(("narrow", "wide"), spread(LESS, 8))
+@sampled(("narrow", "wide"), spread(LESS, 4))
 def test_a_question_that_asks_less_loses_nothing(narrow, wide):
     no_less(verdict_of(narrow), verdict_of(wide))
     assert verdict_of(wide).statistics["fk"] <= 5 * verdict_of(narrow).statistics["fk"] + 2000

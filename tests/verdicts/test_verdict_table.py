@@ -137,7 +137,7 @@ def test_what_it_rests_on_holds(name):
         assert kept.roll.max() + half <= certificate.max_roll + 1e-9 <= half + 2e-9
     if verdict.task.collision is not None:
         scene = plain.scene_of(robot, verdict.cells, verdict.task)
-        least = scene.least_excess(referee.closely(walk.q, 0.03))
+        least = scene.least_excess(referee.closely(walk.q, 0.06))
         needed = np.array([pair[2] for pair in scene.pairs])
         assert least.min() >= -1e-6
         assert certificate.min_clearance <= (least + needed).min() + 1e-6

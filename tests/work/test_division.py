@@ -119,7 +119,7 @@ DRAWN = [("puma560", number) for number in range(22)] + [("ur5", number) for num
 PAPER = ["4a", "4f", "5b", "5e"]
 
 
-@sampled(("arm", "number"), [*[("paper", name) for name in PAPER], *spread(DRAWN, 6)])
+@sampled(("arm", "number"), [*[("paper", name) for name in PAPER], *spread(DRAWN, 3)])
 def test_divisions_agree_with_verdicts(arm, number):
     """One patch exactly where `check` says feasible; at least what any of its motions covers."""
     setup = load_case(f"paper/{number}", []).build() if arm == "paper" else drawn(arm, number)
