@@ -9,16 +9,14 @@ from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from coverable.arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask, Rows
 from coverable.errors import ArgumentError
 from surfaces.parts import PartModels, SurfaceParts
-
-Rows = Ints | Mask
 
 _WAIT = 4.0  # parts this much better than the worst wait until that is cut
 
 
-class Pieces(ABC):
+class Pieces(Rows, ABC):
     """k pieces of a surface that can be cut in two."""
 
     in_halves: ClassVar[bool]
@@ -27,14 +25,6 @@ class Pieces(ABC):
     @abstractmethod
     def models(self) -> PartModels:
         """Rigorous bounds on each."""
-
-    @abstractmethod
-    def rows(self, some: Rows) -> Self:
-        """Some of them."""
-
-    @abstractmethod
-    def with_more(self, more: Self) -> Self:
-        """These, and others behind them."""
 
     @abstractmethod
     def cut(self, axis: Ints) -> Self:
@@ -70,16 +60,6 @@ class Boxes(Pieces):
         """See `Pieces`, as for the others."""
         return self.bounds(self.root, self.low, self.high)
 
-    def rows(self, some: Rows) -> Boxes:
-        """Some of them."""
-        return Boxes(self.bounds, self.root[some], self.low[some], self.high[some])
-
-    def with_more(self, more: Boxes) -> Boxes:
-        """Both."""
-        root = np.concatenate([self.root, more.root])
-        low, high = np.concatenate([self.low, more.low]), np.concatenate([self.high, more.high])
-        return Boxes(self.bounds, root, low, high)
-
     def cut(self, axis: Ints) -> Boxes:
         """In the middle."""
         row, middle = np.arange(len(axis)), (self.low + self.high) / 2.0
@@ -93,26 +73,14 @@ class Boxes(Pieces):
         return self.high - self.low
 
 
-class _Waiting(NamedTuple):
+@dataclass(frozen=True, eq=False, slots=True)
+class _Waiting(Rows):
     """Parts that are too rough, and not cut yet."""
 
     number: Ints
     score: Array
     axis: Ints
     pieces: Pieces
-
-    def rows(self, some: Rows) -> _Waiting:
-        return _Waiting(
-            self.number[some], self.score[some], self.axis[some], self.pieces.rows(some)
-        )
-
-    def with_more(self, more: _Waiting) -> _Waiting:
-        return _Waiting(
-            np.concatenate([self.number, more.number]),
-            np.concatenate([self.score, more.score]),
-            np.concatenate([self.axis, more.axis]),
-            self.pieces.with_more(more.pieces),
-        )
 
 
 def grown(roots: Pieces, flat: float, straight: float, most: int) -> SurfaceParts:
@@ -146,7 +114,7 @@ def grown(roots: Pieces, flat: float, straight: float, most: int) -> SurfacePart
         some = np.flatnonzero(waiting.score >= waiting.score.max() / _WAIT)
         order = np.argsort(-waiting.score[some], kind="stable")
         some = some[order[: (most - count) // 2]]
-        cut = waiting.rows(some)
+        cut = waiting.of(some)
         pieces = cut.pieces.cut(cut.axis)
         found = pieces.models().guarded()
         children[cut.number] = count + np.arange(2 * len(some)).reshape(-1, 2)
@@ -155,9 +123,9 @@ def grown(roots: Pieces, flat: float, straight: float, most: int) -> SurfacePart
         left = np.ones(len(waiting.number), dtype=bool)
         left[some] = False
         more = _rough(pieces, found, count, limits, width)
-        waiting, count = waiting.rows(left).with_more(more), count + 2 * len(some)
-    centre, slopes, radius, _ = (np.concatenate(part) for part in zip(*blocks, strict=True))
-    return SurfaceParts(centre, slopes, radius, children[:count], axes[:count])
+        waiting, count = _Waiting.join(waiting.of(left), more), count + 2 * len(some)
+    made = PartModels.join(*blocks)
+    return SurfaceParts(made.centre, made.slopes, made.radius, children[:count], axes[:count])
 
 
 def _rough(pieces: Pieces, found: PartModels, first: int, limits: Array, width: Array) -> _Waiting:
@@ -168,7 +136,7 @@ def _rough(pieces: Pieces, found: PartModels, first: int, limits: Array, width: 
     sides = pieces.sides[some] / width
     even = by_axis[:, 0] == by_axis[:, 1]
     axis = np.where(even, sides[:, 1] > sides[:, 0], by_axis[:, 1] > by_axis[:, 0])
-    return _Waiting(first + some, score[some], axis.astype(np.int64), pieces.rows(some))
+    return _Waiting(first + some, score[some], axis.astype(np.int64), pieces.of(some))
 
 
 class _Top(NamedTuple):
@@ -199,12 +167,11 @@ def _joined(roots: PartModels) -> _Top:
         group = group[np.argsort(centre[:, axis], kind="stable")]
         half = len(group) // 2
         waiting += [(number, 1, group[half:]), (number, 0, group[:half])]
-    every = PartModels(*(np.concatenate([np.zeros_like(a[1:]), a]) for a in roots))
+    every = PartModels.join(roots.of(slice(1, None)), roots)
     for number in range(count - 2, -1, -1):
-        one, other = (every.rows(children[[number], side]) for side in (0, 1))
-        for array, value in zip(every, _around(one, other), strict=True):
-            array[number] = value[0]
-    return _Top(every.rows(np.arange(count - 1)), children)
+        one, other = (every.of(children[[number], side]) for side in (0, 1))
+        every.put(slice(number, number + 1), _around(one, other))
+    return _Top(every.of(slice(count - 1)), children)
 
 
 def _around(one: PartModels, other: PartModels) -> PartModels:

@@ -10,12 +10,11 @@ so a search that starts at the root and discards parts misses nothing.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from coverable.arrays import Array, Ints, Mask, Protected
+from coverable.arrays import Array, Ints, Protected, Rows
 
 MOST_PARTS = 8192
 RELATIVE, ABSOLUTE = 1e-9, 1e-12  # what is added to a radius for rounding
@@ -43,7 +42,8 @@ class SurfaceParts(Protected):
         return len(self.centre)
 
 
-class PartModels(NamedTuple):
+@dataclass(frozen=True, eq=False, slots=True)
+class PartModels(Rows):
     """Affine models of k parts, and what their radii come from."""
 
     centre: Array
@@ -67,7 +67,7 @@ class PartModels(NamedTuple):
         slopes = np.concatenate(
             [self.slopes[..., :3] @ rotation.T, self.slopes[..., 3:] @ (sign * rotation.T)], axis=-1
         )
-        return self._replace(centre=centre, slopes=slopes)
+        return replace(self, centre=centre, slopes=slopes)
 
     def guarded(self) -> PartModels:
         """The same with room for rounding; what is not finite becomes a model that always holds.
@@ -87,7 +87,3 @@ class PartModels(NamedTuple):
                 centre[~known, some], slopes[~known, :, some] = 0.0, 0.0
                 radius[~known, column] = 1.0 + ABSOLUTE if column else np.inf
         return PartModels(centre, slopes, radius, np.nan_to_num(self.along, posinf=0.0))
-
-    def rows(self, some: Ints | Mask) -> PartModels:
-        """Some of the parts."""
-        return PartModels(*(array[some] for array in self))

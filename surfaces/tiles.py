@@ -7,11 +7,11 @@ each box of parameters is cut at once into as many equal ones along u and v as i
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
-from coverable.arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Rows
 from surfaces.parts import PartModels
 from surfaces.patches.patch import Patch
 
@@ -22,7 +22,8 @@ _AIM = 0.97  # of the deviation: what a cut aims at, since errors shrink only ne
 _AT_ONCE = 8  # cuts along one parameter that errors predict well
 
 
-class FlatTiles(NamedTuple):
+@dataclass(frozen=True, eq=False, slots=True)
+class FlatTiles(Rows):
     """k tiles of a surface: |f - (c + x_1 e_1 + x_2 e_2 + x_1 x_2 t)| <= r_f for |x_i| <= 1."""
 
     models: PartModels
@@ -34,13 +35,6 @@ class FlatTiles(NamedTuple):
     """(k, 2) u and v at x = (-1, -1)."""
     high: Array
     """(k, 2) u and v at x = (1, 1)."""
-
-    def rows(self, some: Mask) -> FlatTiles:
-        """Some of them."""
-        return FlatTiles(
-            self.models.rows(some), self.twist[some], self.piece[some], self.low[some],
-            self.high[some],
-        )  # fmt: skip
 
     def halves(self) -> Array:
         """(2 k, 3, 6) the two triangles of each: points (m) and normals at their corners."""
@@ -81,7 +75,7 @@ def flat_tiles(
             made = FlatTiles(models, twist, np.full(len(low), piece), low, high)
             rough = made.deviations(depth)
             fine = rough <= deviation
-            found.append(made.rows(fine))
+            found.append(made.of(fine))
             count += int(fine.sum())
             if fine.all():
                 break
@@ -91,9 +85,7 @@ def flat_tiles(
             if count + counts.prod(axis=1).sum() > most or number == MOST_ROUNDS - 1:
                 return None
             low, high = _cut(low, high, counts)
-    columns = list(zip(*found, strict=True))
-    joined = PartModels(*map(np.concatenate, zip(*columns[0], strict=True)))
-    return FlatTiles(joined, *map(np.concatenate, columns[1:]))
+    return FlatTiles.join(*found)
 
 
 def _models(

@@ -2,22 +2,17 @@
 
 Judges bound something along stretches: along half of one, bounds fall to a quarter, or to a half,
 and one more exact configuration is known. What one cannot know of that, is only asked for at ends.
-
-`Rows` are values that are arrays of equally many rows: some of the rows, or those of several.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from coverable.arrays import Array, Ints, Mask
-
-Chosen = Mask | NDArray[np.intp] | slice
+from coverable.arrays import Array, Ints, Mask, Rows
 
 
 def runs(some: Mask) -> list[Ints]:
@@ -29,42 +24,6 @@ def runs(some: Mask) -> list[Ints]:
     """
     turns = np.flatnonzero(np.diff(some)) + 1
     return [run for run in np.split(np.arange(len(some)), turns) if some[run].any()]
-
-
-class Rows:
-    """Base of dataclasses whose fields are arrays, or values of rows themselves.
-
-    Example:
-        >>> from dataclasses import dataclass
-        >>> @dataclass(frozen=True, eq=False, slots=True)
-        ... class Points(Rows):
-        ...     x: Array
-        >>> points = Points(np.array([1.0, 2.0, 3.0]))
-        >>> Points.join(points.of(points.x > 2.0), points).x.tolist()
-        [3.0, 1.0, 2.0, 3.0]
-    """
-
-    __slots__ = ()
-
-    def of(self, rows: Chosen) -> Self:
-        """Some of the rows of every field."""
-        values = self._values()
-        return type(self)(*(x[rows] if isinstance(x, np.ndarray) else x.of(rows) for x in values))
-
-    @classmethod
-    def join(cls, *parts: Self) -> Self:
-        """The rows of values one behind another; at least one value."""
-        return cls(*map(_joined, *(part._values() for part in parts)))
-
-    def _values(self) -> list[Any]:
-        """What is in the fields."""
-        return [getattr(self, one.name) for one in fields(self)]  # type: ignore[arg-type]
-
-
-def _joined(*values: Any) -> Any:
-    """Arrays, or values of rows, one behind another."""
-    first = values[0]
-    return np.concatenate(values) if isinstance(first, np.ndarray) else type(first).join(*values)
 
 
 End = TypeVar("End", bound=Rows)

@@ -33,8 +33,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coverable.arrays import Array, Mask
-from feasibility.certification.bisection import Rows
+from coverable.arrays import Array, Mask, Rows
 from robots.kinematics import Kinematics
 from robots.robot import Robot
 

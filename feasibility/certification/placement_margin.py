@@ -51,8 +51,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from coverable.arrays import Array, Ints
-from feasibility.certification.bisection import Rows
+from coverable.arrays import Array, Ints, Rows
 from feasibility.certification.lever_bounds import (
     column_changes,
     jacobians,

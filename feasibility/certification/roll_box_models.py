@@ -29,8 +29,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable.arrays import Array
-from feasibility.certification.bisection import Rows
+from coverable.arrays import Array, Rows
 from feasibility.roll import Roll, projected
 from surfaces.places.places import second_derivative_of_unit
 

@@ -26,12 +26,12 @@ between its ends; and p is off its chord by D_p / 8 at most.
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from coverable.arrays import Array, Ints, Mask
-from feasibility.certification.bisection import Rows, Stretches
+from coverable.arrays import Array, Ints, Mask, Rows
+from feasibility.certification.bisection import Stretches
 from feasibility.certification.faults import ROLL_CLOSE
 from feasibility.certification.lever_bounds import jacobians, peaks, second_derivatives
 from feasibility.task import Task
@@ -223,7 +223,7 @@ class Judge:
         path = self.offset.paths(s.start.places, s.end.places)
         known = path.known
         normals, tangents = self._directions(path.normals, path.tangents)
-        path = path._replace(normals=normals, tangents=tangents)
+        path = replace(path, normals=normals, tangents=tangents)
         for column, fixed in ((1, self._approach), (2, self._reference)):
             if fixed is not None:
                 path.deviations[..., column] = 0.0

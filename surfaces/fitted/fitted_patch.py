@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -47,7 +47,7 @@ class FittedPatch(SplinePatch):
     ) -> tuple[PartModels, Array]:
         """Of the surface meant: those of the spline, wider by what it may deviate."""
         found, twist = SplinePatch.placed_models(self, low, high, sign, twisted)
-        return found._replace(radius=found.radius + np.array(self.off)), twist
+        return replace(found, radius=found.radius + np.array(self.off)), twist
 
 
 def spline_through(

@@ -9,14 +9,14 @@ places. So it is no longer than the longest of these; and |n - m| = |1 - |m||.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
 
 import numpy as np
 
-from coverable.arrays import Array, Ints, Mask
+from coverable.arrays import Array, Chosen, Ints, Mask
 from surfaces.meshes.facets import Facets
-from surfaces.part_growth import Pieces, Rows
+from surfaces.part_growth import Pieces
 from surfaces.parts import PartModels
 
 _BINS = 8  # of a coordinate of the normals
@@ -42,21 +42,22 @@ class Clusters(Pieces):
     """(k,)"""
 
     @staticmethod
-    def of(facets: Facets, straight: float) -> Clusters:
+    def whole(facets: Facets, straight: float) -> Clusters:
         """All facets in one."""
         count = len(facets.corners)
         return Clusters(
             facets, straight, np.arange(count), np.zeros(1, np.int64), np.full(1, count)
         )
 
-    def rows(self, some: Rows) -> Clusters:
-        """See `Pieces`, as for the others."""
-        return Clusters(self.facets, self.alike, self.order, self.begin[some], self.end[some])
+    def of(self, rows: Chosen) -> Self:
+        """See `Rows`."""
+        return replace(self, begin=self.begin[rows], end=self.end[rows])
 
-    def with_more(self, more: Clusters) -> Clusters:
-        """Both."""
-        ends = (np.concatenate(two) for two in ((self.begin, more.begin), (self.end, more.end)))
-        return Clusters(self.facets, self.alike, self.order, *ends)
+    @classmethod
+    def join(cls, *parts: Self) -> Self:
+        """See `Rows`, of clusters of the same facets."""
+        begin, end = (np.concatenate([getattr(one, k) for one in parts]) for k in ("begin", "end"))
+        return replace(parts[0], begin=begin, end=end)
 
     @property
     def sides(self) -> Array:

@@ -112,7 +112,7 @@ class TriangleSurface(Surface):
             self.on_crease,
             straight,
         )
-        return grown(Clusters.of(facets, straight), flat, straight, most)
+        return grown(Clusters.whole(facets, straight), flat, straight, most)
 
     def nearest(self, points: Array) -> tuple[Ints, Array]:
         """Faces (k,), and weights (k, 3) on them, of the places nearest to points (k, 3) m."""

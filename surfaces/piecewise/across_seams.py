@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from coverable.arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Rows
 from surfaces.adjacency import grid_neighbours
 from surfaces.cells import Cells
 from surfaces.curve_fitting import CurveFit
@@ -27,7 +27,7 @@ MARKS = 16  # on each cell's border side; cells that share fewer than one of the
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class SeamPairs:
+class SeamPairs(Rows):
     """Pairs of cells that touch across a seam, on a stretch of their sides or at a corner."""
 
     pairs: Ints
@@ -43,14 +43,9 @@ class SeamPairs:
         apart = np.linalg.norm(self.normals[:, 0] - self.normals[:, 1], axis=1)
         return 2.0 * np.arcsin(np.clip(0.5 * apart, 0.0, 1.0))
 
-    def of(self, pairs: Ints) -> SeamPairs:
+    def between(self, pairs: Ints) -> SeamPairs:
         """Some of the pairs (k, 2), i < j, in the given order."""
-        row = np.searchsorted(_keys(self.pairs), _keys(pairs))
-        return self.rows(row)
-
-    def rows(self, which: Ints | Mask) -> SeamPairs:
-        """Some of the pairs."""
-        return SeamPairs(self.pairs[which], self.crossings[which], self.normals[which])
+        return self.of(np.searchsorted(_keys(self.pairs), _keys(pairs)))
 
 
 def seam_pairs_of(surface: JoinedPatches, counts: Counts) -> SeamPairs:
@@ -207,7 +202,7 @@ def curves_across(
     over = (seam_pairs.creases > SMOOTH) | (steps > JUMP * even).any(axis=1)
     if over.any():
         points[over], normals[over] = _over_the_border(
-            surface, seam_pairs.rows(over), start[over], end[over], t, pieces
+            surface, seam_pairs.of(over), start[over], end[over], t, pieces
         )
     return points, normals
 
@@ -225,9 +220,9 @@ def fit_round_edges(
     """
     for edge, of in surface.creases.edges:
         some = np.flatnonzero((pieces[fit.rough] == of).all(axis=1))
-        at = touching.of(fit.cells.pairs[fit.rough[some]])
+        at = touching.between(fit.cells.pairs[fit.rough[some]])
         on = np.abs(edge.closest(at.crossings).height) <= 2.0 * surface.gap
-        curves, at = fit.rough[some[on]], at.rows(on)
+        curves, at = fit.rough[some[on]], at.of(on)
         off = [surface.nearest(at.crossings, [k]).places - at.crossings for k in of]
         away = np.linalg.norm(off, axis=2).max(axis=0)
         corners = np.broadcast_to(at.crossings[:, None], at.normals.shape)
@@ -249,7 +244,7 @@ def fit_over_inner(
     """
     for of in surface.creases.inner:
         curves = fit.rough[(pieces[fit.rough] == of).all(axis=1)]
-        at = touching.of(fit.cells.pairs[curves])
+        at = touching.between(fit.cells.pairs[curves])
         cosine = (at.normals[:, 0] * at.normals[:, 1]).sum(axis=1, keepdims=True)
         target = at.crossings + height * at.normals.sum(axis=1) / (1.0 + cosine)
         for last in (*[False] * MEETING, True):

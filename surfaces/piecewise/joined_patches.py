@@ -244,7 +244,7 @@ class JoinedPatches(Surface):
                 if len(rows)
             ]
             back = np.argsort(np.concatenate(some), kind="stable")
-            return PartModels(*(np.concatenate(each)[back] for each in zip(*models, strict=True)))
+            return PartModels.join(*models).of(back)
 
         low, high = (np.concatenate(ends) for ends in zip(*roots, strict=True))
         return grown(Boxes(bounds, np.arange(len(low)), low, high), flat, straight, most)

@@ -143,7 +143,7 @@ class PieceCells(Cells):
             else:
                 ends = self.centres[some[:, 0]], self.centres[some[:, 1]]
                 points[both], normals[both] = curves_across(
-                    self.surface, self.seam_pairs.of(some), *ends, t, (a, b), self.around(a, b)
+                    self.surface, self.seam_pairs.between(some), *ends, t, (a, b), self.around(a, b)
                 )
         return points, normals
 
@@ -159,7 +159,7 @@ class PieceCells(Cells):
     def smoothed(self, pairs: Ints) -> Mask:
         """See `Cells.smoothed`: across creases."""
         creased = self.piece[pairs[:, 0]] != self.piece[pairs[:, 1]]
-        creased[creased] = self.seam_pairs.of(pairs[creased]).creases > SMOOTH
+        creased[creased] = self.seam_pairs.between(pairs[creased]).creases > SMOOTH
         return creased
 
     def parallel_curvature(self, height: float) -> Array:

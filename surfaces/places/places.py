@@ -10,19 +10,20 @@ its ends; so whoever knows both there knows them along it.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
-from coverable.arrays import Array, Ints, Mask
+from coverable.arrays import Array, Ints, Mask, Rows
 
 ROUNDING = 1.0 + 1e-9  # covers the rounding of the bounds' own operations
 GUESSES = 6  # closest points that lead from a guess to a place
 
 
-class Places(NamedTuple):
+@dataclass(frozen=True, eq=False, slots=True)
+class Places(Rows):
     """k places of a surface."""
 
     chart: Ints
@@ -30,21 +31,9 @@ class Places(NamedTuple):
     x: Array
     """(k, 2) u and v; on a face the weights of its second and third corner."""
 
-    def of(self, rows: Ints | Mask | slice) -> Places:
-        """Some of the places."""
-        return Places(self.chart[rows], self.x[rows])
 
-    @staticmethod
-    def join(*parts: Places) -> Places:
-        """Places one after the other."""
-        return Places(*(np.concatenate(part) for part in zip(*parts, strict=True)))
-
-    def put(self, rows: Ints | Mask, others: Places) -> None:
-        """Replace some of the places."""
-        self.chart[rows], self.x[rows] = others.chart, others.x
-
-
-class PlacePaths(NamedTuple):
+@dataclass(frozen=True, eq=False, slots=True)
+class PlacePaths(Rows):
     """k continuous paths of places, of three straight pieces each, some of them without length."""
 
     share: Array
@@ -81,7 +70,7 @@ class PlacePaths(NamedTuple):
             placed: what is `at` the first, and at the last.
             deviations: (k, 3) of that piece.
         """
-        ends = zip((*placed[0], *start), (*placed[1], *end), strict=True)
+        ends = zip((*placed[0], *start.values()), (*placed[1], *end.values()), strict=True)
         p, n, t, chart, x = (np.stack([a, a, a, b], axis=1) for a, b in ends)
         share, off = np.tile([0.0, 0.0, 0.0, 1.0], (len(x), 1)), np.zeros((len(x), 3, 3))
         off[:, 2] = deviations
@@ -97,7 +86,7 @@ class PlacePaths(NamedTuple):
         """
         (to, fro), zero = lengths, np.zeros(len(first.x))
         half = np.divide(to, to + fro, out=zero.copy(), where=to + fro > 0.0)
-        ends: Iterator[Any] = zip(first, last, strict=True)
+        ends = zip(first.values(), last.values(), strict=True)
         _, p, n, t, off, chart, x = (
             np.stack([a[:, 0], a[:, -1], b[:, 0], b[:, -1]], axis=1) for a, b in ends
         )
@@ -113,11 +102,6 @@ class PlacePaths(NamedTuple):
     def known(self) -> Mask:
         """(k,) whether something is known of points and normals of all pieces."""
         return np.asarray(np.isfinite(self.deviations[..., :2]).all(axis=(1, 2)))
-
-    def put(self, rows: Ints | Mask, others: PlacePaths) -> None:
-        """Replace some of the paths."""
-        for mine, other in zip(self, others, strict=True):
-            mine[rows] = other
 
 
 @dataclass(frozen=True, eq=False)

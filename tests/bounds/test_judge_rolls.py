@@ -107,7 +107,7 @@ def test_references_bend_no_more_than_is_said(kind):
         path = offset.paths(*(Places(chart, x) for x in ends))
         if kind != "by u":
             path.tangents[:], path.deviations[..., 2] = X, 0.0
-        return path._replace(normals=-path.normals)
+        return replace(path, normals=-path.normals)
 
     path = paths(first, first + way)
     found = held.references_along(path)

@@ -65,14 +65,14 @@ def test_stretches_of_a_motion(name, held, bent):
     assert not (np.isfinite(facets) & (facets > task.standoff - task.effective_tolerance)).any()
 
     def unknown(column):
-        return lambda path: path._replace(deviations=grown(path.deviations, column))
+        return lambda path: replace(path, deviations=grown(path.deviations, column))
 
     for column in (0, 1, 2) if held and "roll_reference" not in held else (0, 1):
         judge.offset = Starved(offset, "paths", unknown(column))
         assert not judge.within(judge.bounds(parts)).any()
     if not offset.bends_evenly:  # as near to a model, and no nearer, at the ends
         near = {"deviations": np.full((len(parts.row), 3, 3), 1e-4)}
-        judge.offset = Starved(offset, "paths", lambda path: path._replace(**near))
+        judge.offset = Starved(offset, "paths", lambda path: replace(path, **near))
         aside = replace(parts, end=replace(parts.end, points=parts.end.points + 0.01))
         off = np.linalg.norm(aside.end.points - judge.targets(aside.end.places)[0], axis=1)
         assert (judge.bounds(aside).error > off + 0.99e-4).all()

@@ -25,8 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable.arrays import Array, Ints
-from feasibility.certification.bisection import Rows
+from coverable.arrays import Array, Ints, Rows
 from feasibility.certification.collisions.collision_replay import collision_replay
 from feasibility.certification.collisions.depths import (
     Balls,

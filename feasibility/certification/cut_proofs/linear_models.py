@@ -22,8 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coverable.arrays import Array, Ints
-from feasibility.certification.bisection import Rows
+from coverable.arrays import Array, Ints, Rows
 from feasibility.certification.lever_bounds import (
     Jacobians,
     jacobians,
