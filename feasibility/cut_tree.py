@@ -71,9 +71,7 @@ class CutTree:
 
     def leaves(self) -> Iterator[Leaf]:
         """The leaves, those below a cut before those above it."""
-        for node in self.nodes():
-            if isinstance(node, Leaf):
-                yield node
+        return (node for node in self.nodes() if isinstance(node, Leaf))
 
     def folded(self, q: Array) -> Array:
         """Configurations (..., n) with opened joints turned into t .. t + 2 pi."""

@@ -15,16 +15,15 @@ MOST_NAMED = 4  # cuts that one sentence names
 
 
 def joint_value(robot: Robot, joint: int, value: float) -> str:
-    """A joint's value with its unit.
+    """A joint's value with its unit, to a tenth, without a trailing zero.
 
     Example:
         >>> from coverable import load_robot
         >>> joint_value(load_robot("ur5"), 2, -1.4312)
         '-82 deg'
     """
-    if robot.prismatic[joint]:
-        return f"{_number(1e3 * value)} mm"
-    return f"{_number(math.degrees(value))} deg"
+    size, unit = (1e3 * value, "mm") if robot.prismatic[joint] else (math.degrees(value), "deg")
+    return f"{round(size, 1) + 0.0:.10g} {unit}"
 
 
 def place_of(cut: Cut, robot: Robot) -> str:
@@ -124,8 +123,3 @@ def _of_many(tree: CutTree, robot: Robot, cells: Cells) -> str:
 def _cell(leaf: Leaf, cells: Cells) -> list[int]:
     """The cell of a leaf, as reports name it."""
     return list(cells.unravel(leaf.cell))
-
-
-def _number(value: float) -> str:
-    """To a tenth, without a trailing zero."""
-    return f"{round(value, 1) + 0.0:.10g}"

@@ -202,14 +202,12 @@ class Certificate:
         return {**vars(self), "margin": self.placement_margin}
 
 
-def deferred(make: Callable[[], Any]) -> Any:
-    """Stand-in for a field of `Verdict` that is made when it is first read."""
-    return _Deferred(make)
-
-
-@dataclass(frozen=True, slots=True)
-class _Deferred:
+class _Deferred(NamedTuple):
     make: Callable[[], Any]
+
+
+deferred: Callable[[Callable[[], Any]], Any] = _Deferred
+"""Stand-in for a field of `Verdict` that is made when it is first read."""
 
 
 @dataclass(frozen=True, eq=False)

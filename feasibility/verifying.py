@@ -82,10 +82,8 @@ class Verification(Judged):
     late: bool = False
     """Did the time run out before there was an answer? Then it does not hold."""
 
-    @property
-    def holds(self) -> bool:
-        """True where the claim is confirmed."""
-        return self.accepted
+    holds = Judged.accepted
+    """True where the claim is confirmed."""
 
     @property
     def collision(self) -> Collision | None:
@@ -285,8 +283,7 @@ def _of_proof(problem: Problem, proof: CutTree, clock: Clock, made: Made) -> Ver
     """The proof that no motion covers every cell."""
     robot, cells, task = problem.robot, problem.cells, problem.task
     checked = verify_proof(robot, cells, task, proof, lambda: clock.tick(0, None, "verifying"))
-    faults = () if checked.accepted else (MotionFault(checked.refusal),)
-    left = unjudged(robot, task, BY_REPLAY)
+    left, faults = unjudged(robot, task, BY_REPLAY), tuple(map(MotionFault, checked.faults))
     return made(faults, proof=proof, boxes=checked.boxes, not_judged=left)
 
 

@@ -42,20 +42,20 @@ class MotionFault:
 
 
 class Judged:
-    """What a replay found: the motion is accepted unless there are faults."""
+    """What a judge found: the motion, or the proof, is accepted unless there are faults."""
 
     __slots__ = ()
 
-    faults: Sequence[MotionFault]
+    faults: Sequence[MotionFault | str]
 
     @property
     def accepted(self) -> bool:
-        """True when every constraint that was judged holds along the whole motion."""
+        """True when all that was judged holds: along a whole motion, or every claim of a proof."""
         return not self.faults
 
     @property
     def refusal(self) -> str:
-        """All faults in words; empty when the motion is accepted."""
+        """All faults in words; empty when it is accepted."""
         return "; ".join(map(str, self.faults))
 
 

@@ -24,6 +24,7 @@ from scipy.spatial import cKDTree
 
 from coverable.arrays import Array, Mask
 from coverable.errors import ArgumentError, Fault
+from feasibility.certification.faults import Judged
 from feasibility.certification.lever_bounds import jacobians, second_derivatives
 from feasibility.certification.segment_rates import SegmentRates, fastest_anywhere, segment_rates
 from feasibility.task import Task
@@ -49,7 +50,7 @@ class Stop:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class RateReplay:
+class RateReplay(Judged):
     """What a motion allows."""
 
     speed: float
@@ -62,13 +63,9 @@ class RateReplay:
     stops: tuple[Stop, ...]
     waiting: float
     """s, how long the stops in place take together at least."""
-    refusals: tuple[str, ...]
-    """Why the motion is refused, each with joint or place; none where it is accepted."""
-
-    @property
-    def accepted(self) -> bool:
-        """Does the motion do what the task asks of speed and singularities?"""
-        return not self.refusals
+    faults: tuple[str, ...]
+    """Why it does not do what the task asks of speed and singularities, each with joint or place;
+    none where it does."""
 
 
 def replay_rates(
@@ -101,7 +98,7 @@ def replay_rates(
         ways = [np.einsum("kij,kj->ki", one, steps) for one in (at.point[:-1], at.point[1:])]
         waits &= np.linalg.norm(ways, axis=2).min(axis=0) < speed * lasts
     stops = _stops(at.points, targets, resting, waits)
-    refusals = []
+    faults = []
     slow = np.flatnonzero(~resting & ~(found.speed >= (speed or -np.inf)))
     if speed is not None and len(slow):
         worst = int(slow[np.argmin(found.sampled_speed[slow])])
@@ -109,18 +106,18 @@ def replay_rates(
         with np.errstate(divide="ignore"):
             times = speed / found.sampled_speed[worst]
         said = too_slow(robot, int(found.joint[worst]), times, f" at cell {place}")
-        refusals.append(said + _others(len(slow) - 1))
+        faults.append(said + _others(len(slow) - 1))
     near = np.flatnonzero(~(found.sigma >= (sigma or -np.inf)))
     if len(near):
         worst = int(near[np.argmin(found.sampled_sigma[near])])
         place = _named(cells, targets, at.points[worst])
-        refusals.append(
+        faults.append(
             f"the smallest singular value is {found.sampled_sigma[worst]:.3g} at cell {place}; "
             f"{sigma:g} is required" + _others(len(near) - 1)
         )
     return RateReplay(
         float(found.speed[~resting].min(initial=np.inf)), float(found.sigma.min(initial=np.inf)),
-        found, stops, float(lasts[waits].sum()), tuple(refusals),
+        found, stops, float(lasts[waits].sum()), tuple(faults),
     )  # fmt: skip
 
 

@@ -147,9 +147,8 @@ def open_fault(judge: Judge, left: SampledStretches, bounds: Bounds) -> MotionFa
     one = int(np.lexsort((left.length, bounds.joined))[0])
     row, share = int(left.row[one]), float(left.middle[one])
     if not bounds.joined[one]:
-        target = [
-            judge.offset.at(s.places.of(np.array([one])))[0][0] for s in (left.start, left.end)
-        ]
+        stuck = left.of(slice(one, one + 1))
+        target = [judge.offset.at(end.places)[0][0] for end in (stuck.start, stuck.end)]
         jump = 1e3 * float(np.linalg.norm(target[1] - target[0]))
         text = f"the place on the surface that the tool is over jumps, by {jump:.3g} mm"
         return MotionFault(text, row, share)

@@ -72,7 +72,7 @@ def _at_rates(robot: Robot, cells: Cells, task: Task, walks: Sequence[Walk]) -> 
     from feasibility.certification.rate_replay import check_rates, replay_rates
 
     check_rates(robot, task)
-    found = [replay_rates(robot, cells, task, walk).refusals for walk in walks]
+    found = [replay_rates(robot, cells, task, walk).faults for walk in walks]
     return Findings(tuple(MotionFault(text) for texts in found for text in texts))
 
 

@@ -229,7 +229,7 @@ def _not_found(
     best = largest_speed(rated)
     message = (
         f"One continuous motion covers every cell, but none was found that does so "
-        f"{required_words(task)}: on the one that is known {'; '.join(replayed.refusals)}. "
+        f"{required_words(task)}: on the one that is known {replayed.refusal}. "
         f"The best of those known covers {int(reached.sum())} of {total} cells."
     )
     if task.speed is not None and best > 0.0:

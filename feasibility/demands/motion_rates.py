@@ -119,7 +119,7 @@ def path_rates(path: CoveragePath, walk: Walk | None = None) -> RateReplay | Non
     if least is not None and not replayed.sigma >= least:
         raise PathError(
             f"the {'path' if walk is None else 'timed path'} in this order comes too near to a "
-            f"singularity: {replayed.refusals[-1]}; try another --order"
+            f"singularity: {replayed.faults[-1]}; try another --order"
         )
     return replayed
 

@@ -240,7 +240,7 @@ def rates_json(
     if rates is None:
         return {}
     stops = [{"why": stop.why, "cell": list(path.cells.unravel(stop.cell))} for stop in rates.stops]
-    found: dict[str, Any] = {"holds": rates.accepted, "why_not": list(rates.refusals)}
+    found: dict[str, Any] = {"holds": rates.accepted, "why_not": list(rates.faults)}
     if path.task.speed is not None:
         found |= {"speed_m_per_s": path.task.speed, "stops": stops, "waiting_s": rates.waiting}
         if trajectory is not None:
@@ -256,7 +256,7 @@ def rates_words(
     """The same in words; empty where there was none."""
     if rates is None:
         return ""
-    parts = list(rates.refusals)
+    parts = list(rates.faults)
     if path.task.speed is not None:
         where = [stop.cell for stop in rates.stops if stop.why == "in place"]
         at = f" at {path.cells.named(list(dict.fromkeys(where)), FEW)}" if where else ""

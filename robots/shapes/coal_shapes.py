@@ -16,7 +16,7 @@ import numpy as np
 import pinocchio as pin
 
 from coverable.arrays import Array, Ints
-from robots.shapes.bodies import Geometry, HalfSpace, Polytope, Triangles
+from robots.shapes.bodies import Geometry, HalfSpace, Polytope, Solid, Triangles
 from robots.shapes.hulls import thickened
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
@@ -63,8 +63,10 @@ def coal_hull(points: Array) -> tuple[Any, Array]:
     return coal.Convex(*_lists(points[used], renumbered.reshape(-1, 3))), points[used]
 
 
-def coal_body(body: Polytope) -> tuple[Any, Array]:
-    """A convex body, and its placement (4, 4) in the frame of its joint."""
+def coal_body(body: Polytope | Solid) -> tuple[Any, Array]:
+    """A body, and its placement (4, 4) in the frame of its joint."""
+    if isinstance(body, Solid):
+        return coal_shape(body.geometry), body.placement
     vertices, place, radius = body.vertices, np.eye(4), max(body.radius, LEAST)
     if len(vertices) > 2:
         shape, _ = coal_hull(thickened(np.array(vertices)))

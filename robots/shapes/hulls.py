@@ -120,9 +120,8 @@ def thickened(points: Array) -> Array:
     axes = np.linalg.svd(centred.T @ centred)[0].T  # rows
     for axis in axes:
         if np.ptp(points @ axis) < HALF_THICKNESS:
-            points = np.concatenate(
-                [points + HALF_THICKNESS * axis, points - HALF_THICKNESS * axis]
-            )
+            step = HALF_THICKNESS * axis
+            points = np.concatenate([points + step, points - step])
     return points
 
 

@@ -22,7 +22,7 @@ from coverable.errors import Fault, listed
 from robots.errors import RobotError
 from robots.robot import Robot
 from robots.shapes.bodies import Polytope, Solid
-from robots.shapes.coal_shapes import coal_body, coal_shape, with_contacts
+from robots.shapes.coal_shapes import coal_body, with_contacts
 from robots.shapes.links import LinkShapes, outer_bodies
 from robots.urdf.elements import UrdfError
 from robots.urdf.srdf import DisabledPairs, read_srdf
@@ -204,10 +204,7 @@ def collision_rates(
     """
     geometry, of_owner = pin.GeometryModel(), dict[str, list[int]]()
     for number, body in enumerate(bodies if pairs else ()):
-        if isinstance(body, Solid):
-            shape, place = coal_shape(body.geometry), body.placement
-        else:
-            shape, place = coal_body(body)
+        shape, place = coal_body(body)
         title, placement = f"{number} {body.owner}", pin.SE3(np.array(place))
         entry = pin.GeometryObject(title, body.joint, 0, placement, shape)
         of_owner.setdefault(body.owner, []).append(int(geometry.addGeometryObject(entry)))

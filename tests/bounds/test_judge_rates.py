@@ -156,8 +156,8 @@ def test_stops_are_counted_and_the_joint_is_named():
     for factor, accepted in ((0.98, True), (1.02, False), (2.0, False)):
         found = replay_rates(ARM, PLATE, replace(TASK, speed=0.4 * factor), line())
         assert found.accepted == accepted
-    assert found.refusals[0].startswith("j2 would need 0.8 m/s at cell")
-    assert "it allows 0.4" in found.refusals[0]
+    assert found.faults[0].startswith("j2 would need 0.8 m/s at cell")
+    assert "it allows 0.4" in found.faults[0]
 
 
 @pytest.mark.parametrize("sigma", [0.98, 1.02])
@@ -168,7 +168,7 @@ def test_the_distance_from_singularities_is_kept_also_where_the_tool_rests(sigma
         asked = replace(TASK, min_manipulability=sigma * least)
         found = replay_rates(ARM, PLATE, asked, Walk(rows, np.full(len(rows), -1)))
         assert found.accepted == (sigma < 1.0)
-        assert found.accepted or "smallest singular value" in found.refusals[0]
+        assert found.accepted or "smallest singular value" in found.faults[0]
 
 
 IN_PLACE = {  # mm beside the target at both ends; radius (mm) of a whole turn between them

@@ -208,7 +208,7 @@ def of_path(one: Any) -> Json:
         "trajectory": timed(one),
         **there(
             rates=rates and {
-                "holds": rates.accepted, "why_not": list(rates.refusals),
+                "holds": rates.accepted, "why_not": list(rates.faults),
                 **there(speed_m_per_s=path.task.speed),
                 "stops": [{"why": stop.why, "cell": list} for stop in rates.stops],
                 "waiting_s": rates.waiting, "share_at_speed": float,

@@ -172,7 +172,7 @@ def test_every_patch_holds_the_rates_that_are_asked(asked, whole):
     assert_division(found)
     assert found.whole == whole == (check(UR5, CELLS, task).answer is coverable.Answer.FEASIBLE)
     for patch in found.patches:
-        assert not replay_rates(UR5, CELLS, task, patch.walk).refusals
+        assert not replay_rates(UR5, CELLS, task, patch.walk).faults
         assert len(patch.cells) > 1
     said = "would need" if task.speed else "singular values fall to"
     assert all(said in cause.detail for cause in found.left_out)

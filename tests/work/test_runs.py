@@ -172,7 +172,7 @@ def test_runs_hold_the_speed_of_the_task():
     runs = pass_runs(UR5, along.cells, fast, along.places, clock=Clock())
     assert runs.runs
     for run in runs.runs:
-        assert not replay_rates(UR5, along.cells, fast, run.walk).refusals
+        assert not replay_rates(UR5, along.cells, fast, run.walk).faults
     said = [cut.cause for cut in runs.cuts] + [gap.cause for gap in runs.gaps]
     assert any("would need" in cause and "rad/s; it allows 3.15" in cause for cause in said)
     assert any("along stretch" in cause for cause in said)

@@ -113,10 +113,10 @@ couples_of = lru_cache(maxsize=KEPT)(Couples)  # for the next motion among them
 def collision_replay(
     robot: Robot, bodies: Bodies, q: Array, deviations: Array | None = None
 ) -> CollisionReplay:
-    """Judge a motion that is straight in joint space between its rows q (m, n), unwrapped.
+    """Judge a motion that is straight in joint space between its rows q (m, n), unwrapped rad or m.
 
     Values that are not finite refuse. Of motions that are curved between rows, `deviations`
-    (m - 1, n) bound how far each joint is from the straight lines.
+    (m - 1, n) bound how far (rad or m) each joint is from the straight lines.
 
     Raises:
         ArgumentError: a pair names what has no body, or q or deviations have other shapes.

@@ -158,10 +158,8 @@ def planes_around(mesh: Triangles) -> Array | None:
 
     if len(mesh.faces) > MOST_FACES or not is_convex(mesh, FULL):
         return None
-    planes, wide = (
-        np.array(ConvexHull(mesh.vertices).equations),
-        np.ptp(mesh.vertices, axis=0).max(),
-    )
+    planes = np.array(ConvexHull(mesh.vertices).equations)
+    wide = np.ptp(mesh.vertices, axis=0).max()
     points = np.concatenate([mesh.vertices, mesh.vertices[mesh.faces].mean(axis=1)])
     if (points @ planes[:, :3].T + planes[:, 3]).max(axis=1).min() < -FLUSH * wide:
         return None

@@ -43,6 +43,7 @@ from feasibility.certification.cut_proofs.linear_models import (
     models_of,
 )
 from feasibility.certification.cut_proofs.refutation import Refuter
+from feasibility.certification.faults import Judged
 from feasibility.certification.lever_bounds import out_of_line
 from feasibility.collisions.problem_bodies import Bodies
 from feasibility.task import Task
@@ -70,18 +71,14 @@ class Claim(NamedTuple):
     """That target, or all of the surface, as a part."""
 
 
-class ProofCheck(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class ProofCheck(Judged):
     """What became of a proof."""
 
     boxes: int
     """How many boxes of joints and surface, or of the tool's tilt and roll, were looked at."""
-    refusal: str = ""
-    """Why it is refused; empty when it is accepted."""
-
-    @property
-    def accepted(self) -> bool:
-        """True when every claim is confirmed."""
-        return not self.refusal
+    faults: tuple[str, ...] = ()
+    """Why it is refused; none when every claim is confirmed."""
 
 
 @dataclass(eq=False, slots=True)
@@ -115,7 +112,7 @@ class Emptiness:
         while len(waiting):
             if done >= most:
                 what = f"{claims[int(waiting.claim.min())].what} cannot be confirmed"
-                return ProofCheck(done, f"{what}: after {done:,} boxes it is still open")
+                return ProofCheck(done, (f"{what}: after {done:,} boxes it is still open",))
             self.tick()
             # The newest first, so that few wait.
             boxes, waiting = waiting.of(slice(-BATCH, None)), waiting.of(slice(-BATCH))
@@ -136,7 +133,7 @@ class Emptiness:
                     where = "on the surface" if claim.cell is None else "at its target"
                     values = ", ".join(f"{value:.4f}" for value in found[1])
                     said = f"{claim.what} is wrong: the tool can be {where} at q = [{values}]"
-                    return ProofCheck(done, said)
+                    return ProofCheck(done, (said,))
             new = smaller(left, models, self.parts, self.allowed.length)
             waiting = Boxes.join(waiting, new)
         return ProofCheck(done)

@@ -78,7 +78,7 @@ def verify_proof(
     """
     fault = out_of_line(robot) or malformed(robot, len(cells), tree)
     if fault:
-        return ProofCheck(0, fault)
+        return ProofCheck(0, (fault,))
     tick()
     if isinstance(tree.root, Leaf):
         point, approach = (each[tree.root.cell] for each in task.targets(cells)[:2])
@@ -95,7 +95,7 @@ def verify_proof(
     try:
         parts = cells.surface.parts(FINE * task.effective_tolerance, FINE * cone)
     except SurfaceError as error:
-        return ProofCheck(0, f"the surface has no bounds to prove anything with: {error}")
+        return ProofCheck(0, (f"the surface has no bounds to prove anything with: {error}",))
     return verify_on(robot, cells, task, tree, parts, tick, most)
 
 
@@ -156,7 +156,7 @@ def verify_on(
     one = held.of(slice(whole, whole + 1))
     limits, endless = _finite_slides(robot, one, task.effective_tolerance)
     if fault or endless:
-        return ProofCheck(0, fault or endless)
+        return ProofCheck(0, (fault or endless,))
     allowed = Allowed.by(task, robot, limits.low, limits.high)
 
     claims = list(_claims(robot, cells, tree, limits, first))
