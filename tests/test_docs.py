@@ -149,8 +149,8 @@ def test_contributing_names_every_dependency() -> None:
         assert f"**{name}**" in CONTRIBUTING, f"{name}: why is it here?"
 
 
-def test_files_that_contributing_names_exist() -> None:
-    names = set(re.findall(r"`([\w/]+\.(?:py|pyi|toml)|[\w/]+/)`", CONTRIBUTING))
+def test_files_that_contributing_and_trust_name_exist() -> None:
+    names = re.findall(r"`([\w/]+\.(?:pyi?|toml)|[\w/]+/)`", CONTRIBUTING + WRITTEN["trust"])
     assert len(names) > 60
     for name in names:
         assert any(ROOT.glob(f"**/{name}" if "/" not in name.rstrip("/") else name)) or any(
