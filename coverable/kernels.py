@@ -35,8 +35,8 @@ CODE = (  # files of kernels, of all that they name, and of the named tuples tha
     "surfaces/meshes/*.py", "surfaces/meshes/cells/*.py", "surfaces/patches/closed_form_kernels.py",
     "feasibility/paper/*.py", "feasibility/collisions/kernels/*.py",
     "feasibility/roadmap/proofs/box*.py", "feasibility/roadmap/proofs/branching.py",
-    "feasibility/roadmap/proofs/ruling.py",
-    "feasibility/roadmap/causes/diagnosis.py", "feasibility/roadmap/moving_clear.py",
+    "feasibility/roadmap/proofs/ruling.py", "feasibility/roadmap/causes/diagnosis.py",
+    "feasibility/roadmap/moving_clear.py",
     "feasibility/roadmap/motions/*.py", "feasibility/timing/timed_curve.py",
     "feasibility/viewer/painter.py",
 )  # fmt: skip

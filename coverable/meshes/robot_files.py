@@ -112,8 +112,9 @@ class MeshFiles:
 
 def _read_once(files: tuple[bytes, ...]) -> list[list[RawMesh] | MeshError]:
     """`read_collada`; what is wrong with files may be a matter of time, and is looked at anew."""
-    if files in _LAST:
-        return _LAST[files]
+    known = _LAST.get(files)
+    if known is not None:
+        return known
     found = read_collada(files)
     if not any(isinstance(one, MeshError) for one in found):
         _LAST.clear()

@@ -29,8 +29,6 @@ KEPT = 256  # meshes whose hulls are kept
 
 _asked = coal.DistanceRequest()
 _asked.enable_signed_distance, _asked.gjk_tolerance = True, GJK
-_within = with_contacts(coal.CollisionRequest())
-_within.gjk_tolerance = GJK
 
 
 class Body:
@@ -78,8 +76,10 @@ class Body:
 
         None where it does not, else a distance (m) of some of their triangles that is less.
         """
-        _within.security_margin, found = margin + COAL, coal.CollisionResult()
-        if not coal.collide(self._geometry, self._place, other._geometry, place, _within, found):
+        # One of its own: in another thread a margin of another couple would certify this one.
+        request, found = with_contacts(coal.CollisionRequest()), coal.CollisionResult()
+        request.gjk_tolerance, request.security_margin = GJK, margin + COAL
+        if not coal.collide(self._geometry, self._place, other._geometry, place, request, found):
             return None
         return float(found.getContact(0).penetration_depth)
 
