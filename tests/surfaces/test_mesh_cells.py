@@ -102,7 +102,7 @@ def test_cells_are_connected_even_compact_and_complete(cut):
 MANY = [(name, count) for count in (20, 200, 77, 500) for name in PATCHES]
 
 
-@sampled(("name", "count"), spread(MANY, 6))
+@sampled(("name", "count"), spread(MANY, 4))
 def test_few_and_many_cells_are_even_too(name, count):
     assert_even(Cut(PATCHES[name](), count), count)
 

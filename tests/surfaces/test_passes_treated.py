@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from mesh_patches import grid, panel_with_hole
+from samples import sampled, seeds
 
 from coverable import cylinder, plane
 from surfaces.passes.tool_lines import ToolLines, visits
@@ -86,7 +87,7 @@ def test_the_bracket_holds_the_closed_form(case):
     assert case is not strips or found.lower == pytest.approx(truth, abs=2e-5)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@sampled("seed", seeds(2, all=5))
 def test_no_face_is_treated_more_or_less_than_is_said_of_it(seed):
     """Large faces that are not cut, about places at random; against points all over each face."""
     rng = np.random.default_rng(seed)

@@ -94,7 +94,7 @@ def test_places_follow_the_curves_past_crowds_and_tell_turns_on_the_spot_apart()
 
 @pytest.mark.parametrize("neighbours", ["order", 0.3])
 def test_parts_hold_every_place_of_every_curve(neighbours):
-    cells = drawn(1, neighbours=neighbours)
+    cells = drawn(1, 14, neighbours=neighbours)
     parts = cells.surface.parts(1e-3, 0.01)
     finest = parts.children[:, 0] < 0
     assert (parts.radius[finest] <= [1e-9, 0.01]).all()

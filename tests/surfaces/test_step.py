@@ -15,7 +15,7 @@ from approved import refused
 from coverable import Case, SurfaceError, mesh, step, step_faces
 from coverable.processes import Ended, Limits, folder_of, run_apart
 from feasibility.cli.main import main
-from surfaces.meshes import step_process
+from surfaces.meshes import step_process, step_surface
 from surfaces.meshes.step_process import Caps
 from surfaces.meshes.step_surface import step_parts, step_triangles
 
@@ -46,17 +46,43 @@ def folder(tmp_path_factory):
     return folder
 
 
+FORKS = """import os, runpy, sys
+child = runpy.run_path(sys.argv[1])
+sys.path[:0] = sys.argv[2:]
+child["_load_all"]()
+for name in map(str.rstrip, sys.stdin):
+    if not os.fork():
+        sys.stdin = open(name)
+        os.dup2(os.open(name + ".out", os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 1)
+        child["main"]()
+    os.wait()
+    print(flush=True)
+"""
+
+
 @pytest.fixture(scope="module")
-def known():
-    """Each question asked of the process once."""
-    answers = {}
+def known(tmp_path_factory):
+    """The product's child, but Open CASCADE is imported once: a fork answers each question."""
+    name = tmp_path_factory.mktemp("asked") / "question"
+    command = [sys.executable, "-c", FORKS, step_process.CHILD, *map(folder_of, ("OCP", "numpy"))]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL) as forks:
 
-    def run(script, given, waiting, limits):
-        if given not in answers:
-            answers[given] = run_apart(script, given, waiting, limits)
-        return answers[given]
+        def run(script, given, *limits):
+            name.write_bytes(given)
+            forks.stdin.write(b"%s\n" % bytes(name))
+            forks.stdin.flush()
+            forks.stdout.readline()
+            return Ended(name.with_suffix(".out").read_bytes())
 
-    return Caps(run=run)
+        yield Caps(run=run)
+
+
+@pytest.fixture
+def all_known(known, monkeypatch):
+    """What names no caps asks there too."""
+    read = step_surface.read_step
+    monkeypatch.setattr(step_surface, "read_step", lambda file, job, _: read(file, job, known))
 
 
 @pytest.fixture(scope="module")
@@ -148,7 +174,7 @@ CONTENTS = (
 
 
 def test_choices_that_make_no_sense_and_files_that_are_none_are_refused(
-    folder, known, tmp_path, approved
+    folder, known, all_known, tmp_path, approved
 ):
     asked = [("part.step", choice) for choice in CHOICES]
     asked.append(("ball.step", {"colour": "#00ff00"}))  # without any
@@ -211,7 +237,7 @@ def test_the_message_names_the_extra(folder, monkeypatch):
 
 def test_the_process_opens_nothing_once_it_sees_the_file(tmp_path):
     """What stands before `answer` in the child closes the door: tried with a child that tries."""
-    text = Path(step_process.CHILD).read_text()
+    text = Path(step_process.CHILD).read_text().replace("    _load_all()\n", "")
     tries = text.replace(
         "        reply = answer(job, data)",
         "        try:\n            open('/dev/null')\n            reply = b'opened'\n"
@@ -220,8 +246,7 @@ def test_the_process_opens_nothing_once_it_sees_the_file(tmp_path):
     assert tries != text
     script = tmp_path / "tries.py"
     script.write_text(tries)
-    job = json.dumps({"library": [folder_of("OCP"), folder_of("numpy")]}).encode()
-    ended = run_apart(script, job + b"\n", 300.0, Limits(6 * 2**30, 60, 1000))
+    ended = run_apart(script, b'{"library": []}\n', 300.0, Limits(6 * 2**30, 60, 1000))
     assert ended.written == b"24"  # too many open files
 
 
@@ -232,6 +257,7 @@ KEYS = {
 
 
 @pytest.mark.parametrize("keys", KEYS)
+@pytest.mark.usefixtures("all_known")
 def test_a_case_says_which_faces(folder, keys):
     area, top = KEYS[keys]
     case = Case.from_toml(CASE.format(keys), folder)
@@ -242,6 +268,7 @@ def test_a_case_says_which_faces(folder, keys):
     assert surface.mesh.vertices[:, 2].max() == pytest.approx(top)
 
 
+@pytest.mark.usefixtures("all_known")
 def test_a_case_with_a_wrong_choice_says_so(folder, monkeypatch, approved):
     monkeypatch.chdir(folder)
     wrong = ("faces = [9]", "", "faces = [3]\ncolour = '#ff0000'", "scale = 0.001\nfaces = [3]")
@@ -250,6 +277,7 @@ def test_a_case_with_a_wrong_choice_says_so(folder, monkeypatch, approved):
     approved("STEP cases refused", "\n".join(said).replace(str(folder), "FOLDER"))
 
 
+@pytest.mark.usefixtures("all_known")
 def test_show_lists_the_faces_and_draws_them_with_their_numbers(folder, tmp_path, capsys):
     page = tmp_path / "faces.html"
     assert main(["show", str(folder / "part.step"), "--html", str(page)]) == 0

@@ -26,7 +26,7 @@ GRIDS = {
     "odd at the poles": sphere(1.0, (0, 180), (0, 360)).cells(6, 13),
     "a row": sphere(1.0, (10, 90), (10, 180)).cells(1, 14),
     "a column": torus(0.5, 0.2, (-180, 180), (0, 360)).cells(14, 1),
-    "fine": sphere(1.0, (10, 90), (10, 180)).cells(12, 15),
+    "fine": sphere(1.0, (10, 90), (10, 180)).cells(9, 10),
 }
 
 

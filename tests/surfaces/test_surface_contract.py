@@ -180,8 +180,8 @@ def test_of_many_closest_points_one_on_the_patch_is_taken(name):
 def test_closest_points_of_ellipsoids_near_the_planes_where_normals_meet(axes):
     whole = ellipsoid(axes, (0, 180), (0, 360))
     rng = np.random.default_rng(2)
-    points = rng.uniform(-1, 1, (30, 3)) * axes
-    points[np.arange(30), rng.integers(0, 3, 30)] *= np.tile([0.0, 1e-300, 1e-17, 1e-9, 0.1], 6)
+    points = rng.uniform(-1, 1, (15, 3)) * axes
+    points[np.arange(15), rng.integers(0, 3, 15)] *= np.tile([0.0, 1e-300, 1e-17, 1e-9, 0.1], 3)
     points[0], points[1] = 0.0, 1e-12
     found = whole.closest(points)
     away = np.linalg.norm(points - whole.point(found.u, found.v), axis=1)

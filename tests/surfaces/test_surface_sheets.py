@@ -35,16 +35,16 @@ def places(surface, rng, count):
 
 
 def distances(surface, wanted, depth, rng, most=600, count=80):
-    """How far places in a thick surface are from its sheet, and what is stated."""
+    """How far places in a thick surface are from its sheet, what is stated, and the sheet."""
     sheet = sheet_of(surface, wanted, most, depth)
     points, normals = places(surface, rng, count)
     deep = depth * rng.choice([0.0, 1.0, rng.uniform()], (len(points), 1))
     far = least_distances(sheet.triangles, points - surface.side_sign * deep * normals)
     # Thin triangles lose digits in their distances.
-    return far, sheet.deviation + 1e-12 * np.abs(sheet.triangles).max()
+    return far, sheet.deviation + 1e-12 * np.abs(sheet.triangles).max(), sheet
 
 
-@sampled("seed", seeds(3, all=100))
+@sampled("seed", seeds(2, all=100))
 @pytest.mark.parametrize("thick", [False, True])
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_place_is_further_from_its_sheet_than_stated(kind, thick, seed):
@@ -53,19 +53,21 @@ def test_no_place_is_further_from_its_sheet_than_stated(kind, thick, seed):
     size = size_of(surface)
     depth = size * 10.0 ** rng.uniform(-3, 0) if thick else 0.0
     wanted = size * 10.0 ** rng.uniform(-4, -1)
-    far, stated = distances(surface, wanted, depth, rng, int(rng.integers(2, 600)))
+    far, stated, _ = distances(surface, wanted, depth, rng, int(rng.integers(2, 600)))
     assert far.max() <= stated, surface
 
 
 @pytest.mark.parametrize("name", EXTREME)
-@pytest.mark.parametrize("most", [2, 8, 100])
-def test_few_triangles_of_extreme_surfaces_are_as_near_as_stated(name, most):
+def test_few_triangles_of_extreme_surfaces_are_as_near_as_stated(name):
     """Where one triangle is far around the axis, or over it; two of them are a convex tile."""
-    far, stated = distances(EXTREME[name], 1e-4, 0.0, np.random.default_rng(3), most, 120)
-    assert far.max() <= stated
-    tiles = sheet_of(EXTREME[name], 1e-4, most).own.reshape(-1, 2, 3, 3)
-    looks = np.cross(tiles[:, :, 1] - tiles[:, :, 0], tiles[:, :, 2] - tiles[:, :, 0])
-    assert ((looks[:, 0] * looks[:, 1]).sum(axis=1) >= 0.0).all()
+    wanted = 2e-3
+    for most in (100, 8, 2):
+        rng = np.random.default_rng(3)
+        far, stated, sheet = distances(EXTREME[name], wanted, 0.0, rng, most, 120)
+        assert far.max() <= stated
+        tiles, wanted = sheet.own.reshape(-1, 2, 3, 3), max(wanted, sheet.deviation)
+        looks = np.cross(tiles[:, :, 1] - tiles[:, :, 0], tiles[:, :, 2] - tiles[:, :, 0])
+        assert ((looks[:, 0] * looks[:, 1]).sum(axis=1) >= 0.0).all()
 
 
 def test_layers_of_a_thick_sheet_leave_no_more_between_them_than_stated():
