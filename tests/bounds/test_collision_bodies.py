@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 from foreign_clearances import distance_from_hull
+from samples import sampled, spread
 
 from coverable import Axis, Collision, Obstacle, ToolShape, load_robot, plane
 from coverable.errors import ArgumentError
@@ -244,7 +245,7 @@ def test_corners_are_welded_and_what_is_no_solid_is_a_sheet_that_says_so():
     assert "taken as a sheet" in sheet.notes[0]
 
 
-@pytest.mark.parametrize("angle", [0.7, -2.0])
+@sampled("angle", spread([-2.0, 0.7], 1))
 def test_a_moving_world_is_as_near_as_one_at_rest(angle):
     """The judge, on the arm with its table, and on the arm alone beside the turned part."""
     shelf = Obstacle.box("shelf", (0.4, 0.3, 0.02), (0.5, -0.2, 0.75), (0, 10, 20))

@@ -162,7 +162,7 @@ def test_clearance_of_many_triangles_is_never_above_the_distance_and_seldom_far_
     walk = np.cumsum(rng.normal(size=(60, 3)) * [0.08, 0.08, 0.02], axis=0)
     walk += [0.6, 0.3, 0.2]
     solid, soup = Solid("tool", 3, at(0.05), body), Soup("surface", dome(20), 0.0, False)
-    for start in range(0, 60, 15):
+    for start in range(0, 60, 20):
         rows = walk[start : start + 6]
         q = np.concatenate([np.linspace(*ends, 15) for ends in pairwise(rows)])
         bent = [q + np.array([0.0, 0.0, way]) for way in (-off, 0.0, off)]
@@ -194,10 +194,10 @@ def test_a_closer_look_certifies_no_more_than_there_is(calls):
     """A bar in a dome, asked for other distances along each segment, with few calls and many."""
     rng, raised = np.random.default_rng(calls), 0
     robot = planar_arm([0.3, 0.4, 0.1], ["revolute", "revolute", "prismatic"])
-    walk = np.cumsum(rng.normal(size=(90, 3)) * [0.08, 0.08, 0.02], axis=0)
+    walk = np.cumsum(rng.normal(size=(60, 3)) * [0.08, 0.08, 0.02], axis=0)
     walk += [0.6, 0.3, 0.2]
     solid, soup = Solid("tool", 3, at(0.05), SHAPES[0]), Soup("surface", dome(20), 0.0, False)
-    for start in range(0, 90, 6):
+    for start in range(0, 60, 6):
         rows = walk[start : start + 6]
         q = np.concatenate([np.linspace(*ends, 15) for ends in pairwise(rows)])
         ((one,), (fine,)) = (

@@ -129,7 +129,7 @@ def with_first_leaf(node, leaf):
     return replace(node, below=with_first_leaf(node.below, leaf))
 
 
-@pytest.mark.parametrize("index", proof_cases.QUICK[:3])
+@sampled("index", proof_cases.QUICK[: len(seeds(2, all=3))])
 def test_exchanged_cells_and_cuts_of_other_joints_are_refused_where_a_motion_refutes_them(index):
     case, refused = stored_case(index), [0, 0]
     leaves = [with_first_leaf(case.tree.root, Leaf(k)) for k in range(0, len(case.cells), 4)]
@@ -151,7 +151,7 @@ def random_tree(rng, robot, cells, depth=0):
     return Cut(joint, value, *(random_tree(rng, robot, cells, depth + 1) for _ in range(2)))
 
 
-@sampled("seed", seeds(3, all=30))
+@sampled("seed", seeds(2, all=30))
 def test_no_tree_is_accepted_where_a_motion_covers_all(seed):
     """Elbow up alone covers the strip, with the first joint's limits a little wider."""
     rng, arm = np.random.default_rng(seed), elbow(q1=proof_cases.ACROSS + 0.3)

@@ -21,7 +21,7 @@ def volume(vertices):
 
 def random_bodies():
     rng = np.random.default_rng(0)
-    for k in range(60):
+    for k in range(30):
         size = 10.0 ** rng.uniform(-3, 2)
         points = rng.normal(size=(int(rng.integers(4, 900)), 3))
         if k % 3 == 1:

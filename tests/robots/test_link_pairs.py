@@ -6,6 +6,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 import trimesh
+from samples import sampled, spread
 
 from coverable import RobotError, load_robot
 from robots.shapes.bodies import Solid
@@ -141,7 +142,7 @@ REACH = {
 }
 
 
-@pytest.mark.parametrize("name", REACH)
+@sampled("name", spread([*REACH], 4))
 def test_how_far_tools_reach_beyond_their_point(name):
     robot = load_robot(name)
     reaches = tool_reach(robot, link_shapes(robot).solids)

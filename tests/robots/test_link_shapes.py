@@ -75,7 +75,7 @@ FEW = ["puma560", "ur5", "panda", "talos_arm"]
 NAMES = [*FEW, *(info.name for info in list_robots() if info.name not in FEW)]
 
 
-@sampled("name", [NAMES[k] for k in seeds(4, all=len(NAMES))])
+@sampled("name", [NAMES[k] for k in seeds(3, all=len(NAMES))])
 def test_bodies_are_where_the_urdf_has_them_and_hulls_and_pieces_hold_them(name):
     """Placements by joints of the URDF, locked ones and fixed links included, without Pinocchio."""
     robot = load_robot(name)
