@@ -9,6 +9,7 @@ from capsule_arms import bodies_of, pair
 from gantry import SURFACES, configurations, gantry, marks_of, places_along, raster, tools_of
 from referee import Facets
 from referee import evenly as dense
+from samples import sampled, spread
 
 from coverable import Obstacle, Task, load_robot, piecewise, plane, poses, replay, sphere, verify
 from feasibility.certification.motion_replay import replay_over_surface
@@ -267,7 +268,7 @@ def round_an_edge(side, turn, reach=0.02, lean=0.0):
     return cells, configurations(points, -sign * up(angles + lean))
 
 
-@pytest.mark.parametrize(("side", "turn"), [("outside", -1.0), ("inside", 1.0), ("outside", -0.7)])
+@sampled(("side", "turn"), spread([("outside", -1.0), ("outside", -0.7), ("inside", 1.0)], 2))
 def test_round_an_outer_edge_the_tool_keeps_its_distance_from_the_edge(side, turn):
     task = Task(standoff=0.02, cone_deg=20, tolerance=1e-3)
 

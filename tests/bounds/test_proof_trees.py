@@ -269,7 +269,7 @@ def test_too_far_is_what_lies_further_than_the_links_are_long():
     for share in (0.999, 1.001):
         assert too_far(arm, np.add(end, (0.01 * share, 0, 0)), 0.01) == (share > 1.0)
     for robot in (load_robot("xarm7"), load_robot("ur5", axes=[rail])):
-        q = np.random.default_rng(0).uniform(-2, 2, (25, robot.n))
+        q = np.random.default_rng(0).uniform(-2, 2, (10, robot.n))
         tips, _ = Kinematics(robot).tools(q.clip(robot.lower, robot.upper))
         assert not any(too_far(robot, tip, 0.0) for tip in tips)
         far = plane((3.9, 6.9), (-0.5, 0.5), "outside").cells(4, 1)

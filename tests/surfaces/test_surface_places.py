@@ -132,7 +132,7 @@ def sagging(offset, one, other):
 @pytest.mark.parametrize("height", [0.0, -0.05])
 def test_paths_bend_no_more_than_is_said(named, height):
     name, surface = named
-    start, end = pairs(surface, 400, np.random.default_rng(2))
+    start, end = pairs(surface, 240, np.random.default_rng(2))
     offset = offset_surface(surface, height)
     path = offset.paths(start, end)
     stated, found, some_known = [], [], np.zeros(len(start.chart), dtype=bool)
@@ -283,7 +283,7 @@ def test_paths_beside_a_pole_are_near_it():
 @pytest.mark.parametrize("name", [n for n, s in SURFACES.items() if s.kind != "mesh"])
 def test_the_u_direction_turns_as_is_said(name):
     surface = SURFACES[name]
-    start, end = pairs(surface, 400, np.random.default_rng(5))
+    start, end = pairs(surface, 240, np.random.default_rng(5))
     offset = offset_surface(surface, 0.03, directed=True)
     path = offset.paths(start, end)
     stated = np.concatenate([path.deviations[:, piece, 2] for piece in (0, 2)])
