@@ -62,12 +62,9 @@ def test_every_pair_is_asked_for_or_left_out_with_a_reason():
 
 
 def test_each_pair_has_its_own_clearance():
-    bodies = bodies_of(
-        scene=(SHELF, POST),
-        clearance=0.005,
-        tool_clearance=0.001,
-        clearances=(("forearm_link", "post", 0.03), ("forearm_link", "upper_arm_link", 0.0)),
-    )
+    own = ("forearm_link", "post", 0.03), ("forearm_link", "upper_arm_link", 0.0)
+    scene, least = (SHELF, POST), {"clearance": 0.005, "tool_clearance": 0.001}
+    bodies = bodies_of(scene=scene, **least, clearances=own)
     asked = clearances(bodies)
     assert asked[frozenset(("forearm_link", "post"))] == 0.03
     assert asked[frozenset(("wrist_1_link", "post"))] == 0.005
@@ -94,11 +91,7 @@ def test_a_tool_of_the_case_is_asked_for_and_one_that_touches_is_left_out():
 
 
 def test_what_is_allowed_is_left_out_and_names_that_are_nothing_are_refused_at_once():
-    allow = (
-        ("surface", "forearm_link"),
-        ("forearm_link", "shoulder_link"),
-        ("post", "wrist_1_link"),
-    )
+    allow = ("surface", "forearm_link"), ("forearm_link", "shoulder_link"), ("post", "wrist_1_link")
     assert left_out(bodies_of(scene=(POST,), allow=allow), "allowed") == both(*allow)
     wrong = {
         "allow": (("link9", "surface"),), "clearances": (("forearm_link", "shelve", 0.1),),

@@ -53,13 +53,10 @@ def test_an_arm_turns_towards_a_wall(clearance):
     assert swept == pytest.approx(turned, abs=1e-6)
 
 
-SHAPES = {
-    "ball": Sphere(0.1),
-    "box": Box((0.2, 0.3, 0.4)),
-    "capsule": Capsule(0.1, 0.4),
-    "cylinder": Cylinder(0.1, 0.4),
-    "mesh": box_mesh((0.2, 0.3, 0.4)),
-}  # each reaches 0.1 m along x
+SHAPES = {  # each reaches 0.1 m along x
+    "ball": Sphere(0.1), "box": Box((0.2, 0.3, 0.4)), "capsule": Capsule(0.1, 0.4),
+    "cylinder": Cylinder(0.1, 0.4), "mesh": box_mesh((0.2, 0.3, 0.4)),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", SHAPES)

@@ -147,10 +147,9 @@ def test_in_a_hollow_as_round_as_the_standoff_is_the_place_that_the_tool_looks_a
     assert found.accepted == accepted, found.refusal
 
 
-@pytest.mark.parametrize(
-    ("deviation", "off", "accepted"),
-    [(4e-4, 5e-4, True), (6e-4, 5e-4, False), (9e-4, 0.0, True), (1.1e-3, 0.0, False)],
-)
+@pytest.mark.parametrize(("deviation", "off", "accepted"), [
+    (4e-4, 5e-4, True), (6e-4, 5e-4, False), (9e-4, 0.0, True), (1.1e-3, 0.0, False),
+])  # fmt: skip
 def test_what_the_surface_under_poses_deviates_by_is_taken_off(deviation, off, accepted):
     """Also where the tool is exactly right."""
     floor = parametric(lambda u, v: (u, v, 0 * u), (-0.5, 0.5), (-0.5, 0.5), **OUT)

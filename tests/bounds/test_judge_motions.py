@@ -247,10 +247,8 @@ def round_an_edge(side, turn, reach=0.02, lean=0.0):
 
     In between in an arc `reach` (m) from the edge, with the tool ahead or behind by `lean` (rad).
     """
-    plates = [
-        plane((0.0, 0.1), (-0.1, 0.1)),
-        plane((-0.1, 0.0), (-0.1, 0.1), rpy_deg=(0, np.degrees(turn), 0)),
-    ]
+    plates = [plane((0.0, 0.1), (-0.1, 0.1))]
+    plates += [plane((-0.1, 0.0), (-0.1, 0.1), rpy_deg=(0, np.degrees(turn), 0))]
     cells = piecewise(plates, side=side, position=(0.45, 0.0, 0.3)).cells((2, 3))
     sign = 1.0 if side == "outside" else -1.0
 

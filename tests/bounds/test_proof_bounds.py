@@ -285,9 +285,8 @@ def test_a_part_that_is_missing_or_a_little_off_is_noticed(off):
         centre=np.vstack([parts.centre[:1], parts.centre[:1] - [0.25, 0, 0, 0, 0, 0]]),
         slopes=np.vstack([parts.slopes[:1], parts.slopes[:1] * [[[0.5], [1.0]]]]),
         radius=np.vstack([parts.radius[:1]] * 2),
-        children=np.array([[1, 1], [-1, -1]]),
-        axis=np.array([-1, -1]),
-    )
+        children=np.array([[1, 1], [-1, -1]]), axis=np.array([-1, -1]),
+    )  # fmt: skip
     points, normals = places(cells, 300)
     held = parts_agreement.on_a_finest_part(np.concatenate([points, normals], axis=1), halves)
     np.testing.assert_array_equal(held, points[:, 0] <= 0.5)

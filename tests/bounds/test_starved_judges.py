@@ -78,11 +78,10 @@ def test_stretches_of_a_motion(name, held, bent):
         assert (judge.bounds(aside).error > off + 0.99e-4).all()
 
 
-@pytest.mark.parametrize(
-    ("off", "standoff", "cone", "accepted"),
-    [((9e-4, 0), 0.02, 30, True), ((1.1e-3, 0), 0.02, 30, False), ((0, 0.04), 0.02, 30, True),
-     ((0, 0.06), 0.02, 30, False), ((0, 0.5), 0.0, 30, True), ((0, 0.53), 0.0, 30, False)],
-)  # fmt: skip
+@pytest.mark.parametrize(("off", "standoff", "cone", "accepted"), [
+    ((9e-4, 0), 0.02, 30, True), ((1.1e-3, 0), 0.02, 30, False), ((0, 0.04), 0.02, 30, True),
+    ((0, 0.06), 0.02, 30, False), ((0, 0.5), 0.0, 30, True), ((0, 0.53), 0.0, 30, False),
+])  # fmt: skip
 def test_what_a_surface_deviates_by(off, standoff, cone, accepted):
     """Off the points, which leaning normals move by the standoff; and off the cone."""
     flat = parametric(lambda u, v: (u, v, 0 * u), (0.4, 0.6), (-0.1, 0.1), side="outside")

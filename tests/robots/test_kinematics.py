@@ -77,11 +77,8 @@ def test_axes_that_are_almost_z_keep_their_tilt(tilt, sign, tmp_path):
 
 def test_rows_of_the_wrong_shape_are_refused():
     kinematics = Kinematics(load_robot("puma560"))
-    for ask, shape in (
-        (kinematics.tools, (2, 5)),
-        (kinematics.tools, (6,)),
-        (kinematics.tool, (1, 6)),
-    ):
+    tools, tool = kinematics.tools, kinematics.tool
+    for ask, shape in ((tools, (2, 5)), (tools, (6,)), (tool, (1, 6))):
         with pytest.raises(ValueError, match="must have"):
             ask(np.zeros(shape))
 

@@ -134,12 +134,9 @@ def test_an_srdf_of_another_arm_is_an_error(tmp_path, approved):
 
 # Arm: link, mm beyond the tool point.
 REACH = {
-    "ur5": ("wrist_3_link", -0.5),
-    "xarm7": ("link7", 0.0),
-    "panda": ("panda_leftfinger", 9.5),
-    "kinova": ("j2s6s200_link_finger_tip_1", 2.4),
-    "puma560": ("link6", -8.0),
-}
+    "ur5": ("wrist_3_link", -0.5), "xarm7": ("link7", 0.0), "panda": ("panda_leftfinger", 9.5),
+    "kinova": ("j2s6s200_link_finger_tip_1", 2.4), "puma560": ("link6", -8.0),
+}  # fmt: skip
 
 
 @sampled("name", spread([*REACH], 4))

@@ -75,12 +75,10 @@ def test_tcp_and_base_are_where_they_are_said_to_be(seed, tmp_path):
     assert np.isclose(given.reach, joined.reach)
 
 
-@pytest.mark.parametrize(
-    ("approach", "reference", "expected"),
-    [((-2, 0, 0), None, (0, 0, 1)), ((1, 1e-7, 0), None, (0, 0, 1)),
-     ((1, 0, 1), None, (np.sqrt(0.5), 0, -np.sqrt(0.5))),
-     ((0, 0, 1), (0, 3e200, 5e200), (0, 1, 0))],
-)  # fmt: skip
+@pytest.mark.parametrize(("approach", "reference", "expected"), [
+    ((-2, 0, 0), None, (0, 0, 1)), ((1, 1e-7, 0), None, (0, 0, 1)),
+    ((1, 0, 1), None, (np.sqrt(0.5), 0, -np.sqrt(0.5))), ((0, 0, 1), (0, 3e200, 5e200), (0, 1, 0)),
+])  # fmt: skip
 def test_the_reference_axis_is_across_the_approach_axis(approach, reference, expected):
     robot = load_robot("ur5", approach_axis=np.array(approach), reference_axis=reference)
     np.testing.assert_allclose(robot.reference_axis, expected, atol=2e-7)

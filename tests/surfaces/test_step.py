@@ -16,7 +16,7 @@ from coverable import Case, SurfaceError, mesh, step, step_faces
 from coverable.processes import Ended, Limits, folder_of, run_apart
 from feasibility.cli.main import main
 from surfaces.meshes import step_process, step_surface
-from surfaces.meshes.step_process import Caps
+from surfaces.meshes.step_process import CAPS, Caps
 from surfaces.meshes.step_surface import step_parts, step_triangles
 
 SIZE = (0.2, 0.1, 0.05)  # m
@@ -55,44 +55,39 @@ for name in map(str.rstrip, sys.stdin):
         sys.stdin = open(name)
         os.dup2(os.open(name + ".out", os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 1)
         child["main"]()
-    os.wait()
-    print(flush=True)
+    print(os.wait(), flush=True)
 """
 
 
-@pytest.fixture(scope="module")
-def known(tmp_path_factory):
-    """The product's child, but Open CASCADE is imported once: a fork answers each question."""
-    name = tmp_path_factory.mktemp("asked") / "question"
+@pytest.fixture(scope="module", autouse=True)
+def asked_of_forks(tmp_path_factory):
+    """Without caps the product's child is asked, but imports Open CASCADE once and forks."""
+    name, read = tmp_path_factory.mktemp("asked") / "question", step_surface.read_step
     command = [sys.executable, "-c", FORKS, step_process.CHILD, *map(folder_of, ("OCP", "numpy"))]
-    pipe = subprocess.PIPE
-    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL) as forks:
+    pipe, patched = subprocess.PIPE, pytest.MonkeyPatch.context()
+    with subprocess.Popen(command, 0, stdin=pipe, stdout=pipe) as forks, patched as patch:
 
         def run(script, given, *limits):
             name.write_bytes(given)
             forks.stdin.write(b"%s\n" % bytes(name))
-            forks.stdin.flush()
             forks.stdout.readline()
             return Ended(name.with_suffix(".out").read_bytes())
 
-        yield Caps(run=run)
+        def asked(file, job, caps):
+            return read(file, job, Caps(run=run) if caps is CAPS else caps)
 
-
-@pytest.fixture
-def all_known(known, monkeypatch):
-    """What names no caps asks there too."""
-    read = step_surface.read_step
-    monkeypatch.setattr(step_surface, "read_step", lambda file, job, _: read(file, job, known))
+        patch.setattr(step_surface, "read_step", asked)
+        yield
 
 
 @pytest.fixture(scope="module")
-def chosen(folder, known):
+def chosen(folder):
     """The round face and two beside it."""
-    return step_triangles(folder / "part.step", [3, 2, 6], deviation=1e-5, caps=known)
+    return step_triangles(folder / "part.step", [3, 2, 6], deviation=1e-5)
 
 
-def test_faces_have_numbers_kinds_areas_and_colours(folder, known):
-    faces = step_faces(folder / "pair.step", known)
+def test_faces_have_numbers_kinds_areas_and_colours(folder):
+    faces = step_faces(folder / "pair.step")
     assert [face.number for face in faces] == list(range(1, 15))
     np.testing.assert_allclose([face.area for face in faces], 2 * AREAS, rtol=1e-9)
     round_ones = [face.number for face in faces if face.kind == "cylinder"]
@@ -116,8 +111,8 @@ def test_faces_have_numbers_kinds_areas_and_colours(folder, known):
         np.testing.assert_allclose(other.normal, turn @ normal, atol=1e-9)
 
 
-def test_all_triangles_look_out_of_the_solid_as_they_come(folder, known):
-    parts = step_parts(folder / "part.step", known)
+def test_all_triangles_look_out_of_the_solid_as_they_come(folder):
+    parts = step_parts(folder / "part.step")
     assert sorted(set(parts.owner.tolist())) == list(range(1, 8))
     a, b, c = parts.vertices[parts.triangles].swapaxes(0, 1)
     outwards = (a + b + c) / 3.0 - np.array(SIZE) / 2.0
@@ -130,7 +125,7 @@ def said_deviation(surface):
 
 
 def test_the_deviation_is_right_at_the_poles_of_a_sphere(folder):
-    surface = step(folder / "ball.step", faces="all", deviation=1e-3)
+    surface = mesh(step_triangles(folder / "ball.step", "all", deviation=1e-3, caps=Caps()))
     corners = surface.mesh.vertices[surface.mesh.faces]
     np.testing.assert_allclose(np.linalg.norm(corners, axis=2), 0.3, atol=1e-9)
     shares = np.random.default_rng(1).dirichlet((1, 1, 1), 20)
@@ -154,8 +149,8 @@ def test_triangles_are_in_metres_as_near_as_is_said_and_look_out_of_the_solid(ch
     assert (np.einsum("fi,fi->f", chosen.face_normals, outwards) > 0.0).all()
 
 
-def test_parts_of_an_assembly_stand_where_it_has_them(folder, known):
-    made = step_triangles(folder / "pair.step", colour="#FF0000", caps=known)
+def test_parts_of_an_assembly_stand_where_it_has_them(folder):
+    made = step_triangles(folder / "pair.step", colour="#FF0000")
     assert "2 faces (3, 10)" in mesh(made).notes[0]
     low = made.vertices[:, 2] < 0.5
     expected = [[0, 0, 0], [ROUND, ROUND, SIZE[2]], [-ROUND, 0, 1], [0, ROUND, 1 + SIZE[2]]]
@@ -173,12 +168,10 @@ CONTENTS = (
 )  # fmt: skip
 
 
-def test_choices_that_make_no_sense_and_files_that_are_none_are_refused(
-    folder, known, all_known, tmp_path, approved
-):
+def test_choices_that_make_no_sense_and_files_that_are_none_are_refused(folder, tmp_path, approved):
     asked = [("part.step", choice) for choice in CHOICES]
     asked.append(("ball.step", {"colour": "#00ff00"}))  # without any
-    said = [refused(step_triangles, folder / a, **choice, caps=known) for a, choice in asked]
+    said = [refused(step_triangles, folder / a, **choice) for a, choice in asked]
     path = tmp_path / "part.step"
     for content in CONTENTS:
         with path.open("wb") as file:
@@ -257,7 +250,6 @@ KEYS = {
 
 
 @pytest.mark.parametrize("keys", KEYS)
-@pytest.mark.usefixtures("all_known")
 def test_a_case_says_which_faces(folder, keys):
     area, top = KEYS[keys]
     case = Case.from_toml(CASE.format(keys), folder)
@@ -268,7 +260,6 @@ def test_a_case_says_which_faces(folder, keys):
     assert surface.mesh.vertices[:, 2].max() == pytest.approx(top)
 
 
-@pytest.mark.usefixtures("all_known")
 def test_a_case_with_a_wrong_choice_says_so(folder, monkeypatch, approved):
     monkeypatch.chdir(folder)
     wrong = ("faces = [9]", "", "faces = [3]\ncolour = '#ff0000'", "scale = 0.001\nfaces = [3]")
@@ -277,7 +268,6 @@ def test_a_case_with_a_wrong_choice_says_so(folder, monkeypatch, approved):
     approved("STEP cases refused", "\n".join(said).replace(str(folder), "FOLDER"))
 
 
-@pytest.mark.usefixtures("all_known")
 def test_show_lists_the_faces_and_draws_them_with_their_numbers(folder, tmp_path, capsys):
     page = tmp_path / "faces.html"
     assert main(["show", str(folder / "part.step"), "--html", str(page)]) == 0

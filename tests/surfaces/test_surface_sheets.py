@@ -112,11 +112,10 @@ def test_thickness_lies_away_from_the_working_side(side, sign):
     assert sheet.deviation <= 4.1e-4
 
 
-@pytest.mark.parametrize(
-    ("bad", "named"),
-    [({"deviation": 0.0}, "deviation"), ({"thickness": -1.0}, "thickness"),
-     ({"thickness": np.nan}, "thickness"), ({"most": 1}, "most")],
-)  # fmt: skip
+@pytest.mark.parametrize(("bad", "named"), [
+    ({"deviation": 0.0}, "deviation"), ({"thickness": -1.0}, "thickness"),
+    ({"thickness": np.nan}, "thickness"), ({"most": 1}, "most"),
+])  # fmt: skip
 def test_numbers_that_make_no_sheet_are_named(bad, named):
     with pytest.raises(ArgumentError, match=named):
         sheet_of(plane((0, 1), (0, 1)), **bad)
