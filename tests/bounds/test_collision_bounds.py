@@ -164,7 +164,7 @@ def test_clearance_of_many_triangles_is_never_above_the_distance_and_seldom_far_
     solid, soup = Solid("tool", 3, at(0.05), body), Soup("surface", dome(20), 0.0, False)
     for start in range(0, 60, 20):
         rows = walk[start : start + 6]
-        q = np.concatenate([np.linspace(*ends, 15) for ends in pairwise(rows)])
+        q = np.concatenate([np.linspace(*ends, 10) for ends in pairwise(rows)])
         bent = [q + np.array([0.0, 0.0, way]) for way in (-off, 0.0, off)]
         ways = [pairings(robot, one, solid, [], None, 0.0, [soup]) for one in bent]
         times = np.arange(float(len(q)))

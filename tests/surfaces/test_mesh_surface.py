@@ -206,7 +206,7 @@ def bead(flank: float):
         x = 0.6 * u
         return x, 0.4 * v, 0.008 * np.clip((0.015 + flank - abs(x - 0.31)) / flank, 0.0, 1.0)
 
-    return bent(shape, 40, 40)
+    return bent(shape, 30, 30)
 
 
 @pytest.mark.parametrize(("share", "kept"), [(4.0, 0.996), (1.0, 0.5), (0.5, 1.0 / 17.0)])

@@ -13,7 +13,7 @@ import pytest
 from approved import refused
 
 from coverable import Case, SurfaceError, mesh, step, step_faces
-from coverable.processes import Ended, Limits, folder_of, run_apart
+from coverable.processes import Ended, Limits, run_apart
 from feasibility.cli.main import main
 from surfaces.meshes import step_process, step_surface
 from surfaces.meshes.step_process import CAPS, Caps
@@ -37,33 +37,29 @@ side = "outside"
 """
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """The part, an assembly of two of it in inches, and a ball."""
-    folder = tmp_path_factory.mktemp("parts")
-    command = [sys.executable, PARTS, folder, *map(str, (*SIZE, ROUND))]
-    subprocess.run(command, check=True, capture_output=True)
-    return folder
-
-
 FORKS = """import os, runpy, sys
-child = runpy.run_path(sys.argv[1])
-sys.path[:0] = sys.argv[2:]
+child, reply = runpy.run_path(sys.argv[1]), os.fdopen(os.dup(1), "w")
+os.dup2(2, 1)
 child["_load_all"]()
+sys.argv = sys.argv[2:]
+runpy.run_path(sys.argv[0], run_name="__main__")
+print("made", file=reply, flush=True)
 for name in map(str.rstrip, sys.stdin):
     if not os.fork():
         sys.stdin = open(name)
         os.dup2(os.open(name + ".out", os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 1)
         child["main"]()
-    print(os.wait(), flush=True)
+    print(os.wait(), file=reply, flush=True)
 """
 
 
 @pytest.fixture(scope="module", autouse=True)
-def asked_of_forks(tmp_path_factory):
-    """Without caps the product's child is asked, but imports Open CASCADE once and forks."""
-    name, read = tmp_path_factory.mktemp("asked") / "question", step_surface.read_step
-    command = [sys.executable, "-c", FORKS, step_process.CHILD, *map(folder_of, ("OCP", "numpy"))]
+def folder(tmp_path_factory):
+    """A part, two of it in inches, and a ball; without caps forks of one process are asked."""
+    folder, read = tmp_path_factory.mktemp("parts"), step_surface.read_step
+    name = tmp_path_factory.mktemp("asked") / "question"
+    command = [sys.executable, "-c", FORKS, step_process.CHILD, PARTS, folder]
+    command += map(str, (*SIZE, ROUND))
     pipe, patched = subprocess.PIPE, pytest.MonkeyPatch.context()
     with subprocess.Popen(command, 0, stdin=pipe, stdout=pipe) as forks, patched as patch:
 
@@ -77,7 +73,8 @@ def asked_of_forks(tmp_path_factory):
             return read(file, job, Caps(run=run) if caps is CAPS else caps)
 
         patch.setattr(step_surface, "read_step", asked)
-        yield
+        assert forks.stdout.readline() == b"made\n"
+        yield folder
 
 
 @pytest.fixture(scope="module")

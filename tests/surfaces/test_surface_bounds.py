@@ -46,7 +46,7 @@ def test_parts_hold_all_their_places_and_smaller_radii_would_not(patch, tree):
         holds(parts.radius[:, k, None], off[..., k], used=0.0 if flat else 0.8)
 
 
-@sampled("patch", spread([*PATCHES], 20), indirect=True)
+@sampled("patch", spread([*PATCHES], 13), indirect=True)
 def test_the_tree_is_one_and_is_cut_as_asked(patch, tree):
     parts, _ = tree
     inner = parts.children[:, 0] >= 0

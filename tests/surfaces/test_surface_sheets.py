@@ -6,6 +6,7 @@ from bounds import holds
 from part_walks import pieces_of, size_of, spread
 from random_surfaces import KINDS, random_surface
 from samples import sampled, seeds
+from samples import spread as few_of
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 from smooth_probes import POSE
@@ -44,7 +45,7 @@ def distances(surface, wanted, depth, rng, most=600, count=80):
     return far, sheet.deviation + 1e-12 * np.abs(sheet.triangles).max(), sheet
 
 
-@sampled("seed", seeds(2, all=100))
+@sampled("seed", seeds(1, all=100))
 @pytest.mark.parametrize("thick", [False, True])
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_place_is_further_from_its_sheet_than_stated(kind, thick, seed):
@@ -57,10 +58,10 @@ def test_no_place_is_further_from_its_sheet_than_stated(kind, thick, seed):
     assert far.max() <= stated, surface
 
 
-@pytest.mark.parametrize("name", EXTREME)
+@sampled("name", few_of([*EXTREME], 12))
 def test_few_triangles_of_extreme_surfaces_are_as_near_as_stated(name):
     """Where one triangle is far around the axis, or over it; two of them are a convex tile."""
-    wanted = 2e-3
+    wanted = 2e-3 * size_of(EXTREME[name])
     for most in (100, 8, 2):
         rng = np.random.default_rng(3)
         far, stated, sheet = distances(EXTREME[name], wanted, 0.0, rng, most, 120)
