@@ -99,10 +99,10 @@ def test_cells_are_connected_even_compact_and_complete(cut):
         assert farthest < 1.2 * np.sqrt(cut.areas[own].sum())
 
 
-MANY = [(name, count) for count in (20, 200, 77, 500) for name in PATCHES]
+MANY = [(name, count) for count in (20, 77, 500, 200) for name in PATCHES]
 
 
-@sampled(("name", "count"), spread(MANY, 4))
+@sampled(("name", "count"), spread(MANY, 3))
 def test_few_and_many_cells_are_even_too(name, count):
     assert_even(Cut(PATCHES[name](), count), count)
 
