@@ -127,7 +127,7 @@ def test_meshes_are_solids_with_dents_or_sheets():
 
 def test_a_tool_wider_than_a_pipe_is_cut_by_it():
     """A disc of 120 mm in a pipe of 100 mm: the surface itself is in the way."""
-    cells = cylinder(0.05, (-170, 170), (-0.2, 0.2), "inside", (0.5, 0.0, 0.3)).cells(1, 1)
+    cells = cylinder(0.05, (-170, 170), (-0.1, 0.1), "inside", (0.5, 0.0, 0.3)).cells(1, 1)
     for radius, blocked in ((0.06, True), (0.02, False)):
         disc = ToolShape.cylinder(radius, 0.03, position=(0.0, 0.0, -0.03))
         asked = Collision(False, tool=(disc,), allow=tuple((n, "surface") for n in UR5.link_names))

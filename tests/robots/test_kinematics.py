@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from arm_urdfs import UNLIKE, arm, joint, load_text, random_arm, random_q, unlike
 from plain import arm_of
-from samples import sampled, seeds
+from samples import sampled, seeds, spread
 
 from coverable import RobotError, list_robots, load_robot
 from robots.chain import frames, jacobians, moved_by_joints
@@ -52,7 +52,7 @@ def check_arm(robot, rng, samples):
             np.testing.assert_allclose(slopes[:, i], (ahead - behind) / 2e-5, rtol=0, atol=2e-9)
 
 
-@pytest.mark.parametrize("info", list_robots(), ids=lambda info: info.name)
+@sampled("info", spread(list_robots(), 16), ids=lambda info: info.name)
 def test_arms_of_the_library(info):
     check_arm(load_robot(info.name), np.random.default_rng(3), 5)
 
