@@ -41,7 +41,8 @@ IMPOSSIBLE = {
     "coverage": ["task.footprint=0.02", "task.coverage=0.99"],
 }
 """Of each demand, what no motion of this arm holds."""
-FEWER = ("--set", "surface.cells=[1, 2]")  # of what searches again and again
+FEWER = ("--set", "surface.cells=[1, 2]", "--set", "search.evaluations=200")
+"""Of what searches again and again."""
 OF_THE_ARM = "says which arm it is"
 MEASURE = "says what another demand is measured by"
 NO_DEMANDS = {
@@ -97,7 +98,6 @@ def says_yes(ask, known, settings):
     """What says that the motion is there: commands, and the search for a placement."""
     case, motion, found, tree = known
     flags = [part for setting in settings for part in ("--set", setting)]
-    fewer = [*FEWER, *(["--set", "search.evaluations=500"] if settings else [])]
 
     def asked_of(path):
         """The same result file, as if it had been found for the case with these settings."""
@@ -110,7 +110,7 @@ def says_yes(ask, known, settings):
         "verify a result": ("verify", asked_of(found)),
         "verify a tree": ("verify", asked_of(tree)),
         "divide": ("divide", case, *flags),
-        "explain": ("explain", case, *flags, *fewer),
+        "explain": ("explain", case, *flags, *FEWER),
         "path": ("path", case, *flags),
     }
     said = {name for name, args in commands.items() if ask(*args).status == 0}

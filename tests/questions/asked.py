@@ -211,8 +211,7 @@ def _as_file(tables: dict[str, Any], how: dict[str, Any]) -> dict[str, Any]:
 
 def _grooved(radius: float) -> np.ndarray:
     """(F, 3, 3) a groove of half a tube along y; its hollow side looks up."""
-    turn, y = np.meshgrid(
-        np.linspace(-0.5, 0.5, 121) * np.pi, np.linspace(-0.15, 0.15, 41), indexing="ij"
-    )
+    turn, y = np.linspace(-0.5, 0.5, 61) * np.pi, np.linspace(-0.15, 0.15, 21)
+    turn, y = np.meshgrid(turn, y, indexing="ij")
     points = np.stack([radius * np.sin(turn), y, -radius * np.cos(turn)], -1)
     return plain.triangles_of_grid(points)

@@ -69,8 +69,8 @@ def _intervals(
 ) -> Floats:
     """(P, R, slots, 2) allowed theta4, ascending; empty ones have low > high."""
     found = np.empty((len(seen), len(rows), slots, 2))
-    found[..., 0] = 1.0
-    found[..., 1] = -1.0
+    for p, r, slot, end in np.ndindex(found.shape):
+        found[p, r, slot, end] = 1.0 - 2.0 * end
     for p in range(len(seen)):
         rho = np.hypot(seen[p, 0], seen[p, 2])
         phi = np.arctan2(seen[p, 2], -seen[p, 0])
@@ -79,14 +79,15 @@ def _intervals(
             if abs(across) <= lift - 1e-12:
                 continue
             if -abs(across) >= lift - 1e-12:
-                found[p, r, 0] = (low, high)
+                found[p, r, 0, 0], found[p, r, 0, 1] = low, high
                 continue
             half = np.arccos(lift / abs(across))
             middle = phi if across > 0.0 else phi + np.pi
             middle += TAU * np.ceil((low - half - middle) / TAU)
             slot = 0
             while middle - half <= high and slot < slots:
-                found[p, r, slot] = (max(low, middle - half), min(high, middle + half))
+                found[p, r, slot, 0] = max(low, middle - half)
+                found[p, r, slot, 1] = min(high, middle + half)
                 middle += TAU
                 slot += 1
     return found

@@ -132,7 +132,7 @@ def test_every_ur5_configuration_is_found_from_its_tool_and_two_wrist_angles():
 @sampled(("arm", "oracle"), [("puma560", puma_oracle), ("ur5", ur5_oracle)])
 def test_stored_answers_are_the_oracles(arm, oracle):
     problems, robot = read(arm), load_robot(arm)
-    for number in spread(range(len(problems)), 2):
+    for number in spread([2, 0, 1, *range(3, len(problems))], 2):  # the first takes long
         problem, said = problems[number]
         assert oracle.solve(problem) == said
         _, cells, task = built(problem, robot)
