@@ -70,7 +70,7 @@ collected: .venv/installed
 
 test: .venv/installed
 	@$(MAKE) --no-print-directory --jobs=2 kernels lint greedy collected
-	COVERABLE_FEW=1 $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder --nbmake --nbmake-timeout=900
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 docs: .venv/installed
 	$(BIN)/python docs/figures.py
@@ -91,10 +91,10 @@ versions:
 
 # Installs nothing: it needs the extra `browser`, and a Chromium on the path or named by CHROMIUM.
 test-browser:
-	$(BIN)/python -m pytest -rP -p no:nbmake tests/browser
+	$(BIN)/python -m pytest -rP tests/browser
 
 campaign: .venv/installed
-	$(BIN)/python -m pytest -n 2 --dist loadfile -rP -p no:nbmake -m sampled --samples=all -k "$(NAME)" tests
+	$(BIN)/python -m pytest -n 2 --dist loadfile -rP -m sampled --samples=all -k "$(NAME)" tests
 
 mutants: .venv/installed
 	$(BIN)/python tests/mutants/mutants.py "$(ONLY)"
@@ -103,7 +103,7 @@ mutants: .venv/installed
 BENCH := out/bench.json
 bench: .venv/installed
 	@mkdir -p $(dir $(BENCH))
-	$(BIN)/python -m pytest tests/benchmarks -p pytest_benchmark.plugin -p no:nbmake -q \
+	$(BIN)/python -m pytest tests/benchmarks -p pytest_benchmark.plugin -q \
 	    -o python_files='bench_*.py' -o python_functions='bench_*' --benchmark-timer=time.process_time \
 	    --benchmark-columns=min,median,rounds --benchmark-sort=fullname --benchmark-json=$(BENCH) $(BENCH_ARGS)
 

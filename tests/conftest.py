@@ -1,4 +1,4 @@
-"""What all tests share: made-up inputs that do not depend on what ran before, Ctrl-C, the order."""
+"""What all tests share: made-up inputs that do not depend on what ran before, and Ctrl-C."""
 
 import gc
 import signal
@@ -25,12 +25,6 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 # Collecting the tests makes no garbage to speak of.
 gc.disable()
 
-# Files that take longest come first: of two processes, neither is left with one at the end.
-LONGEST = (
-    "06_collisions", "05_which_robot_where", "01_paper_cases", "03_mesh_surface",
-    "04_from_verdict_to_motion", "08_paint_a_panel", "02_your_own_robot", "07_positioner_and_tcp",
-)  # fmt: skip
-
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--accept", action="store_true", help="write approved texts anew")
@@ -50,12 +44,6 @@ def pytest_ignore_collect(collection_path: Path) -> bool | None:
     asking = collection_path.name.startswith(("test_", "bench_"))
     shared = collection_path.suffix == ".py" and not asking
     return True if shared else None
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the files that take longest first."""
-    place = {name: number for number, name in enumerate(LONGEST)}
-    items.sort(key=lambda item: place.get(item.path.stem, len(LONGEST)))
 
 
 def pytest_collection_finish() -> None:
