@@ -1,4 +1,4 @@
-"""The notebooks run, on the smaller grids that they choose themselves, and are saved with pictures."""
+"""The notebooks run, on the smaller grids they choose themselves, and are saved with pictures."""
 
 import base64
 import io
