@@ -10,16 +10,13 @@ import referee
 from mesh_patches import in_cells_of
 
 from coverable import Answer, Search, Task, greedy_check, load_robot, mesh, sphere, torus
-from coverable.kernels import allocating_entry
 from feasibility.paper.jcell_steps import Steps
 from feasibility.paper.tree_and_graph import tree_walk
 from feasibility.paper.tree_replay import Path, replay_stored, replay_tree
 from robots.kinematics import Kinematics
 from surfaces.cell_triangles import triangulation
 from surfaces.meshes.triangle_mesh import TriangleMesh
-from surfaces.triangle_kernel import cell_under as cell_under_kernel
-
-cell_under = allocating_entry(cell_under_kernel)
+from surfaces.triangle_kernel import cell_under
 
 PUMA, UR5 = load_robot("puma560", limits="set-1"), load_robot("ur5")
 TASK = Task(0.005, 45)
@@ -33,7 +30,7 @@ def test_triangles_say_what_the_surface_says(cells):
     rng = np.random.default_rng(0)
     for height in (-0.02, 0.03):
         made = triangulation(cells, height, 2e-3)
-        some = rng.integers(len(cells), size=300)
+        some = rng.integers(len(cells), size=200)
         points = cells.centres[some] + height * cells.normals[some]
         points += 0.05 * rng.normal(size=points.shape)
         near = cells.surface.closest(points)
@@ -47,7 +44,7 @@ def test_triangles_say_what_the_surface_says(cells):
         assert turn <= made.turn + 1e-12
         sure = over & (found[:, 0] < len(cells))
         np.testing.assert_array_equal(found[sure, 0], where[sure])
-        assert sure.sum() > 100
+        assert sure.sum() > 70
         assert (where[~over] == -1).all()
 
 

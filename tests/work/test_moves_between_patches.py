@@ -61,7 +61,7 @@ def test_the_move_between_two_patches_goes_around_the_post():
     assert again.min_clearance is not None
     assert not move.via.flags.writeable
     # fcl agrees, at single configurations.
-    dense = samples(move.waypoints, np.radians(2.0))
+    dense = samples(move.waypoints, np.radians(4.0))
     assert ForeignScene(robot, bodies).least_excess(dense).min() >= -1e-6
     for patch in division.patches:
         assert patch.accepted

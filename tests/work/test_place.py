@@ -80,7 +80,7 @@ def case_at(name, pose):
     return case_of(name).with_overrides(sets).build()
 
 
-@sampled(("name", "seed"), [*MOVED[:2], *spread(MOVED, 2)[2:]])
+@sampled(("name", "seed"), spread(MOVED, 1))
 def test_a_surface_moved_away_is_put_back(name, seed):
     """Infeasible where it was moved to; in the region around there is a place, and check agrees."""
     away = moved_away(name, seed)
@@ -197,7 +197,7 @@ def test_the_bound_on_a_region_holds_for_its_placements():
     reaches = [Reach.of(*setup_of(name)[:3]) for name in TEXTS]
     picks = np.array(np.meshgrid(*[[0, 1]] * 6)).reshape(6, -1).T
     tight = []
-    for k in range(80):
+    for k in range(40):
         reach, rng = reaches[k % len(reaches)], np.random.default_rng([21, k])
         far = rng.normal(size=3)
         far *= rng.uniform(0.8, 1.6) * (reach.reach + 0.3) / np.linalg.norm(far)
@@ -214,8 +214,8 @@ def test_the_bound_on_a_region_holds_for_its_placements():
             tight.append(beyond[0] / furthest.min())
         else:  # a pose in reach, or nearly so
             assert furthest.min() <= 1.05 * (reach.reach + reach.tolerance)
-    assert 20 < proved < 80
-    assert several > 5
+    assert 10 < proved < 40
+    assert several > 2
     assert max(tight) > 0.97
 
 
@@ -310,9 +310,9 @@ def test_a_map_tells_what_single_placements_tell():
     setup = setup_of("panda plate")
     evaluator, own = evaluator_here(*setup), Pose.of_surface(setup.cells.surface)
     region = Region.around(own, {"x": (0.3, 1.2), "y": (-0.3, 0.3), "yaw_deg": (-40, 40)})
-    chart = coverable.placement_map(evaluator, region, own, shape=(3, 2, 2))
+    chart = coverable.placement_map(evaluator, region, own, shape=(2, 2, 2))
     assert chart.axes == ("x", "y", "yaw_deg")
-    for index in np.ndindex(3, 2, 2):
+    for index in np.ndindex(2, 2, 2):
         values = chart.held.values
         for axis, ticks, k in zip(chart.axes, chart.ticks, index, strict=True):
             values[list(AXES).index(axis)] = ticks[k]
