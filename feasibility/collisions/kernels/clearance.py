@@ -41,7 +41,7 @@ def _call(typing: Any, memory: Any, what: Any) -> Any:
 @entry
 def call(memory, what):  # type: ignore[no-untyped-def]
     """Run the clearance on a memory, which must not be empty."""
-    return _call(memory, what)  # type: ignore[call-arg]
+    return _call(memory, what)
 
 
 @entry
