@@ -23,23 +23,20 @@ def loaded(code: str) -> set[str]:
 
 
 COMMAND = "from feasibility.cli.main import main; main({})"
-LATE = {"networkx", "scipy.spatial", "scipy.optimize", "urllib.request", "surfaces.passes",
-        "feasibility.collisions.gathering", "feasibility.paper.greedy"}  # fmt: skip
 
 
 @pytest.mark.parametrize(("code", "needed", "late"), [
     ("import coverable", set(), {"numpy", "numba", "pinocchio", "scipy"}),
     (COMMAND.format(["check", "--hlep"]), {"feasibility"},
      {"numpy", "numba", "pinocchio", "coal", "scipy", "networkx", "robots"}),
-    (COMMAND.format(["check", "paper/4a"]), {"numba", "feasibility.roadmap.complete"}, LATE),
-], ids=["import", "refused", "check"])  # fmt: skip
+], ids=["import", "refused"])  # fmt: skip
 def test_libraries_are_loaded_where_they_are_used(
     code: str, needed: set[str], late: set[str]
 ) -> None:
+    """What a check loads is in `test_loaded.py`."""
     found = loaded(code)
-    heavy = HEAVY - {"rich"} if "paper/4a" in code else HEAVY
     assert needed <= found
-    assert not found & (heavy | late)
+    assert not found & (HEAVY | late)
 
 
 def test_loading_the_judge_loads_nothing_of_the_search() -> None:
