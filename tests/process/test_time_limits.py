@@ -23,7 +23,7 @@ from feasibility.interrupts import enforcing, limited
 from feasibility.studies.run import StudyTask
 
 LIMIT = ("--set", "search.time_limit=3600")
-PLACE = ("--workers", "0", "--x", "0.3", "0.4", "--count", "4")
+PLACE = ("--workers", "0", "--x", "0.3", "0.4", "--count", "2")
 QUESTIONS = {
     "check plate": ("check", "plate"),
     "path": ("path", "plate"),
