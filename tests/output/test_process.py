@@ -64,11 +64,11 @@ def test_answers_survive_a_narrow_encoding():
 
 def test_a_terminal_sees_progress_and_stdout_the_answer_alone():
     program = (
-        "import sys, feasibility.checking as c; from feasibility.cli.main import main\n"
+        "import os, sys, feasibility.checking as c; from feasibility.cli.main import main\n"
         "real = c.check\n"
         "def told(*a, clock, **more):\n"
         "    clock.report(3, 12, 'a search'); return real(*a, clock=clock, **more)\n"
-        "c.check = told; sys.exit(main(sys.argv[1:]))"
+        "c.check = told; said = main(sys.argv[1:]); sys.stdout.flush(); os._exit(said)"
     )
     leader, follower = pty.openpty()
     child = subprocess.Popen(

@@ -53,10 +53,7 @@ def cluster(folder, workers):
 
 @sampled("count", spread([60, 2000], 1))
 def test_a_worker_killed_while_it_works_and_then_the_scheduler(count, tmp_path) -> None:
-    """Each task has one row; and real verdicts are those of this process alone, byte by byte.
-
-    Without its scheduler there is one clear message, and what was finished is kept.
-    """
+    """Each task has one row; verdicts are those of this process; what was finished is kept."""
     study = tmp_path / "plates.toml"
     study.write_text(study_works.STUDY, encoding="utf-8")
     with cluster(tmp_path, 2) as (address, made):
