@@ -7,7 +7,9 @@ import textwrap
 from collections.abc import Mapping
 from typing import Any, Protocol
 
-from feasibility.viewer.figures import Plot, plain
+import numpy as np
+
+from feasibility.viewer.figures import DOTS_PER_INCH, Plot, plain
 from feasibility.viewer.html_page import Legend
 
 WIDTH = 90  # characters of a line above a picture
@@ -42,12 +44,14 @@ def plot_view(view: Drawn) -> Plot:
 
 def small_png(figure: Plot) -> bytes:
     """A figure as PNG of 256 colours, rare ones too: notebooks keep many of them."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from PIL import Image
 
-    stream = io.BytesIO()
-    with Image.open(io.BytesIO(figure._repr_png_())) as image:
-        small = image.convert("RGB").quantize(256, Image.Quantize.MAXCOVERAGE)
-        small.save(stream, format="png", optimize=True)
+    figure.set_dpi(DOTS_PER_INCH)
+    canvas, stream = FigureCanvasAgg(figure), io.BytesIO()
+    canvas.draw()  # `savefig` draws twice
+    image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+    image.quantize(256, Image.Quantize.MAXCOVERAGE).save(stream, format="png", optimize=True)
     return stream.getvalue()
 
 
