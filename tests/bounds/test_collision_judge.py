@@ -88,10 +88,9 @@ def test_distances_from_a_half_space_and_a_sheet(name):
 
 
 @pytest.mark.parametrize("gap", [0.003, 0.0139, 0.0141, 0.2])
-@pytest.mark.parametrize(
-    ("names", "joint"),
-    [(("tool", "surface"), 1), (("surface", "tool"), 1), (("tool", "surface"), 0)],
-)
+@pytest.mark.parametrize(("names", "joint"), [
+    (("tool", "surface"), 1), (("surface", "tool"), 1), (("tool", "surface"), 0),
+])  # fmt: skip
 def test_what_triangles_may_be_off_is_taken_off_their_distance(gap, names, joint):
     """A ball before a surface that is known to 4 mm; 10 mm are needed, whoever is named first."""
     triangle = np.array([[[0.1 + gap, -1, -1], [0.1 + gap, 1, -1], [0.1 + gap, 0, 1.0]]])

@@ -91,9 +91,8 @@ def test_no_body_reaches_further_into_a_wall_than_it_does(shape, ahead):
     assert not everywhere(slide(X), bodies, 0.1 + ahead + 1e-3)
 
 
-@pytest.mark.parametrize(
-    ("turn", "claimed"), [(0.29, True), (0.31, False), (1.0, False), (3.0, False)]
-)
+@pytest.mark.parametrize(("turn", "claimed"), [
+    (0.29, True), (0.31, False), (1.0, False), (3.0, False)])  # fmt: skip
 def test_a_joint_turns_a_ball_by_its_lever(turn, claimed):
     """A ball at 1 m of the axis, 0.1 m large and 0.2 m deep in a wall along the link."""
     above = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], dtype=float)

@@ -93,9 +93,8 @@ def test_a_result_comes_back_exactly(name: str, tmp_path: Path) -> None:
             assert np.load(io.BytesIO(data)).dtype in (np.float64, np.int64)
 
 
-@pytest.mark.parametrize(
-    "tree", [TREE, CutTree(Leaf(2)), CutTree(Leaf(0), ((1, -0.5), (4, 0.0)))], ids=str
-)
+@pytest.mark.parametrize("tree", [
+    TREE, CutTree(Leaf(2)), CutTree(Leaf(0), ((1, -0.5), (4, 0.0)))], ids=str)  # fmt: skip
 def test_a_proof_comes_back_as_it_was(tree: CutTree, tmp_path: Path) -> None:
     verdict = replace(verdict_named("long plate"), proof=tree, evidence=Evidence.PROOF)
     assert again(verdict, case_named("long plate"), tmp_path).proof == tree

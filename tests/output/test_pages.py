@@ -45,9 +45,8 @@ def pages():
     }  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "name", ["view", "division", "placements", "explanation", "study", "comparison"]
-)
+@pytest.mark.parametrize("name", [
+    "view", "division", "placements", "explanation", "study", "comparison"])  # fmt: skip
 def test_names_make_no_markup(pages, name):
     text = pages[name]
     whole = Page(text)

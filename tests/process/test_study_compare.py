@@ -73,9 +73,8 @@ def test_other_arms_stand_in_the_same_cell_with_the_same_tool(more, tmp_path) ->
                 read_study('base.case = "nozzle.toml"\nvary.robots = ["kinova"]', tmp_path)
 
 
-@pytest.mark.parametrize(
-    ("name", "z", "turns", "given"), [("puma560", 0.2, 3, 12.0), ("ur3", 0.4, 19, 12.0)]
-)
+@pytest.mark.parametrize(("name", "z", "turns", "given"), [
+    ("puma560", 0.2, 3, 12.0), ("ur3", 0.4, 19, 12.0)])  # fmt: skip
 def test_the_critical_cone_is_where_the_verdict_turns(name, z, turns, given) -> None:
     """At the cone that is named there is a motion; half a degree below none is found."""
     settings = [f"robot.name={name}", "surface.u=[0.3, 0.5]", "surface.v=[-0.05, 0.05]",

@@ -199,9 +199,8 @@ def test_followers_are_held_with_what_they_mimic(tmp_path):
         load_text(tmp_path, text)
 
 
-@pytest.mark.parametrize(
-    ("renamed", "clash"), [("j1", "l0"), ("j1", "l1"), ("j2", "l2"), ("j3", "l2"), ("j3", "l4")]
-)
+@pytest.mark.parametrize(("renamed", "clash"), [
+    ("j1", "l0"), ("j1", "l1"), ("j2", "l2"), ("j3", "l2"), ("j3", "l4")])  # fmt: skip
 def test_a_joint_may_have_the_name_of_a_link(renamed, clash, tmp_path):
     joints = [joint(1), joint(2, "fixed", xyz=(1, 0, 0)), joint(3, xyz=(1, 0, 0)), joint(4)]
     plain = load_text(tmp_path, arm(joints))

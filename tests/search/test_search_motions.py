@@ -33,11 +33,9 @@ def test_a_target_beyond_reach_is_covered_within_the_tolerance_and_no_further(sh
             assert 0.999 * short * 0.01 <= np.linalg.norm(point - cells.centres[0]) <= 0.01
 
 
-@pytest.mark.parametrize(
-    ("stroke", "tool", "feasible"),
-    [((-3.9, -2.5), -3.0, True), ((-3.9, -2.5), 1.0, False), ((50.0, 60.0), 55.0, True),
-     ((-np.inf, -2.5), -7.0, True), (FREE, 8.0, True)],
-)  # fmt: skip
+@pytest.mark.parametrize(("stroke", "tool", "feasible"), [
+    ((-3.9, -2.5), -3.0, True), ((-3.9, -2.5), 1.0, False), ((50.0, 60.0), 55.0, True),
+    ((-np.inf, -2.5), -7.0, True), (FREE, 8.0, True)])  # fmt: skip
 def test_a_slide_whose_stroke_lies_far_out(stroke, tool, feasible):
     """Guesses stay inside the limits, wherever these are; what is out of reach is proved so."""
     sliding = joint(1, "prismatic", axis=(1, 0, 0), limits=(-1, 1))

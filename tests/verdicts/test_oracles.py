@@ -40,9 +40,9 @@ def test_the_referees_arms_stand_where_pinocchios_do(name):
         np.testing.assert_allclose(mine, theirs, atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    "name", ["torus", "bowl", "egg", "funnel", "hood", "waist", "plate", "paper 4a", "paper 4c"]
-)
+@pytest.mark.parametrize("name", [
+    "torus", "bowl", "egg", "funnel", "hood", "waist", "plate", "paper 4a", "paper 4c",
+])  # fmt: skip
 def test_no_sample_of_a_surface_is_nearer_than_the_referees_nearest_place(name):
     form, rng = plain.surface_of(question(name).cells.surface), np.random.default_rng(1)
     # Where the border is nearest each parameter is brought into its range by itself.

@@ -162,10 +162,9 @@ def test_how_many_it_takes_at_least_is_proved(number, motions):
 CELLS = plane((0.35, 0.65), (-0.2, 0.2), "outside", (0.0, 0.0, 0.1)).cells(4, 6)
 
 
-@pytest.mark.parametrize(
-    ("asked", "whole"),
-    [({"speed": 0.8}, True), ({"speed": 1.5}, False), ({"min_manipulability": 0.2}, False)],
-)
+@pytest.mark.parametrize(("asked", "whole"), [
+    ({"speed": 0.8}, True), ({"speed": 1.5}, False), ({"min_manipulability": 0.2}, False),
+])  # fmt: skip
 def test_every_patch_holds_the_rates_that_are_asked(asked, whole):
     task = replace(Task(standoff=0.02, cone_deg=20), **asked)
     found = divide(UR5, CELLS, task)

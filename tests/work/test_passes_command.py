@@ -83,9 +83,7 @@ def test_the_surface_under_the_passes_is_no_less_a_wall():
     assert 0.005 <= verdict.certificate.min_clearance <= 0.031
 
 
-@pytest.mark.parametrize(
-    "more", [[], ["--overrun", "0.02"], ["--one-way"], ["--approach", "0.03"]], ids=str
-)
+@pytest.mark.parametrize("more", [[], ["--overrun", "0.02"], ["--one-way"], ["--approach", "0.03"]])
 def test_verify_accepts_what_path_has_certified(path, tmp_path, more):
     """Between the passes it once went 2.3 mm into the part."""
     out, laid = tmp_path / "run.csv", ["--passes", "90", "--pitch", "0.06"]
