@@ -22,7 +22,8 @@ from coverable import Answer, CauseKind, Evidence, Search, check, replay, verify
 from feasibility.verdict import Walk
 
 TABLE = [name for name in names() if name not in names("dear walls")]
-KEPT = {*spread(TABLE, 31), "a crease inwards", *names("paper"), *names("bodies"), *names("rolls")}
+KEPT = {*spread(TABLE, 31), "a crease inwards", "pieces apart", "inside the shoulder"}
+KEPT |= {*names("paper"), *names("bodies"), *names("rolls")}
 TABLE = [name for name in TABLE if name in KEPT]
 OTHERS = [
     name for file, few in STORED.items() for name in (spread(stored(file), few) if few else ())
@@ -32,8 +33,8 @@ OTHERS.append("puma560 197")  # two of its components cover as many cells
 ALL = TABLE + OTHERS
 WALKED = [name for name in ALL if name not in names("greedy")]
 WORSE = [name for name in WALKED if name not in names("ends")]
-WORSE = {*spread(WORSE, 8), *spread(names("rolls"), 7), *names("bodies")[3:6]}
-WORSE = sorted(WORSE - {"4a within 15 degrees", "a coarse wall 5e"})
+WORSE = {*spread(WORSE, 8), *spread(names("rolls"), 7), *names("bodies")[:6]}
+WORSE = sorted(WORSE - {"4a within 15 degrees"})
 ANSWERS = Path(__file__).parents[1] / "questions" / "answers.json"
 SAMPLES = {"hood": 6} | dict.fromkeys(names("meshes"), spread([6, 20], 1)[-1])  # between rows
 
@@ -172,8 +173,9 @@ def worse(name):
     asked, kept = plain.asked_of(task, verdict.cells), kept_by(name)
     if kept is not None:
         used = float(np.degrees(kept.tilt.max()))
-        if used > 0.1 and task.cone_deg < 180.0 and name not in names("creases"):
-            yield "cone", robot, replace(task, cone_deg=0.995 * used), walk
+        less = 0.995 * used - 0.05  # the place under the tool may be another within the tolerance
+        if less > 0.1 and task.cone_deg < 180.0 and name not in names("creases"):
+            yield "cone", robot, replace(task, cone_deg=less), walk
         if kept.off.max() > 1e-7 and hasattr(form_of(name), "kind"):
             yield "tolerance", robot, replace(task, tolerance=0.99 * float(kept.off.max())), walk
         yield "standoff", robot, replace(task, standoff=task.standoff + 2.1 * asked.tolerance), walk
@@ -234,9 +236,7 @@ def test_a_motion_a_little_worse_is_refused(name):
 def test_every_way_to_be_worse_is_tried():
     """Or the test above would say little."""
     tried = {what for name in WORSE if feasible(name) for what, *_ in worse(name)}
-    assert tried == {
-        "limits", "half", "cone", "tolerance", "standoff", "roll", "row", "clearance"
-    }  # fmt: skip
+    assert tried == {"limits", "half", "cone", "tolerance", "standoff", "roll", "row", "clearance"}
 
 
 @sampled("name", spread([n for n in WALKED if n not in names("poses")], 12))
