@@ -207,7 +207,8 @@ def place_of(page, path):
 
 
 def test_base_tool_and_scene_are_drawn_where_they_are_moved_and_joints_are_moved_by_hand():
-    post = '\n[[collision.scene]]\nname = "post"\nkind = "box"\nsize = [0.1, 0.1, 0.5]\n'
+    post = '\n[robot.base]\nposition = [0.1, 0, 0]\n[[collision.scene]]\nname = "post"\n'
+    post += 'kind = "box"\nsize = [0.1, 0.1, 0.5]\n'
     with Live(Case.from_toml(FILES["plate.toml"] + post, name="plate")) as live:
         window = Window(live)
         page = window.page
