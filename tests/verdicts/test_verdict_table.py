@@ -16,7 +16,7 @@ import plain
 import pytest
 import referee
 from asked import QUESTIONS, STORED, counted, form_of, known, names, question, stored, verdict_of
-from samples import sampled, seeds, spread
+from samples import EVERYTHING, sampled, seeds, spread
 
 from coverable import Answer, CauseKind, Evidence, Search, check, replay, verify
 from feasibility.verdict import Walk
@@ -36,7 +36,7 @@ WORSE = [name for name in WALKED if name not in names("ends")]
 WORSE = {*spread(WORSE, 8), *spread(names("rolls"), 7), *names("bodies")[:6]}
 WORSE = sorted(WORSE - {"4a within 15 degrees"})
 ANSWERS = Path(__file__).parents[1] / "questions" / "answers.json"
-SAMPLES = {"hood": 6} | dict.fromkeys(names("meshes"), spread([6, 20], 1)[-1])  # between rows
+SAMPLES = {"hood": 6} | dict.fromkeys(names("meshes"), 20 if EVERYTHING else 6)  # between rows
 
 
 def feasible(name):
@@ -292,7 +292,7 @@ def test_walls_that_take_longer(name):
     verdict = verdict_of(name)
     if verdict.witness is not None:
         scene = plain.scene_of(verdict.robot, verdict.cells, verdict.task)
-        assert plain.faults_of(verdict, scene=scene, step=spread([0.05, 0.02], 1)[-1]) == []
+        assert plain.faults_of(verdict, scene=scene, step=0.02 if EVERYTHING else 0.05) == []
         return
     assert verdict.n_covered >= QUESTIONS[name]["covered"]
     assert {c.kind for c in verdict.causes} <= {CauseKind.COLLISION, CauseKind.DISCONNECTED}
