@@ -89,7 +89,8 @@ def warm_up(
         for done, (what, words) in enumerate(COMMANDS):
             bar(done, len(COMMANDS), f"compiling: {what}")
             with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
-                inner = commands[words[0]].parse_args([files.get(word, word) for word in words[1:]])
+                inner = argparse.Namespace(command=words[0])
+                commands[words[0]].parse_args([files.get(word, word) for word in words[1:]], inner)
                 status = inner.run(inner, time.perf_counter())
             if status not in STATUS.values():
                 raise RuntimeError(f"{' '.join(words)} ends with status {status}")
