@@ -208,7 +208,7 @@ def place_of(page, path):
 
 def test_base_tool_and_scene_are_drawn_where_they_are_moved_and_joints_are_moved_by_hand():
     post = '\n[robot.base]\nposition = [0.1, 0, 0]\n[[collision.scene]]\nname = "post"\n'
-    post += 'kind = "box"\nsize = [0.1, 0.1, 0.5]\n'
+    post += 'kind = "box"\nsize = [0.1, 0.1, 0.5]\nposition = [0, 0.5, 0]\n'
     with Live(Case.from_toml(FILES["plate.toml"] + post, name="plate")) as live:
         window = Window(live)
         page = window.page
@@ -235,7 +235,7 @@ def test_base_tool_and_scene_are_drawn_where_they_are_moved_and_joints_are_moved
             number = robot.model.getFrameId(link, pin.FrameType.BODY)
             assert np.allclose(shown.homogeneous, data.oMf[number].homogeneous, atol=1e-9), link
         assert np.allclose(
-            page.scene.nodes["/scene/0 post/body"].vertices - before, [0, 0.7, 0], atol=1e-4
+            page.scene.nodes["/scene/0 post/body"].vertices - before, [0, 0.2, 0], atol=1e-4
         )
         point = 1e3 * kinematics.tools(q[None])[0][0]
         assert page.arm.said().startswith("tool at ({:.1f}, {:.1f}, {:.1f}) mm".format(*point))
