@@ -24,7 +24,8 @@ help:
 	@sed -n '/^#/!q; s/^# //p' Makefile
 
 # The stamp is younger than pyproject.toml once everything it names is installed. Python compiles what it
-# imports, which is a third of what pip would compile.
+# imports, which is a third of what pip would compile. The pip of Python 3.11 takes half as long again to choose versions.
+PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-input --no-compile
 .venv/installed: pyproject.toml
 	@if ! $(BIN)/python -m pip --version >/dev/null 2>&1; then \
 	    for candidate in $(or $(PYTHON),$(CANDIDATES)); do \
@@ -38,7 +39,8 @@ help:
 	    "$$python" -m venv --clear .venv; \
 	fi
 	@echo "installing coverable and its libraries into .venv (a minute or two) ..."
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-input --no-compile -e '.[dev]'
+	@$(PIP_INSTALL) --upgrade 'pip>=25'
+	@$(PIP_INSTALL) -e '.[dev]'
 	@touch $@
 
 demo: .venv/installed
@@ -52,16 +54,15 @@ lint: .venv/installed
 	$(BIN)/lint-imports
 	$(BIN)/mypy
 
-# Compiles kernels into the cache; one processor is enough for that: the complete search and collisions,
-# and by itself the paper's search.
+# Compiles kernels into the cache, once what several of them are made of: the complete search, proofs and
+# collisions, and by itself the paper's search.
+CHECK := import sys; from coverable import check, load_case; \
+    [check(*load_case(name, settings).build()) for name, *settings in map(str.split, sys.argv[1:])]
 kernels: .venv/installed
-	@$(BIN)/coverable check paper/4a >/dev/null
-	@$(BIN)/coverable check paper/4d >/dev/null || test $$? -eq 1
-	@$(BIN)/coverable check paper/5e --set collision.clearance=0.005 >/dev/null
+	@$(BIN)/python -c '$(CHECK)' paper/4a paper/4d 'paper/5e collision.clearance=0.005'
 
 greedy: .venv/installed
-	@$(BIN)/coverable check paper/4f --set search.method=greedy >/dev/null || test $$? -eq 1
-	@$(BIN)/coverable check tests/paper/greedy_on_a_torus.toml >/dev/null
+	@$(BIN)/python -c '$(CHECK)' 'paper/4f search.method=greedy' tests/paper/greedy_on_a_torus.toml
 
 # What the tests import is compiled once, and not by each of the two processes that run them; they
 # say it where that fails.
