@@ -160,8 +160,8 @@ def test_every_fault_is_told_with_its_place(approved, tmp_path) -> None:
         with pytest.raises(CaseError) as caught:
             read_study(text, tmp_path)
         assert all(fault.message for fault in caught.value.faults)
-        told.append(f"{text}\n-> {caught.value}")
-    approved("faulty_studies", "\n\n".join(told))
+        told.append(f"{' ; '.join(text.splitlines())}\n-> {caught.value}")
+    approved("faulty_studies", "\n".join(told))
     (tmp_path / "latin.toml").write_bytes(b"a = '\xff'")
     with pytest.raises(CaseError, match="UTF-8"):
         load_study(tmp_path / "latin.toml")
