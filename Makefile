@@ -52,7 +52,7 @@ lint: .venv/installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/lint-imports
-	$(BIN)/mypy
+	$(BIN)/pyrefly check --progress-bar=no --threads=1
 
 # Compiles kernels into the cache, once what several of them are made of: the complete search, proofs and
 # collisions, and by itself the paper's search.
@@ -114,7 +114,7 @@ bench-compare: .venv/installed
 	@$(BIN)/pytest-benchmark compare "$(OLD)" "$(NEW)" --group-by=fullname --columns=min --sort=fullname
 
 clean:
-	rm -rf out build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf out build dist *.egg-info .ruff_cache .pytest_cache .hypothesis
 	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +
 
 distclean: clean

@@ -78,7 +78,7 @@ class Rows:
 
     def values(self) -> list[Any]:
         """What is in the fields."""
-        return [getattr(self, one.name) for one in fields(self)]  # type: ignore[arg-type]
+        return [getattr(self, one.name) for one in fields(self)]  # pyrefly: ignore[bad-argument-type]
 
 
 def _some(value: Any, rows: Chosen) -> Any:

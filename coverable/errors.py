@@ -54,8 +54,8 @@ class Fault(NamedTuple):
             names: the key of each argument, where it differs.
             table: put before the key.
         """
-        argument, rest = re.fullmatch(r"([^.\[]*)(.*)", self.key, re.DOTALL).groups()  # type: ignore[union-attr]
-        key = names.get(argument, argument) + rest
+        argument = re.split(r"[.\[]", self.key, maxsplit=1)[0]
+        key = names.get(argument, argument) + self.key[len(argument) :]
         return self._replace(key=".".join(part for part in (table, key) if part))
 
 

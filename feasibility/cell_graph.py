@@ -23,7 +23,7 @@ class _Attributes(dict[str, Any]):
         """Pickled and copied as what they are."""
         return _Attributes, (dict(self),)
 
-    def items(self) -> ItemsView[str, Any]:  # type: ignore[override]
+    def items(self) -> ItemsView[str, Any]:  # pyrefly: ignore[bad-override]
         """The attributes, in types that `networkx.write_graphml` accepts."""
         return {key: _plain(value) for key, value in super().items() if value is not None}.items()
 

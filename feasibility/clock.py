@@ -6,7 +6,7 @@ import math
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from typing import Any
 
@@ -131,7 +131,7 @@ class Clock:
         return self.began + self.limit + compiling.seconds() - self._compiled
 
     @contextmanager
-    def enforced(self) -> Iterator[None]:
+    def enforced(self) -> Generator[None]:
         """Raise `OutOfTime` in the block, wherever it is, soon after the deadline.
 
         For work of a command that does not look at the clock itself and leaves nothing half done

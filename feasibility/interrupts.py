@@ -12,7 +12,7 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from types import FrameType
@@ -54,7 +54,7 @@ def leave_at_once() -> None:
 
 
 @contextmanager
-def at_leave(act: Callable[[], object]) -> Iterator[None]:
+def at_leave(act: Callable[[], object]) -> Generator[None]:
     """Do something when a Ctrl-C ends the process in the block, before what was asked for outside.
 
     It must be quick, and is called wherever the main thread is at that moment.
@@ -67,7 +67,7 @@ def at_leave(act: Callable[[], object]) -> Iterator[None]:
 
 
 @contextmanager
-def enforcing() -> Iterator[None]:
+def enforcing() -> Generator[None]:
     """Enforce time limits in the block, as in a command: by the alarm of this process."""
     global _enforcing
     if not in_main_thread():
@@ -84,7 +84,7 @@ def enforcing() -> Iterator[None]:
 
 
 @contextmanager
-def limited(left: Callable[[], float], error: type[Exception]) -> Iterator[None]:
+def limited(left: Callable[[], float], error: type[Exception]) -> Generator[None]:
     """Raise an error in the block, wherever it is, when its time is up; not during an import.
 
     Does nothing outside of `enforcing`. In a block in a block the limit that ends first counts.

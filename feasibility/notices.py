@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from functools import partial
 from typing import Any
@@ -35,7 +35,7 @@ def notify(notice: str = NOTICE) -> None:
 @contextmanager
 def compiling_notice(
     patience: float | None = None, say: Callable[[], None] | None = None, notice: str = NOTICE
-) -> Iterator[None]:
+) -> Generator[None]:
     """Say that kernels are being compiled, if they are, and the block takes longer than `patience`.
 
     What is compiled in a block inside, which says so itself, is not said here again.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 
 import coverable.files
@@ -37,7 +37,7 @@ def read_text(path: str | os.PathLike[str], cap: int, what: str) -> str:
 
 
 @contextmanager
-def _named(path: str | os.PathLike[str]) -> Iterator[None]:
+def _named(path: str | os.PathLike[str]) -> Generator[None]:
     """A fault of a file becomes a `FileError` with its name."""
     try:
         yield

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import secrets
 import stat
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
@@ -76,7 +76,7 @@ def write_whole(path: str | os.PathLike[str], write: Callable[[IO[bytes]], objec
 
 
 @contextmanager
-def _unfinished(path: str) -> Iterator[None]:
+def _unfinished(path: str) -> Generator[None]:
     """Remove a file at the end of the block, if it is still there, however the block ends."""
 
     def remove() -> None:

@@ -157,7 +157,7 @@ def verify(
     """
     clock = Clock() if clock is None else clock
     if isinstance(claim, Robot):
-        problem = Problem.of(claim, cells, task)  # type: ignore[arg-type]  # refuses None
+        problem = Problem.of(claim, cells, task)  # pyrefly: ignore[bad-argument-type]  # refuses None
         rows = _rows(q)
         at_work = None if working is None else _one_a_row("working", working, rows, "b")
         said = None if marks is None else _one_a_row("marks", marks, rows, "i")

@@ -148,7 +148,7 @@ def _rotation_onto(axis: Array) -> Array:
 
 
 @allocating_entry
-def frames(chain, q, origins, axes, point, axis, reference):  # type: ignore[no-untyped-def]
+def frames(chain, q, origins, axes, point, axis, reference):  # noqa: ANN001, ANN201
     """Tool point, approach and reference axis, and every joint's axis, in the root frame.
 
     Args:
@@ -208,7 +208,7 @@ def frames(chain, q, origins, axes, point, axis, reference):  # type: ignore[no-
 
 
 @allocating_entry
-def jacobians(chain, origins, axes, point, axis, point_rows, axis_rows):  # type: ignore[no-untyped-def]
+def jacobians(chain, origins, axes, point, axis, point_rows, axis_rows):  # noqa: ANN001, ANN201
     """Derivatives of tool point and approach axis by q, from what `frames` returned.
 
     Revolute joint: dp = z x (p - o), da = z x a. Prismatic joint: dp = z, da = 0.

@@ -15,6 +15,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from robots.errors import RobotError
 
@@ -126,9 +127,9 @@ def fetched() -> Mapping[str, RobotInfo]:
     entries = {}
     for name, entry in table.items():
         module = entry.pop("module", name.removesuffix(SUFFIX)) + SUFFIX
-        given = {"source": "robot_descriptions", "urdf": "", "group": "catalogue", **entry}
+        given: dict[str, Any] = {"source": "robot_descriptions", "urdf": "", "group": "catalogue"}
         axis = tuple(entry.get("approach_axis", (0.0, 0.0, 1.0)))
-        entries[name] = RobotInfo(name, **given | {"approach_axis": axis}, module=module)
+        entries[name] = RobotInfo(name, **given | entry | {"approach_axis": axis}, module=module)
     return MappingProxyType(entries)
 
 

@@ -137,19 +137,19 @@ def values_at(x: Array, size: int) -> Array:
 def to_chebyshev(size: int) -> Array:
     """(size, size) from coefficients to those of the sum of Chebyshev's polynomials."""
     at = nodes(size)
-    return np.asarray(np.linalg.solve(chebvander(at, size - 1), values_at(at, size)))
+    return np.asarray(np.linalg.solve(chebvander(at, size - 1), values_at(at, size)), dtype=float)
 
 
 @cache
 def from_chebyshev(size: int) -> Array:
     """(size, size) the way back."""
-    return np.asarray(np.linalg.inv(to_chebyshev(size)))
+    return np.asarray(np.linalg.inv(to_chebyshev(size)), dtype=float)
 
 
 @cache
 def nodes_to_powers(count: int) -> Array:
     """(count, count) from values at `nodes` to the coefficients of 1, x, x^2, ..."""
-    return np.asarray(np.linalg.inv(np.vander(nodes(count), increasing=True)))
+    return np.asarray(np.linalg.inv(np.vander(nodes(count), increasing=True)), dtype=float)
 
 
 @cache
@@ -161,7 +161,7 @@ def to_nodes(size: int, count: int) -> Array:
 @cache
 def from_nodes(count: int) -> Array:
     """(count, count) from values at `nodes` to the coefficients of the polynomial through them."""
-    return np.asarray(np.linalg.inv(values_at(nodes(count), count)))
+    return np.asarray(np.linalg.inv(values_at(nodes(count), count)), dtype=float)
 
 
 @cache

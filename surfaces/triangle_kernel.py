@@ -73,7 +73,7 @@ class TriangleKernel(NamedTuple):
 
 
 @allocating
-def cell_under(kernel, x, y, z):  # type: ignore[no-untyped-def]
+def cell_under(kernel, x, y, z):
     """The cell that a point is over, with height and normal; all in the root frame.
 
     Args:
@@ -133,7 +133,7 @@ def cell_under(kernel, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @allocating
-def u_direction_under(kernel):  # type: ignore[no-untyped-def]
+def u_direction_under(kernel):
     """(x, y, z), about the u direction at the place that `cell_under` found last, of any length."""
     x, y, z, f = 0.0, 0.0, 0.0, kernel.last[0]
     for c in range(3 if kernel.tangents.shape[0] else 0):
@@ -144,7 +144,7 @@ def u_direction_under(kernel):  # type: ignore[no-untyped-def]
 
 
 @allocating
-def _cross(a, b, made):  # type: ignore[no-untyped-def]
+def _cross(a, b, made):
     """Write a x b."""
     made[0] = a[1] * b[2] - a[2] * b[1]
     made[1] = a[2] * b[0] - a[0] * b[2]
@@ -152,7 +152,7 @@ def _cross(a, b, made):  # type: ignore[no-untyped-def]
 
 
 @allocating
-def _beyond_tile(uv, w1, w2, ahead):  # type: ignore[no-untyped-def]
+def _beyond_tile(uv, w1, w2, ahead):
     """How far (m) a place of weights w_1 and w_2 is beyond the tile of a triangle.
 
     Args:
@@ -175,7 +175,7 @@ def _beyond_tile(uv, w1, w2, ahead):  # type: ignore[no-untyped-def]
 
 
 @allocating
-def _cell_of_tile(kernel, f, p, weights, height, normal):  # type: ignore[no-untyped-def]
+def _cell_of_tile(kernel, f, p, weights, height, normal):
     """Solve P(w) + h N(w) = p on the tile of a triangle, from the triangle's nearest point.
 
     Args:

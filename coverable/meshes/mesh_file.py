@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
@@ -94,7 +94,7 @@ class _File(NamedTuple):
 
 
 @contextmanager
-def _opened(path: str | os.PathLike[str], largest: int) -> Iterator[_File]:
+def _opened(path: str | os.PathLike[str], largest: int) -> Generator[_File]:
     """Open a regular file that begins as its name says."""
     advice = "thin the mesh, or save it as binary STL"
     suffix = Path(os.fsdecode(path)).suffix.lower()

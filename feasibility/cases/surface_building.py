@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Generator, Mapping
 from contextlib import contextmanager
 from typing import Any, Final
 
@@ -34,7 +34,7 @@ Values = Mapping[str, Any]
 @contextmanager
 def faults_of(
     place: str, key: str = "", kind: str = "", file: str | None = None, own: Collection[str] = ()
-) -> Iterator[None]:
+) -> Generator[None]:
     """Turn faults of a surface into faults of the case.
 
     Args:

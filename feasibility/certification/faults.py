@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -46,7 +47,11 @@ class Judged:
 
     __slots__ = ()
 
-    faults: Sequence[MotionFault | str]
+    if TYPE_CHECKING:
+
+        @property
+        def faults(self) -> Sequence[MotionFault | str]:
+            """None when all holds."""
 
     @property
     def accepted(self) -> bool:

@@ -113,7 +113,7 @@ def _links(robot: Robot) -> Array:
     """(n + 1,) m, distances from the root to the first joint, from joint to joint, to the tool."""
     places = [*list(robot.model.jointPlacements)[1:]]
     places.append(robot.model.frames[robot.tool_frame_id].placement)
-    return np.array([np.linalg.norm(place.translation) for place in places])
+    return np.array([np.linalg.norm(place.translation) for place in places], dtype=float)
 
 
 def longest_levers(robot: Robot, low: Array, high: Array) -> Array:
@@ -171,4 +171,4 @@ def smallest_singular(at: Jacobians, scale: float) -> Array:
     """(k,) the smallest singular value that counts: of two directions of the axis, not three."""
     both = np.concatenate([at.point / scale, at.axis], axis=1)
     values = np.linalg.svd(both, compute_uv=False)
-    return np.asarray(values[:, min(both.shape[2], 5) - 1])
+    return np.asarray(values[:, min(both.shape[2], 5) - 1], dtype=float)

@@ -11,7 +11,7 @@ import argparse
 import json
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -138,7 +138,7 @@ def open_case(
     only_complete: str = "",
     check_case: Callable[[Case], None] = lambda case: None,
     time_limit: float | None = None,
-) -> Iterator[OpenCase]:
+) -> Generator[OpenCase]:
     """Load `args.case` with `args.settings`, print its notes, and show progress meanwhile.
 
     Args:

@@ -92,12 +92,11 @@ class Bar:
         if not self.shown or (now - self._last < PAUSE and done != total):
             return
         self._last = now
-        if self._bar is None:
-            self._start()
-        self._bar.update(self._task, completed=done, total=total, description=text)
+        bar = self._start() if self._bar is None else self._bar
+        bar.update(self._task, completed=done, total=total, description=text)
 
-    def _start(self) -> None:
-        """Draw the bar for the first time."""
+    def _start(self) -> Any:
+        """Draw the bar for the first time; the bar."""
         from rich.console import Console
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
         from rich.progress import TimeElapsedColumn as Elapsed
@@ -108,7 +107,7 @@ class Bar:
         self._bar = Progress(*columns, console=Console(file=sys.stderr), transient=True)
         self._task = self._bar.add_task("", total=None)
         self._ends.enter_context(at_leave(lambda: os.write(2, CLEAN)))
-        self._ends.enter_context(self._bar)
+        return self._ends.enter_context(self._bar)
 
     def __enter__(self) -> Bar:
         """Nothing is drawn yet."""

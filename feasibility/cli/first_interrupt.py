@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from types import FrameType
 
@@ -11,7 +11,7 @@ from feasibility.interrupts import importing, in_main_thread, leave
 
 
 @contextmanager
-def raised() -> Iterator[Callable[[], None]]:
+def raised() -> Generator[Callable[[], None]]:
     """Let the first Ctrl-C in the block raise KeyboardInterrupt; the second one ends the process.
 
     Where Ctrl-C is ignored, or has a handler of someone else's, it is left alone.

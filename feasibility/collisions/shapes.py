@@ -102,7 +102,7 @@ def _arrays(checks: Checks, vertices: Any, faces: Any) -> tuple[Array, Ints]:
     try:
         points = np.asarray(vertices, dtype=float)
     except (TypeError, ValueError):
-        points = np.empty(0)
+        points = np.empty((0, 0))
     if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
         checks.keep(Fault("vertices", "are not k x 3 finite numbers (metres)"))
     given = np.asarray(faces)

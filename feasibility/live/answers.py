@@ -8,7 +8,7 @@ parts. Replay, proofs and causes are left to the certified answer.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -109,8 +109,8 @@ def _greedy(problem: Problem, search: Search, clock: Clock) -> QuickAnswer:
         found = greedy_search(problem, search, clock, problem.robot.start)
     except OutOfTime:  # before it had found anything
         return QuickAnswer(np.zeros(len(problem.cells), dtype=bool), None)
-    known = found.postures is not None and len(found.postures)
-    return QuickAnswer(found.covered, found.postures[0] if known else None)  # type: ignore[index]
+    postures = found.postures if found.postures is not None and len(found.postures) else [None]
+    return QuickAnswer(found.covered, postures[0])
 
 
 STEPS = 60  # looks at the clock, between which a search does 8,000 evaluations at most
@@ -165,7 +165,7 @@ class Watch(Clock):
         super().tick(done, total, text, spent)
 
     @contextmanager
-    def enforced(self) -> Iterator[None]:
+    def enforced(self) -> Generator[None]:
         """Nothing: the alarms that this is done with in commands belong to the main thread."""
         yield
 

@@ -12,7 +12,7 @@ import os
 import secrets
 import threading
 import warnings
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from http import HTTPStatus
 from typing import Any
@@ -145,7 +145,7 @@ for (const place of document.querySelectorAll(".coverable-live:not([data-seen])"
 
 
 @contextmanager
-def _guarded(secret: str) -> Iterator[None]:
+def _guarded(secret: str) -> Generator[None]:
     """A server that viser starts inside the block refuses strangers.
 
     They come by another path than the secret one, by another name of this machine, which a page
@@ -178,15 +178,15 @@ def _guarded(secret: str) -> Iterator[None]:
         return plain(*args, process_request=gate, **options)
 
     with _starting:
-        server.serve = serve  # type: ignore[assignment,misc]
+        server.serve = serve  # pyrefly: ignore[bad-assignment]
         try:
             yield
         finally:
-            server.serve = plain  # type: ignore[misc]
+            server.serve = plain
 
 
 @contextmanager
-def _silent() -> Iterator[None]:
+def _silent() -> Generator[None]:
     """viser does not say on stdout, which is the program's, that it has started or stopped."""
     import rich
 

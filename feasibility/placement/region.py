@@ -171,7 +171,7 @@ def moved_cells(cells: Cells, pose: Pose) -> Cells:
     surface = replace(old, rotation=rotation, position=position)
     if isinstance(cells, GridCells):
         # Cut anew: to the last bit what a case with this pose builds.
-        return GridCells.cut(surface, *cells.shape)  # type: ignore[arg-type]
+        return GridCells.cut(surface, *cells.shape)  # pyrefly: ignore[bad-argument-type]
     turn = rotation @ old.rotation.T
     made = replace(
         cells,

@@ -121,7 +121,7 @@ class AxisMap:
         axes = rounded[:, arm]
         second = self.signs[SECOND] * (axes[:, SECOND] - shift[arm[SECOND]])
         axes[:, THIRD] += self.signs[THIRD] * self.j3_by_j2 * second
-        return np.round(axes, digits), rounded[:, list(self.external)]
+        return axes.round(digits), rounded[:, list(self.external)]
 
 
 def check_program(

@@ -48,13 +48,14 @@ def read_certificate(fields: Fields) -> Certificate | None:
     margin = _maybe(row, "min_limit_margin")
     clear = ("min_clearance", "measured_clearance")
     maybe = (*clear, "max_roll", "max_speed", "min_singular_value")
+    known: dict[str, Any] = {key: _maybe(row, key) for key in maybe}
     return Certificate(
         waypoints=row.get("waypoints", int, "a whole number"),
         max_position_error=row.number("max_position_error"),
         max_angle=row.number("max_angle"),
         min_limit_margin=np.inf if margin is None else margin,
         nearest_pair=_pair(row, "nearest_pair"),
-        **{key: _maybe(row, key) for key in maybe},  # type: ignore[arg-type]
+        **known,
         stops_in_place=_count(row, "stops_in_place"),
         corners=_count(row, "corners"),
     )

@@ -14,7 +14,7 @@ PUSH = 0.2  # [rad] or [m] of one step
 
 
 @entry
-def moved_clear(arrays, work, cell, q):  # type: ignore[no-untyped-def]
+def moved_clear(arrays, work, cell, q):
     """Move q (n,), in place, over its cell until it collides no more; False where it still does.
 
     Each step goes down the gradient of the penetration, and is projected back onto the target. This

@@ -76,7 +76,7 @@ def tasks_of(
             put({"surface": pose}, entry.path, value)
             Section(f"{entry.place}[{k}]: surface", pose, wrong).make(check_pose, pose)
     for *values, sample in itertools.product(*(axis.values for axis in varied.axes), draw(varied)):
-        row = list(zip(entries, (*values, *sample), strict=True))
+        row: list[tuple[VariedKey, Any]] = list(zip(entries, (*values, *sample), strict=True))
         parameters = {entry.label: _parameter(entry.label, value) for entry, value in row}
         others = [(entry, value) for entry, value in row if not entry.is_pose]
         name = json.dumps([value for _, value in others], sort_keys=True)

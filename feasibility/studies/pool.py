@@ -155,7 +155,7 @@ class Processes:
                         raise untold(error) from error
                 replies = dict[int, Reply]()
                 for heard in wait(list(self._all), LOOK):
-                    replies |= self._heard(heard)  # type: ignore[arg-type]
+                    replies |= self._heard(heard)  # pyrefly: ignore[bad-argument-type]
                 receive(replies)
         finally:
             for pipe in list(self._busy):  # whatever ended the work: nobody asks for it any more

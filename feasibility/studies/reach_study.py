@@ -6,6 +6,7 @@ import math
 import os
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -43,7 +44,7 @@ def reach_case(path: str | os.PathLike[str]) -> str:
     if "pcd_file" not in found:
         raise FileError("names no pcd_file, so it is no study of REACH", shown_path(path))
     cloud = _file_of(path, found["pcd_file"], ".pcd")
-    tables = {
+    tables: dict[str, dict[str, Any]] = {
         "robot": {"name": "ur5"},
         "surface": {
             "kind": "poses", "file": os.path.relpath(cloud, Path(path).parent), "units": "m",

@@ -10,7 +10,7 @@ import math
 import os
 import sqlite3
 import stat
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Generator, Iterable, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -149,7 +149,7 @@ class Store(AbstractContextManager["Store"]):
         return StoreError(fault, self._name)
 
     @contextmanager
-    def _reported(self) -> Iterator[None]:
+    def _reported(self) -> Generator[None]:
         """Errors of SQLite, with what to do about them."""
         try:
             yield

@@ -1,7 +1,7 @@
 """Workers opened: this process, processes of this machine, or a Dask cluster."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 
 from feasibility.interrupts import at_leave
@@ -18,7 +18,7 @@ def open_workers(
     *,
     warm: bool = True,
     connect: float = CONNECT,
-) -> Iterator[Workers]:
+) -> Generator[Workers]:
     """Workers for `run_tasks`, until the block ends, and with it their work.
 
     Args:

@@ -83,7 +83,7 @@ def fastest_speeds(most: Array, rows: Rows, limits: Array | float = 1.0) -> Arra
 
 
 @entry
-def _run_through(x, margin, lean):  # type: ignore[no-untyped-def]
+def _run_through(x, margin, lean):  # noqa: ANN001, ANN202
     """Set x (m,), upper bounds before, to the largest values; by two passes."""
     for i in range(x.shape[0] - 2, -1, -1):
         x[i] = _largest_start(x[i], x[i + 1], margin[i], lean[i])
@@ -96,7 +96,7 @@ def _run_through(x, margin, lean):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _largest_start(x, end, margin, lean):  # type: ignore[no-untyped-def]
+def _largest_start(x, end, margin, lean):  # noqa: ANN001, ANN202
     """The largest x, at most the one given, that leads to some y in 0 .. end."""
     for _ in range(CROSSINGS):
         upper, upper_margin, upper_lean = end, end, 0.0

@@ -28,7 +28,7 @@ class Handler(BaseHTTPRequestHandler):
     timeout = PATIENCE
     server_version, sys_version = "coverable", ""
     disable_nagle_algorithm = True
-    server: LocalServer
+    server: LocalServer  # pyrefly: ignore[bad-override-mutable-attribute]
 
     def do_GET(self) -> None:
         """Send the page; nothing to strangers, nor behind a wrong token."""

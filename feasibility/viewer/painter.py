@@ -150,7 +150,7 @@ def _light(normals: Array) -> Array:
 
 
 @entry
-def _draw_faces(seen, faces, colours, opacity, depth, image):  # type: ignore[no-untyped-def]
+def _draw_faces(seen, faces, colours, opacity, depth, image):  # noqa: ANN001, ANN202
     """Paint triangles; half transparent ones hide nothing."""
     height, width = depth.shape
     for face in range(faces.shape[0]):
@@ -185,7 +185,7 @@ def _draw_faces(seen, faces, colours, opacity, depth, image):  # type: ignore[no
 
 
 @entry
-def _draw_lines(seen, colours, depth, image):  # type: ignore[no-untyped-def]
+def _draw_lines(seen, colours, depth, image):  # noqa: ANN001, ANN202
     """Paint segments, as wide as one pixel of the picture."""
     height, width = depth.shape
     for line in range(0, seen.shape[0] - 1, 2):

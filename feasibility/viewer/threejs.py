@@ -160,7 +160,7 @@ def animation(tracks: Sequence[dict[str, Any]], *, play: bool, there_and_back: b
 
 def stream_of(commands: Iterable[Command]) -> bytes:
     """Commands as the bytes that the page reads, each behind its length in four bytes."""
-    import umsgpack  # type: ignore[import-untyped]
+    import umsgpack
 
     packed = map(umsgpack.packb, commands)
     return b"".join(len(one).to_bytes(4, "little") + one for one in packed)

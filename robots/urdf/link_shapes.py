@@ -255,7 +255,8 @@ def _rgba(material: Node) -> Rgba | None:
     if colour is None or "rgba" not in colour.attributes:
         return None
     try:
-        red, green, blue, alpha = numbers(colour, "rgba", 4)
+        given = numbers(colour, "rgba", 4)
     except BadValue:
         return None
-    return tuple(min(max(part, 0.0), 1.0) for part in (red, green, blue, alpha))  # type: ignore[return-value]
+    red, green, blue, alpha = (min(max(part, 0.0), 1.0) for part in given)
+    return red, green, blue, alpha

@@ -47,7 +47,7 @@ def evaluate(expression: str, symbols: dict[str, Any], local: Any = None) -> Any
         name = str(getattr(node, "attr", None) or getattr(node, "id", ""))
         if _ESCAPES.fullmatch(name):
             raise Refused(f"uses {name!r} in an expression, which is not allowed; leave it out")
-    dict.update(symbols, __builtins__={})
+    dict.__setitem__(symbols, "__builtins__", {})
     return eval(compile(tree, "<expression>", "eval"), symbols, local)
 
 
@@ -205,8 +205,8 @@ def described(error: BaseException) -> str:
     """What is wrong with the file, in a sentence."""
     deepest: BaseException = error
     where = getattr(error, "suffix", None)
-    while isinstance(getattr(deepest, "exc", None), BaseException):
-        deepest = deepest.exc  # type: ignore[attr-defined]
+    while isinstance(cause := getattr(deepest, "exc", None), BaseException):
+        deepest = cause
         where = getattr(deepest, "suffix", None) or where
     words = f"{deepest} {where or ''}".split() or [type(deepest).__name__]
     said = " ".join(words)[:LONGEST]

@@ -28,7 +28,7 @@ class FittedPatch(SplinePatch):
     """What a user should know, one sentence each."""
 
     @property
-    def kind(self) -> str:  # type: ignore[override]
+    def kind(self) -> str:  # pyrefly: ignore[bad-override]
         """What it was made from."""
         return self.made_from
 

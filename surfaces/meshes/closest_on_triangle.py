@@ -16,7 +16,7 @@ THIN = 1e-4  # [1], square of the sine of the first corner's angle
 
 
 @kernel
-def on_triangle(corners, f, x, y, z, weights):  # type: ignore[no-untyped-def]
+def on_triangle(corners, f, x, y, z, weights):
     """m^2, the square of the distance of a point from a triangle; NaN where either is not finite.
 
     Args:
@@ -67,7 +67,7 @@ def on_triangle(corners, f, x, y, z, weights):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _square(corners, f, x, y, z, i, wi, j, wj, k, wk):  # type: ignore[no-untyped-def]
+def _square(corners, f, x, y, z, i, wi, j, wj, k, wk):
     """m^2, the square of the distance from the place with weights wi, wj, wk of corners i, j, k."""
     c = corners
     return (
@@ -78,7 +78,7 @@ def _square(corners, f, x, y, z, i, wi, j, wj, k, wk):  # type: ignore[no-untype
 
 
 @kernel
-def _on_thin_triangle(corners, f, x, y, z, weights):  # type: ignore[no-untyped-def]
+def _on_thin_triangle(corners, f, x, y, z, weights):
     """`on_triangle` where the sine of an angle is small, or 0: sides and corners may coincide."""
     least, longest, first = np.inf, -1.0, 0
     for i in range(3):
@@ -128,7 +128,7 @@ def _on_thin_triangle(corners, f, x, y, z, weights):  # type: ignore[no-untyped-
 
 
 @allocating_entry
-def on_each(corners, points, squares, weights):  # type: ignore[no-untyped-def]
+def on_each(corners, points, squares, weights):
     """`on_triangle` for a point (F, 3) m of each triangle; fills squares (F,) and weights."""
     for f in range(corners.shape[0]):
         x, y, z = points[f, 0], points[f, 1], points[f, 2]

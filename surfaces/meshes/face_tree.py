@@ -95,7 +95,7 @@ def _cut_at_medians(places: Array, depth: int) -> Ints:
 
 
 @kernel
-def _beside_box(boxes, node, x, y, z):  # type: ignore[no-untyped-def]
+def _beside_box(boxes, node, x, y, z):  # noqa: ANN001, ANN202
     """m^2, the square of the distance of a point from a box; 0 inside."""
     dx = max(boxes[node, 0] - x, x - boxes[node, 3], 0.0)
     dy = max(boxes[node, 1] - y, y - boxes[node, 4], 0.0)
@@ -104,7 +104,7 @@ def _beside_box(boxes, node, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def nearest_face(tree, x, y, z, guess, weights, found):  # type: ignore[no-untyped-def]
+def nearest_face(tree, x, y, z, guess, weights, found):  # noqa: ANN001, ANN201
     """The row of `tree.corners` nearest to a point, or as near as rounding can tell.
 
     Args:
@@ -154,7 +154,7 @@ def nearest_face(tree, x, y, z, guess, weights, found):  # type: ignore[no-untyp
 
 
 @allocating_entry
-def nearest_faces(tree, points, faces, weights):  # type: ignore[no-untyped-def]
+def nearest_faces(tree, points, faces, weights):  # noqa: ANN001, ANN201
     """`nearest_face` for points (k, 3) m; fills faces (k,), as they were given, and weights."""
     near, found = 0, np.empty(3)
     for i in range(points.shape[0]):

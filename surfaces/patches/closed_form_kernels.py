@@ -49,7 +49,7 @@ class PatchKernel(NamedTuple):
 
 
 @allocating
-def wrap(angle, low, high):  # type: ignore[no-untyped-def]
+def wrap(angle, low, high):
     """The value angle + 2 pi k (rad) that lies in low..high, or failing that, nearest to it."""
     a = low + (angle - low) % _TURN
     if a > high and a - high > low - (a - _TURN):
@@ -58,7 +58,7 @@ def wrap(angle, low, high):  # type: ignore[no-untyped-def]
 
 
 @allocating
-def _closest_on_sphere(radius, x, y, z, low, high):  # type: ignore[no-untyped-def]
+def _closest_on_sphere(radius, x, y, z, low, high):
     """Closest point on the sphere about the origin: u, v, height, normal, in its own frame."""
     rho = math.hypot(x, y)
     distance = math.hypot(rho, z)
@@ -74,7 +74,7 @@ def _closest_on_sphere(radius, x, y, z, low, high):  # type: ignore[no-untyped-d
 
 
 @allocating
-def _closest_on_cylinder(radius, x, y, z, low, high):  # type: ignore[no-untyped-def]
+def _closest_on_cylinder(radius, x, y, z, low, high):
     """Closest point on the cylinder about z: u, v, height, normal, in its own frame."""
     rho = math.hypot(x, y)
     if rho == 0.0:
@@ -84,7 +84,7 @@ def _closest_on_cylinder(radius, x, y, z, low, high):  # type: ignore[no-untyped
 
 
 @allocating
-def closest_on_hyperbola(waist, slope, rho, z):  # type: ignore[no-untyped-def]
+def closest_on_hyperbola(waist, slope, rho, z):
     """Abscissa t of the point of r(t) = sqrt(waist^2 + slope^2 t^2) closest to (z, rho).
 
     It is a root of f(t) = (1 + s^2) t - s^2 rho t / r(t) - z. For z >= 0, f is convex on t >= 0
@@ -110,7 +110,7 @@ def closest_on_hyperbola(waist, slope, rho, z):  # type: ignore[no-untyped-def]
 
 
 @allocating
-def _closest_on_hyperboloid(waist, flare, x, y, z, low, high):  # type: ignore[no-untyped-def]
+def _closest_on_hyperboloid(waist, flare, x, y, z, low, high):
     """Closest point on the hyperboloid about z: u, v, height, normal, in its own frame."""
     rho = math.hypot(x, y)
     slope = waist / flare
@@ -129,7 +129,7 @@ def _closest_on_hyperboloid(waist, flare, x, y, z, low, high):  # type: ignore[n
 
 
 @allocating
-def closest_on_patch(patch, x, y, z):  # type: ignore[no-untyped-def]
+def closest_on_patch(patch, x, y, z):
     """The point of the surface closest to (x, y, z), all in the root frame.
 
     Args:
@@ -169,7 +169,7 @@ def closest_on_patch(patch, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @allocating
-def u_direction(patch, u, v):  # type: ignore[no-untyped-def]
+def u_direction(patch, u, v):
     """(x, y, z), the unit direction in the root frame in which u grows at u, v (rad or m)."""
     a, b, c = -math.sin(u), math.cos(u), 0.0
     if patch.code == SPHERE:
@@ -185,14 +185,14 @@ def u_direction(patch, u, v):  # type: ignore[no-untyped-def]
 
 
 @allocating
-def on_patch(patch, u, v):  # type: ignore[no-untyped-def]
+def on_patch(patch, u, v):
     """True where u and v (rad or m, as `closest_on_patch` wraps them) lie in the patch's ranges."""
     (u0, v0), (u1, v1) = patch.low, patch.high
     return u0 - EDGE <= u <= u1 + EDGE and v0 - EDGE <= v <= v1 + EDGE
 
 
 @allocating
-def cell_at(patch, u, v):  # type: ignore[no-untyped-def]
+def cell_at(patch, u, v):
     """Flat row-major index of the cell at u, v (rad or m), or -1 outside the patch.
 
     A closed parameter may be off by any number of turns. A border belongs to the cell of higher
@@ -213,7 +213,7 @@ def cell_at(patch, u, v):  # type: ignore[no-untyped-def]
 
 
 @allocating_entry
-def closest_points(patch, points):  # type: ignore[no-untyped-def]
+def closest_points(patch, points):
     """`closest_on_patch` (k, 6) and `on_patch` (k,) for many points (k, 3) m."""
     count = points.shape[0]
     values = np.empty((count, 6))

@@ -107,7 +107,7 @@ class ParametricSurface(Surface):
 
         def ahead(u: Enclosure, v: Enclosure) -> Any:
             zero = np.zeros(u.shape)
-            point: Any = self.local_point(Slope(u, zero + 1.0), Slope(v, zero))  # type: ignore[arg-type]
+            point: Any = self.local_point(Slope(u, zero + 1.0), Slope(v, zero))  # pyrefly: ignore[bad-argument-type]
             return point.by / np.linalg.norm(point.by, axis=-1, keepdims=True)
 
         return self._enclosed(ahead, u, v)

@@ -71,8 +71,8 @@ class Edge(SmoothPatch):
         one, other = (
             self.signs[k] * self.sides[k].patch.local_normal(*self.on_side(k, u)) for k in (0, 1)
         )
-        parts: Any = (other[..., k, None] * self.turn[:, k] for k in range(3))
-        return one, sum(parts)
+        turned: Any = sum(other[..., k, None] * self.turn[:, k] for k in range(3))
+        return one, turned
 
     def local_normal(self, u: Array, v: Array) -> Array:
         """(1 - v) n_1 + v n_2 over its length."""

@@ -56,7 +56,7 @@ def test_records_are_kept_all_or_none(tmp_path) -> None:
     with Store(tmp_path / "a.study") as store:
         store.keep([record(1)])
         with pytest.raises(StoreError):
-            store.keep([record(2), Row({}, "perhaps", {}, 1.0, "key3")])  # type: ignore[arg-type]
+            store.keep([record(2), Row({}, "perhaps", {}, 1.0, "key3")])
         with pytest.raises(ValueError, match="JSON"):
             store.keep([record(2), Row({}, "done", {"x": float("nan")}, 1.0, "key4")])
         assert len(store) == 1

@@ -125,7 +125,7 @@ def collision_replay(
     segments = max(len(rows) - 1, 0), robot.n
     if deviations is not None and np.shape(deviations) != segments:
         raise ArgumentError(f"deviations must have shape {segments}, got {np.shape(deviations)}")
-    finite = np.isfinite(rows).all(axis=1)
+    finite = np.asarray(np.isfinite(rows).all(axis=1))
     if deviations is not None:
         finite[:-1] &= np.isfinite(deviations).all(axis=1)
     if not finite.all():

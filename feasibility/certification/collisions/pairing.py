@@ -189,7 +189,7 @@ class Pairing:
     def _raised(self, wanted: float | Array, n: Array) -> Mask:
         """(m - 1,) which segments have what is wanted (m), with planes across n (m - 1 or 1, 3)."""
         some = np.flatnonzero(~(self.low >= wanted))
-        ends = np.column_stack([some, some + 1.0])
+        ends = np.asarray(np.column_stack([some, some + 1.0]), dtype=float)
         found = self.parted(ends, n if len(n) == 1 else n[some])
         self.low[some] = np.maximum(self.low[some], found)
         return np.asarray(self.low >= wanted)

@@ -39,13 +39,13 @@ def _call(typing: Any, memory: Any, what: Any) -> Any:
 
 
 @entry
-def call(memory, what):  # type: ignore[no-untyped-def]
+def call(memory, what):
     """Run the clearance on a memory, which must not be empty."""
     return _call(memory, what)
 
 
 @entry
-def segment_clear(buffer, q0, q1):  # type: ignore[no-untyped-def]
+def segment_clear(buffer, q0, q1):
     """Is every pair further apart than its clearance all along a straight joint segment?
 
     Bounds are kept for both ends of the last segment: ask for the next one from either, bit by bit,
@@ -68,7 +68,7 @@ def segment_clear(buffer, q0, q1):  # type: ignore[no-untyped-def]
 
 
 @entry
-def clearance_gradient(buffer, q, step, size):  # type: ignore[no-untyped-def]
+def clearance_gradient(buffer, q, step, size):
     """Add a push of at most `size` away from what is within `INFLUENCE` of its clearance.
 
     Args:
@@ -92,6 +92,6 @@ def clearance_gradient(buffer, q, step, size):  # type: ignore[no-untyped-def]
 
 
 @entry
-def blamed(buffer):  # type: ignore[no-untyped-def]
+def blamed(buffer):
     """Which of `Bodies.pairs` the last segment that was not certified failed at; -1 before."""
     return np.int64(buffer[T.STATE + T.BLAMED])

@@ -29,7 +29,7 @@ NEXT_TO = 1e-12  # m, added to boxes for rounding
 
 
 @kernel
-def ray_meets_box(m, node, x, y, z):  # type: ignore[no-untyped-def]
+def ray_meets_box(m, node, x, y, z):
     """Does the ray from a point meet a node's box?"""
     low, high = 0.0, np.inf
     x, y, z = x - m[node + T.MIDDLE], y - m[node + T.MIDDLE + 1], z - m[node + T.MIDDLE + 2]
@@ -47,7 +47,7 @@ def ray_meets_box(m, node, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def ray_meets_triangle(m, a, x, y, z):  # type: ignore[no-untyped-def]
+def ray_meets_triangle(m, a, x, y, z):
     """Does the ray meet the triangle with corners from place a? By Moeller and Trumbore (1997)."""
     ux, uy, uz = m[a + 3] - m[a], m[a + 4] - m[a + 1], m[a + 5] - m[a + 2]
     vx, vy, vz = m[a + 6] - m[a], m[a + 7] - m[a + 1], m[a + 8] - m[a + 2]
@@ -64,7 +64,7 @@ def ray_meets_triangle(m, a, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def inside_tree(m, root, x, y, z):  # type: ignore[no-untyped-def]
+def inside_tree(m, root, x, y, z):
     """Is a point (root frame) inside the closed body whose tree begins at a node?"""
     top, crossed = 1, False
     m[T.STACK] = root
@@ -82,7 +82,7 @@ def inside_tree(m, root, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def set_relative(m, item, here, there):  # type: ignore[no-untyped-def]
+def set_relative(m, item, here, there):
     """Write the poses of an item's second body, seen from its first, in two slots."""
     for end in range(2):
         slot = there if end == 1 else here
@@ -98,7 +98,7 @@ def set_relative(m, item, here, there):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def swept_ball(m, b, ends):  # type: ignore[no-untyped-def]
+def swept_ball(m, b, ends):
     """Centre and radius of a ball around a polytope in its relative poses."""
     x, y, z = transformed(m, T.RELATIVE, b + T.CENTRE)
     radius = m[b + T.BALL]
@@ -110,7 +110,7 @@ def swept_ball(m, b, ends):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def of_polytopes(m, a, b, direction, ends, need, want, least):  # type: ignore[no-untyped-def]
+def of_polytopes(m, a, b, direction, ends, need, want, least):
     """Lower bound of the distance of two polytopes in the relative poses; see `separation`.
 
     `direction` is the row of the one that separated them the last time.
@@ -132,7 +132,7 @@ def of_polytopes(m, a, b, direction, ends, need, want, least):  # type: ignore[n
 
 
 @kernel
-def of_groups(m, item, ends, need, want, least):  # type: ignore[no-untyped-def]
+def of_groups(m, item, ends, need, want, least):
     """Lower bound of the distance of two groups in the relative poses."""
     a, b = np.int64(m[item + T.ITEM_A]), np.int64(m[item + T.ITEM_B])
     direction, result = np.int64(m[item + T.DIRECTION]), np.inf
@@ -150,7 +150,7 @@ def of_groups(m, item, ends, need, want, least):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def of_item(m, item, here, there, need, want, least):  # type: ignore[no-untyped-def]
+def of_item(m, item, here, there, need, want, least):
     """Lower bound, m, of an item's distance at slot `here`, or between two slots.
 
     Args:

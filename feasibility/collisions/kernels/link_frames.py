@@ -22,13 +22,13 @@ from feasibility.collisions.kernels.tables import row, rows_of
 
 
 @kernel
-def pose_of(m, slot, joint):  # type: ignore[no-untyped-def]
+def pose_of(m, slot, joint):
     """The place of a joint's pose in a slot; joint 0 is the root."""
     return row(m, T.POSES, slot * (rows_of(m, T.JOINTS) + 1) + joint)
 
 
 @kernel
-def link_frames(m, q, root):  # type: ignore[no-untyped-def]
+def link_frames(m, q, root):
     """Poses of all joints in the root frame, each turned so that its axis is z.
 
     Args:
@@ -56,7 +56,7 @@ def link_frames(m, q, root):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def transformed(m, pose, v):  # type: ignore[no-untyped-def]
+def transformed(m, pose, v):
     """The point at place v, placed by a pose."""
     a, b, c, p = m[v], m[v + 1], m[v + 2], pose
     x = m[p] * a + m[p + 1] * b + m[p + 2] * c + m[p + 9]
@@ -66,7 +66,7 @@ def transformed(m, pose, v):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def from_axis(m, pose, x, y, z):  # type: ignore[no-untyped-def]
+def from_axis(m, pose, x, y, z):
     """Squared distance of a point from the z axis of a pose."""
     x, y, z = x - m[pose + 9], y - m[pose + 10], z - m[pose + 11]
     along = m[pose + 2] * x + m[pose + 5] * y + m[pose + 8] * z
@@ -74,7 +74,7 @@ def from_axis(m, pose, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def place_bodies(m, slot):  # type: ignore[no-untyped-def]
+def place_bodies(m, slot):
     """Evaluate the configuration of a slot: poses of joints, and levers of all groups."""
     root, groups = pose_of(m, slot, np.int64(0)), rows_of(m, T.GROUPS)
     link_frames(m, row(m, T.CONFIGURATIONS, slot), root)
@@ -96,7 +96,7 @@ def place_bodies(m, slot):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def bound_levers(m, group, here, there):  # type: ignore[no-untyped-def]
+def bound_levers(m, group, here, there):
     """Set r_j and M of a group for the segment between the configurations of two slots."""
     b, groups = np.int64(m[group + T.NUMBER]), rows_of(m, T.GROUPS)
     q0, q1 = row(m, T.CONFIGURATIONS, here), row(m, T.CONFIGURATIONS, there)
@@ -114,7 +114,7 @@ def bound_levers(m, group, here, there):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def chord_deviation(m, group, inner, here, there):  # type: ignore[no-untyped-def]
+def chord_deviation(m, group, inner, here, there):
     """delta of a group, seen from joint `inner`, between the configurations of two slots."""
     q0, q1 = row(m, T.CONFIGURATIONS, here), row(m, T.CONFIGURATIONS, there)
     largest = row(m, T.LARGEST, np.int64(m[group + T.NUMBER]))

@@ -34,7 +34,7 @@ MOST = 2.0  # times as much as a pair at its clearance may weigh
 
 
 @kernel
-def add_rates(m, item, slot, share):  # type: ignore[no-untyped-def]
+def add_rates(m, item, slot, share):
     """Add d distance / dq of an item, times its share, to the push."""
     witness(m, item, slot)
     out, n, p = row(m, T.ASKED, np.int64(2)), NORMAL, ON_SECOND
@@ -48,7 +48,7 @@ def add_rates(m, item, slot, share):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def push(m):  # type: ignore[no-untyped-def]
+def push(m):
     """Set row 2 of `asked` to a push of at most SIZE away from what is nearer than WISH.
 
     Returns how much nearer than that the nearest pair is, as a share; 0 where none is.
@@ -87,7 +87,7 @@ def push(m):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def measure(m):  # type: ignore[no-untyped-def]
+def measure(m):
     """Bound every item at the configuration in `asked`, in the slot that is returned."""
     here = slot_of_start(m)
     for k in range(rows_of(m, T.ITEMS)):

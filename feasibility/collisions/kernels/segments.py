@@ -36,7 +36,7 @@ START, END = np.int64(0), np.int64(1)
 
 
 @kernel
-def same(m, slot, end):  # type: ignore[no-untyped-def]
+def same(m, slot, end):
     """Does a slot hold a configuration that is asked for, bit by bit?"""
     held, asked = row(m, T.CONFIGURATIONS, slot), row(m, T.ASKED, end)
     equal = m[T.STATE + T.VALID + slot] > 0.0
@@ -46,7 +46,7 @@ def same(m, slot, end):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def settle_in(m, slot, end):  # type: ignore[no-untyped-def]
+def settle_in(m, slot, end):
     """Let slot 0 or 1 hold a configuration that is asked for; nothing is known of it yet."""
     held, asked = row(m, T.CONFIGURATIONS, slot), row(m, T.ASKED, end)
     for j in range(rows_of(m, T.JOINTS)):
@@ -58,7 +58,7 @@ def settle_in(m, slot, end):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def slot_of_start(m):  # type: ignore[no-untyped-def]
+def slot_of_start(m):
     """The slot that holds the first configuration asked for; put there if none does."""
     if same(m, START, START):
         return START
@@ -70,7 +70,7 @@ def slot_of_start(m):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def between_capsules(m, a, b, slot):  # type: ignore[no-untyped-def]
+def between_capsules(m, a, b, slot):
     """Lower bound of the distance of two groups by their capsules in a slot.
 
     The closest points of both axes (Ericson 2005, 5.1.9) propose a direction; it is the ends
@@ -104,7 +104,7 @@ def between_capsules(m, a, b, slot):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def cheap_bound(m, item, slot):  # type: ignore[no-untyped-def]
+def cheap_bound(m, item, slot):
     """Raise an item's bound in a slot by capsules, where both are groups."""
     if m[item + T.TREE] < 0.0:
         bound = between_capsules(
@@ -114,7 +114,7 @@ def cheap_bound(m, item, slot):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def by_budget(m, item, here, there, most, need):  # type: ignore[no-untyped-def]
+def by_budget(m, item, here, there, most, need):
     """Do the bounds of both ends decide? Raises that of the further end."""
     start, end = item + T.BOUND + here, item + T.BOUND + there
     m[end] = max(m[end], m[start] - most)
@@ -122,7 +122,7 @@ def by_budget(m, item, here, there, most, need):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def swept(m, item, here, there, most, need):  # type: ignore[no-untyped-def]
+def swept(m, item, here, there, most, need):
     """Bound of the swept hull between two slots, less delta; -inf where it is less than needed."""
     group, inner = np.int64(m[item + T.ITEM_B]), np.int64(m[item + T.INNER])
     less = need + chord_deviation(m, group, inner, here, there)
@@ -135,7 +135,7 @@ def swept(m, item, here, there, most, need):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def holds_in_parts(m, item, here, there, need):  # type: ignore[no-untyped-def]
+def holds_in_parts(m, item, here, there, need):
     """Is an item certified on every part of a segment, whose end is not too near?
 
     The last part is first: a segment that runs into something does so at its end. Slots 2 and 3
@@ -167,7 +167,7 @@ def holds_in_parts(m, item, here, there, need):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def item_holds(m, item, here, there):  # type: ignore[no-untyped-def]
+def item_holds(m, item, here, there):
     """Is an item clear on the segment between slots `here` and `there` (0 and 1, or one twice)?"""
     need, group = m[item + T.CLEARANCE] + ROUNDING, np.int64(m[item + T.ITEM_B])
     most = m[row(m, T.REACH, np.int64(m[group + T.NUMBER])) + np.int64(m[item + T.INNER])]
@@ -186,7 +186,7 @@ def item_holds(m, item, here, there):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def segment_holds_clear(m):  # type: ignore[no-untyped-def]
+def segment_holds_clear(m):
     """How far the end of the segment in `asked` is sure to exceed what every pair needs, m.
 
     At most 0 where the segment is not certified. The item that was to blame the last time is asked

@@ -35,7 +35,7 @@ NOT_KNOWN = np.int64(0)  # instead of a row of `directions`
 
 
 @kernel
-def support(m, body, x, y, z):  # type: ignore[no-untyped-def]
+def support(m, body, x, y, z):
     """The vertex of a body that is furthest along a direction, and how far it is.
 
     Every other vertex is compared with a most of its own, which the processor does side by side;
@@ -58,7 +58,7 @@ def support(m, body, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def add_point(m, a, b, pose, size):  # type: ignore[no-untyped-def]
+def add_point(m, a, b, pose, size):
     """Add the difference of vertex b, placed by a pose, and vertex a to the simplex.
 
     Returns False where it is in there already.
@@ -78,7 +78,7 @@ def add_point(m, a, b, pose, size):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def shortest(m, size):  # type: ignore[no-untyped-def]
+def shortest(m, size):
     """Set SHORTEST from the weights; its length."""
     square = 0.0
     for k in range(3):
@@ -91,7 +91,7 @@ def shortest(m, size):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def recall(m, known, ends):  # type: ignore[no-untyped-def]
+def recall(m, known, ends):
     """Set the simplex to the vertices at which two bodies were nearest; how many points it has.
 
     0 where none are known, or the bodies overlap in them.
@@ -106,7 +106,7 @@ def recall(m, known, ends):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def remember(m, known, bound):  # type: ignore[no-untyped-def]
+def remember(m, known, bound):
     """Keep at which vertices two bodies are nearest, where the last `separation` found that."""
     points = np.int64(m[POINTS])
     found = points < 4 and m[UPPER] - bound <= COARSE * m[UPPER]
@@ -118,7 +118,7 @@ def remember(m, known, bound):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def separation(m, a, b, ends, need, want, least, turns, known):  # type: ignore[no-untyped-def]
+def separation(m, a, b, ends, need, want, least, turns, known):
     """Lower bound of the distance of two hulls of vertices, m, by at most `turns` directions.
 
     Args:

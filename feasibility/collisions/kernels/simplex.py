@@ -17,7 +17,7 @@ WIDTH = 10  # of a row
 
 
 @kernel
-def dot(m, i, j, k):  # type: ignore[no-untyped-def]
+def dot(m, i, j, k):
     """(j - i) . (k - i)."""
     x = (m[j] - m[i]) * (m[k] - m[i])
     y = (m[j + 1] - m[i + 1]) * (m[k + 1] - m[i + 1])
@@ -25,7 +25,7 @@ def dot(m, i, j, k):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def towards_origin(m, i, j):  # type: ignore[no-untyped-def]
+def towards_origin(m, i, j):
     """(j - i) . (0 - i)."""
     x = (m[j] - m[i]) * m[i]
     y = (m[j + 1] - m[i + 1]) * m[i + 1]
@@ -33,7 +33,7 @@ def towards_origin(m, i, j):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def on_segment(m, i, j):  # type: ignore[no-untyped-def]
+def on_segment(m, i, j):
     """Share of point j in the closest point of the segment from i to j."""
     length = dot(m, i, j, j)
     if not length > 0.0:
@@ -42,7 +42,7 @@ def on_segment(m, i, j):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def on_triangle(m, i, j, k):  # type: ignore[no-untyped-def]
+def on_triangle(m, i, j, k):
     """Shares of points i, j, k in the closest point of their triangle."""
     d1, d2 = towards_origin(m, i, j), towards_origin(m, i, k)
     if d1 <= 0.0 and d2 <= 0.0:
@@ -71,7 +71,7 @@ def on_triangle(m, i, j, k):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def square_at(m, i, j, k, a, b, c):  # type: ignore[no-untyped-def]
+def square_at(m, i, j, k, a, b, c):
     """Squared distance from the origin of the point with shares a, b, c."""
     total = 0.0
     for axis in range(3):
@@ -80,7 +80,7 @@ def square_at(m, i, j, k, a, b, c):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def origin_beyond(m, i, j, k, other):  # type: ignore[no-untyped-def]
+def origin_beyond(m, i, j, k, other):
     """Is the origin on the other side of the plane of i, j, k than the fourth point?"""
     ux, uy, uz = m[j] - m[i], m[j + 1] - m[i + 1], m[j + 2] - m[i + 2]
     vx, vy, vz = m[k] - m[i], m[k + 1] - m[i + 1], m[k + 2] - m[i + 2]
@@ -92,7 +92,7 @@ def origin_beyond(m, i, j, k, other):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def on_tetrahedron(m):  # type: ignore[no-untyped-def]
+def on_tetrahedron(m):
     """Set the weights of four points; all four have one where the origin is inside."""
     least = np.inf
     for corner in range(4):
@@ -112,7 +112,7 @@ def on_tetrahedron(m):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def reduce(m, size):  # type: ignore[no-untyped-def]
+def reduce(m, size):
     """Set the weights of the first `size` points, and drop those without.
 
     Returns how many points are left: 4 where the origin is inside.

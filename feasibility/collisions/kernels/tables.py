@@ -108,13 +108,13 @@ JOINTS, GROUPS, ITEMS, ASKED, CONFIGURATIONS, POSES, LEVERS, LARGEST, REACH = (
 
 
 @kernel
-def rows_of(m, table):  # type: ignore[no-untyped-def]
+def rows_of(m, table):
     """How many rows a table has."""
     return np.int64(m[2 + 3 * table])
 
 
 @kernel
-def row(m, table, k):  # type: ignore[no-untyped-def]
+def row(m, table, k):
     """The place of a table's row."""
     return np.int64(m[1 + 3 * table]) + k * np.int64(m[3 + 3 * table])
 

@@ -28,7 +28,7 @@ ONE_TURN = np.int64(1)
 
 
 @kernel
-def place_box(m, b, ends):  # type: ignore[no-untyped-def]
+def place_box(m, b, ends):
     """Write the box around a polytope in its relative poses: centre, and halves of its sides."""
     for end in range(ends):
         p, out = T.RELATIVE + 12 * end, T.PLACED + 12 * end
@@ -40,7 +40,7 @@ def place_box(m, b, ends):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def between_boxes(m, node, ends):  # type: ignore[no-untyped-def]
+def between_boxes(m, node, ends):
     """Lower bound of the distance of a node's box from the placed boxes and all between them."""
     square = 0.0
     for i in range(3):
@@ -59,7 +59,7 @@ def between_boxes(m, node, ends):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def of_node(m, node, b, ends, bound, need, goal, least, known):  # type: ignore[no-untyped-def]
+def of_node(m, node, b, ends, bound, need, goal, least, known):
     """Make the bound of a node larger: a leaf's up to `goal`, another one's as far as it is cheap.
 
     The first direction is across its thinnest side, unless more is `known`, see `separation`.
@@ -85,7 +85,7 @@ def of_node(m, node, b, ends, bound, need, goal, least, known):  # type: ignore[
 
 
 @kernel
-def of_tree(m, root, b, known, best, ends, need, want, least):  # type: ignore[no-untyped-def]
+def of_tree(m, root, b, known, best, ends, need, want, least):
     """Lower bound of the distance of the triangles of a tree from polytope b, where below `best`.
 
     `OPENED` boxes may be opened for a bound up to `want`, the others only up to `need`; where all

@@ -12,7 +12,7 @@ NORMAL, ON_FIRST, ON_SECOND = T.FOUND + 1, T.FOUND + 4, T.FOUND + 7
 
 
 @kernel
-def record(m, radius, b, bound):  # type: ignore[no-untyped-def]
+def record(m, radius, b, bound):
     """Keep bound, direction and nearest points of a body with a radius and of polytope b.
 
     Where the two overlap, the point of b is the one deepest in the other along the best direction
@@ -42,7 +42,7 @@ def record(m, radius, b, bound):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def witness(m, item, slot):  # type: ignore[no-untyped-def]
+def witness(m, item, slot):
     """Put what was found for an item into the root frame: direction and both points, in place."""
     pose = pose_of(m, slot, np.int64(m[item + T.INNER]))
     for point in range(NORMAL, ON_SECOND + 3, 3):

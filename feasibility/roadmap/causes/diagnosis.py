@@ -46,7 +46,7 @@ MOST_DECIMALS = 6
 
 
 @allocating_entry
-def _nearest_point(arrays, work, cell, guesses):  # type: ignore[no-untyped-def]
+def _nearest_point(arrays, work, cell, guesses):  # noqa: ANN001, ANN202
     """Smallest distance of the tool point from the target, by damped descent from guesses."""
     n = guesses.shape[1]
     best = np.inf

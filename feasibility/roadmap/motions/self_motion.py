@@ -39,7 +39,7 @@ SETTLE_STEPS = np.int64(40)  # of `settle`
 
 
 @entry
-def effects(arrays, work, q, out):  # type: ignore[no-untyped-def]
+def effects(arrays, work, q, out):  # noqa: ANN001, ANN201
     """How much a radian (or metre) of each joint moves the tool at q: lever over scale, plus sine.
 
     Joint differences weighted in this way measure how much a motion moves the tool: the free roll
@@ -64,7 +64,7 @@ def effects(arrays, work, q, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _push_back(work, which, size, share):  # type: ignore[no-untyped-def]
+def _push_back(work, which, size, share):  # noqa: ANN001, ANN202
     """Add to `work.secondary_step` a step down a gradient, by its share (-1 to 1) of a range."""
     norm = 0.0
     for j in range(work.step.shape[0]):
@@ -76,7 +76,7 @@ def _push_back(work, which, size, share):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def margin_objective(arrays, work, q, size):  # type: ignore[no-untyped-def]
+def margin_objective(arrays, work, q, size):  # noqa: ANN001, ANN201
     """Set `work.secondary_step` away from limits, boundaries, and what the arm may hit.
 
     The boundaries are those of cone and roll; their gradients are those of slot 1.
@@ -97,7 +97,7 @@ def margin_objective(arrays, work, q, size):  # type: ignore[no-untyped-def]
 
 
 @spliced
-def _step_towards(arrays, work, q, goal, share, slack, off_target):  # type: ignore[no-untyped-def]
+def _step_towards(arrays, work, q, goal, share, slack, off_target):  # noqa: ANN001, ANN202
     """Put a share of the way from q to the goal, projected, into `work.trial`; True on success."""
     copy_slot(arrays, work)
     for j in range(q.shape[0]):
@@ -130,7 +130,7 @@ def connect(arrays: SearchArrays, work: Work, q: Array, goal: Array) -> tuple[Ar
 
 
 @entry
-def move_towards(arrays, work, q, goal, waypoints):  # type: ignore[no-untyped-def]
+def move_towards(arrays, work, q, goal, waypoints):  # noqa: ANN001, ANN201
     """Write the waypoints of `connect` and move q along; returns their number, and `reached`."""
     n = q.shape[0]
     place(arrays, work, HERE, q)
@@ -184,7 +184,7 @@ def move_towards(arrays, work, q, goal, waypoints):  # type: ignore[no-untyped-d
 
 
 @entry
-def settle(arrays, work, cell, q, most):  # type: ignore[no-untyped-def]
+def settle(arrays, work, cell, q, most):  # noqa: ANN001, ANN201
     """Self-motion over a cell's centre (q in place) away from limits and boundaries."""
     n = q.shape[0]
     look_at(arrays, work, cell)

@@ -101,7 +101,7 @@ def work_for(n: int) -> Work:
 
 
 @kernel
-def measure(arrays, work, slot):  # type: ignore[no-untyped-def]
+def measure(arrays, work, slot):
     """Set the errors of a slot against `work.target`."""
     distance = 0.0
     chord = 0.0
@@ -118,7 +118,7 @@ def measure(arrays, work, slot):  # type: ignore[no-untyped-def]
 
 
 @entry
-def place(arrays, work, slot, q):  # type: ignore[no-untyped-def]
+def place(arrays, work, slot, q):
     """Evaluate the arm at q into a slot, and its errors against `work.target`."""
     frames(
         arrays.chain, q, work.origins[slot], work.axes[slot], work.point[slot], work.axis[slot],
@@ -129,7 +129,7 @@ def place(arrays, work, slot, q):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _copy(work, source, slot):  # type: ignore[no-untyped-def]
+def _copy(work, source, slot):
     """Copy the placement of one slot to the other."""
     for i in range(work.axes.shape[1]):
         for k in range(3):
@@ -142,7 +142,7 @@ def _copy(work, source, slot):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def accept(work):  # type: ignore[no-untyped-def]
+def accept(work):
     """Make the trial slot the current one."""
     _copy(work, NEXT, HERE)
     for k in range(3):
@@ -150,14 +150,14 @@ def accept(work):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def copy_slot(arrays, work):  # type: ignore[no-untyped-def]
+def copy_slot(arrays, work):
     """Let slot 1 start from slot 0; its errors are against the present target."""
     _copy(work, HERE, NEXT)
     measure(arrays, work, NEXT)
 
 
 @kernel
-def off_target(arrays, work, slot):  # type: ignore[no-untyped-def]
+def off_target(arrays, work, slot):
     """m by which the tool point is off its target, less `near`.
 
     The surface's normal next to a target is another, and so is the frame that roll is measured in
@@ -167,14 +167,14 @@ def off_target(arrays, work, slot):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def cone_used(arrays, work, slot):  # type: ignore[no-untyped-def]
+def cone_used(arrays, work, slot):
     """The part of the cone chord that a slot uses, with what it costs to be off the target."""
     off = off_target(arrays, work, slot)
     return work.error[slot, 1] + arrays.off_target_cost * work.derivative_bound[2] * off
 
 
 @kernel
-def roll_lost(arrays, work, slot):  # type: ignore[no-untyped-def]
+def roll_lost(arrays, work, slot):
     """rad of the roll's range that it costs a slot to be off its target."""
     off = off_target(arrays, work, slot)
     # A pole costs nothing where the tool point is at its target.
@@ -182,13 +182,13 @@ def roll_lost(arrays, work, slot):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def roll_used(arrays, work, slot):  # type: ignore[no-untyped-def]
+def roll_used(arrays, work, slot):
     """rad of the roll's half range that a slot uses, as `cone_used`."""
     return abs(work.error[slot, 2]) + roll_lost(arrays, work, slot)
 
 
 @kernel
-def put(target, source):  # type: ignore[no-untyped-def]
+def put(target, source):
     """Copy numbers into an array of the same length; numba's `target[:] = source` is far longer."""
     for j in range(target.shape[0]):
         target[j] = source[j]

@@ -35,7 +35,7 @@ def root_box(arrays: SearchArrays) -> BoxStack:
 
 
 @kernel
-def _split(arrays, places, part, driver, space, low, high):  # type: ignore[no-untyped-def]
+def _split(arrays, places, part, driver, space, low, high):  # noqa: ANN001, ANN202
     """Which interval of a box to halve; m where the part is to be cut, -1 where all are too thin.
 
     The one with most effect on the constraint that is closest to ruling the box out.
@@ -64,13 +64,13 @@ def _split(arrays, places, part, driver, space, low, high):  # type: ignore[no-u
 
 
 @kernel
-def _weight(arrays, which, driver):  # type: ignore[no-untyped-def]
+def _weight(arrays, which, driver):  # noqa: ANN001, ANN202
     """What a change of tool point (1/m), axis or reference axis counts, beside the driver's."""
     return (1.0 if which == driver else 0.05) / (arrays.scale if which == 0 else 1.0)
 
 
 @kernel
-def _push(boxes, low, high, part, weight):  # type: ignore[no-untyped-def]
+def _push(boxes, low, high, part, weight):  # noqa: ANN001, ANN202
     """Put a box on the stack."""
     top = boxes.counts[0]
     put(boxes.low[top], low)
@@ -81,7 +81,7 @@ def _push(boxes, low, high, part, weight):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _push_children(places, boxes, part, weight, n, low, high):  # type: ignore[no-untyped-def]
+def _push_children(places, boxes, part, weight, n, low, high):  # noqa: ANN001, ANN202
     """Hand a box to the children of its part (low and high are lost)."""
     axis = places.axis[part]
     for side in range(2):
@@ -101,7 +101,7 @@ def _push_children(places, boxes, part, weight, n, low, high):  # type: ignore[n
 
 
 @allocating_entry
-def branch_and_bound(arrays, work, places, boxes, most, directions, space, found):  # type: ignore[no-untyped-def]
+def branch_and_bound(arrays, work, places, boxes, most, directions, space, found):  # noqa: ANN001, ANN201
     """Examine up to `most` boxes; returns the value of a `Ruling`.
 
     Args:

@@ -153,7 +153,7 @@ def shared_borders(mesh: LabelledFaces) -> SharedBorders:
     nearest = start + np.clip(along, 0.0, 1.0)[:, None] * (end - start)
     # Rounded, so that of two places equally near the first is taken, however the mesh is turned.
     off = np.linalg.norm(nearest - mean[pair], axis=1) / total[pair]
-    order = np.lexsort((np.arange(len(pair)), np.round(off, 6), pair))
+    order = np.lexsort((np.arange(len(pair)), off.round(6), pair))
     first = order[np.unique(pair[order], return_index=True)[1]]
     return SharedBorders(np.column_stack(np.divmod(keys, count)), total, nearest[first])
 

@@ -192,7 +192,7 @@ def _head_starts(across: Ints, edge: Array, labels: Ints, missing: Array) -> Arr
     border = coo_array((edge[face, k] / _JAGGED / 2.0, ends), shape=(count, count)).tocsr()
     laplace = diags_array(border.sum(axis=1) + _PIN) - border
     change = np.atleast_1d(spsolve(laplace.tocsc(), missing))
-    steepest = np.max(abs(change[ends[0]] - change[ends[1]]), initial=0.0)
+    steepest = float(np.max(abs(change[ends[0]] - change[ends[1]]), initial=0.0))
     return change * min(_GAIN, _MOST_STEP / max(steepest, _MOST_STEP))
 
 

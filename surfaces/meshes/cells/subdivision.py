@@ -118,7 +118,7 @@ def cut_across(vertices: Array, faces: Ints, edges: EdgeLengths, count: Ints) ->
 
 
 @allocating
-def _place(from_vertex, to_vertex, first, count, k):  # type: ignore[no-untyped-def]
+def _place(from_vertex, to_vertex, first, count, k):  # noqa: ANN001, ANN202
     """Vertex k of 0..count on the edge between two vertices; inner ones run from the lower end."""
     if k == 0:
         return from_vertex
@@ -128,7 +128,7 @@ def _place(from_vertex, to_vertex, first, count, k):  # type: ignore[no-untyped-
 
 
 @allocating
-def _apart(points, i, j):  # type: ignore[no-untyped-def]
+def _apart(points, i, j):  # noqa: ANN001, ANN202
     """The squared distance of two points."""
     total = 0.0
     for k in range(3):
@@ -137,7 +137,7 @@ def _apart(points, i, j):  # type: ignore[no-untyped-def]
 
 
 @allocating_entry
-def _ladders(points, faces, of_face, longest, first, count, out):  # type: ignore[no-untyped-def]
+def _ladders(points, faces, of_face, longest, first, count, out):  # noqa: ANN001, ANN202
     """Write the parts of all faces; each next rung is the shorter of the two there could be."""
     written = 0
     for face in range(faces.shape[0]):

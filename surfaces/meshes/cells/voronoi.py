@@ -33,7 +33,7 @@ _BUCKETS = np.int64(91 * 64)  # what is farther than 60 cells waits in the last 
 
 
 @allocating_entry
-def units(distance):  # type: ignore[no-untyped-def]
+def units(distance):  # noqa: ANN001, ANN201
     """A distance (in lengths of a cell) as a whole number."""
     return np.int64(math.floor(distance * _FINE + 0.347))
 
@@ -44,7 +44,7 @@ def whole_steps(step: Array) -> Ints:
 
 
 @allocating
-def push(heap, size, entry):  # type: ignore[no-untyped-def]
+def push(heap, size, entry):  # noqa: ANN001, ANN201
     """Put an entry on a binary heap of `size` entries, least first."""
     k = size
     while k > 0:
@@ -58,7 +58,7 @@ def push(heap, size, entry):  # type: ignore[no-untyped-def]
 
 
 @allocating
-def pop(heap, size):  # type: ignore[no-untyped-def]
+def pop(heap, size):  # noqa: ANN001, ANN201
     """Take the least entry; returns it and the new size."""
     least = heap[0]
     size -= 1
@@ -79,7 +79,7 @@ def pop(heap, size):  # type: ignore[no-untyped-def]
 
 
 @allocating
-def _settle(across, step, distance, heap, size):  # type: ignore[no-untyped-def]
+def _settle(across, step, distance, heap, size):  # noqa: ANN001, ANN202
     """Lower distances (whole numbers) to those over the faces on the heap, where these are less."""
     while size > 0:
         entry, size = pop(heap, size)
@@ -142,7 +142,7 @@ def far_seeds(across: Ints, step: Ints, piece: Ints, quota: Ints, border: int) -
 
 
 @allocating_entry
-def _begin_seeds(across, step, border, distance, heap, queue):  # type: ignore[no-untyped-def]
+def _begin_seeds(across, step, border, distance, heap, queue):  # noqa: ANN001, ANN202
     """Fill in the distances from the border, and the queue; returns its size."""
     count = across.shape[0]
     size = 0
@@ -159,9 +159,7 @@ def _begin_seeds(across, step, border, distance, heap, queue):  # type: ignore[n
 
 
 @allocating_entry
-def _more_seeds(  # type: ignore[no-untyped-def]
-    across, step, piece, distance, heap, queue, missing, end, seeds, size, most
-):
+def _more_seeds(across, step, piece, distance, heap, queue, missing, end, seeds, size, most):  # noqa: ANN001, ANN202
     """Choose up to `most` seeds more; returns the queue's size, 0 when all are chosen."""
     chosen = 0
     while size > 0 and chosen < most:
@@ -183,7 +181,7 @@ def _more_seeds(  # type: ignore[no-untyped-def]
 
 
 @allocating_entry
-def flood(across, step, centre, seeds, anchors, offsets, labels):  # type: ignore[no-untyped-def]
+def flood(across, step, centre, seeds, anchors, offsets, labels):  # noqa: ANN001, ANN201
     """Every face gets the label of the seed that reaches it first; lengths in cells.
 
     A face goes to the seed with the least straight distance from its anchor, less its offset;
@@ -265,7 +263,7 @@ def recentre(
 
 
 @allocating_entry
-def smooth(across, edge, area, target, labels):  # type: ignore[no-untyped-def]
+def smooth(across, edge, area, target, labels):  # noqa: ANN001, ANN201
     """Give away teeth: faces on a border that are held by one edge only, and a short one.
 
     Such a face can leave without tearing its cell. It goes to the neighbour it shares the longest
@@ -298,7 +296,7 @@ def smooth(across, edge, area, target, labels):  # type: ignore[no-untyped-def]
 
 
 @allocating
-def _tooth_to(across, edge, labels, face):  # type: ignore[no-untyped-def]
+def _tooth_to(across, edge, labels, face):  # noqa: ANN001, ANN202
     """The cell that a face should go to: the one it shares most border with; or -1."""
     own, held, most = labels[face], 0, np.int64(0)
     for k in range(3):

@@ -83,7 +83,7 @@ def random_arm(rng: np.random.Generator) -> str:
 def load_text(folder: Path, text: str, **options: object) -> Robot:
     path = folder / "test_arm.urdf"
     path.write_text(text, encoding="utf-8")
-    return load_robot(path, **options)  # type: ignore[arg-type]
+    return load_robot(path, **options)
 
 
 def random_q(robot: Robot, rng: np.random.Generator, turns: float = 2.0) -> NDArray[np.float64]:

@@ -61,7 +61,7 @@ def with_key(text: str, change: str) -> str:
     if f"[{table}]\n" not in text:
         text = f"{text}[{table}]\n"
     before, inside = text.split(f"[{table}]\n")
-    rows = re.match(r"(?:[^\[\n].*\n)*", inside)[0].splitlines(keepends=True)  # type: ignore[index]
+    rows = re.match(r"(?:[^\[\n].*\n)*", inside)[0].splitlines(keepends=True)
     after = inside[sum(map(len, rows)) :]
     if value is None:
         kept = [row for row in rows if not row.startswith(f"{key} = ")]
