@@ -12,7 +12,6 @@ from samples import sampled, spread
 from search_kernels import Clearance
 
 from coverable import Collision, Obstacle, Robot, load_robot, sphere
-from coverable.kernels import entry
 from feasibility.collisions.asked_bodies import gather
 from feasibility.collisions.kernels import link_frames
 from feasibility.collisions.kernels.tables import GROUPS, row, views
@@ -20,8 +19,8 @@ from feasibility.collisions.problem_bodies import Bodies, Pair, Soup
 from robots.shapes.bodies import Polytope
 
 LENGTH, RADIUS = 0.3, 0.03  # m, of each link, a capsule along x
-chord_deviation, place_bodies = entry(link_frames.chord_deviation), entry(link_frames.place_bodies)
-place_group = entry(link_frames.bound_levers)
+chord_deviation, place_bodies = link_frames.chord_deviation, link_frames.place_bodies
+place_group = link_frames.bound_levers
 FINE = np.deg2rad(0.1)  # between samples, of the joint that moves most
 
 

@@ -13,13 +13,12 @@ from samples import sampled, seeds
 from search_kernels import Motions
 
 from coverable import Task, sphere
-from coverable.kernels import entry
 from feasibility.roadmap.motions import roll_kernels, segment_bound
 from feasibility.roll import Roll, projected, roll_of
 from surfaces.patches.grid_cells import GridCells
 
 ROUNDING = 1e-12
-frame_rates, peak = entry(roll_kernels.frame_rates), entry(segment_bound.peak)
+frame_rates, peak = roll_kernels.frame_rates, segment_bound.peak
 KINDS = ["sphere", "cylinder", "hyperboloid", "plane"]
 
 

@@ -25,13 +25,13 @@ from feasibility.roadmap.proofs.ruling import Ruling
 
 Floats = NDArray[np.float64]
 
-# Only other kernels call these in the search.
-bounds_between = entry(aiming.bounds_between)
+# Only other kernels call these in the search. They run as Python here, which takes less time than
+# compiling them; but for the one that has to refuse NaN as compiled code does.
+bounds_between, contract_roll = aiming.bounds_between, box_bounds.contract_roll
+second_derivatives = segment_bound.second_derivatives
+roll_derivatives = segment_bound.roll_derivatives
+reach, shrink = box_bounds.reach, box_contraction.shrink
 segment_holds = entry(segment_bound.segment_holds)
-second_derivatives = entry(segment_bound.second_derivatives)
-roll_derivatives = entry(segment_bound.roll_derivatives)
-reach, shrink = entry(box_bounds.reach), entry(box_contraction.shrink)
-contract_roll = entry(box_bounds.contract_roll)
 
 
 class Clearance:
