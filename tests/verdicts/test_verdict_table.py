@@ -22,8 +22,8 @@ from coverable import Answer, CauseKind, Evidence, Search, check, replay, verify
 from feasibility.verdict import Walk
 
 TABLE = [name for name in names() if name not in names("dear walls")]
-KEPT = {*spread(TABLE, 31), "a crease inwards", "pieces apart", "inside the shoulder"}
-KEPT |= {*names("paper"), *names("bodies"), *names("rolls")}
+KEPT = {*spread(TABLE, 22), "a crease inwards", "pieces apart", "inside the shoulder"}
+KEPT |= {*names("paper"), *names("bodies"), *names("rolls")} - {names("rolls")[5]}
 TABLE = [name for name in TABLE if name in KEPT]
 OTHERS = [
     name for file, few in STORED.items() for name in (spread(stored(file), few) if few else ())
@@ -33,7 +33,7 @@ OTHERS.append("puma560 197")  # two of its components cover as many cells
 ALL = TABLE + OTHERS
 WALKED = [name for name in ALL if name not in names("greedy")]
 WORSE = [name for name in WALKED if name not in names("ends")]
-WORSE = {*spread(WORSE, 8), *spread(names("rolls"), 7), *names("bodies")[:6]}
+WORSE = {*spread(WORSE, 6), *spread(names("rolls"), 4), *names("bodies")[:6:3], "beside a hull"}
 WORSE = sorted(WORSE - {"4a within 15 degrees"})
 ANSWERS = Path(__file__).parents[1] / "questions" / "answers.json"
 SAMPLES = {"hood": 6} | dict.fromkeys(names("meshes"), 20 if EVERYTHING else 6)  # between rows
@@ -239,7 +239,7 @@ def test_every_way_to_be_worse_is_tried():
     assert tried == {"limits", "half", "cone", "tolerance", "standoff", "roll", "row", "clearance"}
 
 
-@sampled("name", spread([n for n in WALKED if n not in names("poses")], 12))
+@sampled("name", spread([n for n in WALKED if n not in names("poses")], 6))
 def test_the_edges_of_its_graph_are_motions_that_judge_and_referee_accept(name):
     """The search has certified each; where judge and search differ, one of them is wrong."""
     verdict = verdict_of(name)
@@ -271,7 +271,7 @@ def test_the_edges_of_its_graph_are_motions_that_judge_and_referee_accept(name):
 
 
 @sampled("seed", seeds(1, all=3))
-@pytest.mark.parametrize("name", [n for n in spread(WALKED, 8) if n not in names("undecided")])
+@pytest.mark.parametrize("name", [n for n in spread(WALKED, 6) if n not in names("undecided")])
 def test_the_seed_does_not_decide(name, seed):
     asked, first = question(name), verdict_of(name)
     other = check(asked.robot, asked.cells, asked.task, Search(seed=seed + 1))
