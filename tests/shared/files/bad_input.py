@@ -28,12 +28,22 @@ KEY = re.compile(r"(robot|surface|task|collision|search|serach|tusk)\.([^ ]+)(?:
 
 
 class Bad(NamedTuple):
+    reader: str
     good: str
     """The table that it is from: of which good text it is, or one of the tables of their own."""
     change: Any
     """As the table has it."""
-    content: bytes
-    """Of the file; empty where there is none."""
+
+    @property
+    def content(self) -> bytes:
+        """Of the file; empty where there is none."""
+        if isinstance(self.change, dict) or self.good == "set":
+            return b""
+        if self.good == "whole":
+            return many(self.change).encode("latin-1" if self.reader == "result" else "utf-8")
+        if self.good == "encoded":
+            return many(self.change[1]).encode(self.change[0])
+        return many(changed(goods(self.reader)[self.good], self.change)).encode()
 
 
 def many(text: str) -> str:
@@ -102,18 +112,8 @@ def bad(reader: str) -> dict[str, Bad]:
     for table, changes in _tables(reader).items():
         for name, change in changes.items() if table != "good" else ():
             assert name not in found, name
-            found[name] = Bad(table, change, _content(reader, table, change))
+            found[name] = Bad(reader, table, change)
     return found
-
-
-def _content(reader: str, table: str, change: Any) -> bytes:
-    if isinstance(change, dict) or table == "set":
-        return b""
-    if table == "whole":
-        return many(change).encode("latin-1" if reader == "result" else "utf-8")
-    if table == "encoded":
-        return many(change[1]).encode(change[0])
-    return many(changed(goods(reader)[table], change)).encode()
 
 
 @cache
