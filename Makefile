@@ -39,8 +39,8 @@ PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check 
 	    "$$python" -m venv --clear .venv; \
 	fi
 	@echo "installing coverable and its libraries into .venv (a minute or two) ..."
-	@$(PIP_INSTALL) --upgrade 'pip>=25'
-	@$(PIP_INSTALL) -e '.[dev]'
+	@$(PIP_INSTALL) --upgrade 'pip>=25' 'setuptools>=77'
+	@$(PIP_INSTALL) --no-build-isolation -e '.[dev]'
 	@touch $@
 
 demo: .venv/installed
