@@ -1,19 +1,28 @@
 """The notebooks run, on the smaller grids they choose themselves, and are saved with pictures."""
 
+import atexit
 import base64
 import io
 import json
 import re
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import samples
 from IPython.core.interactiveshell import InteractiveShell
 from PIL import Image
 
 NOTEBOOKS = sorted((Path(__file__).parents[1] / "notebooks").glob("*.ipynb"))
 each = pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+SHOWN: set[type] = set()
+
+
+def raised(*_: object, **__: object) -> None:
+    """IPython would print what goes wrong where a value is shown, and go on."""
+    raise
 
 
 @each
@@ -23,14 +32,27 @@ def test_it_runs(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path))
     monkeypatch.chdir(path.parent)
     monkeypatch.setitem(sys.modules, "__main__", sys.modules["__main__"])  # IPython has its own
-    shell = InteractiveShell.instance()
+    shell = InteractiveShell.instance(cache_size=0)
     monkeypatch.setattr(shell, "kernel", "a notebook", raising=False)
+    monkeypatch.setattr(shell, "showtraceback", raised)
+    whole = shell.display_formatter.format
+
+    def shown(value: Any) -> tuple[dict, dict]:
+        """Pictures and pages, which nobody sees here, of one value of each type."""
+        if type(value) in SHOWN and not samples.EVERYTHING:
+            return {}, {}
+        SHOWN.add(type(value))
+        return whole(value)
+
+    monkeypatch.setattr(shell.display_formatter, "format", shown)
     try:
         for cell in json.loads(path.read_text("utf-8"))["cells"]:
             if cell["cell_type"] == "code":
                 shell.run_cell("".join(cell["source"])).raise_error()
     finally:
         InteractiveShell.clear_instance()
+        atexit.unregister(shell.atexit_operations)  # all that it made would be kept until then
+        shell.atexit_operations()
 
 
 @each

@@ -21,6 +21,9 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
+# trimesh does without them here, and to load them takes longer than all else.
+NEEDLESS = ("networkx", "scipy")
+
 # All that trimesh and pycollada import late is imported for this one.
 SMALL = b"""<?xml version="1.0"?>
 <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset/>
@@ -104,6 +107,8 @@ def main() -> None:
     sys.path[:0] = job["library"]
     os.environ["OPENBLAS_NUM_THREADS"] = "1"  # each more reserves memory
     logging.disable()  # trimesh prints tracebacks about textures
+    without: Any = dict.fromkeys(NEEDLESS)
+    sys.modules.update(without)  # as if they were not installed
     answer(SMALL, 1)
     written = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)

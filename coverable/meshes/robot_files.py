@@ -20,6 +20,7 @@ from coverable.meshes.raw_mesh import MeshError, RawMesh
 
 MOST_BYTES = 256 << 20  # of .dae files that are read together; the last may exceed it
 MOST_SECONDS = 8.0  # of processor time, for a picture
+KEPT = 3  # arms
 _LAST: dict[tuple[bytes, ...], list[list[RawMesh] | MeshError]] = {}
 """The .dae files that were read last, and what is in them: arms are loaded again and again."""
 
@@ -117,7 +118,8 @@ def _read_once(files: tuple[bytes, ...]) -> list[list[RawMesh] | MeshError]:
         return known
     found = read_collada(files)
     if not any(isinstance(one, MeshError) for one in found):
-        _LAST.clear()
+        if len(_LAST) >= KEPT:
+            del _LAST[next(iter(_LAST))]
         _LAST[files] = found
     return found
 

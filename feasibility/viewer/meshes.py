@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -16,11 +17,14 @@ from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 from surfaces.adjacency import components
 from surfaces.meshes.degenerate import weld_distance, welded
 from surfaces.meshes.triangle_mesh import doubled_areas
-from surfaces.passes.welded_triangles import WorkingMesh, twin_sides
+from surfaces.passes.welded_triangles import WorkingMesh, renumbered, twin_sides
 
 CREASE = 0.7  # [rad]: edges sharper than this keep a visible edge (40 degrees)
 FINEST, COARSEST = 1e-3, 0.1  # [1] of the largest mesh's size: how far they are merged where many
 GREY: Colour = (0.72, 0.74, 0.77)
+KEPT = 6
+_LAST: dict[bytes, list[Mesh]] = {}
+"""Of the robots that were drawn last, by a digest of all: arms are loaded again and again."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -58,9 +62,11 @@ def merge_vertices(
         kinds: (V,) only vertices of one kind are merged; all where None.
     """
     group = welded(vertices, distance)
-    if kinds is not None:
-        group = group * (int(kinds.max()) + 1) + kinds
-    group = np.unique(group, return_inverse=True)[1].reshape(-1)
+    if kinds is None:
+        group = renumbered(group)[1]
+    else:
+        each = group * (int(kinds.max()) + 1) + kinds
+        group = np.unique(each, return_inverse=True)[1].reshape(-1)
     size = np.bincount(group)
     mean = np.column_stack([np.bincount(group, axis) / size for axis in vertices.T])
     order = np.argsort(-np.linalg.norm(vertices - mean[group], axis=1), kind="stable")
@@ -159,6 +165,20 @@ def thinned(meshes: Sequence[Mesh], budget: int) -> list[Mesh]:
     Returns:
         As many meshes as were given, in their order.
     """
+    digest = hashlib.sha256(str(budget).encode())
+    for mesh in meshes:
+        digest.update(repr((mesh.colour, mesh.opacity, mesh.faces.shape)).encode())
+        digest.update(mesh.vertices.tobytes() + mesh.faces.tobytes())
+    key = digest.digest()
+    if key not in _LAST:
+        if len(_LAST) >= KEPT:
+            del _LAST[next(iter(_LAST))]
+        _LAST[key] = _thinned(meshes, budget)
+    return _LAST[key]
+
+
+def _thinned(meshes: Sequence[Mesh], budget: int) -> list[Mesh]:
+    """See `thinned`."""
     result = [_merged(mesh) for mesh in meshes]
     small = budget / (4 * max(len(meshes), 1))
     size = max((float(np.ptp(mesh.vertices)) for mesh in result if len(mesh.faces)), default=0.0)

@@ -10,6 +10,16 @@ from coverable.arrays import Array, Ints, Mask
 from surfaces.meshes.triangle_mesh import doubled_areas, half_edge_ends, half_edges
 
 
+def renumbered(numbers: Ints) -> tuple[Ints, Ints]:
+    """The numbers, at least 0, that occur, in order; and for each its place among them.
+
+    As `np.unique` says it, without sorting.
+    """
+    there = np.zeros(int(numbers.max(initial=-1)) + 1, bool)
+    there[numbers] = True
+    return np.flatnonzero(there), (np.cumsum(there) - 1)[numbers]
+
+
 class WorkingMesh(NamedTuple):
     """A surface as triangles to measure on."""
 
@@ -42,8 +52,8 @@ class WorkingMesh(NamedTuple):
 
     def compact(self) -> WorkingMesh:
         """Without vertices of no face."""
-        used, faces = np.unique(self.faces, return_inverse=True)
-        return WorkingMesh(self.vertices[used], faces.reshape(-1, 3).astype(np.int64))
+        used, faces = renumbered(self.faces)
+        return WorkingMesh(self.vertices[used], faces)
 
 
 class FaceEdges(NamedTuple):
