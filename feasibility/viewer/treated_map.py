@@ -97,12 +97,15 @@ def _first_strokes(found: TreatedArea, motion: Playback, height: float) -> Ints:
     times = np.repeat(times[:-1], count) + within * np.repeat(np.diff(times) / count, count)
     points, stroke = motion.tool_at(times), np.searchsorted(edges, times, side="right") - 1
     first = stroke[KDTree(points).query(middles)[1]]
-    rest = np.arange(len(middles))
+    rest, reach = np.arange(len(middles)), float(np.hypot(radius, height))
     for number in np.unique(stroke):
-        tree = KDTree(points[stroke == number])
-        near, _ = tree.query(middles[rest], distance_upper_bound=float(np.hypot(radius, height)))
-        first[rest[np.isfinite(near)]] = number
-        rest = rest[~np.isfinite(near)]
+        own = points[stroke == number]
+        beside = (middles[rest] > own.min(0) - reach) & (middles[rest] < own.max(0) + reach)
+        here = rest[beside.all(axis=1)]  # to be looked at: most are far away from one stroke
+        near, _ = KDTree(own).query(middles[here], distance_upper_bound=reach)
+        here = here[np.isfinite(near)]
+        first[here] = number
+        rest = np.setdiff1d(rest, here, assume_unique=True)
     return np.asarray(first)
 
 
@@ -136,7 +139,7 @@ def _layers(
 
 def _faces(mesh: WorkingMesh, which: Ints, lift: Any, colour: Colour, path: str) -> Command:
     """Some faces in one colour, a little above the surface."""
-    corners = (mesh.corners[which] + lift[which][:, None]).reshape(-1, 3)
+    corners = (mesh.vertices[mesh.faces[which]] + lift[which][:, None]).reshape(-1, 3)
     faces = np.arange(len(corners)).reshape(-1, 3)
     return threejs.mesh_object(path, corners, faces, colour, opacity=0.9, lit=False)
 
