@@ -41,7 +41,7 @@ IMPOSSIBLE = {
     "coverage": ["task.footprint=0.02", "task.coverage=0.99"],
 }
 """Of each demand, what no motion of this arm holds."""
-FEWER = ("--set", "surface.cells=[1, 2]", "--set", "search.evaluations=500")  # to search often
+FEWER = ("--set", "surface.cells=[1, 2]", "--set", "search.evaluations=200")  # to search often
 OF_THE_ARM = "says which arm it is"
 MEASURE = "says what another demand is measured by"
 NO_DEMANDS = {
