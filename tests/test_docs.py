@@ -14,6 +14,7 @@ import tomllib
 import webbrowser
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -60,10 +61,6 @@ def test_case_files_of_the_pages_are_feasible() -> None:
     assert clear.task.collision.checked == ("self", "surface", "scene")
 
 
-def interrupted(page: coverable.Live) -> None:
-    raise KeyboardInterrupt
-
-
 def test_commands_of_the_pages_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -75,7 +72,7 @@ def test_commands_of_the_pages_run(
     found = [block for page in pages for block in blocks(page, "")]
     lines = dict.fromkeys(line for block in found for line in block.splitlines())
     commands = [shlex.split(x, comments=True) for x in lines if x.startswith("coverable")]
-    monkeypatch.setattr(coverable.Live, "wait", interrupted)
+    monkeypatch.setattr(coverable.Live, "wait", Mock(side_effect=KeyboardInterrupt))
     assert len(commands) >= 18
     for _, *arguments in commands:
         if arguments == ["warm-up"]:  # a campaign

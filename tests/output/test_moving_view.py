@@ -16,6 +16,7 @@ import coverable
 from coverable import Axis, Collision, Obstacle, check, load_case, load_robot, plane, view
 from feasibility.viewer import playback as motion
 from feasibility.viewer.live_server import LiveView
+from feasibility.viewer.obstacles import LINE
 from feasibility.viewer.robot_visuals import joint_paths
 from feasibility.viewer.stage import GROUP
 from feasibility.viewer.viewer import compose, show
@@ -177,7 +178,8 @@ def test_bodies_move_with_the_arm_and_the_nearest_pair_has_its_distance(verdict)
     frame = int(np.searchsorted(times, drawn.start, side="right")) - 1
     assert shown.endswith(drawn.readout.nearest[frame])
     first, second = (places[f"{shown}/{end}"][:3, 3] for end in ("first", "second"))
-    line = places[f"{shown}/line"]
+    line, image = places[f"{shown}/line"], drawn.image()
+    assert (np.abs(image - LINE).max(axis=2) < 0.02).sum() > 5, "seen through all before it"
     np.testing.assert_allclose(line @ [0.0, 0.0, 0.0, 1.0], [*first, 1.0], atol=1e-9)
     np.testing.assert_allclose(line @ [0.0, 0.0, 1.0, 1.0], [*second, 1.0], atol=1e-9)
     between = np.interp(drawn.start, times, values)
