@@ -44,9 +44,8 @@ def test_python_of_the_pages_runs_and_says_what_it_promises(
     (code,) = blocks(page, "python")
     names: dict[str, Any] = {}
     exec(compile(code, "page", "exec"), names)
-    promised = re.findall(r"# (feasible.*edges\.)", code)
-    assert len(promised) == 1
-    assert capsys.readouterr().out.startswith(promised[0])
+    (promised,) = re.findall(r"# (feasible.*edges\.)", code)
+    assert capsys.readouterr().out.startswith(promised)
     assert names["verdict"].graph.number_of_edges() == 305
     assert names["verdict"].witness.q.shape[1] == 6
 

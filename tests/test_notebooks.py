@@ -1,6 +1,5 @@
 """The notebooks run, on the smaller grids they choose themselves, and are saved with pictures."""
 
-import atexit
 import base64
 import io
 import json
@@ -50,8 +49,6 @@ def test_it_runs(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
                 shell.run_cell("".join(cell["source"])).raise_error()
     finally:
         InteractiveShell.clear_instance()
-        atexit.unregister(shell.atexit_operations)  # all that it made would be kept until then
-        shell.atexit_operations()
 
 
 @each

@@ -149,8 +149,7 @@ def test_a_long_motion_becomes_programs_that_one_calls(tmp_path, monkeypatch, fa
     calls = [line.split(":")[-1].split()[-1] for line in whole[1] if "CALL" in line]
     assert calls == [part[0] for part in parts] == ["RUN_P1", "RUN_P2", "RUN_P3"]
     assert len(whole[3]) == 0
-    rows = np.concatenate([part[3] for part in parts])
-    assert len(rows) == len(run)
+    assert len(np.concatenate([part[3] for part in parts])) == len(run)
     lines = [line.strip() for part in parts for line in part[1]]
     moves = [k for k, line in enumerate(lines) if line.startswith(("J P", "MOVJ"))]
     switches = [k for k, line in enumerate(lines) if line.startswith("SWITCH")]

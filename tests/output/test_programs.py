@@ -165,8 +165,7 @@ def test_a_tool_is_off_while_it_is_lifted(tmp_path, ask):
     body = text.split("\n")
     starts = [k for k, line in enumerate(body) if line.startswith("  def ")]
     ends = [k for k, line in enumerate(body) if line == "  end"]
-    lengths = [b - a - 1 for a, b in zip(starts, ends, strict=True)]
-    assert max(lengths) <= 300
+    assert max(b - a - 1 for a, b in zip(starts, ends, strict=True)) <= 300
     assert [f"  {body[k].split()[1].rstrip(':')}" for k in starts] == [
         line for line in body if re.fullmatch(r"  part_\d+\(\)", line)
     ]
