@@ -22,7 +22,6 @@ from typing import Any, NamedTuple, Protocol
 from coverable.errors import CoverableError, counted
 from feasibility.clock import OutOfTime
 from feasibility.notices import compiling_notice
-from feasibility.roadmap.warmup import warm_up
 
 LOOK = 0.1  # [s] between two calls of `receive`
 PATIENCE = 3  # workers that may die with a task before it is given up
@@ -99,6 +98,13 @@ def untold(error: BaseException | str) -> WorkersError:
         f"the workers cannot run the tasks ({why}); what was finished is kept: see that they have "
         "the same coverable installed"
     )
+
+
+def warm_up(rarely_used: bool = False) -> None:
+    """Load the kernels of the search: imported here, as workers that need none start at once."""
+    from feasibility.roadmap import warmup
+
+    warmup.warm_up(rarely_used)
 
 
 class Here:

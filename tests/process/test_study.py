@@ -9,7 +9,10 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from multiprocessing import resource_tracker
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +23,7 @@ from samples import sampled, spread
 
 from coverable import Store, load_study, open_workers, run_tasks
 from feasibility.cases.toml import as_read
+from feasibility.cli.main import run
 from feasibility.studies.pool import WorkersError
 from feasibility.studies.run import StudyTask
 from feasibility.studies.stored import cells_of
@@ -157,31 +161,38 @@ def test_workers_that_are_killed_at_random(count, tmp_path) -> None:
         assert row.result["double"] == kept[task.key].result["double"] == 2 * k
 
 
-COMMAND = """
-import sys
-from feasibility.cli.main import run
-if __name__ == "__main__":
-    if sys.argv.pop(1) == "stop":
-        from study_works import stop_after_keeping
-        stop_after_keeping()
-    run()
-"""
+@contextmanager
+def stopped(*arguments: object) -> Iterator[BaseProcess]:
+    """The command in another process, which has all loaded, stopped when it has kept something.
 
+    What it writes to stderr lies beside the study's store.
+    """
+    ours, theirs = os.pipe()
 
-def start(how: str, *arguments: object) -> subprocess.Popen[str]:
-    """The command in another process, which may stop as soon as it has kept something."""
-    path = os.pathsep.join([str(SHARED), *filter(None, sys.path)])
-    return subprocess.Popen(
-        [sys.executable, "-c", COMMAND, how, *map(str, arguments)],
-        env={**os.environ, "PYTHONPATH": path}, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        text=True, start_new_session=True,
-    )  # fmt: skip
+    def command() -> None:
+        os.setsid()
+        said = os.open(Path(arguments[3]).with_name("said"), os.O_CREAT | os.O_WRONLY | os.O_APPEND)
+        os.dup2(said, 2)
+        os.dup2(theirs, 1)
+        sys.stdout, sys.stderr = sys.__stdout__, sys.__stderr__
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        resource_tracker._resource_tracker._fd = None  # a new command has none yet
+        sys.argv[1:] = map(str, arguments)
+        study_works.stop_after_keeping()
+        run()
 
-
-def wait_until_kept(process) -> None:
-    """Until a process that stops then has stopped."""
-    line = process.stdout.readline()
-    assert line == "kept\n", process.stderr.read()
+    process = multiprocessing.get_context("fork").Process(target=command)
+    process.start()
+    os.close(theirs)
+    try:
+        with open(ours) as out:
+            assert out.readline() == "kept\n"
+            yield process
+            process.join()
+            assert out.read().replace("kept\n", "") == ""
+    finally:
+        process.kill()
+        process.join()
 
 
 def stored(path) -> int:
@@ -235,8 +246,7 @@ def test_the_command_killed_and_run_again(in_peace, tmp_path) -> None:
     before = set(multiprocessing.active_children())
     path, held, orphans = tmp_path / "a.study", [], set[int]()
     for count in (0, 1):
-        with start("stop", *asked(study, tmp_path, "a"), "--workers", count) as process:
-            wait_until_kept(process)
+        with stopped(*asked(study, tmp_path, "a"), "--workers", count) as process:
             orphans |= children_of(process.pid)
             process.kill()
         held.append(stored(path))
@@ -255,15 +265,13 @@ def test_the_command_killed_and_run_again(in_peace, tmp_path) -> None:
 
 def test_ctrl_c_stores_and_leaves_no_worker(in_peace, tmp_path) -> None:
     """A terminal sends it to the workers too: neither they nor their parent write a traceback."""
-    with start("stop", *asked(in_peace[0], tmp_path, "a"), "--workers", 1) as process:
-        wait_until_kept(process)
+    with stopped(*asked(in_peace[0], tmp_path, "a"), "--workers", 1) as process:
         children = children_of(process.pid)
         os.killpg(process.pid, signal.SIGINT)
-        out, err = process.communicate()
     held = stored(tmp_path / "a.study")
     assert 0 < held < 24
-    assert (process.returncode, out.replace("kept\n", "")) == (130, "")
-    lines = err.splitlines()
+    assert process.exitcode == 130
+    lines = (err := (tmp_path / "said").read_text()).splitlines()
     assert lines[-1] == "coverable: interrupted"
     assert f"{held} cases are stored" in lines[-2]
     assert "Traceback" not in err
@@ -275,13 +283,12 @@ DYING = """
 import os
 if __name__ != "__main__":
     os._exit(3)  # a worker imports this module first
-from feasibility.studies.run import StudyTask
 from feasibility.studies.pool import WorkersError
-from coverable import open_workers, run_tasks
+from feasibility.studies.workers import open_workers
 from study_works import double
 try:
-    with open_workers(1) as workers:
-        run_tasks([StudyTask({"number": 1}, {}, double)], workers)
+    with open_workers(1, warm=False) as workers:
+        workers.run(double, [{"number": 1}], print)
 except WorkersError as error:
     print(error)
 """
