@@ -2,10 +2,9 @@
 
 import os
 import signal
-import subprocess
-import sys
 from contextlib import contextmanager
-from pathlib import Path
+from importlib import import_module
+from multiprocessing import get_context
 
 import pytest
 import study_works
@@ -19,23 +18,24 @@ from feasibility.studies.run import StudyTask
 distributed = pytest.importorskip("distributed")
 
 pytestmark = pytest.mark.filterwarnings("ignore")  # what Dask says of its own threads and ports
-SHARED = Path(study_works.__file__).parent
 
 
 @contextmanager
 def cluster(folder, workers):
-    """A scheduler and workers of one thread each, processes of their own, as people start them."""
+    """A scheduler and workers of one thread each, in processes that have all loaded."""
     file = folder / "scheduler.json"
     common = "--scheduler-file", file, "--no-dashboard"
-    path = os.pathsep.join([str(SHARED), *filter(None, sys.path)])
+
+    def run(command, *arguments):
+        for stream in (1, 2):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
+        command(list(map(str, arguments)))
 
     def start(command, *arguments):
-        module = f"distributed.cli.dask_{command}"
-        return subprocess.Popen(
-            [sys.executable, "-m", module, *map(str, arguments)],
-            env={**os.environ, "PYTHONPATH": path},
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
+        command = import_module(f"distributed.cli.dask_{command}").main
+        process = get_context("fork").Process(target=run, args=(command, *arguments))
+        process.start()
+        return process
 
     made = [start("scheduler", *common, "--host", "127.0.0.1", "--port", 0)]
     own = "--nthreads", 1, "--no-nanny", "--host", "127.0.0.1", "--local-directory", folder
@@ -48,7 +48,7 @@ def cluster(folder, workers):
     finally:
         for process in made:
             process.kill()
-            process.wait()
+            process.join()
 
 
 @sampled("count", spread([60, 2000], 1))
