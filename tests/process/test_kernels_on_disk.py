@@ -1,17 +1,18 @@
 """Compiled kernels: kept while no code changes, read only where nobody else can write."""
 
 import ast
-import json
 import os
+import re
 import shutil
 import stat
-import subprocess
 import sys
+import traceback
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
 import pytest
+from numba import config, njit
 
 from coverable.kernels import CODE, ROOT, is_safe
 
@@ -76,51 +77,44 @@ def project(tmp_path: Path) -> Path:
     for path, text in (("robots/chain.py", OUTER), ("surfaces/triangle_kernel.py", INNER)):
         (folder / path).parent.mkdir(parents=True, mode=0o755)
         (folder / path).write_text(text)
+        (folder / path).with_name("__init__.py").touch()
     (folder / "coverable").mkdir(mode=0o755)
     (folder / "coverable/__init__.py").touch()
     shutil.copy(ROOT / "coverable/kernels.py", folder / "coverable")
     return folder
 
 
-# Forks of a process that has compiled with numba, and has nothing of ours: that takes most time.
-FORKS = """
-import json, os, sys, numba
-numba.njit("f8(f8)")(lambda x: x + 1.0)
-for line in sys.stdin:
-    changes, folder, ask = json.loads(line)
-    if not os.fork():
-        os.environ |= changes
-        numba.config.reload_config()
-        os.chdir(folder)
-        sys.path.insert(0, folder)
-        sys.dont_write_bytecode = True
-        exec(ask)
-        sys.stdout.flush()
-        os._exit(0)  # what is left of numba takes ten times as long to tidy up
-    os.wait()
-    print("over", flush=True)
-"""
-
-
-@cache
-def forks() -> subprocess.Popen[str]:
-    words = [sys.executable, "-c", FORKS]
-    return subprocess.Popen(words, stdin=-1, stdout=-1, stderr=subprocess.STDOUT, text=True)
-
-
 @pytest.fixture(scope="module", autouse=True)
-def ended() -> Iterator[None]:
-    yield
-    with forks():
-        pass
+def compiled() -> None:
+    """This process has compiled with numba, which takes the most time, before it is forked."""
+    njit("f8(f8)")(lambda x: x + 1.0)
 
 
 def asked(folder: Path, value: float = 4.0, ask: str = ASK, **more: str) -> tuple[int, int]:
     """Is the kernel loaded, and can it be kept nowhere? Its value is as expected."""
     home = {"HOME": f"{folder.parent}/home", "XDG_CACHE_HOME": f"{folder.parent}/home/cache"}
-    changes = home | {"NUMBA_CACHE_DIR": ""} | more
-    print(json.dumps([changes, f"{folder}", ask]), file=forks().stdin, flush=True)
-    said = "".join(iter(forks().stdout.readline, "over\n"))
+    ours, theirs = os.pipe()
+    if not (child := os.fork()):  # with nothing of ours
+        sys.stdout = sys.stderr = os.fdopen(theirs, "w")
+        try:
+            os.environ |= home | {"NUMBA_CACHE_DIR": ""} | more
+            config.reload_config()
+            os.chdir(folder)
+            for name in list(sys.modules):
+                if name.partition(".")[0] in ("coverable", *PACKAGES):
+                    del sys.modules[name]
+            sys.path.insert(0, str(folder))
+            sys.dont_write_bytecode = True
+            exec(ask, {})
+        except BaseException:  # noqa: BLE001 - the process ends here
+            traceback.print_exc()
+        sys.stdout.flush()
+        os._exit(0)
+    os.close(theirs)
+    with open(ours) as out:
+        said = out.read()
+    os.waitpid(child, 0)
+    assert "Traceback" not in said, said
     result, hits, nowhere, endless, classes = said.split()
     assert (float(result), endless) == (value, "-inf")
     assert eval(classes) == ""
@@ -220,11 +214,7 @@ def test_a_folder_that_cannot_be_written_any_more_ends_nothing(project: Path, la
     assert [asked(project), asked(project)] == [COMPILED, LOADED]
 
 
-TREES = {
-    path: ast.parse(path.read_text("utf-8"))
-    for folder in PACKAGES
-    for path in (ROOT / folder).rglob("*.py")
-}
+FILES = [path for folder in PACKAGES for path in (ROOT / folder).rglob("*.py")]
 STAMPED = {path for pattern in CODE for path in ROOT.glob(pattern)}
 
 
@@ -237,7 +227,16 @@ def made_by(node: ast.AST) -> str:
     )
 
 
-KERNELS = {(p, n.name): made_by(n) for p, t in TREES.items() for n in t.body if made_by(n)}
+@cache
+def tree_of(path: Path) -> ast.Module:
+    return ast.parse(path.read_text("utf-8"))
+
+
+@cache
+def kernels() -> dict[tuple[Path, str], str]:
+    decorated = re.compile(r"@\s*(kernel|inlined|spliced|allocating|entry)")
+    files = [path for path in FILES if decorated.search(path.read_text("utf-8"))]
+    return {(p, n.name): made_by(n) for p in files for n in tree_of(p).body if made_by(n)}
 
 
 def origin(module: str, name: str) -> Path:
@@ -249,7 +248,7 @@ def origin(module: str, name: str) -> Path:
 
 def named(path: Path, compiled: bool) -> Iterator[tuple[Path, str]]:
     """What the kernels of a file name of our other files, or else what its plain code names."""
-    tree, known = TREES[path], {name: (p, name) for p, name in KERNELS if p == path}
+    tree, known = tree_of(path), {name: (p, name) for p, name in kernels() if p == path}
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and f"{node.module}".startswith(PACKAGES):
             for a in node.names:
@@ -257,8 +256,8 @@ def named(path: Path, compiled: bool) -> Iterator[tuple[Path, str]]:
     for part in tree.body:
         if bool(made_by(part)) == compiled:
             nodes = list(ast.walk(part))
-            calls = [node for node in nodes if isinstance(node, ast.Call)]
-            called_back = [a for c in calls if "callback(" in ast.unparse(c.func) for a in c.args]
+            made = [n for n in nodes if isinstance(n, ast.Call) and isinstance(n.func, ast.Call)]
+            called_back = [a for c in made if "callback(" in ast.unparse(c.func) for a in c.args]
             for node in nodes:
                 if isinstance(node, ast.Name) and node.id in known and node not in called_back:
                     yield known[node.id]
@@ -266,13 +265,18 @@ def named(path: Path, compiled: bool) -> Iterator[tuple[Path, str]]:
 
 def test_all_that_is_compiled_into_kernels_is_in_the_stamp() -> None:
     assert all(any(ROOT.glob(pattern)) for pattern in CODE)
-    assert {path for path, _ in KERNELS} <= STAMPED
-    for path in {path for path, _ in KERNELS}:
+    assert {path for path, _ in kernels()} <= STAMPED
+    for path in {path for path, _ in kernels()}:
         assert {file for file, _ in named(path, True)} <= STAMPED, path
 
 
 def test_python_calls_no_kernel_that_is_none_of_the_entries() -> None:
     """It would run as plain Python, hundreds of times slower."""
-    for path in TREES:
-        called = [one for one in named(path, False) if "entry" not in KERNELS.get(one, "entry")]
+    own = {path for path, _ in kernels()}
+    modules = [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in own]
+    for path in FILES:
+        text = path.read_text("utf-8")
+        if path not in own and not any(module in text for module in modules):
+            continue  # it can name none
+        called = [one for one in named(path, False) if "entry" not in kernels().get(one, "entry")]
         assert called == [], path

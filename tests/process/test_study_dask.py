@@ -15,14 +15,20 @@ from coverable import Store, open_workers, run_tasks
 from feasibility.studies.pool import WorkersError
 from feasibility.studies.run import StudyTask
 
-distributed = pytest.importorskip("distributed")
-
 pytestmark = pytest.mark.filterwarnings("ignore")  # what Dask says of its own threads and ports
+
+
+@pytest.fixture(autouse=True)
+def distributed():
+    """It takes long to load, which collecting the tests need not."""
+    return pytest.importorskip("distributed")
 
 
 @contextmanager
 def cluster(folder, workers):
     """A scheduler and workers of one thread each, in processes that have all loaded."""
+    from distributed import Client
+
     file = folder / "scheduler.json"
     common = "--scheduler-file", file, "--no-dashboard"
 
@@ -41,7 +47,7 @@ def cluster(folder, workers):
     own = "--nthreads", 1, "--no-nanny", "--host", "127.0.0.1", "--local-directory", folder
     made += [start("worker", *common, *own) for _ in range(workers)]
     try:
-        with distributed.Client(scheduler_file=str(file), set_as_default=False) as client:
+        with Client(scheduler_file=str(file), set_as_default=False) as client:
             client.wait_for_workers(workers, timeout=60)
             address = client.scheduler.address
         yield address, made
