@@ -55,7 +55,7 @@ def test_a_command_ends_with_an_answer_wherever_the_time_is_up(name, folder):
     known = json.loads(whole.out)
     assert looks >= 5
     undecided = 0
-    for look in sorted({*range(3), *spread(range(looks), 3)}):
+    for look in sorted({*range(2), *spread(range(looks), 3)}):
         said, _ = ask(folder, name, look, "--json")
         found = json.loads(said.out)
         answer = found.get("verdict") or found["answer"]
@@ -188,7 +188,7 @@ def within(clock, work):
 
 def for_ever():
     while True:
-        pass
+        signal.pause()
 
 
 def test_work_that_never_ends_is_ended_soon_after_its_limit():

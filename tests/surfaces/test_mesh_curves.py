@@ -52,7 +52,7 @@ SMOOTH |= {
 ROUGH = {name: (plain(name), 60, np.inf) for name in ("blade", "scattered")}  # not all are usable
 
 
-def off(cells, which, count=100):
+def off(cells, which, count=40):
     """At odd places of some curves: m from the surface, what normals are off, and what is said."""
     pair = np.repeat(which, count)
     t = np.random.default_rng(0).uniform(size=count)

@@ -79,7 +79,7 @@ def test_grids_are_even_and_their_outlines_run_round_the_cells(grid):
 
 
 def test_triangles_of_cells_face_outwards_and_fill_them(cells):
-    which = np.arange(len(cells))[::2]
+    which = np.arange(len(cells))[::4]
     drawn = cells.triangles(which, samples=16)
     corners = drawn.vertices[drawn.faces]
     looks = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -183,7 +183,7 @@ def test_beside_the_patch_there_is_no_cell_and_its_rim_belongs_to_it():
 
 
 def test_curves_join_centres_on_the_surface_within_what_they_state(cells):
-    curves, count = cells.curves, 23
+    curves, count = cells.curves, 15
     pair = np.repeat(np.arange(len(curves)), count)
     points, normals = curves.at(pair, np.tile(np.linspace(0, 1, count), len(curves)))
     ends = points.reshape(-1, count, 3)[:, [0, -1]]

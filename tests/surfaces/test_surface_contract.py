@@ -97,10 +97,10 @@ def test_closest_finds_back_where_points_were_put(smooth):
 def test_no_place_is_nearer_than_the_closest(smooth):
     """By a search without slopes over the patch; a closed form may find places beyond it."""
     rng = np.random.default_rng(3)
-    at = smooth.point(*random_parameters(smooth, 12))
+    at = smooth.point(*random_parameters(smooth, 8))
     size = float(np.ptp(smooth.point(*random_parameters(smooth)), axis=0).max())
     above = smooth.position + np.outer([0.11, 0.4], smooth.rotation[:, 2] * size)
-    points = np.concatenate([at + rng.normal(scale=0.4 * size, size=(12, 3)), above])
+    points = np.concatenate([at + rng.normal(scale=0.4 * size, size=(8, 3)), above])
     found = smooth.closest(points)
     foot = smooth.point(found.u, found.v)
     away = np.linalg.norm(points - foot, axis=1)

@@ -5,6 +5,7 @@ import pytest
 from bounds import holds
 from part_walks import pieces_of
 from random_surfaces import random_surface
+from samples import sampled, spread
 from specimens import EGG, FACETED, SMOOTH, VASE, drawn, quarter_turn, turned
 
 import coverable
@@ -56,6 +57,10 @@ SURFACES = {
     "poses": drawn(2, tangents=np.random.default_rng(4).normal(size=(25, 3))).surface,
     **FACETED,
 }  # fmt: skip
+
+
+BESIDE = [(name, height) for height in (0.0, -0.05) for name in SURFACES]
+HALF = sampled(("named", "height"), spread(BESIDE, len(SURFACES) + 1), indirect=["named"])
 
 
 @pytest.fixture(scope="module", params=SURFACES)
@@ -129,7 +134,7 @@ def sagging(offset, one, other):
     return np.stack(found, axis=2)
 
 
-@pytest.mark.parametrize("height", [0.0, -0.05])
+@HALF
 def test_paths_bend_no_more_than_is_said(named, height):
     name, surface = named
     start, end = pairs(surface, 240, np.random.default_rng(2))
@@ -193,7 +198,7 @@ def test_normals_along_creases_bend_as_each_term_says():
     assert np.isinf(second_derivative_of_unit(np.array([0.0, -1.0]), np.ones(2), np.ones(2))).all()
 
 
-@pytest.mark.parametrize("height", [0.0, -0.05])
+@HALF
 def test_paths_begin_and_end_where_they_should_and_do_not_jump(named, height):
     _, surface = named
     offset = offset_surface(surface, height)

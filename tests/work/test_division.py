@@ -74,7 +74,7 @@ def posed(pan_deg):
 
 @cache
 def behind(low, high):
-    return divide(posed((low, high)), BEHIND.cells(12, 2), TASK)
+    return divide(posed((low, high)), BEHIND.cells(8, 2), TASK)
 
 
 def test_4d_is_one_patch_of_all_that_can_be_covered():
@@ -159,7 +159,7 @@ def test_how_many_it_takes_at_least_is_proved(number, motions):
     assert hasty.at_least <= 1
 
 
-CELLS = plane((0.35, 0.65), (-0.2, 0.2), "outside", (0.0, 0.0, 0.1)).cells(5, 6)
+CELLS = plane((0.35, 0.65), (-0.2, 0.2), "outside", (0.0, 0.0, 0.1)).cells(4, 4)
 
 
 @pytest.mark.parametrize(("asked", "whole"), [

@@ -63,7 +63,8 @@ def test_the_whole_motion_keeps_to_all_limits_and_goes_along_the_path(path):
 
 def test_the_way_home_leads_around_what_is_in_its_way():
     asked = Collision(surface=False, clearance=0.005)
-    alone = coverage_path(check(UR5, CELLS, replace(TASK, collision=asked)))
+    cells = CELLS.surface.cells(1, 2)
+    alone = coverage_path(check(UR5, cells, replace(TASK, collision=asked)))
     straight = dense(np.stack([np.radians(HOME), ends_of(alone, 0.05).entry[-2]]), 2)[1]
     place = Kinematics(UR5).tool(straight)[0]
     ball = Obstacle.sphere("ball", 0.03, position=tuple(place))

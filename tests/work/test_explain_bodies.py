@@ -75,7 +75,8 @@ def test_what_is_left_out_takes_its_pairs_along():
         self_=False, surface=False, scene=(WALL, POST), tool=(ToolShape.sphere(RADIUS),),
         allow=(("forearm_link", "post"),), clearances=(("tool", "wall", 0.2),),
     )  # fmt: skip
-    found = explain(FREE, CELLS, Task(0.02, 30, TOLERANCE, collision=asked))
+    task, few = Task(0.02, 30, TOLERANCE, collision=asked), Search(evaluations=2000)
+    found = explain(FREE, CELLS, task, few)
     assert threshold_of(found, "without wall").feasible is not None
     assert threshold_of(found, "without post").feasible is None
 

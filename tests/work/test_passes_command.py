@@ -26,7 +26,7 @@ CASES = {
     "plate": PANEL.format(wide=0.3) + "task.footprint = 0.1\ntask.coverage = 0.9\n",
     "pipe": """
         robot.name = "ur5"
-        surface = { kind = "cylinder", radius = 0.15, u_deg = [50, 130], v = [0.0, 0.3],
+        surface = { kind = "cylinder", radius = 0.15, u_deg = [50, 130], v = [0.08, 0.22],
             position = [0.5, 0.15, 0.0], rpy_deg = [90, 0, 0], side = "outside", cells = [4, 4] }
         task = { standoff = 0.0, cone_deg = 30, tolerance = 0.0005, footprint = 0.01 }
     """.replace("\n            ", " "),
@@ -88,7 +88,7 @@ def test_verify_accepts_what_path_has_certified(path, tmp_path, more):
     """Between the passes it once went 2.3 mm into the part."""
     out, laid = tmp_path / "run.csv", ["--passes", "90", "--pitch", "0.06"]
     status, said, _ = path("pipe", *laid, *more, "--out", out)
-    assert (status, "treated 20.0" in said) == (0, more in ([], ["--approach", "0.03"]))
+    assert (status, "treated 21.1" in said) == (0, more in ([], ["--approach", "0.03"]))
     assert ("the tool is lifted 3 times" in said) == ("--one-way" in more)
     assert ("beyond the border by up to 20 mm" in said) == ("--overrun" in more)
     status, said, _ = path("pipe", out, *laid, command="verify")
@@ -125,7 +125,7 @@ def test_a_way_through_the_part_is_refused():
 
 def test_passes_are_cut_where_they_cannot_be_run(path, tmp_path):
     switch = ("--program", tmp_path / "run.script", "--on", "ON", "--off", "OFF", "--json")
-    asked = ("--passes", "0", "--pitch", "0.1", "--out", tmp_path / "run.csv")
+    asked = ("--passes", "0", "--pitch", "0.2", "--out", tmp_path / "run.csv")
     status, found, _ = path("round", *asked, *switch)
     runs, cuts = found["runs"], found["cuts"]
     assert (status, found["verdict"]) == (1, "infeasible")

@@ -57,7 +57,7 @@ def beginnings(cells, order):
             yield grid_order(order, *shape, begin, upside).tolist()
 
 
-@pytest.mark.parametrize(("name", "order"), ASKED)
+@sampled(("name", "order"), spread(ASKED, 14))
 def test_a_path_is_one_motion_through_every_cell_in_its_order(name, order):
     """It holds between its waypoints too, and revisits little in the order that suits it best."""
     verdict, path = verdict_of(name), path_of(name, order)

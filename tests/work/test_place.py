@@ -87,7 +87,7 @@ def test_a_surface_moved_away_is_put_back(name, seed):
     moved = case_at(name, away)
     assert check(*moved).answer is Answer.INFEASIBLE
     region = region_about(away)
-    found = place(*moved[:3], region, moved.search, count=32, rounds=4, keep=2)
+    found = place(*moved[:3], region, moved.search, count=16, rounds=2, keep=2)
     assert (found.answer, found.evidence) == (Answer.FEASIBLE, Evidence.WITNESS)
     for trial in found.found:
         assert region.holds(trial.pose)
@@ -205,7 +205,7 @@ def test_the_bound_on_a_region_holds_for_its_placements():
         region = region_about(Pose.of_values(centre), rng.uniform(0.0, [0.4] * 3 + [40.0] * 3))
         beyond = reach.beyond(region)
         corners = np.where(picks == 0, region.low, region.high)
-        furthest = reach.distances(np.vstack([region.samples(64, k), corners])).max(axis=1)
+        furthest = reach.distances(np.vstack([region.samples(16, k), corners])).max(axis=1)
         if beyond is not None:
             assert furthest.min() >= beyond[0] - 1e-9
             assert beyond[0] > reach.reach + reach.tolerance
@@ -293,15 +293,15 @@ def told(trials):
 def test_who_tries_placements_changes_nothing_and_what_fails_is_undecided():
     case, setup = case_of("ur5 plate"), setup_of("ur5 plate")
     region = region_about(moved_away("ur5 plate", 3))
-    ask, number = {"count": 8, "rounds": 1, "keep": 1}, len(setup.cells)
+    ask, number = {"count": 4, "rounds": 1, "keep": 1}, len(setup.cells)
     here = place(*setup[:3], region, setup.search, **ask)
-    with coverable.open_workers(1) as workers:
+    with coverable.open_workers(1, warm=False) as workers:
         there = evaluator_of_study(case, number, workers)
         found = place(*setup[:3], region, setup.search, evaluator=there, **ask)
         assert told(found.trials) == told(here.trials)
         arm = replace(case.robot, name="no such arm")
         lost = evaluator_of_study(replace(case, robot=arm), number, workers)
-        nothing = place(*setup[:3], region, evaluator=lost, count=8, rounds=0)
+        nothing = place(*setup[:3], region, evaluator=lost, count=4, rounds=0)
     assert nothing.answer is Answer.UNDECIDED
     assert "could not be tried" in nothing.message
 

@@ -149,7 +149,7 @@ def test_one_motion_is_one_run_without_cuts_and_gaps():
 
 def test_what_is_left_out_is_named_with_its_cause():
     plate = plane((0.6, 1.0), (-0.1, 0.1), "outside", (0.0, 0.0, 0.2))
-    along = plan_passes(UR5, parallel_passes(plate, 0.1), replace(TASK, cone_deg=20))
+    along = plan_passes(UR5, parallel_passes(plate, 0.1, step=0.05), replace(TASK, cone_deg=20))
     runs = pass_runs(UR5, along.cells, along.task, along.places)
     assert runs.gaps
     lengths = [float(run.figures.length) for run in runs.runs]
