@@ -2,6 +2,7 @@
 
 import json
 import math
+import multiprocessing
 from dataclasses import replace
 from functools import cache
 from itertools import count
@@ -290,7 +291,9 @@ def told(trials):
     return [(trial.pose, trial.effort, dict(trial.result)) for trial in trials]
 
 
-def test_who_tries_placements_changes_nothing_and_what_fails_is_undecided():
+def test_who_tries_placements_changes_nothing_and_what_fails_is_undecided(monkeypatch):
+    fork = multiprocessing.get_context("fork")  # a worker that begins loaded
+    monkeypatch.setattr(multiprocessing, "get_context", lambda _: fork)
     case, setup = case_of("ur5 plate"), setup_of("ur5 plate")
     region = region_about(moved_away("ur5 plate", 3))
     ask, number = {"count": 4, "rounds": 1, "keep": 1}, len(setup.cells)

@@ -124,7 +124,7 @@ def test_a_run_past_a_post_keeps_its_clearance_everywhere():
     assert run.collisions == ("self", "surface", "scene")
     bodies = bodies_of(path_of("post").task)
     for degree in (3, 5):
-        for row in interpolated(run, degree, 2)[0][::18]:
+        for row in interpolated(run, degree, 2)[0][::36]:
             assert collision_replay(UR5, bodies, row[None]).accepted
 
 
@@ -137,7 +137,7 @@ def test_a_timed_motion_that_would_collide_is_refused_with_the_pair(what):
         tight = (*nearest.nearest_pair, nearest.min_clearance - 1e-5)
         task = replace(path.task, collision=replace(AMONG, clearances=(tight,)))
         run = trajectory(replace(path, task=task), SPEED)
-        for row in interpolated(run, 5, 2)[0][::18]:
+        for row in interpolated(run, 5, 2)[0][::36]:
             assert collision_replay(UR5, bodies_of(task), row[None]).accepted
         return
     if what == "in the way":
