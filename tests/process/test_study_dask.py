@@ -93,7 +93,7 @@ def test_a_worker_killed_while_it_works_and_then_the_scheduler(count, tmp_path) 
                 run_tasks(tasks, there, store, lose)
             assert 5 < len(store) < 400
     assert (tmp_path / "dask.csv").read_bytes() == (tmp_path / "0.csv").read_bytes()
-    assert len((tmp_path / "0.csv").read_text(encoding="utf-8").splitlines()) == 25
+    assert len((tmp_path / "0.csv").read_text(encoding="utf-8").splitlines()) == 13
 
 
 def test_a_scheduler_that_was_never_there() -> None:

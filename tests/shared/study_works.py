@@ -65,7 +65,7 @@ base.task = { standoff = 0.02, cone_deg = 30 }
 [vary]
 "surface.position" = { x = { range = [-0.2, 0.7] }, z = { range = [-0.2, 0.7] } }
 "surface.rpy_deg" = { yaw = { range = [-90, 90] } }
-count = 24
+count = 12
 """  # small plates about an arm, about a third of them feasible
 
 

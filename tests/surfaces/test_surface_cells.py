@@ -7,6 +7,7 @@ import pickle
 import numpy as np
 import pytest
 from bounds import holds
+from samples import sampled, spread
 from specimens import ALL, SMOOTH, cells_of
 
 from coverable import SurfaceError, cylinder, plane, sphere, torus
@@ -78,6 +79,7 @@ def test_grids_are_even_and_their_outlines_run_round_the_cells(grid):
     assert (grid.at([np.nan, grid.u[0]], [grid.v[0], np.nan]) == -1).all()
 
 
+@sampled("cells", spread([*CELLS], 11), indirect=True)
 def test_triangles_of_cells_face_outwards_and_fill_them(cells):
     which = np.arange(len(cells))[::4]
     drawn = cells.triangles(which, samples=16)
@@ -182,6 +184,7 @@ def test_beside_the_patch_there_is_no_cell_and_its_rim_belongs_to_it():
     assert plane((0, 1), (0, 2)).cells(3, 4).at([-5, 5, 0.5], [-5, 5, 9]).tolist() == [0, 11, 7]
 
 
+@sampled("cells", spread([*CELLS], 16), indirect=True)
 def test_curves_join_centres_on_the_surface_within_what_they_state(cells):
     curves, count = cells.curves, 15
     pair = np.repeat(np.arange(len(curves)), count)
@@ -217,6 +220,7 @@ def test_curves_join_centres_on_the_surface_within_what_they_state(cells):
     assert (travel <= math.pi / 2 * chord).all() or crease  # no curve goes the long way round
 
 
+@sampled("grid", spread([*GRIDS], 14), indirect=True)
 def test_curves_are_smooth_and_move_along_with_their_surface(grid):
     curves = grid.curves
     last = np.delete(np.arange(curves.first[-1]), curves.first[1:] - 1)  # pieces with a next one

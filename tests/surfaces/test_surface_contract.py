@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from plain import surface_of
 from referee import Form
+from samples import sampled, spread
 from smooth_probes import extrapolated_area, least_distances, random_parameters, same_surface
 from specimens import ALL, CLOSED, POLES, SMOOTH, cells_of
 
@@ -94,6 +95,7 @@ def test_closest_finds_back_where_points_were_put(smooth):
         assert x.max() < high + 1e-9
 
 
+@sampled("smooth", spread([*SMOOTH], 13), indirect=True)
 def test_no_place_is_nearer_than_the_closest(smooth):
     """By a search without slopes over the patch; a closed form may find places beyond it."""
     rng = np.random.default_rng(3)

@@ -285,7 +285,7 @@ def test_paths_beside_a_pole_are_near_it():
         assert offset.paths(start, end).deviations[0, 2, :2].max() < 5.0 * beside
 
 
-@pytest.mark.parametrize("name", [n for n, s in SURFACES.items() if s.kind != "mesh"])
+@sampled("name", spread([n for n, s in SURFACES.items() if s.kind != "mesh"], 13))
 def test_the_u_direction_turns_as_is_said(name):
     surface = SURFACES[name]
     start, end = pairs(surface, 240, np.random.default_rng(5))
