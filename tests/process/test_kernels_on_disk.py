@@ -5,14 +5,13 @@ import os
 import re
 import shutil
 import stat
-import sys
-import traceback
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
 import pytest
-from numba import config, njit
+from jobs import said_without_ours
+from numba import njit
 
 from coverable.kernels import CODE, ROOT, is_safe
 
@@ -61,6 +60,7 @@ from surfaces.triangle_kernel import inner
 def outer(x):
     return inner(x) / 0.0 if x < 0.0 else inner(x)
 """
+RELOAD = "import sys, numba; sys.dont_write_bytecode = True; numba.config.reload_config()\n"
 ASK = """
 from robots.chain import outer; import coverable.kernels, numba
 print(outer(1.0), sum(outer.stats.cache_hits.values()), int(coverable.kernels.FOLDER is None),
@@ -93,27 +93,7 @@ def compiled() -> None:
 def asked(folder: Path, value: float = 4.0, ask: str = ASK, **more: str) -> tuple[int, int]:
     """Is the kernel loaded, and can it be kept nowhere? Its value is as expected."""
     home = {"HOME": f"{folder.parent}/home", "XDG_CACHE_HOME": f"{folder.parent}/home/cache"}
-    ours, theirs = os.pipe()
-    if not (child := os.fork()):  # with nothing of ours
-        sys.stdout = sys.stderr = os.fdopen(theirs, "w")
-        try:
-            os.environ |= home | {"NUMBA_CACHE_DIR": ""} | more
-            config.reload_config()
-            os.chdir(folder)
-            for name in list(sys.modules):
-                if name.partition(".")[0] in ("coverable", *PACKAGES):
-                    del sys.modules[name]
-            sys.path.insert(0, str(folder))
-            sys.dont_write_bytecode = True
-            exec(ask, {})
-        except BaseException:  # noqa: BLE001 - the process ends here
-            traceback.print_exc()
-        sys.stdout.flush()
-        os._exit(0)
-    os.close(theirs)
-    with open(ours) as out:
-        said = out.read()
-    os.waitpid(child, 0)
+    said = said_without_ours(RELOAD + ask, folder, home | {"NUMBA_CACHE_DIR": ""} | more)
     assert "Traceback" not in said, said
     result, hits, nowhere, endless, classes = said.split()
     assert (float(result), endless) == (value, "-inf")

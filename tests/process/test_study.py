@@ -162,22 +162,18 @@ def test_workers_that_are_killed_at_random(count, tmp_path) -> None:
 
 
 @contextmanager
-def stopped(*arguments: object) -> Iterator[BaseProcess]:
-    """The command in another process, which has all loaded, stopped when it has kept something.
-
-    What it writes to stderr lies beside the study's store.
-    """
+def stopped(study: Path, folder: Path, count: int) -> Iterator[BaseProcess]:
+    """The command in a process that has all loaded, stopped when it has kept something."""
     ours, theirs = os.pipe()
 
     def command() -> None:
         os.setsid()
-        said = os.open(Path(arguments[3]).with_name("said"), os.O_CREAT | os.O_WRONLY | os.O_APPEND)
-        os.dup2(said, 2)
+        os.dup2(os.open(folder / "said", os.O_CREAT | os.O_WRONLY | os.O_APPEND), 2)
         os.dup2(theirs, 1)
         sys.stdout, sys.stderr = sys.__stdout__, sys.__stderr__
         signal.signal(signal.SIGINT, signal.default_int_handler)
         resource_tracker._resource_tracker._fd = None  # a new command has none yet
-        sys.argv[1:] = map(str, arguments)
+        sys.argv[1:] = map(str, (*asked(study, folder, "a"), "--workers", count))
         study_works.stop_after_keeping()
         run()
 
@@ -246,7 +242,7 @@ def test_the_command_killed_and_run_again(in_peace, tmp_path) -> None:
     before = set(multiprocessing.active_children())
     path, held, orphans = tmp_path / "a.study", [], set[int]()
     for count in (0, 1):
-        with stopped(*asked(study, tmp_path, "a"), "--workers", count) as process:
+        with stopped(study, tmp_path, count) as process:
             orphans |= children_of(process.pid)
             process.kill()
         held.append(stored(path))
@@ -265,7 +261,7 @@ def test_the_command_killed_and_run_again(in_peace, tmp_path) -> None:
 
 def test_ctrl_c_stores_and_leaves_no_worker(in_peace, tmp_path) -> None:
     """A terminal sends it to the workers too: neither they nor their parent write a traceback."""
-    with stopped(*asked(in_peace[0], tmp_path, "a"), "--workers", 1) as process:
+    with stopped(in_peace[0], tmp_path, 1) as process:
         children = children_of(process.pid)
         os.killpg(process.pid, signal.SIGINT)
     held = stored(tmp_path / "a.study")

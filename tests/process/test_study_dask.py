@@ -4,6 +4,7 @@ import os
 import signal
 from contextlib import contextmanager
 from importlib import import_module
+from importlib.util import find_spec
 from multiprocessing import get_context
 
 import pytest
@@ -15,13 +16,10 @@ from coverable import Store, open_workers, run_tasks
 from feasibility.studies.pool import WorkersError
 from feasibility.studies.run import StudyTask
 
-pytestmark = pytest.mark.filterwarnings("ignore")  # what Dask says of its own threads and ports
-
-
-@pytest.fixture(autouse=True)
-def distributed():
-    """It takes long to load, which collecting the tests need not."""
-    return pytest.importorskip("distributed")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore"),  # what Dask says of its own threads and ports
+    pytest.mark.skipif(find_spec("distributed") is None, reason="needs Dask"),
+]
 
 
 @contextmanager

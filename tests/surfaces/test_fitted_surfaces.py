@@ -1,15 +1,14 @@
 """Surfaces from a user's formula, from grids of points, and from a class of one's own."""
 
 import math
-import os
 import re
-import sys
 from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from bounds import holds
+from jobs import said_without_ours
 from part_walks import lost
 from specimens import EQUAL, ball, ring, sampled
 
@@ -163,18 +162,7 @@ def test_the_class_of_the_page_has_keys_by_rows_of_a_table(tmp_path):
     rows, case = blocks("toml")
     (tmp_path / "keys.toml").write_text(KEYS.read_text("utf-8") + rows)
     (tmp_path / "case.toml").write_text(case)
-    if not (child := os.fork()):  # with nothing of ours, and the libraries that take most time
-        os.chdir(tmp_path)
-        for name in list(sys.modules):
-            if name.partition(".")[0] in ("coverable", "feasibility", "robots", "surfaces"):
-                del sys.modules[name]
-        try:
-            exec("\n".join([*blocks("python"), OF_A_CASE]), {})
-        except BaseException as error:  # noqa: BLE001 - the process ends here
-            Path("said").write_text(str(error))
-        os._exit(0)
-    os.waitpid(child, 0)
-    said = (tmp_path / "said").read_text()
+    said = said_without_ours("\n".join([*blocks("python"), OF_A_CASE]), tmp_path, {})
     assert "surface.rise: must be a finite number > 0 (m per radian), got -0.1" in said
 
 
