@@ -201,10 +201,8 @@ STAMPED = {path for pattern in CODE for path in ROOT.glob(pattern)}
 def made_by(node: ast.AST) -> str:
     """Which of our decorators a function has; empty without one."""
     names = {ast.unparse(decorator) for decorator in getattr(node, "decorator_list", [])}
-    return next(
-        iter(names & {"kernel", "inlined", "spliced", "allocating", "entry", "allocating_entry"}),
-        "",
-    )
+    ours = {"kernel", "inlined", "spliced", "allocating", "entry", "allocating_entry"}
+    return next(iter(names & ours), "")
 
 
 @cache

@@ -53,9 +53,8 @@ def test_an_outcome_says_what_the_verdict_says(name) -> None:
     assert outcome["causes"] == Counter(str(cause.kind) for cause in verdict.causes)
     covers = {tuple(np.flatnonzero(cells_of(bits, n))) for bits in outcome["components"]}
     known = [set(cells.tolist()) for cells in verdict.components]
-    assert {
-        tuple(sorted(own)) for own in known if not any(own < other for other in known)
-    } == covers
+    largest = [own for own in known if not any(own < other for other in known)]
+    assert {tuple(sorted(own)) for own in largest} == covers
     assert (outcome["margins"] is None) == (not verdict.feasible)
     if verdict.feasible:
         q, robot, margins = verdict.witness.q, verdict.robot, outcome["margins"]

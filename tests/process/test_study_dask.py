@@ -16,10 +16,8 @@ from coverable import Store, open_workers, run_tasks
 from feasibility.studies.pool import WorkersError
 from feasibility.studies.run import StudyTask
 
-pytestmark = [
-    pytest.mark.filterwarnings("ignore"),  # what Dask says of its own threads and ports
-    pytest.mark.skipif(find_spec("distributed") is None, reason="needs Dask"),
-]
+QUIET = pytest.mark.filterwarnings("ignore")  # what Dask says of its own threads and ports
+pytestmark = [QUIET, pytest.mark.skipif(not find_spec("distributed"), reason="needs Dask")]
 
 
 @contextmanager

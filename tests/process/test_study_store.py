@@ -122,12 +122,9 @@ def test_a_file_of_someone_else_is_refused_and_left_alone(tmp_path) -> None:
 
 def test_places_that_are_no_files(tmp_path) -> None:
     os.mkfifo(tmp_path / "pipe")
-    for path, word in (
-        (tmp_path, "is a folder"),
-        (tmp_path / "none" / "a.study", "no folder"),
-        (tmp_path / "pipe", "not a regular file"),
-        ("a\0b", "cannot be"),
-    ):
+    none, pipe = tmp_path / "none" / "a.study", tmp_path / "pipe"
+    words = "is a folder", "no folder", "not a regular file", "cannot be"
+    for path, word in zip((tmp_path, none, pipe, "a\0b"), words, strict=True):
         with pytest.raises(StoreError, match=word):
             Store(path)
     for end in ("-wal", "-shm", "-journal"):  # a pipe beside a store is not waited for

@@ -23,24 +23,18 @@ PLATE = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0.0, 0.0, 0.3))
 STIFF = PUMA.with_limits({f"joint{k}": (0.0, 0.0) for k in (4, 5, 6)})
 """joint4 to joint6 held: the tool stands along the forearm, and only joints 1 to 3 aim it."""
 WALL = plane((-0.2, 0.2), (-0.2, 0.2), "outside", (0.6, 0.1, 0.2), (0.0, 90.0, 0.0))
+DEEP = plane((0.5, 0.6), (-0.05, 0.05), "outside", (0.0, 0.0, -0.75))
+DOME = sphere(0.25, (10, 50), (150, 230), position=(0.65, 0, 0.1), side="outside")
 CASES = {
     "plate": lambda: (UR5, PLATE.cells(2, 2), Task(0.02, 30)),
     "long plate": lambda: case_named("long plate").build()[:3],
     "stiff wrist": lambda: (STIFF, WALL.cells(3, 3), Task(0.0, 20)),
     # the tool at the plate's place is below the reach; the standoff lifts it
-    "deep plate": lambda: (
-        UR5,
-        plane((0.5, 0.6), (-0.05, 0.05), "outside", (0.0, 0.0, -0.75)).cells(2, 2),
-        Task(0.01, 40),
-    ),
+    "deep plate": lambda: (UR5, DEEP.cells(2, 2), Task(0.01, 40)),
     "4a": lambda: load_case("paper/4a", ["surface.cells=[3, 3]"]).build()[:3],
     "4d": lambda: load_case("paper/4d", ["surface.cells=[9, 2]"]).build()[:3],
     "5e": lambda: load_case("paper/5e").build()[:3],
-    "dome": lambda: (
-        load_robot("panda"),
-        sphere(0.25, (10, 50), (150, 230), position=(0.65, 0, 0.1), side="outside").cells(9, 10),
-        Task(0.02, 25),
-    ),
+    "dome": lambda: (load_robot("panda"), DOME.cells(9, 10), Task(0.02, 25)),
 }
 
 
@@ -128,9 +122,8 @@ def test_the_cone_a_stiff_wrist_needs_is_that_of_the_geometry():
     assert found.other.value < found.feasible.value
     # A wider joint never needs a wider cone.
     limits = {f"joint{k}": np.radians([-15.0, 15.0]) for k in (4, 5)}
-    wider = threshold_of(
-        explain(STIFF.with_limits(limits), WALL.cells(3, 3), Task(0.0, 10)), "cone"
-    )
+    found_wider = explain(STIFF.with_limits(limits), WALL.cells(3, 3), Task(0.0, 10))
+    wider = threshold_of(found_wider, "cone")
     assert wider.feasible.value < found.feasible.value
 
 
@@ -175,9 +168,8 @@ def test_the_change_that_is_named_first_makes_the_case_feasible(name, tmp_path):
     case = case_named("plate").with_overrides(SETS[name])
     (tmp_path / "case.toml").write_text(case.to_toml())
     (tmp_path / "motions").mkdir()
-    said = run_coverable(
-        "explain", tmp_path / "case.toml", "--json", "--witness", tmp_path / "motions"
-    )
+    asked = "explain", tmp_path / "case.toml", "--json", "--witness", tmp_path / "motions"
+    said = run_coverable(*asked)
     told = json.loads(said.out)
     assert (said.status, told["verdict"]) == (1, "infeasible")
     sets = told["useful"]["set"]

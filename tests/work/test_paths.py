@@ -267,13 +267,8 @@ def test_what_has_no_path_is_said(approved):
     greedy = replace(patch, method="greedy")
     empty = check(patch.robot, patch.cells.surface.cells(0, 3), patch.task)
     said = []
-    for one, order in (
-        (verdict, None),
-        (undecided, None),
-        (greedy, None),
-        (empty, None),
-        (patch, "snake"),
-    ):
+    asked = [(one, None) for one in (verdict, undecided, greedy, empty)]
+    for one, order in [*asked, (patch, "snake")]:
         with pytest.raises(PathError) as caught:
             coverage_path(one, order)
         said.append(str(caught.value))

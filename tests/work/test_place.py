@@ -173,21 +173,18 @@ ROOM = WALL_AT - 0.5 - RADIUS - CLEARANCE
 
 def test_no_place_is_feasible_whose_motion_would_not_stay_clear():
     cells = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0.0, 0.0, 0.3)).cells(1, 2)
-    wall = coverable.Obstacle.halfspace(
-        "wall", position=(WALL_AT, 0.0, 0.0), rpy_deg=(0.0, -90.0, 0.0)
-    )
+    back, robot = (0.0, -90.0, 0.0), coverable.load_robot("ur5")
+    wall = coverable.Obstacle.halfspace("wall", position=(WALL_AT, 0.0, 0.0), rpy_deg=back)
     asked = coverable.Collision(
         self_=False, clearance=CLEARANCE, scene=(wall,), tool=(coverable.ToolShape.sphere(RADIUS),),
         allow=(("tool", "surface"),),
     )  # fmt: skip
     region = Region.around(Pose.of_surface(cells.surface), {"x": (0.0, 2.0 * ROOM)})
     beside = coverable.Task(0.02, 30, 0.001, collision=asked)
-    found = place(coverable.load_robot("ur5"), cells, beside, region, count=6, rounds=0, keep=3)
+    found = place(robot, cells, beside, region, count=6, rounds=0, keep=3)
     assert max(trial.pose.position[0] for trial in found.trials) > ROOM + 0.001
     assert max(trial.pose.position[0] for trial in found.found) <= ROOM + 0.001
-    free = evaluator_here(
-        coverable.load_robot("ur5"), cells, replace(beside, collision=None), Search()
-    )
+    free = evaluator_here(robot, cells, replace(beside, collision=None), Search())
     (trial,) = free([Pose((ROOM + 0.05, 0.0, 0.3), (0.0, 0.0, 0.0))], False)
     assert trial.feasible
 

@@ -102,13 +102,8 @@ def test_a_motion_takes_hardly_longer_than_toppra_says():
     h = np.diff(run.time)
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(run.q, axis=0), axis=1))])
     curve = toppra.SplineInterpolator(s / s[-1], run.q)
-    both = [
-        constraint(np.column_stack([-most, most]))
-        for constraint, most in (
-            (JointVelocityConstraint, limits.velocity),
-            (JointAccelerationConstraint, limits.acceleration),
-        )
-    ]
+    ends = [np.column_stack([-most, most]) for most in (limits.velocity, limits.acceleration)]
+    both = [JointVelocityConstraint(ends[0]), JointAccelerationConstraint(ends[1])]
     least = TOPPRA(both, curve, gridpoints=s / s[-1]).compute_trajectory()
     assert 0.97 <= run.duration / least.duration <= 1.1
     assert h.min() > 0.0
