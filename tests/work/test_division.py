@@ -159,7 +159,7 @@ def test_how_many_it_takes_at_least_is_proved(number, motions):
     assert hasty.at_least <= 1
 
 
-CELLS = plane((0.35, 0.65), (-0.2, 0.2), "outside", (0.0, 0.0, 0.1)).cells(4, 4)
+CELLS = plane((0.35, 0.65), (-0.2, 0.2), "outside", (0.0, 0.0, 0.1)).cells(5, 6)
 
 
 @pytest.mark.parametrize(("asked", "whole"), [

@@ -35,7 +35,7 @@ POSED = UR5.with_limits(
 def behind():
     """A plate behind an arm whose first joint ends there; a post in front, where it has to pass."""
     asked = Collision(clearance=0.005, scene=(POST,))
-    return divide(POSED, BEHIND.cells(1, 4), Task(0.05, cone_deg=30, collision=asked))
+    return divide(POSED, BEHIND.cells(1, 5), Task(0.05, cone_deg=30, collision=asked))
 
 
 def bodies_of(division):
