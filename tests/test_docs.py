@@ -73,20 +73,15 @@ def test_commands_of_the_pages_run(
     commands = [shlex.split(x, comments=True) for x in lines if x.startswith("coverable")]
     monkeypatch.setattr(coverable.Live, "wait", Mock(side_effect=KeyboardInterrupt))
     assert len(commands) >= 18
+    # Fewer cells and placements, no processes, and no browser windows.
+    few, alone = "--set surface.cells=[3,4]", "--workers 0"
+    more = {"show": "--html shown.html", "live": "--no-browser", "study": alone, "path": few,
+            "explain": few, "compare": f"{few} {alone}",
+            "place": f"--set surface.cells=[1,2] --count 4 {alone}"}  # fmt: skip
     for _, *arguments in commands:
         if arguments == ["warm-up"]:  # a campaign
             continue
-        if arguments[0] == "show":  # without it, a browser window
-            arguments += ["--html", "shown.html"]
-        if arguments[0] == "live":
-            arguments += ["--no-browser"]
-        # Fewer cells and placements, and no processes, to save time.
-        if arguments[0] in ("path", "compare", "explain"):
-            arguments += ["--set", "surface.cells=[3, 4]"]
-        if arguments[0] == "place":
-            arguments += ["--set", "surface.cells=[1, 2]", "--count", "4"]
-        if arguments[0] in ("place", "compare", "study"):
-            arguments += ["--workers", "0"]
+        arguments += more.get(arguments[0], "").split()
         expected = 1 if arguments[1:2] == ["paper/4d"] and arguments[0] != "place" else 0
         assert main(arguments) == expected, arguments
         assert "usage" not in capsys.readouterr().err

@@ -65,8 +65,7 @@ def again(verdict: Verdict, case: Case, folder: Path) -> Verdict:
 def test_a_result_comes_back_exactly(name: str, tmp_path: Path) -> None:
     """One for each kind of answer: a witness, causes, the tree of the paper's search."""
     before = verdict_named(name)
-    kinds = (before.witness, before.causes, before.tree)
-    assert kinds[list(TEXTS).index(name)]
+    assert (before.witness, before.causes, before.tree)[list(TEXTS).index(name)]
     after = again(before, case_named(name), tmp_path)
     for key in SAME:
         assert getattr(after, key) == getattr(before, key), key
