@@ -74,6 +74,7 @@ test: .venv/installed
 	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 docs: .venv/installed
+	@$(BIN)/python -c 'import sphinx, furo, myst_parser' 2>/dev/null || $(PIP_INSTALL) --no-build-isolation -e '.[docs]'
 	$(BIN)/python docs/figures.py
 	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going -b html docs out/docs
 

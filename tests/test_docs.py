@@ -130,8 +130,8 @@ def test_complete_columns_of_the_table(name: str) -> None:
 
 
 def test_contributing_names_every_dependency() -> None:
-    required = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["dev"]]
-    for requirement in required:
+    extras = PROJECT["optional-dependencies"]
+    for requirement in [*PROJECT["dependencies"], *extras["dev"], *extras["docs"]]:
         name = re.split(r"[<>=]", requirement)[0]
         assert f"**{name}**" in CONTRIBUTING, f"{name}: why is it here?"
 
