@@ -50,6 +50,8 @@ class Roadmap:
         """(n,) the configuration of each node, over its cell's centre."""
         self.effect: list[Array] = []
         """(n,) how much each joint moves the tool there, see `self_motion.effects`."""
+        self._rows: Array = np.empty((0, 2, 0))
+        """(at least nodes, 2, n) configurations and effects once more, to be looked through."""
         self.component: list[int] = []
         """The component that each node was made in."""
         self.edges: list[RoadmapEdge] = []
@@ -106,6 +108,10 @@ class Roadmap:
         self.cell.append(cell)
         self.q.append(q)
         self.effect.append(effect)
+        if node == len(self._rows):
+            more = np.empty((max(64, node), 2, len(q)))
+            self._rows = np.concatenate([self._rows, more]) if node else more
+        self._rows[node] = q, effect
         self.component.append(root)
         self.over[cell].append(node)
         self.reached[cell] = True
@@ -152,7 +158,8 @@ class Roadmap:
         nodes = [node for node in reversed(self.over[cell]) if root[made[node]] not in passed]
         if len(nodes) < 2:
             return nodes[0] if nodes else None
-        off = (np.array([self.q[x] for x in nodes]) - q) * [self.effect[x] for x in nodes]
+        rows = self._rows[nodes]
+        off = (rows[:, 0] - q) * rows[:, 1]
         return nodes[int((off**2).sum(axis=1).argmin())]
 
     def nearest_two(self, cells: Sequence[int], root: int) -> tuple[int, int] | None:
