@@ -69,6 +69,8 @@ greedy: .venv/installed
 collected: .venv/installed
 	@$(BIN)/python -m pytest --collect-only --quiet tests >/dev/null || true
 
+# Two processes share the processors: threads that wait for the next small matrix only take them from each other.
+test: export OPENBLAS_NUM_THREADS := 1
 test: .venv/installed
 	@$(MAKE) --no-print-directory --jobs=2 kernels lint greedy collected
 	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
