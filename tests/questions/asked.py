@@ -34,7 +34,7 @@ PLAIN = {"robot": {"name": "ur5"}, "task": {"standoff": 0.02, "cone_deg": 40}}
 FILES = tempfile.TemporaryDirectory(prefix="questions-")
 
 STORED = {
-    "puma560": 5, "ur5": 2, "puma560_apart": 1, "ur5_apart": 1, "panda_apart": 0,
+    "puma560": 8, "ur5": 2, "puma560_apart": 1, "ur5_apart": 1, "panda_apart": 0,
     "between_curves": 1, "tolerance_needed": 2, "narrow_cones": 1, "by_a_hair": 4,
     "planted_rolls": 2,
 }  # fmt: skip

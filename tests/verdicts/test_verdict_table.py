@@ -23,7 +23,8 @@ from feasibility.verdict import Walk
 
 TABLE = [name for name in names() if name not in names("dear walls")]
 KEPT = {*spread(TABLE, 22), "a crease inwards", "pieces apart", "inside the shoulder"}
-KEPT |= {*names("paper"), *names("bodies"), *names("rolls")} - {names("rolls")[5]}
+KEPT |= {*names("paper"), *names("bodies"), *names("rolls"), names("poses")[3]}
+KEPT -= {names("rolls")[5]}
 TABLE = [name for name in TABLE if name in KEPT]
 OTHERS = [
     name for file, few in STORED.items() for name in (spread(stored(file), few) if few else ())

@@ -23,13 +23,12 @@ PLATE = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0.0, 0.0, 0.3))
 STIFF = PUMA.with_limits({f"joint{k}": (0.0, 0.0) for k in (4, 5, 6)})
 """joint4 to joint6 held: the tool stands along the forearm, and only joints 1 to 3 aim it."""
 WALL = plane((-0.2, 0.2), (-0.2, 0.2), "outside", (0.6, 0.1, 0.2), (0.0, 90.0, 0.0))
-DEEP = plane((0.5, 0.6), (-0.05, 0.05), "outside", (0.0, 0.0, -0.75))
+DEEP = plane((0.5, 0.6), (-0.05, 0.05), "outside", (0.0, 0.0, -0.75))  # the standoff lifts the tool
 DOME = sphere(0.25, (10, 50), (150, 230), position=(0.65, 0, 0.1), side="outside")
 CASES = {
     "plate": lambda: (UR5, PLATE.cells(2, 2), Task(0.02, 30)),
     "long plate": lambda: case_named("long plate").build()[:3],
     "stiff wrist": lambda: (STIFF, WALL.cells(3, 3), Task(0.0, 20)),
-    # the tool at the plate's place is below the reach; the standoff lifts it
     "deep plate": lambda: (UR5, DEEP.cells(2, 2), Task(0.01, 40)),
     "4a": lambda: load_case("paper/4a", ["surface.cells=[3, 3]"]).build()[:3],
     "4d": lambda: load_case("paper/4d", ["surface.cells=[9, 2]"]).build()[:3],

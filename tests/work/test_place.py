@@ -295,7 +295,7 @@ def test_who_tries_placements_changes_nothing_and_what_fails_is_undecided(monkey
     region = region_about(moved_away("ur5 plate", 3))
     ask, number = {"count": 4, "rounds": 1, "keep": 1}, len(setup.cells)
     here = place(*setup[:3], region, setup.search, **ask)
-    with coverable.open_workers(1, warm=False) as workers:
+    with coverable.open_workers(1) as workers:
         there = evaluator_of_study(case, number, workers)
         found = place(*setup[:3], region, setup.search, evaluator=there, **ask)
         assert told(found.trials) == told(here.trials)
