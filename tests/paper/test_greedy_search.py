@@ -48,9 +48,9 @@ def test_sphere_as_published() -> None:
     branches = list(starts(robot, points[first], approaches[first], task.cone, 0))
     assert len(branches) >= 6
     search = Search(method="greedy", step_deg=0.05)
-    touched = (greedy_check(robot, cells, task, search, start=q).n_covered == 90 for q in branches)
-    assert True in touched
-    assert False in touched, "of those that are left"
+    touched = [greedy_check(robot, cells, task, search, start=q).n_covered for q in branches]
+    assert max(touched) == 90
+    assert min(touched) < 90
 
 
 DEAR = {"all": ("4f", "5c", "5d", "5e", "5f")}
