@@ -52,9 +52,14 @@ def assert_points_refute(case, refusal):
 
 @pytest.mark.parametrize("make", [elbow_case, free_elbow_case, rail_case])
 def test_trees_made_by_hand_are_accepted(make):
-    found = verify_proof(*make())
+    """Also of a toolpath through the centres, whose surface are the curves between them."""
+    case = make()
+    found = verify_proof(*case)
     assert found.accepted, found.refusal
     assert 0 < found.boxes < 2000
+    path = poses(case.cells.centres, case.cells.normals, side="inside")
+    assert verified(case, cells=path).accepted
+    assert "leaf" in verified(case, Leaf(2), cells=path).refusal
 
 
 @sampled("index", range(len(proof_cases.STORED) - 1) if EVERYTHING else proof_cases.QUICK)

@@ -9,6 +9,7 @@ import pytest
 import referee
 from mesh_patches import in_cells_of
 
+import coverable
 from coverable import Answer, Search, Task, greedy_check, load_robot, mesh, sphere, torus
 from feasibility.paper.jcell_steps import Steps
 from feasibility.paper.tree_and_graph import tree_walk
@@ -81,6 +82,18 @@ def test_creases_are_named_and_not_crossed():
     assert not (verdict.covered & roof.creased).any()
     assert verdict.covered.any()
     assert "where the surface is creased or most curved" in verdict.message
+
+
+@pytest.mark.parametrize(("slope", "crossed"), [(5, True), (40, False)])
+def test_pieces_that_meet_at_a_sharp_crease_are_kept_apart(slope, crossed):
+    flat = coverable.plane((0.35, 0.5), (-0.1, 0.1), position=(0, 0, 0.3))
+    at, turn = (0.5, 0, 0.3), (0, slope, 0)
+    tilted = coverable.plane((0.0, 0.15), (-0.1, 0.1), position=at, rpy_deg=turn)
+    roof = coverable.piecewise((flat, tilted), side="outside").cells((2, 2))
+    search = Search(method="greedy", step_deg=0.5, cap=300, starts=1)
+    verdict = greedy_check(UR5, roof, Task(0.005, 20, tolerance=1e-3), search)
+    assert any(roof.piece[a] != roof.piece[b] for a, b in verdict.graph.edges) == crossed
+    assert ("pairs of cells on both sides of a crease" in verdict.message) != crossed
 
 
 def test_a_roll_that_is_limited_is_kept_between_jcells():

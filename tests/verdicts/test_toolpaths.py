@@ -4,6 +4,8 @@ import dataclasses
 
 import numpy as np
 import pytest
+from arm_urdfs import joint
+from random_arms import robot_of
 
 import coverable
 from coverable import Task, check, coverage_path, load_robot, plane, poses, replay, verify
@@ -37,6 +39,28 @@ def test_a_toolpath_is_run_in_order_and_never_back():
     assert (path.order, path.visits.tolist()) == ("given", list(range(36)))
     with pytest.raises(coverable.PathError, match="is run in its order"):
         coverage_path(verdict, "shortest")
+
+
+def test_poses_that_are_only_reached_by_going_back_are_missed_by_runs_in_order():
+    """One motion of three joints reaches all points: but its sheets fold back over the path."""
+    right = np.pi / 2
+    joints = [
+        joint(1, "revolute", (-0.15, 0.46, -0.31), (0, -right, -right), limits=(-1.48, 1.29)),
+        joint(2, "revolute", (-0.12, -0.05, 0.29), (right, -right, 0), limits=(-1.15, 4.64)),
+        joint(3, "revolute", (0.05, 0.14, 0.26), (-right, -right, right), limits=(-1.78, 1.12)),
+        joint(4, "fixed", (0.08, -0.01, -0.01)),
+    ]
+    ends = np.array([[-0.27, 0.55, -0.68], [-0.48, 0.68, -0.55], [-0.2, 0.82, -0.72]])
+    t = np.linspace(0.0, 1.0, 12)[:, None]
+    points = np.hstack([(1.0 - t) ** 2, 2.0 * t * (1.0 - t), t**2]) @ ends
+    path = poses(points, np.tile([0.0, 0.0, 1.0], (12, 1)))
+    verdict = check(robot_of(joints), path, Task(0.0, 180, tolerance=0.01))
+    assert verdict.covered.tolist() == 11 * [True] + [False]
+    assert "One motion reaches all 12 poses, but none was found that runs them" in verdict.message
+    (cause,) = verdict.causes
+    assert (cause.cell, cause.kind, cause.proved) == (11, coverable.CauseKind.DISCONNECTED, False)
+    assert "runs in order end over pose 10" in cause.detail
+    assert not verdict.feasible
 
 
 @pytest.mark.parametrize("standoff", [0.0, 0.02])

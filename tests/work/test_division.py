@@ -8,6 +8,7 @@ from functools import cache
 from itertools import pairwise, permutations, product
 from pathlib import Path
 
+import json_of
 import networkx as nx
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from feasibility.certification.cut_proofs.proof_verification import verify_proof
 from feasibility.certification.rate_replay import replay_rates
 from feasibility.cut_tree import Leaf
 from feasibility.division.reconfiguration import itinerary, straight_moves
+from feasibility.reports.division import as_json, as_text
 from feasibility.verdict import CauseKind, Walk
 
 UR5 = load_robot("ur5")
@@ -154,6 +156,8 @@ def test_how_many_it_takes_at_least_is_proved(number, motions):
     assert pairs == set(itertools.combinations(cells, 2))
     patch = division.patch_of(len(division.cells))
     assert len(set(patch[cells].tolist())) == len(cells)  # no motion found has two of them
+    json_of.agree(json.loads(json.dumps(as_json(division))), json_of.of_divide(division))
+    assert ("no two can be covered by one motion" in as_text(division, "x")) == (motions > 2)
     hasty = divide(*setup, Search(time_limit=1e-6))
     assert (hasty.ended, hasty.proof, len(hasty.apart)) == (False, None, 0)
     assert hasty.at_least <= 1

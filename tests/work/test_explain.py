@@ -168,7 +168,10 @@ def test_the_change_that_is_named_first_makes_the_case_feasible(name, tmp_path):
     (tmp_path / "case.toml").write_text(case.to_toml())
     (tmp_path / "motions").mkdir()
     asked = "explain", tmp_path / "case.toml", "--json", "--witness", tmp_path / "motions"
-    said = run_coverable(*asked)
+    page = tmp_path / "page.html"
+    said = run_coverable(*asked, *(("--html", page) if name == "diagonal" else ()))
+    if name == "diagonal":
+        assert "Two changes together make it feasible" in page.read_text()
     told = json.loads(said.out)
     assert (said.status, told["verdict"]) == (1, "infeasible")
     sets = told["useful"]["set"]
