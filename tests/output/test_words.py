@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from asked import question
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -107,12 +108,34 @@ def test_causes_are_grouped_and_the_largest_group_comes_first(plate, approved):
     approved("causes", "\n".join(texts))
 
 
+PARTS = {
+    "plate": "a narrower surface.u or surface.v", "waist of points": "a part of the grid",
+    "ring of poses": "a part of the poses", "dome of halves": "choice of surface.pieces",
+    "4a as a mesh": "(surface.box, cut, facing or faces)",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_a_part_of_the_surface_is_proposed_in_the_words_of_its_kind(name, plate):
+    case, verdict = plate
+    cells, cause = question(name).cells, Cause(0, CauseKind.DISCONNECTED, False, "")
+    text = report.as_text(replace(
+        verdict, cells=cells, covered=np.zeros(len(cells), dtype=bool), causes=(cause,),
+        answer=Answer.UNDECIDED, message="The time limit ran out.", certificate=None, witness=None,
+    ), case)  # fmt: skip
+    assert PARTS[name] in text
+    assert "--set search.time_limit=... gives the search more time" in text
+
+
 def test_over_no_cells_there_is_nothing_to_cover_and_without_limits_no_margin(plate):
     case, verdict = plate
     setup = case.build()
-    text = report.as_text(check(setup.robot, setup.cells.surface.cells(0, 3), setup.task), case)
+    empty = setup.robot, setup.cells.surface.cells(0, 3), setup.task
+    text = report.as_text(check(*empty), case)
     assert text.startswith("feasible: there are no cells, so there is nothing to cover")
     assert "motion" not in text
+    text = explained.as_text(coverable.explain(*empty), "plate")
+    assert text.startswith("plate: there are no cells to cover, so there is nothing to explain.")
     free = replace(verdict, certificate=Certificate(2, 0.0, 0.0, math.inf))
     found = json.loads(json.dumps(as_json(free), allow_nan=False))
     assert found["certificate"]["min_limit_margin_deg"] is None
