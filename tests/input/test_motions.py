@@ -11,6 +11,7 @@ from bad_input import SLIDER
 from readers import sound_trajectory
 
 from coverable import Robot, Trajectory, load_motion, load_robot, load_trajectory, save_trajectory
+from coverable.errors import ArgumentError
 from feasibility.read_files import FileError
 
 ROWS = np.array([[0.1, -1.2, 1.3, -0.4, -1.5, 0.6], [0.2, -1.1, 1.2, -0.3, -1.4, 0.7]])
@@ -89,6 +90,21 @@ def small_run(k: int, n: int, seed: int = 0) -> Trajectory:
         tool_speed=rng.random(k),
         cell=rng.integers(-1, 3, k),
     )
+
+
+NO_TRAJECTORIES = {
+    "joint_names": (("a", "a"), "there must be at least one joint, and no name twice"),
+    "q": (np.zeros((2, 3)), r"q must have shape \(4, 2\), got \(2, 3\)"),
+    "ddq": (np.full((4, 2), np.nan), "ddq must hold finite numbers"),
+    "cell": (np.full(4, -2), "cells must be flat indices, or -1 in between"),
+}
+
+
+@pytest.mark.parametrize("name", NO_TRAJECTORIES)
+def test_what_is_no_trajectory_says_why(name: str) -> None:
+    value, fault = NO_TRAJECTORIES[name]
+    with pytest.raises(ArgumentError, match=fault):
+        replace(small_run(4, 2), **{name: value})
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -68,6 +68,8 @@ def test_the_replay_of_a_tree_judges_between_jcells():
     assert "the tool axis tilts" in replay_tree(PUMA, RING, narrow, steps, paths).refusal
     swapped = paths[:1] + [replace(path, neighbour=path.cell) for path in paths[1:]]
     assert "in the cell it claims" in replay_tree(PUMA, RING, TASK, steps, swapped).refusal
+    torn = replay_tree(PUMA, RING, TASK, steps, paths[:1] + paths[:0:-1])
+    assert "a path does not begin where its cell was entered" in torn.refusal
 
 
 def test_creases_are_named_and_not_crossed():
@@ -94,6 +96,8 @@ def test_pieces_that_meet_at_a_sharp_crease_are_kept_apart(slope, crossed):
     verdict = greedy_check(UR5, roof, Task(0.005, 20, tolerance=1e-3), search)
     assert any(roof.piece[a] != roof.piece[b] for a, b in verdict.graph.edges) == crossed
     assert ("pairs of cells on both sides of a crease" in verdict.message) != crossed
+    (fault,) = replay_stored(verdict, search).faults
+    assert fault.text.endswith("cells are not in the tree")
 
 
 def test_a_roll_that_is_limited_is_kept_between_jcells():

@@ -1,6 +1,6 @@
 """What would make a case with collisions feasible; and `check` told the motion of a case nearby."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import cache
 
 import numpy as np
@@ -10,7 +10,7 @@ from samples import EVERYTHING, sampled
 
 import coverable
 from coverable import Obstacle, Search, Task, ToolShape, check, explain, load_case, replay
-from feasibility.sensitivity.quantities import Kind
+from feasibility.sensitivity.quantities import Kind, Variant, quantities
 from feasibility.verdict import Walk
 
 UR5 = coverable.load_robot("ur5")
@@ -62,6 +62,17 @@ def test_the_clearance_is_the_room_between_wall_and_tool(clearance):
         assert replay(FREE, cells, changed, side.witness, np.ones(2, dtype=bool)).accepted
         count += 1
     assert count >= 4
+
+
+@pytest.mark.parametrize("kind", [Kind.CLEARANCE, Kind.TOOL_CLEARANCE])
+def test_each_clearance_is_varied_by_itself(kind):
+    asked = coverable.Collision(clearance=0.01, tool_clearance=0.01)
+    given = Variant(UR5, CELLS, Task(0.02, 30, collision=asked))
+    (q,) = (one for one in quantities(given, widen=True) if one.kind is kind)
+    changed = asdict(given.task) | {"collision": asdict(asked) | {kind.value: q.value(3)}}
+    assert asdict(q.applied(given, 3).task) == changed
+    assert q.value(3) < 0.01
+    assert q.applied(given, 0) is given
 
 
 def test_the_object_in_the_way_is_named_and_only_that():

@@ -19,7 +19,7 @@ from feasibility.certification.collisions.collision_replay import collision_repl
 from feasibility.collisions.asked_bodies import gather
 from feasibility.timing.path_timing import within_limits
 from feasibility.timing.smooth_curve import control_points
-from feasibility.timing.speed_limits import past_limits
+from feasibility.timing.speed_limits import past_limits, used
 from feasibility.verdict import Walk
 from robots.kinematics import Kinematics
 
@@ -144,6 +144,15 @@ def test_a_timed_motion_that_would_collide_is_refused_with_the_pair(what):
     task = replace(path.task, collision=Collision(self_=False, surface=False, scene=(ahead,)))
     with pytest.raises(PathError, match=r"\w+ and bracket"):
         trajectory(replace(path, task=task), SPEED)
+
+
+def test_over_one_cell_the_arm_rests():
+    verdict = check(UR5, FLAT.cells(1, 1), Task(0.02, 30, speed=SPEED))
+    run = trajectory(coverage_path(verdict), SPEED)
+    assert (run.time.tolist(), run.q.tolist()) == ([0.0], verdict.witness.q.tolist())
+    assert (run.at(np.array([0.0, 1.0])) == run.q).all()
+    assert not run.at(np.array([0.0, 1.0]), order=1).any()
+    assert not used(UR5, run, motion_limits(UR5, SPEED)).velocity.any()
 
 
 def test_limits_and_numbers_that_are_none():
