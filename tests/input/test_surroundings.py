@@ -66,3 +66,5 @@ def test_arguments_in_another_order_or_of_another_kind() -> None:
             assert [fault.split(":")[0] for fault in str(caught.value).split("; ")] == wrong
     with pytest.raises(TypeError, match=r"robot: .*cells: .*task: "):
         check(good[2], good[0], good[1])
+    with pytest.raises(TypeError, match=r"g\(u, v\) of your own becomes one by parametric"):
+        check(good[0], lambda u, v: (u, v, 0.3), good[2])

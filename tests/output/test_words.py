@@ -21,7 +21,7 @@ from feasibility.cut_words import place_of
 from feasibility.reports import changes, division, path, study
 from feasibility.reports import explanation as explained
 from feasibility.reports import verdict as report
-from feasibility.reports.verdict_json import as_json
+from feasibility.reports.verdict_json import as_json, motion_text
 from feasibility.results.trajectory_files import as_csv, as_json_text, from_csv
 from feasibility.sensitivity.quantities import Kind, Quantity
 from feasibility.sensitivity.thresholds import Finding, Threshold
@@ -160,6 +160,8 @@ def test_the_motion_as_a_table_is_the_motion(commands):
     assert {row[0] for row in rows} - {""} == {str(cell) for cell in range(6)}
     assert text.endswith("\n")
     assert "\r" not in text
+    points = json.loads(motion_text(verdict, ".compas"))["data"]["points"]
+    assert [point["joint_values"] for point in points] == verdict.witness.q.tolist()
     commands.run("check", "no motion to write")
     assert not (commands.folder / "none.csv").exists()
 

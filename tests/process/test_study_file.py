@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 from bad_input import goods
+from jobs import run_coverable
 from mesh_writers import GOOD
 
 from coverable import Case, CaseError, CoverableError, load_case, load_study, read_study
@@ -43,7 +44,7 @@ def test_a_study_of_reach_is_a_case(tmp_path) -> None:
     with pytest.raises(CoverableError, match=r"names package://parts/a\.ply; .*seen: parts"):
         reach_case(file)
     (tmp_path / "a.ply").write_bytes(GOOD["little.ply"])
-    case = Case.from_toml(reach_case(file), base_dir=file.parent)
+    case = Case.from_toml(run_coverable("cases", file).out, base_dir=file.parent)
     asked = case.to_tables()["collision"]
     assert (asked["clearance"], asked["scene"][0]["name"]) == (0.01, "part")
     assert asked["allow"] == (("tool0", "part"), ("wrist_3_link", "part"))

@@ -9,6 +9,7 @@ from itertools import count
 
 import numpy as np
 import pytest
+from asked import question
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from jobs import PLATE, run_coverable
@@ -248,6 +249,18 @@ def test_moved_cells_are_those_of_the_case():
             for field in ("centres", "normals", "areas"):
                 assert (getattr(moved, field) == getattr(built, field)).all()
             assert (moved.curves.cubics == built.curves.cubics).all()
+
+
+@pytest.mark.parametrize("name", ["4a as a mesh", "dome of halves"])
+def test_cells_of_meshes_and_of_pieces_move_with_their_surface(name):
+    cells = question(name).cells
+    moved = moved_cells(cells, Pose((0.1, -0.2, 0.3), (10.0, 20.0, 30.0)))
+    own, again = (
+        ((one.centres - one.surface.position) @ one.surface.rotation,
+         one.normals @ one.surface.rotation) for one in (cells, moved)
+    )  # fmt: skip
+    np.testing.assert_allclose(again, own, atol=1e-12)
+    assert np.abs(moved.surface.closest(moved.centres).height).max() < 1e-9
 
 
 @pytest.mark.parametrize(("name", "seed"), [("ur5 plate", 9), ("puma560 dome", 12)])
