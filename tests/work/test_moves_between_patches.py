@@ -14,6 +14,7 @@ from feasibility.collisions.kernels.memory import collision_buffer
 from feasibility.division.between_patches import clear_moves
 from feasibility.division.free_motion import FreeSpace, free_motion
 from feasibility.division.reconfiguration import Reconfiguration
+from feasibility.reports.division import as_text
 from robots.kinematics import Kinematics
 
 UR5 = load_robot("ur5")
@@ -43,6 +44,10 @@ def bodies_of(division):
     return gather(division.robot, division.cells.surface, task.collision, task.standoff)
 
 
+def text_of(division):
+    return " ".join(as_text(division, "").split())
+
+
 def test_the_move_between_two_patches_goes_around_the_post():
     division = behind()
     one, other = division.patches
@@ -60,6 +65,8 @@ def test_the_move_between_two_patches_goes_around_the_post():
     assert again == move.replayed
     assert again.min_clearance is not None
     assert not move.via.flags.writeable
+    way = f"through {len(move.via)} configurations (--json has them); bodies at least"
+    assert way in text_of(division)
     # fcl agrees, at single configurations.
     dense = samples(move.waypoints, np.radians(4.0))
     assert ForeignScene(robot, bodies).least_excess(dense).min() >= -1e-6
@@ -77,6 +84,7 @@ def test_a_move_that_is_not_found_is_refused_and_said():
     assert len(move.via) == 0
     assert move.refusal.startswith("no path around was found, and straight on")
     assert "wall overlap" in move.refusal
+    assert f"refused: {move.refusal}" in text_of(replace(division, moves=(move,)))
     bodies = gather(division.robot, division.cells.surface, task.collision, task.standoff)
     space = FreeSpace(division.robot, collision_buffer(bodies, division.robot), 500)
     assert free_motion(space, division.moves[0].start, division.moves[0].end, 0) is None
