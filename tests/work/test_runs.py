@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -112,13 +113,18 @@ SHORT = load_robot("ur5", limits=[[a * DEG, b * DEG] for a, b in LIMITS])
 TASK = Task(standoff=0.02, cone_deg=10)
 
 
+def one_stretch(points):
+    """A toolpath through points, seen from above."""
+    cells = coverable.poses(points, np.tile([0.0, 0.0, 1.0], (len(points), 1)))
+    stretch, on = np.zeros(len(points), dtype=np.int64), np.ones(len(points), dtype=bool)
+    return cells, PassPlaces(cells.centres, cells.normals, stretch, on)
+
+
 def ring(count=30):
-    """A toolpath of most of a circle about the base, all of it one stretch."""
+    """Most of a circle about the base."""
     angle = np.linspace(-170.0, 170.0, count) * DEG
     points = np.column_stack([0.5 * np.cos(angle), 0.5 * np.sin(angle), np.full(count, 0.2)])
-    cells = coverable.poses(points, np.tile([0.0, 0.0, 1.0], (count, 1)))
-    stretch, on = np.zeros(count, dtype=np.int64), np.ones(count, dtype=bool)
-    return cells, PassPlaces(cells.centres, cells.normals, stretch, on)
+    return one_stretch(points)
 
 
 @pytest.fixture(scope="module")
@@ -156,6 +162,17 @@ def test_what_is_left_out_is_named_with_its_cause():
     assert 0.0 < runs.left_out < along.passes.length
     assert runs.left_out + sum(lengths) == pytest.approx(along.passes.length, abs=0.2)
     assert all(f"along stretch {1 + gap.stretches[0]}: " in gap.cause for gap in runs.gaps)
+
+
+def test_a_wall_across_a_pass_is_named():
+    cells, places = one_stretch([[0.5, y, 0.3] for y in (-0.1, -0.05, 0.05, 0.1)])
+    wall = coverable.Obstacle.box("wall", (0.5, 0.01, 0.3), position=(0.5, 0.0, 0.3))
+    beside = replace(TASK, cone_deg=30, collision=coverable.Collision(scene=(wall,)))
+    runs = pass_runs(UR5, cells, beside, places)
+    assert [run.visits.tolist() for run in runs.runs] == [[0, 1], [2, 3]]
+    (gap,), (cut,) = runs.gaps, runs.cuts
+    assert gap.cause == cut.cause
+    assert re.search(r"stretch 1: \w+ and wall come too near to each other$", gap.cause)
 
 
 def test_runs_hold_the_speed_of_the_task():
