@@ -9,7 +9,7 @@ import pytest
 import referee
 from mesh_patches import in_cells_of
 
-from coverable import Answer, Search, Task, greedy_check, load_robot, mesh, sphere, torus
+from coverable import Answer, Search, Task, greedy_check, load_robot, mesh, piecewise, sphere, torus
 from feasibility.paper.jcell_steps import Steps
 from feasibility.paper.tree_and_graph import tree_walk
 from feasibility.paper.tree_replay import Path, replay_stored, replay_tree
@@ -22,9 +22,11 @@ PUMA, UR5 = load_robot("puma560", limits="set-1"), load_robot("ur5")
 TASK = Task(0.005, 45)
 COARSE = Search(method="greedy", step_deg=0.5)
 RING = torus(0.8, 0.3, (20, 60), (-20, 20), side="inside").cells(3, 3)
+JOINED = [torus(0.8, 0.3, u, (-20, 20)) for u in ((20, 40), (40, 60))]
+JOINED = piecewise(JOINED, side="inside").cells((2, 3))
 
 
-@pytest.mark.parametrize("cells", [RING, in_cells_of(RING, 6)], ids=["ring", "mesh"])
+@pytest.mark.parametrize("cells", [RING, JOINED, in_cells_of(RING, 6)], ids=range(3))
 def test_triangles_say_what_the_surface_says(cells):
     """Heights, normals and cells within the stated deviations; beyond the border there is none."""
     rng = np.random.default_rng(0)
