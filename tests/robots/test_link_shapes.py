@@ -208,8 +208,7 @@ def test_triangles_that_are_no_body_are_refused(approved):
             thing = refused(Obstacle, "a", Triangles(vertices, faces, False), np.eye(4))
             lines[-1] += f"; {thing}"
     approved("bad_triangles", "\n".join(lines))
-    words = refused(Obstacle, "a", Triangles("corners", FACES, False), np.eye(4))
-    assert "vertices are not k x 3" in words
+    assert "k x 3" in refused(Obstacle, "a", Triangles("corners", FACES, False), np.eye(4))
 
 
 CUBE = trimesh.creation.box((1.0, 2.0, 3.0))
