@@ -115,7 +115,7 @@ def test_a_hole_parts_passes_and_leaves_them_straight():
         assert sum(each.length for each in row) == pytest.approx(0.6 - chord, abs=2e-3)
         for each in row:
             assert np.linalg.norm(each.points[:, :2] - [0.3, 0.2], axis=1).min() >= 0.08 - 2e-4
-    fewer = parallel_passes(panel_with_hole(0.04), 0.13, shortest=0.25)  # the hole parts two of four
+    fewer = parallel_passes(panel_with_hole(0.04), 0.13, shortest=0.25)  # it parts two of four
     assert fewer.dropped == pytest.approx(2 * (0.6 - 2.0 * math.sqrt(0.08**2 - 0.05**2)), abs=5e-3)
 
 
