@@ -20,7 +20,6 @@ BAD = [(reader, name) for reader in TABLES for name in bad_input.bad(reader)]
 MASKS = {
     r"(not valid TOML: |is not JSON: |broken XML \()[^\n(]*?(?= \(at|\)|$)": r"\1#",
     r"(\.npy' is damaged: ).*": r"\1#",
-    r"[\d.]+ kB of it text": "# of it text",  # with times in it
     r"\S*/site-packages/": "PACKAGES/",
     re.escape(f"{Path(__file__).parents[2]}/"): "",
 }

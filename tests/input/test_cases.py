@@ -38,7 +38,8 @@ def test_settings_replace_add_and_remove_keys_and_tables() -> None:
 def test_a_setting_can_complete_a_file_with_windows_line_ends(tmp_path: Path) -> None:
     text = changed(GOOD_CASE, "task.cone_deg").replace("\n", "\r\n")
     (tmp_path / "case.toml").write_bytes(b"\xef\xbb\xbf" + text.encode())
-    assert load_case(tmp_path / "case.toml", ["task.cone_deg=45"]) == Case.from_toml(GOOD_CASE)
+    case = load_case(tmp_path / "case.toml", ["task.cone_deg=45"])
+    assert case == Case.from_toml(GOOD_CASE) == Case.from_toml(case.as_written())
     with pytest.raises(CaseError, match=r'did you mean "paper/4a"\?'):
         load_case("paper/4A")
 
@@ -130,6 +131,8 @@ CHANGES = {
     ("robot.limits_deg.a=[-1, 1]", "task.standoff=0.1"): [
         ("one\n", "one\nlimits_deg.a = [-1.0, 1.0]\n"), ("= 0.02", "= 0.1"),
     ],
+    ("surface.cells=", "surface.cell_size=0.1"): [("cells = 6", "cell_size = 0.1")],
+    ("robot.base.rpy_deg=[0, 0, 9]",): [("0.1] }", "0.1], rpy_deg = [0.0, 0.0, 9.0] }")],
     ("surface.file=../other.stl",): [('"part #1.stl"', '"../other.stl"')],
     ("search.seed=4",): [("shelf.stl\"\n", "shelf.stl\"\n\n[search]\nseed = 4\n")],
 }  # fmt: skip

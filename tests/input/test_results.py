@@ -23,6 +23,7 @@ from feasibility.results.result_file import ResultError
 from feasibility.safe_files import write_whole
 from feasibility.verdict import Verdict
 from feasibility.version import version
+from robots.shapes.link_pairs import LeftOut
 
 UR5 = """
 robot.name = "ur5"
@@ -64,13 +65,15 @@ def again(verdict: Verdict, case: Case, folder: Path) -> Verdict:
 @pytest.mark.parametrize("name", TEXTS)
 def test_a_result_comes_back_exactly(name: str, tmp_path: Path) -> None:
     """One for each kind of answer: a witness, causes, the tree of the paper's search."""
-    before = verdict_named(name)
+    pairs, odd = (LeftOut("base", "arm", "Never", 0.5),), {"odd": ({2.0}, np.array([np.inf]))}
+    before = replace(verdict_named(name), pairs_left_out=pairs)
+    before = replace(before, statistics=before.statistics | odd)
     assert (before.witness, before.causes, before.tree)[list(TEXTS).index(name)]
     after = again(before, case_named(name), tmp_path)
     for key in SAME:
         assert getattr(after, key) == getattr(before, key), key
     assert dict(after.timing) == dict(before.timing)
-    assert dict(after.statistics) == plain(before.statistics)
+    assert dict(after.statistics) == plain(before.statistics) | {"odd": [[2.0], [None]]}
     for pair in zip(
         (before.covered, before.postures, before.cells.centres, before.robot.lower,
          *before.components),
@@ -213,6 +216,7 @@ def test_places_that_cannot_be_written_are_named(tmp_path: Path) -> None:
         (tmp_path / "no" / "a.result", "there is no folder"),
         (tmp_path, "is a folder"),
         (tmp_path / "file" / "a.result", "there is no folder"),
+        ("/proc/self/a.result", "the folder /proc/self cannot be written to"),
     ):
         with pytest.raises(ResultError, match=words):
             save_result(verdict_named("plate"), case_named("plate"), path)

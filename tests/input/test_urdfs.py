@@ -16,7 +16,7 @@ from yourdfpy import URDF
 from coverable.errors import CoverableError
 from robots.pinocchio_model import chain_model
 from robots.urdf.checked_urdf import CheckedUrdf, check_urdf
-from robots.urdf.elements import UrdfError
+from robots.urdf.elements import MAX_BYTES, UrdfError, parse_xml
 from robots.urdf.link_shapes import MeshFile
 from robots.urdf.srdf import read_srdf
 
@@ -119,6 +119,8 @@ def test_what_is_read_of_joints(tmp_path: Path) -> None:
     assert (checked.path_to("hand"), checked.path_to("base")) == ((elbow, wrist), ())
     with pytest.raises(UrdfError, match="no link 'claw'; its leaves are: hand"):
         checked.path_to("claw")
+    with pytest.raises(UrdfError, match="larger than 8 MB"):
+        parse_xml(b" " * (MAX_BYTES + 1), "expanded")
     for velocity in ('velocity="0"', 'velocity="-2"', 'velocity="fast"', ""):
         joint = f'lower="-0.5" upper="0.25" {velocity}'
         elbow = saved(tmp_path, changed(goods("urdf")["limit"], joint)).joints[0]

@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 import trimesh
 from hostile_visuals import urdf, visual, write
+from mesh_writers import stl
 from page_outline import faces_of, points_of
 from samples import sampled, spread
 
@@ -93,7 +94,7 @@ def test_a_mesh_is_scaled_and_placed(tmp_path):
     assert np.allclose(points.max(axis=0), [0.05, 0.1, 0.25], atol=1e-4)
 
 
-@pytest.mark.parametrize("content", [None, b"\0" * 84])
+@pytest.mark.parametrize("content", [None, b"\0" * 84, stl([[np.nan] * 3], [[0, 0, 0]])])
 def test_a_mesh_that_cannot_be_had_becomes_a_capsule_and_a_note(tmp_path, content):
     if content is not None:
         (tmp_path / "lost.stl").write_bytes(content)
@@ -176,7 +177,9 @@ def written(parts, *arrays):
 ])  # fmt: skip
 def test_what_the_process_of_dae_files_writes_is_not_believed(one):
     good = written([[3, 1, [1, 0, 0, 1]]], TRIANGLE, np.array([[0, 1, 2]]).tobytes())
-    before, found, after = read_collada([b"", b"", b""], lambda *_: Ended(good + one))
+    files = [hostile.zipped(), b"", b"", b""]
+    packed, before, found, after = read_collada(files, lambda *_: Ended(good + one))
+    assert "is a zip archive" in str(packed)
     assert (len(before), before[0].rgba) == (1, (1, 0, 0, 1))
     assert isinstance(found, MeshError)
     assert isinstance(after, MeshError)

@@ -10,7 +10,7 @@ import referee
 from mesh_patches import in_cells_of
 
 import coverable
-from coverable import Answer, Search, Task, greedy_check, load_robot, mesh, sphere, torus
+from coverable import Answer, Search, Task, greedy_check, load_robot, mesh, piecewise, sphere, torus
 from feasibility.paper.jcell_steps import Steps
 from feasibility.paper.tree_and_graph import tree_walk
 from feasibility.paper.tree_replay import Path, replay_stored, replay_tree
@@ -23,9 +23,11 @@ PUMA, UR5 = load_robot("puma560", limits="set-1"), load_robot("ur5")
 TASK = Task(0.005, 45)
 COARSE = Search(method="greedy", step_deg=0.5)
 RING = torus(0.8, 0.3, (20, 60), (-20, 20), side="inside").cells(3, 3)
+JOINED = [torus(0.8, 0.3, u, (-20, 20)) for u in ((20, 40), (40, 60))]
+JOINED = piecewise(JOINED, side="inside").cells((2, 3))
 
 
-@pytest.mark.parametrize("cells", [RING, in_cells_of(RING, 6)], ids=["ring", "mesh"])
+@pytest.mark.parametrize("cells", [JOINED, in_cells_of(RING, 6)], ids=["pieces", "mesh"])
 def test_triangles_say_what_the_surface_says(cells):
     """Heights, normals and cells within the stated deviations; beyond the border there is none."""
     rng = np.random.default_rng(0)
@@ -91,7 +93,7 @@ def test_pieces_that_meet_at_a_sharp_crease_are_kept_apart(slope, crossed):
     flat = coverable.plane((0.35, 0.5), (-0.1, 0.1), position=(0, 0, 0.3))
     at, turn = (0.5, 0, 0.3), (0, slope, 0)
     tilted = coverable.plane((0.0, 0.15), (-0.1, 0.1), position=at, rpy_deg=turn)
-    roof = coverable.piecewise((flat, tilted), side="outside").cells((2, 2))
+    roof = piecewise((flat, tilted), side="outside").cells((2, 2))
     search = Search(method="greedy", step_deg=0.5, cap=300, starts=1)
     verdict = greedy_check(UR5, roof, Task(0.005, 20, tolerance=1e-3), search)
     assert any(roof.piece[a] != roof.piece[b] for a, b in verdict.graph.edges) == crossed

@@ -49,6 +49,8 @@ def test_a_study_of_reach_is_a_case(tmp_path) -> None:
     assert (asked["clearance"], asked["scene"][0]["name"]) == (0.01, "part")
     assert asked["allow"] == (("tool0", "part"), ("wrist_3_link", "part"))
     assert case.to_tables()["surface"]["neighbours"] == 250.0  # twice as far as the next
+    (tmp_path / "b" / "a.pcd").write_text(good["cloud"].replace("2\n", "1\n").rsplit("\n", 2)[0])
+    assert Case.from_toml(reach_case(file)).to_tables()["surface"]["neighbours"] == 1.0
     for bad in (good["study"].replace("b/a.pcd", "package.xml"), "pcd: a.pcd"):
         file.write_text(bad)
         with pytest.raises(CoverableError, match=r"a file in \.pcd|no study of REACH"):

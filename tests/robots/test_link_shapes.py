@@ -7,12 +7,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 import trimesh
+from approved import refused
 from arm_urdfs import random_q
 from plain import arm_of
 from samples import sampled, seeds
 from scipy.spatial import ConvexHull
 
-from coverable import Obstacle, RobotError, list_robots, load_robot
+from coverable import Obstacle, RobotError, ToolShape, as_yourdfpy, list_robots, load_robot
 from robots.kinematics import Kinematics
 from robots.shapes.bodies import Triangles
 from robots.shapes.link_pairs import link_pairs
@@ -120,6 +121,19 @@ def test_a_mesh_is_scaled_mirrored_and_closed(tmp_path):
     body = link_shapes(three(tmp_path, base=mesh)).solids[0].geometry
     assert (body.closed, len(body.vertices), len(body.faces)) == (True, 8, 12)
     assert np.allclose(np.ptp(body.vertices, axis=0), [1, 0.2, 0.6])
+    tool = ToolShape.mesh(tmp_path / "box.stl", 0.1)
+    assert np.allclose(np.ptp(tool.geometry.vertices, axis=0), [0.1, 0.2, 0.3])
+
+
+@pytest.mark.parametrize(("shape", "half"), [
+    ('box size="1 2 3"', (0.5, 1, 1.5)), ('sphere radius="2"', (2, 2, 2)),
+    ('cylinder radius="1" length="2"', (1, 1, 1)), ('capsule radius="1" length="2"', (1, 1, 2)),
+])  # fmt: skip
+def test_shapes_that_are_no_meshes_come_to_yourdfpy(shape, half, tmp_path):
+    robot = three(tmp_path, base=VISUAL.replace('box size="0.1 0.1 0.1"', shape))
+    ends = np.array([0, 0, 0.1]) + np.outer([-1, 1], half)
+    np.testing.assert_allclose(as_yourdfpy(robot).scene.bounds, ends, atol=0.02)
+    assert "has no URDF" in refused(as_yourdfpy, replace(robot, urdf=None))
 
 
 # Shapes of base, arm and hand: which of them have a body, and which cannot be checked.
@@ -190,11 +204,18 @@ def test_triangles_that_are_no_body_are_refused(approved):
         with np.errstate(all="ignore"), pytest.raises(RobotError) as caught:
             checked_triangles(vertices, faces, "hand.stl")
         lines.append(f"{name}: " + " / ".join(str(caught.value).splitlines()))
+        if name != "far away":  # from its own frame, which an object may be
+            thing = refused(Obstacle, "a", Triangles(vertices, faces, False), np.eye(4))
+            lines[-1] += f"; {thing}"
     approved("bad_triangles", "\n".join(lines))
+    assert "k x 3" in refused(Obstacle, "a", Triangles("corners", FACES, False), np.eye(4))
 
 
 CUBE = trimesh.creation.box((1.0, 2.0, 3.0))
 TURNED = np.concatenate([CUBE.faces[:1, ::-1], CUBE.faces[1:]])
+SPIKES = np.vstack([CORNERS, -CORNERS[2:]])
+ONE_SIDE = [(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 5), (0, 5, 1), (1, 2, 4), (2, 3, 5), (3, 4, 1),
+            (4, 5, 2), (5, 1, 3)]  # fmt: skip
 SOLIDS = {
     "a box": (CUBE.vertices, CUBE.faces, 6.0),
     "a box inside out": (CUBE.vertices, CUBE.faces[:, ::-1], 6.0),
@@ -202,6 +223,8 @@ SOLIDS = {
     "a face is missing": (CUBE.vertices, CUBE.faces[1:], None),
     "a face twice": (CUBE.vertices, np.concatenate([CUBE.faces, CUBE.faces[:1]]), None),
     "a face turned over": (CUBE.vertices, TURNED, 6.0),
+    "two at an edge": (SPIKES, np.vstack([FACES, np.array([0, 1, 4, 5])[FACES]]), None),
+    "a projective plane": (SPIKES, np.array(ONE_SIDE), None),
     "two faces back to back": (CUBE.vertices, np.array([[0, 1, 2], [0, 2, 1]]), None),
     "flat": (CUBE.vertices * [1.0, 1.0, 1e-10], CUBE.faces, None),
 }

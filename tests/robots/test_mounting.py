@@ -13,7 +13,7 @@ from approved import refused
 from arm_urdfs import arm, joint, load_text, random_arm, random_q
 from scipy.spatial.transform import Rotation
 
-from coverable import Axis, list_robots, load_robot
+from coverable import Axis, as_yourdfpy, list_robots, load_robot
 from robots.kinematics import Kinematics
 from robots.poses import about_fixed_axes
 from robots.shapes.links import link_shapes
@@ -245,6 +245,8 @@ def test_a_composed_cell_is_the_cell_that_one_urdf_describes(cell, tree):
     values = dict(zip(composed.joint_names, q, strict=True))
     expected = tree("turntable", "tool0", values)[:3, 3]
     np.testing.assert_allclose(Kinematics(composed).tool(q)[0], expected, atol=1e-12)
+    other = as_yourdfpy(composed, q, meshes=False).get_transform("tool0", "turn")
+    np.testing.assert_allclose(other[:3, 3], expected, atol=1e-9)
     rail = Rotation.from_euler("xyz", [0, 0.1, 0.2]).as_matrix()
     np.testing.assert_allclose(composed.base[:3, 3], rail @ [0, 0, 0.1] + [0, -1, 0.3], atol=1e-12)
     # The arm keeps its shapes and names.
@@ -300,7 +302,7 @@ def test_what_makes_no_sense(approved, cell):
         "kilometres": {"tcp": ((0, 0, 1e4), (0, 0, 0))},
         "NaN": {"tcp": ((0, 0, np.nan), (0, 0, 0))},
         "a letter": {"tcp": ((0, 0, 0), "z")}, "mirror": {"tcp": np.diag([1, 1, -1, 1])},
-        "infinite": {"tcp": np.diag([np.inf, 1, 1, 1])}, "7": {"base": 7},
+        "infinite": {"tcp": np.diag([np.inf, 1, 1, 1])}, "a word": {"base": "floor"},
         "parallel": {"reference_axis": (0, 0, -2)}, "none": {"reference_axis": (0, 0, 0)},
         "all": {"tcp": 7, "base": ((0, 0, 2e4), (0, 0, 0)), "reference_axis": (0, 0, 0)},
     }.items()]  # fmt: skip

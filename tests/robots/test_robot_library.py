@@ -232,6 +232,8 @@ def test_what_is_refused_by_name_frame_and_lock(approved, tmp_path):
 def test_a_file_is_a_robot_named_after_it_with_its_path_kept_absolute(tmp_path, monkeypatch):
     robot = load_text(tmp_path, arm([joint(1)]))
     monkeypatch.chdir(tmp_path)
-    for found in (robot, load_robot(str(tmp_path / "test_arm.urdf")), load_robot("test_arm.urdf")):
+    path = str(tmp_path / "test_arm.urdf")
+    for found in (robot, load_robot(path), load_robot("test_arm.urdf", package_dirs=tmp_path)):
         assert (found.name, found.joint_names) == ("test_arm", ("j1",))
-        assert found.urdf == str(tmp_path / "test_arm.urdf")
+        assert found.urdf == path
+    assert found.package_dirs == (str(tmp_path),)

@@ -5,6 +5,7 @@ import re
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from approved import refused
 from arm_urdfs import UNLIKE, arm, joint, load_text, random_arm, random_q, unlike
@@ -26,7 +27,8 @@ CHANGES = {
     "screw": {"joint_kinds": ("revolute",) * 5 + ("screw",)},
     "five kinds": {"joint_kinds": ("revolute",) * 5},
     "five of a set": {"limit_sets": {"odd": np.zeros((5, 2))}},
-    "axes alike": {"reference_axis": (0, 0, 1)},
+    "axes alike": {"reference_axis": (0, 0, 1)}, "start": {"start": np.full(6, np.inf)},
+    "another model": {"model": pin.buildSampleModelHumanoidRandom()},
 }  # fmt: skip
 LIMITS = {
     "no such set": "set-9", "no such joint": {"joint7": (0, 1)},

@@ -26,7 +26,7 @@ KINDS = {
          "side": ("top", None, 3, [], np.array([1, 2]), np.array(["inside"])),
          "position": ((0, 0), (0, 0, INF), "x"), "rpy_deg": ((0, NAN, 0), None)},
     ),
-    coverable.cylinder: ({"radius": 1, **TURN}, {"radius": (0,), "angle_deg": ((-200, 200),),
+    coverable.cylinder: ({"radius": 1, **TURN}, {"radius": (1e-300,), "angle_deg": ((-200, 200),),
                                        "height": ((1, 0), (0, INF))}),
     hyperboloid: ({"waist": 1, "flare": 2, **TURN}, {"waist": (0,), "flare": (-1, 1e9, 1e-9)}),
     plane: ({"width": (0, 1), "length": (0, 1)}, {"width": ((0, 0),), "length": ((1, 0),)}),

@@ -106,6 +106,7 @@ def test_heights_are_distances_to_the_nearest_piece():
     lid = cone(0.2, -0.5, (-90, 90), (0, 0.2), position=(0, 0, 0.4))
     surface = piecewise([can, lid])
     assert "crease of up to 26.6 degrees" in surface.notes[0]
+    assert repr(can).startswith("cylinder(0.2, u_deg=(-90, 90), v=(0, 0.4), side=")
     points = np.random.default_rng(4).uniform((0.1, -0.1, 0.3), (0.4, 0.1, 0.5), (40, 3))
     found = surface.closest(points)
     assert found.inside.all()
@@ -125,8 +126,12 @@ def test_long_sides_against_short_ones():
     cells = surface.cells(counts)
     assert (surface.notes, len(surface.seams)) == ((), 3)
     assert all(cells.index(*cells.unravel(k)) == k for k in range(len(cells)))
-    with pytest.raises(IndexError):
-        cells.unravel(len(cells))
+    middles = [line[:-1].mean(axis=0) for line in cells.unrolled().outlines]
+    np.testing.assert_allclose(middles, cells.unrolled().centres, atol=1e-9)
+    assert repr(cells).startswith("Cells(2 x 5 + 2 x 3 + 3 x 4 of piecewise(plane, plane, plane, s")
+    for wrong in (lambda: cells.unravel(len(cells)), lambda: cells.index(-1, 0, 0)):
+        with pytest.raises(IndexError):
+            wrong()
     edges = [np.linspace(0, 1, 6), np.linspace(0, 0.37, 4), np.linspace(0.37, 1, 5)]
     expected = set()
     for other, j in itertools.product((1, 2), range(5)):

@@ -87,9 +87,11 @@ def instances(nodes: int, faces, primitives: int = 1) -> bytes:
 
 
 def strip_scene(mode: int) -> bytes:
-    """A square by a strip (5) or fan (6) of two triangles, and one jump."""
-    content, data = w.scene(SQUARE, [0, 1, 2, 3, 3] if mode == 5 else [0, 1, 3, 2, 2])
-    content["meshes"][0]["primitives"][0]["mode"] = mode
+    """A square by a strip (5) of two triangles and one jump, or by a fan (6) without indices."""
+    strip = mode == 5
+    content, data = w.scene(SQUARE if strip else SQUARE[[0, 1, 3, 2]], [0, 1, 2, 3, 3] * strip)
+    keys = {"attributes": {"POSITION": 0}, "mode": mode} | ({"indices": 1} if strip else {})
+    content["meshes"][0]["primitives"] = [keys]
     return w.glb(content, data)
 
 
@@ -130,17 +132,19 @@ REFUSED = {
     "points.off": w.off(V, F, counts="6000001 12 0"),
     "digits.off": w.off(V, F, counts="9" * 5000 + " 1 0"),
     "minus.off": w.off(V, F, counts="-8 12 0"), "four.off": w.off(V, F, head="4OFF"),
-    "two.off": w.off(V, [(0, 1)]), "sides.off": w.off(V, [[0, 1, 3, 2] * 16 + [0]]),
+    "flat.off": w.off(V, F).replace(b"0.0 0.0 0.0", b"0.0 0.0", 1), "two.off": w.off(V, [(0, 1)]),
+    "sides.off": w.off(V, [[0, 1, 3, 2] * 16 + [0]]),
     # OBJ
     "zero.obj": w.obj(V, [(0, 1, -1)]), "before.obj": b"v 0 0 0\nf -1 -2 -1\n",
     "spline.obj": b"v 0 0 0\ncstype bspline\n", "points.obj": w.obj(V, []) + b"p 1 2 3\n",
     "prose.obj": b"dear reader\n", "binary.obj": bytes(range(256)) * 20,
     "star.obj": w.obj(STAR, [range(8)]), "goes_on.obj": w.obj(V, F) + b"f 1 2 \\\n3\n",
+    "edge.obj": w.obj(V, [(0, 1)]),
     # PLY
     "many.ply": head("element vertex 3", *XYZ, "element face 2000001", LIST),
     "lies.ply": head("element vertex 1000000", *XYZ, "element face 1", LIST,
                      kind="binary_little_endian"),
-    "cut.ply": w.ply(V, F)[:-7], "cut_text.ply": w.ply(V, F, "")[:-30],
+    "cut.ply": w.ply(V, F)[:-13], "cut_text.ply": w.ply(V, F, "")[:-30],
     "list.ply": w.ply(V, F).replace(b"\x07\x03", b"\x07\xff", 1),
     "flat.ply": w.ply(V, F).replace(b"double z", b"double w"),
     "no_list.ply": w.ply(V, F).replace(b"_indices", b"_numbers"),
@@ -152,13 +156,18 @@ REFUSED = {
                       "element face 1", LIST),
     "head.ply": b"ply\nformat ascii 1.0\n" + b"comment\n" * 1200,
     "headless.ply": b"ply\nformat ascii 1.0\n", "kind.ply": b"ply\nformat morse 1.0\nend_header\n",
+    "type.ply": head("element vertex 1", "property real x"),
+    "again.ply": head("element vertex 1", *XYZ, XYZ[0], "element face 1", LIST),
+    "minus.ply": head("element vertex -1", *XYZ, "element face 1", LIST),
     "two.ply": ply_faces("2 0 1"), "row.ply": ply_faces("3 0 1"),
     "index.ply": w.ply(V, [*F, (0, 1, 2**31 - 1)]),
     # GLB
     "cut.glb": scene()[:-4], "tiny.glb": scene()[:16], "old.glb": w.glb(*w.scene(V, F), version=1),
     "json.glb": w.glb(b'{"asset": ', b""),
-    "list.glb": w.glb(b"[1, 2]", b""),
-    "deep.glb": w.glb(b"[" * 200000, b""),
+    "list.glb": w.glb(b"[1, 2]", b""), "numbers.glb": node(translation=[1, 2]),
+    "no_scene.glb": scene().replace(b"JSON", b"BIN\0", 1),
+    "no_numbers.glb": scene().replace(b"BIN\0", b"JSON", 1),
+    "parts.glb": scene(nodes=[{}] * 100_001), "deep.glb": w.glb(b"[" * 200000, b""),
     "wordy.glb": w.glb(b"{}".ljust(9 << 20), b""),
     "bare.glb": w.glb({"asset": {"version": "2.0"}}, b""),
     "outside.glb": scene(buffers=[{"byteLength": 240, "uri": "../../etc/passwd"}]),

@@ -93,6 +93,6 @@ def test_scales_units_and_names_that_are_none_are_refused(tmp_path, approved):
     asked = [(path, {"scale": k}) for k in (0.0, -1.0, np.nan, np.inf, True, "1", 1e-300)]
     asked += [(each, {"scale": 0.0}) for each in (ball(1.0), TriangleMesh(V, F))]
     asked += [(ball(1.0, u), {}) for u in ("furlong", "1 * 2 * mm", "x * mm", "parsec", "angstrom")]
-    asked += [("part\0.stl", {}), (ball(800), {}), (ball(1.0), {"side": "above"})]
+    asked += [(ball(800), {}), (ball(0.3, "mm"), {}), (ball(1.0), {"side": "above"})]
     said = [refused(mesh, source, **options) for source, options in asked]
     approved("scales and units refused", "\n".join(said))

@@ -72,8 +72,9 @@ def test_a_box_is_six_planes():
 
 
 def test_faces_by_number():
-    part = take_faces(HILLY, [7, 3, 3, 200])
-    assert np.array_equal(part.vertices[part.faces], HILLY.vertices[HILLY.faces[[3, 7, 200]]])
+    for chosen in ([7, 3, 3, 200], np.isin(np.arange(len(HILLY.faces)), [3, 7, 200])):
+        part = take_faces(HILLY, chosen)
+        assert np.array_equal(part.vertices[part.faces], HILLY.vertices[HILLY.faces[[3, 7, 200]]])
 
 
 @pytest.mark.parametrize("angle", [5.0, 30.0, 90.0, 180.0])

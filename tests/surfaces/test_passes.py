@@ -115,6 +115,8 @@ def test_a_hole_parts_passes_and_leaves_them_straight():
         assert sum(each.length for each in row) == pytest.approx(0.6 - chord, abs=2e-3)
         for each in row:
             assert np.linalg.norm(each.points[:, :2] - [0.3, 0.2], axis=1).min() >= 0.08 - 2e-4
+    fewer = parallel_passes(panel_with_hole(0.04), 0.13, shortest=0.25)  # it parts two of four
+    assert fewer.dropped == pytest.approx(2 * (0.6 - 2.0 * math.sqrt(0.08**2 - 0.05**2)), abs=5e-3)
 
 
 def test_every_other_pass_is_turned_round_unless_it_is_one_way():
@@ -153,10 +155,10 @@ def test_round_a_tube_and_along_it():
 
 
 def test_pieces_are_sewn_along_their_seam():
-    """A flat plate and a quarter of a cylinder that go over into one another, cut differently."""
-    flat = plane((-0.3, 0.0), (0.0, 0.4), position=(0.0, 0.0, 0.2))
+    """Two flat plates and a quarter of a cylinder that go over into one another, cut apart."""
+    flat = [plane((-0.3, 0.0), v, position=(0, 0, 0.2)) for v in ((0.0, 0.1), (0.1, 0.4))]
     bend = cylinder(0.2, (0, 90), (-0.4, 0.0), side="outside", rpy_deg=(90, 0, 0))
-    surface = piecewise([flat, bend], side="outside")
+    surface = piecewise([*flat, bend], side="outside")
     found, length = parallel_passes(surface, 0.03, (1.0, 0.0, 0.0)), 0.3 + 0.1 * math.pi
     assert found.count == math.ceil(0.4 / 0.03)
     for each in found.stretches:

@@ -90,6 +90,7 @@ def test_places_follow_the_curves_past_crowds_and_tell_turns_on_the_spot_apart()
     point = np.array([[0.1, 0.0, 0.0]])
     found = offset_surface(crowd, 0.0).nearest(point, point - [0, 0, 1], 1e-3)
     assert crowd.pairs[found.chart].tolist() == [[0, 8]]
+    assert offset_surface(crowd, 0.0).along(found) is None  # they are in no order
 
 
 @pytest.mark.parametrize("neighbours", ["order", 0.3])

@@ -13,7 +13,7 @@ from plain import surface_of
 from referee import Form
 from samples import sampled, spread
 from smooth_probes import extrapolated_area, least_distances, random_parameters, same_surface
-from specimens import ALL, CLOSED, POLES, SMOOTH, cells_of
+from specimens import ALL, CLOSED, POLES, SMOOTH, cells_of, hood
 
 from coverable import bspline, cone, cylinder, ellipsoid, hyperboloid, plane, poses, sphere, torus
 from surfaces.patches.normal_bounds import bounds_of
@@ -261,6 +261,8 @@ def test_a_part_of_a_spline_is_the_whole_within_its_range_and_weights_of_one_cha
     u, v = random_parameters(part, 200)
     assert (part.point(u, v) == whole.point(u, v)).all()
     assert (part.normal(u, v) == whole.normal(u, v)).all()
+    many = bspline(hood(90, 4))  # so many spans that each is looked at in fewer places
+    assert np.abs(many.closest(many.point(u, v)).u - u).max() < 1e-9
     beyond = whole.point(0.05, 0.5) + 0.01 * whole.normal(0.05, 0.5)
     found = part.closest(beyond)
     assert (found.u, bool(found.inside), bool(whole.closest(beyond).inside)) == (0.1, False, True)

@@ -273,6 +273,8 @@ def test_places_that_are_none(named):
     points = np.full((2, 3), np.nan)
     places = offset.nearest(points, points, 1e-3)
     assert np.isnan(offset.at(places)[0]).all()
+    along = offset.along(places)
+    assert along is None if surface.kind != "poses" else np.isnan(along).all()
     path = offset.paths(places, places)
     assert not (path.known.all() and np.isfinite(path.points).all())
 

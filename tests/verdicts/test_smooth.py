@@ -11,7 +11,7 @@ from mesh_writers import stl
 from plain import tools
 from referee import Facets, evenly
 
-from coverable import Case, check, load_result, mesh, verify
+from coverable import ArgumentError, Case, CaseError, check, load_case, load_result, mesh, verify
 from feasibility.cli.main import main
 from surfaces.meshes.smoothing import smoothed
 
@@ -80,11 +80,16 @@ def test_folds_are_named_with_a_length_that_does(panel, capsys) -> None:
 def test_what_a_copy_is_off_is_taken_off_the_tolerance(panel) -> None:
     """So the tool point keeps the standoff from the surface itself, within all of the tolerance."""
     settings = ["task.smooth=0.3", "task.tolerance=0.008"]
+    with pytest.raises(CaseError, match=r"task\.smooth: smoothing over 1e-05 m needs more than"):
+        load_case(panel, [*settings, "task.smooth=1e-5"]).build()
     case = Case.from_toml(TOML, panel.parent, overrides=settings)
     setup = case.build()
     verdict = check(*setup)
     off = setup.cells.surface.smoothing.off
     assert verdict.feasible
+    for other in (0.2, None):
+        with pytest.raises(ArgumentError, match=f"is {other}, but .* smoothed over 0.3 m"):
+            check(*setup._replace(task=replace(setup.task, smooth=other)))
     assert 1e-3 < off < 0.008
     assert verdict.certificate.max_position_error <= 0.008 - off
     assert abs(distances(setup, verdict.witness.q) - STANDOFF).max() <= 0.008

@@ -5,6 +5,7 @@ sound: finite, in range, and the same when it is written and read again.
 """
 
 import contextlib
+import fnmatch
 import io
 import json
 import tempfile
@@ -243,8 +244,9 @@ def damaged(which: str, change: dict[str, Any]) -> bytes:
         elif kind in ("meta", "without", "case"):
             content["meta.json"] = _other_meta(content["meta.json"], kind, value)
         elif kind in ("at", "rows", "columns", "objects", "floats"):
-            name = f"{value if isinstance(value, str) else value[0]}.npy"
-            content[name] = _other_array(np.load(io.BytesIO(content[name])), kind, value)
+            pattern = f"{value if isinstance(value, str) else value[0]}.npy"
+            for name in fnmatch.filter(content, pattern):
+                content[name] = _other_array(np.load(io.BytesIO(content[name])), kind, value)
         elif kind == "fill":
             content |= {f"x{k}": b"" for k in range(value - len(content))}
     data = packed(content, change.get("twice", ""))
