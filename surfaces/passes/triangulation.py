@@ -163,9 +163,10 @@ def _sewn(mesh: WorkingMesh, gap: float) -> WorkingMesh:
         ends = edges[row]
         inner = [int(k) for k in on_border[some] if k not in ends]
         off = mesh.vertices[inner] - a[row]
-        along = off @ (b[row] - a[row]) / length[row] ** 2
-        away = np.linalg.norm(off - along[:, None] * (b[row] - a[row]), axis=1)
-        between = (along > 0.02) & (along < 0.98) & (away <= slack[row])
+        along = off @ (b[row] - a[row]) / length[row]
+        away = np.linalg.norm(off - along[:, None] * (b[row] - a[row]) / length[row], axis=1)
+        # What is nearer to an end is welded to it afterwards.
+        between = (along > gap) & (along < length[row] - gap) & (away <= slack[row])
         if between.any():
             order = np.argsort(along[between])
             put[int(ends[0]), int(ends[1])] = np.array(inner)[between][order].tolist()

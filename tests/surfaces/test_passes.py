@@ -154,9 +154,10 @@ def test_round_a_tube_and_along_it():
     assert np.allclose(np.diff(angle) * 0.1, along.spacing, rtol=0.02)
 
 
-def test_pieces_are_sewn_along_their_seam():
+@pytest.mark.parametrize("cut", [0.1, 0.15])  # a vertex just beside another
+def test_pieces_are_sewn_along_their_seam(cut):
     """Two flat plates and a quarter of a cylinder that go over into one another, cut apart."""
-    flat = [plane((-0.3, 0.0), v, position=(0, 0, 0.2)) for v in ((0.0, 0.1), (0.1, 0.4))]
+    flat = [plane((-0.3, 0.0), v, position=(0, 0, 0.2)) for v in ((0.0, cut), (cut, 0.4))]
     bend = cylinder(0.2, (0, 90), (-0.4, 0.0), side="outside", rpy_deg=(90, 0, 0))
     surface = piecewise([*flat, bend], side="outside")
     found, length = parallel_passes(surface, 0.03, (1.0, 0.0, 0.0)), 0.3 + 0.1 * math.pi
