@@ -23,8 +23,8 @@ from feasibility.reports import explanation as explained
 from feasibility.reports import verdict as report
 from feasibility.reports.verdict_json import as_json, motion_text
 from feasibility.results.trajectory_files import as_csv, as_json_text, from_csv
-from feasibility.sensitivity.quantities import Kind, Quantity
-from feasibility.sensitivity.thresholds import Finding, Threshold
+from feasibility.sensitivity.quantities import Kind, Quantity, Variant, quantities
+from feasibility.sensitivity.thresholds import Change, Finding, Threshold
 from feasibility.verdict import Cause, CauseKind, Certificate, Walk
 from robots.known_arms import GROUPS
 
@@ -78,6 +78,26 @@ def test_no_cone_that_lets_the_tool_point_away_is_proposed(plate, given, others)
     assert ("place by 0.499 m" in first) == others
     assert ("the tool may point away" in first) == (given < 90 and not others)
     assert ("cone 120 deg" in first) == (given > 90)
+
+
+def numbers_of(robot, cells, task):
+    bodies = task.collision
+    rest = task.cone_deg, task.standoff, bodies.clearance, bodies.tool_clearance, len(bodies.scene)
+    return robot.lower, robot.upper, cells.centres, task.approach, task.roll_deg, rest
+
+
+def test_the_settings_of_a_change_make_it(commands, plate):
+    more = ["task.roll_deg=[-20,40]", "task.roll_reference=[1,0,0]", "task.approach=[0.1,0,-1]"]
+    case = load_case(commands.folder / "scene.toml").with_overrides(more)
+    given = Variant(*case.build()[:3])
+    verdict = replace(plate[1], robot=given.robot, cells=given.cells, task=given.task)
+    for q in quantities(given, widen=True):
+        if q.name != "without collisions":  # no key says so
+            change = Change(q, q.value(min(3, q.last)))
+            sets = changes.settings([change], verdict, case)
+            made = numbers_of(*case.with_overrides(sets).build()[:3])
+            for one, other in zip(made, numbers_of(*q.applied(given, min(3, q.last))), strict=True):
+                np.testing.assert_allclose(one, other, atol=1e-9, err_msg=q.name)
 
 
 @pytest.fixture(scope="module")
