@@ -110,9 +110,15 @@ def test_causes_are_grouped_and_the_largest_group_comes_first(plate, approved):
 def test_over_no_cells_there_is_nothing_to_cover_and_without_limits_no_margin(plate):
     case, verdict = plate
     setup = case.build()
-    text = report.as_text(check(setup.robot, setup.cells.surface.cells(0, 3), setup.task), case)
+    none = check(setup.robot, setup.cells.surface.cells(0, 3), setup.task)
+    text = report.as_text(none, case)
     assert text.startswith("feasible: there are no cells, so there is nothing to cover")
     assert "motion" not in text
+    assert not [
+        c for c in coverable.view(none).commands if re.match("/(surface|cells|graph)/", c["path"])
+    ]
+    with pytest.raises(ValueError, match="no edge with a motion to draw"):
+        coverable.plot_transition(none)
     free = replace(verdict, certificate=Certificate(2, 0.0, 0.0, math.inf))
     found = json.loads(json.dumps(as_json(free), allow_nan=False))
     assert found["certificate"]["min_limit_margin_deg"] is None
