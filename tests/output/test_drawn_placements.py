@@ -101,22 +101,22 @@ def test_whole_shares_are_feasible_only_where_that_was_said():
         ("failed", {"verdict": "undecided", "evidence": "budget", "message": "died"}, Class.FAILED),
     ):
         assert class_of_row(Row({}, status, result, 0.1)) is kind
+    with pytest.raises(ValueError, match="a row for each task, got 0 for 0 tasks"):
+        coverable.view_study([], [])
 
 
 @pytest.mark.parametrize(("cells", "length", "strokes"), [
-    (CELLS, 1.0, 1), (flat("sheet", 60).cells(count=6), 2.8, 1),
-    (SMOOTH["ball"].cells(12, 24), 3 * 1.2 * np.pi, 0),
+    (flat("sheet", 60).cells(count=6), 2.8, 1), (SMOOTH["ball"].cells(12, 24), 3.6 * np.pi, 0),
 ])  # fmt: skip
 def test_an_outline_is_the_rim_or_three_sections_of_a_closed_surface(cells, length, strokes):
     """In few segments; a stroke points to the working side, where there is one."""
     lines, surface = outline(cells), cells.surface
     count = len(lines) - strokes
-    assert np.linalg.norm(np.diff(lines[:count], axis=1), axis=2).sum() == pytest.approx(
-        length, 0.02
-    )
+    sides = np.linalg.norm(lines[:count, 1] - lines[:count, 0], axis=1)
+    assert (count <= 96, sides.sum()) == (True, pytest.approx(length, 0.02))
     heights = surface.closest(lines[:, 1] @ surface.rotation.T + surface.position).height
     assert np.abs(heights[:count]).max() < 0.01
-    assert (count <= 96, np.sign(heights[count:]).tolist()) == (True, [surface.side_sign] * strokes)
+    assert (heights[count:] * surface.side_sign > 0.03).all()
 
 
 def test_of_many_feasible_poses_some_are_drawn_evenly_and_the_legend_says_so():
@@ -132,7 +132,8 @@ def test_stations_stand_where_they_are_planned_and_what_the_best_one_covers_is_f
     asked = replace(fabricated(), trials=fabricated().trials[2:])
     best, one, other, *_ = asked.trials
     plan = StationPlan((one, other), np.array([0, 0, 0, 1, -1, 1]), 2, ("", ""))
-    view = view_placements(asked, plan=plan)
+    nowhere, view = view_placements(replace(asked, trials=())), view_placements(asked, plan=plan)
+    assert nowhere.legend.text.endswith("the surface is drawn at its pose in the case")
     assert view.legend.text.endswith("; 2 stations cover 5 of 6 cells")
     drawn = {c["path"]: points_of(c) for c in view.commands if c["type"] == "set_object"}
     entries = {entry.label: entry for entry in view.legend.entries}
@@ -149,12 +150,3 @@ def test_stations_stand_where_they_are_planned_and_what_the_best_one_covers_is_f
         if station:
             rim = turned(outline(CELLS), trial.pose)
             np.testing.assert_allclose(drawn[f"{path}/outline"], rim, atol=2e-5)
-
-
-def test_where_nothing_was_tried_the_surface_is_drawn_where_the_case_has_it():
-    view = view_placements(replace(fabricated(), trials=()))
-    assert view.legend.text.endswith("tried; the surface is drawn at its pose in the case")
-    (shape,) = [points_of(c) for c in view.commands if c["path"] == "/surface/patch"]
-    np.testing.assert_allclose(shape.mean(axis=0), PLATE.position, atol=2e-5)
-    with pytest.raises(ValueError, match="a row for each task, got 0 for 0 tasks"):
-        coverable.view_study([], [])
