@@ -36,7 +36,7 @@ def tried(pose, share, covered=True):
     return Trial(pose, {"message": "", "share": share, "cells": 6, "components": cells})
 
 
-def fabricated(*extra):
+def fabricated():
     """A search without an answer whose trials fall into every class but 'feasible'."""
     at = iter(poses(40))
     shares = 1.0, 1.0, 5 / 6, 0.75, 2 / 3, 0.6, 0.5, *[1 / 3] * 4
@@ -44,7 +44,6 @@ def fabricated(*extra):
         *(tried(next(at), share) for share in shares),
         *(tried(next(at), share, False) for share in (1 / 6, 0.0, 0.0, 0.0, 0.0)),
         *(Trial(next(at), {"message": "no"}) for _ in range(3)),
-        *extra,
     ]
     region = coverable.Region.around(Pose.of_surface(PLATE), {"x": (0.2, 0.9)})
     return coverable.Placements(

@@ -5,44 +5,32 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import trimesh
 from made_up import missing
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
-from mesh_patches import grid
 from page_outline import faces_of, points_of
+from specimens import SMOOTH, flat
 
 import coverable
-from coverable import Task, check, load_result, load_robot, mesh, plot_sides, sphere, view
+from coverable import Task, check, load_result, load_robot, mesh, plot_sides, view
 from feasibility.viewer import verdict_scene
 from feasibility.viewer.cell_meshes import make_display_mesh, sides_of
 from feasibility.viewer.figures import plot_causes, plot_graph, plot_transition, unrolled_edges
 
 MISSED = {"mesh": {2, 3, 5, 6, 7, 9, 11, 12, 15, 17, 20}, "grid": {*range(5, 10), *range(13, 19)}}
-DOME = sphere(radius=1.0, polar_deg=(10, 90), azimuth_deg=(10, 180), side="inside")
-
-
-def triangles(nu, nv, shape):
-    """A unit square bent by (u, v) -> points, as a mesh of 2 nu nv triangles."""
-    u, v, faces = grid(nu, nv)
-    return trimesh.Trimesh(shape(u, v), faces, process=False)
-
-
-def dome(u, v):
-    return DOME.point(np.radians(10 + 80 * u), np.radians(10 + 170 * v))
 
 
 @pytest.fixture(scope="module", params=MISSED)
 def verdict(request):
-    cells = DOME.cells(5, 6)
+    cells = SMOOTH["dome"].cells(5, 6)
     if request.param == "mesh":
-        cells = mesh(triangles(30, 40, dome), side="inside").cells(count=24)
+        cells = mesh(flat("dome", 36).mesh, side="inside").cells(count=24)
     robot = load_robot("puma560", limits="set-1")
     return missing(check(robot, cells, Task(0.005, 45)), MISSED[request.param])
 
 
 def test_a_fine_mesh_is_thinned_and_its_cells_keep_their_areas():
-    fine = mesh(triangles(70, 60, dome), side="inside").cells(count=6)
+    fine = flat("dome", 65).cells(count=6)
     display = make_display_mesh(fine, budget=2_000)
     assert len(display.labels) <= 2_000 < len(fine.labels)
     area = np.bincount(display.labels, display.mesh.areas, 6)
@@ -125,8 +113,7 @@ def test_edges_over_a_seam_reach_either_border_and_a_transition_is_that_of_its_e
     angles = sorted(sorted(line[:, 1].round(6).tolist()) for line in lines)
     assert angles == [[0, 45], [45, 135], [135, 225], [225, 315], [315, 360]]
     a, b = max(verdict.graph.edges)
-    ends = " to ".join(str(i if i[1:] else i[0]) for i in map(verdict.cells.unravel, (a, b)))
-    said = f"From E-cell {ends}: {len(verdict.graph.edges[a, b]['motion'])} configurations"
-    assert plot_transition(verdict, (b, a)).axes[0].get_title() == said
+    said = f": {len(verdict.graph.edges[a, b]['motion'])} configurations"
+    assert plot_transition(verdict, (b, a)).axes[0].get_title().endswith(said)
     with pytest.raises(ValueError, match="no edge between the cells 6 and 5 with a motion"):
         plot_transition(verdict, (6, 5))
