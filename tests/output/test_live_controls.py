@@ -14,16 +14,8 @@ PLATE = Case.from_toml(FILES["plate.toml"], name="plate")
 RAIL = Case.from_toml(FILES["rail.toml"])
 POST = """
 [collision]
-[[collision.scene]]
-name = "box"
-kind = "box"
-size = [0.1, 0.1, 0.5]
-position = [0.4, 0.5, 0.25]
-[[collision.scene]]
-name = "held"
-kind = "box"
-size = [0.1, 0.1, 0.1]
-frame = "wrist_3_link"
+scene = [{ name = "box", kind = "box", size = [0.1, 0.1, 0.5], position = [0.4, 0.5, 0.25] },
+         { name = "held", kind = "box", size = [0.1, 0.1, 0.1], frame = "wrist_3_link" }]
 """
 
 
