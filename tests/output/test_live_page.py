@@ -122,9 +122,9 @@ def test_quick_looks_come_first_say_so_and_call_nothing_feasible(window, monkeyp
     assert (quick.kind, quick.head) == ("quick", "quick look: one motion reaches 6 of 6 cells")
     assert quick.parts == ()
     assert quick.motion is None
+    at, clock = full.motion.at, page.time
     window.slide(page.playing, True)
-    until(lambda: page.time.value > 0.2)
-    until(lambda: np.allclose(page.arm.q, full.motion.at(np.array([page.time.value]))))
+    until(lambda: clock.value > 0.2 and np.allclose(page.arm.q, at([clock.value])))
     page.set({(SURFACE, "x"): 900.0, (SURFACE, "z"): 300.0})
     window.answered()
     assert shown[2].head.endswith("of 6 cells so far")

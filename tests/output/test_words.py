@@ -114,7 +114,7 @@ def test_over_no_cells_there_is_nothing_to_cover_and_without_limits_no_margin(pl
     text = report.as_text(none, case)
     assert text.startswith("feasible: there are no cells, so there is nothing to cover")
     assert "motion" not in text
-    assert not [c for c in coverable.view(none).commands if "/surface/" in c["path"]]
+    assert [entry.path for entry in coverable.view(none).legend.entries] == ["/robot"]
     with pytest.raises(ValueError, match="no edge with a motion to draw"):
         coverable.plot_transition(none)
     free = replace(verdict, certificate=Certificate(2, 0.0, 0.0, math.inf))
