@@ -16,6 +16,7 @@ from coverable import Task, check, load_result, load_robot, mesh, plot_sides, vi
 from feasibility.viewer import verdict_scene
 from feasibility.viewer.cell_meshes import make_display_mesh, sides_of
 from feasibility.viewer.figures import plot_causes, plot_graph, plot_transition, unrolled_edges
+from feasibility.viewer.meshes import tubes
 
 MISSED = {"mesh": {2, 3, 5, 6, 7, 9, 11, 12, 15, 17, 20}, "grid": {*range(5, 10), *range(13, 19)}}
 
@@ -112,6 +113,8 @@ def test_edges_over_a_seam_reach_either_border_and_a_transition_is_that_of_its_e
     lines = unrolled_edges(replace(verdict, cells=tube, graph=tube.graph()))
     angles = sorted(sorted(line[:, 1].round(6).tolist()) for line in lines)
     assert angles == [[0, 45], [45, 135], [135, 225], [225, 315], [315, 360]]
+    for nothing in ([], [np.zeros((3, 3))]):  # such as the trail of a tool that rests
+        assert [part.shape for part in tubes(nothing, 0.01)] == [(0, 3), (0, 3)]
     a, b = max(verdict.graph.edges)
     said = f": {len(verdict.graph.edges[a, b]['motion'])} configurations"
     assert plot_transition(verdict, (b, a)).axes[0].get_title().endswith(said)
