@@ -4,6 +4,7 @@ import json
 import sys
 from pathlib import Path
 
+import arm_urdfs
 import hostile_visuals as hostile
 import numpy as np
 import pinocchio as pin
@@ -24,15 +25,6 @@ from feasibility.viewer.robot_visuals import TRIANGLES, draw, joint_paths
 from feasibility.viewer.threejs import safe_name
 from robots.urdf.checked_urdf import check_urdf
 
-TWO_LINKS = (
-    '<robot name="two"><link name="base">{base}</link><link name="arm">{arm}</link>'
-    '<link name="tip"/>'
-    '<joint name="turn" type="revolute"><parent link="base"/><child link="arm"/>'
-    '<origin xyz="0 0 1"/><axis xyz="0 0 1"/>'
-    '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
-    '<joint name="end" type="fixed"><parent link="arm"/><child link="tip"/>'
-    '<origin xyz="0.5 0 0"/></joint></robot>'
-)
 SHAPE = '<visual><origin xyz="0 0 0.1"/><geometry>{}</geometry></visual>'
 
 
@@ -47,9 +39,11 @@ def drawn(robot):
 
 
 def two_links(folder, base="", arm=""):
-    file = folder / "two.urdf"
-    file.write_text(TWO_LINKS.format(base=base, arm=arm))
-    return load_robot(str(file))
+    turn = arm_urdfs.joint(1, xyz=(0, 0, 1), limits=(-1, 1))
+    text = arm_urdfs.arm([turn, arm_urdfs.joint(2, "fixed", (0.5, 0, 0))])
+    for link, shape in (("l0", base), ("l1", arm)):
+        text = text.replace(f'<link name="{link}"/>', f'<link name="{link}">{shape}</link>')
+    return arm_urdfs.load_text(folder, text)
 
 
 @sampled("name", spread(["puma560", "ur5", "panda", "baxter_left", "xarm7"], 2))
@@ -98,28 +92,24 @@ def test_a_mesh_is_scaled_and_placed(tmp_path):
 def test_a_mesh_that_cannot_be_had_becomes_a_capsule_and_a_note(tmp_path, content):
     if content is not None:
         (tmp_path / "lost.stl").write_bytes(content)
-    robot = two_links(
-        tmp_path,
-        base=SHAPE.format('<box size="0.1 0.1 0.1"/>'),
-        arm=SHAPE.format('<mesh filename="lost.stl"/>'),
-    )
-    notes = draw(robot).notes
-    assert len(notes) == 1
-    assert "lost.stl" in notes[0]
+    box = SHAPE.format('<box size="0.1 0.1 0.1"/>')
+    robot = two_links(tmp_path, base=box, arm=SHAPE.format('<mesh filename="lost.stl"/>'))
+    (note,) = draw(robot).notes
+    assert "lost.stl" in note
     parts = drawn(robot)
-    assert set(parts) == {"/robot/link base/part 0", "/robot/joint turn/link capsule/part 1"}
-    points, _ = parts["/robot/joint turn/link capsule/part 1"]
+    assert set(parts) == {"/robot/link l0/part 0", "/robot/joint j1/link capsule/part 1"}
+    points, _ = parts["/robot/joint j1/link capsule/part 1"]
     assert points[:, 0].min() < 0 < 0.49 < points[:, 0].max(), "from the joint to the tool"
 
 
 def test_an_arm_without_pictures_is_a_chain_of_capsules(tmp_path):
     bare, late = two_links(tmp_path), two_links(tmp_path)
     assert len(drawn(bare)) == 2
-    (tmp_path / "two.urdf").unlink()
+    (tmp_path / "test_arm.urdf").unlink()
     assert draw(bare).notes == ()  # files are read once for each robot
     assert len(drawn(late)) == 2
     (note,) = draw(late).notes
-    assert "two.urdf" in note
+    assert "test_arm.urdf" in note
 
 
 opened: list[str] = []

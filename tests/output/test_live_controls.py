@@ -8,21 +8,14 @@ from command_table import FILES
 
 from coverable import Case, CaseError, load_case
 from feasibility.live.controls import BASE, LIMITS, SURFACE, TASK, TCP, Controls
+from feasibility.live.workbench import Workbench
 
 PLATE = Case.from_toml(FILES["plate.toml"], name="plate")
 RAIL = Case.from_toml(FILES["rail.toml"])
 POST = """
 [collision]
-[[collision.scene]]
-name = "box"
-kind = "box"
-size = [0.1, 0.1, 0.5]
-position = [0.4, 0.5, 0.25]
-[[collision.scene]]
-name = "held"
-kind = "box"
-size = [0.1, 0.1, 0.1]
-frame = "wrist_3_link"
+scene = [{ name = "box", kind = "box", size = [0.1, 0.1, 0.5], position = [0.4, 0.5, 0.25] },
+         { name = "held", kind = "box", size = [0.1, 0.1, 0.1], frame = "wrist_3_link" }]
 """
 
 
@@ -92,10 +85,12 @@ def test_base_tool_axes_and_objects_are_moved_and_nothing_else():
 @pytest.mark.parametrize(("values", "said"), [
     ({(TASK, "standoff"): -3.0}, "task.standoff: must be a finite number >= 0"),
     ({(LIMITS, "elbow_joint"): (20.0, -20.0)}, "the wrong way round"),
+    ({(LIMITS, "elbow_joint"): (-10.0, 10.0)}, "robot.start_deg"),
     ({(SURFACE, "x"): 1e300}, "surface.position: must be three finite numbers"),
     ({(TCP, "x"): 1e300}, "robot.tcp.position: must"),
 ])  # fmt: skip
 def test_what_makes_no_sense_is_refused_in_words(values, said):
+    case = PLATE.with_overrides(["robot.start_deg=[0,-90,90,0,90,0]"])
     with pytest.raises(CaseError, match="plate: ") as refused:
-        controls_of(PLATE).changed(values)
+        Workbench(case).build(controls_of(case).changed(values))
     assert said in str(refused.value)

@@ -17,6 +17,7 @@ from live_windows import GUARD_S, Window, until
 from coverable import Case, Live, View, check, live
 from coverable.errors import CoverableError
 from feasibility.live import serving
+from feasibility.live.answers import Watch, quick_look
 from feasibility.live.controls import BASE, LIMITS, SURFACE, TASK, TCP
 from feasibility.live.page import Page
 from feasibility.reports import verdict as report
@@ -121,10 +122,19 @@ def test_quick_looks_come_first_say_so_and_call_nothing_feasible(window, monkeyp
     assert (quick.kind, quick.head) == ("quick", "quick look: one motion reaches 6 of 6 cells")
     assert quick.parts == ()
     assert quick.motion is None
-    assert full.motion is not None
+    at, clock = full.motion.at, page.time
+    window.slide(page.playing, True)
+    until(lambda: clock.value > 0.2 and np.allclose(page.arm.q, at([clock.value])))
     page.set({(SURFACE, "x"): 900.0, (SURFACE, "z"): 300.0})
     window.answered()
     assert shown[2].head.endswith("of 6 cells so far")
+
+
+def test_a_quick_look_ends_after_its_steps_and_goes_by_the_method_of_the_case():
+    for file, steps, reached in (("plate", 0, 0), ("plate", 1, 6), ("greedy", 60, 6)):
+        setup = Case.from_toml(FILES[f"{file}.toml"]).build()
+        look = quick_look(setup, Watch(lambda: True, str, steps=steps))
+        assert f"one motion reaches {reached} of 6 cells" in look.head
 
 
 def test_a_certificate_that_nobody_waits_for_is_given_up(window, monkeypatch):
@@ -207,12 +217,12 @@ def place_of(page, path):
 
 
 def test_base_tool_and_scene_are_drawn_where_they_are_moved_and_joints_are_moved_by_hand():
-    post = '\n[robot.base]\nposition = [0.1, 0, 0]\n[[collision.scene]]\nname = "post"\n'
-    post += 'kind = "box"\nsize = [0.1, 0.1, 0.5]\nposition = [0, 0.5, 0]\n'
+    post = "task.footprint = 0.2\n[robot.base]\nposition = [0.1, 0, 0]\n[[collision.scene]]\n"
+    post += 'name = "post"\nkind = "box"\nsize = [0.1, 0.1, 0.5]\nposition = [0, 0.5, 0]\n'
     with Live(Case.from_toml(FILES["plate.toml"] + post, name="plate")) as live:
         window = Window(live)
         page = window.page
-        window.answered()
+        assert "treated once" in [part.entry.label for part in window.answered().parts]
         first = page.arm.setup.robot
         before = page.scene.nodes["/scene/0 post/body"].vertices.copy()
         page.set(
@@ -245,6 +255,7 @@ def test_base_tool_and_scene_are_drawn_where_they_are_moved_and_joints_are_moved
 
 def test_the_handle_moves_what_is_chosen(window):
     page = window.page
+    assert page.arm.said().endswith(" deg from its normal")  # there are no bodies
     handle, turn = page.handle, (math.cos(math.pi / 8), 0.0, 0.0, math.sin(math.pi / 8))
     middle = np.array(handle.gizmo.position)
     window.drag(turn, middle + np.array([0.1, 0.0, 0.0]))

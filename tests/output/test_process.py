@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numba
 import pytest
-from live_windows import window
+from live_windows import GUARD_S, window
 from numba.core import event
 from samples import EVERYTHING
 
@@ -31,7 +31,6 @@ from feasibility.viewer.live_server import LiveView
 
 ROOT = Path(__file__).parents[2]
 COMMAND = [sys.executable, "-m", "coverable"]
-GUARD_S = 1800.0
 SMALL = ("check", "paper/4a", "--set", "surface.cells=[2, 2]")
 
 

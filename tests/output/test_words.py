@@ -160,9 +160,13 @@ def test_over_no_cells_there_is_nothing_to_cover_and_without_limits_no_margin(pl
     case, verdict = plate
     setup = case.build()
     empty = setup.robot, setup.cells.surface.cells(0, 3), setup.task
-    text = report.as_text(check(*empty), case)
+    none = check(*empty)
+    text = report.as_text(none, case)
     assert text.startswith("feasible: there are no cells, so there is nothing to cover")
     assert "motion" not in text
+    assert [entry.path for entry in coverable.view(none).legend.entries] == ["/robot"]
+    with pytest.raises(ValueError, match="no edge with a motion to draw"):
+        coverable.plot_transition(none)
     text = explained.as_text(coverable.explain(*empty), "plate")
     assert text.startswith("plate: there are no cells to cover, so there is nothing to explain.")
     free = replace(verdict, certificate=Certificate(2, 0.0, 0.0, math.inf))

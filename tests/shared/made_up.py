@@ -2,20 +2,19 @@
 
 from collections.abc import Collection
 from dataclasses import replace
+from itertools import cycle
 
 import numpy as np
 
 from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict
 
 
-def missing(
-    verdict: Verdict, missed: Collection[int], causes: Collection[Cause] | None = None
-) -> Verdict:
-    """The same without some cells; by default causes take turns, and the last cell has none."""
-    kinds = list(CauseKind)
-    if causes is None:
-        causes = [Cause(cell, kinds[k % len(kinds)], proved=True, detail="made up")
-                  for k, cell in enumerate(sorted(missed)[:-1])]  # fmt: skip
+def missing(verdict: Verdict, missed: Collection[int]) -> Verdict:
+    """The same without some cells; causes take turns, a pair for each; the last cell has none."""
+    causes = []
+    for cell, kind in zip(sorted(missed)[:-1], cycle(CauseKind), strict=False):
+        pair = ("shelf", f"link {cell}") if kind is CauseKind.COLLISION else None
+        causes.append(Cause(cell, kind, proved=True, detail="made up", pair=pair))
     covered, graph = verdict.covered.copy(), verdict.graph.copy()
     covered[list(missed)] = False
     graph.remove_edges_from([edge for edge in graph.edges if set(edge) & set(missed)])

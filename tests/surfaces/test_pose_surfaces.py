@@ -27,6 +27,16 @@ def test_each_pose_is_a_cell_where_it_is_placed():
     np.testing.assert_allclose(cells.approaches, TURNED @ turn.T, atol=1e-12)
     np.testing.assert_allclose(cells.tangents, np.tile(turn[:, 0], (4, 1)), atol=1e-12)
     assert (cells.pairs.tolist(), cells.in_order) == ([[0, 1], [1, 2], [2, 3]], True)
+    assert cells.locate(cells.centres[:2] + 0.01).tolist() == [0, 1]
+    for some in (cells, poses(LINE, UP, **TILTED)):  # drawn as squares half as wide as a step
+        tiles = some.triangles(np.arange(4)).vertices.reshape(4, 4, 3)
+        one, other, _ = np.diff(tiles, axis=1).transpose(1, 0, 2)
+        np.testing.assert_allclose(tiles.mean(axis=1), cells.centres, atol=1e-12)
+        np.testing.assert_allclose(np.linalg.norm([one, other], axis=2), 0.05)
+        np.testing.assert_allclose(np.cross(cells.normals, one), other, atol=1e-12)
+        assert some.tangents is None or np.allclose(one, 0.05 * some.tangents)
+        flat = np.diff(some.unrolled().outlines, axis=1)[:, :2]  # y down
+        np.testing.assert_allclose(np.linalg.det(flat), -(0.05**2))
 
 
 def test_poses_of_noether_and_of_clouds(tmp_path):

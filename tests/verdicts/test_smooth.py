@@ -17,17 +17,10 @@ from surfaces.meshes.smoothing import smoothed
 
 STANDOFF = 0.2
 TOML = """
-[robot]
-name = "ur10"
-[surface]
-kind = "mesh"
-file = "panel.stl"
-position = [0.5, -0.2, -0.1]
-side = "outside"
-cells = 20
-[task]
-standoff = 0.2
-cone_deg = 40
+robot.name = "ur10"
+surface = { kind = "mesh", file = "panel.stl", position = [0.5, -0.2, -0.1], side = "outside", \
+cells = 20 }
+task = { standoff = 0.2, cone_deg = 40 }
 """
 
 
