@@ -109,8 +109,8 @@ def _greedy(problem: Problem, search: Search, clock: Clock) -> QuickAnswer:
         found = greedy_search(problem, search, clock, problem.robot.start)
     except OutOfTime:  # before it had found anything
         return QuickAnswer(np.zeros(len(problem.cells), dtype=bool), None)
-    postures = found.postures if found.postures is not None and len(found.postures) else [None]
-    return QuickAnswer(found.covered, postures[0])
+    tree = found.make_tree()
+    return QuickAnswer(found.covered, None if tree is None else tree.nodes[found.start]["q"])
 
 
 STEPS = 60  # looks at the clock, between which a search does 8,000 evaluations at most

@@ -135,6 +135,7 @@ def test_a_quick_look_ends_after_its_steps_and_goes_by_the_method_of_the_case():
         setup = Case.from_toml(FILES[f"{file}.toml"]).build()
         look = quick_look(setup, Watch(lambda: True, str, steps=steps))
         assert f"one motion reaches {reached} of 6 cells" in look.head
+        assert (look.q is not None) == (reached > 0)
 
 
 def test_a_certificate_that_nobody_waits_for_is_given_up(window, monkeypatch):
