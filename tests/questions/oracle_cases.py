@@ -2,11 +2,18 @@
 
 A `net` is the cells' centres and straight lines between neighbours: where a search from centre to
 centre can be. A `patch` is a fine grid over whole cells: wherever a tool could go on the surface.
+
+Stored problems were drawn at random, and kept only where the answer stays the same on both domains,
+at two resolutions, and with cone, limits and place of the surface a little tighter, wider and
+elsewhere; those of "apart" are without that filter, with the oracles' answers to a little tighter
+and wider ones.
 """
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -116,6 +123,16 @@ class Answer(NamedTuple):
     feasible: bool  # One component covers every cell
     covered: int  # Cells of the best single component
     reachable: int  # Cells that some component covers
+
+
+def read(arm: str) -> list[tuple[Problem, Answer]]:
+    """The stored problems of an arm, feasible ones first, then those with cells out of reach, then
+    those that fall apart, then those that a search once got wrong."""
+    found = []
+    for case in json.loads(Path(__file__).with_name(f"{arm}.json").read_text("utf-8")):
+        said = Answer(*(case.pop(field) for field in Answer._fields))
+        found.append((Problem.read(case), said))
+    return found
 
 
 def answer(cells: int, cell: Ints, component: Ints) -> Answer:
