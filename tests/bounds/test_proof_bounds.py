@@ -30,7 +30,6 @@ PATCHES = (
     hyperboloid(0.4, 0.3, (0, 200), (-0.3, 0.4), side="inside"),
     cone(0.4, 0.5, (0, 300), (-0.2, 0.3), **OUT), torus(0.5, 0.2, (0, 360), (0, 360), **OUT),
 )  # fmt: skip
-FAR = 8.0  # [rad], [m] that regions may pass the limits by
 EXACT = 0.3  # share of deviations, tilts and box faces that are as large as they may be
 X, Y, Z = np.eye(3)
 

@@ -8,8 +8,9 @@ import networkx as nx
 import numpy as np
 import pytest
 from approved import refused
-from mesh_patches import CONNECTED, PATCHES, Mesh, bent, box, grid, islands, joined, sheet, used
+from mesh_patches import CONNECTED, PATCHES, Mesh, bent, box, grid, islands, sheet, used
 from samples import sampled, spread
+from trimesh.graph import face_adjacency
 
 from coverable import mesh
 from surfaces.meshes.cells.borders import LabelledFaces, outlines
@@ -69,7 +70,7 @@ def cut(request) -> Cut:
 
 
 def assert_even(cut: Cut, count: int) -> None:
-    sizes, pairs = np.bincount(cut.labels, minlength=count), joined(cut.faces)
+    sizes, pairs = np.bincount(cut.labels, minlength=count), face_adjacency(cut.faces)
     inner = cut.labels[pairs[:, 0]] == cut.labels[pairs[:, 1]]
     assert len(sizes) == count
     assert sizes.min() > 0
@@ -85,7 +86,7 @@ def assert_even(cut: Cut, count: int) -> None:
 
 def test_cells_are_connected_even_compact_and_complete(cut):
     assert_even(cut, N)
-    pairs = cut.labels[joined(cut.faces)]
+    pairs = cut.labels[face_adjacency(cut.faces)]
     islanded = len(cut.given.faces) == len(islands().faces)
     assert parts_of(pairs[pairs[:, 0] != pairs[:, 1]], N) == (3 if islanded else 1)
     if len(cut.given.faces) == 1:

@@ -226,11 +226,3 @@ def can() -> TriangleMesh:
     wall = [np.column_stack([k, after, 48 + k]), np.column_stack([after, 48 + after, 48 + k])]
     lid = np.column_stack([48 + k, 48 + after, np.full(48, 96)])
     return TriangleMesh(np.vstack([low, high, [[0, 0, 0.1]]]), np.vstack([*wall, lid]))
-
-
-def joined(faces):
-    """(K, 2) pairs of faces that share an edge."""
-    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    order = np.lexsort(edges.T)
-    same = (edges[order[1:]] == edges[order[:-1]]).all(axis=1)
-    return np.column_stack([order[:-1][same], order[1:][same]]) // 3
