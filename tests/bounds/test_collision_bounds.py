@@ -7,6 +7,7 @@ import pytest
 from bounds import holds
 from capsule_arms import at, bodies_of, box_mesh, fork, pair, planar_arm
 from mesh_patches import of_patch
+from referee import unit
 
 from coverable import Obstacle, load_robot, sphere
 from feasibility.certification.collisions.collision_replay import Couples, collision_replay
@@ -65,8 +66,7 @@ def test_no_point_moves_or_leaves_its_chord_further(step):
             rows = np.vstack([q, q + step * rng.normal(size=robot.n)])
             centre, ball = rng.normal(size=3) * 0.3, rng.uniform(0.01, 0.3)
             deviations = step * 0.2 * rng.random((1, robot.n))
-            around = rng.normal(size=(60, 3))
-            points = centre + ball * around / np.linalg.norm(around, axis=1, keepdims=True)
+            points = centre + ball * unit(rng.normal(size=(60, 3)))
             bounds.append(bends(robot, rows, a, b, centre, ball, deviations))
             truths.append(how_far(robot, rows, deviations, a, b, points, rng))
             q = q + step * rng.normal(size=robot.n)
@@ -92,8 +92,7 @@ def test_bodies_reach_no_further_than_is_said(shape):
     rng = np.random.default_rng(1)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     body = Body(Solid("", 0, at(0.1, 0.2, 0.3, turn * np.sign(np.linalg.det(turn))), shape))
-    n = rng.normal(size=(40, 3))
-    n /= np.linalg.norm(n, axis=1, keepdims=True)
+    n = unit(rng.normal(size=(40, 3)))
     dot, far = Body(Solid("", 0, np.eye(4), Sphere(1e-6))), 1e4  # its distance is a height
     places = dot.placed(np.tile(np.eye(3), (40, 1, 1)), far * n)
     reach = np.array([far - 1e-6 - body.distance(dot, place)[0] for place in places])

@@ -9,6 +9,7 @@ import trimesh
 from capsule_arms import at
 from hard_scenes import ARMS, CELLS, UR5, Over, a_plate, arm, bracket, planted_over, random_over
 from random_arms import planar_arm
+from referee import unit
 from samples import sampled, seeds, spread
 
 import coverable
@@ -231,8 +232,7 @@ def inside(shape, x):
 
 def around(rng, ball, count=15):
     """Points of a ball (4,), all but on its border."""
-    way = rng.normal(size=(count, 3))
-    return ball[:3] + (1.0 - 1e-6) * ball[3] * way / np.linalg.norm(way, axis=1)[:, None]
+    return ball[:3] + (1.0 - 1e-6) * ball[3] * unit(rng.normal(size=(count, 3)))
 
 
 @pytest.mark.parametrize("shape", [*PRIMITIVES, *MESHES], ids=lambda one: type(one).__name__)

@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from page_outline import points_of, tracks_of
+from referee import unit
 from scipy.spatial.transform import Rotation
 
 import coverable
@@ -132,8 +133,7 @@ def test_the_frames_are_where_they_are(table):
         expected = data.oMf[robot.world_frame_id].actInv(data.oMf[number])
         _, points = object_at(commands, f"/frame of the {name}")
         np.testing.assert_allclose(points[0], expected.translation, atol=4e-5)
-        axes = points[1::2] - points[0]
-        axes /= np.linalg.norm(axes, axis=1)[:, None]
+        axes = unit(points[1::2] - points[0])
         np.testing.assert_allclose(axes.T, expected.rotation, atol=2e-3)
     path, points = object_at(commands, "/root frame")
     assert path == "/root frame"  # of the world: it does not move with the surface

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from approved import refused
 from mesh_patches import CONNECTED, PATCHES, Mesh, bent, box, grid, islands, sheet, used
+from referee import unit
 from samples import sampled, spread
 from trimesh.graph import face_adjacency
 
@@ -49,7 +50,7 @@ class Cut:
         normals = np.zeros_like(self.vertices)
         for k in range(3):
             np.add.at(normals, self.faces[:, k], self.vectors)
-        self.normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        self.normals = unit(normals)
         self.figures = figures(self.vertices, self.faces, self.normals, self.labels)
         self.outlines = outlines(LabelledFaces.of(self.vertices, self.faces, self.labels))
 
@@ -126,8 +127,7 @@ def test_centres_are_deep_inside_their_cells(cut):
         np.einsum("nk,nkc->nc", weights, x[own]) for x in (cut.vertices, cut.normals)
     )
     np.testing.assert_allclose(found.centres, points, atol=1e-13)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    np.testing.assert_allclose(found.normals, normals, atol=1e-12)
+    np.testing.assert_allclose(found.normals, unit(normals), atol=1e-12)
     for cell in range(N):
         corners = cut.vertices[cut.faces[cut.labels == cell]]
         ends = np.array([edge for edge, sides in cut.border.items() if sides[0] == cell])

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from jobs import PLATE, run_coverable
+from referee import unit
 from samples import sampled, spread
 
 import coverable
@@ -197,8 +198,7 @@ def test_the_bound_on_a_region_holds_for_its_placements():
     tight = []
     for k in range(40):
         reach, rng = reaches[k % len(reaches)], np.random.default_rng([21, k])
-        far = rng.normal(size=3)
-        far *= rng.uniform(0.8, 1.6) * (reach.reach + 0.3) / np.linalg.norm(far)
+        far = unit(rng.normal(size=3)) * rng.uniform(0.8, 1.6) * (reach.reach + 0.3)
         centre = np.concatenate([far, rng.uniform(-180.0, 180.0, 3)])
         region = region_about(Pose.of_values(centre), rng.uniform(0.0, [0.4] * 3 + [40.0] * 3))
         beyond = reach.beyond(region)

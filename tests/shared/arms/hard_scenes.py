@@ -9,6 +9,8 @@ import numpy as np
 import pinocchio as pin
 import trimesh
 from foreign_clearances import ForeignScene
+from random_arms import tilted
+from referee import unit
 
 import coverable
 from coverable import Axis, Cells, Collision, Obstacle, Robot, Task, ToolShape, load_robot, plane
@@ -36,12 +38,6 @@ def arm(name: str) -> Robot:
 def within_a_turn(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     """The limits, at most half a turn to either side."""
     return np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi)
-
-
-def upright(rng: np.random.Generator, size: float) -> np.ndarray:
-    """A vector of that length in any direction."""
-    vector = rng.normal(size=3)
-    return size * vector / np.linalg.norm(vector)
 
 
 def a_plate(rng: np.random.Generator, robot: Robot) -> tuple[Cells, Task]:
@@ -109,11 +105,11 @@ class Over:
         axis = frame.rotation @ self.robot.approach_axis
         onto = pin.Quaternion.FromTwoVectors(axis, self.approach).toRotationMatrix()
         for k in range(count):
-            tilt = np.cross(self.approach, rng.normal(size=3))
-            angle = self.task.cone * (1.0 if k % 2 else np.sqrt(rng.uniform()))
-            tilt *= angle / np.linalg.norm(tilt)
+            tilt = unit(np.cross(self.approach, rng.normal(size=3)))
+            tilt *= self.task.cone * (1.0 if k % 2 else np.sqrt(rng.uniform()))
             turn = pin.exp3(tilt) @ pin.exp3(rng.uniform(-np.pi, np.pi) * self.approach) @ onto
-            off = upright(rng, self.task.effective_tolerance * rng.uniform() ** 0.1)
+            size = self.task.effective_tolerance * rng.uniform() ** 0.1
+            off = size * unit(rng.normal(size=3))
             if scene.clear(pin.SE3(turn, self.point + off - turn @ frame.translation)):
                 return True
         return False
@@ -183,19 +179,16 @@ def random_over(seed: int) -> Over:
     return Over.cell(UR5, CELLS, Task(0.02, float(rng.uniform(1, 90)), 0.001, collision=asked))
 
 
-def covered_target(rng: np.random.Generator, robot: Robot, q: np.ndarray, cone_deg: float):
-    """A point and an approach that q covers: off by up to 1 mm, and by up to the cone."""
-    points, axes = Kinematics(robot).tools(q[None])
-    tilt = np.cross(axes[0], rng.normal(size=3))
-    tilt *= np.radians(cone_deg) * rng.uniform() / np.linalg.norm(tilt)
-    return points[0] + upright(rng, 0.001 * rng.uniform()), pin.exp3(tilt) @ axes[0]
-
-
 def planted_over(name: str, seed: int) -> Over | None:
-    """A pose of an arm and a target that it covers, among objects; None if it collides."""
+    """A pose of an arm and a target that it covers, among objects; None if it collides.
+
+    It is off the target by up to 1 mm, and by up to the cone.
+    """
     rng, robot = np.random.default_rng([seed, 1]), arm(name)
     q, cone_deg = rng.uniform(*within_a_turn(robot)), float(rng.uniform(1.0, 60.0))
-    point, approach = covered_target(rng, robot, q, cone_deg)
+    point, axis = Kinematics(robot).tool(q)
+    approach = tilted(axis, np.radians(cone_deg) * rng.uniform(), rng)
+    point = point + 0.001 * rng.uniform() * unit(rng.normal(size=3))
     scene = tuple(random_object(rng, f"object{k}", point) for k in range(rng.integers(1, 4)))
     asked = Collision(surface=False, clearance=float(rng.choice([0.0, 0.005])), scene=scene)
     over = Over(robot, PLATE, Task(0.02, cone_deg, 0.001, collision=asked), point, approach)

@@ -4,6 +4,7 @@ import numpy as np
 from arm_urdfs import RIGHT_ANGLES, arm, joint, random_joints
 from asked import question
 from numpy.typing import NDArray
+from referee import unit
 
 from coverable import Axis, Robot, Surface, Task, cylinder, hyperboloid, load_robot, plane, sphere
 from robots.from_urdf import robot_from_urdf
@@ -57,18 +58,11 @@ def between(q0: Floats, q1: Floats, samples: int) -> tuple[Floats, Floats]:
     return s, q0 + s[:, None] * (q1 - q0)
 
 
-def random_turn(rng: np.random.Generator) -> Floats:
-    q, r = np.linalg.qr(rng.normal(size=(3, 3)))
-    q *= np.sign(np.diag(r))
-    return q if np.linalg.det(q) > 0.0 else -q
-
-
 def turn_onto(start: Floats, end: Floats, rng: np.random.Generator) -> Floats:
     """A random rotation (3, 3) that brings one unit vector onto another."""
 
     def frame(z: Floats) -> Floats:
-        x = np.cross(z, rng.normal(size=3))
-        x /= np.linalg.norm(x)
+        x = unit(np.cross(z, rng.normal(size=3)))
         return np.column_stack([x, np.cross(z, x), z])
 
     return frame(end) @ frame(start).T
@@ -76,8 +70,7 @@ def turn_onto(start: Floats, end: Floats, rng: np.random.Generator) -> Floats:
 
 def tilted(axis: Floats, angle: float, rng: np.random.Generator) -> Floats:
     """A unit vector at an angle (rad) from a unit vector, in a random direction."""
-    across = np.cross(axis, rng.normal(size=3))
-    across /= np.linalg.norm(across)
+    across = unit(np.cross(axis, rng.normal(size=3)))
     return np.cos(angle) * axis + np.sin(angle) * across
 
 
