@@ -5,7 +5,6 @@ keys and replaces some. Stored problems of the oracles are questions too, by fil
 "puma560 17".
 """
 
-import csv
 import json
 import tempfile
 import tomllib
@@ -200,10 +199,8 @@ def _as_file(tables: dict[str, Any], how: dict[str, Any]) -> dict[str, Any]:
         if "tilt_deg" in how:  # tool axes of their own
             tilt = np.radians(how["tilt_deg"])
             rows = np.hstack([rows, np.tile([np.sin(tilt), 0.0, -np.cos(tilt)], (len(rows), 1))])
-        with path.with_suffix(".csv").open("w", newline="") as file:
-            writer = csv.writer(file)
-            writer.writerow(["x", "y", "z", "nx", "ny", "nz", "ax", "ay", "az"][: rows.shape[1]])
-            writer.writerows(rows.tolist())
+        head = ",".join(["x", "y", "z", "nx", "ny", "nz", "ax", "ay", "az"][: rows.shape[1]])
+        np.savetxt(path.with_suffix(".csv"), rows, "%.17g", ",", header=head, comments="")
         made |= {"kind": "poses", "file": f"{path.stem}.csv", "units": "m"}
         made |= {"neighbours": how["neighbours"]} if "neighbours" in how else {}
     return tables | {"surface": made}

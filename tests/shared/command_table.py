@@ -1,8 +1,8 @@
 """The commands of tests/output/commands.toml: each runs once, in one folder for all of them."""
 
+import contextlib
 import io
 import json
-import os
 import shlex
 import tomllib
 import zipfile
@@ -54,12 +54,8 @@ class Commands:
         return self.say(words)
 
     def say(self, words: list[str]) -> Said:
-        before = Path.cwd()
-        os.chdir(self.folder)
-        try:
+        with contextlib.chdir(self.folder):
             return run_coverable(*words)
-        finally:
-            os.chdir(before)
 
     def page(self, command: str, name: str) -> str:
         self.run(command, name)

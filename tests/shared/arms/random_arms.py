@@ -1,17 +1,14 @@
 """Random arms, surfaces and straight joint segments, and dense sampling by Pinocchio."""
 
 import numpy as np
-from arm_urdfs import RIGHT_ANGLES, arm, joint, random_joints
+from arm_urdfs import RIGHT_ANGLES, Floats, arm, finite_limits, joint, random_joints
 from asked import question
-from numpy.typing import NDArray
 from referee import unit
 
 from coverable import Axis, Robot, Surface, Task, cylinder, hyperboloid, load_robot, plane, sphere
 from robots.from_urdf import robot_from_urdf
 from robots.urdf.checked_urdf import checked_tree
 from robots.urdf.elements import parse_xml
-
-Floats = NDArray[np.float64]
 
 
 def robot_of(joints: list[str], approach_axis: tuple[float, ...] = (0.0, 0.0, 1.0)) -> Robot:
@@ -35,11 +32,6 @@ def planar_arm(links: int = 3, limits: tuple[float, float] = (-2.8, 2.8)) -> Rob
 def rail_arm(base: str, stroke: tuple[float, float] = (-0.5, 0.8)) -> Robot:
     """A library arm that rides on a rail along y."""
     return load_robot(base, axes=[Axis("rail", "prismatic", (0, 1, 0), limits=stroke)])
-
-
-def finite_limits(robot: Robot) -> tuple[Floats, Floats]:
-    low = np.where(np.isfinite(robot.lower), robot.lower, -2.0 * np.pi)
-    return low, np.where(np.isfinite(robot.upper), robot.upper, 2.0 * np.pi)
 
 
 def random_configuration(robot: Robot, rng: np.random.Generator) -> Floats:
