@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from capsule_arms import at, bodies_of, box_mesh
-from foreign_clearances import ForeignScene, samples
+from foreign_clearances import ForeignScene
 from mesh_patches import grid
+from referee import closely
 from samples import sampled, spread
 from scipy.spatial.transform import Rotation
 
@@ -59,7 +60,7 @@ def random_scene(name, seed, rows, step, waves):
 def judged_as_by_fcl(robot, bodies, q, step_deg):
     """Refused are exactly the pairs that fcl finds too near; the certified bound is below fcl's."""
     found, foreign = collision_replay(robot, bodies, q), ForeignScene(robot, bodies)
-    rows = samples(q, np.radians(step_deg))
+    rows = closely(q, np.radians(step_deg))
     least = np.min([foreign.distances(row) for row in rows], axis=0)
     refused = {fault.pair for fault in found.faults}
     for pair, distance in zip(bodies.pairs, least, strict=True):
@@ -102,7 +103,7 @@ def walk():
 @pytest.fixture(scope="module")
 def least(walk):
     foreign = ForeignScene(UR5, asked()[1])
-    return np.min([foreign.distances(row) for row in samples(walk.q, np.radians(3.0))], axis=0)
+    return np.min([foreign.distances(row) for row in closely(walk.q, np.radians(3.0))], axis=0)
 
 
 def test_more_clearance_than_there_is_is_refused(walk, least):

@@ -68,12 +68,10 @@ def known(name: str) -> str | None:
     one = _stored(file)[int(number)]
     if "feasible" in one:
         return "feasible" if one["feasible"] else "infeasible"
-    if file == "between_curves":
+    if file in ("between_curves", "planted_rolls"):
         return "feasible"
     if file.endswith("_apart"):
         return "not infeasible" if one["tight_feasible"] else None
-    if file == "planted_rolls":
-        return "feasible"
     if file == "by_a_hair":
         return "not infeasible" if one["share"] < 1.0 else "not feasible"
     return "not infeasible"
@@ -152,11 +150,8 @@ def _of_problem(arm: str, one: dict[str, Any]) -> dict[str, Any]:
     surface |= {f"{k}_deg" if k in angles else k: one[k] for k in ("u", "v")}
     surface |= {key: one[key] for key in ("position", "rpy_deg", "side", "cells")}
     task = {key: one[key] for key in ("standoff", "cone_deg")}
-    return {
-        "robot": {"name": arm, "limits_deg": one["limits_deg"]},
-        "surface": surface,
-        "task": task,
-    }
+    robot = {"name": arm, "limits_deg": one["limits_deg"]}
+    return {"robot": robot, "surface": surface, "task": task}
 
 
 # Surfaces that come as files: made of the patch that a question has.

@@ -89,15 +89,17 @@ def _pairs(nu: int, nv: int) -> Ints:
     return np.concatenate([np.stack([a.ravel(), b.ravel()], 1) for a, b in found])
 
 
-def _middles(limits: Floats, count: int) -> Floats:
-    return np.asarray(limits[0] + (limits[1] - limits[0]) * (np.arange(count) + 0.5) / count)
+def _middles(problem: Problem, refine: int) -> Floats:
+    """(S, 2) middles of `refine` x `refine` parts of every cell, row by row."""
+    lines = []
+    for (low, high), count in zip(problem.ranges, problem.cells, strict=True):
+        lines.append(low + (high - low) * (np.arange(count * refine) + 0.5) / (count * refine))
+    return np.stack(np.meshgrid(*lines, indexing="ij"), -1).reshape(-1, 2)
 
 
 def patch(problem: Problem, refine: int) -> Domain:
     """A grid of `refine` x `refine` samples a cell (odd: the centres are among them)."""
-    (nu, nv), (u_range, v_range) = problem.cells, problem.ranges
-    u, v = _middles(u_range, nu * refine), _middles(v_range, nv * refine)
-    uv = np.stack(np.meshgrid(u, v, indexing="ij"), -1).reshape(-1, 2)
+    (nu, nv), uv = problem.cells, _middles(problem, refine)
     at = np.arange(len(uv)).reshape(nu * refine, nv * refine)
     half = refine // 2
     return Domain(uv, _pairs(*at.shape), at[half::refine, half::refine].ravel())
@@ -105,11 +107,8 @@ def patch(problem: Problem, refine: int) -> Domain:
 
 def net(problem: Problem, pieces: int) -> Domain:
     """Centres, and the lines between neighbours cut into so many pieces."""
-    (nu, nv), (u_range, v_range) = problem.cells, problem.ranges
-    centres = np.stack(
-        np.meshgrid(_middles(u_range, nu), _middles(v_range, nv), indexing="ij"), -1
-    ).reshape(-1, 2)
-    a, b = _pairs(nu, nv).T
+    centres = _middles(problem, 1)
+    a, b = _pairs(*problem.cells).T
     part = np.arange(1, pieces)[:, None] / pieces
     between = centres[a, None] * (1.0 - part) + centres[b, None] * part
     inner = len(centres) + np.arange(len(a) * (pieces - 1)).reshape(len(a), -1)

@@ -10,7 +10,7 @@ import pytest
 import trimesh
 from arm_urdfs import joint
 from numpy.typing import NDArray
-from random_arms import planar_arm, robot_of
+from random_arms import between, planar_arm, robot_of, seen
 from samples import sampled, spread
 from search_kernels import Clearance
 
@@ -262,13 +262,8 @@ def test_no_point_moves_further_nor_leaves_its_chord_further_than_bounded():
 
 def _moved(robot, body, inner, q0, q1):
     """How far vertices move, seen from a joint, and how far they leave their chords."""
-    data, track = robot.model.createData(), []
-    shares = np.linspace(0.0, 1.0, 21)
-    for s in shares:
-        pin.forwardKinematics(robot.model, data, q0 + s * (q1 - q0))
-        pose = data.oMi[inner].inverse() * data.oMi[body.joint]
-        track.append(body.vertices @ pose.rotation.T + pose.translation)
-    track, s = np.array(track), shares[:, None, None]
+    s, q = between(q0, q1, 20)
+    track, s = seen(robot, q, inner, body.joint, body.vertices), s[:, None, None]
     chord = (1.0 - s) * track[0] + s * track[-1]
     length = np.linalg.norm(np.diff(track, axis=0), axis=2).sum(axis=0)
     return length.max(), np.linalg.norm(track - chord, axis=2).max()

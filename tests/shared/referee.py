@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
+import fcl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline, CubicSpline
@@ -74,7 +75,9 @@ class Joint(NamedTuple):
 
 
 def _numbers(element: Any, key: str, default: str) -> Floats:
-    return np.array([float(word) for word in (element.get(key) or default).split()])
+    """Of an attribute; what is left out has a default."""
+    words = default if element is None else element.get(key) or default
+    return np.array([float(word) for word in words.split()])
 
 
 def joints_of(path: str | Path) -> list[Joint]:
@@ -82,10 +85,8 @@ def joints_of(path: str | Path) -> list[Joint]:
     found = []
     for element in ElementTree.parse(path).getroot().findall("joint"):
         origin, axis, limit = (element.find(tag) for tag in ("origin", "axis", "limit"))
-        at = np.eye(4)
-        if origin is not None:
-            at = placement(_numbers(origin, "xyz", "0 0 0"), _numbers(origin, "rpy", "0 0 0"))
-        along = np.array([1.0, 0, 0]) if axis is None else _numbers(axis, "xyz", "1 0 0")
+        at = placement(_numbers(origin, "xyz", "0 0 0"), _numbers(origin, "rpy", "0 0 0"))
+        along = _numbers(axis, "xyz", "1 0 0")
         free = limit is None or element.get("type") == "continuous"
         ends = (-np.inf, np.inf)
         if not free:
@@ -493,8 +494,6 @@ class Shape(NamedTuple):
 
 
 def fcl_object(geometry: tuple) -> Any:
-    import fcl
-
     match geometry:
         case ("box", size):
             return fcl.Box(*size)
@@ -536,9 +535,8 @@ def link_bodies(path: str | Path, folders: Sequence[str | Path] = ()) -> dict[st
     found: dict[str, list[Shape]] = {}
     for link in ElementTree.parse(path).getroot().findall("link"):
         for part in link.findall("collision"):
-            origin, at = part.find("origin"), np.eye(4)
-            if origin is not None:
-                at = placement(_numbers(origin, "xyz", "0 0 0"), _numbers(origin, "rpy", "0 0 0"))
+            origin = part.find("origin")
+            at = placement(_numbers(origin, "xyz", "0 0 0"), _numbers(origin, "rpy", "0 0 0"))
             (shape,) = part.find("geometry")
             match shape.tag:
                 case "box":
@@ -573,8 +571,6 @@ class Scene:
         }
 
     def _placed(self, shape: Shape, model: Any, frames: Mapping[str, Floats]) -> Any:
-        import fcl
-
         at = shape.placement if shape.link is None else frames[shape.link][0] @ shape.placement
         if shape.geometry[0] == "halfspace":
             at = at.copy()
@@ -583,8 +579,6 @@ class Scene:
 
     def distances(self, q: ArrayLike, asked: Sequence[int] | None = None) -> Floats:
         """(pairs,) m at one configuration; `TOUCHING` where bodies share a point."""
-        import fcl
-
         frames, found = self._frames(np.atleast_2d(q)), []
         for k in range(len(self.pairs)) if asked is None else asked:
             least = np.inf
@@ -646,9 +640,8 @@ class Asked(NamedTuple):
     tolerance: float
     cone: float  # rad
     roll: tuple[float, float] | None = None  # rad, the least and the largest; None where it is free
-    reference: Floats | None = (
-        None  # (3,) root frame, the axis at a roll of 0; None for where u grows
-    )
+    # (3,) root frame, the axis at a roll of 0; None for where u grows.
+    reference: Floats | None = None
     approach: Floats | None = None  # (3,) unit, all over the surface; None for along the normals
 
 

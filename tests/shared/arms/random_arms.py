@@ -7,6 +7,7 @@ from referee import unit
 
 from coverable import Axis, Robot, Surface, Task, cylinder, hyperboloid, load_robot, plane, sphere
 from robots.from_urdf import robot_from_urdf
+from robots.kinematics import Kinematics
 from robots.urdf.checked_urdf import checked_tree
 from robots.urdf.elements import parse_xml
 
@@ -48,6 +49,13 @@ def between(q0: Floats, q1: Floats, samples: int) -> tuple[Floats, Floats]:
     """Shares s (samples + 1,) from 0 to 1, and the configurations of a straight segment there."""
     s = np.linspace(0.0, 1.0, samples + 1)
     return s, q0 + s[:, None] * (q1 - q0)
+
+
+def seen(robot: Robot, q: Floats, a: int, b: int, points: Floats) -> Floats:
+    """Points (k, 3) of joint b as seen from joint a (m, k, 3), at configurations q (m, n)."""
+    frames = Kinematics(robot).joints(q)
+    world = np.einsum("mij,kj->mki", frames.rotations[:, b], points) + frames.points[:, None, b]
+    return np.einsum("mji,mkj->mki", frames.rotations[:, a], world - frames.points[:, None, a])
 
 
 def turn_onto(start: Floats, end: Floats, rng: np.random.Generator) -> Floats:
