@@ -4,11 +4,10 @@ from collections import defaultdict
 
 import numpy as np
 import pytest
-import trimesh
 from made_up import missing
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
-from mesh_patches import grid
+from mesh_patches import dome
 from page_outline import faces_of, points_of
 
 import coverable
@@ -16,32 +15,27 @@ from coverable import Task, check, load_result, load_robot, mesh, plot_sides, sp
 from feasibility.viewer import verdict_scene
 from feasibility.viewer.cell_meshes import make_display_mesh, sides_of
 from feasibility.viewer.figures import plot_causes, plot_graph
+from surfaces.meshes.triangle_mesh import TriangleMesh
 
 MISSED = {"mesh": {2, 3, 7, 11, 15, 20}, "grid": {5, 6, 13, 14, 15, 22}}
 DOME = sphere(radius=1.0, polar_deg=(10, 90), azimuth_deg=(10, 180), side="inside")
 
 
-def triangles(nu, nv, shape):
-    """A unit square bent by (u, v) -> points, as a mesh of 2 nu nv triangles."""
-    u, v, faces = grid(nu, nv)
-    return trimesh.Trimesh(shape(u, v), faces, process=False)
-
-
-def dome(u, v):
-    return DOME.point(np.radians(10 + 80 * u), np.radians(10 + 170 * v))
+def as_mesh(nu, nv):
+    return mesh(TriangleMesh(*dome(nu, nv)), side="inside")
 
 
 @pytest.fixture(scope="module", params=MISSED)
 def verdict(request):
     cells = DOME.cells(5, 6)
     if request.param == "mesh":
-        cells = mesh(triangles(30, 40, dome), side="inside").cells(count=24)
+        cells = as_mesh(30, 40).cells(count=24)
     robot = load_robot("puma560", limits="set-1")
     return missing(check(robot, cells, Task(0.005, 45)), MISSED[request.param])
 
 
 def test_a_fine_mesh_is_thinned_and_its_cells_keep_their_areas():
-    fine = mesh(triangles(70, 60, dome), side="inside").cells(count=6)
+    fine = as_mesh(70, 60).cells(count=6)
     display = make_display_mesh(fine, budget=2_000)
     assert len(display.labels) <= 2_000 < len(fine.labels)
     area = np.bincount(display.labels, display.mesh.areas, 6)

@@ -5,6 +5,7 @@ import sys
 import urllib.error
 import urllib.request
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pinocchio as pin
@@ -207,11 +208,7 @@ def test_show_opens_a_window_waits_in_scripts_and_is_the_view_in_notebooks(verdi
     monkeypatch.setattr("webbrowser.open", lambda url: opened.append(url) or True)
     with show(verdict, block=False), urllib.request.urlopen(opened[0], timeout=GUARD_S) as answer:
         assert answer.read().decode() == view(verdict).html()
-
-    def interrupt(live):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(LiveView, "wait", interrupt)
+    monkeypatch.setattr(LiveView, "wait", Mock(side_effect=KeyboardInterrupt))
     monkeypatch.delattr(sys, "ps1", raising=False)
     live = show(verdict)
     with pytest.raises(ConnectionRefusedError):

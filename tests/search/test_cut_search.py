@@ -1,7 +1,7 @@
 """The prover on stored problems with a known answer, whatever their surface is made of."""
 
 from dataclasses import replace
-from itertools import count
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -74,12 +74,7 @@ def test_a_budget_is_kept_and_ticks_may_end_an_attempt():
     proving = prove(*stored("ur5", feasible=False)[2], budget=200, attempts=2)
     assert proving.tree is None
     assert proving.attempt.boxes <= 200
-    ticks = count()
-
-    def tick():
-        if next(ticks) == 3:
-            raise KeyboardInterrupt
-
+    tick = Mock(side_effect=[None, None, None, KeyboardInterrupt])
     with pytest.raises(KeyboardInterrupt):
         proving.prover.attempt(proving.components, 100_000, tick)
     assert 0 < proving.prover.attempt(proving.components, 500, nothing).boxes <= 500

@@ -22,14 +22,10 @@ POST = Obstacle.box("post", (0.1, 0.1, 1.2), position=(0.45, 0.0, 0.6))
 BEHIND = plane(
     (-0.1, 0.1), (-0.2, 0.2), position=(-0.6, 0.0, 0.3), rpy_deg=(0, -90, 0), side="inside"
 )
-POSED = UR5.with_limits(
-    {
-        "shoulder_pan_joint": np.radians([-180, 180]),
-        "shoulder_lift_joint": np.radians([-90, 0]),
-        "elbow_joint": np.radians([0, 150]),
-        "wrist_1_joint": np.radians([-120, 120]),  # not folded back onto the forearm
-    }
-)
+POSTURE = {"shoulder_pan_joint": (-180, 180), "shoulder_lift_joint": (-90, 0),
+           "elbow_joint": (0, 150), "wrist_1_joint": (-120, 120)}  # fmt: skip
+"""The last one is not folded back onto the forearm."""
+POSED = UR5.with_limits({name: np.radians(ends) for name, ends in POSTURE.items()})
 
 
 @cache

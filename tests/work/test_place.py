@@ -6,6 +6,7 @@ import multiprocessing
 from dataclasses import replace
 from functools import cache
 from itertools import count
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -102,15 +103,12 @@ def test_a_surface_moved_away_is_put_back(name, seed):
     assert found.best.margin == again.certificate.placement_margin.position > 0.0
 
 
-def nobody(poses, effort):
-    raise AssertionError("no search should be run")
-
-
 def test_a_region_far_away_is_refused_by_the_bound_alone():
     for name in TEXTS:
         setup = setup_of(name)
         far = Pose.of_surface(setup.cells.surface).values + np.array([3.0, 0, 0, 0, 0, 0])
-        found = place(*setup[:3], region_about(Pose.of_values(far)), setup.search, evaluator=nobody)
+        region, nobody = region_about(Pose.of_values(far)), Mock(side_effect=AssertionError)
+        found = place(*setup[:3], region, setup.search, evaluator=nobody)
         assert (found.answer, found.evidence) == (Answer.INFEASIBLE, Evidence.PROOF)
         assert (found.cause, found.found) == (coverable.CauseKind.OUT_OF_REACH, ())
 
