@@ -1,6 +1,6 @@
 """Foreign judging: what arms, surfaces and bodies do, computed without any code of the product.
 
-Arms are read from their URDF by xml and numpy; surfaces are their formulas; nearest places on
+Arms are read from their URDF by xml; surfaces are their formulas; nearest places on
 triangles are looked for on each that can have them; distances of bodies are python-fcl's. `judge`
 samples a motion densely and lists what it does wrong. All inputs are plain numbers.
 """
@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline, CubicSpline
 from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
 Floats = NDArray[np.float64]
 TAU = 2.0 * np.pi
@@ -31,10 +32,7 @@ SAME = 1e-9  # [m], [rad]: rounding between two computations of one number
 
 def turn(rpy: ArrayLike) -> Floats:
     """(3, 3) Rz(yaw) Ry(pitch) Rx(roll), rad."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
-    about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
-    about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
-    return np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]]) @ about_y @ about_x
+    return Rotation.from_euler("xyz", rpy).as_matrix()
 
 
 def placement(position: ArrayLike = (0, 0, 0), rpy: ArrayLike = (0, 0, 0)) -> Floats:
@@ -44,11 +42,8 @@ def placement(position: ArrayLike = (0, 0, 0), rpy: ArrayLike = (0, 0, 0)) -> Fl
 
 
 def about(axis: ArrayLike, angles: Floats) -> Floats:
-    """(k, 3, 3) turns about a unit axis (Rodrigues)."""
-    x, y, z = np.asarray(axis, float)
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    c, s = np.cos(angles)[:, None, None], np.sin(angles)[:, None, None]
-    return np.eye(3) + s * cross + (1.0 - c) * (cross @ cross)
+    """(k, 3, 3) turns about a unit axis."""
+    return Rotation.from_rotvec(np.outer(angles, axis)).as_matrix()
 
 
 def unit(vectors: ArrayLike) -> Floats:

@@ -26,6 +26,7 @@ CLEARANCE = 0.005  # m, that is asked for
 UR5 = load_robot("ur5")
 PLATE = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0.0, 0.0, 0.3))
 CELLS = PLATE.cells(1, 1)
+NOZZLE = ToolShape.cylinder(0.01, 0.1, position=(0.0, 0.0, -0.05))
 
 
 @cache
@@ -159,6 +160,15 @@ class ToolPoses(ForeignScene):
         return False
 
 
+def over(
+    *scene: Obstacle, tool: ToolShape = NOZZLE, cone_deg: float = 30.0, clearance: float = 0.0
+) -> Over:
+    """The tool alone, without the links, among objects."""
+    allow = tuple((name, one.name) for name in UR5.link_names for one in scene)
+    asked = Collision(False, False, clearance=clearance, scene=scene, tool=(tool,), allow=allow)
+    return Over.cell(UR5, CELLS, Task(0.02, cone_deg, 0.001, collision=asked))
+
+
 def random_over(seed: int) -> Over:
     """One or two objects near the target, and a tool of one shape; links are left out."""
     rng = np.random.default_rng(seed)
@@ -166,17 +176,13 @@ def random_over(seed: int) -> Over:
     scene = tuple(random_object(rng, f"object{k}", around) for k in range(rng.integers(1, 3)))
     clearance = float(rng.choice([0.0, 0.01]))
     tools = [
-        ToolShape.cylinder(0.01, 0.1, position=(0.0, 0.0, -0.05)),
+        NOZZLE,
         ToolShape.box((0.03, 0.02, 0.1), position=(0.01, 0.0, -0.05)),
         ToolShape.capsule(0.015, 0.08, position=(0.0, 0.0, -0.06)),
         ToolShape.sphere(0.04, position=(0.0, 0.0, -0.05)),
     ]
-    asked = Collision(
-        self_=False, surface=False, clearance=clearance, scene=scene,
-        tool=(tools[int(rng.integers(4))],),
-        allow=tuple((name, one.name) for name in UR5.link_names for one in scene),
-    )  # fmt: skip
-    return Over.cell(UR5, CELLS, Task(0.02, float(rng.uniform(1, 90)), 0.001, collision=asked))
+    tool, cone_deg = tools[int(rng.integers(4))], float(rng.uniform(1, 90))
+    return over(*scene, tool=tool, cone_deg=cone_deg, clearance=clearance)
 
 
 def planted_over(name: str, seed: int) -> Over | None:
