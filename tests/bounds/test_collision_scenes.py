@@ -1,6 +1,7 @@
 """Motions among many bodies: the judge of collisions beside python-fcl, and what it certifies."""
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -42,14 +43,9 @@ def random_scene(name, seed, rows, step, waves):
     wavy = np.stack([0.5 * u, 0.5 * v, 0.3 * np.sin(2.0 * u) * np.cos(2.5 * v)], axis=1)
     sheet = Soup("surface", (rng.uniform(-1, 1, 3) + wavy)[faces], 0.0003, False)
     joints = {solid.owner: solid.joint for solid in solids}
-    links = list(joints)
-    moving = [link for link in links if joints[link] > 1]
-    pairs = [
-        Pair(a, b, 0.002)
-        for k, a in enumerate(links)
-        for b in links[k + 1 :]
-        if abs(joints[a] - joints[b]) > 1
-    ]
+    moving = [link for link in joints if joints[link] > 1]
+    apart = [(a, b) for a, b in combinations(joints, 2) if abs(joints[a] - joints[b]) > 1]
+    pairs = [Pair(a, b, 0.002) for a, b in apart]
     pairs += [Pair(link, thing.name, 0.004) for link in moving for thing in scene]
     pairs += [Pair(link, "surface", 0.001) for link in moving]
     low, high = np.maximum(robot.lower, -3.0), np.minimum(robot.upper, 3.0)

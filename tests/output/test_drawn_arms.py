@@ -97,11 +97,8 @@ def test_a_mesh_is_scaled_and_placed(tmp_path):
 def test_a_mesh_that_cannot_be_had_becomes_a_capsule_and_a_note(tmp_path, content):
     if content is not None:
         (tmp_path / "lost.stl").write_bytes(content)
-    robot = two_links(
-        tmp_path,
-        base=SHAPE.format('<box size="0.1 0.1 0.1"/>'),
-        arm=SHAPE.format('<mesh filename="lost.stl"/>'),
-    )
+    shapes = '<box size="0.1 0.1 0.1"/>', '<mesh filename="lost.stl"/>'
+    robot = two_links(tmp_path, *map(SHAPE.format, shapes))
     notes = draw(robot).notes
     assert len(notes) == 1
     assert "lost.stl" in notes[0]

@@ -12,6 +12,7 @@ from mesh_patches import CONNECTED, PATCHES, Mesh, bent, box, grid, islands, she
 from referee import unit
 from samples import sampled, spread
 from trimesh.graph import face_adjacency
+from trimesh.triangles import cross
 
 from coverable import mesh
 from surfaces.meshes.cells.borders import LabelledFaces, outlines
@@ -27,8 +28,7 @@ N = 60
 
 def vectors_of(vertices, faces):
     """(F, 3) m^2, area times normal."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    return np.cross(b - a, c - a) / 2
+    return cross(vertices[faces]) / 2
 
 
 def areas_of(vertices, faces):

@@ -100,11 +100,10 @@ def ply(vertices, polygons, order="<", header=None):
     )
     body = b""
     for x, y, z in np.asarray(vertices, float).tolist():
-        body += (
-            f"9 {x!r} {y!r} {z!r}\n".encode()
-            if not order
-            else struct.pack(order + "B3d", 9, x, y, z)
-        )
+        if order:
+            body += struct.pack(order + "B3d", 9, x, y, z)
+        else:
+            body += f"9 {x!r} {y!r} {z!r}\n".encode()
     for p in polygons:
         if order:
             body += struct.pack(f"{order}BB{len(p)}i", 7, len(p), *map(int, p))
